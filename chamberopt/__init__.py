@@ -1,0 +1,1 @@
+"""chamberopt: designs ultrasonic shot peening chambers."""
