@@ -1,0 +1,37 @@
+"""sim_core: exact event-driven dynamics of balls in a closed triangle mesh.
+
+Build a Scene from a TriangleMesh, Balls and Physics, then simulate it. SI units throughout.
+"""
+
+from sim_core.balls import Balls
+from sim_core.effects.gravity import Gravity
+from sim_core.effects.restitution import Restitution, restitution_at
+from sim_core.effects.vibration import Vibration
+from sim_core.errors import SceneError, SimulationError
+from sim_core.impacts import ImpactLog
+from sim_core.packing import pack_balls
+from sim_core.physics import Physics
+from sim_core.scene import Scene
+from sim_core.simulate import Collisions, Result, simulate
+from sim_core.surfaces.mesh import TriangleMesh
+from sim_core.warm_up import compile_simulator, is_compiled
+
+__all__ = [
+    "Balls",
+    "Collisions",
+    "Gravity",
+    "ImpactLog",
+    "Physics",
+    "Restitution",
+    "Result",
+    "Scene",
+    "SceneError",
+    "SimulationError",
+    "TriangleMesh",
+    "Vibration",
+    "compile_simulator",
+    "is_compiled",
+    "pack_balls",
+    "restitution_at",
+    "simulate",
+]

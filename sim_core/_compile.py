@@ -1,0 +1,73 @@
+"""The one way this package compiles: numba, cached on disk, never stale.
+
+numba's own cache notices an edit only in the file of the cached function. A helper changed in another
+file would go on giving the old answer, so the cache lives in a folder named by a digest of every source
+file of the package: any edit, anywhere, starts a fresh one.
+"""
+
+import hashlib
+import os
+import shutil
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+
+KEPT_DIGESTS = 4  # older folders are removed: each holds a few MB that nothing will read again
+
+
+def _cache_root() -> Path:
+    """Where compiled code is kept: NUMBA_CACHE_DIR if the user set one, else the user's cache folder."""
+    chosen = os.environ.get("NUMBA_CACHE_DIR")
+    if chosen:
+        return Path(chosen)
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches" / "chamberopt"
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA", Path.home())) / "chamberopt" / "cache"
+    return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "chamberopt"
+
+
+def _sources_digest() -> str:
+    digest = hashlib.sha256(numba.__version__.encode())
+    package = Path(__file__).parent
+    for source in sorted(package.rglob("*.py")):
+        digest.update(source.relative_to(package).as_posix().encode())
+        digest.update(source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+CACHE_FOLDER = _cache_root() / f"sim_core-{_sources_digest()}"
+
+
+def _remove_old_caches() -> None:
+    """Keep the newest few folders; a folder in use by another process is simply made again there."""
+    folders = sorted(CACHE_FOLDER.parent.glob("sim_core-*"), key=lambda f: f.stat().st_mtime, reverse=True)
+    for folder in folders[KEPT_DIGESTS:]:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _cache_is_usable() -> bool:
+    """True when the folder can be written; where it cannot, every process compiles for itself."""
+    try:
+        if not CACHE_FOLDER.exists():
+            CACHE_FOLDER.mkdir(parents=True, exist_ok=True)
+            _remove_old_caches()
+    except OSError:
+        return False
+    return os.access(CACHE_FOLDER, os.W_OK)
+
+
+_CACHED = _cache_is_usable() and not numba.config.DISABLE_JIT
+
+
+def jit(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile for nopython mode: no fastmath (bits are promised), GIL released, cached by source digest."""
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(CACHE_FOLDER)  # read when the decorator runs; other packages keep theirs
+    try:
+        return numba.njit(cache=_CACHED, nogil=True, error_model="numpy", fastmath=False)(function)
+    finally:
+        numba.config.CACHE_DIR = before

@@ -1,0 +1,125 @@
+"""Which obstacle a ball meets first: a walk down the tree along one piece of its parabola, nearest boxes first."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sim_core._compile import jit
+from sim_core.detect.ball_sonotrode import waving_face_delay
+from sim_core.detect.ball_triangle import capsule_delay, face_delay
+from sim_core.effects.gravity import Gravity, acceleration
+from sim_core.effects.vibration import Wave
+from sim_core.flight import Point
+from sim_core.roots import NEVER
+from sim_core.simd import BOXES, boxes_hit, lowest_bit
+from sim_core.surfaces.obstacles import CAPSULE, FACE
+from sim_core.surfaces.tree import LEAF_BITS, STACK, Tree
+from sim_core.vec3 import Vec3
+
+SLACK = np.float32(
+    1.000001
+)  # on float32 times: ten times their rounding, so that an equal time is never pruned
+TINY = 1e-30  # stands for a chord component of zero, whose inverse would be infinite
+
+
+class Scratch(NamedTuple):
+    """Working space of one simulation, made once: a flight's chord, boxes' entry times, and the stack."""
+
+    ray: np.ndarray
+    enter: np.ndarray
+    nodes: np.ndarray
+    times: np.ndarray
+    probe: np.ndarray
+
+
+def new_scratch() -> Scratch:
+    """Fresh working space."""
+    return Scratch(
+        np.zeros(9, dtype=np.float32),
+        np.zeros(BOXES, dtype=np.float32),
+        np.zeros(STACK, dtype=np.int64),
+        np.zeros(STACK, dtype=np.float32),
+        np.zeros(9, dtype=np.float32),
+    )
+
+
+@jit
+def _aim(ray: np.ndarray, ball: Point, fall: Vec3, length: float) -> None:
+    """Chord of the arc of ``length`` [s]: lower and upper origins (0:3, 3:6), inverse velocity (6:9).
+
+    The arc lies between its chord and the chord shifted by -a T²/8; the two origins are those of the two.
+    """
+    bulge = -0.125 * length * length
+    for axis in range(3):
+        origin = ball.position[axis]
+        shift = bulge * fall[axis]
+        speed = ball.velocity[axis] + 0.5 * length * fall[axis]
+        if abs(speed) < TINY:
+            speed = TINY
+        ray[axis] = np.float32(origin + max(shift, 0.0))
+        ray[3 + axis] = np.float32(origin + min(shift, 0.0))
+        ray[6 + axis] = np.float32(1.0 / speed)
+
+
+@jit
+def first_contact(
+    tree: Tree,
+    scratch: Scratch,
+    ball: Point,
+    gravity: Gravity | None,
+    wave: Wave | None,
+    seam: float,
+    time: float,
+    length: float,
+) -> tuple[float, int]:
+    """Delay [s] and obstacle of the first contact within ``length`` [s]; (NEVER, -1) if there is none.
+
+    ``time`` [s]: now, on the window's clock (the sonotrode's phase depends on it). Ties go to the obstacle stored first.
+    """
+    fall = acceleration(gravity)
+    _aim(scratch.ray, ball, fall, length)
+    best = length
+    found = -1
+    scratch.nodes[0] = 0
+    scratch.times[0] = np.float32(0.0)
+    depth = 1
+    while depth > 0:
+        depth -= 1
+        longest = np.float32(best) * SLACK
+        if scratch.times[depth] > longest:
+            continue
+        code = scratch.nodes[depth]
+        if code < 0:
+            packed = -(code + 1)
+            first = packed >> LEAF_BITS
+            for row in range(first, first + (packed & ((1 << LEAF_BITS) - 1))):
+                kind = tree.kinds[row]
+                if kind == FACE:
+                    delay = face_delay(tree.numbers, row, ball, fall, tree.radius, seam)
+                elif kind == CAPSULE:
+                    delay = capsule_delay(tree.numbers, row, ball, fall, tree.radius, best)
+                else:
+                    delay = waving_face_delay(
+                        tree.numbers, row, ball, fall, tree.radius, seam, wave, time, best
+                    )
+                if delay < best or (delay == best and (found < 0 or row < found)):
+                    best = delay
+                    found = row
+            continue
+        hits = boxes_hit(tree.bounds, code, scratch.ray, longest, scratch.enter)
+        floor = depth
+        while hits != 0:
+            child = lowest_bit(hits)
+            hits &= hits - 1
+            enter = scratch.enter[child]
+            slot = depth
+            while slot > floor and scratch.times[slot - 1] < enter:  # nearest on top
+                scratch.times[slot] = scratch.times[slot - 1]
+                scratch.nodes[slot] = scratch.nodes[slot - 1]
+                slot -= 1
+            scratch.times[slot] = enter
+            scratch.nodes[slot] = tree.children[code, child]
+            depth += 1
+    if found < 0:
+        return NEVER, -1
+    return best, found

@@ -1,0 +1,88 @@
+"""Normal restitution that falls with impact speed (the paper's eq. 2).
+
+e(v) = C0 for v < v0, C0 (v / v0)^(-1/4) above: Badreddine et al., "CAD based simulation of ultrasonic shot peening", eq. 2, after
+McNamara & Falcon, Phys. Rev. E 71 (2005) 031302. v is the relative normal speed.
+
+Impacts slower than ``elastic_below`` lose nothing. Without such a floor a ball coming to rest bounces infinitely often in
+finite time; with it the number of bounces is bounded and what is neglected is below v²/2 per impact (the idea of the TC
+model of Luding & McNamara, Granular Matter 1 (1998) 113, with a speed in place of a time).
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from sim_core._compile import jit
+from sim_core.errors import SceneError
+
+# 10 mm/s [m/s]: a thousandth of the shot's speed. Mean speeds change by < 3 % between 1 and 100 mm/s; lower values spend
+# events on chatter (2 % of sonotrode hits here, a fifth at 1 mm/s).
+ELASTIC_BELOW = 0.01
+
+
+class Restitution(NamedTuple):
+    """C0 (at most 1) and v0 [m/s] of each surface tag, and of ball against ball.
+
+    ``surfaces``: one (C0, v0) for each tag, by tag number; ``balls``: (C0, v0); ``elastic_below`` [m/s].
+    """
+
+    surfaces: tuple[tuple[float, float], ...] | np.ndarray
+    balls: tuple[float, float]
+    elastic_below: float = ELASTIC_BELOW
+
+
+def checked_restitution(restitution: Restitution, tags: int) -> Restitution:
+    """The same with ``surfaces`` as an array (tags, 2); raises SceneError for a missing tag or numbers out of range."""
+    surfaces = np.array(restitution.surfaces, dtype=np.float64)
+    if surfaces.ndim != 2 or surfaces.shape[1] != 2 or len(surfaces) < tags:
+        raise SceneError(
+            f"restitution.surfaces must give (C0, v0) for tags 0 to {tags - 1}, not shape {surfaces.shape}"
+        )
+    pairs = [(f"surfaces[{i}]", *pair) for i, pair in enumerate(surfaces)] + [("balls", *restitution.balls)]
+    for name, c0, v0 in pairs:
+        if not 0.0 <= c0 <= 1.0 or not 0.0 < v0 < math.inf:
+            raise SceneError(
+                f"restitution.{name} is ({c0}, {v0}): C0 must lie in [0, 1] and v0 be positive [m/s]"
+            )
+    if not restitution.elastic_below >= 0.0:
+        raise SceneError(
+            f"restitution.elastic_below is {restitution.elastic_below}: it must be 0 or more [m/s]"
+        )
+    return Restitution(
+        surfaces, (float(restitution.balls[0]), float(restitution.balls[1])), float(restitution.elastic_below)
+    )
+
+
+@jit
+def restitution_law(speed: float, c0: float, v0: float) -> float:
+    """e at a relative normal speed [m/s]."""
+    if speed < v0:
+        return c0
+    return c0 / math.sqrt(math.sqrt(speed / v0))
+
+
+@jit
+def surface_restitution(restitution: Restitution | None, tag: int, speed: float) -> float:
+    """e of a ball on a surface; 1 without the effect."""
+    if restitution is None:
+        return 1.0
+    if speed < restitution.elastic_below:
+        return 1.0
+    return restitution_law(speed, restitution.surfaces[tag, 0], restitution.surfaces[tag, 1])  # type: ignore[call-overload]
+
+
+@jit
+def ball_restitution(restitution: Restitution | None, speed: float) -> float:
+    """e of ball on ball; 1 without the effect."""
+    if restitution is None:
+        return 1.0
+    if speed < restitution.elastic_below:
+        return 1.0
+    return restitution_law(speed, restitution.balls[0], restitution.balls[1])
+
+
+def restitution_at(speed: np.ndarray, c0: float, v0: float) -> np.ndarray:
+    """The same law on an array of speeds [m/s], any shape."""
+    speed = np.asarray(speed, dtype=np.float64)
+    return np.asarray(c0 / np.sqrt(np.sqrt(np.maximum(speed / v0, 1.0))))

@@ -1,0 +1,246 @@
+"""The event loop, compiled: take the next event, let it change velocities, predict anew for the balls it touched.
+
+One prediction site; an event whose partner has been hit since is not an event, and only its pair is looked for again:
+the ball's own path, and so its wall contact, still stands.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from sim_core._compile import jit
+from sim_core.calendar import (
+    EVENTS,
+    HITS,
+    OBSTACLE,
+    PARTNER,
+    PARTNER_HITS,
+    SEARCH_ON,
+    Calendar,
+    forget,
+    reschedule,
+    set_calendar_back,
+)
+from sim_core.detect.ball_mesh import Scratch, first_contact
+from sim_core.detect.ball_triangle import away_from_capsule, face_normal
+from sim_core.effects.gravity import Gravity
+from sim_core.effects.restitution import Restitution
+from sim_core.effects.vibration import Wave, surface_velocity
+from sim_core.flight import drift, kick, point_at, set_back
+from sim_core.impacts import ImpactPage
+from sim_core.neighbours import next_meeting
+from sim_core.resolve.ball_ball import pair_kick
+from sim_core.resolve.ball_surface import surface_kick
+from sim_core.surfaces.obstacles import CAPSULE, WAVING_FACE
+from sim_core.surfaces.tree import Tree
+from sim_core.vec3 import Vec3, dot, sub
+
+# status
+DONE = 0
+PAGE_FULL = 1
+STORM = 2
+TOO_FAST = 3
+
+PIECE = 0.01  # s: longest arc searched at once; its chord is off by g PIECE²/8 = 0.12 mm, so boxes stay tight
+STORM_EVENTS = 200_000  # of one ball in one window (20 ms): ten million a second is no gas but a jam
+
+# columns of Count
+WALLS, BALLS, SONOTRODE, SEARCHES, STALE = 0, 1, 2, 3, 4
+
+# what to predict
+ALL, PAIRS, WALL = 0, 1, 2
+
+
+class Shot(NamedTuple):
+    """The balls for the loop: ``motion`` (n, 6) float64 in the free-fall frame, ``lanes`` its float32 copy, ``reach`` [m]
+
+    the sum of two radii, ``wide_reach`` the same with the pair filter's margin, good up to ``fastest`` [m/s].
+    """
+
+    motion: np.ndarray
+    lanes: np.ndarray
+    reach: float
+    wide_reach: float
+    fastest: float
+
+
+class Ground(NamedTuple):
+    """What stands still: the tree of obstacles, each triangle's tag, and how far faces overlap [m]."""
+
+    tree: Tree
+    tags: np.ndarray
+    seam: float
+
+
+class Clock(NamedTuple):
+    """``now`` (2,): time on the window's clock [s], and windows gone by; ``window`` [s]; ``stop`` [s] and ``origin`` [s]
+
+    on the scene's clock: where to stop, and what impact times count from.
+    """
+
+    now: np.ndarray
+    window: float
+    stop: float
+    origin: float
+
+
+@jit
+def _hit_surface(
+    shot: Shot,
+    ground: Ground,
+    gravity: Gravity | None,
+    restitution: Restitution | None,
+    wave: Wave | None,
+    clock: Clock,
+    page: ImpactPage,
+    count: np.ndarray,
+    ball: int,
+    obstacle: int,
+    time: float,
+) -> None:
+    """The ball meets the obstacle now: change its velocity, count the impact, write it down if it is on a recorded surface."""
+    tree = ground.tree
+    here = point_at(shot.motion, ball, time, gravity)
+    kind = tree.kinds[obstacle]
+    if kind == CAPSULE:
+        away = away_from_capsule(tree.numbers, obstacle, here.position)
+    else:
+        away = face_normal(tree.numbers, obstacle)
+    relative = here.velocity
+    if kind == WAVING_FACE:
+        relative = sub(relative, surface_velocity(wave, time))
+        count[SONOTRODE] += 1
+    else:
+        count[WALLS] += 1
+    triangle = tree.triangles[obstacle]
+    tag = ground.tags[triangle]
+    kick(shot.motion, shot.lanes, ball, time, surface_kick(away, relative, restitution, tag))
+    speed = -dot(away, relative) / math.sqrt(dot(away, away))
+    if page.record[tag] and speed > 0.0:
+        row = page.filled[0]
+        page.numbers[row, 0] = clock.now[1] * clock.window + time - clock.origin
+        for axis in range(3):
+            page.numbers[row, 1 + axis] = here.position[axis]
+            page.numbers[row, 4 + axis] = relative[axis]
+        page.numbers[row, 7] = speed
+        page.names[row, 0] = ball
+        page.names[row, 1] = triangle
+        page.filled[0] = row + 1
+
+
+@jit
+def _speed_squared(motion: np.ndarray, ball: int) -> float:
+    return motion[ball, 3] ** 2 + motion[ball, 4] ** 2 + motion[ball, 5] ** 2
+
+
+@jit
+def _collide(shot: Shot, restitution: Restitution | None, one: int, two: int, time: float) -> None:
+    """Two balls meet now."""
+    motion = shot.motion
+    apart = sub(drift(motion, two, time), drift(motion, one, time))
+    closing = Vec3(
+        motion[two, 3] - motion[one, 3], motion[two, 4] - motion[one, 4], motion[two, 5] - motion[one, 5]
+    )
+    change = pair_kick(apart, closing, restitution)
+    kick(motion, shot.lanes, one, time, change)
+    kick(motion, shot.lanes, two, time, Vec3(-change.x, -change.y, -change.z))
+
+
+@jit
+def _predict(
+    shot: Shot,
+    ground: Ground,
+    calendar: Calendar,
+    scratch: Scratch,
+    gravity: Gravity | None,
+    wave: Wave | None,
+    count: np.ndarray,
+    ball: int,
+    time: float,
+    what: int,
+) -> None:
+    """Find the ball's next events from ``time`` on and put the earlier on the calendar."""
+    marks = calendar.marks
+    if what != WALL:
+        before = NEVER_BEFORE if what == ALL or marks[ball, OBSTACLE] < 0 else calendar.wall_time[ball]
+        meeting, partner = next_meeting(
+            shot.motion, shot.lanes, scratch.probe, ball, time, before, shot.reach, shot.wide_reach
+        )
+        calendar.pair_time[ball] = meeting
+        marks[ball, PARTNER] = partner
+        if partner >= 0:
+            marks[ball, PARTNER_HITS] = marks[partner, HITS]
+    if what != PAIRS or (marks[ball, OBSTACLE] < 0 and calendar.wall_time[ball] <= time):
+        # no further than the ball is known to get: until its meeting, or one piece
+        length = min(PIECE, calendar.pair_time[ball] - time)
+        here = point_at(shot.motion, ball, time, gravity)
+        delay, obstacle = first_contact(ground.tree, scratch, here, gravity, wave, ground.seam, time, length)
+        calendar.wall_time[ball] = time + (delay if obstacle >= 0 else length)
+        marks[ball, OBSTACLE] = obstacle
+        count[SEARCHES] += 1
+    reschedule(calendar, ball)
+
+
+NEVER_BEFORE = 1e300  # finite, so that differences with it stay numbers
+
+
+@jit
+def advance(
+    shot: Shot,
+    ground: Ground,
+    calendar: Calendar,
+    scratch: Scratch,
+    gravity: Gravity | None,
+    restitution: Restitution | None,
+    wave: Wave | None,
+    clock: Clock,
+    page: ImpactPage,
+    count: np.ndarray,
+) -> tuple[int, int]:
+    """Play events until ``clock.stop``; returns (status, ball): DONE, or why it had to pause and at which ball."""
+    marks = calendar.marks
+    while True:
+        left = clock.stop - clock.now[1] * clock.window
+        ball = calendar.winners[1]
+        time = calendar.next_time[ball]
+        if time >= min(left, clock.window):
+            if left <= clock.window:
+                clock.now[0] = left
+                return DONE, -1
+            set_back(shot.motion, shot.lanes, clock.window, gravity)
+            set_calendar_back(calendar, clock.window)
+            clock.now[1] += 1.0
+            continue
+        if page.filled[0] == len(page.numbers):
+            return PAGE_FULL, -1
+        clock.now[0] = time
+        marks[ball, EVENTS] += 1
+        if marks[ball, EVENTS] > STORM_EVENTS:
+            return STORM, ball
+        second = -1
+        what = ALL
+        obstacle = marks[ball, OBSTACLE]
+        if calendar.pair_time[ball] <= calendar.wall_time[ball]:
+            other = marks[ball, PARTNER]
+            if marks[other, HITS] == marks[ball, PARTNER_HITS]:
+                _collide(shot, restitution, ball, other, time)
+                marks[ball, HITS] += 1
+                marks[other, HITS] += 1
+                second = other
+                count[BALLS] += 1
+            else:
+                what = PAIRS
+                count[STALE] += 1
+        elif obstacle >= 0:
+            _hit_surface(shot, ground, gravity, restitution, wave, clock, page, count, ball, obstacle, time)
+            marks[ball, HITS] += 1
+            if not _speed_squared(shot.motion, ball) <= shot.fastest * shot.fastest:
+                forget(calendar, ball, time)
+                return TOO_FAST, ball
+        elif obstacle == SEARCH_ON:
+            what = WALL
+        todo = ball
+        while todo >= 0:
+            _predict(shot, ground, calendar, scratch, gravity, wave, count, todo, time, what)
+            todo = second if todo == ball else -1

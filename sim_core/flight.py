@@ -1,0 +1,67 @@
+"""Motion between events, in the free-fall frame.
+
+Position x(t) = base + velocity t + ½ a t² with one clock for all balls: what differs between two balls is then a
+straight line, pairs need no clock of their own, and a ball's numbers change only when it is hit. The clock is set back
+every window (a whole number of sonotrode periods), so that t stays small and its rounding with it.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sim_core._compile import jit
+from sim_core.effects.gravity import Gravity, acceleration
+from sim_core.vec3 import Vec3, along
+
+WINDOW = 0.02  # s: rounding of t is 3e-18 s here, a ball at 20 m/s moves 0.4 m; longer loses digits, shorter costs set-backs
+
+
+class Point(NamedTuple):
+    """A ball's centre [m] and velocity [m/s] at some time."""
+
+    position: Vec3
+    velocity: Vec3
+
+
+@jit
+def drift(motion: np.ndarray, ball: int, time: float) -> Vec3:
+    """Position in the free-fall frame [m]: x(t) - ½ a t²."""
+    return Vec3(
+        motion[ball, 0] + motion[ball, 3] * time,
+        motion[ball, 1] + motion[ball, 4] * time,
+        motion[ball, 2] + motion[ball, 5] * time,
+    )
+
+
+@jit
+def point_at(motion: np.ndarray, ball: int, time: float, gravity: Gravity | None) -> Point:
+    """Where a ball is, and how fast, at a time of the window."""
+    fall = acceleration(gravity)
+    position = along(drift(motion, ball, time), 0.5 * time * time, fall)
+    velocity = along(Vec3(motion[ball, 3], motion[ball, 4], motion[ball, 5]), time, fall)
+    return Point(position, velocity)
+
+
+@jit
+def kick(motion: np.ndarray, lanes: np.ndarray, ball: int, time: float, change: Vec3) -> None:
+    """Change a ball's velocity by ``change`` [m/s] at ``time``; its position at that time stays."""
+    here = drift(motion, ball, time)
+    for axis, (now, add) in enumerate(((here.x, change.x), (here.y, change.y), (here.z, change.z))):
+        velocity = motion[ball, 3 + axis] + add
+        base = now - velocity * time
+        motion[ball, axis] = base
+        motion[ball, 3 + axis] = velocity
+        lanes[axis, ball] = np.float32(base)
+        lanes[3 + axis, ball] = np.float32(velocity)
+
+
+@jit
+def set_back(motion: np.ndarray, lanes: np.ndarray, window: float, gravity: Gravity | None) -> None:
+    """Move the clock's zero forward by ``window`` [s]."""
+    fall = acceleration(gravity)
+    for ball in range(len(motion)):
+        for axis, a in enumerate((fall.x, fall.y, fall.z)):
+            motion[ball, axis] += window * (motion[ball, 3 + axis] + 0.5 * a * window)
+            motion[ball, 3 + axis] += a * window
+            lanes[axis, ball] = np.float32(motion[ball, axis])
+            lanes[3 + axis, ball] = np.float32(motion[ball, 3 + axis])

@@ -1,0 +1,58 @@
+"""What happened: the impacts of the shot on the recorded surfaces, as columns."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+CHUNK = 65_536  # impacts the compiled loop writes before handing them over
+
+
+class ImpactPage(NamedTuple):
+    """What the compiled loop writes: ``numbers`` (CHUNK, 8), ``names`` (CHUNK, 2) int32, ``filled`` (1,), ``record`` (tags,) bool."""
+
+    numbers: np.ndarray
+    names: np.ndarray
+    filled: np.ndarray
+    record: np.ndarray
+
+
+def new_page(record: np.ndarray) -> ImpactPage:
+    """An empty page recording the tags marked in ``record`` (256,) bool."""
+    return ImpactPage(
+        np.zeros((CHUNK, 8)), np.zeros((CHUNK, 2), dtype=np.int32), np.zeros(1, dtype=np.int64), record
+    )
+
+
+@dataclass(frozen=True)
+class ImpactLog:
+    """One row an impact, in order of time.
+
+    ``time`` (n,) [s] since the end of the warm-up; ``ball``, ``triangle`` (n,) int32, indices into the scene's balls and mesh;
+    ``position`` (n, 3) [m] of the ball's centre; ``velocity`` (n, 3) [m/s] before the impact, relative to the surface;
+    ``normal_speed`` (n,) [m/s], positive. An impact on an edge between two triangles is booked on one of them.
+    """
+
+    time: np.ndarray
+    ball: np.ndarray
+    triangle: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+    normal_speed: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+
+def impact_log(pages: list[tuple[np.ndarray, np.ndarray]], centre: np.ndarray) -> ImpactLog:
+    """Joins pages of (numbers, names) into one log, positions in the user's coordinates again."""
+    numbers = np.concatenate([page[0] for page in pages]) if pages else np.zeros((0, 8))
+    names = np.concatenate([page[1] for page in pages]) if pages else np.zeros((0, 2), dtype=np.int32)
+    return ImpactLog(
+        time=numbers[:, 0].copy(),
+        ball=names[:, 0].copy(),
+        triangle=names[:, 1].copy(),
+        position=numbers[:, 1:4] + centre,
+        velocity=numbers[:, 4:7].copy(),
+        normal_speed=numbers[:, 7].copy(),
+    )

@@ -1,0 +1,15 @@
+"""Which effects a scene calls for: one optional field an effect; None is absent from memory and machine code."""
+
+from typing import NamedTuple
+
+from sim_core.effects.gravity import Gravity
+from sim_core.effects.restitution import Restitution
+from sim_core.effects.vibration import Vibration
+
+
+class Physics(NamedTuple):
+    """The scene's effects. With none of them balls fly straight and collide elastically between still walls."""
+
+    gravity: Gravity | None = None
+    restitution: Restitution | None = None
+    vibration: Vibration | None = None

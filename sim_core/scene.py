@@ -1,0 +1,70 @@
+"""Everything a simulation needs, cross-checked once."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim_core.balls import Balls
+from sim_core.effects.restitution import checked_restitution
+from sim_core.effects.vibration import checked_wave
+from sim_core.errors import SceneError
+from sim_core.invariants import clearance, closest_pair, contained
+from sim_core.physics import Physics
+from sim_core.surfaces.mesh import TriangleMesh
+
+TOUCH = 1e-9  # m: overlap at the start that is taken for rounding of the input; ten thousand times less than a dent
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A closed mesh, balls inside it, the effects, and how long.
+
+    ``duration`` [s] is simulated after ``warmup`` [s], during which nothing is recorded; ``record``: tags whose impacts are
+    logged (all if None). Raises SceneError, naming the ball, triangle or field: a ball outside the mesh, overlapping a
+    surface or another ball; a tag without restitution; a vibrating tag that the mesh lacks; numbers out of range.
+    """
+
+    mesh: TriangleMesh
+    balls: Balls
+    physics: Physics
+    duration: float
+    warmup: float = 0.0
+    record: tuple[int, ...] | None = None
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.duration) and self.duration > 0.0):
+            raise SceneError(f"scene.duration is {self.duration} s: it must be positive")
+        if not (np.isfinite(self.warmup) and self.warmup >= 0.0):
+            raise SceneError(f"scene.warmup is {self.warmup} s: it must be 0 or more")
+        self._require_physics()
+        self._require_room()
+
+    def _require_physics(self) -> None:
+        gravity, restitution, vibration = self.physics
+        if gravity is not None and not np.isfinite(gravity).all():
+            raise SceneError(f"gravity is {tuple(gravity)} m/s²: it must be finite")
+        if restitution is not None:
+            checked_restitution(restitution, int(self.mesh.tags.max()) + 1)
+        checked_wave(vibration)
+        if vibration is not None and not (self.mesh.tags == vibration.tag).any():
+            tags = np.unique(self.mesh.tags).tolist()
+            raise SceneError(f"vibration.tag is {vibration.tag}, but the mesh has tags {tags}")
+
+    def _require_room(self) -> None:
+        balls = self.balls
+        outside = np.flatnonzero(~contained(self.mesh, balls.positions))
+        if len(outside):
+            where = balls.positions[outside[0]].tolist()
+            raise SceneError(f"ball {outside[0]} at {where} m is outside the mesh ({len(outside)} in all)")
+        gap = clearance(self.mesh, balls.positions, balls.radius) - balls.radius
+        worst = int(gap.argmin())
+        if gap[worst] < -TOUCH:
+            raise SceneError(
+                f"ball {worst} at {balls.positions[worst].tolist()} m overlaps a surface by {-gap[worst]:.3g} m; "
+                "move it or make it smaller"
+            )
+        distance, one, two = closest_pair(balls)
+        if distance < balls.diameter - TOUCH:
+            raise SceneError(
+                f"balls {one} and {two} overlap by {balls.diameter - distance:.3g} m at the start; move one of them"
+            )

@@ -1,0 +1,173 @@
+"""Eight or sixteen comparisons in one instruction: conservative float32 filters in front of the exact float64 tests.
+
+A filter may let through too much, never too little, so results do not depend on it, bit for bit. Each has a
+plain numpy twin that stands in when numba's JIT is off.
+"""
+
+from typing import Any
+
+import numba
+import numpy as np
+from llvmlite import ir
+from numba.core import cgutils, types
+from numba.extending import intrinsic
+
+BOXES = 8  # children of a tree node
+LANES = 16  # balls looked at together
+
+_F32 = ir.FloatType()
+_I32 = ir.IntType(32)
+
+
+class _Vectors:
+    """Few-line builder of n-wide float32 code."""
+
+    def __init__(self, builder: Any, width: int) -> None:
+        self.builder = builder
+        self.width = width
+        self.type = ir.VectorType(_F32, width)
+
+    def spread(self, scalar: Any) -> Any:
+        """The scalar in every lane."""
+        one = self.builder.insert_element(ir.Constant(self.type, ir.Undefined), scalar, _I32(0))
+        mask = ir.Constant(ir.VectorType(_I32, self.width), [0] * self.width)
+        return self.builder.shuffle_vector(one, ir.Constant(self.type, ir.Undefined), mask)
+
+    def load(self, data: Any, index: Any) -> Any:
+        """``width`` consecutive numbers from data[index]."""
+        address = self.builder.bitcast(self.builder.gep(data, [index]), self.type.as_pointer())
+        return self.builder.load(address, align=4)
+
+    def store(self, vector: Any, data: Any, index: Any) -> None:
+        address = self.builder.bitcast(self.builder.gep(data, [index]), self.type.as_pointer())
+        self.builder.store(vector, address, align=4)
+
+    def smaller(self, a: Any, b: Any) -> Any:
+        return self.builder.select(self.builder.fcmp_ordered("<", a, b), a, b)
+
+    def larger(self, a: Any, b: Any) -> Any:
+        return self.builder.select(self.builder.fcmp_ordered(">", a, b), a, b)
+
+    def mask(self, condition: Any) -> Any:
+        """Lane conditions as the bits of an int64."""
+        bits = self.builder.bitcast(condition, ir.IntType(self.width))
+        return self.builder.zext(bits, ir.IntType(64))
+
+
+def _data_of(context: Any, builder: Any, array_type: Any, array: Any) -> Any:
+    return context.make_array(array_type)(context, builder, array).data
+
+
+@intrinsic
+def _boxes_hit(typing_context: Any, bounds: Any, node: Any, ray: Any, longest: Any, enter: Any) -> Any:
+    signature = types.int64(bounds, types.int64, ray, types.float32, enter)
+
+    def codegen(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
+        bounds_type, _, ray_type, _, enter_type = signature.args
+        bounds, node, ray, longest, enter = arguments
+        v = _Vectors(builder, BOXES)
+        boxes = _data_of(context, builder, bounds_type, bounds)
+        rays = _data_of(context, builder, ray_type, ray)
+        first = builder.mul(node, ir.Constant(node.type, 6 * BOXES))
+        near = v.spread(ir.Constant(_F32, 0.0))
+        far = v.spread(longest)
+        for axis in range(3):
+
+            def number(k: int, axis: int = axis) -> Any:
+                return v.spread(builder.load(builder.gep(rays, [ir.Constant(node.type, 3 * k + axis)])))
+
+            low = v.load(boxes, builder.add(first, ir.Constant(node.type, axis * BOXES)))
+            high = v.load(boxes, builder.add(first, ir.Constant(node.type, (3 + axis) * BOXES)))
+            inverse = number(2)
+            one = builder.fmul(builder.fsub(low, number(0)), inverse)
+            two = builder.fmul(builder.fsub(high, number(1)), inverse)
+            near = v.larger(near, v.smaller(one, two))
+            far = v.smaller(far, v.larger(one, two))
+        v.store(near, _data_of(context, builder, enter_type, enter), ir.Constant(node.type, 0))
+        return v.mask(builder.fcmp_ordered("<=", near, far))
+
+    return signature, codegen
+
+
+def _boxes_hit_twin(bounds: Any, node: int, ray: Any, longest: Any, enter: Any) -> int:
+    box = bounds[node]
+    with np.errstate(over="ignore", invalid="ignore"):
+        one = (box[0:3] - ray[0:3, None]) * ray[6:9, None]
+        two = (box[3:6] - ray[3:6, None]) * ray[6:9, None]
+    near = np.maximum(np.float32(0.0), np.minimum(one, two).max(axis=0))
+    far = np.minimum(longest, np.maximum(one, two).min(axis=0))
+    enter[:] = near
+    return int(np.packbits(near <= far, bitorder="little")[0])
+
+
+@intrinsic
+def _balls_near(typing_context: Any, lanes: Any, first: Any, probe: Any) -> Any:
+    signature = types.int64(lanes, types.int64, probe)
+
+    def codegen(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
+        lanes_type, _, probe_type = signature.args
+        lanes, first, probe = arguments
+        v = _Vectors(builder, LANES)
+        columns = _data_of(context, builder, lanes_type, lanes)
+        probes = _data_of(context, builder, probe_type, probe)
+        shape = cgutils.unpack_tuple(builder, context.make_array(lanes_type)(context, builder, lanes).shape)
+        width = shape[1]
+
+        def number(k: int) -> Any:
+            return v.spread(builder.load(builder.gep(probes, [ir.Constant(width.type, k)])))
+
+        def column(k: int) -> Any:
+            return v.load(columns, builder.add(builder.mul(width, ir.Constant(width.type, k)), first))
+
+        now = number(6)
+        zero = v.spread(ir.Constant(_F32, 0.0))
+        square = closing = speed = zero
+        for axis in range(3):
+            velocity = column(3 + axis)
+            apart = builder.fsub(builder.fadd(column(axis), builder.fmul(velocity, now)), number(axis))
+            relative = builder.fsub(velocity, number(3 + axis))
+            square = builder.fadd(square, builder.fmul(apart, apart))
+            closing = builder.fadd(closing, builder.fmul(apart, relative))
+            speed = builder.fadd(speed, builder.fmul(relative, relative))
+        # miss distance² <= reach² + a relative margin on the distance, where float32 loses most
+        miss = builder.fsub(builder.fmul(square, number(8)), number(7))
+        may_meet = builder.fcmp_ordered(">=", builder.fmul(closing, closing), builder.fmul(speed, miss))
+        approaching = builder.fcmp_ordered("<=", closing, zero)
+        touching = builder.fcmp_ordered("<=", miss, zero)  # there the sign of ``closing`` may be rounding
+        return v.mask(builder.and_(may_meet, builder.or_(approaching, touching)))
+
+    return signature, codegen
+
+
+def _balls_near_twin(lanes: Any, first: int, probe: Any) -> int:
+    block = lanes[:, first : first + LANES]
+    with np.errstate(over="ignore", invalid="ignore"):
+        apart = block[0:3] + block[3:6] * probe[6] - probe[0:3, None]
+        relative = block[3:6] - probe[3:6, None]
+        square = (apart * apart).sum(axis=0)
+        closing = (apart * relative).sum(axis=0)
+        speed = (relative * relative).sum(axis=0)
+        miss = square * probe[8] - probe[7]
+        may_meet = (closing * closing >= speed * miss) & ((closing <= 0.0) | (miss <= 0.0))
+    return int(np.packbits(may_meet, bitorder="little").view(np.uint16)[0])
+
+
+@intrinsic
+def _lowest_bit(typing_context: Any, bits: Any) -> Any:
+    signature = types.int64(types.int64)
+
+    def codegen(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
+        return builder.cttz(arguments[0], ir.Constant(ir.IntType(1), 1))
+
+    return signature, codegen
+
+
+def _lowest_bit_twin(bits: int) -> int:
+    return (bits & -bits).bit_length() - 1
+
+
+# boxes_hit(bounds (nodes, 6, 8) f32, node, ray (9,) f32, longest f32, enter (8,) f32 out) -> bit mask
+boxes_hit = _boxes_hit_twin if numba.config.DISABLE_JIT else _boxes_hit
+# balls_near(lanes (6, n) f32, first lane, probe (9,) f32) -> bit mask of LANES balls
+balls_near = _balls_near_twin if numba.config.DISABLE_JIT else _balls_near
+lowest_bit = _lowest_bit_twin if numba.config.DISABLE_JIT else _lowest_bit

@@ -1,0 +1,196 @@
+"""Scene in, Result out: sets up the columns, runs the compiled event loop, checks what must never break."""
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from sim_core.balls import Balls
+from sim_core.calendar import Calendar, new_calendar
+from sim_core.detect.ball_mesh import Scratch, new_scratch
+from sim_core.effects.restitution import Restitution, checked_restitution
+from sim_core.effects.vibration import Wave, checked_wave
+from sim_core.errors import SimulationError
+from sim_core.events import DONE, PAGE_FULL, STORM, TOO_FAST, Clock, Ground, Shot, advance
+from sim_core.flight import WINDOW, point_at
+from sim_core.impacts import ImpactLog, ImpactPage, impact_log, new_page
+from sim_core.invariants import contained
+from sim_core.neighbours import new_lanes, reach_margin
+from sim_core.scene import Scene
+from sim_core.surfaces.mesh import MAX_TAGS, TriangleMesh
+from sim_core.surfaces.obstacles import build_obstacles, seam
+from sim_core.surfaces.tree import build_tree
+
+CHECK_EVERY = 1.0  # s simulated between checks that every ball is still inside; one check costs about a ms
+
+
+@dataclass(frozen=True)
+class Collisions:
+    """How many collisions there were, warm-up included, and how often the loop searched for one."""
+
+    walls: int
+    balls: int
+    sonotrode: int
+    searches: int
+    stale: int
+
+    @property
+    def total(self) -> int:
+        """Real collisions."""
+        return self.walls + self.balls + self.sonotrode
+
+
+@dataclass(frozen=True)
+class Result:
+    """The recorded impacts, the balls at the end, and counts of the collisions."""
+
+    impacts: ImpactLog
+    balls: Balls
+    collisions: Collisions
+
+
+def simulate(scene: Scene) -> Result:
+    """Plays the scene from its start to the end of its duration.
+
+    Releases the GIL while it runs; the same scene gives the same bits on any thread. Raises SimulationError when a ball is
+    lost, jams, or stops being a number.
+    """
+    run = _Run(scene)
+    run.play(scene.warmup, record=False)
+    run.play(scene.warmup + scene.duration, record=True)
+    return Result(impact_log(run.pages, run.centre), run.balls(), Collisions(*(int(n) for n in run.count)))
+
+
+@lru_cache(maxsize=8)
+def _ground(mesh: TriangleMesh, radius: float, waving_tag: int, swing: float) -> Ground:
+    """Obstacles and their tree; replicas of one chamber share them."""
+    waving = mesh.tags == waving_tag
+    obstacles = build_obstacles(mesh, _centre(mesh), radius, waving, swing)
+    return Ground(build_tree(obstacles, radius), mesh.tags, seam(radius))
+
+
+def _centre(mesh: TriangleMesh) -> np.ndarray:
+    """Middle of the mesh's bounding box [m]: all work is done relative to it, so that no digits go to a far origin."""
+    return np.asarray(0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)))
+
+
+class _Run:
+    """A scene being played: the columns the loop works on, and what it has written so far."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.gravity = scene.physics.gravity
+        self.wave: Wave | None = checked_wave(scene.physics.vibration)
+        self.restitution: Restitution | None = None
+        if scene.physics.restitution is not None:
+            tags = int(scene.mesh.tags.max()) + 1
+            self.restitution = checked_restitution(scene.physics.restitution, tags)
+        self.centre = _centre(scene.mesh)
+        radius = scene.balls.radius
+        tag, swing = -1, 0.0
+        self.window = WINDOW
+        if scene.physics.vibration is not None:
+            tag, swing = scene.physics.vibration.tag, scene.physics.vibration.amplitude
+            frequency = scene.physics.vibration.frequency
+            self.window = (
+                max(1.0, round(WINDOW * frequency)) / frequency
+            )  # whole periods: the phase need not be carried
+        self.ground = _ground(scene.mesh, radius, tag, swing)
+        self.motion = np.concatenate([scene.balls.positions - self.centre, scene.balls.velocities], axis=1)
+        self.calendar: Calendar = new_calendar(len(self.motion))
+        self.scratch: Scratch = new_scratch()
+        self.shot = self._shot(2.0 * max(1.0, float(np.abs(scene.balls.velocities).max())))
+        self.now = np.zeros(2)
+        self.count = np.zeros(5, dtype=np.int64)
+        self.pages: list[tuple[np.ndarray, np.ndarray]] = []
+
+    def _shot(self, fastest: float) -> Shot:
+        reach = 2.0 * self.scene.balls.radius
+        extent = float(np.ptp(self.scene.mesh.vertices, axis=0).max())
+        margin = reach_margin(extent, fastest, self.window)
+        return Shot(self.motion, new_lanes(self.motion), reach, reach + margin, fastest)
+
+    def play(self, until: float, record: bool) -> None:
+        """Advance to ``until`` [s], checking containment on the way."""
+        page = new_page(self._recorded_tags() if record else np.zeros(MAX_TAGS, dtype=np.bool_))
+        origin = self.scene.warmup
+        start = self.now[0] + self.now[1] * self.window
+        for stop in np.linspace(start, until, 1 + max(1, math.ceil((until - start) / CHECK_EVERY)))[1:]:
+            self._advance(Clock(self.now, self.window, float(stop), origin), page)
+            self._require_sound()
+        self._turn(page)
+
+    def _recorded_tags(self) -> np.ndarray:
+        record = np.zeros(MAX_TAGS, dtype=np.bool_)
+        record[np.arange(MAX_TAGS) if self.scene.record is None else list(self.scene.record)] = True
+        return record
+
+    def _advance(self, clock: Clock, page: ImpactPage) -> None:
+        while True:
+            status, ball = advance(
+                self.shot,
+                self.ground,
+                self.calendar,
+                self.scratch,
+                self.gravity,
+                self.restitution,
+                self.wave,
+                clock,
+                page,
+                self.count,
+            )
+            if status == DONE:
+                return
+            if status == PAGE_FULL:
+                self._turn(page)
+            elif status == TOO_FAST:
+                speed = float(np.abs(self.motion[ball, 3:]).max())
+                if not math.isfinite(speed):
+                    raise SimulationError(
+                        f"ball {ball}: its velocity is not a number any more; {self._when()}"
+                    )
+                self.shot = self._shot(4.0 * speed)
+            elif status == STORM:
+                where = np.round(self._points(np.array([ball]))[0], 6).tolist()
+                raise SimulationError(
+                    f"ball {ball} jams at {where} m: more than ten million events a second; {self._when()}. "
+                    "Look for a gap just as wide as the ball there, or raise restitution.elastic_below"
+                )
+
+    def _turn(self, page: ImpactPage) -> None:
+        """Put away what the loop has written, and give it the empty page."""
+        rows = int(page.filled[0])
+        if rows:
+            self.pages.append((page.numbers[:rows].copy(), page.names[:rows].copy()))
+            page.filled[0] = 0
+
+    def _when(self) -> str:
+        return f"{self.now[0] + self.now[1] * self.window:.6f} s after the start"
+
+    def _points(self, which: np.ndarray) -> np.ndarray:
+        points = [point_at(self.motion, int(i), self.now[0], self.gravity).position for i in which]
+        return np.array(points) + self.centre
+
+    def _require_sound(self) -> None:
+        everyone = np.arange(len(self.motion))
+        points = self._points(everyone)
+        bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+        if len(bad):
+            raise SimulationError(f"ball {bad[0]}: its position is not a number any more; {self._when()}")
+        outside = np.flatnonzero(~contained(self.scene.mesh, points))
+        if len(outside):
+            raise SimulationError(
+                f"ball {outside[0]} has left the mesh at {np.round(points[outside[0]], 6).tolist()} m, {self._when()}. "
+                "This must never happen: please report the scene"
+            )
+
+    def balls(self) -> Balls:
+        """The balls as they are now."""
+        states = [point_at(self.motion, i, self.now[0], self.gravity) for i in range(len(self.motion))]
+        return Balls(
+            np.array([state.position for state in states]) + self.centre,
+            np.array([state.velocity for state in states]),
+            self.scene.balls.diameter,
+            self.scene.balls.density,
+        )

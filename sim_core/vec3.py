@@ -1,0 +1,43 @@
+"""3-vectors as NamedTuples: registers in compiled code, where a numpy row would be an allocation."""
+
+from typing import NamedTuple
+
+from sim_core._compile import jit
+
+
+class Vec3(NamedTuple):
+    """A vector (x, y, z); metres, metres per second or dimensionless as its name says."""
+
+    x: float
+    y: float
+    z: float
+
+
+@jit
+def add(a: Vec3, b: Vec3) -> Vec3:
+    """a + b."""
+    return Vec3(a.x + b.x, a.y + b.y, a.z + b.z)
+
+
+@jit
+def sub(a: Vec3, b: Vec3) -> Vec3:
+    """a - b."""
+    return Vec3(a.x - b.x, a.y - b.y, a.z - b.z)
+
+
+@jit
+def along(a: Vec3, s: float, b: Vec3) -> Vec3:
+    """a + s b."""
+    return Vec3(a.x + s * b.x, a.y + s * b.y, a.z + s * b.z)
+
+
+@jit
+def dot(a: Vec3, b: Vec3) -> float:
+    """Scalar product."""
+    return a.x * b.x + a.y * b.y + a.z * b.z
+
+
+@jit
+def row3(rows: "np.ndarray", i: int) -> Vec3:  # type: ignore[name-defined]  # noqa: F821
+    """The first three numbers of row i as a vector."""
+    return Vec3(rows[i, 0], rows[i, 1], rows[i, 2])
