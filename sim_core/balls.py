@@ -11,8 +11,8 @@ from sim_core.errors import SceneError
 class Balls:
     """Balls of one size and density.
 
-    ``positions`` [m] and ``velocities`` [m/s], shape (n, 3) float64; ``diameter`` [m]; ``density`` [kg/m³].
-    Raises SceneError for wrong shapes, numbers that are not finite, or several diameters (not supported yet).
+    ``positions`` [m] and ``velocities`` [m/s], shape (n, 3) float64; ``diameter`` [m]; ``density`` [kg/m³]. Raises
+    SceneError for wrong shapes, numbers that are not finite, or several diameters (not supported yet).
     """
 
     positions: np.ndarray
@@ -22,9 +22,7 @@ class Balls:
 
     def __post_init__(self) -> None:
         if np.ndim(self.diameter) != 0 or np.ndim(self.density) != 0:
-            raise SceneError(
-                "several ball diameters or densities in one scene are not supported yet: give one number"
-            )
+            raise SceneError("several ball diameters or densities in one scene are not supported yet: give one number")
         for name in ("diameter", "density"):
             value = float(getattr(self, name))
             if not (np.isfinite(value) and value > 0.0):
@@ -36,14 +34,13 @@ class Balls:
                 raise SceneError(f"balls.{name} must have shape (n, 3) with n >= 1, not {array.shape}")
             bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
             if len(bad):
-                raise SceneError(
-                    f"balls.{name}: ball {bad[0]} has {array[bad[0]].tolist()}; numbers must be finite"
-                )
+                raise SceneError(f"balls.{name}: ball {bad[0]} has {array[bad[0]].tolist()}; give finite numbers")
             array.flags.writeable = False
             object.__setattr__(self, name, array)
         if self.positions.shape != self.velocities.shape:
             raise SceneError(
-                f"balls.positions has {len(self.positions)} balls, balls.velocities {len(self.velocities)}: give one each"
+                f"balls.positions has {len(self.positions)} balls, balls.velocities {len(self.velocities)}: "
+                "give one each"
             )
 
     def __len__(self) -> int:

@@ -20,8 +20,8 @@ EVENTS = 4  # events in this window
 class Calendar(NamedTuple):
     """``pair_time``, ``wall_time`` (n,) [s on the window's clock]; ``marks`` (n, 5) int32;
 
-    ``next_time`` (m,) [s], the earlier of the two, m the next power of two, padded with NEVER;
-    ``winners`` (2 m,) int32: winners[1] is the ball whose event is next.
+    ``next_time`` (m,) [s], the earlier of the two, m the next power of two, padded with NEVER; ``winners`` (2 m,)
+    int32: winners[1] is the ball whose event is next.
     """
 
     pair_time: np.ndarray

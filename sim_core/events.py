@@ -1,7 +1,7 @@
 """The event loop, compiled: take the next event, let it change velocities, predict anew for the balls it touched.
 
-One prediction site; an event whose partner has been hit since is not an event, and only its pair is looked for again:
-the ball's own path, and so its wall contact, still stands.
+One prediction site; an event whose partner has been hit since is not an event, and only its pair is looked for
+again: the ball's own path, and so its wall contact, still stands.
 """
 
 import math
@@ -53,9 +53,10 @@ ALL, PAIRS, WALL = 0, 1, 2
 
 
 class Shot(NamedTuple):
-    """The balls for the loop: ``motion`` (n, 6) float64 in the free-fall frame, ``lanes`` its float32 copy, ``reach`` [m]
+    """The balls for the loop.
 
-    the sum of two radii, ``wide_reach`` the same with the pair filter's margin, good up to ``fastest`` [m/s].
+    ``motion`` (n, 6) float64 in the free-fall frame, ``lanes`` its float32 copy; ``reach`` [m] the sum of two
+    radii, ``wide_reach`` the same with the pair filter's margin, good up to ``fastest`` [m/s].
     """
 
     motion: np.ndarray
@@ -74,7 +75,8 @@ class Ground(NamedTuple):
 
 
 class Clock(NamedTuple):
-    """``now`` (2,): time on the window's clock [s], and windows gone by; ``window`` [s]; ``stop`` [s] and ``origin`` [s]
+    """``now`` (2,): time on the window's clock [s], and windows gone by; ``window`` [s]; ``stop`` [s] and ``origin``
+    [s]
 
     on the scene's clock: where to stop, and what impact times count from.
     """
@@ -99,7 +101,9 @@ def _hit_surface(
     obstacle: int,
     time: float,
 ) -> None:
-    """The ball meets the obstacle now: change its velocity, count the impact, write it down if it is on a recorded surface."""
+    """The ball meets the obstacle now: change its velocity, count the impact, write it down if it is on a recorded
+    surface.
+    """
     tree = ground.tree
     here = point_at(shot.motion, ball, time, gravity)
     kind = tree.kinds[obstacle]
@@ -139,9 +143,7 @@ def _collide(shot: Shot, restitution: Restitution | None, one: int, two: int, ti
     """Two balls meet now."""
     motion = shot.motion
     apart = sub(drift(motion, two, time), drift(motion, one, time))
-    closing = Vec3(
-        motion[two, 3] - motion[one, 3], motion[two, 4] - motion[one, 4], motion[two, 5] - motion[one, 5]
-    )
+    closing = Vec3(motion[two, 3] - motion[one, 3], motion[two, 4] - motion[one, 4], motion[two, 5] - motion[one, 5])
     change = pair_kick(apart, closing, restitution)
     kick(motion, shot.lanes, one, time, change)
     kick(motion, shot.lanes, two, time, Vec3(-change.x, -change.y, -change.z))

@@ -1,8 +1,8 @@
 """Motion between events, in the free-fall frame.
 
 Position x(t) = base + velocity t + ½ a t² with one clock for all balls: what differs between two balls is then a
-straight line, pairs need no clock of their own, and a ball's numbers change only when it is hit. The clock is set back
-every window (a whole number of sonotrode periods), so that t stays small and its rounding with it.
+straight line, pairs need no clock of their own, and a ball's numbers change only when it is hit. The clock is set
+back every window (a whole number of sonotrode periods), so that t stays small and its rounding with it.
 """
 
 from typing import NamedTuple
@@ -13,7 +13,9 @@ from sim_core._compile import jit
 from sim_core.effects.gravity import Gravity, acceleration
 from sim_core.vec3 import Vec3, along
 
-WINDOW = 0.02  # s: rounding of t is 3e-18 s here, a ball at 20 m/s moves 0.4 m; longer loses digits, shorter costs set-backs
+WINDOW = (
+    0.02  # s: rounding of t is 3e-18 s here, a ball at 20 m/s moves 0.4 m; longer loses digits, shorter costs set-backs
+)
 
 
 class Point(NamedTuple):

@@ -9,7 +9,11 @@ CHUNK = 65_536  # impacts the compiled loop writes before handing them over
 
 
 class ImpactPage(NamedTuple):
-    """What the compiled loop writes: ``numbers`` (CHUNK, 8), ``names`` (CHUNK, 2) int32, ``filled`` (1,), ``record`` (tags,) bool."""
+    """What the compiled loop writes.
+
+    ``numbers`` (CHUNK, 8): time, position, velocity, normal speed; ``names`` (CHUNK, 2) int32: ball, triangle;
+    ``filled`` (1,): rows written; ``record`` (MAX_TAGS,) bool: surfaces to record.
+    """
 
     numbers: np.ndarray
     names: np.ndarray
@@ -19,18 +23,17 @@ class ImpactPage(NamedTuple):
 
 def new_page(record: np.ndarray) -> ImpactPage:
     """An empty page recording the tags marked in ``record`` (256,) bool."""
-    return ImpactPage(
-        np.zeros((CHUNK, 8)), np.zeros((CHUNK, 2), dtype=np.int32), np.zeros(1, dtype=np.int64), record
-    )
+    return ImpactPage(np.zeros((CHUNK, 8)), np.zeros((CHUNK, 2), dtype=np.int32), np.zeros(1, dtype=np.int64), record)
 
 
 @dataclass(frozen=True)
 class ImpactLog:
     """One row an impact, in order of time.
 
-    ``time`` (n,) [s] since the end of the warm-up; ``ball``, ``triangle`` (n,) int32, indices into the scene's balls and mesh;
-    ``position`` (n, 3) [m] of the ball's centre; ``velocity`` (n, 3) [m/s] before the impact, relative to the surface;
-    ``normal_speed`` (n,) [m/s], positive. An impact on an edge between two triangles is booked on one of them.
+    ``time`` (n,) [s] since the end of the warm-up; ``ball``, ``triangle`` (n,) int32, indices into the scene's
+    balls and mesh; ``position`` (n, 3) [m] of the ball's centre; ``velocity`` (n, 3) [m/s] before the impact,
+    relative to the surface; ``normal_speed`` (n,) [m/s], positive. An impact on an edge between two triangles is
+    booked on one of them.
     """
 
     time: np.ndarray

@@ -1,6 +1,7 @@
 """What must never break, checked by other means than the code under test.
 
-Containment by counting ray crossings (not by contact times), overlap by plain distances, energy and momentum by their sums.
+Containment by counting ray crossings (not by contact times), overlap by plain distances, energy and momentum by
+their sums.
 """
 
 import math

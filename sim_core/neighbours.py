@@ -1,7 +1,7 @@
 """Who can meet whom: all balls, sixteen at a time through a float32 filter, then exactly.
 
-The filter keeps every pair whose straight paths could come within reach, rounding included; what it lets through is decided in
-float64, so results do not depend on it.
+The filter keeps every pair whose straight paths could come within reach, rounding included; what it lets through is
+decided in float64, so results do not depend on it.
 """
 
 import numpy as np
@@ -17,7 +17,9 @@ FAR_SHARE = np.float32(1.0 - 1e-6)  # of distance²: float32 loses 2e-7 of it in
 
 
 def reach_margin(extent: float, fastest: float, window: float) -> float:
-    """Added to the filter's reach [m]: sixteen roundings of the largest float32 coordinate (about 1e-6 m in a chamber)."""
+    """Added to the filter's reach [m]: sixteen roundings of the largest float32 coordinate (about 1e-6 m in a
+    chamber).
+    """
     return float(16.0 * np.finfo(np.float32).eps * (extent + fastest * window))
 
 

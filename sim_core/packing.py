@@ -1,4 +1,6 @@
-"""First positions without overlap: random sequential placement, lowest in the chamber first, where the shot lies before peening."""
+"""First positions without overlap: random sequential placement, lowest in the chamber first, where the shot lies
+before peening.
+"""
 
 import numpy as np
 
@@ -16,16 +18,14 @@ GAP = 1e-6  # m kept between neighbours and from surfaces, so that rounding of p
 def pack_balls(mesh: TriangleMesh, count: int, diameter: float, rng: np.random.Generator) -> np.ndarray:
     """Positions [m] of ``count`` balls inside the mesh, shape (count, 3), no two overlapping.
 
-    ``diameter`` [m]. "Low" is along -z. Raises SceneError when they do not fit: random placement reaches about 30 % of the
-    volume a ball can use.
+    ``diameter`` [m]. "Low" is along -z. Raises SceneError when they do not fit: random placement reaches about 30 %
+    of the volume a ball can use.
     """
     radius = 0.5 * diameter + GAP
     low = mesh.vertices.min(axis=0) + radius
     high = mesh.vertices.max(axis=0) - radius
     if (high < low).any():
-        raise SceneError(
-            f"no ball of {diameter * 1e3:.3g} mm fits into the mesh: it is narrower than the ball"
-        )
+        raise SceneError(f"no ball of {diameter * 1e3:.3g} mm fits into the mesh: it is narrower than the ball")
     placed = np.zeros((count, 3))
     done = failures = 0
     top = min(low[2] + FIRST_LAYER * diameter, high[2])

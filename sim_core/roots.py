@@ -7,6 +7,8 @@ collides now, one that separates does not (Bannerman, Strobl, Formella & Pösche
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from sim_core._compile import jit
 
 NEVER = math.inf
@@ -21,8 +23,8 @@ NEWTON_STEPS = 60  # quadratic convergence needs about 6; a double root halves t
 def first_approach(c: float, b: float, a: float, depth: float) -> float:
     """Smallest s >= 0 with gap c + b s + a s² <= 0 and falling; NEVER if there is none.
 
-    ``depth`` [unit of c]: an overlap deeper than this is no overlap but the far side of a one-sided surface,
-    which can only be met after coming out in front of it.
+    ``depth`` [unit of c]: an overlap deeper than this is no overlap but the far side of a one-sided surface, which
+    can only be met after coming out in front of it.
     """
     if c <= 0.0 and c > -depth and (b < 0.0 or (b == 0.0 and a < 0.0)):
         return 0.0
@@ -33,12 +35,12 @@ def first_approach(c: float, b: float, a: float, depth: float) -> float:
         if disc <= 0.0:  # a tangent touch does not approach
             return NEVER
         if b < 0.0:
-            return 2.0 * c / (math.sqrt(disc) - b)  # for either sign of a, and without cancellation
-        return -(b + math.sqrt(disc)) / (2.0 * a)
+            return 2.0 * c / (np.sqrt(disc) - b)  # for either sign of a, and without cancellation
+        return -(b + np.sqrt(disc)) / (2.0 * a)
     if b <= 0.0:
         return NEVER
     if disc > 0.0:  # overlapping and receding: out, up, and back down
-        return -(b + math.sqrt(disc)) / (2.0 * a)
+        return -(b + np.sqrt(disc)) / (2.0 * a)
     return -b / (2.0 * a) if c > -depth else NEVER  # turns back while still overlapping
 
 
@@ -142,9 +144,9 @@ def _concave_approach(w: WaveGap, start: float, end: float) -> float:
 def first_wave_approach(w: WaveGap, limit: float, depth: float) -> float:
     """First s in [0, limit] at which the ball meets the vibrating face, approaching it; NEVER if none.
 
-    The ball is carried to the swing's envelope first; inside it the gap is split where its curvature changes
-    sign, sin(angle) = -2a / (swing omega²), so that each piece has at most one approach and Newton started
-    from the safe side cannot miss it nor come early. ``depth`` as in first_approach.
+    The ball is carried to the swing's envelope first; inside it the gap is split where its curvature changes sign,
+    sin(angle) = -2a / (swing omega²), so that each piece has at most one approach and Newton started from the safe
+    side cannot miss it nor come early. ``depth`` as in first_approach.
     """
     if w.c <= -w.swing - depth:
         return NEVER
@@ -162,17 +164,14 @@ def first_wave_approach(w: WaveGap, limit: float, depth: float) -> float:
             if s >= limit:
                 return NEVER
         angle = w.omega * s + w.theta
-        half = math.floor((angle - alpha) / math.pi)  # pieces begin at half π ± alpha; even ones are convex
+        half = float(math.floor((angle - alpha) / math.pi))  # pieces begin at half π ± alpha; even ones are convex
         while _piece_start(half + 1.0, alpha) <= angle:
             half += 1.0
         while _piece_start(half, alpha) > angle:
             half -= 1.0
         next_piece = (_piece_start(half + 1.0, alpha) - w.theta) / w.omega
         end = min(next_piece, limit)
-        if half % 2.0 == 0.0:
-            hit = _convex_approach(w, s, end)
-        else:
-            hit = _concave_approach(w, s, end)
+        hit = _convex_approach(w, s, end) if half % 2.0 == 0.0 else _concave_approach(w, s, end)
         if hit < NEVER:
             return hit
         if next_piece <= s:  # rounding at a piece's very end

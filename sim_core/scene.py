@@ -19,9 +19,10 @@ TOUCH = 1e-9  # m: overlap at the start that is taken for rounding of the input;
 class Scene:
     """A closed mesh, balls inside it, the effects, and how long.
 
-    ``duration`` [s] is simulated after ``warmup`` [s], during which nothing is recorded; ``record``: tags whose impacts are
-    logged (all if None). Raises SceneError, naming the ball, triangle or field: a ball outside the mesh, overlapping a
-    surface or another ball; a tag without restitution; a vibrating tag that the mesh lacks; numbers out of range.
+    ``duration`` [s] is simulated after ``warmup`` [s], during which nothing is recorded; ``record``: tags whose
+    impacts are logged (all if None). Raises SceneError, naming the ball, triangle or field: a ball outside the
+    mesh, overlapping a surface or another ball; a tag without restitution; a vibrating tag that the mesh lacks;
+    numbers out of range.
     """
 
     mesh: TriangleMesh

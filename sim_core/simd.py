@@ -1,7 +1,7 @@
 """Eight or sixteen comparisons in one instruction: conservative float32 filters in front of the exact float64 tests.
 
-A filter may let through too much, never too little, so results do not depend on it, bit for bit. Each has a
-plain numpy twin that stands in when numba's JIT is off.
+A filter may let through too much, never too little, so results do not depend on it, bit for bit. Each has a plain
+numpy twin that stands in when numba's JIT is off.
 """
 
 from typing import Any
@@ -166,8 +166,11 @@ def _lowest_bit_twin(bits: int) -> int:
     return (bits & -bits).bit_length() - 1
 
 
+_settings: Any = numba.config
+_plain = _settings.DISABLE_JIT
+
 # boxes_hit(bounds (nodes, 6, 8) f32, node, ray (9,) f32, longest f32, enter (8,) f32 out) -> bit mask
-boxes_hit = _boxes_hit_twin if numba.config.DISABLE_JIT else _boxes_hit
+boxes_hit: Any = _boxes_hit_twin if _plain else _boxes_hit
 # balls_near(lanes (6, n) f32, first lane, probe (9,) f32) -> bit mask of LANES balls
-balls_near = _balls_near_twin if numba.config.DISABLE_JIT else _balls_near
-lowest_bit = _lowest_bit_twin if numba.config.DISABLE_JIT else _lowest_bit
+balls_near: Any = _balls_near_twin if _plain else _balls_near
+lowest_bit: Any = _lowest_bit_twin if _plain else _lowest_bit

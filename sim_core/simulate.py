@@ -53,8 +53,8 @@ class Result:
 def simulate(scene: Scene) -> Result:
     """Plays the scene from its start to the end of its duration.
 
-    Releases the GIL while it runs; the same scene gives the same bits on any thread. Raises SimulationError when a ball is
-    lost, jams, or stops being a number.
+    Releases the GIL while it runs; the same scene gives the same bits on any thread. Raises SimulationError when a
+    ball is lost, jams, or stops being a number.
     """
     run = _Run(scene)
     run.play(scene.warmup, record=False)
@@ -147,9 +147,7 @@ class _Run:
             elif status == TOO_FAST:
                 speed = float(np.abs(self.motion[ball, 3:]).max())
                 if not math.isfinite(speed):
-                    raise SimulationError(
-                        f"ball {ball}: its velocity is not a number any more; {self._when()}"
-                    )
+                    raise SimulationError(f"ball {ball}: its velocity is not a number any more; {self._when()}")
                 self.shot = self._shot(4.0 * speed)
             elif status == STORM:
                 where = np.round(self._points(np.array([ball]))[0], 6).tolist()

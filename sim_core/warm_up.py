@@ -28,8 +28,6 @@ def compile_simulator(physics: Physics) -> float:
     tags = np.where(floor, tag, 1 if tag == 0 else 0)
     if physics.restitution is not None:
         tags = np.minimum(tags, len(physics.restitution.surfaces) - 1)
-    balls = Balls(
-        np.array([[0.3, 0.5, 0.5], [0.7, 0.5, 0.5]]), np.array([[1.0, 0.1, 0.0], [-1.0, 0.0, 0.1]]), 0.1
-    )
+    balls = Balls(np.array([[0.3, 0.5, 0.5], [0.7, 0.5, 0.5]]), np.array([[1.0, 0.1, 0.0], [-1.0, 0.0, 0.1]]), 0.1)
     simulate(Scene(TriangleMesh(vertices, triangles, tags), balls, physics, duration=0.01))
     return time.perf_counter() - start

@@ -1,6 +1,6 @@
 """When two balls meet. In the free-fall frame both fly straight, with gravity or without."""
 
-import math
+import numpy as np
 
 from sim_core._compile import jit
 from sim_core.roots import NEVER
@@ -22,4 +22,4 @@ def meeting_delay(apart: Vec3, closing: Vec3, reach: float) -> float:
     disc = rate * rate - dot(closing, closing) * excess
     if disc <= 0.0:
         return NEVER
-    return excess / (math.sqrt(disc) - rate)
+    return excess / (np.sqrt(disc) - rate)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim_core._compile import jit
-from sim_core.detect.ball_sonotrode import waving_face_delay
+from sim_core.detect.ball_sonotrode import same_plane, waving_plane_delay, within_waving_borders
 from sim_core.detect.ball_triangle import capsule_delay, face_delay
 from sim_core.effects.gravity import Gravity, acceleration
 from sim_core.effects.vibration import Wave
@@ -16,9 +16,7 @@ from sim_core.surfaces.obstacles import CAPSULE, FACE
 from sim_core.surfaces.tree import LEAF_BITS, STACK, Tree
 from sim_core.vec3 import Vec3
 
-SLACK = np.float32(
-    1.000001
-)  # on float32 times: ten times their rounding, so that an equal time is never pruned
+SLACK = np.float32(1.000001)  # on float32 times: ten times their rounding, so that an equal time is never pruned
 TINY = 1e-30  # stands for a chord component of zero, whose inverse would be infinite
 
 
@@ -74,12 +72,15 @@ def first_contact(
 ) -> tuple[float, int]:
     """Delay [s] and obstacle of the first contact within ``length`` [s]; (NEVER, -1) if there is none.
 
-    ``time`` [s]: now, on the window's clock (the sonotrode's phase depends on it). Ties go to the obstacle stored first.
+    ``time`` [s]: now, on the window's clock (the sonotrode's phase depends on it). Ties go to the obstacle stored
+    first.
     """
     fall = acceleration(gravity)
     _aim(scratch.ray, ball, fall, length)
     best = length
     found = -1
+    plane_row = -1  # the sonotrode's faces share a plane: its equation is solved once a query
+    plane_delay = NEVER
     scratch.nodes[0] = 0
     scratch.times[0] = np.float32(0.0)
     depth = 1
@@ -99,9 +100,14 @@ def first_contact(
                 elif kind == CAPSULE:
                     delay = capsule_delay(tree.numbers, row, ball, fall, tree.radius, best)
                 else:
-                    delay = waving_face_delay(
-                        tree.numbers, row, ball, fall, tree.radius, seam, wave, time, best
-                    )
+                    if plane_row < 0 or not same_plane(tree.numbers, row, plane_row):
+                        plane_row = row
+                        plane_delay = waving_plane_delay(tree.numbers, row, ball, fall, tree.radius, wave, time, best)
+                    delay = plane_delay
+                    if delay <= best and not within_waving_borders(
+                        tree.numbers, row, ball, fall, seam, wave, time, delay
+                    ):
+                        delay = NEVER
                 if delay < best or (delay == best and (found < 0 or row < found)):
                     best = delay
                     found = row

@@ -3,8 +3,6 @@
 The ball is its centre; see surfaces/obstacles.py for what it meets.
 """
 
-import math
-
 import numpy as np
 
 from sim_core._compile import jit
@@ -12,7 +10,9 @@ from sim_core.flight import Point
 from sim_core.roots import NEVER, first_approach
 from sim_core.vec3 import Vec3, along, dot, sub
 
-CONTACT = 1e-13  # m: a gap this small is contact with a capsule; a thousandth of what would count as early, 100 x rounding
+CONTACT = (
+    1e-13  # m: a gap this small is contact with a capsule; a thousandth of what would count as early, 100 x rounding
+)
 STEPS = 200  # 3 to 6 are used; a grazing touch converges by a factor of four a step
 HALF = 0.5  # of a radius: an overlap deeper than this is the far side of a one-sided face
 
@@ -56,21 +56,19 @@ def away_from_capsule(numbers: np.ndarray, row: int, at: Vec3) -> Vec3:
 
 
 @jit
-def capsule_delay(
-    numbers: np.ndarray, row: int, ball: Point, fall: Vec3, radius: float, limit: float
-) -> float:
+def capsule_delay(numbers: np.ndarray, row: int, ball: Point, fall: Vec3, radius: float, limit: float) -> float:
     """Time [s] until the centre meets the capsule; NEVER if it does not within ``limit`` [s].
 
-    The distance to a convex body is never below the distance to the plane that touches it at the nearest point. Along the
-    flight that plane distance is a quadratic in time: go to where it closes, take the plane there, repeat. Each stop lies
-    before the true contact, so nothing is stepped over.
+    The distance to a convex body is never below the distance to the plane that touches it at the nearest point.
+    Along the flight that plane distance is a quadratic in time: go to where it closes, take the plane there,
+    repeat. Each stop lies before the true contact, so nothing is stepped over.
     """
     delay = 0.0
     for _ in range(STEPS):
         at = along(along(ball.position, delay, ball.velocity), 0.5 * delay * delay, fall)
         velocity = along(ball.velocity, delay, fall)
         away = away_from_capsule(numbers, row, at)
-        distance = math.sqrt(dot(away, away))
+        distance = np.sqrt(dot(away, away))
         if distance == 0.0:
             return NEVER
         gap = distance - radius

@@ -1,4 +1,6 @@
-"""Uniform gravity: every flight is a parabola. Badreddine et al., "CAD based simulation of ultrasonic shot peening", eq. 1."""
+"""Uniform gravity: every flight is a parabola. Badreddine et al., "CAD based simulation of ultrasonic shot peening",
+eq. 1.
+"""
 
 from typing import NamedTuple
 

@@ -1,11 +1,11 @@
 """Normal restitution that falls with impact speed (the paper's eq. 2).
 
-e(v) = C0 for v < v0, C0 (v / v0)^(-1/4) above: Badreddine et al., "CAD based simulation of ultrasonic shot peening", eq. 2, after
-McNamara & Falcon, Phys. Rev. E 71 (2005) 031302. v is the relative normal speed.
+e(v) = C0 for v < v0, C0 (v / v0)^(-1/4) above: Badreddine et al., "CAD based simulation of ultrasonic shot
+peening", eq. 2, after McNamara & Falcon, Phys. Rev. E 71 (2005) 031302. v is the relative normal speed.
 
-Impacts slower than ``elastic_below`` lose nothing. Without such a floor a ball coming to rest bounces infinitely often in
-finite time; with it the number of bounces is bounded and what is neglected is below v²/2 per impact (the idea of the TC
-model of Luding & McNamara, Granular Matter 1 (1998) 113, with a speed in place of a time).
+Impacts slower than ``elastic_below`` lose nothing. Without such a floor a ball coming to rest bounces infinitely
+often in finite time; with it the number of bounces is bounded and what is neglected is below v²/2 per impact (the
+idea of the TC model of Luding & McNamara, Granular Matter 1 (1998) 113, with a speed in place of a time).
 """
 
 import math
@@ -16,7 +16,8 @@ import numpy as np
 from sim_core._compile import jit
 from sim_core.errors import SceneError
 
-# 10 mm/s [m/s]: a thousandth of the shot's speed. Mean speeds change by < 3 % between 1 and 100 mm/s; lower values spend
+# 10 mm/s [m/s]: a thousandth of the shot's speed. Mean speeds change by < 3 % between 1 and 100 mm/s; lower values
+# spend
 # events on chatter (2 % of sonotrode hits here, a fifth at 1 mm/s).
 ELASTIC_BELOW = 0.01
 
@@ -42,13 +43,9 @@ def checked_restitution(restitution: Restitution, tags: int) -> Restitution:
     pairs = [(f"surfaces[{i}]", *pair) for i, pair in enumerate(surfaces)] + [("balls", *restitution.balls)]
     for name, c0, v0 in pairs:
         if not 0.0 <= c0 <= 1.0 or not 0.0 < v0 < math.inf:
-            raise SceneError(
-                f"restitution.{name} is ({c0}, {v0}): C0 must lie in [0, 1] and v0 be positive [m/s]"
-            )
+            raise SceneError(f"restitution.{name} is ({c0}, {v0}): C0 must lie in [0, 1] and v0 be positive [m/s]")
     if not restitution.elastic_below >= 0.0:
-        raise SceneError(
-            f"restitution.elastic_below is {restitution.elastic_below}: it must be 0 or more [m/s]"
-        )
+        raise SceneError(f"restitution.elastic_below is {restitution.elastic_below}: it must be 0 or more [m/s]")
     return Restitution(
         surfaces, (float(restitution.balls[0]), float(restitution.balls[1])), float(restitution.elastic_below)
     )

@@ -1,6 +1,7 @@
-"""The sonotrode: one tagged surface moves as a rigid body, amplitude sin(2π frequency t + phase) along its axis, exactly.
+"""The sonotrode: one tagged surface moves as a rigid body by amplitude sin(2π frequency t + phase), exactly.
 
-Source: the process itself (a piezoelectric generator at a fixed frequency); the face's peak speed is 2π frequency amplitude.
+Source: the process itself (a piezoelectric generator at a fixed frequency, amplitude zero-to-peak); the face's peak
+speed is 2π frequency amplitude.
 """
 
 import math
@@ -12,7 +13,10 @@ from sim_core.vec3 import Vec3
 
 
 class Vibration(NamedTuple):
-    """``tag`` of the moving surface; ``amplitude`` [m] zero-to-peak; ``frequency`` [Hz]; ``phase`` [rad] at time 0; unit ``axis``."""
+    """Harmonic motion of the surface ``tag`` along ``axis``.
+
+    ``amplitude`` [m] zero-to-peak; ``frequency`` [Hz]; ``phase`` [rad] at time 0.
+    """
 
     tag: int
     amplitude: float

@@ -11,8 +11,8 @@ from sim_core.vec3 import Vec3, dot
 def pair_kick(apart: Vec3, closing: Vec3, restitution: Restitution | None) -> Vec3:
     """Velocity change [m/s] of the first ball, and minus that of the second.
 
-    ``apart`` [m], ``closing`` [m/s]: second minus first. Zero when they separate. Dividing by |apart|² keeps the energy of an
-    elastic collision to rounding, where a rounded unit normal would drift.
+    ``apart`` [m], ``closing`` [m/s]: second minus first. Zero when they separate. Dividing by |apart|² keeps the
+    energy of an elastic collision to rounding, where a rounded unit normal would drift.
     """
     rate = dot(apart, closing)
     if rate >= 0.0:

@@ -1,4 +1,4 @@
-"""A ball collides with a surface: the normal velocity relative to it is reversed and multiplied by e, the tangential kept."""
+"""A ball hits a surface: the normal velocity relative to it is reversed and multiplied by e, the tangential kept."""
 
 import math
 
@@ -11,7 +11,8 @@ from sim_core.vec3 import Vec3, dot
 def surface_kick(away: Vec3, relative: Vec3, restitution: Restitution | None, tag: int) -> Vec3:
     """Velocity change [m/s] of the ball; zero when it separates.
 
-    ``away``: any vector along the normal, from the surface to the ball; ``relative`` [m/s]: the ball's velocity minus the surface's.
+    ``away``: any vector along the normal, from the surface to the ball; ``relative`` [m/s]: the ball's velocity
+    minus the surface's.
     """
     rate = dot(away, relative)
     if rate >= 0.0:

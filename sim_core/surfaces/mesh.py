@@ -14,11 +14,11 @@ class TriangleMesh:
     """The cavity's surface.
 
     ``vertices`` [m], shape (n, 3) float64. ``triangles``, shape (m, 3) int32: indices of vertices, wound so that
-    the enclosed cavity has positive volume (normals point out of the cavity, away from the shot).
-    ``tags``, shape (m,) uint8: the surface each triangle belongs to; restitution and vibration go by tag.
+    the enclosed cavity has positive volume (normals point out of the cavity, away from the shot). ``tags``, shape
+    (m,) uint8: the surface each triangle belongs to; restitution and vibration go by tag.
 
-    Raises SceneError for wrong shapes, indices or numbers, an open or non-manifold surface, or one that is
-    inside out; the message names the triangle or edge.
+    Raises SceneError for wrong shapes, indices or numbers, an open or non-manifold surface, or one that is inside
+    out; the message names the triangle or edge.
 
         outside      ___________          normals point out of the cavity; a tag is a number
                     |  cavity   |         the user chooses, e.g. 0 part, 1 sonotrode, 2 wall
@@ -39,18 +39,12 @@ class TriangleMesh:
             raise SceneError(f"mesh triangles must have shape (m, 3) with m >= 4, not {triangles.shape}")
         tags = np.asarray(self.tags)
         if tags.shape != (len(triangles),):
-            raise SceneError(
-                f"mesh tags must have shape ({len(triangles)},), one a triangle, not {tags.shape}"
-            )
+            raise SceneError(f"mesh tags must have shape ({len(triangles)},), one a triangle, not {tags.shape}")
         if tags.min() < 0 or tags.max() >= MAX_TAGS:
-            raise SceneError(
-                f"mesh tags must lie between 0 and {MAX_TAGS - 1}, not {tags.min()} to {tags.max()}"
-            )
+            raise SceneError(f"mesh tags must lie between 0 and {MAX_TAGS - 1}, not {tags.min()} to {tags.max()}")
         bad = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
         if len(bad):
-            raise SceneError(
-                f"mesh vertex {bad[0]} is {vertices[bad[0]].tolist()}: coordinates must be finite"
-            )
+            raise SceneError(f"mesh vertex {bad[0]} is {vertices[bad[0]].tolist()}: coordinates must be finite")
         wrong = np.flatnonzero((triangles < 0).any(axis=1) | (triangles >= len(vertices)).any(axis=1))
         if len(wrong):
             raise SceneError(f"mesh triangle {wrong[0]} names a vertex outside 0 to {len(vertices) - 1}")
@@ -92,9 +86,7 @@ def _require_closed(vertices: np.ndarray, triangles: np.ndarray) -> None:
     if counts.max() > 1:
         edge = np.flatnonzero(forward == keys[counts > 1][0])
         named = f"triangles {edge[0] // 3} and {edge[1] // 3}"
-        raise SceneError(
-            f"mesh {named} run along a shared edge the same way: flipped or overlapping triangles"
-        )
+        raise SceneError(f"mesh {named} run along a shared edge the same way: flipped or overlapping triangles")
     lonely = np.flatnonzero(~np.isin(backward, keys))
     if len(lonely):
         where = vertices[edges[lonely[0]]].mean(axis=0)

@@ -29,9 +29,9 @@ SEAM_PER_RADIUS = 1e-5  # the same for balls so small that SEAM would show
 class Obstacles(NamedTuple):
     """What the centre of a ball can hit, one row each. k = faces + capsules.
 
-    ``numbers`` (k, 16) float64 [m]: a face holds its unit normal towards the shot (0:3), the moved plane's offset (3), and
-    three inward in-plane border normals with their offsets (4:16); a capsule its start (0:3), unit direction (3:6), length (6).
-    ``kinds`` (k,) uint8; ``triangles`` (k,) int32: the mesh triangle to book a hit on.
+    ``numbers`` (k, 16) float64 [m]: a face holds its unit normal towards the shot (0:3), the moved plane's offset
+    (3), and three inward in-plane border normals with their offsets (4:16); a capsule its start (0:3), unit
+    direction (3:6), length (6). ``kinds`` (k,) uint8; ``triangles`` (k,) int32: the mesh triangle to book a hit on.
     ``low``, ``high`` (k, 3) float64 [m]: bounding boxes.
     """
 
@@ -52,7 +52,8 @@ def build_obstacles(
 ) -> Obstacles:
     """Obstacles for balls of one radius [m]; coordinates are taken relative to ``centre`` (3,) [m].
 
-    ``waving`` (m,) bool marks triangles that vibrate by ``swing`` [m] zero-to-peak: their boxes hold the whole swing.
+    ``waving`` (m,) bool marks triangles that vibrate by ``swing`` [m] zero-to-peak: their boxes hold the whole
+    swing.
     """
     corners = mesh.corners - centre
     towards_shot = -np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -77,6 +78,7 @@ def _faces(
     numbers = np.zeros((len(solid), 16))
     numbers[:, 0:3] = normal
     numbers[:, 3] = np.einsum("ij,ij->i", normal, corner.mean(axis=1)) + radius
+    _share_plane(numbers, waving[solid])
     for k in range(3):
         start, along = corner[:, k], corner[:, (k + 1) % 3] - corner[:, k]
         inward = np.cross(along, normal)  # the winding is clockwise seen from the shot
@@ -86,9 +88,18 @@ def _faces(
     moved = corner + radius * normal[:, None]
     grow = seam(radius) + np.where(waving[solid], swing, 0.0)[:, None]
     kinds = np.where(waving[solid], WAVING_FACE, FACE).astype(np.uint8)
-    return Obstacles(
-        numbers, kinds, solid.astype(np.int32), moved.min(axis=1) - grow, moved.max(axis=1) + grow
-    )
+    return Obstacles(numbers, kinds, solid.astype(np.int32), moved.min(axis=1) - grow, moved.max(axis=1) + grow)
+
+
+def _share_plane(numbers: np.ndarray, waving: np.ndarray) -> None:
+    """Give waving faces that lie in one plane but for rounding the very same plane, so that it is solved once for all."""
+    rows = np.flatnonzero(waving)
+    while len(rows):
+        first = numbers[rows[0], 0:4]
+        size = max(1.0, np.abs(numbers[rows, 3]).max())
+        same = (np.abs(numbers[rows, 0:4] - first) <= 1e-13 * size).all(axis=1)
+        numbers[rows[same], 0:4] = first
+        rows = rows[~same]
 
 
 def _capsules(
@@ -115,8 +126,8 @@ def _capsules(
     if rim.any():
         edge = np.flatnonzero(rim)[0]
         raise SceneError(
-            f"the vibrating surface has a free rim at the edge of triangles {t_one[edge]} and {t_two[edge]}: a moving edge "
-            "is not supported yet; let the sonotrode fill the chamber's floor from wall to wall, flat"
+            f"the vibrating surface has a free rim at the edge of triangles {t_one[edge]} and {t_two[edge]}: "
+            "a moving edge is not supported yet; let the sonotrode fill the chamber's floor from wall to wall, flat"
         )
     keep = np.flatnonzero(convex & (length > 0.0))
     numbers = np.zeros((len(keep), 16))

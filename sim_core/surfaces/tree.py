@@ -1,7 +1,7 @@
 """An eight-wide tree of bounding boxes over the obstacles.
 
-Built level by level with numpy: each node's obstacles are halved three times at the median of their centres along the
-longest side, giving eight children; a child of at most LEAF obstacles is a leaf. Median splits make the depth
+Built level by level with numpy: each node's obstacles are halved three times at the median of their centres along
+the longest side, giving eight children; a child of at most LEAF obstacles is a leaf. Median splits make the depth
 log8(obstacles), whatever their sizes.
 """
 
@@ -22,8 +22,8 @@ class Tree(NamedTuple):
     """The obstacles and their boxes, ready for compiled code; coordinates relative to the scene's centre.
 
     ``bounds`` (nodes, 6, 8) float32: low x, y, z and high x, y, z of each node's eight children, padded outward;
-    ``children`` (nodes, 8) int32: >= 0 a node, < 0 a leaf; ``numbers``, ``kinds``, ``triangles``: the obstacles in leaf order;
-    ``radius`` [m] of the balls they were made for.
+    ``children`` (nodes, 8) int32: >= 0 a node, < 0 a leaf; ``numbers``, ``kinds``, ``triangles``: the obstacles in
+    leaf order; ``radius`` [m] of the balls they were made for.
     """
 
     bounds: np.ndarray
@@ -75,9 +75,7 @@ def _halve(order: np.ndarray, edges: np.ndarray, centre: np.ndarray) -> tuple[np
     busy = np.flatnonzero(end - start > LEAF)
     if len(busy):
         sizes = end[busy] - start[busy]
-        where = np.repeat(start[busy] - np.concatenate([[0], np.cumsum(sizes)[:-1]]), sizes) + np.arange(
-            sizes.sum()
-        )
+        where = np.repeat(start[busy] - np.concatenate([[0], np.cumsum(sizes)[:-1]]), sizes) + np.arange(sizes.sum())
         owner = np.repeat(np.arange(len(busy)), sizes)
         points = centre[order[where]]
         heads = np.concatenate([[0], np.cumsum(sizes)[:-1]])
@@ -85,14 +83,10 @@ def _halve(order: np.ndarray, edges: np.ndarray, centre: np.ndarray) -> tuple[np
         key = points[np.arange(len(points)), extent.argmax(axis=1)[owner]]
         order = order.copy()
         order[where] = order[where][np.lexsort((key, owner))]
-    return order, np.stack(
-        [np.stack([start, middle], axis=1), np.stack([middle, end], axis=1)], axis=1
-    ).reshape(-1, 2)
+    return order, np.stack([np.stack([start, middle], axis=1), np.stack([middle, end], axis=1)], axis=1).reshape(-1, 2)
 
 
-def _bounds(
-    order: np.ndarray, first: np.ndarray, last: np.ndarray, low: np.ndarray, high: np.ndarray
-) -> np.ndarray:
+def _bounds(order: np.ndarray, first: np.ndarray, last: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """Boxes (nodes, 6, 8) of the children; float32, never smaller than the float64 box."""
     nodes = len(first)
     boxes = np.full((nodes, 6, BOXES), FAR, dtype=np.float32)

@@ -1,0 +1,44 @@
+"""Closed triangle meshes the tests simulate in; tags: 0 ceiling (the part's place), 1 floor (the sonotrode's), 2
+sides.
+"""
+
+import numpy as np
+import trimesh
+
+from sim_core import TriangleMesh
+
+CEILING, FLOOR, SIDES = 0, 1, 2
+
+
+def tagged(vertices: np.ndarray, triangles: np.ndarray) -> TriangleMesh:
+    """Tags triangles by where they lie: highest, lowest, or between."""
+    z = vertices[triangles][:, :, 2]
+    tags = np.full(len(triangles), SIDES)
+    tags[(z == z.max()).all(axis=1)] = CEILING
+    tags[(z == z.min()).all(axis=1)] = FLOOR
+    return TriangleMesh(vertices, triangles, tags)
+
+
+def box(sides: tuple[float, float, float], centre: tuple[float, float, float] | None = None) -> TriangleMesh:
+    """A box [m], from the origin up unless a centre is given."""
+    mesh = trimesh.creation.box(sides)
+    middle = 0.5 * np.array(sides) if centre is None else np.array(centre)
+    return tagged(np.asarray(mesh.vertices) + middle, np.asarray(mesh.faces))
+
+
+def cylinder(radius: float, height: float, sections: int = 64, subdivisions: int = 0) -> TriangleMesh:
+    """A cylinder [m] standing on z = 0."""
+    mesh = trimesh.creation.cylinder(radius=radius, height=height, sections=sections)
+    vertices, triangles = np.asarray(mesh.vertices) + np.array([0.0, 0.0, 0.5 * height]), np.asarray(mesh.faces)
+    for _ in range(subdivisions):
+        vertices, triangles = trimesh.remesh.subdivide(vertices, triangles)
+    return tagged(np.round(vertices, 15), triangles)
+
+
+def box_around(obstacle: trimesh.Trimesh, half: float) -> TriangleMesh:
+    """A cube of half side ``half`` [m] about the origin with a solid body in it: the cavity is what is left."""
+    room = trimesh.creation.box((2 * half, 2 * half, 2 * half))
+    vertices = np.concatenate([room.vertices, obstacle.vertices])
+    triangles = np.concatenate([room.faces, obstacle.faces[:, ::-1] + len(room.vertices)])
+    tags = np.concatenate([np.full(len(room.faces), SIDES), np.full(len(obstacle.faces), CEILING)])
+    return TriangleMesh(vertices, triangles, tags)

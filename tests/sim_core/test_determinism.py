@@ -1,0 +1,70 @@
+"""Same scene, same bits: run twice, on threads, with the JIT off, stopped and resumed."""
+
+import hashlib
+import os
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+
+from sim_core import Balls, Gravity, Physics, Restitution, Result, Scene, Vibration, pack_balls, simulate
+from tests.cavities import FLOOR, cylinder
+
+PHYSICS = Physics(
+    Gravity(),
+    Restitution(((0.9, 0.7), (0.9, 0.7), (0.8, 0.5)), (0.9, 0.7)),
+    Vibration(FLOOR, 25e-6, 20e3, 0.3),
+)
+
+
+def small_scene(duration: float, count: int = 20) -> Scene:
+    room = cylinder(0.012, 0.02, sections=12)
+    rng = np.random.default_rng(5)
+    balls = Balls(pack_balls(room, count, 3e-3, rng), rng.normal(0.0, 3.0, (count, 3)), 3e-3)
+    return Scene(room, balls, PHYSICS, duration)
+
+
+def fingerprint(result: Result) -> str:
+    digest = hashlib.sha256()
+    log = result.impacts
+    for column in (log.time, log.ball, log.triangle, log.position, log.velocity, log.normal_speed):
+        digest.update(np.ascontiguousarray(column).tobytes())
+    digest.update(result.balls.positions.tobytes() + result.balls.velocities.tobytes())
+    return digest.hexdigest()
+
+
+def test_the_same_scene_gives_the_same_bits_alone_and_on_threads() -> None:
+    scene = small_scene(1.0)
+    once = fingerprint(simulate(scene))
+    with ThreadPoolExecutor(4) as pool:
+        assert {fingerprint(r) for r in pool.map(simulate, [scene] * 4)} == {once}
+
+
+def test_the_jit_switched_off_gives_the_same_bits() -> None:
+    code = (
+        "from tests.sim_core.test_determinism import fingerprint, small_scene; from sim_core import simulate;"
+        "r = simulate(small_scene(0.03, 6)); print(r.collisions.total, fingerprint(r))"
+    )
+    here = Path(__file__).parents[2]
+    plain = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
+    answers = [
+        subprocess.run(
+            [sys.executable, "-c", code], cwd=here, env=env, check=True, capture_output=True, text=True
+        ).stdout
+        for env in (plain, dict(os.environ))
+    ]
+    assert int(answers[0].split()[0]) > 50
+    assert answers[0] == answers[1]
+
+
+def test_stopping_and_going_on_changes_nothing() -> None:
+    """A page of the log filling up, a check, a stop: none may touch the trajectory."""
+    whole = simulate(small_scene(0.5))
+    warm = small_scene(0.3)
+    warm = simulate(Scene(warm.mesh, warm.balls, PHYSICS, duration=0.3, warmup=0.2))
+    assert (whole.balls.positions == warm.balls.positions).all()
+    late = whole.impacts.time > 0.2
+    np.testing.assert_array_equal(whole.impacts.triangle[late], warm.impacts.triangle)
+    np.testing.assert_allclose(whole.impacts.time[late] - 0.2, warm.impacts.time, atol=1e-15)

@@ -1,0 +1,70 @@
+"""Scenes that cannot be simulated are refused at the door, with the ball, triangle or field named."""
+
+import math
+
+import numpy as np
+import pytest
+
+from sim_core import Balls, Gravity, Physics, Restitution, Scene, SceneError, TriangleMesh, Vibration
+from tests.cavities import box
+
+ROOM = box((0.03, 0.03, 0.03))
+MIDDLE = [0.015, 0.015, 0.015]
+
+
+def balls(*positions: list[float], diameter: float = 3e-3) -> Balls:
+    return Balls(np.array(positions), np.zeros((len(positions), 3)), diameter)
+
+
+@pytest.mark.parametrize(
+    ("where", "said"),
+    [
+        ([0.05, 0.015, 0.015], "ball 1 .* is outside the mesh"),
+        ([0.001, 0.015, 0.015], "ball 1 .* overlaps a surface by 0.0005 m"),
+        ([0.015, 0.015, 0.0165], "balls 0 and 1 overlap by 0.0015 m"),
+    ],
+)
+def test_a_ball_in_the_wrong_place_is_named(where: list[float], said: str) -> None:
+    with pytest.raises(SceneError, match=said):
+        Scene(ROOM, balls(MIDDLE, where), Physics(), 1.0)
+
+
+@pytest.mark.parametrize(
+    ("physics", "said"),
+    [
+        (Physics(gravity=Gravity(z=math.nan)), "gravity"),
+        (Physics(restitution=Restitution(((0.9, 1.0),), (0.9, 1.0))), "tags 0 to 2"),
+        (Physics(restitution=Restitution(((1.1, 1.0),) * 3, (0.9, 1.0))), r"surfaces\[0\] is \(1.1, 1.0\)"),
+        (Physics(vibration=Vibration(7, 1e-6, 20e3)), "tag is 7, but the mesh has tags"),
+        (Physics(vibration=Vibration(1, -1e-6, 20e3)), "amplitude"),
+        (Physics(vibration=Vibration(1, 1e-6, 0.0)), "frequency"),
+    ],
+)
+def test_physics_out_of_range_is_named(physics: Physics, said: str) -> None:
+    with pytest.raises(SceneError, match=said):
+        Scene(ROOM, balls(MIDDLE), physics, 1.0)
+
+
+def test_an_open_an_inside_out_and_a_broken_mesh_are_refused() -> None:
+    v, t, tags = ROOM.vertices, ROOM.triangles, ROOM.tags
+    with pytest.raises(SceneError, match=r"not closed: 3 open edge\(s\)"):
+        TriangleMesh(v, t[1:], tags[1:])
+    with pytest.raises(SceneError, match="inside out"):
+        TriangleMesh(v, t[:, ::-1], tags)
+    with pytest.raises(SceneError, match="run along a shared edge the same way"):
+        TriangleMesh(v, np.concatenate([t[:1, ::-1], t[1:]]), tags)
+    broken = v.copy()
+    broken[3] = np.nan
+    with pytest.raises(SceneError, match="vertex 3"):
+        TriangleMesh(broken, t, tags)
+
+
+def test_numbers_that_are_none_are_refused() -> None:
+    with pytest.raises(SceneError, match="ball 0"):
+        Balls(np.array([[math.inf, 0, 0]]), np.zeros((1, 3)), 3e-3)
+    with pytest.raises(SceneError, match="diameter"):
+        balls(MIDDLE, diameter=-1.0)
+    with pytest.raises(SceneError, match="not supported"):
+        Balls(np.zeros((2, 3)), np.zeros((2, 3)), np.array([1e-3, 2e-3]))  # type: ignore[arg-type]
+    with pytest.raises(SceneError, match="duration"):
+        Scene(ROOM, balls(MIDDLE), Physics(), 0.0)
