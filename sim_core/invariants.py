@@ -5,6 +5,8 @@ their sums.
 """
 
 import math
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,56 +15,77 @@ from sim_core.balls import Balls
 from sim_core.effects.gravity import Gravity
 from sim_core.surfaces.mesh import TriangleMesh
 
-# A ray direction no designer's edge is parallel to, so that a ray through an edge or corner is a coincidence; where it
-# happens all the same (a crossing within 1e-9 of a border), the next direction is asked.
+# Ray directions no designer's edge is parallel to, so that a ray through an edge or corner is a coincidence; where it
+# happens all the same, the next direction is asked.
 RAYS = np.array([[0.3671, 0.2113, 0.9058], [-0.5317, 0.7411, 0.4098], [0.6119, -0.4733, -0.6337]])
-BORDER = 1e-9
+BORDER = 1e-12  # of the mesh's size squared: a ray passing an edge by less is asked again along the next direction
+
+
+class _Shadows(NamedTuple):
+    """The triangles seen along a ray.
+
+    ``corners`` (m, 3, 3) with the ray as third axis; ``boxes`` (m, 4): low, high of the first axis and of the second;
+    ``turn`` (3, 3), rows the axes; ``border`` [m²].
+    """
+
+    corners: np.ndarray
+    boxes: np.ndarray
+    turn: np.ndarray
+    border: float
+
+
+@lru_cache(maxsize=32)
+def _shadows(mesh: TriangleMesh, k: int) -> _Shadows:
+    ray = RAYS[k] / np.linalg.norm(RAYS[k])
+    side = np.cross(ray, [1.0, 0.0, 0.0])
+    side /= np.linalg.norm(side)
+    turn = np.stack([side, np.cross(ray, side), ray])
+    corners = np.ascontiguousarray(mesh.corners @ turn.T)
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    boxes = np.stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1]], axis=1)
+    return _Shadows(corners, boxes, turn, BORDER * float(np.ptp(mesh.vertices, axis=0).max()) ** 2)
 
 
 @jit
-def _crossings(corners: np.ndarray, point: np.ndarray, ray: np.ndarray) -> int:
-    """Triangles a ray from the point crosses; -1 when one is crossed too near its border to tell.
-
-    Möller & Trumbore, J. Graphics Tools 2 (1997) 21.
-    """
+def _crossings(shadows: _Shadows, u: float, v: float, w: float) -> int:
+    """Triangles that the ray from (u, v, w) along the third axis crosses; -1: too near an edge to tell."""
     crossed = 0
-    for t in range(len(corners)):
-        ax, ay, az = corners[t, 0, 0], corners[t, 0, 1], corners[t, 0, 2]
-        e1x, e1y, e1z = corners[t, 1, 0] - ax, corners[t, 1, 1] - ay, corners[t, 1, 2] - az
-        e2x, e2y, e2z = corners[t, 2, 0] - ax, corners[t, 2, 1] - ay, corners[t, 2, 2] - az
-        px, py, pz = ray[1] * e2z - ray[2] * e2y, ray[2] * e2x - ray[0] * e2z, ray[0] * e2y - ray[1] * e2x
-        det = e1x * px + e1y * py + e1z * pz
-        if det == 0.0:
+    corners, boxes = shadows.corners, shadows.boxes
+    for t in range(len(boxes)):
+        if u < boxes[t, 0] or u > boxes[t, 1] or v < boxes[t, 2] or v > boxes[t, 3]:
             continue
-        tx, ty, tz = point[0] - ax, point[1] - ay, point[2] - az
-        u = (tx * px + ty * py + tz * pz) / det
-        qx, qy, qz = ty * e1z - tz * e1y, tz * e1x - tx * e1z, tx * e1y - ty * e1x
-        v = (ray[0] * qx + ray[1] * qy + ray[2] * qz) / det
-        if u < -BORDER or v < -BORDER or u + v > 1.0 + BORDER:
-            continue
-        if (e2x * qx + e2y * qy + e2z * qz) / det <= 0.0:
-            continue
-        if u < BORDER or v < BORDER or u + v > 1.0 - BORDER:
+        au, av = corners[t, 0, 0] - u, corners[t, 0, 1] - v
+        bu, bv = corners[t, 1, 0] - u, corners[t, 1, 1] - v
+        cu, cv = corners[t, 2, 0] - u, corners[t, 2, 1] - v
+        a, b, c = bu * cv - bv * cu, cu * av - cv * au, au * bv - av * bu  # twice the areas seen from the ray
+        if min(abs(a), abs(b), abs(c)) <= shadows.border:
             return -1
-        crossed += 1
+        if (a > 0.0) == (b > 0.0) == (c > 0.0):
+            above = a * corners[t, 0, 2] + b * corners[t, 1, 2] + c * corners[t, 2, 2]
+            if above / (a + b + c) > w:
+                crossed += 1
     return crossed
 
 
 @jit
-def _contains(corners: np.ndarray, points: np.ndarray, rays: np.ndarray, inside: np.ndarray) -> None:
+def _count(shadows: _Shadows, points: np.ndarray, crossed: np.ndarray) -> None:
     for i in range(len(points)):
-        for k in range(len(rays)):
-            crossed = _crossings(corners, points[i], rays[k])
-            if crossed >= 0:
-                break
-        inside[i] = crossed % 2 == 1
+        crossed[i] = _crossings(shadows, points[i, 0], points[i, 1], points[i, 2])
 
 
 def contained(mesh: TriangleMesh, points: np.ndarray) -> np.ndarray:
-    """Which points (n, 3) [m] lie inside the mesh, shape (n,) bool, by ray parity."""
-    points = np.ascontiguousarray(points, dtype=np.float64)
+    """Which points (n, 3) [m] lie inside the mesh, shape (n,) bool, by the parity of crossings along a ray."""
+    points = np.asarray(points, dtype=np.float64)
     inside = np.zeros(len(points), dtype=np.bool_)
-    _contains(mesh.corners, points, RAYS, inside)
+    asked = np.arange(len(points))
+    for k in range(len(RAYS)):
+        shadows = _shadows(mesh, k)
+        crossed = np.zeros(len(asked), dtype=np.int64)
+        _count(shadows, np.ascontiguousarray(points[asked] @ shadows.turn.T), crossed)
+        inside[asked] = crossed % 2 == 1
+        asked = asked[crossed < 0]
+        if len(asked) == 0:
+            break
     return inside
 
 
@@ -116,11 +139,10 @@ def _clear(
         gap[i] = math.sqrt(nearest)
 
 
-def clearance(mesh: TriangleMesh, points: np.ndarray, reach: float) -> np.ndarray:
-    """Distance (n,) [m] from points (n, 3) [m] to the nearest triangle, at most ``reach`` [m]."""
+def clearance(corners: np.ndarray, points: np.ndarray, reach: float) -> np.ndarray:
+    """Distance (n,) [m] from points (n, 3) to the nearest of the triangles (m, 3 corners, 3), at most ``reach`` [m]."""
     points = np.ascontiguousarray(points, dtype=np.float64)
     gap = np.zeros(len(points))
-    corners = mesh.corners
     _clear(corners, corners.min(axis=1), corners.max(axis=1), points, reach, gap)
     return gap
 

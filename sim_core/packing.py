@@ -15,15 +15,18 @@ FIRST_LAYER = 1.5  # diameters
 GAP = 1e-6  # m kept between neighbours and from surfaces, so that rounding of positions cannot overlap them
 
 
-def pack_balls(mesh: TriangleMesh, count: int, diameter: float, rng: np.random.Generator) -> np.ndarray:
+def pack_balls(
+    mesh: TriangleMesh, count: int, diameter: float, rng: np.random.Generator, clear: float = 0.0
+) -> np.ndarray:
     """Positions [m] of ``count`` balls inside the mesh, shape (count, 3), no two overlapping.
 
-    ``diameter`` [m]. "Low" is along -z. Raises SceneError when they do not fit: random placement reaches about 30 %
-    of the volume a ball can use.
+    ``diameter`` [m]; ``clear`` [m] is kept from every surface (at least the amplitude, where one vibrates). "Low" is
+    along -z. Raises SceneError when they do not fit: random placement reaches about 30 % of the volume a ball can use.
     """
     radius = 0.5 * diameter + GAP
-    low = mesh.vertices.min(axis=0) + radius
-    high = mesh.vertices.max(axis=0) - radius
+    free = radius + clear
+    low = mesh.vertices.min(axis=0) + free
+    high = mesh.vertices.max(axis=0) - free
     if (high < low).any():
         raise SceneError(f"no ball of {diameter * 1e3:.3g} mm fits into the mesh: it is narrower than the ball")
     placed = np.zeros((count, 3))
@@ -31,7 +34,7 @@ def pack_balls(mesh: TriangleMesh, count: int, diameter: float, rng: np.random.G
     top = min(low[2] + FIRST_LAYER * diameter, high[2])
     while done < count:
         tries = rng.uniform(low, [high[0], high[1], top], size=(BATCH, 3))
-        tries = tries[clearance(mesh, tries, radius) >= radius]
+        tries = tries[clearance(mesh.corners, tries, free) >= free]
         tries = tries[contained(mesh, tries)]
         before = done
         for point in tries:

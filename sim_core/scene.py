@@ -57,15 +57,33 @@ class Scene:
         if len(outside):
             where = balls.positions[outside[0]].tolist()
             raise SceneError(f"ball {outside[0]} at {where} m is outside the mesh ({len(outside)} in all)")
-        gap = clearance(self.mesh, balls.positions, balls.radius) - balls.radius
+        gap = clearance(self.mesh.corners, balls.positions, balls.radius) - balls.radius
         worst = int(gap.argmin())
         if gap[worst] < -TOUCH:
             raise SceneError(
                 f"ball {worst} at {balls.positions[worst].tolist()} m overlaps a surface by {-gap[worst]:.3g} m; "
                 "move it or make it smaller"
             )
+        self._require_room_above_sonotrode()
         distance, one, two = closest_pair(balls)
         if distance < balls.diameter - TOUCH:
             raise SceneError(
                 f"balls {one} and {two} overlap by {balls.diameter - distance:.3g} m at the start; move one of them"
+            )
+
+    def _require_room_above_sonotrode(self) -> None:
+        """The vibrating surface is not where the mesh has it, but displaced by its phase."""
+        vibration = self.physics.vibration
+        if vibration is None:
+            return
+        raised = (
+            vibration.amplitude * np.sin(vibration.phase) * np.array(vibration.axis) / np.linalg.norm(vibration.axis)
+        )
+        corners = np.ascontiguousarray(self.mesh.corners[self.mesh.tags == vibration.tag] + raised)
+        gap = clearance(corners, self.balls.positions, self.balls.radius) - self.balls.radius
+        worst = int(gap.argmin())
+        if gap[worst] < -TOUCH:
+            raise SceneError(
+                f"ball {worst} at {self.balls.positions[worst].tolist()} m starts {-gap[worst]:.3g} m inside the "
+                "vibrating surface, which is displaced by its phase at the start; keep one amplitude clear of it"
             )

@@ -5,7 +5,7 @@ sides.
 import numpy as np
 import trimesh
 
-from sim_core import TriangleMesh
+from sim_core import Balls, TriangleMesh
 
 CEILING, FLOOR, SIDES = 0, 1, 2
 
@@ -42,3 +42,8 @@ def box_around(obstacle: trimesh.Trimesh, half: float) -> TriangleMesh:
     triangles = np.concatenate([room.faces, obstacle.faces[:, ::-1] + len(room.vertices)])
     tags = np.concatenate([np.full(len(room.faces), SIDES), np.full(len(obstacle.faces), CEILING)])
     return TriangleMesh(vertices, triangles, tags)
+
+
+def balls_at(positions: np.ndarray, diameter: float = 3e-3) -> Balls:
+    """Balls at rest."""
+    return Balls(positions, np.zeros_like(positions, dtype=float), diameter)

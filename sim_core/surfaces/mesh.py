@@ -1,6 +1,7 @@
 """A closed, tagged triangle mesh: the boundary of the space the shot moves in."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -57,10 +58,10 @@ class TriangleMesh:
         object.__setattr__(self, "triangles", triangles)
         object.__setattr__(self, "tags", tags)
 
-    @property
+    @cached_property
     def corners(self) -> np.ndarray:
         """Corner positions [m], shape (m, 3 corners, 3)."""
-        return np.asarray(self.vertices[self.triangles])
+        return np.ascontiguousarray(self.vertices[self.triangles])
 
     @property
     def volume(self) -> float:

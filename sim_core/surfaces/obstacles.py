@@ -92,7 +92,7 @@ def _faces(
 
 
 def _share_plane(numbers: np.ndarray, waving: np.ndarray) -> None:
-    """Give waving faces that lie in one plane but for rounding the very same plane, so that it is solved once for all."""
+    """Give waving faces that lie in one plane but for rounding that very plane, so that it is solved once for all."""
     rows = np.flatnonzero(waving)
     while len(rows):
         first = numbers[rows[0], 0:4]

@@ -12,7 +12,7 @@ GOLDEN = 0.3819660112501051
 
 @numba.njit(cache=True)
 def _point_triangle(p: np.ndarray, corners: np.ndarray) -> float:
-    """Distance from a point (3,) to a triangle (3, 3): its plane where the foot lies inside, else the nearest border."""
+    """Distance from a point (3,) to a triangle (3, 3): to its plane if the foot lies inside, else to a border."""
     a, b, c = corners[0], corners[1], corners[2]
     normal = np.cross(b - a, c - a)
     size = np.sqrt((normal * normal).sum())
@@ -42,7 +42,7 @@ def _gap(t: float, p: np.ndarray, v: np.ndarray, g: np.ndarray, corners: np.ndar
 
 @numba.njit(cache=True)
 def bracket(p, v, g, corners, radius, length):  # type: ignore[no-untyped-def]
-    """(last time outside, first known time inside); (inf, inf) if the ball passes; the lowest gap seen. Starts apart."""
+    """(last time outside, first known time inside), infinite if the ball passes; the lowest gap seen. Starts apart."""
     step = length / SAMPLES
     before, here = np.inf, _gap(0.0, p, v, g, corners, radius)
     lowest = here

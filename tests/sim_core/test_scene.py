@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sim_core import Balls, Gravity, Physics, Restitution, Scene, SceneError, TriangleMesh, Vibration
-from tests.cavities import box
+from tests.cavities import FLOOR, box
 
 ROOM = box((0.03, 0.03, 0.03))
 MIDDLE = [0.015, 0.015, 0.015]
@@ -27,6 +27,14 @@ def balls(*positions: list[float], diameter: float = 3e-3) -> Balls:
 def test_a_ball_in_the_wrong_place_is_named(where: list[float], said: str) -> None:
     with pytest.raises(SceneError, match=said):
         Scene(ROOM, balls(MIDDLE, where), Physics(), 1.0)
+
+
+def test_a_ball_inside_the_raised_sonotrode_is_named() -> None:
+    raised = Physics(vibration=Vibration(FLOOR, 40e-6, 20e3, phase=math.pi / 2))
+    with pytest.raises(SceneError, match=r"ball 0 .* starts 3e-05 m inside the vibrating surface"):
+        Scene(ROOM, balls([0.015, 0.015, 1.5e-3 + 10e-6]), raised, 1.0)
+    lowered = Physics(vibration=Vibration(FLOOR, 40e-6, 20e3, phase=-math.pi / 2))
+    Scene(ROOM, balls([0.015, 0.015, 1.5e-3 + 10e-6]), lowered, 1.0)
 
 
 @pytest.mark.parametrize(
