@@ -1,0 +1,54 @@
+"""Plain geometry of triangle meshes: pieces, volumes, areas, heights, inside or outside."""
+
+import numpy as np
+
+
+def shells_of(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Connected pieces of a closed surface: (m,) the piece of each triangle, and each piece's volume [m³]."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    a, b = triangles[:, [0, 1]].T.ravel(), triangles[:, [1, 2]].T.ravel()
+    graph = coo_array((np.ones(len(a), dtype=np.int8), (a, b)), shape=(len(vertices), len(vertices)))
+    _, piece = connected_components(graph, directed=False)
+    shells = np.unique(piece[triangles[:, 0]], return_inverse=True)[1].reshape(-1)
+    return shells, np.bincount(shells, tetrahedron_volumes(vertices, triangles))
+
+
+def tetrahedron_volumes(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Signed volume [m³] between the vertices' middle and each triangle, (m,); the sum is enclosed."""
+    a, b, c = (vertices[triangles[:, k]] - vertices.mean(axis=0) for k in range(3))
+    return np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0
+
+
+def winding_number(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """How often a closed surface goes round each point, shape (p,): 1 inside, 0 outside.
+
+    points (p, 3) m, corners (m, 3, 3) m. Sum of the triangles' solid angles over 4 pi; the solid angle from
+    A. Van Oosterom and J. Strackee, IEEE Trans. Biomed. Eng. 30 (1983) 125.
+    """
+    a, b, c = (corners[None, :, k] - points[:, None] for k in range(3))
+    la, lb, lc = (np.linalg.norm(side, axis=2) for side in (a, b, c))
+    top = np.einsum("pij,pij->pi", a, np.cross(b, c))
+    dot = {pair: np.einsum("pij,pij->pi", u, v) for pair, u, v in (("ab", a, b), ("bc", b, c), ("ca", c, a))}
+    bottom = la * lb * lc + dot["ab"] * lc + dot["bc"] * la + dot["ca"] * lb
+    return np.arctan2(top, bottom).sum(axis=1) / (2.0 * np.pi)
+
+
+def heights(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Smallest height [m] of each triangle, shape (m,): 0 for one without area."""
+    corners = vertices[triangles]
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    twice = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    return np.divide(twice, longest, out=np.zeros_like(twice), where=longest > 0.0)
+
+
+def areas(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Area [m²] of each triangle, shape (m,)."""
+    return np.linalg.norm(area_vectors(vertices, triangles), axis=1)
+
+
+def area_vectors(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Normal times area [m²] of each triangle, shape (m, 3)."""
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    return 0.5 * np.cross(b - a, c - a)
