@@ -1,0 +1,298 @@
+"""The command line: thin, one function a command. Results go to stdout, progress and errors to stderr.
+
+Exit status: 0 done, 1 the simulation failed, 2 something to put right in the input, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import json as json_format
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from importlib.metadata import version
+from itertools import count
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import App, CycloptsError, Parameter
+
+from chamberopt.errors import InputError
+
+# Heavy packages (numba, trimesh, pyvista, nlopt) are imported inside the commands: --help answers at once.
+if TYPE_CHECKING:
+    from chamberopt.accuracy import Estimate, Evaluation
+    from chamberopt.chamber import Chamber
+    from chamberopt.config import Design
+
+app = App(
+    name="chamberopt",
+    help="Designs ultrasonic shot peening chambers for uniform coverage of a part.",
+    version=version("chamberopt"),
+    suppress_keyboard_interrupt=False,
+)
+
+Json = Annotated[bool, Parameter(name="--json", negative="", help="Print JSON on stdout instead of text.")]
+Out = Annotated[Path | None, Parameter(name="--out", help="Folder for the results; new or empty.")]
+
+
+@app.command
+def check(file: Path, /, *, json: Json = False, out: Out = None) -> None:
+    """Check a design or study file: geometry, volumes, shot, warnings. Nothing is simulated.
+
+    Parameters
+    ----------
+    file
+        Design or study file (.toml).
+    """
+    from chamberopt.chamber import build_chamber
+    from chamberopt.checkup import describe
+    from chamberopt.config import Study, load
+
+    loaded = load(file)
+    design = loaded.design if isinstance(loaded, Study) else loaded
+    facts = describe(design, build_chamber(design))
+    if isinstance(loaded, Study):
+        facts["vary"] = {
+            name: {"low": low, "start": design.value(name), "high": high} for name, (low, high) in loaded.vary.items()
+        }
+        facts["evaluations"] = loaded.optimizer.evaluations
+    if out is not None:
+        from chamberopt.disk import new_folder, write_text
+
+        facts["folder"] = str(new_folder(out))
+        write_text(out / "check.json", json_format.dumps(facts, indent=2) + "\n")
+    if json:
+        print(json_format.dumps(facts, indent=2))
+        return
+    kind = "study" if isinstance(loaded, Study) else "design"
+    print("\n".join([f"{file}: a usable {kind}", *_facts(facts)]))
+
+
+@app.command
+def simulate(design: Path, /, *, json: Json = False, out: Out = None) -> None:
+    """Simulate one design and predict its coverage, with confidence intervals and pictures.
+
+    Parameters
+    ----------
+    design
+        Design file (.toml).
+    """
+    from chamberopt.accuracy import evaluate
+    from chamberopt.chamber import build_chamber
+    from chamberopt.config import load_design
+    from chamberopt.executor import local_executor
+    from chamberopt.progress import progress_bar
+    from chamberopt.results import write_simulation
+
+    candidate = load_design(design)
+    chamber = build_chamber(candidate)
+    _compile(candidate, chamber)
+    with _results(out, design.stem) as folder:
+        with local_executor() as executor, progress_bar("replicas") as progress:
+            evaluation = evaluate(candidate, chamber, executor, progress)
+        _remark(write_simulation(folder, candidate, chamber, evaluation))
+    _say([*_estimates(evaluation), *_notes((*chamber.notes, *evaluation.notes))], folder, json)
+
+
+@app.command
+def run(study: Path, /, *, json: Json = False, out: Out = None) -> None:
+    """Run a study: search for a better design, confirm it on fresh seeds, write it as best.toml.
+
+    Parameters
+    ----------
+    study
+        Study file (.toml).
+    """
+    from chamberopt.chamber import build_chamber
+    from chamberopt.config import load_study
+    from chamberopt.executor import local_executor
+    from chamberopt.progress import progress_bar
+    from chamberopt.results import write_study
+    from chamberopt.study import run_study
+
+    question = load_study(study)
+    start = build_chamber(question.design)
+    _compile(question.design, start)
+    with _results(out, study.stem) as folder:
+        with local_executor() as executor, progress_bar("evaluations") as progress:
+            result = run_study(question, folder, executor, progress)
+        _remark(write_study(folder, result))
+    lines = [f"{'parameter':34}{'start':>12}{'best':>12}"]
+    lines += [
+        f"{name:34}{question.design.value(name):12.5g}{result.best.design.value(name):12.5g}" for name in question.vary
+    ]
+    lines += [
+        "",
+        "start",
+        *_estimates(result.start.evaluation),
+        "",
+        "best",
+        *_estimates(result.best.evaluation),
+    ]
+    verdict = "better than the start" if result.improved else "within the noise of the start"
+    lines += ["", f"{_row('gain', result.gain)}: {verdict}"]
+    _say([*lines, *_notes((*start.notes, *result.best.evaluation.notes))], folder, json)
+
+
+@app.command
+def compare(*results: Path, json: Json = False, out: Out = None) -> None:
+    """Compare results of the same part: what differs in the designs, and what that did to the coverage.
+
+    Parameters
+    ----------
+    results
+        Two or more results folders.
+    """
+    from chamberopt import compare as comparing
+
+    comparison = comparing.compare(results)
+    with _results(out, "compare") as folder:
+        _remark(comparing.write_comparison(folder, comparison))
+    if json:
+        print(json_format.dumps({**comparison.as_json(), "folder": str(folder)}, indent=2))
+    else:
+        print(f"{comparison.as_text()}\nresults in {folder}")
+
+
+@app.command
+def inspect(result: Path, /, *, screenshot: Path | None = None, json: Json = False, out: Out = None) -> None:
+    """Look at a result in 3D: the part coloured by coverage, inside its chamber. --out: a picture goes there.
+
+    Parameters
+    ----------
+    result
+        Results folder.
+    screenshot
+        Write a picture to this file instead of opening a window.
+    """
+    from chamberopt import viewer
+    from chamberopt.results import load_result, summary
+
+    loaded = load_result(result)
+    if screenshot is None and out is not None:
+        with _results(out, "inspect") as folder:
+            screenshot = folder / "inspect.png"
+    line = summary(loaded)
+    if not json:
+        print(line)
+    viewer.inspect(loaded.folder, screenshot, title=f"{loaded.folder.resolve().name}\n{line}")
+    if json:
+        print(json_format.dumps({**loaded.data, "folder": str(loaded.folder), "screenshot": _text(screenshot)}))
+    elif screenshot is not None:
+        print(f"picture in {screenshot}")
+
+
+@contextmanager
+def _results(out: Path | None, name: str) -> Iterator[Path]:
+    """Where results go: --out (new or empty), else the first free of results/NAME, results/NAME-2 ...
+
+    When nothing came of it the folder does not stay behind empty.
+    """
+    from chamberopt.disk import new_folder
+
+    names = (name if number == 1 else f"{name}-{number}" for number in count(1))
+    free = (folder for name in names if not (folder := Path("results", name)).exists())
+    folder = new_folder(next(free) if out is None else out)
+    try:
+        yield folder
+    except BaseException:
+        if not any(folder.iterdir()):
+            folder.rmdir()
+        raise
+
+
+def _compile(design: Design, chamber: Chamber) -> None:
+    """Compiles, aloud, before the bar starts: else its first minute would look like a hang."""
+    from chamberopt.process import build_scene, chamber_mesh, replica_seed
+    from chamberopt.progress import announce_compilation
+
+    scene = build_scene(design, chamber_mesh(chamber), replica_seed(design.process.seed, 0))
+    announce_compilation(scene.physics)
+
+
+def _remark(remarks: Sequence[str]) -> None:
+    """What went less than well, such as a picture skipped: to stderr, so that --json stays clean."""
+    for remark in remarks:
+        print(remark, file=sys.stderr)
+
+
+def _text(path: Path | None) -> str | None:
+    return None if path is None else str(path)
+
+
+def _estimates(evaluation: Evaluation) -> list[str]:
+    """Objective and metrics, a line each, with their 95 % intervals."""
+    rows = {evaluation.objective_name: evaluation.objective, **evaluation.metrics}
+    return [_row(name, estimate) for name, estimate in rows.items()]
+
+
+def _row(name: str, estimate: Estimate) -> str:
+    return f"{name:34}{estimate.value:12.5g} ± {estimate.half_width:.2g}"
+
+
+def _notes(notes: Sequence[str]) -> list[str]:
+    return [f"note: {note}" for note in notes]
+
+
+def _facts(table: Mapping[str, Any], prefix: str = "") -> list[str]:
+    """A nested table as aligned lines; lists of sentences as notes and warnings."""
+    lines: list[str] = []
+    for name, value in table.items():
+        if isinstance(value, Mapping) and set(value) == {"low", "start", "high"}:
+            lines.append(f"{prefix + name:34}{value['start']:g} in {value['low']:g} .. {value['high']:g}")
+        elif isinstance(value, Mapping):
+            lines += _facts(value, f"{prefix}{name}.")
+        elif name in ("notes", "warnings"):
+            lines += [f"{name.removesuffix('s')}: {text}" for text in value]
+        else:
+            text = " x ".join(f"{v:g}" for v in value) if isinstance(value, list) else str(value)
+            lines.append(f"{prefix + name:34}{text}")
+    return lines
+
+
+def _say(lines: Sequence[str], folder: Path, json: bool) -> None:
+    """The outcome on stdout: text, or what result.json holds; either way with the folder."""
+    if json:
+        result = json_format.loads((folder / "result.json").read_text(encoding="utf-8"))
+        print(json_format.dumps({**result, "folder": str(folder)}, indent=2))
+    else:
+        print("\n".join([*lines, f"results in {folder}"]))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs one command; its exit status. Every error a user can put right is one message on stderr."""
+    try:
+        app(
+            list(sys.argv[1:] if arguments is None else arguments),
+            exit_on_error=False,
+            print_error=False,
+            result_action="return_value",
+        )
+    except CycloptsError as error:
+        return _failed(f"{str(error).rstrip()} (chamberopt --help lists what there is)", 2)
+    except InputError as error:
+        return _failed(str(error), 2)
+    except KeyboardInterrupt:
+        return _failed("interrupted; what had been finished stays on disk", 130)
+    except BrokenPipeError:  # the reader of our stdout left, as `head` does
+        sys.stderr.close()
+        return 0
+    except (ValueError, RuntimeError) as error:
+        return _simulator_failed(error)
+    return 0
+
+
+def _simulator_failed(error: Exception) -> int:
+    """sim_core's own two errors; anything else is ours, and shows where it came from."""
+    import sim_core
+
+    if isinstance(error, sim_core.SceneError):
+        return _failed(str(error), 2)
+    if isinstance(error, sim_core.SimulationError):
+        return _failed(f"the simulation stopped: {error}", 1)
+    raise error
+
+
+def _failed(message: str, status: int) -> int:
+    print(message, file=sys.stderr)
+    return status

@@ -1,0 +1,276 @@
+"""The door: design and study files in, frozen and checked nouns out; all that is wrong in one message."""
+
+import os
+import re
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BaseModel, Field, ValidationError, model_validator
+
+from chamberopt import diagnosis
+from chamberopt.design import Design, checked
+from chamberopt.diagnosis import CrossCheckError, Problem
+from chamberopt.disk import write_text
+from chamberopt.errors import InputError
+from chamberopt.materials import STRICT
+
+__all__ = ["METRICS", "Design", "Limits", "Study", "load", "load_design", "load_study", "save_design"]
+
+# What a study may ask for. objective.py computes them, a test holds the two lists together.
+ObjectiveName = Literal["uniform_coverage"]
+METRICS = (
+    "mean_coverage",
+    "std_coverage",
+    "p05_coverage",
+    "mean_normal_speed_m_s",
+    "impacts_per_mm2_s",
+    "shot_count",
+)
+# NLopt's own names without the "NLOPT_" prefix; "auto" is a global search, then a local one from its best.
+Algorithm = Literal[
+    "auto",
+    "GN_DIRECT_L",
+    "GN_DIRECT_L_RAND",
+    "GN_ORIG_DIRECT_L",
+    "GN_MLSL_LDS",
+    "GN_CRS2_LM",
+    "GN_ISRES",
+    "GN_ESCH",
+    "GN_AGS",
+    "LN_BOBYQA",
+    "LN_COBYLA",
+    "LN_SBPLX",
+    "LN_NELDERMEAD",
+    "LN_PRAXIS",
+]
+
+
+class Objective(BaseModel):
+    """What is maximised."""
+
+    model_config = STRICT
+
+    name: ObjectiveName = Field(default="uniform_coverage", description="mean minus standard deviation over the target")
+
+
+class Limits(BaseModel):
+    """What a metric must stay within."""
+
+    model_config = STRICT
+
+    min: float | None = Field(default=None, description="least value allowed")
+    max: float | None = Field(default=None, description="largest value allowed")
+
+    @model_validator(mode="after")
+    def _agree(self) -> Self:
+        if self.min is None and self.max is None:
+            raise CrossCheckError([Problem("", "empty; give min, max or both, e.g. { min = 0.9 }")])
+        if self.min is not None and self.max is not None and self.min > self.max:
+            raise CrossCheckError([Problem("min", f"given {self.min:g}, above max = {self.max:g}")])
+        return self
+
+
+class Optimizer(BaseModel):
+    """How the best design is sought, and with what budget."""
+
+    model_config = STRICT
+
+    algorithm: Algorithm = Field(default="auto", description="auto, or an NLopt name without its prefix")
+    evaluations: int = Field(default=40, ge=2, le=1000000, description="designs simulated while searching")
+    seed: int = Field(default=1, ge=0, le=2**31 - 1, description="of the search's own random numbers")
+    confirm: int = Field(default=3, ge=1, le=1000, description="best candidates simulated again on fresh seeds")
+    confirm_replicas: int = Field(default=16, ge=3, le=100000, description="replicas of each confirmation")
+
+
+class Study(BaseModel):
+    """A design, what may vary in it, what is sought, and the budget.
+
+    `vary` maps a dotted design parameter to (low, high) in the file's units.
+    """
+
+    model_config = STRICT
+
+    design: Design = Field(description="the start")
+    vary: dict[str, Annotated[tuple[float, float], Field(strict=False)]] = Field(
+        min_length=1,
+        description='e.g. "chamber.height_mm" = [35, 60]',
+        json_schema_extra={"form": "[low, high]"},
+    )
+    objective: Objective = Field(default_factory=Objective)
+    constraints: dict[str, Limits] = Field(default_factory=dict, description="METRIC = { min =, max = }")
+    optimizer: Optimizer = Field(default_factory=Optimizer)
+
+    @model_validator(mode="after")
+    def _agree(self) -> Self:
+        problems = [p for name, bounds in self.vary.items() for p in _vary_problems(self.design, name, bounds)]
+        for name in self.constraints:
+            if name not in METRICS:
+                text = f"not a metric; {diagnosis.did_you_mean(name, METRICS)}"
+                problems.append(Problem(f"constraints.{name}", text))
+        if problems:
+            raise CrossCheckError(problems)
+        return self
+
+
+def load_design(path: str | Path) -> Design:
+    """The design in a file. Raises InputError that names every problem, with file and line."""
+    path = Path(path)
+    source, data = _read(path, "design")
+    if _is_study(data):
+        raise InputError(f"{path}: this is a study file; a design file is wanted: give the one it names")
+    return _design(path, source, data)
+
+
+def load_study(path: str | Path) -> Study:
+    """The study in a file, its design loaded too. Raises InputError that names every problem and line."""
+    path = Path(path)
+    source, data = _read(path, "study")
+    if not _is_study(data):
+        raise InputError(f"{path}: this is a design file; a study file is wanted: one with design = ... and [vary]")
+    return _study(path, source, data)
+
+
+def load(path: str | Path) -> Design | Study:
+    """Whichever of the two the file holds: a study names a design or has [vary]."""
+    path = Path(path)
+    source, data = _read(path, "design or study")
+    return _study(path, source, data) if _is_study(data) else _design(path, source, data)
+
+
+def save_design(design: Design, path: str | Path) -> None:
+    """Writes a design file that loads back as the very same design; its mesh path counts from the file."""
+    import tomli_w
+
+    path = Path(path)
+    data = _without_none(design.model_dump())
+    try:
+        data["part"]["mesh"] = Path(os.path.relpath(design.part.mesh, path.resolve().parent)).as_posix()
+    except ValueError:  # another drive on Windows: only the absolute path leads there
+        data["part"]["mesh"] = Path(design.part.mesh).as_posix()
+    header = (
+        "# A complete candidate chamber, written by chamberopt.\n"
+        "# Units are in the names; amplitude_um is zero-to-peak.\n\n"
+    )
+    write_text(path, header + _lists_on_one_line(tomli_w.dumps(data)))
+
+
+def _read(path: Path, kind: str) -> tuple[str, dict[str, Any]]:
+    """Text and content of a TOML file that is there, readable, UTF-8, not empty and well formed."""
+    if path.is_dir():
+        inside = sorted(p.name for p in path.glob("*.toml"))
+        hint = f"; files in it: {', '.join(inside[:8])}" if inside else ""
+        raise InputError(f"{path}: is a folder; give a {kind} file (.toml){hint}")
+    try:
+        source = path.read_bytes().decode("utf-8-sig")
+    except FileNotFoundError:
+        raise InputError(diagnosis.not_found(path, f"{kind} file", "*.toml")) from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}; check its permissions") from None
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"{path}: not UTF-8 text (byte {error.start}); a {kind} file is TOML, save it as UTF-8"
+        ) from None
+    if not source.strip():
+        raise InputError(f"{path}: the file is empty; a {kind} file is TOML, start from a copy of a shipped one")
+    try:
+        return source, tomllib.loads(source)
+    except tomllib.TOMLDecodeError as error:
+        found = re.search(r"^(.*?) \(at line (\d+), column (\d+)\)$", str(error), re.DOTALL)
+        place, text = (f"{path}:{found[2]}", f"{found[1]}, column {found[3]}") if found else (path, error)
+        raise InputError(f"{place}: not valid TOML: {text}; correct the line, e.g. name = 1.5") from None
+
+
+def _is_study(data: Mapping[str, Any]) -> bool:
+    return isinstance(data.get("design"), str) or any(name in data for name in ("vary", "optimizer"))
+
+
+def _design(path: Path, source: str, data: Mapping[str, Any]) -> Design:
+    return checked(Design, data, path, source)
+
+
+def _study(path: Path, source: str, data: dict[str, Any]) -> Study:
+    named = data.get("design")
+    if not isinstance(named, str):
+        given = "missing" if named is None else f"given {named!r}"
+        text = f'{given}; give the path of a design file, relative to this file: design = "../designs/gear.toml"'
+        raise InputError(diagnosis.message([Problem("design", text)], path, source))
+    values = {**data, "vary": _flattened(data["vary"])} if isinstance(data.get("vary"), Mapping) else data
+    try:
+        design = load_design(Path(os.path.normpath(path.parent / named)))
+    except InputError as error:
+        said = diagnosis.message([Problem("design", f"given {named!r}, which cannot be used:")], path, source)
+        raise InputError("\n".join([said, str(error), *_also_wrong(values, path, source)])) from None
+    return checked(Study, {**values, "design": design}, path, source)
+
+
+def _also_wrong(values: Mapping[str, Any], path: Path, source: str) -> list[str]:
+    """What else a study file has wrong, beside a design that cannot be loaded."""
+    try:
+        Study.model_validate({**values, "design": None})
+    except ValidationError as error:
+        problems = diagnosis.from_validation(error, Study)
+        text = diagnosis.message([p for p in problems if p.field != "design"], path, source)
+        return [text] if text else []
+    return []
+
+
+def _flattened(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Dotted names, whether they were written as quoted keys, dotted keys or nested tables."""
+    flat: dict[str, Any] = {}
+    for name, value in table.items():
+        if isinstance(value, Mapping):
+            flat.update(_flattened(value, f"{prefix}{name}."))
+        else:
+            flat[prefix + name] = value
+    return flat
+
+
+def _vary_problems(design: Design, name: str, bounds: tuple[float, float]) -> list[Problem]:
+    """Why a design parameter cannot vary between these bounds."""
+    field, (low, high), numbers = f"vary.{name}", bounds, Design.numbers()
+    try:
+        start = design.value(name)
+    except InputError as error:
+        near = diagnosis.did_you_mean(name, numbers)
+        return [Problem(field, str(error).removeprefix(f"{name}: ") if name in numbers else f"unknown; {near}")]
+    if name not in numbers:
+        return [Problem(field, f"a whole number cannot vary; {diagnosis.did_you_mean(name, numbers)}")]
+    if low >= high:
+        return [Problem(field, f"given [{low:g}, {high:g}]; low must be below high")]
+    if not low <= start <= high:
+        text = f"given [{low:g}, {high:g}], but the design starts at {start:g}"
+        return [Problem(field, f"{text}; widen the bounds or change the design")]
+    problems = []
+    for bound in bounds:
+        try:
+            design.with_values({name: bound})
+        except InputError as error:
+            problems.append(Problem(field, f"the design cannot have {name} = {bound:g}: {error}"))
+    return problems
+
+
+def _without_none(table: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        name: _without_none(value) if isinstance(value, Mapping) else value
+        for name, value in table.items()
+        if value is not None
+    }
+
+
+def _lists_on_one_line(toml: str) -> str:
+    """tomli_w gives every number of a list its own line; a position reads better on one."""
+    lines: list[str] = []
+    opened = 0
+    for line in toml.splitlines():
+        if opened:
+            lines[-1] += line.strip() + " "
+        else:
+            lines.append(line)
+        if opened or line.endswith("= ["):
+            opened += line.count("[") - line.count("]")
+    joined = (
+        re.sub(r",\s*\]", "]", re.sub(r"= \[.*", lambda m: m[0].replace("[ ", "["), line)).rstrip() for line in lines
+    )
+    return "\n".join(joined) + "\n"

@@ -1,0 +1,345 @@
+"""Design: one complete candidate chamber, as a design file says it. The only place where units are converted.
+
+Fields carry the file's names and units (`height_mm`); properties without a suffix are SI (`height`, metres).
+Every table is frozen, refuses unknown keys, and holds bounds wide enough for any real peening set-up.
+"""
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self, TypeVar
+
+from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_validator, model_validator
+
+from chamberopt import diagnosis
+from chamberopt.diagnosis import CrossCheckError, Problem
+from chamberopt.errors import InputError
+from chamberopt.materials import SHOT_DENSITY, STRICT, Materials, ShotMaterial
+
+Unit = Literal["um", "mm", "cm", "m", "in"]
+METRES_PER: dict[str, float] = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
+
+# TOML has lists only: these two become tuples at the door, their numbers stay strict.
+Pair = Annotated[tuple[float, float], Field(strict=False)]
+Triple = Annotated[tuple[float, float, float], Field(strict=False)]
+
+
+def quantity(low: float, high: float, unit: str, what: str, default: Any = ...) -> Any:
+    """A bounded number of the file; unit and meaning are shown when it is wrong."""
+    return Field(default, ge=low, le=high, description=what, json_schema_extra={"unit": unit})
+
+
+def listed(form: str, what: str, default: Any = ...) -> Any:
+    """A list of numbers of the file, its form shown when it is wrong."""
+    return Field(default, description=what, json_schema_extra={"form": form})
+
+
+class Target(BaseModel):
+    """Which triangles of the part must be covered; conditions given together intersect."""
+
+    model_config = STRICT
+
+    surface: Literal["all"] = Field(default="all", description="all of the part's surface, narrowed by the other keys")
+    direction: Triple | None = listed(
+        "three numbers [x, y, z], not all 0", "reference direction in the part file's frame", None
+    )
+    angle_deg: Pair | None = listed(
+        "two numbers [low, high], 0 <= low < high <= 180",
+        "between outward normal and direction, degrees",
+        None,
+    )
+    box_mm: Annotated[tuple[Triple, Triple], Field(strict=False)] | None = listed(
+        "two corners [[x, y, z], [x, y, z]], low before high, mm",
+        "holding the triangles' centroids, in the part file's frame",
+        None,
+    )
+
+    @model_validator(mode="after")
+    def _agree(self) -> Self:
+        problems = []
+        if (self.direction is None) != (self.angle_deg is None):
+            given, lacking = ("direction", "angle_deg") if self.angle_deg is None else ("angle_deg", "direction")
+            problems.append(Problem(given, f"given without {lacking}; give both or neither"))
+        if self.direction is not None and not any(self.direction):
+            problems.append(Problem("direction", "given [0, 0, 0], which points nowhere; e.g. [0, 0, -1] is down"))
+        if self.angle_deg is not None and not 0 <= self.angle_deg[0] < self.angle_deg[1] <= 180:
+            text = f"given {list(self.angle_deg)}; allowed: [low, high] with 0 <= low < high <= 180 degrees"
+            problems.append(Problem("angle_deg", text))
+        if self.box_mm is not None and not all(a < b for a, b in zip(*self.box_mm, strict=True)):
+            corners = [list(corner) for corner in self.box_mm]
+            problems.append(Problem("box_mm", f"given {corners}; each low corner must be below its high corner"))
+        if problems:
+            raise CrossCheckError(problems)
+        return self
+
+
+class Part(BaseModel):
+    """The part's mesh and how it is placed in the chamber."""
+
+    model_config = STRICT
+
+    mesh: str = Field(min_length=1, description="mesh file, path relative to the design file")
+    unit: Unit = Field(description="of the numbers in the mesh file")
+    rotate_deg: Triple = listed("three numbers [x, y, z] in degrees", "turns about x, then y, then z", (0.0, 0.0, 0.0))
+    offset_mm: Pair = listed("two numbers [x, y] in mm", "sideways from the chamber axis", (0.0, 0.0))
+    target: Target = Field(default_factory=Target, description="which triangles must be covered")
+
+    @field_validator("mesh")
+    @classmethod
+    def _absolute(cls, mesh: str, info: ValidationInfo) -> str:
+        """Held absolute from here on, so that a design stays right wherever it is used or saved."""
+        context = info.context or {}
+        path = (context.get("folder", Path()) / mesh).resolve()
+        if context.get("from_file") and not path.is_file():
+            raise CrossCheckError([Problem("", f"given {mesh!r}: {diagnosis.not_found(path, 'mesh file', '*')}")])
+        return str(path)
+
+    @property
+    def mesh_path(self) -> Path:
+        """Absolute path of the mesh file."""
+        return Path(self.mesh)
+
+    @property
+    def metres_per_unit(self) -> float:
+        """Length [m] of one unit of the mesh file."""
+        return METRES_PER[self.unit]
+
+    @property
+    def offset(self) -> tuple[float, float]:
+        """Sideways shift (x, y) [m] from the chamber axis."""
+        return self.offset_mm[0] * 1e-3, self.offset_mm[1] * 1e-3
+
+
+class ChamberShape(BaseModel):
+    """The cavity before the part is taken out of it; its floor is the sonotrode, at z = 0."""
+
+    model_config = STRICT
+
+    shape: Literal["cylinder"] = Field(description="form of the cavity; others are not supported yet")
+    height_mm: float = quantity(2, 2000, "mm", "inner height, sonotrode to ceiling")
+    sonotrode_distance_mm: float = quantity(0.1, 2000, "mm", "mean sonotrode face to lowest point of the part")
+    diameter_mm: float = quantity(2, 2000, "mm", "inner diameter")
+    facets: int = Field(default=64, ge=8, le=1024, description="flat sides that stand for the round wall")
+
+    @property
+    def height(self) -> float:
+        """Inner height [m]."""
+        return self.height_mm * 1e-3
+
+    @property
+    def sonotrode_distance(self) -> float:
+        """Mean sonotrode face to lowest point of the part [m]."""
+        return self.sonotrode_distance_mm * 1e-3
+
+    @property
+    def diameter(self) -> float:
+        """Inner diameter [m]."""
+        return self.diameter_mm * 1e-3
+
+
+class Sonotrode(BaseModel):
+    """The vibrating floor. Amplitude is ZERO-TO-PEAK: half of a peak-to-valley figure."""
+
+    model_config = STRICT
+
+    frequency_khz: float = quantity(0.01, 200, "kHz", "usually 20")
+    amplitude_um: float = quantity(0.1, 500, "µm", "zero-to-peak: half of peak-to-valley")
+    motion: Literal["sinusoidal"] = Field(default="sinusoidal", description="how the face moves")
+
+    @property
+    def frequency(self) -> float:
+        """Frequency [Hz]."""
+        return self.frequency_khz * 1e3
+
+    @property
+    def amplitude(self) -> float:
+        """Zero-to-peak amplitude [m]."""
+        return self.amplitude_um * 1e-6
+
+    @property
+    def peak_speed(self) -> float:
+        """Largest speed of the face, 2 pi f A [m/s]."""
+        return 2.0 * math.pi * self.frequency * self.amplitude
+
+
+class Shot(BaseModel):
+    """The charge: balls of one size. Give exactly one of material and density_kg_m3."""
+
+    model_config = STRICT
+
+    mass_g: float = quantity(1e-4, 10000, "g", "of all balls together")
+    diameter_mm: float = quantity(0.1, 20, "mm", "of one ball")
+    material: ShotMaterial | None = Field(default=None, description="sets the density")
+    density_kg_m3: float | None = quantity(500, 25000, "kg/m³", "instead of material", None)
+
+    @model_validator(mode="after")
+    def _one_density(self) -> Self:
+        if self.material is None and self.density_kg_m3 is None:
+            materials = ", ".join(f'"{name}"' for name in SHOT_DENSITY)
+            text = f"missing; give material (one of {materials}) or density_kg_m3"
+            raise CrossCheckError([Problem("material", text)])
+        if self.material is not None and self.density_kg_m3 is not None:
+            text = f"given {self.density_kg_m3:g} beside material = {self.material!r}; keep one of the two"
+            raise CrossCheckError([Problem("density_kg_m3", text)])
+        return self
+
+    @property
+    def diameter(self) -> float:
+        """Ball diameter [m]."""
+        return self.diameter_mm * 1e-3
+
+    @property
+    def density(self) -> float:
+        """Ball density [kg/m³]."""
+        return self.density_kg_m3 if self.material is None else SHOT_DENSITY[self.material]  # type: ignore[return-value]
+
+    @property
+    def mass(self) -> float:
+        """Mass of the whole charge [kg], as asked for."""
+        return self.mass_g * 1e-3
+
+    @property
+    def ball_mass(self) -> float:
+        """Mass of one ball [kg]."""
+        return self.density * math.pi / 6.0 * self.diameter**3
+
+    @property
+    def count(self) -> int:
+        """Number of balls: the mass asked for, rounded to whole balls, at least one."""
+        return max(1, round(self.mass / self.ball_mass))
+
+
+class Effects(BaseModel):
+    """Which effects act on the shot in flight. What is not listed here is not simulated."""
+
+    model_config = STRICT
+
+    gravity: bool = Field(default=True, description="9.80665 m/s² downwards")
+
+
+class Accuracy(BaseModel):
+    """How much is simulated: independent replicas, each after its own start and warm-up."""
+
+    model_config = STRICT
+
+    replicas: int = Field(default=8, ge=3, le=100000, description="3 is the least that gives a confidence interval")
+    simulated_time_s: float = quantity(1e-4, 10000, "s", "of each replica, after warm-up", 1.0)
+    warmup_time_s: float = quantity(0, 10000, "s", "simulated first and not counted", 0.2)
+
+    @property
+    def simulated_time(self) -> float:
+        """Recorded time of each replica [s]."""
+        return self.simulated_time_s
+
+    @property
+    def warmup_time(self) -> float:
+        """Time of each replica before recording starts [s]."""
+        return self.warmup_time_s
+
+
+class Process(BaseModel):
+    """How long the part is peened, and how the answer is computed."""
+
+    model_config = STRICT
+
+    treatment_time_s: float = quantity(0.01, 1e6, "s", "peening time the coverage is predicted for")
+    seed: int = Field(default=1, ge=0, le=2**63 - 1, description="same seed, same result")
+    accuracy: Accuracy = Field(default_factory=Accuracy, description="replicas and their length")
+
+    @property
+    def treatment_time(self) -> float:
+        """Peening time [s] the coverage is predicted for."""
+        return self.treatment_time_s
+
+
+class Design(BaseModel):
+    """One complete candidate: part, chamber, sonotrode, shot, materials, effects, process."""
+
+    model_config = STRICT
+
+    part: Part
+    chamber: ChamberShape
+    sonotrode: Sonotrode
+    shot: Shot
+    materials: Materials
+    effects: Effects = Field(default_factory=Effects)
+    process: Process
+
+    @model_validator(mode="after")
+    def _agree(self) -> Self:
+        chamber, shot = self.chamber, self.shot
+        height, distance = chamber.height_mm, chamber.sonotrode_distance_mm
+        problems = []
+
+        def wrong(field: str, given: float, why: str) -> None:
+            problems.append(Problem(field, f"given {given:g}, {why}"))
+
+        if distance >= height:
+            why = f"not below chamber.height_mm = {height:g}: the part would be outside"
+            wrong("chamber.sonotrode_distance_mm", distance, f"{why}; lower it or raise the height")
+        if 10 * self.sonotrode.amplitude_um >= 1e3 * distance:
+            why = f"less than ten amplitudes of the sonotrode ({self.sonotrode.amplitude_um:g} µm); raise it"
+            wrong("chamber.sonotrode_distance_mm", distance, why)
+        if shot.diameter_mm >= min(height, chamber.diameter_mm):
+            why = f"which does not fit a chamber {chamber.diameter_mm:g} mm wide and {height:g} mm high"
+            wrong("shot.diameter_mm", shot.diameter_mm, f"{why}; use a smaller ball")
+        elif shot.diameter_mm >= distance:
+            why = f"not below chamber.sonotrode_distance_mm = {distance:g}: no ball fits under the part"
+            wrong("shot.diameter_mm", shot.diameter_mm, f"{why}; use a smaller ball or raise the distance")
+        filled = shot.mass / shot.density / (math.pi / 4.0 * chamber.diameter**2 * chamber.height)
+        if filled > 0.5:
+            why = f"whose balls fill {filled:.0%} of the chamber; at most 50 % is allowed, usual are a few"
+            wrong("shot.mass_g", shot.mass_g, why)
+        if problems:
+            raise CrossCheckError(problems)
+        return self
+
+    @classmethod
+    def numbers(cls) -> tuple[str, ...]:
+        """Dotted names of every continuous number: what a study may vary."""
+        return tuple(name for name, field in diagnosis.numeric_fields(cls) if field.annotation is not int)
+
+    def value(self, name: str) -> float:
+        """The number at a dotted name, in the file's unit. InputError for a name that is none."""
+        known = [known for known, _ in diagnosis.numeric_fields(Design)]
+        if name not in known:
+            raise InputError(f"{name}: not a number of a design; {diagnosis.did_you_mean(name, known)}")
+        at: Any = self
+        for step in name.split("."):
+            at = at[int(step)] if isinstance(at, tuple) else getattr(at, step)
+            if at is None:
+                raise InputError(f"{name}: not set in this design; give it a value there first")
+        return at
+
+    def with_values(self, values: Mapping[str, float]) -> "Design":
+        """A copy with other numbers, by dotted name and in the file's units, checked again as a whole.
+
+        Raises InputError when a name is no number of a design, or the new values are out of range or
+        contradict each other.
+        """
+        data = self.model_dump()
+        for name, number in values.items():
+            was = self.value(name)
+            whole = isinstance(was, int) and name not in self.numbers() and float(number).is_integer()
+            *tables, last = name.split(".")
+            at: Any = data
+            for step in tables:
+                if isinstance(at[step], tuple):
+                    at[step] = list(at[step])
+                at = at[step]
+            at[int(last) if isinstance(at, list) else last] = int(number) if whole else float(number)
+        return checked(Design, data)
+
+
+Table = TypeVar("Table", bound=BaseModel)
+
+
+def checked(model: type[Table], data: Mapping[str, Any], path: Path | None = None, source: str = "") -> Table:
+    """The data as a frozen model, or InputError with every problem; mesh paths count from the file."""
+    try:
+        return model.model_validate(
+            data, context={"folder": path.parent if path else Path(), "from_file": path is not None}
+        )
+    except ValidationError as error:
+        problems = diagnosis.from_validation(error, model)
+        raise InputError(diagnosis.message(problems, path, source)) from None
