@@ -1,4 +1,4 @@
-"""Who can meet whom: all balls, sixteen at a time through a float32 filter, then exactly.
+"""Who can meet whom: all balls, eight at a time through a float32 filter, then exactly.
 
 The filter keeps every pair whose straight paths could come within reach, rounding included; what it lets through is
 decided in float64, so results do not depend on it.

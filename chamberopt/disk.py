@@ -1,0 +1,42 @@
+"""Writing without regret: a folder that was not in use, and files that appear whole or not at all."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from chamberopt.errors import InputError
+
+
+def new_folder(path: str | Path) -> Path:
+    """The folder, made if need be; InputError when something is in it: results are never overwritten."""
+    folder = Path(path)
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"{folder}: is a file; results need a folder: choose another place with --out DIR")
+    if folder.is_dir() and any(folder.iterdir()):
+        raise InputError(
+            f"{folder}: already holds files, and results are never overwritten: choose another folder with "
+            "--out DIR or remove this one (resuming a study is not supported yet)"
+        )
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be made: {error.strerror}; choose another place with --out") from None
+    return folder
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """A temporary path beside `path`, with the same suffix, that takes its place when the block ends well."""
+    temporary = path.with_name(f".writing-{path.name}")
+    try:
+        yield temporary
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a UTF-8 text file, whole or not at all."""
+    with whole_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")

@@ -1,0 +1,132 @@
+"""Coverage -> numbers: the metrics of a candidate, and the objectives a study can maximise.
+
+Each is a function of a summed Tally, so that accuracy.py can take replicas out of the sum and see how far the
+number moves. All are over the exposed target; averages over it are weighted with exposed area.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from chamberopt.coverage import Tally, coverage_at
+from chamberopt.errors import InputError
+
+if TYPE_CHECKING:
+    from chamberopt.chamber import Chamber
+    from chamberopt.config import Design
+
+Statistic = Callable[[Tally, "Chamber", "Design"], float]
+
+
+@dataclass(frozen=True)
+class Metric:
+    """A named number about a candidate: how it is computed, its unit and the range it can have.
+
+    smooth: whether it moves smoothly with the tally; a quantile does not, which decides how its interval is found.
+    """
+
+    name: str
+    unit: str
+    summary: str
+    function: Statistic
+    lowest: float = -math.inf
+    highest: float = math.inf
+    smooth: bool = True
+
+
+@dataclass(frozen=True)
+class Objective:
+    """What a study maximises: a weighted sum of metrics, so that it always agrees with the metrics shown beside it."""
+
+    name: str
+    summary: str
+    terms: dict[str, float]
+
+
+def exposed_target(chamber: Chamber) -> np.ndarray:
+    """Part triangles that are wanted covered and that the shot can reach, shape (m,) bool."""
+    return chamber.part.target & (chamber.exposed_area > 0.0)
+
+
+def _target_coverage(total: Tally, chamber: Chamber, design: Design) -> tuple[np.ndarray, np.ndarray]:
+    """Coverage of the exposed target triangles at the treatment time, and their share of its area."""
+    target = exposed_target(chamber)
+    if not target.any():
+        raise InputError(
+            "part.target: no triangle of the target bounds the cavity, so its coverage is not defined; "
+            "widen [part.target] or move the part into the chamber"
+        )
+    area = chamber.exposed_area[target]
+    return coverage_at(total, chamber, design.process.treatment_time)[target], area / area.sum()
+
+
+def mean_coverage(total: Tally, chamber: Chamber, design: Design) -> float:
+    """Area-weighted mean of the coverage at the treatment time, 0..1."""
+    coverage, weight = _target_coverage(total, chamber, design)
+    return float(weight @ coverage)
+
+
+def std_coverage(total: Tally, chamber: Chamber, design: Design) -> float:
+    """Area-weighted standard deviation of the coverage from triangle to triangle, 0..0.5."""
+    coverage, weight = _target_coverage(total, chamber, design)
+    return float(np.sqrt(weight @ (coverage - weight @ coverage) ** 2))
+
+
+def p05_coverage(total: Tally, chamber: Chamber, design: Design) -> float:
+    """The coverage that 95 % of the target's area exceeds, 0..1; counting noise in a short simulation lowers it."""
+    coverage, weight = _target_coverage(total, chamber, design)
+    order = np.argsort(coverage, kind="stable")
+    # Mid-point rule: each triangle stands at the middle of its share of the area.
+    share = np.cumsum(weight[order]) - 0.5 * weight[order]
+    return float(np.interp(0.05, share, coverage[order]))
+
+
+def mean_normal_speed(total: Tally, chamber: Chamber, design: Design) -> float:
+    """Mean normal speed of all impacts on the target [m/s]; 0 when nothing hit it."""
+    target = exposed_target(chamber)
+    impacts = total.impacts[target].sum()
+    return float(total.speed_sum[target].sum() / impacts) if impacts else 0.0
+
+
+def impacts_per_mm2_s(total: Tally, chamber: Chamber, design: Design) -> float:
+    """Impacts on the target per mm² of its exposed area and second."""
+    target = exposed_target(chamber)
+    area_mm2 = chamber.exposed_area[target].sum() * 1e6
+    return float(total.impacts[target].sum() / (area_mm2 * total.simulated_time))
+
+
+def shot_count(total: Tally, chamber: Chamber, design: Design) -> float:
+    """Number of balls."""
+    return float(design.shot.count)
+
+
+METRICS = {
+    metric.name: metric
+    for metric in (
+        Metric("mean_coverage", "", "mean coverage of the target", mean_coverage, 0.0, 1.0),
+        Metric("std_coverage", "", "standard deviation of coverage over the target", std_coverage, 0.0, 0.5),
+        Metric("p05_coverage", "", "coverage that 95 % of the target's area exceeds", p05_coverage, 0.0, 1.0, False),
+        Metric("mean_normal_speed_m_s", "m/s", "mean normal speed of the impacts", mean_normal_speed, 0.0),
+        Metric("impacts_per_mm2_s", "1/(mm² s)", "impacts per area and second", impacts_per_mm2_s, 0.0),
+        Metric("shot_count", "balls", "number of balls", shot_count, 0.0),
+    )
+}
+
+OBJECTIVES = {
+    # 1 only when all is covered, and covered evenly.
+    "uniform_coverage": Objective(
+        "uniform_coverage", "mean minus standard deviation of coverage", {"mean_coverage": 1.0, "std_coverage": -1.0}
+    ),
+}
+
+
+def objective(name: str) -> Objective:
+    """The objective of that name; InputError when there is none."""
+    if name not in OBJECTIVES:
+        raise InputError(f"objective.name: {name!r} is not an objective; allowed: {', '.join(OBJECTIVES)}")
+    return OBJECTIVES[name]

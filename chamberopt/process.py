@@ -1,0 +1,78 @@
+"""Chamber + process settings -> Scene: the shot at rest low in the chamber, shaken by the sonotrode."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from chamberopt.chamber import TAG_PART, TAG_SONOTRODE
+
+if TYPE_CHECKING:
+    from chamberopt.chamber import Chamber
+    from chamberopt.config import Design
+    from sim_core import Scene, TriangleMesh
+
+STREAMS = ("search", "confirm")
+
+
+def replica_seed(seed: int, replica: int, stream: str = "search") -> int:
+    """The random seed of one replica, 128 bits.
+
+    The same for every candidate of a study (common random numbers), different between replicas, and
+    different between the streams, so that a candidate chosen on "search" is judged on draws it has not seen.
+    From sha256 rather than hash(), which Python salts anew in every process.
+    """
+    if stream not in STREAMS:
+        raise ValueError(f"stream {stream!r}: one of {', '.join(STREAMS)}")
+    digest = hashlib.sha256(f"chamberopt/{stream}/{seed}/{replica}".encode()).digest()
+    return int.from_bytes(digest[:16], "big")
+
+
+def start_velocities(rng: np.random.Generator, count: int, rms_speed: float) -> np.ndarray:
+    """Isotropic Maxwell velocities [m/s], shape (count, 3), whose rms speed is `rms_speed` [m/s]."""
+    return rng.normal(0.0, rms_speed / np.sqrt(3.0), (count, 3))
+
+
+def chamber_mesh(chamber: Chamber) -> TriangleMesh:
+    """The chamber's surface for the simulator. Make it once per chamber: its search tree goes with it."""
+    from sim_core import TriangleMesh
+
+    return TriangleMesh(chamber.vertices, chamber.triangles, chamber.tags)
+
+
+def build_scene(design: Design, mesh: TriangleMesh, seed: int) -> Scene:
+    """The scene one replica simulates, in a chamber's mesh (`chamber_mesh`).
+
+    The shot starts packed low in the chamber with the speed scale of the sonotrode, 2 pi f A, so that the
+    warm-up has to forget only the arrangement, not to heat or cool the shot through orders of magnitude; the
+    phase of the sonotrode is drawn anew. Same design, chamber and seed: same scene, to the last bit.
+
+    Raises sim_core.SceneError when the shot does not fit.
+    """
+    from sim_core import Balls, Gravity, Physics, Restitution, Scene, Vibration, pack_balls
+
+    rng = np.random.default_rng(seed)
+    sonotrode, shot, materials = design.sonotrode, design.shot, design.materials
+    phase = rng.uniform(0.0, 2.0 * np.pi)
+    positions = pack_balls(mesh, shot.count, shot.diameter, rng, clear=sonotrode.amplitude)
+    velocities = start_velocities(rng, len(positions), sonotrode.peak_speed)
+    # One (C0, v0) per tag, in the order of the tags: TAG_PART, TAG_SONOTRODE, TAG_WALL.
+    surfaces = tuple(
+        (pair.restitution, pair.yield_speed) for pair in (materials.part, materials.sonotrode, materials.wall)
+    )
+    physics = Physics(
+        gravity=Gravity() if design.effects.gravity else None,
+        restitution=Restitution(surfaces=surfaces, balls=(materials.shot.restitution, materials.shot.yield_speed)),
+        vibration=Vibration(TAG_SONOTRODE, sonotrode.amplitude, sonotrode.frequency, phase),
+    )
+    accuracy = design.process.accuracy
+    return Scene(
+        mesh=mesh,
+        balls=Balls(positions, velocities, shot.diameter, shot.density),
+        physics=physics,
+        duration=accuracy.simulated_time,
+        warmup=accuracy.warmup_time,
+        record=(TAG_PART,),
+    )

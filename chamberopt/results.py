@@ -1,0 +1,241 @@
+"""What a run leaves on disk, and reading it back. Every file appears whole or not at all."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from chamberopt.accuracy import Estimate, Evaluation
+from chamberopt.config import Design, save_design
+from chamberopt.design import checked
+from chamberopt.disk import new_folder, write_text
+from chamberopt.errors import InputError
+from chamberopt.executor import core_count
+from chamberopt.history import as_csv, read_history
+from chamberopt.objective import METRICS, exposed_target
+
+if TYPE_CHECKING:
+    from chamberopt.chamber import Chamber
+    from chamberopt.study import StudyResult
+
+RESULT = "result.json"
+FORMAT = 1
+PACKAGES = ("chamberopt", "numpy", "numba", "manifold3d", "nlopt")
+
+
+@dataclass(frozen=True)
+class Result:
+    """A results folder read back.
+
+    kind: "simulation" or "study"; a study stands for its best design as confirmed. design: the candidate the
+    figures belong to · data: all of result.json.
+    """
+
+    folder: Path
+    kind: str
+    design: Design
+    objective_name: str
+    objective: Estimate
+    metrics: dict[str, Estimate]
+    part_sha256: str
+    seeds: tuple[int, str]
+    notes: tuple[str, ...]
+    data: dict[str, Any]
+
+
+def write_simulation(folder: str | Path, design: Design, chamber: Chamber, evaluation: Evaluation) -> list[str]:
+    """Leave a simulation in a new or empty folder; returns remarks, such as why a picture was skipped.
+
+    design.toml · result.json · coverage.vtp · chamber.stl, chamber.vtp · coverage.png.
+    """
+    folder = new_folder(folder)
+    save_design(design, folder / "design.toml")
+    _write_json(folder, {"kind": "simulation", **_write_candidate(folder, design, chamber, evaluation)})
+    return _picture([folder], [evaluation], [folder.resolve().name], folder / "coverage.png")
+
+
+def write_study(folder: str | Path, study_result: StudyResult) -> list[str]:
+    """Complete the folder of a study that has ended; returns remarks, such as why a picture was skipped.
+
+    Beside design.toml, study.toml and history.jsonl, which run_study wrote: best.toml · result.json ·
+    history.csv · convergence.png · the best's coverage.vtp, chamber.stl, chamber.vtp, coverage.png ·
+    before_after.png · start/, a results folder of the start as confirmed on the same seeds.
+    """
+    from chamberopt.chamber import build_chamber
+    from chamberopt.pictures import convergence_picture
+
+    folder = Path(folder)
+    start, best = study_result.start, study_result.best
+    save_design(best.design, folder / "best.toml")
+    write_text(folder / "history.csv", as_csv(read_history(folder)))
+    about = _write_candidate(folder, best.design, build_chamber(best.design), best.evaluation)
+    _write_json(folder, {"kind": "study", **about, "study": _about_study(study_result)})
+    (folder / "start").mkdir(exist_ok=True)
+    save_design(start.design, folder / "start" / "design.toml")
+    about = _write_candidate(folder / "start", start.design, build_chamber(start.design), start.evaluation)
+    _write_json(folder / "start", {"kind": "simulation", **about})
+    convergence_picture(folder / "convergence.png", study_result)
+    remarks = _picture([folder], [best.evaluation], ["best design"], folder / "coverage.png")
+    pair, names = [start.evaluation, best.evaluation], ["start", "best design"]
+    remarks += _picture([folder / "start", folder], pair, names, folder / "before_after.png")
+    return list(dict.fromkeys(remarks))
+
+
+def load_result(path: str | Path) -> Result:
+    """Read a results folder (or its result.json). InputError when it is none, unfinished or damaged."""
+    path = Path(path)
+    file = path if path.name == RESULT else path / RESULT
+    folder = file.parent
+    if not file.is_file():
+        if (folder / "history.jsonl").is_file():
+            raise InputError(f"{folder}: a study that did not finish: it has a history but no {RESULT}; run it again")
+        raise InputError(f"{folder}: not a results folder: {RESULT} is not there; give one made by simulate or run")
+    try:
+        data = json.loads(file.read_text(encoding="utf-8"))
+        if data["format"] != FORMAT:
+            raise InputError(f"{file}: written in format {data['format']}, this version reads {FORMAT}; simulate again")
+        return Result(
+            folder=folder,
+            kind=data["kind"],
+            design=checked(Design, data["design"], file),
+            objective_name=data["objective"]["name"],
+            objective=_estimate(data["objective"]),
+            metrics={name: _estimate(metric) for name, metric in data["metrics"].items()},
+            part_sha256=data["part_sha256"],
+            seeds=(data["seed"], data["stream"]),
+            notes=tuple(data["notes"]),
+            data=data,
+        )
+    except (UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError) as error:
+        raise InputError(f"{file}: damaged ({type(error).__name__}: {error}); simulate again") from None
+
+
+def _write_candidate(folder: Path, design: Design, chamber: Chamber, evaluation: Evaluation) -> dict[str, Any]:
+    """Write the surfaces of one candidate; what there is to say of it, for result.json."""
+    from chamberopt.viewer import COVERAGE, write_chamber, write_coverage
+
+    write_coverage(folder / COVERAGE, chamber, evaluation.total, design.process.treatment_time)
+    write_chamber(folder, chamber)
+    return _about(folder, design, chamber, evaluation)
+
+
+def _picture(folders: list[Path], evaluations: list[Evaluation], names: list[str], picture: Path) -> list[str]:
+    from chamberopt.viewer import coverage_picture
+
+    titles = [f"{name}\n{summary(evaluation)}" for name, evaluation in zip(names, evaluations, strict=True)]
+    trouble = coverage_picture(folders, titles, picture)
+    return [trouble] if trouble else []
+
+
+def summary(evaluation: Evaluation | Result) -> str:
+    """One line: the objective with its interval, mean and spread of coverage."""
+    goal = evaluation.objective
+    mean, spread = (evaluation.metrics[name].value for name in ("mean_coverage", "std_coverage"))
+    name = evaluation.objective_name.replace("_", " ")
+    return f"{name} {goal.value:.3f} ± {goal.half_width:.3f}   mean {mean:.1%}   std {spread:.1%}"
+
+
+def _about(folder: Path, design: Design, chamber: Chamber, evaluation: Evaluation) -> dict[str, Any]:
+    target = exposed_target(chamber)
+    return {
+        "format": FORMAT,
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "objective": {"name": evaluation.objective_name, **_plain(evaluation.objective, "")},
+        "metrics": {name: _plain(value, METRICS[name].unit) for name, value in evaluation.metrics.items()},
+        "seed": design.process.seed,
+        "stream": evaluation.stream,
+        "replicas": len(evaluation.replicas),
+        "simulated_time_s": evaluation.total.simulated_time,
+        "collisions": evaluation.collisions,
+        "timings_s": {step: round(seconds, 3) for step, seconds in evaluation.timings.items()},
+        "chamber": {
+            "volume_mm3": chamber.volume * 1e9,
+            "target_exposed_area_mm2": float(chamber.exposed_area[target].sum() * 1e6),
+            "target_triangles": int(target.sum()),
+        },
+        "notes": [*chamber.notes, *evaluation.notes],
+        "design": _design_values(design, folder),
+        "part_sha256": hashlib.sha256(design.part.mesh_path.read_bytes()).hexdigest(),
+        "versions": _versions(),
+    }
+
+
+def _about_study(result: StudyResult) -> dict[str, Any]:
+    search = [trial for trial in result.trials if trial.stage == "search"]
+    return {
+        "algorithm": result.algorithm,
+        "vary": {name: list(bounds) for name, bounds in result.study.vary.items()},
+        "evaluations": len(search),
+        "failed": sum(trial.objective is None for trial in search),
+        "missing_a_constraint": sum(trial.objective is not None and not trial.feasible for trial in search),
+        "gain": _plain(result.gain, ""),
+        "improved": result.improved,
+        "best": {"searched_as": result.best.searched, "parameters": result.best.parameters},
+        "start": {
+            "parameters": result.start.parameters,
+            "objective": _plain(result.start.evaluation.objective, ""),
+            "metrics": {
+                name: _plain(value, METRICS[name].unit) for name, value in result.start.evaluation.metrics.items()
+            },
+        },
+        "confirmed": [
+            {
+                "searched_as": candidate.searched,
+                "parameters": candidate.parameters,
+                "objective": _plain(candidate.evaluation.objective, ""),
+                "feasible": candidate.feasible,
+                "reason": candidate.reason,
+            }
+            for candidate in result.confirmed
+        ],
+        "seconds": round(result.seconds, 3),
+    }
+
+
+def _plain(estimate: Estimate, unit: str) -> dict[str, Any]:
+    """An estimate as JSON; the pseudo-values let two results be compared with an interval later."""
+    return {
+        "value": estimate.value,
+        "half_width": estimate.half_width,
+        "unit": unit,
+        "pseudovalues": list(estimate.pseudovalues),
+    }
+
+
+def _estimate(data: dict[str, Any]) -> Estimate:
+    return Estimate(data["value"], data["half_width"], tuple(data["pseudovalues"]))
+
+
+def _design_values(design: Design, folder: Path) -> dict[str, Any]:
+    """The design as its file would say it, the mesh relative to the folder."""
+    values = design.model_dump(mode="json", exclude_none=True)
+    try:
+        values["part"]["mesh"] = Path(os.path.relpath(design.part.mesh, folder.resolve())).as_posix()
+    except ValueError:  # another drive on Windows
+        values["part"]["mesh"] = Path(design.part.mesh).as_posix()
+    return values
+
+
+def _versions() -> dict[str, str]:
+    versions = {
+        "python": platform.python_version(),
+        "system": platform.platform(),
+        "cores": str(core_count()),
+    }
+    for package in PACKAGES:
+        try:
+            versions[package] = version(package)
+        except PackageNotFoundError:
+            versions[package] = "not installed as a package"
+    return versions
+
+
+def _write_json(folder: Path, data: dict[str, Any]) -> None:
+    write_text(folder / RESULT, json.dumps(data, indent=2, allow_nan=False) + "\n")

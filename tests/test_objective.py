@@ -1,0 +1,87 @@
+"""Averages over the exposed target, weighted with area, on parts of a few triangles."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from chamberopt import config
+from chamberopt.errors import InputError
+from chamberopt.objective import METRICS, OBJECTIVES, objective
+from tests.synthetic import dented, patchwork, plate_design
+
+MM2 = 1e-6
+
+
+def coverage(share: np.ndarray, area: np.ndarray, treatment_time: float) -> np.ndarray:
+    """The dented area that covers these shares of these areas at the treatment time, simulated for 1 s."""
+    return -np.log1p(-np.asarray(share)) * area / treatment_time
+
+
+def goal(*case) -> float:
+    """Uniform coverage as plain numbers."""
+    return sum(weight * METRICS[name].function(*case) for name, weight in objective("uniform_coverage").terms.items())
+
+
+@pytest.fixture
+def case() -> tuple:
+    # 1, 2, 1 mm² covered 0.9, 0.6, 0.3: mean 0.6, variance (0.09 + 0 + 0.09) / 4 = 0.045
+    design = plate_design(process__treatment_time_s=50)
+    area = np.array([1.0, 2.0, 1.0]) * MM2
+    total = dented(coverage([0.9, 0.6, 0.3], area, 50.0), 1.0, dents=np.array([4, 2, 2]), speed=3.0)
+    return total, patchwork(area), design
+
+
+def test_by_hand(case: tuple) -> None:
+    values = {name: metric.function(*case) for name, metric in METRICS.items()}
+    assert values["mean_coverage"] == pytest.approx(0.6)
+    assert values["std_coverage"] == pytest.approx(np.sqrt(0.045))
+    assert values["impacts_per_mm2_s"] == pytest.approx(8 / 4)
+    assert values["mean_normal_speed_m_s"] == pytest.approx(3.0)
+    assert values["shot_count"] == case[2].shot.count
+    assert goal(*case) == pytest.approx(0.6 - np.sqrt(0.045))
+
+
+def test_evenly_covered_is_worth_its_mean_and_full_is_one() -> None:
+    design = plate_design(process__treatment_time_s=50)
+    area = np.array([1.0, 2.0, 3.0]) * MM2
+    even = dented(coverage(np.full(3, 0.8), area, 50.0), 1.0)
+    assert goal(even, patchwork(area), design) == pytest.approx(0.8)
+    full = dented(1e3 * area, 1.0)
+    assert goal(full, patchwork(area), design) == pytest.approx(1.0)
+
+
+def test_fifth_percentile_of_a_ramp() -> None:
+    design = plate_design(process__treatment_time_s=50)
+    share = np.linspace(0.0, 0.999, 1000)
+    area = np.full(1000, MM2)
+    total = dented(coverage(share, area, 50.0), 1.0)
+    p05 = METRICS["p05_coverage"].function(total, patchwork(area), design)
+    assert p05 == pytest.approx(0.05, abs=0.001)
+
+
+def test_what_is_not_exposed_or_not_target_does_not_count(case: tuple) -> None:
+    total, chamber, design = case
+    hidden = replace(chamber, exposed_area=chamber.exposed_area * [1, 1, 0])
+    assert METRICS["mean_coverage"].function(total, hidden, design) == pytest.approx(0.7)
+    aside = replace(chamber, part=replace(chamber.part, target=np.array([True, False, False])))
+    assert METRICS["mean_coverage"].function(total, aside, design) == pytest.approx(0.9)
+    nothing = replace(chamber, part=replace(chamber.part, target=np.zeros(3, dtype=bool)))
+    with pytest.raises(InputError, match=r"part\.target"):
+        METRICS["mean_coverage"].function(total, nothing, design)
+
+
+def test_nothing_hit() -> None:
+    design, area = plate_design(), np.full(2, MM2)
+    none = dented(np.zeros(2), 1.0, dents=np.zeros(2, dtype=int))
+    values = {name: metric.function(none, patchwork(area), design) for name, metric in METRICS.items()}
+    assert values.pop("shot_count") > 0
+    assert set(values.values()) == {0.0}
+
+
+def test_the_names_a_study_may_use_are_these() -> None:
+    assert tuple(METRICS) == config.METRICS
+    for name in OBJECTIVES:
+        assert config.Objective(name=name).name == name
+    with pytest.raises(InputError, match="uniform_coverage"):
+        objective("shiny")
