@@ -13,7 +13,7 @@ from sim_core.flight import Point
 from sim_core.roots import NEVER
 from sim_core.simd import BOXES, boxes_hit, lowest_bit
 from sim_core.surfaces.obstacles import CAPSULE, FACE
-from sim_core.surfaces.tree import LEAF_BITS, STACK, Tree
+from sim_core.surfaces.tree import STACK, Tree
 from sim_core.vec3 import Vec3
 
 SLACK = np.float32(1.000001)  # on float32 times: ten times their rounding, so that an equal time is never pruned
@@ -91,26 +91,22 @@ def first_contact(
             continue
         code = scratch.nodes[depth]
         if code < 0:
-            packed = -(code + 1)
-            first = packed >> LEAF_BITS
-            for row in range(first, first + (packed & ((1 << LEAF_BITS) - 1))):
-                kind = tree.kinds[row]
-                if kind == FACE:
-                    delay = face_delay(tree.numbers, row, ball, fall, tree.radius, seam)
-                elif kind == CAPSULE:
-                    delay = capsule_delay(tree.numbers, row, ball, fall, tree.radius, best)
-                else:
-                    if plane_row < 0 or not same_plane(tree.numbers, row, plane_row):
-                        plane_row = row
-                        plane_delay = waving_plane_delay(tree.numbers, row, ball, fall, tree.radius, wave, time, best)
-                    delay = plane_delay
-                    if delay <= best and not within_waving_borders(
-                        tree.numbers, row, ball, fall, seam, wave, time, delay
-                    ):
-                        delay = NEVER
-                if delay < best or (delay == best and (found < 0 or row < found)):
-                    best = delay
-                    found = row
+            row = -1 - code
+            kind = tree.kinds[row]
+            if kind == FACE:
+                delay = face_delay(tree.numbers, row, ball, fall, tree.radius, seam)
+            elif kind == CAPSULE:
+                delay = capsule_delay(tree.numbers, row, ball, fall, tree.radius, best)
+            else:
+                if plane_row < 0 or not same_plane(tree.numbers, row, plane_row):
+                    plane_row = row
+                    plane_delay = waving_plane_delay(tree.numbers, row, ball, fall, tree.radius, wave, time, best)
+                delay = plane_delay
+                if delay <= best and not within_waving_borders(tree.numbers, row, ball, fall, seam, wave, time, delay):
+                    delay = NEVER
+            if delay < best or (delay == best and (found < 0 or row < found)):
+                best = delay
+                found = row
             continue
         hits = boxes_hit(tree.bounds, code, scratch.ray, longest, scratch.enter)
         floor = depth
