@@ -1,1 +1,18 @@
-"""chamberopt: designs ultrasonic shot peening chambers."""
+"""chamberopt: designs ultrasonic shot peening chambers. See chamberopt.workbench for use from Python."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from chamberopt.workbench import Design, Study, load_design, load_study, optimise, show, simulate
+
+__all__ = ["Design", "Study", "load_design", "load_study", "optimise", "show", "simulate"]
+
+
+def __getattr__(name: str) -> Any:
+    """The workbench's names, imported when first asked for: `chamberopt --help` needs none of them."""
+    if name in __all__:
+        return getattr(import_module("chamberopt.workbench"), name)
+    raise AttributeError(f"module 'chamberopt' has no attribute {name!r}")

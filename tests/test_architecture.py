@@ -27,6 +27,7 @@ CHAMBEROPT_ORDER = (
     ("pictures", "viewer"),
     ("results",),
     ("compare",),
+    ("workbench",),
     ("cli",),
     ("__main__",),
 )

@@ -1,0 +1,75 @@
+"""From Python, in a few lines: load a design or study, simulate or optimise it, look at the result.
+
+    import chamberopt
+
+    design = chamberopt.load_design("designs/gear.toml")
+    result = chamberopt.simulate(design.with_values({"shot.mass_g": 8}), "results/more-shot")
+    result.metrics["mean_coverage"]            # Estimate(value=..., half_width=...), 95 % interval
+    chamberopt.show(result, "more-shot.png")
+
+Coverage triangle by triangle is in the result's coverage.vtp: cell data on the part's own triangles, which pyvista
+and ParaView read.
+"""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from chamberopt.config import Study, load_design, load_study
+from chamberopt.design import Design
+
+if TYPE_CHECKING:
+    from chamberopt.accuracy import Progress
+    from chamberopt.results import Result
+
+__all__ = ["Design", "Study", "load_design", "load_study", "optimise", "show", "simulate"]
+
+
+def simulate(
+    design: Design, out: str | Path, *, workers: int | None = None, progress: Progress | None = None
+) -> Result:
+    """Simulate one design into the new or empty folder ``out``; the result as read back from there.
+
+    ``workers``: threads, one per core when None; the figures do not depend on it. Raises InputError for a chamber that
+    cannot be built, sim_core.SceneError when the shot does not fit, sim_core.SimulationError when a run must stop.
+    """
+    from chamberopt.accuracy import evaluate
+    from chamberopt.chamber import build_chamber
+    from chamberopt.executor import local_executor
+    from chamberopt.results import load_result, write_simulation
+
+    chamber = build_chamber(design)
+    with local_executor(workers) as executor:
+        evaluation = evaluate(design, chamber, executor, progress)
+    _warn(write_simulation(out, design, chamber, evaluation))
+    return load_result(out)
+
+
+def optimise(study: Study, out: str | Path, *, workers: int | None = None, progress: Progress | None = None) -> Result:
+    """Run a study into the new or empty folder ``out``; the result stands for its best design, as confirmed.
+
+    ``workers`` as in simulate. Raises InputError when the start cannot be simulated or nothing meets the constraints.
+    """
+    from chamberopt.executor import local_executor
+    from chamberopt.results import load_result, write_study
+    from chamberopt.study import run_study
+
+    with local_executor(workers) as executor:
+        found = run_study(study, out, executor, progress)
+    _warn(write_study(out, found))
+    return load_result(out)
+
+
+def show(result: Result, screenshot: str | Path | None = None) -> None:
+    """The part coloured by coverage in its chamber: in a window, or as a picture in the file ``screenshot``."""
+    from chamberopt.results import summary
+    from chamberopt.viewer import inspect
+
+    inspect(result.folder, screenshot, title=f"{result.folder.resolve().name}\n{summary(result)}")
+
+
+def _warn(remarks: list[str]) -> None:
+    for remark in remarks:
+        warnings.warn(remark, stacklevel=3)
