@@ -92,7 +92,7 @@ def build_chamber(design: Design) -> Chamber:
     tags = np.where(on_part, TAG_PART, shape.tags[np.where(on_part, 0, room.source)]).astype(np.uint8)
     source = np.where(on_part, room.source, -1).astype(np.int32)
     exposed = np.bincount(source[on_part], areas(room.vertices, room.triangles)[on_part], len(part.triangles))
-    _refuse_hidden_target(part, exposed)
+    notes += _hidden_target_note(part, exposed)
     notes += room_notes + _crooked_note(room, on_part, part, shape) + _hold_note(room, on_part, part.name)
     volume = float(tetrahedron_volumes(room.vertices, room.triangles).sum())
     return Chamber(room.vertices, room.triangles, tags, source, volume, part, exposed, tuple(notes))
@@ -234,13 +234,21 @@ def _room_over_sonotrode(
     return room, notes
 
 
-def _refuse_hidden_target(part: Part, exposed: np.ndarray) -> None:
+def _hidden_target_note(part: Part, exposed: np.ndarray) -> list[str]:
+    """How much of the target no ball can reach, because it lies outside the cavity. InputError when it is all."""
     if not (exposed[part.target] > 0.0).any():
         raise InputError(
             f"part.target: none of its {int(part.target.sum())} triangles bounds the cavity, so no shot "
             "reaches it; check part.rotate_deg (which side faces the sonotrode), chamber.height_mm and "
             "chamber.diameter_mm"
         )
+    hidden = 1.0 - exposed[part.target].sum() / part.area[part.target].sum()
+    if hidden < 1e-3:
+        return []
+    return [
+        f"{hidden:.1%} of the target's area is outside the cavity and counts as not covered; narrow [part.target] "
+        "to what is to be peened, or enlarge the chamber"
+    ]
 
 
 def _crooked_note(room: Surface, on_part: np.ndarray, part: Part, shape: ShapeSurface) -> list[str]:

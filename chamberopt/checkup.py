@@ -56,7 +56,7 @@ def describe(design: Design, chamber: Chamber) -> dict[str, Any]:
             "packing_fraction": _rounded(shot.count * ball_volume / chamber.volume),
         },
         "simulated_time_s": _rounded(simulated),
-        "notes": [*chamber.notes, *_hidden(chamber)],
+        "notes": list(chamber.notes),
         "warnings": warnings(design, chamber),
     }
 
@@ -83,18 +83,6 @@ def warnings(design: Design, chamber: Chamber) -> list[str]:
                 f"{shot.diameter_mm:g} mm: no ball gets in there; {remedy}"
             )
     return said
-
-
-def _hidden(chamber: Chamber) -> list[str]:
-    """How much of the target no ball can ever reach: it lies outside the cavity."""
-    target = chamber.part.target
-    wanted, exposed = chamber.part.area[target].sum(), chamber.exposed_area[target].sum()
-    if exposed > 0.999 * wanted:
-        return []
-    return [
-        f"{1 - exposed / wanted:.0%} of the target's area is outside the cavity: it is not peened and does "
-        "not count; narrow [part.target] or enlarge the chamber if it should"
-    ]
 
 
 def _gaps(design: Design, chamber: Chamber) -> list[tuple[str, float, str]]:

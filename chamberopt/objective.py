@@ -54,15 +54,21 @@ def exposed_target(chamber: Chamber) -> np.ndarray:
 
 
 def _target_coverage(total: Tally, chamber: Chamber, design: Design) -> tuple[np.ndarray, np.ndarray]:
-    """Coverage of the exposed target triangles at the treatment time, and their share of its area."""
-    target = exposed_target(chamber)
-    if not target.any():
+    """Coverage of every target triangle at the treatment time, and its share of the target's area.
+
+    What lies outside the cavity is not covered. Left out of the count, it would teach the optimiser to hide
+    whatever is hard to reach behind a lower ceiling.
+    """
+    target = chamber.part.target
+    if not exposed_target(chamber).any():
         raise InputError(
             "part.target: no triangle of the target bounds the cavity, so its coverage is not defined; "
             "widen [part.target] or move the part into the chamber"
         )
-    area = chamber.exposed_area[target]
-    return coverage_at(total, chamber, design.process.treatment_time)[target], area / area.sum()
+    area = chamber.part.area[target]
+    exposed = np.minimum(chamber.exposed_area[target] / area, 1.0)
+    coverage = coverage_at(total, chamber, design.process.treatment_time)[target]
+    return np.where(exposed > 0.0, coverage, 0.0) * exposed, area / area.sum()
 
 
 def mean_coverage(total: Tally, chamber: Chamber, design: Design) -> float:
