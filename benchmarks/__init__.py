@@ -1,0 +1,1 @@
+"""Measurements against something a user could pick instead; scenes shared with the tests."""
