@@ -1,4 +1,4 @@
-"""Named scenes: the cylinder of the paper at any fineness, and the shipped gear's chamber. Tags as a chamber has them."""
+"""Named scenes: the paper's cylinder at any fineness, and the shipped gear's chamber. Tags as a chamber has them."""
 
 from functools import lru_cache
 from itertools import pairwise

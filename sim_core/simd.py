@@ -49,6 +49,12 @@ class _Vectors:
     def larger(self, a: Any, b: Any) -> Any:
         return self.builder.select(self.builder.fcmp_ordered(">", a, b), a, b)
 
+    def fused(self, a: Any, b: Any, c: Any) -> Any:
+        """a b + c in one rounding: a filter may round as it likes."""
+        kind = ir.FunctionType(self.type, [self.type] * 3)
+        function = cgutils.get_or_insert_function(self.builder.module, kind, f"llvm.fma.v{self.width}f32")
+        return self.builder.call(function, [a, b, c])
+
     def mask(self, condition: Any) -> Any:
         """Lane conditions as the bits of an int64."""
         bits = self.builder.bitcast(condition, ir.IntType(self.width))
@@ -125,11 +131,11 @@ def _balls_near(typing_context: Any, lanes: Any, first: Any, probe: Any) -> Any:
         square = closing = speed = zero
         for axis in range(3):
             velocity = column(3 + axis)
-            apart = builder.fsub(builder.fadd(column(axis), builder.fmul(velocity, now)), number(axis))
+            apart = v.fused(velocity, now, builder.fsub(column(axis), number(axis)))
             relative = builder.fsub(velocity, number(3 + axis))
-            square = builder.fadd(square, builder.fmul(apart, apart))
-            closing = builder.fadd(closing, builder.fmul(apart, relative))
-            speed = builder.fadd(speed, builder.fmul(relative, relative))
+            square = v.fused(apart, apart, square)
+            closing = v.fused(apart, relative, closing)
+            speed = v.fused(relative, relative, speed)
         # miss distance² <= reach² + a relative margin on the distance, where float32 loses most
         miss = builder.fsub(builder.fmul(square, number(8)), number(7))
         may_meet = builder.fcmp_ordered(">=", builder.fmul(closing, closing), builder.fmul(speed, miss))
