@@ -80,13 +80,19 @@ class Evaluation:
 def estimate(
     pseudovalues: Sequence[float] | np.ndarray, lowest: float = -math.inf, highest: float = math.inf
 ) -> Estimate:
-    """Mean of the pseudo-values, clipped to the range the quantity can have, with its Student-t interval."""
+    """Mean of the pseudo-values, clipped to the range the quantity can have, with its Student-t interval.
+
+    Where the clip bites, the pseudo-values are moved with it: what is made of them later (an objective, a gain)
+    then has the same value as what is made of the clipped estimates.
+    """
     values = np.asarray(pseudovalues, dtype=float)
+    mean = float(np.clip(values.mean(), lowest, highest))
+    values = values + (mean - values.mean())
     n = len(values)
     half_width = float("inf")
     if n > 1:
         half_width = _student(n - 1) * float(values.std(ddof=1)) / math.sqrt(n)
-    return Estimate(float(np.clip(values.mean(), lowest, highest)), half_width, tuple(values.tolist()))
+    return Estimate(mean, half_width, tuple(values.tolist()))
 
 
 def _student(freedom: float) -> float:
@@ -179,7 +185,7 @@ def evaluate(
     replicas: number of them, the design's own when None. stream: which of the two seed streams ("search",
     "confirm"). The same numbers come out whatever the number of workers: replicas are added in order.
 
-    Raises sim_core.SceneError (the shot does not fit) and sim_core.SimulationError.
+    Raises InputError (the shot does not fit) and sim_core.SimulationError.
     """
     goal = objective(objective_name)
     count = replicas or design.process.accuracy.replicas

@@ -35,7 +35,8 @@ __all__ = ["TAG_PART", "TAG_SONOTRODE", "TAG_WALL", "Chamber", "Part", "build_ch
 class Part:
     """The user's own triangles, in the file's order, posed in the chamber.
 
-    vertices (n, 3) m · triangles (m, 3) int32 · area (m,) m² · target (m,) bool: what must be covered · name.
+    vertices (n, 3) m · triangles (m, 3) int32 · area (m,) m² · target (m,) bool: what must be covered · name ·
+    sha256 of the mesh file as it was read.
     """
 
     vertices: np.ndarray
@@ -43,6 +44,7 @@ class Part:
     area: np.ndarray
     target: np.ndarray
     name: str
+    sha256: str = ""
 
 
 @dataclass(frozen=True)
@@ -124,7 +126,8 @@ def _posed(mesh: PartMesh, design: Design) -> Part:
     shift = np.array([x - centre[0], y - centre[1], design.chamber.sonotrode_distance - low[2]])
     vertices = snapped(vertices + shift)
     target = _target(mesh, design)
-    return Part(vertices, mesh.triangles, areas(vertices, mesh.triangles), target, design.part.mesh_path.name)
+    area = areas(vertices, mesh.triangles)
+    return Part(vertices, mesh.triangles, area, target, design.part.mesh_path.name, mesh.sha256)
 
 
 def _rotation(degrees: tuple[float, float, float]) -> np.ndarray:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.chamber import TAG_PART, TAG_SONOTRODE, TAG_WALL
+from chamberopt.process import require_countable
 from chamberopt.shapes import shape_surface
 
 if TYPE_CHECKING:
@@ -19,7 +20,11 @@ CROWDED = 0.3
 
 
 def describe(design: Design, chamber: Chamber) -> dict[str, Any]:
-    """Facts and warnings on a design and its chamber, as plain JSON values; units are in the names."""
+    """Facts and warnings on a design and its chamber, as plain JSON values; units are in the names.
+
+    Raises InputError when the shot has more balls than can be simulated.
+    """
+    require_countable(design)
     part, shot, accuracy = chamber.part, design.shot, design.process.accuracy
     exposed = chamber.exposed_area > 0.0
     box = part.vertices.max(axis=0) - part.vertices.min(axis=0)

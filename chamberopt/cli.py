@@ -8,8 +8,9 @@ from __future__ import annotations
 import json as json_format
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib.metadata import version
+from io import TextIOWrapper
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -86,8 +87,8 @@ def simulate(design: Path, /, *, json: Json = False, out: Out = None) -> None:
 
     candidate = load_design(design)
     chamber = build_chamber(candidate)
-    _compile(candidate, chamber)
     with _results(out, design.stem) as folder:
+        _compile(candidate, chamber)
         with local_executor() as executor, progress_bar("replicas") as progress:
             evaluation = evaluate(candidate, chamber, executor, progress)
         _remark(write_simulation(folder, candidate, chamber, evaluation))
@@ -112,8 +113,8 @@ def run(study: Path, /, *, json: Json = False, out: Out = None) -> None:
 
     question = load_study(study)
     start = build_chamber(question.design)
-    _compile(question.design, start)
     with _results(out, study.stem) as folder:
+        _compile(question.design, start)
         with local_executor() as executor, progress_bar("evaluations") as progress:
             result = run_study(question, folder, executor, progress)
         _remark(write_study(folder, result))
@@ -196,8 +197,9 @@ def _results(out: Path | None, name: str) -> Iterator[Path]:
     try:
         yield folder
     except BaseException:
-        if not any(folder.iterdir()):
-            folder.rmdir()
+        with suppress(OSError):
+            if not any(folder.iterdir()):
+                folder.rmdir()
         raise
 
 
@@ -261,6 +263,9 @@ def _say(lines: Sequence[str], folder: Path, json: bool) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one command; its exit status. Every error a user can put right is one message on stderr."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # a terminal without ± must not cost the figures
     try:
         app(
             list(sys.argv[1:] if arguments is None else arguments),
@@ -277,6 +282,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of our stdout left, as `head` does
         sys.stderr.close()
         return 0
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        return _failed(f"{where}{error.strerror or error}; what had been finished stays on disk", 1)
     except (ValueError, RuntimeError) as error:
         return _simulator_failed(error)
     return 0

@@ -172,6 +172,8 @@ def _read(path: Path, kind: str) -> tuple[str, dict[str, Any]]:
         raise InputError(
             f"{path}: not UTF-8 text (byte {error.start}); a {kind} file is TOML, save it as UTF-8"
         ) from None
+    except ValueError:  # a null character in the name
+        raise InputError(f"{str(path)!r}: not a file name; check the path") from None
     if not source.strip():
         raise InputError(f"{path}: the file is empty; a {kind} file is TOML, start from a copy of a shipped one")
     try:
@@ -180,6 +182,8 @@ def _read(path: Path, kind: str) -> tuple[str, dict[str, Any]]:
         found = re.search(r"^(.*?) \(at line (\d+), column (\d+)\)$", str(error), re.DOTALL)
         place, text = (f"{path}:{found[2]}", f"{found[1]}, column {found[3]}") if found else (path, error)
         raise InputError(f"{place}: not valid TOML: {text}; correct the line, e.g. name = 1.5") from None
+    except (ValueError, RecursionError) as error:  # a number of thousands of digits, brackets thousands deep
+        raise InputError(f"{path}: no {kind} file: {error}; start from a copy of a shipped one") from None
 
 
 def _is_study(data: Mapping[str, Any]) -> bool:

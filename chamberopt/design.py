@@ -90,7 +90,7 @@ class Part(BaseModel):
         """Held absolute from here on, so that a design stays right wherever it is used or saved."""
         context = info.context or {}
         path = (context.get("folder", Path()) / mesh).resolve()
-        if context.get("from_file") and not path.is_file():
+        if context.get("needs_mesh") and not path.is_file():
             raise CrossCheckError([Problem("", f"given {mesh!r}: {diagnosis.not_found(path, 'mesh file', '*')}")])
         return str(path)
 
@@ -334,11 +334,20 @@ class Design(BaseModel):
 Table = TypeVar("Table", bound=BaseModel)
 
 
-def checked(model: type[Table], data: Mapping[str, Any], path: Path | None = None, source: str = "") -> Table:
-    """The data as a frozen model, or InputError with every problem; mesh paths count from the file."""
+def checked(
+    model: type[Table],
+    data: Mapping[str, Any],
+    path: Path | None = None,
+    source: str = "",
+    mesh_must_exist: bool = True,
+) -> Table:
+    """The data as a frozen model, or InputError with every problem; mesh paths count from the file.
+
+    A result can be looked at without the mesh it was made from: mesh_must_exist = False.
+    """
     try:
         return model.model_validate(
-            data, context={"folder": path.parent if path else Path(), "from_file": path is not None}
+            data, context={"folder": path.parent if path else Path(), "needs_mesh": path and mesh_must_exist}
         )
     except ValidationError as error:
         problems = diagnosis.from_validation(error, model)

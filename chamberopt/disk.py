@@ -1,6 +1,7 @@
 """Writing without regret: a folder that was not in use, and files that appear whole or not at all."""
 
 import os
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,17 +12,19 @@ from chamberopt.errors import InputError
 def new_folder(path: str | Path) -> Path:
     """The folder, made if need be; InputError when something is in it: results are never overwritten."""
     folder = Path(path)
-    if folder.exists() and not folder.is_dir():
+    if os.path.lexists(folder) and not os.path.isdir(folder):
         raise InputError(f"{folder}: is a file; results need a folder: choose another place with --out DIR")
-    if folder.is_dir() and any(folder.iterdir()):
-        raise InputError(
-            f"{folder}: already holds files, and results are never overwritten: choose another folder with "
-            "--out DIR or remove this one (resuming a study is not supported yet)"
-        )
     try:
+        if folder.is_dir() and any(folder.iterdir()):
+            raise InputError(
+                f"{folder}: already holds files, and results are never overwritten: choose another folder with "
+                "--out DIR or remove this one (resuming a study is not supported yet)"
+            )
         folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):  # better now than after an hour's work
+            pass
     except OSError as error:
-        raise InputError(f"{folder}: cannot be made: {error.strerror}; choose another place with --out") from None
+        raise InputError(f"{folder}: cannot be written: {error.strerror}; choose another place with --out") from None
     return folder
 
 

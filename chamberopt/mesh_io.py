@@ -6,6 +6,8 @@ that was given.
 
 from __future__ import annotations
 
+import hashlib
+import io
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,13 +27,14 @@ WELD = 1e-6  # of the bounding box's diagonal: what a text format with 6 digits 
 class PartMesh:
     """A closed part in its file's own frame.
 
-    vertices (n, 3) float64 m · triangles (m, 3) int32, normals outward, in the file's order · notes: what
-    was changed.
+    vertices (n, 3) float64 m · triangles (m, 3) int32, normals outward, in the file's order · notes: what was
+    changed · sha256 of the file as read.
     """
 
     vertices: np.ndarray
     triangles: np.ndarray
     notes: tuple[str, ...]
+    sha256: str
 
     @property
     def size(self) -> np.ndarray:
@@ -45,7 +48,8 @@ def read_part(path: Path, unit: str) -> PartMesh:
     Raises InputError, with reason and place, for what is missing, empty, truncated, not finite, open, non-
     manifold or of a size that no part has.
     """
-    corners = _corners(path)
+    content = _content(path)
+    corners = _corners(path, content)
     if not len(corners):
         raise InputError(f"{path}: holds no triangles; export a surface mesh")
     bad = np.flatnonzero(~np.isfinite(corners).all(axis=(1, 2)))
@@ -58,7 +62,8 @@ def read_part(path: Path, unit: str) -> PartMesh:
     _refuse_implausible(path, corners, unit)
     vertices, triangles, notes = _sewn(path, corners)
     triangles, flipped = _outward(path, vertices, triangles)
-    return PartMesh(vertices, triangles.astype(np.int32), (*notes, *flipped))
+    digest = hashlib.sha256(content).hexdigest()
+    return PartMesh(vertices, triangles.astype(np.int32), (*notes, *flipped), digest)
 
 
 def box_text(sides: np.ndarray) -> str:
@@ -71,8 +76,8 @@ def place_text(point: np.ndarray) -> str:
     return "(" + ", ".join(f"{1e3 * value + 0.0:.5g}" for value in point) + ") mm"
 
 
-def _corners(path: Path) -> np.ndarray:
-    """Corners (m, 3, 3) of the file's triangles, in the file's numbers and order."""
+def _content(path: Path) -> bytes:
+    """The file's bytes, where there is a file of a known kind that can be read and is not empty."""
     suffix = path.suffix.lower()
     if path.is_dir():
         raise InputError(f"{path}: is a folder; give a mesh file")
@@ -80,11 +85,20 @@ def _corners(path: Path) -> np.ndarray:
         raise InputError(f"{path}: no such mesh file; check part.mesh, which counts from the design file's folder")
     if suffix not in FORMATS:
         raise InputError(f"{path}: {suffix or 'a file without ending'} is not supported yet; use {', '.join(FORMATS)}")
-    content = path.read_bytes()
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}; check its permissions") from None
     if not content.strip():
         raise InputError(f"{path}: the file is empty; export the mesh again")
+    return content
+
+
+def _corners(path: Path, content: bytes) -> np.ndarray:
+    """Corners (m, 3, 3) of the triangles in the file's bytes, in the file's numbers and order."""
+    suffix = path.suffix.lower()
     if suffix == ".stl":
-        _refuse_truncated_stl(path, content)
+        content = _whole_stl(path, content)
 
     import trimesh
 
@@ -92,7 +106,9 @@ def _corners(path: Path) -> np.ndarray:
         raise InputError(f"{path}: reading 3MF needs the package lxml: pip install lxml, or export as STL")
     options: dict[str, Any] = {"split_objects": False, "group_material": False, "skip_materials": True}
     try:
-        scene = trimesh.load_scene(path, process=False, **(options if suffix == ".obj" else {}))
+        scene = trimesh.load_scene(
+            io.BytesIO(content), file_type=suffix[1:], process=False, **(options if suffix == ".obj" else {})
+        )
         meshes = [mesh for mesh in scene.dump() if isinstance(mesh, trimesh.Trimesh)]
         soups = [np.asarray(mesh.vertices, dtype=np.float64)[mesh.faces] for mesh in meshes if len(mesh.faces)]
     except MemoryError:
@@ -105,18 +121,22 @@ def _corners(path: Path) -> np.ndarray:
     return np.concatenate(soups) if soups else np.zeros((0, 3, 3))
 
 
-def _refuse_truncated_stl(path: Path, content: bytes) -> None:
-    """A binary STL says how many triangles it holds, a text one ends with endsolid."""
+def _whole_stl(path: Path, content: bytes) -> bytes:
+    """The STL without what some exporters put behind it. InputError when it is truncated.
+
+    A binary STL says how many triangles it holds, a text one ends with endsolid.
+    """
     is_text = content.lstrip()[:5].lower() == b"solid" and b"facet" in content[:2000].lower()
     if is_text:
         if not content.rstrip().splitlines()[-1].strip().lower().startswith(b"endsolid"):
             raise InputError(f"{path}: truncated, the last line is not 'endsolid'; export or copy it again")
-        return
+        return content
     declared = int.from_bytes(content[80:84], "little")
     if len(content) < 84 or len(content) < 84 + 50 * declared:
         held = max(0, (len(content) - 84) // 50)
         told = f"it says {declared} triangles and holds {held}" if len(content) >= 84 else "shorter than its header"
         raise InputError(f"{path}: truncated or not an STL: {told}; export or copy it again")
+    return content[: 84 + 50 * declared]
 
 
 def _refuse_implausible(path: Path, corners: np.ndarray, unit: str) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import platform
@@ -98,22 +97,24 @@ def load_result(path: str | Path) -> Result:
             raise InputError(f"{folder}: a study that did not finish: it has a history but no {RESULT}; run it again")
         raise InputError(f"{folder}: not a results folder: {RESULT} is not there; give one made by simulate or run")
     try:
-        data = json.loads(file.read_text(encoding="utf-8"))
+        data = json.loads(file.read_text(encoding="utf-8"), parse_constant=_refuse_constant)
         if data["format"] != FORMAT:
             raise InputError(f"{file}: written in format {data['format']}, this version reads {FORMAT}; simulate again")
         return Result(
             folder=folder,
             kind=data["kind"],
-            design=checked(Design, data["design"], file),
+            design=checked(Design, data["design"], file, mesh_must_exist=False),
             objective_name=data["objective"]["name"],
             objective=_estimate(data["objective"]),
-            metrics={name: _estimate(metric) for name, metric in data["metrics"].items()},
+            metrics={name: _estimate(data["metrics"][name]) for name in METRICS},
             part_sha256=data["part_sha256"],
             seeds=(data["seed"], data["stream"]),
             notes=tuple(data["notes"]),
             data=data,
         )
-    except (UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError) as error:
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read: {error.strerror}; check its permissions") from None
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{file}: damaged ({type(error).__name__}: {error}); simulate again") from None
 
 
@@ -162,7 +163,7 @@ def _about(folder: Path, design: Design, chamber: Chamber, evaluation: Evaluatio
         },
         "notes": [*chamber.notes, *evaluation.notes],
         "design": _design_values(design, folder),
-        "part_sha256": hashlib.sha256(design.part.mesh_path.read_bytes()).hexdigest(),
+        "part_sha256": chamber.part.sha256,
         "versions": _versions(),
     }
 
@@ -210,7 +211,11 @@ def _plain(estimate: Estimate, unit: str) -> dict[str, Any]:
 
 
 def _estimate(data: dict[str, Any]) -> Estimate:
-    return Estimate(data["value"], data["half_width"], tuple(data["pseudovalues"]))
+    return Estimate(float(data["value"]), float(data["half_width"]), tuple(float(x) for x in data["pseudovalues"]))
+
+
+def _refuse_constant(name: str) -> float:
+    raise ValueError(f"{name} is no figure")
 
 
 def _design_values(design: Design, folder: Path) -> dict[str, Any]:

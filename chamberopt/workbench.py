@@ -33,7 +33,7 @@ def simulate(
     """Simulate one design into the new or empty folder ``out``; the result as read back from there.
 
     ``workers``: threads, one per core when None; the figures do not depend on it. Raises InputError for a chamber that
-    cannot be built, sim_core.SceneError when the shot does not fit, sim_core.SimulationError when a run must stop.
+    cannot be built or does not take the shot, sim_core.SimulationError when a run must stop.
     """
     from chamberopt.accuracy import evaluate
     from chamberopt.chamber import build_chamber

@@ -29,7 +29,10 @@ class Balls:
                 raise SceneError(f"balls.{name} is {value}: it must be positive")
             object.__setattr__(self, name, value)
         for name in ("positions", "velocities"):
-            array = np.array(getattr(self, name), dtype=np.float64, order="C")
+            try:
+                array = np.array(getattr(self, name), dtype=np.float64, order="C")
+            except (TypeError, ValueError):
+                raise SceneError(f"balls.{name} must be numbers of shape (n, 3)") from None
             if array.ndim != 2 or array.shape[1] != 3 or len(array) == 0:
                 raise SceneError(f"balls.{name} must have shape (n, 3) with n >= 1, not {array.shape}")
             bad = np.flatnonzero(~np.isfinite(array).all(axis=1))

@@ -155,7 +155,8 @@ def closest_pair(balls: Balls) -> tuple[float, int, int]:
 
     distance, partner = KDTree(balls.positions).query(balls.positions, k=2)
     one = int(distance[:, 1].argmin())
-    return float(distance[one, 1]), one, int(partner[one, 1])
+    two = int(partner[one, 1])  # of balls in one place the first found may be either
+    return float(distance[one, 1]), one, two if two != one else int(partner[one, 0])
 
 
 def energy(balls: Balls, gravity: Gravity | None = None) -> float:

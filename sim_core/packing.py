@@ -23,34 +23,53 @@ def pack_balls(
     ``diameter`` [m]; ``clear`` [m] is kept from every surface (at least the amplitude, where one vibrates). "Low" is
     along -z. Raises SceneError when they do not fit: random placement reaches about 30 % of the volume a ball can use.
     """
+    if not (diameter > 0.0 and count >= 1 and count == int(count)):
+        raise SceneError(f"cannot place {count} balls of {diameter} m: give a whole number and a positive diameter")
     radius = 0.5 * diameter + GAP
     free = radius + clear
     low = mesh.vertices.min(axis=0) + free
     high = mesh.vertices.max(axis=0) - free
     if (high < low).any():
         raise SceneError(f"no ball of {diameter * 1e3:.3g} mm fits into the mesh: it is narrower than the ball")
-    placed = np.zeros((count, 3))
-    done = failures = 0
+    placed = _Placed(2.0 * radius)
+    failures = 0
     top = min(low[2] + FIRST_LAYER * diameter, high[2])
-    while done < count:
+    while len(placed.points) < count:
         tries = rng.uniform(low, [high[0], high[1], top], size=(BATCH, 3))
         tries = tries[clearance(mesh.corners, tries, free) >= free]
         tries = tries[contained(mesh, tries)]
-        before = done
+        before = len(placed.points)
         for point in tries:
-            if done == count:
+            if len(placed.points) == count:
                 break
-            if ((placed[:done] - point) ** 2).sum(axis=1).min(initial=np.inf) >= 4.0 * radius * radius:
-                placed[done] = point
-                done += 1
+            placed.add(point)
         # a layer that takes under one try in fifty is full enough
-        failures = 0 if done - before > BATCH // 50 else failures + 1
+        failures = 0 if len(placed.points) - before > BATCH // 50 else failures + 1
         if failures and top < high[2]:
             top = min(low[2] + GROWTH * (top - low[2]), high[2])
             failures = 0
         elif failures > TRIES:
             raise SceneError(
-                f"only {done} of {count} balls of {diameter * 1e3:.3g} mm find a free place in "
+                f"only {len(placed.points)} of {count} balls of {diameter * 1e3:.3g} mm find a free place in "
                 f"{mesh.volume * 1e6:.3g} cm³; use less shot, smaller balls or a larger chamber"
             )
-    return placed
+    return np.array(placed.points)
+
+
+class _Placed:
+    """Points no two of which are nearer than ``apart`` [m], found again by the cell they lie in."""
+
+    def __init__(self, apart: float) -> None:
+        self.apart = apart
+        self.points: list[np.ndarray] = []
+        self.cells: dict[tuple[int, int, int], list[np.ndarray]] = {}
+
+    def add(self, point: np.ndarray) -> None:
+        """Take the point in, unless it is too near to another."""
+        i, j, k = (int(c) for c in np.floor(point / self.apart))
+        for cell in ((i + a, j + b, k + c) for a in (-1, 0, 1) for b in (-1, 0, 1) for c in (-1, 0, 1)):
+            for other in self.cells.get(cell, ()):
+                if ((point - other) ** 2).sum() < self.apart * self.apart:
+                    return
+        self.points.append(point)
+        self.cells.setdefault((i, j, k), []).append(point)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim_core.balls import Balls
+from sim_core.effects.gravity import checked_gravity
 from sim_core.effects.restitution import checked_restitution
 from sim_core.effects.vibration import checked_wave
 from sim_core.errors import SceneError
@@ -12,6 +13,7 @@ from sim_core.invariants import clearance, closest_pair, contained
 from sim_core.physics import Physics
 from sim_core.surfaces.mesh import TriangleMesh
 
+LONGEST = 1e6  # s: eleven days of peening
 TOUCH = 1e-9  # m: overlap at the start that is taken for rounding of the input; ten thousand times less than a dent
 
 
@@ -33,17 +35,21 @@ class Scene:
     record: tuple[int, ...] | None = None
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.duration) and self.duration > 0.0):
-            raise SceneError(f"scene.duration is {self.duration} s: it must be positive")
-        if not (np.isfinite(self.warmup) and self.warmup >= 0.0):
-            raise SceneError(f"scene.warmup is {self.warmup} s: it must be 0 or more")
+        for name, value in (("duration", self.duration), ("warmup", self.warmup)):
+            if not isinstance(value, (int, float, np.number)) or not 0.0 <= value <= LONGEST:
+                raise SceneError(f"scene.{name} is {value!r}: give seconds from 0 to {LONGEST:g}")
+        if self.duration == 0.0:
+            raise SceneError("scene.duration is 0 s: it must be positive")
+        if self.record is not None and not all(tag in self.mesh.tags for tag in self.record):
+            raise SceneError(
+                f"scene.record is {self.record}, but the mesh has tags {np.unique(self.mesh.tags).tolist()}"
+            )
         self._require_physics()
         self._require_room()
 
     def _require_physics(self) -> None:
         gravity, restitution, vibration = self.physics
-        if gravity is not None and not np.isfinite(gravity).all():
-            raise SceneError(f"gravity is {tuple(gravity)} m/s²: it must be finite")
+        checked_gravity(gravity)
         if restitution is not None:
             checked_restitution(restitution, int(self.mesh.tags.max()) + 1)
         checked_wave(vibration)

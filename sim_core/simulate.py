@@ -9,6 +9,7 @@ import numpy as np
 from sim_core.balls import Balls
 from sim_core.calendar import Calendar, new_calendar
 from sim_core.detect.ball_mesh import Scratch, new_scratch
+from sim_core.effects.gravity import checked_gravity
 from sim_core.effects.restitution import Restitution, checked_restitution
 from sim_core.effects.vibration import Wave, checked_wave
 from sim_core.errors import SimulationError
@@ -80,7 +81,7 @@ class _Run:
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        self.gravity = scene.physics.gravity
+        self.gravity = checked_gravity(scene.physics.gravity)
         self.wave: Wave | None = checked_wave(scene.physics.vibration)
         self.restitution: Restitution | None = None
         if scene.physics.restitution is not None:
@@ -153,7 +154,8 @@ class _Run:
                 where = np.round(self._points(np.array([ball]))[0], 6).tolist()
                 raise SimulationError(
                     f"ball {ball} jams at {where} m: more than ten million events a second; {self._when()}. "
-                    "Look for a gap just as wide as the ball there, or raise restitution.elastic_below"
+                    "Look for a gap just as wide as the ball there; a ball that lies still on a surface is not "
+                    "supported yet"
                 )
 
     def _turn(self, page: ImpactPage) -> None:
@@ -180,7 +182,7 @@ class _Run:
         if len(outside):
             raise SimulationError(
                 f"ball {outside[0]} has left the mesh at {np.round(points[outside[0]], 6).tolist()} m, {self._when()}. "
-                "This must never happen: please report the scene"
+                "Look for surfaces that overlap or cross there; if there are none, please report the scene"
             )
 
     def balls(self) -> Balls:

@@ -141,6 +141,16 @@ def test_value_stays_in_its_range_and_one_replica_has_no_interval() -> None:
     assert estimate([0.5], 0.0, 1.0).half_width == np.inf
 
 
+def test_what_is_made_of_a_clipped_value_agrees_with_its_interval() -> None:
+    """A correction that overshoots is clipped; objective and gain must not keep the overshoot in their intervals."""
+    metrics = {"mean_coverage": estimate([0.7, 0.8, 0.75]), "std_coverage": estimate([0.6, 0.7, 0.62], 0.0, 0.5)}
+    goal = weighted(OBJECTIVES["uniform_coverage"], metrics)
+    assert goal.value == pytest.approx(0.75 - 0.5)
+    assert np.mean(goal.pseudovalues) == pytest.approx(goal.value)
+    gain = paired_difference(goal, estimate([0.1, 0.12, 0.11]))
+    assert np.mean(gain.pseudovalues) == pytest.approx(gain.value)
+
+
 def test_evaluate_gives_the_same_numbers_on_any_number_of_workers() -> None:
     design = plate_design(
         process__accuracy__simulated_time_s=0.02, process__accuracy__warmup_time_s=0.02,

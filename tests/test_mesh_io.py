@@ -197,3 +197,10 @@ def test_what_is_refused_is_named_with_its_place(tmp_path: Path, how: str, said:
         read_part(path, "mm")
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_what_an_exporter_put_behind_a_binary_stl_is_ignored(tmp_path: Path) -> None:
+    plain, longer = tmp_path / "plain.stl", tmp_path / "longer.stl"
+    trimesh.creation.box((20, 20, 20)).export(plain)
+    longer.write_bytes(plain.read_bytes() + bytes(40))
+    assert (read_part(longer, "mm").vertices == read_part(plain, "mm").vertices).all()

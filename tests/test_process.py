@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from chamberopt.chamber import TAG_PART, TAG_SONOTRODE, build_chamber
+from chamberopt.errors import InputError
 from chamberopt.process import build_scene, chamber_mesh, replica_seed, start_velocities
 from tests.synthetic import plate_design
 
@@ -60,3 +61,16 @@ def test_start_velocities_are_isotropic_maxwell() -> None:
     np.testing.assert_allclose((v**2).mean(axis=0), 3.0, rtol=0.02)
     np.testing.assert_allclose((v**4).mean(axis=0) / (v**2).mean(axis=0) ** 2, 3.0, rtol=0.03)
     np.testing.assert_allclose(v.mean(axis=0), 0.0, atol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("shot", "said"),
+    [
+        ({"mass_g": 100.0}, r"shot: only \d+ of 907 balls .* find a free place.*shot\.mass_g"),
+        ({"diameter_mm": 0.1}, "supported"),
+    ],
+)
+def test_shot_that_cannot_be_placed_is_refused_by_its_fields(shot: dict, said: str) -> None:
+    crowded = plate_design(**{f"shot__{name}": value for name, value in shot.items()})
+    with pytest.raises(InputError, match=said):
+        build_scene(crowded, chamber_mesh(build_chamber(crowded)), 1)

@@ -2,9 +2,11 @@
 eq. 1.
 """
 
+import math
 from typing import NamedTuple
 
 from sim_core._compile import jit
+from sim_core.errors import SceneError
 from sim_core.vec3 import Vec3
 
 STANDARD = 9.80665  # m/s², CGPM 1901
@@ -16,6 +18,19 @@ class Gravity(NamedTuple):
     x: float = 0.0
     y: float = 0.0
     z: float = -STANDARD
+
+
+def checked_gravity(gravity: Gravity | None) -> Gravity | None:
+    """The same as plain floats, which compiled code is made for; raises SceneError for anything that is not finite."""
+    if gravity is None:
+        return None
+    try:
+        plain = Gravity(*(float(component) for component in gravity))
+    except (TypeError, ValueError):
+        raise SceneError(f"gravity is {gravity!r}: give three numbers [m/s²]") from None
+    if not all(math.isfinite(component) for component in plain):
+        raise SceneError(f"gravity is {tuple(plain)} m/s²: it must be finite")
+    return plain
 
 
 @jit

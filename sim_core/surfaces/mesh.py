@@ -32,8 +32,13 @@ class TriangleMesh:
     tags: np.ndarray
 
     def __post_init__(self) -> None:
-        vertices = np.array(self.vertices, dtype=np.float64, order="C")
-        triangles = np.array(self.triangles, dtype=np.int32, order="C")
+        try:
+            vertices = np.array(self.vertices, dtype=np.float64, order="C")
+            triangles = np.array(self.triangles, dtype=np.int32, order="C")
+        except (TypeError, ValueError):
+            raise SceneError(
+                "mesh vertices must be numbers of shape (n, 3), triangles indices of shape (m, 3)"
+            ) from None
         if vertices.ndim != 2 or vertices.shape[1] != 3:
             raise SceneError(f"mesh vertices must have shape (n, 3), not {vertices.shape}")
         if triangles.ndim != 2 or triangles.shape[1] != 3 or len(triangles) < 4:

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from sim_core import Balls, Gravity, Physics, Restitution, Scene, SceneError, TriangleMesh, Vibration
+from sim_core import Balls, Gravity, Physics, Restitution, Scene, SceneError, TriangleMesh, Vibration, simulate
 from tests.cavities import FLOOR, box
 
 ROOM = box((0.03, 0.03, 0.03))
@@ -76,3 +76,22 @@ def test_numbers_that_are_none_are_refused() -> None:
         Balls(np.zeros((2, 3)), np.zeros((2, 3)), np.array([1e-3, 2e-3]))  # type: ignore[arg-type]
     with pytest.raises(SceneError, match="duration"):
         Scene(ROOM, balls(MIDDLE), Physics(), 0.0)
+
+
+def test_whole_numbers_in_gravity_are_as_good_as_fractions() -> None:
+    one, two = (
+        simulate(Scene(ROOM, balls(MIDDLE), Physics(gravity=g), 0.1)).balls.positions
+        for g in (Gravity(0, 0, -9), Gravity(0.0, 0.0, -9.0))
+    )
+    assert (one == two).all()
+
+
+def test_balls_in_one_place_are_two_balls() -> None:
+    with pytest.raises(SceneError, match=r"balls (0 and 1|1 and 0) overlap by 0.003 m"):
+        Scene(ROOM, balls(MIDDLE, MIDDLE), Physics(), 1.0)
+
+
+@pytest.mark.parametrize("wrong", [{"duration": "1"}, {"duration": 1e12}, {"warmup": math.nan}, {"record": (9,)}])
+def test_a_wrong_scene_field_is_named(wrong: dict) -> None:
+    with pytest.raises(SceneError, match=rf"scene\.{next(iter(wrong))}"):
+        Scene(ROOM, balls(MIDDLE), Physics(), **{"duration": 1.0, **wrong})
