@@ -132,7 +132,7 @@ def run(study: Path, /, *, json: Json = False, out: Out = None) -> None:
     ]
     verdict = "better than the start" if result.improved else "within the noise of the start"
     lines += ["", f"{_row('gain', result.gain)}: {verdict}"]
-    _say([*lines, *_notes((*start.notes, *result.best.evaluation.notes))], folder, json)
+    _say([*lines, *_notes((*result.at_bounds, *start.notes, *result.best.evaluation.notes))], folder, json)
 
 
 @app.command
@@ -241,7 +241,7 @@ def _facts(table: Mapping[str, Any], prefix: str = "") -> list[str]:
     lines: list[str] = []
     for name, value in table.items():
         if isinstance(value, Mapping) and set(value) == {"low", "start", "high"}:
-            lines.append(f"{prefix + name:34}{value['start']:g} in {value['low']:g} .. {value['high']:g}")
+            lines.append(f"{prefix + name:33} {value['start']:g} in {value['low']:g} .. {value['high']:g}")
         elif isinstance(value, Mapping):
             lines += _facts(value, f"{prefix}{name}.")
         elif name in ("notes", "warnings"):

@@ -178,6 +178,7 @@ def _about_study(result: StudyResult) -> dict[str, Any]:
         "missing_a_constraint": sum(trial.objective is not None and not trial.feasible for trial in search),
         "gain": _plain(result.gain, ""),
         "improved": result.improved,
+        "at_bounds": list(result.at_bounds),
         "best": {"searched_as": result.best.searched, "parameters": result.best.parameters},
         "start": {
             "parameters": result.start.parameters,

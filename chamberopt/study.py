@@ -52,6 +52,17 @@ class StudyResult:
     seconds: float
 
     @property
+    def at_bounds(self) -> tuple[str, ...]:
+        """A sentence for each parameter whose best value lies on its bound, where the search could not go on."""
+        said = []
+        for name, (low, high) in self.study.vary.items():
+            value = self.best.design.value(name)
+            for bound, side in ((low, "lower"), (high, "upper")):
+                if abs(value - bound) < 1e-3 * (high - low):
+                    said.append(f"{name} = {value:g} lies on its {side} bound: better may lie beyond; widen [vary]")
+        return tuple(said)
+
+    @property
     def improved(self) -> bool:
         """Whether the best beats the start by more than the interval of the gain."""
         return self.gain.low > 0.0

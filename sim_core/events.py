@@ -23,7 +23,7 @@ from sim_core.calendar import (
     set_calendar_back,
 )
 from sim_core.detect.ball_mesh import Scratch, first_contact
-from sim_core.detect.ball_triangle import away_from_capsule, face_normal
+from sim_core.detect.ball_triangle import away_from_capsule, face_normal, nearer_neighbour
 from sim_core.effects.gravity import Gravity
 from sim_core.effects.restitution import Restitution
 from sim_core.effects.vibration import Wave, surface_velocity
@@ -107,8 +107,10 @@ def _hit_surface(
     tree = ground.tree
     here = point_at(shot.motion, ball, time, gravity)
     kind = tree.kinds[obstacle]
+    side = 0
     if kind == CAPSULE:
         away = away_from_capsule(tree.numbers, obstacle, here.position)
+        side = nearer_neighbour(tree.numbers, obstacle, away)
     else:
         away = face_normal(tree.numbers, obstacle)
     relative = here.velocity
@@ -117,7 +119,7 @@ def _hit_surface(
         count[SONOTRODE] += 1
     else:
         count[WALLS] += 1
-    triangle = tree.triangles[obstacle]
+    triangle = tree.triangles[obstacle, side]
     tag = ground.tags[triangle]
     kick(shot.motion, shot.lanes, ball, time, surface_kick(away, relative, restitution, tag))
     speed = -dot(away, relative) / math.sqrt(dot(away, away))

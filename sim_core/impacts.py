@@ -32,8 +32,8 @@ class ImpactLog:
 
     ``time`` (n,) [s] since the end of the warm-up; ``ball``, ``triangle`` (n,) int32, indices into the scene's
     balls and mesh; ``position`` (n, 3) [m] of the ball's centre; ``velocity`` (n, 3) [m/s] before the impact,
-    relative to the surface; ``normal_speed`` (n,) [m/s], positive. An impact on an edge between two triangles is
-    booked on one of them.
+    relative to the surface; ``normal_speed`` (n,) [m/s], positive. An impact on an edge is booked on the
+    neighbour that faces the ball more.
     """
 
     time: np.ndarray

@@ -56,6 +56,13 @@ def away_from_capsule(numbers: np.ndarray, row: int, at: Vec3) -> Vec3:
 
 
 @jit
+def nearer_neighbour(numbers: np.ndarray, row: int, away: Vec3) -> int:
+    """0 or 1: which of a capsule's two triangles faces the ball more; so a dent on an edge is shared fairly."""
+    lean = Vec3(numbers[row, 7], numbers[row, 8], numbers[row, 9])
+    return 0 if dot(lean, away) >= 0.0 else 1
+
+
+@jit
 def capsule_delay(numbers: np.ndarray, row: int, ball: Point, fall: Vec3, radius: float, limit: float) -> float:
     """Time [s] until the centre meets the capsule; NEVER if it does not within ``limit`` [s].
 

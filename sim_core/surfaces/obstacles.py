@@ -31,7 +31,8 @@ class Obstacles(NamedTuple):
 
     ``numbers`` (k, 16) float64 [m]: a face holds its unit normal towards the shot (0:3), the moved plane's offset
     (3), and three inward in-plane border normals with their offsets (4:16); a capsule its start (0:3), unit
-    direction (3:6), length (6). ``kinds`` (k,) uint8; ``triangles`` (k,) int32: the mesh triangle to book a hit on.
+    direction (3:6), length (6), and the first neighbour's normal minus the second's (7:10). ``kinds`` (k,) uint8;
+    ``triangles`` (k, 2) int32: the mesh triangles to book a hit on, a capsule's two neighbours or a face twice.
     ``low``, ``high`` (k, 3) float64 [m]: bounding boxes.
     """
 
@@ -88,7 +89,13 @@ def _faces(
     moved = corner + radius * normal[:, None]
     grow = seam(radius) + np.where(waving[solid], swing, 0.0)[:, None]
     kinds = np.where(waving[solid], WAVING_FACE, FACE).astype(np.uint8)
-    return Obstacles(numbers, kinds, solid.astype(np.int32), moved.min(axis=1) - grow, moved.max(axis=1) + grow)
+    return Obstacles(
+        numbers,
+        kinds,
+        np.stack([solid, solid], axis=1).astype(np.int32),
+        moved.min(axis=1) - grow,
+        moved.max(axis=1) + grow,
+    )
 
 
 def _share_plane(numbers: np.ndarray, waving: np.ndarray) -> None:
@@ -134,11 +141,14 @@ def _capsules(
     numbers[:, 0:3] = start[keep]
     numbers[:, 3:6] = along[keep] / length[keep, None]
     numbers[:, 6] = length[keep]
+    numbers[:, 7:10] = normals[t_one[keep]] - normals[t_two[keep]]
     ends = np.stack([start[keep], start[keep] + along[keep]], axis=1)
     return Obstacles(
         numbers,
         np.full(len(keep), CAPSULE, dtype=np.uint8),
-        np.where(solid[t_one], t_one, t_two)[keep].astype(np.int32),
+        np.stack([np.where(solid[t_one], t_one, t_two), np.where(solid[t_two], t_two, t_one)], axis=1)[keep].astype(
+            np.int32
+        ),
         ends.min(axis=1) - radius,
         ends.max(axis=1) + radius,
     )

@@ -60,7 +60,7 @@ def compare_with_reference(family: str, bodies: int, shots: int, seed: int) -> N
             delay, obstacle = first_contact(
                 ground.tree, scratch, ball, gravity, None, ground.seam, 0.0, float(length[i])
             )
-            if obstacle >= 0 and mesh.tags[ground.tree.triangles[obstacle]] == CEILING:
+            if obstacle >= 0 and mesh.tags[ground.tree.triangles[obstacle, 0]] == CEILING:
                 found[i] = delay
         hit = np.flatnonzero(np.isfinite(found))
         hits += len(hit)
