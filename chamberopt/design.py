@@ -100,11 +100,6 @@ class Part(BaseModel):
         return Path(self.mesh)
 
     @property
-    def metres_per_unit(self) -> float:
-        """Length [m] of one unit of the mesh file."""
-        return METRES_PER[self.unit]
-
-    @property
     def offset(self) -> tuple[float, float]:
         """Sideways shift (x, y) [m] from the chamber axis."""
         return self.offset_mm[0] * 1e-3, self.offset_mm[1] * 1e-3

@@ -14,12 +14,6 @@ class Vec3(NamedTuple):
 
 
 @jit
-def add(a: Vec3, b: Vec3) -> Vec3:
-    """a + b."""
-    return Vec3(a.x + b.x, a.y + b.y, a.z + b.z)
-
-
-@jit
 def sub(a: Vec3, b: Vec3) -> Vec3:
     """a - b."""
     return Vec3(a.x - b.x, a.y - b.y, a.z - b.z)
@@ -35,9 +29,3 @@ def along(a: Vec3, s: float, b: Vec3) -> Vec3:
 def dot(a: Vec3, b: Vec3) -> float:
     """Scalar product."""
     return a.x * b.x + a.y * b.y + a.z * b.z
-
-
-@jit
-def row3(rows: "np.ndarray", i: int) -> Vec3:  # type: ignore[name-defined]  # noqa: F821
-    """The first three numbers of row i as a vector."""
-    return Vec3(rows[i, 0], rows[i, 1], rows[i, 2])
