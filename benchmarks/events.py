@@ -127,7 +127,7 @@ def measure(name: str, windows: int) -> dict[str, Any]:
     run = steady(name)
     rates = rate(run, windows)
     shares = run.count / run.count[:3].sum()
-    obstacles = run.ground.tree
+    arrays = [*run.ground.tree[:-1], *run.ground.locator]
     row: dict[str, Any] = {
         "scene": name,
         "balls": len(run.motion),
@@ -138,7 +138,7 @@ def measure(name: str, windows: int) -> dict[str, Any]:
         "searches_per_collision": round(float(shares[3]), 2),
         "wall_query_ns": round(query_ns(run)),
         "embree_ns": embree_ns(name, run),
-        "bytes_per_triangle": round(sum(a.nbytes for a in obstacles[:-1]) / len(mesh(name).triangles)),
+        "bytes_per_triangle": round(sum(a.nbytes for a in arrays) / len(mesh(name).triangles)),
         "bytes_per_ball": round(
             (sum(a.nbytes for a in run.calendar) + run.motion.nbytes + run.shot.lanes.nbytes) / len(run.motion)
         ),

@@ -32,8 +32,9 @@ from sim_core.impacts import ImpactPage
 from sim_core.neighbours import next_meeting
 from sim_core.resolve.ball_ball import pair_kick
 from sim_core.resolve.ball_surface import surface_kick
+from sim_core.surfaces.ground import Ground
+from sim_core.surfaces.locate import triangle_at
 from sim_core.surfaces.obstacles import CAPSULE, WAVING_FACE
-from sim_core.surfaces.tree import Tree
 from sim_core.vec3 import Vec3, dot, sub
 
 # status
@@ -64,14 +65,6 @@ class Shot(NamedTuple):
     reach: float
     wide_reach: float
     fastest: float
-
-
-class Ground(NamedTuple):
-    """What stands still: the tree of obstacles, each triangle's tag, and how far faces overlap [m]."""
-
-    tree: Tree
-    tags: np.ndarray
-    seam: float
 
 
 class Clock(NamedTuple):
@@ -108,9 +101,11 @@ def _hit_surface(
     here = point_at(shot.motion, ball, time, gravity)
     kind = tree.kinds[obstacle]
     side = 0
+    touched = here.position  # or where the ball's centre is seen in the face's plane
     if kind == CAPSULE:
         away = away_from_capsule(tree.numbers, obstacle, here.position)
         side = nearer_neighbour(tree.numbers, obstacle, away)
+        touched = sub(here.position, away)
     else:
         away = face_normal(tree.numbers, obstacle)
     relative = here.velocity
@@ -131,7 +126,7 @@ def _hit_surface(
             page.numbers[row, 4 + axis] = relative[axis]
         page.numbers[row, 7] = speed
         page.names[row, 0] = ball
-        page.names[row, 1] = triangle
+        page.names[row, 1] = triangle_at(ground.locator, triangle, touched)
         page.filled[0] = row + 1
 
 

@@ -13,15 +13,14 @@ from sim_core.effects.gravity import checked_gravity
 from sim_core.effects.restitution import Restitution, checked_restitution
 from sim_core.effects.vibration import Wave, checked_wave
 from sim_core.errors import SimulationError
-from sim_core.events import DONE, PAGE_FULL, STORM, TOO_FAST, Clock, Ground, Shot, advance
+from sim_core.events import DONE, PAGE_FULL, STORM, TOO_FAST, Clock, Shot, advance
 from sim_core.flight import WINDOW, point_at
 from sim_core.impacts import ImpactLog, ImpactPage, impact_log, new_page
 from sim_core.invariants import contained
 from sim_core.neighbours import new_lanes, reach_margin
 from sim_core.scene import Scene
-from sim_core.surfaces.mesh import MAX_TAGS, TriangleMesh
-from sim_core.surfaces.obstacles import build_obstacles, seam
-from sim_core.surfaces.tree import build_tree
+from sim_core.surfaces.ground import build_ground
+from sim_core.surfaces.mesh import MAX_TAGS
 
 CHECK_EVERY = 1.0  # s simulated between checks that every ball is still inside; one check costs about a ms
 
@@ -63,17 +62,7 @@ def simulate(scene: Scene) -> Result:
     return Result(impact_log(run.pages, run.centre), run.balls(), Collisions(*(int(n) for n in run.count)))
 
 
-@lru_cache(maxsize=8)
-def _ground(mesh: TriangleMesh, radius: float, waving_tag: int, swing: float) -> Ground:
-    """Obstacles and their tree; replicas of one chamber share them."""
-    waving = mesh.tags == waving_tag
-    obstacles = build_obstacles(mesh, _centre(mesh), radius, waving, swing)
-    return Ground(build_tree(obstacles, radius), mesh.tags, seam(radius))
-
-
-def _centre(mesh: TriangleMesh) -> np.ndarray:
-    """Middle of the mesh's bounding box [m]: all work is done relative to it, so that no digits go to a far origin."""
-    return np.asarray(0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)))
+_ground = lru_cache(maxsize=8)(build_ground)  # replicas of one chamber share it
 
 
 class _Run:
@@ -87,7 +76,7 @@ class _Run:
         if scene.physics.restitution is not None:
             tags = int(scene.mesh.tags.max()) + 1
             self.restitution = checked_restitution(scene.physics.restitution, tags)
-        self.centre = _centre(scene.mesh)
+        self.centre = scene.mesh.middle
         radius = scene.balls.radius
         tag, swing = -1, 0.0
         self.window = WINDOW

@@ -68,6 +68,11 @@ class TriangleMesh:
         """Corner positions [m], shape (m, 3 corners, 3)."""
         return np.ascontiguousarray(self.vertices[self.triangles])
 
+    @cached_property
+    def middle(self) -> np.ndarray:
+        """Middle of the bounding box [m], (3,): what is computed relative to it loses no digits to a far origin."""
+        return np.asarray(0.5 * (self.vertices.min(axis=0) + self.vertices.max(axis=0)))
+
     @property
     def volume(self) -> float:
         """Enclosed volume [m³], by the divergence theorem."""
@@ -78,6 +83,14 @@ def enclosed_volume(vertices: np.ndarray, triangles: np.ndarray) -> float:
     """Volume [m³] enclosed by a closed surface; negative if it is inside out."""
     a, b, c = np.moveaxis(vertices[triangles] - vertices.mean(axis=0), 1, 0)
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
+
+
+def towards_shot(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Unit normals into the cavity (m, 3), zero where a triangle has no area, and twice the areas (m,) [m²]."""
+    normals = -np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    doubled = np.linalg.norm(normals, axis=1)
+    normals[doubled > 0.0] /= doubled[doubled > 0.0, None]
+    return normals, doubled
 
 
 def _require_closed(vertices: np.ndarray, triangles: np.ndarray) -> None:

@@ -14,7 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from sim_core.errors import SceneError
-from sim_core.surfaces.mesh import TriangleMesh
+from sim_core.surfaces.cover import cover
+from sim_core.surfaces.flats import LONE, Flats, edge_partners
+from sim_core.surfaces.mesh import TriangleMesh, towards_shot
 
 FACE = 0
 CAPSULE = 1
@@ -48,38 +50,44 @@ def seam(radius: float) -> float:
     return min(SEAM, SEAM_PER_RADIUS * radius)
 
 
-def build_obstacles(
-    mesh: TriangleMesh, centre: np.ndarray, radius: float, waving: np.ndarray, swing: float
-) -> Obstacles:
-    """Obstacles for balls of one radius [m]; coordinates are taken relative to ``centre`` (3,) [m].
+def build_obstacles(mesh: TriangleMesh, radius: float, waving: np.ndarray, swing: float, flats: Flats) -> Obstacles:
+    """Obstacles for balls of one radius [m]; coordinates are taken relative to the mesh's middle.
 
     ``waving`` (m,) bool marks triangles that vibrate by ``swing`` [m] zero-to-peak: their boxes hold the whole
-    swing.
+    swing. A flat's faces are fewer than its triangles and are booked on its seed; see locate.py for which was hit.
     """
-    corners = mesh.corners - centre
-    towards_shot = -np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    doubled = np.linalg.norm(towards_shot, axis=1)
-    solid = np.flatnonzero(doubled > 0.0)  # a triangle without area has no face; its neighbours' edges remain
-    normals = np.zeros_like(towards_shot)
-    normals[solid] = towards_shot[solid] / doubled[solid, None]
-    faces = _faces(corners, normals, solid, radius, waving, swing)
-    capsules = _capsules(mesh, corners, normals, doubled > 0.0, radius, waving)
+    corners = mesh.corners - mesh.middle
+    normals, doubled = towards_shot(corners)
+    solid = doubled > 0.0  # a triangle without area has no face; its neighbours' edges remain
+    faces = _faces(corners, normals, doubled, flats, radius, waving, swing)
+    capsules = _capsules(mesh, corners, normals, solid, radius, waving, flats)
     return Obstacles(*(np.concatenate(pair) for pair in zip(faces, capsules, strict=True)))
 
 
 def _faces(
     corners: np.ndarray,
     normals: np.ndarray,
-    solid: np.ndarray,
+    doubled: np.ndarray,
+    flats: Flats,
     radius: float,
     waving: np.ndarray,
     swing: float,
 ) -> Obstacles:
-    corner, normal = corners[solid], normals[solid]
-    numbers = np.zeros((len(solid), 16))
+    lone = [np.flatnonzero((doubled > 0.0) & (flats.flat == LONE))]
+    pieces = [corners[lone[0]]]
+    members = np.argsort(flats.flat, kind="stable")
+    first = np.searchsorted(flats.flat[members], np.arange(len(flats.seed) + 1))
+    for k, rim in enumerate(flats.rims):
+        own = members[first[k] : first[k + 1]]
+        few = _few_faces(corners, rim, flats.frames[k], 0.5 * doubled[own].sum())
+        pieces.append(corners[own] if few is None else few)
+        lone.append(np.full(len(pieces[-1]), flats.seed[k]))
+    triangle, corner = np.concatenate(lone), np.concatenate(pieces)
+    normal = normals[triangle]
+    numbers = np.zeros((len(triangle), 16))
     numbers[:, 0:3] = normal
-    numbers[:, 3] = np.einsum("ij,ij->i", normal, corner.mean(axis=1)) + radius
-    _share_plane(numbers, waving[solid])
+    numbers[:, 3] = np.einsum("ij,ij->i", normal, corners[triangle].mean(axis=1)) + radius
+    _share_plane(numbers, waving[triangle])
     for k in range(3):
         start, along = corner[:, k], corner[:, (k + 1) % 3] - corner[:, k]
         inward = np.cross(along, normal)  # the winding is clockwise seen from the shot
@@ -87,15 +95,23 @@ def _faces(
         numbers[:, 4 + 4 * k : 7 + 4 * k] = inward
         numbers[:, 7 + 4 * k] = np.einsum("ij,ij->i", inward, start)
     moved = corner + radius * normal[:, None]
-    grow = seam(radius) + np.where(waving[solid], swing, 0.0)[:, None]
-    kinds = np.where(waving[solid], WAVING_FACE, FACE).astype(np.uint8)
+    grow = seam(radius) + np.where(waving[triangle], swing, 0.0)[:, None]
+    kinds = np.where(waving[triangle], WAVING_FACE, FACE).astype(np.uint8)
     return Obstacles(
         numbers,
         kinds,
-        np.stack([solid, solid], axis=1).astype(np.int32),
+        np.stack([triangle, triangle], axis=1).astype(np.int32),
         moved.min(axis=1) - grow,
         moved.max(axis=1) + grow,
     )
+
+
+def _few_faces(corners: np.ndarray, rim: np.ndarray, frame: np.ndarray, area: float) -> np.ndarray | None:
+    """Corners (k, 3, 3) [m] of the faces that cover a flat of this area [m²]; None if its rim is not understood."""
+    origin, axes = frame[0], frame[1:]
+    ends = np.stack([corners[rim // 3, rim % 3], corners[rim // 3, (rim % 3 + 1) % 3]], axis=1)
+    triangles = cover((ends - origin) @ axes.T, area)
+    return None if triangles is None else origin + triangles[:, ::-1] @ axes
 
 
 def _share_plane(numbers: np.ndarray, waving: np.ndarray) -> None:
@@ -116,8 +132,13 @@ def _capsules(
     solid: np.ndarray,
     radius: float,
     waving: np.ndarray,
+    flats: Flats,
 ) -> Obstacles:
-    one, two = _edge_sides(mesh.triangles)  # directed edges 3 t + k, each with its reverse
+    two = edge_partners(mesh.triangles)
+    one = np.flatnonzero(np.arange(len(two)) < two)  # each edge once, as two directed edges 3 t + k
+    two = two[one]
+    swap = flats.flat[one // 3] > flats.flat[two // 3]  # all edges between two flats have them in one order
+    one, two = np.where(swap, two, one), np.where(swap, one, two)
     t_one, k_one, t_two = one // 3, one % 3, two // 3
     start = corners[t_one, k_one]
     along = corners[t_one, (k_one + 1) % 3] - start
@@ -137,12 +158,16 @@ def _capsules(
             "a moving edge is not supported yet; let the sonotrode fill the chamber's floor from wall to wall, flat"
         )
     keep = np.flatnonzero(convex & (length > 0.0))
+    chosen, finish = _straight_runs(mesh.triangles, corners, flats, one[keep], two[keep])
+    keep = keep[chosen]
+    along = finish - start[keep]
+    length = np.linalg.norm(along, axis=1)
     numbers = np.zeros((len(keep), 16))
     numbers[:, 0:3] = start[keep]
-    numbers[:, 3:6] = along[keep] / length[keep, None]
-    numbers[:, 6] = length[keep]
+    numbers[:, 3:6] = along / length[:, None]
+    numbers[:, 6] = length
     numbers[:, 7:10] = normals[t_one[keep]] - normals[t_two[keep]]
-    ends = np.stack([start[keep], start[keep] + along[keep]], axis=1)
+    ends = np.stack([start[keep], finish], axis=1)
     return Obstacles(
         numbers,
         np.full(len(keep), CAPSULE, dtype=np.uint8),
@@ -154,13 +179,28 @@ def _capsules(
     )
 
 
-def _edge_sides(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Each undirected edge once, as the two directed edges (3 triangle + corner) that share it."""
-    count = int(triangles.max()) + 1
-    a = triangles.reshape(-1).astype(np.int64)
-    b = np.roll(triangles, -1, axis=1).reshape(-1).astype(np.int64)
-    forward, backward = a * count + b, b * count + a
-    order = np.argsort(forward)
-    partner = order[np.searchsorted(forward, backward, sorter=order)]
-    one = np.flatnonzero(np.arange(len(a)) < partner)
-    return one, partner[one]
+def _straight_runs(
+    triangles: np.ndarray, corners: np.ndarray, flats: Flats, one: np.ndarray, two: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Edges between the same two flats lie on one line: a run of them is one obstacle.
+
+    ``one``, ``two`` (n,): the two sides of each edge. Returns which edges begin an obstacle (k,), and where each of
+    those obstacles ends (k, 3) [m].
+    """
+    head = triangles.reshape(-1)[one]
+    tail = triangles[one // 3, (one % 3 + 1) % 3]
+    sides = flats.flat[np.stack([one // 3, two // 3])]
+    follower = dict(zip(zip(head.tolist(), *sides.tolist(), strict=True), range(len(one)), strict=True))
+    in_run = (sides != LONE).all(axis=0)
+    chosen, finish = [], []
+    begun_by = {(int(tail[i]), int(sides[0, i]), int(sides[1, i])) for i in np.flatnonzero(in_run)}
+    for i in range(len(one)):
+        first, second = int(sides[0, i]), int(sides[1, i])
+        if in_run[i] and (int(head[i]), first, second) in begun_by:
+            continue  # goes on where another edge of the run ends
+        last = i
+        while in_run[i] and (int(tail[last]), first, second) in follower:
+            last = follower[int(tail[last]), first, second]
+        chosen.append(i)
+        finish.append(corners[one[last] // 3, (one[last] % 3 + 1) % 3])
+    return np.array(chosen, dtype=np.int64), np.array(finish).reshape(-1, 3)

@@ -9,7 +9,7 @@ import trimesh
 from sim_core import Gravity
 from sim_core.detect.ball_mesh import first_contact, new_scratch
 from sim_core.flight import Point
-from sim_core.simulate import _centre, _ground
+from sim_core.surfaces.ground import build_ground
 from sim_core.vec3 import Vec3
 from tests.cavities import CEILING, box_around
 from tests.sim_core.first_contact_reference import first_contact_reference, gap_at
@@ -49,8 +49,8 @@ def compare_with_reference(family: str, bodies: int, shots: int, seed: int) -> N
     for _ in range(bodies):
         body = random_body(rng, family)
         mesh = box_around(body, HALF)
-        ground = _ground.__wrapped__(mesh, RADIUS, -1, 0.0)
-        centre = _centre(mesh)
+        ground = build_ground(mesh, RADIUS)
+        centre = mesh.middle
         start, velocity = shots_at(body, shots, rng)
         length = 0.04 / np.linalg.norm(velocity, axis=1)
         expected, lowest = first_contact_reference(start, velocity, fall, body.triangles, RADIUS, length)

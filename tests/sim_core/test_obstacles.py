@@ -4,18 +4,17 @@ import numpy as np
 import trimesh
 
 from sim_core import Balls, Physics, Scene, simulate
-from sim_core.surfaces.obstacles import CAPSULE, FACE, build_obstacles
+from sim_core.surfaces.ground import build_ground
+from sim_core.surfaces.obstacles import CAPSULE, FACE
 from tests.cavities import CEILING, box, box_around, cylinder
 
 
 def test_only_edges_convex_towards_the_shot_are_obstacles() -> None:
     for room in (box((0.1, 0.1, 0.1)), cylinder(0.03, 0.04)):
-        still = np.zeros(len(room.triangles), dtype=bool)
-        assert (build_obstacles(room, np.zeros(3), 1.5e-3, still, 0.0).kinds == FACE).all()
+        assert (build_ground(room, 1.5e-3).tree.kinds == FACE).all()
     room = box_around(trimesh.creation.box((0.02, 0.02, 0.02)), 0.05)
-    still = np.zeros(len(room.triangles), dtype=bool)
-    obstacles = build_obstacles(room, np.zeros(3), 1.5e-3, still, 0.0)
-    assert (obstacles.kinds == CAPSULE).sum() == 12  # a cube's edges, not the diagonals of its faces
+    kinds = build_ground(room, 1.5e-3).tree.kinds
+    assert (kinds == CAPSULE).sum() == 12  # a cube's edges, not the diagonals of its faces
 
 
 def test_hits_on_an_edge_are_shared_by_its_two_faces() -> None:

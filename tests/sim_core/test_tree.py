@@ -8,8 +8,9 @@ from sim_core.detect.ball_mesh import first_contact, new_scratch
 from sim_core.detect.ball_triangle import capsule_delay, face_delay
 from sim_core.flight import Point
 from sim_core.roots import NEVER
-from sim_core.surfaces.obstacles import CAPSULE, build_obstacles, seam
-from sim_core.surfaces.tree import EMPTY, Tree, build_tree
+from sim_core.surfaces.ground import build_ground
+from sim_core.surfaces.obstacles import CAPSULE, seam
+from sim_core.surfaces.tree import EMPTY, Tree
 from sim_core.vec3 import Vec3
 from tests.cavities import box_around
 
@@ -22,10 +23,9 @@ def room_with_a_knobbly_body() -> Tree:
     body = trimesh.creation.icosphere(subdivisions=3, radius=0.012)
     body.vertices *= 1.0 + 0.05 * rng.normal(size=(len(body.vertices), 1))
     mesh = box_around(body, 0.03)
-    waving = np.zeros(len(mesh.triangles), dtype=bool)
-    obstacles = build_obstacles(mesh, np.zeros(3), RADIUS, waving, 0.0)
-    assert (obstacles.kinds == CAPSULE).sum() > 1000
-    return build_tree(obstacles, RADIUS)
+    tree = build_ground(mesh, RADIUS).tree
+    assert (tree.kinds == CAPSULE).sum() > 1000
+    return tree
 
 
 def test_every_obstacle_is_in_one_leaf_and_inside_all_boxes_above_it() -> None:
