@@ -29,7 +29,7 @@ from sim_core.effects.restitution import Restitution
 from sim_core.effects.vibration import Wave, surface_velocity
 from sim_core.flight import drift, kick, point_at, set_back
 from sim_core.impacts import ImpactPage
-from sim_core.neighbours import next_meeting
+from sim_core.neighbours import Margins, next_meeting
 from sim_core.resolve.ball_ball import pair_kick
 from sim_core.resolve.ball_surface import surface_kick
 from sim_core.surfaces.ground import Ground
@@ -56,15 +56,14 @@ ALL, PAIRS, WALL = 0, 1, 2
 class Shot(NamedTuple):
     """The balls for the loop.
 
-    ``motion`` (n, 6) float64 in the free-fall frame, ``lanes`` its float32 copy; ``reach`` [m] the sum of two
-    radii, ``wide_reach`` the same with the pair filter's margin, good up to ``fastest`` [m/s].
+    ``motion`` (n, 6) float64 in the free-fall frame, ``lanes`` its float32 copy; ``reach`` [m] the sum of two radii;
+    ``margins`` of the pair filter.
     """
 
     motion: np.ndarray
     lanes: np.ndarray
     reach: float
-    wide_reach: float
-    fastest: float
+    margins: Margins
 
 
 class Clock(NamedTuple):
@@ -164,7 +163,7 @@ def _predict(
     if what != WALL:
         before = NEVER_BEFORE if what == ALL or marks[ball, OBSTACLE] < 0 else calendar.wall_time[ball]
         meeting, partner = next_meeting(
-            shot.motion, shot.lanes, scratch.probe, ball, time, before, shot.reach, shot.wide_reach
+            shot.motion, shot.lanes, scratch.probe, ball, time, before, shot.reach, shot.margins
         )
         calendar.pair_time[ball] = meeting
         marks[ball, PARTNER] = partner
@@ -234,7 +233,7 @@ def advance(
         elif obstacle >= 0:
             _hit_surface(shot, ground, gravity, restitution, wave, clock, page, count, ball, obstacle, time)
             marks[ball, HITS] += 1
-            if not _speed_squared(shot.motion, ball) <= shot.fastest * shot.fastest:
+            if not _speed_squared(shot.motion, ball) <= shot.margins.fastest ** 2:
                 forget(calendar, ball, time)
                 return TOO_FAST, ball
         elif obstacle == SEARCH_ON:

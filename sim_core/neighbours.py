@@ -1,8 +1,12 @@
-"""Who can meet whom: all balls, eight at a time through a float32 filter, then exactly.
+"""Who can meet whom: all balls, sixteen at a time through a float32 filter, then exactly.
 
-The filter keeps every pair whose straight paths could come within reach, rounding included; what it lets through is
-decided in float64, so results do not depend on it.
+In the free-fall frame two balls' paths are straight lines, so how near they come does not depend on the time asked:
+with b the difference of their bases and w that of their velocities the miss distance² is b² - (b w)² / w², and they
+still approach while b w + t w² < 0. The filter keeps every pair whose paths could come within reach, rounding
+included; what it lets through is decided in float64, so results do not depend on it.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,19 +18,31 @@ from sim_core.simd import LANES, balls_near, lowest_bit
 from sim_core.vec3 import Vec3, sub
 
 FAR_SHARE = np.float32(1.0 - 1e-6)  # of distance²: float32 loses 2e-7 of it in the miss distance
+ROUNDINGS = 16.0 * float(np.finfo(np.float32).eps)  # of the largest number in a sum of three products, and to spare
 
 
-def reach_margin(extent: float, fastest: float, window: float) -> float:
-    """Added to the filter's reach [m]: sixteen roundings of the largest float32 coordinate (about 1e-6 m in a
-    chamber).
+class Margins(NamedTuple):
+    """What float32 may lose.
+
+    ``reach`` [m] of the filter; ``closing`` [m²/s], below which b w + t w² may be negative but for rounding. Good for
+    speeds up to ``fastest`` [m/s].
     """
-    return float(16.0 * np.finfo(np.float32).eps * (extent + fastest * window))
+
+    reach: float
+    closing: float
+    fastest: float
+
+
+def margins(reach: float, extent: float, fastest: float, window: float) -> Margins:
+    """Margins for balls of this ``reach`` [m] (the sum of two radii) in a room of this extent [m]."""
+    furthest = extent + fastest * window  # a base lies up to a window's flight outside the room
+    return Margins(reach + ROUNDINGS * furthest, ROUNDINGS * furthest * fastest, fastest)
 
 
 def new_lanes(motion: np.ndarray) -> np.ndarray:
-    """Float32 copy (6, n) of motion (n, 6), one row a quantity, padded to whole groups of LANES."""
+    """Float32 copy (6, n) of motion (n, 6), one row a quantity, padded with NaN, which meets no one, to whole LANES."""
     balls = len(motion)
-    lanes = np.zeros((6, -(-balls // LANES) * LANES), dtype=np.float32)
+    lanes = np.full((6, -(-balls // LANES) * LANES), np.nan, dtype=np.float32)
     lanes[:, :balls] = motion.T
     return lanes
 
@@ -40,20 +56,20 @@ def next_meeting(
     time: float,
     before: float,
     reach: float,
-    wide_reach: float,
+    margins: Margins,
 ) -> tuple[float, int]:
     """Time [s] and partner of the ball's first meeting after ``time`` and before ``before``; (NEVER, -1) if none.
 
-    ``reach`` [m]: sum of the radii; ``wide_reach`` [m]: the same with the filter's margin.
+    ``reach`` [m]: sum of the radii.
     """
+    for k in range(6):
+        probe[k] = lanes[k, ball]
+    probe[6] = np.float32(time)
+    probe[7] = FAR_SHARE
+    probe[8] = np.float32(-margins.reach * margins.reach)
+    probe[9] = np.float32(margins.closing)
     here = drift(motion, ball, time)
     velocity = Vec3(motion[ball, 3], motion[ball, 4], motion[ball, 5])
-    for axis in range(3):
-        probe[axis] = np.float32(here[axis])
-        probe[3 + axis] = np.float32(velocity[axis])
-    probe[6] = np.float32(time)
-    probe[7] = np.float32(wide_reach * wide_reach)
-    probe[8] = FAR_SHARE
     best = before - time
     partner = -1
     for first in range(0, len(motion), LANES):
@@ -61,8 +77,6 @@ def next_meeting(
         while near != 0:
             other = first + lowest_bit(near)
             near &= near - 1
-            if other == ball or other >= len(motion):
-                continue
             closing = sub(Vec3(motion[other, 3], motion[other, 4], motion[other, 5]), velocity)
             delay = meeting_delay(sub(drift(motion, other, time), here), closing, reach)
             if delay < best:

@@ -13,8 +13,8 @@ from numba.core import cgutils, types
 from numba.extending import intrinsic
 
 BOXES = 8  # children of a tree node
-# Balls looked at together. Sixteen (512 bits) ran a quarter slower: the processor lowers its clock for them.
-LANES = 8
+WIDTH = 8  # numbers in one instruction; sixteen (512 bits) ran a quarter slower: the processor lowers its clock
+LANES = 2 * WIDTH  # balls looked at before one branch on what was found
 
 _F32 = ir.FloatType()
 _I32 = ir.IntType(32)
@@ -54,6 +54,10 @@ class _Vectors:
         kind = ir.FunctionType(self.type, [self.type] * 3)
         function = cgutils.get_or_insert_function(self.builder.module, kind, f"llvm.fma.v{self.width}f32")
         return self.builder.call(function, [a, b, c])
+
+    def sum(self, total: Any | None, a: Any, b: Any) -> Any:
+        """total + a b, or a b when there is no total yet."""
+        return self.builder.fmul(a, b) if total is None else self.fused(a, b, total)
 
     def mask(self, condition: Any) -> Any:
         """Lane conditions as the bits of an int64."""
@@ -114,34 +118,38 @@ def _balls_near(typing_context: Any, lanes: Any, first: Any, probe: Any) -> Any:
     def codegen(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
         lanes_type, _, probe_type = signature.args
         lanes, first, probe = arguments
-        v = _Vectors(builder, LANES)
+        v = _Vectors(builder, WIDTH)
         columns = _data_of(context, builder, lanes_type, lanes)
         probes = _data_of(context, builder, probe_type, probe)
         shape = cgutils.unpack_tuple(builder, context.make_array(lanes_type)(context, builder, lanes).shape)
         width = shape[1]
+        constant = width.type
 
         def number(k: int) -> Any:
-            return v.spread(builder.load(builder.gep(probes, [ir.Constant(width.type, k)])))
+            return v.spread(builder.load(builder.gep(probes, [ir.Constant(constant, k)])))
 
-        def column(k: int) -> Any:
-            return v.load(columns, builder.add(builder.mul(width, ir.Constant(width.type, k)), first))
+        def near(start: Any) -> Any:
+            square = closing = speed = None
+            for axis in range(3):
+                place, velocity = (
+                    v.load(columns, builder.add(builder.mul(width, ir.Constant(constant, k)), start))
+                    for k in (axis, 3 + axis)
+                )
+                apart = builder.fsub(place, number(axis))
+                relative = builder.fsub(velocity, number(3 + axis))
+                square = v.sum(square, apart, apart)
+                closing = v.sum(closing, apart, relative)
+                speed = v.sum(speed, relative, relative)
+            miss = v.fused(square, number(7), number(8))
+            may_meet = builder.fcmp_ordered(">", builder.fmul(closing, closing), builder.fmul(speed, miss))
+            approaching = builder.fcmp_ordered("<", v.fused(speed, number(6), closing), number(9))
+            return v.mask(builder.and_(may_meet, approaching))
 
-        now = number(6)
-        zero = v.spread(ir.Constant(_F32, 0.0))
-        square = closing = speed = zero
-        for axis in range(3):
-            velocity = column(3 + axis)
-            apart = v.fused(velocity, now, builder.fsub(column(axis), number(axis)))
-            relative = builder.fsub(velocity, number(3 + axis))
-            square = v.fused(apart, apart, square)
-            closing = v.fused(apart, relative, closing)
-            speed = v.fused(relative, relative, speed)
-        # miss distance² <= reach² + a relative margin on the distance, where float32 loses most
-        miss = builder.fsub(builder.fmul(square, number(8)), number(7))
-        may_meet = builder.fcmp_ordered(">=", builder.fmul(closing, closing), builder.fmul(speed, miss))
-        approaching = builder.fcmp_ordered("<=", closing, zero)
-        touching = builder.fcmp_ordered("<=", miss, zero)  # there the sign of ``closing`` may be rounding
-        return v.mask(builder.and_(may_meet, builder.or_(approaching, touching)))
+        mask = near(first)
+        for k in range(1, LANES // WIDTH):
+            more = near(builder.add(first, ir.Constant(constant, k * WIDTH)))
+            mask = builder.or_(mask, builder.shl(more, ir.Constant(more.type, k * WIDTH)))
+        return mask
 
     return signature, codegen
 
@@ -149,14 +157,15 @@ def _balls_near(typing_context: Any, lanes: Any, first: Any, probe: Any) -> Any:
 def _balls_near_twin(lanes: Any, first: int, probe: Any) -> int:
     block = lanes[:, first : first + LANES]
     with np.errstate(over="ignore", invalid="ignore"):
-        apart = block[0:3] + block[3:6] * probe[6] - probe[0:3, None]
+        apart = block[0:3] - probe[0:3, None]
         relative = block[3:6] - probe[3:6, None]
         square = (apart * apart).sum(axis=0)
         closing = (apart * relative).sum(axis=0)
         speed = (relative * relative).sum(axis=0)
-        miss = square * probe[8] - probe[7]
-        may_meet = (closing * closing >= speed * miss) & ((closing <= 0.0) | (miss <= 0.0))
-    return int(np.packbits(may_meet, bitorder="little")[0])
+        miss = square * probe[7] + probe[8]
+        may_meet = (closing * closing > speed * miss) & (speed * probe[6] + closing < probe[9])
+    bits = np.packbits(may_meet, bitorder="little")
+    return int.from_bytes(bits.tobytes(), "little")
 
 
 @intrinsic
@@ -178,6 +187,6 @@ _plain = _settings.DISABLE_JIT
 
 # boxes_hit(bounds (nodes, 6, 8) f32, node, ray (9,) f32, longest f32, enter (8,) f32 out) -> bit mask
 boxes_hit: Any = _boxes_hit_twin if _plain else _boxes_hit
-# balls_near(lanes (6, n) f32, first lane, probe (9,) f32) -> bit mask of LANES balls
+# balls_near(lanes (6, n) f32, first lane, probe (10,) f32) -> bit mask of LANES balls
 balls_near: Any = _balls_near_twin if _plain else _balls_near
 lowest_bit: Any = _lowest_bit_twin if _plain else _lowest_bit

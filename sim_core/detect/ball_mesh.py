@@ -37,7 +37,7 @@ def new_scratch() -> Scratch:
         np.zeros(BOXES, dtype=np.float32),
         np.zeros(STACK, dtype=np.int64),
         np.zeros(STACK, dtype=np.float32),
-        np.zeros(9, dtype=np.float32),
+        np.zeros(10, dtype=np.float32),
     )
 
 
