@@ -141,6 +141,22 @@ def _concave_approach(w: WaveGap, start: float, end: float) -> float:
 
 
 @jit
+def _reaches_envelope(w: WaveGap) -> float:
+    """A time [s] before which there is no approach: when the ball comes to the swing's envelope, or comes back to it.
+
+    Inside the envelope that is now, unless the ball leaves it faster than the face ever moves: its speed on leaving
+    is the least on its way out.
+    """
+    height = w.c - w.swing
+    if height > 0.0:
+        return first_approach(height, w.b, w.a, 0.0)
+    disc = w.b * w.b - 4.0 * w.a * height
+    if w.b <= 0.0 or disc <= w.swing * w.swing * w.omega * w.omega:
+        return 0.0
+    return -(w.b + math.sqrt(disc)) / (2.0 * w.a) if w.a < 0.0 else NEVER
+
+
+@jit
 def first_wave_approach(w: WaveGap, limit: float, depth: float) -> float:
     """First s in [0, limit] at which the ball meets the vibrating face, approaching it; NEVER if none.
 
@@ -150,13 +166,15 @@ def first_wave_approach(w: WaveGap, limit: float, depth: float) -> float:
     """
     if w.c <= -w.swing - depth:
         return NEVER
+    s = _reaches_envelope(w)
+    if s >= limit:
+        return NEVER
     strength = w.swing * w.omega * w.omega
     if abs(2.0 * w.a) >= strength:  # too gentle to bend the gap the other way: one piece
         if w.a <= 0.0:
             return _concave_approach(w, 0.0, limit)
         return _convex_approach(w, 0.0, limit)
     alpha = math.asin(-2.0 * w.a / strength)
-    s = 0.0
     while s < limit:
         height = w.c + s * (w.b + w.a * s) - w.swing
         if height > 0.0:
