@@ -19,8 +19,8 @@ HALF = 0.5  # of a radius: an overlap deeper than this is the far side of a one-
 
 @jit
 def within_borders(numbers: np.ndarray, row: int, at: Vec3, seam: float) -> bool:
-    """True when a point in the face's plane lies inside its three borders, or at most ``seam`` [m] over one."""
-    for k in range(4, 16, 4):
+    """True when a point in the face's plane lies inside its borders, or at most ``seam`` [m] over one."""
+    for k in range(4, 20, 4):
         inward = Vec3(numbers[row, k], numbers[row, k + 1], numbers[row, k + 2])
         if dot(inward, at) - numbers[row, k + 3] < -seam:
             return False

@@ -14,7 +14,8 @@ STRAIGHT = 1e-10
 
 
 def cover(outline: np.ndarray, area: float) -> np.ndarray | None:
-    """Triangles (k, 3, 2) [m], counter-clockwise, that cover the inside of an outline; None if that cannot be done.
+    """Convex quadrangles (k, 4, 2) [m], counter-clockwise, that cover the inside of an outline; a triangle has its
+    last corner twice. None if that cannot be done.
 
     ``outline`` (n, 2, 2) [m]: the border's segments, in any order; holes are what lies inside an odd number of them.
     ``area`` [m²] is what the inside must measure: a border that crosses itself is not understood, and then says so by
@@ -24,13 +25,19 @@ def cover(outline: np.ndarray, area: float) -> np.ndarray | None:
     region = shapely.simplify(region, STRAIGHT)
     if region.is_empty or not region.is_valid:
         return None
-    pieces = np.concatenate([_triangles(piece) for piece in _cut(region)])
-    a, b = pieces[:, 1] - pieces[:, 0], pieces[:, 2] - pieces[:, 0]
-    doubled = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    pieces[doubled < 0.0] = pieces[doubled < 0.0][:, ::-1]
-    if abs(0.5 * np.abs(doubled).sum() - area) > 1e-9 * area:
+    pieces = np.concatenate([_quadrangles(piece) for piece in _cut(region)])
+    covered = 0.5 * _turn(pieces[:, 0], pieces[:, 1], pieces[:, 2]) + 0.5 * _turn(
+        pieces[:, 0], pieces[:, 2], pieces[:, 3]
+    )
+    if abs(covered.sum() - area) > 1e-9 * area:
         return None
-    return np.asarray(pieces[doubled != 0.0])
+    return np.asarray(pieces[covered > 0.0])
+
+
+def _turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
+    """Twice the signed area [m²] of triangles with these corners (n, 2)."""
+    one, two = b - a, c - a
+    return np.asarray(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0])
 
 
 def _cut(region: shapely.Geometry) -> list[shapely.Geometry]:
@@ -40,8 +47,8 @@ def _cut(region: shapely.Geometry) -> list[shapely.Geometry]:
     while todo:
         piece, depth = todo.pop()
         for polygon in shapely.get_parts(piece):
-            if shapely.get_dimensions(polygon) < 2:
-                continue  # a quarter that touches the piece in a point or along a line
+            if shapely.get_dimensions(polygon) < 2 or shapely.is_empty(polygon):
+                continue  # a quarter that misses the piece, or touches it in a point or along a line
             if depth == DEEPEST or shapely.get_num_coordinates(polygon) - 1 <= SIMPLE:
                 simple.append(polygon)
                 continue
@@ -56,7 +63,15 @@ def _cut(region: shapely.Geometry) -> list[shapely.Geometry]:
     return simple
 
 
-def _triangles(polygon: shapely.Geometry) -> np.ndarray:
-    """A polygon as triangles (k, 3, 2), no corner added."""
+def _quadrangles(polygon: shapely.Geometry) -> np.ndarray:
+    """A polygon without holes as convex quadrangles (k, 4, 2), no corner added."""
+    ring = shapely.get_coordinates(shapely.orient_polygons(polygon))[:-1]
+    convex = shapely.get_num_interior_rings(polygon) == 0 and bool(
+        (_turn(np.roll(ring, 1, axis=0), ring, np.roll(ring, -1, axis=0)) >= 0.0).all()
+    )
+    if convex:  # a fan of quadrangles
+        last = len(ring) - 1
+        return np.array([ring[[0, k, k + 1, min(k + 2, last)]] for k in range(1, last, 2)])
     parts = shapely.get_parts(shapely.constrained_delaunay_triangles(polygon))
-    return np.array([shapely.get_coordinates(part)[:3] for part in parts]).reshape(-1, 3, 2)
+    corners = np.array([shapely.get_coordinates(shapely.orient_polygons(part))[:3] for part in parts])
+    return corners.reshape(-1, 3, 2)[:, [0, 1, 2, 2]]  # none of a piece that is but a line

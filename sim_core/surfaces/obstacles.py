@@ -18,6 +18,9 @@ from sim_core.surfaces.cover import cover
 from sim_core.surfaces.flats import LONE, Flats, edge_partners
 from sim_core.surfaces.mesh import TriangleMesh, towards_shot
 
+NUMBERS = 20  # kept of each obstacle
+TRIANGLE = [0, 1, 2, 2]  # the corners of a face that has but three
+
 FACE = 0
 CAPSULE = 1
 WAVING_FACE = 2  # a face of the vibrating sonotrode
@@ -31,8 +34,8 @@ SEAM_PER_RADIUS = 1e-5  # the same for balls so small that SEAM would show
 class Obstacles(NamedTuple):
     """What the centre of a ball can hit, one row each. k = faces + capsules.
 
-    ``numbers`` (k, 16) float64 [m]: a face holds its unit normal towards the shot (0:3), the moved plane's offset
-    (3), and three inward in-plane border normals with their offsets (4:16); a capsule its start (0:3), unit
+    ``numbers`` (k, 20) float64 [m]: a face holds its unit normal towards the shot (0:3), the moved plane's offset
+    (3), and four inward in-plane border normals with their offsets (4:20), a triangle's fourth zero; a capsule its start (0:3), unit
     direction (3:6), length (6), and the first neighbour's normal minus the second's (7:10). ``kinds`` (k,) uint8;
     ``triangles`` (k, 2) int32: the mesh triangles to book a hit on, a capsule's two neighbours or a face twice.
     ``low``, ``high`` (k, 3) float64 [m]: bounding boxes.
@@ -74,24 +77,25 @@ def _faces(
     swing: float,
 ) -> Obstacles:
     lone = [np.flatnonzero((doubled > 0.0) & (flats.flat == LONE))]
-    pieces = [corners[lone[0]]]
+    pieces = [corners[lone[0]][:, TRIANGLE]]
     members = np.argsort(flats.flat, kind="stable")
     first = np.searchsorted(flats.flat[members], np.arange(len(flats.seed) + 1))
     for k, rim in enumerate(flats.rims):
         own = members[first[k] : first[k + 1]]
         few = _few_faces(corners, rim, flats.frames[k], 0.5 * doubled[own].sum())
-        pieces.append(corners[own] if few is None else few)
+        pieces.append(corners[own][:, TRIANGLE] if few is None else few)
         lone.append(np.full(len(pieces[-1]), flats.seed[k]))
     triangle, corner = np.concatenate(lone), np.concatenate(pieces)
     normal = normals[triangle]
-    numbers = np.zeros((len(triangle), 16))
+    numbers = np.zeros((len(triangle), NUMBERS))
     numbers[:, 0:3] = normal
     numbers[:, 3] = np.einsum("ij,ij->i", normal, corners[triangle].mean(axis=1)) + radius
     _share_plane(numbers, waving[triangle])
-    for k in range(3):
-        start, along = corner[:, k], corner[:, (k + 1) % 3] - corner[:, k]
+    for k in range(4):
+        start, along = corner[:, k], corner[:, (k + 1) % 4] - corner[:, k]
         inward = np.cross(along, normal)  # the winding is clockwise seen from the shot
-        inward /= np.linalg.norm(inward, axis=1)[:, None]
+        length = np.linalg.norm(inward, axis=1)
+        inward[length > 0.0] /= length[length > 0.0, None]
         numbers[:, 4 + 4 * k : 7 + 4 * k] = inward
         numbers[:, 7 + 4 * k] = np.einsum("ij,ij->i", inward, start)
     moved = corner + radius * normal[:, None]
@@ -107,11 +111,11 @@ def _faces(
 
 
 def _few_faces(corners: np.ndarray, rim: np.ndarray, frame: np.ndarray, area: float) -> np.ndarray | None:
-    """Corners (k, 3, 3) [m] of the faces that cover a flat of this area [m²]; None if its rim is not understood."""
+    """Corners (k, 4, 3) [m] of the faces that cover a flat of this area [m²]; None if its rim is not understood."""
     origin, axes = frame[0], frame[1:]
     ends = np.stack([corners[rim // 3, rim % 3], corners[rim // 3, (rim % 3 + 1) % 3]], axis=1)
-    triangles = cover((ends - origin) @ axes.T, area)
-    return None if triangles is None else origin + triangles[:, ::-1] @ axes
+    faces = cover((ends - origin) @ axes.T, area)
+    return None if faces is None else origin + faces[:, ::-1] @ axes
 
 
 def _share_plane(numbers: np.ndarray, waving: np.ndarray) -> None:
@@ -162,7 +166,7 @@ def _capsules(
     keep = keep[chosen]
     along = finish - start[keep]
     length = np.linalg.norm(along, axis=1)
-    numbers = np.zeros((len(keep), 16))
+    numbers = np.zeros((len(keep), NUMBERS))
     numbers[:, 0:3] = start[keep]
     numbers[:, 3:6] = along / length[:, None]
     numbers[:, 6] = length

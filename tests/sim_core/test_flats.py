@@ -97,9 +97,9 @@ def test_a_cover_fills_an_outline_with_holes_once() -> None:
     hole = np.array([[-0.1, -0.1], [0.2, -0.1], [0.2, 0.2], [-0.1, 0.2]])
     segments = outline(star.tolist(), hole.tolist())
     region = shapely.Polygon(star, [hole])
-    triangles = shapely.polygons(cover(segments, region.area))
-    assert shapely.area(triangles).sum() == pytest.approx(region.area, rel=1e-12)
-    assert shapely.union_all(triangles).symmetric_difference(region).area < 1e-12
+    faces = shapely.polygons(cover(segments, region.area))
+    assert shapely.area(faces).sum() == pytest.approx(region.area, rel=1e-12)
+    assert shapely.union_all(faces).symmetric_difference(region).area < 1e-12
 
 
 def test_an_outline_that_crosses_itself_is_left_to_its_triangles() -> None:
