@@ -140,7 +140,7 @@ def measure(name: str, windows: int) -> dict[str, Any]:
         "embree_ns": embree_ns(name, run),
         "bytes_per_triangle": round(sum(a.nbytes for a in arrays) / len(mesh(name).triangles)),
         "bytes_per_ball": round(
-            (sum(a.nbytes for a in run.calendar) + run.motion.nbytes + run.shot.lanes.nbytes) / len(run.motion)
+            (sum(a.nbytes for a in run.calendar) + run.motion.nbytes + run.shot.crowd.lanes.nbytes) / len(run.motion)
         ),
     }
     if row["embree_ns"] is not None:

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim_core._compile import jit
+from sim_core._compile import inlined, jit
 from sim_core.roots import NEVER
 
 # columns of Calendar.marks
@@ -49,7 +49,7 @@ def new_calendar(balls: int) -> Calendar:
     return Calendar(np.full(balls, NEVER), np.zeros(balls), marks, next_time, winners)
 
 
-@jit
+@inlined
 def reschedule(calendar: Calendar, ball: int) -> None:
     """Put the ball's earlier event on the calendar and replay its matches; ties go to the lower ball."""
     calendar.next_time[ball] = min(calendar.pair_time[ball], calendar.wall_time[ball])

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim_core._compile import jit
+from sim_core._compile import inlined, jit
 from sim_core.calendar import (
     EVENTS,
     HITS,
@@ -29,7 +29,7 @@ from sim_core.effects.restitution import Restitution
 from sim_core.effects.vibration import Wave, surface_velocity
 from sim_core.flight import drift, kick, point_at, set_back
 from sim_core.impacts import ImpactPage
-from sim_core.neighbours import Margins, next_meeting
+from sim_core.neighbours import Crowd, follow, next_meeting, set_crowd
 from sim_core.resolve.ball_ball import pair_kick
 from sim_core.resolve.ball_surface import surface_kick
 from sim_core.surfaces.ground import Ground
@@ -54,16 +54,10 @@ ALL, PAIRS, WALL = 0, 1, 2
 
 
 class Shot(NamedTuple):
-    """The balls for the loop.
-
-    ``motion`` (n, 6) float64 in the free-fall frame, ``lanes`` its float32 copy; ``reach`` [m] the sum of two radii;
-    ``margins`` of the pair filter.
-    """
+    """The balls for the loop: ``motion`` (n, 6) float64 in the free-fall frame, and the ``crowd`` made of it."""
 
     motion: np.ndarray
-    lanes: np.ndarray
-    reach: float
-    margins: Margins
+    crowd: Crowd
 
 
 class Clock(NamedTuple):
@@ -79,7 +73,7 @@ class Clock(NamedTuple):
     origin: float
 
 
-@jit
+@inlined
 def _hit_surface(
     shot: Shot,
     ground: Ground,
@@ -115,7 +109,8 @@ def _hit_surface(
         count[WALLS] += 1
     triangle = tree.triangles[obstacle, side]
     tag = ground.tags[triangle]
-    kick(shot.motion, shot.lanes, ball, time, surface_kick(away, relative, restitution, tag))
+    kick(shot.motion, ball, time, surface_kick(away, relative, restitution, tag))
+    follow(shot.crowd, shot.motion, ball, time)
     speed = -dot(away, relative) / math.sqrt(dot(away, away))
     if page.record[tag] and speed > 0.0:
         row = page.filled[0]
@@ -134,18 +129,20 @@ def _speed_squared(motion: np.ndarray, ball: int) -> float:
     return motion[ball, 3] ** 2 + motion[ball, 4] ** 2 + motion[ball, 5] ** 2
 
 
-@jit
+@inlined
 def _collide(shot: Shot, restitution: Restitution | None, one: int, two: int, time: float) -> None:
     """Two balls meet now."""
     motion = shot.motion
     apart = sub(drift(motion, two, time), drift(motion, one, time))
     closing = Vec3(motion[two, 3] - motion[one, 3], motion[two, 4] - motion[one, 4], motion[two, 5] - motion[one, 5])
     change = pair_kick(apart, closing, restitution)
-    kick(motion, shot.lanes, one, time, change)
-    kick(motion, shot.lanes, two, time, Vec3(-change.x, -change.y, -change.z))
+    kick(motion, one, time, change)
+    kick(motion, two, time, Vec3(-change.x, -change.y, -change.z))
+    follow(shot.crowd, motion, one, time)
+    follow(shot.crowd, motion, two, time)
 
 
-@jit
+@inlined
 def _predict(
     shot: Shot,
     ground: Ground,
@@ -162,16 +159,14 @@ def _predict(
     marks = calendar.marks
     if what != WALL:
         before = NEVER_BEFORE if what == ALL or marks[ball, OBSTACLE] < 0 else calendar.wall_time[ball]
-        meeting, partner = next_meeting(
-            shot.motion, shot.lanes, scratch.probe, ball, time, before, shot.reach, shot.margins
-        )
+        meeting, partner = next_meeting(shot.crowd, shot.motion, ball, time, before)
         calendar.pair_time[ball] = meeting
         marks[ball, PARTNER] = partner
         if partner >= 0:
             marks[ball, PARTNER_HITS] = marks[partner, HITS]
     if what != PAIRS or (marks[ball, OBSTACLE] < 0 and calendar.wall_time[ball] <= time):
         # no further than the ball is known to get: until its meeting, or one piece
-        length = min(PIECE, calendar.pair_time[ball] - time)
+        length = min(PIECE, calendar.pair_time[ball] - time) if marks[ball, PARTNER] >= 0 else PIECE
         here = point_at(shot.motion, ball, time, gravity)
         delay, obstacle = first_contact(ground.tree, scratch, here, gravity, wave, ground.seam, time, length)
         calendar.wall_time[ball] = time + (delay if obstacle >= 0 else length)
@@ -206,7 +201,8 @@ def advance(
             if left <= clock.window:
                 clock.now[0] = left
                 return DONE, -1
-            set_back(shot.motion, shot.lanes, clock.window, gravity)
+            set_back(shot.motion, clock.window, gravity)
+            set_crowd(shot.crowd, shot.motion)
             set_calendar_back(calendar, clock.window)
             clock.now[1] += 1.0
             continue
@@ -221,7 +217,9 @@ def advance(
         obstacle = marks[ball, OBSTACLE]
         if calendar.pair_time[ball] <= calendar.wall_time[ball]:
             other = marks[ball, PARTNER]
-            if marks[other, HITS] == marks[ball, PARTNER_HITS]:
+            if other < 0:
+                what = PAIRS
+            elif marks[other, HITS] == marks[ball, PARTNER_HITS]:
                 _collide(shot, restitution, ball, other, time)
                 marks[ball, HITS] += 1
                 marks[other, HITS] += 1
@@ -233,7 +231,7 @@ def advance(
         elif obstacle >= 0:
             _hit_surface(shot, ground, gravity, restitution, wave, clock, page, count, ball, obstacle, time)
             marks[ball, HITS] += 1
-            if not _speed_squared(shot.motion, ball) <= shot.margins.fastest ** 2:
+            if not _speed_squared(shot.motion, ball) <= shot.crowd.fastest**2:
                 forget(calendar, ball, time)
                 return TOO_FAST, ball
         elif obstacle == SEARCH_ON:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim_core._compile import jit
+from sim_core._compile import inlined, jit
 from sim_core.effects.gravity import Gravity, acceleration
 from sim_core.vec3 import Vec3, along
 
@@ -35,7 +35,7 @@ def drift(motion: np.ndarray, ball: int, time: float) -> Vec3:
     )
 
 
-@jit
+@inlined
 def point_at(motion: np.ndarray, ball: int, time: float, gravity: Gravity | None) -> Point:
     """Where a ball is, and how fast, at a time of the window."""
     fall = acceleration(gravity)
@@ -44,26 +44,21 @@ def point_at(motion: np.ndarray, ball: int, time: float, gravity: Gravity | None
     return Point(position, velocity)
 
 
-@jit
-def kick(motion: np.ndarray, lanes: np.ndarray, ball: int, time: float, change: Vec3) -> None:
+@inlined
+def kick(motion: np.ndarray, ball: int, time: float, change: Vec3) -> None:
     """Change a ball's velocity by ``change`` [m/s] at ``time``; its position at that time stays."""
     here = drift(motion, ball, time)
     for axis, (now, add) in enumerate(((here.x, change.x), (here.y, change.y), (here.z, change.z))):
         velocity = motion[ball, 3 + axis] + add
-        base = now - velocity * time
-        motion[ball, axis] = base
+        motion[ball, axis] = now - velocity * time
         motion[ball, 3 + axis] = velocity
-        lanes[axis, ball] = np.float32(base)
-        lanes[3 + axis, ball] = np.float32(velocity)
 
 
 @jit
-def set_back(motion: np.ndarray, lanes: np.ndarray, window: float, gravity: Gravity | None) -> None:
+def set_back(motion: np.ndarray, window: float, gravity: Gravity | None) -> None:
     """Move the clock's zero forward by ``window`` [s]."""
     fall = acceleration(gravity)
     for ball in range(len(motion)):
         for axis, a in enumerate((fall.x, fall.y, fall.z)):
             motion[ball, axis] += window * (motion[ball, 3 + axis] + 0.5 * a * window)
             motion[ball, 3 + axis] += a * window
-            lanes[axis, ball] = np.float32(motion[ball, axis])
-            lanes[3 + axis, ball] = np.float32(motion[ball, 3 + axis])

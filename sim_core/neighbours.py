@@ -10,78 +10,160 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim_core._compile import jit
+from sim_core._compile import inlined, jit
+from sim_core.blocks import MANY, Blocks, ball_in, new_blocks, slot_of, sort_blocks, widen
 from sim_core.detect.ball_ball import meeting_delay
 from sim_core.flight import drift
 from sim_core.roots import NEVER
-from sim_core.simd import LANES, balls_near, lowest_bit
+from sim_core.simd import BOXES, LANES, balls_near, boxes_hit, lowest_bit
 from sim_core.vec3 import Vec3, sub
 
 FAR_SHARE = np.float32(1.0 - 1e-6)  # of distance²: float32 loses 2e-7 of it in the miss distance
+SLACK = np.float32(1.000001)  # on float32 times: ten times their rounding
 ROUNDINGS = 16.0 * float(np.finfo(np.float32).eps)  # of the largest number in a sum of three products, and to spare
 
 
-class Margins(NamedTuple):
-    """What float32 may lose.
+TINY = 1e-30  # stands for a velocity component of zero, whose inverse would be infinite
 
-    ``reach`` [m] of the filter; ``closing`` [m²/s], below which b w + t w² may be negative but for rounding. Good for
-    speeds up to ``fastest`` [m/s].
+
+class Crowd(NamedTuple):
+    """The balls as the filter sees them.
+
+    ``lanes`` (6, m) float32: base and velocity, a column a ball, padded with NaN, which meets no one; ``probe`` (10,)
+    float32: the column of the ball that asks, its time, and what the filter allows for rounding, good for speeds up
+    to ``fastest`` [m/s]; ``reach`` [m], the sum of two radii; ``window`` [s]; ``blocks``: only for many balls.
     """
 
+    lanes: np.ndarray
+    probe: np.ndarray
     reach: float
-    closing: float
     fastest: float
+    window: float
+    blocks: Blocks | None
 
 
-def margins(reach: float, extent: float, fastest: float, window: float) -> Margins:
-    """Margins for balls of this ``reach`` [m] (the sum of two radii) in a room of this extent [m]."""
-    furthest = extent + fastest * window  # a base lies up to a window's flight outside the room
-    return Margins(reach + ROUNDINGS * furthest, ROUNDINGS * furthest * fastest, fastest)
-
-
-def new_lanes(motion: np.ndarray) -> np.ndarray:
-    """Float32 copy (6, n) of motion (n, 6), one row a quantity, padded with NaN, which meets no one, to whole LANES."""
-    balls = len(motion)
-    lanes = np.full((6, -(-balls // LANES) * LANES), np.nan, dtype=np.float32)
-    lanes[:, :balls] = motion.T
-    return lanes
+def new_crowd(
+    motion: np.ndarray, low: np.ndarray, high: np.ndarray, reach: float, fastest: float, window: float
+) -> Crowd:
+    """The crowd of balls with this motion (n, 6) in a room from ``low`` to ``high`` (3,) [m]."""
+    furthest = float(np.max(high - low)) + fastest * window  # a base lies up to a window's flight outside the room
+    margin = ROUNDINGS * furthest
+    probe = np.zeros(10, dtype=np.float32)
+    probe[7:] = (
+        FAR_SHARE,
+        -((reach + margin) ** 2),
+        margin * fastest,
+    )  # the last: b w + t w² of one that still approaches
+    lanes = np.full((6, -(-len(motion) // LANES) * LANES), np.nan, dtype=np.float32)
+    blocks = new_blocks(len(motion), low, high, reach + 2.0 * margin) if len(motion) >= MANY else None
+    crowd = Crowd(lanes, probe, reach, fastest, window, blocks)
+    set_crowd(crowd, motion)
+    return crowd
 
 
 @jit
-def next_meeting(
-    motion: np.ndarray,
-    lanes: np.ndarray,
-    probe: np.ndarray,
-    ball: int,
-    time: float,
-    before: float,
-    reach: float,
-    margins: Margins,
-) -> tuple[float, int]:
-    """Time [s] and partner of the ball's first meeting after ``time`` and before ``before``; (NEVER, -1) if none.
+def set_crowd(crowd: Crowd, motion: np.ndarray) -> None:
+    """See all balls anew, at a window's start."""
+    sort_blocks(crowd.blocks, motion, crowd.window)
+    for ball in range(len(motion)):
+        _see(crowd, motion, ball)
 
-    ``reach`` [m]: sum of the radii.
+
+@inlined
+def follow(crowd: Crowd, motion: np.ndarray, ball: int, time: float) -> None:
+    """See the new path of a ball hit at ``time`` [s]."""
+    _see(crowd, motion, ball)
+    widen(crowd.blocks, motion, ball, time, crowd.window)
+
+
+@inlined
+def _see(crowd: Crowd, motion: np.ndarray, ball: int) -> None:
+    slot = slot_of(crowd.blocks, ball)
+    lanes = crowd.lanes
+    lanes[0, slot] = np.float32(motion[ball, 0])
+    lanes[1, slot] = np.float32(motion[ball, 1])
+    lanes[2, slot] = np.float32(motion[ball, 2])
+    lanes[3, slot] = np.float32(motion[ball, 3])
+    lanes[4, slot] = np.float32(motion[ball, 4])
+    lanes[5, slot] = np.float32(motion[ball, 5])
+
+
+@inlined
+def next_meeting(crowd: Crowd, motion: np.ndarray, ball: int, time: float, before: float) -> tuple[float, int]:
+    """Time [s] and partner of the ball's first meeting after ``time`` and before ``before``.
+
+    If there is none: -1, and the time up to which that is known, NEVER for few balls and the window's end for many.
     """
+    probe = crowd.probe
+    slot = slot_of(crowd.blocks, ball)
     for k in range(6):
-        probe[k] = lanes[k, ball]
+        probe[k] = crowd.lanes[k, slot]
     probe[6] = np.float32(time)
-    probe[7] = FAR_SHARE
-    probe[8] = np.float32(-margins.reach * margins.reach)
-    probe[9] = np.float32(margins.closing)
+    return _search(crowd.blocks, crowd, motion, ball, time, before)
+
+
+@inlined
+def _search(
+    blocks: Blocks | None, crowd: Crowd, motion: np.ndarray, ball: int, time: float, before: float
+) -> tuple[float, int]:
+    """What next_meeting returns, from all lanes, or from the blocks that the ball's path enters."""
+    if blocks is None:
+        here = drift(motion, ball, time)
+        velocity = Vec3(motion[ball, 3], motion[ball, 4], motion[ball, 5])
+        best = before - time
+        partner = -1
+        for first in range(0, len(motion), LANES):
+            near = balls_near(crowd.lanes, first, crowd.probe)
+            while near != 0:
+                other = first + lowest_bit(near)
+                near &= near - 1
+                closing = sub(Vec3(motion[other, 3], motion[other, 4], motion[other, 5]), velocity)
+                delay = meeting_delay(sub(drift(motion, other, time), here), closing, crowd.reach)
+                if delay < best:
+                    best = delay
+                    partner = other
+        if partner < 0:
+            return NEVER, -1
+        return time + best, partner
+    best, partner = min(before, crowd.window) - time, -1
+    _aim(blocks.ray, motion, ball, time)
+    for node in range(len(blocks.boxes)):
+        entered = boxes_hit(blocks.boxes, node, blocks.ray, np.float32(best) * SLACK, blocks.enter)
+        while entered != 0:
+            block = BOXES * node + lowest_bit(entered)
+            entered &= entered - 1
+            near = balls_near(crowd.lanes, LANES * block, crowd.probe)
+            if near != 0:
+                best, partner = _nearest(crowd, motion, ball, time, LANES * block, near, best, partner)
+    return (time + best, partner) if partner >= 0 else (crowd.window, -1)
+
+
+@inlined
+def _aim(ray: np.ndarray, motion: np.ndarray, ball: int, time: float) -> None:
+    """The ball's straight path from now on, as boxes_hit wants it."""
+    here = drift(motion, ball, time)
+    for axis in range(3):
+        speed = motion[ball, 3 + axis]
+        ray[axis] = ray[3 + axis] = np.float32(here[axis])
+        ray[6 + axis] = np.float32(1.0 / (speed if abs(speed) >= TINY else TINY))
+
+
+@inlined
+def _nearest(
+    crowd: Crowd, motion: np.ndarray, ball: int, time: float, first: int, near: int, best: float, partner: int
+) -> tuple[float, int]:
+    """The earlier of the best meeting so far (a delay [s]) and those with the balls in the lanes that ``near`` marks.
+
+    Ties go to the lower ball, so that the order of the lanes does not matter.
+    """
     here = drift(motion, ball, time)
     velocity = Vec3(motion[ball, 3], motion[ball, 4], motion[ball, 5])
-    best = before - time
-    partner = -1
-    for first in range(0, len(motion), LANES):
-        near = balls_near(lanes, first, probe)
-        while near != 0:
-            other = first + lowest_bit(near)
-            near &= near - 1
-            closing = sub(Vec3(motion[other, 3], motion[other, 4], motion[other, 5]), velocity)
-            delay = meeting_delay(sub(drift(motion, other, time), here), closing, reach)
-            if delay < best:
-                best = delay
-                partner = other
-    if partner < 0:
-        return NEVER, -1
-    return time + best, partner
+    while near != 0:
+        other = ball_in(crowd.blocks, first + lowest_bit(near))
+        near &= near - 1
+        closing = sub(Vec3(motion[other, 3], motion[other, 4], motion[other, 5]), velocity)
+        delay = meeting_delay(sub(drift(motion, other, time), here), closing, crowd.reach)
+        if delay < best or (delay == best and other < partner):
+            best = delay
+            partner = other
+    return best, partner

@@ -17,7 +17,7 @@ from sim_core.events import DONE, PAGE_FULL, STORM, TOO_FAST, Clock, Shot, advan
 from sim_core.flight import WINDOW, point_at
 from sim_core.impacts import ImpactLog, ImpactPage, impact_log, new_page
 from sim_core.invariants import contained
-from sim_core.neighbours import margins, new_lanes
+from sim_core.neighbours import new_crowd
 from sim_core.scene import Scene
 from sim_core.surfaces.ground import build_ground
 from sim_core.surfaces.mesh import MAX_TAGS
@@ -96,9 +96,9 @@ class _Run:
         self.pages: list[tuple[np.ndarray, np.ndarray]] = []
 
     def _shot(self, fastest: float) -> Shot:
-        reach = 2.0 * self.scene.balls.radius
-        extent = float(np.ptp(self.scene.mesh.vertices, axis=0).max())
-        return Shot(self.motion, new_lanes(self.motion), reach, margins(reach, extent, fastest, self.window))
+        low = self.scene.mesh.vertices.min(axis=0) - self.centre
+        high = self.scene.mesh.vertices.max(axis=0) - self.centre
+        return Shot(self.motion, new_crowd(self.motion, low, high, 2.0 * self.scene.balls.radius, fastest, self.window))
 
     def play(self, until: float, record: bool) -> None:
         """Advance to ``until`` [s], checking containment on the way."""

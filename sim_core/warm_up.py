@@ -1,24 +1,37 @@
 """Compiling ahead of time, so that a program can say what takes so long the first time."""
 
+import contextlib
+import math
 import time
+from pathlib import Path
 
 import numpy as np
 
 from sim_core._compile import CACHE_FOLDER
 from sim_core.balls import Balls
+from sim_core.blocks import MANY
 from sim_core.physics import Physics
 from sim_core.scene import Scene
 from sim_core.simulate import simulate
 from sim_core.surfaces.mesh import TriangleMesh
 
 
-def is_compiled() -> bool:
-    """True when the event loop has been compiled before, for some set of effects, by this version of the sources."""
-    return any(CACHE_FOLDER.rglob("events.advance-*.nbc"))
+def _mark(physics: Physics, balls: int) -> Path:
+    """A file that says that this set of effects has been compiled: what is absent is not in the machine code."""
+    present = [name for name, effect in zip(physics._fields, physics, strict=True) if effect is not None]
+    return CACHE_FOLDER / "-".join(["compiled", *present, "many" if balls >= MANY else "few"])
 
 
-def compile_simulator(physics: Physics) -> float:
-    """Compiles (or loads from the cache) what a scene with these effects needs; returns the seconds it took."""
+def is_compiled(physics: Physics, balls: int) -> bool:
+    """True when compile_simulator has done this before, with this version of the sources."""
+    return _mark(physics, balls).exists()
+
+
+def compile_simulator(physics: Physics, balls: int = 1) -> float:
+    """Compiles (or loads from the cache) what a scene with these effects and so many balls needs; returns the seconds
+
+    it took.
+    """
     start = time.perf_counter()
     tag = physics.vibration.tag if physics.vibration is not None else 0
     vertices = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
@@ -28,6 +41,10 @@ def compile_simulator(physics: Physics) -> float:
     tags = np.where(floor, tag, 1 if tag == 0 else 0)
     if physics.restitution is not None:
         tags = np.minimum(tags, len(physics.restitution.surfaces) - 1)
-    balls = Balls(np.array([[0.3, 0.5, 0.5], [0.7, 0.5, 0.5]]), np.array([[1.0, 0.1, 0.0], [-1.0, 0.0, 0.1]]), 0.1)
-    simulate(Scene(TriangleMesh(vertices, triangles, tags), balls, physics, duration=0.01))
+    side = math.ceil(MANY ** (1 / 3)) if balls >= MANY else 2
+    places = np.stack(np.meshgrid(*[np.linspace(0.1, 0.9, side)] * 3), axis=-1).reshape(-1, 3)
+    shot = Balls(places, np.random.default_rng(1).normal(size=places.shape), 0.05)
+    simulate(Scene(TriangleMesh(vertices, triangles, tags), shot, physics, duration=0.01))
+    with contextlib.suppress(OSError):  # a cache that cannot be written: every process compiles for itself
+        _mark(physics, balls).touch()
     return time.perf_counter() - start

@@ -42,7 +42,7 @@ SIM_CORE_ORDER = (
     ("physics",),
     ("flight",),
     ("detect", "resolve"),
-    ("calendar", "neighbours", "impacts", "events"),
+    ("calendar", "blocks", "neighbours", "impacts", "events"),
     ("scene",),
     ("simulate",),
     ("warm_up",),

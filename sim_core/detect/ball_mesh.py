@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim_core._compile import jit
+from sim_core._compile import inlined, jit
 from sim_core.detect.ball_sonotrode import same_plane, waving_plane_delay, within_waving_borders
 from sim_core.detect.ball_triangle import capsule_delay, face_delay
 from sim_core.effects.gravity import Gravity, acceleration
@@ -27,7 +27,6 @@ class Scratch(NamedTuple):
     enter: np.ndarray
     nodes: np.ndarray
     times: np.ndarray
-    probe: np.ndarray
 
 
 def new_scratch() -> Scratch:
@@ -37,7 +36,6 @@ def new_scratch() -> Scratch:
         np.zeros(BOXES, dtype=np.float32),
         np.zeros(STACK, dtype=np.int64),
         np.zeros(STACK, dtype=np.float32),
-        np.zeros(10, dtype=np.float32),
     )
 
 
@@ -59,7 +57,7 @@ def _aim(ray: np.ndarray, ball: Point, fall: Vec3, length: float) -> None:
         ray[6 + axis] = np.float32(1.0 / speed)
 
 
-@jit
+@inlined
 def first_contact(
     tree: Tree,
     scratch: Scratch,

@@ -35,9 +35,10 @@ class Obstacles(NamedTuple):
     """What the centre of a ball can hit, one row each. k = faces + capsules.
 
     ``numbers`` (k, 20) float64 [m]: a face holds its unit normal towards the shot (0:3), the moved plane's offset
-    (3), and four inward in-plane border normals with their offsets (4:20), a triangle's fourth zero; a capsule its start (0:3), unit
-    direction (3:6), length (6), and the first neighbour's normal minus the second's (7:10). ``kinds`` (k,) uint8;
-    ``triangles`` (k, 2) int32: the mesh triangles to book a hit on, a capsule's two neighbours or a face twice.
+    (3), and four inward in-plane border normals with their offsets (4:20), a triangle's fourth zero; a capsule its
+    start (0:3), unit direction (3:6), length (6), and the first neighbour's normal minus the second's (7:10).
+    ``kinds`` (k,) uint8; ``triangles`` (k, 2) int32: the mesh triangles to book a hit on, a capsule's two neighbours
+    or a face twice.
     ``low``, ``high`` (k, 3) float64 [m]: bounding boxes.
     """
 
