@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sim_core import stopwatch
 from sim_core._compile import inlined, jit
 from sim_core.calendar import (
     EVENTS,
@@ -32,6 +33,7 @@ from sim_core.impacts import ImpactPage
 from sim_core.neighbours import Crowd, follow, next_meeting, set_crowd
 from sim_core.resolve.ball_ball import pair_kick
 from sim_core.resolve.ball_surface import surface_kick
+from sim_core.stopwatch import Stopwatch, lap
 from sim_core.surfaces.ground import Ground
 from sim_core.surfaces.locate import triangle_at
 from sim_core.surfaces.obstacles import CAPSULE, WAVING_FACE
@@ -73,25 +75,30 @@ class Clock(NamedTuple):
     origin: float
 
 
+class Loop(NamedTuple):
+    """Everything the event loop works on; ``count`` (5,) int64, see WALLS and below; ``watch`` only to measure."""
+
+    shot: Shot
+    ground: Ground
+    calendar: Calendar
+    scratch: Scratch
+    gravity: Gravity | None
+    restitution: Restitution | None
+    wave: Wave | None
+    clock: Clock
+    page: ImpactPage
+    count: np.ndarray
+    watch: Stopwatch | None
+
+
 @inlined
-def _hit_surface(
-    shot: Shot,
-    ground: Ground,
-    gravity: Gravity | None,
-    restitution: Restitution | None,
-    wave: Wave | None,
-    clock: Clock,
-    page: ImpactPage,
-    count: np.ndarray,
-    ball: int,
-    obstacle: int,
-    time: float,
-) -> None:
+def _hit_surface(loop: Loop, ball: int, obstacle: int, time: float) -> None:
     """The ball meets the obstacle now: change its velocity, count the impact, write it down if it is on a recorded
     surface.
     """
+    shot, ground, clock, page = loop.shot, loop.ground, loop.clock, loop.page
     tree = ground.tree
-    here = point_at(shot.motion, ball, time, gravity)
+    here = point_at(shot.motion, ball, time, loop.gravity)
     kind = tree.kinds[obstacle]
     side = 0
     touched = here.position  # or where the ball's centre is seen in the face's plane
@@ -103,13 +110,13 @@ def _hit_surface(
         away = face_normal(tree.numbers, obstacle)
     relative = here.velocity
     if kind == WAVING_FACE:
-        relative = sub(relative, surface_velocity(wave, time))
-        count[SONOTRODE] += 1
+        relative = sub(relative, surface_velocity(loop.wave, time))
+        loop.count[SONOTRODE] += 1
     else:
-        count[WALLS] += 1
+        loop.count[WALLS] += 1
     triangle = tree.triangles[obstacle, side]
     tag = ground.tags[triangle]
-    kick(shot.motion, ball, time, surface_kick(away, relative, restitution, tag))
+    kick(shot.motion, ball, time, surface_kick(away, relative, loop.restitution, tag))
     follow(shot.crowd, shot.motion, ball, time)
     speed = -dot(away, relative) / math.sqrt(dot(away, away))
     if page.record[tag] and speed > 0.0:
@@ -130,32 +137,22 @@ def _speed_squared(motion: np.ndarray, ball: int) -> float:
 
 
 @inlined
-def _collide(shot: Shot, restitution: Restitution | None, one: int, two: int, time: float) -> None:
+def _collide(loop: Loop, one: int, two: int, time: float) -> None:
     """Two balls meet now."""
-    motion = shot.motion
+    motion = loop.shot.motion
     apart = sub(drift(motion, two, time), drift(motion, one, time))
     closing = Vec3(motion[two, 3] - motion[one, 3], motion[two, 4] - motion[one, 4], motion[two, 5] - motion[one, 5])
-    change = pair_kick(apart, closing, restitution)
+    change = pair_kick(apart, closing, loop.restitution)
     kick(motion, one, time, change)
     kick(motion, two, time, Vec3(-change.x, -change.y, -change.z))
-    follow(shot.crowd, motion, one, time)
-    follow(shot.crowd, motion, two, time)
+    follow(loop.shot.crowd, motion, one, time)
+    follow(loop.shot.crowd, motion, two, time)
 
 
 @inlined
-def _predict(
-    shot: Shot,
-    ground: Ground,
-    calendar: Calendar,
-    scratch: Scratch,
-    gravity: Gravity | None,
-    wave: Wave | None,
-    count: np.ndarray,
-    ball: int,
-    time: float,
-    what: int,
-) -> None:
+def _predict(loop: Loop, ball: int, time: float, what: int) -> None:
     """Find the ball's next events from ``time`` on and put the earlier on the calendar."""
+    shot, calendar = loop.shot, loop.calendar
     marks = calendar.marks
     if what != WALL:
         before = NEVER_BEFORE if what == ALL or marks[ball, OBSTACLE] < 0 else calendar.wall_time[ball]
@@ -164,35 +161,31 @@ def _predict(
         marks[ball, PARTNER] = partner
         if partner >= 0:
             marks[ball, PARTNER_HITS] = marks[partner, HITS]
+        lap(loop.watch, stopwatch.PAIRS)
     if what != PAIRS or (marks[ball, OBSTACLE] < 0 and calendar.wall_time[ball] <= time):
         # no further than the ball is known to get: until its meeting, or one piece
         length = min(PIECE, calendar.pair_time[ball] - time) if marks[ball, PARTNER] >= 0 else PIECE
-        here = point_at(shot.motion, ball, time, gravity)
-        delay, obstacle = first_contact(ground.tree, scratch, here, gravity, wave, ground.seam, time, length)
+        here = point_at(shot.motion, ball, time, loop.gravity)
+        delay, obstacle = first_contact(
+            loop.ground.tree, loop.scratch, here, loop.gravity, loop.wave, loop.ground.seam, time, length
+        )
         calendar.wall_time[ball] = time + (delay if obstacle >= 0 else length)
         marks[ball, OBSTACLE] = obstacle
-        count[SEARCHES] += 1
+        loop.count[SEARCHES] += 1
+        lap(loop.watch, stopwatch.WALLS)
     reschedule(calendar, ball)
+    lap(loop.watch, stopwatch.SCHEDULE)
 
 
 NEVER_BEFORE = 1e300  # finite, so that differences with it stay numbers
 
 
 @jit
-def advance(
-    shot: Shot,
-    ground: Ground,
-    calendar: Calendar,
-    scratch: Scratch,
-    gravity: Gravity | None,
-    restitution: Restitution | None,
-    wave: Wave | None,
-    clock: Clock,
-    page: ImpactPage,
-    count: np.ndarray,
-) -> tuple[int, int]:
+def advance(loop: Loop) -> tuple[int, int]:
     """Play events until ``clock.stop``; returns (status, ball): DONE, or why it had to pause and at which ball."""
+    shot, calendar, clock, page, count = loop.shot, loop.calendar, loop.clock, loop.page, loop.count
     marks = calendar.marks
+    lap(loop.watch, -1)
     while True:
         left = clock.stop - clock.now[1] * clock.window
         ball = calendar.winners[1]
@@ -201,7 +194,7 @@ def advance(
             if left <= clock.window:
                 clock.now[0] = left
                 return DONE, -1
-            set_back(shot.motion, clock.window, gravity)
+            set_back(shot.motion, clock.window, loop.gravity)
             set_crowd(shot.crowd, shot.motion)
             set_calendar_back(calendar, clock.window)
             clock.now[1] += 1.0
@@ -212,6 +205,7 @@ def advance(
         marks[ball, EVENTS] += 1
         if marks[ball, EVENTS] > STORM_EVENTS:
             return STORM, ball
+        lap(loop.watch, stopwatch.NEXT)
         second = -1
         what = ALL
         obstacle = marks[ball, OBSTACLE]
@@ -220,7 +214,7 @@ def advance(
             if other < 0:
                 what = PAIRS
             elif marks[other, HITS] == marks[ball, PARTNER_HITS]:
-                _collide(shot, restitution, ball, other, time)
+                _collide(loop, ball, other, time)
                 marks[ball, HITS] += 1
                 marks[other, HITS] += 1
                 second = other
@@ -229,14 +223,15 @@ def advance(
                 what = PAIRS
                 count[STALE] += 1
         elif obstacle >= 0:
-            _hit_surface(shot, ground, gravity, restitution, wave, clock, page, count, ball, obstacle, time)
+            _hit_surface(loop, ball, obstacle, time)
             marks[ball, HITS] += 1
             if not _speed_squared(shot.motion, ball) <= shot.crowd.fastest**2:
                 forget(calendar, ball, time)
                 return TOO_FAST, ball
         elif obstacle == SEARCH_ON:
             what = WALL
+        lap(loop.watch, stopwatch.RESOLVE)
         todo = ball
         while todo >= 0:
-            _predict(shot, ground, calendar, scratch, gravity, wave, count, todo, time, what)
+            _predict(loop, todo, time, what)
             todo = second if todo == ball else -1

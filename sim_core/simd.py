@@ -4,6 +4,7 @@ A filter may let through too much, never too little, so results do not depend on
 numpy twin that stands in when numba's JIT is off.
 """
 
+import time
 from typing import Any
 
 import numba
@@ -182,6 +183,17 @@ def _lowest_bit_twin(bits: int) -> int:
     return (bits & -bits).bit_length() - 1
 
 
+@intrinsic
+def _ticks(typing_context: Any) -> Any:
+    signature = types.int64()
+
+    def codegen(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
+        kind = ir.FunctionType(ir.IntType(64), [])
+        return builder.call(cgutils.get_or_insert_function(builder.module, kind, "llvm.readcyclecounter"), [])
+
+    return signature, codegen
+
+
 _settings: Any = numba.config
 _plain = _settings.DISABLE_JIT
 
@@ -190,3 +202,5 @@ boxes_hit: Any = _boxes_hit_twin if _plain else _boxes_hit
 # balls_near(lanes (6, n) f32, first lane, probe (10,) f32) -> bit mask of LANES balls
 balls_near: Any = _balls_near_twin if _plain else _balls_near
 lowest_bit: Any = _lowest_bit_twin if _plain else _lowest_bit
+# ticks() -> the processor's clock, in its own unit
+ticks: Any = time.perf_counter_ns if _plain else _ticks

@@ -13,12 +13,13 @@ from sim_core.effects.gravity import checked_gravity
 from sim_core.effects.restitution import Restitution, checked_restitution
 from sim_core.effects.vibration import Wave, checked_wave
 from sim_core.errors import SimulationError
-from sim_core.events import DONE, PAGE_FULL, STORM, TOO_FAST, Clock, Shot, advance
+from sim_core.events import DONE, PAGE_FULL, STORM, TOO_FAST, Clock, Loop, Shot, advance
 from sim_core.flight import WINDOW, point_at
 from sim_core.impacts import ImpactLog, ImpactPage, impact_log, new_page
 from sim_core.invariants import contained
 from sim_core.neighbours import new_crowd
 from sim_core.scene import Scene
+from sim_core.stopwatch import Stopwatch
 from sim_core.surfaces.ground import build_ground
 from sim_core.surfaces.mesh import MAX_TAGS
 
@@ -91,6 +92,7 @@ class _Run:
         self.calendar: Calendar = new_calendar(len(self.motion))
         self.scratch: Scratch = new_scratch()
         self.shot = self._shot(2.0 * max(1.0, float(np.abs(scene.balls.velocities).max())))
+        self.watch: Stopwatch | None = None
         self.now = np.zeros(2)
         self.count = np.zeros(5, dtype=np.int64)
         self.pages: list[tuple[np.ndarray, np.ndarray]] = []
@@ -118,16 +120,19 @@ class _Run:
     def _advance(self, clock: Clock, page: ImpactPage) -> None:
         while True:
             status, ball = advance(
-                self.shot,
-                self.ground,
-                self.calendar,
-                self.scratch,
-                self.gravity,
-                self.restitution,
-                self.wave,
-                clock,
-                page,
-                self.count,
+                Loop(
+                    self.shot,
+                    self.ground,
+                    self.calendar,
+                    self.scratch,
+                    self.gravity,
+                    self.restitution,
+                    self.wave,
+                    clock,
+                    page,
+                    self.count,
+                    self.watch,
+                )
             )
             if status == DONE:
                 return

@@ -34,7 +34,7 @@ CHAMBEROPT_ORDER = (
 )
 SIM_CORE_ORDER = (
     ("errors", "_compile", "simd"),
-    ("vec3",),
+    ("vec3", "stopwatch"),
     ("roots",),
     ("surfaces", "balls", "effects"),
     ("invariants",),

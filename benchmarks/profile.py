@@ -1,0 +1,50 @@
+"""Where the event loop's time goes: ns a collision in each of its parts, scene by scene.
+
+    python benchmarks/profile.py [scene ...]
+
+The loop is compiled once more with a stopwatch in it (sim_core/stopwatch.py); the last column says how much slower it
+is for that. What limits it is said in docs/core.md.
+"""
+
+import argparse
+import statistics
+
+from benchmarks.events import advance, steady
+from benchmarks.scenes import MESHES
+from sim_core.stopwatch import PARTS, new_stopwatch
+
+WINDOW = 0.4  # CPU s a measurement
+
+
+def profile(name: str, repeats: int = 5) -> tuple[list[float], dict[str, float], float]:
+    """ns a collision in each part (medians), events and searches a collision, and how much the stopwatch slows."""
+    bare, watched = steady(name), steady(name)
+    watched.watch = new_stopwatch()
+    advance(watched, 0.01)
+    piece = 0.01 * WINDOW / max(advance(bare, 0.01)[1], 1e-6)
+    parts, ratios = [], []
+    watched.count[:] = 0
+    for _ in range(repeats):
+        collisions, spent = advance(bare, piece)
+        watched.watch.spent[:] = 0
+        seen, longer = advance(watched, piece)
+        ticks = watched.watch.spent
+        parts.append(ticks / ticks.sum() * longer / seen * 1e9)
+        ratios.append((longer / seen) / (spent / collisions))
+    count = watched.count / watched.count[:3].sum()
+    calls = {"walls": count[0], "balls": count[1], "sonotrode": count[2], "searches": count[3], "stale": count[4]}
+    return [statistics.median(column) for column in zip(*parts, strict=True)], calls, statistics.median(ratios)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenes", nargs="*", metavar="scene", help=", ".join(MESHES))
+    print("ns a collision | " + " | ".join(PARTS) + " | all | wall searches a collision | with / without stopwatch")
+    for name in parser.parse_args().scenes or MESHES:
+        parts, calls, ratio = profile(name)
+        cells = [f"{part:.0f}" for part in parts]
+        print(f"{name} | {' | '.join(cells)} | {sum(parts):.0f} | {calls['searches']:.2f} | {ratio:.2f}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
