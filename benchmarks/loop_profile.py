@@ -1,6 +1,6 @@
 """Where the event loop's time goes: ns a collision in each of its parts, scene by scene.
 
-    python benchmarks/profile.py [scene ...]
+    python benchmarks/loop_profile.py [scene ...]
 
 The loop is compiled once more with a stopwatch in it (sim_core/stopwatch.py); the last column says how much slower it
 is for that. What limits it is said in docs/core.md.
@@ -8,6 +8,10 @@ is for that. What limits it is said in docs/core.md.
 
 import argparse
 import statistics
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from benchmarks.events import advance, steady
 from benchmarks.scenes import MESHES
