@@ -48,7 +48,7 @@ TOO_FAST = 3
 PIECE = 0.01  # s: longest arc searched at once; its chord is off by g PIECE²/8 = 0.12 mm, so boxes stay tight
 STORM_EVENTS = 200_000  # of one ball in one window (20 ms): ten million a second is no gas but a jam
 
-# columns of Count
+# columns of Loop.tally
 WALLS, BALLS, SONOTRODE, SEARCHES, STALE = 0, 1, 2, 3, 4
 
 # what to predict
@@ -76,7 +76,7 @@ class Clock(NamedTuple):
 
 
 class Loop(NamedTuple):
-    """Everything the event loop works on; ``count`` (5,) int64, see WALLS and below; ``watch`` only to measure."""
+    """Everything the event loop works on; ``tally`` (5,) int64, see WALLS and below; ``watch`` only to measure."""
 
     shot: Shot
     ground: Ground
@@ -87,7 +87,7 @@ class Loop(NamedTuple):
     wave: Wave | None
     clock: Clock
     page: ImpactPage
-    count: np.ndarray
+    tally: np.ndarray
     watch: Stopwatch | None
 
 
@@ -111,9 +111,9 @@ def _hit_surface(loop: Loop, ball: int, obstacle: int, time: float) -> None:
     relative = here.velocity
     if kind == WAVING_FACE:
         relative = sub(relative, surface_velocity(loop.wave, time))
-        loop.count[SONOTRODE] += 1
+        loop.tally[SONOTRODE] += 1
     else:
-        loop.count[WALLS] += 1
+        loop.tally[WALLS] += 1
     triangle = tree.triangles[obstacle, side]
     tag = ground.tags[triangle]
     kick(shot.motion, ball, time, surface_kick(away, relative, loop.restitution, tag))
@@ -171,7 +171,7 @@ def _predict(loop: Loop, ball: int, time: float, what: int) -> None:
         )
         calendar.wall_time[ball] = time + (delay if obstacle >= 0 else length)
         marks[ball, OBSTACLE] = obstacle
-        loop.count[SEARCHES] += 1
+        loop.tally[SEARCHES] += 1
         lap(loop.watch, stopwatch.WALLS)
     reschedule(calendar, ball)
     lap(loop.watch, stopwatch.SCHEDULE)
@@ -183,7 +183,7 @@ NEVER_BEFORE = 1e300  # finite, so that differences with it stay numbers
 @jit
 def advance(loop: Loop) -> tuple[int, int]:
     """Play events until ``clock.stop``; returns (status, ball): DONE, or why it had to pause and at which ball."""
-    shot, calendar, clock, page, count = loop.shot, loop.calendar, loop.clock, loop.page, loop.count
+    shot, calendar, clock, page, tally = loop.shot, loop.calendar, loop.clock, loop.page, loop.tally
     marks = calendar.marks
     lap(loop.watch, -1)
     while True:
@@ -218,10 +218,10 @@ def advance(loop: Loop) -> tuple[int, int]:
                 marks[ball, HITS] += 1
                 marks[other, HITS] += 1
                 second = other
-                count[BALLS] += 1
+                tally[BALLS] += 1
             else:
                 what = PAIRS
-                count[STALE] += 1
+                tally[STALE] += 1
         elif obstacle >= 0:
             _hit_surface(loop, ball, obstacle, time)
             marks[ball, HITS] += 1
