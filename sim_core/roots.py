@@ -133,22 +133,22 @@ def _concave_approach(w: WaveGap, start: float, end: float) -> float:
         if gap >= -GAP_TOLERANCE:
             return s
         rate = _rate(w, s)
-        step = s - gap / rate
-        if not (start < step < s):
+        step = max(start, s - gap / rate)
+        if not step < s:
             return s
         s = step
     return s
 
 
 @jit
-def _reaches_envelope(w: WaveGap) -> float:
+def _reaches_envelope(w: WaveGap, depth: float) -> float:
     """A time [s] before which there is no approach: when the ball comes to the swing's envelope, or comes back to it.
 
     Inside the envelope that is now, unless the ball leaves it faster than the face ever moves: its speed on leaving
-    is the least on its way out.
+    is the least on its way out. Behind the face, ``depth`` [m] below its swing, it must come out over the crests.
     """
     height = w.c - w.swing
-    if height > 0.0:
+    if height > 0.0 or w.c <= -w.swing - depth:
         return first_approach(height, w.b, w.a, 0.0)
     disc = w.b * w.b - 4.0 * w.a * height
     if w.b <= 0.0 or disc <= w.swing * w.swing * w.omega * w.omega:
@@ -164,16 +164,14 @@ def first_wave_approach(w: WaveGap, limit: float, depth: float) -> float:
     sin(angle) = -2a / (swing omega²), so that each piece has at most one approach and Newton started from the safe
     side cannot miss it nor come early. ``depth`` as in first_approach.
     """
-    if w.c <= -w.swing - depth:
-        return NEVER
-    s = _reaches_envelope(w)
+    s = _reaches_envelope(w, depth)
     if s >= limit:
         return NEVER
     strength = w.swing * w.omega * w.omega
     if abs(2.0 * w.a) >= strength:  # too gentle to bend the gap the other way: one piece
         if w.a <= 0.0:
-            return _concave_approach(w, 0.0, limit)
-        return _convex_approach(w, 0.0, limit)
+            return _concave_approach(w, s, limit)
+        return _convex_approach(w, s, limit)
     alpha = math.asin(-2.0 * w.a / strength)
     while s < limit:
         height = w.c + s * (w.b + w.a * s) - w.swing

@@ -8,22 +8,57 @@ import numpy as np
 from sim_core._compile import jit
 from sim_core.flight import Point
 from sim_core.roots import NEVER, first_approach
-from sim_core.vec3 import Vec3, along, dot, sub
+from sim_core.surfaces.obstacles import PAST_CORNERS
+from sim_core.vec3 import Vec3, along, cross, dot, sub
 
 CONTACT = (
     1e-13  # m: a gap this small is contact with a capsule; a thousandth of what would count as early, 100 x rounding
 )
-STEPS = 200  # 3 to 6 are used; a grazing touch converges by a factor of four a step
+STEPS = (
+    1000  # 3 to 6 are used; a grazing touch converges by a factor of four a step, a ball sliding over an edge needs 300
+)
+ROUNDING = 1e-15  # m: of a place in a face's plane
 HALF = 0.5  # of a radius: an overlap deeper than this is the far side of a one-sided face
 
 
 @jit
 def within_borders(numbers: np.ndarray, row: int, at: Vec3, seam: float) -> bool:
     """True when a point in the face's plane lies inside its borders, or at most ``seam`` [m] over one."""
+    over = False
     for k in range(4, 20, 4):
-        inward = Vec3(numbers[row, k], numbers[row, k + 1], numbers[row, k + 2])
-        if dot(inward, at) - numbers[row, k + 3] < -seam:
+        inside = _inside_border(numbers, row, k, at)
+        if inside < -seam:
             return False
+        over |= inside < 0.0
+    return not over or _near_corners(numbers, row, at, PAST_CORNERS * seam)
+
+
+@jit
+def _inward(numbers: np.ndarray, row: int, border: int) -> Vec3:
+    return Vec3(numbers[row, border], numbers[row, border + 1], numbers[row, border + 2])
+
+
+@jit
+def _inside_border(numbers: np.ndarray, row: int, border: int, at: Vec3) -> float:
+    return dot(_inward(numbers, row, border), at) - numbers[row, border + 3]
+
+
+@jit
+def _near_corners(numbers: np.ndarray, row: int, at: Vec3, reach: float) -> bool:
+    """True when a point over a border is at most ``reach`` [m] past that border's ends.
+
+    The seams of two borders cross far beyond a corner as sharp as a needle's tip.
+    """
+    for border in range(4, 20, 4):
+        over = _inside_border(numbers, row, border, at)
+        if over < 0.0:
+            one = _inward(numbers, row, border)
+            for other in range(4, 20, 4):
+                two = _inward(numbers, row, other)
+                turn = cross(one, two)
+                past = over * dot(one, two) - _inside_border(numbers, row, other, at)
+                if other != border and past > reach * np.sqrt(dot(turn, turn)) + ROUNDING:
+                    return False
     return True
 
 
@@ -82,6 +117,8 @@ def capsule_delay(numbers: np.ndarray, row: int, ball: Point, fall: Vec3, radius
         rate = dot(away, velocity) / distance
         if gap <= CONTACT and rate < 0.0 and gap > -HALF * radius:
             return delay
+        if -HALF * radius < gap <= CONTACT:  # touching, but not approaching: on until it could be deeper than now
+            gap = CONTACT
         step = first_approach(gap, rate, 0.5 * dot(away, fall) / distance, HALF * radius)
         if delay + step > limit:
             return NEVER

@@ -29,6 +29,9 @@ WAVING_FACE = 2  # a face of the vibrating sonotrode
 # contact at a convex edge by SEAM²/2r = 3e-14 m for a 3 mm ball. Smaller than 1e-12 would be rounding itself.
 SEAM = 1e-8
 SEAM_PER_RADIUS = 1e-5  # the same for balls so small that SEAM would show
+# Seams [-]: how far a face reaches past its corners at most, where the seams of two borders cross; at a needle's tip
+# they cross far outside. Six almost flat edges that meet in a convex corner need two of it.
+PAST_CORNERS = 3.0
 
 
 class Obstacles(NamedTuple):
@@ -144,17 +147,22 @@ def _capsules(
     two = two[one]
     swap = flats.flat[one // 3] > flats.flat[two // 3]  # all edges between two flats have them in one order
     one, two = np.where(swap, two, one), np.where(swap, one, two)
-    t_one, k_one, t_two = one // 3, one % 3, two // 3
+    t_one, k_one, t_two, k_two = one // 3, one % 3, two // 3, two % 3
     start = corners[t_one, k_one]
     along = corners[t_one, (k_one + 1) % 3] - start
     length = np.linalg.norm(along, axis=1)
-    far_corner = corners[t_two, (two % 3 + 2) % 3]
+    far_corner = corners[t_two, (k_two + 2) % 3]
     # convex towards the shot: the neighbour falls away behind this face's plane
     bend = np.linalg.norm(np.cross(normals[t_one], normals[t_two]), axis=1)
     behind = np.einsum("ij,ij->i", normals[t_one], far_corner - start) < 0.0
     folded = np.einsum("ij,ij->i", normals[t_one], normals[t_two]) < 0.0
     flat = (bend < 2.0 * seam(radius) / radius) & ~folded
     convex = (behind & ~flat) | ~solid[t_one] | ~solid[t_two]
+    # where many flat edges meet, the moved faces part further than they reach: there a capsule's end is the corner
+    turn = np.where(flat & behind & ~waving[t_one] & ~waving[t_two], bend, 0.0)
+    tips = np.stack([mesh.triangles[t_one, k_one], mesh.triangles[t_two, k_two]])
+    around = np.bincount(tips.ravel(), np.tile(turn, 2))  # of each corner: four times how far its faces part, or more
+    convex |= (turn > 0.0) & (around[tips] > 4.0 * PAST_CORNERS * seam(radius) / radius).any(axis=0)
     rim = (convex & (waving[t_one] | waving[t_two])) | (flat & (waving[t_one] != waving[t_two]))
     if rim.any():
         edge = np.flatnonzero(rim)[0]

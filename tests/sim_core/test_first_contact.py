@@ -1,18 +1,24 @@
-"""The tree's first contact of a flying ball with a body of faces, edges and corners, against a dense extended-
-precision reference.
+"""The first contact of a flying ball with a whole mesh of faces, edges and corners, judged in extended precision.
+
+Two judges: plain dense sampling with bisection (first_contact_reference.py) on bodies met at random, and the judge of
+contact_reference.py, fast enough for millions, on every shape and aim of contact_cases.py.
 """
 
 import numpy as np
 import pytest
 import trimesh
 
-from sim_core import Gravity
-from sim_core.detect.ball_mesh import first_contact, new_scratch
-from sim_core.flight import Point
+from sim_core import Balls, Gravity, Physics, Restitution, Scene, TriangleMesh, simulate
+from sim_core.invariants import clearance, contained
+from sim_core.scene import TOUCH
 from sim_core.surfaces.ground import build_ground
-from sim_core.vec3 import Vec3
+from sim_core.surfaces.obstacles import PAST_CORNERS, seam
 from tests.cavities import CEILING, box_around
+from tests.sim_core import contact_calls
+from tests.sim_core.contact_cases import AIMS, BODIES, FAR, body_of, flights_to, room_with, touches, units
+from tests.sim_core.contact_reference import judge_triangles
 from tests.sim_core.first_contact_reference import first_contact_reference, gap_at
+from tests.sim_core.test_contacts import SIZES, TOLERANCE, require
 
 HALF = 0.05  # m, half side of the room
 RADIUS = 1.5e-3
@@ -44,7 +50,6 @@ def compare_with_reference(family: str, bodies: int, shots: int, seed: int) -> N
     rng = np.random.default_rng(seed)
     gravity = Gravity()
     fall = np.array(gravity)
-    scratch = new_scratch()
     hits = 0
     for _ in range(bodies):
         body = random_body(rng, family)
@@ -54,14 +59,9 @@ def compare_with_reference(family: str, bodies: int, shots: int, seed: int) -> N
         start, velocity = shots_at(body, shots, rng)
         length = 0.04 / np.linalg.norm(velocity, axis=1)
         expected, lowest = first_contact_reference(start, velocity, fall, body.triangles, RADIUS, length)
-        found = np.full(shots, np.inf)
-        for i in range(shots):
-            ball = Point(Vec3(*(start[i] - centre).tolist()), Vec3(*velocity[i].tolist()))
-            delay, obstacle = first_contact(
-                ground.tree, scratch, ball, gravity, None, ground.seam, 0.0, float(length[i])
-            )
-            if obstacle >= 0 and mesh.tags[ground.tree.triangles[obstacle, 0]] == CEILING:
-                found[i] = delay
+        flights = np.concatenate([start - centre, velocity], axis=1)
+        found, triangles = contact_calls.contacts(ground, flights, gravity, None, 0.0, length)
+        found[mesh.tags[triangles] != CEILING] = np.inf  # the room's walls
         hit = np.flatnonzero(np.isfinite(found))
         hits += len(hit)
         everywhere = np.broadcast_to(body.triangles, (len(hit), *body.triangles.shape))
@@ -88,3 +88,60 @@ def test_first_contact_is_never_missed_and_never_early(family: str) -> None:
 @pytest.mark.parametrize("family", ["plump", "sliver", "needle"])
 def test_first_contact_on_a_hundred_thousand_cases(family: str) -> None:
     compare_with_reference(family, bodies=70, shots=500, seed=11)
+
+
+GROUP = 500  # flights to one body; fewer to the cone's many triangles
+PULLS = (Gravity(), Gravity(0.0, 0.0, 0.0), Gravity(), Gravity(500.0, -600.0, 550.0))  # 1, 0 and 100 g
+
+
+@pytest.mark.parametrize("count", SIZES)
+@pytest.mark.parametrize("shape", BODIES)
+def test_first_contact_from_any_start(shape: str, count: int) -> None:
+    """Half of the flights are random, half hard; all shapes together see more than ``count`` of each in the long run."""
+    rng = np.random.default_rng(13)
+    radius, half = BODIES[shape]
+    offset = FAR if shape == "far" else np.zeros(3)
+    hits = np.zeros(0, dtype=bool)
+    size = GROUP if shape != "cone" else GROUP // 10
+    for group in range(max(2 * (len(AIMS) - 2), 3 * count // len(BODIES) // GROUP)):
+        aim = "random" if group % 2 == 0 else AIMS[1:-1][group // 2 % (len(AIMS) - 2)]
+        pull = PULLS[group // 2 % len(PULLS)] if aim != "random" else PULLS[group // 2 % 2]
+        corners, triangles = body_of(rng, shape)
+        mesh = room_with(corners[None], triangles, half, offset)
+        ground = build_ground(mesh, radius)
+        touch, normal = touches(rng, corners, triangles, radius, size)
+        flights = flights_to(rng, aim, touch, normal, np.broadcast_to(np.array(pull), (size, 3)), radius)
+        seen = mesh.corners - mesh.middle  # all digits of a far mesh's rounded corners, as the simulation has them
+        free = clearance(seen, flights[:, :3], radius) >= radius - TOUCH
+        flights = flights[free & contained(mesh, flights[:, :3] + offset)]
+        tilt = (
+            1.1 * PAST_CORNERS * seam(radius) / radius
+        )  # faces reach a seam over their borders, three past their corners
+        lengths = rng.uniform(0.002, 0.02, len(flights))
+        found, _ = contact_calls.contacts(ground, flights, pull, None, 0.0, lengths)
+        everywhere = np.broadcast_to(seen, (len(flights), *seen.shape))
+        verdict = judge_triangles(everywhere, flights, radius, lengths, found, TOLERANCE, tilt)
+        require(verdict, found, f"{shape}, {aim}")
+        hits = np.concatenate([hits, np.isfinite(found)])
+    assert hits.mean() > 0.3, "the flights do not test much: too few hit"
+
+
+def test_a_scene_a_kilometre_away_plays_the_same_bits() -> None:
+    """On a grid of 2^-30 m the move is exact: no digit goes to the far origin."""
+    grid = 2.0**30
+    rng = np.random.default_rng(5)
+    corners, triangles = body_of(rng, "spiky")
+    near = room_with(corners[None], triangles, 0.03, np.zeros(3))
+    rounded = np.round(near.vertices * grid) / grid
+    positions = np.round(0.024 * units(rng, 40) * grid) / grid
+    positions = positions[clearance(rounded[near.triangles], positions, 0.001) >= 0.001]
+    velocities = 3.0 * units(rng, len(positions))
+    physics = Physics(Gravity(), Restitution(((0.9, 1.0),) * 3, (1.0, 1.0)))
+    shift = np.round(FAR * grid) / grid
+    logs = []
+    for move in (np.zeros(3), shift):
+        mesh = TriangleMesh(rounded + move, near.triangles, near.tags)
+        logs.append(simulate(Scene(mesh, Balls(positions + move, velocities, 1e-3), physics, 0.1)).impacts)
+    assert len(logs[0]) > 100
+    for column in ("time", "triangle", "normal_speed"):
+        np.testing.assert_array_equal(getattr(logs[0], column), getattr(logs[1], column))

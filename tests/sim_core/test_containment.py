@@ -1,0 +1,119 @@
+"""In a closed chamber no ball ever leaves, enters a surface or another ball: asked again and again during long runs.
+
+Asked of invariants.py, which counts ray crossings and measures distances: nothing of what finds the contacts.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from benchmarks.scenes import scene
+from sim_core import Physics, Result, Scene, simulate
+from sim_core.invariants import clearance, closest_pair, contained
+from tests.fuzzed_chambers import FAMILIES, Chamber, random_chamber
+
+TOUCH = 2e-13  # m: how far from touching an impact may be: an edge is taken for met at 1e-13, faces at rounding
+ROUNDING = 8 * np.finfo(float).eps  # of the coordinates [m], which answers are rounded to: it matters far away
+REACH = 1.01  # of a radius: where clearance stops measuring
+
+
+@dataclass
+class Record:
+    """What was seen: the deepest overlaps with a ``surface`` and of a ``pair`` [m] at the checks, and the farthest
+    from touching of the ``impacts`` looked at, ``touch`` [m].
+    """
+
+    collisions: int = 0
+    checks: int = 0
+    impacts: int = 0
+    surface: float = 0.0
+    pair: float = 0.0
+    touch: float = 0.0
+
+    def add(self, other: "Record") -> None:
+        """Both together."""
+        for name in ("collisions", "checks", "impacts"):
+            setattr(self, name, getattr(self, name) + getattr(other, name))
+        for name in ("surface", "pair", "touch"):
+            setattr(self, name, max(getattr(self, name), getattr(other, name)))
+
+
+def clearance_at(chamber: Chamber, points: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """Distance (n,) [m] from points (n, 3) [m] to the nearest surface, the sonotrode's where it is at time (n,) [s]."""
+    mesh, balls, (_, _, vibration) = chamber
+    reach = REACH * balls.radius
+    if vibration is None:
+        return clearance(mesh.corners, points, reach)
+    moving = mesh.tags == vibration.tag
+    axis = np.array(vibration.axis) / np.linalg.norm(vibration.axis)
+    shift = vibration.amplitude * np.sin(math.tau * vibration.frequency * time + vibration.phase)[:, None] * axis
+    return np.minimum(
+        clearance(mesh.corners[~moving], points, reach), clearance(mesh.corners[moving], points - shift, reach)
+    )
+
+
+def later(physics: Physics, duration: float) -> Physics:
+    """The same effects, the sonotrode where it is ``duration`` [s] later."""
+    if physics.vibration is None:
+        return physics
+    phase = (physics.vibration.phase + math.tau * physics.vibration.frequency * duration) % math.tau
+    return physics._replace(vibration=physics.vibration._replace(phase=phase))
+
+
+def look(before: Chamber, after: Chamber, result: Result, impacts: int) -> Record:
+    """Is every ball inside and clear of all else, and did the last so many impacts happen where surfaces are?"""
+    mesh, balls, _ = after
+    outside = np.flatnonzero(~contained(mesh, balls.positions))
+    assert len(outside) == 0, f"ball {outside[0]} has left at {balls.positions[outside[0]].tolist()} m"
+    log = result.impacts
+    hit = clearance_at(before, log.position[-impacts:], log.time[-impacts:])
+    return Record(
+        collisions=result.collisions.total,
+        checks=1,
+        impacts=len(hit),
+        surface=float(balls.radius - clearance_at(after, balls.positions, np.zeros(len(balls))).min()),
+        pair=balls.diameter - closest_pair(balls)[0],
+        touch=float(np.abs(hit - balls.radius).max(initial=0.0)),
+    )
+
+
+def watch(chamber: Chamber, collisions: int, every: int, impacts: int) -> Record:
+    """Plays until there were so many ``collisions``, looks after about ``every`` so many; what was seen."""
+    mesh, balls, _ = chamber
+    speed = np.linalg.norm(balls.velocities, axis=1).mean()
+    duration = float(every * 0.3 * np.ptp(mesh.vertices, axis=0).max() / (speed * len(balls)))
+    seen = Record()
+    while seen.collisions < collisions:
+        result = simulate(Scene(*chamber, duration))
+        after = Chamber(mesh, result.balls, later(chamber.physics, duration))
+        seen.add(look(chamber, after, result, impacts))
+        allowed = TOUCH + ROUNDING * np.abs(mesh.vertices).max()
+        assert max(seen.surface, seen.pair, seen.touch) <= allowed, seen
+        chamber = after
+        duration *= min(max(every / (result.collisions.total + 1), 0.25), 4.0)
+    return seen
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_no_ball_leaves_a_fuzzed_chamber(family: str) -> None:
+    for seed in range(2):
+        print(family, watch(random_chamber(family, seed), collisions=10_000, every=500, impacts=500))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("family", FAMILIES)
+def test_no_ball_leaves_fuzzed_chambers_in_half_a_million_collisions_each(family: str) -> None:
+    seen = Record()
+    for seed in range(100, 115):
+        seen.add(watch(random_chamber(family, seed), collisions=500_000, every=5_000, impacts=1_000))
+    print(family, seen)
+
+
+@pytest.mark.long
+def test_no_ball_leaves_the_gears_chamber_in_a_hundred_million_collisions() -> None:
+    gear = scene("gear-200-10k")
+    seen = watch(Chamber(gear.mesh, gear.balls, gear.physics), collisions=100_000_000, every=50_000, impacts=200)
+    print("gear", seen)
+    assert seen.checks > 1_000
