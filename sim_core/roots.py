@@ -197,6 +197,22 @@ def first_wave_approach(w: WaveGap, limit: float, depth: float) -> float:
 
 
 @jit
+def next_wave_approach(w: WaveGap, s: float, limit: float, depth: float) -> float:
+    """First approach within ``limit`` [s] after the one at s, as if the ball had passed through the face there."""
+    out = s + first_wave_approach(
+        _later(WaveGap(-w.c, -w.b, -w.a, w.swing, w.omega, w.theta + math.pi), s), limit - s, math.inf
+    )
+    if out >= limit:
+        return NEVER
+    return out + first_wave_approach(_later(w, out), limit - out, depth)
+
+
+@jit
+def _later(w: WaveGap, s: float) -> WaveGap:
+    return WaveGap(w.c + s * (w.b + w.a * s), w.b + 2.0 * w.a * s, w.a, w.swing, w.omega, w.theta + w.omega * s)
+
+
+@jit
 def _piece_start(half: float, alpha: float) -> float:
     """Wave angle at which half-cycle piece number ``half`` begins."""
     return half * math.pi + (alpha if half % 2.0 == 0.0 else -alpha)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim_core._compile import inlined, jit
-from sim_core.detect.ball_sonotrode import same_plane, waving_plane_delay, within_waving_borders
+from sim_core.detect.ball_sonotrode import meets_later, same_plane, waving_plane_delay, within_waving_borders
 from sim_core.detect.ball_triangle import capsule_delay, face_delay
 from sim_core.effects.gravity import Gravity, acceleration
 from sim_core.effects.vibration import Wave
@@ -120,6 +120,10 @@ def first_contact(
             scratch.times[slot] = enter
             scratch.nodes[slot] = tree.children[code, child]
             depth += 1
+    if plane_row >= 0 and plane_delay < best:  # and no face was there
+        later, face = meets_later(tree, plane_row, ball, fall, seam, wave, time, plane_delay, best)
+        if face >= 0:
+            return later, face
     if found < 0:
         return NEVER, -1
     return best, found

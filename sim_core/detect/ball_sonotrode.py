@@ -8,7 +8,9 @@ from sim_core._compile import jit
 from sim_core.detect.ball_triangle import HALF, face_normal, within_borders
 from sim_core.effects.vibration import Wave
 from sim_core.flight import Point
-from sim_core.roots import NEVER, WaveGap, first_wave_approach
+from sim_core.roots import NEVER, WaveGap, first_wave_approach, next_wave_approach
+from sim_core.surfaces.obstacles import WAVING_FACE
+from sim_core.surfaces.tree import Tree
 from sim_core.vec3 import Vec3, along, dot
 
 
@@ -40,12 +42,18 @@ def waving_plane_delay(
     """
     if wave is None:
         return NEVER
+    return first_wave_approach(_gap(numbers, row, ball, fall, wave, time), limit, HALF * radius)
+
+
+@jit
+def _gap(numbers: np.ndarray, row: int, ball: Point, fall: Vec3, wave: Wave, time: float) -> WaveGap:
+    """The gap between the centre and the face's moving plane."""
     normal = face_normal(numbers, row)
     lift = dot(normal, wave.axis)
     theta = wave.omega * time + wave.phase
     if lift < 0.0:
         theta += math.pi
-    gap = WaveGap(
+    return WaveGap(
         dot(normal, ball.position) - numbers[row, 3],
         dot(normal, ball.velocity),
         0.5 * dot(normal, fall),
@@ -53,7 +61,6 @@ def waving_plane_delay(
         wave.omega,
         theta,
     )
-    return first_wave_approach(gap, limit, HALF * radius)
 
 
 @jit
@@ -73,3 +80,36 @@ def within_waving_borders(
     at = along(along(ball.position, delay, ball.velocity), 0.5 * delay * delay, fall)
     shift = wave.swing * math.sin(wave.omega * (time + delay) + wave.phase)
     return within_borders(numbers, row, along(at, -shift, wave.axis), seam)
+
+
+@jit
+def meets_later(
+    tree: Tree,
+    row: int,
+    ball: Point,
+    fall: Vec3,
+    seam: float,
+    wave: Wave | None,
+    time: float,
+    delay: float,
+    limit: float,
+) -> tuple[float, int]:
+    """Delay [s] and face of a contact within ``limit`` [s] after the plane of face ``row`` was met where it has no
+    face; (NEVER, -1) if there is none.
+
+    Beside the sonotrode, over a pit, a ball is free to be below its plane, and may come down on it afterwards.
+    """
+    if wave is None:
+        return NEVER, -1
+    gap = _gap(tree.numbers, row, ball, fall, wave, time)
+    while True:
+        delay = next_wave_approach(gap, delay, limit, HALF * tree.radius)
+        if delay >= limit:
+            return NEVER, -1
+        for face in range(len(tree.kinds)):
+            if (
+                tree.kinds[face] == WAVING_FACE
+                and same_plane(tree.numbers, row, face)
+                and within_waving_borders(tree.numbers, face, ball, fall, seam, wave, time, delay)
+            ):
+                return delay, face

@@ -97,7 +97,7 @@ PULLS = (Gravity(), Gravity(0.0, 0.0, 0.0), Gravity(), Gravity(500.0, -600.0, 55
 @pytest.mark.parametrize("count", SIZES)
 @pytest.mark.parametrize("shape", BODIES)
 def test_first_contact_from_any_start(shape: str, count: int) -> None:
-    """Half of the flights are random, half hard; all shapes together see more than ``count`` of each in the long run."""
+    """Half of the flights are random, half hard; in the long run all shapes see more than ``count`` of each."""
     rng = np.random.default_rng(13)
     radius, half = BODIES[shape]
     offset = FAR if shape == "far" else np.zeros(3)
