@@ -2,18 +2,20 @@
 
     python benchmarks/events.py [--quick] [--json] [--scenes NAME ...]
 
-Steady state after 0.3 s; process CPU time; the median of several windows, with the best and the worst. Yardsticks
-on the same meshes and flights: embree's batch ray (straight, no thickness: less than is asked of us), and the
-paper's own method (every triangle a plane, faces only). Rows go to benchmarks/results/events.csv with the machine
-named.
+Steady state after 0.3 s; process CPU time. The scenes take turns, one window each, round after round, so that a
+machine that slows down slows them all: figures are medians over the rounds, ratios are medians of each round's own.
+Yardsticks on the same meshes and flights: embree's batch ray (straight, no thickness: less than is asked of us), and
+the paper's own method (every triangle a plane, faces only). Rows go to benchmarks/results/events.csv with the machine
+named; --quick writes none.
 """
 
 import argparse
-import csv
 import json
-import platform
+import os
 import statistics
+import subprocess
 import sys
+import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -23,8 +25,9 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from benchmarks import paper_method
-from benchmarks.scenes import MESHES, PHYSICS, mesh, scene
+from benchmarks import embree, paper_method
+from benchmarks.scenes import MESHES, PHYSICS, ROOT, mesh, scene
+from benchmarks.table import print_table, write_csv
 from sim_core import compile_simulator
 from sim_core._compile import jit
 from sim_core.detect.ball_mesh import first_contact
@@ -36,6 +39,7 @@ from sim_core.surfaces.mesh import MAX_TAGS
 STEADY = 0.3  # s
 FLIGHT = 0.01  # s: the length of arc that the wall queries search
 TARGET = 0.4  # CPU s a window
+ROUNDS = 9
 
 
 def steady(name: str, seed: int = 1) -> _Run:
@@ -88,22 +92,12 @@ def flights(run: _Run) -> tuple[np.ndarray, np.ndarray]:
     return np.array([p.position for p in points]) + run.centre, np.array([p.velocity for p in points])
 
 
-def embree_ns(name: str, run: _Run, repeats: int = 50) -> float | None:
-    """Embree's batch ray [ns] from the same places in the same directions; None where embreex is not installed."""
-    try:
-        from embreex import rtcore_scene
-        from embreex.mesh_construction import TriangleMesh as EmbreeMesh
-    except ImportError:
-        return None
-    target = rtcore_scene.EmbreeScene()
-    EmbreeMesh(target, mesh(name).corners.astype(np.float32))
-    position, velocity = flights(run)
-    origins = np.tile(position, (repeats, 1)).astype(np.float32)
-    directions = np.tile(velocity, (repeats, 1)).astype(np.float32)
-    target.run(origins[:10], directions[:10])
+def ray_ns(rays: Any, run: _Run, repeats: int = 50) -> float:
+    """One of embree's rays [ns], from the same places in the same directions as our wall query."""
+    position, velocity = (np.tile(array, (repeats, 1)).astype(np.float32) for array in flights(run))
     start = time.process_time()
-    target.run(origins, directions)
-    return (time.process_time() - start) / len(origins) * 1e9
+    embree.ask(rays, position, velocity)
+    return (time.process_time() - start) / len(position) * 1e9
 
 
 def two_threads(name: str) -> float:
@@ -122,81 +116,105 @@ def two_threads(name: str) -> float:
     return statistics.median(ratios)
 
 
-def measure(name: str, windows: int) -> dict[str, Any]:
-    """One row of the table."""
-    run = steady(name)
-    rates = rate(run, windows)
-    shares = run.count / run.count[:3].sum()
-    arrays = [*run.ground.tree[:-1], *run.ground.locator]
-    row: dict[str, Any] = {
-        "scene": name,
-        "balls": len(run.motion),
-        "triangles": len(mesh(name).triangles),
-        "collisions_per_cpu_s": round(statistics.median(rates)),
-        "best": round(max(rates)),
-        "worst": round(min(rates)),
-        "searches_per_collision": round(float(shares[3]), 2),
-        "wall_query_ns": round(query_ns(run)),
-        "embree_ns": embree_ns(name, run),
-        "bytes_per_triangle": round(sum(a.nbytes for a in arrays) / len(mesh(name).triangles)),
-        "bytes_per_ball": round(
-            (sum(a.nbytes for a in run.calendar) + run.motion.nbytes + run.shot.crowd.lanes.nbytes) / len(run.motion)
-        ),
-    }
-    if row["embree_ns"] is not None:
-        row["embree_ns"] = round(row["embree_ns"])
-    return row
+class Contestant:
+    """A scene in its steady state, and what was measured of it, a round an entry."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.run = steady(name)
+        self.embree = embree.build(mesh(name).corners)
+        self.triangles = len(mesh(name).triangles)
+        _, spent = advance(self.run, 0.01)
+        self.piece = 0.01 * TARGET / max(spent, 1e-6)
+        self.rates: list[float] = []
+        self.queries: list[float] = []
+        self.rays: list[float] = []
+
+    def play(self) -> None:
+        """One round."""
+        collisions, spent = advance(self.run, self.piece)
+        self.rates.append(collisions / spent)
+        repeats = max(1, 10_000 // len(self.run.motion))
+        self.queries.append(query_ns(self.run, repeats))
+        if self.embree is not None:
+            self.rays.append(ray_ns(self.embree, self.run, repeats))
+
+    def row(self) -> dict[str, Any]:
+        """One row of the table."""
+        run = self.run
+        balls = len(run.motion)
+        shares = run.count / run.count[:3].sum()
+        walls = [*run.ground.tree[:-1], *run.ground.locator]
+        columns = [run.motion, *run.calendar, *(a for a in run.shot.crowd if isinstance(a, np.ndarray))]
+        return {
+            "scene": self.name,
+            "balls": balls,
+            "triangles": self.triangles,
+            "collisions_per_cpu_s": round(statistics.median(self.rates)),
+            "best": round(max(self.rates)),
+            "worst": round(min(self.rates)),
+            "searches_per_collision": round(float(shares[3]), 2),
+            "wall_query_ns": round(statistics.median(self.queries)),
+            "embree_ns": round(statistics.median(self.rays)) if self.rays else None,
+            "bytes_per_triangle": round(sum(a.nbytes for a in walls) / self.triangles),
+            "bytes_per_ball": round(sum(a.nbytes for a in columns) / balls),
+        }
 
 
-def ratios(rows: dict[str, dict[str, Any]]) -> dict[str, Any]:
+def ratios(by_name: dict[str, Contestant]) -> dict[str, Any]:
     """The yardsticks, from what was measured."""
-    small, middle, large = (rows.get(f"cylinder-200-{size}") for size in ("1k", "10k", "100k"))
     answer: dict[str, Any] = {"scene": "ratios"}
+    small, middle, large = (by_name.get(f"cylinder-200-{size}") for size in ("1k", "10k", "100k"))
     if small and large:
-        answer["growth_1k_100k"] = round(small["collisions_per_cpu_s"] / large["collisions_per_cpu_s"], 2)
-    queries = [row["wall_query_ns"] / row["embree_ns"] for row in rows.values() if row["embree_ns"]]
+        growth = [one / other for one, other in zip(small.rates, large.rates, strict=True)]
+        answer["growth_1k_100k"] = round(statistics.median(growth), 2)
+    queries = [q / r for c in by_name.values() for q, r in zip(c.queries, c.rays, strict=False)]
     answer["embree"] = round(statistics.median(queries), 2) if queries else None
     if middle:
-        run = steady("cylinder-200-10k")
-        paper = paper_method.query_ns(mesh("cylinder-200-10k"), *flights(run))
-        answer["paper_method_10k"] = round(paper / query_ns(run))
-        answer["threads_2"] = round(two_threads("cylinder-200-10k"), 2)
+        paper = paper_method.query_ns(mesh(middle.name), *flights(middle.run))
+        answer["paper_method_10k"] = round(paper / query_ns(middle.run))
+        answer["threads_2"] = round(two_threads(middle.name), 2)
     return answer
+
+
+def compile_seconds() -> dict[str, float]:
+    """Seconds the simulator takes to be ready on a machine that has never run it, and every time after."""
+    code = "from benchmarks.scenes import PHYSICS as p; from sim_core import compile_simulator as c; print(c(p))"
+    with tempfile.TemporaryDirectory() as folder:
+        setting = {**os.environ, "NUMBA_CACHE_DIR": folder}
+        spent = [
+            float(
+                subprocess.run(
+                    [sys.executable, "-c", code], env=setting, cwd=ROOT, capture_output=True, text=True, check=True
+                ).stdout
+            )
+            for _ in range(2)
+        ]
+    return {"compile_first_s": round(spent[0], 1), "compile_later_s": round(spent[1], 2)}
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="three windows a scene, the two widest scenes left out")
+    parser.add_argument("--quick", action="store_true", help="three rounds of short windows, within a minute")
     parser.add_argument("--json", action="store_true", help="rows as JSON on stdout")
     parser.add_argument("--scenes", nargs="*", choices=list(MESHES), help="only these")
     options = parser.parse_args()
-    names = options.scenes or [n for n in MESHES if not (options.quick and n in ("wide-2000-10k", "gear-200-100k"))]
-    compiled = compile_simulator(PHYSICS)
-    rows = {}
-    for name in names:
-        rows[name] = measure(name, 3 if options.quick else 9)
-        if not options.json:
-            print(" ".join(f"{key} {value}" for key, value in rows[name].items()), flush=True)
-    last = {**ratios(rows), "compile_s": round(compiled, 2)}
+    compile_simulator(PHYSICS)
+    contestants = [Contestant(name) for name in options.scenes or MESHES]
+    for _ in range(3 if options.quick else ROUNDS):
+        for contestant in contestants:
+            contestant.play()
+    rows = [contestant.row() for contestant in contestants]
+    last = ratios({contestant.name: contestant for contestant in contestants})
+    if not options.quick:
+        last |= compile_seconds()
     if options.json:
-        print(json.dumps([*rows.values(), last], indent=1))
+        print(json.dumps([*rows, last], indent=1))
     else:
-        print(last)
-    path = Path(__file__).parent / "results" / "events.csv"
-    path.parent.mkdir(exist_ok=True)
-    with path.open("w", newline="", encoding="utf-8") as file:
-        machine = f"{platform.system()} {platform.machine()} {_processor()}, Python {platform.python_version()}"
-        writer = csv.DictWriter(file, ["machine", *next(iter(rows.values()))])
-        writer.writeheader()
-        writer.writerows({"machine": machine, **row} for row in rows.values())
-
-
-def _processor() -> str:
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-        return next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
-    except (OSError, StopIteration):
-        return platform.processor()
+        print_table(rows)
+        print(" ".join(f"{name} {value}" for name, value in last.items()))
+    if not options.quick:
+        write_csv("events.csv", rows)
 
 
 if __name__ == "__main__":

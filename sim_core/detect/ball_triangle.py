@@ -117,7 +117,7 @@ def capsule_delay(numbers: np.ndarray, row: int, ball: Point, fall: Vec3, radius
         rate = dot(away, velocity) / distance
         if gap <= CONTACT and rate < 0.0 and gap > -HALF * radius:
             return delay
-        if -HALF * radius < gap <= CONTACT:  # touching, but not approaching: on until it could be deeper than now
+        if -CONTACT < gap <= CONTACT:  # touching, but not approaching: on until it could be deeper than that
             gap = CONTACT
         step = first_approach(gap, rate, 0.5 * dot(away, fall) / distance, HALF * radius)
         if delay + step > limit:

@@ -17,6 +17,7 @@ from sim_core.errors import SceneError
 from sim_core.surfaces.cover import cover
 from sim_core.surfaces.flats import LONE, Flats, edge_partners
 from sim_core.surfaces.mesh import TriangleMesh, towards_shot
+from sim_core.surfaces.rim import Rim, carry_on, find_rim
 
 NUMBERS = 20  # kept of each obstacle
 TRIANGLE = [0, 1, 2, 2]  # the corners of a face that has but three
@@ -32,7 +33,6 @@ SEAM_PER_RADIUS = 1e-5  # the same for balls so small that SEAM would show
 # Seams [-]: how far a face reaches past its corners at most, where the seams of two borders cross; at a needle's tip
 # they cross far outside. Six almost flat edges that meet in a convex corner need two of it.
 PAST_CORNERS = 3.0
-TINY = 1e-300
 
 
 class Obstacles(NamedTuple):
@@ -67,8 +67,8 @@ def build_obstacles(mesh: TriangleMesh, radius: float, waving: np.ndarray, swing
     corners = mesh.corners - mesh.middle
     normals, doubled = towards_shot(corners)
     solid = doubled > 0.0  # a triangle without area has no face; its neighbours' edges remain
-    overhang = _overhang(mesh.triangles, normals, radius, waving, swing)
-    faces = _faces(corners, normals, doubled, flats, radius, waving, swing, overhang)
+    rim = find_rim(mesh.triangles, corners, normals, radius, waving, swing)
+    faces = _faces(corners, normals, doubled, flats, radius, waving, swing, rim)
     capsules = _capsules(mesh, corners, normals, solid, radius, waving, flats)
     return Obstacles(*(np.concatenate(pair) for pair in zip(faces, capsules, strict=True)))
 
@@ -81,15 +81,15 @@ def _faces(
     radius: float,
     waving: np.ndarray,
     swing: float,
-    overhang: float,
+    rim: Rim,
 ) -> Obstacles:
     lone = [np.flatnonzero((doubled > 0.0) & (flats.flat == LONE))]
     pieces = [corners[lone[0]][:, TRIANGLE]]
     members = np.argsort(flats.flat, kind="stable")
     first = np.searchsorted(flats.flat[members], np.arange(len(flats.seed) + 1))
-    for k, rim in enumerate(flats.rims):
+    for k, outline in enumerate(flats.rims):
         own = members[first[k] : first[k + 1]]
-        few = _few_faces(corners, rim, flats.frames[k], 0.5 * doubled[own].sum())
+        few = _few_faces(corners, outline, flats.frames[k], 0.5 * doubled[own].sum())
         pieces.append(corners[own][:, TRIANGLE] if few is None else few)
         lone.append(np.full(len(pieces[-1]), flats.seed[k]))
     triangle, corner = np.concatenate(lone), np.concatenate(pieces)
@@ -104,9 +104,10 @@ def _faces(
         length = np.linalg.norm(inward, axis=1)
         inward[length > 0.0] /= length[length > 0.0, None]
         numbers[:, 4 + 4 * k : 7 + 4 * k] = inward
-        numbers[:, 7 + 4 * k] = np.einsum("ij,ij->i", inward, start) - np.where(waving[triangle], overhang, 0.0)
+        numbers[:, 7 + 4 * k] = np.einsum("ij,ij->i", inward, start)
+    beyond = carry_on(numbers, triangle, waving[triangle], flats, rim)
     moved = corner + radius * normal[:, None]
-    grow = seam(radius) + np.where(waving[triangle], swing + 2.0 * overhang, 0.0)[:, None]
+    grow = seam(radius) + (np.where(waving[triangle], swing, 0.0) + 2.0 * beyond)[:, None]
     kinds = np.where(waving[triangle], WAVING_FACE, FACE).astype(np.uint8)
     return Obstacles(
         numbers,
@@ -117,36 +118,12 @@ def _faces(
     )
 
 
-def _few_faces(corners: np.ndarray, rim: np.ndarray, frame: np.ndarray, area: float) -> np.ndarray | None:
-    """Corners (k, 4, 3) [m] of the faces that cover a flat of this area [m²]; None if its rim is not understood."""
+def _few_faces(corners: np.ndarray, outline: np.ndarray, frame: np.ndarray, area: float) -> np.ndarray | None:
+    """Corners (k, 4, 3) [m] of the faces that cover a flat of this area [m²]; None if its outline is not understood."""
     origin, axes = frame[0], frame[1:]
-    ends = np.stack([corners[rim // 3, rim % 3], corners[rim // 3, (rim % 3 + 1) % 3]], axis=1)
+    ends = np.stack([corners[outline // 3, outline % 3], corners[outline // 3, (outline % 3 + 1) % 3]], axis=1)
     faces = cover((ends - origin) @ axes.T, area)
     return None if faces is None else origin + faces[:, ::-1] @ axes
-
-
-def _overhang(triangles: np.ndarray, normals: np.ndarray, radius: float, waving: np.ndarray, swing: float) -> float:
-    """How far [m] vibrating faces go on under the slopes beside them, to meet those at the height of their swing.
-
-    Otherwise a ball on a gentle slope could come onto a raised face from the side, already below it.
-    """
-    if swing == 0.0:
-        return 0.0
-    two = edge_partners(triangles)
-    one = np.flatnonzero(np.repeat(waving, 3) & ~waving[two // 3])
-    rise = np.linalg.norm(np.cross(normals[one // 3], normals[two[one] // 3]), axis=1)
-    run = np.einsum("ij,ij->i", normals[one // 3], normals[two[one] // 3])
-    overhang = swing * np.maximum(run, 0.0) / np.maximum(rise, TINY)
-    gentle = np.flatnonzero(overhang > radius)
-    if len(gentle):
-        edge = one[gentle[0]]
-        raise SceneError(
-            f"beside the vibrating triangle {edge // 3} the surface of triangle {two[edge] // 3} lies flat or rises by "
-            f"only {np.degrees(np.arctan2(rise, run)[gentle[0]]):.3g} degrees: a moving edge is not supported yet; let "
-            f"the sonotrode fill the chamber's floor from wall to wall, flat, and walls rise from it by "
-            f"{np.ceil(np.degrees(np.arctan2(swing, radius))):.0f} degrees or more"
-        )
-    return float(overhang.max(initial=0.0))
 
 
 def _share_plane(numbers: np.ndarray, waving: np.ndarray) -> None:
