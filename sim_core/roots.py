@@ -144,14 +144,14 @@ def _concave_approach(w: WaveGap, start: float, end: float) -> float:
 def _reaches_envelope(w: WaveGap, depth: float) -> float:
     """A time [s] before which there is no approach: when the ball comes to the swing's envelope, or comes back to it.
 
-    Inside the envelope that is now, unless the ball leaves it faster than the face ever moves: its speed on leaving
-    is the least on its way out. Behind the face, ``depth`` [m] below its swing, it must come out over the crests.
+    Inside the envelope that is now, unless the ball is faster than the face ever moves all the way out: its speed is
+    least now or on leaving. Behind the face, ``depth`` [m] below its swing, it must come out over the crests.
     """
     height = w.c - w.swing
     if height > 0.0 or w.c <= -w.swing - depth:
         return first_approach(height, w.b, w.a, 0.0)
     disc = w.b * w.b - 4.0 * w.a * height
-    if w.b <= 0.0 or disc <= w.swing * w.swing * w.omega * w.omega:
+    if w.b <= 0.0 or min(w.b * w.b, disc) <= w.swing * w.swing * w.omega * w.omega:
         return 0.0
     return -(w.b + math.sqrt(disc)) / (2.0 * w.a) if w.a < 0.0 else NEVER
 

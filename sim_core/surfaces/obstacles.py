@@ -90,7 +90,7 @@ def _faces(
     for k, outline in enumerate(flats.rims):
         own = members[first[k] : first[k + 1]]
         few = _few_faces(corners, outline, flats.frames[k], 0.5 * doubled[own].sum())
-        pieces.append(corners[own][:, TRIANGLE] if few is None else few)
+        pieces.append(corners[own][:, TRIANGLE] if few is None or len(few) > len(own) else few)
         lone.append(np.full(len(pieces[-1]), flats.seed[k]))
     triangle, corner = np.concatenate(lone), np.concatenate(pieces)
     normal = normals[triangle]
@@ -123,7 +123,11 @@ def _few_faces(corners: np.ndarray, outline: np.ndarray, frame: np.ndarray, area
     origin, axes = frame[0], frame[1:]
     ends = np.stack([corners[outline // 3, outline % 3], corners[outline // 3, (outline % 3 + 1) % 3]], axis=1)
     faces = cover((ends - origin) @ axes.T, area)
-    return None if faces is None else origin + faces[:, ::-1] @ axes
+    if faces is None:
+        return None
+    pieces = origin + faces[:, ::-1] @ axes
+    sides = np.linalg.norm(pieces - np.roll(pieces, -1, axis=1), axis=2) > 0.0
+    return np.asarray(pieces[sides.sum(axis=1) >= 3])  # one that rounding made a point or a line would have no borders
 
 
 def _share_plane(numbers: np.ndarray, waving: np.ndarray) -> None:

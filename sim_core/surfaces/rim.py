@@ -49,8 +49,8 @@ def find_rim(
         raise SceneError(
             f"beside the vibrating triangle {face[gentle[flat[0]]]} the surface of triangle {slope[flat[0]]} lies flat "
             f"or rises by only {np.degrees(np.arctan2(rise, run)[flat[0]]):.3g} degrees: a moving edge is not "
-            "supported yet; let the sonotrode fill the chamber's floor from wall to wall, flat, and walls rise from it by "
-            f"{np.ceil(np.degrees(np.arctan2(swing, radius))):.0f} degrees or more"
+            "supported yet; let the sonotrode fill the chamber's floor from wall to wall, flat, and walls rise from it "
+            f"by {np.ceil(np.degrees(np.arctan2(swing, radius))):.0f} degrees or more"
         )
     start = corners[slope, still % 3]
     inward = np.cross(corners[slope, (still % 3 + 1) % 3] - start, normals[slope])

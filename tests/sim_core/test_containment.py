@@ -124,6 +124,18 @@ def test_no_ball_leaves_a_fuzzed_chamber(family: str) -> None:
         print(family, watch(random_chamber(family, seed), collisions=10_000, every=500, impacts=500))
 
 
+@pytest.mark.parametrize(
+    ("family", "seed"),
+    [
+        pytest.param("bladed", 109, id="a face that rounding made a point"),
+        pytest.param("bladed", 110, id="a ball that hops on an edge"),
+        pytest.param("wedged", 106, id="gentle slopes beside the sonotrode"),
+    ],
+)
+def test_no_ball_leaves_a_chamber_that_one_once_left(family: str, seed: int) -> None:
+    watch(random_chamber(family, seed), collisions=10_000, every=5_000, impacts=1_000)
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("family", FAMILIES)
 def test_no_ball_leaves_fuzzed_chambers_in_half_a_million_collisions_each(family: str) -> None:
