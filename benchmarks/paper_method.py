@@ -68,13 +68,21 @@ def _all(corners, normals, positions, velocities, g):  # type: ignore[no-untyped
     return total
 
 
+def planes(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Corners (m, 3, 3) [m] and unit normals (m, 3): all there is to build."""
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return corners, normals / np.linalg.norm(normals, axis=1)[:, None]
+
+
+def ask(corners: np.ndarray, normals: np.ndarray, positions: np.ndarray, velocities: np.ndarray) -> float:
+    """Sum of the contact times [s] of these flights (n, 3)."""
+    return float(_all(corners, normals, positions, velocities, -Gravity().z))
+
+
 def query_ns(mesh: TriangleMesh, positions: np.ndarray, velocities: np.ndarray) -> float:
     """CPU time of one query [ns], the mean over these flights (n, 3)."""
-    corners = mesh.corners
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.linalg.norm(normals, axis=1)[:, None]
-    g = -Gravity().z
-    _all(corners, normals, positions[:1], velocities[:1], g)
+    surfaces = planes(mesh.corners)
+    ask(*surfaces, positions[:1], velocities[:1])
     start = time.process_time()
-    _all(corners, normals, positions, velocities, g)
+    ask(*surfaces, positions, velocities)
     return (time.process_time() - start) / len(positions) * 1e9

@@ -1,0 +1,34 @@
+"""Flights to ask the structures about: where the balls of a gas start from, on the very mesh that is asked."""
+
+import numpy as np
+
+from benchmarks.structures import product
+from benchmarks.structures.shell import FALL, PIECE, Shell, ask
+from sim_core.vec3 import Vec3, along
+
+SPEEDS = (1.5, 8.5)  # m/s, evenly
+AT_ONCE = 1e-7  # s: a flight this short leads into the wall it starts from
+
+
+def sample(shell: Shell, start: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
+    """Positions [m] about the shell's centre and velocities [m/s], shape (count, 6).
+
+    A lone ball from ``start`` (3,) [m] flies in every direction, half the time from where it met the wall, half the
+    time from somewhere on the way, as after meeting another ball.
+    """
+    tree = product.build(shell)
+    here = Vec3(*(start - shell.mesh.middle).tolist())
+    flights: list[list[float]] = []
+    delays, obstacles = np.empty(1), np.empty(1, dtype=np.int64)
+    while len(flights) < count:
+        direction = rng.normal(size=3)
+        velocity = Vec3(*(rng.uniform(*SPEEDS) * direction / np.linalg.norm(direction)).tolist())
+        ask(tree, np.array([[*here, *velocity]]), delays, obstacles)
+        delay = min(delays[0], PIECE)
+        if delay <= AT_ONCE:
+            continue
+        flights.append([*here, *velocity])
+        if rng.random() < 0.5:
+            delay *= rng.random()
+        here = along(along(here, delay, velocity), 0.5 * delay * delay, FALL)
+    return np.array(flights)

@@ -1,0 +1,43 @@
+"""The product's own search, eight boxes in one instruction: as it is, and over the obstacles that the others hold."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from benchmarks.structures.compiled import searches
+from benchmarks.structures.shell import Shell
+from sim_core import Gravity
+from sim_core.detect.ball_mesh import Scratch, first_contact, new_scratch
+from sim_core.surfaces.ground import build_ground
+from sim_core.surfaces.locate import Locator
+from sim_core.surfaces.obstacles import Obstacles
+from sim_core.surfaces.tree import Tree, build_tree
+
+
+class EightWide(NamedTuple):
+    tree: Tree
+    scratch: Scratch
+    gravity: Gravity
+    seam: float
+
+
+def build(shell: Shell) -> EightWide:
+    """The product's tree over the shell's obstacles."""
+    grow = shell.grow[:, None]
+    low, high = shell.points.min(axis=1) - grow, shell.points.max(axis=1) + grow
+    names = np.repeat(np.arange(len(shell.kinds), dtype=np.int32)[:, None], 2, axis=1)
+    tree = build_tree(Obstacles(shell.numbers, shell.kinds, names, low, high), shell.radius)
+    return EightWide(tree, new_scratch(), Gravity(), shell.seam)
+
+
+def build_product(shell: Shell) -> tuple[EightWide, Locator]:
+    """What the product makes of the mesh, flats merged, and how it then finds the triangle that was hit."""
+    ground = build_ground(shell.mesh, shell.radius)
+    return EightWide(ground.tree, new_scratch(), Gravity(), ground.seam), ground.locator
+
+
+@searches(EightWide)
+def nearest(eight, ball, fall, length):  # type: ignore[no-untyped-def]
+    """Delay [s] and name of the first contact within ``length`` [s]: the shell's row, or the product's triangle."""
+    delay, row = first_contact(eight.tree, eight.scratch, ball, eight.gravity, None, eight.seam, 0.0, length)
+    return delay, int(eight.tree.triangles[row, 0]) if row >= 0 else -1

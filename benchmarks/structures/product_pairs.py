@@ -1,0 +1,72 @@
+"""The product's own search, asked in mid window, when its blocks' boxes are as wide as they are on average.
+
+When the window began every ball flew another way, and its block was drawn for that; since then each was hit once.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from benchmarks.gas import HEIGHT, Gas
+from benchmarks.structures.compiled import jit, searches
+from sim_core.flight import WINDOW
+from sim_core.neighbours import Crowd, follow, new_crowd, next_meeting, set_crowd
+from sim_core.roots import NEVER
+
+
+class ProductPairs(NamedTuple):
+    """``motion`` (n, 6) in the free-fall frame, time 0 being the window's start; ``crowd``: what is made of it;
+    ``now`` [s] on the window's clock.
+    """
+
+    motion: np.ndarray
+    crowd: Crowd
+    now: float
+
+
+def build(gas: Gas) -> ProductPairs:
+    """The balls and their crowd."""
+    now = min(0.5 * WINDOW, WINDOW - gas.limit)  # no search goes past a window's end
+    place, velocity = gas.motion[:, :3], gas.motion[:, 3:]
+    high = np.array([0.5 * gas.width, 0.5 * gas.width, HEIGHT])
+    low = np.array([-0.5 * gas.width, -0.5 * gas.width, 0.0])
+    start = np.clip(place - now * np.roll(velocity, 1, axis=0), low, high)
+    motion = np.concatenate([start, (place - start) / now], axis=1)
+    fastest = 2.0 * float(np.abs(velocity).max())
+    pairs = ProductPairs(motion, new_crowd(motion, low, high, gas.reach, fastest, WINDOW), now)
+    motion[:] = np.concatenate([place - now * velocity, velocity], axis=1)
+    _follow_all(pairs)
+    return pairs
+
+
+@jit
+def _follow_all(pairs):  # type: ignore[no-untyped-def]
+    for ball in range(len(pairs.motion)):
+        follow(pairs.crowd, pairs.motion, ball, pairs.now)
+
+
+@searches(ProductPairs)
+def search(pairs, ball, time, before):  # type: ignore[no-untyped-def]
+    """Time [s] and partner of the ball's first meeting before ``before`` and the window's end."""
+    time, partner = next_meeting(pairs.crowd, pairs.motion, ball, pairs.now + time, pairs.now + before)
+    return (time - pairs.now, partner) if partner >= 0 else (NEVER, -1)
+
+
+@jit
+def upkeep(pairs, ends, before, times, partners):  # type: ignore[no-untyped-def]
+    """A whole window: all balls are seen anew and, if in blocks, sorted and asked for once more, since no search goes
+    past a window's end; and every flight begun in it is followed.
+    """
+    balls = len(ends)
+    if balls == 0:
+        return 0
+    set_crowd(pairs.crowd, pairs.motion)
+    for ball in range(balls if pairs.crowd.blocks is not None else 0):
+        times[ball], partners[ball] = search(pairs, ball, 0.0, before)
+    flown = 0.0
+    for ball in range(balls):
+        flown += ends[ball]
+    flights = int(balls * balls * WINDOW / flown)
+    for k in range(flights):
+        follow(pairs.crowd, pairs.motion, k % balls, pairs.now)
+    return flights
