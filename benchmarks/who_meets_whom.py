@@ -51,7 +51,7 @@ ASKED = 10_000
 CLOSE = 1e-12  # s: what rounding may change of a time
 
 Answers = tuple[np.ndarray, np.ndarray]
-PRODUCT = "product: sixteen at once, from 512 balls in blocks"
+PRODUCT = "product: sixteen at once, from 1,024 balls in blocks"
 STRUCTURES: dict[str, Any] = {
     "all pairs": all_pairs,
     "sweep and prune": sweep_and_prune,

@@ -13,7 +13,7 @@ from sim_core._compile import inlined, jit
 from sim_core.simd import BOXES, LANES
 
 # Balls from which blocks pay: with fewer, in a chamber that the shot crosses in one window, no block is left out.
-MANY = 512
+MANY = 1024
 BITS = 5  # of the curve's code along each axis
 FAR = np.float32(1e30)  # an empty box is one no path reaches
 

@@ -45,7 +45,7 @@ def _inside_border(numbers: np.ndarray, row: int, border: int, at: Vec3) -> floa
 
 @jit
 def _near_corners(numbers: np.ndarray, row: int, at: Vec3, reach: float) -> bool:
-    """True when a point over a border is at most ``reach`` [m] past that border's ends.
+    """True when a point over a border is at most ``reach`` [m] past a corner, if it is past the ends of both borders.
 
     The seams of two borders cross far beyond a corner as sharp as a needle's tip.
     """
@@ -54,11 +54,13 @@ def _near_corners(numbers: np.ndarray, row: int, at: Vec3, reach: float) -> bool
         if over < 0.0:
             one = _inward(numbers, row, border)
             for other in range(4, 20, 4):
-                two = _inward(numbers, row, other)
-                turn = cross(one, two)
-                past = over * dot(one, two) - _inside_border(numbers, row, other, at)
-                if other != border and past > reach * np.sqrt(dot(turn, turn)) + ROUNDING:
-                    return False
+                if other != border:
+                    two = _inward(numbers, row, other)
+                    inside = _inside_border(numbers, row, other, at)
+                    turn = cross(one, two)
+                    past = min(over * dot(one, two) - inside, inside * dot(one, two) - over)
+                    if past > reach * np.sqrt(dot(turn, turn)) + ROUNDING:
+                        return False
     return True
 
 
@@ -117,9 +119,10 @@ def capsule_delay(numbers: np.ndarray, row: int, ball: Point, fall: Vec3, radius
         rate = dot(away, velocity) / distance
         if gap <= CONTACT and rate < 0.0 and gap > -HALF * radius:
             return delay
-        if -CONTACT < gap <= CONTACT:  # touching, but not approaching: on until it could be deeper than that
-            gap = CONTACT
-        step = first_approach(gap, rate, 0.5 * dot(away, fall) / distance, HALF * radius)
+        bend = 0.5 * dot(away, fall) / distance
+        if -HALF * radius < gap <= CONTACT and rate * rate <= 4.0 * bend * min(gap, -CONTACT):
+            gap = CONTACT  # touching, and not getting free: on until it could be deeper than now
+        step = first_approach(gap, rate, bend, HALF * radius)
         if delay + step > limit:
             return NEVER
         if delay + step == delay:
