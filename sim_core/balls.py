@@ -6,13 +6,16 @@ import numpy as np
 
 from sim_core.errors import SceneError
 
+FASTEST = 1e6  # m/s: shot has 20; the filters' float32 squares of much more overflow
+
 
 @dataclass(frozen=True)
 class Balls:
     """Balls of one size and density.
 
     ``positions`` [m] and ``velocities`` [m/s], shape (n, 3) float64; ``diameter`` [m]; ``density`` [kg/m³]. Raises
-    SceneError for wrong shapes, numbers that are not finite, or several diameters (not supported yet).
+    SceneError for wrong shapes, numbers that are not finite, speeds beyond FASTEST, or several diameters
+    (not supported yet).
     """
 
     positions: np.ndarray
@@ -38,6 +41,9 @@ class Balls:
             bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
             if len(bad):
                 raise SceneError(f"balls.{name}: ball {bad[0]} has {array[bad[0]].tolist()}; give finite numbers")
+            if name == "velocities" and np.abs(array).max() > FASTEST:
+                worst = int(np.abs(array).max(axis=1).argmax())
+                raise SceneError(f"balls.velocities: ball {worst} has {array[worst].tolist()} m/s; at most {FASTEST:g}")
             array.flags.writeable = False
             object.__setattr__(self, name, array)
         if self.positions.shape != self.velocities.shape:

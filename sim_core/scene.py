@@ -1,6 +1,7 @@
 """Everything a simulation needs, cross-checked once."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -11,9 +12,10 @@ from sim_core.effects.vibration import checked_wave
 from sim_core.errors import SceneError
 from sim_core.invariants import clearance, closest_pair, contained
 from sim_core.physics import Physics
-from sim_core.surfaces.mesh import TriangleMesh
+from sim_core.surfaces.mesh import TriangleMesh, towards_shot
 
 LONGEST = 1e6  # s: eleven days of peening
+STEP = 1e-4  # of a triangle's size: how far before and behind it is asked which side the cavity is on
 TOUCH = 1e-9  # m: overlap at the start that is taken for rounding of the input; ten thousand times less than a dent
 
 
@@ -23,8 +25,8 @@ class Scene:
 
     ``duration`` [s] is simulated after ``warmup`` [s], during which nothing is recorded; ``record``: tags whose
     impacts are logged (all if None). Raises SceneError, naming the ball, triangle or field: a ball outside the
-    mesh, overlapping a surface or another ball; a tag without restitution; a vibrating tag that the mesh lacks;
-    numbers out of range.
+    mesh, overlapping a surface or another ball; a body in the mesh that is inside out; a tag without restitution; a
+    vibrating tag that the mesh lacks; numbers out of range.
     """
 
     mesh: TriangleMesh
@@ -59,6 +61,12 @@ class Scene:
 
     def _require_room(self) -> None:
         balls = self.balls
+        wrong = _inside_out(self.mesh)
+        if wrong >= 0:
+            raise SceneError(
+                f"mesh triangle {wrong} belongs to a body that is inside out: the cavity is behind it; reverse every "
+                "triangle of that body so that normals point away from the shot"
+            )
         outside = np.flatnonzero(~contained(self.mesh, balls.positions))
         if len(outside):
             where = balls.positions[outside[0]].tolist()
@@ -95,3 +103,27 @@ class Scene:
                 f"ball {worst} at {self.balls.positions[worst].tolist()} m starts {-gap[worst]:.3g} m inside the "
                 "vibrating surface, which is displaced by its phase at the start; keep one amplitude clear of it"
             )
+
+
+@lru_cache(maxsize=32)  # replicas of one chamber share the answer
+def _inside_out(mesh: TriangleMesh) -> int:
+    """A triangle whose own closed shell is wound the wrong way round; -1 if there is none.
+
+    The mesh as a whole encloses a positive volume whichever way a small body in it is wound. A shell is judged by its
+    largest triangle, and called wrong only if the cavity is behind it and not before it.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    ends = mesh.triangles[:, [0, 1]].T, mesh.triangles[:, [1, 2]].T
+    rows, columns = np.concatenate(ends, axis=1)
+    links = coo_array((np.ones(len(rows), dtype=np.bool_), (rows, columns)), shape=(len(mesh.vertices),) * 2)
+    shell = connected_components(links, directed=False)[1][mesh.triangles[:, 0]]
+    normals, doubled = towards_shot(mesh.corners)
+    order = np.lexsort((-doubled, shell))  # the largest of each shell first
+    largest = order[np.unique(shell[order], return_index=True)[1]]
+    if len(largest) == 1:
+        return -1
+    middle, step = mesh.corners[largest].mean(axis=1), STEP * np.sqrt(doubled[largest])[:, None] * normals[largest]
+    wrong = largest[~contained(mesh, middle + step) & contained(mesh, middle - step)]
+    return int(wrong[0]) if len(wrong) else -1

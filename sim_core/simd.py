@@ -142,7 +142,10 @@ def _balls_near(typing_context: Any, lanes: Any, first: Any, probe: Any) -> Any:
                 closing = v.sum(closing, apart, relative)
                 speed = v.sum(speed, relative, relative)
             miss = v.fused(square, number(7), number(8))
-            may_meet = builder.fcmp_ordered(">", builder.fmul(closing, closing), builder.fmul(speed, miss))
+            may_meet = builder.or_(
+                builder.fcmp_ordered(">", builder.fmul(closing, closing), builder.fmul(speed, miss)),
+                builder.fcmp_ordered("<=", miss, v.spread(ir.Constant(ir.FloatType(), 0.0))),  # of one velocity
+            )
             approaching = builder.fcmp_ordered("<", v.fused(speed, number(6), closing), number(9))
             return v.mask(builder.and_(may_meet, approaching))
 
@@ -164,7 +167,8 @@ def _balls_near_twin(lanes: Any, first: int, probe: Any) -> int:
         closing = (apart * relative).sum(axis=0)
         speed = (relative * relative).sum(axis=0)
         miss = square * probe[7] + probe[8]
-        may_meet = (closing * closing > speed * miss) & (speed * probe[6] + closing < probe[9])
+        near = (closing * closing > speed * miss) | (miss <= 0.0)  # touching, in float32 at one velocity: ask exactly
+        may_meet = near & (speed * probe[6] + closing < probe[9])
     bits = np.packbits(may_meet, bitorder="little")
     return int.from_bytes(bits.tobytes(), "little")
 

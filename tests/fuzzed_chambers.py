@@ -148,10 +148,27 @@ def throated(diameter: float, rng: np.random.Generator) -> Surface:
     return surface(one + two + tube.translate([-0.3, 0.0, 0.0]))
 
 
+def slotted(diameter: float, rng: np.random.Generator) -> Surface:
+    """A box with a stack of plates in it, apart by a ball and a little, down to a millionth of it."""
+    plates, place = [], -0.4
+    for _ in range(4):
+        thick = rng.uniform(0.01, 0.05)
+        plates.append(Manifold.cube([0.5, 0.6, thick]).translate([-0.25, -0.3, place]))
+        place += thick + diameter * (1.0 + 10.0 ** rng.uniform(-6.0, -0.5))
+    return room_less(plates)
+
+
+def grooved(_: float, rng: np.random.Generator) -> Surface:
+    """A box with prisms side by side in it: between them grooves that end in an edge."""
+    outline = CrossSection([[(0.0, 0.0), (0.2, 0.0), (rng.uniform(0.02, 0.18), rng.uniform(0.1, 0.6))]])
+    prism = outline.extrude(0.7).rotate([90.0, 0.0, 0.0])
+    return room_less([prism.translate([-0.45 + 0.2 * k, 0.35, -0.4]) for k in range(4)])
+
+
 FAMILIES: dict[str, Callable[[float, np.random.Generator], Surface]] = {
-    f.__name__: f for f in (hull, dented, spiked, bladed, wedged, geared, throated)
+    f.__name__: f for f in (hull, dented, spiked, bladed, wedged, geared, throated, slotted, grooved)
 }
-WITH_FLOOR = {"spiked", "bladed", "wedged", "geared", "throated"}
+WITH_FLOOR = {"spiked", "bladed", "wedged", "geared", "throated", "slotted", "grooved"}
 
 
 def turned(body: Manifold, rng: np.random.Generator) -> Manifold:

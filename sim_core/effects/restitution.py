@@ -35,20 +35,25 @@ class Restitution(NamedTuple):
 
 def checked_restitution(restitution: Restitution, tags: int) -> Restitution:
     """The same with ``surfaces`` as an array (tags, 2); raises SceneError for a missing tag or numbers out of range."""
-    surfaces = np.array(restitution.surfaces, dtype=np.float64)
+    try:
+        surfaces = np.array(restitution.surfaces, dtype=np.float64)
+        of_balls = (float(restitution.balls[0]), float(restitution.balls[1]))
+    except (TypeError, ValueError, IndexError):
+        raise SceneError(
+            f"restitution.surfaces is {restitution.surfaces!r} and restitution.balls {restitution.balls!r}: give "
+            "(C0, v0) for each tag and for the balls"
+        ) from None
     if surfaces.ndim != 2 or surfaces.shape[1] != 2 or len(surfaces) < tags:
         raise SceneError(
             f"restitution.surfaces must give (C0, v0) for tags 0 to {tags - 1}, not shape {surfaces.shape}"
         )
-    pairs = [(f"surfaces[{i}]", *pair) for i, pair in enumerate(surfaces)] + [("balls", *restitution.balls)]
+    pairs = [(f"surfaces[{i}]", *pair) for i, pair in enumerate(surfaces)] + [("balls", *of_balls)]
     for name, c0, v0 in pairs:
         if not 0.0 <= c0 <= 1.0 or not 0.0 < v0 < math.inf:
             raise SceneError(f"restitution.{name} is ({c0}, {v0}): C0 must lie in [0, 1] and v0 be positive [m/s]")
-    if not restitution.elastic_below >= 0.0:
+    if not 0.0 <= restitution.elastic_below < math.inf:
         raise SceneError(f"restitution.elastic_below is {restitution.elastic_below}: it must be 0 or more [m/s]")
-    return Restitution(
-        surfaces, (float(restitution.balls[0]), float(restitution.balls[1])), float(restitution.elastic_below)
-    )
+    return Restitution(surfaces, of_balls, float(restitution.elastic_below))
 
 
 @jit

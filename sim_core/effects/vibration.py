@@ -11,6 +11,8 @@ from sim_core._compile import jit
 from sim_core.errors import SceneError
 from sim_core.vec3 import Vec3
 
+HIGHEST = 1e9  # Hz: generators have 1e5 at most; a wave of 1e300 would be searched for ever, period after period
+
 
 class Vibration(NamedTuple):
     """Harmonic motion of the surface ``tag`` along ``axis``.
@@ -45,8 +47,10 @@ def checked_wave(vibration: Vibration | None) -> Wave | None:
         return None
     if not 0.0 <= vibration.amplitude < math.inf:
         raise SceneError(f"vibration.amplitude is {vibration.amplitude} m: it must be 0 or more")
-    if not 0.0 < vibration.frequency < math.inf:
-        raise SceneError(f"vibration.frequency is {vibration.frequency} Hz: it must be positive")
+    if not 0.0 < vibration.frequency <= HIGHEST:
+        raise SceneError(
+            f"vibration.frequency is {vibration.frequency} Hz: it must be positive and at most {HIGHEST:g} Hz"
+        )
     if not math.isfinite(vibration.phase):
         raise SceneError(f"vibration.phase is {vibration.phase} rad: it must be finite")
     length = math.hypot(*vibration.axis)

@@ -34,7 +34,7 @@ class TriangleMesh:
     def __post_init__(self) -> None:
         try:
             vertices = np.array(self.vertices, dtype=np.float64, order="C")
-            triangles = np.array(self.triangles, dtype=np.int32, order="C")
+            triangles = np.array(self.triangles, order="C")
         except (TypeError, ValueError):
             raise SceneError(
                 "mesh vertices must be numbers of shape (n, 3), triangles indices of shape (m, 3)"
@@ -43,9 +43,11 @@ class TriangleMesh:
             raise SceneError(f"mesh vertices must have shape (n, 3), not {vertices.shape}")
         if triangles.ndim != 2 or triangles.shape[1] != 3 or len(triangles) < 4:
             raise SceneError(f"mesh triangles must have shape (m, 3) with m >= 4, not {triangles.shape}")
+        triangles = _whole("triangles", triangles).astype(np.int32)
         tags = np.asarray(self.tags)
         if tags.shape != (len(triangles),):
             raise SceneError(f"mesh tags must have shape ({len(triangles)},), one a triangle, not {tags.shape}")
+        tags = _whole("tags", tags)
         if tags.min() < 0 or tags.max() >= MAX_TAGS:
             raise SceneError(f"mesh tags must lie between 0 and {MAX_TAGS - 1}, not {tags.min()} to {tags.max()}")
         bad = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
@@ -77,6 +79,18 @@ class TriangleMesh:
     def volume(self) -> float:
         """Enclosed volume [m³], by the divergence theorem."""
         return enclosed_volume(self.vertices, self.triangles)
+
+
+def _whole(name: str, numbers: np.ndarray) -> np.ndarray:
+    """The numbers as int64; raises SceneError for one that is not whole, or beyond int32."""
+    try:
+        whole = (numbers == np.floor(numbers)) & (np.abs(numbers) <= np.iinfo(np.int32).max)
+    except TypeError:
+        raise SceneError(f"mesh {name} must be whole numbers, not {numbers.dtype}") from None
+    wrong = np.flatnonzero(~whole.reshape(len(numbers), -1).all(axis=1))
+    if len(wrong):
+        raise SceneError(f"mesh {name} must be whole numbers: of triangle {wrong[0]}, {numbers[wrong[0]].tolist()}")
+    return numbers.astype(np.int64)
 
 
 def enclosed_volume(vertices: np.ndarray, triangles: np.ndarray) -> float:

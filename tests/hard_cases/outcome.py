@@ -1,0 +1,245 @@
+"""What became of a hard case, judged by physics: closed forms, conservation, or a clear refusal."""
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from sim_core import Balls, Gravity, Physics, Restitution, Scene, SceneError, SimulationError, TriangleMesh, simulate
+from sim_core.invariants import closest_pair, contained
+from tests.fuzzed_chambers import Chamber
+from tests.sim_core.test_containment import REACH, ROUNDING, TOUCH, clearance_at, later
+
+WATCHED = 20_000  # impacts of each piece whose overlap is measured: where a ball is deepest, if it is ever too deep
+NOT_ELASTIC = math.nan
+CONSTANT = 1e6  # m/s: a yield speed v0 that no ball reaches, so that e = C0 at any speed
+# Effects that change nothing, where a case wants none: fewer combinations of effects have to be compiled.
+WEIGHTLESS = Gravity(0.0, 0.0, 0.0)
+LOSSLESS = Restitution(((1.0, CONSTANT),) * 3, (1.0, CONSTANT))
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """``ok``: did what physics demands happen; ``said``: what was expected and seen, or the message it stopped with.
+
+    ``collisions``; ``events_per_s``: collisions and stale meetings a simulated second; ``penetration`` [m]: worst
+    overlap with a surface or a ball, negative while none touched; ``energy_drift`` [-]: worst relative change of the
+    energy, NaN where it need not be kept.
+    """
+
+    case: str
+    ok: bool
+    said: str
+    collisions: int = 0
+    events_per_s: float = 0.0
+    penetration: float = math.nan
+    energy_drift: float = NOT_ELASTIC
+
+
+class Claim(NamedTuple):
+    """One thing physics demands, and whether it was so."""
+
+    holds: bool
+    said: str
+
+
+@dataclass(frozen=True)
+class Case:
+    """A named hard case. ``needs_rest``: it can only go right with the contact mode; ``long``: minutes;
+    ``unsolved``: why it is known to go wrong, empty where it does not.
+    """
+
+    name: str
+    judge: Callable[[], Outcome]
+    needs_rest: bool = False
+    long: bool = False
+    unsolved: str = ""
+
+    @property
+    def supported(self) -> bool:
+        """False while the simulator lacks what the case is about."""
+        return has_rest() or not self.needs_rest
+
+    def outcome(self) -> Outcome:
+        """Plays it; an error that nobody expected, of any kind, is an outcome too, and not a good one."""
+        try:
+            return replace(self.judge(), case=self.name)
+        except Exception as error:
+            return Outcome(self.name, False, f"{type(error).__name__}: {error}")
+
+
+def named(function: Callable[[], Outcome], **about: bool | str) -> Case:
+    """A case called like its function."""
+    return Case(function.__name__.replace("_", " "), function, **about)  # type: ignore[arg-type]
+
+
+@dataclass
+class Played:
+    """A chamber played piece by piece, and what was seen on the way.
+
+    ``time`` [s], ``ball``, ``triangle``, ``position`` [m], ``normal_speed`` [m/s]: of all recorded impacts.
+    ``track``: the balls at the start and after each piece.
+    """
+
+    mesh: TriangleMesh
+    track: list[Balls]
+    duration: float
+    pairs: int = 0
+    collisions: int = 0
+    events: int = 0
+    penetration: float = -math.inf
+    energy_drift: float = NOT_ELASTIC
+    impacts: list[tuple[np.ndarray, ...]] = field(default_factory=list)
+
+    @property
+    def end(self) -> Balls:
+        return self.track[-1]
+
+    @property
+    def time(self) -> np.ndarray:
+        return self._column(0)
+
+    @property
+    def ball(self) -> np.ndarray:
+        return self._column(1)
+
+    @property
+    def triangle(self) -> np.ndarray:
+        return self._column(2)
+
+    @property
+    def position(self) -> np.ndarray:
+        return self._column(3)
+
+    @property
+    def normal_speed(self) -> np.ndarray:
+        return self._column(4)
+
+    def _column(self, k: int) -> np.ndarray:
+        return np.concatenate([row[k] for row in self.impacts])
+
+
+def play(chamber: Chamber, duration: float, pieces: int = 1, record: tuple[int, ...] | None = None) -> Played:
+    """Plays the chamber for ``duration`` [s] and looks at all overlaps, energies and who is still inside at the end of
+    each of the ``pieces``. Raises SimulationError when a ball is outside.
+    """
+    mesh, balls, physics = chamber
+    seen = Played(mesh, [balls], duration)
+    elastic = is_elastic(physics)
+    before = energy_above_floor(mesh, balls, physics)
+    if elastic:
+        seen.energy_drift = 0.0
+    for piece in range(pieces):
+        result = simulate(Scene(mesh, seen.end, physics, duration / pieces, record=record))
+        log, here = result.impacts, slice(-WATCHED, None)
+        if len(log):
+            gap = clearance_at(Chamber(mesh, balls, physics), log.position[here], log.time[here])
+            seen.penetration = max(seen.penetration, float((balls.radius - gap).max()))
+        start = piece * duration / pieces
+        seen.impacts.append((start + log.time, log.ball, log.triangle, log.position, log.normal_speed))
+        physics = later(physics, duration / pieces)
+        seen.penetration = max(seen.penetration, overlap(Chamber(mesh, result.balls, physics)))
+        seen.track.append(result.balls)
+        seen.collisions += result.collisions.total
+        seen.pairs += result.collisions.balls
+        seen.events += result.collisions.total + result.collisions.stale
+        outside = np.flatnonzero(~contained(mesh, result.balls.positions))
+        if len(outside):
+            raise SimulationError(f"ball {outside[0]} is outside at {result.balls.positions[outside[0]].tolist()} m")
+        if elastic and before > 0.0:
+            drift = abs(energy_above_floor(mesh, result.balls, physics) / before - 1.0)
+            seen.energy_drift = max(seen.energy_drift, drift)
+    return seen
+
+
+def overlap(chamber: Chamber) -> float:
+    """Deepest overlap [m] of any ball with a surface or with another ball, now."""
+    balls = chamber.balls
+    gap = clearance_at(chamber, balls.positions, np.zeros(len(balls)))
+    near = gap < REACH * balls.radius  # others touch nothing: how far they are is not measured
+    surface = float((balls.radius - gap[near]).max(initial=-math.inf))
+    return max(surface, balls.diameter - closest_pair(balls)[0])
+
+
+def is_elastic(physics: Physics) -> bool:
+    """True when energy must be kept."""
+    still = physics.vibration is None or physics.vibration.amplitude == 0.0
+    if physics.restitution is None:
+        return still
+    surfaces, balls, _ = physics.restitution
+    return still and all(c0 == 1.0 and v0 >= CONSTANT for c0, v0 in [*surfaces, balls])
+
+
+def energy_above_floor(mesh: TriangleMesh, balls: Balls, physics: Physics) -> float:
+    """Energy of a kilogram of shot [J/kg], potential energy counted from the mesh's lowest corner: never negative."""
+    total = 0.5 * float((balls.velocities**2).sum())
+    if physics.gravity is not None:
+        down = np.array(physics.gravity)
+        total += float(((mesh.vertices @ down).max() - balls.positions @ down).sum())
+    return total / len(balls)
+
+
+def allowed(mesh: TriangleMesh) -> float:
+    """Overlap [m] that rounding explains: contacts are found to TOUCH, coordinates to their own rounding."""
+    return float(TOUCH + ROUNDING * np.abs(mesh.vertices).max())
+
+
+DRIFT = 1e-12  # relative energy error of a run of up to a million elastic collisions: 1e-16 each, adding up at random
+
+
+def near(what: str, seen: object, wanted: object, within: float) -> Claim:
+    """All of ``seen`` equal ``wanted`` to ``within`` (absolute, any unit); shapes must agree."""
+    one, two = np.asarray(seen, dtype=float), np.asarray(wanted, dtype=float)
+    if one.shape != two.shape:
+        return Claim(False, f"{what}: {one.shape} where {two.shape} was expected")
+    off = float(np.abs(one - two).max(initial=0.0))
+    return Claim(off <= within, f"{what} off by {off:.2g} (allowed {within:.2g})")
+
+
+def verdict(played: Played, expected: str, *claims: Claim, drift: float = DRIFT) -> Outcome:
+    """Claims of the case, and those of every case: no overlap, and energy kept to ``drift`` where nothing loses it."""
+    deepest = allowed(played.mesh)
+    every = [
+        *claims,
+        Claim(played.penetration <= deepest, f"overlap {played.penetration:.2g} m (allowed {deepest:.2g})"),
+        Claim(not played.energy_drift > drift, f"energy drifts by {played.energy_drift:.2g}"),
+    ]
+    broken = [claim.said for claim in every if not claim.holds]
+    return Outcome(
+        "",
+        not broken,
+        f"{expected}, but {'; '.join(broken)}" if broken else expected,
+        played.collisions,
+        played.events / played.duration,
+        played.penetration,
+        played.energy_drift,
+    )
+
+
+def refusal(
+    attempt: Callable[[], object], message: str, error: type[Exception] | tuple[type[Exception], ...] = SceneError
+) -> Outcome:
+    """The attempt must be refused with an ``error`` whose message matches the pattern: it names who and where."""
+    try:
+        attempt()
+    except error as said:
+        ok = re.search(message, str(said)) is not None
+        return Outcome("", ok, f"refused: {said}" if ok else f"refused without saying {message!r}: {said}")
+    return Outcome("", False, f"not refused, though it should be with {message!r}")
+
+
+def has_rest() -> bool:
+    """True when the simulator has the contact mode."""
+    return "rest" in Physics._fields
+
+
+def with_rest(physics: Physics) -> Physics:
+    """The same effects with the contact mode, where the simulator has it."""
+    if not has_rest():
+        return physics
+    hint = Physics.__annotations__["rest"]  # Rest | None
+    rest = next(kind for kind in hint.__args__ if kind is not type(None))
+    return physics._replace(rest=rest())  # type: ignore[call-arg]

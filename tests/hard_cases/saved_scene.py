@@ -1,0 +1,57 @@
+"""A scene in a file: what a failure is kept as, to be played again for ever after.
+
+An .npz: ``vertices``, ``triangles``, ``tags``, ``positions``, ``velocities``, ``numbers`` (diameter, density, duration,
+warm-up) and ``physics``, the effects as JSON, field by field; absent ones are left out.
+"""
+
+import json
+from pathlib import Path
+from typing import Any, get_args, get_type_hints
+
+import numpy as np
+
+from sim_core import Balls, Physics, Scene, TriangleMesh
+
+FOLDER = Path(__file__).parent / "saved"
+
+
+def save_scene(path: Path, scene: Scene) -> None:
+    """Writes the scene, to the last bit."""
+    effects = {name: _plain(effect) for name, effect in scene.physics._asdict().items() if effect is not None}
+    np.savez_compressed(
+        path,
+        vertices=scene.mesh.vertices,
+        triangles=scene.mesh.triangles,
+        tags=scene.mesh.tags,
+        positions=scene.balls.positions,
+        velocities=scene.balls.velocities,
+        numbers=np.array([scene.balls.diameter, scene.balls.density, scene.duration, scene.warmup]),
+        physics=np.array(json.dumps(effects)),
+    )
+
+
+def load_scene(path: Path) -> Scene:
+    """The scene again; fields of effects that were added since have their defaults."""
+    with np.load(path) as file:
+        diameter, density, duration, warmup = (float(number) for number in file["numbers"])
+        effects = json.loads(str(file["physics"]))
+        kinds = get_type_hints(Physics)
+        physics = Physics(**{name: _effect(kinds[name], numbers) for name, numbers in effects.items()})
+        mesh = TriangleMesh(file["vertices"], file["triangles"], file["tags"])
+        balls = Balls(file["positions"], file["velocities"], diameter, density)
+    return Scene(mesh, balls, physics, duration, warmup)
+
+
+def _plain(value: Any) -> Any:
+    if hasattr(value, "_asdict"):
+        return {name: _plain(part) for name, part in value._asdict().items()}
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+
+
+def _effect(hint: Any, numbers: dict[str, Any]) -> Any:
+    kind = next(one for one in (*get_args(hint), hint) if hasattr(one, "_fields"))
+    return kind(**{name: _tuples(value) for name, value in numbers.items()})
+
+
+def _tuples(value: Any) -> Any:
+    return tuple(_tuples(part) for part in value) if isinstance(value, list) else value

@@ -1,0 +1,53 @@
+"""Random scenes keep all invariants or stop with a message; and the scenes that once did not are played again."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+
+from sim_core import Gravity, Physics, Restitution, Scene, SceneError, SimulationError, Vibration
+from tests.cavities import FLOOR
+from tests.fuzzed_chambers import Chamber, random_chamber
+from tests.hard_cases.fuzz import Plan, judge, plans, require_invariants
+from tests.hard_cases.saved_scene import FOLDER, load_scene, save_scene
+
+SAVED = sorted(FOLDER.glob("*.npz"))
+SLOW = [HealthCheck.too_slow, HealthCheck.data_too_large]
+
+
+@settings(max_examples=60, derandomize=True, deadline=None, database=None, suppress_health_check=SLOW)
+@given(plans(st.just(False)))
+def test_any_scene_runs_or_says_why_not(plan: Plan) -> None:
+    judge(plan)
+
+
+@pytest.mark.long
+@settings(max_examples=5_000, deadline=None, suppress_health_check=SLOW, phases=set(Phase) - {Phase.explain})
+@given(plans(st.booleans()))
+def test_many_scenes_run_or_say_why_not(plan: Plan) -> None:
+    judge(plan)
+
+
+@pytest.mark.parametrize("path", SAVED, ids=[path.stem for path in SAVED])
+def test_a_saved_scene_runs_or_says_why_not(path: Path) -> None:
+    try:
+        scene = load_scene(path)
+        require_invariants(Chamber(scene.mesh, scene.balls, scene.physics), scene.duration)
+    except (SceneError, SimulationError) as error:
+        assert "has left the mesh" not in str(error), error  # noqa: PT017
+
+
+def test_a_scene_comes_back_from_its_file_as_it_was(tmp_path: Path) -> None:
+    law = (0.9, 1.0)
+    physics = Physics(Gravity(), Restitution((law, law), law), Vibration(FLOOR, 25e-6, 20e3, 0.3))
+    chamber = random_chamber("geared", 3)
+    scene = Scene(chamber.mesh, chamber.balls, physics, 0.5)
+    save_scene(tmp_path / "scene.npz", scene)
+    again = load_scene(tmp_path / "scene.npz")
+    assert again.physics == physics
+    assert (again.duration, again.balls.diameter) == (scene.duration, scene.balls.diameter)
+    for name in ("positions", "velocities"):
+        assert (getattr(again.balls, name) == getattr(scene.balls, name)).all()
+    for name in ("vertices", "triangles", "tags"):
+        assert (getattr(again.mesh, name) == getattr(scene.mesh, name)).all()
