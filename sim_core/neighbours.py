@@ -113,7 +113,7 @@ def _search(
         best = before - time
         partner = -1
         for first in range(0, len(motion), LANES):
-            near = balls_near(crowd.lanes, first, crowd.probe)
+            near = _without(balls_near(crowd.lanes, first, crowd.probe), ball - first)
             while near != 0:
                 other = first + lowest_bit(near)
                 near &= near - 1
@@ -127,15 +127,22 @@ def _search(
         return time + best, partner
     best, partner = min(before, crowd.window) - time, -1
     _aim(blocks.ray, motion, ball, time)
+    slot = slot_of(blocks, ball)
     for node in range(len(blocks.boxes)):
         entered = boxes_hit(blocks.boxes, node, blocks.ray, np.float32(best) * SLACK, blocks.enter)
         while entered != 0:
             block = BOXES * node + lowest_bit(entered)
             entered &= entered - 1
-            near = balls_near(crowd.lanes, LANES * block, crowd.probe)
+            near = _without(balls_near(crowd.lanes, LANES * block, crowd.probe), slot - LANES * block)
             if near != 0:
                 best, partner = _nearest(crowd, motion, ball, time, LANES * block, near, best, partner)
     return (time + best, partner) if partner >= 0 else (crowd.window, -1)
+
+
+@inlined
+def _without(near: int, lane: int) -> int:
+    """The marks of the lanes without the ball's own, if it is among them."""
+    return near & ~(1 << lane) if 0 <= lane < LANES else near
 
 
 @inlined

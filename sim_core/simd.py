@@ -142,10 +142,8 @@ def _balls_near(typing_context: Any, lanes: Any, first: Any, probe: Any) -> Any:
                 closing = v.sum(closing, apart, relative)
                 speed = v.sum(speed, relative, relative)
             miss = v.fused(square, number(7), number(8))
-            may_meet = builder.or_(
-                builder.fcmp_ordered(">", builder.fmul(closing, closing), builder.fmul(speed, miss)),
-                builder.fcmp_ordered("<=", miss, v.spread(ir.Constant(ir.FloatType(), 0.0))),  # of one velocity
-            )
+            # or equal: a touching pair may have one velocity in float32
+            may_meet = builder.fcmp_ordered(">=", builder.fmul(closing, closing), builder.fmul(speed, miss))
             approaching = builder.fcmp_ordered("<", v.fused(speed, number(6), closing), number(9))
             return v.mask(builder.and_(may_meet, approaching))
 
@@ -167,8 +165,7 @@ def _balls_near_twin(lanes: Any, first: int, probe: Any) -> int:
         closing = (apart * relative).sum(axis=0)
         speed = (relative * relative).sum(axis=0)
         miss = square * probe[7] + probe[8]
-        near = (closing * closing > speed * miss) | (miss <= 0.0)  # touching, in float32 at one velocity: ask exactly
-        may_meet = near & (speed * probe[6] + closing < probe[9])
+        may_meet = (closing * closing >= speed * miss) & (speed * probe[6] + closing < probe[9])
     bits = np.packbits(may_meet, bitorder="little")
     return int.from_bytes(bits.tobytes(), "little")
 
@@ -184,7 +181,7 @@ def _lowest_bit(typing_context: Any, bits: Any) -> Any:
 
 
 def _lowest_bit_twin(bits: int) -> int:
-    return (bits & -bits).bit_length() - 1
+    return (int(bits) & -int(bits)).bit_length() - 1
 
 
 @intrinsic

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from sim_core.blocks import MANY
 from sim_core.neighbours import Crowd, follow, new_crowd, next_meeting, set_crowd
 
 REACH = 3e-3  # m
@@ -39,7 +40,7 @@ def crowd_of(motion: np.ndarray, half: float) -> Crowd:
     return new_crowd(motion, np.full(3, -half), np.full(3, half), REACH, fastest, WINDOW)
 
 
-@pytest.mark.parametrize(("balls", "half"), [(4, 0.005), (200, 0.03), (511, 0.05), (512, 0.05), (3000, 0.2)])
+@pytest.mark.parametrize(("balls", "half"), [(4, 0.005), (200, 0.03), (MANY - 1, 0.07), (MANY, 0.07), (3000, 0.2)])
 def test_every_meeting_is_found(balls: int, half: float) -> None:
     rng = np.random.default_rng(balls)
     motion = gas(balls, half, rng)
@@ -78,13 +79,14 @@ def test_a_graze_within_the_filters_rounding_is_not_lost(balls: int) -> None:
 
 def test_sorting_into_blocks_keeps_every_ball() -> None:
     rng = np.random.default_rng(6)
-    motion = gas(777, 0.1, rng)
+    count = MANY + 9
+    motion = gas(count, 0.1, rng)
     crowd = crowd_of(motion, 0.1)
     assert crowd.blocks is not None
     for _ in range(3):
-        motion[:, :3] = rng.uniform(-0.12, 0.12, (777, 3))  # some outside the room, as bases may be
+        motion[:, :3] = rng.uniform(-0.12, 0.12, (count, 3))  # some outside the room, as bases may be
         set_crowd(crowd, motion)
         slots = crowd.blocks.slot
-        assert sorted(slots) == list(range(777))
-        assert (crowd.blocks.ball[slots] == np.arange(777)).all()
+        assert sorted(slots) == list(range(count))
+        assert (crowd.blocks.ball[slots] == np.arange(count)).all()
         assert (crowd.lanes[:, slots] == motion.T.astype(np.float32)).all()
