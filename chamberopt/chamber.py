@@ -119,15 +119,30 @@ def _posed(mesh: PartMesh, design: Design) -> Part:
 
     Sideways by the offset, up or down so that its lowest point is at the sonotrode distance.
     """
-    vertices = mesh.vertices @ _rotation(design.part.rotate_deg).T
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
-    centre = (low + high) / 2.0
-    x, y = design.part.offset
-    shift = np.array([x - centre[0], y - centre[1], design.chamber.sonotrode_distance - low[2]])
-    vertices = snapped(vertices + shift)
+    rotation, shift = _pose(mesh, design)
+    vertices = snapped(mesh.vertices @ rotation.T + shift)
     target = _target(mesh, design)
     area = areas(vertices, mesh.triangles)
     return Part(vertices, mesh.triangles, area, target, design.part.mesh_path.name, mesh.sha256)
+
+
+def _pose(mesh: PartMesh, design: Design) -> tuple[np.ndarray, np.ndarray]:
+    """From the part file's frame to the chamber's: matrix (3, 3), then shift (3,) [m]."""
+    rotation = _rotation(design.part.rotate_deg)
+    vertices = mesh.vertices @ rotation.T
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    centre = (low + high) / 2.0
+    x, y = design.part.offset
+    return rotation, np.array([x - centre[0], y - centre[1], design.chamber.sonotrode_distance - low[2]])
+
+
+def turning_axis(design: Design) -> tuple[np.ndarray, np.ndarray]:
+    """Point [m] and direction, (3,) each, of the axis that effects.part_turn names, in the chamber's frame."""
+    turn = design.effects.part_turn
+    if turn is None:
+        raise ValueError("nothing turns in this design")
+    rotation, shift = _pose(_mesh(design.part.mesh_path, design.part.unit), design)
+    return rotation @ np.array(turn.through) + shift, rotation @ np.array(turn.axis)
 
 
 def _rotation(degrees: tuple[float, float, float]) -> np.ndarray:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.chamber import TAG_PART, TAG_SONOTRODE, TAG_WALL
-from chamberopt.process import require_countable
+from chamberopt.process import chamber_mesh, require_countable, require_turnable
 from chamberopt.shapes import shape_surface
 
 if TYPE_CHECKING:
@@ -22,9 +22,11 @@ CROWDED = 0.3
 def describe(design: Design, chamber: Chamber) -> dict[str, Any]:
     """Facts and warnings on a design and its chamber, as plain JSON values; units are in the names.
 
-    Raises InputError when the shot has more balls than can be simulated.
+    Raises InputError when the shot has more balls than can be simulated, or the part cannot turn as asked.
     """
     require_countable(design)
+    if design.effects.part_turn is not None:
+        require_turnable(design, chamber_mesh(chamber))
     part, shot, accuracy = chamber.part, design.shot, design.process.accuracy
     exposed = chamber.exposed_area > 0.0
     box = part.vertices.max(axis=0) - part.vertices.min(axis=0)
@@ -81,11 +83,19 @@ def warnings(design: Design, chamber: Chamber) -> list[str]:
             f"shot.mass_g = {shot.mass_g:g} is rounded to {shot.count} whole ball(s) of "
             f"{shot.ball_mass * 1e6:.3g} mg: the charge differs by more than 5 %"
         )
+    turn, accuracy = design.effects.part_turn, design.process.accuracy
+    if turn is not None and accuracy.replicas * accuracy.simulated_time < turn.period:
+        said.append(
+            f"the part takes {turn.period:.3g} s to turn once, the replicas together last "
+            f"{accuracy.replicas * accuracy.simulated_time:.3g} s: coverage is that of some of its positions only; "
+            "raise process.accuracy"
+        )
+    caught = "no ball gets in there" if turn is None else "a ball may be jammed there as the part turns"
     for place, gap, remedy in _gaps(design, chamber):
         if 0.0 < gap < ball:
             said.append(
                 f"the gap between {place} is {gap * 1e3:.3g} mm, narrower than a ball of "
-                f"{shot.diameter_mm:g} mm: no ball gets in there; {remedy}"
+                f"{shot.diameter_mm:g} mm: {caught}; {remedy}"
             )
     return said
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.chamber import TAG_PART, TAG_SONOTRODE
+from chamberopt.chamber import TAG_PART, TAG_SONOTRODE, turning_axis
 from chamberopt.errors import InputError
 
 # Every ball is compared with every other: 20,000 take about 40 µs a prediction, a thousand times a second each.
@@ -16,7 +16,7 @@ MOST_BALLS = 20_000
 if TYPE_CHECKING:
     from chamberopt.chamber import Chamber
     from chamberopt.config import Design
-    from sim_core import Scene, TriangleMesh
+    from sim_core import Scene, TriangleMesh, Turn
 
 STREAMS = ("search", "confirm")
 
@@ -55,23 +55,49 @@ def require_countable(design: Design) -> None:
         )
 
 
+def part_turn(design: Design, phase: float = 0.0) -> Turn | None:
+    """How the part turns, if it does; ``phase`` [rad] at the start."""
+    from sim_core import Turn
+
+    turn = design.effects.part_turn
+    if turn is None:
+        return None
+    point, axis = ((float(x), float(y), float(z)) for x, y, z in turning_axis(design))
+    return Turn(TAG_PART, point, axis, turn.rpm, turn.swing, turn.frequency_hz, phase)
+
+
+def require_turnable(design: Design, mesh: TriangleMesh) -> None:
+    """InputError if the part is to turn in its chamber and cannot."""
+    from sim_core import SceneError, require_free_turn
+
+    turn = part_turn(design)
+    try:
+        if turn is not None:
+            require_free_turn(mesh, turn, design.shot.diameter)
+    except SceneError as error:
+        raise InputError(f"effects.part_turn: {error}") from None
+
+
 def build_scene(design: Design, mesh: TriangleMesh, seed: int) -> Scene:
     """The scene one replica simulates, in a chamber's mesh (`chamber_mesh`).
 
     The shot starts packed low in the chamber with the speed scale of the sonotrode, 2 pi f A, so that the
     warm-up has to forget only the arrangement, not to heat or cool the shot through orders of magnitude; the
-    phase of the sonotrode is drawn anew. Same design, chamber and seed: same scene, to the last bit.
+    phase of the sonotrode is drawn anew, and so is that of a turning part, which may take longer to turn once than
+    a replica lasts. Same design, chamber and seed: same scene, to the last bit.
 
-    Raises InputError when the shot does not fit or has too many balls.
+    Raises InputError when the shot does not fit or has too many balls, or the part cannot turn.
     """
     from sim_core import Balls, Gravity, Physics, Restitution, Scene, SceneError, Vibration, pack_balls
 
     require_countable(design)
+    require_turnable(design, mesh)
     rng = np.random.default_rng(seed)
     sonotrode, shot, materials = design.sonotrode, design.shot, design.materials
     phase = rng.uniform(0.0, 2.0 * np.pi)
+    turn = None if design.effects.part_turn is None else part_turn(design, rng.uniform(0.0, 2.0 * np.pi))
     try:
-        positions = pack_balls(mesh, shot.count, shot.diameter, rng, clear=sonotrode.amplitude)
+        positions = pack_balls(mesh, shot.count, shot.diameter, rng, clear=sonotrode.amplitude, turn=turn)
     except SceneError as error:
         raise InputError(f"shot: {error}; see shot.mass_g, shot.diameter_mm and [chamber]") from None
     velocities = start_velocities(rng, len(positions), sonotrode.peak_speed)
@@ -83,6 +109,7 @@ def build_scene(design: Design, mesh: TriangleMesh, seed: int) -> Scene:
         gravity=Gravity() if design.effects.gravity else None,
         restitution=Restitution(surfaces=surfaces, balls=(materials.shot.restitution, materials.shot.yield_speed)),
         vibration=Vibration(TAG_SONOTRODE, sonotrode.amplitude, sonotrode.frequency, phase),
+        turn=turn,
     )
     accuracy = design.process.accuracy
     return Scene(

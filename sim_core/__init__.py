@@ -6,12 +6,13 @@ Build a Scene from a TriangleMesh, Balls and Physics, then simulate it. SI units
 from sim_core.balls import Balls
 from sim_core.effects.gravity import Gravity
 from sim_core.effects.restitution import Restitution, restitution_at
+from sim_core.effects.turn import Turn
 from sim_core.effects.vibration import Vibration
 from sim_core.errors import SceneError, SimulationError
 from sim_core.impacts import ImpactLog
 from sim_core.packing import pack_balls
 from sim_core.physics import Physics
-from sim_core.scene import Scene
+from sim_core.scene import Scene, require_free_turn
 from sim_core.simulate import Collisions, Result, simulate
 from sim_core.surfaces.mesh import TriangleMesh
 from sim_core.warm_up import compile_simulator, is_compiled
@@ -28,10 +29,12 @@ __all__ = [
     "SceneError",
     "SimulationError",
     "TriangleMesh",
+    "Turn",
     "Vibration",
     "compile_simulator",
     "is_compiled",
     "pack_balls",
+    "require_free_turn",
     "restitution_at",
     "simulate",
 ]

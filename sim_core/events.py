@@ -24,12 +24,14 @@ from sim_core.calendar import (
     set_calendar_back,
 )
 from sim_core.detect.ball_mesh import Scratch, first_contact
+from sim_core.detect.ball_part import first_part_contact
 from sim_core.detect.ball_triangle import away_from_capsule, face_normal, nearer_neighbour
-from sim_core.effects.gravity import Gravity
+from sim_core.effects.gravity import Gravity, acceleration
 from sim_core.effects.restitution import Restitution
+from sim_core.effects.turn import Turning, carry, from_part, seen_from_part, slip
 from sim_core.effects.vibration import Wave, surface_velocity
 from sim_core.flight import drift, kick, point_at, set_back
-from sim_core.impacts import ImpactPage
+from sim_core.impacts import ImpactPage, note_impact
 from sim_core.neighbours import Crowd, follow, next_meeting, set_crowd
 from sim_core.resolve.ball_ball import pair_kick
 from sim_core.resolve.ball_surface import surface_kick
@@ -37,6 +39,7 @@ from sim_core.stopwatch import Stopwatch, lap
 from sim_core.surfaces.ground import Ground
 from sim_core.surfaces.locate import triangle_at
 from sim_core.surfaces.obstacles import CAPSULE, WAVING_FACE
+from sim_core.surfaces.part import PartTree
 from sim_core.vec3 import Vec3, dot, sub
 
 # status
@@ -85,6 +88,7 @@ class Loop(NamedTuple):
     gravity: Gravity | None
     restitution: Restitution | None
     wave: Wave | None
+    turning: Turning | None
     clock: Clock
     page: ImpactPage
     tally: np.ndarray
@@ -120,15 +124,42 @@ def _hit_surface(loop: Loop, ball: int, obstacle: int, time: float) -> None:
     follow(shot.crowd, shot.motion, ball, time)
     speed = -dot(away, relative) / math.sqrt(dot(away, away))
     if page.record[tag] and speed > 0.0:
-        row = page.filled[0]
-        page.numbers[row, 0] = clock.now[1] * clock.window + time - clock.origin
-        for axis in range(3):
-            page.numbers[row, 1 + axis] = here.position[axis]
-            page.numbers[row, 4 + axis] = relative[axis]
-        page.numbers[row, 7] = speed
-        page.names[row, 0] = ball
-        page.names[row, 1] = triangle_at(ground.locator, triangle, touched)
-        page.filled[0] = row + 1
+        when = clock.now[1] * clock.window + time - clock.origin
+        note_impact(page, when, ball, triangle_at(ground.locator, triangle, touched), here.position, relative, speed)
+
+
+@inlined
+def _hit_part(
+    turning: Turning | None, part: PartTree | None, loop: Loop, ball: int, obstacle: int, time: float
+) -> bool:
+    """The same for an obstacle of the turning part, seen and written down in the part's frame; False if it is none."""
+    if turning is None or part is None:
+        return False
+    row = obstacle - len(loop.ground.tree.kinds)
+    if row < 0:
+        return False
+    shot, clock, page, tree = loop.shot, loop.clock, loop.page, part.tree
+    here = point_at(shot.motion, ball, time, loop.gravity)
+    seen = seen_from_part(turning, here.position, here.velocity, acceleration(loop.gravity), time)
+    side = 0
+    if tree.kinds[row] == CAPSULE:
+        away = away_from_capsule(tree.numbers, row, seen.position)
+        side = nearer_neighbour(tree.numbers, row, away)
+    else:
+        normal = face_normal(tree.numbers, row)
+        away = Vec3(tree.radius * normal.x, tree.radius * normal.y, tree.radius * normal.z)
+    relative = slip(turning, seen, away, time)
+    loop.tally[WALLS] += 1
+    triangle = tree.triangles[row, side]
+    tag = loop.ground.tags[triangle]
+    kick(shot.motion, ball, time, from_part(turning, surface_kick(away, relative, loop.restitution, tag), time))
+    follow(shot.crowd, shot.motion, ball, time)
+    speed = -dot(away, relative) / math.sqrt(dot(away, away))
+    if page.record[tag] and speed > 0.0:
+        when = clock.now[1] * clock.window + time - clock.origin
+        touched = triangle_at(loop.ground.locator, triangle, sub(seen.position, away))
+        note_impact(page, when, ball, touched, seen.position, relative, speed)
+    return True
 
 
 @jit
@@ -169,7 +200,19 @@ def _predict(loop: Loop, ball: int, time: float, what: int) -> None:
         delay, obstacle = first_contact(
             loop.ground.tree, loop.scratch, here, loop.gravity, loop.wave, loop.ground.seam, time, length
         )
-        calendar.wall_time[ball] = time + (delay if obstacle >= 0 else length)
+        delay, obstacle = first_part_contact(
+            loop.ground.part,
+            loop.turning,
+            loop.scratch,
+            here,
+            loop.gravity,
+            loop.ground.seam,
+            time,
+            delay if obstacle >= 0 else length,
+            obstacle,
+            len(loop.ground.tree.kinds),
+        )
+        calendar.wall_time[ball] = time + delay
         marks[ball, OBSTACLE] = obstacle
         loop.tally[SEARCHES] += 1
         lap(loop.watch, stopwatch.WALLS)
@@ -197,6 +240,7 @@ def advance(loop: Loop) -> tuple[int, int]:
             set_back(shot.motion, clock.window, loop.gravity)
             set_crowd(shot.crowd, shot.motion)
             set_calendar_back(calendar, clock.window)
+            carry(loop.turning, clock.window)
             clock.now[1] += 1.0
             continue
         if page.filled[0] == len(page.numbers):
@@ -223,7 +267,8 @@ def advance(loop: Loop) -> tuple[int, int]:
                 what = PAIRS
                 tally[STALE] += 1
         elif obstacle >= 0:
-            _hit_surface(loop, ball, obstacle, time)
+            if not _hit_part(loop.turning, loop.ground.part, loop, ball, obstacle, time):
+                _hit_surface(loop, ball, obstacle, time)
             marks[ball, HITS] += 1
             if not _speed_squared(shot.motion, ball) <= shot.crowd.fastest**2:
                 forget(calendar, ball, time)

@@ -5,6 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sim_core._compile import inlined
+from sim_core.vec3 import Vec3
+
 CHUNK = 65_536  # impacts the compiled loop writes before handing them over
 
 
@@ -26,6 +29,22 @@ def new_page(record: np.ndarray) -> ImpactPage:
     return ImpactPage(np.zeros((CHUNK, 8)), np.zeros((CHUNK, 2), dtype=np.int32), np.zeros(1, dtype=np.int64), record)
 
 
+@inlined
+def note_impact(
+    page: ImpactPage, time: float, ball: int, triangle: int, position: Vec3, velocity: Vec3, speed: float
+) -> None:
+    """Write one impact down."""
+    row = page.filled[0]
+    page.numbers[row, 0] = time
+    for axis in range(3):
+        page.numbers[row, 1 + axis] = position[axis]
+        page.numbers[row, 4 + axis] = velocity[axis]
+    page.numbers[row, 7] = speed
+    page.names[row, 0] = ball
+    page.names[row, 1] = triangle
+    page.filled[0] = row + 1
+
+
 @dataclass(frozen=True)
 class ImpactLog:
     """One row an impact, in order of time.
@@ -33,7 +52,8 @@ class ImpactLog:
     ``time`` (n,) [s] since the end of the warm-up; ``ball``, ``triangle`` (n,) int32, indices into the scene's
     balls and mesh; ``position`` (n, 3) [m] of the ball's centre; ``velocity`` (n, 3) [m/s] before the impact,
     relative to the surface; ``normal_speed`` (n,) [m/s], positive. An impact on an edge is booked on the
-    neighbour that faces the ball more.
+    neighbour that faces the ball more. On a turning part position and velocity are in its own frame: where the part,
+    as the mesh has it, was hit, and how.
     """
 
     time: np.ndarray

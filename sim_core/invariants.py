@@ -13,7 +13,9 @@ import numpy as np
 from sim_core._compile import jit
 from sim_core.balls import Balls
 from sim_core.effects.gravity import Gravity
+from sim_core.effects.turn import Turn, angle_now, checked_axle, checked_turn, turned
 from sim_core.surfaces.mesh import TriangleMesh
+from sim_core.vec3 import Vec3, cross, dot, sub
 
 # Ray directions no designer's edge is parallel to, so that a ray through an edge or corner is a coincidence; where it
 # happens all the same, the next direction is asked.
@@ -36,11 +38,16 @@ class _Shadows(NamedTuple):
 
 @lru_cache(maxsize=32)
 def _shadows(mesh: TriangleMesh, k: int) -> _Shadows:
+    return _cast(mesh.corners, mesh, k)
+
+
+def _cast(triangles: np.ndarray, mesh: TriangleMesh, k: int) -> _Shadows:
+    """The triangles (m, 3, 3) seen along ray k; the ``mesh`` gives the scale."""
     ray = RAYS[k] / np.linalg.norm(RAYS[k])
     side = np.cross(ray, [1.0, 0.0, 0.0])
     side /= np.linalg.norm(side)
     turn = np.stack([side, np.cross(ray, side), ray])
-    corners = np.ascontiguousarray(mesh.corners @ turn.T)
+    corners = np.ascontiguousarray(triangles @ turn.T)
     low, high = corners.min(axis=1), corners.max(axis=1)
     boxes = np.stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1]], axis=1)
     return _Shadows(corners, boxes, turn, BORDER * float(np.ptp(mesh.vertices, axis=0).max()) ** 2)
@@ -73,20 +80,63 @@ def _count(shadows: _Shadows, points: np.ndarray, crossed: np.ndarray) -> None:
         crossed[i] = _crossings(shadows, points[i, 0], points[i, 1], points[i, 2])
 
 
-def contained(mesh: TriangleMesh, points: np.ndarray) -> np.ndarray:
-    """Which points (n, 3) [m] lie inside the mesh, shape (n,) bool, by the parity of crossings along a ray."""
+def contained(mesh: TriangleMesh, points: np.ndarray, corners: np.ndarray | None = None) -> np.ndarray:
+    """Which points (n, 3) [m] lie inside the mesh, shape (n,) bool, by the parity of crossings along a ray.
+
+    ``corners`` (m, 3, 3) [m]: where the triangles are now, if not where the mesh has them. Where a turned part goes
+    through a wall the surface has slits: who is out by the parity, is out only if the surface's solid angle, which a
+    slit hardly changes, says so too.
+    """
     points = np.asarray(points, dtype=np.float64)
     inside = np.zeros(len(points), dtype=np.bool_)
     asked = np.arange(len(points))
     for k in range(len(RAYS)):
-        shadows = _shadows(mesh, k)
+        shadows = _shadows(mesh, k) if corners is None else _cast(corners, mesh, k)
         crossed = np.zeros(len(asked), dtype=np.int64)
         _count(shadows, np.ascontiguousarray(points[asked] @ shadows.turn.T), crossed)
         inside[asked] = crossed % 2 == 1
         asked = asked[crossed < 0]
         if len(asked) == 0:
             break
+    if corners is not None:
+        inside[~inside] = enclosed(corners, points[~inside])
     return inside
+
+
+def enclosed(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Which points (n, 3) [m] the triangles (m, 3, 3) [m] go round, shape (n,) bool, by their solid angle."""
+    angle = np.zeros(len(points))
+    _solid_angles(np.ascontiguousarray(corners), np.ascontiguousarray(points, dtype=np.float64), angle)
+    return np.asarray(angle > 2.0 * math.pi)
+
+
+@jit
+def _solid_angles(corners: np.ndarray, points: np.ndarray, angle: np.ndarray) -> None:
+    """Of all triangles, seen from each point: van Oosterom & Strackee, IEEE Trans. Biomed. Eng. 30 (1983) 125."""
+    for i in range(len(points)):
+        at = Vec3(points[i, 0], points[i, 1], points[i, 2])
+        for t in range(len(corners)):
+            a = sub(Vec3(corners[t, 0, 0], corners[t, 0, 1], corners[t, 0, 2]), at)
+            b = sub(Vec3(corners[t, 1, 0], corners[t, 1, 1], corners[t, 1, 2]), at)
+            c = sub(Vec3(corners[t, 2, 0], corners[t, 2, 1], corners[t, 2, 2]), at)
+            p, q, r = math.sqrt(dot(a, a)), math.sqrt(dot(b, b)), math.sqrt(dot(c, c))
+            below = p * q * r + dot(a, b) * r + dot(b, c) * p + dot(c, a) * q
+            angle[i] += 2.0 * math.atan2(dot(a, cross(b, c)), below)
+
+
+def posed(mesh: TriangleMesh, turn: Turn, angle: float | None = None) -> np.ndarray:
+    """Corners (m, 3, 3) [m] of the mesh's triangles, those of the part turned by ``angle`` [rad]: at the start, if
+    none is given.
+    """
+    turning = checked_turn(turn, mesh.middle)
+    assert turning is not None
+    angle = angle_now(turning, 0.0) if angle is None else angle
+    axle = checked_axle(turn)
+    assert axle is not None
+    corners = mesh.corners.copy()
+    own = mesh.tags == axle.tag
+    corners[own] = turned(corners[own], np.array(axle.point), np.array(axle.axis), angle)
+    return corners
 
 
 @jit

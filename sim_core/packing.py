@@ -4,8 +4,9 @@ before peening.
 
 import numpy as np
 
+from sim_core.effects.turn import Turn
 from sim_core.errors import SceneError
-from sim_core.invariants import clearance, contained
+from sim_core.invariants import clearance, contained, enclosed, posed
 from sim_core.surfaces.mesh import TriangleMesh
 
 BATCH = 256  # positions tried at once
@@ -16,12 +17,18 @@ GAP = 1e-6  # m kept between neighbours and from surfaces, so that rounding of p
 
 
 def pack_balls(
-    mesh: TriangleMesh, count: int, diameter: float, rng: np.random.Generator, clear: float = 0.0
+    mesh: TriangleMesh,
+    count: int,
+    diameter: float,
+    rng: np.random.Generator,
+    clear: float = 0.0,
+    turn: Turn | None = None,
 ) -> np.ndarray:
     """Positions [m] of ``count`` balls inside the mesh, shape (count, 3), no two overlapping.
 
-    ``diameter`` [m]; ``clear`` [m] is kept from every surface (at least the amplitude, where one vibrates). "Low" is
-    along -z. Raises SceneError when they do not fit: random placement reaches about 30 % of the volume a ball can use.
+    ``diameter`` [m]; ``clear`` [m] is kept from every surface (at least the amplitude, where one vibrates); ``turn``:
+    a part that turns is where its phase has it. "Low" is along -z. Raises SceneError when they do not fit: random
+    placement reaches about 30 % of the volume a ball can use.
     """
     if not (diameter > 0.0 and count >= 1 and count == int(count)):
         raise SceneError(f"cannot place {count} balls of {diameter} m: give a whole number and a positive diameter")
@@ -31,13 +38,14 @@ def pack_balls(
     high = mesh.vertices.max(axis=0) - free
     if (high < low).any():
         raise SceneError(f"no ball of {diameter * 1e3:.3g} mm fits into the mesh: it is narrower than the ball")
+    corners = mesh.corners if turn is None else posed(mesh, turn)
     placed = _Placed(2.0 * radius)
     failures = 0
     top = min(low[2] + FIRST_LAYER * diameter, high[2])
     while len(placed.points) < count:
         tries = rng.uniform(low, [high[0], high[1], top], size=(BATCH, 3))
-        tries = tries[clearance(mesh.corners, tries, free) >= free]
-        tries = tries[contained(mesh, tries)]
+        tries = tries[clearance(corners, tries, free) >= free]
+        tries = tries[contained(mesh, tries) if turn is None else enclosed(corners, tries)]
         before = len(placed.points)
         for point in tries:
             if len(placed.points) == count:

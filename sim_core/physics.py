@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 from sim_core.effects.gravity import Gravity
 from sim_core.effects.restitution import Restitution
+from sim_core.effects.turn import Turn
 from sim_core.effects.vibration import Vibration
 
 
@@ -13,3 +14,4 @@ class Physics(NamedTuple):
     gravity: Gravity | None = None
     restitution: Restitution | None = None
     vibration: Vibration | None = None
+    turn: Turn | None = None

@@ -8,11 +8,13 @@ import numpy as np
 from sim_core.balls import Balls
 from sim_core.effects.gravity import checked_gravity
 from sim_core.effects.restitution import checked_restitution
+from sim_core.effects.turn import Turn, checked_axle
 from sim_core.effects.vibration import checked_wave
 from sim_core.errors import SceneError
-from sim_core.invariants import clearance, closest_pair, contained
+from sim_core.invariants import clearance, closest_pair, contained, enclosed, posed
 from sim_core.physics import Physics
 from sim_core.surfaces.mesh import TriangleMesh, towards_shot
+from sim_core.surfaces.part import require_free_axle
 
 LONGEST = 1e6  # s: eleven days of peening
 STEP = 1e-4  # of a triangle's size: how far before and behind it is asked which side the cavity is on
@@ -26,7 +28,7 @@ class Scene:
     ``duration`` [s] is simulated after ``warmup`` [s], during which nothing is recorded; ``record``: tags whose
     impacts are logged (all if None). Raises SceneError, naming the ball, triangle or field: a ball outside the
     mesh, overlapping a surface or another ball; a body in the mesh that is inside out; a tag without restitution; a
-    vibrating tag that the mesh lacks; numbers out of range.
+    vibrating or turning tag that the mesh lacks; a part that cannot turn; numbers out of range.
     """
 
     mesh: TriangleMesh
@@ -50,11 +52,19 @@ class Scene:
         self._require_room()
 
     def _require_physics(self) -> None:
-        gravity, restitution, vibration = self.physics
-        checked_gravity(gravity)
+        vibration, restitution, turn = self.physics.vibration, self.physics.restitution, self.physics.turn
+        checked_gravity(self.physics.gravity)
         if restitution is not None:
             checked_restitution(restitution, int(self.mesh.tags.max()) + 1)
         checked_wave(vibration)
+        axle = checked_axle(turn)
+        if turn is not None and axle is not None:
+            tags = np.unique(self.mesh.tags).tolist()
+            if turn.tag not in tags:
+                raise SceneError(f"turn.tag is {turn.tag}, but the mesh has tags {tags}")
+            if vibration is not None and turn.tag == vibration.tag:
+                raise SceneError(f"turn.tag and vibration.tag are both {turn.tag}: one surface cannot do both")
+            require_free_axle(self.mesh, axle, self.balls.radius)
         if vibration is not None and not (self.mesh.tags == vibration.tag).any():
             tags = np.unique(self.mesh.tags).tolist()
             raise SceneError(f"vibration.tag is {vibration.tag}, but the mesh has tags {tags}")
@@ -67,12 +77,17 @@ class Scene:
                 f"mesh triangle {wrong} belongs to a body that is inside out: the cavity is behind it; reverse every "
                 "triangle of that body so that normals point away from the shot"
             )
-        outside = np.flatnonzero(~contained(self.mesh, balls.positions))
+        turn = self.physics.turn
+        corners = None if turn is None else posed(self.mesh, turn)
+        inside = contained(self.mesh, balls.positions) if corners is None else enclosed(corners, balls.positions)
+        outside = np.flatnonzero(~inside)
         if len(outside):
             where = balls.positions[outside[0]].tolist()
             raise SceneError(f"ball {outside[0]} at {where} m is outside the mesh ({len(outside)} in all)")
         vibration = self.physics.vibration  # its face is not where the mesh has it; it is judged at its phase, below
-        still = self.mesh.corners if vibration is None else self.mesh.corners[self.mesh.tags != vibration.tag]
+        still = self.mesh.corners if corners is None else corners  # where its phase has a turning part
+        if vibration is not None:
+            still = still[self.mesh.tags != vibration.tag]
         gap = clearance(still, balls.positions, balls.radius) - balls.radius
         worst = int(gap.argmin())
         if gap[worst] < -TOUCH:
@@ -103,6 +118,15 @@ class Scene:
                 f"ball {worst} at {self.balls.positions[worst].tolist()} m starts {-gap[worst]:.3g} m inside the "
                 "vibrating surface, which is displaced by its phase at the start; keep one amplitude clear of it"
             )
+
+
+def require_free_turn(mesh: TriangleMesh, turn: Turn, diameter: float) -> None:
+    """Raises SceneError if the part cannot turn in its chamber, with balls of this diameter [m], or its numbers are
+    out of range: what a Scene asks, without the balls.
+    """
+    axle = checked_axle(turn)
+    assert axle is not None
+    require_free_axle(mesh, axle, 0.5 * diameter)
 
 
 @lru_cache(maxsize=32)  # replicas of one chamber share the answer

@@ -11,12 +11,13 @@ from sim_core.calendar import Calendar, new_calendar
 from sim_core.detect.ball_mesh import Scratch, new_scratch
 from sim_core.effects.gravity import acceleration, checked_gravity
 from sim_core.effects.restitution import Restitution, checked_restitution
+from sim_core.effects.turn import Turning, angle_now, checked_axle, checked_turn
 from sim_core.effects.vibration import Wave, checked_wave
 from sim_core.errors import SimulationError
 from sim_core.events import DONE, PAGE_FULL, STORM, TOO_FAST, Clock, Loop, Shot, advance
 from sim_core.flight import WINDOW
 from sim_core.impacts import ImpactLog, ImpactPage, impact_log, new_page
-from sim_core.invariants import contained
+from sim_core.invariants import contained, posed
 from sim_core.neighbours import new_crowd
 from sim_core.scene import Scene
 from sim_core.stopwatch import Stopwatch
@@ -87,7 +88,8 @@ class _Run:
             self.window = (
                 max(1.0, round(WINDOW * frequency)) / frequency
             )  # whole periods: the phase need not be carried
-        self.ground = _ground(scene.mesh, radius, tag, swing)
+        self.turning: Turning | None = checked_turn(scene.physics.turn, self.centre)
+        self.ground = _ground(scene.mesh, radius, tag, swing, checked_axle(scene.physics.turn))
         self.motion = np.concatenate([scene.balls.positions - self.centre, scene.balls.velocities], axis=1)
         self.calendar: Calendar = new_calendar(len(self.motion))
         self.scratch: Scratch = new_scratch()
@@ -128,6 +130,7 @@ class _Run:
                     self.gravity,
                     self.restitution,
                     self.wave,
+                    self.turning,
                     clock,
                     page,
                     self.count,
@@ -172,12 +175,19 @@ class _Run:
         bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
         if len(bad):
             raise SimulationError(f"ball {bad[0]}: its position is not a number any more; {self._when()}")
-        outside = np.flatnonzero(~contained(self.scene.mesh, points))
+        outside = np.flatnonzero(~contained(self.scene.mesh, points, self._corners()))
         if len(outside):
             raise SimulationError(
                 f"ball {outside[0]} has left the mesh at {np.round(points[outside[0]], 6).tolist()} m, {self._when()}. "
                 "Look for surfaces that overlap or cross there; if there are none, please report the scene"
             )
+
+    def _corners(self) -> np.ndarray | None:
+        """The triangles where they are now, if some of them turn."""
+        turn = self.scene.physics.turn
+        if turn is None or self.turning is None:
+            return None
+        return posed(self.scene.mesh, turn, angle_now(self.turning, float(self.now[0])))
 
     def balls(self) -> Balls:
         """The balls as they are now."""

@@ -41,6 +41,8 @@ def compile_simulator(physics: Physics, balls: int = 1) -> float:
     tags = np.where(floor, tag, 1 if tag == 0 else 0)
     if physics.restitution is not None:
         tags = np.minimum(tags, len(physics.restitution.surfaces) - 1)
+    if physics.turn is not None:
+        physics, vertices, triangles, tags = _with_a_turning_box(physics, vertices, triangles, tags)
     side = math.ceil(MANY ** (1 / 3)) if balls >= MANY else 2
     places = np.stack(np.meshgrid(*[np.linspace(0.1, 0.9, side)] * 3), axis=-1).reshape(-1, 3)
     shot = Balls(places, np.random.default_rng(1).normal(size=places.shape), 0.05)
@@ -48,3 +50,25 @@ def compile_simulator(physics: Physics, balls: int = 1) -> float:
     with contextlib.suppress(OSError):  # a cache that cannot be written: every process compiles for itself
         _mark(physics, balls).touch()
     return time.perf_counter() - start
+
+
+def _with_a_turning_box(
+    physics: Physics, vertices: np.ndarray, triangles: np.ndarray, tags: np.ndarray
+) -> tuple[Physics, np.ndarray, np.ndarray, np.ndarray]:
+    """The cube with a small box in a corner, which turns."""
+    turn = physics.turn
+    assert turn is not None
+    shaken = -1 if physics.vibration is None else physics.vibration.tag
+    still = next(tag for tag in range(3) if tag not in (turn.tag, shaken))
+    if physics.restitution is not None:
+        surfaces = physics.restitution.surfaces
+        physics = physics._replace(
+            restitution=physics.restitution._replace(surfaces=[surfaces[0]] * max(3, len(surfaces)))  # type: ignore[arg-type]
+        )
+    box = len(vertices) + triangles[:, ::-1]
+    return (
+        physics._replace(turn=turn._replace(axis_point=(0.03, 0.03, 0.03))),
+        np.concatenate([vertices, 0.02 * vertices + 0.02]),
+        np.concatenate([triangles, box]),
+        np.concatenate([np.where(tags == shaken, shaken, still), np.full(len(box), turn.tag)]),
+    )

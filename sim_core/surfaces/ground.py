@@ -1,32 +1,45 @@
-"""All that stands still in a scene, prepared once for balls of one radius."""
+"""All that stands still in a scene, or turns as a whole, prepared once for balls of one radius."""
 
 from typing import NamedTuple
 
 import numpy as np
 
+from sim_core.effects.turn import Axle
 from sim_core.surfaces.flats import edge_partners, find_flats, in_plane
 from sim_core.surfaces.locate import Locator, build_locator
 from sim_core.surfaces.mesh import TriangleMesh
 from sim_core.surfaces.obstacles import build_obstacles, seam
+from sim_core.surfaces.part import PartTree, chosen, part_of, part_tree
 from sim_core.surfaces.tree import Tree, build_tree
 
 
 class Ground(NamedTuple):
     """The tree of obstacles, which triangle of a flat is where, each triangle's tag, and how far faces overlap [m].
 
-    Coordinates are relative to the middle of the mesh.
+    Coordinates are relative to the middle of the mesh. ``part``: what turns, if anything does; its obstacles are not
+    in ``tree``.
     """
 
     tree: Tree
     locator: Locator
     tags: np.ndarray
     seam: float
+    part: PartTree | None
 
 
-def build_ground(mesh: TriangleMesh, radius: float, waving_tag: int = -1, swing: float = 0.0) -> Ground:
-    """The ground for balls of this radius [m]; triangles of ``waving_tag`` vibrate by ``swing`` [m] zero-to-peak."""
+def build_ground(
+    mesh: TriangleMesh, radius: float, waving_tag: int = -1, swing: float = 0.0, axle: Axle | None = None
+) -> Ground:
+    """The ground for balls of this radius [m]; triangles of ``waving_tag`` vibrate by ``swing`` [m] zero-to-peak,
+    those of the ``axle``'s tag turn.
+    """
     corners = mesh.corners - mesh.middle
     flats = find_flats(corners, edge_partners(mesh.triangles), mesh.tags, in_plane(mesh.vertices))
     obstacles = build_obstacles(mesh, radius, mesh.tags == waving_tag, swing, flats)
     overlap = seam(radius)
-    return Ground(build_tree(obstacles, radius), build_locator(corners, flats, overlap), mesh.tags, overlap)
+    locator = build_locator(corners, flats, overlap)
+    if axle is None:
+        return Ground(build_tree(obstacles, radius), locator, mesh.tags, overlap, None)
+    turns = part_of(obstacles, mesh, axle, radius)
+    part = part_tree(chosen(obstacles, turns), mesh, axle, radius)
+    return Ground(build_tree(chosen(obstacles, ~turns), radius), locator, mesh.tags, overlap, part)

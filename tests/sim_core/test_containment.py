@@ -53,7 +53,7 @@ def height_at(chamber: Chamber, points: np.ndarray, time: np.ndarray) -> np.ndar
 
 def clearance_at(chamber: Chamber, points: np.ndarray, time: np.ndarray) -> np.ndarray:
     """Distance (n,) [m] from points (n, 3) [m] to the nearest surface, the sonotrode's where it is at time (n,) [s]."""
-    mesh, balls, (_, _, vibration) = chamber
+    mesh, balls, vibration = chamber.mesh, chamber.balls, chamber.physics.vibration
     reach = REACH * balls.radius
     if vibration is None:
         return clearance(mesh.corners, points, reach)
