@@ -27,7 +27,7 @@ from chamberopt.process import build_scene, chamber_mesh, replica_seed
 if TYPE_CHECKING:
     from chamberopt.chamber import Chamber
     from chamberopt.config import Design
-    from sim_core import TriangleMesh
+    from sim_core import Resting, TriangleMesh
 
 CONFIDENCE = 0.95
 BOOTSTRAP_DRAWS = 100  # enough for a standard error (Efron and Tibshirani, chapter 6.4)
@@ -194,10 +194,12 @@ def evaluate(
     mesh = chamber_mesh(chamber)
     futures = [executor.submit(_replica, design, chamber, mesh, seed) for seed in seeds]
     tallies: list[Tally] = []
+    stuck: list[str] = []
     collisions: dict[str, int] = {}
     try:
         for future in futures:
-            part, counts = future.result()
+            part, counts, still = future.result()
+            stuck += [still] if still else []
             tallies.append(part)
             collisions = {kind: collisions.get(kind, 0) + number for kind, number in counts.items()}
             if progress:
@@ -217,19 +219,39 @@ def evaluate(
         replicas=tuple(tallies),
         timings={"simulate": simulated - started, "coverage": time.perf_counter() - simulated},
         collisions=collisions,
-        notes=_notes(total, chamber),
+        notes=(*_notes(total, chamber), *_stuck_notes(stuck, count)),
         stream=stream,
     )
 
 
-def _replica(design: Design, chamber: Chamber, mesh: TriangleMesh, seed: int) -> tuple[Tally, dict[str, int]]:
-    """One replica on a worker: only its tally travels back, never the impact log."""
+def _replica(design: Design, chamber: Chamber, mesh: TriangleMesh, seed: int) -> tuple[Tally, dict[str, int], str]:
+    """One replica on a worker: only its tally travels back, never the impact log, and a line on who lies still."""
     from sim_core import simulate
 
     result = simulate(build_scene(design, mesh, seed))
     kinds = ("walls", "balls", "sonotrode", "total")
     counts = {kind: int(getattr(result.collisions, kind)) for kind in kinds}
-    return tally(result.impacts, chamber, design), counts
+    return tally(result.impacts, chamber, design), counts, _still(result.resting, len(result.balls))
+
+
+def _still(resting: Resting, balls: int) -> str:
+    """One line on the balls that lie still at a replica's end; empty if there are none."""
+    if len(resting) == 0:
+        return ""
+    first = int(resting.since.argmin())
+    where = ", ".join(f"{1e3 * x:.2f}" for x in resting.position[first])
+    under = resting.triangles[first][resting.triangles[first] >= 0]
+    on = f" on triangle {under[0]}" if len(under) else " between other balls"
+    return (
+        f"{len(resting)} of {balls} balls lie still at the end, the longest since {resting.since[first]:.2f} s, "
+        f"that one at ({where}) mm{on}"
+    )
+
+
+def _stuck_notes(stuck: list[str], replicas: int) -> tuple[str, ...]:
+    if not stuck:
+        return ()
+    return (f"balls came to rest in {len(stuck)} of {replicas} replicas; in the first of them {stuck[0]}",)
 
 
 def _notes(total: Tally, chamber: Chamber) -> tuple[str, ...]:

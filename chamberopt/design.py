@@ -261,6 +261,19 @@ class Effects(BaseModel):
     part_turn: PartTurn | None = Field(
         default=None, description="{ rpm = ... } or { angle_deg = ..., frequency_hz = ... }"
     )
+    rest: bool | None = Field(
+        default=None,
+        description="balls slide and lie still on surfaces that do not vibrate; left out: where the chamber has some "
+        "that face up",
+    )
+
+    @model_validator(mode="after")
+    def _agree(self) -> Self:
+        if self.rest and not self.gravity:
+            raise CrossCheckError([Problem("rest", "given true with gravity = false; nothing lies still without")])
+        if self.rest and self.part_turn is not None:
+            raise CrossCheckError([Problem("rest", "given true with part_turn: not supported together yet")])
+        return self
 
 
 class Accuracy(BaseModel):

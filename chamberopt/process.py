@@ -88,7 +88,7 @@ def build_scene(design: Design, mesh: TriangleMesh, seed: int) -> Scene:
 
     Raises InputError when the shot does not fit or has too many balls, or the part cannot turn.
     """
-    from sim_core import Balls, Gravity, Physics, Restitution, Scene, SceneError, Vibration, pack_balls
+    from sim_core import Balls, Gravity, Physics, Rest, Restitution, Scene, SceneError, Vibration, can_rest, pack_balls
 
     require_countable(design)
     require_turnable(design, mesh)
@@ -105,11 +105,16 @@ def build_scene(design: Design, mesh: TriangleMesh, seed: int) -> Scene:
     surfaces = tuple(
         (pair.restitution, pair.yield_speed) for pair in (materials.part, materials.sonotrode, materials.wall)
     )
+    gravity = Gravity() if design.effects.gravity else None
+    rests = design.effects.rest
+    if rests is None:
+        rests = turn is None and can_rest(mesh, gravity, TAG_SONOTRODE)
     physics = Physics(
-        gravity=Gravity() if design.effects.gravity else None,
+        gravity=gravity,
         restitution=Restitution(surfaces=surfaces, balls=(materials.shot.restitution, materials.shot.yield_speed)),
         vibration=Vibration(TAG_SONOTRODE, sonotrode.amplitude, sonotrode.frequency, phase),
         turn=turn,
+        rest=Rest() if rests else None,
     )
     accuracy = design.process.accuracy
     return Scene(

@@ -5,6 +5,7 @@ Build a Scene from a TriangleMesh, Balls and Physics, then simulate it. SI units
 
 from sim_core.balls import Balls
 from sim_core.effects.gravity import Gravity
+from sim_core.effects.rest import Rest
 from sim_core.effects.restitution import Restitution, restitution_at
 from sim_core.effects.turn import Turn
 from sim_core.effects.vibration import Vibration
@@ -12,6 +13,7 @@ from sim_core.errors import SceneError, SimulationError
 from sim_core.impacts import ImpactLog
 from sim_core.packing import pack_balls
 from sim_core.physics import Physics
+from sim_core.resting import Resting, can_rest
 from sim_core.scene import Scene, require_free_turn
 from sim_core.simulate import Collisions, Result, simulate
 from sim_core.surfaces.mesh import TriangleMesh
@@ -23,6 +25,8 @@ __all__ = [
     "Gravity",
     "ImpactLog",
     "Physics",
+    "Rest",
+    "Resting",
     "Restitution",
     "Result",
     "Scene",
@@ -31,6 +35,7 @@ __all__ = [
     "TriangleMesh",
     "Turn",
     "Vibration",
+    "can_rest",
     "compile_simulator",
     "is_compiled",
     "pack_balls",

@@ -64,9 +64,16 @@ def reschedule(calendar: Calendar, ball: int) -> None:
 @jit
 def forget(calendar: Calendar, ball: int, time: float) -> None:
     """Drop what was predicted for the ball: it is due now to look again."""
+    call_up(calendar, ball, time, UNKNOWN)
+
+
+@jit
+def call_up(calendar: Calendar, ball: int, time: float, what: int) -> None:
+    """Make an event of kind ``what`` (see OBSTACLE) the ball's next, now."""
     calendar.pair_time[ball] = NEVER
     calendar.wall_time[ball] = time
-    calendar.marks[ball, OBSTACLE] = UNKNOWN
+    calendar.marks[ball, PARTNER] = -1
+    calendar.marks[ball, OBSTACLE] = what
     reschedule(calendar, ball)
 
 

@@ -23,18 +23,24 @@ from sim_core.calendar import (
     reschedule,
     set_calendar_back,
 )
-from sim_core.detect.ball_mesh import Scratch, first_contact
+from sim_core.detect.ball_footing import end_of_path
+from sim_core.detect.ball_mesh import Scratch, first_contact_from
 from sim_core.detect.ball_part import first_part_contact
 from sim_core.detect.ball_triangle import away_from_capsule, face_normal, nearer_neighbour
 from sim_core.effects.gravity import Gravity, acceleration
+from sim_core.effects.rest import ASLEEP, MODE, STILL, Footing, own_pull, static_law
 from sim_core.effects.restitution import Restitution
 from sim_core.effects.turn import Turning, carry, from_part, seen_from_part, slip
 from sim_core.effects.vibration import Wave, surface_velocity
-from sim_core.flight import drift, kick, point_at, set_back
+from sim_core.flight import drift, kick, point_at, point_under, set_back
+from sim_core.grounded import first_meeting, hide, hide_all, lies_still, wake_if_it_moves
 from sim_core.impacts import ImpactPage, note_impact
-from sim_core.neighbours import Crowd, follow, next_meeting, set_crowd
+from sim_core.neighbours import Crowd, follow, set_crowd
 from sim_core.resolve.ball_ball import pair_kick
 from sim_core.resolve.ball_surface import surface_kick
+from sim_core.resolve.footing import BOUNCES, ROLLS, deflect, land, set_out, step
+from sim_core.resolve.leaning import hold, meet
+from sim_core.roots import NEVER
 from sim_core.stopwatch import Stopwatch, lap
 from sim_core.surfaces.ground import Ground
 from sim_core.surfaces.locate import triangle_at
@@ -49,6 +55,7 @@ STORM = 2
 TOO_FAST = 3
 
 PIECE = 0.01  # s: longest arc searched at once; its chord is off by g PIECE²/8 = 0.12 mm, so boxes stay tight
+JAM_EVENTS = 5_000  # of one ball in one window: with contact mode it is held still then
 STORM_EVENTS = 200_000  # of one ball in one window (20 ms): ten million a second is no gas but a jam
 
 # columns of Loop.tally
@@ -93,6 +100,7 @@ class Loop(NamedTuple):
     page: ImpactPage
     tally: np.ndarray
     watch: Stopwatch | None
+    footing: Footing | None
 
 
 @inlined
@@ -102,7 +110,9 @@ def _hit_surface(loop: Loop, ball: int, obstacle: int, time: float) -> None:
     """
     shot, ground, clock, page = loop.shot, loop.ground, loop.clock, loop.page
     tree = ground.tree
-    here = point_at(shot.motion, ball, time, loop.gravity)
+    here = point_under(shot.motion, ball, time, own_pull(loop.footing, ball, loop.gravity))
+    moment = clock.now[1] * clock.window + time
+    lay_still = lies_still(loop.footing, ball)
     kind = tree.kinds[obstacle]
     side = 0
     touched = here.position  # or where the ball's centre is seen in the face's plane
@@ -110,18 +120,32 @@ def _hit_surface(loop: Loop, ball: int, obstacle: int, time: float) -> None:
         away = away_from_capsule(tree.numbers, obstacle, here.position)
         side = nearer_neighbour(tree.numbers, obstacle, away)
         touched = sub(here.position, away)
+        here = set_out(loop.footing, shot.motion, ball, time, here, away, tree.radius)
     else:
         away = face_normal(tree.numbers, obstacle)
     relative = here.velocity
+    landed = BOUNCES
+    law = loop.restitution
     if kind == WAVING_FACE:
         relative = sub(relative, surface_velocity(loop.wave, time))
+    else:
+        landed = land(loop.footing, tree, shot.motion, ball, obstacle, time, moment, here, away)
+        law = static_law(loop.footing, loop.restitution)
+    triangle = tree.triangles[obstacle, side]
+    tag = ground.tags[triangle]
+    if landed == BOUNCES:
+        change = surface_kick(away, relative, law, tag)
+        deflect(loop.footing, shot.motion, ball, time, moment, here, change)
+    follow(shot.crowd, shot.motion, ball, time)
+    hide(loop.footing, shot.crowd, ball)
+    if lay_still:
+        wake_if_it_moves(loop.footing, loop.calendar, shot.motion, ball, time, shot.crowd.reach)
+    if landed == ROLLS:
+        return
+    if kind == WAVING_FACE:
         loop.tally[SONOTRODE] += 1
     else:
         loop.tally[WALLS] += 1
-    triangle = tree.triangles[obstacle, side]
-    tag = ground.tags[triangle]
-    kick(shot.motion, ball, time, surface_kick(away, relative, loop.restitution, tag))
-    follow(shot.crowd, shot.motion, ball, time)
     speed = -dot(away, relative) / math.sqrt(dot(away, away))
     if page.record[tag] and speed > 0.0:
         when = clock.now[1] * clock.window + time - clock.origin
@@ -171,13 +195,60 @@ def _speed_squared(motion: np.ndarray, ball: int) -> float:
 def _collide(loop: Loop, one: int, two: int, time: float) -> None:
     """Two balls meet now."""
     motion = loop.shot.motion
+    _kick_both(loop.footing, loop, one, two, time)
+    follow(loop.shot.crowd, motion, one, time)
+    follow(loop.shot.crowd, motion, two, time)
+    hide(loop.footing, loop.shot.crowd, one)
+    hide(loop.footing, loop.shot.crowd, two)
+
+
+@inlined
+def _kick_both(footing: Footing | None, loop: Loop, one: int, two: int, time: float) -> None:
+    motion = loop.shot.motion
+    if footing is not None:
+        moment = loop.clock.now[1] * loop.clock.window + time
+        if meet(footing, motion, one, two, time, moment, loop.restitution, loop.ground.tree.radius):
+            reach = loop.shot.crowd.reach
+            wake_if_it_moves(footing, loop.calendar, motion, one, time, reach)
+            wake_if_it_moves(footing, loop.calendar, motion, two, time, reach)
+        return
     apart = sub(drift(motion, two, time), drift(motion, one, time))
     closing = Vec3(motion[two, 3] - motion[one, 3], motion[two, 4] - motion[one, 4], motion[two, 5] - motion[one, 5])
     change = pair_kick(apart, closing, loop.restitution)
     kick(motion, one, time, change)
     kick(motion, two, time, Vec3(-change.x, -change.y, -change.z))
-    follow(loop.shot.crowd, motion, one, time)
-    follow(loop.shot.crowd, motion, two, time)
+
+
+@inlined
+def _step(footing: Footing | None, loop: Loop, ball: int, what: int, time: float) -> bool:
+    """A ball in contact mode comes to a border or a stop, or is woken; False if it is none of these."""
+    if footing is None:
+        return False
+    motion = loop.shot.motion
+    lay_still = lies_still(footing, ball)
+    here = point_under(motion, ball, time, own_pull(footing, ball, loop.gravity))
+    if not step(footing, motion, ball, what, time, loop.clock.now[1] * loop.clock.window + time, here):
+        return False
+    follow(loop.shot.crowd, motion, ball, time)
+    hide(footing, loop.shot.crowd, ball)
+    if lay_still:
+        wake_if_it_moves(footing, loop.calendar, motion, ball, time, loop.shot.crowd.reach)
+    return True
+
+
+@inlined
+def _gives_up(footing: Footing | None, loop: Loop, ball: int, time: float) -> bool:
+    """True when a ball in a jam that contact mode cannot resolve is held still for it."""
+    if footing is None:
+        return False
+    if loop.calendar.marks[ball, EVENTS] < JAM_EVENTS or footing.marks[ball, MODE] >= ASLEEP:
+        return False
+    here = point_under(loop.shot.motion, ball, time, own_pull(footing, ball, loop.gravity))
+    hold(footing, loop.shot.motion, ball, time, loop.clock.now[1] * loop.clock.window + time, here.position)
+    loop.calendar.marks[ball, EVENTS] = 0
+    follow(loop.shot.crowd, loop.shot.motion, ball, time)
+    hide(footing, loop.shot.crowd, ball)
+    return True
 
 
 @inlined
@@ -187,7 +258,7 @@ def _predict(loop: Loop, ball: int, time: float, what: int) -> None:
     marks = calendar.marks
     if what != WALL:
         before = NEVER_BEFORE if what == ALL or marks[ball, OBSTACLE] < 0 else calendar.wall_time[ball]
-        meeting, partner = next_meeting(shot.crowd, shot.motion, ball, time, before)
+        meeting, partner = first_meeting(loop.footing, shot.crowd, shot.motion, ball, time, before)
         calendar.pair_time[ball] = meeting
         marks[ball, PARTNER] = partner
         if partner >= 0:
@@ -196,9 +267,12 @@ def _predict(loop: Loop, ball: int, time: float, what: int) -> None:
     if what != PAIRS or (marks[ball, OBSTACLE] < 0 and calendar.wall_time[ball] <= time):
         # no further than the ball is known to get: until its meeting, or one piece
         length = min(PIECE, calendar.pair_time[ball] - time) if marks[ball, PARTNER] >= 0 else PIECE
-        here = point_at(shot.motion, ball, time, loop.gravity)
-        delay, obstacle = first_contact(
-            loop.ground.tree, loop.scratch, here, loop.gravity, loop.wave, loop.ground.seam, time, length
+        tree, seam = loop.ground.tree, loop.ground.seam
+        pull = own_pull(loop.footing, ball, loop.gravity)
+        here = point_under(shot.motion, ball, time, pull)
+        length, end = end_of_path(loop.footing, tree, seam, loop.wave, here, pull, ball, length)
+        delay, obstacle = first_contact_from(
+            loop.footing, ball, tree, loop.scratch, here, pull, loop.wave, seam, time, length
         )
         delay, obstacle = first_part_contact(
             loop.ground.part,
@@ -206,12 +280,14 @@ def _predict(loop: Loop, ball: int, time: float, what: int) -> None:
             loop.scratch,
             here,
             loop.gravity,
-            loop.ground.seam,
+            seam,
             time,
             delay if obstacle >= 0 else length,
             obstacle,
-            len(loop.ground.tree.kinds),
+            len(tree.kinds),
         )
+        if obstacle < 0:
+            delay, obstacle = (NEVER if end == STILL else length), end
         calendar.wall_time[ball] = time + delay
         marks[ball, OBSTACLE] = obstacle
         loop.tally[SEARCHES] += 1
@@ -237,8 +313,9 @@ def advance(loop: Loop) -> tuple[int, int]:
             if left <= clock.window:
                 clock.now[0] = left
                 return DONE, -1
-            set_back(shot.motion, clock.window, loop.gravity)
+            set_back(shot.motion, clock.window, loop.gravity, loop.footing)
             set_crowd(shot.crowd, shot.motion)
+            hide_all(loop.footing, shot.crowd)
             set_calendar_back(calendar, clock.window)
             carry(loop.turning, clock.window)
             clock.now[1] += 1.0
@@ -253,7 +330,9 @@ def advance(loop: Loop) -> tuple[int, int]:
         second = -1
         what = ALL
         obstacle = marks[ball, OBSTACLE]
-        if calendar.pair_time[ball] <= calendar.wall_time[ball]:
+        if _gives_up(loop.footing, loop, ball, time):
+            marks[ball, HITS] += 1
+        elif calendar.pair_time[ball] <= calendar.wall_time[ball]:
             other = marks[ball, PARTNER]
             if other < 0:
                 what = PAIRS
@@ -275,6 +354,8 @@ def advance(loop: Loop) -> tuple[int, int]:
                 return TOO_FAST, ball
         elif obstacle == SEARCH_ON:
             what = WALL
+        elif _step(loop.footing, loop, ball, obstacle, time):
+            marks[ball, HITS] += 1
         lap(loop.watch, stopwatch.RESOLVE)
         todo = ball
         while todo >= 0:

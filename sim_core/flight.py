@@ -11,6 +11,7 @@ import numpy as np
 
 from sim_core._compile import inlined, jit
 from sim_core.effects.gravity import Gravity, acceleration
+from sim_core.effects.rest import Footing, own_pull
 from sim_core.vec3 import Vec3, along
 
 WINDOW = (
@@ -38,7 +39,12 @@ def drift(motion: np.ndarray, ball: int, time: float) -> Vec3:
 @inlined
 def point_at(motion: np.ndarray, ball: int, time: float, gravity: Gravity | None) -> Point:
     """Where a ball is, and how fast, at a time of the window."""
-    fall = acceleration(gravity)
+    return point_under(motion, ball, time, acceleration(gravity))
+
+
+@inlined
+def point_under(motion: np.ndarray, ball: int, time: float, fall: Vec3) -> Point:
+    """The same under the ball's own acceleration [m/s²]."""
     position = along(drift(motion, ball, time), 0.5 * time * time, fall)
     velocity = along(Vec3(motion[ball, 3], motion[ball, 4], motion[ball, 5]), time, fall)
     return Point(position, velocity)
@@ -54,11 +60,20 @@ def kick(motion: np.ndarray, ball: int, time: float, change: Vec3) -> None:
         motion[ball, 3 + axis] = velocity
 
 
+@inlined
+def set_off(motion: np.ndarray, ball: int, time: float, here: Point, fall: Vec3) -> None:
+    """Give a ball the path that leads through ``here`` at ``time`` under its own acceleration [m/s²]."""
+    for axis in range(3):
+        velocity = here.velocity[axis] - fall[axis] * time
+        motion[ball, axis] = here.position[axis] - (velocity + 0.5 * fall[axis] * time) * time
+        motion[ball, 3 + axis] = velocity
+
+
 @jit
-def set_back(motion: np.ndarray, window: float, gravity: Gravity | None) -> None:
+def set_back(motion: np.ndarray, window: float, gravity: Gravity | None, footing: Footing | None = None) -> None:
     """Move the clock's zero forward by ``window`` [s]."""
-    fall = acceleration(gravity)
     for ball in range(len(motion)):
+        fall = own_pull(footing, ball, gravity)
         for axis, a in enumerate((fall.x, fall.y, fall.z)):
             motion[ball, axis] += window * (motion[ball, 3 + axis] + 0.5 * a * window)
             motion[ball, 3 + axis] += a * window

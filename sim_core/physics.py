@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 from sim_core.effects.gravity import Gravity
+from sim_core.effects.rest import Rest
 from sim_core.effects.restitution import Restitution
 from sim_core.effects.turn import Turn
 from sim_core.effects.vibration import Vibration
@@ -14,4 +15,5 @@ class Physics(NamedTuple):
     gravity: Gravity | None = None
     restitution: Restitution | None = None
     vibration: Vibration | None = None
+    rest: Rest | None = None
     turn: Turn | None = None

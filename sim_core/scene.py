@@ -7,6 +7,7 @@ import numpy as np
 
 from sim_core.balls import Balls
 from sim_core.effects.gravity import checked_gravity
+from sim_core.effects.rest import checked_rest
 from sim_core.effects.restitution import checked_restitution
 from sim_core.effects.turn import Turn, checked_axle
 from sim_core.effects.vibration import checked_wave
@@ -54,6 +55,9 @@ class Scene:
     def _require_physics(self) -> None:
         vibration, restitution, turn = self.physics.vibration, self.physics.restitution, self.physics.turn
         checked_gravity(self.physics.gravity)
+        checked_rest(self.physics.rest)
+        if self.physics.rest is not None and turn is not None:
+            raise SceneError("rest and turn are both given: balls at rest beside a turning part are not supported yet")
         if restitution is not None:
             checked_restitution(restitution, int(self.mesh.tags.max()) + 1)
         checked_wave(vibration)

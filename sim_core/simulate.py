@@ -10,15 +10,18 @@ from sim_core.balls import Balls
 from sim_core.calendar import Calendar, new_calendar
 from sim_core.detect.ball_mesh import Scratch, new_scratch
 from sim_core.effects.gravity import acceleration, checked_gravity
+from sim_core.effects.rest import Footing, checked_rest, new_footing
 from sim_core.effects.restitution import Restitution, checked_restitution
 from sim_core.effects.turn import Turning, angle_now, checked_axle, checked_turn
 from sim_core.effects.vibration import Wave, checked_wave
 from sim_core.errors import SimulationError
 from sim_core.events import DONE, PAGE_FULL, STORM, TOO_FAST, Clock, Loop, Shot, advance
 from sim_core.flight import WINDOW
+from sim_core.grounded import hide_all
 from sim_core.impacts import ImpactLog, ImpactPage, impact_log, new_page
 from sim_core.invariants import contained, posed
 from sim_core.neighbours import new_crowd
+from sim_core.resting import Resting, resting
 from sim_core.scene import Scene
 from sim_core.stopwatch import Stopwatch
 from sim_core.surfaces.ground import build_ground
@@ -45,11 +48,12 @@ class Collisions:
 
 @dataclass(frozen=True)
 class Result:
-    """The recorded impacts, the balls at the end, and counts of the collisions."""
+    """The recorded impacts, the balls at the end, counts of the collisions, and who lies still at the end."""
 
     impacts: ImpactLog
     balls: Balls
     collisions: Collisions
+    resting: Resting
 
 
 def simulate(scene: Scene) -> Result:
@@ -61,7 +65,9 @@ def simulate(scene: Scene) -> Result:
     run = _Run(scene)
     run.play(scene.warmup, record=False)
     run.play(scene.warmup + scene.duration, record=True)
-    return Result(impact_log(run.pages, run.centre), run.balls(), Collisions(*(int(n) for n in run.count)))
+    balls = run.balls()
+    still = resting(run.footing, run.ground, balls.positions, run.centre, scene.warmup)
+    return Result(impact_log(run.pages, run.centre), balls, Collisions(*(int(n) for n in run.count)), still)
 
 
 _ground = lru_cache(maxsize=8)(build_ground)  # replicas of one chamber share it
@@ -93,6 +99,9 @@ class _Run:
         self.motion = np.concatenate([scene.balls.positions - self.centre, scene.balls.velocities], axis=1)
         self.calendar: Calendar = new_calendar(len(self.motion))
         self.scratch: Scratch = new_scratch()
+        self.footing: Footing | None = new_footing(
+            checked_rest(scene.physics.rest), len(self.motion), self.gravity, self.restitution
+        )
         self.shot = self._shot(2.0 * max(1.0, float(np.abs(scene.balls.velocities).max())))
         self.watch: Stopwatch | None = None
         self.now = np.zeros(2)
@@ -102,7 +111,9 @@ class _Run:
     def _shot(self, fastest: float) -> Shot:
         low = self.scene.mesh.vertices.min(axis=0) - self.centre
         high = self.scene.mesh.vertices.max(axis=0) - self.centre
-        return Shot(self.motion, new_crowd(self.motion, low, high, 2.0 * self.scene.balls.radius, fastest, self.window))
+        crowd = new_crowd(self.motion, low, high, 2.0 * self.scene.balls.radius, fastest, self.window)
+        hide_all(self.footing, crowd)
+        return Shot(self.motion, crowd)
 
     def play(self, until: float, record: bool) -> None:
         """Advance to ``until`` [s], checking containment on the way."""
@@ -135,6 +146,7 @@ class _Run:
                     page,
                     self.count,
                     self.watch,
+                    self.footing,
                 )
             )
             if status == DONE:
@@ -150,8 +162,8 @@ class _Run:
                 where = np.round(self._states()[0][ball], 6).tolist()
                 raise SimulationError(
                     f"ball {ball} jams at {where} m: more than ten million events a second; {self._when()}. "
-                    "Look for a gap just as wide as the ball there; a ball that lies still on a surface is not "
-                    "supported yet"
+                    "Look for a gap just as wide as the ball there"
+                    + ("" if self.footing is not None else "; if balls can lie still there, switch contact mode on")
                 )
 
     def _turn(self, page: ImpactPage) -> None:
@@ -166,7 +178,8 @@ class _Run:
 
     def _states(self) -> tuple[np.ndarray, np.ndarray]:
         """Positions [m] and velocities [m/s] now, (n, 3) each: point_at for all balls at once."""
-        now, fall = self.now[0], np.array(acceleration(self.gravity))
+        now = self.now[0]
+        fall = np.array(acceleration(self.gravity)) if self.footing is None else self.footing.pull
         base, velocities = self.motion[:, :3], self.motion[:, 3:]
         return base + velocities * now + 0.5 * now * now * fall + self.centre, velocities + now * fall
 

@@ -42,8 +42,8 @@ SIM_CORE_ORDER = (
     ("physics",),
     ("flight",),
     ("detect", "resolve"),
-    ("calendar", "blocks", "neighbours", "impacts", "events"),
-    ("scene",),
+    ("calendar", "blocks", "neighbours", "grounded", "impacts", "events"),
+    ("scene", "resting"),
     ("simulate",),
     ("warm_up",),
 )

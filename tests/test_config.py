@@ -254,6 +254,10 @@ class TestWrongDesigns:
             (("distance_mm = 15", "distance_mm = 45"), "not below chamber.height_mm = 40"),
             (("distance_mm = 15", "distance_mm = 2"), "no ball fits under the part"),
             (("amplitude_um = 25", "amplitude_um = 500\n[effects]\n"), None),
+            (
+                ("amplitude_um = 25", "amplitude_um = 25\n[effects]\ngravity = false\nrest = true"),
+                "effects.rest: given true",
+            ),
             (("mass_g = 3.308", "mass_g = 400"), "fill 65% of the chamber; at most 50 %"),
             (("diameter_mm = 50", "diameter_mm = 2.5"), "does not fit a chamber 2.5 mm wide"),
         ],

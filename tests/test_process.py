@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from chamberopt.chamber import TAG_PART, TAG_SONOTRODE, build_chamber
+from chamberopt.config import load_design
 from chamberopt.errors import InputError
 from chamberopt.process import build_scene, chamber_mesh, replica_seed, start_velocities
-from tests.synthetic import plate_design
+from sim_core import Rest
+from tests.synthetic import DESIGNS, plate_design
 
 
 @pytest.fixture(scope="module")
@@ -53,6 +55,23 @@ def test_what_the_design_says_is_in_the_scene(design, mesh) -> None:
     assert scene.physics.gravity is not None
     weightless = build_scene(design.model_copy(update={"effects": type(design.effects)(gravity=False)}), mesh, 1)
     assert weightless.physics.gravity is None
+
+
+def test_contact_mode_is_on_where_a_ball_can_lie_still(design, mesh) -> None:
+    """Under a lid nothing but the sonotrode faces up; the design has the last word."""
+    effects = type(design.effects)
+
+    def physics(**said):
+        return build_scene(design.model_copy(update={"effects": effects(**said)}), mesh, 1).physics
+
+    assert physics().rest is None
+    assert physics(rest=False).rest is None
+    assert physics(rest=True).rest == Rest()
+    gear = load_design(DESIGNS / "gear.toml")
+    hung = chamber_mesh(build_chamber(gear))
+    assert build_scene(gear, hung, 1).physics.rest == Rest()
+    weightless = gear.model_copy(update={"effects": effects(gravity=False)})
+    assert build_scene(weightless, hung, 1).physics.rest is None
 
 
 def test_start_velocities_are_isotropic_maxwell() -> None:

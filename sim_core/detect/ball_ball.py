@@ -1,10 +1,13 @@
-"""When two balls meet. In the free-fall frame both fly straight, with gravity or without."""
+"""When two balls meet. In the free-fall frame both fly straight, with gravity or without, unless one is in contact."""
 
 import numpy as np
 
 from sim_core._compile import jit
-from sim_core.roots import NEVER
-from sim_core.vec3 import Vec3, dot
+from sim_core.detect.ball_triangle import CONTACT, HALF, STEPS
+from sim_core.roots import NEVER, first_approach
+from sim_core.vec3 import Vec3, along, dot
+
+STANDING = 1e-12  # m/s: what rounding leaves of a normal velocity that was taken away
 
 
 @jit
@@ -23,3 +26,26 @@ def meeting_delay(apart: Vec3, closing: Vec3, reach: float) -> float:
     if disc <= 0.0:
         return NEVER
     return excess / (np.sqrt(disc) - rate)
+
+
+@jit
+def pulled_meeting_delay(apart: Vec3, closing: Vec3, pull: Vec3, reach: float, limit: float) -> float:
+    """The same under a relative acceleration ``pull`` [m/s²], within ``limit`` [s]; by the steps of capsule_delay."""
+    delay = 0.0
+    for _ in range(STEPS):
+        at = along(along(apart, delay, closing), 0.5 * delay * delay, pull)
+        velocity = along(closing, delay, pull)
+        distance = np.sqrt(dot(at, at))
+        gap = distance - reach
+        rate = dot(at, velocity) / distance
+        if gap <= CONTACT and rate < -STANDING:
+            return delay
+        if gap <= CONTACT:
+            gap, rate = 0.0, max(rate, 0.0)  # touching, but not approaching: on until it could be as near as now; at once if pressed together
+        step = first_approach(gap, rate, 0.5 * dot(at, pull) / distance, HALF * reach)
+        if not delay + step < limit:
+            return NEVER
+        if delay + step == delay:
+            return delay
+        delay += step
+    return delay

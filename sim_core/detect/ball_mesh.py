@@ -5,9 +5,11 @@ from typing import NamedTuple
 import numpy as np
 
 from sim_core._compile import inlined, jit
+from sim_core.detect.ball_footing import out_of_reach
 from sim_core.detect.ball_sonotrode import meets_later, same_plane, waving_plane_delay, within_waving_borders
 from sim_core.detect.ball_triangle import capsule_delay, face_delay
 from sim_core.effects.gravity import Gravity, acceleration
+from sim_core.effects.rest import Footing
 from sim_core.effects.vibration import Wave
 from sim_core.flight import Point
 from sim_core.roots import NEVER
@@ -73,7 +75,23 @@ def first_contact(
     ``time`` [s]: now, on the window's clock (the sonotrode's phase depends on it). Ties go to the obstacle stored
     first.
     """
-    fall = acceleration(gravity)
+    return first_contact_from(None, -1, tree, scratch, ball, acceleration(gravity), wave, seam, time, length)
+
+
+@inlined
+def first_contact_from(
+    footing: Footing | None,
+    number: int,
+    tree: Tree,
+    scratch: Scratch,
+    ball: Point,
+    fall: Vec3,
+    wave: Wave | None,
+    seam: float,
+    time: float,
+    length: float,
+) -> tuple[float, int]:
+    """The same for ball ``number``, under its own acceleration ``fall`` [m/s²], with what it stands on left out."""
     _aim(scratch.ray, ball, fall, length)
     best = length
     found = -1
@@ -102,6 +120,8 @@ def first_contact(
                 delay = plane_delay
                 if delay <= best and not within_waving_borders(tree.numbers, row, ball, fall, seam, wave, time, delay):
                     delay = NEVER
+            if out_of_reach(footing, tree, number, ball.position, row):
+                delay = NEVER
             if delay < best or (delay == best and (found < 0 or row < found)):
                 best = delay
                 found = row

@@ -246,7 +246,7 @@ def crowd(turn: Turn, duration: float, count: int = 40, seed: int = 4) -> Scene:
     tags = room.tags.copy()
     tags[(room.corners[:, :, 2] == room.corners[:, :, 2].min()).all(axis=1)] = 1
     room = TriangleMesh(room.vertices, room.triangles, tags)
-    physics = Physics(Gravity(), Restitution(((0.9, 1.0),) * 3, (0.9, 1.0)), Vibration(1, 40e-6, 20e3, 0.3), turn)
+    physics = Physics(Gravity(), Restitution(((0.9, 1.0),) * 3, (0.9, 1.0)), Vibration(1, 40e-6, 20e3, 0.3), turn=turn)
     rng = np.random.default_rng(seed)
     positions = pack_balls(room, count, 3e-3, rng, clear=50e-6, turn=turn)
     return Scene(room, Balls(positions, rng.normal(0.0, 2.0, (count, 3)), 3e-3), physics, duration, record=(PART,))

@@ -44,7 +44,7 @@ class Record:
 
 def height_at(chamber: Chamber, points: np.ndarray, time: np.ndarray) -> np.ndarray:
     """Height (n,) [m] of points (n, 3) [m] above the sonotrode where it is at time (n,) [s]: here a plane below all."""
-    mesh, _, (_, _, vibration) = chamber
+    mesh, vibration = chamber.mesh, chamber.physics.vibration
     assert vibration is not None
     axis = np.array(vibration.axis) / np.linalg.norm(vibration.axis)
     shift = vibration.amplitude * np.sin(math.tau * vibration.frequency * time + vibration.phase)
@@ -65,7 +65,7 @@ def has_sharp_rim(chamber: Chamber, points: np.ndarray, time: np.ndarray) -> np.
     """False (n,) for centres of balls so near the sonotrode that a gentle slope beside it, which goes on under it
     (surfaces/rim.py), may be met past its end.
     """
-    mesh, balls, (_, _, vibration) = chamber
+    mesh, balls, vibration = chamber.mesh, chamber.balls, chamber.physics.vibration
     if vibration is None:
         return np.ones(len(points), dtype=bool)
     normals, _ = towards_shot(mesh.corners)

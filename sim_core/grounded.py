@@ -1,0 +1,132 @@
+"""Who meets whom when some balls are in contact mode: those fly no straight lines in the free-fall frame.
+
+The filter of neighbours.py does not see them; they are looked at one by one, exactly.
+"""
+
+import numpy as np
+
+from sim_core._compile import inlined, jit
+from sim_core.blocks import slot_of
+from sim_core.calendar import Calendar, call_up
+from sim_core.detect.ball_ball import pulled_meeting_delay
+from sim_core.effects.rest import ASLEEP, FLYING, JAMMED, MODE, WAKES, Footing, stands_on_ball
+from sim_core.flight import Point, point_under
+from sim_core.neighbours import Crowd, next_meeting
+from sim_core.roots import NEVER
+from sim_core.vec3 import Vec3, dot, sub
+
+LEANING = 2e-5  # m: a ball held still is this near to what holds it, or nearer: hops at 10 mm/s are 5 um high
+
+
+@inlined
+def hide(footing: Footing | None, crowd: Crowd, ball: int) -> None:
+    """Take a ball in contact mode out of the filter's sight."""
+    if footing is None:
+        return
+    if footing.marks[ball, MODE] != FLYING:
+        crowd.lanes[0, slot_of(crowd.blocks, ball)] = np.float32(np.nan)
+
+
+@jit
+def hide_all(footing: Footing | None, crowd: Crowd) -> None:
+    """The same for all of them, at a window's start."""
+    if footing is None:
+        return
+    for k in range(footing.held[0]):
+        hide(footing, crowd, footing.roster[k])
+
+
+@inlined
+def first_meeting(
+    footing: Footing | None, crowd: Crowd, motion: np.ndarray, ball: int, time: float, before: float
+) -> tuple[float, int]:
+    """next_meeting among all balls, whether in flight or in contact."""
+    if footing is None:
+        return next_meeting(crowd, motion, ball, time, before)
+    meeting, partner = NEVER, -1
+    if footing.marks[ball, MODE] == FLYING:
+        meeting, partner = next_meeting(crowd, motion, ball, time, before)
+        if footing.held[0] == 0:
+            return meeting, partner
+    return _with_grounded(footing, motion, ball, time, before, meeting, partner, crowd.reach)
+
+
+@jit
+def _with_grounded(
+    footing: Footing,
+    motion: np.ndarray,
+    ball: int,
+    time: float,
+    before: float,
+    meeting: float,
+    partner: int,
+    reach: float,
+) -> tuple[float, int]:
+    """The earlier of a meeting found among the balls in flight and those with balls in contact; for a ball in contact
+    itself those with all balls.
+    """
+    best = min(meeting, before) - time
+    here = _place(footing, motion, ball, time)
+    flying = footing.marks[ball, MODE] == FLYING
+    still = footing.marks[ball, MODE] >= ASLEEP
+    pull = _pull(footing, ball)
+    for k in range(footing.held[0] if flying else len(motion)):
+        other = footing.roster[k] if flying else k
+        if other == ball or (still and footing.marks[other, MODE] >= ASLEEP):
+            continue
+        if stands_on_ball(footing, ball, other) or stands_on_ball(footing, other, ball):
+            continue
+        there = _place(footing, motion, other, time)
+        apart, closing = sub(there.position, here.position), sub(there.velocity, here.velocity)
+        delay = pulled_meeting_delay(apart, closing, sub(_pull(footing, other), pull), reach, best)
+        if delay < best or (delay == best and partner >= 0 and other < partner):
+            best = delay
+            partner = other
+    if partner < 0:
+        return meeting, partner
+    return time + best, partner
+
+
+@jit
+def _pull(footing: Footing, ball: int) -> Vec3:
+    return Vec3(footing.pull[ball, 0], footing.pull[ball, 1], footing.pull[ball, 2])
+
+
+@jit
+def _place(footing: Footing, motion: np.ndarray, ball: int, time: float) -> Point:
+    return point_under(motion, ball, time, _pull(footing, ball))
+
+
+@inlined
+def lies_still(footing: Footing | None, ball: int) -> bool:
+    """True for a ball that sleeps or is jammed."""
+    if footing is None:
+        return False
+    return footing.marks[ball, MODE] >= ASLEEP
+
+
+@inlined
+def wake_if_it_moves(
+    footing: Footing | None, calendar: Calendar, motion: np.ndarray, ball: int, time: float, reach: float
+) -> None:
+    """What leans on a ball that lay still is woken when it no longer does."""
+    if footing is None:
+        return
+    if footing.marks[ball, MODE] < ASLEEP:
+        wake_neighbours(footing, calendar, motion, ball, time, reach)
+
+
+@jit
+def wake_neighbours(
+    footing: Footing, calendar: Calendar, motion: np.ndarray, ball: int, time: float, reach: float
+) -> None:
+    """Call up the balls that stand on one that has begun to move, and those held still beside it."""
+    here = _place(footing, motion, ball, time).position
+    for k in range(footing.held[0]):
+        other = footing.roster[k]
+        if stands_on_ball(footing, other, ball):
+            call_up(calendar, other, time, WAKES)
+        elif other != ball and footing.marks[other, MODE] == JAMMED:
+            apart = sub(_place(footing, motion, other, time).position, here)
+            if dot(apart, apart) < (reach + LEANING) ** 2:
+                call_up(calendar, other, time, WAKES)

@@ -1,0 +1,176 @@
+"""Two balls meet, and at least one is not in free flight.
+
+A fast hit is the ordinary one: what a surface behind the ball does to it is the next event. To a slow one (below
+Restitution.elastic_below) a ball that lies still is a still surface: friction holds it, and what would be handed on
+is below elastic_below²/2 of energy per mass. Between balls on the move a slow hit is a single constrained impact: a
+ball that stands on feet takes from an impulse along d only what they leave of it, P(d), so its share of the inverse
+mass is |P(d)|² in place of 1, and elastic means elastic for the two together (Brogliato, Nonsmooth Mechanics (2016),
+section 5.2).
+"""
+
+import math
+
+import numpy as np
+
+from sim_core._compile import jit
+from sim_core.effects.rest import (
+    ASLEEP,
+    FLYING,
+    JAMMED,
+    MODE,
+    ON_BALL,
+    ROLLING,
+    SLOW_HITS,
+    Footing,
+    onto_cone,
+)
+from sim_core.effects.restitution import Restitution, restitution_law
+from sim_core.flight import Point, kick, point_under
+from sim_core.resolve.ball_ball import pair_kick
+from sim_core.resolve.footing import BOUNCES, move_on, settle, touch_down
+from sim_core.vec3 import Vec3, along, dot, sub
+
+JAM_HITS = 64  # slow hits in a row within HELD: a ball sliding off another is further along after a few
+HELD = 0.01  # of a radius
+BLOCKED = 0.01  # of an inverse mass: a push on balls that give way by less is no greater for it
+PARTING = 1e-9  # m/s: balls in touch that part by less are in touch for good
+# s: balls pressed together without any speed would meet again at once; they part for so long, which lifts them 50 nm
+SHORTEST_HOP = 1e-4
+
+
+@jit
+def meet(
+    footing: Footing,
+    motion: np.ndarray,
+    one: int,
+    two: int,
+    time: float,
+    moment: float,
+    restitution: Restitution | None,
+    radius: float,
+) -> bool:
+    """Two balls meet now; True when one that lay still is moved, so that what leans on it must be woken."""
+    first, second = _place(footing, motion, one, time), _place(footing, motion, two, time)
+    apart, closing = sub(second.position, first.position), sub(second.velocity, first.velocity)
+    distance = math.sqrt(dot(apart, apart))
+    into = -dot(apart, closing) / distance
+    if into < -PARTING:
+        return False
+    into = max(into, 0.0)  # pressed together without any speed
+    still_one, still_two = footing.marks[one, MODE] >= ASLEEP, footing.marks[two, MODE] >= ASLEEP
+    slow = into < footing.slow
+    scale = 1.0 / distance
+    normal = Vec3(scale * apart.x, scale * apart.y, scale * apart.z)
+    if slow and still_one:
+        _land_on(footing, motion, two, one, time, moment, second, normal, into, restitution, radius)
+    elif slow and still_two:
+        _land_on(footing, motion, one, two, time, moment, first, _times(-1.0, normal), into, restitution, radius)
+    elif not slow or (footing.marks[one, MODE] == FLYING and footing.marks[two, MODE] == FLYING):
+        change = pair_kick(apart, closing, restitution)
+        _push(footing, motion, one, time, moment, first, change)
+        _push(footing, motion, two, time, moment, second, _times(-1.0, change))
+    else:
+        give_one, give_two = _response(footing, one, _times(-1.0, normal)), _response(footing, two, normal)
+        total = max(dot(give_two, normal) - dot(give_one, normal), BLOCKED)
+        press = -dot(sub(_pull(footing, two), _pull(footing, one)), normal)
+        push = (into + max(into, SHORTEST_HOP * press)) / total
+        _push(footing, motion, one, time, moment, first, _times(push, give_one))
+        _push(footing, motion, two, time, moment, second, _times(push, give_two))
+    _watch(footing, motion, one, time, moment, first.position, slow, radius)
+    _watch(footing, motion, two, time, moment, second.position, slow, radius)
+    return (still_one or still_two) and not slow
+
+
+@jit
+def _land_on(
+    footing: Footing,
+    motion: np.ndarray,
+    ball: int,
+    other: int,
+    time: float,
+    moment: float,
+    here: Point,
+    normal: Vec3,
+    into: float,
+    restitution: Restitution | None,
+    radius: float,
+) -> None:
+    """A ball meets one that lies still: a surface like others."""
+    if footing.marks[ball, MODE] >= ASLEEP:
+        return
+    landed = touch_down(footing, motion, ball, ON_BALL - other, 2.0 * radius, time, moment, here, normal)
+    if landed == BOUNCES:
+        e = 1.0 if restitution is None else _law(restitution, into)
+        _push(footing, motion, ball, time, moment, here, _times((1.0 + e) * into, normal))
+
+
+@jit
+def _law(restitution: Restitution, speed: float) -> float:
+    return restitution_law(speed, restitution.balls[0], restitution.balls[1])
+
+
+@jit
+def _pull(footing: Footing, ball: int) -> Vec3:
+    return Vec3(footing.pull[ball, 0], footing.pull[ball, 1], footing.pull[ball, 2])
+
+
+@jit
+def _place(footing: Footing, motion: np.ndarray, ball: int, time: float) -> Point:
+    return point_under(motion, ball, time, Vec3(footing.pull[ball, 0], footing.pull[ball, 1], footing.pull[ball, 2]))
+
+
+@jit
+def _times(s: float, a: Vec3) -> Vec3:
+    return Vec3(s * a.x, s * a.y, s * a.z)
+
+
+@jit
+def _response(footing: Footing, ball: int, push: Vec3) -> Vec3:
+    """Velocity change of a ball for a unit push per mass."""
+    if footing.marks[ball, MODE] == FLYING:
+        return push
+    return onto_cone(footing, ball, push)
+
+
+@jit
+def _push(footing: Footing, motion: np.ndarray, ball: int, time: float, moment: float, at: Point, change: Vec3) -> None:
+    if footing.marks[ball, MODE] == FLYING:
+        kick(motion, ball, time, change)
+    else:
+        settle(footing, motion, ball, time, moment, Point(at.position, along(at.velocity, 1.0, change)))
+
+
+@jit
+def hold(footing: Footing, motion: np.ndarray, ball: int, time: float, moment: float, position: Vec3) -> None:
+    """Hold a ball still where it is."""
+    nothing = Vec3(0.0, 0.0, 0.0)
+    move_on(footing, motion, ball, time, moment, Point(position, nothing), nothing, JAMMED)
+
+
+@jit
+def _watch(
+    footing: Footing,
+    motion: np.ndarray,
+    ball: int,
+    time: float,
+    moment: float,
+    position: Vec3,
+    slow: bool,
+    radius: float,
+) -> None:
+    """Count a ball's small hops, and hold it still when they lead nowhere."""
+    marks = footing.marks
+    marks[ball, ROLLING] = 0
+    gone = sub(position, Vec3(footing.memory[ball, 3], footing.memory[ball, 4], footing.memory[ball, 5]))
+    if not slow or dot(gone, gone) > (HELD * radius) ** 2:
+        marks[ball, SLOW_HITS] = 0
+        for axis in range(3):
+            footing.memory[ball, 3 + axis] = position[axis]
+        return
+    marks[ball, SLOW_HITS] += 1
+    if marks[ball, SLOW_HITS] < JAM_HITS or marks[ball, MODE] >= ASLEEP:
+        return
+    velocity = _place(footing, motion, ball, time).velocity
+    if dot(velocity, velocity) < footing.slow * footing.slow:
+        marks[ball, SLOW_HITS] = 0
+        hold(footing, motion, ball, time, moment, position)
