@@ -19,10 +19,10 @@ from sim_core.events import DONE, PAGE_FULL, STORM, TOO_FAST, Clock, Loop, Shot,
 from sim_core.flight import WINDOW
 from sim_core.grounded import hide_all
 from sim_core.impacts import ImpactLog, ImpactPage, impact_log, new_page
-from sim_core.invariants import contained, posed
+from sim_core.invariants import closest_pair, contained, posed
 from sim_core.neighbours import new_crowd
 from sim_core.resting import Resting, resting
-from sim_core.scene import Scene
+from sim_core.scene import TOUCH, Scene
 from sim_core.stopwatch import Stopwatch
 from sim_core.surfaces.ground import build_ground
 from sim_core.surfaces.mesh import MAX_TAGS
@@ -201,6 +201,12 @@ class _Run:
         if turn is None or self.turning is None:
             return None
         return posed(self.scene.mesh, turn, angle_now(self.turning, float(self.now[0])))
+        distance, one, two = closest_pair(self.balls())
+        if distance < self.scene.balls.diameter - TOUCH:
+            raise SimulationError(
+                f"balls {one} and {two} overlap by {self.scene.balls.diameter - distance:.3g} m, {self._when()}: please "
+                "report the scene"
+            )
 
     def balls(self) -> Balls:
         """The balls as they are now."""

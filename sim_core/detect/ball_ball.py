@@ -41,7 +41,8 @@ def pulled_meeting_delay(apart: Vec3, closing: Vec3, pull: Vec3, reach: float, l
         if gap <= CONTACT and rate < -STANDING:
             return delay
         if gap <= CONTACT:
-            gap, rate = 0.0, max(rate, 0.0)  # touching, but not approaching: on until it could be as near as now; at once if pressed together
+            # touching, but not approaching: on until it could be as near as now; at once if pressed together
+            gap, rate = 0.0, max(rate, 0.0)
         step = first_approach(gap, rate, 0.5 * dot(at, pull) / distance, HALF * reach)
         if not delay + step < limit:
             return NEVER
