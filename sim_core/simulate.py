@@ -204,8 +204,8 @@ class _Run:
         distance, one, two = closest_pair(self.balls())
         if distance < self.scene.balls.diameter - TOUCH:
             raise SimulationError(
-                f"balls {one} and {two} overlap by {self.scene.balls.diameter - distance:.3g} m, {self._when()}: please "
-                "report the scene"
+                f"balls {one} and {two} overlap by {self.scene.balls.diameter - distance:.3g} m, {self._when()}; "
+                "please report the scene"
             )
 
     def balls(self) -> Balls:
