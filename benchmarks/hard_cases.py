@@ -18,6 +18,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from tests.hard_cases.cases import CASES
 from tests.hard_cases.outcome import Case, Outcome
+from tests.hard_cases.tested import CASES as TESTED
 
 NOT_YET = "not supported yet: it needs balls that can lie still"
 
@@ -26,7 +27,7 @@ def chosen(words: list[str], with_long: bool) -> list[Case]:
     """The cases with one of the words in their names, all if there are none."""
     return [
         case
-        for case in CASES
+        for case in [*CASES, *TESTED]
         if (with_long or not case.long) and (not words or any(word in case.name for word in words))
     ]
 
