@@ -8,7 +8,8 @@ import trimesh
 from sim_core import Balls, Gravity, Physics, TriangleMesh
 from tests.cavities import box, box_around
 from tests.fuzzed_chambers import Chamber
-from tests.hard_cases.outcome import TOUCH, Claim, Outcome, named, near, play, verdict
+from tests.hard_cases.outcome import Claim, Outcome, named, near, play, verdict
+from tests.sim_core.test_containment import TOUCH
 
 RADIUS = 1.5e-3  # m
 G = 9.80665  # m/s²
