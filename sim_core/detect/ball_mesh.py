@@ -60,6 +60,28 @@ def _aim(ray: np.ndarray, ball: Point, fall: Vec3, length: float) -> None:
 
 
 @inlined
+def stack_children(tree: Tree, scratch: Scratch, node: int, depth: int, longest: np.float32) -> int:
+    """Put those children of a node on the stack that the flight enters within ``longest`` [s], nearest on top; its new
+    depth.
+    """
+    hits = boxes_hit(tree.bounds, node, scratch.ray, longest, scratch.enter)
+    floor = depth
+    while hits != 0:
+        child = lowest_bit(hits)
+        hits &= hits - 1
+        enter = scratch.enter[child]
+        slot = depth
+        while slot > floor and scratch.times[slot - 1] < enter:
+            scratch.times[slot] = scratch.times[slot - 1]
+            scratch.nodes[slot] = scratch.nodes[slot - 1]
+            slot -= 1
+        scratch.times[slot] = enter
+        scratch.nodes[slot] = tree.children[node, child]
+        depth += 1
+    return depth
+
+
+@inlined
 def first_contact(
     tree: Tree,
     scratch: Scratch,
@@ -126,20 +148,7 @@ def first_contact_from(
                 best = delay
                 found = row
             continue
-        hits = boxes_hit(tree.bounds, code, scratch.ray, longest, scratch.enter)
-        floor = depth
-        while hits != 0:
-            child = lowest_bit(hits)
-            hits &= hits - 1
-            enter = scratch.enter[child]
-            slot = depth
-            while slot > floor and scratch.times[slot - 1] < enter:  # nearest on top
-                scratch.times[slot] = scratch.times[slot - 1]
-                scratch.nodes[slot] = scratch.nodes[slot - 1]
-                slot -= 1
-            scratch.times[slot] = enter
-            scratch.nodes[slot] = tree.children[code, child]
-            depth += 1
+        depth = stack_children(tree, scratch, code, depth, longest)
     if plane_row >= 0 and plane_delay < best:  # and no face was there
         later, face = meets_later(tree, plane_row, ball, fall, seam, wave, time, plane_delay, best)
         if face >= 0:

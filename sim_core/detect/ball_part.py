@@ -10,13 +10,12 @@ again. Every stop lies before the contact, so nothing is stepped over, and near 
 import numpy as np
 
 from sim_core._compile import inlined, jit
-from sim_core.detect.ball_mesh import SLACK, TINY, Scratch
+from sim_core.detect.ball_mesh import SLACK, TINY, Scratch, stack_children
 from sim_core.detect.ball_triangle import CONTACT, HALF, away_from_capsule, face_normal, within_borders
 from sim_core.effects.gravity import Gravity, acceleration
 from sim_core.effects.turn import Seen, Turning, jerk_bound, seen_from_part
 from sim_core.flight import Point
 from sim_core.roots import NEVER, first_approach
-from sim_core.simd import boxes_hit, lowest_bit
 from sim_core.surfaces.obstacles import CAPSULE
 from sim_core.surfaces.part import PartTree
 from sim_core.surfaces.tree import Tree
@@ -81,20 +80,7 @@ def first_part_contact(
                     best = delay
                     found = first + row if sure else -1
                 continue
-            hits = boxes_hit(part.tree.bounds, code, scratch.ray, longest, scratch.enter)
-            floor = depth
-            while hits != 0:
-                child = lowest_bit(hits)
-                hits &= hits - 1
-                enter = scratch.enter[child]
-                slot = depth
-                while slot > floor and scratch.times[slot - 1] < enter:  # nearest on top
-                    scratch.times[slot] = scratch.times[slot - 1]
-                    scratch.nodes[slot] = scratch.nodes[slot - 1]
-                    slot -= 1
-                scratch.times[slot] = enter
-                scratch.nodes[slot] = part.tree.children[code, child]
-                depth += 1
+            depth = stack_children(part.tree, scratch, code, depth, longest)
         begin = end
         if last:
             break
