@@ -9,7 +9,7 @@ from sim_core._compile import inlined, jit
 from sim_core.blocks import slot_of
 from sim_core.calendar import Calendar, call_up
 from sim_core.detect.ball_ball import pulled_meeting_delay
-from sim_core.effects.rest import ASLEEP, FLYING, JAMMED, MODE, WAKES, Footing, stands_on_ball
+from sim_core.effects.rest import ASLEEP, CALLED, FLYING, JAMMED, MODE, WAKES, Footing, stands_on_ball
 from sim_core.flight import Point, point_under
 from sim_core.neighbours import Crowd, next_meeting
 from sim_core.roots import NEVER
@@ -120,13 +120,18 @@ def wake_if_it_moves(
 def wake_neighbours(
     footing: Footing, calendar: Calendar, motion: np.ndarray, ball: int, time: float, reach: float
 ) -> None:
-    """Call up the balls that stand on one that has begun to move, and those held still beside it."""
+    """Call up the balls that stand on one that has begun to move, and those held still beside it.
+
+    Marked besides: what meets one of them at this very time has its events predicted anew, and the call must not be
+    lost with the old ones.
+    """
     here = _place(footing, motion, ball, time).position
     for k in range(footing.held[0]):
         other = footing.roster[k]
-        if stands_on_ball(footing, other, ball):
-            call_up(calendar, other, time, WAKES)
-        elif other != ball and footing.marks[other, MODE] == JAMMED:
+        leans = stands_on_ball(footing, other, ball)
+        if not leans and other != ball and footing.marks[other, MODE] == JAMMED:
             apart = sub(_place(footing, motion, other, time).position, here)
-            if dot(apart, apart) < (reach + LEANING) ** 2:
-                call_up(calendar, other, time, WAKES)
+            leans = dot(apart, apart) < (reach + LEANING) ** 2
+        if leans:
+            footing.marks[other, CALLED] = 1
+            call_up(calendar, other, time, WAKES)

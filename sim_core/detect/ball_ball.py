@@ -40,8 +40,7 @@ def pulled_meeting_delay(apart: Vec3, closing: Vec3, pull: Vec3, reach: float, l
         rate = dot(at, velocity) / distance
         if gap <= CONTACT and rate < -STANDING:
             return delay
-        if gap <= CONTACT:
-            # touching, but not approaching: on until it could be as near as now; at once if pressed together
+        if gap <= CONTACT:  # not approaching: on until it could be as near as now, at once if pressed together
             gap, rate = 0.0, max(rate, 0.0)
         step = first_approach(gap, rate, 0.5 * dot(at, pull) / distance, HALF * reach)
         if not delay + step < limit:

@@ -7,6 +7,7 @@ import numpy as np
 from sim_core._compile import inlined, jit
 from sim_core.effects.rest import (
     ASLEEP,
+    CALLED,
     FEET,
     FLYING,
     GOES_ON,
@@ -14,6 +15,7 @@ from sim_core.effects.rest import (
     MODE,
     STILL,
     STOPS,
+    WAKES,
     Footing,
     foot_normal,
 )
@@ -76,6 +78,8 @@ def end_of_path(
     mode = footing.marks[ball, MODE]
     if mode == FLYING:
         return length, GOES_ON
+    if footing.marks[ball, CALLED] != 0:
+        return 0.0, WAKES
     if mode >= ASLEEP:
         return _swing(wave), STILL
     best, end = length, GOES_ON

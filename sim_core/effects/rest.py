@@ -34,6 +34,7 @@ FLYING, SLIDING, ASLEEP, JAMMED = 0, 1, 2, 3
 
 # columns of Footing.marks
 MODE, FEET, ROLLING, SLOW_HITS = 0, 1, 2, 3
+CALLED = 4  # what it leans on has begun to move, and it has not seen to that yet
 
 # what ends a path in contact, in place of an obstacle's number (calendar.py has -1 and -2)
 GOES_ON = -1
@@ -63,7 +64,7 @@ class Footing(NamedTuple):
 
     ``pull`` (n, 3): each ball's own acceleration [m/s²]; ``normals`` (n, 4, 3) of its feet; ``spots`` (n, 4, 4): where
     [m] a foot was set and how far the ball may go from there on what is round; ``rows`` (n, 4) int32: the obstacles it
-    stands on, or see ON_BALL; ``marks`` (n, 4) int32, see MODE; ``memory`` (n, 7): the normal of the foot left last,
+    stands on, or see ON_BALL; ``marks`` (n, 5) int32, see MODE; ``memory`` (n, 7): the normal of the foot left last,
     where its small hops began [m], and when it came to lie still [s]; ``roster``, ``seat`` (n,) int32 and ``held``
     (1,): the balls not in flight, each one's place among them, and how many. ``capture``, ``resistance`` as in Rest;
     ``slow`` [m/s]: pair hits below lose nothing.
@@ -107,7 +108,7 @@ def new_footing(
         np.zeros((balls, MOST_FEET, 3)),
         np.zeros((balls, MOST_FEET, 4)),
         np.full((balls, MOST_FEET), -1, dtype=np.int32),
-        np.zeros((balls, 4), dtype=np.int32),
+        np.zeros((balls, 5), dtype=np.int32),
         np.zeros((balls, 7)),
         np.zeros(balls, dtype=np.int32),
         np.full(balls, -1, dtype=np.int32),

@@ -7,6 +7,7 @@ import numpy as np
 from sim_core._compile import inlined, jit
 from sim_core.effects.rest import (
     ASLEEP,
+    CALLED,
     FEET,
     FLYING,
     KISS,
@@ -37,6 +38,7 @@ BOUNCES, ROLLS, CAUGHT = 0, 1, 2
 ONE_SURFACE = math.cos(math.radians(25.0))  # faces that meet at less than 25 degrees stand for a smooth surface
 SAME_HOP = 1.05  # of the speed a facet's turn gives: landing on the next facet, not from a height
 SHARE = 0.5  # of capture: how fast a ball may come down again when the plane under it has left what is round
+NO_WAY_OUT = 0.01  # wedged between its feet and an edge a ball would have to go ten times as far as it is deep
 NO_FOOT = -1
 LAST_LEFT = -2
 
@@ -46,8 +48,17 @@ def settle(footing: Footing, motion: np.ndarray, ball: int, time: float, moment:
     """Let a ball go on from ``at`` on those of its feet that hold it. ``time``, ``moment`` [s]: on the window's clock,
     and since the start.
 
-    A foot hit faster than capture is taken away: the search finds it again at once, as the wall it then is.
+    A foot hit faster than capture is taken away: the search finds it again at once, as the wall it then is. One on a
+    ball that has begun to move is none: the two are a pair like others again.
     """
+    footing.marks[ball, CALLED] = 0
+    foot = 0
+    while foot < footing.marks[ball, FEET]:
+        other = ON_BALL - footing.rows[ball, foot]
+        if other >= 0 and footing.marks[other, MODE] < ASLEEP:
+            drop_foot(footing, ball, foot)
+        else:
+            foot += 1
     velocity = at.velocity
     foot = 0
     while foot < footing.marks[ball, FEET]:
@@ -123,15 +134,19 @@ def set_out(
     footing: Footing | None, motion: np.ndarray, ball: int, time: float, here: Point, away: Vec3, radius: float
 ) -> Point:
     """Put a ball that meets an edge back to ``radius`` [m] from it: contact is up to 1e-13 m deep there, and thousands
-    of small hops on one edge would add up.
+    of small hops on one edge would add up. It goes out along the planes of its feet, not into them.
     """
     if footing is None:
         return here
     distance = math.sqrt(dot(away, away))
     if distance >= radius:
         return here
+    free = onto_cone(footing, ball, away)
+    share = dot(free, free) / (distance * distance)  # of a step along ``free``: how far it leads out
+    if share < NO_WAY_OUT:
+        return here
     pull = Vec3(footing.pull[ball, 0], footing.pull[ball, 1], footing.pull[ball, 2])
-    there = Point(along(here.position, (radius - distance) / distance, away), here.velocity)
+    there = Point(along(here.position, (radius - distance) / (distance * share), free), here.velocity)
     set_off(motion, ball, time, there, pull)
     return there
 
@@ -259,13 +274,6 @@ def _step(footing: Footing, motion: np.ndarray, ball: int, what: int, time: floa
         settle(footing, motion, ball, time, moment, Point(here.position, velocity))
         return True
     if what == WAKES:
-        foot = 0
-        while foot < footing.marks[ball, FEET]:
-            other = ON_BALL - footing.rows[ball, foot]
-            if other >= 0 and footing.marks[other, MODE] < ASLEEP:
-                drop_foot(footing, ball, foot)
-            else:
-                foot += 1
         settle(footing, motion, ball, time, moment, here)
         return True
     return False

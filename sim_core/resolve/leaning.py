@@ -33,7 +33,9 @@ from sim_core.vec3 import Vec3, along, dot, sub
 JAM_HITS = 64  # slow hits in a row within HELD: a ball sliding off another is further along after a few
 HELD = 0.01  # of a radius
 BLOCKED = 0.01  # of an inverse mass: a push on balls that give way by less is no greater for it
-PARTING = 1e-9  # m/s: balls in touch that part by less are in touch for good
+# m/s: balls in touch that part by less are in touch for good. Slow hits part them twice as fast: two that went on as
+# one (e = 0) would meet for ever by rounding
+PARTING = 1e-9
 # s: balls pressed together without any speed would meet again at once; they part for so long, which lifts them 50 nm
 SHORTEST_HOP = 1e-4
 
@@ -65,7 +67,7 @@ def meet(
         _land_on(footing, motion, two, one, time, moment, second, normal, into, restitution, radius)
     elif slow and still_two:
         _land_on(footing, motion, one, two, time, moment, first, _times(-1.0, normal), into, restitution, radius)
-    elif not slow or (footing.marks[one, MODE] == FLYING and footing.marks[two, MODE] == FLYING):
+    elif not slow:
         change = pair_kick(apart, closing, restitution)
         _push(footing, motion, one, time, moment, first, change)
         _push(footing, motion, two, time, moment, second, _times(-1.0, change))
@@ -73,7 +75,7 @@ def meet(
         give_one, give_two = _response(footing, one, _times(-1.0, normal)), _response(footing, two, normal)
         total = max(dot(give_two, normal) - dot(give_one, normal), BLOCKED)
         press = -dot(sub(_pull(footing, two), _pull(footing, one)), normal)
-        push = (into + max(into, SHORTEST_HOP * press)) / total
+        push = (into + max(into, SHORTEST_HOP * press, 2.0 * PARTING)) / total
         _push(footing, motion, one, time, moment, first, _times(push, give_one))
         _push(footing, motion, two, time, moment, second, _times(push, give_two))
     _watch(footing, motion, one, time, moment, first.position, slow, radius)

@@ -28,7 +28,7 @@ from sim_core import (
     simulate,
 )
 from sim_core.effects.gravity import STANDARD as G
-from sim_core.effects.rest import ASLEEP, FEET, MODE
+from sim_core.effects.rest import ASLEEP, FEET, JAMMED, MODE, ON_BALL
 from sim_core.invariants import clearance, closest_pair, energy
 from sim_core.simulate import _Run
 from tests.cavities import FLOOR, box, cylinder
@@ -301,6 +301,44 @@ def test_a_settling_heap_falls_still_and_is_reported() -> None:
     assert run.count[:3].sum() < 2_000_000
     result = simulate(Scene(box((0.012, 0.012, 0.05)), balls, physics(0.9, 0.005), 2.0))
     assert len(result.resting) > 25
+
+
+def rough_floor(rng: np.random.Generator) -> TriangleMesh:
+    """Peaks and pits as wide as a ball and more, with edges that balls are wedged against."""
+    nodes = np.linspace(0.0, 0.02, 7)
+    return terrain(nodes, nodes, rng.uniform(0.0, 0.004, (7, 7)), 0.05, rng)
+
+
+@pytest.mark.parametrize("e", [0.0, 0.5, 0.9])
+@pytest.mark.parametrize(("floor", "seed"), [("flat", 7), ("rough", 3), ("rough", 6)])
+def test_in_a_settling_pile_nothing_overlaps(floor: str, seed: int, e: float) -> None:
+    """Checked every millisecond (see film), and through restarts, which know nothing of who lies still."""
+    rng = np.random.default_rng(seed)
+    room = box((0.012, 0.012, 0.06)) if floor == "flat" else rough_floor(rng)
+    places = pack_balls(room, 50, DIAMETER, rng)
+    balls = Balls(places, rng.normal(0.0, 0.5, places.shape), DIAMETER)
+    for _ in range(6):
+        run, frames = film(room, balls, physics(e, 0.005), 0.1)
+        balls = frames[-1]
+        assert run.count[:3].sum() < 200_000
+        assert run.footing is not None
+        marks, rows = run.footing.marks, run.footing.rows
+        stood_on = ON_BALL - rows[rows <= ON_BALL]
+        assert (marks[stood_on, MODE] >= ASLEEP).all()
+        assert (np.diff(energies(frames)) < 50 * CAPTURE**2).all()
+    assert np.abs(balls.velocities).max() < 0.1
+
+
+def test_balls_that_go_on_as_one_in_flight_do_not_jam() -> None:
+    """e = 0: rounding leaves such balls approaching or not, and must not have them meet for ever."""
+    rng = np.random.default_rng(6)
+    room = box((0.025, 0.025, 0.06))
+    places = pack_balls(room, 100, DIAMETER, rng)
+    balls = Balls(places, rng.normal(0.0, 0.5, places.shape), DIAMETER)
+    run, _ = film(room, balls, physics(0.0, 0.005), 0.01, 10)
+    assert 100 < run.count[1] < 3000
+    assert run.footing is not None
+    assert (run.footing.marks[:, MODE] != JAMMED).all()
 
 
 def test_another_balls_hit_wakes_it() -> None:
