@@ -3,7 +3,7 @@
     python benchmarks/hard_cases.py [--json] [--long] [--cases WORD ...]
 
 The cases and what physics expects of them are in tests/hard_cases. A case that needs what the simulator does not have
-yet is listed as "not supported yet", never as ok.
+yet is listed as "not supported yet", never as ok. It needs what the tests need: pip install -e '.[test]'.
 """
 
 import argparse

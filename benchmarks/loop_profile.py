@@ -43,8 +43,12 @@ def profile(name: str, repeats: int = 5) -> tuple[list[float], dict[str, float],
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenes", nargs="*", metavar="scene", help=", ".join(MESHES))
+    names = parser.parse_args().scenes or list(MESHES)
+    for name in names:
+        if name not in MESHES:
+            parser.error(f"no scene {name}: choose from {', '.join(MESHES)}")
     print("ns a collision | " + " | ".join(PARTS) + " | all | wall searches a collision | with / without stopwatch")
-    for name in parser.parse_args().scenes or MESHES:
+    for name in names:
         parts, calls, ratio = profile(name)
         cells = [f"{part:.0f}" for part in parts]
         print(f"{name} | {' | '.join(cells)} | {sum(parts):.0f} | {calls['searches']:.2f} | {ratio:.2f}", flush=True)

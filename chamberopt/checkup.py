@@ -84,7 +84,7 @@ def warnings(design: Design, chamber: Chamber) -> list[str]:
             f"{shot.ball_mass * 1e6:.3g} mg: the charge differs by more than 5 %"
         )
     turn, accuracy = design.effects.part_turn, design.process.accuracy
-    if turn is not None and accuracy.replicas * accuracy.simulated_time < turn.period:
+    if turn is not None and turn.rpm != 0.0 and accuracy.replicas * accuracy.simulated_time < turn.period:
         said.append(
             f"the part takes {turn.period:.3g} s to turn once, the replicas together last "
             f"{accuracy.replicas * accuracy.simulated_time:.3g} s: coverage is that of some of its positions only; "

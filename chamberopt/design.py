@@ -224,7 +224,8 @@ class PartTurn(BaseModel):
             given, lacking = (
                 ("angle_deg", "frequency_hz") if self.frequency_hz is None else ("frequency_hz", "angle_deg")
             )
-            problems.append(Problem(given, f"given without {lacking}; give both, or rpm instead"))
+            remedy = "rpm is given: remove it" if self.rpm is not None else "give both, or rpm instead"
+            problems.append(Problem(given, f"given without {lacking}; {remedy}"))
         elif self.rpm is not None and self.angle_deg is not None:
             problems.append(Problem("rpm", "given beside angle_deg and frequency_hz; keep rpm or the other two"))
         elif self.rpm is None and self.angle_deg is None:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim_core.errors import SceneError
+from sim_core.errors import SceneError, number
 
 FASTEST = 1e6  # m/s: shot has 20; the filters' float32 squares of much more overflow
 
@@ -27,7 +27,7 @@ class Balls:
         if np.ndim(self.diameter) != 0 or np.ndim(self.density) != 0:
             raise SceneError("several ball diameters or densities in one scene are not supported yet: give one number")
         for name in ("diameter", "density"):
-            value = float(getattr(self, name))
+            value = number(f"balls.{name}", getattr(self, name))
             if not (np.isfinite(value) and value > 0.0):
                 raise SceneError(f"balls.{name} is {value}: it must be positive")
             object.__setattr__(self, name, value)

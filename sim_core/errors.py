@@ -7,3 +7,11 @@ class SceneError(ValueError):
 
 class SimulationError(RuntimeError):
     """An invariant broke or a ball cannot be followed; the message says where, and what to try."""
+
+
+def number(name: str, value: object) -> float:
+    """The value as a float; raises SceneError, with the field's name, for what is no number."""
+    try:
+        return float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        raise SceneError(f"{name} is {value!r}: give a number") from None

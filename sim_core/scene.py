@@ -7,10 +7,10 @@ import numpy as np
 
 from sim_core.balls import Balls
 from sim_core.effects.gravity import checked_gravity
-from sim_core.effects.rest import checked_rest
-from sim_core.effects.restitution import checked_restitution
+from sim_core.effects.rest import Rest, checked_rest
+from sim_core.effects.restitution import Restitution, checked_restitution
 from sim_core.effects.turn import Turn, checked_axle
-from sim_core.effects.vibration import checked_wave
+from sim_core.effects.vibration import Vibration, checked_wave
 from sim_core.errors import SceneError
 from sim_core.invariants import clearance, closest_pair, contained, enclosed, posed
 from sim_core.physics import Physics
@@ -53,6 +53,10 @@ class Scene:
         self._require_room()
 
     def _require_physics(self) -> None:
+        for name, effect in self.physics._asdict().items():
+            kind = {"restitution": Restitution, "vibration": Vibration, "rest": Rest, "turn": Turn}.get(name)
+            if kind is not None and effect is not None and not isinstance(effect, kind):
+                raise SceneError(f"physics.{name} is {effect!r}: give a {kind.__name__}, or None")
         vibration, restitution, turn = self.physics.vibration, self.physics.restitution, self.physics.turn
         checked_gravity(self.physics.gravity)
         checked_rest(self.physics.rest)

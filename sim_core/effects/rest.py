@@ -21,7 +21,7 @@ import numpy as np
 from sim_core._compile import inlined, jit
 from sim_core.effects.gravity import Gravity, acceleration
 from sim_core.effects.restitution import ELASTIC_BELOW, Restitution
-from sim_core.errors import SceneError
+from sim_core.errors import SceneError, number
 from sim_core.vec3 import Vec3, along, cross, dot
 
 CAPTURE = 1e-3  # m/s: drops from 50 nm; a ten-thousandth of the shot's speed. Lower costs bounces: 22 a decade at e 0.9
@@ -89,11 +89,12 @@ def checked_rest(rest: Rest | None) -> Rest | None:
     """The same as plain floats; raises SceneError for numbers out of range."""
     if rest is None:
         return None
-    if not 0.0 < rest.capture < math.inf:
-        raise SceneError(f"rest.capture is {rest.capture} m/s: it must be positive")
-    if not 0.0 <= rest.resistance < math.inf:
-        raise SceneError(f"rest.resistance is {rest.resistance}: it must be 0 or more")
-    return Rest(float(rest.capture), float(rest.resistance))
+    plain = Rest(number("rest.capture", rest.capture), number("rest.resistance", rest.resistance))
+    if not 0.0 < plain.capture < math.inf:
+        raise SceneError(f"rest.capture is {plain.capture} m/s: it must be positive")
+    if not 0.0 <= plain.resistance < math.inf:
+        raise SceneError(f"rest.resistance is {plain.resistance}: it must be 0 or more")
+    return plain
 
 
 def new_footing(

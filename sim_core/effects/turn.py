@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim_core._compile import jit
-from sim_core.errors import SceneError
+from sim_core.errors import SceneError, number
 from sim_core.vec3 import Vec3, along, cross, dot, sub
 
 FASTEST = 1e5  # rpm; and the angular speed of 1e5 rpm for a part that swings. No peened part turns a tenth as fast.
@@ -111,6 +111,9 @@ def checked_axle(turn: Turn | None) -> Axle | None:
     if turn is None:
         return None
     fastest = TURN * FASTEST / 60.0
+    for name in ("rpm", "swing", "frequency", "phase"):
+        if getattr(turn, name) is not None:
+            number(f"turn.{name}", getattr(turn, name))
     if (turn.rpm is None) == (turn.swing is None) or (turn.swing is None) != (turn.frequency is None):
         raise SceneError("turn: give either rpm, or swing and frequency")
     if turn.rpm is not None and not abs(turn.rpm) <= FASTEST:

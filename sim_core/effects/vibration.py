@@ -8,7 +8,7 @@ import math
 from typing import NamedTuple
 
 from sim_core._compile import jit
-from sim_core.errors import SceneError
+from sim_core.errors import SceneError, number
 from sim_core.vec3 import Vec3
 
 HIGHEST = 1e9  # Hz: generators have 1e5 at most; a wave of 1e300 would be searched for ever, period after period
@@ -45,6 +45,8 @@ def checked_wave(vibration: Vibration | None) -> Wave | None:
     """Raises SceneError for numbers out of range."""
     if vibration is None:
         return None
+    for name in ("amplitude", "frequency", "phase"):
+        number(f"vibration.{name}", getattr(vibration, name))
     if not 0.0 <= vibration.amplitude < math.inf:
         raise SceneError(f"vibration.amplitude is {vibration.amplitude} m: it must be 0 or more")
     if not 0.0 < vibration.frequency <= HIGHEST:

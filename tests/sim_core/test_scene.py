@@ -5,8 +5,20 @@ import math
 import numpy as np
 import pytest
 
-from sim_core import Balls, Gravity, Physics, Restitution, Scene, SceneError, TriangleMesh, Vibration, simulate
-from tests.cavities import FLOOR, box
+from sim_core import (
+    Balls,
+    Gravity,
+    Physics,
+    Rest,
+    Restitution,
+    Scene,
+    SceneError,
+    TriangleMesh,
+    Turn,
+    Vibration,
+    simulate,
+)
+from tests.cavities import CEILING, FLOOR, box
 
 ROOM = box((0.03, 0.03, 0.03))
 MIDDLE = [0.015, 0.015, 0.015]
@@ -96,3 +108,24 @@ def test_balls_in_one_place_are_two_balls() -> None:
 def test_a_wrong_scene_field_is_named(wrong: dict) -> None:
     with pytest.raises(SceneError, match=rf"scene\.{next(iter(wrong))}"):
         Scene(ROOM, balls(MIDDLE), Physics(), **{"duration": 1.0, **wrong})
+
+
+@pytest.mark.parametrize(
+    ("physics", "field"),
+    [
+        (Physics(vibration=Vibration(FLOOR, "tall", 20e3)), "vibration.amplitude is 'tall'"),
+        (Physics(Gravity(), rest=True), "physics.rest is True: give a Rest, or None"),
+        (Physics(Gravity(), rest=Rest(capture="slow")), "rest.capture is 'slow'"),
+        (Physics(turn=Turn(CEILING, rpm="fast")), "turn.rpm is 'fast'"),
+        (Physics(restitution=0.9), "physics.restitution is 0.9"),
+    ],
+    ids=lambda given: given if isinstance(given, str) else "",
+)
+def test_what_is_no_number_or_no_effect_is_named(physics: Physics, field: str) -> None:
+    with pytest.raises(SceneError, match=field):
+        Scene(ROOM, balls([0.015, 0.015, 0.01]), physics, 1.0)
+
+
+def test_a_diameter_that_is_no_number_is_named() -> None:
+    with pytest.raises(SceneError, match=r"balls\.diameter is '3mm': give a number"):
+        Balls(np.zeros((1, 3)), np.zeros((1, 3)), "3mm")  # type: ignore[arg-type]
