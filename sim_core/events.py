@@ -55,7 +55,7 @@ STORM = 2
 TOO_FAST = 3
 
 PIECE = 0.01  # s: longest arc searched at once; its chord is off by g PIECE²/8 = 0.12 mm, so boxes stay tight
-JAM_EVENTS = 5_000  # of one ball in one window: with contact mode it is held still then
+JAM_EVENTS = 5_000  # of one ball in one window: with contact mode it is held still then, and each time as many later
 STORM_EVENTS = 200_000  # of one ball in one window (20 ms): ten million a second is no gas but a jam
 
 # columns of Loop.tally
@@ -241,11 +241,10 @@ def _gives_up(footing: Footing | None, loop: Loop, ball: int, time: float) -> bo
     """True when a ball in a jam that contact mode cannot resolve is held still for it."""
     if footing is None:
         return False
-    if loop.calendar.marks[ball, EVENTS] < JAM_EVENTS or footing.marks[ball, MODE] >= ASLEEP:
+    if loop.calendar.marks[ball, EVENTS] % JAM_EVENTS != 0 or footing.marks[ball, MODE] >= ASLEEP:
         return False
     here = point_under(loop.shot.motion, ball, time, own_pull(footing, ball, loop.gravity))
     hold(footing, loop.shot.motion, ball, time, loop.clock.now[1] * loop.clock.window + time, here.position)
-    loop.calendar.marks[ball, EVENTS] = 0
     follow(loop.shot.crowd, loop.shot.motion, ball, time)
     hide(footing, loop.shot.crowd, ball)
     return True
