@@ -194,6 +194,12 @@ class _Run:
                 f"ball {outside[0]} has left the mesh at {np.round(points[outside[0]], 6).tolist()} m, {self._when()}. "
                 "Look for surfaces that overlap or cross there; if there are none, please report the scene"
             )
+        distance, one, two = closest_pair(self.balls())
+        if distance < self.scene.balls.diameter - TOUCH:
+            raise SimulationError(
+                f"balls {one} and {two} overlap by {self.scene.balls.diameter - distance:.3g} m, {self._when()}; "
+                "please report the scene"
+            )
 
     def _corners(self) -> np.ndarray | None:
         """The triangles where they are now, if some of them turn."""
@@ -201,12 +207,6 @@ class _Run:
         if turn is None or self.turning is None:
             return None
         return posed(self.scene.mesh, turn, angle_now(self.turning, float(self.now[0])))
-        distance, one, two = closest_pair(self.balls())
-        if distance < self.scene.balls.diameter - TOUCH:
-            raise SimulationError(
-                f"balls {one} and {two} overlap by {self.scene.balls.diameter - distance:.3g} m, {self._when()}; "
-                "please report the scene"
-            )
 
     def balls(self) -> Balls:
         """The balls as they are now."""

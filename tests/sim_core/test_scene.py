@@ -13,11 +13,13 @@ from sim_core import (
     Restitution,
     Scene,
     SceneError,
+    SimulationError,
     TriangleMesh,
     Turn,
     Vibration,
     simulate,
 )
+from sim_core.simulate import _Run
 from tests.cavities import CEILING, FLOOR, box
 
 ROOM = box((0.03, 0.03, 0.03))
@@ -129,3 +131,11 @@ def test_what_is_no_number_or_no_effect_is_named(physics: Physics, field: str) -
 def test_a_diameter_that_is_no_number_is_named() -> None:
     with pytest.raises(SceneError, match=r"balls\.diameter is '3mm': give a number"):
         Balls(np.zeros((1, 3)), np.zeros((1, 3)), "3mm")  # type: ignore[arg-type]
+
+
+def test_balls_that_came_to_overlap_stop_the_run() -> None:
+    apart = Balls(np.array([[0.01, 0.01, 0.01], [0.02, 0.01, 0.01]]), np.zeros((2, 3)), 3e-3)
+    run = _Run(Scene(ROOM, apart, Physics(), 1.0))
+    run.motion[1, :3] = run.motion[0, :3] + [0.001, 0.0, 0.0]
+    with pytest.raises(SimulationError, match=r"balls 0 and 1 overlap by 0\.002 m"):
+        run.play(0.1, record=False)
