@@ -13,25 +13,13 @@ from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_va
 
 from chamberopt import diagnosis
 from chamberopt.diagnosis import CrossCheckError, Problem
+from chamberopt.effects import Effects
 from chamberopt.errors import InputError
+from chamberopt.fields import Pair, Triple, listed, quantity
 from chamberopt.materials import SHOT_DENSITY, STRICT, Materials, ShotMaterial
 
 Unit = Literal["um", "mm", "cm", "m", "in"]
 METRES_PER: dict[str, float] = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
-
-# TOML has lists only: these two become tuples at the door, their numbers stay strict.
-Pair = Annotated[tuple[float, float], Field(strict=False)]
-Triple = Annotated[tuple[float, float, float], Field(strict=False)]
-
-
-def quantity(low: float, high: float, unit: str, what: str, default: Any = ...) -> Any:
-    """A bounded number of the file; unit and meaning are shown when it is wrong."""
-    return Field(default, ge=low, le=high, description=what, json_schema_extra={"unit": unit})
-
-
-def listed(form: str, what: str, default: Any = ...) -> Any:
-    """A list of numbers of the file, its form shown when it is wrong."""
-    return Field(default, description=what, json_schema_extra={"form": form})
 
 
 class Target(BaseModel):
@@ -202,79 +190,6 @@ class Shot(BaseModel):
     def count(self) -> int:
         """Number of balls: the mass asked for, rounded to whole balls, at least one."""
         return max(1, round(self.mass / self.ball_mass))
-
-
-class PartTurn(BaseModel):
-    """The part turns about an axis during peening: steadily (rpm), or to and fro (angle_deg and frequency_hz)."""
-
-    model_config = STRICT
-
-    rpm: float | None = quantity(-10000, 10000, "1/min", "right-handed about the axis; real set-ups: 1 to 100", None)
-    angle_deg: float | None = quantity(0.01, 3600, "degrees", "to and fro, to each side", None)
-    frequency_hz: float | None = quantity(1e-4, 100, "Hz", "of the motion to and fro", None)
-    axis: Triple = listed("three numbers [x, y, z], not all 0", "direction, in the part file's frame", (0.0, 0.0, 1.0))
-    through_mm: Triple = listed("three numbers [x, y, z] in mm", "a point on it, same frame", (0.0, 0.0, 0.0))
-
-    @model_validator(mode="after")
-    def _agree(self) -> Self:
-        problems = []
-        if not any(self.axis):
-            problems.append(Problem("axis", "given [0, 0, 0], which points nowhere; e.g. [0, 0, 1]"))
-        if (self.angle_deg is None) != (self.frequency_hz is None):
-            given, lacking = (
-                ("angle_deg", "frequency_hz") if self.frequency_hz is None else ("frequency_hz", "angle_deg")
-            )
-            remedy = "rpm is given: remove it" if self.rpm is not None else "give both, or rpm instead"
-            problems.append(Problem(given, f"given without {lacking}; {remedy}"))
-        elif self.rpm is not None and self.angle_deg is not None:
-            problems.append(Problem("rpm", "given beside angle_deg and frequency_hz; keep rpm or the other two"))
-        elif self.rpm is None and self.angle_deg is None:
-            problems.append(Problem("", "says no motion; e.g. { rpm = 30 } or { angle_deg = 20, frequency_hz = 1 }"))
-        if problems:
-            raise CrossCheckError(problems)
-        return self
-
-    @property
-    def swing(self) -> float | None:
-        """Largest angle to each side [rad], of a part that turns to and fro."""
-        return None if self.angle_deg is None else math.radians(self.angle_deg)
-
-    @property
-    def through(self) -> tuple[float, float, float]:
-        """A point on the axis [m], in the part file's frame."""
-        x, y, z = self.through_mm
-        return x * 1e-3, y * 1e-3, z * 1e-3
-
-    @property
-    def period(self) -> float:
-        """Time [s] after which the part is where it was; infinite for 0 rpm."""
-        if self.frequency_hz is not None:
-            return 1.0 / self.frequency_hz
-        return 60.0 / abs(self.rpm) if self.rpm else math.inf
-
-
-class Effects(BaseModel):
-    """Which effects act on the shot in flight. What is not listed here is not simulated."""
-
-    model_config = STRICT
-
-    gravity: bool = Field(default=True, description="9.80665 m/s² downwards")
-    part_turn: PartTurn | None = Field(
-        default=None, description="{ rpm = ... } or { angle_deg = ..., frequency_hz = ... }"
-    )
-    rest: bool | None = Field(
-        default=None,
-        description="balls slide and lie still on surfaces that do not vibrate; left out: where the chamber has some "
-        "that face up",
-    )
-
-    @model_validator(mode="after")
-    def _agree(self) -> Self:
-        if self.rest and not self.gravity:
-            raise CrossCheckError([Problem("rest", "given true with gravity = false; nothing lies still without")])
-        if self.rest and self.part_turn is not None:
-            raise CrossCheckError([Problem("rest", "given true with part_turn: not supported together yet")])
-        return self
 
 
 class Accuracy(BaseModel):

@@ -15,11 +15,12 @@ from sim_core.effects.restitution import Restitution, checked_restitution
 from sim_core.effects.turn import Turning, angle_now, checked_axle, checked_turn
 from sim_core.effects.vibration import Wave, checked_wave
 from sim_core.errors import SimulationError
-from sim_core.events import DONE, PAGE_FULL, STORM, TOO_FAST, Clock, Loop, Shot, advance
+from sim_core.events import DONE, PAGE_FULL, STORM, TOO_FAST, advance
 from sim_core.flight import WINDOW
 from sim_core.grounded import hide_all
 from sim_core.impacts import ImpactLog, ImpactPage, impact_log, new_page
 from sim_core.invariants import closest_pair, contained, posed
+from sim_core.loop import Clock, Loop, Shot
 from sim_core.neighbours import new_crowd
 from sim_core.resting import Resting, resting
 from sim_core.scene import TOUCH, Scene

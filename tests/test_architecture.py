@@ -11,7 +11,8 @@ ROOT = Path(__file__).resolve().parents[1]
 # Each line may import from the lines above it, and from its own line. A folder stands for all of its files.
 CHAMBEROPT_ORDER = (
     ("errors",),
-    ("diagnosis", "disk", "materials"),
+    ("diagnosis", "disk", "fields", "materials"),
+    ("effects",),
     ("design",),
     ("config",),
     ("mesh_io", "solids", "slivers", "triangles"),
@@ -42,7 +43,10 @@ SIM_CORE_ORDER = (
     ("physics",),
     ("flight",),
     ("detect", "resolve"),
-    ("calendar", "blocks", "neighbours", "grounded", "impacts", "events"),
+    ("calendar", "blocks", "neighbours", "grounded", "impacts"),
+    ("loop",),
+    ("hits",),
+    ("events",),
     ("scene", "resting"),
     ("simulate",),
     ("warm_up",),

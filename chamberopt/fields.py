@@ -1,0 +1,19 @@
+"""The kinds of numbers a file holds, with what is shown when one is wrong."""
+
+from typing import Annotated, Any
+
+from pydantic import Field
+
+# TOML has lists only: these two become tuples at the door, their numbers stay strict.
+Pair = Annotated[tuple[float, float], Field(strict=False)]
+Triple = Annotated[tuple[float, float, float], Field(strict=False)]
+
+
+def quantity(low: float, high: float, unit: str, what: str, default: Any = ...) -> Any:
+    """A bounded number of the file; unit and meaning are shown when it is wrong."""
+    return Field(default, ge=low, le=high, description=what, json_schema_extra={"unit": unit})
+
+
+def listed(form: str, what: str, default: Any = ...) -> Any:
+    """A list of numbers of the file, its form shown when it is wrong."""
+    return Field(default, description=what, json_schema_extra={"form": form})

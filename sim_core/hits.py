@@ -1,0 +1,166 @@
+"""What an event does: a ball meets a surface, the turning part or another ball, or takes a step in contact mode."""
+
+import math
+
+from sim_core._compile import inlined
+from sim_core.calendar import EVENTS
+from sim_core.detect.ball_triangle import away_from_capsule, face_normal, nearer_neighbour
+from sim_core.effects.gravity import acceleration
+from sim_core.effects.rest import ASLEEP, MODE, Footing, own_pull, static_law
+from sim_core.effects.turn import Turning, from_part, seen_from_part, slip
+from sim_core.effects.vibration import surface_velocity
+from sim_core.flight import drift, kick, point_at, point_under
+from sim_core.grounded import hide, lies_still, wake_if_it_moves
+from sim_core.impacts import note_impact
+from sim_core.loop import SONOTRODE, WALLS, Loop
+from sim_core.neighbours import follow
+from sim_core.resolve.ball_ball import pair_kick
+from sim_core.resolve.ball_surface import surface_kick
+from sim_core.resolve.footing import BOUNCES, ROLLS, deflect, land, set_out, step
+from sim_core.resolve.leaning import hold, meet
+from sim_core.surfaces.locate import triangle_at
+from sim_core.surfaces.obstacles import CAPSULE, WAVING_FACE
+from sim_core.surfaces.part import PartTree
+from sim_core.vec3 import Vec3, dot, sub
+
+JAM_EVENTS = 5_000  # of one ball in one window: with contact mode it is held still then, and each time as many later
+
+
+@inlined
+def hit_surface(loop: Loop, ball: int, obstacle: int, time: float) -> None:
+    """The ball meets the obstacle now: change its velocity, count the impact, write it down if it is on a recorded
+    surface.
+    """
+    shot, ground, clock, page = loop.shot, loop.ground, loop.clock, loop.page
+    tree = ground.tree
+    here = point_under(shot.motion, ball, time, own_pull(loop.footing, ball, loop.gravity))
+    moment = clock.now[1] * clock.window + time
+    lay_still = lies_still(loop.footing, ball)
+    kind = tree.kinds[obstacle]
+    side = 0
+    touched = here.position  # or where the ball's centre is seen in the face's plane
+    if kind == CAPSULE:
+        away = away_from_capsule(tree.numbers, obstacle, here.position)
+        side = nearer_neighbour(tree.numbers, obstacle, away)
+        touched = sub(here.position, away)
+        here = set_out(loop.footing, shot.motion, ball, time, here, away, tree.radius)
+    else:
+        away = face_normal(tree.numbers, obstacle)
+    relative = here.velocity
+    landed = BOUNCES
+    law = loop.restitution
+    if kind == WAVING_FACE:
+        relative = sub(relative, surface_velocity(loop.wave, time))
+    else:
+        landed = land(loop.footing, tree, shot.motion, ball, obstacle, time, moment, here, away)
+        law = static_law(loop.footing, loop.restitution)
+    triangle = tree.triangles[obstacle, side]
+    tag = ground.tags[triangle]
+    if landed == BOUNCES:
+        change = surface_kick(away, relative, law, tag)
+        deflect(loop.footing, shot.motion, ball, time, moment, here, change)
+    follow(shot.crowd, shot.motion, ball, time)
+    hide(loop.footing, shot.crowd, ball)
+    if lay_still:
+        wake_if_it_moves(loop.footing, loop.calendar, shot.motion, ball, time, shot.crowd.reach)
+    if landed == ROLLS:
+        return
+    if kind == WAVING_FACE:
+        loop.tally[SONOTRODE] += 1
+    else:
+        loop.tally[WALLS] += 1
+    speed = -dot(away, relative) / math.sqrt(dot(away, away))
+    if page.record[tag] and speed > 0.0:
+        when = clock.now[1] * clock.window + time - clock.origin
+        note_impact(page, when, ball, triangle_at(ground.locator, triangle, touched), here.position, relative, speed)
+
+
+@inlined
+def hit_part(turning: Turning | None, part: PartTree | None, loop: Loop, ball: int, obstacle: int, time: float) -> bool:
+    """The same for an obstacle of the turning part, seen and written down in the part's frame; False if it is none."""
+    if turning is None or part is None:
+        return False
+    row = obstacle - len(loop.ground.tree.kinds)
+    if row < 0:
+        return False
+    shot, clock, page, tree = loop.shot, loop.clock, loop.page, part.tree
+    here = point_at(shot.motion, ball, time, loop.gravity)
+    seen = seen_from_part(turning, here.position, here.velocity, acceleration(loop.gravity), time)
+    side = 0
+    if tree.kinds[row] == CAPSULE:
+        away = away_from_capsule(tree.numbers, row, seen.position)
+        side = nearer_neighbour(tree.numbers, row, away)
+    else:
+        normal = face_normal(tree.numbers, row)
+        away = Vec3(tree.radius * normal.x, tree.radius * normal.y, tree.radius * normal.z)
+    relative = slip(turning, seen, away, time)
+    loop.tally[WALLS] += 1
+    triangle = tree.triangles[row, side]
+    tag = loop.ground.tags[triangle]
+    kick(shot.motion, ball, time, from_part(turning, surface_kick(away, relative, loop.restitution, tag), time))
+    follow(shot.crowd, shot.motion, ball, time)
+    speed = -dot(away, relative) / math.sqrt(dot(away, away))
+    if page.record[tag] and speed > 0.0:
+        when = clock.now[1] * clock.window + time - clock.origin
+        touched = triangle_at(loop.ground.locator, triangle, sub(seen.position, away))
+        note_impact(page, when, ball, touched, seen.position, relative, speed)
+    return True
+
+
+@inlined
+def collide(loop: Loop, one: int, two: int, time: float) -> None:
+    """Two balls meet now."""
+    motion = loop.shot.motion
+    _kick_both(loop.footing, loop, one, two, time)
+    follow(loop.shot.crowd, motion, one, time)
+    follow(loop.shot.crowd, motion, two, time)
+    hide(loop.footing, loop.shot.crowd, one)
+    hide(loop.footing, loop.shot.crowd, two)
+
+
+@inlined
+def _kick_both(footing: Footing | None, loop: Loop, one: int, two: int, time: float) -> None:
+    motion = loop.shot.motion
+    if footing is not None:
+        moment = loop.clock.now[1] * loop.clock.window + time
+        if meet(footing, motion, one, two, time, moment, loop.restitution, loop.ground.tree.radius):
+            reach = loop.shot.crowd.reach
+            wake_if_it_moves(footing, loop.calendar, motion, one, time, reach)
+            wake_if_it_moves(footing, loop.calendar, motion, two, time, reach)
+        return
+    apart = sub(drift(motion, two, time), drift(motion, one, time))
+    closing = Vec3(motion[two, 3] - motion[one, 3], motion[two, 4] - motion[one, 4], motion[two, 5] - motion[one, 5])
+    change = pair_kick(apart, closing, loop.restitution)
+    kick(motion, one, time, change)
+    kick(motion, two, time, Vec3(-change.x, -change.y, -change.z))
+
+
+@inlined
+def take_step(footing: Footing | None, loop: Loop, ball: int, what: int, time: float) -> bool:
+    """A ball in contact mode comes to a border or a stop, or is woken; False if it is none of these."""
+    if footing is None:
+        return False
+    motion = loop.shot.motion
+    lay_still = lies_still(footing, ball)
+    here = point_under(motion, ball, time, own_pull(footing, ball, loop.gravity))
+    if not step(footing, motion, ball, what, time, loop.clock.now[1] * loop.clock.window + time, here):
+        return False
+    follow(loop.shot.crowd, motion, ball, time)
+    hide(footing, loop.shot.crowd, ball)
+    if lay_still:
+        wake_if_it_moves(footing, loop.calendar, motion, ball, time, loop.shot.crowd.reach)
+    return True
+
+
+@inlined
+def gives_up(footing: Footing | None, loop: Loop, ball: int, time: float) -> bool:
+    """True when a ball in a jam that contact mode cannot resolve is held still for it."""
+    if footing is None:
+        return False
+    if loop.calendar.marks[ball, EVENTS] % JAM_EVENTS != 0 or footing.marks[ball, MODE] >= ASLEEP:
+        return False
+    here = point_under(loop.shot.motion, ball, time, own_pull(footing, ball, loop.gravity))
+    hold(footing, loop.shot.motion, ball, time, loop.clock.now[1] * loop.clock.window + time, here.position)
+    follow(loop.shot.crowd, loop.shot.motion, ball, time)
+    hide(footing, loop.shot.crowd, ball)
+    return True

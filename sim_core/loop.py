@@ -1,0 +1,58 @@
+"""What the event loop works on: every column of a scene being played, in one tuple."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sim_core.calendar import Calendar
+from sim_core.detect.ball_mesh import Scratch
+from sim_core.effects.gravity import Gravity
+from sim_core.effects.rest import Footing
+from sim_core.effects.restitution import Restitution
+from sim_core.effects.turn import Turning
+from sim_core.effects.vibration import Wave
+from sim_core.impacts import ImpactPage
+from sim_core.neighbours import Crowd
+from sim_core.stopwatch import Stopwatch
+from sim_core.surfaces.ground import Ground
+
+# columns of Loop.tally
+WALLS, BALLS, SONOTRODE, SEARCHES, STALE = 0, 1, 2, 3, 4
+
+
+class Shot(NamedTuple):
+    """The balls for the loop: ``motion`` (n, 6) float64 in the free-fall frame, and the ``crowd`` made of it."""
+
+    motion: np.ndarray
+    crowd: Crowd
+
+
+class Clock(NamedTuple):
+    """``now`` (2,): time on the window's clock [s], and windows gone by; ``window`` [s]; ``stop`` [s] and ``origin``
+    [s]
+
+    on the scene's clock: where to stop, and what impact times count from.
+    """
+
+    now: np.ndarray
+    window: float
+    stop: float
+    origin: float
+
+
+class Loop(NamedTuple):
+    """Everything the event loop works on; ``tally`` (5,) int64, see WALLS and below; ``watch`` only to measure."""
+
+    shot: Shot
+    ground: Ground
+    calendar: Calendar
+    scratch: Scratch
+    gravity: Gravity | None
+    restitution: Restitution | None
+    wave: Wave | None
+    turning: Turning | None
+    clock: Clock
+    page: ImpactPage
+    tally: np.ndarray
+    watch: Stopwatch | None
+    footing: Footing | None
