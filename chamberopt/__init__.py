@@ -16,3 +16,8 @@ def __getattr__(name: str) -> Any:
     if name in __all__:
         return getattr(import_module("chamberopt.workbench"), name)
     raise AttributeError(f"module 'chamberopt' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """The same names, for a Python prompt."""
+    return sorted({*globals(), *__all__})

@@ -13,18 +13,19 @@ def new_folder(path: str | Path) -> Path:
     """The folder, made if need be; InputError when something is in it: results are never overwritten."""
     folder = Path(path)
     if os.path.lexists(folder) and not os.path.isdir(folder):
-        raise InputError(f"{folder}: is a file; results need a folder: choose another place with --out DIR")
+        raise InputError(f"{folder}: is a file; results need a folder: choose another folder (out, or --out)")
     try:
         if folder.is_dir() and any(folder.iterdir()):
             raise InputError(
-                f"{folder}: already holds files, and results are never overwritten: choose another folder with "
-                "--out DIR or remove this one (resuming a study is not supported yet)"
+                f"{folder}: already holds files, and results are never overwritten: choose "
+                "another folder (out, or --out) or remove this one (resuming a study is not supported yet)"
             )
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):  # better now than after an hour's work
             pass
     except OSError as error:
-        raise InputError(f"{folder}: cannot be written: {error.strerror}; choose another place with --out") from None
+        why = f"{folder}: cannot be written: {error.strerror}; choose another folder (out, or --out)"
+        raise InputError(why) from None
     return folder
 
 

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 
 from chamberopt.config import Study, load_design, load_study
 from chamberopt.design import Design
+from chamberopt.errors import InputError
 
 if TYPE_CHECKING:
     from chamberopt.accuracy import Progress
@@ -40,10 +41,11 @@ def simulate(
     from chamberopt.executor import local_executor
     from chamberopt.results import load_result, write_simulation
 
+    _require("design", design, Design, "load_design")
     chamber = build_chamber(design)
     with local_executor(workers) as executor:
         evaluation = evaluate(design, chamber, executor, progress)
-    _warn(write_simulation(out, design, chamber, evaluation))
+    _warn([*evaluation.notes, *write_simulation(out, design, chamber, evaluation)])
     return load_result(out)
 
 
@@ -56,18 +58,26 @@ def optimise(study: Study, out: str | Path, *, workers: int | None = None, progr
     from chamberopt.results import load_result, write_study
     from chamberopt.study import run_study
 
+    _require("study", study, Study, "load_study")
     with local_executor(workers) as executor:
         found = run_study(study, out, executor, progress)
-    _warn(write_study(out, found))
+    _warn([*found.best.evaluation.notes, *write_study(out, found)])
     return load_result(out)
 
 
 def show(result: Result, screenshot: str | Path | None = None) -> None:
     """The part coloured by coverage in its chamber: in a window, or as a picture in the file ``screenshot``."""
-    from chamberopt.results import summary
+    from chamberopt.results import Result, summary
     from chamberopt.viewer import inspect
 
+    _require("result", result, Result, "simulate")
     inspect(result.folder, screenshot, title=f"{result.folder.resolve().name}\n{summary(result)}")
+
+
+def _require(name: str, given: object, kind: type, maker: str) -> None:
+    """InputError for what is no design, study or result, such as the path of one."""
+    if not isinstance(given, kind):
+        raise InputError(f"{name}: given {given!r}; give a {kind.__name__}, as chamberopt.{maker} makes it")
 
 
 def _warn(remarks: list[str]) -> None:
