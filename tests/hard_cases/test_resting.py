@@ -4,10 +4,6 @@ Steel balls of 3 mm; frictionless where nothing else is said. e is constant, so 
 """
 
 import math
-import os
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -33,6 +29,7 @@ from sim_core.invariants import clearance, closest_pair, energy
 from sim_core.simulate import _Run
 from tests.cavities import FLOOR, box, cylinder
 from tests.hard_cases.terrain import profile, terrain
+from tests.same_bits import with_and_without_jit
 from tests.sim_core.test_determinism import fingerprint
 
 DIAMETER = 3e-3
@@ -374,13 +371,7 @@ def test_a_scene_with_rest_gives_the_same_bits_with_the_jit_off() -> None:
         "from tests.sim_core.test_determinism import fingerprint;"
         "r = simulate(small_scene()); print(r.collisions.total, len(r.resting), fingerprint(r))"
     )
-    here = Path(__file__).parents[2]
-    answers = [
-        subprocess.run(
-            [sys.executable, "-c", code], cwd=here, env=env, check=True, capture_output=True, text=True
-        ).stdout
-        for env in ({**os.environ, "NUMBA_DISABLE_JIT": "1"}, dict(os.environ))
-    ]
+    answers = with_and_without_jit(code)
     assert int(answers[0].split()[0]) > 50
     assert int(answers[0].split()[1]) > 0
     assert answers[0] == answers[1]

@@ -1,10 +1,7 @@
 """A part that turns: contacts against references made without the code under test, and what turning must keep."""
 
 import os
-import subprocess
-import sys
 from collections.abc import Callable
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -29,6 +26,7 @@ from sim_core import (
 from sim_core.invariants import clearance
 from tests.cavities import box_around
 from tests.hard_cases.turning_scenes import BODIES, PART, Rotor, bar
+from tests.same_bits import with_and_without_jit
 
 EARLY = 1e-12  # m
 SAMPLES = 1500
@@ -284,13 +282,7 @@ def test_the_same_scene_gives_the_same_bits_with_the_jit_on_and_off() -> None:
         "from tests.hard_cases.test_turning_part import crowd, Turn, PART; from sim_core import simulate;"
         "r = simulate(crowd(Turn(PART, rpm=400.0), 0.06, 8)); print(r.collisions.total, fingerprint(r))"
     )
-    here = Path(__file__).parents[2]
-    answers = [
-        subprocess.run(
-            [sys.executable, "-c", code], cwd=here, env=env, check=True, capture_output=True, text=True
-        ).stdout
-        for env in ({**os.environ, "NUMBA_DISABLE_JIT": "1"}, dict(os.environ))
-    ]
+    answers = with_and_without_jit(code)
     assert int(answers[0].split()[0]) > 20
     assert answers[0] == answers[1]
 

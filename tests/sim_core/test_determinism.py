@@ -1,16 +1,13 @@
 """Same scene, same bits: run twice, on threads, with the JIT off, stopped and resumed."""
 
 import hashlib
-import os
-import subprocess
-import sys
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import numpy as np
 
 from sim_core import Balls, Gravity, Physics, Restitution, Result, Scene, Vibration, pack_balls, simulate
 from tests.cavities import FLOOR, cylinder
+from tests.same_bits import with_and_without_jit
 
 PHYSICS = Physics(
     Gravity(),
@@ -47,14 +44,7 @@ def test_the_jit_switched_off_gives_the_same_bits() -> None:
         "from tests.sim_core.test_determinism import fingerprint, small_scene; from sim_core import simulate;"
         "r = simulate(small_scene(0.03, 6)); print(r.collisions.total, fingerprint(r))"
     )
-    here = Path(__file__).parents[2]
-    plain = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
-    answers = [
-        subprocess.run(
-            [sys.executable, "-c", code], cwd=here, env=env, check=True, capture_output=True, text=True
-        ).stdout
-        for env in (plain, dict(os.environ))
-    ]
+    answers = with_and_without_jit(code)
     assert int(answers[0].split()[0]) > 50
     assert answers[0] == answers[1]
 
