@@ -70,14 +70,12 @@ class Effects(BaseModel):
     )
     rest: bool | None = Field(
         default=None,
-        description="balls slide and lie still on surfaces that do not vibrate; left out: where the chamber has some "
-        "that face up",
+        description="balls slide and lie still on surfaces that neither vibrate nor turn; left out: where the chamber "
+        "has some that face up",
     )
 
     @model_validator(mode="after")
     def _agree(self) -> Self:
         if self.rest and not self.gravity:
             raise CrossCheckError([Problem("rest", "given true with gravity = false; nothing lies still without")])
-        if self.rest and self.part_turn is not None:
-            raise CrossCheckError([Problem("rest", "given true with part_turn: not supported together yet")])
         return self

@@ -108,7 +108,7 @@ def build_scene(design: Design, mesh: TriangleMesh, seed: int) -> Scene:
     gravity = Gravity() if design.effects.gravity else None
     rests = design.effects.rest
     if rests is None:
-        rests = turn is None and can_rest(mesh, gravity, TAG_SONOTRODE)
+        rests = can_rest(mesh, gravity, TAG_SONOTRODE, *([] if turn is None else [TAG_PART]))
     physics = Physics(
         gravity=gravity,
         restitution=Restitution(surfaces=surfaces, balls=(materials.shot.restitution, materials.shot.yield_speed)),

@@ -78,6 +78,14 @@ def call_up(calendar: Calendar, ball: int, time: float, what: int) -> None:
 
 
 @jit
+def look_again(calendar: Calendar, ball: int, time: float) -> None:
+    """Have the ball look again, now, for how its own path ends; its meeting stands."""
+    calendar.wall_time[ball] = time
+    calendar.marks[ball, OBSTACLE] = SEARCH_ON
+    reschedule(calendar, ball)
+
+
+@jit
 def set_calendar_back(calendar: Calendar, window: float) -> None:
     """Move the clock's zero forward by ``window`` [s]; the order of events stays."""
     for ball in range(len(calendar.pair_time)):

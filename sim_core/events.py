@@ -23,7 +23,7 @@ from sim_core.detect.ball_footing import end_of_path
 from sim_core.detect.ball_mesh import first_contact_from
 from sim_core.detect.ball_part import first_part_contact
 from sim_core.effects.rest import STILL, own_pull
-from sim_core.effects.turn import carry
+from sim_core.effects.turn import carry, one_turn
 from sim_core.flight import point_under, set_back
 from sim_core.grounded import first_meeting, hide_all
 from sim_core.hits import collide, gives_up, hit_part, hit_surface, take_step
@@ -69,7 +69,9 @@ def _predict(loop: Loop, ball: int, time: float, what: int) -> None:
         tree, seam = loop.ground.tree, loop.ground.seam
         pull = own_pull(loop.footing, ball, loop.gravity)
         here = point_under(shot.motion, ball, time, pull)
-        length, end = end_of_path(loop.footing, tree, seam, loop.wave, here, pull, ball, length)
+        moment = loop.clock.now[1] * loop.clock.window + time
+        length, end = end_of_path(loop.footing, tree, seam, loop.wave, here, pull, ball, moment, length)
+        look = one_turn(loop.turning, length) if end == STILL else length
         delay, obstacle = first_contact_from(
             loop.footing, ball, tree, loop.scratch, here, pull, loop.wave, seam, time, length
         )
@@ -78,14 +80,14 @@ def _predict(loop: Loop, ball: int, time: float, what: int) -> None:
             loop.turning,
             loop.scratch,
             here,
-            loop.gravity,
+            pull,
             seam,
             time,
-            delay if obstacle >= 0 else length,
+            delay if obstacle >= 0 else look,
             obstacle,
             len(tree.kinds),
         )
-        if obstacle < 0:
+        if obstacle < 0 and delay >= look:  # and not a search that gave up before
             delay, obstacle = (NEVER if end == STILL else length), end
         calendar.wall_time[ball] = time + delay
         marks[ball, OBSTACLE] = obstacle

@@ -7,9 +7,24 @@ import numpy as np
 
 from sim_core._compile import inlined, jit
 from sim_core.blocks import slot_of
-from sim_core.calendar import Calendar, call_up
+from sim_core.calendar import Calendar, call_up, look_again
 from sim_core.detect.ball_ball import pulled_meeting_delay
-from sim_core.effects.rest import ASLEEP, CALLED, FLYING, JAMMED, MODE, WAKES, Footing, stands_on_ball
+from sim_core.effects.rest import (
+    ASLEEP,
+    CALLED,
+    FEET,
+    FLYING,
+    JAMMED,
+    MODE,
+    ON_BALL,
+    PROPPED_BY,
+    PROPS,
+    STAYS_UNTIL,
+    WAKES,
+    Footing,
+    drop_foot,
+    stands_on_ball,
+)
 from sim_core.flight import Point, point_under
 from sim_core.neighbours import Crowd, next_meeting
 from sim_core.roots import NEVER
@@ -107,18 +122,24 @@ def lies_still(footing: Footing | None, ball: int) -> bool:
 
 @inlined
 def wake_if_it_moves(
-    footing: Footing | None, calendar: Calendar, motion: np.ndarray, ball: int, time: float, reach: float
+    footing: Footing | None,
+    calendar: Calendar,
+    motion: np.ndarray,
+    ball: int,
+    time: float,
+    moment: float,
+    reach: float,
 ) -> None:
     """What leans on a ball that lay still is woken when it no longer does."""
     if footing is None:
         return
     if footing.marks[ball, MODE] < ASLEEP:
-        wake_neighbours(footing, calendar, motion, ball, time, reach)
+        wake_neighbours(footing, calendar, motion, ball, time, moment, reach)
 
 
 @jit
 def wake_neighbours(
-    footing: Footing, calendar: Calendar, motion: np.ndarray, ball: int, time: float, reach: float
+    footing: Footing, calendar: Calendar, motion: np.ndarray, ball: int, time: float, moment: float, reach: float
 ) -> None:
     """Call up the balls that stand on one that has begun to move, and those held still beside it.
 
@@ -134,4 +155,38 @@ def wake_neighbours(
             leans = dot(apart, apart) < (reach + LEANING) ** 2
         if leans:
             footing.marks[other, CALLED] = 1
-            call_up(calendar, other, time, WAKES)
+            if footing.memory[other, STAYS_UNTIL] > moment:
+                _step_off(footing, other, ball)  # until then they are a pair like others
+                look_again(calendar, other, time)
+            else:
+                call_up(calendar, other, time, WAKES)
+
+
+@jit
+def _step_off(footing: Footing, ball: int, other: int) -> None:
+    foot = 0
+    while foot < footing.marks[ball, FEET]:
+        if footing.rows[ball, foot] == ON_BALL - other:
+            drop_foot(footing, ball, foot)
+        else:
+            foot += 1
+
+
+@jit
+def count_props(footing: Footing, motion: np.ndarray, ball: int, time: float, reach: float) -> bool:
+    """Note which balls are about a jammed one, if any of them moves: it may not be held any more once one has gone.
+
+    True when they are not those noted before.
+    """
+    here = _place(footing, motion, ball, time).position
+    count, numbers, moves = 0, 0, False
+    for other in range(len(motion)):
+        apart = sub(_place(footing, motion, other, time).position, here)
+        if other != ball and dot(apart, apart) < (reach + LEANING) ** 2:
+            count += 1
+            numbers += other
+            moves |= footing.marks[other, MODE] < ASLEEP
+    others = count != footing.marks[ball, PROPS] or numbers != footing.memory[ball, PROPPED_BY]
+    footing.marks[ball, PROPS] = count if moves else 0
+    footing.memory[ball, PROPPED_BY] = numbers
+    return others

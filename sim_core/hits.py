@@ -5,19 +5,18 @@ import math
 from sim_core._compile import inlined
 from sim_core.calendar import EVENTS
 from sim_core.detect.ball_triangle import away_from_capsule, face_normal, nearer_neighbour
-from sim_core.effects.gravity import acceleration
-from sim_core.effects.rest import ASLEEP, MODE, Footing, own_pull, static_law
+from sim_core.effects.rest import ASLEEP, CALLED, DRIVEN, JAMMED, LOOKS, MODE, Footing, own_pull, static_law
 from sim_core.effects.turn import Turning, from_part, seen_from_part, slip
 from sim_core.effects.vibration import surface_velocity
-from sim_core.flight import drift, kick, point_at, point_under
-from sim_core.grounded import hide, lies_still, wake_if_it_moves
+from sim_core.flight import drift, kick, point_under
+from sim_core.grounded import count_props, hide, lies_still, wake_if_it_moves
 from sim_core.impacts import note_impact
 from sim_core.loop import SONOTRODE, WALLS, Loop
 from sim_core.neighbours import follow
 from sim_core.resolve.ball_ball import pair_kick
 from sim_core.resolve.ball_surface import surface_kick
 from sim_core.resolve.footing import BOUNCES, ROLLS, deflect, land, set_out, step
-from sim_core.resolve.leaning import hold, meet
+from sim_core.resolve.leaning import drive, hold, meet
 from sim_core.surfaces.locate import triangle_at
 from sim_core.surfaces.obstacles import CAPSULE, WAVING_FACE
 from sim_core.surfaces.part import PartTree
@@ -62,7 +61,7 @@ def hit_surface(loop: Loop, ball: int, obstacle: int, time: float) -> None:
     follow(shot.crowd, shot.motion, ball, time)
     hide(loop.footing, shot.crowd, ball)
     if lay_still:
-        wake_if_it_moves(loop.footing, loop.calendar, shot.motion, ball, time, shot.crowd.reach)
+        wake_if_it_moves(loop.footing, loop.calendar, shot.motion, ball, time, moment, shot.crowd.reach)
     if landed == ROLLS:
         return
     if kind == WAVING_FACE:
@@ -84,8 +83,11 @@ def hit_part(turning: Turning | None, part: PartTree | None, loop: Loop, ball: i
     if row < 0:
         return False
     shot, clock, page, tree = loop.shot, loop.clock, loop.page, part.tree
-    here = point_at(shot.motion, ball, time, loop.gravity)
-    seen = seen_from_part(turning, here.position, here.velocity, acceleration(loop.gravity), time)
+    pull = own_pull(loop.footing, ball, loop.gravity)
+    here = point_under(shot.motion, ball, time, pull)
+    moment = clock.now[1] * clock.window + time
+    lay_still = lies_still(loop.footing, ball)
+    seen = seen_from_part(turning, here.position, here.velocity, pull, time)
     side = 0
     if tree.kinds[row] == CAPSULE:
         away = away_from_capsule(tree.numbers, row, seen.position)
@@ -97,9 +99,13 @@ def hit_part(turning: Turning | None, part: PartTree | None, loop: Loop, ball: i
     loop.tally[WALLS] += 1
     triangle = tree.triangles[row, side]
     tag = loop.ground.tags[triangle]
-    kick(shot.motion, ball, time, from_part(turning, surface_kick(away, relative, loop.restitution, tag), time))
-    follow(shot.crowd, shot.motion, ball, time)
+    change = from_part(turning, surface_kick(away, relative, loop.restitution, tag), time)
     speed = -dot(away, relative) / math.sqrt(dot(away, away))
+    drive(loop.footing, turning, shot.motion, ball, time, moment, here, away, speed, change)
+    follow(shot.crowd, shot.motion, ball, time)
+    hide(loop.footing, shot.crowd, ball)
+    if lay_still:
+        wake_if_it_moves(loop.footing, loop.calendar, shot.motion, ball, time, moment, shot.crowd.reach)
     if page.record[tag] and speed > 0.0:
         when = clock.now[1] * clock.window + time - clock.origin
         touched = triangle_at(loop.ground.locator, triangle, sub(seen.position, away))
@@ -123,10 +129,15 @@ def _kick_both(footing: Footing | None, loop: Loop, one: int, two: int, time: fl
     motion = loop.shot.motion
     if footing is not None:
         moment = loop.clock.now[1] * loop.clock.window + time
+        reach = loop.shot.crowd.reach
+        jammed = footing.marks[one, MODE] == JAMMED, footing.marks[two, MODE] == JAMMED
         if meet(footing, motion, one, two, time, moment, loop.restitution, loop.ground.tree.radius):
-            reach = loop.shot.crowd.reach
-            wake_if_it_moves(footing, loop.calendar, motion, one, time, reach)
-            wake_if_it_moves(footing, loop.calendar, motion, two, time, reach)
+            wake_if_it_moves(footing, loop.calendar, motion, one, time, moment, reach)
+            wake_if_it_moves(footing, loop.calendar, motion, two, time, moment, reach)
+        if footing.marks[one, MODE] == JAMMED and not jammed[0]:
+            count_props(footing, motion, one, time, reach)
+        if footing.marks[two, MODE] == JAMMED and not jammed[1]:
+            count_props(footing, motion, two, time, reach)
         return
     apart = sub(drift(motion, two, time), drift(motion, one, time))
     closing = Vec3(motion[two, 3] - motion[one, 3], motion[two, 4] - motion[one, 4], motion[two, 5] - motion[one, 5])
@@ -143,12 +154,17 @@ def take_step(footing: Footing | None, loop: Loop, ball: int, what: int, time: f
     motion = loop.shot.motion
     lay_still = lies_still(footing, ball)
     here = point_under(motion, ball, time, own_pull(footing, ball, loop.gravity))
-    if not step(footing, motion, ball, what, time, loop.clock.now[1] * loop.clock.window + time, here):
+    moment = loop.clock.now[1] * loop.clock.window + time
+    if what == LOOKS:
+        if count_props(footing, motion, ball, time, loop.shot.crowd.reach):
+            footing.marks[ball, CALLED] = 1
+        return False
+    if not step(footing, motion, ball, what, time, moment, here):
         return False
     follow(loop.shot.crowd, motion, ball, time)
     hide(footing, loop.shot.crowd, ball)
     if lay_still:
-        wake_if_it_moves(footing, loop.calendar, motion, ball, time, loop.shot.crowd.reach)
+        wake_if_it_moves(footing, loop.calendar, motion, ball, time, moment, loop.shot.crowd.reach)
     return True
 
 
@@ -159,8 +175,12 @@ def gives_up(footing: Footing | None, loop: Loop, ball: int, time: float) -> boo
         return False
     if loop.calendar.marks[ball, EVENTS] % JAM_EVENTS != 0 or footing.marks[ball, MODE] >= ASLEEP:
         return False
+    if footing.marks[ball, DRIVEN] != 0:  # the part would go through it
+        return False
     here = point_under(loop.shot.motion, ball, time, own_pull(footing, ball, loop.gravity))
-    hold(footing, loop.shot.motion, ball, time, loop.clock.now[1] * loop.clock.window + time, here.position)
+    moment = loop.clock.now[1] * loop.clock.window + time
+    hold(footing, loop.shot.motion, ball, time, moment, here.position, loop.ground.tree.radius)
+    count_props(footing, loop.shot.motion, ball, time, loop.shot.crowd.reach)
     follow(loop.shot.crowd, loop.shot.motion, ball, time)
     hide(footing, loop.shot.crowd, ball)
     return True

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim_core.effects.gravity import Gravity
-from sim_core.effects.rest import ASLEEP, FEET, JAMMED, MODE, MOST_FEET, ON_BALL, Footing
+from sim_core.effects.rest import ASLEEP, FEET, JAMMED, LIES_SINCE, MODE, MOST_FEET, ON_BALL, Footing
 from sim_core.surfaces.ground import Ground
 from sim_core.surfaces.locate import triangle_at
 from sim_core.surfaces.mesh import TriangleMesh, towards_shot
@@ -58,7 +58,7 @@ def resting(
     return Resting(
         still,
         positions[still],
-        footing.memory[still, 6] - origin,
+        footing.memory[still, LIES_SINCE] - origin,
         triangles,
         balls,
         footing.marks[still, MODE] == JAMMED,
@@ -75,14 +75,14 @@ _EMPTY = (
 )
 
 
-def can_rest(mesh: TriangleMesh, gravity: Gravity | None, vibrating: int | None = None) -> bool:
-    """True when a ball can lie still in the chamber: gravity presses it onto some triangle that does not vibrate.
+def can_rest(mesh: TriangleMesh, gravity: Gravity | None, *moving: int) -> bool:
+    """True when a ball can lie still in the chamber: gravity presses it onto some triangle that keeps still.
 
-    ``vibrating``: the tag of the surface that does.
+    ``moving``: the tags of the surfaces that vibrate or turn.
     """
     if gravity is None:
         return False
     pull = np.array(gravity, dtype=np.float64)
     normals, doubled = towards_shot(mesh.corners)
-    still = (doubled > 0.0) & (mesh.tags != vibrating if vibrating is not None else True)
+    still = (doubled > 0.0) & ~np.isin(mesh.tags, moving)
     return bool((normals[still] @ pull < -UPWARD * np.linalg.norm(pull)).any())

@@ -60,8 +60,6 @@ class Scene:
         vibration, restitution, turn = self.physics.vibration, self.physics.restitution, self.physics.turn
         checked_gravity(self.physics.gravity)
         checked_rest(self.physics.rest)
-        if self.physics.rest is not None and turn is not None:
-            raise SceneError("rest and turn are both given: balls at rest beside a turning part are not supported yet")
         if restitution is not None:
             checked_restitution(restitution, int(self.mesh.tags.max()) + 1)
         checked_wave(vibration)

@@ -20,6 +20,7 @@ from sim_core.flight import WINDOW
 from sim_core.grounded import hide_all
 from sim_core.impacts import ImpactLog, ImpactPage, impact_log, new_page
 from sim_core.invariants import closest_pair, contained, posed
+from sim_core.jams import touching
 from sim_core.loop import Clock, Loop, Shot
 from sim_core.neighbours import new_crowd
 from sim_core.resting import Resting, resting
@@ -160,12 +161,25 @@ class _Run:
                     raise SimulationError(f"ball {ball}: its velocity is not a number any more; {self._when()}")
                 self.shot = self._shot(4.0 * speed)
             elif status == STORM:
-                where = np.round(self._states()[0][ball], 6).tolist()
-                raise SimulationError(
-                    f"ball {ball} jams at {where} m: more than ten million events a second; {self._when()}. "
-                    "Look for a gap just as wide as the ball there"
-                    + ("" if self.footing is not None else "; if balls can lie still there, switch contact mode on")
-                )
+                raise SimulationError(self._jam(ball))
+
+    def _jam(self, ball: int) -> str:
+        positions = self._states()[0]
+        where = np.round(positions[ball], 6).tolist()
+        corners = self._corners()
+        now = self.scene.mesh.corners if corners is None else corners
+        between, by_part = touching(self.scene, now, positions, ball)
+        if self.turning is not None and (by_part or self.footing is not None):
+            through = "" if by_part else ", and the turning part presses on it through other balls"
+            return (
+                f"ball {ball} is caught between {between}{through}, at {where} m, {self._when()}; make room there for "
+                "a ball between the part and what it turns past, or so little that none gets in"
+            )
+        return (
+            f"ball {ball} jams at {where} m{f', between {between}' if between else ''}: more than ten million events "
+            f"a second; {self._when()}. Look for a gap just as wide as the ball there"
+            + ("" if self.footing is not None else "; if balls can lie still there, switch contact mode on")
+        )
 
     def _turn(self, page: ImpactPage) -> None:
         """Put away what the loop has written, and give it the empty page."""

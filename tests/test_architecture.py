@@ -48,6 +48,7 @@ SIM_CORE_ORDER = (
     ("hits",),
     ("events",),
     ("scene", "resting"),
+    ("jams",),
     ("simulate",),
     ("warm_up",),
 )

@@ -103,3 +103,12 @@ def test_the_shipped_study_is_about_the_turning_gear() -> None:
         for bound in bounds:
             changed = study.design.with_values({name: bound})
             require_turnable(changed, chamber_mesh(build_chamber(changed)))
+
+
+def test_balls_rest_beside_a_turning_part_if_asked_or_if_something_still_faces_up(design: Design, mesh) -> None:  # type: ignore[no-untyped-def]
+    """Here only the sonotrode and the gear do, and on neither of them a ball can lie still."""
+    assert build_scene(design, mesh, 1).physics.rest is None
+    asked = design.model_copy(update={"effects": design.effects.model_copy(update={"rest": True})})
+    physics = build_scene(asked, mesh, 1).physics
+    assert physics.rest is not None
+    assert physics.turn is not None

@@ -12,7 +12,10 @@ from sim_core.effects.rest import (
     FLYING,
     GOES_ON,
     LEAVES,
+    LOOKS,
     MODE,
+    PROPS,
+    STAYS_UNTIL,
     STILL,
     STOPS,
     WAKES,
@@ -31,6 +34,7 @@ ONE_PLANE = 1e-5  # rad: faces that meet at less are told apart at their border 
 BEHIND = 2e-13  # m: an edge this little in front of a foot's plane is behind it but for rounding
 TURN = 0.1  # rad: a ball that resistance slows while it curves has its direction read anew after so much
 SHORTEST = 1e-3  # s: but not more often
+LOOK = 2e-3  # s: in which a ball that nothing holds any more would have fallen 20 um, see grounded.LEANING
 
 
 @inlined
@@ -67,11 +71,13 @@ def end_of_path(
     here: Point,
     pull: Vec3,
     ball: int,
+    moment: float,
     length: float,
 ) -> tuple[float, int]:
     """For how long, at most ``length`` [s], the ball's path is good, and what ends it (see GOES_ON).
 
-    A ball that lies still is looked at for one swing of the sonotrode: what does not touch it then never will.
+    ``moment`` [s]: now, since the start. A ball that lies still is looked at for one swing of the sonotrode: what does
+    not touch it then never will.
     """
     if footing is None:
         return length, GOES_ON
@@ -79,7 +85,10 @@ def end_of_path(
     if mode == FLYING:
         return length, GOES_ON
     if footing.marks[ball, CALLED] != 0:
-        return 0.0, WAKES
+        wait = max(0.0, footing.memory[ball, STAYS_UNTIL] - moment)
+        return (wait, WAKES) if wait <= length else (length, GOES_ON)
+    if footing.marks[ball, PROPS] > 0:
+        return LOOK, LOOKS
     if mode >= ASLEEP:
         return _swing(wave), STILL
     best, end = length, GOES_ON

@@ -12,7 +12,6 @@ import numpy as np
 from sim_core._compile import inlined, jit
 from sim_core.detect.ball_mesh import SLACK, TINY, Scratch, stack_children
 from sim_core.detect.ball_triangle import CONTACT, HALF, away_from_capsule, face_normal, within_borders
-from sim_core.effects.gravity import Gravity, acceleration
 from sim_core.effects.turn import Seen, Turning, jerk_bound, seen_from_part
 from sim_core.flight import Point
 from sim_core.roots import NEVER, first_approach
@@ -35,7 +34,7 @@ def first_part_contact(
     turning: Turning | None,
     scratch: Scratch,
     ball: Point,
-    gravity: Gravity | None,
+    fall: Vec3,
     seam: float,
     time: float,
     limit: float,
@@ -44,12 +43,11 @@ def first_part_contact(
 ) -> tuple[float, int]:
     """Delay [s] and obstacle of the first contact with the part before ``limit`` [s]; (limit, known) if there is none.
 
-    ``time`` [s]: now, on the window's clock. The part's obstacles are numbered from ``first`` on. A search that runs
-    out of steps answers (how far it got, -1).
+    ``fall`` [m/s²]: the ball's acceleration; ``time`` [s]: now, on the window's clock. The part's obstacles are
+    numbered from ``first`` on. A search that runs out of steps answers (how far it got, -1).
     """
     if part is None or turning is None:
         return limit, known
-    fall = acceleration(gravity)
     jerk = _jerk(part, turning, ball, fall, limit)
     if jerk < 0.0:
         return limit, known

@@ -7,10 +7,12 @@ one nearest to the free one), so its motion is a parabola again, its own. ``resi
 load on its feet: sliding friction without rotation, or what rolling resists. What is neglected at a capture is
 below capture²/2 of energy per mass.
 
-Nothing rests on the vibrating surface: hits there keep their law. A ball that lies still is itself such a surface to
-hits slower than Restitution.elastic_below, as if friction held it, so heaps come to rest from below. Two balls that
-lean on each other while they move go on in small hops; one that has made many without getting anywhere is held where
-it is (jammed). A faster hit wakes a ball, and with it what stands on it.
+Nothing rests on the vibrating surface or on a turning part: hits there keep their law. A ball that lies still is
+itself such a surface to hits slower than Restitution.elastic_below, as if friction held it, so heaps come to rest
+from below. Two balls that lean on each other while they move go on in small hops; one that has made many without
+getting anywhere is held where it is (jammed) until one of the balls around it has gone; held at one place again and
+again, for twice as long each time. A faster hit wakes a ball, and with it what stands on it. The turning part moves
+what it touches, slow or not, and what is pressed between it and a ball that lies still moves that one.
 """
 
 import math
@@ -35,12 +37,26 @@ FLYING, SLIDING, ASLEEP, JAMMED = 0, 1, 2, 3
 # columns of Footing.marks
 MODE, FEET, ROLLING, SLOW_HITS = 0, 1, 2, 3
 CALLED = 4  # what it leans on has begun to move, and it has not seen to that yet
+DRIVEN = 5  # 1: the turning part has touched it, or a pressed one; 2: pressed, it is pushed and gets nowhere
+PROPS = 6  # balls about a jammed one, while some of them move
+HOLDS = 7  # how often it was held where it is
+
+# columns of Footing.memory; times [s] since the start
+LEFT = 0  # normal of the foot left last
+HOPS = 3  # where its small hops began [m]
+LIES_SINCE = 6
+HELD_AT = 7  # where it was held last [m]
+STAYS_UNTIL = 10  # a call does not wake it before
+PROPPED_BY = 11  # sum of the numbers of its PROPS
+COUNTS_SINCE = 12  # when its SLOW_HITS were 0
+TOUCHED = 13  # when it was last driven
 
 # what ends a path in contact, in place of an obstacle's number (calendar.py has -1 and -2)
 GOES_ON = -1
 STOPS = -3  # or turns: the resistance is set anew
 WAKES = -4
 STILL = -5
+LOOKS = -6  # a jammed ball looks whether those about it are still there
 LEAVES = -10  # minus the foot's place
 
 ON_BALL = -2  # minus the ball's number: the row of a foot on a ball that lies still
@@ -64,10 +80,9 @@ class Footing(NamedTuple):
 
     ``pull`` (n, 3): each ball's own acceleration [m/s²]; ``normals`` (n, 4, 3) of its feet; ``spots`` (n, 4, 4): where
     [m] a foot was set and how far the ball may go from there on what is round; ``rows`` (n, 4) int32: the obstacles it
-    stands on, or see ON_BALL; ``marks`` (n, 5) int32, see MODE; ``memory`` (n, 7): the normal of the foot left last,
-    where its small hops began [m], and when it came to lie still [s]; ``roster``, ``seat`` (n,) int32 and ``held``
-    (1,): the balls not in flight, each one's place among them, and how many. ``capture``, ``resistance`` as in Rest;
-    ``slow`` [m/s]: pair hits below lose nothing.
+    stands on, or see ON_BALL; ``marks`` (n, 8) int32, see MODE; ``memory`` (n, 14), see LEFT; ``roster``, ``seat``
+    (n,) int32 and ``held`` (1,): the balls not in flight, each one's place among them, and how many. ``capture``,
+    ``resistance`` as in Rest; ``slow`` [m/s]: pair hits below lose nothing.
     """
 
     pull: np.ndarray
@@ -109,8 +124,8 @@ def new_footing(
         np.zeros((balls, MOST_FEET, 3)),
         np.zeros((balls, MOST_FEET, 4)),
         np.full((balls, MOST_FEET), -1, dtype=np.int32),
-        np.zeros((balls, 5), dtype=np.int32),
-        np.zeros((balls, 7)),
+        np.zeros((balls, 8), dtype=np.int32),
+        np.zeros((balls, 14)),
         np.zeros(balls, dtype=np.int32),
         np.full(balls, -1, dtype=np.int32),
         np.zeros(1, dtype=np.int64),

@@ -12,13 +12,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim_core._compile import jit
+from sim_core._compile import inlined, jit
 from sim_core.errors import SceneError, number
 from sim_core.vec3 import Vec3, along, cross, dot, sub
 
 FASTEST = 1e5  # rpm; and the angular speed of 1e5 rpm for a part that swings. No peened part turns a tenth as fast.
 LARGEST_SWING = 100.0 * math.pi  # rad, zero-to-peak
 TURN = 2.0 * math.pi
+ROUND_AGAIN = 1.01  # turns: a little more than one
 
 
 class Turn(NamedTuple):
@@ -159,6 +160,18 @@ def carry(turning: Turning | None, window: float) -> None:
     if turning is None:
         return
     turning.argument[0] = (turning.argument[0] + turning.rate * window) % TURN
+
+
+@inlined
+def one_turn(turning: Turning | None, length: float) -> float:
+    """Time [s] by which the part has been wherever it gets, at least ``length``: what lies still and has not been
+    touched by then never will be.
+    """
+    if turning is None:
+        return length
+    if turning.rate == 0.0:
+        return length
+    return max(length, ROUND_AGAIN * TURN / abs(turning.rate))
 
 
 @jit

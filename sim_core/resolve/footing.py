@@ -10,13 +10,17 @@ from sim_core.effects.rest import (
     CALLED,
     FEET,
     FLYING,
+    JAMMED,
     KISS,
     LEAVES,
+    LIES_SINCE,
     MODE,
     ON_BALL,
+    PROPS,
     ROLLING,
     ROUNDING,
     SLIDING,
+    STAYS_UNTIL,
     STILL_BELOW,
     STOPS,
     WAKES,
@@ -107,7 +111,10 @@ def move_on(
 ) -> None:
     """Give a ball its path and its place on the roster."""
     if mode >= ASLEEP and footing.marks[ball, MODE] < ASLEEP:
-        footing.memory[ball, 6] = moment
+        footing.memory[ball, LIES_SINCE] = moment
+    if mode != JAMMED:
+        footing.memory[ball, STAYS_UNTIL] = 0.0
+        footing.marks[ball, PROPS] = 0
     enrol(footing, ball, mode)
     for axis in range(3):
         footing.pull[ball, axis] = pull[axis]

@@ -24,10 +24,14 @@ from sim_core import (
     simulate,
 )
 from sim_core.effects.gravity import STANDARD as G
-from sim_core.effects.rest import ASLEEP, FEET, JAMMED, MODE, ON_BALL
+from sim_core.effects.rest import ASLEEP, FEET, JAMMED, MODE, ON_BALL, STAYS_UNTIL
+from sim_core.grounded import LEANING, count_props
 from sim_core.invariants import clearance, closest_pair, energy
+from sim_core.resolve.leaning import hold
 from sim_core.simulate import _Run
+from sim_core.vec3 import Vec3
 from tests.cavities import FLOOR, box, cylinder
+from tests.hard_cases.force_balance import force_lacking
 from tests.hard_cases.terrain import profile, terrain
 from tests.same_bits import with_and_without_jit
 from tests.sim_core.test_determinism import fingerprint
@@ -391,3 +395,59 @@ def test_rest_is_checked() -> None:
     for wrong in (Rest(0.0), Rest(CAPTURE, -1.0), Rest(math.nan)):
         with pytest.raises(SceneError, match="rest"):
             Scene(ROOM, shot([0.01, 0.01, 0.01]), Physics(Gravity(), rest=wrong), 1.0)
+
+
+def held_beside_another(leaves: float) -> _Run:
+    """Ball 0 is held in the air, 1 um beside ball 1, which goes aside at ``leaves`` [m/s]."""
+    balls = shot([[0.005, 0.01, 0.03], [0.005 + DIAMETER + 1e-6, 0.01, 0.03]], [[0.0, 0.0, 0.0], [leaves, 0.0, 0.0]])
+    run = _Run(Scene(ROOM, balls, physics(), 1.0))
+    assert run.footing is not None
+    hold_beside(run, 0.0)
+    return run
+
+
+def hold_beside(run: _Run, moment: float) -> None:
+    """Hold ball 0 where it is, as if it had jammed."""
+    assert run.footing is not None
+    here = Vec3(*(float(x) for x in run.motion[0, :3]))
+    hold(run.footing, run.motion, 0, 0.0, moment, here, R)
+    count_props(run.footing, run.motion, 0, 0.0, DIAMETER)
+
+
+def test_a_held_ball_falls_when_one_of_those_around_it_has_gone() -> None:
+    """20 um at 0.1 m/s takes 0.2 ms; it looks every 2 ms."""
+    run = held_beside_another(0.1)
+    assert mode(run) == JAMMED
+    run.play(0.03, record=False)
+    fallen = 0.03 - run.balls().positions[0, 2]
+    assert 0.5 * G * (0.03 - 0.003) ** 2 < fallen <= 0.5 * G * 0.03**2
+
+
+def test_a_ball_held_at_one_place_again_and_again_is_left_there_for_longer_each_time() -> None:
+    """1, 3, 7 ... ms: so that jams cost the logarithm of the time, and none hangs for ever."""
+    run = held_beside_another(0.1)
+    for times in range(1, 6):
+        hold_beside(run, 0.0)
+        assert run.footing is not None
+        assert run.footing.memory[0, STAYS_UNTIL] == pytest.approx(1e-3 * (2**times - 1))
+    run.play(0.03, record=False)
+    assert mode(run) == JAMMED
+    run.play(0.031 + 0.03, record=False)
+    fallen = 0.03 - run.balls().positions[0, 2]
+    assert 0.5 * G * 0.027**2 < fallen <= 0.5 * G * 0.03**2 + TOUCH
+
+
+def test_every_ball_of_a_settled_heap_is_held_by_what_it_touches() -> None:
+    """Forces of contacts within LEANING, each within friction of 0.3, can carry all weights: a linear programme."""
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        room = rough_floor(rng) if seed % 2 else box((0.012, 0.012, 0.06))
+        places = pack_balls(room, 50, DIAMETER, rng)
+        balls = Balls(places, rng.normal(0.0, 0.3, places.shape), DIAMETER)
+        run = _Run(Scene(room, balls, physics([0.5, 0.9][seed // 3], 0.005), 2.0))
+        run.play(2.0, record=False)
+        assert run.footing is not None
+        still = np.flatnonzero(run.footing.marks[:, MODE] >= ASLEEP)
+        assert len(still) > 45
+        lacking = force_lacking(room, run.balls(), still, LEANING, friction=0.3)
+        assert lacking.max() < 0.02, f"seed {seed}: ball {still[lacking.argmax()]} lacks {lacking.max():.2f}"

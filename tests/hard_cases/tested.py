@@ -13,6 +13,7 @@ import numpy as np
 from sim_core.invariants import clearance, closest_pair
 from sim_core.simulate import _Run
 from tests.hard_cases import test_resting as resting
+from tests.hard_cases import test_resting_beside_a_turning_part as beside
 from tests.hard_cases import test_turning_part as turning
 from tests.hard_cases.outcome import Case, Outcome
 
@@ -107,4 +108,13 @@ CASES = [
         "shaft turns in its ceiling",
         turning.test_a_round_shaft_turns_where_it_goes_through_the_ceiling_and_balls_stay_in,
     ),
+    *(
+        tested(f"woken by a paddle at {rpm:g} rpm", beside.test_a_sleeping_ball_is_woken_when_the_paddle_arrives, rpm)
+        for rpm in (0.1, 10.0)
+    ),
+    tested("pushed by a paddle at 0.05 rpm", beside.test_what_it_pushes_pushes_others_however_slowly, 0.05),
+    tested("pile swept at 1 rpm", beside.test_a_pile_swept_by_a_slow_paddle_gets_no_more_speed_than_that_gives, 1.0),
+    tested("at rest below a turning gear", beside.test_balls_rest_below_a_gear_that_turns_and_nothing_overlaps),
+    tested("hops on a turning slab", beside.test_on_the_turning_part_nothing_rests_and_hops_are_bounded),
+    tested("crushed by a cam", beside.test_a_ball_that_the_part_crushes_stops_the_run_and_the_part_is_named),
 ]

@@ -8,6 +8,7 @@ from sim_core import Gravity, TriangleMesh, Turn
 from sim_core._compile import jit
 from sim_core.detect.ball_mesh import Scratch, new_scratch
 from sim_core.detect.ball_part import first_part_contact
+from sim_core.effects.gravity import acceleration
 from sim_core.effects.turn import Turning, checked_axle, checked_turn
 from sim_core.flight import Point
 from sim_core.invariants import clearance, contained
@@ -59,7 +60,8 @@ BODIES = {
 def _search(  # type: ignore[no-untyped-def]
     part: PartTree, turning: Turning, scratch: Scratch, position: Vec3, velocity: Vec3, gravity, seam, time, limit
 ):
-    return first_part_contact(part, turning, scratch, Point(position, velocity), gravity, seam, time, limit, -1, 0)
+    fall = acceleration(gravity)
+    return first_part_contact(part, turning, scratch, Point(position, velocity), fall, seam, time, limit, -1, 0)
 
 
 class Rotor:

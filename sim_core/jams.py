@@ -1,0 +1,43 @@
+"""What a ball is jammed between, in words: whoever has to make room wants to know where."""
+
+import numpy as np
+
+from sim_core.grounded import LEANING
+from sim_core.invariants import clearance
+from sim_core.scene import Scene
+from sim_core.surfaces.mesh import towards_shot
+
+MOST_NAMED = 4  # of the surfaces, and of the balls, nearest first
+ONE_WAY = 0.99  # cosine: triangles that face alike are one surface
+
+
+def touching(scene: Scene, corners: np.ndarray, positions: np.ndarray, ball: int) -> tuple[str, bool]:
+    """What touches the ball, e.g. "triangle 7, the turning part (triangle 12) and ball 3", and whether the part does.
+
+    ``corners`` (m, 3, 3) [m]: the triangles where they are now; ``positions`` (n, 3) [m] of the balls.
+    """
+    physics, radius, here = scene.physics, scene.balls.radius, positions[[ball]]
+    slack = np.full(len(corners), LEANING)
+    moving: dict[int, str] = {}
+    if physics.vibration is not None:  # it is given where the mesh has it
+        slack[scene.mesh.tags == physics.vibration.tag] += physics.vibration.amplitude
+        moving[physics.vibration.tag] = "the vibrating surface"
+    if physics.turn is not None:
+        moving[physics.turn.tag] = "the turning part"
+    box = np.abs(here - np.clip(here, corners.min(axis=1), corners.max(axis=1))).max(axis=1)
+    near = [int(t) for t in np.flatnonzero(box <= radius + slack)]
+    gap = {t: float(clearance(corners[[t]], here, 2.0 * radius)[0]) - radius for t in near}
+    normals = towards_shot(corners)[0]
+    found: list[int] = []
+    for t in sorted((t for t in near if gap[t] <= slack[t]), key=lambda t: gap[t]):
+        alike = (normals[t] @ normals[k] > ONE_WAY and scene.mesh.tags[t] == scene.mesh.tags[k] for k in found)
+        if not any(alike) and len(found) < MOST_NAMED:
+            found.append(t)
+    apart = np.linalg.norm(positions - here, axis=1) - scene.balls.diameter
+    others = [int(k) for k in np.argsort(apart) if k != ball and apart[k] <= LEANING][:MOST_NAMED]
+    tags = [int(scene.mesh.tags[t]) for t in found]
+    surfaces = zip(found, tags, strict=True)
+    names = [f"{moving[tag]} (triangle {t})" if tag in moving else f"triangle {t}" for t, tag in surfaces]
+    names += [f"ball {k}" for k in others]
+    held_by_part = physics.turn is not None and physics.turn.tag in tags
+    return " and ".join(filter(None, [", ".join(names[:-1]), *names[-1:]])), held_by_part
