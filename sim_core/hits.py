@@ -15,8 +15,10 @@ from sim_core.loop import SONOTRODE, WALLS, Loop
 from sim_core.neighbours import follow
 from sim_core.resolve.ball_ball import pair_kick
 from sim_core.resolve.ball_surface import surface_kick
+from sim_core.resolve.driving import drive
 from sim_core.resolve.footing import BOUNCES, ROLLS, deflect, land, set_out, step
-from sim_core.resolve.leaning import drive, hold, meet
+from sim_core.resolve.holding import hold
+from sim_core.resolve.leaning import meet
 from sim_core.surfaces.locate import triangle_at
 from sim_core.surfaces.obstacles import CAPSULE, WAVING_FACE
 from sim_core.surfaces.part import PartTree

@@ -26,6 +26,12 @@ def along(a: Vec3, s: float, b: Vec3) -> Vec3:
 
 
 @jit
+def times(s: float, a: Vec3) -> Vec3:
+    """s a."""
+    return Vec3(s * a.x, s * a.y, s * a.z)
+
+
+@jit
 def cross(a: Vec3, b: Vec3) -> Vec3:
     """Vector product."""
     return Vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)

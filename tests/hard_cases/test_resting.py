@@ -27,7 +27,7 @@ from sim_core.effects.gravity import STANDARD as G
 from sim_core.effects.rest import ASLEEP, FEET, JAMMED, MODE, ON_BALL, STAYS_UNTIL
 from sim_core.grounded import LEANING, count_props
 from sim_core.invariants import clearance, closest_pair, energy
-from sim_core.resolve.leaning import hold
+from sim_core.resolve.holding import hold
 from sim_core.simulate import _Run
 from sim_core.vec3 import Vec3
 from tests.cavities import FLOOR, box, cylinder
