@@ -59,6 +59,30 @@ class PartTurn(BaseModel):
         return 60.0 / abs(self.rpm) if self.rpm else math.inf
 
 
+class Friction(BaseModel):
+    """Balls rub and spin: Walton's mu and beta0, of balls on all surfaces and, unless given apart, of ball on ball."""
+
+    model_config = STRICT
+
+    mu: float = Field(ge=0.0, le=10.0, description="coefficient of friction; 0 is smooth, metals: tenths")
+    beta0: float = Field(ge=-1.0, le=1.0, description="of a hit that sticks, slip after over slip before, turned round")
+    mu_balls: float | None = Field(default=None, ge=0.0, le=10.0, description="mu of ball on ball, if not the same")
+    beta0_balls: float | None = Field(default=None, ge=-1.0, le=1.0, description="beta0 of ball on ball, likewise")
+
+    @property
+    def surfaces(self) -> tuple[float, float]:
+        """mu and beta0 of a ball on a surface."""
+        return self.mu, self.beta0
+
+    @property
+    def balls(self) -> tuple[float, float]:
+        """mu and beta0 of ball on ball."""
+        return (
+            self.mu if self.mu_balls is None else self.mu_balls,
+            self.beta0 if self.beta0_balls is None else self.beta0_balls,
+        )
+
+
 class Effects(BaseModel):
     """Which effects act on the shot in flight. What is not listed here is not simulated."""
 
@@ -67,6 +91,9 @@ class Effects(BaseModel):
     gravity: bool = Field(default=True, description="9.80665 m/s² downwards")
     part_turn: PartTurn | None = Field(
         default=None, description="{ rpm = ... } or { angle_deg = ..., frequency_hz = ... }"
+    )
+    friction: Friction | None = Field(
+        default=None, description="balls rub and spin: { mu = 0.3, beta0 = 0.2 }; left out: smooth, no rotation"
     )
     rest: bool | None = Field(
         default=None,

@@ -88,7 +88,19 @@ def build_scene(design: Design, mesh: TriangleMesh, seed: int) -> Scene:
 
     Raises InputError when the shot does not fit or has too many balls, or the part cannot turn.
     """
-    from sim_core import Balls, Gravity, Physics, Rest, Restitution, Scene, SceneError, Vibration, can_rest, pack_balls
+    from sim_core import (
+        Balls,
+        Friction,
+        Gravity,
+        Physics,
+        Rest,
+        Restitution,
+        Scene,
+        SceneError,
+        Vibration,
+        can_rest,
+        pack_balls,
+    )
 
     require_countable(design)
     require_turnable(design, mesh)
@@ -109,12 +121,14 @@ def build_scene(design: Design, mesh: TriangleMesh, seed: int) -> Scene:
     rests = design.effects.rest
     if rests is None:
         rests = can_rest(mesh, gravity, TAG_SONOTRODE, *([] if turn is None else [TAG_PART]))
+    rubs = design.effects.friction
     physics = Physics(
         gravity=gravity,
         restitution=Restitution(surfaces=surfaces, balls=(materials.shot.restitution, materials.shot.yield_speed)),
         vibration=Vibration(TAG_SONOTRODE, sonotrode.amplitude, sonotrode.frequency, phase),
         turn=turn,
         rest=Rest() if rests else None,
+        friction=Friction((rubs.surfaces,) * len(surfaces), rubs.balls) if rubs is not None else None,
     )
     accuracy = design.process.accuracy
     return Scene(

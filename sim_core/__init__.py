@@ -4,6 +4,7 @@ Build a Scene from a TriangleMesh, Balls and Physics, then simulate it. SI units
 """
 
 from sim_core.balls import Balls
+from sim_core.effects.friction import Friction
 from sim_core.effects.gravity import Gravity
 from sim_core.effects.rest import Rest
 from sim_core.effects.restitution import Restitution, restitution_at
@@ -22,6 +23,7 @@ from sim_core.warm_up import compile_simulator, is_compiled
 __all__ = [
     "Balls",
     "Collisions",
+    "Friction",
     "Gravity",
     "ImpactLog",
     "Physics",

@@ -1,4 +1,4 @@
-"""The shot: equal spheres as columns of positions and velocities."""
+"""The shot: equal spheres as columns of positions, velocities and, where they rub, spins."""
 
 from dataclasses import dataclass
 
@@ -13,15 +13,16 @@ FASTEST = 1e6  # m/s: shot has 20; the filters' float32 squares of much more ove
 class Balls:
     """Balls of one size and density.
 
-    ``positions`` [m] and ``velocities`` [m/s], shape (n, 3) float64; ``diameter`` [m]; ``density`` [kg/m³]. Raises
-    SceneError for wrong shapes, numbers that are not finite, speeds beyond FASTEST, or several diameters
-    (not supported yet).
+    ``positions`` [m] and ``velocities`` [m/s], shape (n, 3) float64; ``diameter`` [m]; ``density`` [kg/m³]; ``spins``
+    [rad/s], shape (n, 3), only with Physics.friction, where None is no spin. Raises SceneError for wrong shapes,
+    numbers that are not finite, speeds beyond FASTEST, or several diameters (not supported yet).
     """
 
     positions: np.ndarray
     velocities: np.ndarray
     diameter: float
     density: float = 7800.0
+    spins: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         if np.ndim(self.diameter) != 0 or np.ndim(self.density) != 0:
@@ -31,7 +32,9 @@ class Balls:
             if not (np.isfinite(value) and value > 0.0):
                 raise SceneError(f"balls.{name} is {value}: it must be positive")
             object.__setattr__(self, name, value)
-        for name in ("positions", "velocities"):
+        for name in ("positions", "velocities", "spins"):
+            if getattr(self, name) is None and name == "spins":
+                continue
             try:
                 array = np.array(getattr(self, name), dtype=np.float64, order="C")
             except (TypeError, ValueError):
@@ -41,16 +44,19 @@ class Balls:
             bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
             if len(bad):
                 raise SceneError(f"balls.{name}: ball {bad[0]} has {array[bad[0]].tolist()}; give finite numbers")
-            if name == "velocities" and np.abs(array).max() > FASTEST:
+            most, unit = {"velocities": (FASTEST, "m/s"), "spins": (FASTEST / self.radius, "rad/s")}.get(
+                name, (np.inf, "")
+            )
+            if np.abs(array).max() > most:
                 worst = int(np.abs(array).max(axis=1).argmax())
-                raise SceneError(f"balls.velocities: ball {worst} has {array[worst].tolist()} m/s; at most {FASTEST:g}")
+                raise SceneError(f"balls.{name}: ball {worst} has {array[worst].tolist()} {unit}; at most {most:g}")
             array.flags.writeable = False
             object.__setattr__(self, name, array)
-        if self.positions.shape != self.velocities.shape:
-            raise SceneError(
-                f"balls.positions has {len(self.positions)} balls, balls.velocities {len(self.velocities)}: "
-                "give one each"
-            )
+        for name, others in (("velocities", self.velocities), ("spins", self.spins)):
+            if others is not None and others.shape != self.positions.shape:
+                raise SceneError(
+                    f"balls.positions has {len(self.positions)} balls, balls.{name} {len(others)}: give one each"
+                )
 
     def __len__(self) -> int:
         return len(self.positions)

@@ -22,6 +22,7 @@ from sim_core.calendar import (
 from sim_core.detect.ball_footing import end_of_path
 from sim_core.detect.ball_mesh import first_contact_from
 from sim_core.detect.ball_part import first_part_contact
+from sim_core.effects.friction import carry_spins
 from sim_core.effects.rest import STILL, own_pull
 from sim_core.effects.turn import carry, one_turn
 from sim_core.flight import point_under, set_back
@@ -70,7 +71,7 @@ def _predict(loop: Loop, ball: int, time: float, what: int) -> None:
         pull = own_pull(loop.footing, ball, loop.gravity)
         here = point_under(shot.motion, ball, time, pull)
         moment = loop.clock.now[1] * loop.clock.window + time
-        length, end = end_of_path(loop.footing, tree, seam, loop.wave, here, pull, ball, moment, length)
+        length, end = end_of_path(loop.footing, tree, seam, loop.wave, here, pull, ball, time, moment, length)
         look = one_turn(loop.turning, length) if end == STILL else length
         delay, obstacle = first_contact_from(
             loop.footing, ball, tree, loop.scratch, here, pull, loop.wave, seam, time, length
@@ -119,6 +120,7 @@ def advance(loop: Loop) -> tuple[int, int]:
             hide_all(loop.footing, shot.crowd)
             set_calendar_back(calendar, clock.window)
             carry(loop.turning, clock.window)
+            carry_spins(loop.grip, clock.window)
             clock.now[1] += 1.0
             continue
         if page.filled[0] == len(page.numbers):

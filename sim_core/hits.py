@@ -5,6 +5,7 @@ import math
 from sim_core._compile import inlined
 from sim_core.calendar import EVENTS
 from sim_core.detect.ball_triangle import away_from_capsule, face_normal, nearer_neighbour
+from sim_core.effects.friction import Grip
 from sim_core.effects.rest import ASLEEP, CALLED, DRIVEN, JAMMED, LOOKS, MODE, Footing, own_pull, static_law
 from sim_core.effects.turn import Turning, from_part, seen_from_part, slip
 from sim_core.effects.vibration import surface_velocity
@@ -15,10 +16,11 @@ from sim_core.loop import SONOTRODE, WALLS, Loop
 from sim_core.neighbours import follow
 from sim_core.resolve.ball_ball import pair_kick
 from sim_core.resolve.ball_surface import surface_kick
-from sim_core.resolve.driving import drive
+from sim_core.resolve.driving import drive, taken_from_part
 from sim_core.resolve.footing import BOUNCES, ROLLS, deflect, land, set_out, step
 from sim_core.resolve.holding import hold
 from sim_core.resolve.leaning import meet
+from sim_core.resolve.rubbing import rub_pair, rub_surface
 from sim_core.surfaces.locate import triangle_at
 from sim_core.surfaces.obstacles import CAPSULE, WAVING_FACE
 from sim_core.surfaces.part import PartTree
@@ -59,6 +61,7 @@ def hit_surface(loop: Loop, ball: int, obstacle: int, time: float) -> None:
     tag = ground.tags[triangle]
     if landed == BOUNCES:
         change = surface_kick(away, relative, law, tag)
+        change = rub_surface(loop.grip, ball, time, away, relative, change, tag)
         deflect(loop.footing, shot.motion, ball, time, moment, here, change)
     follow(shot.crowd, shot.motion, ball, time)
     hide(loop.footing, shot.crowd, ball)
@@ -103,7 +106,9 @@ def hit_part(turning: Turning | None, part: PartTree | None, loop: Loop, ball: i
     tag = loop.ground.tags[triangle]
     change = from_part(turning, surface_kick(away, relative, loop.restitution, tag), time)
     speed = -dot(away, relative) / math.sqrt(dot(away, away))
-    drive(loop.footing, turning, shot.motion, ball, time, moment, here, away, speed, change)
+    change = taken_from_part(loop.footing, turning, ball, time, away, speed, change)
+    change = _rub_part(loop.grip, turning, ball, time, away, relative, change, tag)
+    drive(loop.footing, shot.motion, ball, time, moment, here, change)
     follow(shot.crowd, shot.motion, ball, time)
     hide(loop.footing, shot.crowd, ball)
     if lay_still:
@@ -113,6 +118,17 @@ def hit_part(turning: Turning | None, part: PartTree | None, loop: Loop, ball: i
         touched = triangle_at(loop.ground.locator, triangle, sub(seen.position, away))
         note_impact(page, when, ball, touched, seen.position, relative, speed)
     return True
+
+
+@inlined
+def _rub_part(
+    grip: Grip | None, turning: Turning, ball: int, time: float, away: Vec3, relative: Vec3, change: Vec3, tag: int
+) -> Vec3:
+    """rub_surface for ``away`` and ``relative`` in the part's frame; spins are those of the room."""
+    if grip is None:
+        return change
+    there, slip = from_part(turning, away, time), from_part(turning, relative, time)
+    return rub_surface(grip, ball, time, there, slip, change, tag)
 
 
 @inlined
@@ -144,6 +160,7 @@ def _kick_both(footing: Footing | None, loop: Loop, one: int, two: int, time: fl
     apart = sub(drift(motion, two, time), drift(motion, one, time))
     closing = Vec3(motion[two, 3] - motion[one, 3], motion[two, 4] - motion[one, 4], motion[two, 5] - motion[one, 5])
     change = pair_kick(apart, closing, loop.restitution)
+    change = rub_pair(loop.grip, one, two, time, apart, closing, change)
     kick(motion, one, time, change)
     kick(motion, two, time, Vec3(-change.x, -change.y, -change.z))
 

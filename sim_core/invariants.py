@@ -210,8 +210,10 @@ def closest_pair(balls: Balls) -> tuple[float, int, int]:
 
 
 def energy(balls: Balls, gravity: Gravity | None = None) -> float:
-    """Kinetic plus potential energy [J], potential zero at the origin."""
+    """Kinetic plus potential energy [J], that of spins included, potential zero at the origin."""
     total = 0.5 * float(np.einsum("ij,ij->", balls.velocities, balls.velocities))
+    if balls.spins is not None:  # the moment of inertia of a solid sphere: 2/5 m R²
+        total += 0.2 * balls.radius**2 * float(np.einsum("ij,ij->", balls.spins, balls.spins))
     if gravity is not None:
         total -= float(np.sum(balls.positions @ np.array([gravity.x, gravity.y, gravity.z])))
     return balls.ball_mass * total

@@ -6,6 +6,7 @@ import numpy as np
 
 from sim_core.calendar import Calendar
 from sim_core.detect.ball_mesh import Scratch
+from sim_core.effects.friction import Grip
 from sim_core.effects.gravity import Gravity
 from sim_core.effects.rest import Footing
 from sim_core.effects.restitution import Restitution
@@ -56,3 +57,4 @@ class Loop(NamedTuple):
     tally: np.ndarray
     watch: Stopwatch | None
     footing: Footing | None
+    grip: Grip | None

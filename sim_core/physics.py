@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+from sim_core.effects.friction import Friction
 from sim_core.effects.gravity import Gravity
 from sim_core.effects.rest import Rest
 from sim_core.effects.restitution import Restitution
@@ -17,3 +18,4 @@ class Physics(NamedTuple):
     vibration: Vibration | None = None
     rest: Rest | None = None
     turn: Turn | None = None
+    friction: Friction | None = None

@@ -6,6 +6,7 @@ from functools import lru_cache
 import numpy as np
 
 from sim_core.balls import Balls
+from sim_core.effects.friction import Friction, checked_friction
 from sim_core.effects.gravity import checked_gravity
 from sim_core.effects.rest import Rest, checked_rest
 from sim_core.effects.restitution import Restitution, checked_restitution
@@ -17,6 +18,7 @@ from sim_core.physics import Physics
 from sim_core.surfaces.mesh import TriangleMesh, towards_shot
 from sim_core.surfaces.part import require_free_axle
 
+KINDS = {"restitution": Restitution, "vibration": Vibration, "rest": Rest, "turn": Turn, "friction": Friction}
 LONGEST = 1e6  # s: eleven days of peening
 STEP = 1e-4  # of a triangle's size: how far before and behind it is asked which side the cavity is on
 TOUCH = 1e-9  # m: overlap at the start that is taken for rounding of the input; ten thousand times less than a dent
@@ -54,7 +56,7 @@ class Scene:
 
     def _require_physics(self) -> None:
         for name, effect in self.physics._asdict().items():
-            kind = {"restitution": Restitution, "vibration": Vibration, "rest": Rest, "turn": Turn}.get(name)
+            kind = KINDS.get(name)
             if kind is not None and effect is not None and not isinstance(effect, kind):
                 raise SceneError(f"physics.{name} is {effect!r}: give a {kind.__name__}, or None")
         vibration, restitution, turn = self.physics.vibration, self.physics.restitution, self.physics.turn
@@ -62,6 +64,12 @@ class Scene:
         checked_rest(self.physics.rest)
         if restitution is not None:
             checked_restitution(restitution, int(self.mesh.tags.max()) + 1)
+        if self.physics.friction is not None:
+            checked_friction(self.physics.friction, int(self.mesh.tags.max()) + 1)
+        elif self.balls.spins is not None:
+            raise SceneError(
+                "balls.spins are given without physics.friction, where nothing rubs: give a Friction, or no spins"
+            )
         checked_wave(vibration)
         axle = checked_axle(turn)
         if turn is not None and axle is not None:

@@ -9,6 +9,7 @@ import numpy as np
 from sim_core.balls import Balls
 from sim_core.calendar import Calendar, new_calendar
 from sim_core.detect.ball_mesh import Scratch, new_scratch
+from sim_core.effects.friction import Grip, checked_friction, new_grip
 from sim_core.effects.gravity import acceleration, checked_gravity
 from sim_core.effects.rest import Footing, checked_rest, new_footing
 from sim_core.effects.restitution import Restitution, checked_restitution
@@ -83,8 +84,8 @@ class _Run:
         self.gravity = checked_gravity(scene.physics.gravity)
         self.wave: Wave | None = checked_wave(scene.physics.vibration)
         self.restitution: Restitution | None = None
+        tags = int(scene.mesh.tags.max()) + 1
         if scene.physics.restitution is not None:
-            tags = int(scene.mesh.tags.max()) + 1
             self.restitution = checked_restitution(scene.physics.restitution, tags)
         self.centre = scene.mesh.middle
         radius = scene.balls.radius
@@ -101,14 +102,23 @@ class _Run:
         self.motion = np.concatenate([scene.balls.positions - self.centre, scene.balls.velocities], axis=1)
         self.calendar: Calendar = new_calendar(len(self.motion))
         self.scratch: Scratch = new_scratch()
+        self.grip = self._grip(tags)
         self.footing: Footing | None = new_footing(
-            checked_rest(scene.physics.rest), len(self.motion), self.gravity, self.restitution
+            checked_rest(scene.physics.rest), len(self.motion), self.gravity, self.restitution, self.grip
         )
         self.shot = self._shot(2.0 * max(1.0, float(np.abs(scene.balls.velocities).max())))
         self.watch: Stopwatch | None = None
         self.now = np.zeros(2)
         self.count = np.zeros(5, dtype=np.int64)
         self.pages: list[tuple[np.ndarray, np.ndarray]] = []
+
+    def _grip(self, tags: int) -> Grip | None:
+        friction, balls, ground = self.scene.physics.friction, self.scene.balls, self.ground
+        if friction is None:
+            return None
+        spins = np.zeros_like(balls.positions) if balls.spins is None else balls.spins
+        tags_of_rows = ground.tags[ground.tree.triangles[:, 0]]
+        return new_grip(checked_friction(friction, tags), spins, balls.radius, tags_of_rows)
 
     def _shot(self, fastest: float) -> Shot:
         low = self.scene.mesh.vertices.min(axis=0) - self.centre
@@ -149,6 +159,7 @@ class _Run:
                     self.count,
                     self.watch,
                     self.footing,
+                    self.grip,
                 )
             )
             if status == DONE:
@@ -225,4 +236,5 @@ class _Run:
 
     def balls(self) -> Balls:
         """The balls as they are now."""
-        return Balls(*self._states(), self.scene.balls.diameter, self.scene.balls.density)
+        spins = None if self.grip is None else self.grip.spins + self.now[0] * self.grip.twists
+        return Balls(*self._states(), self.scene.balls.diameter, self.scene.balls.density, spins)

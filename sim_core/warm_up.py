@@ -39,8 +39,9 @@ def compile_simulator(physics: Physics, balls: int = 1) -> float:
     triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
     floor = (vertices[triangles][:, :, 2] == 0.0).all(axis=1)
     tags = np.where(floor, tag, 1 if tag == 0 else 0)
-    if physics.restitution is not None:
-        tags = np.minimum(tags, len(physics.restitution.surfaces) - 1)
+    for law in (physics.restitution, physics.friction):
+        if law is not None:
+            tags = np.minimum(tags, len(law.surfaces) - 1)
     if physics.turn is not None:
         physics, vertices, triangles, tags = _with_a_turning_box(physics, vertices, triangles, tags)
     side = math.ceil(MANY ** (1 / 3)) if balls >= MANY else 2
@@ -60,11 +61,11 @@ def _with_a_turning_box(
     assert turn is not None
     shaken = -1 if physics.vibration is None else physics.vibration.tag
     still = next(tag for tag in range(3) if tag not in (turn.tag, shaken))
-    if physics.restitution is not None:
-        surfaces = physics.restitution.surfaces
-        physics = physics._replace(
-            restitution=physics.restitution._replace(surfaces=[surfaces[0]] * max(3, len(surfaces)))  # type: ignore[arg-type]
-        )
+    for name in ("restitution", "friction"):
+        law = getattr(physics, name)
+        if law is not None:
+            wider = law._replace(surfaces=[law.surfaces[0]] * max(3, len(law.surfaces)))
+            physics = physics._replace(**{name: wider})
     box = len(vertices) + triangles[:, ::-1]
     return (
         physics._replace(turn=turn._replace(axis_point=(0.03, 0.03, 0.03))),

@@ -43,8 +43,8 @@ WRONG = [
     Wrong("misspelt table", ("[sonotrode]", "[sonotrod]"), (":18", "did you mean 'sonotrode'")),
     Wrong(
         "effect not there yet",
-        ("gravity = true", "friction = 0.3"),
-        ("effects.friction: unknown key", "gravity"),
+        ("gravity = true", "wind = 0.3"),
+        ("effects.wind: unknown key", "gravity"),
     ),
     Wrong(
         "key of another table",

@@ -147,7 +147,9 @@ class TestNumbers:
 
     def test_every_number_can_be_read_and_set(self, design: Design) -> None:
         for name in Design.numbers():
-            if name != "shot.density_kg_m3" and not name.startswith("effects.part_turn."):  # these are not set
+            if name != "shot.density_kg_m3" and not name.startswith(
+                ("effects.part_turn.", "effects.friction.")
+            ):  # not set
                 assert design.with_values({name: design.value(name)}) == design, name
 
     def test_frozen(self, design: Design) -> None:
@@ -258,6 +260,15 @@ class TestWrongDesigns:
                 ("amplitude_um = 25", "amplitude_um = 25\n[effects]\ngravity = false\nrest = true"),
                 "effects.rest: given true",
             ),
+            (
+                ("amplitude_um = 25", "amplitude_um = 25\n[effects]\nfriction = { mu = -0.1, beta0 = 0.2 }"),
+                "effects.friction.mu: given -0.1; allowed: a number from 0 to 10",
+            ),
+            (
+                ("amplitude_um = 25", "amplitude_um = 25\n[effects]\nfriction = { mu = 0.3 }"),
+                "effects.friction.beta0: missing",
+            ),
+            (("amplitude_um = 25", "amplitude_um = 25\n[effects]\nfriction = 0.3"), "effects.friction: given 0.3"),
             (("mass_g = 3.308", "mass_g = 400"), "fill 65% of the chamber; at most 50 %"),
             (("diameter_mm = 50", "diameter_mm = 2.5"), "does not fit a chamber 2.5 mm wide"),
         ],

@@ -5,6 +5,7 @@ import pytest
 
 from chamberopt.chamber import TAG_PART, TAG_SONOTRODE, build_chamber
 from chamberopt.config import load_design
+from chamberopt.effects import Friction
 from chamberopt.errors import InputError
 from chamberopt.process import build_scene, chamber_mesh, replica_seed, start_velocities
 from sim_core import Rest
@@ -55,6 +56,16 @@ def test_what_the_design_says_is_in_the_scene(design, mesh) -> None:
     assert scene.physics.gravity is not None
     weightless = build_scene(design.model_copy(update={"effects": type(design.effects)(gravity=False)}), mesh, 1)
     assert weightless.physics.gravity is None
+
+
+def test_friction_is_what_the_design_says_or_absent(design, mesh) -> None:
+    def friction(**said):
+        effects = design.effects.model_copy(update={"friction": Friction(**said)})
+        return build_scene(design.model_copy(update={"effects": effects}), mesh, 1).physics.friction
+
+    assert build_scene(design, mesh, 1).physics.friction is None
+    assert friction(mu=0.3, beta0=0.2) == (((0.3, 0.2),) * 3, (0.3, 0.2))
+    assert friction(mu=0.3, beta0=0.2, mu_balls=0.1, beta0_balls=-0.5) == (((0.3, 0.2),) * 3, (0.1, -0.5))
 
 
 def test_contact_mode_is_on_where_a_ball_can_lie_still(design, mesh) -> None:

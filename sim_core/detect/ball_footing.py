@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from sim_core._compile import inlined, jit
+from sim_core.effects.friction import Grip
 from sim_core.effects.rest import (
     ASLEEP,
     CALLED,
@@ -32,7 +33,7 @@ from sim_core.vec3 import Vec3, along, cross, dot, sub
 OVER = 1.5  # seams: a foot reaches further over its border than the face does, so that a ball that left it is past it
 ONE_PLANE = 1e-5  # rad: faces that meet at less are told apart at their border only; over a seam that is 1e-13 m
 BEHIND = 2e-13  # m: an edge this little in front of a foot's plane is behind it but for rounding
-TURN = 0.1  # rad: a ball that resistance slows while it curves has its direction read anew after so much
+TURN = 0.1  # rad: what resistance or friction slows while it curves has its direction read anew after so much
 SHORTEST = 1e-3  # s: but not more often
 LOOK = 2e-3  # s: in which a ball that nothing holds any more would have fallen 20 um, see grounded.LEANING
 
@@ -71,6 +72,7 @@ def end_of_path(
     here: Point,
     pull: Vec3,
     ball: int,
+    time: float,
     moment: float,
     length: float,
 ) -> tuple[float, int]:
@@ -102,10 +104,9 @@ def end_of_path(
             delay = _leaves_edge(footing, tree.numbers, ball, foot, here, pull, OVER * seam)
         if delay < best:
             best, end = delay, LEAVES - foot
-    if footing.resistance > 0.0:
-        delay = _stops(here.velocity, pull)
-        if delay < best:
-            best, end = delay, STOPS
+    delay = _brake_ends(footing.grip, footing, ball, time, here.velocity, pull)
+    if delay < best:
+        best, end = delay, STOPS
     return best, end
 
 
@@ -162,6 +163,20 @@ def _leaves_round(
     speed = math.sqrt(dot(velocity, velocity))
     root = speed + math.sqrt(speed * speed + 2.0 * left * math.sqrt(dot(pull, pull)))
     return 2.0 * left / root if root > 1e-12 else NEVER
+
+
+@jit
+def _brake_ends(grip: Grip | None, footing: Footing, ball: int, time: float, velocity: Vec3, pull: Vec3) -> float:
+    """How long the force against a ball's slip, or against its motion, keeps its direction."""
+    if grip is not None:
+        slips = grip.slips
+        change = Vec3(slips[ball, 3], slips[ball, 4], slips[ball, 5])
+        slip = along(Vec3(slips[ball, 0], slips[ball, 1], slips[ball, 2]), time, change)
+        if dot(slip, slip) + dot(change, change) > 0.0:
+            return _stops(slip, change)
+    if footing.resistance > 0.0:
+        return _stops(velocity, pull)
+    return NEVER
 
 
 @jit

@@ -4,8 +4,8 @@ A hit slower than ``capture`` on a still surface into which gravity presses is p
 keeps the surface's normal n as a *foot*: its velocity and its acceleration are the projections of what they would be
 on the cone {n_k x >= 0} of its feet (Moreau, J. Math. Pures Appl. 56 (1977) 65: the constrained acceleration is the
 one nearest to the free one), so its motion is a parabola again, its own. ``resistance`` slows it by that share of the
-load on its feet: sliding friction without rotation, or what rolling resists. What is neglected at a capture is
-below capture²/2 of energy per mass.
+load on its feet: sliding friction without rotation, or, where balls rub (friction.py), what rolling resists. What is
+neglected at a capture is below capture²/2 of energy per mass.
 
 Nothing rests on the vibrating surface or on a turning part: hits there keep their law. A ball that lies still is
 itself such a surface to hits slower than Restitution.elastic_below, as if friction held it, so heaps come to rest
@@ -21,6 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim_core._compile import inlined, jit
+from sim_core.effects.friction import Grip
 from sim_core.effects.gravity import Gravity, acceleration
 from sim_core.effects.restitution import ELASTIC_BELOW, Restitution
 from sim_core.errors import SceneError, number
@@ -82,7 +83,7 @@ class Footing(NamedTuple):
     [m] a foot was set and how far the ball may go from there on what is round; ``rows`` (n, 4) int32: the obstacles it
     stands on, or see ON_BALL; ``marks`` (n, 8) int32, see MODE; ``memory`` (n, 14), see LEFT; ``roster``, ``seat``
     (n,) int32 and ``held`` (1,): the balls not in flight, each one's place among them, and how many. ``capture``,
-    ``resistance`` as in Rest; ``slow`` [m/s]: pair hits below lose nothing.
+    ``resistance`` as in Rest; ``slow`` [m/s]: pair hits below lose nothing; ``grip``: friction, if there is any.
     """
 
     pull: np.ndarray
@@ -98,6 +99,7 @@ class Footing(NamedTuple):
     resistance: float
     slow: float
     gravity: Vec3
+    grip: Grip | None
 
 
 def checked_rest(rest: Rest | None) -> Rest | None:
@@ -113,7 +115,11 @@ def checked_rest(rest: Rest | None) -> Rest | None:
 
 
 def new_footing(
-    rest: Rest | None, balls: int, gravity: Gravity | None, restitution: Restitution | None
+    rest: Rest | None,
+    balls: int,
+    gravity: Gravity | None,
+    restitution: Restitution | None,
+    grip: Grip | None,
 ) -> Footing | None:
     """All balls in flight; None without the effect."""
     if rest is None:
@@ -133,6 +139,7 @@ def new_footing(
         rest.resistance,
         ELASTIC_BELOW if restitution is None else restitution.elastic_below,
         Vec3(*(float(x) for x in pull)),
+        grip,
     )
 
 

@@ -19,46 +19,37 @@ PRESSED = 2  # of DRIVEN
 
 
 @inlined
-def drive(
-    footing: Footing | None,
-    turning: Turning,
-    motion: np.ndarray,
-    ball: int,
-    time: float,
-    moment: float,
-    here: Point,
-    away: Vec3,
-    into: float,
-    change: Vec3,
-) -> None:
-    """The turning part hits a ball at ``into`` [m/s]: ``change`` [m/s] is what a free ball would take from it, and
-    ``away`` points to it from where it is touched, in the part's frame.
+def taken_from_part(
+    footing: Footing | None, turning: Turning, ball: int, time: float, away: Vec3, into: float, change: Vec3
+) -> Vec3:
+    """The velocity change [m/s] of a ball that the turning part hits at ``into`` [m/s], without friction.
+
+    ``change`` [m/s]: what a free ball would take; ``away`` points to it from where it is touched, in the part's frame.
     """
     if footing is None:
-        kick(motion, ball, time, change)
-        return
-    normal = from_part(turning, times(1.0 / math.sqrt(dot(away, away)), away), time)
-    _drive(footing, motion, ball, time, moment, here, normal, into, change)
+        return change
+    if into >= footing.slow:
+        return change
+    return _constrained(footing, ball, from_part(turning, times(1.0 / math.sqrt(dot(away, away)), away), time), into)
 
 
 @jit
-def _drive(
-    footing: Footing,
-    motion: np.ndarray,
-    ball: int,
-    time: float,
-    moment: float,
-    here: Point,
-    normal: Vec3,
-    into: float,
-    change: Vec3,
+def _constrained(footing: Footing, ball: int, normal: Vec3, into: float) -> Vec3:
+    let_go(footing, ball, normal)
+    give = response(footing, ball, normal)
+    lift = SHORTEST_HOP * math.sqrt(dot(footing.gravity, footing.gravity))  # what lies on it hops, not too often
+    return times((into + max(into, lift)) / max(dot(give, normal), BLOCKED), give)
+
+
+@inlined
+def drive(
+    footing: Footing | None, motion: np.ndarray, ball: int, time: float, moment: float, here: Point, change: Vec3
 ) -> None:
+    """The turning part changes a ball's velocity by ``change`` [m/s]."""
+    if footing is None:
+        kick(motion, ball, time, change)
+        return
     footing.marks[ball, ROLLING] = 0
-    if into < footing.slow:
-        let_go(footing, ball, normal)
-        give = response(footing, ball, normal)
-        lift = SHORTEST_HOP * math.sqrt(dot(footing.gravity, footing.gravity))  # what lies on it hops, not too often
-        change = times((into + max(into, lift)) / max(dot(give, normal), BLOCKED), give)
     impart(footing, motion, ball, time, moment, here, change)
     touch(footing, ball, moment)
 

@@ -19,9 +19,7 @@ from sim_core.effects.rest import (
     PROPS,
     ROLLING,
     ROUNDING,
-    SLIDING,
     STAYS_UNTIL,
-    STILL_BELOW,
     STOPS,
     WAKES,
     Footing,
@@ -32,6 +30,7 @@ from sim_core.effects.rest import (
     onto_cone,
 )
 from sim_core.flight import Point, kick, set_off
+from sim_core.resolve.rolling import braked, crept, off_its_feet
 from sim_core.surfaces.obstacles import CAPSULE
 from sim_core.surfaces.tree import Tree
 from sim_core.vec3 import Vec3, along, cross, dot
@@ -63,7 +62,7 @@ def settle(footing: Footing, motion: np.ndarray, ball: int, time: float, moment:
             drop_foot(footing, ball, foot)
         else:
             foot += 1
-    velocity = at.velocity
+    velocity = crept(footing.grip, footing, ball, at.velocity)
     foot = 0
     while foot < footing.marks[ball, FEET]:
         normal = foot_normal(footing, ball, foot)
@@ -76,32 +75,16 @@ def settle(footing: Footing, motion: np.ndarray, ball: int, time: float, moment:
             foot += 1
     velocity = onto_cone(footing, ball, velocity)
     speed = math.sqrt(dot(velocity, velocity))
-    pull = footing.gravity
-    weight = math.sqrt(dot(pull, pull))
     foot = 0
     while foot < footing.marks[ball, FEET]:
         if dot(foot_normal(footing, ball, foot), velocity) > ROUNDING * (1.0 + speed):
             drop_foot(footing, ball, foot)
         else:
             foot += 1
-    pull = onto_cone(footing, ball, pull)
-    foot = 0
-    while foot < footing.marks[ball, FEET]:
-        if dot(foot_normal(footing, ball, foot), pull) > STILL_BELOW * weight:
-            drop_foot(footing, ball, foot)
-        else:
-            foot += 1
-    mode = SLIDING if footing.marks[ball, FEET] > 0 else FLYING
-    if mode == SLIDING:
-        size = math.sqrt(dot(pull, pull))
-        brake = footing.resistance * math.sqrt(max(0.0, weight * weight - size * size))  # the load: see Moreau's cones
-        if speed > ROUNDING:
-            pull = along(pull, -brake / speed, velocity)
-        elif size <= brake or size <= STILL_BELOW * weight:
-            mode = ASLEEP
-            pull = velocity = Vec3(0.0, 0.0, 0.0)
-        else:
-            pull = along(pull, -brake / size, pull)
+    pull = onto_cone(footing, ball, footing.gravity)
+    mode = FLYING
+    if footing.marks[ball, FEET] > 0:
+        velocity, pull, mode = braked(footing.grip, footing, ball, time, velocity, pull)
     move_on(footing, motion, ball, time, moment, Point(at.position, velocity), pull, mode)
 
 
@@ -116,6 +99,7 @@ def move_on(
         footing.memory[ball, STAYS_UNTIL] = 0.0
         footing.marks[ball, PROPS] = 0
     enrol(footing, ball, mode)
+    off_its_feet(footing.grip, ball, time, mode)
     for axis in range(3):
         footing.pull[ball, axis] = pull[axis]
     set_off(motion, ball, time, at, pull)

@@ -5,7 +5,7 @@ Restitution.elastic_below) a ball that lies still is a still surface: friction h
 is below elastic_below²/2 of energy per mass. Between balls on the move a slow hit is a single constrained impact: a
 ball that stands on feet takes from an impulse along d only what they leave of it, P(d), so its share of the inverse
 mass is |P(d)|² in place of 1, and elastic means elastic for the two together (Brogliato, Nonsmooth Mechanics (2016),
-section 5.2).
+section 5.2). Slow hits between moving balls do not rub.
 """
 
 import math
@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from sim_core._compile import jit
+from sim_core.effects.friction import OF_BALLS, Grip
 from sim_core.effects.rest import ASLEEP, MODE, ON_BALL, Footing
 from sim_core.effects.restitution import Restitution, restitution_law
 from sim_core.flight import Point
@@ -21,6 +22,7 @@ from sim_core.resolve.driving import is_pressed, let_go, touch
 from sim_core.resolve.footing import BOUNCES, touch_down
 from sim_core.resolve.holding import watch
 from sim_core.resolve.pushing import BLOCKED, SHORTEST_HOP, impart, place, pull, response
+from sim_core.resolve.rubbing import rub_pair, rub_surface
 from sim_core.vec3 import Vec3, dot, sub, times
 
 # m/s: balls in touch that part by less are in touch for good. Slow hits part them twice as fast: two that went on as
@@ -58,6 +60,7 @@ def meet(
         _land_on(footing, motion, one, two, time, moment, first, times(-1.0, normal), into, restitution, radius)
     elif not slow:
         change = pair_kick(apart, closing, restitution)
+        change = rub_pair(footing.grip, one, two, time, apart, closing, change)
         impart(footing, motion, one, time, moment, first, change)
         impart(footing, motion, two, time, moment, second, times(-1.0, change))
     else:
@@ -66,7 +69,7 @@ def meet(
             let_go(footing, two, normal)
         give_one, give_two = response(footing, one, times(-1.0, normal)), response(footing, two, normal)
         total = max(dot(give_two, normal) - dot(give_one, normal), BLOCKED)
-        press = -dot(sub(pull(footing, two), pull(footing, one)), normal)
+        press = _press(footing.grip, footing, one, two, normal)
         push = (into + max(into, SHORTEST_HOP * press, 2.0 * PARTING)) / total
         impart(footing, motion, one, time, moment, first, times(push, give_one))
         impart(footing, motion, two, time, moment, second, times(push, give_two))
@@ -98,9 +101,20 @@ def _land_on(
     landed = touch_down(footing, motion, ball, ON_BALL - other, 2.0 * radius, time, moment, here, normal)
     if landed == BOUNCES:
         e = 1.0 if restitution is None else _law(restitution, into)
-        impart(footing, motion, ball, time, moment, here, times((1.0 + e) * into, normal))
+        change = times((1.0 + e) * into, normal)
+        change = rub_surface(footing.grip, ball, time, normal, here.velocity, change, OF_BALLS)
+        impart(footing, motion, ball, time, moment, here, change)
 
 
 @jit
 def _law(restitution: Restitution, speed: float) -> float:
     return restitution_law(speed, restitution.balls[0], restitution.balls[1])
+
+
+@jit
+def _press(grip: Grip | None, footing: Footing, one: int, two: int, normal: Vec3) -> float:
+    """How hard two balls are pressed together [m/s²]; by a slip that ends soon no harder than by two weights."""
+    press = -dot(sub(pull(footing, two), pull(footing, one)), normal)
+    if grip is None:
+        return press
+    return min(press, 2.0 * math.sqrt(dot(footing.gravity, footing.gravity)))

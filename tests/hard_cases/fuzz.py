@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from sim_core import (
     Balls,
+    Friction,
     Gravity,
     Physics,
     Rest,
@@ -20,6 +21,7 @@ from sim_core import (
     Vibration,
     pack_balls,
 )
+from sim_core.invariants import energy
 from tests.cavities import CEILING, FLOOR
 from tests.fuzzed_chambers import FAMILIES, WITH_FLOOR, Chamber
 from tests.hard_cases.outcome import CONSTANT, allowed, play
@@ -40,7 +42,7 @@ class Plan(NamedTuple):
     ``weight``: g wide / speed²; ``restitution``: e, None elastic; ``elastic_below`` [speeds]; ``swing``: [diameters]
     of the floor, None still; ``beat``: the face's peak speed over the shot's; ``bare``: effects that change nothing
     are left out, which is other machine code, instead of given as g = 0 and e = 1; ``rests``: balls may lie still,
-    where there is weight.
+    where there is weight; ``rough``: mu and beta0 of balls that start spinning, None smooth.
     """
 
     family: str
@@ -56,6 +58,7 @@ class Plan(NamedTuple):
     beat: float
     bare: bool
     rests: bool
+    rough: tuple[float, float] | None
 
 
 def powers(low: float, high: float) -> st.SearchStrategy[float]:
@@ -80,6 +83,7 @@ def plans(bare: st.SearchStrategy[bool]) -> st.SearchStrategy[Plan]:
         swing=st.none() | powers(-4.0, -0.5),
         beat=powers(-1.0, 1.0),
         rests=st.booleans(),
+        rough=st.none() | st.tuples(st.sampled_from([0.0, 0.1, 0.5, 10.0]), st.floats(-1.0, 1.0)),
     )
 
 
@@ -104,8 +108,10 @@ def chamber_of(plan: Plan) -> Chamber:
         None if plan.bare and plan.restitution == 1.0 else restitution,
         vibration,
         Rest(1e-3 * plan.speed) if plan.rests and plan.weight > 0.0 else None,
+        friction=None if plan.rough is None else Friction((plan.rough,) * 2, plan.rough),
     )
-    return Chamber(mesh, Balls(positions, velocities, diameter), physics)
+    spins = None if plan.rough is None else rng.normal(0.0, plan.speed / diameter, positions.shape)
+    return Chamber(mesh, Balls(positions, velocities, diameter, spins=spins), physics)
 
 
 def duration_of(plan: Plan) -> float:
@@ -150,5 +156,5 @@ def require_invariants(chamber: Chamber, duration: float) -> None:
     drift = 1e-12 + 1e-15 * PIECES * far / size
     assert not seen.energy_drift > drift, f"energy drifts by {seen.energy_drift:.3g}"
     if chamber.physics.vibration is None and not any(chamber.physics.gravity or ()):
-        energies = np.array([(one.velocities**2).sum() for one in seen.track])
+        energies = np.array([energy(one) for one in seen.track])
         assert (energies[1:] <= energies[:-1] * (1.0 + drift)).all(), f"energy grows: {energies}"

@@ -169,14 +169,16 @@ def is_elastic(physics: Physics) -> bool:
     """True when energy must be kept."""
     still = physics.vibration is None or physics.vibration.amplitude == 0.0
     if physics.restitution is None:
-        return still
+        return still and physics.friction is None
     surfaces, balls, _ = physics.restitution
-    return still and all(c0 == 1.0 and v0 >= CONSTANT for c0, v0 in [*surfaces, balls])
+    return still and physics.friction is None and all(c0 == 1.0 and v0 >= CONSTANT for c0, v0 in [*surfaces, balls])
 
 
 def energy_above_floor(mesh: TriangleMesh, balls: Balls, physics: Physics) -> float:
     """Energy of a kilogram of shot [J/kg], potential energy counted from the mesh's lowest corner: never negative."""
     total = 0.5 * float((balls.velocities**2).sum())
+    if balls.spins is not None:
+        total += 0.2 * balls.radius**2 * float((balls.spins**2).sum())
     if physics.gravity is not None:
         down = np.array(physics.gravity)
         total += float(((mesh.vertices @ down).max() - balls.positions @ down).sum())

@@ -1,7 +1,7 @@
 """A scene in a file: what a failure is kept as, to be played again for ever after.
 
 An .npz: ``vertices``, ``triangles``, ``tags``, ``positions``, ``velocities``, ``numbers`` (diameter, density, duration,
-warm-up) and ``physics``, the effects as JSON, field by field; absent ones are left out.
+warm-up), ``spins`` if there are any, and ``physics``, the effects as JSON, field by field; absent ones are left out.
 """
 
 import json
@@ -17,6 +17,7 @@ FOLDER = Path(__file__).parent / "saved"
 
 def save_scene(path: Path, scene: Scene) -> None:
     """Writes the scene, to the last bit."""
+    spins = {} if scene.balls.spins is None else {"spins": scene.balls.spins}
     effects = {name: _plain(effect) for name, effect in scene.physics._asdict().items() if effect is not None}
     np.savez_compressed(
         path,
@@ -27,6 +28,7 @@ def save_scene(path: Path, scene: Scene) -> None:
         velocities=scene.balls.velocities,
         numbers=np.array([scene.balls.diameter, scene.balls.density, scene.duration, scene.warmup]),
         physics=np.array(json.dumps(effects)),
+        **spins,
     )
 
 
@@ -38,7 +40,7 @@ def load_scene(path: Path) -> Scene:
         kinds = get_type_hints(Physics)
         physics = Physics(**{name: _effect(kinds[name], numbers) for name, numbers in effects.items()})
         mesh = TriangleMesh(file["vertices"], file["triangles"], file["tags"])
-        balls = Balls(file["positions"], file["velocities"], diameter, density)
+        balls = Balls(file["positions"], file["velocities"], diameter, density, file.get("spins"))
     return Scene(mesh, balls, physics, duration, warmup)
 
 

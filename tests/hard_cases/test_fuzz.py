@@ -1,12 +1,13 @@
 """Random scenes keep all invariants or stop with a message; and the scenes that once did not are played again."""
 
+import dataclasses
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
-from sim_core import Gravity, Physics, Restitution, Scene, SceneError, SimulationError, Vibration
+from sim_core import Friction, Gravity, Physics, Restitution, Scene, SceneError, SimulationError, Vibration
 from tests.cavities import FLOOR
 from tests.fuzzed_chambers import Chamber, random_chamber
 from tests.hard_cases.fuzz import Plan, judge, plans, require_invariants
@@ -40,14 +41,16 @@ def test_a_saved_scene_runs_or_says_why_not(path: Path) -> None:
 
 def test_a_scene_comes_back_from_its_file_as_it_was(tmp_path: Path) -> None:
     law = (0.9, 1.0)
-    physics = Physics(Gravity(), Restitution((law, law), law), Vibration(FLOOR, 25e-6, 20e3, 0.3))
+    shaken = Vibration(FLOOR, 25e-6, 20e3, 0.3)
+    physics = Physics(Gravity(), Restitution((law, law), law), shaken, friction=Friction((law, law), law))
     chamber = random_chamber("geared", 3)
-    scene = Scene(chamber.mesh, chamber.balls, physics, 0.5)
+    balls = dataclasses.replace(chamber.balls, spins=chamber.balls.velocities)
+    scene = Scene(chamber.mesh, balls, physics, 0.5)
     save_scene(tmp_path / "scene.npz", scene)
     again = load_scene(tmp_path / "scene.npz")
     assert again.physics == physics
     assert (again.duration, again.balls.diameter) == (scene.duration, scene.balls.diameter)
-    for name in ("positions", "velocities"):
+    for name in ("positions", "velocities", "spins"):
         assert (getattr(again.balls, name) == getattr(scene.balls, name)).all()
     for name in ("vertices", "triangles", "tags"):
         assert (getattr(again.mesh, name) == getattr(scene.mesh, name)).all()

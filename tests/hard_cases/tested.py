@@ -14,6 +14,7 @@ from sim_core.invariants import clearance, closest_pair
 from sim_core.simulate import _Run
 from tests.hard_cases import test_resting as resting
 from tests.hard_cases import test_resting_beside_a_turning_part as beside
+from tests.hard_cases import test_rolling as rolling
 from tests.hard_cases import test_turning_part as turning
 from tests.hard_cases.outcome import Case, Outcome
 
@@ -75,6 +76,24 @@ CASES = [
     tested("down a ramp of triangles", resting.test_down_a_ramp_of_many_triangles_it_slides_as_on_one, 6, 0.0),
     tested("down a ramp with resistance", resting.test_down_a_ramp_of_many_triangles_it_slides_as_on_one, 6, 0.1),
     tested("held on a gentle slope", resting.test_resistance_stops_a_sliding_ball_and_holds_it_on_a_gentle_slope),
+    *(
+        tested(f"down a ramp, mu = {mu:g}", rolling.test_down_a_ramp_of_many_triangles_it_rolls_or_slips, mu, 0.0, 6)
+        for mu in (0.0, 0.05, 10.0)
+    ),
+    *(
+        tested(f"landing with mu = {mu:g}", rolling.test_landing_it_rolls_in_the_end_with_what_the_floor_leaves_it, mu)
+        for mu in (0.01, 10.0)
+    ),
+    tested("slip turns on a slope", rolling.test_on_a_slope_a_slip_that_turns_is_followed),
+    tested("rolling down a valley", rolling.test_down_a_valley_it_rolls_on_both_faces, 10.0),
+    tested("rolling over an edge", rolling.test_slowly_over_an_edge_it_rolls_until_it_leaves_it, 0.05),
+    tested(
+        "held on a slope by friction",
+        rolling.test_on_a_slope_it_lies_still_where_neither_slip_nor_roll_moves_it,
+        0.37,
+        0.27,
+        True,
+    ),
     tested("lift-off at a ramp's end", resting.test_it_lifts_off_at_the_ramps_end),
     tested("slowly over an edge", resting.test_slowly_over_an_edge_it_rolls_until_it_leaves_it, 0.05),
     tested("change of slope", resting.test_over_a_gentle_change_of_slope_it_keeps_its_energy, 20.0, 8.0),
