@@ -1,60 +1,43 @@
 """How sure a number is: a candidate is simulated in independent replicas, and every metric gets its interval.
 
-The delete-one jackknife over replicas (B. Efron and R. J. Tibshirani, "An Introduction to the Bootstrap",
-Chapman & Hall 1993, chapters 10 and 11) does two things here. It corrects the bias of order 1/n that counting
-noise puts on everything not linear in the tally (noise widens the spread over triangles, and 1 - exp(-x)
-bends down: the plain figure improves with simulated time although the chamber stays the same), and it gives
-the standard error. It needs some dents on a triangle to work with: see FEW_DENTS.
+Coverage figures have their own estimators (figures.py). The others are ratios of sums: the delete-one jackknife
+over replicas (B. Efron and R. J. Tibshirani, "An Introduction to the Bootstrap", Chapman & Hall 1993, chapter 11)
+corrects their bias of order 1/n and gives the standard error.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import reduce
 from operator import add
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.coverage import Tally, tally
-from chamberopt.objective import METRICS, Metric, Objective, exposed_target, objective
-from chamberopt.process import build_scene, chamber_mesh, replica_seed
+from chamberopt.coverage import Tally
+from chamberopt.dents import Samples, marked_share, sample_points
+from chamberopt.estimate import Estimate, estimate
+from chamberopt.figures import coverage_figures, few_dents_note, surface
+from chamberopt.objective import METRICS, Metric, Objective, objective, on_target
+from chamberopt.process import chamber_mesh
+from chamberopt.replicas import (
+    LEAST_WATCHED,
+    Progress,
+    Replica,
+    replicas_wanted,
+    simulate_replicas,
+    stuck_notes,
+)
 
 if TYPE_CHECKING:
     from chamberopt.chamber import Chamber
     from chamberopt.config import Design
-    from sim_core import Resting, TriangleMesh
 
-CONFIDENCE = 0.95
-BOOTSTRAP_DRAWS = 100  # enough for a standard error (Efron and Tibshirani, chapter 6.4)
-# Dents per exposed target triangle, all replicas together. From 5 on, the corrected uniform_coverage is
-# within 0.02 of the truth; at 2 it is 0.01 too low where 20 % is covered, 0.1 where 90 % is (measured on
-# Poisson models).
-FEW_DENTS = 5.0
-
-Progress = Callable[[int, int, "float | None"], None]
-"""Called as progress(done, total, best so far or None)."""
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """A value with the half-width of its 95 % interval, and the jackknife pseudo-values (n,) behind both, if any."""
-
-    value: float
-    half_width: float
-    pseudovalues: tuple[float, ...] = field(default=(), repr=False)
-
-    @property
-    def low(self) -> float:
-        return self.value - self.half_width
-
-    @property
-    def high(self) -> float:
-        return self.value + self.half_width
+CURVE = 50  # points of coverage against time
 
 
 @dataclass(frozen=True)
@@ -63,7 +46,9 @@ class Evaluation:
 
     total: sum of the replicas' tallies · replicas: one Tally each · timings: seconds of wall clock by step ·
     collisions: numbers of simulated collisions by kind, warm-up included · notes: what to know before
-    trusting it.
+    trusting it · stopped_by: what ended it, "replicas" (a number was asked for), "accuracy" or "most_replicas" ·
+    marked (m,): share of each part triangle inside dents, NaN unexposed, and against_time: (time s, mean coverage of
+    the target) pairs; both only where every dent is marked.
     """
 
     objective_name: str
@@ -75,99 +60,58 @@ class Evaluation:
     collisions: dict[str, int]
     notes: tuple[str, ...] = ()
     stream: str = "search"
-
-
-def estimate(
-    pseudovalues: Sequence[float] | np.ndarray, lowest: float = -math.inf, highest: float = math.inf
-) -> Estimate:
-    """Mean of the pseudo-values, clipped to the range the quantity can have, with its Student-t interval.
-
-    Where the clip bites, the pseudo-values are moved with it: what is made of them later (an objective, a gain)
-    then has the same value as what is made of the clipped estimates.
-    """
-    values = np.asarray(pseudovalues, dtype=float)
-    mean = float(np.clip(values.mean(), lowest, highest))
-    values = values + (mean - values.mean())
-    n = len(values)
-    half_width = float("inf")
-    if n > 1:
-        half_width = _student(n - 1) * float(values.std(ddof=1)) / math.sqrt(n)
-    return Estimate(mean, half_width, tuple(values.tolist()))
-
-
-def _student(freedom: float) -> float:
-    """How many standard errors the 95 % interval reaches to each side."""
-    from scipy.special import stdtrit  # scipy.stats would take a second to import
-
-    return float(stdtrit(freedom, 0.5 + CONFIDENCE / 2.0))
+    stopped_by: str = "replicas"
+    marked: np.ndarray | None = None
+    against_time: tuple[tuple[float, Estimate], ...] = ()
 
 
 def jackknife(
     replicas: Sequence[Tally], statistics: Sequence[Metric], chamber: Chamber, design: Design
 ) -> list[Estimate]:
-    """Each statistic of the summed tally, corrected for its 1/n bias, with its 95 % interval.
+    """Each statistic with its 95 % interval; with a single replica: the value, half-width infinite.
 
     Pseudo-value of replica j: n · statistic(all) - (n - 1) · statistic(all but j); their mean is the
-    corrected value and their scatter its standard error. With a single replica: the plain value, half-width
-    infinite. A statistic that is not smooth is left uncorrected and gets a bootstrap interval, for there the
-    jackknife fails (chapter 11.6).
+    corrected value and their scatter its standard error. Figures of coverage are made by figures.py.
     """
     n = len(replicas)
     total = reduce(add, replicas)
     parts = [total - replica for replica in replicas] if n > 1 else []
+    figures = {}
+    if any(metric.over_surface for metric in statistics):
+        figures = coverage_figures(replicas, chamber, surface(replicas, chamber, design))
     estimates = []
     for metric in statistics:
-        plain = metric.function(total, chamber, design)
-        if n > 1 and not metric.smooth:
-            estimates.append(Estimate(plain, _bootstrap(replicas, metric, chamber, design)))
+        if metric.name in figures:
+            estimates.append(figures[metric.name])
             continue
+        plain = metric.function(total, chamber, design)
         without = np.array([metric.function(part, chamber, design) for part in parts])
         pseudovalues = n * plain - (n - 1) * without if n > 1 else np.array([plain])
         estimates.append(estimate(pseudovalues, metric.lowest, metric.highest))
     return estimates
 
 
-def _bootstrap(replicas: Sequence[Tally], metric: Metric, chamber: Chamber, design: Design) -> float:
-    """Half-width of the 95 % interval from replicas drawn anew with replacement."""
-    rng = np.random.default_rng(0)
-    n = len(replicas)
-    draws = rng.integers(n, size=(BOOTSTRAP_DRAWS, n))
-    values = [metric.function(reduce(add, (replicas[j] for j in draw)), chamber, design) for draw in draws]
-    # The bootstrap's variance is short by (n - 1)/n for a mean of n replicas.
-    return _student(n - 1) * float(np.std(values)) * math.sqrt(n / (n - 1))
+def marked_figures(shares: Sequence[np.ndarray], chamber: Chamber) -> dict[str, Estimate]:
+    """The figures of parts peened to the end, dent by dent: plain means over them, (m,) coverage each.
+
+    Such a part has the grain of its dents in it: std_coverage is larger, and p05_coverage lower, than of the
+    coverage to expect, the more so the smaller the triangles.
+    """
+    each = [on_target(share, chamber) for share in shares]
+    return {
+        name: estimate([metric.over_surface(*one) for one in each], metric.lowest, metric.highest)
+        for name, metric in METRICS.items()
+        if metric.over_surface
+    }
 
 
 def weighted(goal: Objective, metrics: dict[str, Estimate]) -> Estimate:
     """The objective from the metrics: their corrected values, and an interval that knows how they move together."""
     value = sum(weight * metrics[name].value for name, weight in goal.terms.items())
     columns = [weight * np.array(metrics[name].pseudovalues) for name, weight in goal.terms.items()]
-    spread = estimate(np.sum(columns, axis=0))
-    return Estimate(value, spread.half_width, spread.pseudovalues)
-
-
-def paired_difference(after: Estimate, before: Estimate) -> Estimate:
-    """after - before with its 95 % interval, from replicas run on the same seeds, pair by pair.
-
-    The jackknife of the difference: its pseudo-values are the differences of the two. A peening chamber is
-    chaotic, so equal seeds hardly correlate, but where they do the interval is right too.
-    """
-    if not (after.pseudovalues and before.pseudovalues):
-        return independent_difference(after, before)
-    pairs = estimate(np.subtract(after.pseudovalues, before.pseudovalues))
-    return Estimate(after.value - before.value, pairs.half_width, pairs.pseudovalues)
-
-
-def independent_difference(after: Estimate, before: Estimate) -> Estimate:
-    """after - before with its 95 % interval when the two were simulated independently (Welch's t)."""
-    a, b = np.asarray(after.pseudovalues), np.asarray(before.pseudovalues)
-    value = after.value - before.value
-    if min(len(a), len(b)) < 2:  # no replicas to count with: the intervals in quadrature
-        return Estimate(value, math.hypot(after.half_width, before.half_width))
-    va, vb = a.var(ddof=1) / len(a), b.var(ddof=1) / len(b)
-    if va + vb == 0.0:
-        return Estimate(value, 0.0)
-    freedom = (va + vb) ** 2 / (va**2 / (len(a) - 1) + vb**2 / (len(b) - 1))
-    return Estimate(value, _student(freedom) * math.sqrt(va + vb))
+    bias = sum(abs(weight) * metrics[name].bias for name, weight in goal.terms.items())
+    spread = estimate(np.sum(columns, axis=0), bias=bias)
+    return Estimate(value, spread.half_width, spread.pseudovalues, bias)
 
 
 def evaluate(
@@ -182,85 +126,98 @@ def evaluate(
 ) -> Evaluation:
     """Simulate a candidate in independent replicas and estimate its objective and metrics.
 
-    replicas: number of them, the design's own when None. stream: which of the two seed streams ("search",
-    "confirm"). The same numbers come out whatever the number of workers: replicas are added in order.
+    replicas: number of them; when None as many as the design's accuracy asks for. stream: which of the two seed
+    streams ("search", "confirm"). The same numbers come out whatever the number of workers: replicas are added in
+    order, and what they say, never a clock, decides how many there are.
 
     Raises InputError (the shot does not fit) and sim_core.SimulationError.
     """
-    goal = objective(objective_name)
-    count = replicas or design.process.accuracy.replicas
-    seeds = [replica_seed(design.process.seed, index, stream) for index in range(count)]
-    started = time.perf_counter()
+    accuracy = design.process.accuracy
+    wanted = accuracy.coverage if replicas is None else None
+    planned = replicas or accuracy.replicas
+    if wanted is not None:
+        planned = min(max(planned, LEAST_WATCHED), accuracy.most_replicas)
     mesh = chamber_mesh(chamber)
-    futures = [executor.submit(_replica, design, chamber, mesh, seed) for seed in seeds]
-    tallies: list[Tally] = []
-    stuck: list[str] = []
-    collisions: dict[str, int] = {}
-    try:
-        for future in futures:
-            part, counts, still = future.result()
-            stuck += [still] if still else []
-            tallies.append(part)
-            collisions = {kind: collisions.get(kind, 0) + number for kind, number in counts.items()}
+    samples = sample_points(chamber, accuracy.sample_spacing) if accuracy.coverage_model == "dents" else None
+    done: list[Replica] = []
+    clock = {"simulate": 0.0, "coverage": 0.0}
+    while True:
+        started = time.perf_counter()
+        numbers = range(len(done), planned)
+        for replica in simulate_replicas(design, chamber, mesh, samples, executor, stream, numbers):
+            done.append(replica)
             if progress:
-                progress(len(tallies), count, None)
-    finally:
-        # One replica failed, or the user pressed Ctrl-C: the rest need not be simulated.
-        for future in futures:
-            future.cancel()
-    simulated = time.perf_counter()
-    metrics = dict(zip(METRICS, jackknife(tallies, list(METRICS.values()), chamber, design), strict=True))
-    total = reduce(add, tallies)
+                progress(len(done), planned, None)
+        simulated = time.perf_counter()
+        metrics = _metrics(done, chamber, design, samples)
+        goal = weighted(objective(objective_name), metrics)
+        clock["simulate"] += simulated - started
+        clock["coverage"] += time.perf_counter() - simulated
+        if wanted is None:
+            break
+        planned = replicas_wanted(len(done), goal.half_width, wanted, accuracy.most_replicas)
+        if planned == len(done):
+            break
+    tallies = [replica.tally for replica in done]
+    stopped_by = "replicas" if wanted is None else "accuracy" if goal.half_width <= wanted else "most_replicas"
+    notes = _accuracy_note(stopped_by, len(done), goal, wanted)
+    if samples is None:
+        notes += few_dents_note(tallies, surface(tallies, chamber, design))
     return Evaluation(
         objective_name=objective_name,
-        objective=weighted(goal, metrics),
+        objective=goal,
         metrics=metrics,
-        total=total,
+        total=reduce(add, tallies),
         replicas=tuple(tallies),
-        timings={"simulate": simulated - started, "coverage": time.perf_counter() - simulated},
-        collisions=collisions,
-        notes=(*_notes(total, chamber), *_stuck_notes(stuck, count)),
+        timings=clock,
+        collisions={kind: sum(replica.collisions[kind] for replica in done) for kind in done[0].collisions},
+        notes=(*notes, *stuck_notes([replica.still for replica in done if replica.still], len(done))),
         stream=stream,
+        stopped_by=stopped_by,
+        marked=None if samples is None else np.mean(_shares(done, samples, chamber, design), axis=0),
+        against_time=() if samples is None else _against_time(done, samples, chamber, design),
     )
 
 
-def _replica(design: Design, chamber: Chamber, mesh: TriangleMesh, seed: int) -> tuple[Tally, dict[str, int], str]:
-    """One replica on a worker: only its tally travels back, never the impact log, and a line on who lies still."""
-    from sim_core import simulate
+def _metrics(done: Sequence[Replica], chamber: Chamber, design: Design, samples: Samples | None) -> dict[str, Estimate]:
+    tallies = [replica.tally for replica in done]
+    if samples is None:
+        return dict(zip(METRICS, jackknife(tallies, list(METRICS.values()), chamber, design), strict=True))
+    others = [metric for metric in METRICS.values() if metric.over_surface is None]
+    named = {m.name: e for m, e in zip(others, jackknife(tallies, others, chamber, design), strict=True)}
+    named |= marked_figures(_shares(done, samples, chamber, design), chamber)
+    return {name: named[name] for name in METRICS}
 
-    result = simulate(build_scene(design, mesh, seed))
-    kinds = ("walls", "balls", "sonotrode", "total")
-    counts = {kind: int(getattr(result.collisions, kind)) for kind in kinds}
-    return tally(result.impacts, chamber, design), counts, _still(result.resting, len(result.balls))
+
+def _shares(done: Sequence[Replica], samples: Samples, chamber: Chamber, design: Design) -> list[np.ndarray]:
+    """Marked share of each part triangle at the treatment time, (m,), a replica each."""
+    return _shares_at(done, samples, chamber, design.process.treatment_time)
 
 
-def _still(resting: Resting, balls: int) -> str:
-    """One line on the balls that lie still at a replica's end; empty if there are none."""
-    if len(resting) == 0:
-        return ""
-    first = int(resting.since.argmin())
-    where = ", ".join(f"{1e3 * x:.2f}" for x in resting.position[first])
-    under = resting.triangles[first][resting.triangles[first] >= 0]
-    on = f" on triangle {under[0]}" if len(under) else " between other balls"
-    return (
-        f"{len(resting)} of {balls} balls lie still at the end, the longest since {resting.since[first]:.2f} s, "
-        f"that one at ({where}) mm{on}"
+def _shares_at(done: Sequence[Replica], samples: Samples, chamber: Chamber, at: float) -> list[np.ndarray]:
+    firsts = [replica.first_marked for replica in done if replica.first_marked is not None]
+    return [marked_share(samples, first, at, len(chamber.part.triangles)) for first in firsts]
+
+
+def _against_time(
+    done: Sequence[Replica], samples: Samples, chamber: Chamber, design: Design
+) -> tuple[tuple[float, Estimate], ...]:
+    """Mean coverage of the target at even steps of time up to the treatment's end."""
+    times = np.linspace(0.0, design.process.treatment_time, CURVE + 1)[1:]
+    return tuple(
+        (float(at), marked_figures(_shares_at(done, samples, chamber, at), chamber)["mean_coverage"]) for at in times
     )
 
 
-def _stuck_notes(stuck: list[str], replicas: int) -> tuple[str, ...]:
-    if not stuck:
+def _accuracy_note(stopped_by: str, replicas: int, goal: Estimate, wanted: float | None) -> tuple[str, ...]:
+    """Which of the two ended an evaluation that was to be accurate: the accuracy or the budget."""
+    if stopped_by == "accuracy":
+        return (f"the accuracy asked for, ± {wanted:g}, was reached after {replicas} replicas",)
+    if stopped_by == "replicas" or wanted is None:
         return ()
-    return (f"balls came to rest in {len(stuck)} of {replicas} replicas; in the first of them {stuck[0]}",)
-
-
-def _notes(total: Tally, chamber: Chamber) -> tuple[str, ...]:
-    target = exposed_target(chamber)
-    per_triangle = total.dents[target].sum() / max(1, target.sum())
-    if per_triangle >= FEW_DENTS:
-        return ()
+    more = math.ceil(replicas * (goal.half_width / wanted) ** 2) if math.isfinite(goal.half_width) else "many more"
+    remedy = "raise process.accuracy.most_replicas or simulated_time_s"
     return (
-        f"only {per_triangle:.1f} dents per target triangle were simulated; below {FEW_DENTS:.0f} the "
-        "spread of coverage comes out too wide and uniform_coverage too low: raise process.accuracy.simulated_time_s "
-        "or replicas, or mesh the part more coarsely",
+        f"the accuracy asked for, ± {wanted:g}, was not reached: process.accuracy.most_replicas = {replicas} ended it "
+        f"at ± {goal.half_width:.2g}, some {more} would be needed; {remedy}",
     )

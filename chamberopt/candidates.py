@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.accuracy import Evaluation, Progress
+from chamberopt.accuracy import Evaluation
 from chamberopt.errors import InputError
 from chamberopt.history import History, Trial
+from chamberopt.replicas import Progress
 from chamberopt.surrogate import recommend
 
 if TYPE_CHECKING:

@@ -27,12 +27,12 @@ def describe(design: Design, chamber: Chamber) -> dict[str, Any]:
     require_countable(design)
     if design.effects.part_turn is not None:
         require_turnable(design, chamber_mesh(chamber))
-    part, shot, accuracy = chamber.part, design.shot, design.process.accuracy
+    part, shot, process = chamber.part, design.shot, design.process
     exposed = chamber.exposed_area > 0.0
     box = part.vertices.max(axis=0) - part.vertices.min(axis=0)
     shape = _volume(*_surface(design))
     ball_volume = np.pi / 6.0 * shot.diameter**3
-    simulated = accuracy.replicas * (accuracy.simulated_time + accuracy.warmup_time)
+    simulated = process.accuracy.replicas * (process.recorded_time + process.accuracy.warmup_time)
     return {
         "part": {
             "mesh": str(design.part.mesh_path),
@@ -83,11 +83,11 @@ def warnings(design: Design, chamber: Chamber) -> list[str]:
             f"shot.mass_g = {shot.mass_g:g} is rounded to {shot.count} whole ball(s) of "
             f"{shot.ball_mass * 1e6:.3g} mg: the charge differs by more than 5 %"
         )
-    turn, accuracy = design.effects.part_turn, design.process.accuracy
-    if turn is not None and turn.rpm != 0.0 and accuracy.replicas * accuracy.simulated_time < turn.period:
+    turn, recorded = design.effects.part_turn, design.process.accuracy.replicas * design.process.recorded_time
+    if turn is not None and turn.rpm != 0.0 and recorded < turn.period:
         said.append(
             f"the part takes {turn.period:.3g} s to turn once, the replicas together last "
-            f"{accuracy.replicas * accuracy.simulated_time:.3g} s: coverage is that of some of its positions only; "
+            f"{recorded:.3g} s: coverage is that of some of its positions only; "
             "raise process.accuracy"
         )
     caught = "no ball gets in there" if turn is None else "a ball may be jammed there as the part turns"

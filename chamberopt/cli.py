@@ -21,9 +21,10 @@ from chamberopt.errors import InputError
 
 # Heavy packages (numba, trimesh, pyvista, nlopt) are imported inside the commands: --help answers at once.
 if TYPE_CHECKING:
-    from chamberopt.accuracy import Estimate, Evaluation
+    from chamberopt.accuracy import Evaluation
     from chamberopt.chamber import Chamber
     from chamberopt.config import Design
+    from chamberopt.estimate import Estimate
 
 app = App(
     name="chamberopt",

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from chamberopt.accuracy import Estimate, independent_difference, paired_difference
 from chamberopt.disk import new_folder, write_text
 from chamberopt.errors import InputError
+from chamberopt.estimate import Estimate, independent_difference, paired_difference
 from chamberopt.results import Result, load_result, summary
 
 

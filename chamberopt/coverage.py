@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +19,8 @@ class Tally:
 
     simulated_time s · impacts (m,), dents (m,): numbers · dented_area (m,) m² · speed_sum (m,) m/s, of normal
     speeds · angle_sum (m,) degrees, of impact angles. Every column is a plain sum, so tallies add: `a + b`.
+
+    One replica's also has its dents one by one: dent_triangle (k,) int, dent_area (k,) m²; sums are without.
     """
 
     simulated_time: float
@@ -27,15 +29,18 @@ class Tally:
     dented_area: np.ndarray
     speed_sum: np.ndarray
     angle_sum: np.ndarray
+    dent_triangle: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int32))
+    dent_area: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def __add__(self, other: Tally) -> Tally:
-        return Tally(*(getattr(self, f.name) + getattr(other, f.name) for f in fields(self)))
+        return Tally(*(getattr(self, name) + getattr(other, name) for name in SUMS))
 
     def __sub__(self, other: Tally) -> Tally:
         """This tally without one of its parts; what rounding leaves below zero is zero."""
-        return Tally(
-            *(np.maximum(getattr(self, f.name) - getattr(other, f.name), 0) for f in fields(self)),
-        )
+        return Tally(*(np.maximum(getattr(self, name) - getattr(other, name), 0) for name in SUMS))
+
+
+SUMS = tuple(column.name for column in fields(Tally) if not column.name.startswith("dent_"))
 
 
 def dent_diameter(
@@ -80,14 +85,17 @@ def tally(impacts: ImpactLog, chamber: Chamber, design: Design) -> Tally:
         speed, shot.diameter, shot.density, material.hardness, material.restitution, material.yield_speed
     )
     angle = impact_angle_deg(np.asarray(impacts.velocity)[on_part], speed)
+    dented, area = dent > 0.0, np.pi / 4.0 * dent * dent
     count = len(chamber.part.triangles)
     return Tally(
-        simulated_time=design.process.accuracy.simulated_time,
+        simulated_time=design.process.recorded_time,
         impacts=np.bincount(triangle, minlength=count),
-        dents=np.bincount(triangle[dent > 0.0], minlength=count),
-        dented_area=np.bincount(triangle, np.pi / 4.0 * dent * dent, count),
+        dents=np.bincount(triangle[dented], minlength=count),
+        dented_area=np.bincount(triangle, area, count),
         speed_sum=np.bincount(triangle, speed, count),
         angle_sum=np.bincount(triangle, angle, count),
+        dent_triangle=triangle[dented],
+        dent_area=area[dented],
     )
 
 

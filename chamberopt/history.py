@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from chamberopt.accuracy import Estimate
 from chamberopt.errors import InputError
+from chamberopt.estimate import Estimate
 
 HISTORY = "history.jsonl"
 

@@ -21,13 +21,14 @@ if TYPE_CHECKING:
     from chamberopt.config import Design
 
 Statistic = Callable[[Tally, "Chamber", "Design"], float]
+OverSurface = Callable[[np.ndarray, np.ndarray], float]
 
 
 @dataclass(frozen=True)
 class Metric:
     """A named number about a candidate: how it is computed, its unit and the range it can have.
 
-    smooth: whether it moves smoothly with the tally; a quantile does not, which decides how its interval is found.
+    over_surface: the same of any coverage (m,) of target triangles and their shares (m,) of its area, where it is one.
     """
 
     name: str
@@ -36,7 +37,7 @@ class Metric:
     function: Statistic
     lowest: float = -math.inf
     highest: float = math.inf
-    smooth: bool = True
+    over_surface: OverSurface | None = None
 
 
 @dataclass(frozen=True)
@@ -53,39 +54,40 @@ def exposed_target(chamber: Chamber) -> np.ndarray:
     return chamber.part.target & (chamber.exposed_area > 0.0)
 
 
-def _target_coverage(total: Tally, chamber: Chamber, design: Design) -> tuple[np.ndarray, np.ndarray]:
-    """Coverage of every target triangle at the treatment time, and its share of the target's area.
-
-    What lies outside the cavity is not covered. Left out of the count, it would teach the optimiser to hide
-    whatever is hard to reach behind a lower ceiling.
-    """
-    target = chamber.part.target
+def require_target(chamber: Chamber) -> None:
+    """InputError when nothing of the target bounds the cavity."""
     if not exposed_target(chamber).any():
         raise InputError(
             "part.target: no triangle of the target bounds the cavity, so its coverage is not defined; "
             "widen [part.target] or move the part into the chamber"
         )
+
+
+def on_target(coverage: np.ndarray, chamber: Chamber) -> tuple[np.ndarray, np.ndarray]:
+    """Coverage of every target triangle, from that of the part's exposed triangles (m,), and its share of the area.
+
+    What lies outside the cavity is not covered. Left out of the count, it would teach the optimiser to hide
+    whatever is hard to reach behind a lower ceiling.
+    """
+    target = chamber.part.target
+    require_target(chamber)
     area = chamber.part.area[target]
     exposed = np.minimum(chamber.exposed_area[target] / area, 1.0)
-    coverage = coverage_at(total, chamber, design.process.treatment_time)[target]
-    return np.where(exposed > 0.0, coverage, 0.0) * exposed, area / area.sum()
+    return np.where(exposed > 0.0, coverage[target], 0.0) * exposed, area / area.sum()
 
 
-def mean_coverage(total: Tally, chamber: Chamber, design: Design) -> float:
+def mean_coverage(coverage: np.ndarray, weight: np.ndarray) -> float:
     """Area-weighted mean of the coverage at the treatment time, 0..1."""
-    coverage, weight = _target_coverage(total, chamber, design)
     return float(weight @ coverage)
 
 
-def std_coverage(total: Tally, chamber: Chamber, design: Design) -> float:
+def std_coverage(coverage: np.ndarray, weight: np.ndarray) -> float:
     """Area-weighted standard deviation of the coverage from triangle to triangle, 0..0.5."""
-    coverage, weight = _target_coverage(total, chamber, design)
     return float(np.sqrt(weight @ (coverage - weight @ coverage) ** 2))
 
 
-def p05_coverage(total: Tally, chamber: Chamber, design: Design) -> float:
-    """The coverage that 95 % of the target's area exceeds, 0..1; counting noise in a short simulation lowers it."""
-    coverage, weight = _target_coverage(total, chamber, design)
+def p05_coverage(coverage: np.ndarray, weight: np.ndarray) -> float:
+    """The coverage that 95 % of the target's area exceeds, 0..1."""
     order = np.argsort(coverage, kind="stable")
     # Mid-point rule: each triangle stands at the middle of its share of the area.
     share = np.cumsum(weight[order]) - 0.5 * weight[order]
@@ -111,12 +113,21 @@ def shot_count(total: Tally, chamber: Chamber, design: Design) -> float:
     return float(design.shot.count)
 
 
+def _coverage_metric(name: str, summary: str, over_surface: OverSurface, highest: float) -> Metric:
+    """Its plain function takes the dents of a tally for all there are: figures.py corrects for a short simulation."""
+
+    def plain(total: Tally, chamber: Chamber, design: Design) -> float:
+        return over_surface(*on_target(coverage_at(total, chamber, design.process.treatment_time), chamber))
+
+    return Metric(name, "", summary, plain, 0.0, highest, over_surface)
+
+
 METRICS = {
     metric.name: metric
     for metric in (
-        Metric("mean_coverage", "", "mean coverage of the target", mean_coverage, 0.0, 1.0),
-        Metric("std_coverage", "", "standard deviation of coverage over the target", std_coverage, 0.0, 0.5),
-        Metric("p05_coverage", "", "coverage that 95 % of the target's area exceeds", p05_coverage, 0.0, 1.0, False),
+        _coverage_metric("mean_coverage", "mean coverage of the target", mean_coverage, 1.0),
+        _coverage_metric("std_coverage", "standard deviation of coverage over the target", std_coverage, 0.5),
+        _coverage_metric("p05_coverage", "coverage that 95 % of the target's area exceeds", p05_coverage, 1.0),
         Metric("mean_normal_speed_m_s", "m/s", "mean normal speed of the impacts", mean_normal_speed, 0.0),
         Metric("impacts_per_mm2_s", "1/(mm² s)", "impacts per area and second", impacts_per_mm2_s, 0.0),
         Metric("shot_count", "balls", "number of balls", shot_count, 0.0),

@@ -135,7 +135,7 @@ def build_scene(design: Design, mesh: TriangleMesh, seed: int) -> Scene:
         mesh=mesh,
         balls=Balls(positions, velocities, shot.diameter, shot.density),
         physics=physics,
-        duration=accuracy.simulated_time,
+        duration=design.process.recorded_time,
         warmup=accuracy.warmup_time,
         record=(TAG_PART,),
     )

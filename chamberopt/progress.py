@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, TextIO
 
 if TYPE_CHECKING:
-    from chamberopt.accuracy import Progress
+    from chamberopt.replicas import Progress
     from sim_core import Physics
 
 

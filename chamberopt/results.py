@@ -11,11 +11,12 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from chamberopt.accuracy import Estimate, Evaluation
+from chamberopt.accuracy import Evaluation
 from chamberopt.config import Design, save_design
 from chamberopt.design import checked
 from chamberopt.disk import new_folder, write_text
 from chamberopt.errors import InputError
+from chamberopt.estimate import Estimate
 from chamberopt.executor import core_count
 from chamberopt.history import as_csv, read_history
 from chamberopt.objective import METRICS, exposed_target
@@ -122,7 +123,7 @@ def _write_candidate(folder: Path, design: Design, chamber: Chamber, evaluation:
     """Write the surfaces of one candidate; what there is to say of it, for result.json."""
     from chamberopt.viewer import COVERAGE, write_chamber, write_coverage
 
-    write_coverage(folder / COVERAGE, chamber, evaluation.total, design.process.treatment_time)
+    write_coverage(folder / COVERAGE, chamber, evaluation.total, design.process.treatment_time, evaluation.marked)
     write_chamber(folder, chamber)
     return _about(folder, design, chamber, evaluation)
 
@@ -145,14 +146,20 @@ def summary(evaluation: Evaluation | Result) -> str:
 
 def _about(folder: Path, design: Design, chamber: Chamber, evaluation: Evaluation) -> dict[str, Any]:
     target = exposed_target(chamber)
+    curve = [
+        {"time_s": at, "mean_coverage": mean.value, "half_width": mean.half_width}
+        for at, mean in evaluation.against_time
+    ]
     return {
         "format": FORMAT,
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "objective": {"name": evaluation.objective_name, **_plain(evaluation.objective, "")},
         "metrics": {name: _plain(value, METRICS[name].unit) for name, value in evaluation.metrics.items()},
+        **({"coverage_against_time": curve} if curve else {}),
         "seed": design.process.seed,
         "stream": evaluation.stream,
         "replicas": len(evaluation.replicas),
+        "stopped_by": evaluation.stopped_by,
         "simulated_time_s": evaluation.total.simulated_time,
         "collisions": evaluation.collisions,
         "timings_s": {step: round(seconds, 3) for step, seconds in evaluation.timings.items()},
@@ -208,11 +215,13 @@ def _plain(estimate: Estimate, unit: str) -> dict[str, Any]:
         "half_width": estimate.half_width,
         "unit": unit,
         "pseudovalues": list(estimate.pseudovalues),
+        "bias": estimate.bias,
     }
 
 
 def _estimate(data: dict[str, Any]) -> Estimate:
-    return Estimate(float(data["value"]), float(data["half_width"]), tuple(float(x) for x in data["pseudovalues"]))
+    pseudovalues = tuple(float(x) for x in data["pseudovalues"])
+    return Estimate(float(data["value"]), float(data["half_width"]), pseudovalues, float(data.get("bias", 0.0)))
 
 
 def _refuse_constant(name: str) -> float:

@@ -11,12 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chamberopt.accuracy import Estimate, Evaluation, Progress, evaluate, paired_difference
+from chamberopt.accuracy import Evaluation, evaluate
 from chamberopt.candidates import Candidates, Confirmed, Evaluator
 from chamberopt.config import save_design
 from chamberopt.disk import new_folder, write_text
 from chamberopt.errors import InputError
+from chamberopt.estimate import Estimate, paired_difference
 from chamberopt.history import History, Trial
+from chamberopt.replicas import Progress
 
 if TYPE_CHECKING:
     from chamberopt.config import Design, Study

@@ -47,17 +47,20 @@ def _pyvista() -> Any:
     return pyvista
 
 
-def write_coverage(path: Path, chamber: Chamber, total: Tally, treatment_time: float) -> None:
+def write_coverage(
+    path: Path, chamber: Chamber, total: Tally, treatment_time: float, marked: np.ndarray | None = None
+) -> None:
     """The user's part, posed in the chamber [mm], with what each triangle got; opens in ParaView.
 
     Cell data: coverage (0..1) and impacts_per_mm2 at the treatment time [s], dent_density (dented area per area then:
     coverage is 1 - exp(-it)), dents (simulated number), mean_normal_speed [m/s], mean_angle_deg (90 is head on),
-    exposed_area_mm2, target; NaN where not exposed or never hit.
+    exposed_area_mm2, target; NaN where not exposed or never hit. marked (m,): with it, coverage is the share of each
+    triangle inside dents rather than what follows from their rate.
     """
     exposed_mm2 = np.where(chamber.exposed_area > 0.0, chamber.exposed_area * 1e6, np.nan)
     times = treatment_time / total.simulated_time
     fields = {
-        "coverage": coverage_at(total, chamber, treatment_time),
+        "coverage": coverage_at(total, chamber, treatment_time) if marked is None else marked,
         "impacts_per_mm2": total.impacts * times / exposed_mm2,
         "dent_density": total.dented_area * 1e6 * times / exposed_mm2,
         "dents": total.dents,

@@ -22,7 +22,7 @@ from chamberopt.design import Design
 from chamberopt.errors import InputError
 
 if TYPE_CHECKING:
-    from chamberopt.accuracy import Progress
+    from chamberopt.replicas import Progress
     from chamberopt.results import Result
 
 __all__ = ["Design", "Study", "load_design", "load_study", "optimise", "show", "simulate"]

@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from chamberopt.accuracy import Estimate, Evaluation, estimate, jackknife, weighted
+from chamberopt.accuracy import Evaluation, jackknife, weighted
 from chamberopt.chamber import Chamber, Part
 from chamberopt.config import Design, load_design
 from chamberopt.coverage import Tally
+from chamberopt.estimate import Estimate, estimate
 from chamberopt.objective import METRICS, OBJECTIVES
 
 DESIGNS = Path(__file__).resolve().parents[1] / "designs"
@@ -56,6 +57,13 @@ def dented(area: np.ndarray, time: float, dents: np.ndarray | None = None, speed
     return Tally(time, count, count, np.asarray(area, dtype=float), speed * count, 90.0 * count)
 
 
+def equal_dents(time: float, dents: np.ndarray, size: float, speed: float = 1.0, angle: float = 90.0) -> Tally:
+    """One replica's tally: so many dents (m,) of one size [m²]."""
+    triangle = np.repeat(np.arange(len(dents)), dents)
+    each = np.full(len(triangle), size)
+    return Tally(time, dents, dents, size * dents, speed * dents, angle * dents, triangle, each)
+
+
 def judged(objective: np.ndarray, **metrics: float) -> Evaluation:
     """An evaluation whose replicas said these objectives; metrics given are exact, the others 0."""
     empty = dented(np.zeros(1), 1.0)
@@ -71,10 +79,7 @@ def poisson_evaluation(
     rng = np.random.default_rng(seed)
     mean = per_mm2 * 1e6 * chamber.exposed_area / replicas
     seconds = design.process.accuracy.simulated_time
-    tallies = []
-    for _ in range(replicas):
-        dents = rng.poisson(mean)
-        tallies.append(Tally(seconds, dents, dents, 1e-8 * dents, 3.0 * dents, 70.0 * dents))
+    tallies = [equal_dents(seconds, rng.poisson(mean), 1e-8, 3.0, 70.0) for _ in range(replicas)]
     metrics = dict(zip(METRICS, jackknife(tallies, list(METRICS.values()), chamber, design), strict=True))
     return Evaluation(
         "uniform_coverage",

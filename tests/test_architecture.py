@@ -10,7 +10,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 # Each line may import from the lines above it, and from its own line. A folder stands for all of its files.
 CHAMBEROPT_ORDER = (
-    ("errors",),
+    ("errors", "estimate", "mixture", "patches", "uncovered"),
     ("diagnosis", "disk", "fields", "materials"),
     ("effects",),
     ("design",),
@@ -21,7 +21,8 @@ CHAMBEROPT_ORDER = (
     ("process",),
     ("checkup",),
     ("coverage",),
-    ("objective",),
+    ("dents", "objective"),
+    ("figures", "replicas"),
     ("accuracy",),
     ("executor", "history", "progress", "surrogate"),
     ("candidates",),

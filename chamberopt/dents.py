@@ -1,0 +1,122 @@
+"""Every dent as a disc on the part's own surface: what is marked counts once, across triangles and round edges.
+
+The surface is sampled by points; a dent marks those nearer to its contact point than its radius, measured along the
+surface. Where p and q lie on two planes that meet in an edge, at angle theta between the normals n_p and n_q, that is
+
+    distance² = |p - q|² + 2 a b / (1 + cos theta),   a = (p - q).n_q,   b = (q - p).n_p,
+
+exact for the straight way over the edge: with h and y the distances of p and q from it and s along it,
+a = -h sin theta, b = -y sin theta (both + in a hollow), |p - q|² = h² + y² + 2 h y cos theta + s², and unfolded it is
+(h + y)² + s². The far side of a thin blade faces the other way, cos theta = -1, and is infinitely far.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from chamberopt.coverage import dent_diameter
+from chamberopt.errors import InputError
+from chamberopt.triangles import area_vectors
+
+if TYPE_CHECKING:
+    from chamberopt.chamber import Chamber
+    from chamberopt.config import Design
+    from sim_core import ImpactLog
+
+MOST_POINTS = 5_000_000  # about a gigabyte with what is computed on the way
+AT_ONCE = 5_000  # dents looked up together
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Points on the part's exposed surface: place, normal (p, 3) m · triangle (p,) of the part · area (p,) m² each."""
+
+    place: np.ndarray
+    normal: np.ndarray
+    triangle: np.ndarray
+    area: np.ndarray
+
+
+def sample_points(chamber: Chamber, spacing: float) -> Samples:
+    """About one point for each spacing² [m²] of the part's exposed surface, at least one a triangle of the cavity.
+
+    Spread within a triangle by the additive recurrence of the plastic number (M. Roberts, "The unreasonable
+    effectiveness of quasirandom sequences", 2018), folded from the square: even, and the same every time. Raises
+    InputError for more points than can be held.
+    """
+    index = np.flatnonzero(chamber.source >= 0)
+    vectors = area_vectors(chamber.vertices, chamber.triangles[index])
+    area = np.linalg.norm(vectors, axis=1)
+    index, vectors, area = (column[area > 0.0] for column in (index, vectors, area))
+    count = np.maximum(1, np.rint(area / spacing**2)).astype(int)
+    if count.sum() > MOST_POINTS:
+        raise InputError(
+            f"process.accuracy.sample_mm: given {spacing * 1e3:g}, which takes {count.sum():,} points for a surface of "
+            f"{area.sum() * 1e6:.4g} mm²; at most {MOST_POINTS:,} are supported: raise it"
+        )
+    owner = np.repeat(np.arange(len(index)), count)
+    number = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
+    plastic = 1.32471795724474602596
+    # Each triangle begins elsewhere in the sequence: else all single points would be at the same corner.
+    u, v = (((number + 0.5) / plastic**power + owner / plastic ** (power + 2) + 0.5) % 1.0 for power in (1, 2))
+    folded = u + v > 1.0
+    u, v = np.where(folded, 1.0 - u, u), np.where(folded, 1.0 - v, v)
+    a, b, c = (chamber.vertices[chamber.triangles[index[owner], k]] for k in range(3))
+    return Samples(
+        place=a + u[:, None] * (b - a) + v[:, None] * (c - a),
+        normal=(vectors / area[:, None])[owner],
+        triangle=chamber.source[index[owner]],
+        area=(area / count)[owner],
+    )
+
+
+def first_marked(samples: Samples, impacts: ImpactLog, chamber: Chamber, design: Design) -> np.ndarray:
+    """When each point is first inside a dent [s], (p,); inf for never."""
+    material, shot = design.materials.part, design.shot
+    diameter = dent_diameter(
+        impacts.normal_speed, shot.diameter, shot.density, material.hardness, material.restitution, material.yield_speed
+    )
+    dents = np.flatnonzero((diameter > 0.0) & (chamber.source[impacts.triangle] >= 0))
+    corners = chamber.vertices[chamber.triangles[impacts.triangle[dents]]]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    place = nearest_on_triangles(corners, impacts.position[dents])
+    return mark(samples, place, normal, 0.5 * diameter[dents], impacts.time[dents])
+
+
+def nearest_on_triangles(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """The contact of a ball at each point (n, 3) with its triangle (n, 3, 3): its nearest point, on an edge or not."""
+    from trimesh.triangles import closest_point
+
+    return np.asarray(closest_point(corners, points)) if len(points) else points
+
+
+def mark(samples: Samples, place: np.ndarray, normal: np.ndarray, radius: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """First time (p,) at which each point is inside one of these discs: place, normal (k, 3), radius, time (k,)."""
+    from scipy.spatial import cKDTree
+
+    first = np.full(len(samples.area), np.inf)
+    tree = cKDTree(samples.place)
+    for begin in range(0, len(place), AT_ONCE):
+        part = slice(begin, begin + AT_ONCE)
+        # No way along a surface is shorter than the straight one: what is near in space holds all candidates.
+        pairs = tree.sparse_distance_matrix(cKDTree(place[part]), radius[part].max(), output_type="ndarray")
+        point, dent = pairs["i"], pairs["j"] + begin
+        cosine = (samples.normal[point] * normal[dent]).sum(axis=1)
+        away = place[dent] - samples.place[point]
+        bend = (away * samples.normal[point]).sum(axis=1) * -(away * normal[dent]).sum(axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            detour = np.where(bend > 0.0, 2.0 * bend / (1.0 + cosine), 0.0)
+        hit = pairs["v"] ** 2 + detour <= radius[dent] ** 2
+        np.minimum.at(first, point[hit], time[dent[hit]])
+    return first
+
+
+def marked_share(samples: Samples, first: np.ndarray, time: float, triangles: int) -> np.ndarray:
+    """Share of each part triangle's exposed area that is inside a dent by a time [s], (triangles,); NaN unexposed."""
+    area = np.bincount(samples.triangle, samples.area, triangles)
+    marked = np.bincount(samples.triangle, samples.area * (first <= time), triangles)
+    return np.divide(marked, area, out=np.full(triangles, np.nan), where=area > 0.0)
