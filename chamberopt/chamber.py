@@ -10,17 +10,16 @@ Frame: metres, z up, mean sonotrode face at z = 0, chamber axis x = y = 0.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from chamberopt.errors import InputError
-from chamberopt.mesh_io import PartMesh, box_text, read_part
+from chamberopt.mesh_io import box_text
+from chamberopt.part import Part, posed_part, turning_axis
 from chamberopt.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL, ShapeSurface, shape_surface
 from chamberopt.slivers import THINNEST, without_slivers
-from chamberopt.solids import Solid, Surface, cavities, snapped, solid, subtract, united
+from chamberopt.solids import Solid, Surface, cavities, solid, subtract, united
 from chamberopt.triangles import area_vectors, areas, shells_of, tetrahedron_volumes
 
 if TYPE_CHECKING:
@@ -28,23 +27,7 @@ if TYPE_CHECKING:
 
 CROOKED = 1e-3  # rad: turns a ball's path by less than the facets of a round wall do, by a hundred times
 
-__all__ = ["TAG_PART", "TAG_SONOTRODE", "TAG_WALL", "Chamber", "Part", "build_chamber"]
-
-
-@dataclass(frozen=True)
-class Part:
-    """The user's own triangles, in the file's order, posed in the chamber.
-
-    vertices (n, 3) m · triangles (m, 3) int32 · area (m,) m² · target (m,) bool: what must be covered · name ·
-    sha256 of the mesh file as it was read.
-    """
-
-    vertices: np.ndarray
-    triangles: np.ndarray
-    area: np.ndarray
-    target: np.ndarray
-    name: str
-    sha256: str = ""
+__all__ = ["TAG_PART", "TAG_SONOTRODE", "TAG_WALL", "Chamber", "Part", "build_chamber", "turning_axis"]
 
 
 @dataclass(frozen=True)
@@ -73,9 +56,7 @@ def build_chamber(design: Design) -> Chamber:
     Raises InputError when the part's mesh cannot be used, when the part is outside the cavity or touches the
     sonotrode, when nothing of the target faces the shot, or when the part leaves no room over the sonotrode.
     """
-    mesh = _mesh(design.part.mesh_path, design.part.unit)
-    part = _posed(mesh, design)
-    notes = list(mesh.notes)
+    part, notes = posed_part(design)
     shape = shape_surface(design)
     _refuse_misplaced(part, shape.vertices, design)
 
@@ -98,93 +79,6 @@ def build_chamber(design: Design) -> Chamber:
     notes += room_notes + _crooked_note(room, on_part, part, shape) + _hold_note(room, on_part, part.name)
     volume = float(tetrahedron_volumes(room.vertices, room.triangles).sum())
     return Chamber(room.vertices, room.triangles, tags, source, volume, part, exposed, tuple(notes))
-
-
-def _mesh(path: Path, unit: str) -> PartMesh:
-    """The part's mesh, read once per file: a study builds a hundred chambers around the same part."""
-    try:
-        stamp = path.stat()
-    except OSError:
-        return read_part(path, unit)  # says what is wrong
-    return _mesh_once(path, unit, stamp.st_mtime_ns, stamp.st_size)
-
-
-@lru_cache(maxsize=4)
-def _mesh_once(path: Path, unit: str, _changed: int, _size: int) -> PartMesh:
-    return read_part(path, unit)
-
-
-def _posed(mesh: PartMesh, design: Design) -> Part:
-    """The part turned about the file's x, then y, then z, its box centred on the axis, then moved.
-
-    Sideways by the offset, up or down so that its lowest point is at the sonotrode distance.
-    """
-    rotation, shift = _pose(mesh, design)
-    vertices = snapped(mesh.vertices @ rotation.T + shift)
-    target = _target(mesh, design)
-    area = areas(vertices, mesh.triangles)
-    return Part(vertices, mesh.triangles, area, target, design.part.mesh_path.name, mesh.sha256)
-
-
-def _pose(mesh: PartMesh, design: Design) -> tuple[np.ndarray, np.ndarray]:
-    """From the part file's frame to the chamber's: matrix (3, 3), then shift (3,) [m]."""
-    rotation = _rotation(design.part.rotate_deg)
-    vertices = mesh.vertices @ rotation.T
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
-    centre = (low + high) / 2.0
-    x, y = design.part.offset
-    return rotation, np.array([x - centre[0], y - centre[1], design.chamber.sonotrode_distance - low[2]])
-
-
-def turning_axis(design: Design) -> tuple[np.ndarray, np.ndarray]:
-    """Point [m] and direction, (3,) each, of the axis that effects.part_turn names, in the chamber's frame."""
-    turn = design.effects.part_turn
-    if turn is None:
-        raise ValueError("nothing turns in this design")
-    rotation, shift = _pose(_mesh(design.part.mesh_path, design.part.unit), design)
-    return rotation @ np.array(turn.through) + shift, rotation @ np.array(turn.axis)
-
-
-def _rotation(degrees: tuple[float, float, float]) -> np.ndarray:
-    """Matrix (3, 3) of turns about the fixed axes x, then y, then z; exact for quarter turns."""
-    matrix = np.eye(3)
-    for axis, angle in enumerate(degrees):
-        turns, rest = divmod(angle, 90.0)
-        s, c = np.sin(np.radians(rest)), np.cos(np.radians(rest))
-        for _ in range(int(turns) % 4):
-            s, c = c, -s
-        i, j = (axis + 1) % 3, (axis + 2) % 3
-        turn = np.eye(3)
-        turn[i, i], turn[i, j], turn[j, i], turn[j, j] = c, -s, s, c
-        matrix = turn @ matrix
-    return matrix
-
-
-def _target(mesh: PartMesh, design: Design) -> np.ndarray:
-    """Which triangles (m,) must be covered, chosen in the file's own frame; the conditions intersect."""
-    chosen, wanted = np.ones(len(mesh.triangles), dtype=bool), design.part.target
-    if wanted.direction is not None and wanted.angle_deg is not None:
-        normal = area_vectors(mesh.vertices, mesh.triangles)
-        direction = np.asarray(wanted.direction) / np.linalg.norm(wanted.direction)
-        # atan2 of sine and cosine: acos alone is a hundred times coarser near 0 and 180 degrees
-        angle = np.degrees(np.arctan2(np.linalg.norm(np.cross(normal, direction), axis=1), normal @ direction))
-        low, high = wanted.angle_deg
-        chosen &= (angle >= low) & (angle <= high)
-    if wanted.box_mm is not None:
-        centroid_mm = mesh.vertices[mesh.triangles].mean(axis=1) * 1e3
-        low_corner, high_corner = np.asarray(wanted.box_mm)
-        chosen &= ((centroid_mm >= low_corner) & (centroid_mm <= high_corner)).all(axis=1)
-    if not chosen.any():
-        low_text, high_text = _corner(mesh.vertices.min(axis=0)), _corner(mesh.vertices.max(axis=0))
-        raise InputError(
-            f"part.target: chooses none of the {len(chosen)} triangles; in its own file the part goes from "
-            f"{low_text} to {high_text} mm: widen box_mm or angle_deg"
-        )
-    return chosen
-
-
-def _corner(point: np.ndarray) -> str:
-    return str([float(f"{1e3 * value:.6g}") for value in point])
 
 
 def _refuse_misplaced(part: Part, shape: np.ndarray, design: Design) -> None:

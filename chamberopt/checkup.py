@@ -36,6 +36,8 @@ def describe(design: Design, chamber: Chamber) -> dict[str, Any]:
     return {
         "part": {
             "mesh": str(design.part.mesh_path),
+            "unit": part.unit,
+            "names": list(part.names),
             "triangles": len(part.triangles),
             "bounding_box_mm": [_rounded(side * 1e3) for side in box],
             "area_mm2": _rounded(part.area.sum() * 1e6),

@@ -13,6 +13,7 @@ from importlib.metadata import version
 from io import TextIOWrapper
 from itertools import count
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, CycloptsError, Parameter
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from chamberopt.chamber import Chamber
     from chamberopt.config import Design
     from chamberopt.estimate import Estimate
+    from chamberopt.mesh_io import SurfaceError
 
 app = App(
     name="chamberopt",
@@ -38,21 +40,32 @@ Out = Annotated[Path | None, Parameter(name="--out", help="Folder for the result
 
 
 @app.command
-def check(file: Path, /, *, json: Json = False, out: Out = None) -> None:
+def check(file: Path, /, *, screenshot: Path | None = None, json: Json = False, out: Out = None) -> None:
     """Check a design or study file: geometry, volumes, shot, warnings. Nothing is simulated.
 
     Parameters
     ----------
     file
         Design or study file (.toml).
+    screenshot
+        Write a picture (.png) of the part with its target, or of what is wrong with its surface.
     """
     from chamberopt.chamber import build_chamber
     from chamberopt.checkup import describe
     from chamberopt.config import Study, load
+    from chamberopt.mesh_io import SurfaceError
 
     loaded = load(file)
     design = loaded.design if isinstance(loaded, Study) else loaded
-    facts = describe(design, build_chamber(design))
+    try:
+        chamber = build_chamber(design)
+    except SurfaceError as fault:
+        if screenshot is not None:
+            _picture_of_fault(fault, screenshot)
+        raise
+    facts = describe(design, chamber)
+    if screenshot is not None:
+        _picture_of_target(chamber, screenshot)
     if isinstance(loaded, Study):
         facts["vary"] = {
             name: {"low": low, "start": design.value(name), "high": high} for name, (low, high) in loaded.vary.items()
@@ -204,6 +217,22 @@ def _results(out: Path | None, name: str) -> Iterator[Path]:
         raise
 
 
+def _picture_of_fault(fault: SurfaceError, screenshot: Path) -> None:
+    """What is wrong with a part's surface, in red; the message itself follows on stderr."""
+    from chamberopt.viewer import part_picture
+
+    text = fill(str(fault), 110)
+    _remark([part_picture(fault.corners, text, screenshot, edges=fault.edges) or f"picture in {screenshot}"])
+
+
+def _picture_of_target(chamber: Chamber, screenshot: Path) -> None:
+    from chamberopt.viewer import part_picture
+
+    part, title = chamber.part, f"{chamber.part.name}: the target in orange"
+    corners = part.vertices[part.triangles]
+    _remark([part_picture(corners, title, screenshot, marked=part.target) or f"picture in {screenshot}"])
+
+
 def _compile(design: Design, chamber: Chamber) -> None:
     """Compiles, aloud, before the bar starts: else its first minute would look like a hang."""
     from chamberopt.process import build_scene, chamber_mesh, replica_seed
@@ -248,9 +277,16 @@ def _facts(table: Mapping[str, Any], prefix: str = "") -> list[str]:
         elif name in ("notes", "warnings"):
             lines += [f"{name.removesuffix('s')}: {text}" for text in value]
         else:
-            text = " x ".join(f"{v:g}" for v in value) if isinstance(value, list) else str(value)
+            text = _listed(value) if isinstance(value, list) else str(value)
             lines.append(f"{prefix + name:34}{text}")
     return lines
+
+
+def _listed(values: list[Any]) -> str:
+    """Sizes as 1 x 2 x 3, names with commas."""
+    if values and isinstance(values[0], float):
+        return " x ".join(f"{value:g}" for value in values)
+    return ", ".join(values) or "none"
 
 
 def _say(lines: Sequence[str], folder: Path, json: bool) -> None:

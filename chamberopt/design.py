@@ -18,7 +18,7 @@ from chamberopt.errors import InputError
 from chamberopt.fields import Pair, Triple, listed, quantity
 from chamberopt.materials import SHOT_DENSITY, STRICT, Materials, ShotMaterial
 
-Unit = Literal["um", "mm", "cm", "m", "in"]
+Unit = Literal["um", "mm", "cm", "m", "in", "guess"]
 METRES_PER: dict[str, float] = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
 
 
@@ -27,7 +27,11 @@ class Target(BaseModel):
 
     model_config = STRICT
 
-    surface: Literal["all"] = Field(default="all", description="all of the part's surface, narrowed by the other keys")
+    surface: Annotated[tuple[str, ...], Field(strict=False, min_length=1)] = listed(
+        'a name in quotes, or a list of names, e.g. ["flank", "root"]',
+        "groups, sets, properties or colours of the part's file; all: the whole surface",
+        ("all",),
+    )
     direction: Triple | None = listed(
         "three numbers [x, y, z], not all 0", "reference direction in the part file's frame", None
     )
@@ -41,6 +45,20 @@ class Target(BaseModel):
         "holding the triangles' centroids, in the part file's frame",
         None,
     )
+
+    element_mm: float | None = quantity(
+        0.01, 1000, "mm", "wished side of the target's triangles; absent: the file's", None
+    )
+
+    @field_validator("surface", mode="before")
+    @classmethod
+    def _one_name(cls, surface: Any) -> Any:
+        return (surface,) if isinstance(surface, str) else surface
+
+    @property
+    def element(self) -> float | None:
+        """Wished side of the target's triangles [m]."""
+        return None if self.element_mm is None else self.element_mm * 1e-3
 
     @model_validator(mode="after")
     def _agree(self) -> Self:
@@ -67,7 +85,7 @@ class Part(BaseModel):
     model_config = STRICT
 
     mesh: str = Field(min_length=1, description="mesh file, path relative to the design file")
-    unit: Unit = Field(description="of the numbers in the mesh file")
+    unit: Unit = Field(default="guess", description="of the numbers in the mesh file")
     rotate_deg: Triple = listed("three numbers [x, y, z] in degrees", "turns about x, then y, then z", (0.0, 0.0, 0.0))
     offset_mm: Pair = listed("two numbers [x, y] in mm", "sideways from the chamber axis", (0.0, 0.0))
     target: Target = Field(default_factory=Target, description="which triangles must be covered")

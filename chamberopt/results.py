@@ -171,6 +171,7 @@ def _about(folder: Path, design: Design, chamber: Chamber, evaluation: Evaluatio
         "notes": [*chamber.notes, *evaluation.notes],
         "design": _design_values(design, folder),
         "part_sha256": chamber.part.sha256,
+        "part_unit": chamber.part.unit,
         "versions": _versions(),
     }
 

@@ -11,6 +11,7 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
@@ -30,6 +31,7 @@ COVERAGE, CHAMBER = "coverage.vtp", "chamber.vtp"
 # Even steps of lightness, told apart by colour-blind readers too.
 COLOURS = "viridis"
 GREY, DARK, GLASS, SONOTRODE, BACKGROUND = "#b9bec4", "#2b3440", "#9db7cc", "#e08a2e", "white"
+FAULT = "#d01c1c"
 INSTALL = "install OpenGL for machines without a display (Debian: apt install libegl1 libgl1-mesa-dri)"
 MM = 1e3
 # Pictures average coverage over so many dents or more where triangles got fewer: single dents would be confetti.
@@ -125,10 +127,46 @@ def coverage_picture(folders: Sequence[str | Path], titles: Sequence[str], pictu
 
     folders: each with coverage.vtp and chamber.vtp. Returns None, or one line saying why there is no picture.
     """
+    return _drawn_apart({"folders": [str(f) for f in folders], "titles": list(titles)}, picture)
+
+
+def part_picture(
+    corners: np.ndarray,
+    title: str,
+    picture: str | Path,
+    marked: np.ndarray | None = None,
+    edges: np.ndarray | None = None,
+) -> str | None:
+    """Draw a part as its file has it into a .png, from two sides; for what is wrong with it, or what its target is.
+
+    corners (m, 3, 3) m · marked (m,) bool: triangles in colour · edges (k, 2, 3) m: drawn red, through the part.
+    Returns None, or one line saying why there is no picture. Raises InputError where no such file can be.
+    """
+    path = _picture_path(picture)
+    with tempfile.TemporaryDirectory() as folder:
+        part = Path(folder) / "part.npz"
+        marked = np.zeros(len(corners), dtype=bool) if marked is None else marked
+        edges = np.zeros((0, 2, 3)) if edges is None else edges
+        np.savez(part, corners=corners * MM, marked=marked, edges=edges * MM)
+        return _drawn_apart({"part": str(part), "title": title}, path)
+
+
+def _picture_path(picture: str | Path) -> Path:
+    """Where --screenshot may write. InputError for what is no .png, or in no folder."""
+    path = Path(picture)
+    if path.suffix.lower() != ".png":
+        raise InputError(f"--screenshot {path}: pictures are written as .png; give such a name")
+    if not path.resolve().parent.is_dir():
+        raise InputError(f"--screenshot {path}: the folder does not exist; make it first")
+    return path
+
+
+def _drawn_apart(job: dict[str, Any], picture: str | Path) -> str | None:
+    """Does a drawing job in a process of its own. None, or one line saying why there is no picture."""
     missing = why_no_pictures()
     if missing:
         return f"{Path(picture).name} skipped: {missing}"
-    job = {"folders": [str(f) for f in folders], "titles": list(titles), "picture": str(picture)}
+    job = {**job, "picture": str(picture)}
     environment = dict(os.environ)
     window = _offscreen_window()
     if sys.platform.startswith("linux") and window:
@@ -151,11 +189,7 @@ def inspect(folder: str | Path, screenshot: str | Path | None = None, title: str
     folder = Path(folder)
     read_surface(folder / COVERAGE)
     if screenshot is not None:
-        path = Path(screenshot)
-        if path.suffix.lower() != ".png":
-            raise InputError(f"--screenshot {path}: pictures are written as .png; give such a name")
-        if not path.resolve().parent.is_dir():
-            raise InputError(f"--screenshot {path}: the folder does not exist; make it first")
+        path = _picture_path(screenshot)
         trouble = coverage_picture([folder], [title or folder.name], path)
         if trouble:
             raise InputError(trouble)
@@ -187,6 +221,31 @@ def _draw(job: dict[str, Any]) -> None:
         _scene(plotter, part, chamber, title, limits, bar=False)
         plotter.subplot(*((0, 1) if single else (1, column)))
         _near(plotter, part, limits, bar=single or column == len(folders) - 1)
+    with whole_file(Path(job["picture"])) as temporary:
+        plotter.screenshot(temporary)
+
+
+def _draw_part(job: dict[str, Any]) -> None:
+    """The part's surface from two opposite sides; edges shine through it, where there are any."""
+    pyvista = _pyvista()
+    with np.load(job["part"]) as data:
+        corners, marked, edges = data["corners"], data["marked"], data["edges"]
+    surface = pyvista.PolyData.from_regular_faces(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
+    lines = pyvista.line_segments_from_points(edges.reshape(-1, 3)) if len(edges) else None
+    plotter = pyvista.Plotter(off_screen=True, shape=(1, 2), window_size=[1800, 900], border=False)
+    for column, side in enumerate((1.0, -1.0)):
+        plotter.subplot(0, column)
+        plotter.set_background(BACKGROUND)
+        for chosen, colour in ((~marked, GREY), (marked, SONOTRODE)):
+            if chosen.any():
+                plotter.add_mesh(surface.extract_cells(chosen), color=colour, opacity=1.0 if lines is None else 0.35)
+        if lines is not None:
+            plotter.add_mesh(lines, color=FAULT, line_width=6, lighting=False)
+        if column == 0:
+            plotter.add_text(job["title"], position="upper_left", font_size=11, color=DARK)
+        plotter.camera_position = [(side, -1.6 * side, 0.7 * side), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
+        plotter.reset_camera()
+        plotter.enable_anti_aliasing("ssaa")
     with whole_file(Path(job["picture"])) as temporary:
         plotter.screenshot(temporary)
 
@@ -290,7 +349,8 @@ def _near(plotter: Any, part: _Part, limits: tuple[float, float], bar: bool) -> 
 
 if __name__ == "__main__":
     try:
-        _draw(json.loads(sys.argv[1]))
+        asked = json.loads(sys.argv[1])
+        (_draw_part if "part" in asked else _draw)(asked)
     except InputError as error:
         print(error, file=sys.stderr)
         sys.exit(2)

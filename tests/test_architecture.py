@@ -15,8 +15,10 @@ CHAMBEROPT_ORDER = (
     ("effects",),
     ("design",),
     ("config",),
-    ("mesh_io", "solids", "slivers", "triangles"),
-    ("shapes",),
+    ("triangles",),
+    ("mesh_io", "solids", "slivers", "remesh"),
+    ("shapes", "target"),
+    ("part",),
     ("chamber",),
     ("process",),
     ("checkup",),
@@ -57,6 +59,8 @@ ORDER = {"chamberopt": CHAMBEROPT_ORDER, "sim_core": SIM_CORE_ORDER}
 # Package fronts gather names for users and may import everything below them.
 FRONTS = {"chamberopt/__init__.py", "sim_core/__init__.py"}
 ONE_DOOR = {"manifold3d": "solids.py", "nlopt": "study.py", "pyvista": "viewer.py", "vtk": "viewer.py"}
+# VTK's file readers alone, which need no OpenGL.
+ONE_DOOR["vtkmodules"] = "mesh_io/vtk_files.py"
 
 
 def sources(package: str) -> list[Path]:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from chamberopt.cli import main
@@ -52,7 +53,7 @@ WRONG = [
         ("did you mean 'height_mm' in [chamber]",),
     ),
     Wrong("missing key", ("diameter_mm = 70\n", ""), ("chamber.diameter_mm: missing", "from 2 to 2000 mm")),
-    Wrong("missing unit", ('unit = "mm"', ""), ("part.unit: missing", '"mm"')),
+    Wrong("no such unit", ('unit = "mm"', "unit = 1"), ("part.unit: given 1", '"mm"')),
     Wrong("unknown unit", ('unit = "mm"', 'unit = "millimetre"'), ("given 'millimetre'", '"um", "mm"')),
     Wrong(
         "negative mass",
@@ -255,6 +256,41 @@ class TestCheck:
         assert status == 0
         assert any("hinder each other" in text for text in warnings)
         assert any("between part and ceiling is 1 mm" in text for text in warnings)
+
+    def test_a_guessed_unit_is_said(self, copies: Path, chamberopt: Said) -> None:
+        path = copies / "designs" / "gear.toml"
+        path.write_text(path.read_text(encoding="utf-8").replace('unit = "mm"', ""), encoding="utf-8")
+        status, out, _ = chamberopt("check", path)
+        assert status == 0
+        assert "unit guessed as 'mm' (by its size): the part measures 44 x 44 x 70 mm" in out
+
+    @pytest.mark.parametrize("open_part", [True, False])
+    def test_screenshot_of_the_target_or_of_the_fault(
+        self, open_part: bool, copies: Path, chamberopt: Said, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        drawn: list[tuple[str, int, int]] = []
+
+        nothing = np.zeros(0)
+
+        def draw(corners: np.ndarray, title: str, picture: Path, marked=nothing, edges=nothing) -> None:  # type: ignore[no-untyped-def]
+            drawn.append((title, int(marked.sum()), len(edges)))
+
+        monkeypatch.setattr("chamberopt.viewer.part_picture", draw)
+        if open_part:
+            mesh = copies / "designs" / "parts" / "gear.stl"
+            content = mesh.read_bytes()  # without its last 100 triangles
+            mesh.write_bytes(content[:80] + (9820).to_bytes(4, "little") + content[84:-5000])
+        status, out, err = chamberopt("check", copies / "designs" / "gear.toml", "--screenshot", "look.png")
+        [(title, marked, edges)] = drawn
+        assert "picture in look.png" in err
+        assert status == (2 if open_part else 0)
+        if open_part:
+            assert "the surface is not closed" in err
+            assert "the surface is not closed" in " ".join(title.split())
+            assert edges > 3
+        else:
+            assert "a usable design" in out
+            assert marked > 1000
 
     def test_out(self, tmp_path: Path, chamberopt: Said) -> None:
         out = tmp_path / "out"

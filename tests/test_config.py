@@ -15,7 +15,11 @@ from chamberopt.materials import SHOT_DENSITY
 ROOT = Path(__file__).resolve().parents[1]
 DESIGNS = sorted((ROOT / "designs").glob("*.toml"))
 STUDIES = sorted((ROOT / "studies").glob("*.toml"))
-UNSET = ("shot.density_kg_m3", "process.accuracy.coverage")  # numbers that a design need not have
+UNSET = (
+    "shot.density_kg_m3",
+    "process.accuracy.coverage",
+    "part.target.element_mm",
+)  # numbers that a design need not have
 TABLES = """
 [part]
 mesh = "part.stl"
@@ -217,7 +221,7 @@ class TestWrongDesigns:
             ("mass_g = 3.308", "mass_g = -1"),
         ).splitlines()
         assert said == [
-            f'{design_file}:4: part.unit: given \'mmm\'; allowed: "um", "mm", "cm", "m", "in" '
+            f'{design_file}:4: part.unit: given \'mmm\'; allowed: "um", "mm", "cm", "m", "in", "guess" '
             "(of the numbers in the mesh file); did you mean 'mm'?",
             f"{design_file}:5: chamber.height_mm: missing; give a number from 2 to 2000 mm "
             "(inner height, sonotrode to ceiling)",

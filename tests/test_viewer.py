@@ -14,7 +14,7 @@ from chamberopt import viewer
 from chamberopt.chamber import build_chamber
 from chamberopt.coverage import coverage_at
 from chamberopt.errors import InputError
-from chamberopt.viewer import coverage_picture, inspect, read_surface, write_chamber, write_coverage
+from chamberopt.viewer import coverage_picture, inspect, part_picture, read_surface, write_chamber, write_coverage
 from tests.synthetic import plate_design, poisson_evaluation
 
 DESIGN = plate_design()
@@ -160,3 +160,25 @@ def test_averaging_keeps_the_mean_and_does_not_cross_edges() -> None:
 def test_importing_chamberopt_does_not_import_pyvista() -> None:
     code = "import sys, chamberopt.results, chamberopt.compare; assert 'pyvista' not in sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True, env=dict(os.environ))
+
+
+@needs_opengl
+def test_a_part_is_drawn_with_its_target_or_with_its_fault_in_red(tmp_path: Path) -> None:
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=0.01)
+    corners, upper = ball.triangles, ball.triangles_center[:, 2] > 0.0
+    edges = corners[:80, [0, 1, 1, 2]].reshape(-1, 2, 3)
+
+    assert part_picture(corners, "a ball", tmp_path / "target.png", marked=upper) is None
+    assert part_picture(corners, "a hole", tmp_path / "fault.png", edges=edges) is None
+
+    target, fault = (imread(tmp_path / f"{name}.png")[..., :3] for name in ("target", "fault"))
+    red = [(picture[..., 0] - picture[..., 1:].max(axis=2) > 0.5).mean() for picture in (target, fault)]
+    orange = [(picture[..., 1] - picture[..., 2] > 0.1).mean() for picture in (target, fault)]
+    assert red[1] > 5e-4 > 10 * red[0]
+    assert orange[0] > 0.05 > 10 * orange[1]
+
+
+def test_a_part_is_drawn_only_where_there_can_be_such_a_file(tmp_path: Path) -> None:
+    for name, said in (("part.jpg", r"\.png"), ("nowhere/part.png", "does not exist")):
+        with pytest.raises(InputError, match=said):
+            part_picture(np.zeros((1, 3, 3)), "a part", tmp_path / name)
