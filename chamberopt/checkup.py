@@ -31,7 +31,6 @@ def describe(design: Design, chamber: Chamber) -> dict[str, Any]:
     exposed = chamber.exposed_area > 0.0
     box = part.vertices.max(axis=0) - part.vertices.min(axis=0)
     shape = _volume(*_surface(design))
-    ball_volume = np.pi / 6.0 * shot.diameter**3
     simulated = process.accuracy.replicas * (process.recorded_time + process.accuracy.warmup_time)
     return {
         "part": {
@@ -62,7 +61,7 @@ def describe(design: Design, chamber: Chamber) -> dict[str, Any]:
             "balls": shot.count,
             "ball_mass_mg": _rounded(shot.ball_mass * 1e6),
             "mass_g": _rounded(shot.count * shot.ball_mass * 1e3),
-            "packing_fraction": _rounded(shot.count * ball_volume / chamber.volume),
+            "packing_fraction": _rounded(shot.volume / chamber.volume),
         },
         "simulated_time_s": _rounded(simulated),
         "notes": list(chamber.notes),
@@ -74,7 +73,7 @@ def warnings(design: Design, chamber: Chamber) -> list[str]:
     """What is allowed but probably not meant, each with what to do."""
     shot, said = design.shot, []
     ball = shot.diameter
-    filled = shot.count * np.pi / 6.0 * ball**3 / chamber.volume
+    filled = shot.volume / chamber.volume
     if filled > CROWDED:
         said.append(
             f"the balls fill {filled:.0%} of the free volume; above {CROWDED:.0%} they hinder each other: "
@@ -97,7 +96,7 @@ def warnings(design: Design, chamber: Chamber) -> list[str]:
         if 0.0 < gap < ball:
             said.append(
                 f"the gap between {place} is {gap * 1e3:.3g} mm, narrower than a ball of "
-                f"{shot.diameter_mm:g} mm: {caught}; {remedy}"
+                f"{ball * 1e3:g} mm: {caught}; {remedy}"
             )
     return said
 

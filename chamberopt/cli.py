@@ -239,7 +239,7 @@ def _compile(design: Design, chamber: Chamber) -> None:
     from chamberopt.progress import announce_compilation
 
     scene = build_scene(design, chamber_mesh(chamber), replica_seed(design.process.seed, 0))
-    announce_compilation(scene.physics, len(scene.balls))
+    announce_compilation(scene.physics, len(scene.balls), scene.balls.alike)
 
 
 def _remark(remarks: Sequence[str]) -> None:

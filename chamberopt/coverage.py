@@ -44,7 +44,7 @@ SUMS = tuple(column.name for column in fields(Tally) if not column.name.startswi
 
 
 def dent_diameter(
-    normal_speed: np.ndarray, diameter: float, density: float, hardness: float, c0: float, v0: float
+    normal_speed: np.ndarray, diameter: float | np.ndarray, density: float, hardness: float, c0: float, v0: float
 ) -> np.ndarray:
     """Diameter [m] of the dent a ball leaves; 0 where the normal speed is not above the yield speed v0.
 
@@ -81,9 +81,8 @@ def tally(impacts: ImpactLog, chamber: Chamber, design: Design) -> Tally:
     triangle = source[on_part]
     speed = np.asarray(impacts.normal_speed)[on_part]
     material, shot = design.materials.part, design.shot
-    dent = dent_diameter(
-        speed, shot.diameter, shot.density, material.hardness, material.restitution, material.yield_speed
-    )
+    diameter = shot.diameter if shot.mix is None else np.array(shot.diameters)[impacts.ball[on_part]]
+    dent = dent_diameter(speed, diameter, shot.density, material.hardness, material.restitution, material.yield_speed)
     angle = impact_angle_deg(np.asarray(impacts.velocity)[on_part], speed)
     dented, area = dent > 0.0, np.pi / 4.0 * dent * dent
     count = len(chamber.part.triangles)

@@ -5,7 +5,7 @@ Every table is frozen, refuses unknown keys, and holds bounds wide enough for an
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeVar
 
@@ -145,7 +145,9 @@ class Sonotrode(BaseModel):
 
     frequency_khz: float = quantity(0.01, 200, "kHz", "usually 20")
     amplitude_um: float = quantity(0.1, 500, "µm", "zero-to-peak: half of peak-to-valley")
-    motion: Literal["sinusoidal"] = Field(default="sinusoidal", description="how the face moves")
+    motion: Literal["sinusoidal", "random_phase"] = Field(
+        default="sinusoidal", description="how the face moves: as it does, or met by each ball at a phase drawn anew"
+    )
 
     @property
     def frequency(self) -> float:
@@ -163,31 +165,79 @@ class Sonotrode(BaseModel):
         return 2.0 * math.pi * self.frequency * self.amplitude
 
 
+class ShotSize(BaseModel):
+    """One of several sizes of balls."""
+
+    model_config = STRICT
+
+    diameter_mm: float = quantity(0.1, 20, "mm", "of one ball of this size")
+    share: float = quantity(1e-6, 1, "of the charge's mass", "the shares of all sizes add up to 1")
+
+
 class Shot(BaseModel):
-    """The charge: balls of one size. Give exactly one of material and density_kg_m3."""
+    """The charge: balls of one size, or a mix. Give exactly one of diameter_mm and mix, and of material and
+    density_kg_m3.
+    """
 
     model_config = STRICT
 
     mass_g: float = quantity(1e-4, 10000, "g", "of all balls together")
-    diameter_mm: float = quantity(0.1, 20, "mm", "of one ball")
+    diameter_mm: float | None = quantity(0.1, 20, "mm", "of one ball", None)
+    mix: Annotated[tuple[ShotSize, ...], Field(strict=False)] | None = listed(
+        "a list of { diameter_mm = ..., share = ... }", "2 to 8 sizes and their shares of the mass", None
+    )
     material: ShotMaterial | None = Field(default=None, description="sets the density")
     density_kg_m3: float | None = quantity(500, 25000, "kg/m³", "instead of material", None)
 
     @model_validator(mode="after")
-    def _one_density(self) -> Self:
+    def _agree(self) -> Self:
+        problems = [*self._density_problems(), *self._size_problems()]
+        if problems:
+            raise CrossCheckError(problems)
+        return self
+
+    def _size_problems(self) -> Iterator[Problem]:
+        if self.mix is None:
+            if self.diameter_mm is None:
+                yield Problem("diameter_mm", "missing; a number from 0.1 to 20 mm (of one ball), or several sizes: mix")
+            return
+        if self.diameter_mm is not None:
+            yield Problem("diameter_mm", f"given {self.diameter_mm:g} beside mix; keep one of the two")
+        if not 2 <= len(self.mix) <= 8:
+            yield Problem("mix", f"given {len(self.mix)} sizes; allowed: 2 to 8, or one as diameter_mm")
+        if len({size.diameter_mm for size in self.mix}) < len(self.mix):
+            yield Problem("mix", "given one diameter_mm twice; add up its shares")
+        whole = sum(size.share for size in self.mix)
+        if abs(whole - 1.0) > 1e-6:
+            yield Problem("mix", f"given shares that add up to {whole:g}; they must add up to 1")
+
+    def _density_problems(self) -> Iterator[Problem]:
         if self.material is None and self.density_kg_m3 is None:
             materials = ", ".join(f'"{name}"' for name in SHOT_DENSITY)
-            text = f"missing; give material (one of {materials}) or density_kg_m3"
-            raise CrossCheckError([Problem("material", text)])
+            yield Problem("material", f"missing; give material (one of {materials}) or density_kg_m3")
         if self.material is not None and self.density_kg_m3 is not None:
             text = f"given {self.density_kg_m3:g} beside material = {self.material!r}; keep one of the two"
-            raise CrossCheckError([Problem("density_kg_m3", text)])
-        return self
+            yield Problem("density_kg_m3", text)
+
+    @property
+    def sizes(self) -> tuple[tuple[float, int], ...]:
+        """Diameter [m] and number of the balls of each size: the mass asked for, rounded to whole balls, at least
+        one.
+        """
+        alone = () if self.diameter_mm is None else ((self.diameter_mm * 1e-3, 1.0),)
+        asked = alone if self.mix is None else tuple((size.diameter_mm * 1e-3, size.share) for size in self.mix)
+        whole = self.mass / (self.density * math.pi / 6.0)
+        return tuple((diameter, max(1, round(share * whole / diameter**3))) for diameter, share in asked)
 
     @property
     def diameter(self) -> float:
-        """Ball diameter [m]."""
-        return self.diameter_mm * 1e-3
+        """Ball diameter [m]; of the largest, if there are several sizes."""
+        return max(diameter for diameter, _ in self.sizes)
+
+    @property
+    def diameters(self) -> tuple[float, ...]:
+        """Diameter of each ball [m], in the order of the balls of a scene: size by size."""
+        return tuple(diameter for diameter, count in self.sizes for _ in range(count))
 
     @property
     def density(self) -> float:
@@ -200,14 +250,21 @@ class Shot(BaseModel):
         return self.mass_g * 1e-3
 
     @property
+    def volume(self) -> float:
+        """Volume of all balls [m³]."""
+        return math.pi / 6.0 * sum(count * diameter**3 for diameter, count in self.sizes)
+
+    @property
     def ball_mass(self) -> float:
-        """Mass of one ball [kg]."""
-        return self.density * math.pi / 6.0 * self.diameter**3
+        """Mass of one ball [kg]; the mean, if there are several sizes."""
+        if self.mix is None:
+            return self.density * math.pi / 6.0 * self.diameter**3
+        return self.density * self.volume / self.count
 
     @property
     def count(self) -> int:
-        """Number of balls: the mass asked for, rounded to whole balls, at least one."""
-        return max(1, round(self.mass / self.ball_mass))
+        """Number of balls."""
+        return sum(count for _, count in self.sizes)
 
 
 class Accuracy(BaseModel):
@@ -309,12 +366,18 @@ class Design(BaseModel):
         if 10 * self.sonotrode.amplitude_um >= 1e3 * distance:
             why = f"less than ten amplitudes of the sonotrode ({self.sonotrode.amplitude_um:g} µm); raise it"
             wrong("chamber.sonotrode_distance_mm", distance, why)
-        if shot.diameter_mm >= min(height, chamber.diameter_mm):
+        field, largest = ("shot.diameter_mm" if shot.mix is None else "shot.mix"), 1e3 * shot.diameter
+        if largest >= min(height, chamber.diameter_mm):
             why = f"which does not fit a chamber {chamber.diameter_mm:g} mm wide and {height:g} mm high"
-            wrong("shot.diameter_mm", shot.diameter_mm, f"{why}; use a smaller ball")
-        elif shot.diameter_mm >= distance:
+            wrong(field, largest, f"{why}; use a smaller ball")
+        elif largest >= distance:
             why = f"not below chamber.sonotrode_distance_mm = {distance:g}: no ball fits under the part"
-            wrong("shot.diameter_mm", shot.diameter_mm, f"{why}; use a smaller ball or raise the distance")
+            wrong(field, largest, f"{why}; use a smaller ball or raise the distance")
+        problems += [
+            Problem(f"effects.{effect}", "given beside shot.mix: not supported together yet")
+            for effect in ("rest", "part_turn")
+            if shot.mix is not None and getattr(self.effects, effect)
+        ]
         filled = shot.mass / shot.density / (math.pi / 4.0 * chamber.diameter**2 * chamber.height)
         if filled > 0.5:
             why = f"whose balls fill {filled:.0%} of the chamber; at most 50 % is allowed, usual are a few"

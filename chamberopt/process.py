@@ -50,8 +50,8 @@ def require_countable(design: Design) -> None:
     """InputError for more balls than the simulator is made for."""
     if design.shot.count > MOST_BALLS:
         raise InputError(
-            f"shot: {design.shot.count} balls of {design.shot.diameter_mm:g} mm in {design.shot.mass_g:g} g, more than "
-            f"the {MOST_BALLS} supported; lower shot.mass_g or raise shot.diameter_mm"
+            f"shot: {design.shot.count} balls of {1e3 * min(design.shot.diameters):g} mm or more in "
+            f"{design.shot.mass_g:g} g, more than the {MOST_BALLS} supported; lower shot.mass_g or use larger balls"
         )
 
 
@@ -89,10 +89,13 @@ def build_scene(design: Design, mesh: TriangleMesh, seed: int) -> Scene:
     Raises InputError when the shot does not fit or has too many balls, or the part cannot turn.
     """
     from sim_core import (
+        BallCollisions,
         Balls,
+        Drag,
         Friction,
         Gravity,
         Physics,
+        RandomPhase,
         Rest,
         Restitution,
         Scene,
@@ -109,7 +112,8 @@ def build_scene(design: Design, mesh: TriangleMesh, seed: int) -> Scene:
     phase = rng.uniform(0.0, 2.0 * np.pi)
     turn = None if design.effects.part_turn is None else part_turn(design, rng.uniform(0.0, 2.0 * np.pi))
     try:
-        positions = pack_balls(mesh, shot.count, shot.diameter, rng, clear=sonotrode.amplitude, turn=turn)
+        diameter = np.array(shot.diameters)
+        positions = pack_balls(mesh, shot.count, diameter, rng, clear=sonotrode.amplitude, turn=turn)
     except SceneError as error:
         raise InputError(f"shot: {error}; see shot.mass_g, shot.diameter_mm and [chamber]") from None
     velocities = start_velocities(rng, len(positions), sonotrode.peak_speed)
@@ -120,7 +124,8 @@ def build_scene(design: Design, mesh: TriangleMesh, seed: int) -> Scene:
     gravity = Gravity() if design.effects.gravity else None
     rests = design.effects.rest
     if rests is None:
-        rests = can_rest(mesh, gravity, TAG_SONOTRODE, *([] if turn is None else [TAG_PART]))
+        moving = [TAG_SONOTRODE] if turn is None else [TAG_SONOTRODE, TAG_PART]
+        rests = shot.mix is None and can_rest(mesh, gravity, *moving)
     rubs = design.effects.friction
     physics = Physics(
         gravity=gravity,
@@ -129,11 +134,14 @@ def build_scene(design: Design, mesh: TriangleMesh, seed: int) -> Scene:
         turn=turn,
         rest=Rest() if rests else None,
         friction=Friction((rubs.surfaces,) * len(surfaces), rubs.balls) if rubs is not None else None,
+        drag=Drag() if design.effects.drag else None,
+        ball_collisions=BallCollisions() if design.effects.ball_collisions else None,
+        random_phase=RandomPhase(int(rng.integers(2**32))) if sonotrode.motion == "random_phase" else None,
     )
     accuracy = design.process.accuracy
     return Scene(
         mesh=mesh,
-        balls=Balls(positions, velocities, shot.diameter, shot.density),
+        balls=Balls(positions, velocities, diameter, shot.density),
         physics=physics,
         duration=design.process.recorded_time,
         warmup=accuracy.warmup_time,

@@ -4,8 +4,11 @@ Build a Scene from a TriangleMesh, Balls and Physics, then simulate it. SI units
 """
 
 from sim_core.balls import Balls
+from sim_core.effects.ball_collisions import BallCollisions
+from sim_core.effects.drag import Drag
 from sim_core.effects.friction import Friction
 from sim_core.effects.gravity import Gravity
+from sim_core.effects.random_phase import RandomPhase
 from sim_core.effects.rest import Rest
 from sim_core.effects.restitution import Restitution, restitution_at
 from sim_core.effects.turn import Turn
@@ -21,12 +24,15 @@ from sim_core.surfaces.mesh import TriangleMesh
 from sim_core.warm_up import compile_simulator, is_compiled
 
 __all__ = [
+    "BallCollisions",
     "Balls",
     "Collisions",
+    "Drag",
     "Friction",
     "Gravity",
     "ImpactLog",
     "Physics",
+    "RandomPhase",
     "Rest",
     "Resting",
     "Restitution",

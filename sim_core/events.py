@@ -16,21 +16,26 @@ from sim_core.calendar import (
     PARTNER_HITS,
     SEARCH_ON,
     forget,
+    meeting_time,
     reschedule,
     set_calendar_back,
 )
 from sim_core.detect.ball_footing import end_of_path
 from sim_core.detect.ball_mesh import first_contact_from
 from sim_core.detect.ball_part import first_part_contact
+from sim_core.effects.drag import set_air_back
 from sim_core.effects.friction import carry_spins
+from sim_core.effects.random_phase import arrival, own_wave
 from sim_core.effects.rest import STILL, own_pull
 from sim_core.effects.turn import carry, one_turn
 from sim_core.flight import point_under, set_back
 from sim_core.grounded import first_meeting, hide_all
-from sim_core.hits import collide, gives_up, hit_part, hit_surface, take_step
+from sim_core.hits import collide, fly_on, gives_up, hit_part, hit_surface, take_step
 from sim_core.loop import BALLS, SEARCHES, STALE, Loop
-from sim_core.neighbours import set_crowd
+from sim_core.neighbours import Crowd, set_crowd, speed_limit
+from sim_core.resolve.air import piece_left
 from sim_core.roots import NEVER
+from sim_core.sizes import own_seam
 from sim_core.stopwatch import lap
 
 # status
@@ -52,29 +57,70 @@ def _speed_squared(motion: np.ndarray, ball: int) -> float:
 
 
 @inlined
+def _predict_meeting(
+    crowd: Crowd | None, pair_time: np.ndarray | None, loop: Loop, ball: int, time: float, what: int
+) -> None:
+    """Find the ball it meets next, if balls meet."""
+    if crowd is None or pair_time is None:
+        return
+    calendar = loop.calendar
+    marks = calendar.marks
+    before = NEVER_BEFORE if what == ALL or marks[ball, OBSTACLE] < 0 else calendar.wall_time[ball]
+    meeting, partner = first_meeting(loop.footing, crowd, loop.shot.motion, ball, time, before)
+    pair_time[ball] = meeting
+    marks[ball, PARTNER] = partner
+    if partner >= 0:
+        marks[ball, PARTNER_HITS] = marks[partner, HITS]
+
+
+@inlined
+def _until_meeting(pair_time: np.ndarray | None, marks: np.ndarray, ball: int, time: float) -> float:
+    """How far [s] a wall is looked for: no further than the ball is known to get, until its meeting, or one piece."""
+    if pair_time is None:
+        return PIECE
+    return min(PIECE, pair_time[ball] - time) if marks[ball, PARTNER] >= 0 else PIECE
+
+
+@inlined
+def _meet(crowd: Crowd | None, loop: Loop, ball: int, time: float) -> tuple[int, int]:
+    """The ball meets its partner, if that one has not been hit since: what to predict, and for whom besides (or -1)."""
+    if crowd is None:
+        return PAIRS, -1
+    marks = loop.calendar.marks
+    other = marks[ball, PARTNER]
+    if other < 0:
+        return PAIRS, -1
+    if marks[other, HITS] != marks[ball, PARTNER_HITS]:
+        loop.tally[STALE] += 1
+        return PAIRS, -1
+    collide(loop, ball, other, time)
+    marks[ball, HITS] += 1
+    marks[other, HITS] += 1
+    loop.tally[BALLS] += 1
+    return ALL, other
+
+
+@inlined
 def _predict(loop: Loop, ball: int, time: float, what: int) -> None:
     """Find the ball's next events from ``time`` on and put the earlier on the calendar."""
     shot, calendar = loop.shot, loop.calendar
     marks = calendar.marks
     if what != WALL:
-        before = NEVER_BEFORE if what == ALL or marks[ball, OBSTACLE] < 0 else calendar.wall_time[ball]
-        meeting, partner = first_meeting(loop.footing, shot.crowd, shot.motion, ball, time, before)
-        calendar.pair_time[ball] = meeting
-        marks[ball, PARTNER] = partner
-        if partner >= 0:
-            marks[ball, PARTNER_HITS] = marks[partner, HITS]
+        _predict_meeting(shot.crowd, calendar.pair_time, loop, ball, time, what)
         lap(loop.watch, stopwatch.PAIRS)
     if what != PAIRS or (marks[ball, OBSTACLE] < 0 and calendar.wall_time[ball] <= time):
-        # no further than the ball is known to get: until its meeting, or one piece
-        length = min(PIECE, calendar.pair_time[ball] - time) if marks[ball, PARTNER] >= 0 else PIECE
-        tree, seam = loop.ground.tree, loop.ground.seam
+        length = _until_meeting(calendar.pair_time, marks, ball, time)
+        tree, seam = loop.ground.tree, own_seam(loop.sizes, loop.ground.seam, ball)
         pull = own_pull(loop.footing, ball, loop.gravity)
         here = point_under(shot.motion, ball, time, pull)
+        length = min(length, piece_left(loop.air, loop.footing, ball, time))
+        length = arrival(loop.phases, here.position, here.velocity, pull, ball, length)
+        wave = own_wave(loop.phases, loop.wave, ball)
         moment = loop.clock.now[1] * loop.clock.window + time
-        length, end = end_of_path(loop.footing, tree, seam, loop.wave, here, pull, ball, time, moment, length)
+        length, end = end_of_path(loop.footing, tree, seam, wave, here, pull, ball, time, moment, length)
         look = one_turn(loop.turning, length) if end == STILL else length
         delay, obstacle = first_contact_from(
-            loop.footing, ball, tree, loop.scratch, here, pull, loop.wave, seam, time, length
+            loop.footing, loop.sizes, ball, tree, loop.scratch, here, pull, wave, seam, time, length
         )
         delay, obstacle = first_part_contact(
             loop.ground.part,
@@ -104,7 +150,7 @@ NEVER_BEFORE = 1e300  # finite, so that differences with it stay numbers
 @jit
 def advance(loop: Loop) -> tuple[int, int]:
     """Play events until ``clock.stop``; returns (status, ball): DONE, or why it had to pause and at which ball."""
-    shot, calendar, clock, page, tally = loop.shot, loop.calendar, loop.clock, loop.page, loop.tally
+    shot, calendar, clock, page = loop.shot, loop.calendar, loop.clock, loop.page
     marks = calendar.marks
     lap(loop.watch, -1)
     while True:
@@ -121,6 +167,7 @@ def advance(loop: Loop) -> tuple[int, int]:
             set_calendar_back(calendar, clock.window)
             carry(loop.turning, clock.window)
             carry_spins(loop.grip, clock.window)
+            set_air_back(loop.air, clock.window)
             clock.now[1] += 1.0
             continue
         if page.filled[0] == len(page.numbers):
@@ -135,28 +182,20 @@ def advance(loop: Loop) -> tuple[int, int]:
         obstacle = marks[ball, OBSTACLE]
         if gives_up(loop.footing, loop, ball, time):
             marks[ball, HITS] += 1
-        elif calendar.pair_time[ball] <= calendar.wall_time[ball]:
-            other = marks[ball, PARTNER]
-            if other < 0:
-                what = PAIRS
-            elif marks[other, HITS] == marks[ball, PARTNER_HITS]:
-                collide(loop, ball, other, time)
-                marks[ball, HITS] += 1
-                marks[other, HITS] += 1
-                second = other
-                tally[BALLS] += 1
-            else:
-                what = PAIRS
-                tally[STALE] += 1
+        elif meeting_time(calendar.pair_time, ball) <= calendar.wall_time[ball]:
+            what, second = _meet(shot.crowd, loop, ball, time)
         elif obstacle >= 0:
             if not hit_part(loop.turning, loop.ground.part, loop, ball, obstacle, time):
                 hit_surface(loop, ball, obstacle, time)
             marks[ball, HITS] += 1
-            if not _speed_squared(shot.motion, ball) <= shot.crowd.fastest**2:
+            if not _speed_squared(shot.motion, ball) <= speed_limit(shot.crowd) ** 2:
                 forget(calendar, ball, time)
                 return TOO_FAST, ball
         elif obstacle == SEARCH_ON:
             what = WALL
+            if fly_on(loop, ball, time):
+                what = ALL
+                marks[ball, HITS] += 1
         elif take_step(loop.footing, loop, ball, obstacle, time):
             marks[ball, HITS] += 1
         lap(loop.watch, stopwatch.RESOLVE)

@@ -34,18 +34,18 @@ LEANING = 2e-5  # m: a ball held still is this near to what holds it, or nearer:
 
 
 @inlined
-def hide(footing: Footing | None, crowd: Crowd, ball: int) -> None:
+def hide(footing: Footing | None, crowd: Crowd | None, ball: int) -> None:
     """Take a ball in contact mode out of the filter's sight."""
-    if footing is None:
+    if footing is None or crowd is None:
         return
     if footing.marks[ball, MODE] != FLYING:
         crowd.lanes[0, slot_of(crowd.blocks, ball)] = np.float32(np.nan)
 
 
 @jit
-def hide_all(footing: Footing | None, crowd: Crowd) -> None:
+def hide_all(footing: Footing | None, crowd: Crowd | None) -> None:
     """The same for all of them, at a window's start."""
-    if footing is None:
+    if footing is None or crowd is None:
         return
     for k in range(footing.held[0]):
         hide(footing, crowd, footing.roster[k])

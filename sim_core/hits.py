@@ -6,6 +6,7 @@ from sim_core._compile import inlined
 from sim_core.calendar import EVENTS
 from sim_core.detect.ball_triangle import away_from_capsule, face_normal, nearer_neighbour
 from sim_core.effects.friction import Grip
+from sim_core.effects.random_phase import own_wave
 from sim_core.effects.rest import ASLEEP, CALLED, DRIVEN, JAMMED, LOOKS, MODE, Footing, own_pull, static_law
 from sim_core.effects.turn import Turning, from_part, seen_from_part, slip
 from sim_core.effects.vibration import surface_velocity
@@ -13,7 +14,8 @@ from sim_core.flight import drift, kick, point_under
 from sim_core.grounded import count_props, hide, lies_still, wake_if_it_moves
 from sim_core.impacts import note_impact
 from sim_core.loop import SONOTRODE, WALLS, Loop
-from sim_core.neighbours import follow
+from sim_core.neighbours import follow, reach_of
+from sim_core.resolve.air import catch_up, flies, goes_on
 from sim_core.resolve.ball_ball import pair_kick
 from sim_core.resolve.ball_surface import surface_kick
 from sim_core.resolve.driving import drive, taken_from_part
@@ -21,6 +23,7 @@ from sim_core.resolve.footing import BOUNCES, ROLLS, deflect, land, set_out, ste
 from sim_core.resolve.holding import hold
 from sim_core.resolve.leaning import meet
 from sim_core.resolve.rubbing import rub_pair, rub_surface
+from sim_core.sizes import by_mass
 from sim_core.surfaces.locate import triangle_at
 from sim_core.surfaces.obstacles import CAPSULE, WAVING_FACE
 from sim_core.surfaces.part import PartTree
@@ -36,6 +39,7 @@ def hit_surface(loop: Loop, ball: int, obstacle: int, time: float) -> None:
     """
     shot, ground, clock, page = loop.shot, loop.ground, loop.clock, loop.page
     tree = ground.tree
+    catch_up(loop.air, loop.footing, shot.motion, ball, time, loop.gravity)
     here = point_under(shot.motion, ball, time, own_pull(loop.footing, ball, loop.gravity))
     moment = clock.now[1] * clock.window + time
     lay_still = lies_still(loop.footing, ball)
@@ -53,7 +57,7 @@ def hit_surface(loop: Loop, ball: int, obstacle: int, time: float) -> None:
     landed = BOUNCES
     law = loop.restitution
     if kind == WAVING_FACE:
-        relative = sub(relative, surface_velocity(loop.wave, time))
+        relative = sub(relative, surface_velocity(own_wave(loop.phases, loop.wave, ball), time))
     else:
         landed = land(loop.footing, tree, shot.motion, ball, obstacle, time, moment, here, away)
         law = static_law(loop.footing, loop.restitution)
@@ -66,7 +70,7 @@ def hit_surface(loop: Loop, ball: int, obstacle: int, time: float) -> None:
     follow(shot.crowd, shot.motion, ball, time)
     hide(loop.footing, shot.crowd, ball)
     if lay_still:
-        wake_if_it_moves(loop.footing, loop.calendar, shot.motion, ball, time, moment, shot.crowd.reach)
+        wake_if_it_moves(loop.footing, loop.calendar, shot.motion, ball, time, moment, reach_of(shot.crowd))
     if landed == ROLLS:
         return
     if kind == WAVING_FACE:
@@ -88,6 +92,7 @@ def hit_part(turning: Turning | None, part: PartTree | None, loop: Loop, ball: i
     if row < 0:
         return False
     shot, clock, page, tree = loop.shot, loop.clock, loop.page, part.tree
+    catch_up(loop.air, loop.footing, shot.motion, ball, time, loop.gravity)
     pull = own_pull(loop.footing, ball, loop.gravity)
     here = point_under(shot.motion, ball, time, pull)
     moment = clock.now[1] * clock.window + time
@@ -112,7 +117,7 @@ def hit_part(turning: Turning | None, part: PartTree | None, loop: Loop, ball: i
     follow(shot.crowd, shot.motion, ball, time)
     hide(loop.footing, shot.crowd, ball)
     if lay_still:
-        wake_if_it_moves(loop.footing, loop.calendar, shot.motion, ball, time, moment, shot.crowd.reach)
+        wake_if_it_moves(loop.footing, loop.calendar, shot.motion, ball, time, moment, reach_of(shot.crowd))
     if page.record[tag] and speed > 0.0:
         when = clock.now[1] * clock.window + time - clock.origin
         touched = triangle_at(loop.ground.locator, triangle, sub(seen.position, away))
@@ -135,6 +140,8 @@ def _rub_part(
 def collide(loop: Loop, one: int, two: int, time: float) -> None:
     """Two balls meet now."""
     motion = loop.shot.motion
+    for ball in (one, two):
+        catch_up(loop.air, loop.footing, motion, ball, time, loop.gravity)
     _kick_both(loop.footing, loop, one, two, time)
     follow(loop.shot.crowd, motion, one, time)
     follow(loop.shot.crowd, motion, two, time)
@@ -147,7 +154,7 @@ def _kick_both(footing: Footing | None, loop: Loop, one: int, two: int, time: fl
     motion = loop.shot.motion
     if footing is not None:
         moment = loop.clock.now[1] * loop.clock.window + time
-        reach = loop.shot.crowd.reach
+        reach = reach_of(loop.shot.crowd)
         jammed = footing.marks[one, MODE] == JAMMED, footing.marks[two, MODE] == JAMMED
         if meet(footing, motion, one, two, time, moment, loop.restitution, loop.ground.tree.radius):
             wake_if_it_moves(footing, loop.calendar, motion, one, time, moment, reach)
@@ -161,8 +168,8 @@ def _kick_both(footing: Footing | None, loop: Loop, one: int, two: int, time: fl
     closing = Vec3(motion[two, 3] - motion[one, 3], motion[two, 4] - motion[one, 4], motion[two, 5] - motion[one, 5])
     change = pair_kick(apart, closing, loop.restitution)
     change = rub_pair(loop.grip, one, two, time, apart, closing, change)
-    kick(motion, one, time, change)
-    kick(motion, two, time, Vec3(-change.x, -change.y, -change.z))
+    kick(motion, one, time, by_mass(loop.sizes, one, two, change))
+    kick(motion, two, time, by_mass(loop.sizes, two, one, Vec3(-change.x, -change.y, -change.z)))
 
 
 @inlined
@@ -172,10 +179,12 @@ def take_step(footing: Footing | None, loop: Loop, ball: int, what: int, time: f
         return False
     motion = loop.shot.motion
     lay_still = lies_still(footing, ball)
+    if not flies(footing, ball):
+        catch_up(loop.air, footing, motion, ball, time, loop.gravity)
     here = point_under(motion, ball, time, own_pull(footing, ball, loop.gravity))
     moment = loop.clock.now[1] * loop.clock.window + time
     if what == LOOKS:
-        if count_props(footing, motion, ball, time, loop.shot.crowd.reach):
+        if count_props(footing, motion, ball, time, reach_of(loop.shot.crowd)):
             footing.marks[ball, CALLED] = 1
         return False
     if not step(footing, motion, ball, what, time, moment, here):
@@ -183,7 +192,17 @@ def take_step(footing: Footing | None, loop: Loop, ball: int, what: int, time: f
     follow(loop.shot.crowd, motion, ball, time)
     hide(footing, loop.shot.crowd, ball)
     if lay_still:
-        wake_if_it_moves(footing, loop.calendar, motion, ball, time, moment, loop.shot.crowd.reach)
+        wake_if_it_moves(footing, loop.calendar, motion, ball, time, moment, reach_of(loop.shot.crowd))
+    return True
+
+
+@inlined
+def fly_on(loop: Loop, ball: int, time: float) -> bool:
+    """The ball flies on; True when the air has changed its path."""
+    motion = loop.shot.motion
+    if not goes_on(loop.air, loop.footing, motion, ball, time, loop.gravity):
+        return False
+    follow(loop.shot.crowd, motion, ball, time)
     return True
 
 
@@ -199,7 +218,7 @@ def gives_up(footing: Footing | None, loop: Loop, ball: int, time: float) -> boo
     here = point_under(loop.shot.motion, ball, time, own_pull(footing, ball, loop.gravity))
     moment = loop.clock.now[1] * loop.clock.window + time
     hold(footing, loop.shot.motion, ball, time, moment, here.position, loop.ground.tree.radius)
-    count_props(footing, loop.shot.motion, ball, time, loop.shot.crowd.reach)
+    count_props(footing, loop.shot.motion, ball, time, reach_of(loop.shot.crowd))
     follow(loop.shot.crowd, loop.shot.motion, ball, time)
     hide(footing, loop.shot.crowd, ball)
     return True

@@ -209,16 +209,35 @@ def closest_pair(balls: Balls) -> tuple[float, int, int]:
     return float(distance[one, 1]), one, two if two != one else int(partner[one, 0])
 
 
+def narrowest_gap(balls: Balls) -> tuple[float, int, int]:
+    """Smallest gap [m] between the surfaces of two balls, negative when they overlap, and which two.
+
+    (inf, -1, -1) for a single ball; of several sizes also when no two are nearer than the largest's diameter.
+    """
+    if np.ndim(balls.diameter) == 0:
+        distance, one, two = closest_pair(balls)
+        return distance - float(balls.diameter), one, two
+    from scipy.spatial import KDTree
+
+    pairs = KDTree(balls.positions).query_pairs(2.0 * balls.radius, output_type="ndarray")
+    if len(pairs) == 0:
+        return math.inf, -1, -1
+    apart = np.linalg.norm(balls.positions[pairs[:, 0]] - balls.positions[pairs[:, 1]], axis=1)
+    gap = apart - 0.5 * balls.diameters[pairs].sum(axis=1)
+    worst = int(gap.argmin())
+    return float(gap[worst]), int(pairs[worst, 0]), int(pairs[worst, 1])
+
+
 def energy(balls: Balls, gravity: Gravity | None = None) -> float:
     """Kinetic plus potential energy [J], that of spins included, potential zero at the origin."""
-    total = 0.5 * float(np.einsum("ij,ij->", balls.velocities, balls.velocities))
+    each = 0.5 * np.einsum("ij,ij->i", balls.velocities, balls.velocities)
     if balls.spins is not None:  # the moment of inertia of a solid sphere: 2/5 m R²
-        total += 0.2 * balls.radius**2 * float(np.einsum("ij,ij->", balls.spins, balls.spins))
+        each += 0.2 * (0.5 * balls.diameters) ** 2 * np.einsum("ij,ij->i", balls.spins, balls.spins)
     if gravity is not None:
-        total -= float(np.sum(balls.positions @ np.array([gravity.x, gravity.y, gravity.z])))
-    return balls.ball_mass * total
+        each -= balls.positions @ np.array([gravity.x, gravity.y, gravity.z])
+    return float(balls.masses @ each)
 
 
 def momentum(balls: Balls) -> np.ndarray:
     """Total momentum [kg m/s], shape (3,)."""
-    return np.asarray(balls.ball_mass * balls.velocities.sum(axis=0))
+    return np.asarray(balls.masses @ balls.velocities)

@@ -16,7 +16,8 @@ def touching(scene: Scene, corners: np.ndarray, positions: np.ndarray, ball: int
 
     ``corners`` (m, 3, 3) [m]: the triangles where they are now; ``positions`` (n, 3) [m] of the balls.
     """
-    physics, radius, here = scene.physics, scene.balls.radius, positions[[ball]]
+    physics, radii, here = scene.physics, 0.5 * scene.balls.diameters, positions[[ball]]
+    radius = float(radii[ball])
     slack = np.full(len(corners), LEANING)
     moving: dict[int, str] = {}
     if physics.vibration is not None:  # it is given where the mesh has it
@@ -33,7 +34,7 @@ def touching(scene: Scene, corners: np.ndarray, positions: np.ndarray, ball: int
         alike = (normals[t] @ normals[k] > ONE_WAY and scene.mesh.tags[t] == scene.mesh.tags[k] for k in found)
         if not any(alike) and len(found) < MOST_NAMED:
             found.append(t)
-    apart = np.linalg.norm(positions - here, axis=1) - scene.balls.diameter
+    apart = np.linalg.norm(positions - here, axis=1) - radii - radius
     others = [int(k) for k in np.argsort(apart) if k != ball and apart[k] <= LEANING][:MOST_NAMED]
     tags = [int(scene.mesh.tags[t]) for t in found]
     surfaces = zip(found, tags, strict=True)

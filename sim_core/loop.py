@@ -6,14 +6,17 @@ import numpy as np
 
 from sim_core.calendar import Calendar
 from sim_core.detect.ball_mesh import Scratch
+from sim_core.effects.drag import Air
 from sim_core.effects.friction import Grip
 from sim_core.effects.gravity import Gravity
+from sim_core.effects.random_phase import Phases
 from sim_core.effects.rest import Footing
 from sim_core.effects.restitution import Restitution
 from sim_core.effects.turn import Turning
 from sim_core.effects.vibration import Wave
 from sim_core.impacts import ImpactPage
 from sim_core.neighbours import Crowd
+from sim_core.sizes import Sizes
 from sim_core.stopwatch import Stopwatch
 from sim_core.surfaces.ground import Ground
 
@@ -22,10 +25,12 @@ WALLS, BALLS, SONOTRODE, SEARCHES, STALE = 0, 1, 2, 3, 4
 
 
 class Shot(NamedTuple):
-    """The balls for the loop: ``motion`` (n, 6) float64 in the free-fall frame, and the ``crowd`` made of it."""
+    """The balls for the loop: ``motion`` (n, 6) float64 in the free-fall frame, and the ``crowd`` made of it,
+    if they collide with one another.
+    """
 
     motion: np.ndarray
-    crowd: Crowd
+    crowd: Crowd | None
 
 
 class Clock(NamedTuple):
@@ -58,3 +63,6 @@ class Loop(NamedTuple):
     watch: Stopwatch | None
     footing: Footing | None
     grip: Grip | None
+    phases: Phases | None
+    air: Air | None
+    sizes: Sizes | None

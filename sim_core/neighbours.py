@@ -23,6 +23,7 @@ SLACK = np.float32(1.000001)  # on float32 times: ten times their rounding
 ROUNDINGS = 16.0 * float(np.finfo(np.float32).eps)  # of the largest number in a sum of three products, and to spare
 
 
+FINITE = 1e150  # m/s: its square is finite
 TINY = 1e-30  # stands for a velocity component of zero, whose inverse would be infinite
 
 
@@ -31,7 +32,8 @@ class Crowd(NamedTuple):
 
     ``lanes`` (6, m) float32: base and velocity, a column a ball, padded with NaN, which meets no one; ``probe`` (10,)
     float32: the column of the ball that asks, its time, and what the filter allows for rounding, good for speeds up
-    to ``fastest`` [m/s]; ``reach`` [m], the sum of two radii; ``window`` [s]; ``blocks``: only for many balls.
+    to ``fastest`` [m/s]; ``reach`` [m], the sum of two radii; ``window`` [s]; ``blocks``: only for many balls;
+    ``radii`` (n,) [m]: only for several sizes, whose ``reach`` is that of the largest.
     """
 
     lanes: np.ndarray
@@ -40,10 +42,17 @@ class Crowd(NamedTuple):
     fastest: float
     window: float
     blocks: Blocks | None
+    radii: np.ndarray | None = None
 
 
 def new_crowd(
-    motion: np.ndarray, low: np.ndarray, high: np.ndarray, reach: float, fastest: float, window: float
+    motion: np.ndarray,
+    low: np.ndarray,
+    high: np.ndarray,
+    reach: float,
+    fastest: float,
+    window: float,
+    radii: np.ndarray | None = None,
 ) -> Crowd:
     """The crowd of balls with this motion (n, 6) in a room from ``low`` to ``high`` (3,) [m]."""
     furthest = float(np.max(high - low)) + fastest * window  # a base lies up to a window's flight outside the room
@@ -56,24 +65,52 @@ def new_crowd(
     )  # the last: b w + t w² of one that still approaches
     lanes = np.full((6, -(-len(motion) // LANES) * LANES), np.nan, dtype=np.float32)
     blocks = new_blocks(len(motion), low, high, reach + 2.0 * margin) if len(motion) >= MANY else None
-    crowd = Crowd(lanes, probe, reach, fastest, window, blocks)
+    crowd = Crowd(lanes, probe, reach, fastest, window, blocks, radii)
     set_crowd(crowd, motion)
     return crowd
 
 
 @jit
-def set_crowd(crowd: Crowd, motion: np.ndarray) -> None:
+def set_crowd(crowd: Crowd | None, motion: np.ndarray) -> None:
     """See all balls anew, at a window's start."""
+    if crowd is None:
+        return
     sort_blocks(crowd.blocks, motion, crowd.window)
     for ball in range(len(motion)):
         _see(crowd, motion, ball)
 
 
 @inlined
-def follow(crowd: Crowd, motion: np.ndarray, ball: int, time: float) -> None:
+def follow(crowd: Crowd | None, motion: np.ndarray, ball: int, time: float) -> None:
     """See the new path of a ball hit at ``time`` [s]."""
+    if crowd is None:
+        return
     _see(crowd, motion, ball)
     widen(crowd.blocks, motion, ball, time, crowd.window)
+
+
+@inlined
+def speed_limit(crowd: Crowd | None) -> float:
+    """Speed [m/s] up to which the filter's margins are good; every finite one without it."""
+    if crowd is None:
+        return FINITE
+    return crowd.fastest
+
+
+@inlined
+def _pair_reach(radii: np.ndarray | None, reach: float, one: int, two: int) -> float:
+    """Distance [m] at which these two touch."""
+    if radii is None:
+        return reach
+    return radii[one] + radii[two]
+
+
+@inlined
+def reach_of(crowd: Crowd | None) -> float:
+    """Distance [m] at which two balls touch; 0 where they never do."""
+    if crowd is None:
+        return 0.0
+    return crowd.reach
 
 
 @inlined
@@ -118,7 +155,8 @@ def _search(
                 other = first + lowest_bit(near)
                 near &= near - 1
                 closing = sub(Vec3(motion[other, 3], motion[other, 4], motion[other, 5]), velocity)
-                delay = meeting_delay(sub(drift(motion, other, time), here), closing, crowd.reach)
+                reach = _pair_reach(crowd.radii, crowd.reach, ball, other)
+                delay = meeting_delay(sub(drift(motion, other, time), here), closing, reach)
                 if delay < best:
                     best = delay
                     partner = other
@@ -169,7 +207,8 @@ def _nearest(
         other = ball_in(crowd.blocks, first + lowest_bit(near))
         near &= near - 1
         closing = sub(Vec3(motion[other, 3], motion[other, 4], motion[other, 5]), velocity)
-        delay = meeting_delay(sub(drift(motion, other, time), here), closing, crowd.reach)
+        reach = _pair_reach(crowd.radii, crowd.reach, ball, other)
+        delay = meeting_delay(sub(drift(motion, other, time), here), closing, reach)
         if delay < best or (delay == best and other < partner):
             best = delay
             partner = other

@@ -19,38 +19,59 @@ GAP = 1e-6  # m kept between neighbours and from surfaces, so that rounding of p
 def pack_balls(
     mesh: TriangleMesh,
     count: int,
-    diameter: float,
+    diameter: float | np.ndarray,
     rng: np.random.Generator,
     clear: float = 0.0,
     turn: Turn | None = None,
 ) -> np.ndarray:
     """Positions [m] of ``count`` balls inside the mesh, shape (count, 3), no two overlapping.
 
-    ``diameter`` [m]; ``clear`` [m] is kept from every surface (at least the amplitude, where one vibrates); ``turn``:
-    a part that turns is where its phase has it. "Low" is along -z. Raises SceneError when they do not fit: random
-    placement reaches about 30 % of the volume a ball can use.
+    ``diameter`` [m], of all or of each, (count,): the larger are placed first; ``clear`` [m] is kept from every surface
+    (at least the amplitude, where one vibrates); ``turn``: a part that turns is where its phase has it. "Low" is along
+    -z. Raises SceneError when they do not fit: random placement reaches about 30 % of the volume a ball can use.
     """
-    if not (diameter > 0.0 and count >= 1 and count == int(count)):
+    sizes = np.asarray(diameter, dtype=np.float64)
+    if not (count >= 1 and count == int(count) and (sizes > 0.0).all() and sizes.shape in ((), (count,))):
         raise SceneError(f"cannot place {count} balls of {diameter} m: give a whole number and a positive diameter")
+    each = np.broadcast_to(sizes, int(count))
+    corners = mesh.corners if turn is None else posed(mesh, turn)
+    placed = _Placed(2.0 * (0.5 * float(each.max()) + GAP))
+    positions = np.empty((int(count), 3))
+    for size in np.unique(each)[::-1]:
+        before = len(placed.points)
+        _place(placed, mesh, corners, int((each == size).sum()), float(size), rng, clear, turn)
+        positions[each == size] = placed.points[before:]
+    return positions
+
+
+def _place(
+    placed: "_Placed",
+    mesh: TriangleMesh,
+    corners: np.ndarray,
+    count: int,
+    diameter: float,
+    rng: np.random.Generator,
+    clear: float,
+    turn: Turn | None,
+) -> None:
+    """So many balls of one size more."""
     radius = 0.5 * diameter + GAP
     free = radius + clear
     low = mesh.vertices.min(axis=0) + free
     high = mesh.vertices.max(axis=0) - free
     if (high < low).any():
         raise SceneError(f"no ball of {diameter * 1e3:.3g} mm fits into the mesh: it is narrower than the ball")
-    corners = mesh.corners if turn is None else posed(mesh, turn)
-    placed = _Placed(2.0 * radius)
-    failures = 0
+    failures, first = 0, len(placed.points)
     top = min(low[2] + FIRST_LAYER * diameter, high[2])
-    while len(placed.points) < count:
+    while len(placed.points) - first < count:
         tries = rng.uniform(low, [high[0], high[1], top], size=(BATCH, 3))
         tries = tries[clearance(corners, tries, free) >= free]
         tries = tries[contained(mesh, tries) if turn is None else enclosed(corners, tries)]
         before = len(placed.points)
         for point in tries:
-            if len(placed.points) == count:
+            if len(placed.points) - first == count:
                 break
-            placed.add(point)
+            placed.add(point, radius)
         # a layer that takes under one try in fifty is full enough
         failures = 0 if len(placed.points) - before > BATCH // 50 else failures + 1
         if failures and top < high[2]:
@@ -58,26 +79,27 @@ def pack_balls(
             failures = 0
         elif failures > TRIES:
             raise SceneError(
-                f"only {len(placed.points)} of {count} balls of {diameter * 1e3:.3g} mm find a free place in "
+                f"only {len(placed.points) - first} of {count} balls of {diameter * 1e3:.3g} mm find a free place in "
                 f"{mesh.volume * 1e6:.3g} cm³; use less shot, smaller balls or a larger chamber"
             )
-    return np.array(placed.points)
 
 
 class _Placed:
-    """Points no two of which are nearer than ``apart`` [m], found again by the cell they lie in."""
+    """Points no two of which are nearer than their radii, found again by the cell they lie in, ``edge`` [m] wide: twice
+    the largest radius.
+    """
 
-    def __init__(self, apart: float) -> None:
-        self.apart = apart
+    def __init__(self, edge: float) -> None:
+        self.edge = edge
         self.points: list[np.ndarray] = []
-        self.cells: dict[tuple[int, int, int], list[np.ndarray]] = {}
+        self.cells: dict[tuple[int, int, int], list[tuple[np.ndarray, float]]] = {}
 
-    def add(self, point: np.ndarray) -> None:
+    def add(self, point: np.ndarray, radius: float) -> None:
         """Take the point in, unless it is too near to another."""
-        i, j, k = (int(c) for c in np.floor(point / self.apart))
+        i, j, k = (int(c) for c in np.floor(point / self.edge))
         for cell in ((i + a, j + b, k + c) for a in (-1, 0, 1) for b in (-1, 0, 1) for c in (-1, 0, 1)):
-            for other in self.cells.get(cell, ()):
-                if ((point - other) ** 2).sum() < self.apart * self.apart:
+            for other, its_radius in self.cells.get(cell, ()):
+                if ((point - other) ** 2).sum() < (radius + its_radius) ** 2:
                     return
         self.points.append(point)
-        self.cells.setdefault((i, j, k), []).append(point)
+        self.cells.setdefault((i, j, k), []).append((point, radius))

@@ -2,8 +2,11 @@
 
 from typing import NamedTuple
 
+from sim_core.effects.ball_collisions import BallCollisions
+from sim_core.effects.drag import Drag
 from sim_core.effects.friction import Friction
 from sim_core.effects.gravity import Gravity
+from sim_core.effects.random_phase import RandomPhase
 from sim_core.effects.rest import Rest
 from sim_core.effects.restitution import Restitution
 from sim_core.effects.turn import Turn
@@ -11,7 +14,10 @@ from sim_core.effects.vibration import Vibration
 
 
 class Physics(NamedTuple):
-    """The scene's effects. With none of them balls fly straight and collide elastically between still walls."""
+    """The scene's effects. With none given balls fly straight and collide elastically between still walls;
+
+    ``ball_collisions=None`` lets them fly through each other.
+    """
 
     gravity: Gravity | None = None
     restitution: Restitution | None = None
@@ -19,3 +25,6 @@ class Physics(NamedTuple):
     rest: Rest | None = None
     turn: Turn | None = None
     friction: Friction | None = None
+    random_phase: RandomPhase | None = None
+    ball_collisions: BallCollisions | None = BallCollisions()
+    drag: Drag | None = None

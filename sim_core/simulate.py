@@ -9,8 +9,10 @@ import numpy as np
 from sim_core.balls import Balls
 from sim_core.calendar import Calendar, new_calendar
 from sim_core.detect.ball_mesh import Scratch, new_scratch
+from sim_core.effects.drag import Air, catch_all_up, checked_drag, new_air
 from sim_core.effects.friction import Grip, checked_friction, new_grip
 from sim_core.effects.gravity import acceleration, checked_gravity
+from sim_core.effects.random_phase import Phases, checked_random_phase, new_phases
 from sim_core.effects.rest import Footing, checked_rest, new_footing
 from sim_core.effects.restitution import Restitution, checked_restitution
 from sim_core.effects.turn import Turning, angle_now, checked_axle, checked_turn
@@ -20,12 +22,13 @@ from sim_core.events import DONE, PAGE_FULL, STORM, TOO_FAST, advance
 from sim_core.flight import WINDOW
 from sim_core.grounded import hide_all
 from sim_core.impacts import ImpactLog, ImpactPage, impact_log, new_page
-from sim_core.invariants import closest_pair, contained, posed
+from sim_core.invariants import contained, narrowest_gap, posed
 from sim_core.jams import touching
 from sim_core.loop import Clock, Loop, Shot
 from sim_core.neighbours import new_crowd
 from sim_core.resting import Resting, resting
 from sim_core.scene import TOUCH, Scene
+from sim_core.sizes import Sizes, new_sizes
 from sim_core.stopwatch import Stopwatch
 from sim_core.surfaces.ground import build_ground
 from sim_core.surfaces.mesh import MAX_TAGS
@@ -88,7 +91,6 @@ class _Run:
         if scene.physics.restitution is not None:
             self.restitution = checked_restitution(scene.physics.restitution, tags)
         self.centre = scene.mesh.middle
-        radius = scene.balls.radius
         tag, swing = -1, 0.0
         self.window = WINDOW
         if scene.physics.vibration is not None:
@@ -97,15 +99,23 @@ class _Run:
             self.window = (
                 max(1.0, round(WINDOW * frequency)) / frequency
             )  # whole periods: the phase need not be carried
+        vibrating = scene.mesh.corners[scene.mesh.tags == tag] - self.centre
+        random_phase = checked_random_phase(scene.physics.random_phase, self.wave is not None)
+        self.phases: Phases | None = new_phases(random_phase, self.wave, vibrating, 0.5 * scene.balls.diameters)
         self.turning: Turning | None = checked_turn(scene.physics.turn, self.centre)
-        self.ground = _ground(scene.mesh, radius, tag, swing, checked_axle(scene.physics.turn))
+        radii = tuple(float(r) for r in 0.5 * scene.balls.sizes)
+        self.ground = _ground(scene.mesh, radii, tag, swing, checked_axle(scene.physics.turn))
+        self.sizes: Sizes | None = new_sizes(scene.balls, self.ground.roots)
+        self.collide = scene.physics.ball_collisions is not None
         self.motion = np.concatenate([scene.balls.positions - self.centre, scene.balls.velocities], axis=1)
-        self.calendar: Calendar = new_calendar(len(self.motion))
+        self.calendar: Calendar = new_calendar(len(self.motion), self.collide)
         self.scratch: Scratch = new_scratch()
         self.grip = self._grip(tags)
         self.footing: Footing | None = new_footing(
             checked_rest(scene.physics.rest), len(self.motion), self.gravity, self.restitution, self.grip
         )
+        drag = checked_drag(scene.physics.drag)
+        self.air: Air | None = new_air(drag, scene.balls.diameters, scene.balls.densities)
         self.shot = self._shot(2.0 * max(1.0, float(np.abs(scene.balls.velocities).max())))
         self.watch: Stopwatch | None = None
         self.now = np.zeros(2)
@@ -121,9 +131,13 @@ class _Run:
         return new_grip(checked_friction(friction, tags), spins, balls.radius, tags_of_rows)
 
     def _shot(self, fastest: float) -> Shot:
+        if not self.collide:
+            return Shot(self.motion, None)
         low = self.scene.mesh.vertices.min(axis=0) - self.centre
         high = self.scene.mesh.vertices.max(axis=0) - self.centre
-        crowd = new_crowd(self.motion, low, high, 2.0 * self.scene.balls.radius, fastest, self.window)
+        balls = self.scene.balls
+        radii = None if balls.alike else 0.5 * balls.diameters
+        crowd = new_crowd(self.motion, low, high, 2.0 * balls.radius, fastest, self.window, radii)
         hide_all(self.footing, crowd)
         return Shot(self.motion, crowd)
 
@@ -160,6 +174,9 @@ class _Run:
                     self.watch,
                     self.footing,
                     self.grip,
+                    self.phases,
+                    self.air,
+                    self.sizes,
                 )
             )
             if status == DONE:
@@ -207,7 +224,9 @@ class _Run:
         now = self.now[0]
         fall = np.array(acceleration(self.gravity)) if self.footing is None else self.footing.pull
         base, velocities = self.motion[:, :3], self.motion[:, 3:]
-        return base + velocities * now + 0.5 * now * now * fall + self.centre, velocities + now * fall
+        velocities_now = velocities + now * fall
+        catch_all_up(self.air, velocities_now, now)
+        return base + velocities * now + 0.5 * now * now * fall + self.centre, velocities_now
 
     def _require_sound(self) -> None:
         points, _ = self._states()
@@ -220,11 +239,12 @@ class _Run:
                 f"ball {outside[0]} has left the mesh at {np.round(points[outside[0]], 6).tolist()} m, {self._when()}. "
                 "Look for surfaces that overlap or cross there; if there are none, please report the scene"
             )
-        distance, one, two = closest_pair(self.balls())
-        if distance < self.scene.balls.diameter - TOUCH:
+        if not self.collide:
+            return
+        gap, one, two = narrowest_gap(self.balls())
+        if gap < -TOUCH:
             raise SimulationError(
-                f"balls {one} and {two} overlap by {self.scene.balls.diameter - distance:.3g} m, {self._when()}; "
-                "please report the scene"
+                f"balls {one} and {two} overlap by {-gap:.3g} m, {self._when()}; please report the scene"
             )
 
     def _corners(self) -> np.ndarray | None:

@@ -16,21 +16,21 @@ from sim_core.simulate import simulate
 from sim_core.surfaces.mesh import TriangleMesh
 
 
-def _mark(physics: Physics, balls: int) -> Path:
+def _mark(physics: Physics, balls: int, alike: bool) -> Path:
     """A file that says that this set of effects has been compiled: what is absent is not in the machine code."""
     present = [name for name, effect in zip(physics._fields, physics, strict=True) if effect is not None]
-    return CACHE_FOLDER / "-".join(["compiled", *present, "many" if balls >= MANY else "few"])
+    kind = ["many" if balls >= MANY else "few", "alike" if alike else "mixed"]
+    return CACHE_FOLDER / "-".join(["compiled", *present, *kind])
 
 
-def is_compiled(physics: Physics, balls: int) -> bool:
+def is_compiled(physics: Physics, balls: int, alike: bool = True) -> bool:
     """True when compile_simulator has done this before, with this version of the sources."""
-    return _mark(physics, balls).exists()
+    return _mark(physics, balls, alike).exists()
 
 
-def compile_simulator(physics: Physics, balls: int = 1) -> float:
-    """Compiles (or loads from the cache) what a scene with these effects and so many balls needs; returns the seconds
-
-    it took.
+def compile_simulator(physics: Physics, balls: int = 1, alike: bool = True) -> float:
+    """Compiles (or loads from the cache) what a scene with these effects and so many balls, ``alike`` or of several
+    sizes, needs; returns the seconds it took.
     """
     start = time.perf_counter()
     tag = physics.vibration.tag if physics.vibration is not None else 0
@@ -46,10 +46,11 @@ def compile_simulator(physics: Physics, balls: int = 1) -> float:
         physics, vertices, triangles, tags = _with_a_turning_box(physics, vertices, triangles, tags)
     side = math.ceil(MANY ** (1 / 3)) if balls >= MANY else 2
     places = np.stack(np.meshgrid(*[np.linspace(0.1, 0.9, side)] * 3), axis=-1).reshape(-1, 3)
-    shot = Balls(places, np.random.default_rng(1).normal(size=places.shape), 0.05)
+    diameter = 0.05 if alike else np.linspace(0.04, 0.05, len(places)).round(2)
+    shot = Balls(places, np.random.default_rng(1).normal(size=places.shape), diameter)
     simulate(Scene(TriangleMesh(vertices, triangles, tags), shot, physics, duration=0.01))
     with contextlib.suppress(OSError):  # a cache that cannot be written: every process compiles for itself
-        _mark(physics, balls).touch()
+        _mark(physics, balls, alike).touch()
     return time.perf_counter() - start
 
 

@@ -42,10 +42,11 @@ def patchwork(area: np.ndarray, exposed: np.ndarray | None = None, target: np.nd
     )
 
 
-def impact_log(triangle: Any, velocity: Any, normal_speed: Any) -> Any:
+def impact_log(triangle: Any, velocity: Any, normal_speed: Any, ball: Any = 0) -> Any:
     """The columns of a sim_core.ImpactLog that coverage reads."""
     return SimpleNamespace(
         triangle=np.asarray(triangle, dtype=np.int32),
+        ball=np.broadcast_to(np.asarray(ball, dtype=np.int32), np.shape(triangle)),
         velocity=np.asarray(velocity, dtype=float).reshape(-1, 3),
         normal_speed=np.asarray(normal_speed, dtype=float),
     )

@@ -41,7 +41,7 @@ SIM_CORE_ORDER = (
     ("vec3", "stopwatch"),
     ("roots",),
     ("surfaces", "balls", "effects"),
-    ("invariants",),
+    ("invariants", "sizes"),
     ("packing",),
     ("physics",),
     ("flight",),

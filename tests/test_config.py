@@ -253,6 +253,44 @@ class TestWrongDesigns:
         said = edited(design_file, ('material = "steel"\ndensity_kg_m3 = 7800', ""))
         assert "shot.material: missing; give material (one of" in said
 
+    def test_a_mix_of_sizes(self, design_file: Path) -> None:
+        mix = "mix = [{ diameter_mm = 2, share = 0.25 }, { diameter_mm = 3, share = 0.75 }]"
+        design_file.write_text(TABLES.replace("diameter_mm = 3\n", mix + "\n"), encoding="utf-8")
+        shot = load_design(design_file).shot
+        small, large = (7800 * math.pi / 6 * d**3 for d in (0.002, 0.003))
+        assert shot.sizes == ((0.002, round(0.25 * 3.308e-3 / small)), (0.003, round(0.75 * 3.308e-3 / large)))
+        assert shot.count == len(shot.diameters) == 25 + 22
+        assert shot.count * shot.ball_mass == pytest.approx(25 * small + 22 * large)
+        assert shot.diameter == 0.003
+        assert "shot.diameter_mm" in Design.numbers()
+        with pytest.raises(InputError, match=r"shot\.diameter_mm: not set"):
+            load_design(design_file).with_values({"shot.diameter_mm": 2.0})
+        again = design_file.with_name("again.toml")
+        save_design(load_design(design_file), again)
+        assert load_design(again) == load_design(design_file)
+        assert load_design(design_file).with_values({"shot.mass_g": 4.0}).shot.mix == shot.mix
+
+    @pytest.mark.parametrize(
+        ("mix", "said"),
+        [
+            ("", "shot.diameter_mm: missing; a number from 0.1 to 20 mm (of one ball), or several sizes: mix"),
+            ("diameter_mm = 3\nmix = [[2, 0.5], [3, 0.5]]", "shot.mix"),
+            ("diameter_mm = 3\nMIX", "shot.diameter_mm: given 3 beside mix"),
+            ("mix = [{ diameter_mm = 3, share = 1.0 }]", "shot.mix: given 1 sizes; allowed: 2 to 8"),
+            ("MIX" + "[effects]\nrest = true\n", "effects.rest: given beside shot.mix: not supported"),
+            ("mix = [{ diameter_mm = 3, share = 0.5 }, { diameter_mm = 3, share = 0.5 }]", "one diameter_mm twice"),
+            ("mix = [{ diameter_mm = 3, share = 0.5 }, { diameter_mm = 2, share = 0.4 }]", "add up to 0.9"),
+            ("mix = [{ diameter_mm = 3, share = 0.5 }, { diameter_mm = 16, share = 0.5 }]", "shot.mix: given 16"),
+        ],
+        ids=lambda text: text[:30],
+    )
+    def test_a_mix_that_is_wrong(self, design_file: Path, mix: str, said: str) -> None:
+        fine = "mix = [{ diameter_mm = 2, share = 0.5 }, { diameter_mm = 3, share = 0.5 }]\n"
+        shot, _, effects = mix.replace("MIX", fine).partition("[effects]")
+        tables = TABLES.replace("diameter_mm = 3\n", shot + "\n") + (f"[effects]{effects}" if effects else "")
+        design_file.write_text(tables, encoding="utf-8")
+        assert said in edited(design_file)
+
     @pytest.mark.parametrize(
         ("change", "said"),
         [

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from chamberopt.coverage import coverage_at, dent_diameter, impact_angle_deg, mean_normal_speed, tally
+from chamberopt.design import ShotSize
 from tests.synthetic import dented, impact_log, patchwork, plate_design
 
 HB = 9.81e6
@@ -59,6 +60,17 @@ def test_known_impacts_give_known_coverage() -> None:
     simulated = design.process.accuracy.simulated_time
     expected = 1 - np.exp(-got.dented_area / (1e-6 * simulated) * 7.0)
     np.testing.assert_allclose(coverage_at(got, chamber, 7.0), expected, rtol=1e-12)
+
+
+def test_a_dent_is_as_large_as_its_own_ball_makes_it() -> None:
+    design, chamber = plate_design(), patchwork(np.full(2, 1e-6))
+    sizes = tuple(ShotSize(diameter_mm=d, share=0.5) for d in (1.0, 2.0))
+    mixed = design.model_copy(update={"shot": design.shot.model_copy(update={"diameter_mm": None, "mix": sizes})})
+    diameters = np.array(mixed.shot.diameters)
+    small, large = int(diameters.argmin()), int(diameters.argmax())
+    log = impact_log([0, 1], np.tile([0, 0, 3.0], (2, 1)), [3.0, 3.0], [small, large])
+    area = tally(log, chamber, mixed).dented_area
+    assert area[1] / area[0] == pytest.approx(4.0)
 
 
 def test_avrami_at_one_area() -> None:

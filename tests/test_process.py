@@ -5,10 +5,11 @@ import pytest
 
 from chamberopt.chamber import TAG_PART, TAG_SONOTRODE, build_chamber
 from chamberopt.config import load_design
+from chamberopt.design import ShotSize
 from chamberopt.effects import Friction
 from chamberopt.errors import InputError
 from chamberopt.process import build_scene, chamber_mesh, replica_seed, start_velocities
-from sim_core import Rest
+from sim_core import Drag, Rest
 from tests.synthetic import DESIGNS, plate_design
 
 
@@ -83,6 +84,32 @@ def test_contact_mode_is_on_where_a_ball_can_lie_still(design, mesh) -> None:
     assert build_scene(gear, hung, 1).physics.rest == Rest()
     weightless = gear.model_copy(update={"effects": effects(gravity=False)})
     assert build_scene(weightless, hung, 1).physics.rest is None
+
+
+def test_effects_that_are_asked_for_are_in_the_scene(design, mesh) -> None:
+    """Each by its own key; none of them moves the random numbers of what was there before."""
+    plain = build_scene(design, mesh, 1)
+    assert plain.physics.random_phase is None
+    assert plain.physics.drag is None
+    assert plain.physics.ball_collisions is not None
+    effects = design.effects.model_copy(update={"drag": True, "ball_collisions": False})
+    sonotrode = design.sonotrode.model_copy(update={"motion": "random_phase"})
+    asked = build_scene(design.model_copy(update={"effects": effects, "sonotrode": sonotrode}), mesh, 1)
+    assert asked.physics.drag == Drag()
+    assert asked.physics.ball_collisions is None
+    other = build_scene(design.model_copy(update={"sonotrode": sonotrode}), mesh, 2)
+    assert asked.physics.random_phase is not None
+    assert asked.physics.random_phase != other.physics.random_phase
+    np.testing.assert_array_equal(asked.balls.velocities, plain.balls.velocities)
+
+
+def test_a_mix_of_sizes_is_in_the_scene(design, mesh) -> None:
+    sizes = (ShotSize(diameter_mm=2.0, share=0.4), ShotSize(diameter_mm=3.0, share=0.6))
+    shot = design.shot.model_copy(update={"diameter_mm": None, "mix": sizes})
+    mixed = build_scene(design.model_copy(update={"shot": shot}), mesh, 1)
+    np.testing.assert_array_equal(mixed.balls.diameters, shot.diameters)
+    assert mixed.balls.masses.sum() == pytest.approx(design.shot.mass, rel=0.02)
+    assert mixed.physics.rest is None
 
 
 def test_start_velocities_are_isotropic_maxwell() -> None:

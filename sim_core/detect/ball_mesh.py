@@ -14,6 +14,7 @@ from sim_core.effects.vibration import Wave
 from sim_core.flight import Point
 from sim_core.roots import NEVER
 from sim_core.simd import BOXES, boxes_hit, lowest_bit
+from sim_core.sizes import Sizes, own_radius, own_root
 from sim_core.surfaces.obstacles import CAPSULE, FACE
 from sim_core.surfaces.tree import STACK, Tree
 from sim_core.vec3 import Vec3
@@ -97,12 +98,13 @@ def first_contact(
     ``time`` [s]: now, on the window's clock (the sonotrode's phase depends on it). Ties go to the obstacle stored
     first.
     """
-    return first_contact_from(None, -1, tree, scratch, ball, acceleration(gravity), wave, seam, time, length)
+    return first_contact_from(None, None, -1, tree, scratch, ball, acceleration(gravity), wave, seam, time, length)
 
 
 @inlined
 def first_contact_from(
     footing: Footing | None,
+    sizes: Sizes | None,
     number: int,
     tree: Tree,
     scratch: Scratch,
@@ -113,13 +115,17 @@ def first_contact_from(
     time: float,
     length: float,
 ) -> tuple[float, int]:
-    """The same for ball ``number``, under its own acceleration ``fall`` [m/s²], with what it stands on left out."""
+    """The same for ball ``number``, under its own acceleration ``fall`` [m/s²], with what it stands on left out;
+
+    of several ``sizes`` it has obstacles of its own.
+    """
+    radius = own_radius(sizes, tree.radius, number)
     _aim(scratch.ray, ball, fall, length)
     best = length
     found = -1
     plane_row = -1  # the sonotrode's faces share a plane: its equation is solved once a query
     plane_delay = NEVER
-    scratch.nodes[0] = 0
+    scratch.nodes[0] = own_root(sizes, number)
     scratch.times[0] = np.float32(0.0)
     depth = 1
     while depth > 0:
@@ -132,13 +138,13 @@ def first_contact_from(
             row = -1 - code
             kind = tree.kinds[row]
             if kind == FACE:
-                delay = face_delay(tree.numbers, row, ball, fall, tree.radius, seam)
+                delay = face_delay(tree.numbers, row, ball, fall, radius, seam)
             elif kind == CAPSULE:
-                delay = capsule_delay(tree.numbers, row, ball, fall, tree.radius, best)
+                delay = capsule_delay(tree.numbers, row, ball, fall, radius, best)
             else:
                 if plane_row < 0 or not same_plane(tree.numbers, row, plane_row):
                     plane_row = row
-                    plane_delay = waving_plane_delay(tree.numbers, row, ball, fall, tree.radius, wave, time, best)
+                    plane_delay = waving_plane_delay(tree.numbers, row, ball, fall, radius, wave, time, best)
                 delay = plane_delay
                 if delay <= best and not within_waving_borders(tree.numbers, row, ball, fall, seam, wave, time, delay):
                     delay = NEVER
@@ -150,7 +156,7 @@ def first_contact_from(
             continue
         depth = stack_children(tree, scratch, code, depth, longest)
     if plane_row >= 0 and plane_delay < best:  # and no face was there
-        later, face = meets_later(tree, plane_row, ball, fall, seam, wave, time, plane_delay, best)
+        later, face = meets_later(tree, radius, plane_row, ball, fall, seam, wave, time, plane_delay, best)
         if face >= 0:
             return later, face
     if found < 0:

@@ -85,6 +85,7 @@ def within_waving_borders(
 @jit
 def meets_later(
     tree: Tree,
+    radius: float,
     row: int,
     ball: Point,
     fall: Vec3,
@@ -103,7 +104,7 @@ def meets_later(
         return NEVER, -1
     gap = _gap(tree.numbers, row, ball, fall, wave, time)
     while True:
-        delay = next_wave_approach(gap, delay, limit, HALF * tree.radius)
+        delay = next_wave_approach(gap, delay, limit, HALF * radius)
         if delay >= limit:
             return NEVER, -1
         for face in range(len(tree.kinds)):

@@ -1,4 +1,7 @@
-"""Two equal balls collide: momentum is kept, the normal relative speed is reversed and multiplied by e."""
+"""Two equal balls collide: momentum is kept, the normal relative speed is reversed and multiplied by e.
+
+For unequal ones see sizes.by_mass.
+"""
 
 import math
 

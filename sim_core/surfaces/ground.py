@@ -10,14 +10,14 @@ from sim_core.surfaces.locate import Locator, build_locator
 from sim_core.surfaces.mesh import TriangleMesh
 from sim_core.surfaces.obstacles import build_obstacles, seam
 from sim_core.surfaces.part import PartTree, chosen, part_of, part_tree
-from sim_core.surfaces.tree import Tree, build_tree
+from sim_core.surfaces.tree import Tree, build_tree, joined
 
 
 class Ground(NamedTuple):
     """The tree of obstacles, which triangle of a flat is where, each triangle's tag, and how far faces overlap [m].
 
     Coordinates are relative to the middle of the mesh. ``part``: what turns, if anything does; its obstacles are not
-    in ``tree``.
+    in ``tree``. ``roots`` (k,): the nodes of the tree where the obstacles of each radius begin.
     """
 
     tree: Tree
@@ -25,21 +25,32 @@ class Ground(NamedTuple):
     tags: np.ndarray
     seam: float
     part: PartTree | None
+    roots: np.ndarray
 
 
 def build_ground(
-    mesh: TriangleMesh, radius: float, waving_tag: int = -1, swing: float = 0.0, axle: Axle | None = None
+    mesh: TriangleMesh,
+    radius: float | tuple[float, ...],
+    waving_tag: int = -1,
+    swing: float = 0.0,
+    axle: Axle | None = None,
 ) -> Ground:
-    """The ground for balls of this radius [m]; triangles of ``waving_tag`` vibrate by ``swing`` [m] zero-to-peak,
-    those of the ``axle``'s tag turn.
+    """The ground for balls of this radius [m], or these radii, ascending; triangles of ``waving_tag`` vibrate by
+    ``swing`` [m] zero-to-peak, those of the ``axle``'s tag turn.
     """
     corners = mesh.corners - mesh.middle
     flats = find_flats(corners, edge_partners(mesh.triangles), mesh.tags, in_plane(mesh.vertices))
-    obstacles = build_obstacles(mesh, radius, mesh.tags == waving_tag, swing, flats)
-    overlap = seam(radius)
+    radii = radius if isinstance(radius, tuple) else (radius,)
+    overlap = seam(radii[-1])
     locator = build_locator(corners, flats, overlap)
     if axle is None:
-        return Ground(build_tree(obstacles, radius), locator, mesh.tags, overlap, None)
+        trees = [build_tree(build_obstacles(mesh, r, mesh.tags == waving_tag, swing, flats), r) for r in radii]
+        tree, roots = joined(trees)
+        return Ground(tree, locator, mesh.tags, overlap, None, roots)
+    (radius,) = radii  # a turning part and several sizes are not supported together
+    obstacles = build_obstacles(mesh, radius, mesh.tags == waving_tag, swing, flats)
     turns = part_of(obstacles, mesh, axle, radius)
     part = part_tree(chosen(obstacles, turns), mesh, axle, radius)
-    return Ground(build_tree(chosen(obstacles, ~turns), radius), locator, mesh.tags, overlap, part)
+    return Ground(
+        build_tree(chosen(obstacles, ~turns), radius), locator, mesh.tags, overlap, part, np.zeros(1, np.int64)
+    )

@@ -67,6 +67,27 @@ def build_tree(obstacles: Obstacles, radius: float) -> Tree:
     )
 
 
+def joined(trees: list[Tree]) -> tuple[Tree, np.ndarray]:
+    """Several trees as one, and the node (k,) int64 each begins at; the tree's radius is the last's."""
+    if len(trees) == 1:
+        return trees[0], np.zeros(1, dtype=np.int64)
+    roots = np.cumsum([0, *(len(tree.children) for tree in trees[:-1])])
+    rows = np.cumsum([0, *(len(tree.kinds) for tree in trees[:-1])])
+    children = [
+        np.where(tree.children >= 0, tree.children + root, np.where(tree.children == EMPTY, EMPTY, tree.children - row))
+        for tree, root, row in zip(trees, roots, rows, strict=True)
+    ]
+    whole = Tree(
+        np.concatenate([tree.bounds for tree in trees]),
+        np.concatenate(children).astype(np.int32),
+        np.concatenate([tree.numbers for tree in trees]),
+        np.concatenate([tree.kinds for tree in trees]),
+        np.concatenate([tree.triangles for tree in trees]),
+        trees[-1].radius,
+    )
+    return whole, roots.astype(np.int64)
+
+
 @jit
 def _grow(
     low: np.ndarray,

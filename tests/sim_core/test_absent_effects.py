@@ -4,12 +4,26 @@ import json
 import os
 import subprocess
 import sys
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from sim_core import Balls, Gravity, Physics, Rest, Restitution, Scene, Turn, Vibration
+from sim_core import (
+    BallCollisions,
+    Balls,
+    Drag,
+    Friction,
+    Gravity,
+    Physics,
+    RandomPhase,
+    Rest,
+    Restitution,
+    Scene,
+    Turn,
+    Vibration,
+)
 from sim_core.simulate import _Run
 from tests.cavities import box
 
@@ -20,6 +34,10 @@ KEPT = {
     "vibration": ("wave", "Wave"),
     "rest": ("footing", "Footing"),
     "turn": ("turning", "Turning"),
+    "friction": ("grip", "Grip"),
+    "random_phase": ("phases", "Phases"),
+    "drag": ("air", "Air"),
+    "ball_collisions": ("shot.crowd", "Crowd"),
 }
 STEEL = (0.9, 1.0)
 PRESENT = {
@@ -28,10 +46,16 @@ PRESENT = {
     "vibration": Vibration(0, 25e-6, 20e3),
     "rest": Rest(),
     "turn": Turn(0, rpm=10.0),
+    "friction": Friction(((0.3, 0.2),) * 3, (0.3, 0.2)),
+    "random_phase": RandomPhase(1),
+    "drag": Drag(),
+    "ball_collisions": BallCollisions(),
 }
+NEEDS = {"rest": "gravity", "random_phase": "vibration"}
+BARE = Physics(ball_collisions=None)
 
 
-def bare_scene(physics: Physics = Physics()) -> Scene:  # noqa: B008  (a NamedTuple)
+def bare_scene(physics: Physics = BARE) -> Scene:
     places = np.array([[0.005, 0.005, 0.005], [0.012, 0.01, 0.01]])
     return Scene(
         box((0.02, 0.02, 0.02)), Balls(places, np.array([[1.0, 0.5, 0.2], [-1.0, 0.3, 0.4]]), 3e-3), physics, 0.05
@@ -89,6 +113,8 @@ def test_the_machine_code_of_a_bare_scene_knows_no_effect(bare: dict[str, list[s
         "resolve.leaning.meet",
         "effects.turn.seen_from_part",
         "effects.restitution.restitution_law",
+        "resolve.rubbing._rub",
+        "neighbours.next_meeting",
     ):
         module, _, name = f"sim_core.{function}".rpartition(".")
         assert hasattr(sys.modules.get(module) or __import__(module, fromlist=[name]), name), f"{function} is no more"
@@ -98,11 +124,12 @@ def test_the_machine_code_of_a_bare_scene_knows_no_effect(bare: dict[str, list[s
 @pytest.mark.parametrize("effect", sorted(KEPT))
 def test_the_arrays_of_an_absent_effect_do_not_exist(effect: str) -> None:
     field, _ = KEPT[effect]
-    assert getattr(_Run(bare_scene()), field) is None
+    assert attrgetter(field)(_Run(bare_scene())) is None
 
 
 @pytest.mark.parametrize("effect", sorted(set(KEPT) - {"turn"}))
 def test_the_table_names_what_a_present_effect_keeps(effect: str) -> None:
     field, kind = KEPT[effect]
-    needed = {effect: PRESENT[effect]} | ({"gravity": Gravity()} if effect == "rest" else {})
-    assert type(getattr(_Run(bare_scene(Physics(**needed))), field)).__name__ == kind  # type: ignore[arg-type]
+    needed = {name: PRESENT[name] for name in (effect, NEEDS.get(effect)) if name}
+    run = _Run(bare_scene(BARE._replace(**needed)))  # type: ignore[arg-type]
+    assert type(attrgetter(field)(run)).__name__ == kind

@@ -4,8 +4,21 @@ import hashlib
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
+import pytest
 
-from sim_core import Balls, Gravity, Physics, Restitution, Result, Scene, Vibration, pack_balls, simulate
+from sim_core import (
+    Balls,
+    Drag,
+    Gravity,
+    Physics,
+    RandomPhase,
+    Restitution,
+    Result,
+    Scene,
+    Vibration,
+    pack_balls,
+    simulate,
+)
 from tests.cavities import FLOOR, cylinder
 from tests.same_bits import with_and_without_jit
 
@@ -21,6 +34,14 @@ def small_scene(duration: float, count: int = 20) -> Scene:
     rng = np.random.default_rng(5)
     balls = Balls(pack_balls(room, count, 3e-3, rng), rng.normal(0.0, 3.0, (count, 3)), 3e-3)
     return Scene(room, balls, PHYSICS, duration)
+
+
+def scene_with_everything_else(duration: float, count: int = 6) -> Scene:
+    """Two sizes in still air over a floor that each meets at a phase of its own."""
+    scene = small_scene(duration, count)
+    physics = PHYSICS._replace(random_phase=RandomPhase(4), drag=Drag(density=50.0))
+    diameter = np.where(np.arange(count) % 2 == 0, 3e-3, 2e-3)
+    return Scene(scene.mesh, Balls(scene.balls.positions, scene.balls.velocities, diameter), physics, duration)
 
 
 def fingerprint(result: Result) -> str:
@@ -39,10 +60,11 @@ def test_the_same_scene_gives_the_same_bits_alone_and_on_threads() -> None:
         assert {fingerprint(r) for r in pool.map(simulate, [scene] * 4)} == {once}
 
 
-def test_the_jit_switched_off_gives_the_same_bits() -> None:
+@pytest.mark.parametrize("scene", ["small_scene", "scene_with_everything_else"])
+def test_the_jit_switched_off_gives_the_same_bits(scene: str) -> None:
     code = (
-        "from tests.sim_core.test_determinism import fingerprint, small_scene; from sim_core import simulate;"
-        "r = simulate(small_scene(0.03, 6)); print(r.collisions.total, fingerprint(r))"
+        f"from tests.sim_core.test_determinism import fingerprint, {scene}; from sim_core import simulate;"
+        f"r = simulate({scene}(0.03, 6)); print(r.collisions.total, fingerprint(r))"
     )
     answers = with_and_without_jit(code)
     assert int(answers[0].split()[0]) > 50

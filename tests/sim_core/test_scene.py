@@ -87,8 +87,12 @@ def test_numbers_that_are_none_are_refused() -> None:
         Balls(np.array([[math.inf, 0, 0]]), np.zeros((1, 3)), 3e-3)
     with pytest.raises(SceneError, match="diameter"):
         balls(MIDDLE, diameter=-1.0)
-    with pytest.raises(SceneError, match="not supported"):
-        Balls(np.zeros((2, 3)), np.zeros((2, 3)), np.array([1e-3, 2e-3]))  # type: ignore[arg-type]
+    with pytest.raises(SceneError, match=r"balls\.diameter has 9 different values: at most 8"):
+        Balls(np.zeros((9, 3)), np.zeros((9, 3)), 1e-3 * np.arange(1.0, 10.0))
+    with pytest.raises(SceneError, match=r"balls\.diameter has shape \(3,\)"):
+        Balls(np.zeros((2, 3)), np.zeros((2, 3)), np.ones(3))
+    with pytest.raises(SceneError, match=r"balls\.density of ball 1 is -1\.0"):
+        Balls(np.zeros((2, 3)), np.zeros((2, 3)), 1e-3, np.array([1.0, -1.0]))
     with pytest.raises(SceneError, match="duration"):
         Scene(ROOM, balls(MIDDLE), Physics(), 0.0)
 
