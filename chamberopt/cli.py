@@ -235,11 +235,12 @@ def _picture_of_target(chamber: Chamber, screenshot: Path) -> None:
 
 def _compile(design: Design, chamber: Chamber) -> None:
     """Compiles, aloud, before the bar starts: else its first minute would look like a hang."""
-    from chamberopt.process import build_scene, chamber_mesh, replica_seed
+    from chamberopt.process import chamber_mesh, require_countable, scene_physics
     from chamberopt.progress import announce_compilation
 
-    scene = build_scene(design, chamber_mesh(chamber), replica_seed(design.process.seed, 0))
-    announce_compilation(scene.physics, len(scene.balls), scene.balls.alike)
+    require_countable(design)
+    shot = design.shot
+    announce_compilation(scene_physics(design, chamber_mesh(chamber)), shot.count, shot.mix is None)
 
 
 def _remark(remarks: Sequence[str]) -> None:

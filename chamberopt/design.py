@@ -375,7 +375,7 @@ class Design(BaseModel):
             wrong(field, largest, f"{why}; use a smaller ball or raise the distance")
         problems += [
             Problem(f"effects.{effect}", "given beside shot.mix: not supported together yet")
-            for effect in ("rest", "part_turn")
+            for effect in ("rest", "part_turn", "friction")
             if shot.mix is not None and getattr(self.effects, effect)
         ]
         filled = shot.mass / shot.density / (math.pi / 4.0 * chamber.diameter**2 * chamber.height)

@@ -16,7 +16,7 @@ MOST_BALLS = 20_000
 if TYPE_CHECKING:
     from chamberopt.chamber import Chamber
     from chamberopt.config import Design
-    from sim_core import Scene, TriangleMesh, Turn
+    from sim_core import Physics, Scene, TriangleMesh, Turn
 
 STREAMS = ("search", "confirm")
 
@@ -78,6 +78,47 @@ def require_turnable(design: Design, mesh: TriangleMesh) -> None:
         raise InputError(f"effects.part_turn: {error}") from None
 
 
+def rests(design: Design, mesh: TriangleMesh) -> bool:
+    """Whether balls can lie still: as the design says, or wherever its chamber has a still surface that faces up."""
+    from sim_core import Gravity, can_rest
+
+    asked = design.effects.rest
+    if asked is not None:
+        return asked
+    moving = [TAG_SONOTRODE] if design.effects.part_turn is None else [TAG_SONOTRODE, TAG_PART]
+    gravity = Gravity() if design.effects.gravity else None
+    return design.shot.mix is None and can_rest(mesh, gravity, *moving)
+
+
+def scene_physics(
+    design: Design, mesh: TriangleMesh, phase: float = 0.0, turn_phase: float = 0.0, draws: int = 0
+) -> Physics:
+    """The effects of a design in its chamber's mesh.
+
+    ``phase`` and ``turn_phase`` [rad]: of the sonotrode and of a part that turns, at the start; ``draws``: the seed
+    of arrival phases that are drawn anew.
+    """
+    from sim_core import BallCollisions, Drag, Friction, Gravity, Physics, RandomPhase, Rest, Restitution, Vibration
+
+    sonotrode, effects, materials = design.sonotrode, design.effects, design.materials
+    # One (C0, v0) per tag, in the order of the tags: TAG_PART, TAG_SONOTRODE, TAG_WALL.
+    surfaces = tuple(
+        (pair.restitution, pair.yield_speed) for pair in (materials.part, materials.sonotrode, materials.wall)
+    )
+    rubs = effects.friction
+    return Physics(
+        gravity=Gravity() if effects.gravity else None,
+        restitution=Restitution(surfaces=surfaces, balls=(materials.shot.restitution, materials.shot.yield_speed)),
+        vibration=Vibration(TAG_SONOTRODE, sonotrode.amplitude, sonotrode.frequency, phase),
+        turn=part_turn(design, turn_phase),
+        rest=Rest() if rests(design, mesh) else None,
+        friction=Friction((rubs.surfaces,) * len(surfaces), rubs.balls) if rubs is not None else None,
+        drag=Drag() if effects.drag else None,
+        ball_collisions=BallCollisions() if effects.ball_collisions else None,
+        random_phase=RandomPhase(draws) if sonotrode.motion == "random_phase" else None,
+    )
+
+
 def build_scene(design: Design, mesh: TriangleMesh, seed: int) -> Scene:
     """The scene one replica simulates, in a chamber's mesh (`chamber_mesh`).
 
@@ -88,61 +129,28 @@ def build_scene(design: Design, mesh: TriangleMesh, seed: int) -> Scene:
 
     Raises InputError when the shot does not fit or has too many balls, or the part cannot turn.
     """
-    from sim_core import (
-        BallCollisions,
-        Balls,
-        Drag,
-        Friction,
-        Gravity,
-        Physics,
-        RandomPhase,
-        Rest,
-        Restitution,
-        Scene,
-        SceneError,
-        Vibration,
-        can_rest,
-        pack_balls,
-    )
+    from sim_core import Balls, Scene, SceneError, pack_balls
 
     require_countable(design)
     require_turnable(design, mesh)
     rng = np.random.default_rng(seed)
-    sonotrode, shot, materials = design.sonotrode, design.shot, design.materials
+    sonotrode, shot = design.sonotrode, design.shot
     phase = rng.uniform(0.0, 2.0 * np.pi)
-    turn = None if design.effects.part_turn is None else part_turn(design, rng.uniform(0.0, 2.0 * np.pi))
+    turn_phase = 0.0 if design.effects.part_turn is None else rng.uniform(0.0, 2.0 * np.pi)
     try:
         diameter = np.array(shot.diameters)
-        positions = pack_balls(mesh, shot.count, diameter, rng, clear=sonotrode.amplitude, turn=turn)
+        positions = pack_balls(
+            mesh, shot.count, diameter, rng, clear=sonotrode.amplitude, turn=part_turn(design, turn_phase)
+        )
     except SceneError as error:
         raise InputError(f"shot: {error}; see shot.mass_g, shot.diameter_mm and [chamber]") from None
     velocities = start_velocities(rng, len(positions), sonotrode.peak_speed)
-    # One (C0, v0) per tag, in the order of the tags: TAG_PART, TAG_SONOTRODE, TAG_WALL.
-    surfaces = tuple(
-        (pair.restitution, pair.yield_speed) for pair in (materials.part, materials.sonotrode, materials.wall)
-    )
-    gravity = Gravity() if design.effects.gravity else None
-    rests = design.effects.rest
-    if rests is None:
-        moving = [TAG_SONOTRODE] if turn is None else [TAG_SONOTRODE, TAG_PART]
-        rests = shot.mix is None and can_rest(mesh, gravity, *moving)
-    rubs = design.effects.friction
-    physics = Physics(
-        gravity=gravity,
-        restitution=Restitution(surfaces=surfaces, balls=(materials.shot.restitution, materials.shot.yield_speed)),
-        vibration=Vibration(TAG_SONOTRODE, sonotrode.amplitude, sonotrode.frequency, phase),
-        turn=turn,
-        rest=Rest() if rests else None,
-        friction=Friction((rubs.surfaces,) * len(surfaces), rubs.balls) if rubs is not None else None,
-        drag=Drag() if design.effects.drag else None,
-        ball_collisions=BallCollisions() if design.effects.ball_collisions else None,
-        random_phase=RandomPhase(int(rng.integers(2**32))) if sonotrode.motion == "random_phase" else None,
-    )
+    draws = int(rng.integers(2**32)) if sonotrode.motion == "random_phase" else 0
     accuracy = design.process.accuracy
     return Scene(
         mesh=mesh,
         balls=Balls(positions, velocities, diameter, shot.density),
-        physics=physics,
+        physics=scene_physics(design, mesh, phase, turn_phase, draws),
         duration=design.process.recorded_time,
         warmup=accuracy.warmup_time,
         record=(TAG_PART,),

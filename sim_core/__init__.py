@@ -5,7 +5,7 @@ Build a Scene from a TriangleMesh, Balls and Physics, then simulate it. SI units
 
 from sim_core.balls import Balls
 from sim_core.effects.ball_collisions import BallCollisions
-from sim_core.effects.drag import Drag
+from sim_core.effects.drag import Drag, drag_coefficient
 from sim_core.effects.friction import Friction
 from sim_core.effects.gravity import Gravity
 from sim_core.effects.random_phase import RandomPhase
@@ -45,6 +45,7 @@ __all__ = [
     "Vibration",
     "can_rest",
     "compile_simulator",
+    "drag_coefficient",
     "is_compiled",
     "pack_balls",
     "require_free_turn",

@@ -70,6 +70,13 @@ def new_air(drag: Drag | None, diameters: np.ndarray, densities: np.ndarray) -> 
     return Air(balls, 0.5 * drag.piece)
 
 
+def drag_coefficient(reynolds: float) -> float:
+    """C_d of a sphere at a Reynolds number."""
+    if reynolds >= TURBULENT:
+        return NEWTON
+    return 24.0 / reynolds * (1.0 + INERTIA * reynolds**POWER)
+
+
 @jit
 def slowing(air: Air, ball: int, speed: float, span: float) -> float:
     """What ``span`` [s] of air leave of a speed [m/s], as a share of it; more than all when time goes back."""

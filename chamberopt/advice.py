@@ -1,0 +1,237 @@
+"""Which effects a design needs: an estimate from dimensionless groups, and a short paired pilot run with each switched.
+
+The pilot simulates the design, and the design with one effect switched, from the same starts, and compares what a short
+run knows without bias: the mean normal speed of impacts on the target, and the dented area a second on its lower and
+its upper half, told as the coverage that comes of it if it is spread evenly there. It advises; it never
+switches. A design that says ``effects = "auto"`` asks for the switching too: see decide.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chamberopt import groups
+from chamberopt.accuracy import evaluate
+from chamberopt.design import checked
+from chamberopt.estimate import Estimate, estimate
+from chamberopt.objective import exposed_target
+from chamberopt.process import chamber_mesh, rests
+
+if TYPE_CHECKING:
+    from chamberopt.chamber import Chamber
+    from chamberopt.config import Design
+    from chamberopt.coverage import Tally
+    from chamberopt.replicas import Progress
+
+SPEED = "mean impact speed"
+REPLICAS = 8
+IMPACTS = 100_000  # on the target, all replicas together: half a per cent of speed and of dents
+FIRST_LOOK = 0.05  # s of each replica, to learn how often the target is hit
+LONGEST = 10.0  # s of each replica
+# What switching friction on takes for it, assumed: dry metal (mu), and beta0 between those that S. Foerster, M. Louge,
+# H. Chang and K. Allia, Phys. Fluids 6 (1994) 1108, measured (0.43, 0.44) and none.
+FRICTION = {"mu": 0.3, "beta0": 0.2}
+ACCURACY = 0.01  # [-]: changes below are taken to be of no matter, unless the design asks for better
+
+
+@dataclass(frozen=True)
+class Switch:
+    """An effect that can be on or off in a design: ``reason``: what the groups say of it, one sentence."""
+
+    effect: str
+    on: Callable[[Design, Chamber], bool]
+    switched: Callable[[dict[str, Any], bool], None]
+    reason: Callable[[Design, Chamber], str]
+
+
+@dataclass(frozen=True)
+class Advice:
+    """What switching one effect on changes, with 95 % intervals: the mean impact speed by a share of it, coverages by
+    so much.
+
+    ``verdict``: "matters", "makes no difference" (both at ``accuracy``) or "undecided".
+    """
+
+    effect: str
+    on: bool
+    reason: str
+    changes: dict[str, Estimate]
+    accuracy: float
+
+    @property
+    def verdict(self) -> str:
+        """From the largest change and its interval."""
+        if all(abs(e.value) + e.half_width <= self.accuracy for e in self.changes.values()):
+            return "makes no difference"
+        if any(abs(e.value) - e.half_width > self.accuracy for e in self.changes.values()):
+            return "matters"
+        return "undecided"
+
+    def __str__(self) -> str:
+        """One sentence for a person."""
+        name, most = max(self.changes.items(), key=lambda item: abs(item[1].value))
+        seen = f"{name} changes by {100 * most.value:+.2g} ± {100 * most.half_width:.1g} % with it"
+        at = f"at {100 * self.accuracy:g} %"
+        advice = {
+            ("matters", True): "needed",
+            ("matters", False): "switch it on",
+            ("makes no difference", True): f"off is safe {at}",
+            ("makes no difference", False): f"off is safe {at}",
+            ("undecided", True): f"not decided {at}: keep it",
+            ("undecided", False): f"not decided {at}: on is the safe side",
+        }[self.verdict, self.on]
+        return f"{self.effect} is {'on' if self.on else 'off'}: {advice} ({self.reason}; pilot: {seen})"
+
+
+def _set(name: str, on: Any, off: Any) -> Callable[[dict[str, Any], bool], None]:
+    def switched(data: dict[str, Any], wanted: bool) -> None:
+        data["effects"][name] = on if wanted else off
+
+    return switched
+
+
+SWITCHES = (
+    Switch(
+        "gravity",
+        lambda design, chamber: design.effects.gravity,
+        _set("gravity", True, False),
+        lambda design, chamber: f"g H / V² = {groups.fall(design):.2g}",
+    ),
+    Switch(
+        "ball_collisions",
+        lambda design, chamber: design.effects.ball_collisions,
+        _set("ball_collisions", True, False),
+        lambda design, chamber: f"mean free path {groups.free_path(design, chamber):.2g} chamber heights",
+    ),
+    Switch(
+        "friction",
+        lambda design, chamber: design.effects.friction is not None,
+        _set("friction", FRICTION, None),
+        lambda design, chamber: f"a hit that sticks takes {groups.MOST_INTO_SPIN:.0%} of the sideways speed into spin",
+    ),
+    Switch(
+        "drag",
+        lambda design, chamber: design.effects.drag,
+        _set("drag", True, False),
+        lambda design, chamber: f"{groups.drag_loss(design):.2g} of the speed is lost over the chamber's height",
+    ),
+    Switch(
+        "rest",
+        lambda design, chamber: rests(design, chamber_mesh(chamber)),
+        _set("rest", True, False),
+        lambda design, chamber: "something still faces up, where balls can lie",
+    ),
+)
+
+
+def advise(
+    design: Design, chamber: Chamber, executor: Executor, progress: Progress | None = None, accuracy: float = ACCURACY
+) -> list[Advice]:
+    """Advice on every effect that can be switched in this design, the most important first.
+
+    Raises InputError and sim_core.SimulationError as evaluate does.
+    """
+    switches = [switch for switch in SWITCHES if _applies(switch, design, chamber)]
+    seconds = _pilot_seconds(design, chamber, executor)
+    base = _figures(_with(design, {}, seconds), chamber, executor)
+    said = []
+    for done, switch in enumerate(switches):
+        if progress:
+            progress(done, len(switches), None)
+        on = switch.on(design, chamber)
+        other = _figures(_with(design, {switch: not on}, seconds), chamber, executor)
+        without, with_it = (other, base) if on else (base, other)
+        changes = {name: _change(name, with_it[name], without[name]) for name in base}
+        said.append(Advice(switch.effect, on, switch.reason(design, chamber), changes, accuracy))
+    return sorted(said, key=lambda one: -max(abs(change.value) for change in one.changes.values()))
+
+
+def decide(
+    design: Design, chamber: Chamber, executor: Executor, progress: Progress | None = None
+) -> tuple[Design, list[Advice]]:
+    """A design that leaves its effects to us, with those switched off that a pilot shows to make no difference.
+
+    All are on at first; each is switched off alone, and stays off only if that is safe.
+    """
+    full = _with(design, {switch: True for switch in SWITCHES if _applies(switch, design, chamber)}, None)
+    advice = advise(full, chamber, executor, progress)
+    off = {one.effect for one in advice if one.verdict == "makes no difference"}
+    return _with(full, {switch: False for switch in SWITCHES if switch.effect in off}, None), advice
+
+
+def _applies(switch: Switch, design: Design, chamber: Chamber) -> bool:
+    """Whether an effect can be switched in this design at all."""
+    if switch.effect == "rest":
+        loose = design.model_copy(update={"effects": design.effects.model_copy(update={"rest": None})})
+        return rests(loose, chamber_mesh(chamber))
+    if design.shot.mix is not None and switch.effect == "friction":
+        return False  # not supported together
+    return switch.effect != "ball_collisions" or design.shot.count > 1
+
+
+def _with(design: Design, wanted: dict[Switch, bool], seconds: float | None) -> Design:
+    data = design.model_dump()
+    for switch, on in wanted.items():
+        switch.switched(data, on)
+    if not data["effects"]["gravity"]:
+        data["effects"]["rest"] = None  # nothing lies still without gravity
+    if seconds is not None:
+        data["process"]["accuracy"] |= {
+            "replicas": REPLICAS,
+            "simulated_time_s": seconds,
+            "coverage": None,
+            "coverage_model": "avrami",
+        }
+    return checked(type(design), data)
+
+
+def _pilot_seconds(design: Design, chamber: Chamber, executor: Executor) -> float:
+    """How long each replica of the pilot is simulated [s]."""
+    look = evaluate(_with(design, {}, FIRST_LOOK), chamber, executor)
+    hits = look.total.impacts[exposed_target(chamber)].sum()
+    return float(np.clip(FIRST_LOOK * IMPACTS / max(hits, 1), FIRST_LOOK, LONGEST))
+
+
+def _figures(design: Design, chamber: Chamber, executor: Executor) -> dict[str, np.ndarray]:
+    """The three figures of every replica."""
+    replicas = evaluate(design, chamber, executor).replicas
+    target = exposed_target(chamber)
+    heights = chamber.part.vertices[chamber.part.triangles].mean(axis=1)[:, 2]
+    lower = target & (heights <= _middle(heights[target], chamber.exposed_area[target]))
+
+    def of_each(figure: Callable[[Tally], float]) -> np.ndarray:
+        return np.array([figure(replica) for replica in replicas])
+
+    def coverage(half: np.ndarray) -> np.ndarray:
+        area = max(chamber.exposed_area[half].sum(), np.finfo(float).tiny)
+        times = design.process.treatment_time / area
+        return -np.expm1(-of_each(lambda t: t.dented_area[half].sum() / t.simulated_time) * times)
+
+    return {
+        SPEED: of_each(lambda t: t.speed_sum[target].sum() / max(1, t.impacts[target].sum())),
+        "coverage of the target's lower half": coverage(lower),
+        "coverage of its upper half": coverage(target & ~lower),
+    }
+
+
+def _middle(heights: np.ndarray, areas: np.ndarray) -> float:
+    """The height below which half the area lies."""
+    order = np.argsort(heights, kind="stable")
+    return float(heights[order][np.searchsorted(np.cumsum(areas[order]), 0.5 * areas.sum())])
+
+
+def _change(name: str, with_it: np.ndarray, without: np.ndarray) -> Estimate:
+    """Mean change, from replicas paired by their seeds; infinitely uncertain where nothing was hit."""
+    scale = float(without.mean()) if name == SPEED else 1.0
+    return estimate((with_it - without) / scale) if scale > 0.0 else Estimate(0.0, math.inf)
+
+
+def sentences(advice: Sequence[Advice]) -> list[str]:
+    """One sentence an effect."""
+    return [str(one) for one in advice]
