@@ -30,8 +30,8 @@ from chamberopt.replicas import (
     Replica,
     replicas_wanted,
     simulate_replicas,
-    stuck_notes,
 )
+from chamberopt.stuck import stuck_notes
 
 if TYPE_CHECKING:
     from chamberopt.chamber import Chamber
@@ -171,7 +171,7 @@ def evaluate(
         replicas=tuple(tallies),
         timings=clock,
         collisions={kind: sum(replica.collisions[kind] for replica in done) for kind in done[0].collisions},
-        notes=(*notes, *stuck_notes([replica.still for replica in done if replica.still], len(done))),
+        notes=(*notes, *stuck_notes([replica.stuck for replica in done if replica.stuck], len(done))),
         stream=stream,
         stopped_by=stopped_by,
         marked=None if samples is None else np.mean(_shares(done, samples, chamber, design), axis=0),

@@ -6,9 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chamberopt.chamber import TAG_PART, TAG_SONOTRODE, TAG_WALL
+from chamberopt.chamber import TAG_PART, TAG_SONOTRODE, TAG_WALL, turning_axis
+from chamberopt.ledges import ledges
 from chamberopt.process import chamber_mesh, require_countable, require_turnable
 from chamberopt.shapes import shape_surface
+from chamberopt.slivers import THINNEST
+from chamberopt.triangles import area_vectors
 
 if TYPE_CHECKING:
     from chamberopt.chamber import Chamber
@@ -56,6 +59,7 @@ def describe(design: Design, chamber: Chamber) -> dict[str, Any]:
             "sonotrode_triangles": int((chamber.tags == TAG_SONOTRODE).sum()),
             "wall_triangles": int((chamber.tags == TAG_WALL).sum()),
         },
+        **_turn(design),
         "sonotrode": {"peak_speed_m_s": _rounded(design.sonotrode.peak_speed)},
         "shot": {
             "balls": shot.count,
@@ -64,7 +68,7 @@ def describe(design: Design, chamber: Chamber) -> dict[str, Any]:
             "packing_fraction": _rounded(shot.volume / chamber.volume),
         },
         "simulated_time_s": _rounded(simulated),
-        "notes": list(chamber.notes),
+        "notes": [*chamber.notes, *(ledge.said for ledge in ledges(design, chamber) if not ledge.level)],
         "warnings": warnings(design, chamber),
     }
 
@@ -98,30 +102,92 @@ def warnings(design: Design, chamber: Chamber) -> list[str]:
                 f"the gap between {place} is {gap * 1e3:.3g} mm, narrower than a ball of "
                 f"{ball * 1e3:g} mm: {caught}; {remedy}"
             )
-    return said
+    crossing = _through_side_wall(design, chamber)
+    if crossing is not None:
+        low, high = crossing
+        said.append(
+            f"the part goes out through the side wall between z = {1e3 * low:.4g} and {1e3 * high:.4g} mm: what is "
+            "outside is not peened; raise chamber.diameter_mm, or check part.offset_mm"
+        )
+    return said + [ledge.said for ledge in ledges(design, chamber) if ledge.level]
+
+
+def _turn(design: Design) -> dict[str, Any]:
+    """How the part turns, if it does: its axis in the chamber's frame."""
+    turn = design.effects.part_turn
+    if turn is None:
+        return {}
+    point, axis = turning_axis(design)
+    motion = (
+        {"rpm": turn.rpm} if turn.rpm is not None else {"angle_deg": turn.angle_deg, "frequency_hz": turn.frequency_hz}
+    )
+    return {
+        "part_turn": {
+            **motion,
+            "through_mm": [_rounded(x * 1e3) for x in point],
+            "axis": [_rounded(x) for x in axis / np.linalg.norm(axis)],
+        }
+    }
+
+
+def _through_side_wall(design: Design, chamber: Chamber) -> tuple[float, float] | None:
+    """Between which heights [m] part and side wall are joined; None where they are not.
+
+    Not asked of a part that closes the chamber like a lid, nor of one that turns: its joint is a round shaft.
+    """
+    if design.effects.part_turn is not None or chamber.vertices[:, 2].max() < design.chamber.height - THINNEST:
+        return None
+    edges = chamber.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    normal = area_vectors(chamber.vertices, chamber.triangles)
+    upright = np.abs(normal[:, 2]) < 0.5 * np.linalg.norm(normal, axis=1)
+    own = np.repeat(chamber.tags == TAG_PART, 3)
+    beside = np.repeat((chamber.tags == TAG_WALL) & upright, 3)
+    of_part, of_wall = ({tuple(edge) for edge in np.sort(edges[rows]).tolist()} for rows in (own, beside))
+    height = chamber.vertices[np.array(sorted(of_part & of_wall), dtype=int).reshape(-1, 2), 2]
+    return (float(height.min()), float(height.max())) if height.size else None
 
 
 def _gaps(design: Design, chamber: Chamber) -> list[tuple[str, float, str]]:
-    """Clear widths [m] between the part and what surrounds it; 0 where they touch."""
+    """Clear widths [m] between the part and the walls; 0 where they touch.
+
+    A Design has room for a ball over its sonotrode where the part is put, but it may turn down into that.
+    """
     corners = chamber.vertices[chamber.triangles]  # (k, 3, 3)
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     upwards = normal[:, 2] < -0.5 * np.linalg.norm(normal, axis=1)  # out of the cavity is into the part
     part = chamber.tags == TAG_PART
     apothem = design.chamber.diameter / 2.0 * np.cos(np.pi / design.chamber.facets)
     reach = np.hypot(*corners[part].reshape(-1, 3)[:, :2].T).max()
-    below = design.chamber.sonotrode_distance - design.sonotrode.amplitude
     gaps = [
-        ("part and sonotrode", below, "raise chamber.sonotrode_distance_mm"),
         (
             "part and side wall",
             max(0.0, apothem - reach),
             "raise chamber.diameter_mm or check part.offset_mm",
         ),
     ]
+    turn = design.effects.part_turn
+    if turn is not None:
+        lowest = _lowest_on_its_way(design, corners[part].reshape(-1, 3), turn.swing)
+        below = max(0.0, lowest - design.sonotrode.amplitude)
+        gaps.append(("turning part and sonotrode", below, "raise chamber.sonotrode_distance_mm"))
     if (part & upwards).any():
         above = design.chamber.height - corners[part & upwards][..., 2].max()
         gaps.append(("part and ceiling", max(0.0, above), "raise chamber.height_mm or close the gap"))
     return gaps
+
+
+def _lowest_on_its_way(design: Design, points: np.ndarray, swing: float | None) -> float:
+    """How low [m] points (n, 3) of the turning part get, going round or ``swing`` [rad] to each side.
+
+    At angle a of the part a point is at c + r cos(a - a0) for some c, r and a0: lowest where a is furthest from a0.
+    """
+    point, axis = turning_axis(design)
+    axis = axis / np.linalg.norm(axis)
+    offset = points - point
+    along = (offset @ axis)[:, None] * axis
+    across, ahead = (offset - along)[:, 2], np.cross(axis, offset)[:, 2]
+    furthest = np.minimum(np.abs(np.arctan2(ahead, across)) + (np.pi if swing is None else swing), np.pi)
+    return float((point[2] + along[:, 2] + np.hypot(across, ahead) * np.cos(furthest)).min())
 
 
 def _surface(design: Design) -> tuple[np.ndarray, np.ndarray]:

@@ -101,6 +101,7 @@ def simulate(design: Path, /, *, json: Json = False, out: Out = None) -> None:
 
     candidate = load_design(design)
     chamber = build_chamber(candidate)
+    _warn(candidate, chamber)
     with _results(out, design.stem) as folder:
         _compile(candidate, chamber)
         with local_executor() as executor, progress_bar("replicas") as progress:
@@ -132,6 +133,7 @@ def run(study: Path, /, *, json: Json = False, out: Out = None) -> None:
         with local_executor() as executor, progress_bar("evaluations") as progress:
             result = run_study(question, folder, executor, progress)
         _remark(write_study(folder, result))
+    _warn(result.best.design, build_chamber(result.best.design))
     lines = [f"{'parameter':34}{'start':>12}{'best':>12}"]
     lines += [
         f"{name:34}{question.design.value(name):12.5g}{result.best.design.value(name):12.5g}" for name in question.vary
@@ -249,6 +251,13 @@ def _remark(remarks: Sequence[str]) -> None:
         print(remark, file=sys.stderr)
 
 
+def _warn(design: Design, chamber: Chamber) -> None:
+    """What `check` would warn of, to stderr."""
+    from chamberopt.checkup import warnings
+
+    _remark([f"warning: {text}" for text in warnings(design, chamber)])
+
+
 def _text(path: Path | None) -> str | None:
     return None if path is None else str(path)
 
@@ -278,15 +287,15 @@ def _facts(table: Mapping[str, Any], prefix: str = "") -> list[str]:
         elif name in ("notes", "warnings"):
             lines += [f"{name.removesuffix('s')}: {text}" for text in value]
         else:
-            text = _listed(value) if isinstance(value, list) else str(value)
+            text = _listed(value, name) if isinstance(value, list) else str(value)
             lines.append(f"{prefix + name:34}{text}")
     return lines
 
 
-def _listed(values: list[Any]) -> str:
-    """Sizes as 1 x 2 x 3, names with commas."""
+def _listed(values: list[Any], name: str) -> str:
+    """Sizes as 1 x 2 x 3, other numbers and names with commas."""
     if values and isinstance(values[0], float):
-        return " x ".join(f"{value:g}" for value in values)
+        return (" x " if name.startswith("bounding_box") else ", ").join(f"{value:g}" for value in values)
     return ", ".join(values) or "none"
 
 

@@ -370,8 +370,9 @@ class Design(BaseModel):
         if largest >= min(height, chamber.diameter_mm):
             why = f"which does not fit a chamber {chamber.diameter_mm:g} mm wide and {height:g} mm high"
             wrong(field, largest, f"{why}; use a smaller ball")
-        elif largest >= distance:
-            why = f"not below chamber.sonotrode_distance_mm = {distance:g}: no ball fits under the part"
+        elif largest >= distance - 1e-3 * self.sonotrode.amplitude_um:
+            swing = f"less the amplitude of {self.sonotrode.amplitude_um:g} µm"
+            why = f"not below chamber.sonotrode_distance_mm = {distance:g} {swing}: no ball fits under the part"
             wrong(field, largest, f"{why}; use a smaller ball or raise the distance")
         problems += [
             Problem(f"effects.{effect}", "given beside shot.mix: not supported together yet")

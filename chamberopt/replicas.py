@@ -13,11 +13,12 @@ import numpy as np
 from chamberopt.coverage import Tally, tally
 from chamberopt.dents import Samples, first_marked
 from chamberopt.process import build_scene, replica_seed
+from chamberopt.stuck import Stuck, still
 
 if TYPE_CHECKING:
     from chamberopt.chamber import Chamber
     from chamberopt.config import Design
-    from sim_core import Resting, TriangleMesh
+    from sim_core import TriangleMesh
 
 Progress = Callable[[int, int, "float | None"], None]
 """Called as progress(done, total, best so far or None)."""
@@ -35,7 +36,7 @@ class Replica:
 
     tally: Tally
     collisions: dict[str, int]
-    still: str
+    stuck: Stuck | None
     first_marked: np.ndarray | None
 
 
@@ -73,31 +74,10 @@ def _replica(design: Design, chamber: Chamber, mesh: TriangleMesh, samples: Samp
     from sim_core import simulate
 
     result = simulate(build_scene(design, mesh, seed))
-    kinds = ("walls", "balls", "sonotrode", "total")
+    shot, kinds = design.shot, ("walls", "balls", "sonotrode", "total")
     return Replica(
         tally=tally(result.impacts, chamber, design),
         collisions={kind: int(getattr(result.collisions, kind)) for kind in kinds},
-        still=_still(result.resting, len(result.balls)),
+        stuck=still(result.resting, len(result.balls), shot.diameter, chamber, design.effects.part_turn is not None),
         first_marked=None if samples is None else first_marked(samples, result.impacts, chamber, design),
     )
-
-
-def _still(resting: Resting, balls: int) -> str:
-    """One line on the balls that lie still at a replica's end; empty if there are none."""
-    if len(resting) == 0:
-        return ""
-    first = int(resting.since.argmin())
-    where = ", ".join(f"{1e3 * x:.2f}" for x in resting.position[first])
-    under = resting.triangles[first][resting.triangles[first] >= 0]
-    on = f" on triangle {under[0]}" if len(under) else " between other balls"
-    return (
-        f"{len(resting)} of {balls} balls lie still at the end, the longest since {resting.since[first]:.2f} s, "
-        f"that one at ({where}) mm{on}"
-    )
-
-
-def stuck_notes(stuck: Sequence[str], replicas: int) -> tuple[str, ...]:
-    """One line on balls that came to rest, from the lines of the replicas where some did."""
-    if not stuck:
-        return ()
-    return (f"balls came to rest in {len(stuck)} of {replicas} replicas; in the first of them {stuck[0]}",)

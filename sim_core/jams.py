@@ -4,6 +4,7 @@ import numpy as np
 
 from sim_core.grounded import LEANING
 from sim_core.invariants import clearance
+from sim_core.pinches import surface_name
 from sim_core.scene import Scene
 from sim_core.surfaces.mesh import towards_shot
 
@@ -19,12 +20,8 @@ def touching(scene: Scene, corners: np.ndarray, positions: np.ndarray, ball: int
     physics, radii, here = scene.physics, 0.5 * scene.balls.diameters, positions[[ball]]
     radius = float(radii[ball])
     slack = np.full(len(corners), LEANING)
-    moving: dict[int, str] = {}
     if physics.vibration is not None:  # it is given where the mesh has it
         slack[scene.mesh.tags == physics.vibration.tag] += physics.vibration.amplitude
-        moving[physics.vibration.tag] = "the vibrating surface"
-    if physics.turn is not None:
-        moving[physics.turn.tag] = "the turning part"
     box = np.abs(here - np.clip(here, corners.min(axis=1), corners.max(axis=1))).max(axis=1)
     near = [int(t) for t in np.flatnonzero(box <= radius + slack)]
     gap = {t: float(clearance(corners[[t]], here, 2.0 * radius)[0]) - radius for t in near}
@@ -37,8 +34,7 @@ def touching(scene: Scene, corners: np.ndarray, positions: np.ndarray, ball: int
     apart = np.linalg.norm(positions - here, axis=1) - radii - radius
     others = [int(k) for k in np.argsort(apart) if k != ball and apart[k] <= LEANING][:MOST_NAMED]
     tags = [int(scene.mesh.tags[t]) for t in found]
-    surfaces = zip(found, tags, strict=True)
-    names = [f"{moving[tag]} (triangle {t})" if tag in moving else f"triangle {t}" for t, tag in surfaces]
+    names = [surface_name(scene.mesh, physics, t) for t in found]
     names += [f"ball {k}" for k in others]
     held_by_part = physics.turn is not None and physics.turn.tag in tags
     return " and ".join(filter(None, [", ".join(names[:-1]), *names[-1:]])), held_by_part

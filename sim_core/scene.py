@@ -18,6 +18,7 @@ from sim_core.effects.vibration import Vibration, checked_wave
 from sim_core.errors import SceneError
 from sim_core.invariants import clearance, contained, enclosed, narrowest_gap, posed
 from sim_core.physics import Physics
+from sim_core.pinches import find_pinch, surface_name
 from sim_core.surfaces.mesh import TriangleMesh, towards_shot
 from sim_core.surfaces.part import require_free_axle
 
@@ -43,8 +44,9 @@ class Scene:
 
     ``duration`` [s] is simulated after ``warmup`` [s], during which nothing is recorded; ``record``: tags whose
     impacts are logged (all if None). Raises SceneError, naming the ball, triangle or field: a ball outside the
-    mesh, overlapping a surface or another ball; a body in the mesh that is inside out; a tag without restitution; a
-    vibrating or turning tag that the mesh lacks; a part that cannot turn; numbers out of range.
+    mesh, overlapping a surface or another ball, or in a gap narrower than itself; a body in the mesh that is inside
+    out; a tag without restitution; a vibrating or turning tag that the mesh lacks; a part that cannot turn; numbers
+    out of range.
     """
 
     mesh: TriangleMesh
@@ -130,29 +132,43 @@ class Scene:
                 f"ball {worst} at {balls.positions[worst].tolist()} m overlaps a surface by {-gap[worst]:.3g} m; "
                 "move it or make it smaller"
             )
-        self._require_room_above_sonotrode()
+        corners = self.mesh.corners.copy() if corners is None else corners
+        self._require_room_above_sonotrode(corners)
+        self._require_room_between(corners)
         if self.physics.ball_collisions is None:
             return
         gap_between, one, two = narrowest_gap(balls)
         if gap_between < -TOUCH:
             raise SceneError(f"balls {one} and {two} overlap by {-gap_between:.3g} m at the start; move one of them")
 
-    def _require_room_above_sonotrode(self) -> None:
-        """The vibrating surface is not where the mesh has it, but displaced by its phase."""
+    def _require_room_above_sonotrode(self, corners: np.ndarray) -> None:
+        """The vibrating surface is not where the mesh has it: its ``corners`` are displaced by its phase here."""
         vibration = self.physics.vibration
         if vibration is None:
             return
-        raised = (
+        waving = self.mesh.tags == vibration.tag
+        corners[waving] += (
             vibration.amplitude * np.sin(vibration.phase) * np.array(vibration.axis) / np.linalg.norm(vibration.axis)
         )
-        corners = np.ascontiguousarray(self.mesh.corners[self.mesh.tags == vibration.tag] + raised)
-        gap = clearance(corners, self.balls.positions, self.balls.radius) - 0.5 * self.balls.diameters
+        gap = clearance(corners[waving], self.balls.positions, self.balls.radius) - 0.5 * self.balls.diameters
         worst = int(gap.argmin())
         if gap[worst] < -TOUCH:
             raise SceneError(
                 f"ball {worst} at {self.balls.positions[worst].tolist()} m starts {-gap[worst]:.3g} m inside the "
                 "vibrating surface, which is displaced by its phase at the start; keep one amplitude clear of it"
             )
+
+    def _require_room_between(self, corners: np.ndarray) -> None:
+        pinch = find_pinch(self.mesh, self.physics, self.balls, corners)
+        if pinch is None:
+            return
+        one, two = (surface_name(self.mesh, self.physics, triangle) for triangle in (pinch.one, pinch.two))
+        when = " at the end of its swing" if pinch.swings else ""
+        raise SceneError(
+            f"ball {pinch.ball} at {self.balls.positions[pinch.ball].tolist()} m does not fit between {one} and {two}: "
+            f"the gap is narrower than the ball by {pinch.narrower:.3g} m{when}; widen it, start the ball elsewhere, "
+            "or make it smaller"
+        )
 
 
 def require_free_turn(mesh: TriangleMesh, turn: Turn, diameter: float) -> None:

@@ -14,8 +14,7 @@ from chamberopt.executor import SerialExecutor, local_executor
 from chamberopt.figures import few_dents_note, surface
 from chamberopt.objective import METRICS, OBJECTIVES
 from chamberopt.patches import patches
-from chamberopt.replicas import LEAST_WATCHED, _still, replicas_wanted, stuck_notes
-from sim_core import Resting
+from chamberopt.replicas import LEAST_WATCHED, replicas_wanted
 from tests.synthetic import equal_dents, patchwork, plate_design
 
 TREATMENT = 50.0
@@ -173,26 +172,6 @@ def test_evaluate_gives_the_same_numbers_on_any_number_of_workers() -> None:
     other = evaluate(design, chamber, SerialExecutor(), stream="confirm", replicas=3)
     assert other.objective.value != serial.objective.value
     assert (other.stream, len(other.replicas)) == ("confirm", 3)
-
-
-def test_balls_that_lie_still_are_said_in_one_line() -> None:
-    nothing = np.full((2, 4), -1)
-    under = nothing.copy()
-    under[1, 0] = 1234
-    still = Resting(
-        np.array([3, 7]),
-        np.array([[0.0, 0.0, 0.0], [1e-3, -2e-3, 3.5e-3]]),
-        np.array([0.7, 0.41]),
-        under,
-        nothing,
-        np.zeros(2, dtype=bool),
-    )
-    assert _still(still, 20) == (
-        "2 of 20 balls lie still at the end, the longest since 0.41 s, that one at (1.00, -2.00, 3.50) mm "
-        "on triangle 1234"
-    )
-    assert stuck_notes([_still(still, 20)], 8)[0].startswith("balls came to rest in 1 of 8 replicas; in the first")
-    assert stuck_notes([], 8) == ()
 
 
 # Accuracy asked for

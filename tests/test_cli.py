@@ -382,6 +382,18 @@ class TestWhole:
         status, _, err = chamberopt("run", "studies/small.toml", "--out", "results/small")
         assert (status, "never overwritten" in err) == (2, True)
 
+    def test_simulate_and_run_warn_as_check_does(self, small: Path, chamberopt: Said) -> None:
+        """To stderr, so that --json stays clean; a study warns of its best design."""
+        path = Path("designs/plate.toml")
+        text = path.read_text(encoding="utf-8")
+        path.write_text(text.replace("mass_g = 3.308", "mass_g = 0.5"), encoding="utf-8")
+        study = Path("studies/small.toml")
+        study.write_text(study.read_text(encoding="utf-8").replace("[2, 5]", "[0.48, 0.5]"), encoding="utf-8")
+        for command, file in (("simulate", path), ("run", study)):
+            status, out, err = chamberopt(command, file, "--json")
+            assert (status, bool(json.loads(out))) == (0, True)
+            assert err.count("warning: shot.mass_g = ") == 1
+
     def test_shot_that_does_not_fit(self, small: Path, chamberopt: Said) -> None:
         """45 % of the cylinder passes the file's check, but the plate takes a quarter of that: no room."""
         path = Path("designs/plate.toml")

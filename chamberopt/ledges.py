@@ -1,0 +1,69 @@
+"""Where shot can come to rest, seen before anything runs: what faces up and neither vibrates nor turns."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from chamberopt.chamber import TAG_PART, TAG_WALL
+from chamberopt.triangles import area_vectors
+
+if TYPE_CHECKING:
+    from chamberopt.chamber import Chamber
+    from chamberopt.config import Design
+
+UPWARD = 1e-6  # of a triangle's area: what faces up by less is upright but for rounding
+REMEDY = {
+    TAG_PART: "turn it (effects.part_turn), tilt it (part.rotate_deg), or lower chamber.height_mm to its top side",
+    TAG_WALL: "make it slope towards the sonotrode",
+}
+
+
+class Ledge(NamedTuple):
+    """What of part or wall faces up: one sentence, and whether enough of it is ``level`` for a ball to lie on."""
+
+    said: str
+    level: bool
+
+
+def ledges(design: Design, chamber: Chamber) -> list[Ledge]:
+    """Where balls can come to rest, on part and wall."""
+    from sim_core import Rest
+
+    if not design.effects.gravity:
+        return []
+    normal = -area_vectors(chamber.vertices, chamber.triangles)  # to the shot
+    area = np.linalg.norm(normal, axis=1)
+    upward = normal[:, 2] > UPWARD * area
+    flat = upward & (np.hypot(normal[:, 0], normal[:, 1]) <= Rest().resistance * normal[:, 2])
+    cross_section = np.pi / 4.0 * design.shot.diameter**2
+    found = []
+    for tag, name in ((TAG_PART, "part"), (TAG_WALL, "wall")):
+        faces = upward & (chamber.tags == tag)
+        if not faces.any() or (tag == TAG_PART and design.effects.part_turn is not None):
+            continue
+        level = bool(area[faces & flat].sum() >= cross_section)
+        shown = faces & flat if level else faces  # where balls lie, rather than roll off
+        much = _mm2(area[shown].sum())
+        where, how = ("on", f"{much} of it are level") if level else ("in hollows of", f"{much} face up, none level")
+        found.append(
+            Ledge(
+                f"balls can come to rest {where} the {name}, which neither vibrates nor turns: {how}, "
+                f"{_place(chamber, shown, area)}; {REMEDY[tag]}",
+                level,
+            )
+        )
+    return found
+
+
+def _place(chamber: Chamber, faces: np.ndarray, area: np.ndarray) -> str:
+    corners = 1e3 * chamber.vertices[chamber.triangles[faces]]
+    middle = np.average(corners.mean(axis=1), axis=0, weights=area[faces])
+    low, high = corners[..., 2].min(), corners[..., 2].max()
+    heights = f"z = {low:.4g} mm" if high - low < 0.01 else f"z = {low:.4g} to {high:.4g} mm"
+    return f"around ({', '.join(f'{x:.1f}' for x in np.round(middle, 1) + 0.0)}) mm, at {heights}"
+
+
+def _mm2(area: float) -> str:
+    return f"{float(f'{1e6 * area:.3g}'):g} mm²"
