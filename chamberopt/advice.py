@@ -3,13 +3,13 @@
 The pilot simulates the design, and the design with one effect switched, from the same starts, and compares what a short
 run knows without bias: the mean normal speed of impacts on the target, and the dented area a second on its lower and
 its upper half, told as the coverage that comes of it if it is spread evenly there. It advises; it never
-switches. A design that says ``effects = "auto"`` asks for the switching too: see decide.
+switches. A design that says ``effects = "auto"`` asks for the switching too: see settled.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -29,11 +29,16 @@ if TYPE_CHECKING:
     from chamberopt.coverage import Tally
     from chamberopt.replicas import Progress
 
-SPEED = "mean impact speed"
+Prepare = Callable[["Design"], None]
+FIGURES = SPEED, LOWER, UPPER = (
+    "mean impact speed",
+    "coverage of the target's lower half",
+    "coverage of its upper half",
+)
 REPLICAS = 8
-IMPACTS = 100_000  # on the target, all replicas together: half a per cent of speed and of dents
+IMPACTS = 300_000  # on the target, all replicas together: speed and dents to about half a per cent
 FIRST_LOOK = 0.05  # s of each replica, to learn how often the target is hit
-LONGEST = 10.0  # s of each replica
+LONGEST = 20.0  # s of each replica
 # What switching friction on takes for it, assumed: dry metal (mu), and beta0 between those that S. Foerster, M. Louge,
 # H. Chang and K. Allia, Phys. Fluids 6 (1994) 1108, measured (0.43, 0.44) and none.
 FRICTION = {"mu": 0.3, "beta0": 0.2}
@@ -73,6 +78,11 @@ class Advice:
             return "matters"
         return "undecided"
 
+    def as_json(self) -> dict[str, Any]:
+        """Plain JSON values."""
+        changes = {name: {"value": e.value, "half_width": e.half_width} for name, e in self.changes.items()}
+        return {"effect": self.effect, "on": self.on, "verdict": self.verdict, "said": str(self), "changes": changes}
+
     def __str__(self) -> str:
         """One sentence for a person."""
         name, most = max(self.changes.items(), key=lambda item: abs(item[1].value))
@@ -91,7 +101,7 @@ class Advice:
 
 def _set(name: str, on: Any, off: Any) -> Callable[[dict[str, Any], bool], None]:
     def switched(data: dict[str, Any], wanted: bool) -> None:
-        data["effects"][name] = on if wanted else off
+        data["effects"][name] = (data["effects"][name] or on) if wanted else off
 
     return switched
 
@@ -131,38 +141,85 @@ SWITCHES = (
 
 
 def advise(
-    design: Design, chamber: Chamber, executor: Executor, progress: Progress | None = None, accuracy: float = ACCURACY
+    design: Design,
+    chamber: Chamber,
+    executor: Executor,
+    progress: Progress | None = None,
+    prepare: Prepare | None = None,
 ) -> list[Advice]:
     """Advice on every effect that can be switched in this design, the most important first.
 
-    Raises InputError and sim_core.SimulationError as evaluate does.
+    prepare(variant) is called before each variant runs: every set of effects is compiled once. Raises InputError and
+    sim_core.SimulationError as evaluate does.
     """
+    pilot = _Pilot(design, chamber, executor, prepare)
     switches = [switch for switch in SWITCHES if _applies(switch, design, chamber)]
-    seconds = _pilot_seconds(design, chamber, executor)
-    base = _figures(_with(design, {}, seconds), chamber, executor)
     said = []
     for done, switch in enumerate(switches):
         if progress:
             progress(done, len(switches), None)
         on = switch.on(design, chamber)
-        other = _figures(_with(design, {switch: not on}, seconds), chamber, executor)
-        without, with_it = (other, base) if on else (base, other)
-        changes = {name: _change(name, with_it[name], without[name]) for name in base}
-        said.append(Advice(switch.effect, on, switch.reason(design, chamber), changes, accuracy))
-    return sorted(said, key=lambda one: -max(abs(change.value) for change in one.changes.values()))
+        other = pilot.figures({switch: not on})
+        without, with_it = (other, pilot.base) if on else (pilot.base, other)
+        changes = {name: _change(name, with_it[name], without[name]) for name in FIGURES}
+        said.append(Advice(switch.effect, on, switch.reason(design, chamber), changes, ACCURACY))
+    return sorted(said, key=lambda one: -_size(one))
 
 
-def decide(
-    design: Design, chamber: Chamber, executor: Executor, progress: Progress | None = None
+def settled(
+    design: Design,
+    chamber: Chamber,
+    executor: Executor,
+    progress: Progress | None = None,
+    prepare: Prepare | None = None,
 ) -> tuple[Design, list[Advice]]:
-    """A design that leaves its effects to us, with those switched off that a pilot shows to make no difference.
+    """The design as it is, without advice; or, if it leaves its effects to us (effects.auto), with those switched off
+    that a pilot shows to make no difference, and the advice.
 
-    All are on at first; each is switched off alone, and stays off only if that is safe.
+    All are on at first; each is switched off alone, and then all that this shows to be safe, together: as long as that
+    does make a difference, the most important of them stays on.
     """
-    full = _with(design, {switch: True for switch in SWITCHES if _applies(switch, design, chamber)}, None)
-    advice = advise(full, chamber, executor, progress)
-    off = {one.effect for one in advice if one.verdict == "makes no difference"}
-    return _with(full, {switch: False for switch in SWITCHES if switch.effect in off}, None), advice
+    if not design.effects.auto:
+        return design, []
+    whole = _with(design, {switch: True for switch in SWITCHES if _applies(switch, design, chamber)})
+    advice = advise(whole, chamber, executor, progress, prepare)
+    off = [one.effect for one in advice if one.verdict == "makes no difference"]
+    pilot = _Pilot(whole, chamber, executor, prepare) if len(off) > 1 else None
+    while pilot is not None and len(off) > 1:
+        without = pilot.figures({switch: False for switch in SWITCHES if switch.effect in off})
+        changes = {name: _change(name, pilot.base[name], without[name]) for name in FIGURES}
+        if Advice("", True, "", changes, ACCURACY).verdict != "matters":
+            break
+        off = off[1:]
+    return _with(whole, {switch: False for switch in SWITCHES if switch.effect in off}), advice
+
+
+class _Pilot:
+    """Short runs of a design with some effects switched; ``base``: the figures of none switched."""
+
+    def __init__(self, design: Design, chamber: Chamber, executor: Executor, prepare: Prepare | None) -> None:
+        self._design, self._chamber, self._executor, self._prepare = design, chamber, executor, prepare
+        look = evaluate(self._switched({}, FIRST_LOOK), chamber, executor)
+        hits = look.total.impacts[exposed_target(chamber)].sum()
+        self._seconds = float(np.clip(FIRST_LOOK * IMPACTS / max(hits, 1), FIRST_LOOK, LONGEST))
+        self.base = self.figures({})
+
+    def figures(self, wanted: dict[Switch, bool]) -> dict[str, np.ndarray]:
+        """Each of FIGURES in every replica, (REPLICAS,)."""
+        return _figures(self._switched(wanted, self._seconds), self._chamber, self._executor)
+
+    def _switched(self, wanted: dict[Switch, bool], seconds: float) -> Design:
+        data = _with(self._design, wanted).model_dump()
+        data["process"]["accuracy"] |= {
+            "replicas": REPLICAS,
+            "simulated_time_s": seconds,
+            "coverage": None,
+            "coverage_model": "avrami",
+        }
+        variant = checked(type(self._design), data)
+        if self._prepare is not None:
+            self._prepare(variant)
+        return variant
 
 
 def _applies(switch: Switch, design: Design, chamber: Chamber) -> bool:
@@ -175,27 +232,18 @@ def _applies(switch: Switch, design: Design, chamber: Chamber) -> bool:
     return switch.effect != "ball_collisions" or design.shot.count > 1
 
 
-def _with(design: Design, wanted: dict[Switch, bool], seconds: float | None) -> Design:
+def _with(design: Design, wanted: dict[Switch, bool]) -> Design:
     data = design.model_dump()
+    data["effects"]["auto"] = False
     for switch, on in wanted.items():
         switch.switched(data, on)
     if not data["effects"]["gravity"]:
         data["effects"]["rest"] = None  # nothing lies still without gravity
-    if seconds is not None:
-        data["process"]["accuracy"] |= {
-            "replicas": REPLICAS,
-            "simulated_time_s": seconds,
-            "coverage": None,
-            "coverage_model": "avrami",
-        }
     return checked(type(design), data)
 
 
-def _pilot_seconds(design: Design, chamber: Chamber, executor: Executor) -> float:
-    """How long each replica of the pilot is simulated [s]."""
-    look = evaluate(_with(design, {}, FIRST_LOOK), chamber, executor)
-    hits = look.total.impacts[exposed_target(chamber)].sum()
-    return float(np.clip(FIRST_LOOK * IMPACTS / max(hits, 1), FIRST_LOOK, LONGEST))
+def _size(one: Advice) -> float:
+    return max(abs(change.value) for change in one.changes.values())
 
 
 def _figures(design: Design, chamber: Chamber, executor: Executor) -> dict[str, np.ndarray]:
@@ -215,8 +263,8 @@ def _figures(design: Design, chamber: Chamber, executor: Executor) -> dict[str, 
 
     return {
         SPEED: of_each(lambda t: t.speed_sum[target].sum() / max(1, t.impacts[target].sum())),
-        "coverage of the target's lower half": coverage(lower),
-        "coverage of its upper half": coverage(target & ~lower),
+        LOWER: coverage(lower),
+        UPPER: coverage(target & ~lower),
     }
 
 
@@ -230,8 +278,3 @@ def _change(name: str, with_it: np.ndarray, without: np.ndarray) -> Estimate:
     """Mean change, from replicas paired by their seeds; infinitely uncertain where nothing was hit."""
     scale = float(without.mean()) if name == SPEED else 1.0
     return estimate((with_it - without) / scale) if scale > 0.0 else Estimate(0.0, math.inf)
-
-
-def sentences(advice: Sequence[Advice]) -> list[str]:
-    """One sentence an effect."""
-    return [str(one) for one in advice]

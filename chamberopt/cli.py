@@ -23,6 +23,7 @@ from chamberopt.errors import InputError
 # Heavy packages (numba, trimesh, pyvista, nlopt) are imported inside the commands: --help answers at once.
 if TYPE_CHECKING:
     from chamberopt.accuracy import Evaluation
+    from chamberopt.advice import Advice
     from chamberopt.chamber import Chamber
     from chamberopt.config import Design
     from chamberopt.estimate import Estimate
@@ -40,13 +41,18 @@ Out = Annotated[Path | None, Parameter(name="--out", help="Folder for the result
 
 
 @app.command
-def check(file: Path, /, *, screenshot: Path | None = None, json: Json = False, out: Out = None) -> None:
-    """Check a design or study file: geometry, volumes, shot, warnings. Nothing is simulated.
+def check(
+    file: Path, /, *, pilot: bool = True, screenshot: Path | None = None, json: Json = False, out: Out = None
+) -> None:
+    """Check a design or study file: geometry, volumes, shot, warnings; and, by a short pilot run with each effect
+    switched, which effects it needs.
 
     Parameters
     ----------
     file
         Design or study file (.toml).
+    pilot
+        --no-pilot: nothing is simulated.
     screenshot
         Write a picture (.png) of the part with its target, or of what is wrong with its surface.
     """
@@ -71,6 +77,13 @@ def check(file: Path, /, *, screenshot: Path | None = None, json: Json = False, 
             name: {"low": low, "start": design.value(name), "high": high} for name, (low, high) in loaded.vary.items()
         }
         facts["evaluations"] = loaded.optimizer.evaluations
+    kind = "study" if isinstance(loaded, Study) else "design"
+    if not json:
+        print("\n".join([f"{file}: a usable {kind}", *_facts(facts)]), flush=True)
+    if pilot:
+        facts["effects"] = _advice(design, chamber)
+        if not json:
+            print("\n".join(f"effect: {one['said']}" for one in facts["effects"]))
     if out is not None:
         from chamberopt.disk import new_folder, write_text
 
@@ -78,9 +91,6 @@ def check(file: Path, /, *, screenshot: Path | None = None, json: Json = False, 
         write_text(out / "check.json", json_format.dumps(facts, indent=2) + "\n")
     if json:
         print(json_format.dumps(facts, indent=2))
-        return
-    kind = "study" if isinstance(loaded, Study) else "design"
-    print("\n".join([f"{file}: a usable {kind}", *_facts(facts)]))
 
 
 @app.command
@@ -99,15 +109,17 @@ def simulate(design: Path, /, *, json: Json = False, out: Out = None) -> None:
     from chamberopt.progress import progress_bar
     from chamberopt.results import write_simulation
 
-    candidate = load_design(design)
-    chamber = build_chamber(candidate)
-    _warn(candidate, chamber)
+    asked = load_design(design)
+    chamber = build_chamber(asked)
+    _warn(asked, chamber)
     with _results(out, design.stem) as folder:
+        candidate, advice = _settled(asked, chamber)
         _compile(candidate, chamber)
         with local_executor() as executor, progress_bar("replicas") as progress:
             evaluation = evaluate(candidate, chamber, executor, progress)
-        _remark(write_simulation(folder, candidate, chamber, evaluation))
-    _say([*_estimates(evaluation), *_notes((*chamber.notes, *evaluation.notes))], folder, json)
+        _remark(write_simulation(folder, candidate, chamber, evaluation, advice))
+    notes = (*map(str, advice), *chamber.notes, *evaluation.notes)
+    _say([*_estimates(evaluation), *_notes(notes)], folder, json)
 
 
 @app.command
@@ -129,10 +141,12 @@ def run(study: Path, /, *, json: Json = False, out: Out = None) -> None:
     question = load_study(study)
     start = build_chamber(question.design)
     with _results(out, study.stem) as folder:
+        design, advice = _settled(question.design, start)
+        question = question.model_copy(update={"design": design})
         _compile(question.design, start)
         with local_executor() as executor, progress_bar("evaluations") as progress:
             result = run_study(question, folder, executor, progress)
-        _remark(write_study(folder, result))
+        _remark(write_study(folder, result, advice))
     _warn(result.best.design, build_chamber(result.best.design))
     lines = [f"{'parameter':34}{'start':>12}{'best':>12}"]
     lines += [
@@ -148,7 +162,8 @@ def run(study: Path, /, *, json: Json = False, out: Out = None) -> None:
     ]
     verdict = "better than the start" if result.improved else "within the noise of the start"
     lines += ["", f"{_row('gain', result.gain)}: {verdict}"]
-    _say([*lines, *_notes((*result.at_bounds, *start.notes, *result.best.evaluation.notes))], folder, json)
+    notes = (*map(str, advice), *result.at_bounds, *start.notes, *result.best.evaluation.notes)
+    _say([*lines, *_notes(notes)], folder, json)
 
 
 @app.command
@@ -243,6 +258,32 @@ def _compile(design: Design, chamber: Chamber) -> None:
     require_countable(design)
     shot = design.shot
     announce_compilation(scene_physics(design, chamber_mesh(chamber)), shot.count, shot.mix is None)
+
+
+def _settled(design: Design, chamber: Chamber) -> tuple[Design, list[Advice]]:
+    """The design with its effects chosen, and why, where it leaves them to us."""
+    from chamberopt.advice import settled
+    from chamberopt.executor import local_executor
+    from chamberopt.progress import progress_bar
+
+    with local_executor() as executor, progress_bar("pilot runs") as progress:
+        return settled(design, chamber, executor, progress, lambda variant: _compile(variant, chamber))
+
+
+def _advice(design: Design, chamber: Chamber) -> list[dict[str, Any]]:
+    """Which effects a design needs, by pilot runs."""
+    from chamberopt.advice import advise, settled
+    from chamberopt.executor import local_executor
+    from chamberopt.progress import progress_bar
+
+    def prepare(variant: Design) -> None:
+        _compile(variant, chamber)
+
+    print("pilot runs, with each effect switched (--no-pilot skips them) ...", file=sys.stderr, flush=True)
+    with local_executor() as executor, progress_bar("pilot runs") as progress:
+        advice = settled(design, chamber, executor, progress, prepare)[1]
+        advice = advice or advise(design, chamber, executor, progress, prepare)
+    return [one.as_json() for one in advice]
 
 
 def _remark(remarks: Sequence[str]) -> None:

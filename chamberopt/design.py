@@ -351,6 +351,11 @@ class Design(BaseModel):
     effects: Effects = Field(default_factory=Effects)
     process: Process
 
+    @field_validator("effects", mode="before")
+    @classmethod
+    def _left_to_us(cls, effects: Any) -> Any:
+        return {"auto": True} if effects == "auto" else effects
+
     @model_validator(mode="after")
     def _agree(self) -> Self:
         chamber, shot = self.chamber, self.shot

@@ -88,6 +88,10 @@ class Effects(BaseModel):
 
     model_config = STRICT
 
+    auto: bool = Field(
+        default=False,
+        description='the others are switched for you, by a pilot run; short for { auto = true }: effects = "auto"',
+    )
     gravity: bool = Field(default=True, description="9.80665 m/s² downwards")
     part_turn: PartTurn | None = Field(
         default=None, description="{ rpm = ... } or { angle_deg = ..., frequency_hz = ... }"

@@ -101,6 +101,8 @@ def scene_physics(
     from sim_core import BallCollisions, Drag, Friction, Gravity, Physics, RandomPhase, Rest, Restitution, Vibration
 
     sonotrode, effects, materials = design.sonotrode, design.effects, design.materials
+    if effects.auto:
+        raise InputError('effects: still "auto"; advice.settled decides them, as simulate and run do')
     # One (C0, v0) per tag, in the order of the tags: TAG_PART, TAG_SONOTRODE, TAG_WALL.
     surfaces = tuple(
         (pair.restitution, pair.yield_speed) for pair in (materials.part, materials.sonotrode, materials.wall)

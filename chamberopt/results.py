@@ -22,6 +22,9 @@ from chamberopt.history import as_csv, read_history
 from chamberopt.objective import METRICS, exposed_target
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from chamberopt.advice import Advice
     from chamberopt.chamber import Chamber
     from chamberopt.study import StudyResult
 
@@ -50,18 +53,23 @@ class Result:
     data: dict[str, Any]
 
 
-def write_simulation(folder: str | Path, design: Design, chamber: Chamber, evaluation: Evaluation) -> list[str]:
+def write_simulation(
+    folder: str | Path, design: Design, chamber: Chamber, evaluation: Evaluation, advice: Sequence[Advice] = ()
+) -> list[str]:
     """Leave a simulation in a new or empty folder; returns remarks, such as why a picture was skipped.
+
+    advice: why its effects were chosen, if the design left them to us.
 
     design.toml · result.json · coverage.vtp · chamber.stl, chamber.vtp · coverage.png.
     """
     folder = new_folder(folder)
     save_design(design, folder / "design.toml")
-    _write_json(folder, {"kind": "simulation", **_write_candidate(folder, design, chamber, evaluation)})
+    about = _write_candidate(folder, design, chamber, evaluation)
+    _write_json(folder, {"kind": "simulation", **about, **_chosen(advice)})
     return _picture([folder], [evaluation], [folder.resolve().name], folder / "coverage.png")
 
 
-def write_study(folder: str | Path, study_result: StudyResult) -> list[str]:
+def write_study(folder: str | Path, study_result: StudyResult, advice: Sequence[Advice] = ()) -> list[str]:
     """Complete the folder of a study that has ended; returns remarks, such as why a picture was skipped.
 
     Beside design.toml, study.toml and history.jsonl, which run_study wrote: best.toml · result.json ·
@@ -76,7 +84,7 @@ def write_study(folder: str | Path, study_result: StudyResult) -> list[str]:
     save_design(best.design, folder / "best.toml")
     write_text(folder / "history.csv", as_csv(read_history(folder)))
     about = _write_candidate(folder, best.design, build_chamber(best.design), best.evaluation)
-    _write_json(folder, {"kind": "study", **about, "study": _about_study(study_result)})
+    _write_json(folder, {"kind": "study", **about, "study": _about_study(study_result), **_chosen(advice)})
     (folder / "start").mkdir(exist_ok=True)
     save_design(start.design, folder / "start" / "design.toml")
     about = _write_candidate(folder / "start", start.design, build_chamber(start.design), start.evaluation)
@@ -174,6 +182,11 @@ def _about(folder: Path, design: Design, chamber: Chamber, evaluation: Evaluatio
         "part_unit": chamber.part.unit,
         "versions": _versions(),
     }
+
+
+def _chosen(advice: Sequence[Advice]) -> dict[str, Any]:
+    """What a pilot said of each effect of a design that left them to us: result.json's "effects"."""
+    return {"effects": [one.as_json() for one in advice]} if advice else {}
 
 
 def _about_study(result: StudyResult) -> dict[str, Any]:

@@ -37,6 +37,7 @@ def simulate(
     cannot be built or does not take the shot, sim_core.SimulationError when a run must stop.
     """
     from chamberopt.accuracy import evaluate
+    from chamberopt.advice import settled
     from chamberopt.chamber import build_chamber
     from chamberopt.executor import local_executor
     from chamberopt.results import load_result, write_simulation
@@ -44,8 +45,9 @@ def simulate(
     _require("design", design, Design, "load_design")
     chamber = build_chamber(design)
     with local_executor(workers) as executor:
+        design, advice = settled(design, chamber, executor)
         evaluation = evaluate(design, chamber, executor, progress)
-    _warn([*evaluation.notes, *write_simulation(out, design, chamber, evaluation)])
+    _warn([*map(str, advice), *evaluation.notes, *write_simulation(out, design, chamber, evaluation, advice)])
     return load_result(out)
 
 
@@ -54,14 +56,17 @@ def optimise(study: Study, out: str | Path, *, workers: int | None = None, progr
 
     ``workers`` as in simulate. Raises InputError when the start cannot be simulated or nothing meets the constraints.
     """
+    from chamberopt.advice import settled
+    from chamberopt.chamber import build_chamber
     from chamberopt.executor import local_executor
     from chamberopt.results import load_result, write_study
     from chamberopt.study import run_study
 
     _require("study", study, Study, "load_study")
     with local_executor(workers) as executor:
-        found = run_study(study, out, executor, progress)
-    _warn([*found.best.evaluation.notes, *write_study(out, found)])
+        design, advice = settled(study.design, build_chamber(study.design), executor)
+        found = run_study(study.model_copy(update={"design": design}), out, executor, progress)
+    _warn([*map(str, advice), *found.best.evaluation.notes, *write_study(out, found, advice)])
     return load_result(out)
 
 
