@@ -2,10 +2,13 @@
 
 from typing import NamedTuple
 
+import numpy as np
+
 from benchmarks.scenes import PART, PHYSICS, scene
-from sim_core import Physics, Rest, Scene, Turn
+from sim_core import Balls, Drag, Friction, Physics, RandomPhase, Rest, Scene, Turn
 
 NAME = "gear-200-10k"
+STEEL = (0.3, 0.2)  # mu and beta0, of every surface
 
 
 class Effect(NamedTuple):
@@ -21,12 +24,21 @@ EFFECTS = {
     "gravity": Effect(PHYSICS._replace(gravity=None), PHYSICS, ("gravity",)),
     "restitution": Effect(PHYSICS._replace(restitution=None), PHYSICS, ("restitution",)),
     "vibration": Effect(LOSSLESS._replace(vibration=None), LOSSLESS, ("wave",)),
+    "random_phase": Effect(PHYSICS, PHYSICS._replace(random_phase=RandomPhase(1)), ("phases",)),
+    "ball_collisions": Effect(PHYSICS._replace(ball_collisions=None), PHYSICS, ("crowd", "pair_time")),
+    "friction": Effect(PHYSICS, PHYSICS._replace(friction=Friction((STEEL,) * 3, STEEL)), ("grip",)),
+    "drag": Effect(PHYSICS, PHYSICS._replace(drag=Drag()), ("air",)),
     "rest": Effect(PHYSICS, PHYSICS._replace(rest=Rest()), ("footing",)),
     "turn": Effect(PHYSICS, PHYSICS._replace(turn=Turn(PART, rpm=30.0)), ("turning", "part")),
+    "sizes": Effect(PHYSICS, PHYSICS, ("sizes",)),
 }
 
 
 def effect_scene(effect: str, on: bool) -> Scene:
-    """The chamber with the effect on, or all the same without it."""
+    """The chamber with the effect on, or all the same without it; of several sizes, every second ball is smaller."""
     still = scene(NAME)
-    return Scene(still.mesh, still.balls, EFFECTS[effect].on if on else EFFECTS[effect].off, still.duration)
+    balls = still.balls
+    if effect == "sizes" and on:
+        diameters = np.where(np.arange(len(balls)) % 2, balls.diameter, 0.75 * balls.diameters)
+        balls = Balls(balls.positions, balls.velocities, diameters, balls.density)
+    return Scene(still.mesh, balls, EFFECTS[effect].on if on else EFFECTS[effect].off, still.duration)

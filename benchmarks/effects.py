@@ -87,9 +87,8 @@ def play(effect: str, on: bool) -> None:
     advance(run, STEADY)
     collisions, spent = advance(run, 0.02)
     piece = 0.02 * TARGET / max(spent, 1e-6)
-    columns = [run.motion, *run.calendar, *(part for part in run.shot[1:] if part is not None)]
-    columns += [part for part in (run.footing,) if part is not None]
-    size = sum(array_bytes(column) for column in columns) / len(run.motion)
+    kept = (run.motion, run.calendar, run.shot.crowd, run.footing, run.grip, run.phases, run.air, run.sizes)
+    size = sum(map(array_bytes, kept)) / len(run.motion)
     print(json.dumps({"simulator": sim_core.__file__, "compile_s": compiled, "bytes_per_ball": size}), flush=True)
     for _ in sys.stdin:
         collisions, spent = advance(run, piece)

@@ -1,9 +1,9 @@
 """Which effects a design needs: an estimate from dimensionless groups, and a short paired pilot run with each switched.
 
 The pilot simulates the design, and the design with one effect switched, from the same starts, and compares what a short
-run knows without bias: the mean normal speed of impacts on the target, and the dented area a second on its lower and
-its upper half, told as the coverage that comes of it if it is spread evenly there. It advises; it never
-switches. A design that says ``effects = "auto"`` asks for the switching too: see settled.
+run knows without bias: the mean normal speed of impacts on the target, and the dented area a second on the half of
+it nearer to the sonotrode and on the other, told as the coverage that comes of it if it is spread evenly there. It
+advises; it never switches. A design that says ``effects = "auto"`` asks for the switching too: see settled.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ if TYPE_CHECKING:
     from chamberopt.replicas import Progress
 
 Prepare = Callable[["Design"], None]
-FIGURES = SPEED, LOWER, UPPER = (
+FIGURES = SPEED, NEARER, FARTHER = (
     "mean impact speed",
-    "coverage of the target's lower half",
-    "coverage of its upper half",
+    "coverage of the target's half nearer to the sonotrode",
+    "coverage of its farther half",
 )
 REPLICAS = 8
 IMPACTS = 300_000  # on the target, all replicas together: speed and dents to about half a per cent
@@ -250,8 +250,10 @@ def _figures(design: Design, chamber: Chamber, executor: Executor) -> dict[str, 
     """The three figures of every replica."""
     replicas = evaluate(design, chamber, executor).replicas
     target = exposed_target(chamber)
-    heights = chamber.part.vertices[chamber.part.triangles].mean(axis=1)[:, 2]
-    lower = target & (heights <= _middle(heights[target], chamber.exposed_area[target]))
+    away = np.linalg.norm(
+        chamber.part.vertices[chamber.part.triangles].mean(axis=1), axis=1
+    )  # of the sonotrode's middle
+    near = target & (away <= _middle(away[target], chamber.exposed_area[target]))
 
     def of_each(figure: Callable[[Tally], float]) -> np.ndarray:
         return np.array([figure(replica) for replica in replicas])
@@ -263,15 +265,15 @@ def _figures(design: Design, chamber: Chamber, executor: Executor) -> dict[str, 
 
     return {
         SPEED: of_each(lambda t: t.speed_sum[target].sum() / max(1, t.impacts[target].sum())),
-        LOWER: coverage(lower),
-        UPPER: coverage(target & ~lower),
+        NEARER: coverage(near),
+        FARTHER: coverage(target & ~near),
     }
 
 
-def _middle(heights: np.ndarray, areas: np.ndarray) -> float:
-    """The height below which half the area lies."""
-    order = np.argsort(heights, kind="stable")
-    return float(heights[order][np.searchsorted(np.cumsum(areas[order]), 0.5 * areas.sum())])
+def _middle(distances: np.ndarray, areas: np.ndarray) -> float:
+    """The distance within which half the area lies."""
+    order = np.argsort(distances, kind="stable")
+    return float(distances[order][np.searchsorted(np.cumsum(areas[order]), 0.5 * areas.sum())])
 
 
 def _change(name: str, with_it: np.ndarray, without: np.ndarray) -> Estimate:
