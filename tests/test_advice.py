@@ -32,10 +32,11 @@ def test_groups_are_what_their_formulas_say() -> None:
     speed = PLATE.sonotrode.peak_speed
     assert groups.fall(PLATE) == pytest.approx(9.80665 * PLATE.chamber.height / speed**2)
     # A dilute gas: the packing does not matter, and twice the balls halve the path.
-    thin, thinner = (plate_design(shot__mass_g=grams) for grams in (0.552, 0.276))
+    each = 1e3 * PLATE.shot.ball_mass  # g
+    thin, thinner = (plate_design(shot__mass_g=balls * each) for balls in (8, 4))
     assert thin.shot.count == 2 * thinner.shot.count
     assert groups.free_path(thinner, CHAMBER) == pytest.approx(2 * groups.free_path(thin, CHAMBER), rel=0.01)
-    assert math.isinf(groups.free_path(plate_design(shot__mass_g=0.014), CHAMBER))
+    assert math.isinf(groups.free_path(plate_design(shot__mass_g=each), CHAMBER))
     # In the range of constant C_d the loss goes with the height over the diameter.
     big = plate_design(shot__diameter_mm=6)
     assert groups.drag_loss(big) == pytest.approx(0.5 * groups.drag_loss(PLATE), rel=0.05)
