@@ -32,7 +32,8 @@ def touching(scene: Scene, corners: np.ndarray, positions: np.ndarray, ball: int
         if not any(alike) and len(found) < MOST_NAMED:
             found.append(t)
     apart = np.linalg.norm(positions - here, axis=1) - radii - radius
-    others = [int(k) for k in np.argsort(apart) if k != ball and apart[k] <= LEANING][:MOST_NAMED]
+    meets = (apart <= LEANING) & (np.arange(len(apart)) != ball) & (physics.ball_collisions is not None)
+    others = [int(k) for k in np.argsort(apart) if meets[k]][:MOST_NAMED]
     tags = [int(scene.mesh.tags[t]) for t in found]
     names = [surface_name(scene.mesh, physics, t) for t in found]
     names += [f"ball {k}" for k in others]

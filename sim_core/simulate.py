@@ -9,7 +9,7 @@ import numpy as np
 from sim_core.balls import Balls
 from sim_core.calendar import Calendar, new_calendar
 from sim_core.detect.ball_mesh import Scratch, new_scratch
-from sim_core.effects.drag import Air, catch_all_up, checked_drag, new_air
+from sim_core.effects.drag import Air, checked_drag, new_air
 from sim_core.effects.friction import Grip, checked_friction, new_grip
 from sim_core.effects.gravity import acceleration, checked_gravity
 from sim_core.effects.random_phase import Phases, checked_random_phase, new_phases
@@ -26,6 +26,7 @@ from sim_core.invariants import contained, narrowest_gap, posed
 from sim_core.jams import touching
 from sim_core.loop import Clock, Loop, Shot
 from sim_core.neighbours import new_crowd
+from sim_core.resolve.air import catch_all_up
 from sim_core.resting import Resting, resting
 from sim_core.scene import TOUCH, Scene
 from sim_core.sizes import Sizes, new_sizes
@@ -225,7 +226,7 @@ class _Run:
         fall = np.array(acceleration(self.gravity)) if self.footing is None else self.footing.pull
         base, velocities = self.motion[:, :3], self.motion[:, 3:]
         velocities_now = velocities + now * fall
-        catch_all_up(self.air, velocities_now, now)
+        catch_all_up(self.air, self.footing, velocities_now, now)
         return base + velocities * now + 0.5 * now * now * fall + self.centre, velocities_now
 
     def _require_sound(self) -> None:
@@ -233,7 +234,7 @@ class _Run:
         bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
         if len(bad):
             raise SimulationError(f"ball {bad[0]}: its position is not a number any more; {self._when()}")
-        outside = np.flatnonzero(~contained(self.scene.mesh, points, self._corners()))
+        outside = np.flatnonzero(~self._inside(points))
         if len(outside):
             raise SimulationError(
                 f"ball {outside[0]} has left the mesh at {np.round(points[outside[0]], 6).tolist()} m, {self._when()}. "
@@ -246,6 +247,15 @@ class _Run:
             raise SimulationError(
                 f"balls {one} and {two} overlap by {-gap:.3g} m, {self._when()}; please report the scene"
             )
+
+    def _inside(self, points: np.ndarray) -> np.ndarray:
+        """Which points (n, 3) [m] are in the chamber; also down to where a face that swings wider than a ball is."""
+        mesh, corners, vibration = self.scene.mesh, self._corners(), self.scene.physics.vibration
+        inside = contained(mesh, points, corners)
+        if vibration is not None and vibration.amplitude >= 0.5 * self.scene.balls.sizes[0] and not inside.all():
+            swing = vibration.amplitude * np.array(vibration.axis) / np.linalg.norm(vibration.axis)
+            inside |= contained(mesh, points + swing, corners) | contained(mesh, points - swing, corners)
+        return inside
 
     def _corners(self) -> np.ndarray | None:
         """The triangles where they are now, if some of them turn."""

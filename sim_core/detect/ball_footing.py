@@ -104,9 +104,11 @@ def end_of_path(
             delay = _leaves_edge(footing, tree.numbers, ball, foot, here, pull, OVER * seam)
         if delay < best:
             best, end = delay, LEAVES - foot
-    delay = _brake_ends(footing.grip, footing, ball, time, here.velocity, pull)
+    delay, turns = _brake_ends(footing.grip, footing, ball, time, here.velocity, pull)
     if delay < best:
         best, end = delay, STOPS
+    elif turns and end == GOES_ON:  # or it would turn in every piece by less than TURN, unnoticed
+        end = STOPS
     return best, end
 
 
@@ -166,8 +168,10 @@ def _leaves_round(
 
 
 @jit
-def _brake_ends(grip: Grip | None, footing: Footing, ball: int, time: float, velocity: Vec3, pull: Vec3) -> float:
-    """How long the force against a ball's slip, or against its motion, keeps its direction."""
+def _brake_ends(
+    grip: Grip | None, footing: Footing, ball: int, time: float, velocity: Vec3, pull: Vec3
+) -> tuple[float, bool]:
+    """How long the force against a ball's slip, or against its motion, keeps its direction, and whether that turns."""
     if grip is not None:
         slips = grip.slips
         change = Vec3(slips[ball, 3], slips[ball, 4], slips[ball, 5])
@@ -176,18 +180,19 @@ def _brake_ends(grip: Grip | None, footing: Footing, ball: int, time: float, vel
             return _stops(slip, change)
     if footing.resistance > 0.0:
         return _stops(velocity, pull)
-    return NEVER
+    return NEVER, False
 
 
 @jit
-def _stops(velocity: Vec3, pull: Vec3) -> float:
+def _stops(velocity: Vec3, pull: Vec3) -> tuple[float, bool]:
     square = dot(velocity, velocity)
     if square == 0.0:
-        return NEVER
+        return NEVER, False
     rate = dot(pull, velocity)
     speed = math.sqrt(square)
     across = dot(pull, pull) - rate * rate / square
     soonest = -square / rate if rate < 0.0 else NEVER
-    if across > 1e-12 * dot(pull, pull):
+    turns = across > 1e-12 * dot(pull, pull)
+    if turns:
         soonest = min(soonest, max(SHORTEST, TURN * speed / math.sqrt(across)))
-    return soonest
+    return soonest, turns

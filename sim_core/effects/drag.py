@@ -22,6 +22,7 @@ from sim_core.errors import SceneError, number
 TURBULENT = 1000.0  # Re from which C_d is NEWTON; the two laws differ by 0.3 % there
 NEWTON = 0.44
 INERTIA, POWER = 0.15, 0.687
+SHORTEST = 1e-5  # s: shorter ones make nothing truer, cost ever more events, and in the end are taken for a jam
 LEAST = 0.5  # of what a kick back in time divides by: nothing comes near it with pieces shorter than the ball's slowing
 
 # columns of Air.balls
@@ -56,6 +57,8 @@ def checked_drag(drag: Drag | None) -> Drag | None:
     for name, value in plain._asdict().items():
         if not 0.0 < value < math.inf:
             raise SceneError(f"drag.{name} is {value}: it must be positive")
+    if plain.piece < SHORTEST:
+        raise SceneError(f"drag.piece is {plain.piece:g} s: it must be {SHORTEST:g} or more; the path is off by less")
     return plain
 
 
@@ -95,15 +98,3 @@ def set_air_back(air: Air | None, window: float) -> None:
         return
     for ball in range(len(air.balls)):
         air.balls[ball, UNTIL] -= window
-
-
-@jit
-def catch_all_up(air: Air | None, velocities: np.ndarray, time: float) -> None:
-    """Make velocities (n, 3) [m/s] in flight what the air has made of them by ``time``, no half piece ahead."""
-    if air is None:
-        return
-    for ball in range(len(velocities)):
-        x, y, z = velocities[ball, 0], velocities[ball, 1], velocities[ball, 2]
-        share = slowing(air, ball, math.sqrt(x * x + y * y + z * z), time - air.balls[ball, UNTIL])
-        for axis in range(3):
-            velocities[ball, axis] *= share

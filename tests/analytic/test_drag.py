@@ -177,7 +177,9 @@ def test_no_ball_jams_on_its_way_up_with_the_sonotrode() -> None:
     assert simulate(Scene(room, up, physics, 30.0, record=())).collisions.sonotrode > 50_000
 
 
-@pytest.mark.parametrize(("drag", "said"), [(Drag(density=-1.0), "density"), (Drag(piece=0.0), "piece")])
+@pytest.mark.parametrize(
+    ("drag", "said"), [(Drag(density=-1.0), "density"), (Drag(piece=0.0), "piece"), (Drag(piece=1e-7), "piece")]
+)
 def test_air_that_is_none_is_named(drag: Drag, said: str) -> None:
     with pytest.raises(SceneError, match=rf"drag\.{said} is "):
         Scene(box((0.03,) * 3), gas(box((0.03,) * 3), 1, 1.0, 1), Physics(drag=drag), 1.0)

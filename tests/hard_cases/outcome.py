@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim_core import Balls, Gravity, Physics, Restitution, Scene, SceneError, SimulationError, TriangleMesh, simulate
-from sim_core.invariants import closest_pair, contained
+from sim_core.invariants import clearance, contained, narrowest_gap, posed
 from tests.fuzzed_chambers import Chamber
 from tests.sim_core.test_containment import REACH, ROUNDING, clearance_at, later
 
@@ -135,10 +135,11 @@ def play(chamber: Chamber, duration: float, pieces: int = 1, record: tuple[int, 
         seen.energy_drift = 0.0
     for piece in range(pieces):
         result = simulate(Scene(mesh, seen.end, physics, duration / pieces, record=record))
-        log, here = result.impacts, slice(-WATCHED, None)
-        if len(log):
+        log = result.impacts
+        here = np.flatnonzero(_in_the_room(mesh, physics)[log.triangle])[-WATCHED:]
+        if len(here):
             gap = clearance_at(Chamber(mesh, balls, physics), log.position[here], log.time[here])
-            seen.penetration = max(seen.penetration, float((balls.radius - gap).max()))
+            seen.penetration = max(seen.penetration, float((0.5 * balls.diameters[log.ball[here]] - gap).max()))
         start = piece * duration / pieces
         seen.impacts.append((start + log.time, log.ball, log.triangle, log.position, log.normal_speed))
         physics = later(physics, duration / pieces)
@@ -147,7 +148,8 @@ def play(chamber: Chamber, duration: float, pieces: int = 1, record: tuple[int, 
         seen.collisions += result.collisions.total
         seen.pairs += result.collisions.balls
         seen.events += result.collisions.total + result.collisions.stale
-        outside = np.flatnonzero(~contained(mesh, result.balls.positions))
+        inside = contained(mesh, result.balls.positions, corners_now(mesh, physics))
+        outside = np.flatnonzero(~inside & ~_beneath_the_mesh(Chamber(mesh, result.balls, physics)))
         if len(outside):
             raise SimulationError(f"ball {outside[0]} is outside at {result.balls.positions[outside[0]].tolist()} m")
         if elastic and before > 0.0:
@@ -157,32 +159,63 @@ def play(chamber: Chamber, duration: float, pieces: int = 1, record: tuple[int, 
 
 
 def overlap(chamber: Chamber) -> float:
-    """Deepest overlap [m] of any ball with a surface or with another ball, now."""
-    balls = chamber.balls
+    """Deepest overlap [m] of any ball with a surface or, where balls meet, with another ball, now."""
+    mesh, balls, physics = chamber
     gap = clearance_at(chamber, balls.positions, np.zeros(len(balls)))
+    corners = corners_now(mesh, physics)
+    if corners is not None and physics.turn is not None:
+        part = np.ascontiguousarray(corners[mesh.tags == physics.turn.tag])
+        gap = np.minimum(gap, clearance(part, balls.positions, REACH * balls.radius))
     near = gap < REACH * balls.radius  # others touch nothing: how far they are is not measured
-    surface = float((balls.radius - gap[near]).max(initial=-math.inf))
-    return max(surface, balls.diameter - closest_pair(balls)[0])
+    surface = float((0.5 * balls.diameters - gap)[near].max(initial=-math.inf))
+    return surface if physics.ball_collisions is None else max(surface, -narrowest_gap(balls)[0])
+
+
+def _beneath_the_mesh(chamber: Chamber) -> np.ndarray:
+    """True (n,) for balls so small that the floor, at its lowest, leaves room for their centres below the mesh's."""
+    balls, vibration = chamber.balls, chamber.physics.vibration
+    if vibration is None:
+        return np.zeros(len(balls), dtype=np.bool_)
+    lowest = chamber.mesh.vertices[:, 2].min() - vibration.amplitude + 0.5 * balls.diameters
+    low, high = chamber.mesh.vertices.min(axis=0), chamber.mesh.vertices.max(axis=0)
+    above = ((balls.positions > low) & (balls.positions < high))[:, :2].all(axis=1)
+    return np.asarray(above & (balls.positions[:, 2] >= lowest - DEEPEST) & (balls.positions[:, 2] <= low[2]))
+
+
+def _in_the_room(mesh: TriangleMesh, physics: Physics) -> np.ndarray:
+    """True (m,) for triangles whose impacts are logged where they happen, and not as a turning part sees them."""
+    return np.ones(len(mesh.tags), dtype=np.bool_) if physics.turn is None else mesh.tags != physics.turn.tag
+
+
+def corners_now(mesh: TriangleMesh, physics: Physics) -> np.ndarray | None:
+    """The triangles (m, 3, 3) [m] where a turning part is now; None if none turns."""
+    return None if physics.turn is None else posed(mesh, physics.turn)
+
+
+def is_still(physics: Physics) -> bool:
+    """True when no surface moves, so that no energy comes in."""
+    return (physics.vibration is None or physics.vibration.amplitude == 0.0) and physics.turn is None
 
 
 def is_elastic(physics: Physics) -> bool:
     """True when energy must be kept."""
-    still = physics.vibration is None or physics.vibration.amplitude == 0.0
+    if physics.friction is not None or physics.drag is not None:
+        return False
     if physics.restitution is None:
-        return still and physics.friction is None
+        return is_still(physics)
     surfaces, balls, _ = physics.restitution
-    return still and physics.friction is None and all(c0 == 1.0 and v0 >= CONSTANT for c0, v0 in [*surfaces, balls])
+    return is_still(physics) and all(c0 == 1.0 and v0 >= CONSTANT for c0, v0 in [*surfaces, balls])
 
 
 def energy_above_floor(mesh: TriangleMesh, balls: Balls, physics: Physics) -> float:
     """Energy of a kilogram of shot [J/kg], potential energy counted from the mesh's lowest corner: never negative."""
-    total = 0.5 * float((balls.velocities**2).sum())
+    each = 0.5 * (balls.velocities**2).sum(axis=1)
     if balls.spins is not None:
-        total += 0.2 * balls.radius**2 * float((balls.spins**2).sum())
+        each += 0.2 * balls.radius**2 * (balls.spins**2).sum(axis=1)
     if physics.gravity is not None:
         down = np.array(physics.gravity)
-        total += float(((mesh.vertices @ down).max() - balls.positions @ down).sum())
-    return total / len(balls)
+        each += (mesh.vertices @ down).max() - balls.positions @ down
+    return float(np.average(each, weights=balls.masses))
 
 
 def allowed(mesh: TriangleMesh) -> float:

@@ -1,7 +1,8 @@
 """A scene in a file: what a failure is kept as, to be played again for ever after.
 
 An .npz: ``vertices``, ``triangles``, ``tags``, ``positions``, ``velocities``, ``numbers`` (diameter, density, duration,
-warm-up), ``spins`` if there are any, and ``physics``, the effects as JSON, field by field; absent ones are left out.
+warm-up), ``spins`` if there are any, ``each`` (n, 2), diameter and density of each ball, where they differ, and
+``physics``, the effects as JSON, field by field; absent ones are null.
 """
 
 import json
@@ -17,18 +18,21 @@ FOLDER = Path(__file__).parent / "saved"
 
 def save_scene(path: Path, scene: Scene) -> None:
     """Writes the scene, to the last bit."""
-    spins = {} if scene.balls.spins is None else {"spins": scene.balls.spins}
-    effects = {name: _plain(effect) for name, effect in scene.physics._asdict().items() if effect is not None}
+    balls = scene.balls
+    more = {} if balls.spins is None else {"spins": balls.spins}
+    if not balls.alike:
+        more["each"] = np.column_stack([balls.diameters, balls.densities])
+    effects = {name: _plain(effect) for name, effect in scene.physics._asdict().items()}
     np.savez_compressed(
         path,
         vertices=scene.mesh.vertices,
         triangles=scene.mesh.triangles,
         tags=scene.mesh.tags,
-        positions=scene.balls.positions,
-        velocities=scene.balls.velocities,
-        numbers=np.array([scene.balls.diameter, scene.balls.density, scene.duration, scene.warmup]),
+        positions=balls.positions,
+        velocities=balls.velocities,
+        numbers=np.array([balls.diameters[0], balls.densities[0], scene.duration, scene.warmup]),
         physics=np.array(json.dumps(effects)),
-        **spins,
+        **more,
     )
 
 
@@ -40,7 +44,8 @@ def load_scene(path: Path) -> Scene:
         kinds = get_type_hints(Physics)
         physics = Physics(**{name: _effect(kinds[name], numbers) for name, numbers in effects.items()})
         mesh = TriangleMesh(file["vertices"], file["triangles"], file["tags"])
-        balls = Balls(file["positions"], file["velocities"], diameter, density, file.get("spins"))
+        sizes = file["each"].T if "each" in file else (diameter, density)
+        balls = Balls(file["positions"], file["velocities"], *sizes, file.get("spins"))
     return Scene(mesh, balls, physics, duration, warmup)
 
 
@@ -50,7 +55,9 @@ def _plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 
 
-def _effect(hint: Any, numbers: dict[str, Any]) -> Any:
+def _effect(hint: Any, numbers: dict[str, Any] | None) -> Any:
+    if numbers is None:
+        return None
     kind = next(one for one in (*get_args(hint), hint) if hasattr(one, "_fields"))
     return kind(**{name: _tuples(value) for name, value in numbers.items()})
 

@@ -3,14 +3,27 @@
 import dataclasses
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings
-from hypothesis import strategies as st
 
-from sim_core import Friction, Gravity, Physics, Restitution, Scene, SceneError, SimulationError, Vibration
+from sim_core import (
+    Drag,
+    Friction,
+    Gravity,
+    Physics,
+    RandomPhase,
+    Rest,
+    Restitution,
+    Scene,
+    SceneError,
+    SimulationError,
+    Vibration,
+)
 from tests.cavities import FLOOR
 from tests.fuzzed_chambers import Chamber, random_chamber
 from tests.hard_cases.fuzz import Plan, judge, plans, require_invariants
+from tests.hard_cases.fuzzed_effects import FEW, MANY
 from tests.hard_cases.saved_scene import FOLDER, load_scene, save_scene
 
 SAVED = sorted(FOLDER.glob("*.npz"))
@@ -18,14 +31,14 @@ SLOW = [HealthCheck.too_slow, HealthCheck.data_too_large]
 
 
 @settings(max_examples=60, derandomize=True, deadline=None, database=None, suppress_health_check=SLOW)
-@given(plans(st.just(False)))
+@given(plans(FEW))
 def test_any_scene_runs_or_says_why_not(plan: Plan) -> None:
     judge(plan)
 
 
 @pytest.mark.long
 @settings(max_examples=5_000, deadline=None, suppress_health_check=SLOW, phases=set(Phase) - {Phase.explain})
-@given(plans(st.booleans()))
+@given(plans(MANY))
 def test_many_scenes_run_or_say_why_not(plan: Plan) -> None:
     judge(plan)
 
@@ -39,18 +52,29 @@ def test_a_saved_scene_runs_or_says_why_not(path: Path) -> None:
         assert "has left the mesh" not in str(error), error  # noqa: PT017
 
 
-def test_a_scene_comes_back_from_its_file_as_it_was(tmp_path: Path) -> None:
-    law = (0.9, 1.0)
-    shaken = Vibration(FLOOR, 25e-6, 20e3, 0.3)
-    physics = Physics(Gravity(), Restitution((law, law), law), shaken, friction=Friction((law, law), law))
+LAW = (0.9, 1.0)
+LAWS = Physics(Gravity(), Restitution((LAW, LAW), LAW), Vibration(FLOOR, 25e-6, 20e3, 0.3))
+
+
+@pytest.mark.parametrize(
+    ("physics", "alike"),
+    [
+        (LAWS._replace(friction=Friction((LAW, LAW), LAW), rest=Rest()), True),
+        (LAWS._replace(random_phase=RandomPhase(7), drag=Drag(), ball_collisions=None), False),
+    ],
+)
+def test_a_scene_comes_back_from_its_file_as_it_was(tmp_path: Path, physics: Physics, alike: bool) -> None:
     chamber = random_chamber("geared", 3)
-    balls = dataclasses.replace(chamber.balls, spins=chamber.balls.velocities)
+    balls = dataclasses.replace(chamber.balls, spins=chamber.balls.velocities if alike else None)
+    if not alike:
+        shares = np.where(np.arange(len(balls)) % 3, 1.0, 0.7)
+        balls = dataclasses.replace(balls, diameter=shares * balls.diameter, density=7800.0 * shares)
     scene = Scene(chamber.mesh, balls, physics, 0.5)
     save_scene(tmp_path / "scene.npz", scene)
     again = load_scene(tmp_path / "scene.npz")
     assert again.physics == physics
-    assert (again.duration, again.balls.diameter) == (scene.duration, scene.balls.diameter)
-    for name in ("positions", "velocities", "spins"):
-        assert (getattr(again.balls, name) == getattr(scene.balls, name)).all()
+    assert again.duration == scene.duration
+    for name in ("positions", "velocities", "spins", "diameter", "density"):
+        np.testing.assert_array_equal(getattr(again.balls, name), getattr(scene.balls, name))
     for name in ("vertices", "triangles", "tags"):
         assert (getattr(again.mesh, name) == getattr(scene.mesh, name)).all()

@@ -23,6 +23,7 @@ from sim_core import (
     pack_balls,
     simulate,
 )
+from sim_core.detect.ball_footing import TURN
 from sim_core.effects.gravity import STANDARD as G
 from sim_core.effects.rest import ASLEEP, FEET, JAMMED, MODE, ON_BALL, STAYS_UNTIL
 from sim_core.grounded import LEANING, count_props
@@ -164,6 +165,24 @@ def test_resistance_stops_a_sliding_ball_and_holds_it_on_a_gentle_slope() -> Non
     for resistance, still in ((0.37, True), (0.36, False)):  # tan 20° = 0.364
         result = simulate(Scene(ramp, shot(start), physics(0.8, resistance), 0.2))
         assert (len(result.resting) == 1) is still
+
+
+@pytest.mark.parametrize("speed", [0.4, 4.0])  # the faster turns by less than TURN while it is searched in one piece
+def test_resistance_is_against_the_motion_of_a_ball_that_turns_downhill(speed: float) -> None:
+    """Thrown across a slope, against small steps of v' = g sin - resistance g cos v/|v|."""
+    resistance, degrees, until = 0.25, 20.0, 0.3
+    normal, down = slope(degrees)
+    x = np.array([0.0, 0.5])
+    ramp = profile(x, -math.tan(math.radians(degrees)) * x, 0.7 * speed, 0.05)
+    start, v = 0.02 / down[0] * down + R * normal, np.array([0.0, speed, 0.0])
+    _, frames = film(ramp, shot(start, v), physics(resistance=resistance), until, 10)
+    step, place, brake = 1e-5, start.copy(), resistance * G * math.cos(math.radians(degrees))
+    for _ in range(round(until / step)):
+        place += step * v
+        v = v + step * (G * math.sin(math.radians(degrees)) * down - brake * v / np.linalg.norm(v))
+    lag = 0.5 * TURN * brake  # the force's direction is old by TURN at most
+    np.testing.assert_allclose(frames[-1].positions[0], place, atol=0.5 * lag * until**2)
+    np.testing.assert_allclose(frames[-1].velocities[0], v, atol=lag * until)
 
 
 def test_it_lifts_off_at_the_ramps_end() -> None:

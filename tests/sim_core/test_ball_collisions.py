@@ -16,6 +16,7 @@ from sim_core import (
     pack_balls,
     simulate,
 )
+from sim_core.jams import touching
 from sim_core.simulate import _Run
 from tests.cavities import FLOOR, box, cylinder
 
@@ -65,6 +66,7 @@ def test_nothing_is_kept_of_pairs_and_overlaps_are_no_error() -> None:
     assert run.calendar.pair_time is None
     assert run.calendar.marks.shape == (3, 3)
     run.play(0.1, record=False)
+    assert touching(run.scene, ROOM.corners, in_one_place.positions, 0) == ("", False)  # a jam is not of those
     with pytest.raises(SceneError, match="overlap"):
         Scene(ROOM, in_one_place, Physics(), 1.0)
 

@@ -43,21 +43,28 @@ class Record:
 
 
 def height_at(chamber: Chamber, points: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """Height (n,) [m] of points (n, 3) [m] above the sonotrode where it is at time (n,) [s]: here a plane below all."""
+    """Height (n,) [m] of points (n, 3) [m] above the sonotrode where it is at time (n,) [s]: here a plane below all. At
+    its lowest, where each ball sees it at a phase of its own.
+    """
     mesh, vibration = chamber.mesh, chamber.physics.vibration
     assert vibration is not None
     axis = np.array(vibration.axis) / np.linalg.norm(vibration.axis)
     shift = vibration.amplitude * np.sin(math.tau * vibration.frequency * time + vibration.phase)
+    if chamber.physics.random_phase is not None:
+        shift = np.full(len(points), -vibration.amplitude)
     return np.asarray((points - mesh.corners[mesh.tags == vibration.tag][0, 0]) @ axis - shift)
 
 
 def clearance_at(chamber: Chamber, points: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """Distance (n,) [m] from points (n, 3) [m] to the nearest surface, the sonotrode's where it is at time (n,) [s]."""
-    mesh, balls, vibration = chamber.mesh, chamber.balls, chamber.physics.vibration
+    """Distance (n,) [m] from points (n, 3) [m] to the nearest surface, the sonotrode's where it is at time (n,) [s]; a
+    part that turns is not looked at.
+    """
+    mesh, balls, physics = chamber
     reach = REACH * balls.radius
-    if vibration is None:
-        return clearance(mesh.corners, points, reach)
-    still = clearance(mesh.corners[mesh.tags != vibration.tag], points, reach)
+    moving = [effect.tag for effect in (physics.vibration, physics.turn) if effect is not None]
+    still = clearance(mesh.corners[~np.isin(mesh.tags, moving)], points, reach)
+    if physics.vibration is None:
+        return still
     return np.minimum(still, np.minimum(height_at(chamber, points, time), reach))
 
 
@@ -75,11 +82,15 @@ def has_sharp_rim(chamber: Chamber, points: np.ndarray, time: np.ndarray) -> np.
 
 
 def later(physics: Physics, duration: float) -> Physics:
-    """The same effects, the sonotrode where it is ``duration`` [s] later."""
-    if physics.vibration is None:
-        return physics
-    phase = (physics.vibration.phase + math.tau * physics.vibration.frequency * duration) % math.tau
-    return physics._replace(vibration=physics.vibration._replace(phase=phase))
+    """The same effects, the sonotrode and the turning part where they are ``duration`` [s] later."""
+    vibration, turn = physics.vibration, physics.turn
+    if vibration is not None:
+        phase = (vibration.phase + math.tau * vibration.frequency * duration) % math.tau
+        physics = physics._replace(vibration=vibration._replace(phase=phase))
+    if turn is not None:
+        rate = turn.rpm / 60.0 if turn.rpm is not None else turn.frequency or 0.0  # [1/s]
+        physics = physics._replace(turn=turn._replace(phase=(turn.phase + math.tau * rate * duration) % math.tau))
+    return physics
 
 
 def look(before: Chamber, after: Chamber, result: Result, impacts: int) -> Record:

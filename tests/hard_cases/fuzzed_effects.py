@@ -1,0 +1,121 @@
+"""Which effects a random scene has: a few combinations, for each is compiled; their numbers vary freely."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from hypothesis import strategies as st
+
+from sim_core import (
+    BallCollisions,
+    Drag,
+    Friction,
+    Gravity,
+    Physics,
+    RandomPhase,
+    Rest,
+    Restitution,
+    Turn,
+    Vibration,
+)
+from sim_core.effects.drag import SHORTEST
+from tests.cavities import FLOOR
+from tests.hard_cases.outcome import CONSTANT
+from tests.hard_cases.turning_scenes import PART
+
+SIZES = "sizes"  # beside the fields of Physics: balls of several diameters and densities
+LAWFUL = "gravity restitution ball_collisions"  # of a chamber that is of this world
+FEW = (
+    f"{LAWFUL} vibration rest friction drag",
+    f"{LAWFUL} vibration random_phase drag {SIZES}",
+    f"{LAWFUL} vibration rest friction turn",
+    "gravity restitution vibration random_phase rest friction drag turn",
+)
+MANY = (
+    *FEW,
+    f"{LAWFUL} vibration random_phase rest friction drag turn",
+    f"{LAWFUL} vibration",
+    f"{LAWFUL} vibration rest",
+    f"{LAWFUL} vibration friction",
+    f"{LAWFUL} vibration random_phase friction",
+    f"{LAWFUL} friction drag turn",
+    f"{LAWFUL} rest friction",
+    f"{LAWFUL} rest turn drag",
+    f"ball_collisions {SIZES}",
+    "ball_collisions friction",
+    "ball_collisions",
+    "gravity restitution rest friction",
+    "restitution drag",
+)
+RESTITUTIONS = (0.0, 1e-9, 0.05, 0.5, 0.9, 1.0 - 1e-12, 1.0)
+TAGS = 3
+
+
+class Strengths(NamedTuple):
+    """How much of each effect, where it is present; speeds and widths are those of shot and chamber.
+
+    ``weight``: g wide / speed²; ``restitution``: e; ``elastic_below`` [speeds]; ``swing``: [diameters] of the floor,
+    ``beat``: the face's peak speed; ``tip``: the part's speed at its tip, ``to_and_fro``: it swings; ``rough``: mu and
+    beta0 of balls that start spinning, once for surfaces, once for balls; ``slowing``: share of the air's deceleration
+    that takes all of the speed on one width; ``spread``: smallest over largest diameter.
+    """
+
+    weight: float
+    restitution: float
+    elastic_below: float
+    swing: float
+    beat: float
+    tip: float
+    to_and_fro: bool
+    rough: tuple[tuple[float, float], tuple[float, float]]
+    slowing: float
+    spread: float
+
+
+def powers(low: float, high: float) -> st.SearchStrategy[float]:
+    """Ten to a number from low to high."""
+    return st.floats(low, high).map(lambda exponent: 10.0**exponent)
+
+
+def strengths() -> st.SearchStrategy[Strengths]:
+    """Of any size, the extremes often."""
+    rough = st.tuples(st.sampled_from([0.0, 0.1, 0.5, 10.0]) | powers(-3.0, 1.0), st.floats(-1.0, 1.0))
+    return st.builds(
+        Strengths,
+        weight=st.just(0.0) | powers(-3.0, 2.0),
+        restitution=st.sampled_from(RESTITUTIONS) | st.floats(0.0, 1.0),
+        elastic_below=st.sampled_from([1e-3, 0.03]),
+        swing=st.just(0.0) | powers(-4.0, -0.5),
+        beat=powers(-1.0, 1.0),
+        tip=st.just(0.0) | powers(-2.0, 1.0),
+        to_and_fro=st.booleans(),
+        rough=st.tuples(rough, rough),
+        slowing=powers(-4.0, 0.5),
+        spread=st.floats(0.2, 1.0),
+    )
+
+
+def physics_of(
+    effects: frozenset[str], much: Strengths, wide: float, speed: float, diameter: float, middle: np.ndarray, seed: int
+) -> Physics:
+    """The effects named, for a chamber ``wide`` [m] about ``middle`` (3,) [m] and shot of so much ``speed`` [m/s]."""
+    law = (much.restitution, CONSTANT if much.restitution == 1.0 else speed)
+    amplitude = much.swing * diameter
+    rate = much.tip * speed / (0.3 * wide)  # rad/s
+    turn = Turn(PART, tuple(middle.tolist()), (0.1, -0.2, 1.0), rpm=60.0 * rate / math.tau)
+    if much.to_and_fro:
+        turn = turn._replace(rpm=None, swing=0.7, frequency=max(rate, 1e-6) / (0.7 * math.tau))
+    # of steel, at speed: 3/4 C_d air / (rho D) = slowing / wide, with C_d 0.44
+    air = much.slowing * 7800.0 * diameter / (0.33 * wide)
+    present = Physics(
+        Gravity(z=-much.weight * speed**2 / wide),
+        Restitution((law,) * TAGS, law, much.elastic_below * speed),
+        Vibration(FLOOR, amplitude, much.beat * speed / (math.tau * amplitude) if amplitude else 20e3),
+        Rest(1e-3 * speed),
+        turn,
+        Friction((much.rough[0],) * TAGS, much.rough[1]),
+        RandomPhase(seed),
+        BallCollisions(),
+        Drag(air, air * speed * diameter / 1e4, max(0.1 * wide / speed, SHORTEST)),
+    )
+    return Physics(**{name: effect if name in effects else None for name, effect in present._asdict().items()})
