@@ -59,6 +59,7 @@ def check(
     from chamberopt.chamber import build_chamber
     from chamberopt.checkup import describe
     from chamberopt.config import Study, load
+    from chamberopt.disk import new_folder, write_text
     from chamberopt.mesh_io import SurfaceError
 
     loaded = load(file)
@@ -77,6 +78,8 @@ def check(
             name: {"low": low, "start": design.value(name), "high": high} for name, (low, high) in loaded.vary.items()
         }
         facts["evaluations"] = loaded.optimizer.evaluations
+    if out is not None:
+        facts["folder"] = str(new_folder(out))
     kind = "study" if isinstance(loaded, Study) else "design"
     if not json:
         print("\n".join([f"{file}: a usable {kind}", *_facts(facts)]), flush=True)
@@ -85,9 +88,6 @@ def check(
         if not json:
             print("\n".join(f"effect: {one['said']}" for one in facts["effects"]))
     if out is not None:
-        from chamberopt.disk import new_folder, write_text
-
-        facts["folder"] = str(new_folder(out))
         write_text(out / "check.json", json_format.dumps(facts, indent=2) + "\n")
     if json:
         print(json_format.dumps(facts, indent=2))
@@ -120,6 +120,35 @@ def simulate(design: Path, /, *, json: Json = False, out: Out = None) -> None:
         _remark(write_simulation(folder, candidate, chamber, evaluation, advice))
     notes = (*map(str, advice), *chamber.notes, *evaluation.notes)
     _say([*_estimates(evaluation), *_notes(notes)], folder, json)
+
+
+@app.command
+def accuracy(design: Path, /, *, budget_s: float = 300.0, json: Json = False, out: Out = None) -> None:
+    """What accuracy costs: every knob that trades it for time against a reference, and what to set for 5, 1, 0.1 %.
+
+    Parameters
+    ----------
+    design
+        Design file (.toml).
+    budget_s
+        CPU seconds to spend on simulating; more tell smaller errors apart.
+    """
+    from chamberopt.config import load_design
+    from chamberopt.executor import local_executor
+    from chamberopt.ladder import climb, require_budget
+    from chamberopt.price_list import as_json, as_text, write_price_list
+    from chamberopt.progress import progress_bar
+
+    require_budget(budget_s)
+    candidate = load_design(design)
+    with _results(out, f"{design.stem}-accuracy") as folder:
+        with local_executor() as executor, progress_bar("CPU seconds") as progress:
+            ladder = climb(candidate, budget_s, executor, progress, _compile)
+        write_price_list(folder, ladder)
+    if json:
+        print(json_format.dumps({**as_json(ladder), "folder": str(folder)}, indent=2))
+    else:
+        print("\n".join([*as_text(ladder), f"results in {folder}"]))
 
 
 @app.command

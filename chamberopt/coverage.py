@@ -61,6 +61,15 @@ def dent_diameter(
     return 1.278 * diameter * (np.maximum(1.0 - e * e, 0.0) * density * speed * speed / hardness) ** 0.25
 
 
+def dent_diameters(impacts: ImpactLog, design: Design) -> np.ndarray:
+    """Diameter [m] of the dent each impact would leave on the part, (n,), each ball with its own size."""
+    material, shot = design.materials.part, design.shot
+    ball = shot.diameter if shot.mix is None else np.array(shot.diameters)[impacts.ball]
+    return dent_diameter(
+        impacts.normal_speed, ball, shot.density, material.hardness, material.restitution, material.yield_speed
+    )
+
+
 def impact_angle_deg(velocity: np.ndarray, normal_speed: np.ndarray) -> np.ndarray:
     """Angle [degrees] between the incoming ball's path and the surface: 90 is head on, 0 grazing."""
     speed = np.linalg.norm(velocity, axis=1)
@@ -80,9 +89,7 @@ def tally(impacts: ImpactLog, chamber: Chamber, design: Design) -> Tally:
     on_part = source >= 0
     triangle = source[on_part]
     speed = np.asarray(impacts.normal_speed)[on_part]
-    material, shot = design.materials.part, design.shot
-    diameter = shot.diameter if shot.mix is None else np.array(shot.diameters)[impacts.ball[on_part]]
-    dent = dent_diameter(speed, diameter, shot.density, material.hardness, material.restitution, material.yield_speed)
+    dent = dent_diameters(impacts, design)[on_part]
     angle = impact_angle_deg(np.asarray(impacts.velocity)[on_part], speed)
     dented, area = dent > 0.0, np.pi / 4.0 * dent * dent
     count = len(chamber.part.triangles)

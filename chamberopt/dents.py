@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.coverage import dent_diameter
+from chamberopt.coverage import dent_diameters
 from chamberopt.errors import InputError
 from chamberopt.triangles import area_vectors
 
@@ -75,10 +75,7 @@ def sample_points(chamber: Chamber, spacing: float) -> Samples:
 
 def first_marked(samples: Samples, impacts: ImpactLog, chamber: Chamber, design: Design) -> np.ndarray:
     """When each point is first inside a dent [s], (p,); inf for never."""
-    material, shot = design.materials.part, design.shot
-    diameter = dent_diameter(
-        impacts.normal_speed, shot.diameter, shot.density, material.hardness, material.restitution, material.yield_speed
-    )
+    diameter = dent_diameters(impacts, design)
     dents = np.flatnonzero((diameter > 0.0) & (chamber.source[impacts.triangle] >= 0))
     corners = chamber.vertices[chamber.triangles[impacts.triangle[dents]]]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

@@ -281,6 +281,8 @@ class Accuracy(BaseModel):
         default="avrami", description="from dent rates, or dent by dent over the whole treatment"
     )
     sample_mm: float = quantity(0.005, 10, "mm", 'spacing of the points that coverage_model = "dents" marks', 0.1)
+    elastic_below_mm_s: float = quantity(0.1, 1000, "mm/s", "slower hits lose nothing: ends endless bouncing", 10.0)
+    drag_piece_ms: float = quantity(0.1, 1000, "ms", "longest flight between two kicks of the air, effects.drag", 10.0)
 
     @model_validator(mode="after")
     def _agree(self) -> Self:
@@ -303,6 +305,16 @@ class Accuracy(BaseModel):
     def sample_spacing(self) -> float:
         """Spacing of the points that dents mark [m]."""
         return self.sample_mm * 1e-3
+
+    @property
+    def elastic_below(self) -> float:
+        """Normal speed [m/s] below which hits lose nothing."""
+        return self.elastic_below_mm_s * 1e-3
+
+    @property
+    def drag_piece(self) -> float:
+        """Longest time [s] between two kicks of the air."""
+        return self.drag_piece_ms * 1e-3
 
 
 # The longest treatment [s] that is simulated from beginning to end: minutes of computing a replica.

@@ -107,15 +107,16 @@ def scene_physics(
     surfaces = tuple(
         (pair.restitution, pair.yield_speed) for pair in (materials.part, materials.sonotrode, materials.wall)
     )
-    rubs = effects.friction
+    of_balls = (materials.shot.restitution, materials.shot.yield_speed)
+    rubs, accuracy = effects.friction, design.process.accuracy
     return Physics(
         gravity=Gravity() if effects.gravity else None,
-        restitution=Restitution(surfaces=surfaces, balls=(materials.shot.restitution, materials.shot.yield_speed)),
+        restitution=Restitution(surfaces, of_balls, accuracy.elastic_below),
         vibration=Vibration(TAG_SONOTRODE, sonotrode.amplitude, sonotrode.frequency, phase),
         turn=part_turn(design, turn_phase),
         rest=Rest() if rests(design, mesh) else None,
         friction=Friction((rubs.surfaces,) * len(surfaces), rubs.balls) if rubs is not None else None,
-        drag=Drag() if effects.drag else None,
+        drag=Drag(piece=accuracy.drag_piece) if effects.drag else None,
         ball_collisions=BallCollisions() if effects.ball_collisions else None,
         random_phase=RandomPhase(draws) if sonotrode.motion == "random_phase" else None,
     )

@@ -51,7 +51,7 @@ def simulate_replicas(
 ) -> Iterator[Replica]:
     """The replicas of these numbers, in order: the same come out whatever the number of workers."""
     seeds = [replica_seed(design.process.seed, number, stream) for number in numbers]
-    futures = [executor.submit(_replica, design, chamber, mesh, samples, seed) for seed in seeds]
+    futures = [executor.submit(simulate_replica, design, chamber, mesh, samples, seed) for seed in seeds]
     try:
         for future in futures:
             yield future.result()
@@ -69,8 +69,10 @@ def replicas_wanted(done: int, half_width: float, wanted: float, most: int) -> i
     return min(most, math.ceil(min(max(foretold, STEP * done), LEAP * done)))
 
 
-def _replica(design: Design, chamber: Chamber, mesh: TriangleMesh, samples: Samples | None, seed: int) -> Replica:
-    """One replica on a worker."""
+def simulate_replica(
+    design: Design, chamber: Chamber, mesh: TriangleMesh, samples: Samples | None, seed: int
+) -> Replica:
+    """One replica, on a worker."""
     from sim_core import simulate
 
     result = simulate(build_scene(design, mesh, seed))

@@ -180,7 +180,7 @@ def _about(folder: Path, design: Design, chamber: Chamber, evaluation: Evaluatio
         "design": _design_values(design, folder),
         "part_sha256": chamber.part.sha256,
         "part_unit": chamber.part.unit,
-        "versions": _versions(),
+        "versions": versions(),
     }
 
 
@@ -252,18 +252,19 @@ def _design_values(design: Design, folder: Path) -> dict[str, Any]:
     return values
 
 
-def _versions() -> dict[str, str]:
-    versions = {
+def versions() -> dict[str, str]:
+    """Python, system and packages that figures were made with."""
+    found = {
         "python": platform.python_version(),
         "system": platform.platform(),
         "cores": str(core_count()),
     }
     for package in PACKAGES:
         try:
-            versions[package] = version(package)
+            found[package] = version(package)
         except PackageNotFoundError:
-            versions[package] = "not installed as a package"
-    return versions
+            found[package] = "not installed as a package"
+    return found
 
 
 def _write_json(folder: Path, data: dict[str, Any]) -> None:

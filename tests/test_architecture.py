@@ -10,7 +10,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 # Each line may import from the lines above it, and from its own line. A folder stands for all of its files.
 CHAMBEROPT_ORDER = (
-    ("errors", "estimate", "mixture", "patches", "uncovered"),
+    ("errors", "estimate", "law", "mixture", "patches", "uncovered"),
     ("diagnosis", "disk", "fields", "materials"),
     ("effects",),
     ("design",),
@@ -27,13 +27,13 @@ CHAMBEROPT_ORDER = (
     ("dents", "objective", "stuck"),
     ("figures", "replicas"),
     ("accuracy",),
-    ("advice",),
+    ("advice", "dent_rungs", "knobs", "ladder", "price", "rungs"),
     ("executor", "history", "progress", "surrogate"),
     ("candidates",),
     ("study",),
     ("pictures", "viewer"),
     ("results",),
-    ("compare",),
+    ("compare", "price_list"),
     ("workbench",),
     ("cli",),
     ("__main__",),

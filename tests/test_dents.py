@@ -6,10 +6,12 @@ import pytest
 from chamberopt.accuracy import evaluate
 from chamberopt.chamber import build_chamber
 from chamberopt.config import load_design
+from chamberopt.coverage import dent_diameters
 from chamberopt.dents import Samples, mark, marked_share, nearest_on_triangles, sample_points
+from chamberopt.design import ShotSize
 from chamberopt.errors import InputError
 from chamberopt.executor import SerialExecutor
-from tests.synthetic import DESIGNS, plate_design
+from tests.synthetic import DESIGNS, impact_log, plate_design
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -112,6 +114,15 @@ def test_points_cover_the_exposed_part_evenly() -> None:
     nothing = marked_share(samples, np.full(len(samples.area), np.inf), 1.0, len(area))
     assert np.isnan(nothing[chamber.exposed_area == 0]).all()
     assert (nothing[chamber.exposed_area > 0] == 0.0).all()
+
+
+def test_each_ball_of_a_mix_leaves_dents_of_its_own_size() -> None:
+    mix = (ShotSize(diameter_mm=2.0, share=0.4), ShotSize(diameter_mm=3.0, share=0.6))
+    shot = plate_design().shot.model_copy(update={"diameter_mm": None, "mix": mix})
+    design = plate_design().model_copy(update={"shot": shot})
+    ends = np.array([0, shot.count - 1])
+    small, large = dent_diameters(impact_log([0, 0], np.full((2, 3), 3.0), [3.0, 3.0], ends), design)
+    assert 0.0 < small == pytest.approx(large * 2.0 / 3.0)
 
 
 def marking_design(**values: float):  # type: ignore[no-untyped-def]

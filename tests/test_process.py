@@ -10,6 +10,7 @@ from chamberopt.effects import Friction
 from chamberopt.errors import InputError
 from chamberopt.process import build_scene, chamber_mesh, replica_seed, start_velocities
 from sim_core import Drag, Rest
+from sim_core.effects.restitution import ELASTIC_BELOW
 from tests.synthetic import DESIGNS, plate_design
 
 
@@ -101,6 +102,18 @@ def test_effects_that_are_asked_for_are_in_the_scene(design, mesh) -> None:
     assert asked.physics.random_phase is not None
     assert asked.physics.random_phase != other.physics.random_phase
     np.testing.assert_array_equal(asked.balls.velocities, plain.balls.velocities)
+
+
+def test_numerical_tolerances_are_what_the_design_says(design, mesh) -> None:
+    """Their defaults are the simulator's own, to the last bit."""
+    drag = design.model_copy(update={"effects": design.effects.model_copy(update={"drag": True})})
+    plain = build_scene(drag, mesh, 1).physics
+    assert plain.restitution.elastic_below == ELASTIC_BELOW
+    assert plain.drag == Drag()
+    finer = {"process.accuracy.elastic_below_mm_s": 2.0, "process.accuracy.drag_piece_ms": 5.0}
+    asked = build_scene(drag.with_values(finer), mesh, 1).physics
+    assert asked.restitution.elastic_below == pytest.approx(2e-3)
+    assert asked.drag == Drag(piece=5e-3)
 
 
 def test_a_mix_of_sizes_is_in_the_scene(design, mesh) -> None:
