@@ -58,11 +58,15 @@ class Candidates:
         return trial.score
 
     def confirm(self) -> list[Confirmed]:
-        """The start, then the best candidates, on fresh seeds with more replicas; failures are left out."""
+        """The start, then the best candidates, on fresh seeds at the design's own accuracy; failures are left out.
+
+        With more replicas, unless the design asks for an accuracy, which then says how many.
+        """
         settings = self._study.optimizer
+        replicas = settings.confirm_replicas if self._study.design.process.accuracy.coverage is None else None
         confirmed = []
         for searched, point in self._promising(settings.confirm):
-            trial, evaluation = self._judge(point, "confirm", settings.confirm_replicas)
+            trial, evaluation = self._judge(point, "confirm", replicas)
             if evaluation is not None:
                 design = self._design(point)
                 confirmed.append(
@@ -107,7 +111,9 @@ class Candidates:
         evaluation: Evaluation | None = None
         score, reason = FAILED_SCORE, ""
         try:
-            evaluation = self._evaluator(self._design(point), stage, replicas)
+            design = self._design(point)
+            design = self._study.drafted(design) if stage == "search" else design
+            evaluation = self._evaluator(design, stage, replicas)
         except (InputError, SceneError, SimulationError) as error:
             if not self.trials:
                 raise

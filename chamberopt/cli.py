@@ -191,6 +191,11 @@ def run(study: Path, /, *, json: Json = False, out: Out = None) -> None:
     ]
     verdict = "better than the start" if result.improved else "within the noise of the start"
     lines += ["", f"{_row('gain', result.gain)}: {verdict}"]
+    fine = result.best.evaluation
+    lines += [
+        f"± 95 % intervals; start and best from {len(fine.replicas)} replicas of {design.process.recorded_time:g} s on "
+        f"seeds of their own, the search's figures in history.csv from {_said(question.drafted(design))}"
+    ]
     notes = (*map(str, advice), *result.at_bounds, *start.notes, *result.best.evaluation.notes)
     _say([*lines, *_notes(notes)], folder, json)
 
@@ -340,6 +345,14 @@ def _estimates(evaluation: Evaluation) -> list[str]:
 
 def _row(name: str, estimate: Estimate) -> str:
     return f"{name:34}{estimate.value:12.5g} ± {estimate.half_width:.2g}"
+
+
+def _said(design: Design) -> str:
+    """How accurate a search is, in words."""
+    accuracy = design.process.accuracy
+    if accuracy.coverage is not None:
+        return f"as many as make ± {accuracy.coverage:g}"
+    return f"{accuracy.replicas} replicas of {design.process.recorded_time:g} s"
 
 
 def _notes(notes: Sequence[str]) -> list[str]:

@@ -101,6 +101,18 @@ class Study(BaseModel):
     objective: Objective = Field(default_factory=Objective)
     constraints: dict[str, Limits] = Field(default_factory=dict, description="METRIC = { min =, max = }")
     optimizer: Optimizer = Field(default_factory=Optimizer)
+    draft: dict[str, int | float | str] = Field(
+        default_factory=dict,
+        description="while searching, in place of the design's own: keys of [process.accuracy], and facets",
+    )
+
+    def drafted(self, design: Design) -> Design:
+        """A candidate at the accuracy of the search. Raises InputError for a draft that cannot be."""
+        data = design.model_dump()
+        for name, value in self.draft.items():
+            table = data["chamber"] if name == "facets" else data["process"]["accuracy"]
+            table[name] = value
+        return checked(Design, data)
 
     @model_validator(mode="after")
     def _agree(self) -> Self:
@@ -109,9 +121,22 @@ class Study(BaseModel):
             if name not in METRICS:
                 text = f"not a metric; {diagnosis.did_you_mean(name, METRICS)}"
                 problems.append(Problem(f"constraints.{name}", text))
+        problems += self._draft_problems()
         if problems:
             raise CrossCheckError(problems)
         return self
+
+    def _draft_problems(self) -> list[Problem]:
+        try:
+            self.drafted(self.design)
+        except InputError as error:
+            return [Problem("draft", str(error).replace("process.accuracy.", "").replace("chamber.", ""))]
+        both = {"facets": "chamber.facets"} | {name: f"process.accuracy.{name}" for name in self.draft}
+        return [
+            Problem(f"draft.{name}", "given beside [vary], which varies it; remove it from one of the two")
+            for name in self.draft
+            if both[name] in self.vary
+        ]
 
 
 def load_design(path: str | Path) -> Design:

@@ -195,6 +195,11 @@ def _about_study(result: StudyResult) -> dict[str, Any]:
         "algorithm": result.algorithm,
         "vary": {name: list(bounds) for name, bounds in result.study.vary.items()},
         "evaluations": len(search),
+        "accuracy": {
+            "search": result.study.drafted(result.study.design).process.accuracy.model_dump(exclude_none=True),
+            "confirm": result.study.design.process.accuracy.model_dump(exclude_none=True)
+            | {"replicas": len(result.best.evaluation.replicas)},
+        },
         "failed": sum(trial.objective is None for trial in search),
         "missing_a_constraint": sum(trial.objective is not None and not trial.feasible for trial in search),
         "gain": _plain(result.gain, ""),

@@ -280,3 +280,53 @@ def test_history_rows_are_plain_json(tmp_path: Path) -> None:
     run(study(evaluations=4), tmp_path, analytic(0.01))
     for line in (tmp_path / "history.jsonl").read_text().splitlines():
         json.loads(line, parse_constant=lambda name: pytest.fail(f"{name} is not JSON"))
+
+
+def drafted(draft: dict, design=GEAR, **vary) -> Study:
+    return Study(design=design, vary={**BOUNDS, **vary}, optimizer={"evaluations": 12, "confirm": 2}, draft=draft)
+
+
+def test_a_study_searches_at_draft_and_confirms_at_the_designs_own_accuracy(tmp_path: Path) -> None:
+    seen = set()
+
+    def evaluator(design, stream, replicas):
+        accuracy = design.process.accuracy
+        seen.add((stream, replicas, accuracy.simulated_time_s, accuracy.replicas, design.chamber.facets))
+        return judged(hill(shares(design)) + np.linspace(-0.01, 0.01, replicas or 4))
+
+    found = run(drafted({"replicas": 3, "simulated_time_s": 0.25, "facets": 16}), tmp_path / "out", evaluator)
+    fine = GEAR.process.accuracy
+    assert seen == {
+        ("search", None, 0.25, 3, 16),
+        ("confirm", 16, fine.simulated_time_s, fine.replicas, GEAR.chamber.facets),
+    }
+    assert found.best.design.process == GEAR.process
+
+
+def test_an_accuracy_asked_for_is_what_confirms(tmp_path: Path) -> None:
+    asked = GEAR.with_values({"process.accuracy.most_replicas": 60})
+    accuracy = asked.process.accuracy.model_copy(update={"coverage": 0.01})
+    asked = asked.model_copy(update={"process": asked.process.model_copy(update={"accuracy": accuracy})})
+    seen = set()
+
+    def evaluator(design, stream, replicas):
+        seen.add((stream, replicas, design.process.accuracy.coverage))
+        return judged(hill(shares(design)) + np.linspace(-0.01, 0.01, replicas or 4))
+
+    run(drafted({"coverage": 0.05}, asked), tmp_path / "out", evaluator)
+    assert seen == {("search", None, 0.05), ("confirm", None, 0.01)}
+
+
+@pytest.mark.parametrize(
+    ("draft", "vary", "said"),
+    [
+        ({"replicas": 1}, {}, r"draft.*replicas"),
+        ({"replica": 3}, {}, r"draft.*replica"),
+        ({"coverage_model": "dint"}, {}, r"draft.*coverage_model"),
+        ({"facets": 2}, {}, r"draft.*facets"),
+        ({"simulated_time_s": 1.0}, {"process.accuracy.simulated_time_s": (0.5, 2.0)}, "beside .*vary"),
+    ],
+)
+def test_a_draft_that_cannot_be_is_named(draft: dict, vary: dict, said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        drafted(draft, **vary)
