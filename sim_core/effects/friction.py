@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim_core._compile import inlined, jit
+from sim_core.effects.surface_table import surface_table
 from sim_core.errors import SceneError
 from sim_core.vec3 import Vec3
 
@@ -53,18 +54,7 @@ class Grip(NamedTuple):
 
 def checked_friction(friction: Friction, tags: int) -> Friction:
     """The same with ``surfaces`` as an array (tags, 2); raises SceneError for a missing tag or numbers out of range."""
-    try:
-        surfaces = np.array(friction.surfaces, dtype=np.float64)
-        of_balls = (float(friction.balls[0]), float(friction.balls[1]))
-    except (TypeError, ValueError, IndexError):
-        raise SceneError(
-            f"friction.surfaces is {friction.surfaces!r} and friction.balls {friction.balls!r}: give (mu, beta0) for "
-            "each tag and for the balls"
-        ) from None
-    if surfaces.ndim != 2 or surfaces.shape[1] != 2 or len(surfaces) < tags:
-        raise SceneError(
-            f"friction.surfaces must give (mu, beta0) for tags 0 to {tags - 1}, not shape {surfaces.shape}"
-        )
+    surfaces, of_balls = surface_table("friction", "(mu, beta0)", *friction, tags)
     pairs = [(f"surfaces[{i}]", *pair) for i, pair in enumerate(surfaces)] + [("balls", *of_balls)]
     for name, mu, beta0 in pairs:
         if not 0.0 <= mu < math.inf or not -1.0 <= beta0 <= 1.0:

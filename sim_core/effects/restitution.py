@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim_core._compile import jit
+from sim_core.effects.surface_table import surface_table
 from sim_core.errors import SceneError
 
 # 10 mm/s [m/s]: a thousandth of the shot's speed. Mean speeds change by < 3 % between 1 and 100 mm/s; lower values
@@ -35,18 +36,7 @@ class Restitution(NamedTuple):
 
 def checked_restitution(restitution: Restitution, tags: int) -> Restitution:
     """The same with ``surfaces`` as an array (tags, 2); raises SceneError for a missing tag or numbers out of range."""
-    try:
-        surfaces = np.array(restitution.surfaces, dtype=np.float64)
-        of_balls = (float(restitution.balls[0]), float(restitution.balls[1]))
-    except (TypeError, ValueError, IndexError):
-        raise SceneError(
-            f"restitution.surfaces is {restitution.surfaces!r} and restitution.balls {restitution.balls!r}: give "
-            "(C0, v0) for each tag and for the balls"
-        ) from None
-    if surfaces.ndim != 2 or surfaces.shape[1] != 2 or len(surfaces) < tags:
-        raise SceneError(
-            f"restitution.surfaces must give (C0, v0) for tags 0 to {tags - 1}, not shape {surfaces.shape}"
-        )
+    surfaces, of_balls = surface_table("restitution", "(C0, v0)", *restitution[:2], tags)
     pairs = [(f"surfaces[{i}]", *pair) for i, pair in enumerate(surfaces)] + [("balls", *of_balls)]
     for name, c0, v0 in pairs:
         if not 0.0 <= c0 <= 1.0 or not 0.0 < v0 < math.inf:
