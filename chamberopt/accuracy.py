@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.coverage import Tally
-from chamberopt.dents import Samples, marked_share, sample_points
+from chamberopt.dents import Samples, few_points_note, marked_share, sample_points
 from chamberopt.estimate import Estimate, estimate
 from chamberopt.figures import coverage_figures, few_dents_note, surface
 from chamberopt.objective import METRICS, Metric, Objective, objective, on_target
@@ -161,7 +161,9 @@ def evaluate(
     tallies = [replica.tally for replica in done]
     stopped_by = "replicas" if wanted is None else "accuracy" if goal.half_width <= wanted else "most_replicas"
     notes = _accuracy_note(stopped_by, len(done), goal, wanted)
-    if samples is None:
+    if samples is not None:
+        notes += few_points_note(samples, chamber)
+    else:
         notes += few_dents_note(tallies, surface(tallies, chamber, design))
     return Evaluation(
         objective_name=objective_name,

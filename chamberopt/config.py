@@ -131,12 +131,7 @@ class Study(BaseModel):
             self.drafted(self.design)
         except InputError as error:
             return [Problem("draft", str(error).replace("process.accuracy.", "").replace("chamber.", ""))]
-        both = {"facets": "chamber.facets"} | {name: f"process.accuracy.{name}" for name in self.draft}
-        return [
-            Problem(f"draft.{name}", "given beside [vary], which varies it; remove it from one of the two")
-            for name in self.draft
-            if both[name] in self.vary
-        ]
+        return []
 
 
 def load_design(path: str | Path) -> Design:
@@ -264,6 +259,8 @@ def _vary_problems(design: Design, name: str, bounds: tuple[float, float]) -> li
     except InputError as error:
         near = diagnosis.did_you_mean(name, numbers)
         return [Problem(field, str(error).removeprefix(f"{name}: ") if name in numbers else f"unknown; {near}")]
+    if name.startswith("process.accuracy."):
+        return [Problem(field, "not a choice of design, but of how well it is known; see [draft]")]
     if name not in numbers:
         return [Problem(field, f"a whole number cannot vary; {diagnosis.did_you_mean(name, numbers)}")]
     if low >= high:

@@ -19,6 +19,7 @@ import numpy as np
 
 from chamberopt.coverage import dent_diameters
 from chamberopt.errors import InputError
+from chamberopt.objective import exposed_target
 from chamberopt.triangles import area_vectors
 
 if TYPE_CHECKING:
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 
 MOST_POINTS = 5_000_000  # about a gigabyte with what is computed on the way
 AT_ONCE = 5_000  # dents looked up together
+FEW_POINTS = 25  # a triangle; with 13 of them the gear's uniform_coverage is 0.03 too low (docs/accuracy.md)
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,19 @@ class Samples:
     normal: np.ndarray
     triangle: np.ndarray
     area: np.ndarray
+
+
+def few_points_note(samples: Samples, chamber: Chamber) -> tuple[str, ...]:
+    """What is said where a triangle of the target has too few sample points to tell a coverage by."""
+    on_target = exposed_target(chamber)[samples.triangle]
+    each = np.bincount(samples.triangle[on_target], minlength=len(chamber.part.triangles))
+    middle = float(np.median(each[each > 0])) if each.any() else 0.0
+    if middle >= FEW_POINTS:
+        return ()
+    return (
+        f"a triangle of the target has {middle:.0f} sample points in the middle, fewer than {FEW_POINTS}: std_coverage "
+        "comes out too large and uniform_coverage too low; lower process.accuracy.sample_mm",
+    )
 
 
 def sample_points(chamber: Chamber, spacing: float) -> Samples:

@@ -366,6 +366,9 @@ class Design(BaseModel):
     @field_validator("effects", mode="before")
     @classmethod
     def _left_to_us(cls, effects: Any) -> Any:
+        if isinstance(effects, (str, int, float, list)) and effects != "auto":
+            text = f'given {effects!r}; allowed: "auto", or a table, e.g. {{ gravity = true, drag = true }}'
+            raise CrossCheckError([Problem("", text)])
         return {"auto": True} if effects == "auto" else effects
 
     @model_validator(mode="after")

@@ -165,7 +165,7 @@ def allowed(field: FieldInfo) -> str:
     """What a field takes, from its own bounds: 'a number from 2 to 2000 mm (inner height of the chamber)'."""
     bounds = {name: getattr(meta, name) for meta in field.metadata for name in ("ge", "le") if hasattr(meta, name)}
     extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
-    unit = f" {extra['unit']}" if "unit" in extra else ""
+    unit = f" {extra['unit']}" if extra.get("unit") else ""
     kinds = _kinds(field.annotation)
     what = f"{extra['form']}" if "form" in extra else ""
     if not what and _table(field):
@@ -222,7 +222,7 @@ def _unknown_key(key: str, table: type[BaseModel], model: type[BaseModel]) -> st
     elsewhere = [name for name in _dotted(model) if name.split(".")[-1].lower() == key.lower()]
     if elsewhere:
         home, _, last = elsewhere[0].rpartition(".")
-        return f"unknown key here; did you mean {last!r} in [{home}]?"
+        return f"unknown key here; did you mean {last!r} {f'in [{home}]' if home else 'above the first [table]'}?"
     return f"unknown key; allowed here: {', '.join(table.model_fields)}"
 
 

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 # (400 triangles, a quarter in shadow: intervals of the spread held the truth in 88 % at 2, in 96 % at 3).
 LEAST_EXPOSURE = 3.0
 POOREST = 0.05
+NORMAL = 1.645  # standard deviations: how far below the mean of a normal distribution its poorest twentieth ends
 
 
 @dataclass(frozen=True)
@@ -148,9 +149,13 @@ def _poorest(
     shaped = np.array([mixture.poorest(counts, share, MANY_STEPS), mixture.poorest_drawn_in(counts, share)])
     value = -math.expm1(-x[0])
     bias = float(np.abs(value + np.expm1(-shaped)).max()) + abs(value + math.expm1(-joined))
-    # How far it lies below the mean goes with the spread, and is no better known.
-    unsure = min(1.0, std.half_width / std.value) if std.value > 0.0 else 1.0
-    bias += unsure * abs(mean.value - value)
+    # How far it lies below the mean goes with the spread, and is no better known; where that may be nothing at all, a
+    # normal distribution says how far at most.
+    below = abs(mean.value - value)
+    if std.value > std.half_width:
+        bias += std.half_width / std.value * below
+    else:
+        bias += max(below, NORMAL * (std.value + std.half_width) - below)
     return estimate(_pseudovalues(-np.expm1(-x)), 0.0, 1.0, bias)
 
 

@@ -147,9 +147,14 @@ def _picture(folders: list[Path], evaluations: list[Evaluation], names: list[str
 def summary(evaluation: Evaluation | Result) -> str:
     """One line: the objective with its interval, mean and spread of coverage."""
     goal = evaluation.objective
-    mean, spread = (evaluation.metrics[name].value for name in ("mean_coverage", "std_coverage"))
+    mean, spread = (evaluation.metrics[name] for name in ("mean_coverage", "std_coverage"))
     name = evaluation.objective_name.replace("_", " ")
-    return f"{name} {goal.value:.3f} ± {goal.half_width:.3f}   mean {mean:.1%}   std {spread:.1%}"
+    figures = f"mean {_share(mean)}   std {_share(spread)}"
+    return f"{name} {goal.value:.3f} ± {goal.half_width:.3f}   {figures}"
+
+
+def _share(estimate: Estimate) -> str:
+    return f"{100.0 * estimate.value:.1f} ± {100.0 * estimate.half_width:.1f} %"
 
 
 def _about(folder: Path, design: Design, chamber: Chamber, evaluation: Evaluation) -> dict[str, Any]:

@@ -234,6 +234,23 @@ class TestWrongDesigns:
         said = edited(design_file, ("amplitude_um = 25", "amplitude_um = 25\ndiameter_mm = 3"))
         assert "sonotrode.diameter_mm: unknown key here; did you mean 'diameter_mm' in [chamber]?" in said
 
+    def test_key_that_stands_above_all_tables(self, design_file: Path) -> None:
+        said = edited(design_file, ("amplitude_um = 25", 'amplitude_um = 25\neffects = "auto"'))
+        assert "sonotrode.effects: unknown key here; did you mean 'effects' above the first [table]?" in said
+
+    @pytest.mark.parametrize("given", ['"Auto"', "true", '["auto"]', "3"])
+    def test_effects_that_are_no_table(self, design_file: Path, given: str) -> None:
+        source = "effects = " + given + "\n" + design_file.read_text().split("[effects]")[0]
+        design_file.write_text(source)
+        with pytest.raises(InputError) as error:
+            load_design(design_file)
+        assert ":1: effects: given " in str(error.value)
+        assert 'allowed: "auto", or a table' in str(error.value)
+
+    def test_a_bound_without_a_unit(self, design_file: Path) -> None:
+        said = edited(design_file, ("[process]", "[process.accuracy]\ncoverage = 2\n[process]"))
+        assert "a number from 0.0001 to 0.5 (wanted" in said
+
     def test_true_is_not_a_number(self, design_file: Path) -> None:
         assert "height_mm: given true; allowed: a number" in edited(design_file, ("_mm = 40", "_mm = true"))
 

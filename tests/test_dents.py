@@ -7,7 +7,7 @@ from chamberopt.accuracy import evaluate
 from chamberopt.chamber import build_chamber
 from chamberopt.config import load_design
 from chamberopt.coverage import dent_diameters
-from chamberopt.dents import Samples, mark, marked_share, nearest_on_triangles, sample_points
+from chamberopt.dents import Samples, few_points_note, mark, marked_share, nearest_on_triangles, sample_points
 from chamberopt.design import ShotSize
 from chamberopt.errors import InputError
 from chamberopt.executor import SerialExecutor
@@ -157,3 +157,12 @@ def test_a_treatment_too_long_to_simulate_is_refused(tmp_path) -> None:  # type:
     (tmp_path / "long.toml").write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match=r"process\.accuracy\.coverage_model.*avrami"):
         load_design(tmp_path / "long.toml")
+
+
+def test_too_few_sample_points_are_said() -> None:
+    chamber = build_chamber(plate_design())
+    side = np.sqrt(np.median(chamber.part.area[chamber.part.target]))
+    (note,) = few_points_note(sample_points(chamber, side / 2), chamber)
+    assert "4 sample points" in note
+    assert "sample_mm" in note
+    assert few_points_note(sample_points(chamber, side / 8), chamber) == ()

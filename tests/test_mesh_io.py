@@ -170,6 +170,10 @@ def broken(folder: Path, how: str) -> Path:
         path = folder / "part.ply"
         trimesh.creation.box((20, 20, 20)).export(path)
         path.write_bytes(path.read_bytes()[:-60])
+    elif how == "short text ply":
+        path = folder / "part.ply"
+        trimesh.creation.box((20, 20, 20)).export(path, encoding="ascii")
+        path.write_bytes(path.read_bytes().rstrip().rpartition(b"\n")[0] + b"\n")  # the last face is gone
     return path
 
 
@@ -190,6 +194,7 @@ def broken(folder: Path, how: str) -> Path:
         ("too small", r"measures 0\.02 x 0\.02 x 0\.02 mm.*'m' or 'in'"),
         ("too big", r"measures 20000 x 20000 x 20000 mm.*'um'"),
         ("damaged ply", "cannot be read as PLY, it is damaged or truncated"),
+        ("short text ply", "truncated: its header counts 20 lines and 19 are there"),
     ],
 )
 def test_what_is_refused_is_named_with_its_place(tmp_path: Path, how: str, said: str) -> None:

@@ -36,6 +36,7 @@ def read_ply(path: Path, content: bytes) -> RawMesh:
     """Text or binary; a triangle painted in one colour, by face or by its three corners, is named "#rrggbb"."""
     import trimesh
 
+    _require_all_lines(path, content)
     mesh: Any = trimesh.load(io.BytesIO(content), file_type="ply", process=False)
     if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
         return RawMesh(np.zeros((0, 3, 3)))
@@ -47,6 +48,17 @@ def read_ply(path: Path, content: bytes) -> RawMesh:
     names = [] if len(kinds) > MOST_COLOURS else ["#" + "".join(f"{int(c):02x}" for c in kind) for kind in kinds]
     groups = {name: of_triangle.reshape(-1) == k for k, name in enumerate(names) if kinds[k, 0] >= 0}
     return RawMesh(corners, groups)
+
+
+def _require_all_lines(path: Path, content: bytes) -> None:
+    """A text file holds a line for each element its header counts; of one cut short the reader takes what is there."""
+    header, end, body = content.partition(b"end_header")
+    if not end or not re.search(rb"^format\s+ascii", header, re.MULTILINE):
+        return
+    said = sum(int(count) for count in re.findall(rb"^element\s+\S+\s+(\d+)", header, re.MULTILINE))
+    there = sum(1 for line in body.splitlines() if line.strip())
+    if there < said:
+        raise InputError(f"{path}: truncated: its header counts {said} lines and {there} are there; export it again")
 
 
 def _colours(mesh: Any) -> np.ndarray | None:

@@ -25,7 +25,8 @@ def checked_gravity(gravity: Gravity | None) -> Gravity | None:
     if gravity is None:
         return None
     try:
-        plain = Gravity(*(float(component) for component in gravity))
+        x, y, z = gravity
+        plain = Gravity(float(x), float(y), float(z))
     except (TypeError, ValueError):
         raise SceneError(f"gravity is {gravity!r}: give three numbers [m/s²]") from None
     if not all(math.isfinite(component) for component in plain):

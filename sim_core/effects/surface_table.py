@@ -17,7 +17,7 @@ def surface_table(
     try:
         table = np.array(surfaces, dtype=np.float64)
         pair = (float(balls[0]), float(balls[1]))
-    except (TypeError, ValueError, IndexError):
+    except (TypeError, ValueError, LookupError):
         given = f"{effect}.surfaces is {surfaces!r} and {effect}.balls {balls!r}"
         raise SceneError(f"{given}: give {form} for each tag and for the balls") from None
     if table.ndim != 2 or table.shape[1] != 2 or len(table) < tags:

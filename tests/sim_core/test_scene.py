@@ -7,6 +7,7 @@ import pytest
 
 from sim_core import (
     Balls,
+    Friction,
     Gravity,
     Physics,
     Rest,
@@ -124,6 +125,9 @@ def test_a_wrong_scene_field_is_named(wrong: dict) -> None:
         (Physics(Gravity(), rest=Rest(capture="slow")), "rest.capture is 'slow'"),
         (Physics(turn=Turn(CEILING, rpm="fast")), "turn.rpm is 'fast'"),
         (Physics(restitution=0.9), "physics.restitution is 0.9"),
+        (Physics(friction=Friction(((0.3, 0.2),) * 2, {})), "friction.balls {}: give"),  # type: ignore[arg-type]
+        (Physics({}), "gravity is {}: give three numbers"),  # type: ignore[arg-type]
+        (Physics((1.0,)), "gravity is .*: give three numbers"),  # type: ignore[arg-type]
     ],
     ids=lambda given: given if isinstance(given, str) else "",
 )
