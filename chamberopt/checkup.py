@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.chamber import TAG_PART, TAG_SONOTRODE, TAG_WALL, turning_axis
+from chamberopt.groups import free_path
 from chamberopt.ledges import ledges
 from chamberopt.process import chamber_mesh, require_countable, require_turnable
 from chamberopt.shapes import shape_surface
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 # Above this share of the free volume the shot is a shaken bed rather than a gas: few balls reach the part,
 # and event-driven simulation slows down, because collisions crowd.
 CROWDED = 0.3
+THIN = 10.0  # chamber heights between two meetings of a ball: from there on few dents come from balls that met
 
 
 def describe(design: Design, chamber: Chamber) -> dict[str, Any]:
@@ -87,6 +89,12 @@ def warnings(design: Design, chamber: Chamber) -> list[str]:
         said.append(
             f"shot.mass_g = {shot.mass_g:g} is rounded to {shot.count} whole ball(s) of "
             f"{shot.ball_mass * 1e6:.3g} mg: the charge differs by more than 5 %"
+        )
+    path = free_path(design, chamber)
+    if not design.effects.ball_collisions and path < THIN:
+        said.append(
+            f"effects.ball_collisions is false, though a ball would meet another every {path:.2g} chamber heights: "
+            "they fly through each other; switch it on"
         )
     turn, recorded = design.effects.part_turn, design.process.accuracy.replicas * design.process.recorded_time
     if turn is not None and turn.rpm != 0.0 and recorded < turn.period:

@@ -89,3 +89,12 @@ def test_a_part_that_turns_down_to_the_sonotrode_is_warned_of() -> None:
     motion = swings.effects.part_turn.model_copy(update={"rpm": None, "angle_deg": 5.0, "frequency_hz": 1.0})  # type: ignore[union-attr]
     swings = swings.model_copy(update={"effects": swings.effects.model_copy(update={"part_turn": motion})})
     assert "turning part" not in " ".join(warnings(swings, chamber))
+
+
+def test_balls_that_would_meet_but_are_let_through_each_other_are_warned_of() -> None:
+    design, chamber = made("gear")
+    through = design.model_copy(update={"effects": design.effects.model_copy(update={"ball_collisions": False})})
+    assert any("effects.ball_collisions is false" in text for text in warnings(through, chamber))
+    assert not any("ball_collisions" in text for text in warnings(design, chamber))
+    alone = through.with_values({"shot.mass_g": 1e-3 * round(1e6 * design.shot.ball_mass)})
+    assert not any("ball_collisions" in text for text in warnings(alone, chamber))

@@ -459,6 +459,11 @@ REFUSED = {
     "unknown": ("part.xyz", "hello", "not a mesh file that is known.*\\.stl.*\\.bdf"),
     "obj": ("p.obj", "v 0 0 0\nv 1 0 0\nf 1 2 9\n", "a face names a vertex that is not there"),
     "obj number": ("p.obj", "v 0 0 0\nv 1 0 x\n", "line 2: 'v' with no number"),
+    "nastran grid twice": (
+        "p.bdf",
+        "GRID,1,,0.,0.,0.\nGRID,1,,1.,0.,0.\nCTRIA3,5,1,1,1,1\n",
+        "line 2: GRID 1 is given",
+    ),
     "nastran grid": ("p.bdf", "GRID,1,,0.,0.,0.\nCTRIA3,5,1,1,2,3\n", "line 2: CTRIA3 5 names grid 2"),
     "nastran number": ("p.bdf", "GRID,1,,0.,zero,0.\n", "line 1: a GRID coordinate is 'zero'"),
     "nastran include": ("p.bdf", "GRID,1,,0.,0.,0.\nINCLUDE 'x.bdf'\n", "line 2: INCLUDE is not supported"),

@@ -121,8 +121,10 @@ def _points(path: Path, cards: dict[str, list[Card]]) -> tuple[np.ndarray, dict[
     points = np.zeros((len(cards["GRID"]), 3))
     own: dict[int, list[int]] = defaultdict(list)
     for row, (_, fields, line) in enumerate(cards["GRID"]):
-        row_of[_whole(fields[0], line, "GRID's number")] = row
+        number = _whole(fields[0], line, "GRID's number")
         points[row] = [_number(text, line, "a GRID coordinate") for text in fields[2:5]]
+        if (points[row] != points[row_of.setdefault(number, row)]).any():
+            raise ValueError(f"line {line}: GRID {number} is given twice, at two places; give each number once")
         if fields[1] not in ("", "0"):
             own[_whole(fields[1], line, "GRID's coordinate system")].append(row)
     for system, rows in own.items():
