@@ -31,7 +31,7 @@ from chamberopt.replicas import (
     replicas_wanted,
     simulate_replicas,
 )
-from chamberopt.stuck import stuck_notes
+from chamberopt.stuck import on_the_spot_notes, stuck_notes
 
 if TYPE_CHECKING:
     from chamberopt.chamber import Chamber
@@ -173,7 +173,11 @@ def evaluate(
         replicas=tuple(tallies),
         timings=clock,
         collisions={kind: sum(replica.collisions[kind] for replica in done) for kind in done[0].collisions},
-        notes=(*notes, *stuck_notes([replica.stuck for replica in done if replica.stuck], len(done))),
+        notes=(
+            *notes,
+            *stuck_notes([replica.stuck for replica in done if replica.stuck], len(done)),
+            *on_the_spot_notes([replica.on_the_spot for replica in done]),
+        ),
         stream=stream,
         stopped_by=stopped_by,
         marked=None if samples is None else np.mean(_shares(done, samples, chamber, design), axis=0),

@@ -13,7 +13,7 @@ import numpy as np
 from chamberopt.coverage import Tally, tally
 from chamberopt.dents import Samples, first_marked
 from chamberopt.process import build_scene, replica_seed
-from chamberopt.stuck import Stuck, still
+from chamberopt.stuck import Stuck, share_on_the_spot, still
 
 if TYPE_CHECKING:
     from chamberopt.chamber import Chamber
@@ -37,6 +37,7 @@ class Replica:
     tally: Tally
     collisions: dict[str, int]
     stuck: Stuck | None
+    on_the_spot: float
     first_marked: np.ndarray | None
 
 
@@ -80,6 +81,7 @@ def simulate_replica(
     return Replica(
         tally=tally(result.impacts, chamber, design),
         collisions={kind: int(getattr(result.collisions, kind)) for kind in kinds},
+        on_the_spot=share_on_the_spot(result.balls.velocities),
         stuck=still(result.resting, len(result.balls), shot.diameter, chamber, design.effects.part_turn is not None),
         first_marked=None if samples is None else first_marked(samples, result.impacts, chamber, design),
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -20,6 +21,8 @@ TOUCHES = 2e-5  # m: a ball held still is this near to what holds it, or nearer
 ONE_PLACE = 3.0  # diameters: balls nearer to each other than that lie in one place
 MOST_PLACES = 3  # named, those with most balls first
 ON_BALLS = ""
+STRAIGHT = 1e-6  # of its speed: what goes sideways by less will be on its spot for thousands of hits
+MUCH = 0.1  # of the shot
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,24 @@ def still(resting: Resting, balls: int, diameter: float, chamber: Chamber, part_
     said += [f"{others} elsewhere"] if others else []
     verb = "lies" if len(resting) == 1 else "lie"
     return Stuck(len(resting) / balls, f"{len(resting)} of {balls} balls {verb} still at the end: {'; '.join(said)}")
+
+
+def share_on_the_spot(velocities: np.ndarray) -> float:
+    """The share of balls, of velocities (n, 3), that go straight up and down: for ever, if nothing meets them."""
+    sideways, speed = np.hypot(velocities[:, 0], velocities[:, 1]), np.linalg.norm(velocities, axis=1)
+    return float(((sideways < STRAIGHT * speed) & (speed > 0.0)).mean())
+
+
+def on_the_spot_notes(shares: Sequence[float]) -> tuple[str, ...]:
+    """One note where much of the shot, of a ``share`` in each replica, ends so: a trap of faces that are ideal."""
+    caught = [share for share in shares if share > MUCH]
+    if not caught:
+        return ()
+    return (
+        f"in {len(caught)} of {len(shares)} replicas up to {_percent(max(caught))} of the shot ends bouncing straight "
+        "up and down, each ball on its spot: between parallel faces friction takes all sideways speed, which rough faces "
+        "would give back; shorten process.accuracy.simulated_time_s, or do not trust where the dents are",
+    )
 
 
 def stuck_notes(stuck: list[Stuck], replicas: int) -> tuple[str, ...]:

@@ -4,10 +4,13 @@ import numpy as np
 import pytest
 import trimesh
 
-from chamberopt.chamber import Chamber, Part
-from chamberopt.stuck import Stuck, still, stuck_notes
-from sim_core import Resting
+from chamberopt.chamber import Chamber, Part, build_chamber
+from chamberopt.effects import Friction
+from chamberopt.process import build_scene, chamber_mesh, replica_seed
+from chamberopt.stuck import Stuck, on_the_spot_notes, share_on_the_spot, still, stuck_notes
+from sim_core import Resting, simulate
 from tests.cavities import box_around
+from tests.synthetic import plate_design
 
 BALL = 3e-3  # m
 NOBODY = [-1, -1, -1, -1]
@@ -96,3 +99,23 @@ def test_one_note_on_all_replicas() -> None:
         "balls came to rest in 3 of 8 replicas and peen no more: by the end 7.5 % of the shot, on average of all; "
         "where it is most, many",
     )
+
+
+def test_shot_that_bounces_on_the_spot_is_said() -> None:
+    velocities = np.array([[0.0, 0.0, 5.0], [1e-9, 0.0, -4.0], [1.0, 0.0, 3.0], [0.0, 0.0, 0.0]])
+    assert share_on_the_spot(velocities) == 0.5
+    (note,) = on_the_spot_notes([0.0, 0.5, 0.2])
+    assert "in 2 of 3 replicas up to 50 %" in note
+    assert on_the_spot_notes([0.0, 0.05]) == ()
+
+
+@pytest.mark.long
+def test_between_parallel_plates_friction_leaves_no_sideways_speed() -> None:
+    """What the note is about: 30 balls on the plate, each on its spot within 20 s, and not one without friction."""
+    plate = plate_design(process__accuracy__simulated_time_s=20.0)
+    chamber = build_chamber(plate)
+    rubs = plate.effects.model_copy(update={"friction": Friction(mu=0.3, beta0=0.2)})
+    for design, caught in ((plate, False), (plate.model_copy(update={"effects": rubs}), True)):
+        seeds = [replica_seed(design.process.seed, k) for k in range(4)]
+        ends = [simulate(build_scene(design, chamber_mesh(chamber), seed)).balls.velocities for seed in seeds]
+        assert (max(map(share_on_the_spot, ends)) > 0.9) == caught
