@@ -173,16 +173,18 @@ def evaluate(
         replicas=tuple(tallies),
         timings=clock,
         collisions={kind: sum(replica.collisions[kind] for replica in done) for kind in done[0].collisions},
-        notes=(
-            *notes,
-            *stuck_notes([replica.stuck for replica in done if replica.stuck], len(done)),
-            *on_the_spot_notes([replica.on_the_spot for replica in done]),
-        ),
+        notes=(*notes, *_motion_notes(done)),
         stream=stream,
         stopped_by=stopped_by,
         marked=None if samples is None else np.mean(_shares(done, samples, chamber, design), axis=0),
         against_time=() if samples is None else _against_time(done, samples, chamber, design),
     )
+
+
+def _motion_notes(done: Sequence[Replica]) -> tuple[str, ...]:
+    """What became of the shot by the replicas' ends."""
+    stuck = [replica.stuck for replica in done if replica.stuck]
+    return (*stuck_notes(stuck, len(done)), *on_the_spot_notes([replica.on_the_spot for replica in done]))
 
 
 def _metrics(done: Sequence[Replica], chamber: Chamber, design: Design, samples: Samples | None) -> dict[str, Estimate]:

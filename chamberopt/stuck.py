@@ -63,8 +63,8 @@ def on_the_spot_notes(shares: Sequence[float]) -> tuple[str, ...]:
         return ()
     return (
         f"in {len(caught)} of {len(shares)} replicas up to {_percent(max(caught))} of the shot ends bouncing straight "
-        "up and down, each ball on its spot: between parallel faces friction takes all sideways speed, which rough faces "
-        "would give back; shorten process.accuracy.simulated_time_s, or do not trust where the dents are",
+        "up and down, each ball on its spot: between parallel faces friction takes all sideways speed, which rough "
+        "faces would give back; shorten process.accuracy.simulated_time_s, or do not trust where the dents are",
     )
 
 

@@ -109,13 +109,12 @@ def test_shot_that_bounces_on_the_spot_is_said() -> None:
     assert on_the_spot_notes([0.0, 0.05]) == ()
 
 
-@pytest.mark.long
-def test_between_parallel_plates_friction_leaves_no_sideways_speed() -> None:
-    """What the note is about: 30 balls on the plate, each on its spot within 20 s, and not one without friction."""
-    plate = plate_design(process__accuracy__simulated_time_s=20.0)
+def test_between_parallel_plates_friction_leaves_a_ball_no_sideways_speed() -> None:
+    """What the note is about; without friction its sideways speed lasts."""
+    plate = plate_design(process__accuracy__simulated_time_s=5.0)
+    plate = plate.with_values({"shot.mass_g": 1e3 * plate.shot.ball_mass})
     chamber = build_chamber(plate)
     rubs = plate.effects.model_copy(update={"friction": Friction(mu=0.3, beta0=0.2)})
-    for design, caught in ((plate, False), (plate.model_copy(update={"effects": rubs}), True)):
-        seeds = [replica_seed(design.process.seed, k) for k in range(4)]
-        ends = [simulate(build_scene(design, chamber_mesh(chamber), seed)).balls.velocities for seed in seeds]
-        assert (max(map(share_on_the_spot, ends)) > 0.9) == caught
+    for design, caught in ((plate, 0.0), (plate.model_copy(update={"effects": rubs}), 1.0)):
+        end = simulate(build_scene(design, chamber_mesh(chamber), replica_seed(1, 0))).balls
+        assert share_on_the_spot(end.velocities) == caught
