@@ -2,6 +2,7 @@
 
 import pytest
 
+from tests.hard_cases import tested
 from tests.hard_cases.cases import CASES
 from tests.hard_cases.outcome import Case
 
@@ -22,5 +23,5 @@ def test_hard_case(case: Case) -> None:
 
 
 def test_no_two_cases_have_one_name() -> None:
-    names = [case.name for case in CASES]
+    names = [case.name for case in (*CASES, *tested.CASES)]
     assert len(set(names)) == len(names)

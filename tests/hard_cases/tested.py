@@ -4,6 +4,7 @@ What is counted is what the runs of the test counted; the overlap is that at the
 """
 
 import functools
+import inspect
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from unittest import mock
@@ -66,6 +67,7 @@ def judged(test: Callable[..., None], *arguments: object) -> Outcome:
 
 def tested(name: str, test: Callable[..., None], *arguments: object) -> Case:
     """A test, called with these parameters, as a case."""
+    inspect.signature(test).bind(*arguments)  # a call that cannot be is found when the table is made
     return Case(name, functools.partial(judged, test, *arguments))
 
 
@@ -84,7 +86,10 @@ CASES = [
         tested(f"landing with mu = {mu:g}", rolling.test_landing_it_rolls_in_the_end_with_what_the_floor_leaves_it, mu)
         for mu in (0.01, 10.0)
     ),
-    tested("slip turns on a slope", rolling.test_on_a_slope_a_slip_that_turns_is_followed),
+    *(
+        tested(f"slip turns on a slope, {speed:g} m/s", rolling.test_on_a_slope_a_slip_that_turns_is_followed, speed)
+        for speed in (0.4, 4.0)
+    ),
     tested("rolling down a valley", rolling.test_down_a_valley_it_rolls_on_both_faces, 10.0),
     tested("rolling over an edge", rolling.test_slowly_over_an_edge_it_rolls_until_it_leaves_it, 0.05),
     tested(
