@@ -12,13 +12,14 @@ import numpy as np
 from chamberopt.accuracy import marked_figures, weighted
 from chamberopt.coverage import Tally, tally
 from chamberopt.dents import Samples, first_marked, marked_share, sample_points
-from chamberopt.design import LONGEST_MARKED, Design
+from chamberopt.design import Design
 from chamberopt.errors import InputError
 from chamberopt.estimate import estimate, paired_difference
 from chamberopt.knobs import MODEL, changed
 from chamberopt.objective import objective
 from chamberopt.process import build_scene, replica_seed
 from chamberopt.rungs import Pool, Rung, dents_alone, figures
+from chamberopt.treatment import LONGEST_MARKED
 
 if TYPE_CHECKING:
     from chamberopt.chamber import Chamber

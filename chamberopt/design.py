@@ -5,7 +5,7 @@ Every table is frozen, refuses unknown keys, and holds bounds wide enough for an
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeVar
 
@@ -16,7 +16,9 @@ from chamberopt.diagnosis import CrossCheckError, Problem
 from chamberopt.effects import Effects
 from chamberopt.errors import InputError
 from chamberopt.fields import Pair, Triple, listed, quantity
-from chamberopt.materials import SHOT_DENSITY, STRICT, Materials, ShotMaterial
+from chamberopt.materials import STRICT, Materials
+from chamberopt.shot import Shot
+from chamberopt.treatment import Process
 
 Unit = Literal["um", "mm", "cm", "m", "in", "guess"]
 METRES_PER: dict[str, float] = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
@@ -163,191 +165,6 @@ class Sonotrode(BaseModel):
     def peak_speed(self) -> float:
         """Largest speed of the face, 2 pi f A [m/s]."""
         return 2.0 * math.pi * self.frequency * self.amplitude
-
-
-class ShotSize(BaseModel):
-    """One of several sizes of balls."""
-
-    model_config = STRICT
-
-    diameter_mm: float = quantity(0.1, 20, "mm", "of one ball of this size")
-    share: float = quantity(1e-6, 1, "of the charge's mass", "the shares of all sizes add up to 1")
-
-
-class Shot(BaseModel):
-    """The charge: balls of one size, or a mix. Give exactly one of diameter_mm and mix, and of material and
-    density_kg_m3.
-    """
-
-    model_config = STRICT
-
-    mass_g: float = quantity(1e-4, 10000, "g", "of all balls together")
-    diameter_mm: float | None = quantity(0.1, 20, "mm", "of one ball", None)
-    mix: Annotated[tuple[ShotSize, ...], Field(strict=False)] | None = listed(
-        "a list of { diameter_mm = ..., share = ... }", "2 to 8 sizes and their shares of the mass", None
-    )
-    material: ShotMaterial | None = Field(default=None, description="sets the density")
-    density_kg_m3: float | None = quantity(500, 25000, "kg/m³", "instead of material", None)
-
-    @model_validator(mode="after")
-    def _agree(self) -> Self:
-        problems = [*self._density_problems(), *self._size_problems()]
-        if problems:
-            raise CrossCheckError(problems)
-        return self
-
-    def _size_problems(self) -> Iterator[Problem]:
-        if self.mix is None:
-            if self.diameter_mm is None:
-                yield Problem("diameter_mm", "missing; a number from 0.1 to 20 mm (of one ball), or several sizes: mix")
-            return
-        if self.diameter_mm is not None:
-            yield Problem("diameter_mm", f"given {self.diameter_mm:g} beside mix; keep one of the two")
-        if not 2 <= len(self.mix) <= 8:
-            yield Problem("mix", f"given {len(self.mix)} sizes; allowed: 2 to 8, or one as diameter_mm")
-        if len({size.diameter_mm for size in self.mix}) < len(self.mix):
-            yield Problem("mix", "given one diameter_mm twice; add up its shares")
-        whole = sum(size.share for size in self.mix)
-        if abs(whole - 1.0) > 1e-6:
-            yield Problem("mix", f"given shares that add up to {whole:g}; they must add up to 1")
-
-    def _density_problems(self) -> Iterator[Problem]:
-        if self.material is None and self.density_kg_m3 is None:
-            materials = ", ".join(f'"{name}"' for name in SHOT_DENSITY)
-            yield Problem("material", f"missing; give material (one of {materials}) or density_kg_m3")
-        if self.material is not None and self.density_kg_m3 is not None:
-            text = f"given {self.density_kg_m3:g} beside material = {self.material!r}; keep one of the two"
-            yield Problem("density_kg_m3", text)
-
-    @property
-    def sizes(self) -> tuple[tuple[float, int], ...]:
-        """Diameter [m] and number of the balls of each size: the mass asked for, rounded to whole balls, at least
-        one.
-        """
-        alone = () if self.diameter_mm is None else ((self.diameter_mm * 1e-3, 1.0),)
-        asked = alone if self.mix is None else tuple((size.diameter_mm * 1e-3, size.share) for size in self.mix)
-        whole = self.mass / (self.density * math.pi / 6.0)
-        return tuple((diameter, max(1, round(share * whole / diameter**3))) for diameter, share in asked)
-
-    @property
-    def diameter(self) -> float:
-        """Ball diameter [m]; of the largest, if there are several sizes."""
-        return max(diameter for diameter, _ in self.sizes)
-
-    @property
-    def diameters(self) -> tuple[float, ...]:
-        """Diameter of each ball [m], in the order of the balls of a scene: size by size."""
-        return tuple(diameter for diameter, count in self.sizes for _ in range(count))
-
-    @property
-    def density(self) -> float:
-        """Ball density [kg/m³]."""
-        return self.density_kg_m3 if self.material is None else SHOT_DENSITY[self.material]  # type: ignore[return-value]
-
-    @property
-    def mass(self) -> float:
-        """Mass of the whole charge [kg], as asked for."""
-        return self.mass_g * 1e-3
-
-    @property
-    def volume(self) -> float:
-        """Volume of all balls [m³]."""
-        return math.pi / 6.0 * sum(count * diameter**3 for diameter, count in self.sizes)
-
-    @property
-    def ball_mass(self) -> float:
-        """Mass of one ball [kg]; the mean, if there are several sizes."""
-        if self.mix is None:
-            return self.density * math.pi / 6.0 * self.diameter**3
-        return self.density * self.volume / self.count
-
-    @property
-    def count(self) -> int:
-        """Number of balls."""
-        return sum(count for _, count in self.sizes)
-
-
-class Accuracy(BaseModel):
-    """How much is simulated: independent replicas, each after its own start and warm-up."""
-
-    model_config = STRICT
-
-    replicas: int = Field(default=8, ge=3, le=100000, description="3 is the least that gives a confidence interval")
-    simulated_time_s: float = quantity(1e-4, 10000, "s", "of each replica, after warm-up", 1.0)
-    warmup_time_s: float = quantity(0, 10000, "s", "simulated first and not counted", 0.2)
-    coverage: float | None = quantity(1e-4, 0.5, "", "wanted half-width of the objective's 95 % interval", None)
-    most_replicas: int = Field(default=200, ge=3, le=100000, description="where the wish for accuracy ends")
-    coverage_model: Literal["avrami", "dents"] = Field(
-        default="avrami", description="from dent rates, or dent by dent over the whole treatment"
-    )
-    sample_mm: float = quantity(0.005, 10, "mm", 'spacing of the points that coverage_model = "dents" marks', 0.1)
-    elastic_below_mm_s: float = quantity(0.1, 1000, "mm/s", "slower hits lose nothing: ends endless bouncing", 10.0)
-    drag_piece_ms: float = quantity(0.1, 1000, "ms", "longest flight between two kicks of the air, effects.drag", 10.0)
-
-    @model_validator(mode="after")
-    def _agree(self) -> Self:
-        if self.coverage is not None and self.most_replicas < self.replicas:
-            text = f"given {self.most_replicas}, below replicas = {self.replicas}; raise it"
-            raise CrossCheckError([Problem("most_replicas", text)])
-        return self
-
-    @property
-    def simulated_time(self) -> float:
-        """Recorded time of each replica [s]."""
-        return self.simulated_time_s
-
-    @property
-    def warmup_time(self) -> float:
-        """Time of each replica before recording starts [s]."""
-        return self.warmup_time_s
-
-    @property
-    def sample_spacing(self) -> float:
-        """Spacing of the points that dents mark [m]."""
-        return self.sample_mm * 1e-3
-
-    @property
-    def elastic_below(self) -> float:
-        """Normal speed [m/s] below which hits lose nothing."""
-        return self.elastic_below_mm_s * 1e-3
-
-    @property
-    def drag_piece(self) -> float:
-        """Longest time [s] between two kicks of the air."""
-        return self.drag_piece_ms * 1e-3
-
-
-# The longest treatment [s] that is simulated from beginning to end: minutes of computing a replica.
-LONGEST_MARKED = 600.0
-
-
-class Process(BaseModel):
-    """How long the part is peened, and how the answer is computed."""
-
-    model_config = STRICT
-
-    treatment_time_s: float = quantity(0.01, 1e6, "s", "peening time the coverage is predicted for")
-    seed: int = Field(default=1, ge=0, le=2**63 - 1, description="same seed, same result")
-    accuracy: Accuracy = Field(default_factory=Accuracy, description="replicas and their length")
-
-    @model_validator(mode="after")
-    def _agree(self) -> Self:
-        if self.accuracy.coverage_model == "dents" and self.treatment_time_s > LONGEST_MARKED:
-            text = f'given "dents", which simulates all of treatment_time_s = {self.treatment_time_s:g} in each replica'
-            wants = f'at most {LONGEST_MARKED:g} s are supported; shorten the treatment or use "avrami"'
-            raise CrossCheckError([Problem("accuracy.coverage_model", f"{text}; {wants}")])
-        return self
-
-    @property
-    def recorded_time(self) -> float:
-        """What each replica records [s]: all of the treatment where every dent is marked."""
-        marks = self.accuracy.coverage_model == "dents"
-        return self.treatment_time_s if marks else self.accuracy.simulated_time
-
-    @property
-    def treatment_time(self) -> float:
-        """Peening time [s] the coverage is predicted for."""
-        return self.treatment_time_s
 
 
 class Design(BaseModel):

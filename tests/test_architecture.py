@@ -12,7 +12,7 @@ ROOT = Path(__file__).resolve().parents[1]
 CHAMBEROPT_ORDER = (
     ("errors", "estimate", "law", "mixture", "patches", "uncovered"),
     ("diagnosis", "disk", "fields", "materials"),
-    ("effects",),
+    ("effects", "shot", "treatment"),
     ("design",),
     ("config",),
     ("triangles",),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from chamberopt.coverage import coverage_at, dent_diameter, impact_angle_deg, mean_normal_speed, tally
-from chamberopt.design import ShotSize
+from chamberopt.shot import ShotSize
 from tests.synthetic import dented, impact_log, patchwork, plate_design
 
 HB = 9.81e6

@@ -5,10 +5,10 @@ import pytest
 
 from chamberopt.chamber import TAG_PART, TAG_SONOTRODE, build_chamber
 from chamberopt.config import load_design
-from chamberopt.design import ShotSize
 from chamberopt.effects import Friction
 from chamberopt.errors import InputError
 from chamberopt.process import build_scene, chamber_mesh, replica_seed, start_velocities
+from chamberopt.shot import ShotSize
 from sim_core import Drag, Rest
 from sim_core.effects.restitution import ELASTIC_BELOW
 from tests.synthetic import DESIGNS, plate_design
