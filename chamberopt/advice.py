@@ -42,7 +42,7 @@ LONGEST = 20.0  # s of each replica
 # What switching friction on takes for it, assumed: dry metal (mu), and beta0 between those that S. Foerster, M. Louge,
 # H. Chang and K. Allia, Phys. Fluids 6 (1994) 1108, measured (0.43, 0.44) and none.
 FRICTION = {"mu": 0.3, "beta0": 0.2}
-ACCURACY = 0.01  # [-]: changes below are taken to be of no matter, unless the design asks for better
+ACCURACY = 0.01  # [-]: changes below are taken to be of no matter
 
 
 @dataclass(frozen=True)

@@ -25,10 +25,10 @@ from sim_core.effects.rest import (
     drop_foot,
     stands_on_ball,
 )
-from sim_core.flight import Point, point_under
 from sim_core.neighbours import Crowd, next_meeting
+from sim_core.resolve.pushing import place, pull
 from sim_core.roots import NEVER
-from sim_core.vec3 import Vec3, dot, sub
+from sim_core.vec3 import dot, sub
 
 LEANING = 2e-5  # m: a ball held still is this near to what holds it, or nearer: hops at 10 mm/s are 5 um high
 
@@ -81,35 +81,25 @@ def _with_grounded(
     itself those with all balls.
     """
     best = min(meeting, before) - time
-    here = _place(footing, motion, ball, time)
+    here = place(footing, motion, ball, time)
     flying = footing.marks[ball, MODE] == FLYING
     still = footing.marks[ball, MODE] >= ASLEEP
-    pull = _pull(footing, ball)
+    own = pull(footing, ball)
     for k in range(footing.held[0] if flying else len(motion)):
         other = footing.roster[k] if flying else k
         if other == ball or (still and footing.marks[other, MODE] >= ASLEEP):
             continue
         if stands_on_ball(footing, ball, other) or stands_on_ball(footing, other, ball):
             continue
-        there = _place(footing, motion, other, time)
+        there = place(footing, motion, other, time)
         apart, closing = sub(there.position, here.position), sub(there.velocity, here.velocity)
-        delay = pulled_meeting_delay(apart, closing, sub(_pull(footing, other), pull), reach, best)
+        delay = pulled_meeting_delay(apart, closing, sub(pull(footing, other), own), reach, best)
         if delay < best or (delay == best and partner >= 0 and other < partner):
             best = delay
             partner = other
     if partner < 0:
         return meeting, partner
     return time + best, partner
-
-
-@jit
-def _pull(footing: Footing, ball: int) -> Vec3:
-    return Vec3(footing.pull[ball, 0], footing.pull[ball, 1], footing.pull[ball, 2])
-
-
-@jit
-def _place(footing: Footing, motion: np.ndarray, ball: int, time: float) -> Point:
-    return point_under(motion, ball, time, _pull(footing, ball))
 
 
 @inlined
@@ -146,12 +136,12 @@ def wake_neighbours(
     Marked besides: what meets one of them at this very time has its events predicted anew, and the call must not be
     lost with the old ones.
     """
-    here = _place(footing, motion, ball, time).position
+    here = place(footing, motion, ball, time).position
     for k in range(footing.held[0]):
         other = footing.roster[k]
         leans = stands_on_ball(footing, other, ball)
         if not leans and other != ball and footing.marks[other, MODE] == JAMMED:
-            apart = sub(_place(footing, motion, other, time).position, here)
+            apart = sub(place(footing, motion, other, time).position, here)
             leans = dot(apart, apart) < (reach + LEANING) ** 2
         if leans:
             footing.marks[other, CALLED] = 1
@@ -178,10 +168,10 @@ def count_props(footing: Footing, motion: np.ndarray, ball: int, time: float, re
 
     True when they are not those noted before.
     """
-    here = _place(footing, motion, ball, time).position
+    here = place(footing, motion, ball, time).position
     count, numbers, moves = 0, 0, False
     for other in range(len(motion)):
-        apart = sub(_place(footing, motion, other, time).position, here)
+        apart = sub(place(footing, motion, other, time).position, here)
         if other != ball and dot(apart, apart) < (reach + LEANING) ** 2:
             count += 1
             numbers += other

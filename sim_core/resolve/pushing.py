@@ -22,7 +22,7 @@ def pull(footing: Footing, ball: int) -> Vec3:
 @jit
 def place(footing: Footing, motion: np.ndarray, ball: int, time: float) -> Point:
     """Where a ball is [m], and its velocity [m/s], at a time of the window's clock."""
-    return point_under(motion, ball, time, Vec3(footing.pull[ball, 0], footing.pull[ball, 1], footing.pull[ball, 2]))
+    return point_under(motion, ball, time, pull(footing, ball))
 
 
 @jit
