@@ -111,7 +111,7 @@ SWITCHES = (
         "gravity",
         lambda design, chamber: design.effects.gravity,
         _set("gravity", True, False),
-        lambda design, chamber: f"g H / V² = {groups.fall(design):.2g}",
+        lambda design, chamber: f"g H / V² = {groups.fall(design, chamber):.2g}",
     ),
     Switch(
         "ball_collisions",
@@ -129,7 +129,7 @@ SWITCHES = (
         "drag",
         lambda design, chamber: design.effects.drag,
         _set("drag", True, False),
-        lambda design, chamber: f"{groups.drag_loss(design):.2g} of the speed is lost over the chamber's height",
+        lambda design, chamber: f"{groups.drag_loss(design, chamber):.2g} of the speed is lost on the way up",
     ),
     Switch(
         "rest",

@@ -17,7 +17,7 @@ import numpy as np
 from chamberopt.errors import InputError
 from chamberopt.mesh_io import box_text
 from chamberopt.part import Part, posed_part, turning_axis
-from chamberopt.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL, ShapeSurface, shape_surface
+from chamberopt.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL, ShapeSurface
 from chamberopt.slivers import THINNEST, without_slivers
 from chamberopt.solids import Solid, Surface, cavities, solid, subtract, united
 from chamberopt.triangles import area_vectors, areas, shells_of, tetrahedron_volumes
@@ -49,6 +49,11 @@ class Chamber:
     exposed_area: np.ndarray
     notes: tuple[str, ...]
 
+    @property
+    def height(self) -> float:
+        """From the sonotrode to the highest point of the cavity [m]."""
+        return float(self.vertices[:, 2].max())
+
 
 def build_chamber(design: Design) -> Chamber:
     """The chamber of a design.
@@ -57,7 +62,7 @@ def build_chamber(design: Design) -> Chamber:
     sonotrode, when nothing of the target faces the shot, or when the part leaves no room over the sonotrode.
     """
     part, notes = posed_part(design)
-    shape = shape_surface(design)
+    shape = design.chamber.surface(part.vertices, part.triangles)
     _refuse_misplaced(part, shape.vertices, design)
 
     body, voids = _body(part)
@@ -66,10 +71,9 @@ def build_chamber(design: Design) -> Chamber:
     whole = subtract(shell, body).surface()
     if not (whole.solid != shell.label).any():
         raise InputError(
-            f"{part.name}: no part of it is inside the chamber; change part.offset_mm, "
-            "chamber.diameter_mm or chamber.height_mm"
+            f"{part.name}: no part of it is inside the chamber; change part.offset_mm or the sizes in [chamber]"
         )
-    room, room_notes = _room_over_sonotrode(whole, shell, shape.tags, design)
+    room, room_notes = _room_over_sonotrode(whole, shell, shape)
     room = without_slivers(room)[0]
     on_part = room.solid != shell.label
     tags = np.where(on_part, TAG_PART, shape.tags[np.where(on_part, 0, room.source)]).astype(np.uint8)
@@ -116,13 +120,11 @@ def _body(part: Part) -> tuple[Solid, int]:
     return united(solids, part.name), int((volumes < 0.0).sum())
 
 
-def _room_over_sonotrode(
-    whole: Surface, shell: Solid, shape_tags: np.ndarray, design: Design
-) -> tuple[Surface, list[str]]:
+def _room_over_sonotrode(whole: Surface, shell: Solid, shape: ShapeSurface) -> tuple[Surface, list[str]]:
     """The room that has the sonotrode for its floor, and notes on what was cut off."""
     rooms = cavities(whole)
     floor = (whole.solid == shell.label) & (
-        shape_tags[np.where(whole.solid == shell.label, whole.source, 0)] == TAG_SONOTRODE
+        shape.tags[np.where(whole.solid == shell.label, whole.source, 0)] == TAG_SONOTRODE
     )
     over = [room for room in rooms if (room & floor).any()]
     if not over:
@@ -141,7 +143,7 @@ def _room_over_sonotrode(
             "mm: no shot gets there, it is left out"
         )
     top = float(room.vertices[:, 2].max())
-    if top < design.chamber.height - THINNEST:
+    if top < shape.vertices[:, 2].max() - THINNEST:
         notes.append(f"the part closes the chamber at z = {1e3 * top:.4g} mm: more chamber.height_mm has no effect")
     return room, notes
 
@@ -151,8 +153,7 @@ def _hidden_target_note(part: Part, exposed: np.ndarray) -> list[str]:
     if not (exposed[part.target] > 0.0).any():
         raise InputError(
             f"part.target: none of its {int(part.target.sum())} triangles bounds the cavity, so no shot "
-            "reaches it; check part.rotate_deg (which side faces the sonotrode), chamber.height_mm and "
-            "chamber.diameter_mm"
+            "reaches it; check part.rotate_deg (which side faces the sonotrode) and the sizes in [chamber]"
         )
     hidden = 1.0 - exposed[part.target].sum() / part.area[part.target].sum()
     if hidden < 1e-3:

@@ -10,9 +10,10 @@ from chamberopt.chamber import TAG_PART, TAG_SONOTRODE, TAG_WALL, turning_axis
 from chamberopt.groups import free_path
 from chamberopt.ledges import ledges
 from chamberopt.process import chamber_mesh, require_countable, require_turnable
-from chamberopt.shapes import shape_surface
+from chamberopt.shapes.cylinder import Cylinder
+from chamberopt.shapes.surface import ShapeSurface
 from chamberopt.slivers import THINNEST
-from chamberopt.triangles import area_vectors
+from chamberopt.triangles import area_vectors, tetrahedron_volumes
 
 if TYPE_CHECKING:
     from chamberopt.chamber import Chamber
@@ -35,7 +36,7 @@ def describe(design: Design, chamber: Chamber) -> dict[str, Any]:
     part, shot, process = chamber.part, design.shot, design.process
     exposed = chamber.exposed_area > 0.0
     box = part.vertices.max(axis=0) - part.vertices.min(axis=0)
-    shape = _volume(*_surface(design))
+    shape = _shape(design, chamber)
     simulated = process.accuracy.replicas * (process.recorded_time + process.accuracy.warmup_time)
     return {
         "part": {
@@ -55,7 +56,7 @@ def describe(design: Design, chamber: Chamber) -> dict[str, Any]:
         },
         "chamber": {
             "shape": design.chamber.shape,
-            "shape_volume_cm3": _rounded(shape * 1e6),
+            "shape_volume_cm3": _rounded(float(tetrahedron_volumes(shape.vertices, shape.triangles).sum()) * 1e6),
             "free_volume_cm3": _rounded(chamber.volume * 1e6),
             "part_triangles": int((chamber.tags == TAG_PART).sum()),
             "sonotrode_triangles": int((chamber.tags == TAG_SONOTRODE).sum()),
@@ -143,7 +144,7 @@ def _through_side_wall(design: Design, chamber: Chamber) -> tuple[float, float] 
 
     Not asked of a part that closes the chamber like a lid, nor of one that turns: its joint is a round shaft.
     """
-    if design.effects.part_turn is not None or chamber.vertices[:, 2].max() < design.chamber.height - THINNEST:
+    if design.effects.part_turn is not None or chamber.height < _shape(design, chamber).vertices[:, 2].max() - THINNEST:
         return None
     edges = chamber.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     normal = area_vectors(chamber.vertices, chamber.triangles)
@@ -164,22 +165,19 @@ def _gaps(design: Design, chamber: Chamber) -> list[tuple[str, float, str]]:
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     upwards = normal[:, 2] < -0.5 * np.linalg.norm(normal, axis=1)  # out of the cavity is into the part
     part = chamber.tags == TAG_PART
-    apothem = design.chamber.diameter / 2.0 * np.cos(np.pi / design.chamber.facets)
-    reach = np.hypot(*corners[part].reshape(-1, 3)[:, :2].T).max()
-    gaps = [
-        (
-            "part and side wall",
-            max(0.0, apothem - reach),
-            "raise chamber.diameter_mm or check part.offset_mm",
-        ),
-    ]
+    gaps = []
+    if isinstance(design.chamber, Cylinder):
+        apothem = design.chamber.diameter / 2.0 * np.cos(np.pi / design.chamber.facets)
+        reach = np.hypot(*corners[part].reshape(-1, 3)[:, :2].T).max()
+        remedy = "raise chamber.diameter_mm or check part.offset_mm"
+        gaps.append(("part and side wall", max(0.0, apothem - reach), remedy))
     turn = design.effects.part_turn
     if turn is not None:
         lowest = _lowest_on_its_way(design, corners[part].reshape(-1, 3), turn.swing)
         below = max(0.0, lowest - design.sonotrode.amplitude)
         gaps.append(("turning part and sonotrode", below, "raise chamber.sonotrode_distance_mm"))
     if (part & upwards).any():
-        above = design.chamber.height - corners[part & upwards][..., 2].max()
+        above = chamber.height - corners[part & upwards][..., 2].max()
         gaps.append(("part and ceiling", max(0.0, above), "raise chamber.height_mm or close the gap"))
     return gaps
 
@@ -198,15 +196,9 @@ def _lowest_on_its_way(design: Design, points: np.ndarray, swing: float | None) 
     return float((point[2] + along[:, 2] + np.hypot(across, ahead) * np.cos(furthest)).min())
 
 
-def _surface(design: Design) -> tuple[np.ndarray, np.ndarray]:
-    shape = shape_surface(design)
-    return shape.vertices, shape.triangles
-
-
-def _volume(vertices: np.ndarray, triangles: np.ndarray) -> float:
-    """Volume inside a closed surface: the tetrahedra from the origin to each triangle, signed."""
-    a, b, c = np.moveaxis(vertices[triangles], 1, 0)
-    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
+def _shape(design: Design, chamber: Chamber) -> ShapeSurface:
+    """The cavity as it would be without the part."""
+    return design.chamber.surface(chamber.part.vertices, chamber.part.triangles)
 
 
 def _rounded(value: float) -> float:

@@ -253,7 +253,7 @@ def _flattened(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
 
 def _vary_problems(design: Design, name: str, bounds: tuple[float, float]) -> list[Problem]:
     """Why a design parameter cannot vary between these bounds."""
-    field, (low, high), numbers = f"vary.{name}", bounds, Design.numbers()
+    field, (low, high), numbers = f"vary.{name}", bounds, design.numbers()
     try:
         start = design.value(name)
     except InputError as error:

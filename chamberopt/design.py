@@ -6,10 +6,21 @@ Every table is frozen, refuses unknown keys, and holds bounds wide enough for an
 
 import math
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeVar
 
-from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_validator, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ModelWrapValidatorHandler,
+    ValidationError,
+    ValidationInfo,
+    create_model,
+    field_validator,
+    model_validator,
+)
 
 from chamberopt import diagnosis
 from chamberopt.diagnosis import CrossCheckError, Problem
@@ -17,6 +28,7 @@ from chamberopt.effects import Effects
 from chamberopt.errors import InputError
 from chamberopt.fields import Pair, Triple, listed, quantity
 from chamberopt.materials import STRICT, Materials
+from chamberopt.shapes import SHAPES, ChamberTable
 from chamberopt.shot import Shot
 from chamberopt.treatment import Process
 
@@ -113,33 +125,6 @@ class Part(BaseModel):
         return self.offset_mm[0] * 1e-3, self.offset_mm[1] * 1e-3
 
 
-class ChamberShape(BaseModel):
-    """The cavity before the part is taken out of it; its floor is the sonotrode, at z = 0."""
-
-    model_config = STRICT
-
-    shape: Literal["cylinder"] = Field(description="form of the cavity; others are not supported yet")
-    height_mm: float = quantity(2, 2000, "mm", "inner height, sonotrode to ceiling")
-    sonotrode_distance_mm: float = quantity(0.1, 2000, "mm", "mean sonotrode face to lowest point of the part")
-    diameter_mm: float = quantity(2, 2000, "mm", "inner diameter")
-    facets: int = Field(default=64, ge=8, le=1024, description="flat sides that stand for the round wall")
-
-    @property
-    def height(self) -> float:
-        """Inner height [m]."""
-        return self.height_mm * 1e-3
-
-    @property
-    def sonotrode_distance(self) -> float:
-        """Mean sonotrode face to lowest point of the part [m]."""
-        return self.sonotrode_distance_mm * 1e-3
-
-    @property
-    def diameter(self) -> float:
-        """Inner diameter [m]."""
-        return self.diameter_mm * 1e-3
-
-
 class Sonotrode(BaseModel):
     """The vibrating floor. Amplitude is ZERO-TO-PEAK: half of a peak-to-valley figure."""
 
@@ -173,12 +158,24 @@ class Design(BaseModel):
     model_config = STRICT
 
     part: Part
-    chamber: ChamberShape
+    chamber: ChamberTable
     sonotrode: Sonotrode
     shot: Shot
     materials: Materials
     effects: Effects = Field(default_factory=Effects)
     process: Process
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _of_its_shape(cls, data: Any, rest: ModelWrapValidatorHandler["Design"], info: ValidationInfo) -> "Design":
+        """The chamber's table has the keys of its shape: each shape has a subclass, with no more than that table."""
+        if cls is not Design or not isinstance(data, Mapping):
+            return rest(data)
+        return design_class(data).model_validate(data, context=info.context)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Workers get the values: the class of a shape's designs is made anew there."""
+        return checked, (Design, self.model_dump())
 
     @field_validator("effects", mode="before")
     @classmethod
@@ -191,12 +188,13 @@ class Design(BaseModel):
     @model_validator(mode="after")
     def _agree(self) -> Self:
         chamber, shot = self.chamber, self.shot
-        height, distance = chamber.height_mm, chamber.sonotrode_distance_mm
+        distance, widths = chamber.sonotrode_distance_mm, chamber.widths_mm()
         problems = []
 
         def wrong(field: str, given: float, why: str) -> None:
             problems.append(Problem(field, f"given {given:g}, {why}"))
 
+        height = widths.get("height_mm", math.inf)
         if distance >= height:
             why = f"not below chamber.height_mm = {height:g}: the part would be outside"
             wrong("chamber.sonotrode_distance_mm", distance, f"{why}; lower it or raise the height")
@@ -204,9 +202,9 @@ class Design(BaseModel):
             why = f"less than ten amplitudes of the sonotrode ({self.sonotrode.amplitude_um:g} µm); raise it"
             wrong("chamber.sonotrode_distance_mm", distance, why)
         field, largest = ("shot.diameter_mm" if shot.mix is None else "shot.mix"), 1e3 * shot.diameter
-        if largest >= min(height, chamber.diameter_mm):
-            why = f"which does not fit a chamber {chamber.diameter_mm:g} mm wide and {height:g} mm high"
-            wrong(field, largest, f"{why}; use a smaller ball")
+        narrow = [f"chamber.{key} = {width:g}" for key, width in widths.items() if largest >= width]
+        if narrow:
+            wrong(field, largest, f"which does not fit a chamber with {' and '.join(narrow)}; use a smaller ball")
         elif largest >= distance - 1e-3 * self.sonotrode.amplitude_um:
             swing = f"less the amplitude of {self.sonotrode.amplitude_um:g} µm"
             why = f"not below chamber.sonotrode_distance_mm = {distance:g} {swing}: no ball fits under the part"
@@ -216,7 +214,7 @@ class Design(BaseModel):
             for effect in ("rest", "part_turn", "friction")
             if shot.mix is not None and getattr(self.effects, effect)
         ]
-        filled = shot.mass / shot.density / (math.pi / 4.0 * chamber.diameter**2 * chamber.height)
+        filled = shot.mass / shot.density / chamber.room()
         if filled > 0.5:
             why = f"whose balls fill {filled:.0%} of the chamber; at most 50 % is allowed, usual are a few"
             wrong("shot.mass_g", shot.mass_g, why)
@@ -224,14 +222,13 @@ class Design(BaseModel):
             raise CrossCheckError(problems)
         return self
 
-    @classmethod
-    def numbers(cls) -> tuple[str, ...]:
+    def numbers(self) -> tuple[str, ...]:
         """Dotted names of every continuous number: what a study may vary."""
-        return tuple(name for name, field in diagnosis.numeric_fields(cls) if field.annotation is not int)
+        return tuple(name for name, field in diagnosis.numeric_fields(self) if field.annotation is not int)
 
     def value(self, name: str) -> float:
         """The number at a dotted name, in the file's unit. InputError for a name that is none."""
-        known = [known for known, _ in diagnosis.numeric_fields(Design)]
+        known = [known for known, _ in diagnosis.numeric_fields(self)]
         if name not in known:
             raise InputError(f"{name}: not a number of a design; {diagnosis.did_you_mean(name, known)}")
         at: Any = self
@@ -254,11 +251,33 @@ class Design(BaseModel):
             *tables, last = name.split(".")
             at: Any = data
             for step in tables:
-                if isinstance(at[step], tuple):
-                    at[step] = list(at[step])
-                at = at[step]
+                place: Any = int(step) if isinstance(at, list) else step
+                if isinstance(at[place], tuple):
+                    at[place] = list(at[place])
+                at = at[place]
             at[int(last) if isinstance(at, list) else last] = int(number) if whole else float(number)
         return checked(Design, data)
+
+
+class AnyShape(ChamberTable):
+    """Stands for a chamber whose shape is not known, so that what else is wrong can be said too."""
+
+    model_config = ConfigDict(**{**STRICT, "extra": "ignore"})
+
+    shape: Literal[tuple(SHAPES)] = Field(description="form of the cavity")  # type: ignore[valid-type]
+
+
+def design_class(data: Mapping[str, Any]) -> type[Design]:
+    """The class of designs whose chamber has the shape that the data name."""
+    chamber = data.get("chamber")
+    name = chamber.get("shape") if isinstance(chamber, Mapping) else getattr(chamber, "shape", None)
+    return _designs_with(SHAPES.get(name, AnyShape) if isinstance(name, str) else AnyShape)
+
+
+@cache
+def _designs_with(table: type[ChamberTable]) -> type[Design]:
+    chamber = (table, Field(description="the cavity before the part is taken out of it"))
+    return create_model("Design", __base__=Design, __doc__=Design.__doc__, chamber=chamber)
 
 
 Table = TypeVar("Table", bound=BaseModel)
@@ -280,5 +299,6 @@ def checked(
             data, context={"folder": path.parent if path else Path(), "needs_mesh": path and mesh_must_exist}
         )
     except ValidationError as error:
-        problems = diagnosis.from_validation(error, model)
+        shown: type[BaseModel] = design_class(data) if model is Design else model
+        problems = diagnosis.from_validation(error, shown)
         raise InputError(diagnosis.message(problems, path, source)) from None

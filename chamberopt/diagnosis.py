@@ -81,13 +81,21 @@ def not_found(path: Path, what: str, pattern: str) -> str:
     return f"{path}: no such {what}; in {folder} there is {', '.join(there[:8]) or 'none'}"
 
 
-def numeric_fields(model: type[BaseModel], prefix: str = "") -> Iterator[tuple[str, FieldInfo]]:
-    """Dotted name and field of every number in a model; lists of numbers by index: part.offset_mm.0."""
+def numeric_fields(table: BaseModel | type[BaseModel], prefix: str = "") -> Iterator[tuple[str, FieldInfo]]:
+    """Dotted name and field of every number in a table; those of lists by index: part.offset_mm.0.
+
+    Of a class, what its tables can hold; of an instance, the tables of its lists too.
+    """
+    model = table if isinstance(table, type) else type(table)
     for name, field in model.model_fields.items():
         kinds = _kinds(field.annotation)
-        table = _table(field)
-        if table is not None:
-            yield from numeric_fields(table, f"{prefix}{name}.")
+        value = None if isinstance(table, type) else getattr(table, name)
+        inner = value if isinstance(value, BaseModel) else _table(field)
+        if isinstance(value, tuple) and value and isinstance(value[0], BaseModel):
+            for i, item in enumerate(value):
+                yield from numeric_fields(item, f"{prefix}{name}.{i}.")
+        elif inner is not None:
+            yield from numeric_fields(inner, f"{prefix}{name}.")
         elif float in kinds or int in kinds:
             yield f"{prefix}{name}", field
         else:

@@ -16,10 +16,12 @@ REFERENCE, DESIGNED = "reference", "as designed"
 
 def knobs(design: Design) -> dict[str, tuple[Any, ...]]:
     """Settings of every knob, by dotted name; the last is the reference's."""
-    accuracy, facets = design.process.accuracy, design.chamber.facets
+    accuracy, facets = design.process.accuracy, getattr(design.chamber, "facets", None)
     warm, floor, piece = accuracy.warmup_time_s, accuracy.elastic_below_mm_s, accuracy.drag_piece_ms
-    ladder: dict[str, tuple[Any, ...]] = {
-        FACETS: tuple(sorted({16, facets, min(1024, max(256, 4 * facets))})),
+    ladder: dict[str, tuple[Any, ...]] = {}
+    if facets is not None:
+        ladder[FACETS] = tuple(sorted({16, facets, min(1024, max(256, 4 * facets))}))
+    ladder |= {
         MOTION: ("random_phase", "sinusoidal"),
         WARM_UP: tuple(sorted({0.0, warm / 4, warm, min(1e4, 4 * max(warm, 0.05))})),
         FLOOR: tuple(sorted({min(1e3, 10 * floor), floor, max(0.1, floor / 10)}, reverse=True)),

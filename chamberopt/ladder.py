@@ -30,6 +30,7 @@ from chamberopt.rungs import Pool, Rung, dents_alone
 
 if TYPE_CHECKING:
     from chamberopt.chamber import Chamber
+    from chamberopt.shapes import ChamberTable
     from sim_core import TriangleMesh
 
 LEAST_ROUNDS = 3  # fewer replicas of a rung have no interval
@@ -86,13 +87,13 @@ def climb(
     require_budget(budget_s)
     started = time.perf_counter()
     settings, ladder = designs(design)
-    shapes: dict[int, tuple[Chamber, TriangleMesh]] = {}
+    shapes: dict[ChamberTable, tuple[Chamber, TriangleMesh]] = {}
     pools = {}
     for key, one in ladder.items():
-        if one.chamber.facets not in shapes:
+        if one.chamber not in shapes:
             chamber = build_chamber(one)
-            shapes[one.chamber.facets] = chamber, chamber_mesh(chamber)
-        pools[key] = Pool(one, *shapes[one.chamber.facets])
+            shapes[one.chamber] = chamber, chamber_mesh(chamber)
+        pools[key] = Pool(one, *shapes[one.chamber])
         ready(one, pools[key].chamber)
     reference, *others = pools.values()
     rounds, spent = 0, 0.0

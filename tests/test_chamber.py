@@ -10,7 +10,6 @@ import trimesh
 from chamberopt.chamber import TAG_PART, TAG_SONOTRODE, TAG_WALL, Chamber, Part, build_chamber
 from chamberopt.config import Design, load_design
 from chamberopt.errors import InputError
-from chamberopt.shapes import shape_surface
 from chamberopt.solids import solid
 from chamberopt.triangles import area_vectors, areas, heights
 
@@ -43,14 +42,15 @@ def box(size: tuple[float, float, float], at: tuple[float, float, float] = (0, 0
 
 def overlap(design: Design, chamber: Chamber) -> float:
     """Volume [m³] that the part and the whole shape have in common."""
-    shape = shape_surface(design)
+    shape = design.chamber.surface(chamber.part.vertices, chamber.part.triangles)
     part = solid(chamber.part.vertices, chamber.part.triangles, "part")
     return (solid(shape.vertices, shape.triangles, "shape").body ^ part.body).volume() * 1e-9
 
 
 def shape_volume(design: Design) -> float:
     """Volume [m³] of the whole shape, its corners on the grid: within 0.5 nm of the prism over a polygon."""
-    shape, chamber = shape_surface(design), design.chamber
+    chamber = design.chamber
+    shape = chamber.surface(np.zeros((0, 3)), np.zeros((0, 3), dtype=int))
     volume = solid(shape.vertices, shape.triangles, "shape").volume
     polygon = chamber.facets / 2 * (chamber.diameter / 2) ** 2 * np.sin(2 * np.pi / chamber.facets)
     assert volume == pytest.approx(polygon * chamber.height, rel=4e-9 / chamber.diameter + 2e-9 / chamber.height)

@@ -1,0 +1,60 @@
+"""What the chamber table of a design holds, whatever the shape: one class a shape, each in a file of its own."""
+
+import math
+from abc import abstractmethod
+
+import numpy as np
+from pydantic import BaseModel, Field
+
+from chamberopt.fields import quantity
+from chamberopt.materials import STRICT
+from chamberopt.shapes.surface import ShapeSurface
+
+
+class ChamberTable(BaseModel):
+    """A cavity before the part is taken out of it; its floor is the sonotrode, at z = 0.
+
+    A shape is a subclass with keys of its own, in the file's units, and ``surface``.
+    """
+
+    model_config = STRICT
+
+    shape: str = Field(description="form of the cavity")
+    sonotrode_distance_mm: float = quantity(0.1, 2000, "mm", "mean sonotrode face to lowest point of the part")
+
+    @property
+    def sonotrode_distance(self) -> float:
+        """Mean sonotrode face to lowest point of the part [m]."""
+        return self.sonotrode_distance_mm * 1e-3
+
+    @abstractmethod
+    def surface(self, vertices: np.ndarray, triangles: np.ndarray) -> ShapeSurface:
+        """The closed surface of the cavity, without the part; vertices (n, 3) m and triangles (m, 3) are the part as
+        it stands in it, for shapes that follow it. Raises InputError for values that make no cavity.
+        """
+
+    def widths_mm(self) -> dict[str, float]:
+        """Inner widths [mm] by the key that sets them: no ball wider than the least of them fits."""
+        return {}
+
+    def room(self) -> float:
+        """A volume [m³] that the cavity does not exceed, as far as the table alone says."""
+        return math.inf
+
+
+class ParametricChamber(ChamberTable):
+    """A cavity made from its parameters: floor, sides that may lean, flat ceiling."""
+
+    height_mm: float = quantity(2, 2000, "mm", "inner height, sonotrode to ceiling")
+    inclination_deg: float = quantity(-45, 45, "degrees", "of the side walls: above 0 wider at the ceiling", 0.0)
+    facets: int = Field(default=64, ge=8, le=1024, description="flat sides that stand for a full turn of a round wall")
+
+    @property
+    def height(self) -> float:
+        """Inner height [m]."""
+        return self.height_mm * 1e-3
+
+    @property
+    def lean(self) -> float:
+        """How far the side walls go outward over the height [m]."""
+        return self.height * math.tan(math.radians(self.inclination_deg))
