@@ -26,14 +26,11 @@ from chamberopt import diagnosis
 from chamberopt.diagnosis import CrossCheckError, Problem
 from chamberopt.effects import Effects
 from chamberopt.errors import InputError
-from chamberopt.fields import Pair, Triple, listed, quantity
+from chamberopt.fields import Pair, Triple, Unit, listed, quantity
 from chamberopt.materials import STRICT, Materials
 from chamberopt.shapes import SHAPES, ChamberTable
 from chamberopt.shot import Shot
 from chamberopt.treatment import Process
-
-Unit = Literal["um", "mm", "cm", "m", "in", "guess"]
-METRES_PER: dict[str, float] = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
 
 
 class Target(BaseModel):

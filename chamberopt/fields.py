@@ -1,12 +1,16 @@
 """The kinds of numbers a file holds, with what is shown when one is wrong."""
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
 # TOML has lists only: these two become tuples at the door, their numbers stay strict.
 Pair = Annotated[tuple[float, float], Field(strict=False)]
 Triple = Annotated[tuple[float, float, float], Field(strict=False)]
+
+
+Unit = Literal["um", "mm", "cm", "m", "in", "guess"]
+METRES_PER: dict[str, float] = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
 
 
 def quantity(low: float, high: float, unit: str, what: str, default: Any = ...) -> Any:

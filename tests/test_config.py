@@ -329,7 +329,7 @@ class TestWrongDesigns:
             ),
             (("amplitude_um = 25", "amplitude_um = 25\n[effects]\nfriction = 0.3"), "effects.friction: given 0.3"),
             (("mass_g = 3.308", "mass_g = 400"), "fill 65% of the chamber; at most 50 %"),
-            (("diameter_mm = 50", "diameter_mm = 2.5"), "does not fit a chamber 2.5 mm wide"),
+            (("diameter_mm = 50", "diameter_mm = 2.5"), "does not fit a chamber with chamber.diameter_mm = 2.5"),
         ],
     )
     def test_contradictions(self, design_file: Path, change: tuple[str, str], said: str | None) -> None:

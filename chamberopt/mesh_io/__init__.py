@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from chamberopt.design import METRES_PER
 from chamberopt.errors import InputError
+from chamberopt.fields import METRES_PER
 from chamberopt.mesh_io.crossings import refuse_crossings
 from chamberopt.mesh_io.faults import SurfaceError, box_text, place_text
 from chamberopt.mesh_io.formats import FORMATS, read_raw

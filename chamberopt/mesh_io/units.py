@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from chamberopt.design import METRES_PER
 from chamberopt.errors import InputError
+from chamberopt.fields import METRES_PER
 from chamberopt.mesh_io.faults import box_text
 
 SMALLEST, LARGEST = 5e-4, 3.0  # m, longest side of the bounding box: a part that can be peened in a chamber
