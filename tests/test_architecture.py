@@ -29,7 +29,7 @@ CHAMBEROPT_ORDER = (
     ("figures", "replicas"),
     ("accuracy",),
     ("advice", "dent_rungs", "knobs", "ladder", "price", "rungs"),
-    ("executor", "history", "progress", "surrogate"),
+    ("executor", "history", "progress", "search", "surrogate"),
     ("candidates",),
     ("study",),
     ("pictures", "viewer"),
@@ -62,7 +62,7 @@ SIM_CORE_ORDER = (
 ORDER = {"chamberopt": CHAMBEROPT_ORDER, "sim_core": SIM_CORE_ORDER}
 # Package fronts gather names for users and may import everything below them.
 FRONTS = {"chamberopt/__init__.py", "sim_core/__init__.py"}
-ONE_DOOR = {"manifold3d": "solids.py", "nlopt": "study.py", "pyvista": "viewer.py", "vtk": "viewer.py"}
+ONE_DOOR = {"manifold3d": "solids.py", "nlopt": "search.py", "pyvista": "viewer.py", "vtk": "viewer.py"}
 # VTK's file readers alone, which need no OpenGL.
 ONE_DOOR["vtkmodules"] = "mesh_io/vtk_files.py"
 

@@ -14,7 +14,8 @@ from chamberopt.executor import SerialExecutor, local_executor
 from chamberopt.history import as_csv, read_history
 from chamberopt.objective import METRICS
 from chamberopt.results import load_result, write_study
-from chamberopt.study import maximise, run_study
+from chamberopt.search import maximise
+from chamberopt.study import run_study
 from chamberopt.surrogate import recommend
 from tests.synthetic import DESIGNS, judged, plate_design
 
