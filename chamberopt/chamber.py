@@ -9,7 +9,7 @@ Frame: metres, z up, mean sonotrode face at z = 0, chamber axis x = y = 0.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +17,7 @@ import numpy as np
 from chamberopt.errors import InputError
 from chamberopt.mesh_io import box_text
 from chamberopt.part import Part, posed_part, turning_axis
+from chamberopt.reach import part_share, reach
 from chamberopt.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL, ShapeSurface
 from chamberopt.slivers import THINNEST, without_slivers
 from chamberopt.solids import Solid, Surface, cavities, solid, subtract, united
@@ -25,6 +26,7 @@ from chamberopt.triangles import area_vectors, areas, shells_of, tetrahedron_vol
 if TYPE_CHECKING:
     from chamberopt.config import Design
 
+KEPT = "target.reachable: the target is what the shot reaches in the study's start"
 CROOKED = 1e-3  # rad: turns a ball's path by less than the facets of a round wall do, by a hundred times
 
 __all__ = ["TAG_PART", "TAG_SONOTRODE", "TAG_WALL", "Chamber", "Part", "build_chamber", "turning_axis"]
@@ -55,13 +57,15 @@ class Chamber:
         return float(self.vertices[:, 2].max())
 
 
-def build_chamber(design: Design) -> Chamber:
+def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
     """The chamber of a design.
 
+    ``target`` (m,) bool takes the place of the target that the design chooses: a study keeps that of its start.
     Raises InputError when the part's mesh cannot be used, when the part is outside the cavity or touches the
     sonotrode, when nothing of the target faces the shot, or when the part leaves no room over the sonotrode.
     """
     part, notes = posed_part(design)
+    part = part if target is None else replace(part, target=target)
     shape = design.chamber.surface(part.vertices, part.triangles)
     _refuse_misplaced(part, shape.vertices, design)
 
@@ -79,6 +83,9 @@ def build_chamber(design: Design) -> Chamber:
     tags = np.where(on_part, TAG_PART, shape.tags[np.where(on_part, 0, room.source)]).astype(np.uint8)
     source = np.where(on_part, room.source, -1).astype(np.int32)
     exposed = np.bincount(source[on_part], areas(room.vertices, room.triangles)[on_part], len(part.triangles))
+    if design.part.target.reachable:
+        part, told = _only_reachable(part, room, tags, source, design) if target is None else (part, KEPT)
+        notes.append(told)
     notes += _hidden_target_note(part, exposed)
     notes += room_notes + _crooked_note(room, on_part, part, shape) + _hold_note(room, on_part, part.name)
     volume = float(tetrahedron_volumes(room.vertices, room.triangles).sum())
@@ -146,6 +153,28 @@ def _room_over_sonotrode(whole: Surface, shell: Solid, shape: ShapeSurface) -> t
     if top < shape.vertices[:, 2].max() - THINNEST:
         notes.append(f"the part closes the chamber at z = {1e3 * top:.4g} mm: more chamber.height_mm has no effect")
     return room, notes
+
+
+def _only_reachable(
+    part: Part, room: Surface, tags: np.ndarray, source: np.ndarray, design: Design
+) -> tuple[Part, str]:
+    """The part with what the shot can touch of its target, and a note on the rest. InputError when that is all."""
+    from sim_core import TriangleMesh
+
+    ball = min(design.shot.diameters)
+    mesh = TriangleMesh(room.vertices, room.triangles, tags)
+    target = part.target & (part_share(reach(mesh, ball), source, len(part.triangles)) > 0.5)
+    if not target.any():
+        raise InputError(
+            f"part.target.reachable: a ball of {1e3 * ball:g} mm touches nothing of the target; use smaller balls, "
+            "check part.rotate_deg, or leave it out: check says what is in the way"
+        )
+    whole, left = part.area[part.target].sum(), part.area[part.target & ~target].sum()
+    return replace(part, target=target), (
+        f"target.reachable: {left / whole:.1%} of the target ({1e6 * left:.3g} mm²) is left out, where a ball of "
+        f"{1e3 * ball:g} mm from over the sonotrode touches less than half of a triangle; a study keeps this "
+        "target for all its candidates"
+    )
 
 
 def _hidden_target_note(part: Part, exposed: np.ndarray) -> list[str]:

@@ -7,32 +7,37 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.chamber import TAG_PART, TAG_SONOTRODE, TAG_WALL, turning_axis
+from chamberopt.gaps import gap_warnings, pocket_warnings, target_warnings
 from chamberopt.groups import free_path
 from chamberopt.ledges import ledges
+from chamberopt.places import CEILING, SIDE_WALL, on_target, surface_names
 from chamberopt.process import chamber_mesh, require_countable, require_turnable
-from chamberopt.shapes.cylinder import Cylinder
+from chamberopt.reach import Reach, reach
 from chamberopt.shapes.surface import ShapeSurface
-from chamberopt.slivers import THINNEST
-from chamberopt.triangles import area_vectors, tetrahedron_volumes
+from chamberopt.triangles import areas, tetrahedron_volumes
 
 if TYPE_CHECKING:
     from chamberopt.chamber import Chamber
     from chamberopt.config import Design
+    from sim_core import TriangleMesh
 
 # Above this share of the free volume the shot is a shaken bed rather than a gas: few balls reach the part,
 # and event-driven simulation slows down, because collisions crowd.
 CROWDED = 0.3
+CLEAR_AMPLITUDES = 10.0  # between part and sonotrode, as a design's sonotrode_distance_mm has to have
 THIN = 10.0  # chamber heights between two meetings of a ball: from there on few dents come from balls that met
 
 
-def describe(design: Design, chamber: Chamber) -> dict[str, Any]:
+def describe(design: Design, chamber: Chamber, found: Reach | None = None) -> dict[str, Any]:
     """Facts and warnings on a design and its chamber, as plain JSON values; units are in the names.
 
-    Raises InputError when the shot has more balls than can be simulated, or the part cannot turn as asked.
+    ``found``: its `shot_reach`, if it is known. Raises InputError when the shot has more balls than can be simulated,
+    or the part cannot turn as asked; sim_core.SceneError, with the place, for a cavity that leaks.
     """
     require_countable(design)
+    found = shot_reach(design, chamber) if found is None else found
     if design.effects.part_turn is not None:
-        require_turnable(design, chamber_mesh(chamber))
+        require_turnable(design, found.mesh)
     part, shot, process = chamber.part, design.shot, design.process
     exposed = chamber.exposed_area > 0.0
     box = part.vertices.max(axis=0) - part.vertices.min(axis=0)
@@ -58,6 +63,8 @@ def describe(design: Design, chamber: Chamber) -> dict[str, Any]:
             "shape": design.chamber.shape,
             "shape_volume_cm3": _rounded(float(tetrahedron_volumes(shape.vertices, shape.triangles).sum()) * 1e6),
             "free_volume_cm3": _rounded(chamber.volume * 1e6),
+            "closed": "yes",  # what leaks has been refused above
+            "sonotrode_clearance_mm": _rounded(sonotrode_clearance(found.mesh) * 1e3),
             "part_triangles": int((chamber.tags == TAG_PART).sum()),
             "sonotrode_triangles": int((chamber.tags == TAG_SONOTRODE).sum()),
             "wall_triangles": int((chamber.tags == TAG_WALL).sum()),
@@ -70,14 +77,21 @@ def describe(design: Design, chamber: Chamber) -> dict[str, Any]:
             "mass_g": _rounded(shot.count * shot.ball_mass * 1e3),
             "packing_fraction": _rounded(shot.volume / chamber.volume),
         },
+        "reach": _reach_facts(found, chamber),
         "simulated_time_s": _rounded(simulated),
         "notes": [*chamber.notes, *(ledge.said for ledge in ledges(design, chamber) if not ledge.level)],
-        "warnings": warnings(design, chamber),
+        "warnings": warnings(design, chamber, found),
     }
 
 
-def warnings(design: Design, chamber: Chamber) -> list[str]:
-    """What is allowed but probably not meant, each with what to do."""
+def shot_reach(design: Design, chamber: Chamber) -> Reach:
+    """What the shot can reach; a part that turns, where it is drawn. A second or two."""
+    return reach(chamber_mesh(chamber), min(design.shot.diameters), design.shot.diameter)
+
+
+def warnings(design: Design, chamber: Chamber, found: Reach | None = None) -> list[str]:
+    """What is allowed but probably not meant, each with what to do; ``found``: its `shot_reach`, if it is known."""
+    found = shot_reach(design, chamber) if found is None else found
     shot, said = design.shot, []
     ball = shot.diameter
     filled = shot.volume / chamber.volume
@@ -104,21 +118,29 @@ def warnings(design: Design, chamber: Chamber) -> list[str]:
             f"{recorded:.3g} s: coverage is that of some of its positions only; "
             "raise process.accuracy"
         )
-    caught = "no ball gets in there" if turn is None else "a ball may be jammed there as the part turns"
-    for place, gap, remedy in _gaps(design, chamber):
-        if 0.0 < gap < ball:
-            said.append(
-                f"the gap between {place} is {gap * 1e3:.3g} mm, narrower than a ball of "
-                f"{ball * 1e3:g} mm: {caught}; {remedy}"
-            )
+    said += _sonotrode_warnings(design, found.mesh)
+    said += target_warnings(found, chamber, design.part.target.reachable) + pocket_warnings(found, chamber)
+    said += gap_warnings(found, chamber, ball, turns=turn is not None)
     crossing = _through_side_wall(design, chamber)
     if crossing is not None:
         low, high = crossing
         said.append(
             f"the part goes out through the side wall between z = {1e3 * low:.4g} and {1e3 * high:.4g} mm: what is "
-            "outside is not peened; raise chamber.diameter_mm, or check part.offset_mm"
+            "outside is not peened; enlarge the chamber (chamber.diameter_mm), or check part.offset_mm"
         )
     return said + [ledge.said for ledge in ledges(design, chamber) if ledge.level]
+
+
+def _reach_facts(found: Reach, chamber: Chamber) -> dict[str, Any]:
+    """How much of target and part the smallest balls can touch, of what is in the chamber."""
+    own = {"target": on_target(chamber), "part": chamber.tags == TAG_PART}
+    size = areas(chamber.vertices, chamber.triangles)
+    facts: dict[str, Any] = {"ball_mm": _rounded(found.diameter * 1e3)}
+    for name, rows in own.items():
+        touched = float((found.share * size)[rows].sum())
+        facts[f"{name}_reachable_mm2"] = _rounded(touched * 1e6)
+        facts[f"{name}_reachable_share"] = _rounded(touched / size[rows].sum())
+    return facts
 
 
 def _turn(design: Design) -> dict[str, Any]:
@@ -144,42 +166,52 @@ def _through_side_wall(design: Design, chamber: Chamber) -> tuple[float, float] 
 
     Not asked of a part that closes the chamber like a lid, nor of one that turns: its joint is a round shaft.
     """
-    if design.effects.part_turn is not None or chamber.height < _shape(design, chamber).vertices[:, 2].max() - THINNEST:
+    names = surface_names(chamber)
+    if design.effects.part_turn is not None or not (names == CEILING).any():
         return None
     edges = chamber.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    normal = area_vectors(chamber.vertices, chamber.triangles)
-    upright = np.abs(normal[:, 2]) < 0.5 * np.linalg.norm(normal, axis=1)
     own = np.repeat(chamber.tags == TAG_PART, 3)
-    beside = np.repeat((chamber.tags == TAG_WALL) & upright, 3)
+    beside = np.repeat(names == SIDE_WALL, 3)
     of_part, of_wall = ({tuple(edge) for edge in np.sort(edges[rows]).tolist()} for rows in (own, beside))
     height = chamber.vertices[np.array(sorted(of_part & of_wall), dtype=int).reshape(-1, 2), 2]
     return (float(height.min()), float(height.max())) if height.size else None
 
 
-def _gaps(design: Design, chamber: Chamber) -> list[tuple[str, float, str]]:
-    """Clear widths [m] between the part and the walls; 0 where they touch.
+def _sonotrode_warnings(design: Design, mesh: TriangleMesh) -> list[str]:
+    """What the sonotrode, or a ball on it, may hit."""
+    amplitude, ball = design.sonotrode.amplitude, design.shot.diameter
+    remedy = "raise chamber.sonotrode_distance_mm"
+    clear, turn = sonotrode_clearance(mesh), design.effects.part_turn
+    if clear < CLEAR_AMPLITUDES * amplitude:
+        return [
+            f"part and sonotrode are only {1e3 * clear:.3g} mm apart, less than ten amplitudes of "
+            f"{1e6 * amplitude:g} µm: they may hit each other; {remedy}"
+        ]
+    if turn is None:
+        return []
+    own = mesh.vertices[mesh.triangles[mesh.tags == TAG_PART]].reshape(-1, 3)
+    below = _lowest_on_its_way(design, own, turn.swing) - amplitude
+    if not 0.0 < below < ball:
+        return []
+    return [
+        f"the gap between turning part and sonotrode is {below * 1e3:.3g} mm, narrower than a ball of "
+        f"{ball * 1e3:g} mm: a ball may be jammed there as the part turns; {remedy}"
+    ]
 
-    A Design has room for a ball over its sonotrode where the part is put, but it may turn down into that.
-    """
-    corners = chamber.vertices[chamber.triangles]  # (k, 3, 3)
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    upwards = normal[:, 2] < -0.5 * np.linalg.norm(normal, axis=1)  # out of the cavity is into the part
-    part = chamber.tags == TAG_PART
-    gaps = []
-    if isinstance(design.chamber, Cylinder):
-        apothem = design.chamber.diameter / 2.0 * np.cos(np.pi / design.chamber.facets)
-        reach = np.hypot(*corners[part].reshape(-1, 3)[:, :2].T).max()
-        remedy = "raise chamber.diameter_mm or check part.offset_mm"
-        gaps.append(("part and side wall", max(0.0, apothem - reach), remedy))
-    turn = design.effects.part_turn
-    if turn is not None:
-        lowest = _lowest_on_its_way(design, corners[part].reshape(-1, 3), turn.swing)
-        below = max(0.0, lowest - design.sonotrode.amplitude)
-        gaps.append(("turning part and sonotrode", below, "raise chamber.sonotrode_distance_mm"))
-    if (part & upwards).any():
-        above = chamber.height - corners[part & upwards][..., 2].max()
-        gaps.append(("part and ceiling", max(0.0, above), "raise chamber.height_mm or close the gap"))
-    return gaps
+
+def sonotrode_clearance(mesh: TriangleMesh) -> float:
+    """Least distance [m] from a corner of the part to the sonotrode, or the other way; inf without one of them."""
+    from sim_core import nearest
+
+    if not ((mesh.tags == TAG_PART).any() and (mesh.tags == TAG_SONOTRODE).any()):
+        return float("inf")
+    whole = float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
+    ways = ((TAG_PART, TAG_SONOTRODE), (TAG_SONOTRODE, TAG_PART))
+    corners = (np.unique(mesh.triangles[mesh.tags == one]) for one, _ in ways)
+    return min(
+        float(nearest(mesh, mesh.vertices[these], whole, other).distance.min())
+        for these, (_, other) in zip(corners, ways, strict=True)
+    )
 
 
 def _lowest_on_its_way(design: Design, points: np.ndarray, swing: float | None) -> float:

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from chamberopt.config import Design
     from chamberopt.estimate import Estimate
     from chamberopt.mesh_io import SurfaceError
+    from chamberopt.reach import Reach
 
 app = App(
     name="chamberopt",
@@ -57,7 +58,7 @@ def check(
         Write a picture (.png) of the part with its target, or of what is wrong with its surface.
     """
     from chamberopt.chamber import build_chamber
-    from chamberopt.checkup import describe
+    from chamberopt.checkup import describe, shot_reach
     from chamberopt.config import Study, load
     from chamberopt.disk import new_folder, write_text
     from chamberopt.mesh_io import SurfaceError
@@ -70,9 +71,10 @@ def check(
         if screenshot is not None:
             _picture_of_fault(fault, screenshot)
         raise
-    facts = describe(design, chamber)
+    found = shot_reach(design, chamber)
+    facts = describe(design, chamber, found)
     if screenshot is not None:
-        _picture_of_target(chamber, screenshot)
+        _picture_of_target(chamber, found, screenshot)
     if isinstance(loaded, Study):
         facts["vary"] = {
             name: {"low": low, "start": design.value(name), "high": high} for name, (low, high) in loaded.vary.items()
@@ -176,7 +178,7 @@ def run(study: Path, /, *, json: Json = False, out: Out = None) -> None:
         with local_executor() as executor, progress_bar("evaluations") as progress:
             result = run_study(question, folder, executor, progress)
         _remark(write_study(folder, result, advice))
-    _warn(result.best.design, build_chamber(result.best.design))
+    _warn(result.best.design, build_chamber(result.best.design, result.target))
     lines = [f"{'parameter':34}{'start':>12}{'best':>12}"]
     lines += [
         f"{name:34}{question.design.value(name):12.5g}{result.best.design.value(name):12.5g}" for name in question.vary
@@ -276,12 +278,16 @@ def _picture_of_fault(fault: SurfaceError, screenshot: Path) -> None:
     _remark([part_picture(fault.corners, text, screenshot, edges=fault.edges) or f"picture in {screenshot}"])
 
 
-def _picture_of_target(chamber: Chamber, screenshot: Path) -> None:
+def _picture_of_target(chamber: Chamber, found: Reach, screenshot: Path) -> None:
+    """The part with its target, and what of it the shot does not reach."""
+    from chamberopt.reach import part_share
     from chamberopt.viewer import part_picture
 
-    part, title = chamber.part, f"{chamber.part.name}: the target in orange"
+    part = chamber.part
+    missed = part.target & (part_share(found, chamber.source, len(part.triangles)) <= 0.5)
+    title = f"{part.name}: the target in orange" + (", in red where hardly a ball can touch it" if missed.any() else "")
     corners = part.vertices[part.triangles]
-    _remark([part_picture(corners, title, screenshot, marked=part.target) or f"picture in {screenshot}"])
+    _remark([part_picture(corners, title, screenshot, part.target, missed=missed) or f"picture in {screenshot}"])
 
 
 def _compile(design: Design, chamber: Chamber) -> None:

@@ -60,6 +60,7 @@ class Target(BaseModel):
     element_mm: float | None = quantity(
         0.01, 1000, "mm", "wished side of the target's triangles; absent: the file's", None
     )
+    reachable: bool = Field(default=False, description="only what a ball can touch, in the design's own chamber")
 
     @field_validator("surface", mode="before")
     @classmethod

@@ -91,7 +91,8 @@ def climb(
     pools = {}
     for key, one in ladder.items():
         if one.chamber not in shapes:
-            chamber = build_chamber(one)
+            first = next(iter(shapes.values()), None)
+            chamber = build_chamber(one, first and first[0].part.target)
             shapes[one.chamber] = chamber, chamber_mesh(chamber)
         pools[key] = Pool(one, *shapes[one.chamber])
         ready(one, pools[key].chamber)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from chamberopt.chamber import TAG_PART, TAG_WALL
+from chamberopt.places import around, mm2
 from chamberopt.triangles import area_vectors
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ def ledges(design: Design, chamber: Chamber) -> list[Ledge]:
             continue
         level = bool(area[faces & flat].sum() >= cross_section)
         shown = faces & flat if level else faces  # where balls lie, rather than roll off
-        much = _mm2(area[shown].sum())
+        much = mm2(area[shown].sum())
         where, how = ("on", f"{much} of it are level") if level else ("in hollows of", f"{much} face up, none level")
         found.append(
             Ledge(
@@ -58,12 +59,7 @@ def ledges(design: Design, chamber: Chamber) -> list[Ledge]:
 
 
 def _place(chamber: Chamber, faces: np.ndarray, area: np.ndarray) -> str:
-    corners = 1e3 * chamber.vertices[chamber.triangles[faces]]
-    middle = np.average(corners.mean(axis=1), axis=0, weights=area[faces])
-    low, high = corners[..., 2].min(), corners[..., 2].max()
+    corners = chamber.vertices[chamber.triangles[faces]]
+    low, high = 1e3 * corners[..., 2].min(), 1e3 * corners[..., 2].max()
     heights = f"z = {low:.4g} mm" if high - low < 0.01 else f"z = {low:.4g} to {high:.4g} mm"
-    return f"around ({', '.join(f'{x:.1f}' for x in np.round(middle, 1) + 0.0)}) mm, at {heights}"
-
-
-def _mm2(area: float) -> str:
-    return f"{float(f'{1e6 * area:.3g}'):g} mm²"
+    return f"around {around(corners.mean(axis=1), area[faces])}, at {heights}"

@@ -83,11 +83,13 @@ def write_study(folder: str | Path, study_result: StudyResult, advice: Sequence[
     start, best = study_result.start, study_result.best
     save_design(best.design, folder / "best.toml")
     write_text(folder / "history.csv", as_csv(read_history(folder)))
-    about = _write_candidate(folder, best.design, build_chamber(best.design), best.evaluation)
+    target = study_result.target
+    about = _write_candidate(folder, best.design, build_chamber(best.design, target), best.evaluation)
     _write_json(folder, {"kind": "study", **about, "study": _about_study(study_result), **_chosen(advice)})
     (folder / "start").mkdir(exist_ok=True)
     save_design(start.design, folder / "start" / "design.toml")
-    about = _write_candidate(folder / "start", start.design, build_chamber(start.design), start.evaluation)
+    chamber = build_chamber(start.design, target)
+    about = _write_candidate(folder / "start", start.design, chamber, start.evaluation)
     _write_json(folder / "start", {"kind": "simulation", **about})
     convergence_picture(folder / "convergence.png", study_result)
     remarks = _picture([folder], [best.evaluation], ["best design"], folder / "coverage.png")

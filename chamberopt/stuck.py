@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.chamber import TAG_PART, TAG_SONOTRODE
-from chamberopt.triangles import area_vectors
+from chamberopt.chamber import TAG_PART
+from chamberopt.places import around, surface_names
 
 if TYPE_CHECKING:
     from chamberopt.chamber import Chamber
     from sim_core import Resting
 
-STEEP = 0.5  # cosine to the vertical: what is steeper than 60 degrees is a side, neither top nor underside
 TOUCHES = 2e-5  # m: a ball held still is this near to what holds it, or nearer
 ONE_PLACE = 3.0  # diameters: balls nearer to each other than that lie in one place
 MOST_PLACES = 3  # named, those with most balls first
@@ -40,7 +39,7 @@ def still(resting: Resting, balls: int, diameter: float, chamber: Chamber, part_
     """
     if len(resting) == 0:
         return None
-    surfaces = _surfaces(chamber)
+    surfaces = surface_names(chamber)
     kinds = [_kind(resting, i, surfaces, chamber, 0.5 * diameter, part_turns) for i in range(len(resting))]
     places = _places(resting, _inherited(resting, kinds), diameter)
     said = [_said(resting, members, kind) for kind, members in places[:MOST_PLACES]]
@@ -82,18 +81,6 @@ def stuck_notes(stuck: list[Stuck], replicas: int) -> tuple[str, ...]:
 
 def _percent(share: float) -> str:
     return f"{100.0 * share:.2g} %"
-
-
-def _surfaces(chamber: Chamber) -> np.ndarray:
-    """What a designer calls each triangle, (k,) of str."""
-    normal = -area_vectors(chamber.vertices, chamber.triangles)  # to the shot
-    size = np.linalg.norm(normal, axis=1)
-    up = np.divide(normal[:, 2], size, out=np.zeros_like(size), where=size > 0.0)
-    on_part = np.select([up > STEEP, up < -STEEP], ["the part's upper side", "the part's underside"], "the part's side")
-    on_wall = np.select([up > STEEP, up < -STEEP], ["a ledge of the wall", "the ceiling"], "the wall")
-    words = np.where(chamber.tags == TAG_PART, on_part, on_wall).astype(object)
-    words[chamber.tags == TAG_SONOTRODE] = "the sonotrode"
-    return words
 
 
 def _kind(resting: Resting, i: int, surfaces: np.ndarray, chamber: Chamber, radius: float, part_turns: bool) -> str:
@@ -154,7 +141,7 @@ def _places(resting: Resting, kinds: list[str], diameter: float) -> list[tuple[s
 
 
 def _said(resting: Resting, members: np.ndarray, kind: str) -> str:
-    where = ", ".join(f"{x:.1f}" for x in np.round(1e3 * resting.position[members].mean(axis=0), 1) + 0.0)
+    where = around(resting.position[members])
     if len(members) == 1:
-        return f"1 {kind} at ({where}) mm, since {resting.since[members[0]]:.2f} s"
-    return f"{len(members)} {kind} around ({where}) mm, the longest since {resting.since[members].min():.2f} s"
+        return f"1 {kind} at {where}, since {resting.since[members[0]]:.2f} s"
+    return f"{len(members)} {kind} around {where}, the longest since {resting.since[members].min():.2f} s"

@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from chamberopt.accuracy import Evaluation, evaluate
 from chamberopt.candidates import Candidates, Confirmed, Evaluator
 from chamberopt.config import save_design
@@ -27,7 +29,8 @@ class StudyResult:
     """What a study found.
 
     start, best, confirmed: judged on the same fresh seeds · gain: objective of best minus start with its 95 %
-    interval from those paired replicas · trials: search and confirmation, as they ran · seconds: wall clock.
+    interval from those paired replicas · trials: search and confirmation, as they ran · seconds: wall clock ·
+    target (m,) bool: of all candidates, where it is the start's; None where each design's own says it.
     """
 
     study: Study
@@ -39,6 +42,7 @@ class StudyResult:
     best: Confirmed
     gain: Estimate
     seconds: float
+    target: np.ndarray | None = None
 
     @property
     def at_bounds(self) -> tuple[str, ...]:
@@ -80,7 +84,9 @@ def run_study(
     began = time.perf_counter()
     folder = new_folder(folder)
     _save_inputs(study, folder)
-    candidates = Candidates(study, History(folder), evaluator or _simulation(study, executor), progress)
+    target = kept_target(study)
+    evaluator = evaluator or _simulation(study, executor, target)
+    candidates = Candidates(study, History(folder), evaluator, progress)
     settings = study.optimizer
     algorithm = maximise(candidates.score, candidates.start, settings.algorithm, settings.evaluations, settings.seed)
     confirmed = candidates.confirm()
@@ -105,7 +111,23 @@ def run_study(
         best=best,
         gain=paired_difference(best.evaluation.objective, start.evaluation.objective),
         seconds=time.perf_counter() - began,
+        target=target,
     )
+
+
+def kept_target(study: Study) -> np.ndarray | None:
+    """The target (m,) bool of every candidate where it is what the shot reaches: found once, in the start's chamber.
+
+    A search could else shrink what it has to cover. Raises InputError where the study varies the target itself.
+    """
+    from chamberopt.chamber import build_chamber
+
+    if not study.design.part.target.reachable:
+        return None
+    varied = [name for name in study.vary if name.startswith("part.target.")]
+    if varied:
+        raise InputError(f"vary: {varied[0]} with part.target.reachable: not supported; leave one of the two out")
+    return build_chamber(study.design).part.target
 
 
 def _save_inputs(study: Study, folder: Path) -> None:
@@ -117,13 +139,13 @@ def _save_inputs(study: Study, folder: Path) -> None:
     write_text(folder / "study.toml", tomli_w.dumps({"design": "design.toml", **asked}))
 
 
-def _simulation(study: Study, executor: Executor) -> Evaluator:
+def _simulation(study: Study, executor: Executor, target: np.ndarray | None) -> Evaluator:
     """The real thing: chamber, replicas, coverage."""
     from chamberopt.chamber import build_chamber
 
     def simulate_candidate(design: Design, stream: str, replicas: int | None) -> Evaluation:
         began = time.perf_counter()
-        chamber = build_chamber(design)
+        chamber = build_chamber(design, target)
         built = time.perf_counter() - began
         name = study.objective.name
         result = evaluate(design, chamber, executor, objective_name=name, stream=stream, replicas=replicas)

@@ -136,18 +136,22 @@ def part_picture(
     picture: str | Path,
     marked: np.ndarray | None = None,
     edges: np.ndarray | None = None,
+    missed: np.ndarray | None = None,
 ) -> str | None:
     """Draw a part as its file has it into a .png, from two sides; for what is wrong with it, or what its target is.
 
-    corners (m, 3, 3) m · marked (m,) bool: triangles in colour · edges (k, 2, 3) m: drawn red, through the part.
+    corners (m, 3, 3) m · marked (m,) bool: triangles in orange · missed (m,) bool: in red · edges (k, 2, 3) m: drawn
+    red, through the part.
     Returns None, or one line saying why there is no picture. Raises InputError where no such file can be.
     """
     path = _picture_path(picture)
     with tempfile.TemporaryDirectory() as folder:
         part = Path(folder) / "part.npz"
-        marked = np.zeros(len(corners), dtype=bool) if marked is None else marked
+        marked, missed = (
+            np.zeros(len(corners), dtype=bool) if chosen is None else chosen for chosen in (marked, missed)
+        )
         edges = np.zeros((0, 2, 3)) if edges is None else edges
-        np.savez(part, corners=corners * MM, marked=marked, edges=edges * MM)
+        np.savez(part, corners=corners * MM, marked=marked & ~missed, missed=missed, edges=edges * MM)
         return _drawn_apart({"part": str(part), "title": title}, path)
 
 
@@ -229,14 +233,14 @@ def _draw_part(job: dict[str, Any]) -> None:
     """The part's surface from two opposite sides; edges shine through it, where there are any."""
     pyvista = _pyvista()
     with np.load(job["part"]) as data:
-        corners, marked, edges = data["corners"], data["marked"], data["edges"]
+        corners, marked, missed, edges = data["corners"], data["marked"], data["missed"], data["edges"]
     surface = pyvista.PolyData.from_regular_faces(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
     lines = pyvista.line_segments_from_points(edges.reshape(-1, 3)) if len(edges) else None
     plotter = pyvista.Plotter(off_screen=True, shape=(1, 2), window_size=[1800, 900], border=False)
     for column, side in enumerate((1.0, -1.0)):
         plotter.subplot(0, column)
         plotter.set_background(BACKGROUND)
-        for chosen, colour in ((~marked, GREY), (marked, SONOTRODE)):
+        for chosen, colour in ((~(marked | missed), GREY), (marked, SONOTRODE), (missed, FAULT)):
             if chosen.any():
                 plotter.add_mesh(surface.extract_cells(chosen), color=colour, opacity=1.0 if lines is None else 0.35)
         if lines is not None:

@@ -15,6 +15,7 @@ from sim_core.effects.turn import Turn
 from sim_core.effects.vibration import Vibration
 from sim_core.errors import SceneError, SimulationError
 from sim_core.impacts import ImpactLog
+from sim_core.nearest import Nearest, nearest
 from sim_core.packing import pack_balls
 from sim_core.physics import Physics
 from sim_core.resting import Resting, can_rest
@@ -31,6 +32,7 @@ __all__ = [
     "Friction",
     "Gravity",
     "ImpactLog",
+    "Nearest",
     "Physics",
     "RandomPhase",
     "Rest",
@@ -47,6 +49,7 @@ __all__ = [
     "compile_simulator",
     "drag_coefficient",
     "is_compiled",
+    "nearest",
     "pack_balls",
     "require_free_turn",
     "restitution_at",

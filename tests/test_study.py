@@ -7,15 +7,18 @@ import numpy as np
 import pytest
 
 from chamberopt import viewer
+from chamberopt.candidates import FAILED_SCORE
+from chamberopt.chamber import build_chamber
 from chamberopt.config import Limits, Study, load_design, load_study
 from chamberopt.disk import new_folder
 from chamberopt.errors import InputError
 from chamberopt.executor import SerialExecutor, local_executor
 from chamberopt.history import as_csv, read_history
 from chamberopt.objective import METRICS
+from chamberopt.process import require_countable
 from chamberopt.results import load_result, write_study
 from chamberopt.search import maximise
-from chamberopt.study import run_study
+from chamberopt.study import kept_target, run_study
 from chamberopt.surrogate import recommend
 from tests.synthetic import DESIGNS, judged, plate_design
 
@@ -335,3 +338,55 @@ def test_a_draft_that_cannot_be_is_named(draft: dict, said: str) -> None:
 def test_how_well_a_design_is_known_is_none_of_its_choices() -> None:
     with pytest.raises(ValueError, match=r"process\.accuracy\.simulated_time_s.*see \[draft\]"):
         drafted({}, **{"process.accuracy.simulated_time_s": (0.5, 2.0)})
+
+
+@pytest.mark.parametrize(
+    ("vary", "corner", "why"),
+    [
+        ({"chamber.height_mm": (16, 60), "chamber.sonotrode_distance_mm": (2, 44)}, (0, 1), "part would be outside"),
+        ({"shot.diameter_mm": (1, 10), "chamber.sonotrode_distance_mm": (2, 25)}, (1, 0), "no ball fits under"),
+        ({"sonotrode.amplitude_um": (20, 400), "chamber.sonotrode_distance_mm": (2, 25)}, (1, 0), "ten amplitudes"),
+        ({"shot.mass_g": (1, 600), "chamber.height_mm": (16, 60)}, (1, 0), "at most 50 % is allowed"),
+        ({"shot.mass_g": (1, 100), "shot.diameter_mm": (0.9, 3)}, (1, 0), "more than the 20000 supported"),
+    ],
+)
+def test_a_corner_of_the_bounds_that_is_no_design_is_a_penalty_with_the_reason(
+    tmp_path: Path, vary: dict, corner: tuple, why: str
+) -> None:
+    """Each bound alone is a design, not so both together: there the search is drawn to."""
+    low, high = np.array(list(vary.values()), dtype=float).T
+
+    def evaluator(design, stream, replicas):
+        require_countable(design)
+        x = (np.array([design.value(name) for name in vary]) - low) / (high - low)
+        return judged(PEAK - ((x - corner) ** 2).sum() + np.zeros(replicas or 8))
+
+    settings = {"evaluations": 24, "confirm": 1, "confirm_replicas": 8}
+    result = run(Study(design=GEAR, vary=vary, optimizer=settings), tmp_path, evaluator)
+    rows = read_history(tmp_path)
+    failed = [row for row in rows if row["objective"] is None]
+    assert any(why in row["reason"] for row in failed)
+    assert all(row["reason"] and not row["feasible"] and row["score"] == FAILED_SCORE for row in failed)
+    assert len([row for row in rows if row["stage"] == "search"]) == 24
+    assert result.best.feasible
+
+
+def test_every_candidate_has_the_target_that_the_start_can_reach(tmp_path: Path) -> None:
+    """A larger ball would reach, and so have to cover, less of the gear's tooth flanks."""
+    target = GEAR.part.target.model_copy(update={"reachable": True})
+    design = GEAR.model_copy(update={"part": GEAR.part.model_copy(update={"target": target})})
+    settings = {"evaluations": 6, "confirm": 1, "confirm_replicas": 8}
+    question = Study(design=design, vary={"shot.diameter_mm": (1.5, 4.0)}, optimizer=settings)
+
+    result = run(question, tmp_path, lambda design, stream, replicas: judged(0.5 + np.zeros(replicas or 8)))
+
+    np.testing.assert_array_equal(result.target, build_chamber(design).part.target)
+    larger = design.with_values({"shot.diameter_mm": 4.0})
+    assert build_chamber(larger).part.target.sum() < 0.8 * result.target.sum()
+    np.testing.assert_array_equal(build_chamber(larger, result.target).part.target, result.target)
+    assert kept_target(study()) is None
+    meshed = target.model_copy(update={"element_mm": 2.0})
+    meshed = GEAR.model_copy(update={"part": GEAR.part.model_copy(update={"target": meshed})})
+    varied = Study(design=meshed, vary={"part.target.element_mm": (1.0, 3.0)})
+    with pytest.raises(InputError, match=r"vary: part\.target\.element_mm with part\.target\.reachable: not supported"):
+        kept_target(varied)

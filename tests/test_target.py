@@ -101,3 +101,44 @@ def test_elements_are_made_in_the_target_alone_and_cover_it_exactly(tmp_path: Pa
 def test_too_small_elements_are_refused_with_a_size_that_fits(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"part\.target\.element_mm: given 0\.01.*million triangles.*at least 0\.13"):
         build_chamber(design_of(tmp_path, {"element_mm": 0.01}))
+
+
+def with_reachable(reachable: bool, **values: float) -> Design:
+    design = load_design(GEAR).with_values({name.replace("__", "."): value for name, value in values.items()})
+    target = design.part.target.model_copy(update={"reachable": reachable})
+    return design.model_copy(update={"part": design.part.model_copy(update={"target": target})})
+
+
+def test_what_the_shot_cannot_touch_can_be_left_out_of_the_target() -> None:
+    """The sharp roots of the gear's teeth; larger balls leave out more. Every other condition still holds."""
+    whole = build_chamber(with_reachable(False))
+    small, large = (build_chamber(with_reachable(True, shot__diameter_mm=d)) for d in (1.5, 3.0))
+    assert (small.part.target <= whole.part.target).all()
+    assert (large.part.target <= small.part.target).all()
+    assert large.part.target.sum() < 0.8 * small.part.target.sum() < 0.8 * whole.part.target.sum()
+    roots = np.linalg.norm(whole.part.vertices[whole.part.triangles].mean(axis=1)[:, :2], axis=1) < 17.6e-3
+    assert not small.part.target[roots].all()
+    (note,) = (note for note in small.notes if note.startswith("target.reachable: "))
+    left = target_area_mm2(whole) - target_area_mm2(small)
+    assert float(note.split("(")[1].split(" mm²")[0]) == pytest.approx(left, rel=0.01)
+    assert "a study keeps this target for all its candidates" in note
+    facts = describe(with_reachable(True), small)
+    assert facts["reach"]["target_reachable_share"] > 0.93
+    assert not any("set part.target.reachable" in text for text in facts["warnings"])
+
+
+def test_a_target_can_be_given_to_a_chamber() -> None:
+    """As a study does, which keeps that of its start."""
+    design = with_reachable(True, shot__diameter_mm=3.0)
+    given = build_chamber(with_reachable(True)).part.target
+    chamber = build_chamber(design, given)
+    np.testing.assert_array_equal(chamber.part.target, given)
+    assert any("the target is what the shot reaches in the study's start" in note for note in chamber.notes)
+
+
+def test_a_target_that_no_ball_touches_is_refused(tmp_path: Path) -> None:
+    """The box's upper side, 1 mm under the ceiling."""
+    data = design_of(tmp_path, {"surface": "top", "reachable": True}).model_dump()
+    data["chamber"]["height_mm"] = 46.0
+    with pytest.raises(InputError, match=r"part\.target\.reachable: a ball of 1\.5 mm touches nothing of the target"):
+        build_chamber(Design.model_validate(data))
