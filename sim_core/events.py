@@ -27,6 +27,7 @@ from sim_core.effects.drag import set_air_back
 from sim_core.effects.friction import carry_spins
 from sim_core.effects.random_phase import arrival, own_wave
 from sim_core.effects.rest import STILL, own_pull
+from sim_core.effects.sonotrodes import carry_phases
 from sim_core.effects.turn import carry, one_turn
 from sim_core.flight import point_under, set_back
 from sim_core.grounded import first_meeting, hide_all
@@ -120,7 +121,7 @@ def _predict(loop: Loop, ball: int, time: float, what: int) -> None:
         length, end = end_of_path(loop.footing, tree, seam, wave, here, pull, ball, time, moment, length)
         look = one_turn(loop.turning, length) if end == STILL else length
         delay, obstacle = first_contact_from(
-            loop.footing, loop.sizes, ball, tree, loop.scratch, here, pull, wave, seam, time, length
+            loop.footing, loop.sizes, ball, tree, loop.scratch, here, pull, wave, loop.waves, seam, time, length
         )
         delay, obstacle = first_part_contact(
             loop.ground.part,
@@ -166,6 +167,7 @@ def advance(loop: Loop) -> tuple[int, int]:
             hide_all(loop.footing, shot.crowd)
             set_calendar_back(calendar, clock.window)
             carry(loop.turning, clock.window)
+            carry_phases(loop.waves)
             carry_spins(loop.grip, clock.window)
             set_air_back(loop.air, clock.window)
             clock.now[1] += 1.0

@@ -2,7 +2,7 @@
 
 Position x(t) = base + velocity t + ½ a t² with one clock for all balls: what differs between two balls is then a
 straight line, pairs need no clock of their own, and a ball's numbers change only when it is hit. The clock is set
-back every window (a whole number of sonotrode periods), so that t stays small and its rounding with it.
+back every window (a whole number of periods of the fastest sonotrode), so that t stays small and its rounding with it.
 """
 
 from typing import NamedTuple

@@ -8,6 +8,7 @@ from sim_core.detect.ball_triangle import away_from_capsule, face_normal, nearer
 from sim_core.effects.friction import Grip
 from sim_core.effects.random_phase import own_wave
 from sim_core.effects.rest import ASLEEP, CALLED, DRIVEN, JAMMED, LOOKS, MODE, Footing, own_pull, static_law
+from sim_core.effects.sonotrodes import face_wave
 from sim_core.effects.turn import Turning, from_part, seen_from_part, slip
 from sim_core.effects.vibration import surface_velocity
 from sim_core.flight import drift, kick, point_under
@@ -57,7 +58,8 @@ def hit_surface(loop: Loop, ball: int, obstacle: int, time: float) -> None:
     landed = BOUNCES
     law = loop.restitution
     if kind == WAVING_FACE:
-        relative = sub(relative, surface_velocity(own_wave(loop.phases, loop.wave, ball), time))
+        wave = face_wave(loop.waves, own_wave(loop.phases, loop.wave, ball), obstacle)
+        relative = sub(relative, surface_velocity(wave, time))
     else:
         landed = land(loop.footing, tree, shot.motion, ball, obstacle, time, moment, here, away)
         law = static_law(loop.footing, loop.restitution)

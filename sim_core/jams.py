@@ -20,8 +20,8 @@ def touching(scene: Scene, corners: np.ndarray, positions: np.ndarray, ball: int
     physics, radii, here = scene.physics, 0.5 * scene.balls.diameters, positions[[ball]]
     radius = float(radii[ball])
     slack = np.full(len(corners), LEANING)
-    if physics.vibration is not None:  # it is given where the mesh has it
-        slack[scene.mesh.tags == physics.vibration.tag] += physics.vibration.amplitude
+    for vibration in physics.vibrations:  # it is given where the mesh has it
+        slack[scene.mesh.tags == vibration.tag] += vibration.amplitude
     box = np.abs(here - np.clip(here, corners.min(axis=1), corners.max(axis=1))).max(axis=1)
     near = [int(t) for t in np.flatnonzero(box <= radius + slack)]
     gap = {t: float(clearance(corners[[t]], here, 2.0 * radius)[0]) - radius for t in near}

@@ -12,6 +12,7 @@ from sim_core.effects.gravity import Gravity
 from sim_core.effects.random_phase import Phases
 from sim_core.effects.rest import Footing
 from sim_core.effects.restitution import Restitution
+from sim_core.effects.sonotrodes import Waves
 from sim_core.effects.turn import Turning
 from sim_core.effects.vibration import Wave
 from sim_core.impacts import ImpactPage
@@ -66,3 +67,4 @@ class Loop(NamedTuple):
     phases: Phases | None
     air: Air | None
     sizes: Sizes | None
+    waves: Waves | None

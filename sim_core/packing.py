@@ -27,7 +27,7 @@ def pack_balls(
     """Positions [m] of ``count`` balls inside the mesh, shape (count, 3), no two overlapping.
 
     ``diameter`` [m], of all or of each, (count,): the larger are placed first; ``clear`` [m] is kept from every surface
-    (at least the amplitude, where one vibrates); ``turn``: a part that turns is where its phase has it. "Low" is along
+    (at least the largest amplitude, if any); ``turn``: a part that turns is where its phase has it. "Low" is along
     -z. Raises SceneError when they do not fit: random placement reaches about 30 % of the volume a ball can use.
     """
     sizes = np.asarray(diameter, dtype=np.float64)

@@ -16,15 +16,22 @@ from sim_core.effects.vibration import Vibration
 class Physics(NamedTuple):
     """The scene's effects. With none given balls fly straight and collide elastically between still walls;
 
-    ``ball_collisions=None`` lets them fly through each other.
+    ``ball_collisions=None`` lets them fly through each other; several sonotrodes are a tuple of Vibrations.
     """
 
     gravity: Gravity | None = None
     restitution: Restitution | None = None
-    vibration: Vibration | None = None
+    vibration: Vibration | tuple[Vibration, ...] | None = None
     rest: Rest | None = None
     turn: Turn | None = None
     friction: Friction | None = None
     random_phase: RandomPhase | None = None
     ball_collisions: BallCollisions | None = BallCollisions()
     drag: Drag | None = None
+
+    @property
+    def vibrations(self) -> tuple[Vibration, ...]:
+        """Of all surfaces that vibrate."""
+        if self.vibration is None:
+            return ()
+        return (self.vibration,) if isinstance(self.vibration, Vibration) else self.vibration

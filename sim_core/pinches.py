@@ -1,7 +1,7 @@
 """Gaps narrower than the ball that starts in them, or about to be: no motion of a rigid ball there is right.
 
-Asked are two surfaces that the ball touches on opposite sides; in a wedge it could still move out. The vibrating
-surface counts where its swing brings it nearest.
+Asked are two surfaces that the ball touches on opposite sides; in a wedge it could still move out. A vibrating surface
+counts where its swing brings it nearest; of two, both.
 """
 
 from typing import NamedTuple
@@ -19,7 +19,7 @@ OPPOSED = -1.0 + 1e-9  # cosine: parallel but for 0.05 mrad; a ball that overlap
 
 class Pinch(NamedTuple):
     """``ball`` is in a gap ``narrower`` [m] than itself between the triangles ``one`` and ``two``; ``swings``: so when
-    the vibrating surface, which has one of them, is at its nearest to the other.
+    the vibrating surface that has one of them, or those that have both, come nearest to the other.
     """
 
     ball: int
@@ -31,10 +31,10 @@ class Pinch(NamedTuple):
 
 def find_pinch(mesh: TriangleMesh, physics: Physics, balls: Balls, corners: np.ndarray) -> Pinch | None:
     """The first ball that does not fit where it starts; ``corners`` (m, 3, 3) [m]: the triangles at the start."""
-    radius, wave = 0.5 * balls.diameters, physics.vibration
+    radius, swing = 0.5 * balls.diameters, _swing(physics)
     asked = clearance(corners, balls.positions, balls.radius) < radius - 0.5 * TIGHT  # two such gaps, or one of more
-    if wave is not None:
-        swing, waving = 2.0 * wave.amplitude, mesh.tags == wave.tag
+    for vibration in physics.vibrations:
+        waving = mesh.tags == vibration.tag
         both = [corners[own] for own in (waving, ~waving) if own.any()]
         near = [clearance(some, balls.positions, balls.radius + swing) < radius + swing for some in both]
         asked |= np.all(near, axis=0)
@@ -47,33 +47,42 @@ def find_pinch(mesh: TriangleMesh, physics: Physics, balls: Balls, corners: np.n
 
 def surface_name(mesh: TriangleMesh, physics: Physics, triangle: int) -> str:
     """E.g. "triangle 7", or "the turning part (triangle 12)"."""
-    vibration, turn, tag = physics.vibration, physics.turn, int(mesh.tags[triangle])
-    if vibration is not None and tag == vibration.tag:
-        return f"the vibrating surface (triangle {triangle})"
+    turn, tag = physics.turn, int(mesh.tags[triangle])
+    if tag in [one.tag for one in physics.vibrations]:
+        return f"{vibrating_name(physics, tag)} (triangle {triangle})"
     if turn is not None and tag == turn.tag:
         return f"the turning part (triangle {triangle})"
     return f"triangle {triangle}"
 
 
+def vibrating_name(physics: Physics, tag: int) -> str:
+    """E.g. "the vibrating surface of tag 3"; without its tag where there is but one."""
+    return "the vibrating surface" + (f" of tag {tag}" if len(physics.vibrations) > 1 else "")
+
+
+def _swing(physics: Physics) -> float:
+    """How much nearer [m] two surfaces may come to each other than they are at the start, or more."""
+    return sum(2.0 * one.amplitude for one in physics.vibrations)
+
+
 def _tightest(
     mesh: TriangleMesh, physics: Physics, here: np.ndarray, radius: float, corners: np.ndarray
 ) -> tuple[int, int, float, bool] | None:
-    wave, turn = physics.vibration, physics.turn
-    reach = radius + (0.0 if wave is None else 2.0 * wave.amplitude)
+    turn, reach = physics.turn, radius + _swing(physics)
     box = np.abs(here - np.clip(here, corners.min(axis=1), corners.max(axis=1))).max(axis=1)
     near = np.flatnonzero(box <= reach)
     away = here - _nearest_points(corners[near], here)
     distance = np.linalg.norm(away, axis=1)
     touched = (distance <= reach) & (distance > 0.0)
     near, gap, away = near[touched], distance[touched] - radius, away[touched] / distance[touched, None]
-    least, waving, still = gap, np.zeros(len(near), np.bool_), np.ones(len(near), np.bool_)
-    if turn is not None:
-        still = mesh.tags[near] != turn.tag
-    if wave is not None:
-        waving = mesh.tags[near] == wave.tag
-        towards = away @ np.array(wave.axis) / np.linalg.norm(wave.axis)
-        least = gap - waving * wave.amplitude * (np.abs(towards) - np.sin(wave.phase) * towards)
-    swings = (waving[:, None] & (still & ~waving)) | (waving & (still & ~waving)[:, None])
+    least, moves = gap.copy(), np.full(len(near), -1)  # which of the vibrations has it, if any
+    turns = np.zeros(len(near), np.bool_) if turn is None else mesh.tags[near] == turn.tag
+    for k, vibration in enumerate(physics.vibrations):
+        waving = mesh.tags[near] == vibration.tag
+        towards = away[waving] @ vibration.peak
+        least[waving] -= np.abs(towards) - np.sin(vibration.phase) * towards
+        moves[waving] = k
+    swings = (moves[:, None] != moves) & ~turns[:, None] & ~turns
     room = np.where(swings, least[:, None] + least, gap[:, None] + gap)
     room[away @ away.T > OPPOSED] = np.inf
     if room.min(initial=np.inf) >= -TIGHT:

@@ -14,11 +14,11 @@ from sim_core.effects.random_phase import RandomPhase, checked_random_phase
 from sim_core.effects.rest import Rest, checked_rest
 from sim_core.effects.restitution import Restitution, checked_restitution
 from sim_core.effects.turn import Turn, checked_axle
-from sim_core.effects.vibration import Vibration, checked_wave
+from sim_core.effects.vibration import checked_waves
 from sim_core.errors import SceneError
 from sim_core.invariants import clearance, contained, enclosed, narrowest_gap, posed
 from sim_core.physics import Physics
-from sim_core.pinches import find_pinch, surface_name
+from sim_core.pinches import find_pinch, surface_name, vibrating_name
 from sim_core.surfaces.mesh import TriangleMesh, towards_shot
 from sim_core.surfaces.part import require_free_axle
 
@@ -28,7 +28,6 @@ TOUCH = 1e-9  # m: overlap at the start that is taken for rounding of the input;
 
 KINDS = {  # of the effects that are checked by name; gravity may be any three numbers
     "restitution": Restitution,
-    "vibration": Vibration,
     "rest": Rest,
     "turn": Turn,
     "random_phase": RandomPhase,
@@ -74,7 +73,8 @@ class Scene:
             kind = KINDS.get(name)
             if kind is not None and effect is not None and not isinstance(effect, kind):
                 raise SceneError(f"physics.{name} is {effect!r}: give a {kind.__name__}, or None")
-        vibration, restitution, turn = self.physics.vibration, self.physics.restitution, self.physics.turn
+        checked_waves(self.physics.vibration)
+        vibrations, restitution, turn = self.physics.vibrations, self.physics.restitution, self.physics.turn
         checked_gravity(self.physics.gravity)
         checked_rest(self.physics.rest)
         for name in ("rest", "turn", "friction"):
@@ -91,20 +91,19 @@ class Scene:
             raise SceneError(
                 "balls.spins are given without physics.friction, where nothing rubs: give a Friction, or no spins"
             )
-        checked_wave(vibration)
         checked_drag(self.physics.drag)
-        checked_random_phase(self.physics.random_phase, vibration is not None)
+        checked_random_phase(self.physics.random_phase, len(vibrations))
         axle = checked_axle(turn)
+        tags = np.unique(self.mesh.tags).tolist()
         if turn is not None and axle is not None:
-            tags = np.unique(self.mesh.tags).tolist()
             if turn.tag not in tags:
                 raise SceneError(f"turn.tag is {turn.tag}, but the mesh has tags {tags}")
-            if vibration is not None and turn.tag == vibration.tag:
+            if turn.tag in [one.tag for one in vibrations]:
                 raise SceneError(f"turn.tag and vibration.tag are both {turn.tag}: one surface cannot do both")
             require_free_axle(self.mesh, axle, self.balls.radius)
-        if vibration is not None and not (self.mesh.tags == vibration.tag).any():
-            tags = np.unique(self.mesh.tags).tolist()
-            raise SceneError(f"vibration.tag is {vibration.tag}, but the mesh has tags {tags}")
+        for one in vibrations:
+            if one.tag not in tags:
+                raise SceneError(f"vibration.tag is {one.tag}, but the mesh has tags {tags}")
 
     def _require_room(self) -> None:
         balls = self.balls
@@ -121,10 +120,9 @@ class Scene:
         if len(outside):
             where = balls.positions[outside[0]].tolist()
             raise SceneError(f"ball {outside[0]} at {where} m is outside the mesh ({len(outside)} in all)")
-        vibration = self.physics.vibration  # its face is not where the mesh has it; it is judged at its phase, below
         still = self.mesh.corners if corners is None else corners  # where its phase has a turning part
-        if vibration is not None:
-            still = still[self.mesh.tags != vibration.tag]
+        # a vibrating face is not where the mesh has it; it is judged at its phase, below
+        still = still[~np.isin(self.mesh.tags, [one.tag for one in self.physics.vibrations])]
         gap = clearance(still, balls.positions, balls.radius) - 0.5 * balls.diameters
         worst = int(gap.argmin())
         if gap[worst] < -TOUCH:
@@ -142,21 +140,18 @@ class Scene:
             raise SceneError(f"balls {one} and {two} overlap by {-gap_between:.3g} m at the start; move one of them")
 
     def _require_room_above_sonotrode(self, corners: np.ndarray) -> None:
-        """The vibrating surface is not where the mesh has it: its ``corners`` are displaced by its phase here."""
-        vibration = self.physics.vibration
-        if vibration is None:
-            return
-        waving = self.mesh.tags == vibration.tag
-        corners[waving] += (
-            vibration.amplitude * np.sin(vibration.phase) * np.array(vibration.axis) / np.linalg.norm(vibration.axis)
-        )
-        gap = clearance(corners[waving], self.balls.positions, self.balls.radius) - 0.5 * self.balls.diameters
-        worst = int(gap.argmin())
-        if gap[worst] < -TOUCH:
-            raise SceneError(
-                f"ball {worst} at {self.balls.positions[worst].tolist()} m starts {-gap[worst]:.3g} m inside the "
-                "vibrating surface, which is displaced by its phase at the start; keep one amplitude clear of it"
-            )
+        """A vibrating surface is not where the mesh has it: its ``corners`` are displaced by its phase here."""
+        for vibration in self.physics.vibrations:
+            waving = self.mesh.tags == vibration.tag
+            corners[waving] += np.sin(vibration.phase) * vibration.peak
+            gap = clearance(corners[waving], self.balls.positions, self.balls.radius) - 0.5 * self.balls.diameters
+            worst = int(gap.argmin())
+            if gap[worst] < -TOUCH:
+                raise SceneError(
+                    f"ball {worst} at {self.balls.positions[worst].tolist()} m starts {-gap[worst]:.3g} m inside "
+                    f"{vibrating_name(self.physics, vibration.tag)}, which is displaced by its phase at the start; "
+                    "keep one amplitude clear of it"
+                )
 
     def _require_room_between(self, corners: np.ndarray) -> None:
         pinch = find_pinch(self.mesh, self.physics, self.balls, corners)

@@ -15,8 +15,9 @@ from sim_core.effects.gravity import acceleration, checked_gravity
 from sim_core.effects.random_phase import Phases, checked_random_phase, new_phases
 from sim_core.effects.rest import Footing, checked_rest, new_footing
 from sim_core.effects.restitution import Restitution, checked_restitution
+from sim_core.effects.sonotrodes import Waves, new_waves, whole_periods
 from sim_core.effects.turn import Turning, angle_now, checked_axle, checked_turn
-from sim_core.effects.vibration import Wave, checked_wave
+from sim_core.effects.vibration import Wave, checked_waves
 from sim_core.errors import SimulationError
 from sim_core.events import DONE, PAGE_FULL, STORM, TOO_FAST, advance
 from sim_core.flight import WINDOW
@@ -86,26 +87,22 @@ class _Run:
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self.gravity = checked_gravity(scene.physics.gravity)
-        self.wave: Wave | None = checked_wave(scene.physics.vibration)
+        vibrations, waves = scene.physics.vibrations, checked_waves(scene.physics.vibration)
+        self.wave: Wave | None = min(waves, key=lambda wave: wave.omega, default=None)
         self.restitution: Restitution | None = None
         tags = int(scene.mesh.tags.max()) + 1
         if scene.physics.restitution is not None:
             self.restitution = checked_restitution(scene.physics.restitution, tags)
         self.centre = scene.mesh.middle
-        tag, swing = -1, 0.0
-        self.window = WINDOW
-        if scene.physics.vibration is not None:
-            tag, swing = scene.physics.vibration.tag, scene.physics.vibration.amplitude
-            frequency = scene.physics.vibration.frequency
-            self.window = (
-                max(1.0, round(WINDOW * frequency)) / frequency
-            )  # whole periods: the phase need not be carried
-        vibrating = scene.mesh.corners[scene.mesh.tags == tag] - self.centre
-        random_phase = checked_random_phase(scene.physics.random_phase, self.wave is not None)
+        self.window = whole_periods(vibrations, WINDOW)
+        tags_waving, swings = tuple(one.tag for one in vibrations), tuple(float(one.amplitude) for one in vibrations)
+        vibrating = scene.mesh.corners[np.isin(scene.mesh.tags, tags_waving)] - self.centre
+        random_phase = checked_random_phase(scene.physics.random_phase, len(vibrations))
         self.phases: Phases | None = new_phases(random_phase, self.wave, vibrating, 0.5 * scene.balls.diameters)
         self.turning: Turning | None = checked_turn(scene.physics.turn, self.centre)
         radii = tuple(float(r) for r in 0.5 * scene.balls.sizes)
-        self.ground = _ground(scene.mesh, radii, tag, swing, checked_axle(scene.physics.turn))
+        self.ground = _ground(scene.mesh, radii, tags_waving, swings, checked_axle(scene.physics.turn))
+        self.waves: Waves | None = new_waves(vibrations, waves, self.window, self._tags_of_obstacles())
         self.sizes: Sizes | None = new_sizes(scene.balls, self.ground.roots)
         self.collide = scene.physics.ball_collisions is not None
         self.motion = np.concatenate([scene.balls.positions - self.centre, scene.balls.velocities], axis=1)
@@ -124,12 +121,14 @@ class _Run:
         self.pages: list[tuple[np.ndarray, np.ndarray]] = []
 
     def _grip(self, tags: int) -> Grip | None:
-        friction, balls, ground = self.scene.physics.friction, self.scene.balls, self.ground
+        friction, balls = self.scene.physics.friction, self.scene.balls
         if friction is None:
             return None
         spins = np.zeros_like(balls.positions) if balls.spins is None else balls.spins
-        tags_of_rows = ground.tags[ground.tree.triangles[:, 0]]
-        return new_grip(checked_friction(friction, tags), spins, balls.radius, tags_of_rows)
+        return new_grip(checked_friction(friction, tags), spins, balls.radius, self._tags_of_obstacles())
+
+    def _tags_of_obstacles(self) -> np.ndarray:
+        return np.asarray(self.ground.tags[self.ground.tree.triangles[:, 0]])
 
     def _shot(self, fastest: float) -> Shot:
         if not self.collide:
@@ -178,6 +177,7 @@ class _Run:
                     self.phases,
                     self.air,
                     self.sizes,
+                    self.waves,
                 )
             )
             if status == DONE:
@@ -250,11 +250,11 @@ class _Run:
 
     def _inside(self, points: np.ndarray) -> np.ndarray:
         """Which points (n, 3) [m] are in the chamber; also down to where a face that swings wider than a ball is."""
-        mesh, corners, vibration = self.scene.mesh, self._corners(), self.scene.physics.vibration
+        mesh, corners = self.scene.mesh, self._corners()
         inside = contained(mesh, points, corners)
-        if vibration is not None and vibration.amplitude >= 0.5 * self.scene.balls.sizes[0] and not inside.all():
-            swing = vibration.amplitude * np.array(vibration.axis) / np.linalg.norm(vibration.axis)
-            inside |= contained(mesh, points + swing, corners) | contained(mesh, points - swing, corners)
+        for one in self.scene.physics.vibrations:
+            if one.amplitude >= 0.5 * self.scene.balls.sizes[0] and not inside.all():
+                inside |= contained(mesh, points + one.peak, corners) | contained(mesh, points - one.peak, corners)
         return inside
 
     def _corners(self) -> np.ndarray | None:

@@ -20,6 +20,8 @@ def _mark(physics: Physics, balls: int, alike: bool) -> Path:
     """A file that says that this set of effects has been compiled: what is absent is not in the machine code."""
     present = [name for name, effect in zip(physics._fields, physics, strict=True) if effect is not None]
     kind = ["many" if balls >= MANY else "few", "alike" if alike else "mixed"]
+    if len(physics.vibrations) > 1:
+        kind.append("sonotrodes")
     return CACHE_FOLDER / "-".join(["compiled", *present, *kind])
 
 
@@ -33,12 +35,15 @@ def compile_simulator(physics: Physics, balls: int = 1, alike: bool = True) -> f
     sizes, needs; returns the seconds it took.
     """
     start = time.perf_counter()
-    tag = physics.vibration.tag if physics.vibration is not None else 0
+    if len(physics.vibrations) > 2:
+        physics = physics._replace(vibration=physics.vibrations[:2])  # the same machine code
+    shaken = [one.tag for one in physics.vibrations]
     vertices = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
     quads = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
     triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
-    floor = (vertices[triangles][:, :, 2] == 0.0).all(axis=1)
-    tags = np.where(floor, tag, 1 if tag == 0 else 0)
+    tags = np.full(len(triangles), next(tag for tag in range(3) if tag not in shaken))
+    for height, tag in enumerate(shaken):  # floor and ceiling
+        tags[(vertices[triangles][:, :, 2] == height).all(axis=1)] = tag
     for law in (physics.restitution, physics.friction):
         if law is not None:
             tags = np.minimum(tags, len(law.surfaces) - 1)
@@ -60,17 +65,17 @@ def _with_a_turning_box(
     """The cube with a small box in a corner, which turns."""
     turn = physics.turn
     assert turn is not None
-    shaken = -1 if physics.vibration is None else physics.vibration.tag
-    still = next(tag for tag in range(3) if tag not in (turn.tag, shaken))
+    shaken = [one.tag for one in physics.vibrations]
+    still = next(tag for tag in range(4) if tag not in (turn.tag, *shaken))
     for name in ("restitution", "friction"):
         law = getattr(physics, name)
         if law is not None:
-            wider = law._replace(surfaces=[law.surfaces[0]] * max(3, len(law.surfaces)))
+            wider = law._replace(surfaces=[law.surfaces[0]] * max(4, len(law.surfaces)))
             physics = physics._replace(**{name: wider})
     box = len(vertices) + triangles[:, ::-1]
     return (
         physics._replace(turn=turn._replace(axis_point=(0.03, 0.03, 0.03))),
         np.concatenate([vertices, 0.02 * vertices + 0.02]),
         np.concatenate([triangles, box]),
-        np.concatenate([np.where(tags == shaken, shaken, still), np.full(len(box), turn.tag)]),
+        np.concatenate([np.where(np.isin(tags, shaken), tags, still), np.full(len(box), turn.tag)]),
     )

@@ -78,8 +78,8 @@ def end_of_path(
 ) -> tuple[float, int]:
     """For how long, at most ``length`` [s], the ball's path is good, and what ends it (see GOES_ON).
 
-    ``moment`` [s]: now, since the start. A ball that lies still is looked at for one swing of the sonotrode: what does
-    not touch it then never will.
+    ``moment`` [s]: now, since the start. A ball that lies still is looked at for one swing of the slowest sonotrode:
+    what does not touch it then never will.
     """
     if footing is None:
         return length, GOES_ON

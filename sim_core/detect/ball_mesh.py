@@ -10,6 +10,7 @@ from sim_core.detect.ball_sonotrode import meets_later, same_plane, waving_plane
 from sim_core.detect.ball_triangle import capsule_delay, face_delay
 from sim_core.effects.gravity import Gravity, acceleration
 from sim_core.effects.rest import Footing
+from sim_core.effects.sonotrodes import Waves, face_wave, move_alike
 from sim_core.effects.vibration import Wave
 from sim_core.flight import Point
 from sim_core.roots import NEVER
@@ -98,7 +99,8 @@ def first_contact(
     ``time`` [s]: now, on the window's clock (the sonotrode's phase depends on it). Ties go to the obstacle stored
     first.
     """
-    return first_contact_from(None, None, -1, tree, scratch, ball, acceleration(gravity), wave, seam, time, length)
+    fall = acceleration(gravity)
+    return first_contact_from(None, None, -1, tree, scratch, ball, fall, wave, None, seam, time, length)
 
 
 @inlined
@@ -111,19 +113,20 @@ def first_contact_from(
     ball: Point,
     fall: Vec3,
     wave: Wave | None,
+    waves: Waves | None,
     seam: float,
     time: float,
     length: float,
 ) -> tuple[float, int]:
     """The same for ball ``number``, under its own acceleration ``fall`` [m/s²], with what it stands on left out;
 
-    of several ``sizes`` it has obstacles of its own.
+    of several ``sizes`` it has obstacles of its own; of several ``waves`` each sonotrode has its own.
     """
     radius = own_radius(sizes, tree.radius, number)
     _aim(scratch.ray, ball, fall, length)
     best = length
     found = -1
-    plane_row = -1  # the sonotrode's faces share a plane: its equation is solved once a query
+    plane_row = -1  # a sonotrode's faces share a plane: its equation is solved once a query
     plane_delay = NEVER
     scratch.nodes[0] = own_root(sizes, number)
     scratch.times[0] = np.float32(0.0)
@@ -142,11 +145,21 @@ def first_contact_from(
             elif kind == CAPSULE:
                 delay = capsule_delay(tree.numbers, row, ball, fall, radius, best)
             else:
-                if plane_row < 0 or not same_plane(tree.numbers, row, plane_row):
+                own = face_wave(waves, wave, row)
+                if plane_row < 0 or not (
+                    same_plane(tree.numbers, row, plane_row) and move_alike(waves, row, plane_row)
+                ):
+                    if plane_row >= 0 and plane_delay < best:  # and no face was there
+                        last = face_wave(waves, wave, plane_row)
+                        later, face = meets_later(
+                            tree, waves, radius, plane_row, ball, fall, seam, last, time, plane_delay, best
+                        )
+                        if face >= 0:
+                            best, found = later, face
                     plane_row = row
-                    plane_delay = waving_plane_delay(tree.numbers, row, ball, fall, radius, wave, time, best)
+                    plane_delay = waving_plane_delay(tree.numbers, row, ball, fall, radius, own, time, best)
                 delay = plane_delay
-                if delay <= best and not within_waving_borders(tree.numbers, row, ball, fall, seam, wave, time, delay):
+                if delay <= best and not within_waving_borders(tree.numbers, row, ball, fall, seam, own, time, delay):
                     delay = NEVER
             if out_of_reach(footing, tree, number, ball.position, row):
                 delay = NEVER
@@ -156,7 +169,8 @@ def first_contact_from(
             continue
         depth = stack_children(tree, scratch, code, depth, longest)
     if plane_row >= 0 and plane_delay < best:  # and no face was there
-        later, face = meets_later(tree, radius, plane_row, ball, fall, seam, wave, time, plane_delay, best)
+        last = face_wave(waves, wave, plane_row)
+        later, face = meets_later(tree, waves, radius, plane_row, ball, fall, seam, last, time, plane_delay, best)
         if face >= 0:
             return later, face
     if found < 0:

@@ -6,6 +6,7 @@ import numpy as np
 
 from sim_core._compile import jit
 from sim_core.detect.ball_triangle import HALF, face_normal, within_borders
+from sim_core.effects.sonotrodes import Waves, move_alike
 from sim_core.effects.vibration import Wave
 from sim_core.flight import Point
 from sim_core.roots import NEVER, WaveGap, first_wave_approach, next_wave_approach
@@ -85,6 +86,7 @@ def within_waving_borders(
 @jit
 def meets_later(
     tree: Tree,
+    waves: Waves | None,
     radius: float,
     row: int,
     ball: Point,
@@ -95,8 +97,8 @@ def meets_later(
     delay: float,
     limit: float,
 ) -> tuple[float, int]:
-    """Delay [s] and face of a contact within ``limit`` [s] after the plane of face ``row`` was met where it has no
-    face; (NEVER, -1) if there is none.
+    """Delay [s] and face of a contact within ``limit`` [s] after the plane of face ``row``, which moves as ``wave``
+    says, was met where it has no face; (NEVER, -1) if there is none.
 
     Beside the sonotrode, over a pit, a ball is free to be below its plane, and may come down on it afterwards.
     """
@@ -111,6 +113,7 @@ def meets_later(
             if (
                 tree.kinds[face] == WAVING_FACE
                 and same_plane(tree.numbers, row, face)
+                and move_alike(waves, row, face)
                 and within_waving_borders(tree.numbers, face, ball, fall, seam, wave, time, delay)
             ):
                 return delay, face

@@ -47,15 +47,20 @@ class Phases(NamedTuple):
     seed: int
 
 
-def checked_random_phase(random_phase: RandomPhase | None, vibrates: bool) -> RandomPhase | None:
-    """Raises SceneError for a seed out of range, or without a vibration to draw the phases of."""
+def checked_random_phase(random_phase: RandomPhase | None, vibrating: int) -> RandomPhase | None:
+    """Raises SceneError for a seed out of range, or unless one surface is ``vibrating``, to draw the phases of."""
     if random_phase is None:
         return None
     seed = random_phase.seed
     if not isinstance(seed, (int, np.integer)) or not 0 <= seed < SEEDS:
         raise SceneError(f"random_phase.seed is {seed!r}: give a whole number from 0 to {WORD}")
-    if not vibrates:
+    if vibrating == 0:
         raise SceneError("physics.random_phase is given without physics.vibration: nothing has a phase; give both")
+    if vibrating > 1:
+        raise SceneError(
+            f"physics.random_phase is given, and {vibrating} vibrating surfaces: not supported together yet; give one "
+            "vibration, or leave random_phase out"
+        )
     return RandomPhase(int(seed))
 
 

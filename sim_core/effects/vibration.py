@@ -1,11 +1,13 @@
 """The sonotrode: one tagged surface moves as a rigid body by amplitude sin(2π frequency t + phase), exactly.
 
 Source: the process itself (a piezoelectric generator at a fixed frequency, amplitude zero-to-peak); the face's peak
-speed is 2π frequency amplitude.
+speed is 2π frequency amplitude. Several of them: sonotrodes.py.
 """
 
 import math
 from typing import NamedTuple
+
+import numpy as np
 
 from sim_core._compile import jit
 from sim_core.errors import SceneError, number
@@ -31,6 +33,11 @@ class Vibration(NamedTuple):
         """Largest speed of the face [m/s]."""
         return 2.0 * math.pi * self.frequency * self.amplitude
 
+    @property
+    def peak(self) -> np.ndarray:
+        """Displacement of the face at its peak [m], (3,)."""
+        return self.amplitude * np.array(self.axis) / np.linalg.norm(self.axis)
+
 
 class Wave(NamedTuple):
     """Vibration as compiled code wants it: ``swing`` [m], ``omega`` [rad/s], ``phase`` [rad], ``axis``."""
@@ -41,23 +48,36 @@ class Wave(NamedTuple):
     axis: Vec3
 
 
-def checked_wave(vibration: Vibration | None) -> Wave | None:
-    """Raises SceneError for numbers out of range."""
+def checked_waves(vibration: Vibration | tuple[Vibration, ...] | None) -> tuple[Wave, ...]:
+    """Of each that vibrates; raises SceneError for numbers out of range, and for one tag that vibrates twice."""
     if vibration is None:
-        return None
+        return ()
+    if isinstance(vibration, Vibration):
+        return (_checked_wave("vibration", vibration),)
+    each: list[Vibration] = [*vibration] if isinstance(vibration, tuple) else []
+    if not each or not all(isinstance(one, Vibration) for one in each):
+        raise SceneError(f"physics.vibration is {vibration!r}: give a Vibration, several of them in a tuple, or None")
+    tags = [one.tag for one in each]
+    for k, tag in enumerate(tags):
+        if tag in tags[:k]:
+            raise SceneError(f"vibration[{k}].tag is {tag}, as vibration[{tags.index(tag)}].tag: give each its own")
+    return tuple(_checked_wave(f"vibration[{k}]", one) for k, one in enumerate(each))
+
+
+def _checked_wave(which: str, vibration: Vibration) -> Wave:
     for name in ("amplitude", "frequency", "phase"):
-        number(f"vibration.{name}", getattr(vibration, name))
+        number(f"{which}.{name}", getattr(vibration, name))
     if not 0.0 <= vibration.amplitude < math.inf:
-        raise SceneError(f"vibration.amplitude is {vibration.amplitude} m: it must be 0 or more")
+        raise SceneError(f"{which}.amplitude is {vibration.amplitude} m: it must be 0 or more")
     if not 0.0 < vibration.frequency <= HIGHEST:
         raise SceneError(
-            f"vibration.frequency is {vibration.frequency} Hz: it must be positive and at most {HIGHEST:g} Hz"
+            f"{which}.frequency is {vibration.frequency} Hz: it must be positive and at most {HIGHEST:g} Hz"
         )
     if not math.isfinite(vibration.phase):
-        raise SceneError(f"vibration.phase is {vibration.phase} rad: it must be finite")
+        raise SceneError(f"{which}.phase is {vibration.phase} rad: it must be finite")
     length = math.hypot(*vibration.axis)
     if not 0.0 < length < math.inf:
-        raise SceneError(f"vibration.axis is {vibration.axis}: it must be a direction")
+        raise SceneError(f"{which}.axis is {vibration.axis}: it must be a direction")
     return Wave(
         float(vibration.amplitude),
         2.0 * math.pi * vibration.frequency,

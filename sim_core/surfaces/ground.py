@@ -31,24 +31,28 @@ class Ground(NamedTuple):
 def build_ground(
     mesh: TriangleMesh,
     radius: float | tuple[float, ...],
-    waving_tag: int = -1,
-    swing: float = 0.0,
+    waving_tag: int | tuple[int, ...] = (),
+    swing: float | tuple[float, ...] = (),
     axle: Axle | None = None,
 ) -> Ground:
-    """The ground for balls of this radius [m], or these radii, ascending; triangles of ``waving_tag`` vibrate by
-    ``swing`` [m] zero-to-peak, those of the ``axle``'s tag turn.
+    """The ground for balls of this radius [m], or these radii, ascending; triangles of ``waving_tag``, or of each of
+    several, vibrate by ``swing`` [m] zero-to-peak, those of the ``axle``'s tag turn.
     """
     corners = mesh.corners - mesh.middle
     flats = find_flats(corners, edge_partners(mesh.triangles), mesh.tags, in_plane(mesh.vertices))
     radii = radius if isinstance(radius, tuple) else (radius,)
+    waving, swings = np.zeros(len(corners), dtype=np.bool_), np.zeros(len(corners))
+    for tag, widest in zip(np.atleast_1d(waving_tag), np.atleast_1d(swing), strict=True):
+        waving |= mesh.tags == tag
+        swings[mesh.tags == tag] = widest
     overlap = seam(radii[-1])
     locator = build_locator(corners, flats, overlap)
     if axle is None:
-        trees = [build_tree(build_obstacles(mesh, r, mesh.tags == waving_tag, swing, flats), r) for r in radii]
+        trees = [build_tree(build_obstacles(mesh, r, waving, swings, flats), r) for r in radii]
         tree, roots = joined(trees)
         return Ground(tree, locator, mesh.tags, overlap, None, roots)
     (radius,) = radii  # a turning part and several sizes are not supported together
-    obstacles = build_obstacles(mesh, radius, mesh.tags == waving_tag, swing, flats)
+    obstacles = build_obstacles(mesh, radius, waving, swings, flats)
     turns = part_of(obstacles, mesh, axle, radius)
     part = part_tree(chosen(obstacles, turns), mesh, axle, radius)
     return Ground(

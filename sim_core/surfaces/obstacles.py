@@ -17,7 +17,7 @@ from sim_core.errors import SceneError
 from sim_core.surfaces.cover import cover
 from sim_core.surfaces.flats import LONE, Flats, edge_partners
 from sim_core.surfaces.mesh import TriangleMesh, towards_shot
-from sim_core.surfaces.rim import Rim, carry_on, find_rim
+from sim_core.surfaces.rim import Rim, carry_on, find_rim, require_room_at_joints
 
 NUMBERS = 20  # kept of each obstacle
 TRIANGLE = [0, 1, 2, 2]  # the corners of a face that has but three
@@ -58,15 +58,20 @@ def seam(radius: float) -> float:
     return min(SEAM, SEAM_PER_RADIUS * radius)
 
 
-def build_obstacles(mesh: TriangleMesh, radius: float, waving: np.ndarray, swing: float, flats: Flats) -> Obstacles:
+def build_obstacles(
+    mesh: TriangleMesh, radius: float, waving: np.ndarray, swing: float | np.ndarray, flats: Flats
+) -> Obstacles:
     """Obstacles for balls of one radius [m]; coordinates are taken relative to the mesh's middle.
 
-    ``waving`` (m,) bool marks triangles that vibrate by ``swing`` [m] zero-to-peak: their boxes hold the whole
-    swing. A flat's faces are fewer than its triangles and are booked on its seed; see locate.py for which was hit.
+    ``waving`` (m,) bool marks triangles that vibrate by ``swing`` [m] zero-to-peak, or each by its own (m,): their
+    boxes hold the whole swing. A flat's faces are fewer than its triangles and are booked on its seed; see locate.py
+    for which was hit.
     """
     corners = mesh.corners - mesh.middle
     normals, doubled = towards_shot(corners)
     solid = doubled > 0.0  # a triangle without area has no face; its neighbours' edges remain
+    swing = np.broadcast_to(swing, waving.shape)
+    require_room_at_joints(mesh, normals, radius, waving, swing)
     rim = find_rim(mesh.triangles, corners, normals, radius, waving, swing)
     faces = _faces(corners, normals, doubled, flats, radius, waving, swing, rim)
     capsules = _capsules(mesh, corners, normals, solid, radius, waving, flats)
@@ -80,7 +85,7 @@ def _faces(
     flats: Flats,
     radius: float,
     waving: np.ndarray,
-    swing: float,
+    swing: np.ndarray,
     rim: Rim,
 ) -> Obstacles:
     lone = [np.flatnonzero((doubled > 0.0) & (flats.flat == LONE))]
@@ -107,7 +112,7 @@ def _faces(
         numbers[:, 7 + 4 * k] = np.einsum("ij,ij->i", inward, start)
     beyond = carry_on(numbers, triangle, waving[triangle], flats, rim)
     moved = corner + radius * normal[:, None]
-    grow = seam(radius) + (np.where(waving[triangle], swing, 0.0) + 2.0 * beyond)[:, None]
+    grow = seam(radius) + (np.where(waving[triangle], swing[triangle], 0.0) + 2.0 * beyond)[:, None]
     kinds = np.where(waving[triangle], WAVING_FACE, FACE).astype(np.uint8)
     return Obstacles(
         numbers,

@@ -14,6 +14,7 @@ import numpy as np
 
 from sim_core.errors import SceneError
 from sim_core.surfaces.flats import LONE, Flats, edge_partners
+from sim_core.surfaces.mesh import TriangleMesh
 
 SAME_LINE = 1e-9  # [-] and m: a face's border that runs along the edge, but for rounding
 
@@ -31,32 +32,62 @@ class Rim(NamedTuple):
 
 
 def find_rim(
-    triangles: np.ndarray, corners: np.ndarray, normals: np.ndarray, radius: float, waving: np.ndarray, swing: float
+    triangles: np.ndarray,
+    corners: np.ndarray,
+    normals: np.ndarray,
+    radius: float,
+    waving: np.ndarray,
+    swing: float | np.ndarray,
 ) -> Rim:
-    """The gentle edges of the triangles marked ``waving`` (m,), which vibrate by ``swing`` [m] zero-to-peak.
+    """The gentle edges of the triangles marked ``waving`` (m,), which vibrate by ``swing`` [m] zero-to-peak, or each by
+    its own (m,).
 
     Raises SceneError where a surface rises so gently that the raised face would come out far from its edge.
     """
     two = edge_partners(triangles)
     still = two[np.repeat(waving, 3) & ~waving[two // 3]]
     face, slope = two[still] // 3, still // 3
+    own = np.broadcast_to(swing, waving.shape)[face]
     rise = np.linalg.norm(np.cross(normals[face], normals[slope]), axis=1)
     run = np.einsum("ij,ij->i", normals[face], normals[slope])
-    gentle = np.flatnonzero((run > 0.0) & (radius * (1.0 - run) < swing))
-    still, slope, rise, run = still[gentle], slope[gentle], rise[gentle], run[gentle]
-    flat = np.flatnonzero(swing * run > radius * rise)
+    gentle = np.flatnonzero((run > 0.0) & (radius * (1.0 - run) < own))
+    still, slope, rise, run, own = still[gentle], slope[gentle], rise[gentle], run[gentle], own[gentle]
+    flat = np.flatnonzero(own * run > radius * rise)
     if len(flat):
         raise SceneError(
             f"beside the vibrating triangle {face[gentle[flat[0]]]} the surface of triangle {slope[flat[0]]} lies flat "
             f"or rises by only {np.degrees(np.arctan2(rise, run)[flat[0]]):.3g} degrees: a moving edge is not "
             "supported yet; let the sonotrode fill the chamber's floor from wall to wall, flat, and walls rise from it "
-            f"by {np.ceil(np.degrees(np.arctan2(swing, radius))):.0f} degrees or more"
+            f"by {np.ceil(np.degrees(np.arctan2(own[flat[0]], radius))):.0f} degrees or more"
         )
     start = corners[slope, still % 3]
     inward = np.cross(corners[slope, (still % 3 + 1) % 3] - start, normals[slope])
     inward /= np.linalg.norm(inward, axis=1)[:, None]
     lines = np.column_stack([inward, np.einsum("ij,ij->i", inward, start)])
-    return Rim(float((swing * run / rise).max(initial=0.0)), slope, lines, swing / rise)
+    return Rim(float((own * run / rise).max(initial=0.0)), slope, lines, own / rise)
+
+
+def require_room_at_joints(
+    mesh: TriangleMesh, normals: np.ndarray, radius: float, waving: np.ndarray, swing: np.ndarray
+) -> None:
+    """Raises SceneError where two sonotrodes meet in an edge so blunt that one could come out beside the other.
+
+    A ball that touches both has its centre radius (1 - cos) / sin from the ends of their moved faces; swings take at
+    most their sum from the numerator.
+    """
+    two = edge_partners(mesh.triangles)
+    one = np.flatnonzero(np.arange(len(two)) < two)
+    face, other = one // 3, two[one] // 3
+    room = radius * (1.0 - np.einsum("ij,ij->i", normals[face], normals[other])) - swing[face] - swing[other]
+    apart = waving[face] & waving[other] & (mesh.tags[face] != mesh.tags[other])
+    tight = np.flatnonzero(apart & (room < 0.0))
+    if len(tight):
+        a, b = face[tight[0]], other[tight[0]]
+        raise SceneError(
+            f"the vibrating triangles {a} and {b}, of tags {mesh.tags[a]} and {mesh.tags[b]}, meet in an edge so blunt "
+            "that a ball could touch the edge of one beside the other: a moving edge is not supported yet; let a steep "
+            "wall part them"
+        )
 
 
 def carry_on(numbers: np.ndarray, triangle: np.ndarray, waving: np.ndarray, flats: Flats, rim: Rim) -> np.ndarray:

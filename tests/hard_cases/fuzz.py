@@ -11,7 +11,7 @@ from sim_core import Balls, Physics, Scene, SceneError, SimulationError, Triangl
 from sim_core.resolve.pushing import SHORTEST_HOP
 from tests.cavities import CEILING, FLOOR, SIDES, box_around
 from tests.fuzzed_chambers import FAMILIES, WITH_FLOOR, Chamber, Surface
-from tests.hard_cases.fuzzed_effects import SIZES, Strengths, physics_of, powers, strengths
+from tests.hard_cases.fuzzed_effects import LID, SIZES, SONOTRODES, Strengths, physics_of, powers, strengths
 from tests.hard_cases.outcome import allowed, energy_above_floor, is_still, play
 from tests.hard_cases.saved_scene import FOLDER, save_scene
 from tests.hard_cases.turning_scenes import BODIES, PART
@@ -69,6 +69,8 @@ def chamber_of(plan: Plan) -> Chamber:
     (vertices, triangles), part = _shape(plan.family, diameter / plan.wide, rng)
     level = (vertices[triangles][:, :, 2] == vertices[:, 2].min()).all(axis=1)
     tags = np.where(level, FLOOR, np.where(part, PART, SIDES if part.any() else CEILING))
+    if SONOTRODES in plan.effects:
+        tags[(vertices[triangles][:, :, 2] == vertices[:, 2].max()).all(axis=1)] = LID
     mesh = TriangleMesh(plan.wide * (vertices + plan.far), triangles, tags)
     middle = np.full(3, plan.wide * plan.far)
     physics = physics_of(plan.effects, plan.much, plan.wide, plan.speed, diameter, middle, plan.seed)
@@ -77,7 +79,7 @@ def chamber_of(plan: Plan) -> Chamber:
     if SIZES in plan.effects:
         size = diameter * np.where(np.arange(plan.count) % 2, plan.much.spread, 1.0)
         density = rng.choice([2500.0, 7800.0], plan.count)
-    clear = physics.vibration.amplitude if physics.vibration else 0.0
+    clear = max((one.amplitude for one in physics.vibrations), default=0.0)
     positions = pack_balls(mesh, plan.count, size, rng, clear, physics.turn)
     velocities = rng.normal(0.0, plan.speed, positions.shape)
     spins = None if physics.friction is None else rng.normal(0.0, plan.speed / diameter, positions.shape)

@@ -24,18 +24,22 @@ from tests.hard_cases.outcome import CONSTANT
 from tests.hard_cases.turning_scenes import PART
 
 SIZES = "sizes"  # beside the fields of Physics: balls of several diameters and densities
+SONOTRODES = "sonotrodes"  # the same: a lid that vibrates as well as the floor
 LAWFUL = "gravity restitution ball_collisions"  # of a chamber that is of this world
 FEW = (
     f"{LAWFUL} vibration rest friction drag",
     f"{LAWFUL} vibration random_phase drag {SIZES}",
     f"{LAWFUL} vibration rest friction turn",
     "gravity restitution vibration random_phase rest friction drag turn",
+    f"{LAWFUL} vibration rest {SONOTRODES}",
 )
 MANY = (
     *FEW,
     f"{LAWFUL} vibration random_phase rest friction drag turn",
     f"{LAWFUL} vibration",
     f"{LAWFUL} vibration rest",
+    f"{LAWFUL} vibration rest friction drag turn {SONOTRODES}",
+    f"{LAWFUL} vibration drag {SIZES} {SONOTRODES}",
     f"{LAWFUL} vibration friction",
     f"{LAWFUL} vibration random_phase friction",
     f"{LAWFUL} friction drag turn",
@@ -48,7 +52,8 @@ MANY = (
     "restitution drag",
 )
 RESTITUTIONS = (0.0, 1e-9, 0.05, 0.5, 0.9, 1.0 - 1e-12, 1.0)
-TAGS = 3
+TAGS = 4
+LID = 3
 
 
 class Strengths(NamedTuple):
@@ -107,10 +112,12 @@ def physics_of(
         turn = turn._replace(rpm=None, swing=0.7, frequency=max(rate, 1e-6) / (0.7 * math.tau))
     # of steel, at speed: 3/4 C_d air / (rho D) = slowing / wide, with C_d 0.44
     air = much.slowing * 7800.0 * diameter / (0.33 * wide)
+    floor = Vibration(FLOOR, amplitude, much.beat * speed / (math.tau * amplitude) if amplitude else 20e3)
+    lid = Vibration(LID, 0.7 * amplitude, 0.83 * floor.frequency, 1.0, (0.0, 0.0, -1.0))
     present = Physics(
         Gravity(z=-much.weight * speed**2 / wide),
         Restitution((law,) * TAGS, law, much.elastic_below * speed),
-        Vibration(FLOOR, amplitude, much.beat * speed / (math.tau * amplitude) if amplitude else 20e3),
+        (floor, lid) if SONOTRODES in effects else floor,
         Rest(1e-3 * speed),
         turn,
         Friction((much.rough[0],) * TAGS, much.rough[1]),

@@ -172,14 +172,16 @@ def overlap(chamber: Chamber) -> float:
 
 
 def _beneath_the_mesh(chamber: Chamber) -> np.ndarray:
-    """True (n,) for balls so small that the floor, at its lowest, leaves room for their centres below the mesh's."""
-    balls, vibration = chamber.balls, chamber.physics.vibration
-    if vibration is None:
-        return np.zeros(len(balls), dtype=np.bool_)
-    lowest = chamber.mesh.vertices[:, 2].min() - vibration.amplitude + 0.5 * balls.diameters
+    """True (n,) for balls so small that a floor, at its lowest, leaves room for their centres below the mesh's; or a
+    lid, the second of two sonotrodes, above it.
+    """
+    balls, vibrations = chamber.balls, chamber.physics.vibrations
     low, high = chamber.mesh.vertices.min(axis=0), chamber.mesh.vertices.max(axis=0)
     above = ((balls.positions > low) & (balls.positions < high))[:, :2].all(axis=1)
-    return np.asarray(above & (balls.positions[:, 2] >= lowest - DEEPEST) & (balls.positions[:, 2] <= low[2]))
+    height, beyond = balls.positions[:, 2], np.zeros(len(balls), dtype=np.bool_)
+    for one, depth in zip(vibrations, (low[2] - height, height - high[2]), strict=False):
+        beyond |= above & (depth >= 0.0) & (depth <= one.amplitude - 0.5 * balls.diameters + DEEPEST)
+    return beyond
 
 
 def _in_the_room(mesh: TriangleMesh, physics: Physics) -> np.ndarray:
@@ -194,7 +196,7 @@ def corners_now(mesh: TriangleMesh, physics: Physics) -> np.ndarray | None:
 
 def is_still(physics: Physics) -> bool:
     """True when no surface moves, so that no energy comes in."""
-    return (physics.vibration is None or physics.vibration.amplitude == 0.0) and physics.turn is None
+    return all(one.amplitude == 0.0 for one in physics.vibrations) and physics.turn is None
 
 
 def is_elastic(physics: Physics) -> bool:

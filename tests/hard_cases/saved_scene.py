@@ -52,12 +52,16 @@ def load_scene(path: Path) -> Scene:
 def _plain(value: Any) -> Any:
     if hasattr(value, "_asdict"):
         return {name: _plain(part) for name, part in value._asdict().items()}
+    if isinstance(value, tuple):
+        return [_plain(part) for part in value]
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 
 
-def _effect(hint: Any, numbers: dict[str, Any] | None) -> Any:
+def _effect(hint: Any, numbers: dict[str, Any] | list[dict[str, Any]] | None) -> Any:
     if numbers is None:
         return None
+    if isinstance(numbers, list):
+        return tuple(_effect(hint, one) for one in numbers)
     kind = next(one for one in (*get_args(hint), hint) if hasattr(one, "_fields"))
     return kind(**{name: _tuples(value) for name, value in numbers.items()})
 

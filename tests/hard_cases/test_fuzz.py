@@ -20,7 +20,7 @@ from sim_core import (
     SimulationError,
     Vibration,
 )
-from tests.cavities import FLOOR
+from tests.cavities import CEILING, FLOOR
 from tests.fuzzed_chambers import Chamber, random_chamber
 from tests.hard_cases.fuzz import Plan, judge, plans, require_invariants
 from tests.hard_cases.fuzzed_effects import FEW, MANY
@@ -61,6 +61,7 @@ LAWS = Physics(Gravity(), Restitution((LAW, LAW), LAW), Vibration(FLOOR, 25e-6, 
     [
         (LAWS._replace(friction=Friction((LAW, LAW), LAW), rest=Rest()), True),
         (LAWS._replace(random_phase=RandomPhase(7), drag=Drag(), ball_collisions=None), False),
+        (LAWS._replace(vibration=(Vibration(FLOOR, 0.0, 20e3), Vibration(CEILING, 0.0, 19e3)), drag=Drag()), False),
     ],
 )
 def test_a_scene_comes_back_from_its_file_as_it_was(tmp_path: Path, physics: Physics, alike: bool) -> None:

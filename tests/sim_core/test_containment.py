@@ -43,16 +43,17 @@ class Record:
 
 
 def height_at(chamber: Chamber, points: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """Height (n,) [m] of points (n, 3) [m] above the sonotrode where it is at time (n,) [s]: here a plane below all. At
-    its lowest, where each ball sees it at a phase of its own.
+    """Height (n,) [m] of points (n, 3) [m] above the nearest sonotrode where it is at time (n,) [s]: here planes with
+    all before them. At its lowest, where each ball sees it at a phase of its own.
     """
-    mesh, vibration = chamber.mesh, chamber.physics.vibration
-    assert vibration is not None
-    axis = np.array(vibration.axis) / np.linalg.norm(vibration.axis)
-    shift = vibration.amplitude * np.sin(math.tau * vibration.frequency * time + vibration.phase)
-    if chamber.physics.random_phase is not None:
-        shift = np.full(len(points), -vibration.amplitude)
-    return np.asarray((points - mesh.corners[mesh.tags == vibration.tag][0, 0]) @ axis - shift)
+    mesh, height = chamber.mesh, np.full(len(points), np.inf)
+    for vibration in chamber.physics.vibrations:
+        axis = np.array(vibration.axis) / np.linalg.norm(vibration.axis)
+        shift = vibration.amplitude * np.sin(math.tau * vibration.frequency * time + vibration.phase)
+        if chamber.physics.random_phase is not None:
+            shift = np.full(len(points), -vibration.amplitude)
+        height = np.minimum(height, (points - mesh.corners[mesh.tags == vibration.tag][0, 0]) @ axis - shift)
+    return height
 
 
 def clearance_at(chamber: Chamber, points: np.ndarray, time: np.ndarray) -> np.ndarray:
@@ -61,10 +62,8 @@ def clearance_at(chamber: Chamber, points: np.ndarray, time: np.ndarray) -> np.n
     """
     mesh, balls, physics = chamber
     reach = REACH * balls.radius
-    moving = [effect.tag for effect in (physics.vibration, physics.turn) if effect is not None]
+    moving = [effect.tag for effect in (*physics.vibrations, physics.turn) if effect is not None]
     still = clearance(mesh.corners[~np.isin(mesh.tags, moving)], points, reach)
-    if physics.vibration is None:
-        return still
     return np.minimum(still, np.minimum(height_at(chamber, points, time), reach))
 
 
@@ -72,21 +71,23 @@ def has_sharp_rim(chamber: Chamber, points: np.ndarray, time: np.ndarray) -> np.
     """False (n,) for centres of balls so near the sonotrode that a gentle slope beside it, which goes on under it
     (surfaces/rim.py), may be met past its end.
     """
-    mesh, balls, vibration = chamber.mesh, chamber.balls, chamber.physics.vibration
-    if vibration is None:
-        return np.ones(len(points), dtype=bool)
+    mesh, balls, sharp = chamber.mesh, chamber.balls, np.ones(len(points), dtype=bool)
     normals, _ = towards_shot(mesh.corners)
-    rim = find_rim(mesh.triangles, mesh.corners, normals, balls.radius, mesh.tags == vibration.tag, vibration.amplitude)
-    near = height_at(chamber, points, time) < balls.radius + 2.0 * vibration.amplitude
-    return np.asarray(~near | (len(rim.slopes) == 0))
+    for one in chamber.physics.vibrations:
+        rim = find_rim(mesh.triangles, mesh.corners, normals, balls.radius, mesh.tags == one.tag, one.amplitude)
+        near = height_at(chamber, points, time) < balls.radius + 2.0 * one.amplitude
+        sharp &= ~near | (len(rim.slopes) == 0)
+    return sharp
 
 
 def later(physics: Physics, duration: float) -> Physics:
     """The same effects, the sonotrode and the turning part where they are ``duration`` [s] later."""
-    vibration, turn = physics.vibration, physics.turn
-    if vibration is not None:
-        phase = (vibration.phase + math.tau * vibration.frequency * duration) % math.tau
-        physics = physics._replace(vibration=vibration._replace(phase=phase))
+    turn, moved = physics.turn, []
+    for one in physics.vibrations:
+        phase = (one.phase + math.tau * one.frequency * duration) % math.tau
+        moved.append(one._replace(phase=phase))
+    if moved:
+        physics = physics._replace(vibration=tuple(moved) if len(moved) > 1 else moved[0])
     if turn is not None:
         rate = turn.rpm / 60.0 if turn.rpm is not None else turn.frequency or 0.0  # [1/s]
         physics = physics._replace(turn=turn._replace(phase=(turn.phase + math.tau * rate * duration) % math.tau))

@@ -13,8 +13,9 @@ SWING = 25e-6  # m
 RADIUS = 1.5e-3  # m
 
 
-def trough(right: list[tuple[float, float]]) -> TriangleMesh:
-    r"""A prism 4 cm deep. The left half of its floor vibrates; the right half has these corners (x, z) [m].
+def trough(right: list[tuple[float, float]], left: float = 0.0) -> TriangleMesh:
+    r"""A prism 4 cm deep. The left half of its floor vibrates; the right half has these corners (x, z) [m];
+    its left wall is at x = ``left`` [m].
 
     z=2cm  ___________________
           |                   |
@@ -22,7 +23,7 @@ def trough(right: list[tuple[float, float]]) -> TriangleMesh:
           |_________-----
          x=0   floor  2cm    4cm
     """
-    outline = np.array([(0.0, 0.0), (0.02, 0.0), *right, (0.04, 0.02), (0.0, 0.02)])
+    outline = np.array([(left, 0.0), (0.02, 0.0), *right, (0.04, 0.02), (left, 0.02)])
     n = len(outline)
     front, back = (np.column_stack([outline[:, 0], np.full(n, y), outline[:, 1]]) for y in (0.0, 0.04))
     walls = [(k, k + n, (k + 1) % n) for k in range(n)] + [((k + 1) % n, k + n, (k + 1) % n + n) for k in range(n)]
