@@ -66,6 +66,7 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
     """
     part, notes = posed_part(design)
     part = part if target is None else replace(part, target=target)
+    notes += design.chamber.notes(design.shot.diameter)
     shape = design.chamber.surface(part.vertices, part.triangles)
     _refuse_misplaced(part, shape.vertices, design)
 
@@ -77,7 +78,7 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
         raise InputError(
             f"{part.name}: no part of it is inside the chamber; change part.offset_mm or the sizes in [chamber]"
         )
-    room, room_notes = _room_over_sonotrode(whole, shell, shape)
+    room, room_notes = _room_over_sonotrode(whole, shell, shape, design.chamber.ceiling_key)
     room = without_slivers(room)[0]
     on_part = room.solid != shell.label
     tags = np.where(on_part, TAG_PART, shape.tags[np.where(on_part, 0, room.source)]).astype(np.uint8)
@@ -102,10 +103,11 @@ def _refuse_misplaced(part: Part, shape: np.ndarray, design: Design) -> None:
         )
     low, high = part.vertices.min(axis=0), part.vertices.max(axis=0)
     wall_low, wall_high = shape.min(axis=0), shape.max(axis=0)
+    ceiling = design.chamber.ceiling_key
     if low[2] >= wall_high[2]:
         raise InputError(
-            f"chamber.height_mm: given {1e3 * wall_high[2]:g}, but the part begins {1e3 * low[2]:g} mm above "
-            "the sonotrode, above the ceiling; raise height_mm or lower chamber.sonotrode_distance_mm"
+            f"chamber.{ceiling}: given {1e3 * wall_high[2]:g}, but the part begins {1e3 * low[2]:g} mm above "
+            f"the sonotrode, above the ceiling; raise {ceiling} or lower chamber.sonotrode_distance_mm"
         )
     if (low[:2] >= wall_high[:2]).any() or (high[:2] <= wall_low[:2]).any():
         raise InputError(
@@ -127,7 +129,7 @@ def _body(part: Part) -> tuple[Solid, int]:
     return united(solids, part.name), int((volumes < 0.0).sum())
 
 
-def _room_over_sonotrode(whole: Surface, shell: Solid, shape: ShapeSurface) -> tuple[Surface, list[str]]:
+def _room_over_sonotrode(whole: Surface, shell: Solid, shape: ShapeSurface, ceiling: str) -> tuple[Surface, list[str]]:
     """The room that has the sonotrode for its floor, and notes on what was cut off."""
     rooms = cavities(whole)
     floor = (whole.solid == shell.label) & (
@@ -151,7 +153,7 @@ def _room_over_sonotrode(whole: Surface, shell: Solid, shape: ShapeSurface) -> t
         )
     top = float(room.vertices[:, 2].max())
     if top < shape.vertices[:, 2].max() - THINNEST:
-        notes.append(f"the part closes the chamber at z = {1e3 * top:.4g} mm: more chamber.height_mm has no effect")
+        notes.append(f"the part closes the chamber at z = {1e3 * top:.4g} mm: more chamber.{ceiling} has no effect")
     return room, notes
 
 

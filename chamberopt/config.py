@@ -15,6 +15,7 @@ from chamberopt.diagnosis import CrossCheckError, Problem
 from chamberopt.disk import write_text
 from chamberopt.errors import InputError
 from chamberopt.materials import STRICT
+from chamberopt.shapes.table import is_own
 
 __all__ = ["METRICS", "Design", "Limits", "Study", "load", "load_design", "load_study", "save_design"]
 
@@ -160,20 +161,31 @@ def load(path: str | Path) -> Design | Study:
 
 
 def save_design(design: Design, path: str | Path) -> None:
-    """Writes a design file that loads back as the very same design; its mesh path counts from the file."""
+    """Writes a design file that loads back as the very same design; paths of mesh and shape count from the file."""
     import tomli_w
 
     path = Path(path)
-    data = _without_none(design.model_dump())
-    try:
-        data["part"]["mesh"] = Path(os.path.relpath(design.part.mesh, path.resolve().parent)).as_posix()
-    except ValueError:  # another drive on Windows: only the absolute path leads there
-        data["part"]["mesh"] = Path(design.part.mesh).as_posix()
+    data = with_paths_from(path.resolve().parent, _without_none(design.model_dump()))
     header = (
         "# A complete candidate chamber, written by chamberopt.\n"
         "# Units are in the names; amplitude_um is zero-to-peak.\n\n"
     )
     write_text(path, header + _lists_on_one_line(tomli_w.dumps(data)))
+
+
+def with_paths_from(folder: Path, design: dict[str, Any]) -> dict[str, Any]:
+    """The values of a design, paths of mesh and shape counting from a folder."""
+    design["part"]["mesh"] = _relative(design["part"]["mesh"], folder)
+    if is_own(design["chamber"]["shape"]):
+        design["chamber"]["shape"] = _relative(design["chamber"]["shape"], folder)
+    return design
+
+
+def _relative(path: str, folder: Path) -> str:
+    try:
+        return Path(os.path.relpath(path, folder)).as_posix()
+    except ValueError:  # another drive on Windows: only the absolute path leads there
+        return Path(path).as_posix()
 
 
 def _read(path: Path, kind: str) -> tuple[str, dict[str, Any]]:

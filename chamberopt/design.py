@@ -26,9 +26,11 @@ from chamberopt import diagnosis
 from chamberopt.diagnosis import CrossCheckError, Problem
 from chamberopt.effects import Effects
 from chamberopt.errors import InputError
-from chamberopt.fields import Pair, Triple, Unit, listed, quantity
+from chamberopt.fields import Pair, Triple, Unit, from_file, listed, quantity
 from chamberopt.materials import STRICT, Materials
 from chamberopt.shapes import SHAPES, ChamberTable
+from chamberopt.shapes.own import KeptShape, own_shape
+from chamberopt.shapes.table import is_own
 from chamberopt.shot import Shot
 from chamberopt.treatment import Process
 
@@ -106,9 +108,8 @@ class Part(BaseModel):
     @classmethod
     def _absolute(cls, mesh: str, info: ValidationInfo) -> str:
         """Held absolute from here on, so that a design stays right wherever it is used or saved."""
-        context = info.context or {}
-        path = (context.get("folder", Path()) / mesh).resolve()
-        if context.get("needs_mesh") and not path.is_file():
+        path = from_file(mesh, info.context)
+        if (info.context or {}).get("needs_mesh") and not path.is_file():
             raise CrossCheckError([Problem("", f"given {mesh!r}: {diagnosis.not_found(path, 'mesh file', '*')}")])
         return str(path)
 
@@ -169,7 +170,7 @@ class Design(BaseModel):
         """The chamber's table has the keys of its shape: each shape has a subclass, with no more than that table."""
         if cls is not Design or not isinstance(data, Mapping):
             return rest(data)
-        return design_class(data).model_validate(data, context=info.context)
+        return design_class(data, info.context).model_validate(data, context=info.context)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Workers get the values: the class of a shape's designs is made anew there."""
@@ -262,14 +263,31 @@ class AnyShape(ChamberTable):
 
     model_config = ConfigDict(**{**STRICT, "extra": "ignore"})
 
-    shape: Literal[tuple(SHAPES)] = Field(description="form of the cavity")  # type: ignore[valid-type]
+    shape: Literal[tuple(SHAPES)] = Field(  # type: ignore[valid-type]
+        description="form of the cavity, or a Python file with one of your own"
+    )
+
+    @field_validator("shape", mode="before")
+    @classmethod
+    def _own(cls, shape: Any, info: ValidationInfo) -> Any:
+        if is_own(shape):
+            try:
+                own_shape(from_file(shape, info.context))
+            except InputError as error:
+                raise CrossCheckError([Problem("", f"given {shape!r}: {error}")]) from None
+        return shape
 
 
-def design_class(data: Mapping[str, Any]) -> type[Design]:
-    """The class of designs whose chamber has the shape that the data name."""
+def design_class(data: Mapping[str, Any], context: Mapping[str, Any] | None = None) -> type[Design]:
+    """The class of designs whose chamber has the shape that the data name; context as in ``checked``."""
     chamber = data.get("chamber")
     name = chamber.get("shape") if isinstance(chamber, Mapping) else getattr(chamber, "shape", None)
-    return _designs_with(SHAPES.get(name, AnyShape) if isinstance(name, str) else AnyShape)
+    if not is_own(name):
+        return _designs_with(SHAPES.get(name, AnyShape) if isinstance(name, str) else AnyShape)
+    try:
+        return _designs_with(own_shape(from_file(str(name), context)))
+    except InputError:
+        return _designs_with(AnyShape if (context or {}).get("needs_mesh") else KeptShape)
 
 
 @cache
@@ -288,15 +306,14 @@ def checked(
     source: str = "",
     mesh_must_exist: bool = True,
 ) -> Table:
-    """The data as a frozen model, or InputError with every problem; mesh paths count from the file.
+    """The data as a frozen model, or InputError with every problem; paths of meshes and shapes count from the file.
 
-    A result can be looked at without the mesh it was made from: mesh_must_exist = False.
+    A result can be looked at without the files it was made from: mesh_must_exist = False.
     """
+    context = {"folder": path.parent if path else Path(), "needs_mesh": path and mesh_must_exist}
     try:
-        return model.model_validate(
-            data, context={"folder": path.parent if path else Path(), "needs_mesh": path and mesh_must_exist}
-        )
+        return model.model_validate(data, context=context)
     except ValidationError as error:
-        shown: type[BaseModel] = design_class(data) if model is Design else model
+        shown: type[BaseModel] = design_class(data, context) if model is Design else model
         problems = diagnosis.from_validation(error, shown)
         raise InputError(diagnosis.message(problems, path, source)) from None

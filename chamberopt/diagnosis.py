@@ -94,6 +94,8 @@ def numeric_fields(table: BaseModel | type[BaseModel], prefix: str = "") -> Iter
         if isinstance(value, tuple) and value and isinstance(value[0], BaseModel):
             for i, item in enumerate(value):
                 yield from numeric_fields(item, f"{prefix}{name}.{i}.")
+        elif isinstance(value, tuple) and value and isinstance(value[0], tuple):
+            yield from ((f"{prefix}{name}.{i}.{j}", field) for i, row in enumerate(value) for j in range(len(row)))
         elif inner is not None:
             yield from numeric_fields(inner, f"{prefix}{name}.")
         elif float in kinds or int in kinds:

@@ -1,5 +1,7 @@
 """The kinds of numbers a file holds, with what is shown when one is wrong."""
 
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field
@@ -21,3 +23,8 @@ def quantity(low: float, high: float, unit: str, what: str, default: Any = ...) 
 def listed(form: str, what: str, default: Any = ...) -> Any:
     """A list of numbers of the file, its form shown when it is wrong."""
     return Field(default, description=what, json_schema_extra={"form": form})
+
+
+def from_file(path: str, context: Mapping[str, Any] | None) -> Path:
+    """Absolute path of a file that a design names relative to its own; context as ``design.checked`` makes it."""
+    return ((context or {}).get("folder", Path()) / path).resolve()

@@ -16,10 +16,11 @@ REFERENCE, DESIGNED = "reference", "as designed"
 
 def knobs(design: Design) -> dict[str, tuple[Any, ...]]:
     """Settings of every knob, by dotted name; the last is the reference's."""
-    accuracy, facets = design.process.accuracy, getattr(design.chamber, "facets", None)
+    accuracy = design.process.accuracy
     warm, floor, piece = accuracy.warmup_time_s, accuracy.elastic_below_mm_s, accuracy.drag_piece_ms
     ladder: dict[str, tuple[Any, ...]] = {}
-    if facets is not None:
+    if design.chamber.is_round:
+        facets = design.value(FACETS)
         ladder[FACETS] = tuple(sorted({16, facets, min(1024, max(256, 4 * facets))}))
     ladder |= {
         MOTION: ("random_phase", "sinusoidal"),

@@ -235,8 +235,9 @@ def described(ladder: Ladder) -> str:
     pool = ladder.reference
     finest = ", ".join(f"{short(knob)} {shown(value)}" for knob, value in ladder.settings.items())
     took = pool.replicas * pool.cpu.value
+    walls = f"; there is no chamber with a round wall to compare {FACETS} with, only the finest facets"
     return (
         f"reference: {pool.replicas} replicas with {finest}: objective {pool.objective.value:.4f} ± "
         f"{pool.objective.half_width:.2g}, mean coverage {pool.mean.value:.4f} ± {pool.mean.half_width:.2g}, in "
-        f"{took:.0f} CPU s; there is no chamber with a round wall to compare {FACETS} with, only the finest facets"
+        f"{took:.0f} CPU s{walls if FACETS in ladder.settings else ''}"
     )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import platform
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -12,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from chamberopt.accuracy import Evaluation
-from chamberopt.config import Design, save_design
+from chamberopt.config import Design, save_design, with_paths_from
 from chamberopt.design import checked
 from chamberopt.disk import new_folder, write_text
 from chamberopt.errors import InputError
@@ -186,6 +185,7 @@ def _about(folder: Path, design: Design, chamber: Chamber, evaluation: Evaluatio
         "notes": [*chamber.notes, *evaluation.notes],
         "design": _design_values(design, folder),
         "part_sha256": chamber.part.sha256,
+        **({"shape_sha256": design.chamber.sha256} if design.chamber.sha256 else {}),
         "part_unit": chamber.part.unit,
         "versions": versions(),
     }
@@ -255,13 +255,8 @@ def _refuse_constant(name: str) -> float:
 
 
 def _design_values(design: Design, folder: Path) -> dict[str, Any]:
-    """The design as its file would say it, the mesh relative to the folder."""
-    values = design.model_dump(mode="json", exclude_none=True)
-    try:
-        values["part"]["mesh"] = Path(os.path.relpath(design.part.mesh, folder.resolve())).as_posix()
-    except ValueError:  # another drive on Windows
-        values["part"]["mesh"] = Path(design.part.mesh).as_posix()
-    return values
+    """The design as its file would say it, its files relative to the folder."""
+    return with_paths_from(folder.resolve(), design.model_dump(mode="json", exclude_none=True))
 
 
 def versions() -> dict[str, str]:

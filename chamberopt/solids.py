@@ -18,7 +18,7 @@ from chamberopt.errors import InputError
 from chamberopt.triangles import shells_of, winding_number
 
 if TYPE_CHECKING:
-    from manifold3d import Manifold
+    from manifold3d import CrossSection, Manifold
 
 GRID_MM = 2.0**-20  # 1 nm: a thousandth of the finest surface roughness, yet 1e7 steps of a double at 100 mm
 SAME_VOLUME = 1e-9  # relative; a boolean that went wrong is off by whole triangles, rounding by 1e-13
@@ -124,6 +124,52 @@ def subtract(whole: Solid, taken: Solid) -> Solid:
     return Solid(rest, -1, f"{whole.name} without {taken.name}")
 
 
+@dataclass(frozen=True)
+class Outline:
+    """An area in plan, perhaps in several pieces and with holes."""
+
+    section: CrossSection
+
+    def grown(self, by: float, facets: int) -> Outline:
+        """The area within ``by`` [m] of this one, round corners in ``facets`` flat sides to a turn; below 0: shrunk."""
+        from manifold3d import JoinType
+
+        return Outline(self.section.offset(1e3 * by, JoinType.Round, circular_segments=facets))
+
+    def hull(self, tolerance: float) -> np.ndarray:
+        """Corners (n, 2) m of the convex hull, counter-clockwise; those within the tolerance [m] of a line left out."""
+        return _corners(self.section.hull().simplify(1e3 * tolerance))[0]
+
+    def filled(self, tolerance: float) -> list[np.ndarray]:
+        """Corners of the pieces, as those of the hull, their holes left out."""
+        from manifold3d import CrossSection
+
+        outer = [piece for piece in self.section.to_polygons() if _signed_area(piece) > 0.0]
+        return _corners(CrossSection(outer).simplify(1e3 * tolerance))
+
+
+def shadow(vertices: np.ndarray, triangles: np.ndarray, below: float) -> Outline:
+    """What a closed surface, vertices (n, 3) m and triangles (m, 3) outward, covers in plan, below a height [m]."""
+    from manifold3d import CrossSection, OpType
+
+    shells, volumes = shells_of(vertices, triangles)
+    bodies = [
+        solid(vertices, triangles, "the part", only=np.flatnonzero(shells == k)) for k in np.flatnonzero(volumes > 0.0)
+    ]
+    sections = [
+        CrossSection(one.body.trim_by_plane((0.0, 0.0, -1.0), -1e3 * below).project().to_polygons()) for one in bodies
+    ]
+    return Outline(CrossSection.batch_boolean(sections, OpType.Add))
+
+
+def extruded(outline: np.ndarray, height: float) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (k, 3) m and triangles (m, 3) of the prism from z = 0 up over an outline (n, 2) m, convex or not."""
+    from manifold3d import CrossSection
+
+    mesh = CrossSection([1e3 * outline]).extrude(1e3 * height).to_mesh64()
+    return 1e-3 * np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts).astype(np.int32)
+
+
 def cavities(surface: Surface) -> list[np.ndarray]:
     """The separate rooms of a surface, largest first: masks (k,) of an outer shell and the islands in it."""
     shells, volumes = shells_of(surface.vertices, surface.triangles)
@@ -138,6 +184,15 @@ def cavities(surface: Surface) -> list[np.ndarray]:
                 rooms[int(shell)] |= shells == island
                 break
     return list(rooms.values())
+
+
+def _corners(section: CrossSection) -> list[np.ndarray]:
+    return [1e-3 * np.asarray(polygon) for polygon in section.to_polygons()]
+
+
+def _signed_area(polygon: np.ndarray) -> float:
+    (x, y), (xn, yn) = polygon.T, np.roll(polygon, -1, axis=0).T
+    return float(0.5 * (x * yn - y * xn).sum())
 
 
 def _grid_mm(vertices: np.ndarray) -> np.ndarray:

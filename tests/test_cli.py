@@ -181,7 +181,7 @@ class TestWrongCalls:
     def test_a_folder(self, copies: Path, chamberopt: Said) -> None:
         status, _, err = chamberopt("check", copies / "designs")
         assert status == 2
-        assert "is a folder; give a design or study file (.toml); files in it: blade.toml, gear.toml" in err
+        assert "is a folder; give a design or study file (.toml); files in it: blade.toml, blade_conformal.toml" in err
 
     def test_study_to_simulate_and_design_to_run(self, copies: Path, chamberopt: Said) -> None:
         status, _, err = chamberopt("simulate", copies / "studies" / "gear.toml")

@@ -196,7 +196,7 @@ class TestShipped:
         """v_Y² = 26 (Y/E*)⁴ Y/rho (Johnson), half of it for two balls; v0 = v_Y (1.18 / C0)⁴."""
         elastic = {"steel": (210e9, 0.30), "aluminium": (70e9, 0.33), "titanium": (114e9, 0.34)}
         part = {"gear": ("steel", 300), "plate": ("aluminium", 120), "blade": ("titanium", 330)}[
-            path.stem.removesuffix("_turning")
+            path.stem.partition("_")[0]
         ]
         pairs = {"shot": ("steel", 650), "wall": ("steel", 300), "sonotrode": ("titanium", 330), "part": part}
         design = load_design(path)

@@ -3,9 +3,14 @@
 A new shape: a file with a subclass of ChamberTable, and its name here.
 """
 
+from chamberopt.shapes.box import Box
+from chamberopt.shapes.conformal import Conformal
 from chamberopt.shapes.cylinder import Cylinder
+from chamberopt.shapes.loft import lofted
+from chamberopt.shapes.prism import Prism
+from chamberopt.shapes.revolve import Revolve
 from chamberopt.shapes.surface import TAG_PART, TAG_SONOTRODE, TAG_WALL, ShapeSurface
-from chamberopt.shapes.table import ChamberTable, ParametricChamber
+from chamberopt.shapes.table import ChamberTable, ParametricChamber, WalledChamber
 
 __all__ = [
     "SHAPES",
@@ -15,6 +20,14 @@ __all__ = [
     "ChamberTable",
     "ParametricChamber",
     "ShapeSurface",
+    "WalledChamber",
+    "lofted",
 ]
 
-SHAPES: dict[str, type[ChamberTable]] = {"cylinder": Cylinder}
+SHAPES: dict[str, type[ChamberTable]] = {
+    "cylinder": Cylinder,
+    "box": Box,
+    "prism": Prism,
+    "revolve": Revolve,
+    "conformal": Conformal,
+}

@@ -1,20 +1,23 @@
 """A closed surface from rings of points, one above the other."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from chamberopt.shapes.surface import TAG_SONOTRODE, TAG_WALL, ShapeSurface
 
 
-def lofted(rings: list[np.ndarray]) -> ShapeSurface:
+def lofted(rings: Sequence[np.ndarray], peak: np.ndarray | None = None) -> ShapeSurface:
     """Floor, sides, ceiling over rings (n, 3) m of equally many points, lowest first, each round a convex outline and
     counter-clockwise seen from above. The floor is the sonotrode; 2 n triangles a ring.
 
-            ____ ring 1      ceiling: a fan about its middle
+            ____ ring 1      ceiling: a fan about its middle, or about a peak (3,) m
            /____\\
            |    | ring 0     floor: a fan about its middle
     """
     n, k = len(rings[0]), len(rings)
-    vertices = np.concatenate([*rings, [rings[0].mean(axis=0), rings[-1].mean(axis=0)]])
+    middle = rings[-1].mean(axis=0) if peak is None else peak
+    vertices = np.concatenate([*rings, [rings[0].mean(axis=0), middle]])
     here, beside = np.arange(n), (np.arange(n) + 1) % n
     floor = np.c_[np.full(n, k * n), beside, here]
     sides = []

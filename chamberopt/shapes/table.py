@@ -2,11 +2,12 @@
 
 import math
 from abc import abstractmethod
+from typing import ClassVar
 
 import numpy as np
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, ValidationInfo, field_validator
 
-from chamberopt.fields import quantity
+from chamberopt.fields import from_file, quantity
 from chamberopt.materials import STRICT
 from chamberopt.shapes.surface import ShapeSurface
 
@@ -19,8 +20,17 @@ class ChamberTable(BaseModel):
 
     model_config = STRICT
 
+    sha256: ClassVar[str] = ""  # of the file, where the shape is a user's own
+    ceiling_key: ClassVar[str] = "height_mm"  # what to change when the ceiling is too low
+
     shape: str = Field(description="form of the cavity")
     sonotrode_distance_mm: float = quantity(0.1, 2000, "mm", "mean sonotrode face to lowest point of the part")
+
+    @field_validator("shape")
+    @classmethod
+    def _absolute(cls, shape: str, info: ValidationInfo) -> str:
+        """A user's own file is held absolute from here on, like the part's mesh."""
+        return str(from_file(shape, info.context)) if is_own(shape) else shape
 
     @property
     def sonotrode_distance(self) -> float:
@@ -41,13 +51,32 @@ class ChamberTable(BaseModel):
         """A volume [m³] that the cavity does not exceed, as far as the table alone says."""
         return math.inf
 
+    @property
+    def is_round(self) -> bool:
+        """Whether `facets` makes a difference."""
+        return False
 
-class ParametricChamber(ChamberTable):
+    def notes(self, ball: float) -> list[str]:
+        """What to know of these values with shot whose largest balls have this diameter [m]."""
+        return []
+
+
+class WalledChamber(ChamberTable):
+    """A cavity with side walls all round, that may lean."""
+
+    inclination_deg: float = quantity(-45, 45, "degrees", "of the side walls: above 0 wider at the ceiling", 0.0)
+    facets: int = Field(default=64, ge=8, le=1024, description="flat sides that stand for a full turn of a round wall")
+
+    @property
+    def slope(self) -> float:
+        """How far the side walls go outward for each metre up."""
+        return math.tan(math.radians(self.inclination_deg))
+
+
+class ParametricChamber(WalledChamber):
     """A cavity made from its parameters: floor, sides that may lean, flat ceiling."""
 
     height_mm: float = quantity(2, 2000, "mm", "inner height, sonotrode to ceiling")
-    inclination_deg: float = quantity(-45, 45, "degrees", "of the side walls: above 0 wider at the ceiling", 0.0)
-    facets: int = Field(default=64, ge=8, le=1024, description="flat sides that stand for a full turn of a round wall")
 
     @property
     def height(self) -> float:
@@ -57,4 +86,9 @@ class ParametricChamber(ChamberTable):
     @property
     def lean(self) -> float:
         """How far the side walls go outward over the height [m]."""
-        return self.height * math.tan(math.radians(self.inclination_deg))
+        return self.height * self.slope
+
+
+def is_own(shape: object) -> bool:
+    """Whether a design's shape names a Python file of the user's."""
+    return isinstance(shape, str) and shape.endswith(".py")

@@ -1,0 +1,104 @@
+"""A user's own shape: a Python file with one subclass of ChamberTable, named by the design."""
+
+import inspect
+import sys
+import traceback
+from collections.abc import Callable
+from functools import lru_cache
+from hashlib import sha256
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from pydantic import ConfigDict
+
+from chamberopt import diagnosis
+from chamberopt.errors import InputError
+from chamberopt.materials import STRICT
+from chamberopt.shapes.sound import fault
+from chamberopt.shapes.surface import ShapeSurface
+from chamberopt.shapes.table import ChamberTable
+
+
+class KeptShape(ChamberTable):
+    """Stands for a shape whose file is gone or broken, so that results made with it can still be looked at."""
+
+    model_config = ConfigDict(**{**STRICT, "extra": "allow"})
+
+    def surface(self, vertices: np.ndarray, triangles: np.ndarray) -> ShapeSurface:
+        """By the file, should it be back; else InputError that says what is wrong with it."""
+        return own_shape(Path(self.shape)).model_validate(self.model_dump()).surface(vertices, triangles)
+
+
+def own_shape(path: Path) -> type[ChamberTable]:
+    """The shape in a file; the same class as long as the file's content is the same. InputError if it holds none."""
+    try:
+        source = path.read_bytes()
+    except FileNotFoundError:
+        raise InputError(diagnosis.not_found(path, "shape file", "*.py")) from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}; check its permissions") from None
+    return _shape_in(path, source)
+
+
+@lru_cache(maxsize=64)
+def _shape_in(path: Path, source: bytes) -> type[ChamberTable]:
+    digest = sha256(source).hexdigest()
+    module = ModuleType(f"chamberopt_own_shape_{digest[:16]}")
+    module.__file__ = str(path)
+    sys.modules[module.__name__] = module  # where pydantic looks up the names in annotations
+    try:
+        exec(compile(source, str(path), "exec"), vars(module))
+    except Exception as error:
+        raise InputError(_said(path, "cannot be run", error)) from None
+    made = [cls for cls in vars(module).values() if isinstance(cls, type) and issubclass(cls, ChamberTable)]
+    bases = {base for cls in made for base in cls.__bases__}
+    shapes = [cls for cls in made if cls.__module__ == module.__name__ and cls not in bases]
+    names = " and ".join(cls.__name__ for cls in shapes) or "none"
+    if len(shapes) != 1:
+        raise InputError(f"{path}: one subclass of chamberopt.shapes.ChamberTable is wanted, it defines {names}")
+    if inspect.isabstract(shapes[0]):
+        lacking = ", ".join(sorted(shapes[0].__abstractmethods__))
+        raise InputError(f"{path}: {names} does not define {lacking}(); see docs/chambers.md")
+    return _guarded(path, shapes[0], digest)
+
+
+def _guarded(path: Path, shape: type[ChamberTable], digest: str) -> type[ChamberTable]:
+    """The shape, its code's faults and those of its surface told as a user's."""
+
+    def guard(name: str) -> Callable[..., Any]:
+        def method(self: ChamberTable, *given: Any) -> Any:
+            try:
+                return getattr(shape, name)(self, *given)
+            except InputError:
+                raise
+            except Exception as error:
+                raise InputError(_said(path, f"{name}() failed", error)) from None
+
+        method.__doc__ = getattr(shape, name).__doc__
+        return method
+
+    made = guard("surface")
+
+    def surface(self: ChamberTable, vertices: np.ndarray, triangles: np.ndarray) -> ShapeSurface:
+        """As the file makes it, if it is a closed surface with a sonotrode."""
+        cavity = made(self, vertices, triangles)
+        wrong = fault(cavity)
+        if wrong:
+            raise InputError(f"chamber.shape: {path}: surface() of {shape.__name__} {wrong}")
+        return cavity
+
+    methods = {name: guard(name) for name in ("widths_mm", "room", "notes")} | {"surface": surface}
+    about = {"__module__": shape.__module__, "__doc__": shape.__doc__, "sha256": digest}
+    metaclass: Any = type(shape)
+    return metaclass(shape.__name__, (shape,), {**methods, **about})
+
+
+def _said(path: Path, what: str, error: Exception) -> str:
+    """Where in the user's file an error came from."""
+    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
+    line = error.lineno if isinstance(error, SyntaxError) else (lines or [None])[-1]
+    place = f"{path}:{line}" if line else str(path)
+    said = error.msg if isinstance(error, SyntaxError) else " ".join(str(error).split())
+    return f"{place}: {what}: {type(error).__name__}: {said}"
