@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from chamberopt.analytic import described
 from chamberopt.coverage import Tally
 from chamberopt.dents import Samples, few_points_note, marked_share, sample_points
 from chamberopt.estimate import Estimate, estimate
@@ -36,6 +37,7 @@ from chamberopt.stuck import on_the_spot_notes, stuck_notes
 if TYPE_CHECKING:
     from chamberopt.chamber import Chamber
     from chamberopt.config import Design
+    from sim_core import AnalyticCavity
 
 CURVE = 50  # points of coverage against time
 
@@ -47,6 +49,7 @@ class Evaluation:
     total: sum of the replicas' tallies · replicas: one Tally each · timings: seconds of wall clock by step ·
     collisions: numbers of simulated collisions by kind, warm-up included · notes: what to know before
     trusting it · stopped_by: what ended it, "replicas" (a number was asked for), "accuracy" or "most_replicas" ·
+    analytic: in an exact cavity, not the chamber's mesh ·
     marked (m,): share of each part triangle inside dents, NaN unexposed, and against_time: (time s, mean coverage of
     the target) pairs; both only where every dent is marked.
     """
@@ -61,6 +64,7 @@ class Evaluation:
     notes: tuple[str, ...] = ()
     stream: str = "search"
     stopped_by: str = "replicas"
+    analytic: bool = False
     marked: np.ndarray | None = None
     against_time: tuple[tuple[float, Estimate], ...] = ()
 
@@ -123,12 +127,14 @@ def evaluate(
     objective_name: str = "uniform_coverage",
     stream: str = "search",
     replicas: int | None = None,
+    cavity: AnalyticCavity | None = None,
 ) -> Evaluation:
     """Simulate a candidate in independent replicas and estimate its objective and metrics.
 
     replicas: number of them; when None as many as the design's accuracy asks for. stream: which of the two seed
-    streams ("search", "confirm"). The same numbers come out whatever the number of workers: replicas are added in
-    order, and what they say, never a clock, decides how many there are.
+    streams ("search", "confirm"). cavity: `analytic_cavity`'s, in place of the chamber's mesh. The same numbers come
+    out whatever the number of workers: replicas are added in order, and what they say, never a clock, decides how many
+    there are.
 
     Raises InputError (the shot does not fit) and sim_core.SimulationError.
     """
@@ -137,7 +143,7 @@ def evaluate(
     planned = replicas or accuracy.replicas
     if wanted is not None:
         planned = min(max(planned, LEAST_WATCHED), accuracy.most_replicas)
-    mesh = chamber_mesh(chamber)
+    mesh = cavity or chamber_mesh(chamber)
     samples = sample_points(chamber, accuracy.sample_spacing) if accuracy.coverage_model == "dents" else None
     done: list[Replica] = []
     clock = {"simulate": 0.0, "coverage": 0.0}
@@ -160,7 +166,8 @@ def evaluate(
             break
     tallies = [replica.tally for replica in done]
     stopped_by = "replicas" if wanted is None else "accuracy" if goal.half_width <= wanted else "most_replicas"
-    notes = _accuracy_note(stopped_by, len(done), goal, wanted)
+    notes: tuple[str, ...] = (described(cavity),) if cavity else ()
+    notes += _accuracy_note(stopped_by, len(done), goal, wanted)
     if samples is not None:
         notes += few_points_note(samples, chamber)
     else:
@@ -176,6 +183,7 @@ def evaluate(
         notes=(*notes, *_motion_notes(done)),
         stream=stream,
         stopped_by=stopped_by,
+        analytic=cavity is not None,
         marked=None if samples is None else np.mean(_shares(done, samples, chamber, design), axis=0),
         against_time=() if samples is None else _against_time(done, samples, chamber, design),
     )

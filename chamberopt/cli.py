@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from chamberopt.estimate import Estimate
     from chamberopt.mesh_io import SurfaceError
     from chamberopt.reach import Reach
+    from sim_core import AnalyticCavity
 
 app = App(
     name="chamberopt",
@@ -96,15 +97,18 @@ def check(
 
 
 @app.command
-def simulate(design: Path, /, *, json: Json = False, out: Out = None) -> None:
+def simulate(design: Path, /, *, analytic: bool = False, json: Json = False, out: Out = None) -> None:
     """Simulate one design and predict its coverage, with confidence intervals and pictures.
 
     Parameters
     ----------
     design
         Design file (.toml).
+    analytic
+        In an exact cylinder, box or prism, if the chamber is one, in place of its triangles.
     """
     from chamberopt.accuracy import evaluate
+    from chamberopt.analytic import analytic_cavity
     from chamberopt.chamber import build_chamber
     from chamberopt.config import load_design
     from chamberopt.executor import local_executor
@@ -113,12 +117,13 @@ def simulate(design: Path, /, *, json: Json = False, out: Out = None) -> None:
 
     asked = load_design(design)
     chamber = build_chamber(asked)
+    cavity = analytic_cavity(asked, chamber) if analytic else None
     _warn(asked, chamber)
     with _results(out, design.stem) as folder:
         candidate, advice = _settled(asked, chamber)
-        _compile(candidate, chamber)
+        _compile(candidate, chamber, cavity)
         with local_executor() as executor, progress_bar("replicas") as progress:
-            evaluation = evaluate(candidate, chamber, executor, progress)
+            evaluation = evaluate(candidate, chamber, executor, progress, cavity=cavity)
         _remark(write_simulation(folder, candidate, chamber, evaluation, advice))
     notes = (*map(str, advice), *chamber.notes, *evaluation.notes)
     _say([*_estimates(evaluation), *_notes(notes)], folder, json)
@@ -290,14 +295,15 @@ def _picture_of_target(chamber: Chamber, found: Reach, screenshot: Path) -> None
     _remark([part_picture(corners, title, screenshot, part.target, missed=missed) or f"picture in {screenshot}"])
 
 
-def _compile(design: Design, chamber: Chamber) -> None:
+def _compile(design: Design, chamber: Chamber, cavity: AnalyticCavity | None = None) -> None:
     """Compiles, aloud, before the bar starts: else its first minute would look like a hang."""
     from chamberopt.process import chamber_mesh, require_countable, scene_physics
     from chamberopt.progress import announce_compilation
 
     require_countable(design)
     shot = design.shot
-    announce_compilation(scene_physics(design, chamber_mesh(chamber)), shot.count, shot.mix is None)
+    physics = scene_physics(design, cavity or chamber_mesh(chamber))
+    announce_compilation(physics, shot.count, shot.mix is None, cavity is not None and cavity.radius is not None)
 
 
 def _settled(design: Design, chamber: Chamber) -> tuple[Design, list[Advice]]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from chamberopt.chamber import TAG_PART, TAG_WALL
+from chamberopt.chamber import TAG_PART, TAG_SONOTRODE, TAG_WALL
 from chamberopt.places import around, mm2
 from chamberopt.triangles import area_vectors
 
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from chamberopt.chamber import Chamber
     from chamberopt.config import Design
 
+LEVEL = 1e-9  # m: corners whose heights differ by less are level but for rounding
 UPWARD = 1e-6  # of a triangle's area: what faces up by less is upright but for rounding
 REMEDY = {
     TAG_PART: "turn it (effects.part_turn), tilt it (part.rotate_deg), or lower chamber.height_mm to its top side",
@@ -45,7 +46,9 @@ def ledges(design: Design, chamber: Chamber) -> list[Ledge]:
         if not faces.any() or (tag == TAG_PART and design.effects.part_turn is not None):
             continue
         level = bool(area[faces & flat].sum() >= cross_section)
-        shown = faces & flat if level else faces  # where balls lie, rather than roll off
+        shown = faces & flat if level else faces & _in_hollows(chamber, upward)  # where balls lie, rather than roll off
+        if not shown.any():
+            continue
         much = mm2(area[shown].sum())
         where, how = ("on", f"{much} of it are level") if level else ("in hollows of", f"{much} face up, none level")
         found.append(
@@ -56,6 +59,27 @@ def ledges(design: Design, chamber: Chamber) -> list[Ledge]:
             )
         )
     return found
+
+
+def _in_hollows(chamber: Chamber, upward: np.ndarray) -> np.ndarray:
+    """Which of the faces that go ``upward`` (k,) touch the bottom of a hollow: from there every way leads up.
+
+    A wall that leans out has its lowest points on the sonotrode, and the edges of a slope lead on downwards.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    count, height = len(chamber.vertices), chamber.vertices[:, 2]
+    one, two = chamber.triangles[:, [0, 1, 2, 1, 2, 0]].reshape(-1, 2, 3).transpose(1, 0, 2).reshape(2, -1)
+    alike = np.abs(height[one] - height[two]) <= LEVEL
+    links = coo_array((np.ones(alike.sum(), dtype=bool), (one[alike], two[alike])), shape=(count, count))
+    plateaus, plateau = connected_components(links, directed=False)
+    bottom = np.ones(plateaus, dtype=bool)
+    lower = height[two] < height[one] - LEVEL
+    bottom[plateau[one[lower]]] = False
+    bottom[plateau[two[height[one] < height[two] - LEVEL]]] = False
+    bottom[plateau[chamber.triangles[chamber.tags == TAG_SONOTRODE]]] = False
+    return np.asarray(upward & bottom[plateau[chamber.triangles]].any(axis=1))
 
 
 def _place(chamber: Chamber, faces: np.ndarray, area: np.ndarray) -> str:

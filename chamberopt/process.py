@@ -16,7 +16,7 @@ MOST_BALLS = 20_000
 if TYPE_CHECKING:
     from chamberopt.chamber import Chamber
     from chamberopt.config import Design
-    from sim_core import Physics, Scene, TriangleMesh, Turn
+    from sim_core import AnalyticCavity, Physics, Scene, TriangleMesh, Turn
 
 STREAMS = ("search", "confirm")
 
@@ -78,7 +78,7 @@ def require_turnable(design: Design, mesh: TriangleMesh) -> None:
         raise InputError(f"effects.part_turn: {error}") from None
 
 
-def rests(design: Design, mesh: TriangleMesh) -> bool:
+def rests(design: Design, mesh: TriangleMesh | AnalyticCavity) -> bool:
     """Whether balls can lie still: as the design says, or wherever its chamber has a still surface that faces up."""
     from sim_core import Gravity, can_rest
 
@@ -91,9 +91,13 @@ def rests(design: Design, mesh: TriangleMesh) -> bool:
 
 
 def scene_physics(
-    design: Design, mesh: TriangleMesh, phase: float = 0.0, turn_phase: float = 0.0, draws: int = 0
+    design: Design,
+    mesh: TriangleMesh | AnalyticCavity,
+    phase: float = 0.0,
+    turn_phase: float = 0.0,
+    draws: int = 0,
 ) -> Physics:
-    """The effects of a design in its chamber's mesh.
+    """The effects of a design in its chamber's mesh, or analytical cavity.
 
     ``phase`` and ``turn_phase`` [rad]: of the sonotrode and of a part that turns, at the start; ``draws``: the seed
     of arrival phases that are drawn anew.
@@ -122,8 +126,8 @@ def scene_physics(
     )
 
 
-def build_scene(design: Design, mesh: TriangleMesh, seed: int) -> Scene:
-    """The scene one replica simulates, in a chamber's mesh (`chamber_mesh`).
+def build_scene(design: Design, mesh: TriangleMesh | AnalyticCavity, seed: int) -> Scene:
+    """The scene one replica simulates, in a chamber's mesh (`chamber_mesh`) or `analytic.analytic_cavity`.
 
     The shot starts packed low in the chamber with the speed scale of the sonotrode, 2 pi f A, so that the
     warm-up has to forget only the arrangement, not to heat or cool the shot through orders of magnitude; the
@@ -132,10 +136,11 @@ def build_scene(design: Design, mesh: TriangleMesh, seed: int) -> Scene:
 
     Raises InputError when the shot does not fit or has too many balls, or the part cannot turn.
     """
-    from sim_core import Balls, Scene, SceneError, pack_balls
+    from sim_core import AnalyticCavity, Balls, Scene, SceneError, pack_balls
 
     require_countable(design)
-    require_turnable(design, mesh)
+    if not isinstance(mesh, AnalyticCavity):
+        require_turnable(design, mesh)
     rng = np.random.default_rng(seed)
     sonotrode, shot = design.sonotrode, design.shot
     phase = rng.uniform(0.0, 2.0 * np.pi)

@@ -51,14 +51,16 @@ def progress_bar(what: str, stream: TextIO | None = None) -> Iterator[Progress]:
         yield show
 
 
-def announce_compilation(physics: Physics, balls: int, alike: bool = True, stream: TextIO | None = None) -> float:
+def announce_compilation(
+    physics: Physics, balls: int, alike: bool = True, bore: bool = False, stream: TextIO | None = None
+) -> float:
     """Compiles the simulator for these effects if it never was, here, and says so; seconds it took, else 0."""
     import sim_core
 
     stream = stream or sys.stderr
-    if sim_core.is_compiled(physics, balls, alike):
+    if sim_core.is_compiled(physics, balls, alike, bore):
         return 0.0
     print("compiling the simulator (once per set of effects) ...", file=stream, flush=True)
-    seconds = float(sim_core.compile_simulator(physics, balls, alike))
+    seconds = float(sim_core.compile_simulator(physics, balls, alike, bore))
     print(f"compiled in {seconds:.0f} s", file=stream, flush=True)
     return seconds

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from chamberopt.analytic import on_chamber
 from chamberopt.coverage import Tally, tally
 from chamberopt.dents import Samples, first_marked
 from chamberopt.process import build_scene, replica_seed
@@ -18,7 +19,7 @@ from chamberopt.stuck import Stuck, share_on_the_spot, still
 if TYPE_CHECKING:
     from chamberopt.chamber import Chamber
     from chamberopt.config import Design
-    from sim_core import TriangleMesh
+    from sim_core import AnalyticCavity, TriangleMesh
 
 Progress = Callable[[int, int, "float | None"], None]
 """Called as progress(done, total, best so far or None)."""
@@ -44,7 +45,7 @@ class Replica:
 def simulate_replicas(
     design: Design,
     chamber: Chamber,
-    mesh: TriangleMesh,
+    mesh: TriangleMesh | AnalyticCavity,
     samples: Samples | None,
     executor: Executor,
     stream: str,
@@ -71,17 +72,18 @@ def replicas_wanted(done: int, half_width: float, wanted: float, most: int) -> i
 
 
 def simulate_replica(
-    design: Design, chamber: Chamber, mesh: TriangleMesh, samples: Samples | None, seed: int
+    design: Design, chamber: Chamber, mesh: TriangleMesh | AnalyticCavity, samples: Samples | None, seed: int
 ) -> Replica:
     """One replica, on a worker."""
-    from sim_core import simulate
+    from sim_core import TriangleMesh, simulate
 
     result = simulate(build_scene(design, mesh, seed))
+    impacts = result.impacts if isinstance(mesh, TriangleMesh) else on_chamber(result.impacts, chamber)
     shot, kinds = design.shot, ("walls", "balls", "sonotrode", "total")
     return Replica(
-        tally=tally(result.impacts, chamber, design),
+        tally=tally(impacts, chamber, design),
         collisions={kind: int(getattr(result.collisions, kind)) for kind in kinds},
         on_the_spot=share_on_the_spot(result.balls.velocities),
         stuck=still(result.resting, len(result.balls), shot.diameter, chamber, design.effects.part_turn is not None),
-        first_marked=None if samples is None else first_marked(samples, result.impacts, chamber, design),
+        first_marked=None if samples is None else first_marked(samples, impacts, chamber, design),
     )

@@ -174,6 +174,7 @@ def _about(folder: Path, design: Design, chamber: Chamber, evaluation: Evaluatio
         "stream": evaluation.stream,
         "replicas": len(evaluation.replicas),
         "stopped_by": evaluation.stopped_by,
+        "analytic": evaluation.analytic,
         "simulated_time_s": evaluation.total.simulated_time,
         "collisions": evaluation.collisions,
         "timings_s": {step: round(seconds, 3) for step, seconds in evaluation.timings.items()},

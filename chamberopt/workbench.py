@@ -29,24 +29,32 @@ __all__ = ["Design", "Study", "load_design", "load_study", "optimise", "show", "
 
 
 def simulate(
-    design: Design, out: str | Path, *, workers: int | None = None, progress: Progress | None = None
+    design: Design,
+    out: str | Path,
+    *,
+    analytic: bool = False,
+    workers: int | None = None,
+    progress: Progress | None = None,
 ) -> Result:
     """Simulate one design into the new or empty folder ``out``; the result as read back from there.
 
-    ``workers``: threads, one per core when None; the figures do not depend on it. Raises InputError for a chamber that
-    cannot be built or does not take the shot, sim_core.SimulationError when a run must stop.
+    ``analytic``: in an exact cylinder, box or prism, if the chamber is one, in place of its mesh. ``workers``: threads,
+    one per core when None; the figures do not depend on it. Raises InputError for a chamber that cannot be built, does
+    not take the shot or is not analytical, sim_core.SimulationError when a run must stop.
     """
     from chamberopt.accuracy import evaluate
     from chamberopt.advice import settled
+    from chamberopt.analytic import analytic_cavity
     from chamberopt.chamber import build_chamber
     from chamberopt.executor import local_executor
     from chamberopt.results import load_result, write_simulation
 
     _require("design", design, Design, "load_design")
     chamber = build_chamber(design)
+    cavity = analytic_cavity(design, chamber) if analytic else None
     with local_executor(workers) as executor:
         design, advice = settled(design, chamber, executor)
-        evaluation = evaluate(design, chamber, executor, progress)
+        evaluation = evaluate(design, chamber, executor, progress, cavity=cavity)
     _warn([*map(str, advice), *evaluation.notes, *write_simulation(out, design, chamber, evaluation, advice)])
     return load_result(out)
 

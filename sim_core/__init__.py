@@ -1,6 +1,7 @@
-"""sim_core: exact event-driven dynamics of balls in a closed triangle mesh.
+"""sim_core: exact event-driven dynamics of balls in a closed triangle mesh, or a cavity of exact surfaces.
 
-Build a Scene from a TriangleMesh, Balls and Physics, then simulate it. SI units throughout.
+Build a Scene from a TriangleMesh (or a cylinder_cavity or prism_cavity), Balls and Physics, then simulate it. SI units
+throughout.
 """
 
 from sim_core.balls import Balls
@@ -21,10 +22,13 @@ from sim_core.physics import Physics
 from sim_core.resting import Resting, can_rest
 from sim_core.scene import Scene, require_free_turn
 from sim_core.simulate import Collisions, Result, simulate
+from sim_core.surfaces.analytic import AnalyticCavity, cylinder_cavity, prism_cavity
+from sim_core.surfaces.locate import triangles_at
 from sim_core.surfaces.mesh import TriangleMesh
 from sim_core.warm_up import compile_simulator, is_compiled
 
 __all__ = [
+    "AnalyticCavity",
     "BallCollisions",
     "Balls",
     "Collisions",
@@ -47,11 +51,14 @@ __all__ = [
     "Vibration",
     "can_rest",
     "compile_simulator",
+    "cylinder_cavity",
     "drag_coefficient",
     "is_compiled",
     "nearest",
     "pack_balls",
+    "prism_cavity",
     "require_free_turn",
     "restitution_at",
     "simulate",
+    "triangles_at",
 ]

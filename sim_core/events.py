@@ -121,7 +121,19 @@ def _predict(loop: Loop, ball: int, time: float, what: int) -> None:
         length, end = end_of_path(loop.footing, tree, seam, wave, here, pull, ball, time, moment, length)
         look = one_turn(loop.turning, length) if end == STILL else length
         delay, obstacle = first_contact_from(
-            loop.footing, loop.sizes, ball, tree, loop.scratch, here, pull, wave, loop.waves, seam, time, length
+            loop.footing,
+            loop.sizes,
+            loop.ground.bore,
+            ball,
+            tree,
+            loop.scratch,
+            here,
+            pull,
+            wave,
+            loop.waves,
+            seam,
+            time,
+            length,
         )
         delay, obstacle = first_part_contact(
             loop.ground.part,

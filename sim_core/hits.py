@@ -4,6 +4,7 @@ import math
 
 from sim_core._compile import inlined
 from sim_core.calendar import EVENTS
+from sim_core.detect.ball_bore import facing
 from sim_core.detect.ball_triangle import away_from_capsule, face_normal, nearer_neighbour
 from sim_core.effects.friction import Grip
 from sim_core.effects.random_phase import own_wave
@@ -18,6 +19,7 @@ from sim_core.loop import SONOTRODE, WALLS, Loop
 from sim_core.neighbours import follow, reach_of
 from sim_core.resolve.air import catch_up, flies, goes_on
 from sim_core.resolve.ball_ball import pair_kick
+from sim_core.resolve.ball_bore import hop
 from sim_core.resolve.ball_surface import surface_kick
 from sim_core.resolve.driving import drive, taken_from_part
 from sim_core.resolve.footing import BOUNCES, ROLLS, deflect, land, set_out, step
@@ -53,7 +55,7 @@ def hit_surface(loop: Loop, ball: int, obstacle: int, time: float) -> None:
         touched = sub(here.position, away)
         here = set_out(loop.footing, shot.motion, ball, time, here, away, tree.radius)
     else:
-        away = face_normal(tree.numbers, obstacle)
+        away = facing(ground.bore, tree.numbers, obstacle, kind, here.position)
     relative = here.velocity
     landed = BOUNCES
     law = loop.restitution
@@ -68,6 +70,7 @@ def hit_surface(loop: Loop, ball: int, obstacle: int, time: float) -> None:
     if landed == BOUNCES:
         change = surface_kick(away, relative, law, tag)
         change = rub_surface(loop.grip, ball, time, away, relative, change, tag)
+        change = hop(ground.bore, kind, away, relative, change)
         deflect(loop.footing, shot.motion, ball, time, moment, here, change)
     follow(shot.crowd, shot.motion, ball, time)
     hide(loop.footing, shot.crowd, ball)

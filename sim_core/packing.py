@@ -2,11 +2,14 @@
 before peening.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from sim_core.effects.turn import Turn
 from sim_core.errors import SceneError
 from sim_core.invariants import clearance, contained, enclosed, posed
+from sim_core.surfaces.analytic import AnalyticCavity
 from sim_core.surfaces.mesh import TriangleMesh
 
 BATCH = 256  # positions tried at once
@@ -17,7 +20,7 @@ GAP = 1e-6  # m kept between neighbours and from surfaces, so that rounding of p
 
 
 def pack_balls(
-    mesh: TriangleMesh,
+    mesh: TriangleMesh | AnalyticCavity,
     count: int,
     diameter: float | np.ndarray,
     rng: np.random.Generator,
@@ -34,39 +37,48 @@ def pack_balls(
     if not (count >= 1 and count == int(count) and (sizes > 0.0).all() and sizes.shape in ((), (count,))):
         raise SceneError(f"cannot place {count} balls of {diameter} m: give a whole number and a positive diameter")
     each = np.broadcast_to(sizes, int(count))
-    corners = mesh.corners if turn is None else posed(mesh, turn)
     placed = _Placed(2.0 * (0.5 * float(each.max()) + GAP))
+    free = _free_of(mesh, turn)
     positions = np.empty((int(count), 3))
     for size in np.unique(each)[::-1]:
         before = len(placed.points)
-        _place(placed, mesh, corners, int((each == size).sum()), float(size), rng, clear, turn)
+        _place(placed, mesh, free, int((each == size).sum()), float(size), rng, clear)
         positions[each == size] = placed.points[before:]
     return positions
 
 
+def _free_of(mesh: TriangleMesh | AnalyticCavity, turn: Turn | None) -> Callable[[np.ndarray, float], np.ndarray]:
+    """Those of points (n, 3) [m] that are inside and so far [m] from every surface, as a function of the two."""
+    if isinstance(mesh, AnalyticCavity):
+        return lambda points, reach: points[(mesh.gaps(points) >= reach).all(axis=1)]
+    corners = mesh.corners if turn is None else posed(mesh, turn)
+
+    def free(points: np.ndarray, reach: float) -> np.ndarray:
+        points = points[clearance(corners, points, reach) >= reach]
+        return points[contained(mesh, points) if turn is None else enclosed(corners, points)]
+
+    return free
+
+
 def _place(
     placed: "_Placed",
-    mesh: TriangleMesh,
-    corners: np.ndarray,
+    mesh: TriangleMesh | AnalyticCavity,
+    free: Callable[[np.ndarray, float], np.ndarray],
     count: int,
     diameter: float,
     rng: np.random.Generator,
     clear: float,
-    turn: Turn | None,
 ) -> None:
     """So many balls of one size more."""
     radius = 0.5 * diameter + GAP
-    free = radius + clear
-    low = mesh.vertices.min(axis=0) + free
-    high = mesh.vertices.max(axis=0) - free
+    reach = radius + clear
+    low, high = mesh.bounds[0] + reach, mesh.bounds[1] - reach
     if (high < low).any():
         raise SceneError(f"no ball of {diameter * 1e3:.3g} mm fits into the mesh: it is narrower than the ball")
     failures, first = 0, len(placed.points)
     top = min(low[2] + FIRST_LAYER * diameter, high[2])
     while len(placed.points) - first < count:
-        tries = rng.uniform(low, [high[0], high[1], top], size=(BATCH, 3))
-        tries = tries[clearance(corners, tries, free) >= free]
-        tries = tries[contained(mesh, tries) if turn is None else enclosed(corners, tries)]
+        tries = free(rng.uniform(low, [high[0], high[1], top], size=(BATCH, 3)), reach)
         before = len(placed.points)
         for point in tries:
             if len(placed.points) - first == count:

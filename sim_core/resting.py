@@ -6,6 +6,7 @@ import numpy as np
 
 from sim_core.effects.gravity import Gravity
 from sim_core.effects.rest import ASLEEP, FEET, JAMMED, LIES_SINCE, MODE, MOST_FEET, ON_BALL, Footing
+from sim_core.surfaces.analytic import AnalyticCavity
 from sim_core.surfaces.ground import Ground
 from sim_core.surfaces.locate import triangle_at
 from sim_core.surfaces.mesh import TriangleMesh, towards_shot
@@ -75,7 +76,7 @@ _EMPTY = (
 )
 
 
-def can_rest(mesh: TriangleMesh, gravity: Gravity | None, *moving: int) -> bool:
+def can_rest(mesh: TriangleMesh | AnalyticCavity, gravity: Gravity | None, *moving: int) -> bool:
     """True when a ball can lie still in the chamber: gravity presses it onto some triangle that keeps still.
 
     ``moving``: the tags of the surfaces that vibrate or turn.

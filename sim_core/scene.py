@@ -5,6 +5,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from sim_core.analytic_scene import require_clear, require_supported
 from sim_core.balls import Balls
 from sim_core.effects.ball_collisions import BallCollisions
 from sim_core.effects.drag import Drag, checked_drag
@@ -19,6 +20,7 @@ from sim_core.errors import SceneError
 from sim_core.invariants import clearance, contained, enclosed, narrowest_gap, posed
 from sim_core.physics import Physics
 from sim_core.pinches import find_pinch, surface_name, vibrating_name
+from sim_core.surfaces.analytic import AnalyticCavity
 from sim_core.surfaces.mesh import TriangleMesh, towards_shot
 from sim_core.surfaces.part import require_free_axle
 
@@ -39,16 +41,16 @@ KINDS = {  # of the effects that are checked by name; gravity may be any three n
 
 @dataclass(frozen=True)
 class Scene:
-    """A closed mesh, balls inside it, the effects, and how long.
+    """A closed mesh or an analytical cavity, balls inside it, the effects, and how long.
 
     ``duration`` [s] is simulated after ``warmup`` [s], during which nothing is recorded; ``record``: tags whose
     impacts are logged (all if None). Raises SceneError, naming the ball, triangle or field: a ball outside the
     mesh, overlapping a surface or another ball, or in a gap narrower than itself; a body in the mesh that is inside
     out; a tag without restitution; a vibrating or turning tag that the mesh lacks; a part that cannot turn; numbers
-    out of range.
+    out of range; an analytical cavity with contact mode, a turning part, or, in a cylinder, gravity across it.
     """
 
-    mesh: TriangleMesh
+    mesh: TriangleMesh | AnalyticCavity
     balls: Balls
     physics: Physics
     duration: float
@@ -95,7 +97,7 @@ class Scene:
         checked_random_phase(self.physics.random_phase, len(vibrations))
         axle = checked_axle(turn)
         tags = np.unique(self.mesh.tags).tolist()
-        if turn is not None and axle is not None:
+        if turn is not None and axle is not None and isinstance(self.mesh, TriangleMesh):
             if turn.tag not in tags:
                 raise SceneError(f"turn.tag is {turn.tag}, but the mesh has tags {tags}")
             if turn.tag in [one.tag for one in vibrations]:
@@ -104,8 +106,22 @@ class Scene:
         for one in vibrations:
             if one.tag not in tags:
                 raise SceneError(f"vibration.tag is {one.tag}, but the mesh has tags {tags}")
+        if isinstance(self.mesh, AnalyticCavity):
+            require_supported(self.mesh, self.physics)
 
     def _require_room(self) -> None:
+        if isinstance(self.mesh, AnalyticCavity):
+            require_clear(self.mesh, self.balls, self.physics.vibrations, TOUCH)
+        else:
+            self._require_room_in_mesh()
+        if self.physics.ball_collisions is None:
+            return
+        gap_between, one, two = narrowest_gap(self.balls)
+        if gap_between < -TOUCH:
+            raise SceneError(f"balls {one} and {two} overlap by {-gap_between:.3g} m at the start; move one of them")
+
+    def _require_room_in_mesh(self) -> None:
+        assert isinstance(self.mesh, TriangleMesh)
         balls = self.balls
         wrong = _inside_out(self.mesh)
         if wrong >= 0:
@@ -133,11 +149,6 @@ class Scene:
         corners = self.mesh.corners.copy() if corners is None else corners
         self._require_room_above_sonotrode(corners)
         self._require_room_between(corners)
-        if self.physics.ball_collisions is None:
-            return
-        gap_between, one, two = narrowest_gap(balls)
-        if gap_between < -TOUCH:
-            raise SceneError(f"balls {one} and {two} overlap by {-gap_between:.3g} m at the start; move one of them")
 
     def _require_room_above_sonotrode(self, corners: np.ndarray) -> None:
         """A vibrating surface is not where the mesh has it: its ``corners`` are displaced by its phase here."""
@@ -154,6 +165,7 @@ class Scene:
                 )
 
     def _require_room_between(self, corners: np.ndarray) -> None:
+        assert isinstance(self.mesh, TriangleMesh)
         pinch = find_pinch(self.mesh, self.physics, self.balls, corners)
         if pinch is None:
             return

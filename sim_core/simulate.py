@@ -32,6 +32,7 @@ from sim_core.resting import Resting, resting
 from sim_core.scene import TOUCH, Scene
 from sim_core.sizes import Sizes, new_sizes
 from sim_core.stopwatch import Stopwatch
+from sim_core.surfaces.analytic import AnalyticCavity
 from sim_core.surfaces.ground import build_ground
 from sim_core.surfaces.mesh import MAX_TAGS
 
@@ -133,8 +134,7 @@ class _Run:
     def _shot(self, fastest: float) -> Shot:
         if not self.collide:
             return Shot(self.motion, None)
-        low = self.scene.mesh.vertices.min(axis=0) - self.centre
-        high = self.scene.mesh.vertices.max(axis=0) - self.centre
+        low, high = self.scene.mesh.bounds - self.centre
         balls = self.scene.balls
         radii = None if balls.alike else 0.5 * balls.diameters
         crowd = new_crowd(self.motion, low, high, 2.0 * balls.radius, fastest, self.window, radii)
@@ -195,9 +195,7 @@ class _Run:
     def _jam(self, ball: int) -> str:
         positions = self._states()[0]
         where = np.round(positions[ball], 6).tolist()
-        corners = self._corners()
-        now = self.scene.mesh.corners if corners is None else corners
-        between, by_part = touching(self.scene, now, positions, ball)
+        between, by_part = touching(self.scene, self._corners(), positions, ball)
         if self.turning is not None and (by_part or self.footing is not None):
             through = "" if by_part else ", and the turning part presses on it through other balls"
             return (
@@ -251,6 +249,8 @@ class _Run:
     def _inside(self, points: np.ndarray) -> np.ndarray:
         """Which points (n, 3) [m] are in the chamber; also down to where a face that swings wider than a ball is."""
         mesh, corners = self.scene.mesh, self._corners()
+        if isinstance(mesh, AnalyticCavity):
+            return mesh.contains(points, max((one.amplitude for one in self.scene.physics.vibrations), default=0.0))
         inside = contained(mesh, points, corners)
         for one in self.scene.physics.vibrations:
             if one.amplitude >= 0.5 * self.scene.balls.sizes[0] and not inside.all():
@@ -260,9 +260,10 @@ class _Run:
     def _corners(self) -> np.ndarray | None:
         """The triangles where they are now, if some of them turn."""
         turn = self.scene.physics.turn
-        if turn is None or self.turning is None:
+        mesh = self.scene.mesh
+        if turn is None or self.turning is None or isinstance(mesh, AnalyticCavity):
             return None
-        return posed(self.scene.mesh, turn, angle_now(self.turning, float(self.now[0])))
+        return posed(mesh, turn, angle_now(self.turning, float(self.now[0])))
 
     def balls(self) -> Balls:
         """The balls as they are now."""

@@ -13,26 +13,27 @@ from sim_core.blocks import MANY
 from sim_core.physics import Physics
 from sim_core.scene import Scene
 from sim_core.simulate import simulate
+from sim_core.surfaces.analytic import cylinder_cavity
 from sim_core.surfaces.mesh import TriangleMesh
 
 
-def _mark(physics: Physics, balls: int, alike: bool) -> Path:
+def _mark(physics: Physics, balls: int, alike: bool, bore: bool) -> Path:
     """A file that says that this set of effects has been compiled: what is absent is not in the machine code."""
     present = [name for name, effect in zip(physics._fields, physics, strict=True) if effect is not None]
     kind = ["many" if balls >= MANY else "few", "alike" if alike else "mixed"]
     if len(physics.vibrations) > 1:
         kind.append("sonotrodes")
-    return CACHE_FOLDER / "-".join(["compiled", *present, *kind])
+    return CACHE_FOLDER / "-".join(["compiled", *present, *kind, *["bore"] * bore])
 
 
-def is_compiled(physics: Physics, balls: int, alike: bool = True) -> bool:
+def is_compiled(physics: Physics, balls: int, alike: bool = True, bore: bool = False) -> bool:
     """True when compile_simulator has done this before, with this version of the sources."""
-    return _mark(physics, balls, alike).exists()
+    return _mark(physics, balls, alike, bore).exists()
 
 
-def compile_simulator(physics: Physics, balls: int = 1, alike: bool = True) -> float:
+def compile_simulator(physics: Physics, balls: int = 1, alike: bool = True, bore: bool = False) -> float:
     """Compiles (or loads from the cache) what a scene with these effects and so many balls, ``alike`` or of several
-    sizes, needs; returns the seconds it took.
+    sizes, needs, in a mesh or a prism, or in the ``bore`` of an analytical cylinder; returns the seconds it took.
     """
     start = time.perf_counter()
     if len(physics.vibrations) > 2:
@@ -53,9 +54,13 @@ def compile_simulator(physics: Physics, balls: int = 1, alike: bool = True) -> f
     places = np.stack(np.meshgrid(*[np.linspace(0.1, 0.9, side)] * 3), axis=-1).reshape(-1, 3)
     diameter = 0.05 if alike else np.linspace(0.04, 0.05, len(places)).round(2)
     shot = Balls(places, np.random.default_rng(1).normal(size=places.shape), diameter)
-    simulate(Scene(TriangleMesh(vertices, triangles, tags), shot, physics, duration=0.01))
+    mesh = TriangleMesh(vertices, triangles, tags)
+    floor = (vertices[triangles][:, :, 2] == 0.0).all(axis=1)
+    walls = int(tags[~floor][0])
+    room = cylinder_cavity(2.0, 0.0, 1.0, (int(tags[floor][0]), walls, walls), (0.5, 0.5)) if bore else mesh
+    simulate(Scene(room, shot, physics, duration=0.01))
     with contextlib.suppress(OSError):  # a cache that cannot be written: every process compiles for itself
-        _mark(physics, balls, alike).touch()
+        _mark(physics, balls, alike, bore).touch()
     return time.perf_counter() - start
 
 

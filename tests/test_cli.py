@@ -362,6 +362,15 @@ class TestWhole:
         assert compared["differences_to_first"]["mean_coverage"][0]["value"] == 0.0
         assert Path(compared["folder"], "compare.txt").is_file()
 
+    def test_simulate_analytically(self, small: Path, chamberopt: Said) -> None:
+        status, out, _ = chamberopt("simulate", "designs/plate.toml", "--analytic", "--json")
+        folder = Path(json.loads(out)["folder"])
+        assert (status, json.loads((folder / "result.json").read_text(encoding="utf-8"))["analytic"]) == (0, True)
+        status, _, err = chamberopt("simulate", "designs/gear.toml", "--analytic")
+        assert (status, err.count("\n")) == (2, 1)
+        assert "the part reaches into the cavity" in err
+        assert not Path("results/gear").exists()
+
     def test_inspect(self, small: Path, chamberopt: Said) -> None:
         from chamberopt.viewer import why_no_pictures
 

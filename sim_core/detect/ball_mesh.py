@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim_core._compile import inlined, jit
+from sim_core.detect.ball_bore import bore_delay, is_round
 from sim_core.detect.ball_footing import out_of_reach
 from sim_core.detect.ball_sonotrode import meets_later, same_plane, waving_plane_delay, within_waving_borders
 from sim_core.detect.ball_triangle import capsule_delay, face_delay
@@ -16,7 +17,7 @@ from sim_core.flight import Point
 from sim_core.roots import NEVER
 from sim_core.simd import BOXES, boxes_hit, lowest_bit
 from sim_core.sizes import Sizes, own_radius, own_root
-from sim_core.surfaces.obstacles import CAPSULE, FACE
+from sim_core.surfaces.obstacles import CAPSULE, FACE, Bore
 from sim_core.surfaces.tree import STACK, Tree
 from sim_core.vec3 import Vec3
 
@@ -100,13 +101,14 @@ def first_contact(
     first.
     """
     fall = acceleration(gravity)
-    return first_contact_from(None, None, -1, tree, scratch, ball, fall, wave, None, seam, time, length)
+    return first_contact_from(None, None, None, -1, tree, scratch, ball, fall, wave, None, seam, time, length)
 
 
 @inlined
 def first_contact_from(
     footing: Footing | None,
     sizes: Sizes | None,
+    bore: Bore | None,
     number: int,
     tree: Tree,
     scratch: Scratch,
@@ -120,7 +122,8 @@ def first_contact_from(
 ) -> tuple[float, int]:
     """The same for ball ``number``, under its own acceleration ``fall`` [m/s²], with what it stands on left out;
 
-    of several ``sizes`` it has obstacles of its own; of several ``waves`` each sonotrode has its own.
+    of several ``sizes`` it has obstacles of its own, in a ``bore`` one that is round; of several ``waves`` each
+    sonotrode has its own.
     """
     radius = own_radius(sizes, tree.radius, number)
     _aim(scratch.ray, ball, fall, length)
@@ -144,6 +147,8 @@ def first_contact_from(
                 delay = face_delay(tree.numbers, row, ball, fall, radius, seam)
             elif kind == CAPSULE:
                 delay = capsule_delay(tree.numbers, row, ball, fall, radius, best)
+            elif is_round(bore, kind):
+                delay = bore_delay(bore, tree.numbers, row, ball)
             else:
                 own = face_wave(waves, wave, row)
                 if plane_row < 0 or not (

@@ -6,6 +6,7 @@ import numpy as np
 
 from sim_core._compile import jit
 from sim_core.surfaces.flats import LONE, Flats
+from sim_core.surfaces.mesh import towards_shot
 from sim_core.vec3 import Vec3
 
 TRIANGLES_A_SQUARE = 2.0
@@ -95,6 +96,29 @@ def triangle_at(locator: Locator, seed: int, at: Vec3) -> int:
         if outside < least:
             nearest, least = triangle, outside
     return nearest
+
+
+def triangles_at(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Which of the triangles (m, 3, 3) [m] of one plane holds each point (n, 3) [m] of it, or is nearest to it: (n,).
+
+    Triangles wound as in a TriangleMesh, normals away from the shot; a point off the plane is seen along its normal.
+    """
+    corners, points = np.ascontiguousarray(corners, np.float64), np.ascontiguousarray(points, np.float64)
+    normals, doubled = towards_shot(corners)
+    seed = int(doubled.argmax())
+    along = corners[seed, 1] - corners[seed, 0]
+    along /= np.linalg.norm(along)
+    frame = np.stack([corners[seed, 0], along, np.cross(normals[seed], along)])
+    flats = Flats(np.zeros(len(corners), dtype=np.int32), np.array([seed], dtype=np.int32), frame[None], [])
+    found = np.zeros(len(points), dtype=np.int64)
+    _locate(build_locator(corners, flats, 0.0), seed, points, found)
+    return found
+
+
+@jit
+def _locate(locator: Locator, seed: int, points: np.ndarray, found: np.ndarray) -> None:
+    for i in range(len(points)):
+        found[i] = triangle_at(locator, seed, Vec3(points[i, 0], points[i, 1], points[i, 2]))
 
 
 @jit

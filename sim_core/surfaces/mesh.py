@@ -76,6 +76,11 @@ class TriangleMesh:
         return np.asarray(0.5 * (self.vertices.min(axis=0) + self.vertices.max(axis=0)))
 
     @property
+    def bounds(self) -> np.ndarray:
+        """Lowest and highest corner of the bounding box [m], (2, 3)."""
+        return np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)])
+
+    @property
     def volume(self) -> float:
         """Enclosed volume [m³], by the divergence theorem."""
         return enclosed_volume(self.vertices, self.triangles)

@@ -25,6 +25,7 @@ TRIANGLE = [0, 1, 2, 2]  # the corners of a face that has but three
 FACE = 0
 CAPSULE = 1
 WAVING_FACE = 2  # a face of the vibrating sonotrode
+ROUND = 3  # the round side of an upright cylinder, seen from inside
 
 # Faces reach this far over their borders [m], so that rounding leaves no crack between neighbours. It moves
 # contact at a convex edge by SEAM²/2r = 3e-14 m for a 3 mm ball. Smaller than 1e-12 would be rounding itself.
@@ -35,12 +36,20 @@ SEAM_PER_RADIUS = 1e-5  # the same for balls so small that SEAM would show
 PAST_CORNERS = 3.0
 
 
+class Bore(NamedTuple):
+    """The axis ``x``, ``y`` [m] of the upright cylinder that the shot is in."""
+
+    x: float
+    y: float
+
+
 class Obstacles(NamedTuple):
     """What the centre of a ball can hit, one row each. k = faces + capsules.
 
     ``numbers`` (k, 20) float64 [m]: a face holds its unit normal towards the shot (0:3), the moved plane's offset
     (3), and four inward in-plane border normals with their offsets (4:20), a triangle's fourth zero; a capsule its
-    start (0:3), unit direction (3:6), length (6), and the first neighbour's normal minus the second's (7:10).
+    start (0:3), unit direction (3:6), length (6), and the first neighbour's normal minus the second's (7:10);
+    a round side how far from the axis the centre gets (3).
     ``kinds`` (k,) uint8; ``triangles`` (k, 2) int32: the mesh triangles to book a hit on, a capsule's two neighbours
     or a face twice.
     ``low``, ``high`` (k, 3) float64 [m]: bounding boxes.

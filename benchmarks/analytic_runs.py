@@ -1,0 +1,191 @@
+"""The runs of benchmarks/analytic.py: one chamber, analytical or meshed, and how far two of them are apart."""
+
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from chamberopt.accuracy import jackknife
+from chamberopt.analytic import analytic_cavity, on_chamber
+from chamberopt.chamber import Chamber, build_chamber
+from chamberopt.config import Design
+from chamberopt.coverage import Tally, impact_angle_deg, tally
+from chamberopt.estimate import Estimate, estimate
+from chamberopt.objective import METRICS
+from chamberopt.process import build_scene, chamber_mesh, replica_seed
+from sim_core import AnalyticCavity, ImpactLog, TriangleMesh, simulate
+
+MEASURED, PEENED = 0.39, 50.0  # the paper's experiment: coverage, and after how long [s]
+BINS = 10
+GUESS, SLOPE, STEPS = 5.0, 2.5, 3  # µm to start from; of exponent against amplitude, both logarithmic
+FAR = 0.01  # of a logarithm: nearer to one another two points give no slope but noise
+FIGURES = {
+    "mean_coverage": "coverage",
+    "impacts_per_mm2_s": "impacts / mm² s",
+    "mean_normal_speed_m_s": "normal speed, m/s",
+}
+INSCRIBED = -2.0 * np.pi**2 / 3.0  # relative volume of a polygon in its circle, less 1, times n² (first order)
+PROFILES = {  # of the impacts on the plate: name, unit
+    "distance from the axis": "mm",
+    "normal speed": "m/s",
+    "impact angle": "degrees",
+}
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is simulated: replicas of so many seconds each, of facets the numbers in ``facets``."""
+
+    replicas: int
+    seconds: float
+    facets: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Run:
+    """One chamber, simulated: its figures with their intervals, and of each profile the share of impacts in each bin,
+    a row a replica.
+    """
+
+    volume: float
+    figures: dict[str, Estimate]
+    shares: dict[str, np.ndarray]
+
+
+def values(log: ImpactLog) -> dict[str, np.ndarray]:
+    """What the profiles are made of, one number an impact."""
+    return dict(
+        zip(
+            PROFILES,
+            (
+                1e3 * np.hypot(log.position[:, 0], log.position[:, 1]),
+                log.normal_speed,
+                impact_angle_deg(log.velocity, log.normal_speed),
+            ),
+            strict=True,
+        )
+    )
+
+
+def replica(
+    design: Design, chamber: Chamber, surface: TriangleMesh | AnalyticCavity, seed: int
+) -> tuple[Tally, ImpactLog]:
+    """What the plate got in one replica, and its impacts."""
+    log = simulate(build_scene(design, surface, seed)).impacts
+    if isinstance(surface, AnalyticCavity):
+        log = on_chamber(log, chamber)
+    return tally(log, chamber, design), log
+
+
+def run(
+    design: Design, effort: Effort, edges: dict[str, np.ndarray], executor: Executor, stream: str, analytic: bool
+) -> Run:
+    """Simulate a design's chamber, analytical or meshed, on one of the two streams of seeds."""
+    chamber = build_chamber(design)
+    surface = analytic_cavity(design, chamber) if analytic else chamber_mesh(chamber)
+
+    def one(number: int) -> tuple[Tally, list[np.ndarray]]:
+        got, log = replica(design, chamber, surface, replica_seed(design.process.seed, number, stream))
+        seen = values(log)
+        return got, [
+            np.histogram(np.clip(seen[name], *bins[[0, -1]]), bins)[0] / len(log) for name, bins in edges.items()
+        ]
+
+    tallies, counts = zip(*executor.map(one, range(effort.replicas)), strict=True)
+    found = jackknife(tallies, [METRICS[name] for name in FIGURES], chamber, design)
+    shares = {name: np.array([one[k] for one in counts]) for k, name in enumerate(edges)}
+    return Run(surface.volume, dict(zip(FIGURES, found, strict=True)), shares)
+
+
+def calibrated(design: Design, effort: Effort, executor: Executor) -> Design:
+    """The design at the amplitude [µm, to 0.01] that covers what was measured, in the analytical chamber.
+
+    By secants: the logarithm of coverage's exponent is nearly straight in that of the amplitude.
+    """
+    wanted, slope, amplitude = np.log(-np.log1p(-MEASURED)), SLOPE, GUESS
+    before: tuple[float, float] | None = None
+    for _ in range(STEPS):
+        design = design.with_values({"sonotrode.amplitude_um": round(amplitude, 2)})
+        covered = run(design, effort, {}, executor, "search", True).figures["mean_coverage"].value
+        here = np.log(1e6 * design.sonotrode.amplitude), np.log(-np.log1p(-covered))
+        if before is not None and abs(here[0] - before[0]) > FAR:
+            slope = (here[1] - before[1]) / (here[0] - before[0])
+        before, amplitude = here, float(np.exp(here[0] + (wanted - here[1]) / slope))
+    return design.with_values({"sonotrode.amplitude_um": round(amplitude, 2)})
+
+
+def bin_edges(design: Design) -> dict[str, np.ndarray]:
+    """Bins with as many impacts each in one replica of the analytical chamber; of distances, of one area each. What
+    lies beyond them is counted in the first and last.
+    """
+    chamber = build_chamber(design)
+    log = replica(design, chamber, analytic_cavity(design, chamber), replica_seed(0, 0))[1]
+    edges = {name: np.quantile(seen, np.linspace(0.0, 1.0, BINS + 1)) for name, seen in values(log).items()}
+    reach = 1e3 * 0.5 * (design.chamber.diameter - design.shot.diameter)
+    edges["distance from the axis"] = reach * np.sqrt(np.linspace(0.0, 1.0, BINS + 1))
+    return edges
+
+
+def hotelling(one: np.ndarray, two: np.ndarray) -> float:
+    """The probability that two sets of replicas (n, bins) differ by as much if their means are the same.
+
+    Hotelling's two-sample T² (T. W. Anderson, An Introduction to Multivariate Statistical Analysis, 3rd ed. 2003,
+    section 5.3), which allows for bins that move together; shares add up to 1, so that the last bin says nothing new.
+    """
+    from scipy.stats import f
+
+    one, two = one[:, :-1], two[:, :-1]
+    n, m, p = len(one), len(two), one.shape[1]
+    pooled = ((n - 1) * np.cov(one.T) + (m - 1) * np.cov(two.T)) / (n + m - 2)
+    apart = one.mean(axis=0) - two.mean(axis=0)
+    square = n * m / (n + m) * apart @ np.linalg.solve(pooled, apart)
+    return float(f.sf(square * (n + m - p - 1) / (p * (n + m - 2)), p, n + m - p - 1))
+
+
+def difference(one: Estimate, two: Estimate) -> Estimate:
+    """One minus two, of independent replicas, with its 95 % interval."""
+    return Estimate(one.value - two.value, float(np.hypot(one.half_width, two.half_width)), ())
+
+
+def relative(run: Run, exact: Run, name: str) -> tuple[float, float]:
+    """How much [-] a figure is off the analytical one, and the 95 % half-width of that."""
+    apart, whole = difference(run.figures[name], exact.figures[name]), exact.figures[name].value
+    return apart.value / whole, apart.half_width / whole
+
+
+def fit(exact: Run, meshed: dict[int, Run], name: str) -> tuple[float, float, float]:
+    """k of the relative difference k/n² by least squares, its 95 % half-width, and the fit's p-value."""
+    from scipy.stats import chi2
+
+    square = np.array([1.0 / n**2 for n in meshed])
+    off, half_width = np.array([relative(run, exact, name) for run in meshed.values()]).T
+    weight = half_width**-2.0
+    k = float((weight * square * off).sum() / (weight * square**2).sum())
+    misfit = 1.96**2 * (weight * (off - k * square) ** 2).sum()
+    return k, float((weight * square**2).sum() ** -0.5), float(chi2.sf(misfit, len(meshed) - 1))
+
+
+def rows(exact: Run, meshed: dict[int, Run], facets: int, edges: dict[str, np.ndarray]) -> list[dict[str, Any]]:
+    """For the CSV: figures of every mesh, bins of the design's own, each beside the analytical chamber's."""
+    found = [
+        (f"{name}, {n} facets", "", exact.figures[name], run.figures[name])
+        for n, run in meshed.items()
+        for name in FIGURES
+    ]
+    for name in PROFILES:
+        for k in range(BINS):
+            a, b = (estimate(one.shares[name][:, k]) for one in (exact, meshed[facets]))
+            found.append((name, f"{edges[name][k]:.4g} to {edges[name][k + 1]:.4g} {PROFILES[name]}", a, b))
+    return [
+        {
+            "quantity": name,
+            "bin": where,
+            "analytical": f"{a.value:.6g}",
+            "half_width": f"{a.half_width:.2g}",
+            "meshed": f"{b.value:.6g}",
+            "meshed_half_width": f"{b.half_width:.2g}",
+            "difference_over_half_width": round(difference(b, a).value / difference(b, a).half_width, 2),
+        }
+        for name, where, a, b in found
+    ]
