@@ -1,8 +1,8 @@
 """Design -> Chamber: the closed cavity that the shot flies in, each triangle knowing what it belongs to.
 
-The cavity is the shape without the part. One subtraction covers a part that hangs freely, one whose shaft
-goes out through the ceiling, and one that closes the chamber like a lid; of what is left, the room over the
-sonotrode counts.
+The cavity is the shape, with what is bored into it and stands in it, without the part. One subtraction covers a part
+that hangs freely, one whose shaft goes out through the ceiling, and one that closes the chamber like a lid; of what is
+left, the room over the sonotrode counts. A part that is drawn with its chamber may be a piece of its surface already.
 
 Frame: metres, z up, mean sonotrode face at z = 0, chamber axis x = y = 0.
 """
@@ -15,13 +15,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.errors import InputError
-from chamberopt.mesh_io import box_text
+from chamberopt.fittings import Cavity, Piece, fitted, piece, swept_faces
+from chamberopt.mesh_io import box_text, place_text
 from chamberopt.part import Part, posed_part, turning_axis
 from chamberopt.reach import part_share, reach
-from chamberopt.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL, ShapeSurface
+from chamberopt.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL, is_sonotrode, tag_of_further
 from chamberopt.slivers import THINNEST, without_slivers
-from chamberopt.solids import Solid, Surface, cavities, solid, subtract, united
-from chamberopt.triangles import area_vectors, areas, shells_of, tetrahedron_volumes
+from chamberopt.solids import Solid, Surface, cavities, overlap, solid, subtract, united
+from chamberopt.triangles import area_vectors, areas, free_rim, shells_of, tetrahedron_volumes
 
 if TYPE_CHECKING:
     from chamberopt.config import Design
@@ -70,27 +71,33 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
     shape = design.chamber.surface(part.vertices, part.triangles)
     _refuse_misplaced(part, shape.vertices, design)
 
-    body, voids = _body(part)
-    notes += [f"{part.name}: {voids} closed voids inside the part are left out"] if voids else []
-    shell = solid(shape.vertices, shape.triangles, "the chamber")
-    whole = subtract(shell, body).surface()
-    if not (whole.solid != shell.label).any():
-        raise InputError(
-            f"{part.name}: no part of it is inside the chamber; change part.offset_mm or the sizes in [chamber]"
-        )
-    room, room_notes = _room_over_sonotrode(whole, shell, shape, design.chamber.ceiling_key)
+    cavity = fitted(design, shape)
+    own = piece(-1, TAG_PART, -area_vectors(part.vertices, part.triangles), np.arange(len(part.triangles)))
+    whole = cavity.body.surface()
+    if shape.source is None:  # else the part is drawn as what it bounds: there is nothing to cut out
+        body, voids = _body(part)
+        notes += [f"{part.name}: {voids} closed voids inside the part are left out"] if voids else []
+        _refuse_in_swing(design, cavity, body)
+        whole = subtract(cavity.body, body).surface()
+    if not (cavity.traced(whole, own).tags == TAG_PART).any():
+        drawn = design.chamber.setup() is not None
+        remedy = "check the groups in [chamber]" if drawn else "change part.offset_mm or the sizes in [chamber]"
+        raise InputError(f"{part.name}: no part of it is inside the chamber; {remedy}")
+    ceiling = float(shape.vertices[:, 2].max()) if design.chamber.setup() is None else None
+    room, room_notes = _room_over_sonotrode(whole, cavity.traced(whole, own).tags, ceiling, design.chamber.ceiling_key)
     room = without_slivers(room)[0]
-    on_part = room.solid != shell.label
-    tags = np.where(on_part, TAG_PART, shape.tags[np.where(on_part, 0, room.source)]).astype(np.uint8)
-    source = np.where(on_part, room.source, -1).astype(np.int32)
-    exposed = np.bincount(source[on_part], areas(room.vertices, room.triangles)[on_part], len(part.triangles))
+    traced = cavity.traced(room, own)
+    on_part = traced.tags == TAG_PART
+    _refuse_rims(design, room, traced.tags)
+    area = areas(room.vertices, room.triangles)
+    exposed = np.bincount(traced.source[on_part], area[on_part], len(part.triangles))
     if design.part.target.reachable:
-        part, told = _only_reachable(part, room, tags, source, design) if target is None else (part, KEPT)
-        notes.append(told)
+        found = (part, KEPT) if target is not None else _only_reachable(part, room, traced, design)
+        part, notes = found[0], [*notes, found[1]]
     notes += _hidden_target_note(part, exposed)
-    notes += room_notes + _crooked_note(room, on_part, part, shape) + _hold_note(room, on_part, part.name)
+    notes += room_notes + _crooked_note(room, traced.facing) + _hold_note(room, on_part, part.name)
     volume = float(tetrahedron_volumes(room.vertices, room.triangles).sum())
-    return Chamber(room.vertices, room.triangles, tags, source, volume, part, exposed, tuple(notes))
+    return Chamber(room.vertices, room.triangles, traced.tags, traced.source, volume, part, exposed, tuple(notes))
 
 
 def _refuse_misplaced(part: Part, shape: np.ndarray, design: Design) -> None:
@@ -101,6 +108,13 @@ def _refuse_misplaced(part: Part, shape: np.ndarray, design: Design) -> None:
             f"chamber.sonotrode_distance_mm: given {1e3 * distance:g}, not above the amplitude of "
             f"{1e6 * amplitude:g} µm: the sonotrode would hit the part; raise it"
         )
+    if design.chamber.setup() is not None:  # the part is where the file has it
+        if design.shot.diameter >= distance - amplitude:
+            raise InputError(
+                f"shot.diameter_mm: given {1e3 * design.shot.diameter:g}, but the part is drawn {1e3 * distance:.4g} mm"
+                " above the sonotrode: no ball fits under it; use smaller balls or give chamber.sonotrode_distance_mm"
+            )
+        return
     low, high = part.vertices.min(axis=0), part.vertices.max(axis=0)
     wall_low, wall_high = shape.min(axis=0), shape.max(axis=0)
     ceiling = design.chamber.ceiling_key
@@ -129,12 +143,34 @@ def _body(part: Part) -> tuple[Solid, int]:
     return united(solids, part.name), int((volumes < 0.0).sum())
 
 
-def _room_over_sonotrode(whole: Surface, shell: Solid, shape: ShapeSurface, ceiling: str) -> tuple[Surface, list[str]]:
-    """The room that has the sonotrode for its floor, and notes on what was cut off."""
+def _refuse_in_swing(design: Design, cavity: Cavity, body: Solid) -> None:
+    """A part in the way of a further sonotrode; of the first the distance has been asked."""
+    for name, swing in swept_faces(design, cavity)[1:] if design.sonotrodes else ():
+        if overlap(swing, body) > 0.0:
+            raise InputError(f"{name}.at_mm: its face would hit the part; move it back along its axis, or the part")
+
+
+def _refuse_rims(design: Design, room: Surface, tags: np.ndarray) -> None:
+    """A sonotrode without a room, or one that walls do not rise from all round: a moving edge."""
+    for k in range(len(design.sonotrodes)):
+        if not (tags == tag_of_further(k)).any():
+            raise InputError(f"sonotrodes.{k}.at_mm: the part cuts its face off from the room; move one of them")
+    rim = free_rim(room.vertices, room.triangles, is_sonotrode(tags))
+    if rim is not None:
+        raise InputError(
+            f"sonotrode: its face has a free rim at {place_text(rim)}: walls must rise from it all round, as a moving "
+            "edge is not supported; let it fill the floor of the room, or of a well, from wall to wall"
+        )
+
+
+def _room_over_sonotrode(
+    whole: Surface, tags: np.ndarray, ceiling: float | None, key: str
+) -> tuple[Surface, list[str]]:
+    """The room that has the sonotrode for its floor, and notes on what was cut off; ``ceiling`` [m]: if its ``key`` of
+    the chamber's table can move it.
+    """
     rooms = cavities(whole)
-    floor = (whole.solid == shell.label) & (
-        shape.tags[np.where(whole.solid == shell.label, whole.source, 0)] == TAG_SONOTRODE
-    )
+    floor = tags == TAG_SONOTRODE
     over = [room for room in rooms if (room & floor).any()]
     if not over:
         raise InputError("the part leaves no room over the sonotrode; raise chamber.sonotrode_distance_mm")
@@ -152,20 +188,18 @@ def _room_over_sonotrode(whole: Surface, shell: Solid, shape: ShapeSurface, ceil
             "mm: no shot gets there, it is left out"
         )
     top = float(room.vertices[:, 2].max())
-    if top < shape.vertices[:, 2].max() - THINNEST:
-        notes.append(f"the part closes the chamber at z = {1e3 * top:.4g} mm: more chamber.{ceiling} has no effect")
+    if ceiling is not None and top < ceiling - THINNEST:
+        notes.append(f"the part closes the chamber at z = {1e3 * top:.4g} mm: more chamber.{key} has no effect")
     return room, notes
 
 
-def _only_reachable(
-    part: Part, room: Surface, tags: np.ndarray, source: np.ndarray, design: Design
-) -> tuple[Part, str]:
+def _only_reachable(part: Part, room: Surface, traced: Piece, design: Design) -> tuple[Part, str]:
     """The part with what the shot can touch of its target, and a note on the rest. InputError when that is all."""
     from sim_core import TriangleMesh
 
     ball = min(design.shot.diameters)
-    mesh = TriangleMesh(room.vertices, room.triangles, tags)
-    target = part.target & (part_share(reach(mesh, ball), source, len(part.triangles)) > 0.5)
+    mesh = TriangleMesh(room.vertices, room.triangles, traced.tags)
+    target = part.target & (part_share(reach(mesh, ball), traced.source, len(part.triangles)) > 0.5)
     if not target.any():
         raise InputError(
             f"part.target.reachable: a ball of {1e3 * ball:g} mm touches nothing of the target; use smaller balls, "
@@ -195,12 +229,9 @@ def _hidden_target_note(part: Part, exposed: np.ndarray) -> list[str]:
     ]
 
 
-def _crooked_note(room: Surface, on_part: np.ndarray, part: Part, shape: ShapeSurface) -> list[str]:
-    """Triangles that do not face as the surface they were cut from: rounding made them, not the design."""
+def _crooked_note(room: Surface, wanted: np.ndarray) -> list[str]:
+    """Triangles that do not face as the surface they were cut from, (k, 3): rounding made them, not the design."""
     facing = area_vectors(room.vertices, room.triangles)
-    wanted = area_vectors(shape.vertices, shape.triangles)[np.where(on_part, 0, room.source)]
-    of_part = -area_vectors(part.vertices, part.triangles)
-    wanted[on_part] = of_part[room.source[on_part]]
     across = np.linalg.norm(np.cross(facing, wanted), axis=1)
     crooked = np.arctan2(across, np.einsum("ij,ij->i", facing, wanted)) > CROOKED
     if not crooked.any():

@@ -13,6 +13,7 @@ from chamberopt.ledges import ledges
 from chamberopt.places import CEILING, SIDE_WALL, on_target, surface_names
 from chamberopt.process import chamber_mesh, require_countable, require_turnable
 from chamberopt.reach import Reach, reach
+from chamberopt.shapes import is_sonotrode
 from chamberopt.shapes.surface import ShapeSurface
 from chamberopt.triangles import areas, tetrahedron_volumes
 
@@ -66,7 +67,7 @@ def describe(design: Design, chamber: Chamber, found: Reach | None = None) -> di
             "closed": "yes",  # what leaks has been refused above
             "sonotrode_clearance_mm": _rounded(sonotrode_clearance(found.mesh) * 1e3),
             "part_triangles": int((chamber.tags == TAG_PART).sum()),
-            "sonotrode_triangles": int((chamber.tags == TAG_SONOTRODE).sum()),
+            "sonotrode_triangles": int(is_sonotrode(chamber.tags).sum()),
             "wall_triangles": int((chamber.tags == TAG_WALL).sum()),
         },
         **_turn(design),
@@ -164,10 +165,13 @@ def _turn(design: Design) -> dict[str, Any]:
 def _through_side_wall(design: Design, chamber: Chamber) -> tuple[float, float] | None:
     """Between which heights [m] part and side wall are joined; None where they are not.
 
-    Not asked of a part that closes the chamber like a lid, nor of one that turns: its joint is a round shaft.
+    Not asked of a part that closes the chamber like a lid, nor of one that turns: its joint is a round shaft; nor
+    where there is a hole for a fixture, or the part is drawn with its chamber.
     """
+    if design.chamber.holes or design.effects.part_turn is not None or design.chamber.setup() is not None:
+        return None
     names = surface_names(chamber)
-    if design.effects.part_turn is not None or not (names == CEILING).any():
+    if not (names == CEILING).any():
         return None
     edges = chamber.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     own = np.repeat(chamber.tags == TAG_PART, 3)

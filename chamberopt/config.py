@@ -161,7 +161,7 @@ def load(path: str | Path) -> Design | Study:
 
 
 def save_design(design: Design, path: str | Path) -> None:
-    """Writes a design file that loads back as the very same design; paths of mesh and shape count from the file."""
+    """Writes a design file that loads back as the very same design; paths of meshes and shape count from the file."""
     import tomli_w
 
     path = Path(path)
@@ -173,12 +173,16 @@ def save_design(design: Design, path: str | Path) -> None:
     write_text(path, header + _lists_on_one_line(tomli_w.dumps(data)))
 
 
-def with_paths_from(folder: Path, design: dict[str, Any]) -> dict[str, Any]:
-    """The values of a design, paths of mesh and shape counting from a folder."""
-    design["part"]["mesh"] = _relative(design["part"]["mesh"], folder)
-    if is_own(design["chamber"]["shape"]):
-        design["chamber"]["shape"] = _relative(design["chamber"]["shape"], folder)
-    return design
+def with_paths_from(folder: Path, value: Any) -> Any:
+    """The values of a design, paths of meshes and of a shape of one's own counting from a folder."""
+    if isinstance(value, Mapping):
+        return {
+            name: _relative(inner, folder)
+            if isinstance(inner, str) and (name == "mesh" or (name == "shape" and is_own(inner)))
+            else with_paths_from(folder, inner)
+            for name, inner in value.items()
+        }
+    return [with_paths_from(folder, inner) for inner in value] if isinstance(value, list | tuple) else value
 
 
 def _relative(path: str, folder: Path) -> str:
@@ -289,12 +293,11 @@ def _vary_problems(design: Design, name: str, bounds: tuple[float, float]) -> li
     return problems
 
 
-def _without_none(table: Mapping[str, Any]) -> dict[str, Any]:
-    return {
-        name: _without_none(value) if isinstance(value, Mapping) else value
-        for name, value in table.items()
-        if value is not None
-    }
+def _without_none(value: Any) -> Any:
+    """Without what is not set, and without empty lists."""
+    if isinstance(value, Mapping):
+        return {name: _without_none(inner) for name, inner in value.items() if inner is not None and inner != ()}
+    return [_without_none(inner) for inner in value] if isinstance(value, tuple) else value
 
 
 def _lists_on_one_line(toml: str) -> str:

@@ -5,7 +5,7 @@ Every table is frozen, refuses unknown keys, and holds bounds wide enough for an
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeVar
@@ -26,12 +26,14 @@ from chamberopt import diagnosis
 from chamberopt.diagnosis import CrossCheckError, Problem
 from chamberopt.effects import Effects
 from chamberopt.errors import InputError
-from chamberopt.fields import Pair, Triple, Unit, from_file, listed, quantity
+from chamberopt.fields import MeshFile, Names, Pair, Triple, Unit, from_file, listed, quantity
 from chamberopt.materials import STRICT, Materials
 from chamberopt.shapes import SHAPES, ChamberTable
+from chamberopt.shapes.imported import IMPORTED, Imported
 from chamberopt.shapes.own import KeptShape, own_shape
 from chamberopt.shapes.table import is_own
 from chamberopt.shot import Shot
+from chamberopt.sonotrode import FurtherSonotrode, Sonotrode
 from chamberopt.treatment import Process
 
 
@@ -40,7 +42,7 @@ class Target(BaseModel):
 
     model_config = STRICT
 
-    surface: Annotated[tuple[str, ...], Field(strict=False, min_length=1)] = listed(
+    surface: Names = listed(
         'a name in quotes, or a list of names, e.g. ["flank", "root"]',
         "groups, sets, properties or colours of the part's file; all: the whole surface",
         ("all",),
@@ -63,11 +65,6 @@ class Target(BaseModel):
         0.01, 1000, "mm", "wished side of the target's triangles; absent: the file's", None
     )
     reachable: bool = Field(default=False, description="only what a ball can touch, in the design's own chamber")
-
-    @field_validator("surface", mode="before")
-    @classmethod
-    def _one_name(cls, surface: Any) -> Any:
-        return (surface,) if isinstance(surface, str) else surface
 
     @property
     def element(self) -> float | None:
@@ -98,20 +95,11 @@ class Part(BaseModel):
 
     model_config = STRICT
 
-    mesh: str = Field(min_length=1, description="mesh file, path relative to the design file")
+    mesh: MeshFile = Field(description="mesh file, path relative to the design file")
     unit: Unit = Field(default="guess", description="of the numbers in the mesh file")
     rotate_deg: Triple = listed("three numbers [x, y, z] in degrees", "turns about x, then y, then z", (0.0, 0.0, 0.0))
     offset_mm: Pair = listed("two numbers [x, y] in mm", "sideways from the chamber axis", (0.0, 0.0))
     target: Target = Field(default_factory=Target, description="which triangles must be covered")
-
-    @field_validator("mesh")
-    @classmethod
-    def _absolute(cls, mesh: str, info: ValidationInfo) -> str:
-        """Held absolute from here on, so that a design stays right wherever it is used or saved."""
-        path = from_file(mesh, info.context)
-        if (info.context or {}).get("needs_mesh") and not path.is_file():
-            raise CrossCheckError([Problem("", f"given {mesh!r}: {diagnosis.not_found(path, 'mesh file', '*')}")])
-        return str(path)
 
     @property
     def mesh_path(self) -> Path:
@@ -124,33 +112,6 @@ class Part(BaseModel):
         return self.offset_mm[0] * 1e-3, self.offset_mm[1] * 1e-3
 
 
-class Sonotrode(BaseModel):
-    """The vibrating floor. Amplitude is ZERO-TO-PEAK: half of a peak-to-valley figure."""
-
-    model_config = STRICT
-
-    frequency_khz: float = quantity(0.01, 200, "kHz", "usually 20")
-    amplitude_um: float = quantity(0.1, 500, "µm", "zero-to-peak: half of peak-to-valley")
-    motion: Literal["sinusoidal", "random_phase"] = Field(
-        default="sinusoidal", description="how the face moves: as it does, or met by each ball at a phase drawn anew"
-    )
-
-    @property
-    def frequency(self) -> float:
-        """Frequency [Hz]."""
-        return self.frequency_khz * 1e3
-
-    @property
-    def amplitude(self) -> float:
-        """Zero-to-peak amplitude [m]."""
-        return self.amplitude_um * 1e-6
-
-    @property
-    def peak_speed(self) -> float:
-        """Largest speed of the face, 2 pi f A [m/s]."""
-        return 2.0 * math.pi * self.frequency * self.amplitude
-
-
 class Design(BaseModel):
     """One complete candidate: part, chamber, sonotrode, shot, materials, effects, process."""
 
@@ -159,6 +120,9 @@ class Design(BaseModel):
     part: Part
     chamber: ChamberTable
     sonotrode: Sonotrode
+    sonotrodes: Annotated[tuple[FurtherSonotrode, ...], Field(strict=False)] = listed(
+        "a list of tables, [[sonotrodes]]", "further ones beside the floor", ()
+    )
     shot: Shot
     materials: Materials
     effects: Effects = Field(default_factory=Effects)
@@ -176,6 +140,17 @@ class Design(BaseModel):
         """Workers get the values: the class of a shape's designs is made anew there."""
         return checked, (Design, self.model_dump())
 
+    @model_validator(mode="before")
+    @classmethod
+    def _one_file(cls, data: Any) -> Any:
+        """A set-up and its part are one file, named once."""
+        if not isinstance(data, Mapping) or not all(isinstance(data.get(k), Mapping) for k in ("part", "chamber")):
+            return data
+        if data["chamber"].get("shape") != IMPORTED:
+            return data
+        of_part = {key: data["part"][key] for key in ("mesh", "unit") if key in data["part"]}
+        return {**data, "chamber": {**of_part, **data["chamber"]}}
+
     @field_validator("effects", mode="before")
     @classmethod
     def _left_to_us(cls, effects: Any) -> Any:
@@ -188,13 +163,14 @@ class Design(BaseModel):
     def _agree(self) -> Self:
         chamber, shot = self.chamber, self.shot
         distance, widths = chamber.sonotrode_distance_mm, chamber.widths_mm()
-        problems = []
+        distance = math.inf if distance is None else distance  # as drawn: not known here
+        problems = list(self._setup_problems())
 
         def wrong(field: str, given: float, why: str) -> None:
             problems.append(Problem(field, f"given {given:g}, {why}"))
 
         height = widths.get("height_mm", math.inf)
-        if distance >= height:
+        if height <= distance < math.inf:
             why = f"not below chamber.height_mm = {height:g}: the part would be outside"
             wrong("chamber.sonotrode_distance_mm", distance, f"{why}; lower it or raise the height")
         if 10 * self.sonotrode.amplitude_um >= 1e3 * distance:
@@ -213,6 +189,9 @@ class Design(BaseModel):
             for effect in ("rest", "part_turn", "friction")
             if shot.mix is not None and getattr(self.effects, effect)
         ]
+        if self.sonotrodes and self.sonotrode.motion == "random_phase":
+            text = 'given "random_phase" beside sonotrodes: not supported together; leave it out'
+            problems.append(Problem("sonotrode.motion", text))
         filled = shot.mass / shot.density / chamber.room()
         if filled > 0.5:
             why = f"whose balls fill {filled:.0%} of the chamber; at most 50 % is allowed, usual are a few"
@@ -220,6 +199,21 @@ class Design(BaseModel):
         if problems:
             raise CrossCheckError(problems)
         return self
+
+    def _setup_problems(self) -> Iterator[Problem]:
+        """What a set-up that was drawn as a whole leaves no choice of."""
+        chamber, part = self.chamber, self.part
+        if not isinstance(chamber, Imported):
+            return
+        if (chamber.mesh, chamber.unit) != (part.mesh, part.unit):
+            yield Problem("chamber.mesh", "not as in [part], though a set-up is one file; leave mesh and unit out")
+        for key, value in (("rotate_deg", part.rotate_deg), ("offset_mm", part.offset_mm)):
+            if any(value):
+                text = f'given {list(value)} beside chamber.shape = "{IMPORTED}": the part is where its file has it'
+                yield Problem(f"part.{key}", f"{text}; leave it out")
+        if part.target.element_mm is not None:
+            text = f'given beside chamber.shape = "{IMPORTED}": not supported together; leave it out'
+            yield Problem("part.target.element_mm", text)
 
     def numbers(self) -> tuple[str, ...]:
         """Dotted names of every continuous number: what a study may vary."""

@@ -2,10 +2,11 @@
 
 import difflib
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, get_args, get_origin
+from typing import Annotated, Any, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
@@ -112,17 +113,22 @@ def key_lines(source: str) -> dict[str, int]:
     A plain scan, enough to point a person at the place: inline tables count as their key's line.
     """
     lines: dict[str, int] = {}
+    rows: Counter[str] = Counter()
     table = ""
     in_string = ""
     for number, line in enumerate(source.splitlines(), start=1):
         if in_string:
             in_string = "" if in_string in line else in_string
             continue
-        header = re.match(r"\s*\[+\s*([^\]]+?)\s*\]+\s*(#.*)?$", line)
+        header = re.match(r"\s*(\[+)\s*([^\]]+?)\s*\]+\s*(#.*)?$", line)
         key = re.match(r"""\s*((?:[\w-]+|"[^"]*"|'[^']*')(?:\s*\.\s*(?:[\w-]+|"[^"]*"|'[^']*'))*)\s*=""", line)
         if header:
-            table = _plain(header[1])
+            table = _plain(header[2])
             lines.setdefault(table, number)
+            if header[1] == "[[":  # one of a list of tables
+                rows[table] += 1
+                table = f"{table}.{rows[table] - 1}"
+                lines[table] = number
         elif key:
             lines.setdefault(".".join(filter(None, (table, _plain(key[1])))), number)
         for quote in ('"""', "'''"):
@@ -153,6 +159,16 @@ def _table(field: FieldInfo) -> type[BaseModel] | None:
     return None
 
 
+def _row(field: FieldInfo) -> type[BaseModel] | None:
+    """The table of each item, where the field is a list of tables."""
+    for kind in _kinds(field.annotation):
+        kind = get_args(kind)[0] if get_origin(kind) is Annotated else kind
+        items = get_args(kind) if get_origin(kind) is tuple else ()
+        if items and isinstance(items[0], type) and issubclass(items[0], BaseModel):
+            return items[0]
+    return None
+
+
 def _walk(model: type[BaseModel], loc: tuple[int | str, ...]) -> tuple[type[BaseModel], FieldInfo | None]:
     """The innermost table on the way to `loc`, and the field there when the table knows it."""
     field: FieldInfo | None = None
@@ -161,7 +177,7 @@ def _walk(model: type[BaseModel], loc: tuple[int | str, ...]) -> tuple[type[Base
         if isinstance(step, int) or free_name:
             free_name = False
             continue
-        table = model if field is None else _table(field)
+        table = model if field is None else _table(field) or _row(field)
         if table is None:
             break
         model, field = table, table.model_fields.get(step)

@@ -22,8 +22,9 @@ def knobs(design: Design) -> dict[str, tuple[Any, ...]]:
     if design.chamber.is_round:
         facets = design.value(FACETS)
         ladder[FACETS] = tuple(sorted({16, facets, min(1024, max(256, 4 * facets))}))
+    if not design.sonotrodes:
+        ladder[MOTION] = ("random_phase", "sinusoidal")
     ladder |= {
-        MOTION: ("random_phase", "sinusoidal"),
         WARM_UP: tuple(sorted({0.0, warm / 4, warm, min(1e4, 4 * max(warm, 0.05))})),
         FLOOR: tuple(sorted({min(1e3, 10 * floor), floor, max(0.1, floor / 10)}, reverse=True)),
     }

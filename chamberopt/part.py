@@ -10,22 +10,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.errors import InputError
-from chamberopt.mesh_io import PartMesh, read_part
+from chamberopt.mesh_io import PartMesh, read_once
 from chamberopt.remesh import quality, remeshed
 from chamberopt.solids import snapped
 from chamberopt.target import chosen_triangles
-from chamberopt.triangles import areas
+from chamberopt.triangles import areas, rotation
 
 if TYPE_CHECKING:
     from chamberopt.design import Design, Target
-    from chamberopt.design import Part as PartTable
 
 MOST_ELEMENTS = 3e5  # a few minutes of meshing; what follows is slow too
 
 
 @dataclass(frozen=True)
 class Part:
-    """The user's own triangles, in the file's order (unless target.element_mm asks for others), in the chamber.
+    """The user's own triangles, in the file's order (unless target.element_mm asks for others), in the chamber: closed,
+    unless the file draws it as the piece that bounds the room of a whole set-up.
 
     vertices (n, 3) m · triangles (m, 3) int32 · area (m,) m² · target (m,) bool: what must be covered · name ·
     sha256 of the mesh file as it was read · unit that its numbers were taken in · names that the file gives.
@@ -44,12 +44,13 @@ class Part:
 def posed_part(design: Design) -> tuple[Part, list[str]]:
     """The part turned about the file's x, then y, then z, its box centred on the axis, then moved; and notes.
 
-    Sideways by the offset, up or down so that its lowest point is at the sonotrode distance. Raises InputError
+    Sideways by the offset, up or down so that its lowest point is at the sonotrode distance. One that is drawn with
+    its chamber stays in it as it is drawn, and may be only the piece of its surface that is drawn. Raises InputError
     when the file cannot be used or the target is empty.
     """
-    mesh, target = _mesh(design.part)
-    rotation, shift = _pose(mesh, design)
-    vertices = snapped(mesh.vertices @ rotation.T + shift)
+    mesh, target = _mesh(design)
+    turn, shift = _pose(mesh, design)
+    vertices = snapped(mesh.vertices @ turn.T + shift)
     area = areas(vertices, mesh.triangles)
     name, names = design.part.mesh_path.name, tuple(mesh.groups)
     return Part(vertices, mesh.triangles, area, target, name, mesh.sha256, mesh.unit, names), list(mesh.notes)
@@ -60,30 +61,23 @@ def turning_axis(design: Design) -> tuple[np.ndarray, np.ndarray]:
     turn = design.effects.part_turn
     if turn is None:
         raise ValueError("nothing turns in this design")
-    rotation, shift = _pose(_mesh(design.part)[0], design)
-    return rotation @ np.array(turn.through) + shift, rotation @ np.array(turn.axis)
+    matrix, shift = _pose(_mesh(design)[0], design)
+    return matrix @ np.array(turn.through) + shift, matrix @ np.array(turn.axis)
 
 
-def _mesh(part: PartTable) -> tuple[PartMesh, np.ndarray]:
-    """The part's mesh and target, read once per file: a study builds a hundred chambers around the same part."""
-    try:
-        stamp = part.mesh_path.stat()
-    except OSError:
-        read_part(part.mesh_path, part.unit)  # says what is wrong
-        raise
-    return _meshed_once(part.mesh, part.unit, part.target, stamp.st_mtime_ns, stamp.st_size)
-
-
-@lru_cache(maxsize=4)
-def _meshed_once(mesh: str, unit: str, target: Target, changed: int, size: int) -> tuple[PartMesh, np.ndarray]:
-    part = _read_once(mesh, unit, changed, size)
-    chosen = chosen_triangles(part, target)
-    return (part, chosen) if target.element is None else _in_elements(part, chosen, target.element)
+def _mesh(design: Design) -> tuple[PartMesh, np.ndarray]:
+    """The part's mesh and target, meshed once per file: a study builds a hundred chambers around the same part."""
+    part, setup = design.part, design.chamber.setup()
+    mesh = read_once(part.mesh_path, part.unit) if setup is None else setup.part
+    if part.target.element is None:
+        return mesh, chosen_triangles(mesh, part.target)
+    return _meshed_once(part.mesh_path, part.unit, part.target, mesh.sha256)
 
 
 @lru_cache(maxsize=4)
-def _read_once(mesh: str, unit: str, _changed: int, _size: int) -> PartMesh:
-    return read_part(Path(mesh), unit)
+def _meshed_once(path: Path, unit: str, target: Target, _sha256: str) -> tuple[PartMesh, np.ndarray]:
+    mesh = read_once(path, unit)
+    return _in_elements(mesh, chosen_triangles(mesh, target), target.element)  # type: ignore[arg-type]
 
 
 def _in_elements(mesh: PartMesh, target: np.ndarray, size: float) -> tuple[PartMesh, np.ndarray]:
@@ -113,24 +107,12 @@ def _in_elements(mesh: PartMesh, target: np.ndarray, size: float) -> tuple[PartM
 
 def _pose(mesh: PartMesh, design: Design) -> tuple[np.ndarray, np.ndarray]:
     """From the part file's frame to the chamber's: matrix (3, 3), then shift (3,) [m]."""
-    rotation = _rotation(design.part.rotate_deg)
-    vertices = mesh.vertices @ rotation.T
+    setup = design.chamber.setup()
+    if setup is not None:
+        return setup.turn, setup.shift + np.array([0.0, 0.0, design.chamber.sonotrode_distance - setup.distance])
+    turn = rotation(design.part.rotate_deg)
+    vertices = mesh.vertices @ turn.T
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     centre = (low + high) / 2.0
     x, y = design.part.offset
-    return rotation, np.array([x - centre[0], y - centre[1], design.chamber.sonotrode_distance - low[2]])
-
-
-def _rotation(degrees: tuple[float, float, float]) -> np.ndarray:
-    """Matrix (3, 3) of turns about the fixed axes x, then y, then z; exact for quarter turns."""
-    matrix = np.eye(3)
-    for axis, angle in enumerate(degrees):
-        turns, rest = divmod(angle, 90.0)
-        s, c = np.sin(np.radians(rest)), np.cos(np.radians(rest))
-        for _ in range(int(turns) % 4):
-            s, c = c, -s
-        i, j = (axis + 1) % 3, (axis + 2) % 3
-        turn = np.eye(3)
-        turn[i, i], turn[i, j], turn[j, i], turn[j, j] = c, -s, s, c
-        matrix = turn @ matrix
-    return matrix
+    return turn, np.array([x - centre[0], y - centre[1], design.chamber.sonotrode_distance - low[2]])

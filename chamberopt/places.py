@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.chamber import TAG_PART, TAG_SONOTRODE
+from chamberopt.chamber import TAG_PART, TAG_SONOTRODE, TAG_WALL
+from chamberopt.shapes import tag_of_further
 from chamberopt.triangles import area_vectors
 
 if TYPE_CHECKING:
@@ -25,6 +26,8 @@ def surface_names(chamber: Chamber) -> np.ndarray:
     on_wall = np.select([up > STEEP, up < -STEEP], ["a ledge of the wall", CEILING], SIDE_WALL)
     words = np.where(chamber.tags == TAG_PART, on_part, on_wall).astype(object)
     words[chamber.tags == TAG_SONOTRODE] = SONOTRODE
+    for tag in np.unique(chamber.tags[chamber.tags > TAG_WALL]):
+        words[chamber.tags == tag] = f"sonotrodes.{tag - tag_of_further(0)}"
     return words
 
 

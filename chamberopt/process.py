@@ -9,6 +9,7 @@ import numpy as np
 
 from chamberopt.chamber import TAG_PART, TAG_SONOTRODE, turning_axis
 from chamberopt.errors import InputError
+from chamberopt.shapes import tag_of_further
 
 # Every ball is compared with every other: 20,000 take about 40 µs a prediction, a thousand times a second each.
 MOST_BALLS = 20_000
@@ -16,7 +17,7 @@ MOST_BALLS = 20_000
 if TYPE_CHECKING:
     from chamberopt.chamber import Chamber
     from chamberopt.config import Design
-    from sim_core import AnalyticCavity, Physics, Scene, TriangleMesh, Turn
+    from sim_core import AnalyticCavity, Physics, Scene, TriangleMesh, Turn, Vibration
 
 STREAMS = ("search", "confirm")
 
@@ -85,9 +86,25 @@ def rests(design: Design, mesh: TriangleMesh | AnalyticCavity) -> bool:
     asked = design.effects.rest
     if asked is not None:
         return asked
-    moving = [TAG_SONOTRODE] if design.effects.part_turn is None else [TAG_SONOTRODE, TAG_PART]
+    moving = [TAG_SONOTRODE, *(tag_of_further(k) for k in range(len(design.sonotrodes)))]
+    if design.effects.part_turn is not None:
+        moving.append(TAG_PART)
     gravity = Gravity() if design.effects.gravity else None
     return design.shot.mix is None and can_rest(mesh, gravity, *moving)
+
+
+def vibrations(design: Design, phase: float) -> Vibration | tuple[Vibration, ...]:
+    """How the sonotrode moves, or each of several; ``phase`` [rad] at the start: of the first, the others have theirs
+    on top, so that among those of one frequency a phase is a shift in time, whatever the draw.
+    """
+    from sim_core import Vibration
+
+    first = Vibration(TAG_SONOTRODE, design.sonotrode.amplitude, design.sonotrode.frequency, phase)
+    further = tuple(
+        Vibration(tag_of_further(k), one.amplitude, one.frequency, phase + one.phase, one.direction)
+        for k, one in enumerate(design.sonotrodes)
+    )
+    return (first, *further) if further else first
 
 
 def scene_physics(
@@ -102,21 +119,20 @@ def scene_physics(
     ``phase`` and ``turn_phase`` [rad]: of the sonotrode and of a part that turns, at the start; ``draws``: the seed
     of arrival phases that are drawn anew.
     """
-    from sim_core import BallCollisions, Drag, Friction, Gravity, Physics, RandomPhase, Rest, Restitution, Vibration
+    from sim_core import BallCollisions, Drag, Friction, Gravity, Physics, RandomPhase, Rest, Restitution
 
     sonotrode, effects, materials = design.sonotrode, design.effects, design.materials
     if effects.auto:
         raise InputError('effects: still "auto"; advice.settled decides them, as simulate and run do')
-    # One (C0, v0) per tag, in the order of the tags: TAG_PART, TAG_SONOTRODE, TAG_WALL.
-    surfaces = tuple(
-        (pair.restitution, pair.yield_speed) for pair in (materials.part, materials.sonotrode, materials.wall)
-    )
+    # One (C0, v0) per tag, in the order of the tags: TAG_PART, TAG_SONOTRODE, TAG_WALL, further sonotrodes.
+    pairs = (materials.part, materials.sonotrode, materials.wall, *(materials.sonotrode for _ in design.sonotrodes))
+    surfaces = tuple((pair.restitution, pair.yield_speed) for pair in pairs)
     of_balls = (materials.shot.restitution, materials.shot.yield_speed)
     rubs, accuracy = effects.friction, design.process.accuracy
     return Physics(
         gravity=Gravity() if effects.gravity else None,
         restitution=Restitution(surfaces, of_balls, accuracy.elastic_below),
-        vibration=Vibration(TAG_SONOTRODE, sonotrode.amplitude, sonotrode.frequency, phase),
+        vibration=vibrations(design, phase),
         turn=part_turn(design, turn_phase),
         rest=Rest() if rests(design, mesh) else None,
         friction=Friction((rubs.surfaces,) * len(surfaces), rubs.balls) if rubs is not None else None,
@@ -145,11 +161,10 @@ def build_scene(design: Design, mesh: TriangleMesh | AnalyticCavity, seed: int) 
     sonotrode, shot = design.sonotrode, design.shot
     phase = rng.uniform(0.0, 2.0 * np.pi)
     turn_phase = 0.0 if design.effects.part_turn is None else rng.uniform(0.0, 2.0 * np.pi)
+    swing = max(one.amplitude for one in (sonotrode, *design.sonotrodes))
     try:
         diameter = np.array(shot.diameters)
-        positions = pack_balls(
-            mesh, shot.count, diameter, rng, clear=sonotrode.amplitude, turn=part_turn(design, turn_phase)
-        )
+        positions = pack_balls(mesh, shot.count, diameter, rng, clear=swing, turn=part_turn(design, turn_phase))
     except SceneError as error:
         raise InputError(f"shot: {error}; see shot.mass_g, shot.diameter_mm and [chamber]") from None
     velocities = start_velocities(rng, len(positions), sonotrode.peak_speed)

@@ -257,7 +257,8 @@ def _refuse_constant(name: str) -> float:
 
 def _design_values(design: Design, folder: Path) -> dict[str, Any]:
     """The design as its file would say it, its files relative to the folder."""
-    return with_paths_from(folder.resolve(), design.model_dump(mode="json", exclude_none=True))
+    values: dict[str, Any] = with_paths_from(folder.resolve(), design.model_dump(mode="json", exclude_none=True))
+    return values
 
 
 def versions() -> dict[str, str]:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.errors import InputError
-from chamberopt.triangles import shells_of, winding_number
+from chamberopt.triangles import border, shells_of, winding_number
 
 if TYPE_CHECKING:
     from manifold3d import CrossSection, Manifold
@@ -97,6 +97,14 @@ def solid(vertices: np.ndarray, triangles: np.ndarray, name: str, only: np.ndarr
     return made
 
 
+def swept(face: Surface, way: np.ndarray, name: str) -> Solid:
+    """The room over a flat face, whose normals point away from it, up to as far as ``way`` (3,) [m]."""
+    count, (a, b) = len(face.vertices), border(face.triangles).T
+    walls = np.concatenate([np.c_[b, a, a + count], np.c_[b, a + count, b + count]])
+    triangles = np.concatenate([face.triangles, face.triangles[:, ::-1] + count, walls])
+    return solid(np.concatenate([face.vertices, face.vertices + way]), triangles, name)
+
+
 def united(solids: list[Solid], name: str) -> Solid:
     """All of them as one body; where they overlap, once."""
     from manifold3d import Manifold, OpType
@@ -168,6 +176,12 @@ def extruded(outline: np.ndarray, height: float) -> tuple[np.ndarray, np.ndarray
 
     mesh = CrossSection([1e3 * outline]).extrude(1e3 * height).to_mesh64()
     return 1e-3 * np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts).astype(np.int32)
+
+
+def overlap(one: Solid, two: Solid) -> float:
+    """The volume [m³] that both have in common."""
+    common = one.body ^ two.body
+    return float(_checked(common, f"{one.name} and {two.name} cannot be intersected").volume()) * 1e-9
 
 
 def cavities(surface: Surface) -> list[np.ndarray]:

@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt import diagnosis
 from chamberopt.errors import InputError
-from chamberopt.mesh_io import PartMesh
+from chamberopt.mesh_io import PartMesh, named
 from chamberopt.triangles import area_vectors
 
 if TYPE_CHECKING:
@@ -20,7 +19,7 @@ def chosen_triangles(mesh: PartMesh, wanted: Target) -> np.ndarray:
 
     Raises InputError for a name that the file does not have, and when nothing is chosen.
     """
-    chosen = _named(mesh, wanted.surface)
+    chosen = named(mesh.groups, wanted.surface, len(mesh.triangles), "part.target.surface")
     if wanted.direction is not None and wanted.angle_deg is not None:
         normal = area_vectors(mesh.vertices, mesh.triangles)
         direction = np.asarray(wanted.direction) / np.linalg.norm(wanted.direction)
@@ -38,22 +37,6 @@ def chosen_triangles(mesh: PartMesh, wanted: Target) -> np.ndarray:
             f"part.target: chooses none of the {len(chosen)} triangles; in its own file the part goes from "
             f"{low_text} to {high_text} mm: widen box_mm or angle_deg"
         )
-    return chosen
-
-
-def _named(mesh: PartMesh, names: tuple[str, ...]) -> np.ndarray:
-    """Triangles (m,) that have one of the names; case counts only where the file needs it to."""
-    by_lower = {name.lower(): name for name in mesh.groups}
-    chosen = np.zeros(len(mesh.triangles), dtype=bool)
-    for name in names:
-        known = name if name in mesh.groups else by_lower.get(name.lower())
-        if name == "all" and known is None:
-            chosen[:] = True
-        elif known is None:
-            told = diagnosis.did_you_mean(name, ["all", *mesh.groups]) if mesh.groups else "its file names none: 'all'"
-            raise InputError(f"part.target.surface: {name!r} is no name in the part's file; {told}")
-        else:
-            chosen |= mesh.groups[known]
     return chosen
 
 

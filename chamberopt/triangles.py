@@ -2,6 +2,8 @@
 
 import numpy as np
 
+LEVEL = 1e-3  # rad: a surface that rises by less is level but for rounding
+
 
 def distinct_rows(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Index of the first of each different row of (n, 3), rows in rising order, and which one each row is, (n,).
@@ -22,6 +24,13 @@ def edge_keys(triangles: np.ndarray) -> np.ndarray:
     count = int(triangles.max()) + 1
     a, b = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).T.astype(np.int64)
     return np.minimum(a, b) * count + np.maximum(a, b)
+
+
+def border(triangles: np.ndarray) -> np.ndarray:
+    """The directed sides (k, 2) of some triangles (m, 3) of a surface that are not shared among them."""
+    sides = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
+    count = int(sides.max()) + 1
+    return sides[~np.isin(sides[:, 0] * count + sides[:, 1], sides[:, 1] * count + sides[:, 0])]
 
 
 def shells_of(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -56,6 +65,25 @@ def winding_number(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
     return np.arctan2(top, bottom).sum(axis=1) / (2.0 * np.pi)
 
 
+def free_rim(vertices: np.ndarray, triangles: np.ndarray, face: np.ndarray) -> np.ndarray | None:
+    """A point (3,) where the surface does not rise into the room beside the marked flat triangles; None if there is
+    none. Normals point out of the room; face (m,) bool.
+    """
+    sides = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    order = np.argsort(edge_keys(triangles), kind="stable").reshape(-1, 2)  # the two sides of each edge
+    one, two = order[face[order[:, 0] // 3] != face[order[:, 1] // 3]].T
+    of_face, beside = np.where(face[one // 3], one, two), np.where(face[one // 3], two, one)
+    normal = area_vectors(vertices, triangles)[of_face // 3]
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    a, b = vertices[sides[beside, 0]], vertices[sides[beside, 1]]
+    apex = vertices[triangles[beside // 3, (beside % 3 + 2) % 3]]
+    along = (b - a) / np.linalg.norm(b - a, axis=1)[:, None]
+    away = apex - a - np.einsum("ij,ij->i", apex - a, along)[:, None] * along  # square to the edge
+    rise = -np.einsum("ij,ij->i", away, normal)
+    low = np.flatnonzero(rise < LEVEL * np.linalg.norm(away, axis=1))
+    return 0.5 * (a[low[0]] + b[low[0]]) if len(low) else None
+
+
 def heights(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Smallest height [m] of each triangle, shape (m,): 0 for one without area."""
     corners = vertices[triangles]
@@ -73,3 +101,18 @@ def area_vectors(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Normal times area [m²] of each triangle, shape (m, 3)."""
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     return 0.5 * np.cross(b - a, c - a)
+
+
+def rotation(degrees: tuple[float, float, float]) -> np.ndarray:
+    """Matrix (3, 3) of turns about the fixed axes x, then y, then z; exact for quarter turns."""
+    matrix = np.eye(3)
+    for axis, angle in enumerate(degrees):
+        turns, rest = divmod(angle, 90.0)
+        s, c = np.sin(np.radians(rest)), np.cos(np.radians(rest))
+        for _ in range(int(turns) % 4):
+            s, c = c, -s
+        i, j = (axis + 1) % 3, (axis + 2) % 3
+        turn = np.eye(3)
+        turn[i, i], turn[i, j], turn[j, i], turn[j, j] = c, -s, s, c
+        matrix = turn @ matrix
+    return matrix

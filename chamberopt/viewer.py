@@ -22,6 +22,7 @@ import numpy as np
 from chamberopt.coverage import coverage_at, mean_impact_angle_deg, mean_normal_speed
 from chamberopt.disk import whole_file
 from chamberopt.errors import InputError
+from chamberopt.shapes import TAG_WALL, is_sonotrode
 
 if TYPE_CHECKING:
     from chamberopt.chamber import Chamber
@@ -75,7 +76,7 @@ def write_coverage(
 
 
 def write_chamber(folder: Path, chamber: Chamber) -> None:
-    """The closed cavity [mm]: chamber.stl for CAD, chamber.vtp with tags (0 part, 1 sonotrode, 2 wall)."""
+    """The closed cavity [mm]: chamber.stl for CAD, chamber.vtp with tags (0 part, 1 sonotrode, 2 wall, 3 ... more)."""
     fields = {"tag": chamber.tags, "source": chamber.source}
     _write_surface(folder / CHAMBER, chamber.vertices, chamber.triangles, fields)
     _write_surface(folder / "chamber.stl", chamber.vertices, chamber.triangles, {})
@@ -324,8 +325,10 @@ def _show(plotter: Any, part: _Part, limits: tuple[float, float], bar: bool) -> 
 def _scene(plotter: Any, part: _Part, chamber: Surface, title: str, limits: tuple[float, float], bar: bool) -> None:
     """The part inside the glass chamber, over the sonotrode."""
     _show(plotter, part, limits, bar)
+    tags = np.asarray(chamber["tag"])
     sonotrode, wall = (
-        chamber.extract_cells(chamber["tag"] == tag).extract_surface(algorithm="dataset_surface") for tag in (1, 2)
+        chamber.extract_cells(chosen).extract_surface(algorithm="dataset_surface")
+        for chosen in (is_sonotrode(tags), tags == TAG_WALL)
     )
     plotter.add_mesh(sonotrode, color=SONOTRODE, lighting=False)
     plotter.add_mesh(wall, color=GLASS, opacity=0.16, specular=0.3)

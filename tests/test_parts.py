@@ -25,14 +25,14 @@ def gear() -> Iterator[ModuleType]:
         sys.path.remove(str(PARTS))
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [*(f"{name}.stl" for name in NAMES), "plate_setup.bdf"])
 def test_the_script_writes_the_same_bytes_again(tmp_path: Path, name: str) -> None:
     for script in PARTS.glob("*.py"):
         (tmp_path / script.name).write_bytes(script.read_bytes())
 
-    subprocess.run([sys.executable, str(tmp_path / f"{name}.py")], check=True, capture_output=True)
+    subprocess.run([sys.executable, str((tmp_path / name).with_suffix(".py"))], check=True, capture_output=True)
 
-    assert (tmp_path / f"{name}.stl").read_bytes() == (PARTS / f"{name}.stl").read_bytes()
+    assert (tmp_path / name).read_bytes() == (PARTS / name).read_bytes()
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -16,12 +17,26 @@ import numpy as np
 from chamberopt.errors import InputError
 from chamberopt.fields import METRES_PER
 from chamberopt.mesh_io.crossings import refuse_crossings
-from chamberopt.mesh_io.faults import SurfaceError, box_text, place_text
+from chamberopt.mesh_io.faults import OpenSurfaceError, SurfaceError, box_text, place_text
 from chamberopt.mesh_io.formats import FORMATS, read_raw
 from chamberopt.mesh_io.healing import outward, sewn
+from chamberopt.mesh_io.names import named
 from chamberopt.mesh_io.units import unit_of
 
-__all__ = ["FORMATS", "PartMesh", "SurfaceError", "box_text", "place_text", "read_part"]
+__all__ = [
+    "FORMATS",
+    "OpenSurfaceError",
+    "PartMesh",
+    "SurfaceError",
+    "Triangles",
+    "box_text",
+    "closed",
+    "named",
+    "place_text",
+    "read_once",
+    "read_part",
+    "read_triangles",
+]
 
 
 @dataclass(frozen=True)
@@ -46,12 +61,32 @@ class PartMesh:
         return np.ptp(self.vertices, axis=0)
 
 
+@dataclass(frozen=True)
+class Triangles:
+    """What a file holds, in metres and its own frame, before it is made one closed surface.
+
+    path · corners (m, 3, 3) · groups: name -> (m,) bool · notes · sha256 of the file · unit of its numbers.
+    """
+
+    path: Path
+    corners: np.ndarray
+    groups: dict[str, np.ndarray]
+    notes: tuple[str, ...]
+    sha256: str
+    unit: str
+
+
 def read_part(path: Path, unit: str = "guess") -> PartMesh:
     """The part in a mesh file whose numbers are in `unit` (um, mm, cm, m, in; or guess): closed, outward, in metres.
 
     Raises InputError, with reason and place, for what is missing, empty, truncated, not finite, open, non-
     manifold, crossing itself, or of a size that no part has.
     """
+    return closed(read_triangles(path, unit))
+
+
+def read_triangles(path: Path, unit: str = "guess") -> Triangles:
+    """The triangles in a mesh file. Raises InputError as read_part does, but not for what they make together."""
     content = _content(path)
     raw = read_raw(path, content)
     corners = raw.corners
@@ -65,13 +100,36 @@ def read_part(path: Path, unit: str = "guess") -> PartMesh:
         )
     unit, told = unit_of(path, content, corners, unit, raw.unit)
     corners = corners * METRES_PER[unit] + 0.0  # + 0.0: -0 and 0 are one place
-    vertices, triangles, source, healed = sewn(path, corners)
+    digest = hashlib.sha256(content).hexdigest()
+    return Triangles(path, corners, raw.groups, (*raw.notes, *told), digest, unit)
+
+
+def closed(read: Triangles, only: np.ndarray | None = None) -> PartMesh:
+    """One closed surface of all the triangles, or of those marked ``only`` (m,); its healing goes into the notes.
+
+    Raises SurfaceError, with the place, where it is open, non-manifold or crosses itself.
+    """
+    path, chosen = read.path, np.arange(len(read.corners)) if only is None else np.flatnonzero(only)
+    vertices, triangles, source, healed = sewn(path, read.corners[chosen])
     triangles, turned = outward(path, vertices, triangles)
     refuse_crossings(path, vertices, triangles)
-    groups = {name: np.where(source >= 0, mask[source], False) for name, mask in raw.groups.items()}
-    notes = tuple(f"{path.name}: {note}" for note in (*raw.notes, *told, *healed, *turned))
-    digest = hashlib.sha256(content).hexdigest()
-    return PartMesh(vertices, triangles.astype(np.int32), notes, digest, groups, unit)
+    groups = {name: np.where(source >= 0, mask[chosen][source], False) for name, mask in read.groups.items()}
+    notes = tuple(f"{path.name}: {note}" for note in (*read.notes, *healed, *turned))
+    return PartMesh(vertices, triangles.astype(np.int32), notes, read.sha256, groups, read.unit)
+
+
+def read_once(path: Path, unit: str = "guess") -> PartMesh:
+    """As read_part, each file once as long as it does not change: a study builds a hundred chambers from it."""
+    try:
+        stamp = path.stat()
+    except OSError:
+        return read_part(path, unit)  # says what is wrong
+    return _read_once(path, unit, stamp.st_mtime_ns, stamp.st_size)
+
+
+@lru_cache(maxsize=8)
+def _read_once(path: Path, unit: str, _changed: int, _size: int) -> PartMesh:
+    return read_part(path, unit)
 
 
 def _content(path: Path) -> bytes:

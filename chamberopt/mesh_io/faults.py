@@ -18,6 +18,10 @@ class SurfaceError(InputError):
         self.corners, self.edges = corners, edges
 
 
+class OpenSurfaceError(SurfaceError):
+    """A surface with open edges that are too many to be closed."""
+
+
 def box_text(sides: np.ndarray) -> str:
     """A bounding box's sides (3,) [m] as text: '44 x 44 x 70 mm'."""
     return " x ".join(f"{1e3 * side:.5g}" for side in sides) + " mm"

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from chamberopt.errors import InputError
-from chamberopt.mesh_io.faults import SurfaceError, place_text
+from chamberopt.mesh_io.faults import OpenSurfaceError, SurfaceError, place_text
 from chamberopt.mesh_io.holes import filled, hole_count
 from chamberopt.triangles import distinct_rows, edge_keys, shells_of, winding_number
 
@@ -41,7 +41,7 @@ def sewn(path: Path, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nd
         holes = hole_count(open_edges)
         a, b = points[open_edges[0]]
         where = f"{len(open_edges)} open edges in {holes} hole{'s' * (holes > 1)}"
-        raise SurfaceError(
+        raise OpenSurfaceError(
             f"{path}: the surface is not closed: {where}, the first from {place_text(a)} to {place_text(b)}; "
             "close it in the CAD program",
             points[triangles],

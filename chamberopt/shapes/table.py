@@ -2,13 +2,15 @@
 
 import math
 from abc import abstractmethod
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import BaseModel, Field, ValidationInfo, field_validator
 
-from chamberopt.fields import from_file, quantity
+from chamberopt.fields import from_file, listed, quantity
 from chamberopt.materials import STRICT
+from chamberopt.shapes.fittings import Deflector, Hole
+from chamberopt.shapes.setup import Setup
 from chamberopt.shapes.surface import ShapeSurface
 
 
@@ -25,6 +27,12 @@ class ChamberTable(BaseModel):
 
     shape: str = Field(description="form of the cavity")
     sonotrode_distance_mm: float = quantity(0.1, 2000, "mm", "mean sonotrode face to lowest point of the part")
+    deflectors: Annotated[tuple[Deflector, ...], Field(strict=False)] = listed(
+        "a list of tables, [[chamber.deflectors]]", "bodies that stand in the chamber", ()
+    )
+    holes: Annotated[tuple[Hole, ...], Field(strict=False)] = listed(
+        "a list of tables, [[chamber.holes]]", "blind bores in its wall", ()
+    )
 
     @field_validator("shape")
     @classmethod
@@ -42,6 +50,10 @@ class ChamberTable(BaseModel):
         """The closed surface of the cavity, without the part; vertices (n, 3) m and triangles (m, 3) are the part as
         it stands in it, for shapes that follow it. Raises InputError for values that make no cavity.
         """
+
+    def setup(self) -> Setup | None:
+        """What a file has drawn, where chamber and part come from one file; None for a parametric cavity."""
+        return None
 
     def widths_mm(self) -> dict[str, float]:
         """Inner widths [mm] by the key that sets them: no ball wider than the least of them fits."""
