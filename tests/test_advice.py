@@ -30,7 +30,7 @@ def with_effects(effects: Any) -> Design:
 
 def test_groups_are_what_their_formulas_say() -> None:
     speed = PLATE.sonotrode.peak_speed
-    assert groups.fall(PLATE) == pytest.approx(9.80665 * PLATE.chamber.height / speed**2)
+    assert groups.fall(PLATE, CHAMBER) == pytest.approx(9.80665 * CHAMBER.height / speed**2)
     # A dilute gas: the packing does not matter, and twice the balls halve the path.
     each = 1e3 * PLATE.shot.ball_mass  # g
     thin, thinner = (plate_design(shot__mass_g=balls * each) for balls in (8, 4))
@@ -38,8 +38,8 @@ def test_groups_are_what_their_formulas_say() -> None:
     assert groups.free_path(thinner, CHAMBER) == pytest.approx(2 * groups.free_path(thin, CHAMBER), rel=0.01)
     assert math.isinf(groups.free_path(plate_design(shot__mass_g=each), CHAMBER))
     big = plate_design(shot__diameter_mm=8)  # Re above 1000: C_d is 0.44
-    expected = 0.75 * 0.44 * 1.204 / 7800 * PLATE.chamber.height / 8e-3
-    assert groups.drag_loss(big) == pytest.approx(expected, rel=1e-6)
+    expected = 0.75 * 0.44 * 1.204 / 7800 * CHAMBER.height / 8e-3
+    assert groups.drag_loss(big, CHAMBER) == pytest.approx(expected, rel=1e-6)
 
 
 @pytest.mark.parametrize(
