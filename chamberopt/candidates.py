@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
+from concurrent.futures import BrokenExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -11,7 +13,9 @@ import numpy as np
 
 from chamberopt.accuracy import Evaluation
 from chamberopt.errors import InputError
-from chamberopt.history import History, Trial
+from chamberopt.estimate import Estimate
+from chamberopt.history import Trial
+from chamberopt.record import Record
 from chamberopt.replicas import Progress
 from chamberopt.surrogate import recommend
 
@@ -24,6 +28,7 @@ FAILED_SCORE = -1.0
 # Candidates nearer to each other than this share of the bounds count as one when the best are picked.
 DISTINCT = 0.02
 
+Stop = Callable[[], bool]
 Evaluator = Callable[["Design", str, "int | None"], Evaluation]
 """evaluator(design, stream, replicas) judges one candidate; raises InputError or sim_core's two errors."""
 
@@ -41,10 +46,21 @@ class Confirmed:
 
 
 class Candidates:
-    """Maps points of the unit cube to designs and scores; keeps every trial, in memory and on disk."""
+    """Maps points of the unit cube to designs and scores; keeps every trial, and judges none that is on record.
 
-    def __init__(self, study: Study, history: History, evaluator: Evaluator, progress: Progress | None) -> None:
-        self._study, self._history, self._evaluator, self._progress = study, history, evaluator, progress
+    stop() is asked before each evaluation: KeyboardInterrupt when it says True.
+    """
+
+    def __init__(
+        self,
+        study: Study,
+        record: Record,
+        evaluator: Evaluator,
+        progress: Progress | None = None,
+        stop: Stop | None = None,
+    ) -> None:
+        self._study, self._record, self._evaluator = study, record, evaluator
+        self._progress, self._stop = progress, stop
         self._low, self._high = np.array(list(study.vary.values()), dtype=float).T
         begin = np.array([study.design.value(name) for name in study.vary], dtype=float)
         self.start = (begin - self._low) / (self._high - self._low)
@@ -105,19 +121,44 @@ class Candidates:
         return self._study.design.with_values(self.parameters(point))
 
     def _judge(self, point: np.ndarray, stage: str, replicas: int | None) -> tuple[Trial, Evaluation | None]:
+        """From the record, or by an evaluation that is on record when this returns."""
+        number = len(self.trials)
+        trial = self._record.replayed(number, stage, point.tolist())
+        if trial is not None:
+            confirmed = stage == "confirm" and trial.objective is not None
+            evaluation = self._record.evaluation(number) if confirmed else None
+        else:
+            if self._stop and self._stop():
+                raise KeyboardInterrupt
+            began = time.perf_counter()
+            trial, evaluation = self._evaluated(number, point, stage, replicas)
+            self._record.append(trial, evaluation, time.perf_counter() - began)
+        self.trials.append(trial)
+        if number + 1 >= len(self._record.trials):
+            self._report(stage)
+        return trial, evaluation
+
+    def _evaluated(
+        self, number: int, point: np.ndarray, stage: str, replicas: int | None
+    ) -> tuple[Trial, Evaluation | None]:
         from sim_core import SceneError, SimulationError
 
-        began = time.perf_counter()
         evaluation: Evaluation | None = None
         score, reason = FAILED_SCORE, ""
         try:
             design = self._design(point)
             design = self._study.drafted(design) if stage == "search" else design
-            evaluation = self._evaluator(design, stage, replicas)
+            evaluation = self._simulated(design, stage, replicas)
+            if not math.isfinite(evaluation.objective.value):
+                raise InputError(f"its objective is {evaluation.objective.value}, not a number to compare")
         except (InputError, SceneError, SimulationError) as error:
-            if not self.trials:
+            if number == 0:
                 raise
-            reason = str(error)
+            evaluation, reason = None, str(error)
+        except Exception as error:  # a fault of ours or of the machine, not of the candidate: it has no place on record
+            values = ", ".join(f"{name} = {value!r}" for name, value in self.parameters(point).items())
+            error.add_note(f"in evaluation {number + 1} ({stage}): {values}")
+            raise
         else:
             missed = [
                 miss
@@ -127,20 +168,23 @@ class Candidates:
             score = evaluation.objective.value - sum(size for size, _ in missed)
             reason = "; ".join(text for _, text in missed)
         trial = Trial(
-            number=len(self.trials),
+            number=number,
             stage=stage,
+            point=tuple(point.tolist()),
             parameters=self.parameters(point),
-            objective=evaluation.objective if evaluation else None,
-            metrics=evaluation.metrics if evaluation else {},
+            objective=_bare(evaluation.objective) if evaluation else None,
+            metrics={name: _bare(metric) for name, metric in evaluation.metrics.items()} if evaluation else {},
             score=score,
             feasible=not reason,
             reason=reason,
-            seconds=time.perf_counter() - began,
         )
-        self.trials.append(trial)
-        self._history.append(trial)
-        self._report(stage)
         return trial, evaluation
+
+    def _simulated(self, design: Design, stage: str, replicas: int | None) -> Evaluation:
+        try:
+            return self._evaluator(design, stage, replicas)
+        except BrokenExecutor:  # a worker died: once more, with an executor that may have mended itself
+            return self._evaluator(design, stage, replicas)
 
     def _report(self, stage: str) -> None:
         if self._progress:
@@ -148,6 +192,11 @@ class Candidates:
             total = settings.evaluations + 1 + settings.confirm
             best = max((t.score for t in self.trials if t.feasible and t.stage == stage), default=None)
             self._progress(len(self.trials), total, best)
+
+
+def _bare(estimate: Estimate) -> Estimate:
+    """As a row keeps it: without pseudo-values, which a confirmation has in a file of its own."""
+    return Estimate(estimate.value, estimate.half_width)
 
 
 def violations(name: str, value: float, limits: Limits) -> list[tuple[float, str]]:

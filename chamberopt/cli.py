@@ -1,14 +1,17 @@
 """The command line: thin, one function a command. Results go to stdout, progress and errors to stderr.
 
-Exit status: 0 done, 1 the simulation failed, 2 something to put right in the input, 130 interrupted.
+Exit status: 0 done, 1 the simulation, a worker or the disk failed, 2 something to put right in the input,
+130 interrupted.
 """
 
 from __future__ import annotations
 
 import json as json_format
+import shlex
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from concurrent.futures import BrokenExecutor
+from contextlib import contextmanager, nullcontext, suppress
 from importlib.metadata import version
 from io import TextIOWrapper
 from itertools import count
@@ -25,10 +28,12 @@ if TYPE_CHECKING:
     from chamberopt.accuracy import Evaluation
     from chamberopt.advice import Advice
     from chamberopt.chamber import Chamber
-    from chamberopt.config import Design
+    from chamberopt.config import Design, Study
     from chamberopt.estimate import Estimate
+    from chamberopt.interrupt import Interrupt
     from chamberopt.mesh_io import SurfaceError
     from chamberopt.reach import Reach
+    from chamberopt.record import Record
     from sim_core import AnalyticCavity
 
 app = App(
@@ -40,6 +45,10 @@ app = App(
 
 Json = Annotated[bool, Parameter(name="--json", negative="", help="Print JSON on stdout instead of text.")]
 Out = Annotated[Path | None, Parameter(name="--out", help="Folder for the results; new or empty.")]
+Resumable = Annotated[
+    Path | None,
+    Parameter(name="--out", help="Folder for the results; new, empty, or of this study where it was stopped."),
+]
 
 
 @app.command
@@ -159,30 +168,59 @@ def accuracy(design: Path, /, *, budget_s: float = 300.0, json: Json = False, ou
 
 
 @app.command
-def run(study: Path, /, *, json: Json = False, out: Out = None) -> None:
-    """Run a study: search for a better design, confirm it on fresh seeds, write it as best.toml.
+def run(study: Path, /, *, json: Json = False, out: Resumable = None) -> None:
+    """Run a study: search for a better design, confirm it on fresh seeds, write it as best.toml. With the --out of a
+    run that was stopped it goes on from there. Ctrl-C: once to stop after this evaluation, twice to stop now.
 
     Parameters
     ----------
     study
         Study file (.toml).
     """
+    from chamberopt.interrupt import Interrupt
+
+    with Interrupt() as interrupt:
+        from chamberopt.chamber import build_chamber
+        from chamberopt.config import load_study
+        from chamberopt.record import open_record
+
+        question = load_study(study)
+        start = build_chamber(question.design)
+        if out is None:
+            _remark(_unfinished(study))
+        place = _results(None, study.stem) if out is None else nullcontext(out)
+        with place as folder, open_record(question, folder) as record:
+            if record.finished:
+                _finished(record.folder, json)
+                return
+            command = f"to go on: {_command('run', study, '--out', record.folder)}"
+            try:
+                _run(question, start, record, interrupt, command, json)
+            except InputError:
+                raise
+            except BaseException as error:
+                if record.begun:
+                    error.add_note(command)
+                raise
+
+
+def _run(question: Study, start: Chamber, record: Record, interrupt: Interrupt, how_to_go_on: str, json: bool) -> None:
+    """A study from where its record stands to what is said of its result. start: the chamber of its design."""
     from chamberopt.chamber import build_chamber
-    from chamberopt.config import load_study
     from chamberopt.executor import local_executor
     from chamberopt.progress import progress_bar
     from chamberopt.results import write_study
-    from chamberopt.study import run_study
+    from chamberopt.study import go_on
 
-    question = load_study(study)
-    start = build_chamber(question.design)
-    with _results(out, study.stem) as folder:
-        design, advice = _settled(question.design, start)
-        question = question.model_copy(update={"design": design})
-        _compile(question.design, start)
-        with local_executor() as executor, progress_bar("evaluations") as progress:
-            result = run_study(question, folder, executor, progress)
-        _remark(write_study(folder, result, advice))
+    question, advice = record.settled(lambda design: _settled(design, start))
+    design = question.design
+    _compile(design, start)
+    if record.trials:
+        _remark([f"{record.folder}: {len(record.trials)} evaluations are there; going on from the next"])
+    with local_executor() as executor, progress_bar("evaluations") as progress:
+        interrupt.be_patient(how_to_go_on)
+        result = go_on(question, record, executor, progress, stop=lambda: interrupt.asked)
+    _remark(write_study(record.folder, result, advice))
     _warn(result.best.design, build_chamber(result.best.design, result.target))
     lines = [f"{'parameter':34}{'start':>12}{'best':>12}"]
     lines += [
@@ -204,7 +242,29 @@ def run(study: Path, /, *, json: Json = False, out: Out = None) -> None:
         f"seeds of their own, the search's figures in history.csv from {_said(question.drafted(design))}"
     ]
     notes = (*map(str, advice), *result.at_bounds, *start.notes, *result.best.evaluation.notes)
-    _say([*lines, *_notes(notes)], folder, json)
+    _say([*lines, *_notes(notes)], record.folder, json)
+
+
+def _finished(folder: Path, json: bool) -> None:
+    """What `run` says of a study that needs nothing more."""
+    from chamberopt.results import load_result, summary
+
+    _remark([f"{folder}: this study is finished, nothing was run; to run it anew give another folder (--out)"])
+    _say([f"best design: {summary(load_result(folder))}"], folder, json)
+
+
+def _unfinished(study: Path) -> list[str]:
+    """Earlier runs of a study that were stopped, by their folders' names: what is run now begins anew."""
+    from chamberopt.record import is_finished, is_study_folder
+
+    names = [study.stem, *(path.name for path in sorted(Path("results").glob(f"{study.stem}-[0-9]*")))]
+    stopped = [folder for name in names if is_study_folder(folder := Path("results", name)) and not is_finished(folder)]
+    return [f"{folder}: not finished; to go on there: {_command('run', study, '--out', folder)}" for folder in stopped]
+
+
+def _command(*words: object) -> str:
+    """A command of ours as a shell takes it."""
+    return shlex.join(["chamberopt", *map(str, words)])
 
 
 @app.command
@@ -261,10 +321,10 @@ def _results(out: Path | None, name: str) -> Iterator[Path]:
 
     When nothing came of it the folder does not stay behind empty.
     """
-    from chamberopt.disk import new_folder
+    from chamberopt.disk import is_free, new_folder
 
     names = (name if number == 1 else f"{name}-{number}" for number in count(1))
-    free = (folder for name in names if not (folder := Path("results", name)).exists())
+    free = (folder for name in names if is_free(folder := Path("results", name)))
     folder = new_folder(next(free) if out is None else out)
     try:
         yield folder
@@ -419,14 +479,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _failed(f"{str(error).rstrip()} (chamberopt --help lists what there is)", 2)
     except InputError as error:
         return _failed(str(error), 2)
-    except KeyboardInterrupt:
-        return _failed("interrupted; what had been finished stays on disk", 130)
+    except KeyboardInterrupt as error:
+        return _failed("interrupted; what had been finished stays on disk", 130, error)
     except BrokenPipeError:  # the reader of our stdout left, as `head` does
         sys.stderr.close()
         return 0
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
-        return _failed(f"{where}{error.strerror or error}; what had been finished stays on disk", 1)
+        return _failed(f"{where}{error.strerror or error}; what had been finished stays on disk", 1, error)
+    except MemoryError as error:
+        return _failed("out of memory; what had been finished stays on disk", 1, error)
+    except BrokenExecutor as error:
+        return _failed(
+            "a worker process died, twice (killed from outside, or out of memory: use fewer workers); "
+            "what had been finished stays on disk",
+            1,
+            error,
+        )
     except (ValueError, RuntimeError) as error:
         return _simulator_failed(error)
     return 0
@@ -437,12 +506,13 @@ def _simulator_failed(error: Exception) -> int:
     import sim_core
 
     if isinstance(error, sim_core.SceneError):
-        return _failed(str(error), 2)
+        return _failed(str(error), 2, error)
     if isinstance(error, sim_core.SimulationError):
-        return _failed(f"the simulation stopped: {error}", 1)
+        return _failed(f"the simulation stopped: {error}", 1, error)
     raise error
 
 
-def _failed(message: str, status: int) -> int:
-    print(message, file=sys.stderr)
+def _failed(message: str, status: int, error: BaseException | None = None) -> int:
+    """Says what went wrong, and what was noted on the way up: which candidate it was, how to go on."""
+    print("\n".join([message, *getattr(error, "__notes__", ())]), file=sys.stderr)
     return status

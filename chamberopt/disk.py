@@ -3,10 +3,20 @@
 import os
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from chamberopt.errors import InputError
+
+# What a killed run may leave beside its files: a file half written, and the mark of who was writing (lock.py).
+TRACES = (".writing-", ".lock")
+
+
+def is_free(folder: Path) -> bool:
+    """Whether results can go there: it is not there, or a folder with nothing in it."""
+    if not os.path.lexists(folder):
+        return True
+    return folder.is_dir() and all(file.name.startswith(TRACES) for file in folder.iterdir())
 
 
 def new_folder(path: str | Path) -> Path:
@@ -15,10 +25,10 @@ def new_folder(path: str | Path) -> Path:
     if os.path.lexists(folder) and not os.path.isdir(folder):
         raise InputError(f"{folder}: is a file; results need a folder: choose another folder (out, or --out)")
     try:
-        if folder.is_dir() and any(folder.iterdir()):
+        if not is_free(folder):
             raise InputError(
                 f"{folder}: already holds files, and results are never overwritten: choose "
-                "another folder (out, or --out) or remove this one (resuming a study is not supported yet)"
+                "another folder (out, or --out) or remove this one"
             )
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):  # better now than after an hour's work
@@ -31,11 +41,16 @@ def new_folder(path: str | Path) -> Path:
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """A temporary path beside `path`, with the same suffix, that takes its place when the block ends well."""
+    """A temporary path beside `path`, with the same suffix, that takes its place when the block ends well.
+
+    It is on the disk before it does, so that neither a crash nor a power cut leaves half a file.
+    """
     temporary = path.with_name(f".writing-{path.name}")
     try:
         yield temporary
+        _sync(temporary)
         os.replace(temporary, path)
+        sync_folder(path.parent)
     finally:
         temporary.unlink(missing_ok=True)
 
@@ -44,3 +59,17 @@ def write_text(path: Path, text: str) -> None:
     """Write a UTF-8 text file, whole or not at all."""
     with whole_file(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+def sync_folder(folder: Path) -> None:
+    """Make the names in a folder outlast a power cut, where the system can."""
+    with suppress(OSError):  # Windows opens no folders
+        _sync(folder)
+
+
+def _sync(path: Path) -> None:
+    file = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
+    try:
+        os.fsync(file)
+    finally:
+        os.close(file)

@@ -15,8 +15,8 @@ from chamberopt.estimate import Estimate
 from chamberopt.ladder import Ladder
 from chamberopt.pictures import price_picture
 from chamberopt.price import ASKED, choices, described, explained, recommend, short, unrecorded
-from chamberopt.results import versions
 from chamberopt.rungs import Rung
+from chamberopt.versions import versions
 
 FORMAT = 1
 

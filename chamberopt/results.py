@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import json
-import platform
+import shlex
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,9 +15,10 @@ from chamberopt.design import checked
 from chamberopt.disk import new_folder, write_text
 from chamberopt.errors import InputError
 from chamberopt.estimate import Estimate
-from chamberopt.executor import core_count
-from chamberopt.history import as_csv, read_history
+from chamberopt.history import HISTORY, as_csv, read_history
 from chamberopt.objective import METRICS, exposed_target
+from chamberopt.record import RESULT, is_study_folder
+from chamberopt.versions import versions
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,9 +27,7 @@ if TYPE_CHECKING:
     from chamberopt.chamber import Chamber
     from chamberopt.study import StudyResult
 
-RESULT = "result.json"
 FORMAT = 1
-PACKAGES = ("chamberopt", "numpy", "numba", "manifold3d", "nlopt")
 
 
 @dataclass(frozen=True)
@@ -73,7 +71,8 @@ def write_study(folder: str | Path, study_result: StudyResult, advice: Sequence[
 
     Beside design.toml, study.toml and history.jsonl, which run_study wrote: best.toml · result.json ·
     history.csv · convergence.png · the best's coverage.vtp, chamber.stl, chamber.vtp, coverage.png ·
-    before_after.png · start/, a results folder of the start as confirmed on the same seeds.
+    before_after.png · start/, a results folder of the start as confirmed on the same seeds. result.json is the last: a
+    study that is stopped while it writes has none, and writes all of them again.
     """
     from chamberopt.chamber import build_chamber
     from chamberopt.pictures import convergence_picture
@@ -83,17 +82,17 @@ def write_study(folder: str | Path, study_result: StudyResult, advice: Sequence[
     save_design(best.design, folder / "best.toml")
     write_text(folder / "history.csv", as_csv(read_history(folder)))
     target = study_result.target
-    about = _write_candidate(folder, best.design, build_chamber(best.design, target), best.evaluation)
-    _write_json(folder, {"kind": "study", **about, "study": _about_study(study_result), **_chosen(advice)})
     (folder / "start").mkdir(exist_ok=True)
     save_design(start.design, folder / "start" / "design.toml")
     chamber = build_chamber(start.design, target)
     about = _write_candidate(folder / "start", start.design, chamber, start.evaluation)
     _write_json(folder / "start", {"kind": "simulation", **about})
+    about = _write_candidate(folder, best.design, build_chamber(best.design, target), best.evaluation)
     convergence_picture(folder / "convergence.png", study_result)
     remarks = _picture([folder], [best.evaluation], ["best design"], folder / "coverage.png")
     pair, names = [start.evaluation, best.evaluation], ["start", "best design"]
     remarks += _picture([folder / "start", folder], pair, names, folder / "before_after.png")
+    _write_json(folder, {"kind": "study", **about, "study": _about_study(study_result), **_chosen(advice)})
     return list(dict.fromkeys(remarks))
 
 
@@ -103,8 +102,11 @@ def load_result(path: str | Path) -> Result:
     file = path if path.name == RESULT else path / RESULT
     folder = file.parent
     if not file.is_file():
-        if (folder / "history.jsonl").is_file():
-            raise InputError(f"{folder}: a study that did not finish: it has a history but no {RESULT}; run it again")
+        if is_study_folder(folder) or (folder / HISTORY).is_file():
+            raise InputError(
+                f"{folder}: a study that did not finish: it has no {RESULT} yet; go on with: chamberopt run STUDY.toml "
+                f"--out {shlex.quote(str(folder))}"
+            )
         raise InputError(f"{folder}: not a results folder: {RESULT} is not there; give one made by simulate or run")
     try:
         data = json.loads(file.read_text(encoding="utf-8"), parse_constant=_refuse_constant)
@@ -259,21 +261,6 @@ def _design_values(design: Design, folder: Path) -> dict[str, Any]:
     """The design as its file would say it, its files relative to the folder."""
     values: dict[str, Any] = with_paths_from(folder.resolve(), design.model_dump(mode="json", exclude_none=True))
     return values
-
-
-def versions() -> dict[str, str]:
-    """Python, system and packages that figures were made with."""
-    found = {
-        "python": platform.python_version(),
-        "system": platform.platform(),
-        "cores": str(core_count()),
-    }
-    for package in PACKAGES:
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = "not installed as a package"
-    return found
 
 
 def _write_json(folder: Path, data: dict[str, Any]) -> None:

@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.accuracy import Evaluation, evaluate
-from chamberopt.candidates import Candidates, Confirmed, Evaluator
+from chamberopt.candidates import Candidates, Confirmed, Evaluator, Stop
 from chamberopt.config import save_design
-from chamberopt.disk import new_folder, write_text
+from chamberopt.disk import write_text
 from chamberopt.errors import InputError
 from chamberopt.estimate import Estimate, paired_difference
-from chamberopt.history import History, Trial
+from chamberopt.history import Trial
+from chamberopt.record import STUDY, Record, open_record
 from chamberopt.replicas import Progress
 from chamberopt.search import maximise
 
@@ -29,8 +30,9 @@ class StudyResult:
     """What a study found.
 
     start, best, confirmed: judged on the same fresh seeds · gain: objective of best minus start with its 95 %
-    interval from those paired replicas · trials: search and confirmation, as they ran · seconds: wall clock ·
-    target (m,) bool: of all candidates, where it is the start's; None where each design's own says it.
+    interval from those paired replicas · trials: search and confirmation, as they ran · seconds: wall clock of all
+    evaluations, whenever they ran · target (m,) bool: of all candidates, where it is the start's; None where each
+    design's own says it.
     """
 
     study: Study
@@ -67,29 +69,45 @@ def run_study(
     executor: Executor,
     progress: Progress | None = None,
     evaluator: Evaluator | None = None,
+    stop: Stop | None = None,
 ) -> StudyResult:
     """Search for a better design within the budget, then confirm the best and the start on fresh seeds.
 
-    folder: new or empty; receives design.toml, study.toml and history.jsonl while the study runs. evaluator:
-    stands in for the simulation (tests, other models). progress(done, total, best): after each evaluation.
+    folder: new, empty, or where this very study was stopped: then what is on record there is not evaluated again, and
+    the end is the same as if it had never been stopped. evaluator: stands in for the simulation (tests, other models).
+    progress(done, total, best): after each evaluation. stop(): asked before each; KeyboardInterrupt when it says True.
 
     Every candidate of the search gets the same seeds. The best candidates and the start are then simulated
     with more replicas on a second stream of seeds, and the answer is the best of those: the search's own
     figures favour the lucky. (Of the few confirmed the best is still picked by the figures reported: a little
     in its favour.)
 
-    Raises InputError when the folder is in use, the start cannot be simulated, or nothing meets the
-    constraints.
+    Raises InputError when the folder is in use or its study another, when the start cannot be simulated, or nothing
+    meets the constraints; OSError when an evaluation cannot be recorded.
     """
-    began = time.perf_counter()
-    folder = new_folder(folder)
+    with open_record(study, folder) as record:
+        return go_on(study, record, executor, progress, evaluator, stop)
+
+
+def go_on(
+    study: Study,
+    record: Record,
+    executor: Executor,
+    progress: Progress | None = None,
+    evaluator: Evaluator | None = None,
+    stop: Stop | None = None,
+) -> StudyResult:
+    """The same from where a record stands. study: the record's, with its effects chosen (Record.settled)."""
+    folder = record.folder
+    record.begin()
     _save_inputs(study, folder)
     target = kept_target(study)
     evaluator = evaluator or _simulation(study, executor, target)
-    candidates = Candidates(study, History(folder), evaluator, progress)
+    candidates = Candidates(study, record, evaluator, progress, stop)
     settings = study.optimizer
     algorithm = maximise(candidates.score, candidates.start, settings.algorithm, settings.evaluations, settings.seed)
     confirmed = candidates.confirm()
+    record.require_no_more(len(candidates.trials))
     if not confirmed or confirmed[0].searched != 0:
         first = next(trial for trial in candidates.trials if trial.stage == "confirm")
         raise InputError(f"the start could not be simulated on the confirmation's seeds: {first.reason}")
@@ -110,7 +128,7 @@ def run_study(
         confirmed=tuple(confirmed),
         best=best,
         gain=paired_difference(best.evaluation.objective, start.evaluation.objective),
-        seconds=time.perf_counter() - began,
+        seconds=record.seconds,
         target=target,
     )
 
@@ -131,12 +149,14 @@ def kept_target(study: Study) -> np.ndarray | None:
 
 
 def _save_inputs(study: Study, folder: Path) -> None:
-    """What was asked, first of all: a study that is killed still says what it was."""
+    """The study as files to read and to run again; asked.json has what it is compared by."""
     import tomli_w
 
+    if (folder / STUDY).is_file():
+        return
     save_design(study.design, folder / "design.toml")
     asked = study.model_dump(mode="json", exclude={"design"}, exclude_none=True)
-    write_text(folder / "study.toml", tomli_w.dumps({"design": "design.toml", **asked}))
+    write_text(folder / STUDY, tomli_w.dumps({"design": "design.toml", **asked}))
 
 
 def _simulation(study: Study, executor: Executor, target: np.ndarray | None) -> Evaluator:

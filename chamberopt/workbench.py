@@ -60,21 +60,26 @@ def simulate(
 
 
 def optimise(study: Study, out: str | Path, *, workers: int | None = None, progress: Progress | None = None) -> Result:
-    """Run a study into the new or empty folder ``out``; the result stands for its best design, as confirmed.
+    """Run a study into the folder ``out``; the result stands for its best design, as confirmed.
 
-    ``workers`` as in simulate. Raises InputError when the start cannot be simulated or nothing meets the constraints.
+    ``out``: new, empty, or of the same study: a run that was stopped goes on, of one that has ended the result is read.
+    ``workers`` as in simulate. Raises InputError when the folder is another study's, when the start cannot be
+    simulated, or nothing meets the constraints.
     """
     from chamberopt.advice import settled
     from chamberopt.chamber import build_chamber
     from chamberopt.executor import local_executor
+    from chamberopt.record import open_record
     from chamberopt.results import load_result, write_study
-    from chamberopt.study import run_study
+    from chamberopt.study import go_on
 
     _require("study", study, Study, "load_study")
-    with local_executor(workers) as executor:
-        design, advice = settled(study.design, build_chamber(study.design), executor)
-        found = run_study(study.model_copy(update={"design": design}), out, executor, progress)
-    _warn([*map(str, advice), *found.best.evaluation.notes, *write_study(out, found, advice)])
+    with open_record(study, out) as record, local_executor(workers) as executor:
+        if not record.finished:
+            start = build_chamber(study.design)
+            study, advice = record.settled(lambda design: settled(design, start, executor))
+            found = go_on(study, record, executor, progress)
+            _warn([*map(str, advice), *found.best.evaluation.notes, *write_study(out, found, advice)])
     return load_result(out)
 
 

@@ -390,7 +390,13 @@ class TestWhole:
         status, out, _ = chamberopt("check", "--no-pilot", best, "--json")
         assert status == 0
         assert 2 <= json.loads(out)["shot"]["mass_g"] <= 5.1
-        status, _, err = chamberopt("run", "studies/small.toml", "--out", "results/small")
+        status, again, err = chamberopt("run", "studies/small.toml", "--out", "results/small", "--json")
+        assert (status, json.loads(again), "nothing was run" in err) == (0, result, True)
+        status, _, err = chamberopt("run", "studies/gear.toml", "--out", "results/small")
+        assert (status, "began otherwise" in err) == (2, True)
+        Path("out").mkdir()
+        Path("out/precious.txt").write_text("keep me")
+        status, _, err = chamberopt("run", "studies/small.toml", "--out", "out")
         assert (status, "never overwritten" in err) == (2, True)
 
     def test_simulate_and_run_warn_as_check_does(self, small: Path, chamberopt: Said) -> None:
