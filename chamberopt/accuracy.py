@@ -22,6 +22,7 @@ from chamberopt.analytic import described
 from chamberopt.coverage import Tally
 from chamberopt.dents import Samples, few_points_note, marked_share, sample_points
 from chamberopt.estimate import Estimate, estimate
+from chamberopt.executor import shared
 from chamberopt.figures import coverage_figures, few_dents_note, surface
 from chamberopt.objective import METRICS, Metric, Objective, objective, on_target
 from chamberopt.process import chamber_mesh
@@ -145,12 +146,13 @@ def evaluate(
         planned = min(max(planned, LEAST_WATCHED), accuracy.most_replicas)
     mesh = cavity or chamber_mesh(chamber)
     samples = sample_points(chamber, accuracy.sample_spacing) if accuracy.coverage_model == "dents" else None
+    setting = shared(executor, (design, chamber, mesh, samples))
     done: list[Replica] = []
     clock = {"simulate": 0.0, "coverage": 0.0}
     while True:
         started = time.perf_counter()
         numbers = range(len(done), planned)
-        for replica in simulate_replicas(design, chamber, mesh, samples, executor, stream, numbers):
+        for replica in simulate_replicas(setting, design.process.seed, executor, stream, numbers):
             done.append(replica)
             if progress:
                 progress(len(done), planned, None)

@@ -18,15 +18,15 @@ FORMAT = 1
 SHOWN = 12  # differences in one message
 
 
-def asked(study: Study) -> dict[str, Any]:
+def asked(study: Study, plan: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """Everything that a study's history depends on, as plain JSON: its values, not the text they were written in.
 
     A file that the design names, such as the part's mesh, stands with its name and the sha256 of its content, wherever
-    it lies.
+    it lies. plan: of a sweep.
     """
     question = study.model_dump(mode="json", exclude={"design"})
     question["design"] = _with_files(study.design.model_dump(mode="json"))
-    plain = json.loads(json.dumps({"format": FORMAT, "study": question, "program": program()}))
+    plain = json.loads(json.dumps({"format": FORMAT, "study": question, "sweep": plan, "program": program()}))
     assert isinstance(plain, dict)
     return plain
 

@@ -25,6 +25,8 @@ from chamberopt.errors import InputError
 
 # Heavy packages (numba, trimesh, pyvista, nlopt) are imported inside the commands: --help answers at once.
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from chamberopt.accuracy import Evaluation
     from chamberopt.advice import Advice
     from chamberopt.chamber import Chamber
@@ -44,6 +46,15 @@ app = App(
 )
 
 Json = Annotated[bool, Parameter(name="--json", negative="", help="Print JSON on stdout instead of text.")]
+Workers = Annotated[
+    int | None, Parameter(name="--workers", help="Workers on this machine; one per core if left out. Same figures.")
+]
+Cluster = Annotated[
+    str | None,
+    Parameter(
+        name="--cluster", help="Dask scheduler to work on: tcp://HOST:PORT, or its scheduler file. Same figures."
+    ),
+]
 Out = Annotated[Path | None, Parameter(name="--out", help="Folder for the results; new or empty.")]
 Resumable = Annotated[
     Path | None,
@@ -106,7 +117,10 @@ def check(
 
 
 @app.command
-def simulate(design: Path, /, *, analytic: bool = False, json: Json = False, out: Out = None) -> None:
+def simulate(
+    design: Path, /, *, analytic: bool = False, workers: Workers = None, cluster: Cluster = None, json: Json = False,
+    out: Out = None,
+) -> None:  # fmt: skip
     """Simulate one design and predict its coverage, with confidence intervals and pictures.
 
     Parameters
@@ -120,7 +134,7 @@ def simulate(design: Path, /, *, analytic: bool = False, json: Json = False, out
     from chamberopt.analytic import analytic_cavity
     from chamberopt.chamber import build_chamber
     from chamberopt.config import load_design
-    from chamberopt.executor import local_executor
+    from chamberopt.executor import open_executor
     from chamberopt.progress import progress_bar
     from chamberopt.results import write_simulation
 
@@ -128,10 +142,10 @@ def simulate(design: Path, /, *, analytic: bool = False, json: Json = False, out
     chamber = build_chamber(asked)
     cavity = analytic_cavity(asked, chamber) if analytic else None
     _warn(asked, chamber)
-    with _results(out, design.stem) as folder:
-        candidate, advice = _settled(asked, chamber)
+    with _results(out, design.stem) as folder, open_executor(workers, cluster) as executor:
+        candidate, advice = _settled(asked, chamber, executor)
         _compile(candidate, chamber, cavity)
-        with local_executor() as executor, progress_bar("replicas") as progress:
+        with progress_bar("replicas") as progress:
             evaluation = evaluate(candidate, chamber, executor, progress, cavity=cavity)
         _remark(write_simulation(folder, candidate, chamber, evaluation, advice))
     notes = (*map(str, advice), *chamber.notes, *evaluation.notes)
@@ -168,7 +182,9 @@ def accuracy(design: Path, /, *, budget_s: float = 300.0, json: Json = False, ou
 
 
 @app.command
-def run(study: Path, /, *, json: Json = False, out: Resumable = None) -> None:
+def run(
+    study: Path, /, *, workers: Workers = None, cluster: Cluster = None, json: Json = False, out: Resumable = None
+) -> None:
     """Run a study: search for a better design, confirm it on fresh seeds, write it as best.toml. With the --out of a
     run that was stopped it goes on from there. Ctrl-C: once to stop after this evaluation, twice to stop now.
 
@@ -182,6 +198,7 @@ def run(study: Path, /, *, json: Json = False, out: Resumable = None) -> None:
     with Interrupt() as interrupt:
         from chamberopt.chamber import build_chamber
         from chamberopt.config import load_study
+        from chamberopt.executor import open_executor
         from chamberopt.record import open_record
 
         question = load_study(study)
@@ -195,7 +212,8 @@ def run(study: Path, /, *, json: Json = False, out: Resumable = None) -> None:
                 return
             command = f"to go on: {_command('run', study, '--out', record.folder)}"
             try:
-                _run(question, start, record, interrupt, command, json)
+                with open_executor(workers, cluster) as executor:
+                    _run(question, start, record, executor, interrupt, command, json)
             except InputError:
                 raise
             except BaseException as error:
@@ -204,20 +222,22 @@ def run(study: Path, /, *, json: Json = False, out: Resumable = None) -> None:
                 raise
 
 
-def _run(question: Study, start: Chamber, record: Record, interrupt: Interrupt, how_to_go_on: str, json: bool) -> None:
+def _run(
+    question: Study, start: Chamber, record: Record, executor: Executor, interrupt: Interrupt, how_to_go_on: str,
+    json: bool,
+) -> None:  # fmt: skip
     """A study from where its record stands to what is said of its result. start: the chamber of its design."""
     from chamberopt.chamber import build_chamber
-    from chamberopt.executor import local_executor
     from chamberopt.progress import progress_bar
     from chamberopt.results import write_study
     from chamberopt.study import go_on
 
-    question, advice = record.settled(lambda design: _settled(design, start))
+    question, advice = record.settled(lambda design: _settled(design, start, executor))
     design = question.design
     _compile(design, start)
     if record.trials:
         _remark([f"{record.folder}: {len(record.trials)} evaluations are there; going on from the next"])
-    with local_executor() as executor, progress_bar("evaluations") as progress:
+    with progress_bar("evaluations") as progress:
         interrupt.be_patient(how_to_go_on)
         result = go_on(question, record, executor, progress, stop=lambda: interrupt.asked)
     _remark(write_study(record.folder, result, advice))
@@ -265,6 +285,54 @@ def _unfinished(study: Path) -> list[str]:
 def _command(*words: object) -> str:
     """A command of ours as a shell takes it."""
     return shlex.join(["chamberopt", *map(str, words)])
+
+
+@app.command
+def sweep(
+    study: Path, /, *, grid: int | None = None, sobol: int | None = None, seed: int | None = None,
+    workers: Workers = None, cluster: Cluster = None, json: Json = False, out: Resumable = None,
+) -> None:  # fmt: skip
+    """Map a study: simulate candidates all over [vary], on a grid or evenly spread, instead of searching. With the
+    --out of a sweep that was stopped it goes on from there.
+
+    Parameters
+    ----------
+    study
+        Study file (.toml).
+    grid
+        Values of every parameter, bounds included: N parameters make GRID^N candidates.
+    sobol
+        Candidates in all, as Sobol points; powers of 2 spread best.
+    seed
+        Of the Sobol points; the study's optimizer.seed if left out.
+    """
+    from chamberopt import maps
+    from chamberopt.chamber import build_chamber
+    from chamberopt.config import load_study
+    from chamberopt.executor import open_executor
+    from chamberopt.progress import progress_bar
+    from chamberopt.sweep import plan_sweep, run_sweep
+
+    question = load_study(study)
+    plan = plan_sweep(question, grid, sobol, seed)
+    start = build_chamber(question.design)
+    place = _results(None, f"{study.stem}-sweep") if out is None else nullcontext(out)
+    with place as folder, open_executor(workers, cluster, "processes") as executor:
+        design, advice = _settled(question.design, start, executor)
+        question = question.model_copy(update={"design": design})
+        _compile(design, start)
+        with progress_bar("candidates") as progress:
+            found = run_sweep(question, plan, folder, executor, progress)
+        _remark(maps.write_sweep(folder, found))
+    lines = [f"{len(found.trials)} candidates in {found.seconds:.0f} s, {_said(question.drafted(design))} each"]
+    best = found.best
+    if best is not None and best.objective is not None:
+        lines += ["", f"best, number {best.number}", *(f"{name:34}{x:12.5g}" for name, x in best.parameters.items())]
+        goal = {question.objective.name: best.objective, **best.metrics}
+        lines += [_row(name, estimate) for name, estimate in goal.items()]
+    failed = [trial for trial in found.trials if trial.objective is None]
+    reasons = [f"{len(failed)} candidates could not be simulated, the first for: {failed[0].reason}"] if failed else []
+    _say([*lines, *_notes([*map(str, advice), *reasons, maps.caution(found)])], folder, json)
 
 
 @app.command
@@ -366,13 +434,12 @@ def _compile(design: Design, chamber: Chamber, cavity: AnalyticCavity | None = N
     announce_compilation(physics, shot.count, shot.mix is None, cavity is not None and cavity.radius is not None)
 
 
-def _settled(design: Design, chamber: Chamber) -> tuple[Design, list[Advice]]:
+def _settled(design: Design, chamber: Chamber, executor: Executor) -> tuple[Design, list[Advice]]:
     """The design with its effects chosen, and why, where it leaves them to us."""
     from chamberopt.advice import settled
-    from chamberopt.executor import local_executor
     from chamberopt.progress import progress_bar
 
-    with local_executor() as executor, progress_bar("pilot runs") as progress:
+    with progress_bar("pilot runs") as progress:
         return settled(design, chamber, executor, progress, lambda variant: _compile(variant, chamber))
 
 
@@ -490,12 +557,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except MemoryError as error:
         return _failed("out of memory; what had been finished stays on disk", 1, error)
     except BrokenExecutor as error:
-        return _failed(
-            "a worker process died, twice (killed from outside, or out of memory: use fewer workers); "
-            "what had been finished stays on disk",
-            1,
-            error,
+        what = (
+            f"{str(error) or 'a worker process died, twice'} (killed from outside, or out of memory: use fewer workers)"
         )
+        return _failed(f"{what}; what had been finished stays on disk", 1, error)
     except (ValueError, RuntimeError) as error:
         return _simulator_failed(error)
     return 0

@@ -26,8 +26,8 @@ TIMINGS = "timings.jsonl"
 class Trial:
     """One candidate as it was judged.
 
-    stage: "search" or "confirm" · point: in shares of the bounds · parameters: in the file's units, by dotted name ·
-    objective, metrics: without their pseudo-values; None and empty when the evaluation failed · score: what the
+    stage: "search", "confirm" or "sweep" · point: in shares of the bounds · parameters: in the file's units, by dotted
+    name · objective, metrics: without their pseudo-values; None and empty when the evaluation failed · score: what the
     optimiser saw, objective less penalties · reason: why it is not feasible, else "".
     """
 

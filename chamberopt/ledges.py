@@ -38,6 +38,7 @@ def ledges(design: Design, chamber: Chamber) -> list[Ledge]:
     normal = -area_vectors(chamber.vertices, chamber.triangles)  # to the shot
     area = np.linalg.norm(normal, axis=1)
     upward = normal[:, 2] > UPWARD * area
+    downward = normal[:, 2] < -UPWARD * area
     flat = upward & (np.hypot(normal[:, 0], normal[:, 1]) <= Rest().resistance * normal[:, 2])
     cross_section = np.pi / 4.0 * design.shot.diameter**2
     found = []
@@ -46,7 +47,8 @@ def ledges(design: Design, chamber: Chamber) -> list[Ledge]:
         if not faces.any() or (tag == TAG_PART and design.effects.part_turn is not None):
             continue
         level = bool(area[faces & flat].sum() >= cross_section)
-        shown = faces & flat if level else faces & _in_hollows(chamber, upward)  # where balls lie, rather than roll off
+        # where balls lie, rather than roll off
+        shown = faces & flat if level else faces & _in_hollows(chamber, upward, downward)
         if not shown.any():
             continue
         much = mm2(area[shown].sum())
@@ -61,10 +63,10 @@ def ledges(design: Design, chamber: Chamber) -> list[Ledge]:
     return found
 
 
-def _in_hollows(chamber: Chamber, upward: np.ndarray) -> np.ndarray:
-    """Which of the faces that go ``upward`` (k,) touch the bottom of a hollow: from there every way leads up.
+def _in_hollows(chamber: Chamber, upward: np.ndarray, downward: np.ndarray) -> np.ndarray:
+    """Which faces that go ``upward`` (k,), others ``downward``, are at the bottom of a hollow: every way leads up.
 
-    A wall that leans out has its lowest points on the sonotrode, and the edges of a slope lead on downwards.
+    A wall that leans out has its lowest points on the sonotrode, and off what faces down beside it a ball falls.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -78,7 +80,7 @@ def _in_hollows(chamber: Chamber, upward: np.ndarray) -> np.ndarray:
     lower = height[two] < height[one] - LEVEL
     bottom[plateau[one[lower]]] = False
     bottom[plateau[two[height[one] < height[two] - LEVEL]]] = False
-    bottom[plateau[chamber.triangles[chamber.tags == TAG_SONOTRODE]]] = False
+    bottom[plateau[chamber.triangles[downward | (chamber.tags == TAG_SONOTRODE)]]] = False
     return np.asarray(upward & bottom[plateau[chamber.triangles]].any(axis=1))
 
 

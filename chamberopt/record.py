@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
@@ -31,17 +31,17 @@ RESULT = "result.json"  # written last of all (results.py): a study that has it 
 
 
 @contextmanager
-def open_record(study: Study, folder: str | Path) -> Iterator[Record]:
+def open_record(study: Study, folder: str | Path, plan: Mapping[str, Any] | None = None) -> Iterator[Record]:
     """The record of a study in a folder that is new, empty or its own, held against other processes.
 
     Raises InputError when the folder holds anything else or is being written, and when study, part or program are not
-    what they were: it says what changed.
+    what they were: it says what changed. plan: of a sweep, what it was asked beside its study.
     """
     folder = Path(folder)
     if not is_study_folder(folder):
         folder = new_folder(folder)
     with only_writer(folder):
-        yield Record(study, folder)
+        yield Record(study, folder, plan)
 
 
 def is_study_folder(folder: Path) -> bool:
@@ -57,8 +57,8 @@ def is_finished(folder: Path) -> bool:
 class Record:
     """See open_record. trials: those on disk when it was opened."""
 
-    def __init__(self, study: Study, folder: Path) -> None:
-        self.folder, self._study, self._asked = folder, study, asked(study)
+    def __init__(self, study: Study, folder: Path, plan: Mapping[str, Any] | None = None) -> None:
+        self.folder, self._study, self._asked = folder, study, asked(study, plan)
         self._history, self._timings = Journal(folder / HISTORY), Journal(folder / TIMINGS, lasting=False)
         self._require_same_study()
         self.trials = self._read_trials()

@@ -6,13 +6,14 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from chamberopt.analytic import on_chamber
 from chamberopt.coverage import Tally, tally
 from chamberopt.dents import Samples, first_marked
+from chamberopt.errors import WorkerLostError
 from chamberopt.process import build_scene, replica_seed
 from chamberopt.stuck import Stuck, share_on_the_spot, still
 
@@ -43,20 +44,20 @@ class Replica:
 
 
 def simulate_replicas(
-    design: Design,
-    chamber: Chamber,
-    mesh: TriangleMesh | AnalyticCavity,
-    samples: Samples | None,
-    executor: Executor,
-    stream: str,
-    numbers: Sequence[int],
+    setting: Any, seed: int, executor: Executor, stream: str, numbers: Sequence[int]
 ) -> Iterator[Replica]:
-    """The replicas of these numbers, in order: the same come out whatever the number of workers."""
-    seeds = [replica_seed(design.process.seed, number, stream) for number in numbers]
-    futures = [executor.submit(simulate_replica, design, chamber, mesh, samples, seed) for seed in seeds]
+    """The replicas of these numbers, in order: the same come out whatever the number of workers.
+
+    setting: (design, chamber, mesh, samples) as executor.shared hands them over; keep it until the last replica, for
+    it goes to a worker once · seed: of the design's process.
+    """
+    futures = [executor.submit(_replica, setting, replica_seed(seed, number, stream)) for number in numbers]
     try:
-        for future in futures:
-            yield future.result()
+        for number, future in zip(numbers, futures, strict=True):
+            try:
+                yield future.result()
+            except WorkerLostError as error:
+                raise WorkerLostError(f"replica {number}: {error}") from None
     finally:
         # One replica failed, or the user pressed Ctrl-C: the rest need not be simulated.
         for future in futures:
@@ -69,6 +70,10 @@ def replicas_wanted(done: int, half_width: float, wanted: float, most: int) -> i
         return done
     foretold = done * (half_width / wanted) ** 2 if math.isfinite(half_width) else math.inf
     return min(most, math.ceil(min(max(foretold, STEP * done), LEAP * done)))
+
+
+def _replica(setting: tuple[Design, Chamber, TriangleMesh | AnalyticCavity, Samples | None], seed: int) -> Replica:
+    return simulate_replica(*setting, seed)
 
 
 def simulate_replica(

@@ -112,6 +112,9 @@ def load_result(path: str | Path) -> Result:
         data = json.loads(file.read_text(encoding="utf-8"), parse_constant=_refuse_constant)
         if data["format"] != FORMAT:
             raise InputError(f"{file}: written in format {data['format']}, this version reads {FORMAT}; simulate again")
+        if data["kind"] == "sweep":
+            what = "a sweep, a map of candidates that stands for no single one"
+            raise InputError(f"{folder}: {what}; simulate the design you want of it, such as its best.toml")
         return Result(
             folder=folder,
             kind=data["kind"],

@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.accuracy import Evaluation, evaluate
-from chamberopt.candidates import Candidates, Confirmed, Evaluator, Stop
+from chamberopt.candidates import Candidates, Confirmed, Stop
 from chamberopt.config import save_design
 from chamberopt.disk import write_text
 from chamberopt.errors import InputError
 from chamberopt.estimate import Estimate, paired_difference
 from chamberopt.history import Trial
+from chamberopt.judge import Evaluator
 from chamberopt.record import STUDY, Record, open_record
 from chamberopt.replicas import Progress
 from chamberopt.search import maximise
@@ -100,9 +101,9 @@ def go_on(
     """The same from where a record stands. study: the record's, with its effects chosen (Record.settled)."""
     folder = record.folder
     record.begin()
-    _save_inputs(study, folder)
+    save_inputs(study, folder)
     target = kept_target(study)
-    evaluator = evaluator or _simulation(study, executor, target)
+    evaluator = evaluator or simulation(study, executor, target)
     candidates = Candidates(study, record, evaluator, progress, stop)
     settings = study.optimizer
     algorithm = maximise(candidates.score, candidates.start, settings.algorithm, settings.evaluations, settings.seed)
@@ -148,7 +149,7 @@ def kept_target(study: Study) -> np.ndarray | None:
     return build_chamber(study.design).part.target
 
 
-def _save_inputs(study: Study, folder: Path) -> None:
+def save_inputs(study: Study, folder: Path) -> None:
     """The study as files to read and to run again; asked.json has what it is compared by."""
     import tomli_w
 
@@ -159,7 +160,7 @@ def _save_inputs(study: Study, folder: Path) -> None:
     write_text(folder / STUDY, tomli_w.dumps({"design": "design.toml", **asked}))
 
 
-def _simulation(study: Study, executor: Executor, target: np.ndarray | None) -> Evaluator:
+def simulation(study: Study, executor: Executor, target: np.ndarray | None) -> Evaluator:
     """The real thing: chamber, replicas, coverage."""
     from chamberopt.chamber import build_chamber
 

@@ -9,6 +9,7 @@ from chamberopt.accuracy import evaluate
 from chamberopt.analytic import analytic_cavity, on_chamber
 from chamberopt.chamber import Chamber, Part, build_chamber
 from chamberopt.config import Design, load_design
+from chamberopt.design import checked
 from chamberopt.errors import InputError
 from chamberopt.executor import local_executor
 from sim_core import ImpactLog, TriangleMesh, prism_cavity
@@ -16,7 +17,8 @@ from tests import cavities
 from tests.synthetic import DESIGNS, plate_design
 
 PLATE = plate_design()
-EDGED = PLATE.model_copy(update={"chamber": PLATE.chamber.model_copy(update={"shape": "box"})})
+BOX = {"shape": "box", "length_mm": 30.0, "width_mm": 40.0, "height_mm": 20.0, "sonotrode_distance_mm": 15.0}
+EDGED = checked(Design, {**PLATE.model_dump(), "chamber": BOX})
 
 
 @cache

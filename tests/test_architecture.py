@@ -11,7 +11,8 @@ ROOT = Path(__file__).resolve().parents[1]
 # Each line may import from the lines above it, and from its own line. A folder stands for all of its files.
 CHAMBEROPT_ORDER = (
     ("errors", "estimate", "law", "mixture", "patches", "uncovered"),
-    ("diagnosis", "disk", "fields", "materials"),
+    ("cluster", "diagnosis", "disk", "fields", "materials", "processes"),
+    ("executor",),
     ("effects", "shot", "sonotrode", "treatment"),
     ("triangles",),
     ("mesh_io", "solids", "slivers", "remesh"),
@@ -29,15 +30,16 @@ CHAMBEROPT_ORDER = (
     ("figures", "replicas"),
     ("accuracy",),
     ("advice", "dent_rungs", "knobs", "ladder", "price", "rungs"),
-    ("executor", "history", "interrupt", "lock", "progress", "search", "surrogate"),
+    ("history", "interrupt", "lock", "progress", "search", "surrogate"),
     ("versions",),
     ("asked", "evaluation_file"),
-    ("record",),
+    ("judge", "record"),
     ("candidates",),
     ("study",),
+    ("sweep",),
     ("pictures", "viewer"),
     ("results",),
-    ("compare", "price_list"),
+    ("compare", "maps", "price_list"),
     ("workbench",),
     ("cli",),
     ("__main__",),
@@ -67,6 +69,7 @@ ORDER = {"chamberopt": CHAMBEROPT_ORDER, "sim_core": SIM_CORE_ORDER}
 # Package fronts gather names for users and may import everything below them.
 FRONTS = {"chamberopt/__init__.py", "sim_core/__init__.py"}
 ONE_DOOR = {"manifold3d": "solids.py", "nlopt": "search.py", "pyvista": "viewer.py", "vtk": "viewer.py"}
+ONE_DOOR |= {"distributed": "cluster.py", "dask": "cluster.py"}
 # VTK's file readers alone, which need no OpenGL.
 ONE_DOOR["vtkmodules"] = "mesh_io/vtk_files.py"
 

@@ -12,7 +12,7 @@ import pytest
 from chamberopt.chamber import TAG_SONOTRODE, Chamber, build_chamber
 from chamberopt.checkup import describe, shot_reach, warnings
 from chamberopt.config import load_design
-from chamberopt.design import Design
+from chamberopt.design import Design, checked
 from chamberopt.ledges import ledges
 from chamberopt.reach import Reach
 from sim_core import SceneError
@@ -71,12 +71,21 @@ def test_a_level_top_is_warned_of_with_area_place_and_remedy(gear: tuple[Design,
 
 
 def test_slopes_are_a_note_and_no_warning() -> None:
+    """A gutter round the wall; the blade's own slopes, and walls that lean out, lead down to the sonotrode."""
     design, chamber = made("blade")
-    assert not any("come to rest" in text for text in warned(design, chamber))
-    (said,) = (text for text in described(design, chamber)["notes"] if "come to rest" in text)
-    assert "in hollows of the part" in said
-    assert "none level" in said
-    assert "z = 15 to 55 mm" in said
+    assert not ledges(design, chamber)
+    data = design.model_dump()
+    data["chamber"] = {"shape": "prism", "sides": 6, "across_mm": 50.0, "height_mm": 57.0, "inclination_deg": 10.0}
+    leaning = checked(Design, {**data, "chamber": {**data["chamber"], "sonotrode_distance_mm": 15.0}})
+    assert not ledges(leaning, build_chamber(leaning))
+    profile = [[24, 0], [24, 12], [28, 8], [32, 12], [32, 57]]
+    data["chamber"] = {"shape": "revolve", "profile_mm": profile, "sonotrode_distance_mm": 15.0}
+    gutter = checked(Design, data)
+    (found,) = ledges(gutter, build_chamber(gutter))
+    assert not found.level
+    assert "in hollows of the wall" in found.said
+    assert "none level" in found.said
+    assert "z = 8 to 12 mm" in found.said
 
 
 def test_nothing_comes_to_rest_under_a_lid_or_on_a_part_that_turns() -> None:

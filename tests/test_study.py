@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from chamberopt import viewer
-from chamberopt.candidates import FAILED_SCORE
 from chamberopt.chamber import build_chamber
 from chamberopt.config import Limits, Study, load_design, load_study
 from chamberopt.disk import new_folder
 from chamberopt.errors import InputError
 from chamberopt.executor import SerialExecutor, local_executor
 from chamberopt.history import as_csv, read_history
+from chamberopt.judge import FAILED_SCORE
 from chamberopt.objective import METRICS
 from chamberopt.process import require_countable
 from chamberopt.results import load_result, write_study

@@ -13,12 +13,12 @@ from pathlib import Path
 import pytest
 
 import chamberopt
-from chamberopt.candidates import FAILED_SCORE
 from chamberopt.chamber import build_chamber
 from chamberopt.cli import main
 from chamberopt.config import load_study
 from chamberopt.estimate import Estimate
 from chamberopt.interrupt import EARLY, FIRST, SECOND
+from chamberopt.judge import FAILED_SCORE
 from chamberopt.results import load_result
 from tests.resuming import calls, history, logged, run, study
 from tests.synthetic import DESIGNS, plate_design, poisson_evaluation
@@ -186,7 +186,7 @@ class TestCommandLine:
             return poisson_evaluation(design, chamber, 4.0 * design.shot.mass_g, 3, seed=len(stream))
 
         self.at: dict[int, Callable[[], None]] = {}
-        monkeypatch.setattr("chamberopt.study._simulation", lambda *_: evaluator)
+        monkeypatch.setattr("chamberopt.study.simulation", lambda *_: evaluator)
         monkeypatch.setattr("chamberopt.cli._compile", lambda *_: None)
         monkeypatch.setattr("chamberopt.viewer.coverage_picture", lambda *_: None)
         return done

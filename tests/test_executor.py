@@ -1,0 +1,137 @@
+"""Workers of every kind give the same answers; one that is lost costs its task alone, and twice lost is said so."""
+
+import pickle
+import sys
+from collections import Counter
+from concurrent.futures import Executor
+from pathlib import Path
+
+import pytest
+
+from chamberopt import config
+from chamberopt.cli import main
+from chamberopt.errors import InputError, WorkerLostError
+from chamberopt.executor import SerialExecutor, local_executor, open_executor, shared
+from tests import jobs
+
+
+@pytest.fixture(scope="module")
+def processes():
+    with local_executor(2, "processes") as executor:
+        yield executor
+
+
+def test_processes_answer_in_order_and_share_the_work(processes: Executor) -> None:
+    assert [future.result() for future in [processes.submit(jobs.square, n) for n in range(20)]] == [
+        n * n for n in range(20)
+    ]
+    busy = Counter(processes.map(jobs.pid_of, range(8)))
+    assert set(busy) == set(processes.pids)  # type: ignore[attr-defined]
+    assert min(busy.values()) >= 3
+
+
+def test_an_error_travels_as_what_it_is(processes: Executor) -> None:
+    with pytest.raises(InputError, match=r"^shot: too many$"):
+        processes.submit(jobs.refuse, "shot: too many").result()
+
+
+def test_an_error_of_the_system_is_the_tasks_own_and_no_lost_worker(processes: Executor, tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError):
+        processes.submit(jobs.open_nothing, tmp_path).result()
+    assert jobs.marks(tmp_path) == {"tried": 1}
+
+
+def test_an_error_that_cannot_travel_is_told_in_words(processes: Executor) -> None:
+    with pytest.raises(RuntimeError, match=r"^AwkwardError: open edges$"):
+        processes.submit(jobs.refuse_awkwardly).result()
+
+
+def test_a_lost_process_costs_its_task_alone(processes: Executor, tmp_path: Path) -> None:
+    before = set(processes.pids)  # type: ignore[attr-defined]
+    futures = [processes.submit(jobs.square, n, tmp_path, 0.02) for n in range(6)]
+    lost = processes.submit(jobs.die, tmp_path)
+    futures += [processes.submit(jobs.square, n, tmp_path, 0.02) for n in range(6, 12)]
+    assert [future.result() for future in futures] == [n * n for n in range(12)]
+    assert lost.result() == "alive"
+    assert jobs.marks(tmp_path) == {**{str(n): 1 for n in range(12)}, "die": 2}
+    assert len(before & set(processes.pids)) == 1  # type: ignore[attr-defined]
+
+
+def test_a_task_that_takes_its_processes_down_is_said_so(processes: Executor, tmp_path: Path) -> None:
+    with pytest.raises(
+        WorkerLostError, match=r"died 2 times \(signal 9, as when memory runs out\); give fewer --workers"
+    ):
+        processes.submit(jobs.die, tmp_path, 99).result()
+    assert jobs.marks(tmp_path) == {"die": 2}
+    assert processes.submit(jobs.square, 3).result() == 9
+
+
+def test_what_is_shared_travels_once_a_worker(processes: Executor, tmp_path: Path) -> None:
+    parcel = shared(processes, jobs.Counted(tmp_path, 100_000))
+    assert len(pickle.dumps((jobs.size_of, (parcel, 1), {}))) < 300
+    assert set(processes.map(jobs.size_of, [parcel] * 20, range(20))) == {100_000}
+    assert jobs.marks(tmp_path) == {str(pid): 1 for pid in processes.pids}  # type: ignore[attr-defined]
+    file = Path(parcel.path)
+    assert file.exists()
+    del parcel
+    assert not file.exists()
+
+
+@pytest.mark.parametrize("executor", [SerialExecutor(), local_executor(1)], ids=["serial", "threads"])
+def test_where_memory_is_shared_nothing_travels(executor: Executor) -> None:
+    value = object()
+    assert shared(executor, value) is value
+
+
+def test_leaving_by_an_exception_does_not_wait_for_the_tasks(tmp_path: Path) -> None:
+    executor = local_executor(1, "processes")
+
+    def interrupted() -> None:
+        with executor:
+            assert executor.submit(jobs.square, 2).result() == 4
+            executor.submit(jobs.square, 3, None, 60.0)
+            executor.submit(jobs.square, 4, tmp_path)
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert executor.pids == []  # type: ignore[attr-defined]
+    assert jobs.marks(tmp_path) == {}
+
+
+@pytest.mark.parametrize(
+    ("workers", "cluster", "said"),
+    [
+        (0, None, "--workers: given 0; give at least 1"),
+        (2, "tcp://127.0.0.1:8786", "--workers: given 2, but --cluster has workers of its own"),
+        (None, "no-such-file.json", "neither an address nor a file; give tcp://HOST:PORT"),
+        (None, __file__, "holds no scheduler's address"),
+        (None, "http://127.0.0.1", r"no scheduler answers at http://127.0.0.1 .*not of the form tcp://HOST:PORT"),
+    ],
+)
+def test_what_cannot_be_is_said(workers: int | None, cluster: str | None, said: str) -> None:
+    if cluster and not workers:
+        pytest.importorskip("distributed", reason="Dask is not installed")
+    with pytest.raises(InputError, match=said):
+        open_executor(workers, cluster)
+
+
+def test_without_dask_the_remedy_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(InputError, match=r"pip install 'chamberopt\[dask\]'"):
+        open_executor(None, "tcp://127.0.0.1:8786")
+
+
+def test_lost_workers_are_one_message_and_status_1(monkeypatch: pytest.MonkeyPatch, capsys) -> None:
+    def lose(_: Path) -> None:
+        raise WorkerLostError("replica 3: its worker process died 2 times (signal 9)")
+
+    monkeypatch.setattr(config, "load_design", lose)
+    assert main(["simulate", "any.toml"]) == 1
+    assert capsys.readouterr().err.startswith("replica 3: its worker process died 2 times (signal 9) (killed")
+
+
+@pytest.mark.parametrize(("workers", "kind"), [(1, "ThreadPoolExecutor"), (8, "ThreadPoolExecutor"), (9, "Processes")])
+def test_too_many_cores_for_threads_are_given_processes(workers: int, kind: str) -> None:
+    with open_executor(workers, None) as executor:  # processes start with their first task
+        assert type(executor).__name__ == kind
