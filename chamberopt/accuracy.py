@@ -23,7 +23,8 @@ from chamberopt.coverage import Tally
 from chamberopt.dents import Samples, few_points_note, marked_share, sample_points
 from chamberopt.estimate import Estimate, estimate
 from chamberopt.executor import shared
-from chamberopt.figures import coverage_figures, few_dents_note, surface
+from chamberopt.figures import coverage_figures, few_dents_note, surface, time_to_98
+from chamberopt.intensity import intensity_uniformity
 from chamberopt.objective import METRICS, Metric, Objective, objective, on_target
 from chamberopt.process import chamber_mesh
 from chamberopt.replicas import (
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from chamberopt.config import Design
     from sim_core import AnalyticCavity
 
+OWN_ESTIMATORS = ("time_to_98_s", "intensity_uniformity")  # beside those of coverage
 CURVE = 50  # points of coverage against time
 
 
@@ -82,8 +84,11 @@ def jackknife(
     total = reduce(add, replicas)
     parts = [total - replica for replica in replicas] if n > 1 else []
     figures = {}
-    if any(metric.over_surface for metric in statistics):
-        figures = coverage_figures(replicas, chamber, surface(replicas, chamber, design))
+    if any(metric.over_surface or metric.name in OWN_ESTIMATORS for metric in statistics):
+        ground = surface(replicas, chamber, design)
+        figures = coverage_figures(replicas, chamber, ground)
+        figures["time_to_98_s"] = time_to_98(figures["p05_coverage"], design.process.treatment_time)
+        figures["intensity_uniformity"] = intensity_uniformity(replicas, ground)
     estimates = []
     for metric in statistics:
         if metric.name in figures:
@@ -129,13 +134,14 @@ def evaluate(
     stream: str = "search",
     replicas: int | None = None,
     cavity: AnalyticCavity | None = None,
+    done: list[Replica] | None = None,
 ) -> Evaluation:
     """Simulate a candidate in independent replicas and estimate its objective and metrics.
 
     replicas: number of them; when None as many as the design's accuracy asks for. stream: which of the two seed
-    streams ("search", "confirm"). cavity: `analytic_cavity`'s, in place of the chamber's mesh. The same numbers come
-    out whatever the number of workers: replicas are added in order, and what they say, never a clock, decides how many
-    there are.
+    streams ("search", "confirm"). cavity: `analytic_cavity`'s, in place of the chamber's mesh. done: the first replicas
+    of this very candidate, simulated before; the others are added to it. The same numbers come out whatever the number
+    of workers: replicas are added in order, and what they say, never a clock, decides how many there are.
 
     Raises InputError (the shot does not fit) and sim_core.SimulationError.
     """
@@ -147,7 +153,7 @@ def evaluate(
     mesh = cavity or chamber_mesh(chamber)
     samples = sample_points(chamber, accuracy.sample_spacing) if accuracy.coverage_model == "dents" else None
     setting = shared(executor, (design, chamber, mesh, samples))
-    done: list[Replica] = []
+    done = [] if done is None else done
     clock = {"simulate": 0.0, "coverage": 0.0}
     while True:
         started = time.perf_counter()

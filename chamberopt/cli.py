@@ -256,12 +256,16 @@ def _run(
     ]
     verdict = "better than the start" if result.improved else "within the noise of the start"
     lines += ["", f"{_row('gain', result.gain)}: {verdict}"]
+    if result.findings:
+        lines += ["", *result.findings.sentences(), ""]
+    if question.objective.pareto:
+        lines += [f"the front of {' and '.join(question.objective.pareto)}: pareto.csv, pareto.png", ""]
     fine = result.best.evaluation
     lines += [
         f"± 95 % intervals; start and best from {len(fine.replicas)} replicas of {design.process.recorded_time:g} s on "
         f"seeds of their own, the search's figures in history.csv from {_said(question.drafted(design))}"
     ]
-    notes = (*map(str, advice), *result.at_bounds, *start.notes, *result.best.evaluation.notes)
+    notes = (*map(str, advice), *result.doubts, *result.at_bounds, *start.notes, *result.best.evaluation.notes)
     _say([*lines, *_notes(notes)], record.folder, json)
 
 

@@ -5,7 +5,7 @@ import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import BaseModel, Field, ValidationError, model_validator
 
@@ -14,24 +14,30 @@ from chamberopt.design import Design, checked
 from chamberopt.diagnosis import CrossCheckError, Problem
 from chamberopt.disk import write_text
 from chamberopt.errors import InputError
+from chamberopt.fields import listed, quantity
 from chamberopt.materials import STRICT
 from chamberopt.shapes.table import is_own
 
 __all__ = ["METRICS", "Design", "Limits", "Study", "load", "load_design", "load_study", "save_design"]
 
 # What a study may ask for. objective.py computes them, a test holds the two lists together.
-ObjectiveName = Literal["uniform_coverage"]
+ObjectiveName = Literal["uniform_coverage", "coverage_p05", "time_to_98", "intensity_uniformity"]
 METRICS = (
     "mean_coverage",
     "std_coverage",
     "p05_coverage",
+    "time_to_98_s",
+    "intensity_uniformity",
     "mean_normal_speed_m_s",
     "impacts_per_mm2_s",
     "shot_count",
 )
-# NLopt's own names without the "NLOPT_" prefix; "auto" is a global search, then a local one from its best.
+# NLopt's own names without the "NLOPT_" prefix, and two phases that are none of them: points spread evenly, and a model
+# of the scores on which NLopt looks for the next; "auto" is these two, one after the other.
 Algorithm = Literal[
     "auto",
+    "sobol",
+    "surrogate",
     "GN_DIRECT_L",
     "GN_DIRECT_L_RAND",
     "GN_ORIG_DIRECT_L",
@@ -49,11 +55,43 @@ Algorithm = Literal[
 
 
 class Objective(BaseModel):
-    """What is maximised."""
+    """What is maximised: one objective by name, a weighted sum, or two at once."""
 
     model_config = STRICT
 
-    name: ObjectiveName = Field(default="uniform_coverage", description="mean minus standard deviation over the target")
+    name: ObjectiveName = Field(default="uniform_coverage", description="what is maximised")
+    sum: dict[str, float] = Field(
+        default_factory=dict, description="NAME = WEIGHT of objectives and metrics, in place of a name"
+    )
+    pareto: Annotated[tuple[ObjectiveName, ObjectiveName], Field(strict=False)] | None = listed(
+        'two names, e.g. ["uniform_coverage", "time_to_98"]', "two objectives at once, in place of a name", None
+    )
+
+    @model_validator(mode="after")
+    def _agree(self) -> Self:
+        names = (*get_args(ObjectiveName), *METRICS)
+        problems = [
+            Problem(f"sum.{name}", f"not an objective or a metric; {diagnosis.did_you_mean(name, names)}")
+            for name in self.sum
+            if name not in names
+        ]
+        if self.sum and not any(self.sum.values()):
+            problems.append(Problem("sum", "all weights are 0; give one another value"))
+        if self.pareto and self.pareto[0] == self.pareto[1]:
+            problems.append(Problem("pareto", f"given {self.pareto[0]} twice; give two different objectives"))
+        given = [self.name != "uniform_coverage", bool(self.sum), self.pareto is not None]
+        if given.count(True) > 1:
+            problems.append(Problem("", "more than one of name, sum and pareto; give one"))
+        if problems:
+            raise CrossCheckError(problems)
+        return self
+
+    @property
+    def goals(self) -> tuple[str, ...]:
+        """Names as objective.objective() takes them: one, or the two of a Pareto front."""
+        if self.sum:
+            return (" + ".join(f"{weight:.10g} {name}" for name, weight in self.sum.items()),)
+        return self.pareto or (self.name,)
 
 
 class Limits(BaseModel):
@@ -73,16 +111,62 @@ class Limits(BaseModel):
         return self
 
 
+class Phase(BaseModel):
+    """A part of a search."""
+
+    model_config = STRICT
+
+    algorithm: Algorithm = Field(description='"sobol", "surrogate" or an NLopt name without its prefix')
+    share: float = quantity(0.001, 1, "of the evaluations", "the last phase has what the others leave", 1.0)
+
+    @model_validator(mode="after")
+    def _agree(self) -> Self:
+        if self.algorithm == "auto":
+            raise CrossCheckError([Problem("algorithm", 'given "auto", which is phases itself; leave phases out')])
+        return self
+
+
 class Optimizer(BaseModel):
     """How the best design is sought, and with what budget."""
 
     model_config = STRICT
 
-    algorithm: Algorithm = Field(default="auto", description="auto, or an NLopt name without its prefix")
+    algorithm: Algorithm = Field(default="auto", description="auto, sobol, surrogate, or an NLopt name without prefix")
+    phases: Annotated[tuple[Phase, ...], Field(strict=False)] = Field(
+        default=(), description="several algorithms one after another, in place of one"
+    )
+    initial_step: float = quantity(0.001, 1, "of the bounds", "first step of local algorithms", 0.15)
+    tolerance: float = quantity(1e-6, 0.5, "of the bounds", "step at which local algorithms end", 0.02)
     evaluations: int = Field(default=40, ge=2, le=1000000, description="designs simulated while searching")
     seed: int = Field(default=1, ge=0, le=2**31 - 1, description="of the search's own random numbers")
     confirm: int = Field(default=3, ge=1, le=1000, description="best candidates simulated again on fresh seeds")
     confirm_replicas: int = Field(default=16, ge=3, le=100000, description="replicas of each confirmation")
+    first_replicas: int = Field(
+        default=4,
+        ge=0,
+        le=100000,
+        description="after so many a candidate plainly worse than the best gets no more; 0: all",
+    )
+    confirm_rounds: int = Field(
+        default=1,
+        ge=1,
+        le=10,
+        description="while the best cannot be told apart: again, each time with twice the replicas",
+    )
+
+    @model_validator(mode="after")
+    def _agree(self) -> Self:
+        problems = []
+        if 0 < self.first_replicas < 3:
+            text = f"given {self.first_replicas}; 3 is the least that gives an interval, 0 gives all of them to each"
+            problems.append(Problem("first_replicas", text))
+        if self.phases and self.algorithm != "auto":
+            problems.append(Problem("phases", f"given beside algorithm = {self.algorithm!r}; give one of the two"))
+        if sum(phase.share for phase in self.phases[:-1]) >= 1.0:
+            problems.append(Problem("phases", "the shares before the last phase add up to 1 or more; lower them"))
+        if problems:
+            raise CrossCheckError(problems)
+        return self
 
 
 class Study(BaseModel):
@@ -100,7 +184,9 @@ class Study(BaseModel):
         json_schema_extra={"form": "[low, high]"},
     )
     objective: Objective = Field(default_factory=Objective)
-    constraints: dict[str, Limits] = Field(default_factory=dict, description="METRIC = { min =, max = }")
+    constraints: dict[str, Limits] = Field(
+        default_factory=dict, description="METRIC = { min =, max = }, or a number of the design in quotes"
+    )
     optimizer: Optimizer = Field(default_factory=Optimizer)
     draft: dict[str, int | float | str] = Field(
         default_factory=dict,
@@ -119,9 +205,14 @@ class Study(BaseModel):
     def _agree(self) -> Self:
         problems = [p for name, bounds in self.vary.items() for p in _vary_problems(self.design, name, bounds)]
         for name in self.constraints:
-            if name not in METRICS:
-                text = f"not a metric; {diagnosis.did_you_mean(name, METRICS)}"
+            if name not in METRICS and name not in self.design.numbers():
+                known = (*METRICS, *(self.design.numbers() if "." in name else ()))
+                text = f"not a metric; {diagnosis.did_you_mean(name, known)}"
                 problems.append(Problem(f"constraints.{name}", text))
+        phases = [phase.algorithm for phase in self.optimizer.phases] or [self.optimizer.algorithm]
+        if self.objective.pareto and not {"auto", "sobol", "surrogate"}.issuperset(phases):
+            text = "given two objectives, which only auto, sobol and surrogate can search"
+            problems.append(Problem("objective.pareto", text))
         problems += self._draft_problems()
         if problems:
             raise CrossCheckError(problems)

@@ -19,7 +19,7 @@ import numpy as np
 from chamberopt.coverage import Tally
 from chamberopt.estimate import Estimate, estimate
 from chamberopt.mixture import MANY_STEPS, Mixture
-from chamberopt.objective import exposed_target, require_target
+from chamberopt.objective import LONGEST, exposed_target, require_target, seconds_to_98
 from chamberopt.patches import patches
 from chamberopt.uncovered import Bare, Dents
 
@@ -118,6 +118,21 @@ def _mean_and_std(dents: Sequence[Dents], ground: Surface, lost: float) -> tuple
         slope = (high - low) / (2.0 * reach) if low > 0.0 else high / reach
     moved = value + slope * (np.array(spread.pseudovalues) - spread.value)
     return estimate(mean - shift + bare.swing(-seen, 0.0), 0.0, 1.0, shift), estimate(moved, 0.0, 0.5, slope * wider)
+
+
+def time_to_98(poorest: Estimate, seconds: float) -> Estimate:
+    """Time [s] to full coverage from p05_coverage after `seconds`; never: objective.LONGEST, and an interval as wide.
+
+    The chord over the interval instead of the tangent, as for the spread: the time is steep where little is covered.
+    """
+    value, slope = seconds_to_98(poorest.value, seconds), 0.0
+    reach = min(poorest.half_width, 1.0)
+    if reach > 0.0 and value < LONGEST:
+        slow, fast = (seconds_to_98(poorest.value + side * reach, seconds) for side in (-1.0, 1.0))
+        slope = (fast - slow) / (2.0 * reach)
+    moved = value + slope * (np.array(poorest.pseudovalues) - poorest.value)
+    made = estimate(moved, 0.0, LONGEST, abs(slope) * poorest.bias)
+    return Estimate(made.value, LONGEST, made.pseudovalues, made.bias) if value == LONGEST else made
 
 
 def _pseudovalues(values: np.ndarray) -> np.ndarray:

@@ -27,19 +27,26 @@ class Trial:
     """One candidate as it was judged.
 
     stage: "search", "confirm" or "sweep" · point: in shares of the bounds · parameters: in the file's units, by dotted
-    name · objective, metrics: without their pseudo-values; None and empty when the evaluation failed · score: what the
-    optimiser saw, objective less penalties · reason: why it is not feasible, else "".
+    name · goals: every objective of the study, empty when the evaluation failed · metrics: without their pseudo-values
+    · penalty: of the constraints, relative to their limits · score: what the optimiser saw, the first objective less
+    penalties · reason: why it is not feasible, else "".
     """
 
     number: int
     stage: str
     point: tuple[float, ...]
     parameters: dict[str, float]
-    objective: Estimate | None
+    goals: tuple[Estimate, ...]
     metrics: dict[str, Estimate]
+    penalty: float
     score: float
     feasible: bool
     reason: str
+
+    @property
+    def objective(self) -> Estimate | None:
+        """The first objective; None when the evaluation failed."""
+        return self.goals[0] if self.goals else None
 
     def row(self) -> dict[str, Any]:
         """The trial as plain JSON values; numbers as Python prints them, which reads back to the same bits."""
@@ -49,6 +56,9 @@ class Trial:
             "point": list(self.point),
             "parameters": self.parameters,
             **(_plain(self.objective) if self.objective else {"objective": None, "half_width": None}),
+            "replicas": len(self.objective.pseudovalues) if self.objective else None,
+            "goals": [_whole(goal) for goal in self.goals],
+            "penalty": self.penalty,
             "score": self.score,
             "feasible": self.feasible,
             "reason": self.reason,
@@ -63,8 +73,9 @@ class Trial:
             stage=str(row["stage"]),
             point=tuple(float(share) for share in row["point"]),
             parameters={name: float(value) for name, value in row["parameters"].items()},
-            objective=None if row["objective"] is None else _estimate(row, "objective"),
+            goals=tuple(_goal(goal) for goal in row["goals"]),
             metrics={name: _estimate(metric, "value") for name, metric in row["metrics"].items()},
+            penalty=float(row["penalty"]),
             score=float(row["score"]),
             feasible=bool(row["feasible"]),
             reason=str(row["reason"]),
@@ -75,6 +86,16 @@ def _plain(estimate: Estimate, name: str = "objective") -> dict[str, float | Non
     """JSON knows neither infinity, a half-width that is not known, nor NaN: both are null."""
     named = {name: estimate.value, "half_width": estimate.half_width}
     return {key: value if math.isfinite(value) else None for key, value in named.items()}
+
+
+def _whole(estimate: Estimate) -> dict[str, Any]:
+    """With pseudo-values, from which a model of the search learns how sure it is."""
+    return {**_plain(estimate, "value"), "pseudovalues": list(estimate.pseudovalues), "bias": estimate.bias}
+
+
+def _goal(row: Mapping[str, Any]) -> Estimate:
+    bare = _estimate(row, "value")
+    return Estimate(bare.value, bare.half_width, tuple(float(x) for x in row["pseudovalues"]), float(row["bias"]))
 
 
 def _estimate(row: Mapping[str, Any], name: str) -> Estimate:

@@ -3,36 +3,48 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import BrokenExecutor
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from chamberopt.accuracy import Evaluation
+from chamberopt.accuracy import Evaluation, weighted
+from chamberopt.constraints import shortfall, violations
 from chamberopt.errors import InputError, WorkerLostError
 from chamberopt.estimate import Estimate
 from chamberopt.history import Trial
+from chamberopt.objective import METRICS, objective
 
 if TYPE_CHECKING:
-    from chamberopt.config import Design, Limits, Study
+    from chamberopt.config import Design, Study
 
-# What the optimiser is told of a candidate that could not be simulated: below any uniform_coverage (which
-# cannot be less than -0.21), finite because NLopt's models break on inf and NaN.
-FAILED_SCORE = -1.0
+# What the optimiser is told of a candidate that could not be simulated: so many of the objective's scale below the
+# start. Finite because NLopt's models break on inf and NaN.
+FAILED = 2.0
 
 Evaluator = Callable[["Design", str, "int | None"], Evaluation]
 """evaluator(design, stream, replicas) judges one candidate; raises InputError or sim_core's two errors."""
 
 
+class Reference(NamedTuple):
+    """What candidates are measured by: the start's score, and how much a whole unit of the objective is."""
+
+    score: float = 0.0
+    scale: float = 1.0
+
+
 class Judge:
-    """Maps points of the unit cube, shares of a study's bounds, to designs and their figures; remembers none."""
+    """Maps points of the unit cube, shares of a study's bounds, to designs and their figures; remembers but the
+    ``reference``, which a search sets when it has judged its start.
+    """
 
     def __init__(self, study: Study, evaluator: Evaluator) -> None:
         self._study, self._evaluator = study, evaluator
         self._low, self._high = np.array(list(study.vary.values()), dtype=float).T
         begin = np.array([study.design.value(name) for name in study.vary], dtype=float)
         self.start = (begin - self._low) / (self._high - self._low)
+        self.reference = Reference()
 
     def parameters(self, point: np.ndarray) -> dict[str, float]:
         """The varied parameters at a point of the unit cube, in the file's units."""
@@ -45,54 +57,87 @@ class Judge:
     def design(self, point: np.ndarray) -> Design:
         return self._study.design.with_values(self.parameters(point))
 
+    def goals(self, evaluation: Evaluation) -> tuple[Estimate, ...]:
+        """Every objective of the study."""
+        others = self._study.objective.goals[1:]
+        return (evaluation.objective, *(weighted(objective(name), evaluation.metrics) for name in others))
+
+    def constrained(self, parameters: dict[str, float], evaluation: Evaluation) -> dict[str, Estimate]:
+        """The figures that the constraints are about: metrics, and numbers of the design, which are exact."""
+        design = self._study.design
+        return {
+            name: evaluation.metrics[name]
+            if name in evaluation.metrics
+            else Estimate(parameters[name] if name in parameters else design.value(name), 0.0)
+            for name in self._study.constraints
+        }
+
     def trial(
-        self, number: int, point: np.ndarray, stage: str, replicas: int | None = None
+        self, number: int, point: np.ndarray, stage: str, replicas: int | None = None, bar: float | None = None
     ) -> tuple[Trial, Evaluation | None]:
         """The candidate's row, and its evaluation unless it failed. A search's first, the start, raises if it fails.
 
-        All but a confirmation are judged at the accuracy of a search, on its seeds.
+        All but a confirmation are judged at the accuracy of a search, on its seeds. bar: of a search, an objective that
+        the best has for sure.
         """
         from sim_core import SceneError, SimulationError
 
         evaluation: Evaluation | None = None
-        score, reason = FAILED_SCORE, ""
+        goals: tuple[Estimate, ...] = ()
+        parameters, penalty = self.parameters(point), 0.0
         try:
-            evaluation = self._evaluation(self.design(point), stage, replicas)
-            if not math.isfinite(evaluation.objective.value):
-                raise InputError(f"its objective is {evaluation.objective.value}, not a number to compare")
+            evaluation = self._evaluation(self.design(point), stage, replicas, bar)
+            goals = self.goals(evaluation)
+            if not all(math.isfinite(goal.value) for goal in goals):
+                raise InputError(f"its objective is {goals[0].value}, not a number to compare")
         except (InputError, SceneError, SimulationError) as error:
             if stage == "search" and number == 0:
                 raise
-            evaluation, reason = None, str(error)
+            evaluation, goals = None, ()
+            score, reason = self.reference.score - FAILED * self.reference.scale, str(error)
         except Exception as error:  # a fault of ours or of the machine, not of the candidate: it has no place on record
-            values = ", ".join(f"{name} = {value!r}" for name, value in self.parameters(point).items())
+            values = ", ".join(f"{name} = {value!r}" for name, value in parameters.items())
             error.add_note(f"in evaluation {number + 1} ({stage}): {values}")
             raise
         else:
+            first = stage == "search" and number == 0
+            unit = scale(self._study.objective.goals[0], evaluation.metrics) if first else self.reference.scale
+            figures = self.constrained(parameters, evaluation)
+            penalty = sum(shortfall(figures[name], limits) for name, limits in self._study.constraints.items())
             missed = [
                 miss
                 for name, limits in self._study.constraints.items()
-                for miss in violations(name, evaluation.metrics[name].value, limits)
+                for miss in violations(name, figures[name], limits)
             ]
-            score = evaluation.objective.value - sum(size for size, _ in missed)
-            reason = "; ".join(text for _, text in missed)
+            score, reason = goals[0].value - unit * penalty, "; ".join(missed)
         trial = Trial(
             number=number,
             stage=stage,
             point=tuple(point.tolist()),
-            parameters=self.parameters(point),
-            objective=_bare(evaluation.objective) if evaluation else None,
+            parameters=parameters,
+            goals=goals,
             metrics={name: _bare(metric) for name, metric in evaluation.metrics.items()} if evaluation else {},
+            penalty=penalty,
             score=score,
             feasible=not reason,
             reason=reason,
         )
         return trial, evaluation
 
-    def _evaluation(self, design: Design, stage: str, replicas: int | None) -> Evaluation:
+    def _evaluation(self, design: Design, stage: str, replicas: int | None, bar: float | None) -> Evaluation:
+        """A candidate of the search that a few replicas show to be plainly worse than the best gets no more of them."""
+        if stage == "confirm":
+            return self._simulated(design, "confirm", replicas)
+        design = self._study.drafted(design)
+        few, accuracy = self._study.optimizer.first_replicas, design.process.accuracy
+        if bar is not None and 0 < few < accuracy.replicas and accuracy.coverage is None:
+            first = self._simulated(design, "search", few)
+            if len(self._study.objective.goals) == 1 and first.objective.high < bar:
+                return first
+        return self._simulated(design, "search", replicas)
+
+    def _simulated(self, design: Design, stream: str, replicas: int | None) -> Evaluation:
         """Once more where a worker died: the executor may have mended itself."""
-        stream = "confirm" if stage == "confirm" else "search"
-        design = design if stage == "confirm" else self._study.drafted(design)
         try:
             return self._evaluator(design, stream, replicas)
         except WorkerLostError:  # it has tried twice itself
@@ -106,11 +151,10 @@ def _bare(estimate: Estimate) -> Estimate:
     return Estimate(estimate.value, estimate.half_width)
 
 
-def violations(name: str, value: float, limits: Limits) -> list[tuple[float, str]]:
-    """By how much a metric misses its limits, relative to the limit, and in words; empty if it does not."""
-    missed = []
-    if limits.min is not None and value < limits.min:
-        missed.append(((limits.min - value) / (abs(limits.min) or 1.0), f"{name} {value:.4g} < min {limits.min:g}"))
-    if limits.max is not None and value > limits.max:
-        missed.append(((value - limits.max) / (abs(limits.max) or 1.0), f"{name} {value:.4g} > max {limits.max:g}"))
-    return missed
+def scale(goal: str, metrics: Mapping[str, Estimate]) -> float:
+    """How much a whole unit of an objective is: its heaviest term, of a metric within 0..1 the weight itself."""
+    sizes = [
+        abs(weight) * (1.0 if METRICS[name].highest <= 1.0 else abs(metrics[name].value))
+        for name, weight in objective(goal).terms.items()
+    ]
+    return max(sizes) or 1.0

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from chamberopt.chamber import Chamber
     from chamberopt.config import Design
 
+FULL = 0.98  # SAE J2277: coverage that counts as complete
+LONGEST = 1e6  # s; eleven days of peening stand for never
+
 Statistic = Callable[[Tally, "Chamber", "Design"], float]
 OverSurface = Callable[[np.ndarray, np.ndarray], float]
 
@@ -108,6 +111,31 @@ def impacts_per_mm2_s(total: Tally, chamber: Chamber, design: Design) -> float:
     return float(total.impacts[target].sum() / (area_mm2 * total.simulated_time))
 
 
+def time_to_98(total: Tally, chamber: Chamber, design: Design) -> float:
+    """Treatment time [s] after which 95 % of the target's area is covered to 98 %; see seconds_to_98."""
+    seconds = design.process.treatment_time
+    return seconds_to_98(p05_coverage(*on_target(coverage_at(total, chamber, seconds), chamber)), seconds)
+
+
+def seconds_to_98(poorest: float, seconds: float) -> float:
+    """The same from what the poorest twentieth has after `seconds`: dents fall as Avrami has it, 1 - exp(-rate · time).
+
+    98 % counts as full coverage (SAE J2277), and all but the twentieth as everywhere. At most LONGEST, which stands for
+    never.
+    """
+    rate = -math.log(min(max(1.0 - poorest, 1e-12), 1.0)) / seconds
+    return min(LONGEST, -math.log(1.0 - FULL) / rate) if rate > 0.0 else LONGEST
+
+
+def intensity_uniformity(total: Tally, chamber: Chamber, design: Design) -> float:
+    """1 - standard deviation over mean of the local mean normal speed; 0 when nothing hit. See intensity.py."""
+    target = chamber.part.target
+    hits, area = total.impacts[target], chamber.part.area[target]
+    local = np.divide(total.speed_sum[target], hits, out=np.zeros(len(hits)), where=hits > 0)
+    mean = mean_coverage(local, area / area.sum())
+    return 1.0 - std_coverage(local, area / area.sum()) / mean if mean > 0.0 else 0.0
+
+
 def shot_count(total: Tally, chamber: Chamber, design: Design) -> float:
     """Number of balls."""
     return float(design.shot.count)
@@ -128,6 +156,8 @@ METRICS = {
         _coverage_metric("mean_coverage", "mean coverage of the target", mean_coverage, 1.0),
         _coverage_metric("std_coverage", "standard deviation of coverage over the target", std_coverage, 0.5),
         _coverage_metric("p05_coverage", "coverage that 95 % of the target's area exceeds", p05_coverage, 1.0),
+        Metric("time_to_98_s", "s", "time until 95 % of the target's area is 98 % covered", time_to_98, 0.0, LONGEST),
+        Metric("intensity_uniformity", "", "1 - relative spread of the local impact speed", intensity_uniformity),
         Metric("mean_normal_speed_m_s", "m/s", "mean normal speed of the impacts", mean_normal_speed, 0.0),
         Metric("impacts_per_mm2_s", "1/(mm² s)", "impacts per area and second", impacts_per_mm2_s, 0.0),
         Metric("shot_count", "balls", "number of balls", shot_count, 0.0),
@@ -135,15 +165,39 @@ METRICS = {
 }
 
 OBJECTIVES = {
-    # 1 only when all is covered, and covered evenly.
-    "uniform_coverage": Objective(
-        "uniform_coverage", "mean minus standard deviation of coverage", {"mean_coverage": 1.0, "std_coverage": -1.0}
-    ),
+    one.name: one
+    for one in (
+        # 1 only when all is covered, and covered evenly.
+        Objective(
+            "uniform_coverage",
+            "mean minus standard deviation of coverage",
+            {"mean_coverage": 1.0, "std_coverage": -1.0},
+        ),
+        Objective("coverage_p05", "coverage of the least covered 5 % of the area", {"p05_coverage": 1.0}),
+        Objective("time_to_98", "time to full coverage, the shorter the better", {"time_to_98_s": -1.0}),
+        Objective("intensity_uniformity", "how evenly hard the target is hit", {"intensity_uniformity": 1.0}),
+    )
 }
 
 
 def objective(name: str) -> Objective:
-    """The objective of that name; InputError when there is none."""
-    if name not in OBJECTIVES:
-        raise InputError(f"objective.name: {name!r} is not an objective; allowed: {', '.join(OBJECTIVES)}")
-    return OBJECTIVES[name]
+    """The objective of that name, or a sum such as "1 uniform_coverage + -0.001 time_to_98_s"; else InputError."""
+    if name in OBJECTIVES:
+        return OBJECTIVES[name]
+    terms: dict[str, float] = {}
+    for term in name.split(" + "):
+        weight, _, part = term.partition(" ")
+        try:
+            factor, parts = float(weight), _terms(part)
+        except (ValueError, KeyError):
+            raise InputError(
+                f"objective.name: {name!r} is not an objective; allowed: {', '.join(OBJECTIVES)}"
+            ) from None
+        for metric, share in parts.items():
+            terms[metric] = terms.get(metric, 0.0) + factor * share
+    return Objective(name, "weighted sum", terms)
+
+
+def _terms(name: str) -> dict[str, float]:
+    """Metrics and weights of an objective or a metric. KeyError when it is neither."""
+    return {METRICS[name].name: 1.0} if name in METRICS and name not in OBJECTIVES else OBJECTIVES[name].terms

@@ -233,7 +233,7 @@ def _biases(axes: Axes, ladder: Ladder) -> None:
 
 
 def _label(result: StudyResult) -> str:
-    return result.study.objective.name.replace("_", " ")
+    return result.study.objective.goals[0].replace("_", " ")
 
 
 def _plain(axes: Axes) -> None:

@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from chamberopt import front
 from chamberopt.accuracy import Evaluation
 from chamberopt.config import Design, save_design, with_paths_from
 from chamberopt.design import checked
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from chamberopt.study import StudyResult
 
 FORMAT = 1
+LATER = ("time_to_98_s", "intensity_uniformity")  # metrics that results of 0.1.0 may lack
 
 
 @dataclass(frozen=True)
@@ -71,11 +73,13 @@ def write_study(folder: str | Path, study_result: StudyResult, advice: Sequence[
 
     Beside design.toml, study.toml and history.jsonl, which run_study wrote: best.toml · result.json ·
     history.csv · convergence.png · the best's coverage.vtp, chamber.stl, chamber.vtp, coverage.png ·
-    before_after.png · start/, a results folder of the start as confirmed on the same seeds. result.json is the last: a
-    study that is stopped while it writes has none, and writes all of them again.
+    before_after.png · slices.png where there is enough to fit · pareto.csv and pareto.png of two objectives · start/, a
+    results folder of the start as confirmed on the same seeds. result.json is the last: a study that is stopped while
+    it writes has none, and writes all of them again.
     """
     from chamberopt.chamber import build_chamber
     from chamberopt.pictures import convergence_picture
+    from chamberopt.study_pictures import front_picture, slices_picture
 
     folder = Path(folder)
     start, best = study_result.start, study_result.best
@@ -89,6 +93,11 @@ def write_study(folder: str | Path, study_result: StudyResult, advice: Sequence[
     _write_json(folder / "start", {"kind": "simulation", **about})
     about = _write_candidate(folder, best.design, build_chamber(best.design, target), best.evaluation)
     convergence_picture(folder / "convergence.png", study_result)
+    if study_result.findings:
+        slices_picture(folder / "slices.png", study_result, study_result.findings)
+    if study_result.study.objective.pareto:
+        write_text(folder / "pareto.csv", front.as_csv(study_result))
+        front_picture(folder / "pareto.png", study_result)
     remarks = _picture([folder], [best.evaluation], ["best design"], folder / "coverage.png")
     pair, names = [start.evaluation, best.evaluation], ["start", "best design"]
     remarks += _picture([folder / "start", folder], pair, names, folder / "before_after.png")
@@ -121,7 +130,11 @@ def load_result(path: str | Path) -> Result:
             design=checked(Design, data["design"], file, mesh_must_exist=False),
             objective_name=data["objective"]["name"],
             objective=_estimate(data["objective"]),
-            metrics={name: _estimate(data["metrics"][name]) for name in METRICS},
+            metrics={
+                name: _estimate(data["metrics"][name])
+                for name in METRICS
+                if name in data["metrics"] or name not in LATER
+            },
             part_sha256=data["part_sha256"],
             seeds=(data["seed"], data["stream"]),
             notes=tuple(data["notes"]),
@@ -218,6 +231,8 @@ def _about_study(result: StudyResult) -> dict[str, Any]:
         "gain": _plain(result.gain, ""),
         "improved": result.improved,
         "at_bounds": list(result.at_bounds),
+        **({"model": result.findings.as_json()} if result.findings else {}),
+        **({"front": front.as_json(result)} if result.study.objective.pareto else {}),
         "best": {"searched_as": result.best.searched, "parameters": result.best.parameters},
         "start": {
             "parameters": result.start.parameters,
@@ -232,6 +247,7 @@ def _about_study(result: StudyResult) -> dict[str, Any]:
                 "parameters": candidate.parameters,
                 "objective": _plain(candidate.evaluation.objective, ""),
                 "feasible": candidate.feasible,
+                "standing": candidate.standing,
                 "reason": candidate.reason,
             }
             for candidate in result.confirmed

@@ -1,135 +1,170 @@
-"""Where NLopt looks next: a global search, then local ones from its best, on one budget. The only file that imports
-nlopt.
-"""
+"""Where to look next: phases one after another on one budget, by NLopt on the scores or on a model of them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from chamberopt.errors import InputError
+from chamberopt.climb import LOCAL, climb, seed_nlopt
+from chamberopt.proposal import propose
+from chamberopt.surrogate import MOST_POINTS, Surrogate
 
-# Share of the budget "auto" gives to the global search before it refines the best. Measured on three noisy
-# toys, 24 and 40 evaluations: MLSL for half, then BOBYQA has the least regret (0.010 at noise 0.02), before
-# DIRECT_L then BOBYQA (0.011), MLSL alone (0.017), DIRECT_L alone (0.017), BOBYQA alone (0.04) and CRS2
-# (0.08).
-GLOBAL_SHARE = 0.5
-LOCAL = "LN_BOBYQA"
+# Phases that are not NLopt algorithms: points evenly over the bounds, and a model on which NLopt climbs.
+SPREAD, MODEL = "sobol", "surrogate"
+AUTO = (SPREAD, MODEL, LOCAL)
+# Of two objectives, where no single score rises: each step of the model weighs them anew.
+PARETO_PHASES = ((SPREAD, 0.3), (MODEL, 0.7))
+# "auto" spreads this share of the budget, or two points per parameter and two more where that is more, and then
+# follows the model; BOBYQA takes over where there are more points than a model can hold. benchmarks/optimizers.py.
+SPREAD_SHARE, SPREAD_PER_PARAMETER = 0.3, 2
+# Every so many steps the model is taken to be rougher than it seems, its length scales this times the fitted: it may
+# have missed a peak between its points.
+DOUBT_EVERY, ROUGH = 4, 0.5
 # First steps of the local searches, in shares of the bounds, one after another from the best so far.
-LOCAL_STEPS = (0.15, 0.08, 0.04)
+STEP = 0.15
+SMALLER = (1.0, 0.5, 0.25)
 # A step this small, in shares of the bounds, moves a simulated score less than its noise.
-LOCAL_TOLERANCE = 0.02
+TOLERANCE = 0.02
+
+Seen = Callable[[], tuple[np.ndarray, np.ndarray]]
+"""Scores (n,) and their variances (n,) of the points judged so far, in order, as the model is to learn them."""
 
 
-def maximise(score: Callable[[np.ndarray], float], start: np.ndarray, algorithm: str, budget: int, seed: int) -> str:
-    """Maximise over the unit cube with `budget` calls of `score`, the first at `start`; says which algorithms
-    ran.
+def maximise(
+    score: Callable[[np.ndarray], float],
+    start: np.ndarray,
+    algorithm: str,
+    budget: int,
+    seed: int,
+    *,
+    step: float = STEP,
+    tolerance: float = TOLERANCE,
+    phases: Sequence[tuple[str, float]] = (),
+    seen: Seen | None = None,
+) -> str:
+    """Maximise over the unit cube with `budget` calls of `score`, the first at `start`; says which phases ran.
 
     score(point (n,)) -> finite float is called once per different point and keeps its own record: NLopt's
-    return value is never looked at. Raises InputError for an algorithm that cannot take these parameters, and
-    whatever `score` raises.
+    return value is never looked at. algorithm: "auto" or a phase; phases, in its place: several, with their shares of
+    the budget, the last has what the others leave. step, tolerance: of local algorithms, in shares of the bounds.
+    seen: what the model learns from; absent: the scores, their noise unknown. The same seed and the same answers make
+    the same search.
+
+    Raises InputError for an algorithm that cannot take these parameters, and whatever `score` raises.
     """
-    search = _Search(score, start, budget, seed)
+    search = _Search(score, start, budget, seed, step, tolerance, seen)
     try:
-        if algorithm != "auto":
-            search.run(algorithm)
-            return algorithm
-        search.run("GN_MLSL_LDS", share=GLOBAL_SHARE)
-        spent = 0
-        while spent < len(search.scores):  # the budget, or a round of local searches that brings no new point
-            spent = len(search.scores)
-            for step in LOCAL_STEPS:
-                search.run(LOCAL, step=step)
+        search.judge(start)
+        if phases:
+            ends = np.cumsum([share for _, share in phases]).tolist()
+            plan = list(zip([name for name, _ in phases], [*ends[:-1], 1.0], strict=True))
+        else:
+            plan = search.auto_plan() if algorithm == "auto" else [(algorithm, 1.0)]
+        for phase, end in plan:
+            search.run(phase, max(1, round(end * budget)))
+        if algorithm == "auto" and not phases:
+            search.go_on(LOCAL)
     except _BudgetSpentError:
         pass
-    return algorithm if algorithm != "auto" else f"GN_MLSL_LDS, then {LOCAL}"
+    return ", then ".join(search.ran) or "none"
 
 
 class _BudgetSpentError(Exception):
-    """Ends a search from inside NLopt's callback."""
+    """Ends a phase or the search from inside an algorithm."""
 
 
 class _Search:
-    """NLopt algorithms one after another on one budget; a point seen before costs nothing."""
+    """The points judged and what is left of the budget; a point seen before costs nothing."""
 
-    def __init__(self, score: Callable[[np.ndarray], float], start: np.ndarray, budget: int, seed: int) -> None:
-        import nlopt
-
-        self._score, self._start, self._budget = score, start, budget
+    def __init__(
+        self,
+        score: Callable[[np.ndarray], float],
+        start: np.ndarray,
+        budget: int,
+        seed: int,
+        step: float,
+        tolerance: float,
+        seen: Seen | None,
+    ) -> None:
+        self._score, self._start, self._budget, self._seed = score, start, budget, seed
+        self._step, self._tolerance = step, tolerance
+        self._seen = seen or (lambda: (np.array(list(self.scores.values())), np.zeros(len(self.scores))))
         self.scores: dict[bytes, float] = {}  # by the point's exact bytes
+        self.points: list[np.ndarray] = []
+        self.ran: list[str] = []
         self._best, self._best_score = start, -np.inf
-        nlopt.srand(seed)  # process-global: set once, before the first algorithm draws
-        self._judge(start)
+        self._rng = np.random.default_rng(seed)
+        seed_nlopt(seed)
 
-    def run(self, algorithm: str, share: float = 1.0, step: float = LOCAL_STEPS[0]) -> None:
-        """One algorithm from the best point so far, until it converges or its share of the budget is gone."""
-        import nlopt
+    def auto_plan(self) -> list[tuple[str, float]]:
+        """The phases of "auto", and how far into the budget each goes."""
+        modelled = min(self._budget, MOST_POINTS)
+        spread = max(SPREAD_SHARE * modelled, SPREAD_PER_PARAMETER * len(self._start) + 2)
+        ends = (spread, modelled, self._budget)
+        return [(phase, min(1.0, end / self._budget)) for phase, end in zip(AUTO, ends, strict=True)]
 
-        stop_at = max(1, round(share * self._budget))
-        kept: list[BaseException] = []
+    def run(self, phase: str, stop_at: int) -> None:
+        """One phase, until it converges or so many points are judged."""
+        if len(self.scores) >= min(stop_at, self._budget):
+            return
+        self.ran.append(phase)
+        if phase == SPREAD:
+            self._spread(stop_at)
+        elif phase == MODEL:
+            self._follow_model(stop_at)
+        else:
+            self._climb(phase, stop_at, self._step)
 
-        def callback(x: np.ndarray, gradient: np.ndarray) -> float:
-            # An exception that crosses NLopt can turn into SystemError: keep it, stop, raise it outside.
-            # After force_stop some algorithms still ask for a few points; any finite answer does.
-            if kept:
-                return 0.0
-            try:
-                if len(self.scores) >= stop_at and self._point(x).tobytes() not in self.scores:
-                    raise _BudgetSpentError
-                return -self._judge(self._point(x))
-            except BaseException as error:
-                kept.append(error)
-                optimizer.force_stop()
-                return 0.0
+    def go_on(self, algorithm: str) -> None:
+        """Rounds of local searches with ever smaller steps, until the budget or no new point comes."""
+        spent = 0
+        while spent < len(self.scores):
+            spent = len(self.scores)
+            for smaller in SMALLER:
+                self._climb(algorithm, self._budget, smaller * self._step)
 
-        optimizer = self._optimizer(algorithm, step)
-        optimizer.set_min_objective(callback)
+    def _spread(self, stop_at: int) -> None:
+        from scipy.stats.qmc import Sobol
+
+        wanted = min(stop_at, self._budget) - len(self.scores)
+        for point in Sobol(len(self._start), seed=self._seed).random_base2(max(1, (wanted - 1).bit_length()))[:wanted]:
+            self.judge(point)
+
+    def _follow_model(self, stop_at: int) -> None:
+        while len(self.scores) < min(stop_at, self._budget):
+            scores, variances = self._seen()
+            if np.ptp(scores) == 0.0:  # nothing to learn from
+                self.judge(self._rng.random(len(self._start)))
+                continue
+            rough = ROUGH if len(self.points) % DOUBT_EVERY == 0 else 1.0
+            self.judge(propose(Surrogate(np.array(self.points), scores, variances, rough), self._rng))
+
+    def _climb(self, algorithm: str, stop_at: int, step: float) -> None:
+        def within(point: np.ndarray) -> float:
+            if len(self.scores) >= stop_at and point.tobytes() not in self.scores:
+                raise _BudgetSpentError
+            return self.judge(point)
+
         try:
-            optimizer.optimize(self._best)
-        except (nlopt.ForcedStop, nlopt.RoundoffLimited):
-            pass
-        except Exception as error:  # NLopt's own exceptions share no base class from one version to the next
-            if not kept:
-                raise InputError(
-                    f"optimizer.algorithm: NLopt's {algorithm} cannot search {len(self._start)} parameter(s) "
-                    f'({error or type(error).__name__}); choose "auto"'
-                ) from None
-        if kept and not (isinstance(kept[0], _BudgetSpentError) and stop_at < self._budget):
-            raise kept[0]
+            # `most`: a safety net for algorithms that keep asking for points already seen.
+            climb(within, self._best, algorithm, step=step, tolerance=self._tolerance, most=100 * self._budget)
+        except _BudgetSpentError:
+            if stop_at >= self._budget:
+                raise
 
-    def _optimizer(self, algorithm: str, step: float) -> Any:
-        import nlopt
-
-        count = len(self._start)
-        # Any MLSL name takes the local search it is given only under the G_ name.
-        name = algorithm.replace("GN_MLSL", "G_MLSL")
-        optimizer = nlopt.opt(getattr(nlopt, name), count)
-        optimizer.set_lower_bounds(np.zeros(count))
-        optimizer.set_upper_bounds(np.ones(count))
-        # A safety net for algorithms that keep asking for points already seen.
-        optimizer.set_maxeval(100 * self._budget)
-        if name.startswith("G_MLSL"):
-            inner = nlopt.opt(getattr(nlopt, LOCAL), count)
-            inner.set_initial_step(step)
-            inner.set_xtol_abs(LOCAL_TOLERANCE)
-            optimizer.set_local_optimizer(inner)
-        elif name.startswith("LN_"):
-            optimizer.set_initial_step(step)
-            optimizer.set_xtol_abs(LOCAL_TOLERANCE)
-        return optimizer
-
-    def _point(self, x: np.ndarray) -> np.ndarray:
-        """A copy, for x is NLopt's own reused view; clipped, for BOBYQA can leave the bounds by rounding."""
-        return np.clip(np.array(x, dtype=float), 0.0, 1.0)
-
-    def _judge(self, point: np.ndarray) -> float:
+    def judge(self, point: np.ndarray) -> float:
+        """The score of a point, asked for once."""
         key = point.tobytes()
         if key not in self.scores:
             if len(self.scores) >= self._budget:
                 raise _BudgetSpentError
-            self.scores[key] = float(self._score(point))
+            self.points.append(point)
+            try:
+                self.scores[key] = float(self._score(point))
+            except BaseException:
+                self.points.pop()
+                raise
             if self.scores[key] > self._best_score:
                 self._best, self._best_score = point, self.scores[key]
         return self.scores[key]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,19 +12,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.accuracy import Evaluation, evaluate
-from chamberopt.candidates import Candidates, Confirmed, Stop
+from chamberopt.candidates import FIRST_ALONE, Candidates, Confirmed, Stop
 from chamberopt.config import save_design
+from chamberopt.constraints import NOT_KNOWN
 from chamberopt.disk import write_text
 from chamberopt.errors import InputError
 from chamberopt.estimate import Estimate, paired_difference
+from chamberopt.findings import Findings, found
 from chamberopt.history import Trial
 from chamberopt.judge import Evaluator
 from chamberopt.record import STUDY, Record, open_record
 from chamberopt.replicas import Progress
-from chamberopt.search import maximise
+from chamberopt.search import PARETO_PHASES, maximise
 
 if TYPE_CHECKING:
+    from chamberopt.chamber import Chamber
     from chamberopt.config import Design, Study
+    from chamberopt.replicas import Replica
 
 
 @dataclass(frozen=True)
@@ -31,9 +36,10 @@ class StudyResult:
     """What a study found.
 
     start, best, confirmed: judged on the same fresh seeds · gain: objective of best minus start with its 95 %
-    interval from those paired replicas · trials: search and confirmation, as they ran · seconds: wall clock of all
-    evaluations, whenever they ran · target (m,) bool: of all candidates, where it is the start's; None where each
-    design's own says it.
+    interval from those paired replicas · findings: what a model of the whole search says about the best; None when
+    there is too little to fit · trials: search and confirmation, as they ran · seconds: wall clock of all evaluations,
+    whenever they ran · target (m,) bool: of all candidates, where it is the start's; None where each design's own says
+    it. Of two objectives, best is the best by the first.
     """
 
     study: Study
@@ -46,6 +52,7 @@ class StudyResult:
     gain: Estimate
     seconds: float
     target: np.ndarray | None = None
+    findings: Findings | None = None
 
     @property
     def at_bounds(self) -> tuple[str, ...]:
@@ -57,6 +64,11 @@ class StudyResult:
                 if abs(value - bound) < 1e-3 * (high - low):
                     said.append(f"{name} = {value:g} lies on its {side} bound: better may lie beyond; widen [vary]")
         return tuple(said)
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """A sentence where it is not known whether the best keeps the constraints."""
+        return (f"constraints: {self.best.reason}",) if self.best.standing == NOT_KNOWN else ()
 
     @property
     def improved(self) -> bool:
@@ -106,14 +118,27 @@ def go_on(
     evaluator = evaluator or simulation(study, executor, target)
     candidates = Candidates(study, record, evaluator, progress, stop)
     settings = study.optimizer
-    algorithm = maximise(candidates.score, candidates.start, settings.algorithm, settings.evaluations, settings.seed)
+    phases: Sequence[tuple[str, float]] = [(phase.algorithm, phase.share) for phase in settings.phases]
+    if study.objective.pareto and settings.algorithm == "auto" and not phases:
+        phases = PARETO_PHASES
+    algorithm = maximise(
+        candidates.score,
+        candidates.start,
+        settings.algorithm,
+        settings.evaluations,
+        settings.seed,
+        step=settings.initial_step,
+        tolerance=settings.tolerance,
+        phases=phases,
+        seen=candidates.seen,
+    )
     confirmed = candidates.confirm()
     record.require_no_more(len(candidates.trials))
     if not confirmed or confirmed[0].searched != 0:
         first = next(trial for trial in candidates.trials if trial.stage == "confirm")
         raise InputError(f"the start could not be simulated on the confirmation's seeds: {first.reason}")
     start = confirmed[0]
-    winners = [candidate for candidate in confirmed if candidate.feasible]
+    winners = [one for one in confirmed if one.feasible] or [one for one in confirmed if one.standing == NOT_KNOWN]
     if not winners:
         raise InputError(
             f"constraints: no candidate meets them (the start: {start.reason}); loosen them, widen [vary] or "
@@ -131,6 +156,9 @@ def go_on(
         gain=paired_difference(best.evaluation.objective, start.evaluation.objective),
         seconds=record.seconds,
         target=target,
+        findings=found(
+            candidates.model(FIRST_ALONE), study.vary, best.parameters, best.evaluation.objective.half_width
+        ),
     )
 
 
@@ -161,15 +189,22 @@ def save_inputs(study: Study, folder: Path) -> None:
 
 
 def simulation(study: Study, executor: Executor, target: np.ndarray | None) -> Evaluator:
-    """The real thing: chamber, replicas, coverage."""
+    """The real thing: chamber, replicas, coverage. Asked again for more replicas it adds to those it has."""
     from chamberopt.chamber import build_chamber
+
+    known: dict[str, tuple[Chamber, list[Replica]]] = {}  # of the confirmation, and of the search's last candidate
 
     def simulate_candidate(design: Design, stream: str, replicas: int | None) -> Evaluation:
         began = time.perf_counter()
-        chamber = build_chamber(design, target)
+        key = f"{stream} {design.model_dump_json()}"
+        if key not in known:
+            for other in [other for other in known if other.startswith("search")]:
+                del known[other]
+            known[key] = build_chamber(design, target), []
+        chamber, done = known[key]
         built = time.perf_counter() - began
-        name = study.objective.name
-        result = evaluate(design, chamber, executor, objective_name=name, stream=stream, replicas=replicas)
+        name = study.objective.goals[0]
+        result = evaluate(design, chamber, executor, objective_name=name, stream=stream, replicas=replicas, done=done)
         return replace(result, timings={"chamber": built, **result.timings})
 
     return simulate_candidate

@@ -1,83 +1,137 @@
-"""A smooth model of noisy scores: which point the whole search recommends, not just its luckiest evaluation.
+"""A smooth model of noisy scores: what the whole search says of a point, and how sure it is.
 
-A Gaussian process (C. E. Rasmussen and C. K. I. Williams, "Gaussian Processes for Machine Learning", MIT
-Press 2006, algorithm 2.1) with a Matérn-5/2 kernel and one length scale per parameter. Measured on three
-noisy toys with 40 evaluations, confirming its recommendation beside the best seen about halves the regret.
+A Gaussian process (C. E. Rasmussen and C. K. I. Williams, "Gaussian Processes for Machine Learning", MIT Press 2006)
+fitted by scikit-learn: Matérn-5/2, one length scale per parameter, the noise of the evaluations as their replicas
+tell it plus some more to be fitted. The most probable hyperparameters, not the likeliest: a prior keeps 20 points from
+being over-read (measured on noisy toys, 40 evaluations each: mean regret 0.027 with it, 0.032 without).
 """
 
+from __future__ import annotations
+
+import warnings
 from collections.abc import Callable
+from functools import cache
+from typing import Any
 
 import numpy as np
 
-# Fewer points than this per parameter do not fix a length scale.
-POINTS_PER_PARAMETER = 4
-# How much the model's own doubt counts against a point: recommends where the search has been, not a far
-# corner.
-CAUTION = 0.5
+# A fit costs their number cubed: 0.05 s at 80, 1 s at 300.
+MOST_POINTS = 300
+# Scores further below the middle than this many times the best's distance above it say "bad", not how bad: the
+# model would otherwise bend to penalties.
+DEEPEST = 3.0
+# Variances this many times the middle one are no chance: of four normal replicas one in ten thousand is.
+OUTLIER = 9.0
+# Prior of the logarithms of signal variance, length scales in shares of the bounds, and unexplained noise: middle and
+# width; and the bounds of each.
+SIGNAL, LENGTH, NOISE = (1.0, 1.5), (0.3, 0.6), (0.01, 1.5)
+SIGNAL_BOUNDS, LENGTH_BOUNDS, NOISE_BOUNDS = (0.02, 50.0), (0.05, 5.0), (1e-6, 7.0)
 
 
-def recommend(points: np.ndarray, scores: np.ndarray, seed: int) -> np.ndarray | None:
-    """The point of the unit cube with the best modelled score, or None when there are too few points.
+class Surrogate:
+    """Scores as a smooth function of points of the unit cube, fitted once.
 
-    points (n, d) in [0, 1], scores (n,) to be maximised.
+    points (n, d) in [0, 1] · scores (n,) · variances (n,): squared standard errors of the scores, see pooled(); 0, or
+    absent, where not known. Of more than MOST_POINTS only the best are used. rough: the fitted length scales times
+    this; below 1 for a model that trusts less what it has not seen.
     """
-    count, dimension = points.shape
-    if count < POINTS_PER_PARAMETER * dimension:
-        return None
-    model = _fit(points, scores)
-    if model is None:
-        return None
-    rng = np.random.default_rng(seed)
-    leaders = points[np.argsort(-scores)[:5]]
-    nearby = np.repeat(leaders, 200, axis=0)
-    nearby = np.clip(nearby + rng.normal(0.0, 0.07, nearby.shape), 0.0, 1.0)
-    choices = np.vstack([points, nearby, rng.random((2000, dimension))])
-    mean, deviation = model(choices)
-    best: np.ndarray = choices[np.argmax(mean - CAUTION * deviation)]
-    return best
+
+    def __init__(
+        self, points: np.ndarray, scores: np.ndarray, variances: np.ndarray | None = None, rough: float = 1.0
+    ) -> None:
+        keep = np.sort(np.argsort(-scores, kind="stable")[:MOST_POINTS])
+        known = np.zeros(len(scores)) if variances is None else variances
+        self.points, scores, known = points[keep], scores[keep], known[keep]
+        middle = float(np.median(scores))
+        scores = np.maximum(scores, middle - DEEPEST * (float(scores.max()) - middle))
+        self._centre, self._spread = float(np.median(scores)), float(scores.std()) or 1.0
+        with one_thread():
+            process = _fitted(self.points, (scores - self._centre) / self._spread, known / self._spread**2, rough)
+            self._inverse = np.linalg.inv(process.L_)
+        self._signal = process.kernel_.k1.k1.constant_value
+        self._lengths = process.kernel_.k1.k2.length_scale
+        self._weights = process.alpha_
+        self.noise = float(known.mean() + process.kernel_.k2.noise_level * self._spread**2)
+        """Variance of one evaluation's score."""
+
+    def __call__(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and standard deviation of the true score at points (k, d): two arrays (k,)."""
+        kernel = self._kernel(at, self.points)
+        known = kernel @ self._inverse.T
+        left = np.maximum(self._signal - (known**2).sum(axis=1), 1e-12)
+        return self._centre + self._spread * (kernel @ self._weights), self._spread * np.sqrt(left)
+
+    def covariance(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Of the true scores at points a (k, d) and b (m, d), after what was seen: (k, m)."""
+        seen = (self._kernel(a, self.points) @ self._inverse.T) @ (self._kernel(b, self.points) @ self._inverse.T).T
+        both: np.ndarray = self._spread**2 * (self._kernel(a, b) - seen)
+        return both
+
+    def _kernel(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        from scipy.spatial.distance import cdist
+
+        distance = np.sqrt(5.0) * cdist(a / self._lengths, b / self._lengths)
+        matern: np.ndarray = self._signal * (1.0 + distance + distance**2 / 3.0) * np.exp(-distance)
+        return matern
 
 
-def _matern(a: np.ndarray, b: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    distance = np.sqrt(5.0 * (((a[:, None] - b[None]) / scale) ** 2).sum(axis=-1))
-    matern: np.ndarray = (1.0 + distance + distance**2 / 3.0) * np.exp(-distance)
-    return matern
+def pooled(spreads: np.ndarray, replicas: np.ndarray) -> np.ndarray:
+    """Squared standard errors (n,) of means of so many replicas (n,), from the variances (n,) of one replica each.
+
+    So few replicas tell a candidate's own variance badly: all are taken to scatter alike, as the mean of them. Only one
+    that scatters far more than most, as a time to full coverage does where little is covered, has its own.
+    """
+    known = np.isfinite(spreads)
+    if not known.any():
+        return np.zeros(len(spreads))
+    own = known & (spreads > OUTLIER * float(np.median(spreads[known])))
+    return np.where(own, spreads, float(spreads[known & ~own].mean())) / replicas
 
 
-def _fit(points: np.ndarray, scores: np.ndarray) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]] | None:
-    """Mean and standard deviation as functions of points; None when all scores are equal."""
-    from scipy.linalg import LinAlgError, cho_factor, cho_solve
-    from scipy.optimize import minimize
+def _fitted(points: np.ndarray, values: np.ndarray, noise: np.ndarray, rough: float) -> Any:
+    """scikit-learn's process, given values of mean 0 and size 1 and the variances of their noise (n,)."""
+    from sklearn.exceptions import ConvergenceWarning
+    from sklearn.gaussian_process import GaussianProcessRegressor
+    from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 
-    count, dimension = points.shape
-    centre, spread = float(np.median(scores)), float(scores.std())
-    if spread == 0.0:
-        return None
-    values = (scores - centre) / spread
-    # Log of: length scales, signal variance, noise variance. The priors keep 20 points from being over-read.
-    prior_mean = np.log([*[0.5] * dimension, 1.0, 0.05])
-    prior_width = np.array([*[0.8] * dimension, 1.5, 1.5])
-    bounds = [(np.log(0.05), np.log(5.0))] * dimension + [(-4.0, 4.0), (-9.0, 2.0)]
+    priors = [SIGNAL, *[LENGTH] * points.shape[1], NOISE]
+    middle, width = np.array([np.log(prior[0]) for prior in priors]), np.array([prior[1] for prior in priors])
 
-    def covariance(p: np.ndarray) -> np.ndarray:
-        kernel = np.exp(p[-2]) * _matern(points, points, np.exp(p[:dimension]))
-        total: np.ndarray = kernel + np.exp(p[-1]) * np.eye(count)
-        return total
+    def most_probable(
+        misfit: Callable[[np.ndarray], tuple[float, np.ndarray]], begin: np.ndarray, bounds: np.ndarray
+    ) -> tuple[np.ndarray, float]:
+        from scipy.optimize import minimize
 
-    def misfit(p: np.ndarray) -> float:
-        try:
-            factor = cho_factor(covariance(p), lower=True)
-        except LinAlgError:
-            return 1e6
-        likelihood = 0.5 * values @ cho_solve(factor, values) + np.log(np.diag(factor[0])).sum()
-        return float(likelihood + 0.5 * (((p - prior_mean) / prior_width) ** 2).sum())
+        def with_prior(logs: np.ndarray) -> tuple[float, np.ndarray]:
+            value, gradient = misfit(logs)
+            away = (logs - middle) / width
+            return value + 0.5 * float(away @ away), gradient + away / width
 
-    best = minimize(misfit, prior_mean, method="L-BFGS-B", bounds=bounds).x
-    factor = cho_factor(covariance(best), lower=True)
-    weights = cho_solve(factor, values)
+        found = minimize(with_prior, begin, jac=True, method="L-BFGS-B", bounds=bounds)
+        return found.x, float(found.fun)
 
-    def predict(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        kernel = np.exp(best[-2]) * _matern(at, points, np.exp(best[:dimension]))
-        variance = np.exp(best[-2]) - np.einsum("ij,ji->i", kernel, cho_solve(factor, kernel.T))
-        return centre + spread * (kernel @ weights), spread * np.sqrt(np.maximum(variance, 0.0))
+    kernel = ConstantKernel(SIGNAL[0], SIGNAL_BOUNDS) * Matern(
+        np.full(points.shape[1], LENGTH[0]), LENGTH_BOUNDS, nu=2.5
+    ) + WhiteKernel(NOISE[0], NOISE_BOUNDS)
+    process = GaussianProcessRegressor(kernel, alpha=np.maximum(noise, 1e-8), optimizer=most_probable)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ConvergenceWarning)  # a length at its bound: a parameter without effect
+        process.fit(points, values)
+        if rough == 1.0:
+            return process
+        logs = process.kernel_.theta + np.log([1.0, *[rough] * points.shape[1], 1.0])
+        return GaussianProcessRegressor(kernel.clone_with_theta(logs), alpha=process.alpha, optimizer=None).fit(
+            points, values
+        )
 
-    return predict
+
+def one_thread() -> Any:
+    """Within it linear algebra runs on one thread: the same bits whatever the number of cores, and faster so small."""
+    return _threads().limit(limits=1)
+
+
+@cache
+def _threads() -> Any:
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()

@@ -12,7 +12,7 @@ from pathlib import Path
 from chamberopt.executor import core_count
 
 # What takes part in a figure; what only draws or prints does not.
-PACKAGES = ("chamberopt", "numpy", "scipy", "numba", "manifold3d", "nlopt")
+PACKAGES = ("chamberopt", "numpy", "scipy", "numba", "manifold3d", "nlopt", "scikit-learn")
 
 
 def versions() -> dict[str, str]:

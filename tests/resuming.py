@@ -19,7 +19,9 @@ CALLS = "calls.log"
 
 
 def study(**optimizer: object) -> Study:
-    settings = {"evaluations": 16, "confirm": 3, "confirm_replicas": 4, **optimizer}
+    """One call of the evaluator a row, unless asked otherwise."""
+    once = {"first_replicas": 0, "confirm_rounds": 1}
+    settings = {"evaluations": 16, "confirm": 3, "confirm_replicas": 4, **once, **optimizer}
     return Study(design=GEAR, vary=BOUNDS, optimizer=settings)
 
 

@@ -168,6 +168,11 @@ def test_evaluate_gives_the_same_numbers_on_any_number_of_workers() -> None:
     assert serial.total.simulated_time == pytest.approx(0.08)
     assert serial.collisions["total"] > serial.total.impacts.sum()
     assert any("dents per target triangle" in note for note in serial.notes)
+    # Replicas there are, are added to: the same as all at once.
+    done: list = []
+    few = evaluate(design, chamber, SerialExecutor(), replicas=3, done=done)
+    assert (len(few.replicas), len(done)) == (3, 3)
+    assert evaluate(design, chamber, SerialExecutor(), done=done).metrics == serial.metrics
     # Fresh draws for a confirmation.
     other = evaluate(design, chamber, SerialExecutor(), stream="confirm", replicas=3)
     assert other.objective.value != serial.objective.value

@@ -27,17 +27,18 @@ CHAMBEROPT_ORDER = (
     ("checkup",),
     ("coverage",),
     ("dents", "objective", "stuck"),
-    ("figures", "replicas"),
+    ("figures", "intensity", "replicas"),
     ("accuracy",),
     ("advice", "dent_rungs", "knobs", "ladder", "price", "rungs"),
-    ("history", "interrupt", "lock", "progress", "search", "surrogate"),
-    ("versions",),
-    ("asked", "evaluation_file"),
+    ("climb", "constraints", "history", "interrupt", "lock", "pareto", "progress", "surrogate"),
+    ("findings", "proposal", "versions"),
+    ("asked", "evaluation_file", "search"),
     ("judge", "record"),
     ("candidates",),
     ("study",),
     ("sweep",),
-    ("pictures", "viewer"),
+    ("front", "pictures", "viewer"),
+    ("study_pictures",),
     ("results",),
     ("compare", "maps", "price_list"),
     ("workbench",),
@@ -68,8 +69,15 @@ SIM_CORE_ORDER = (
 ORDER = {"chamberopt": CHAMBEROPT_ORDER, "sim_core": SIM_CORE_ORDER}
 # Package fronts gather names for users and may import everything below them.
 FRONTS = {"chamberopt/__init__.py", "sim_core/__init__.py"}
-ONE_DOOR = {"manifold3d": "solids.py", "nlopt": "search.py", "pyvista": "viewer.py", "vtk": "viewer.py"}
-ONE_DOOR |= {"distributed": "cluster.py", "dask": "cluster.py"}
+ONE_DOOR = {
+    "sklearn": "surrogate.py",
+    "manifold3d": "solids.py",
+    "nlopt": "climb.py",
+    "pyvista": "viewer.py",
+    "vtk": "viewer.py",
+    "distributed": "cluster.py",
+    "dask": "cluster.py",
+}
 # VTK's file readers alone, which need no OpenGL.
 ONE_DOOR["vtkmodules"] = "mesh_io/vtk_files.py"
 

@@ -32,7 +32,7 @@ def test_the_same_twice(tmp_path: Path) -> None:
     assert both.parameters == {}
     for name, (difference,) in both.differences.items():
         assert difference.value == 0.0
-        if name != "p05_coverage":  # its bootstrap interval knows nothing of pairs
+        if name not in ("p05_coverage", "time_to_98_s"):  # their intervals hold a bias that knows nothing of pairs
             assert difference.half_width == 0.0
     assert "the designs do not differ" in both.as_text()
     assert " *" not in both.as_text().splitlines()[2]

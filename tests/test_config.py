@@ -458,8 +458,34 @@ class TestStudies:
 
         from chamberopt.config import Algorithm
 
-        unknown = [name for name in typing.get_args(Algorithm) if name != "auto" and not hasattr(nlopt, name)]
+        ours = {"auto", "sobol", "surrogate"}
+        assert ours < set(typing.get_args(Algorithm))
+        unknown = [name for name in typing.get_args(Algorithm) if name not in ours and not hasattr(nlopt, name)]
         assert not unknown
+
+    def test_phases(self, study_file: Path) -> None:
+        with study_file.open("a") as file:
+            file.write("[optimizer]\nphases = [{ algorithm = 'sobol', share = 0.3 }, { algorithm = 'LN_BOBYQA' }]\n")
+        phases = load_study(study_file).optimizer.phases
+        assert [(phase.algorithm, phase.share) for phase in phases] == [("sobol", 0.3), ("LN_BOBYQA", 1.0)]
+
+    @pytest.mark.parametrize(
+        ("table", "said"),
+        [
+            ('[optimizer]\nalgorithm = "LN_BOBYQA"\nphases = [{ algorithm = "sobol" }]', "give one of the two"),
+            ('[optimizer]\nphases = [{ algorithm = "auto" }]', "which is phases itself"),
+            ('[optimizer]\nphases = [{ algorithm = "sobol" }, { algorithm = "surrogate" }]', "add up to 1 or more"),
+            ("[optimizer]\nfirst_replicas = 2", "3 is the least"),
+            ("[optimizer]\ninitial_step = 2", "initial_step"),
+            ("[objective]\nsum = { coverage = 1 }", "not an objective or a metric"),
+            ('[objective]\npareto = ["coverage_p05", "coverage_p05"]', "twice"),
+            ('[constraints]\n"shot.mas_g" = { max = 3 }', "did you mean 'shot.mass_g'"),
+        ],
+    )
+    def test_what_a_search_cannot_be_is_said(self, study_file: Path, table: str, said: str) -> None:
+        study_file.write_text(study_file.read_text() + table + "\n")
+        with pytest.raises(InputError, match=said):
+            load_study(study_file)
 
 
 def test_lines_of_keys() -> None:

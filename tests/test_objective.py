@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from chamberopt import config
+from chamberopt.accuracy import jackknife
 from chamberopt.errors import InputError
-from chamberopt.objective import METRICS, OBJECTIVES, objective
-from tests.synthetic import dented, patchwork, plate_design
+from chamberopt.objective import LONGEST, METRICS, OBJECTIVES, objective
+from tests.synthetic import dented, equal_dents, patchwork, plate_design
 
 MM2 = 1e-6
 
@@ -87,6 +88,7 @@ def test_nothing_hit() -> None:
     none = dented(np.zeros(2), 1.0, dents=np.zeros(2, dtype=int))
     values = {name: metric.function(none, patchwork(area), design) for name, metric in METRICS.items()}
     assert values.pop("shot_count") > 0
+    assert values.pop("time_to_98_s") == LONGEST
     assert set(values.values()) == {0.0}
 
 
@@ -96,3 +98,49 @@ def test_the_names_a_study_may_use_are_these() -> None:
         assert config.Objective(name=name).name == name
     with pytest.raises(InputError, match="uniform_coverage"):
         objective("shiny")
+
+
+def test_a_sum_weighs_objectives_and_metrics() -> None:
+    made = objective("1 uniform_coverage + -0.001 time_to_98_s + 2 mean_coverage")
+    assert made.terms == {"mean_coverage": 3.0, "std_coverage": -1.0, "time_to_98_s": -0.001}
+    for wrong in ("1 shiny", "x mean_coverage", "mean_coverage"):
+        with pytest.raises(InputError, match="not an objective"):
+            objective(wrong)
+
+
+def test_time_to_98_is_when_the_poorest_twentieth_is_covered() -> None:
+    """Dents at random at one rate: exp(-rate · time) = 0.02."""
+    rng, area, size = np.random.default_rng(1), np.full(400, 4.0 * MM2), 0.02 * MM2
+    design = plate_design(process__treatment_time_s=100.0)
+    chamber = patchwork(area)
+    per_second = 0.02  # dented area over area
+    truth = np.log(50.0) / per_second
+    held = []
+    for _ in range(10):
+        replicas = [equal_dents(10.0, rng.poisson(per_second * 10.0 * area / size), size) for _ in range(8)]
+        [got] = jackknife(replicas, [METRICS["time_to_98_s"]], chamber, design)
+        assert got.value == pytest.approx(truth, rel=0.1)
+        held.append(got.low <= truth <= got.high)
+    assert sum(held) >= 8
+    unhit = [equal_dents(10.0, np.zeros(400, dtype=int), size) for _ in range(3)]
+    [never] = jackknife(unhit, [METRICS["time_to_98_s"]], chamber, design)
+    assert never.value == LONGEST
+
+
+def test_intensity_uniformity_knows_places_from_scatter() -> None:
+    """Half the surface hit at 1 m/s and half at 3: mean 2, spread 1. Scatter from hit to hit is no unevenness."""
+    rng, area = np.random.default_rng(2), np.full(200, MM2)
+    design, chamber = plate_design(), patchwork(area)
+
+    def replicas(local: np.ndarray) -> list:
+        made = []
+        for _ in range(8):
+            dents = rng.poisson(4.0, len(area))
+            speeds = np.array([rng.gamma(4.0, speed / 4.0, n).sum() for speed, n in zip(local, dents, strict=True)])
+            made.append(replace(equal_dents(1.0, dents, 0.1 * MM2), speed_sum=speeds))
+        return made
+
+    for local, truth in ((np.repeat([1.0, 3.0], 100), 0.5), (np.full(200, 2.0), 1.0)):
+        [got] = jackknife(replicas(local), [METRICS["intensity_uniformity"]], chamber, design)
+        assert abs(got.value - truth) < max(got.half_width, 0.06)
+        assert got.value == pytest.approx(truth, abs=0.08)

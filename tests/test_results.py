@@ -120,7 +120,8 @@ def test_a_study_leaves_everything_and_its_best_design_can_be_used(tmp_path: Pat
     names = {path.name for path in folder.iterdir()}
     assert names == {
         "design.toml", "study.toml", "history.jsonl", "history.csv", "best.toml", "result.json", "coverage.vtp",
-        "chamber.stl", "chamber.vtp", "convergence.png", "start", "asked.json", "timings.jsonl", "confirm", ".lock",
+        "chamber.stl", "chamber.vtp", "convergence.png", "slices.png", "start", "asked.json", "timings.jsonl",
+        "confirm", ".lock",
     }  # fmt: skip
     result = load_result(folder)
     assert result.kind == "study"

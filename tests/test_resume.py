@@ -14,7 +14,7 @@ import pytest
 from chamberopt.accuracy import Evaluation
 from chamberopt.advice import Advice
 from chamberopt.chamber import build_chamber
-from chamberopt.config import Design, Study
+from chamberopt.config import Design, Objective, Study
 from chamberopt.errors import InputError
 from chamberopt.estimate import Estimate
 from chamberopt.evaluation_file import load_evaluation, save_evaluation
@@ -47,13 +47,29 @@ def test_every_algorithm_goes_on_from_any_row(algorithm: str, tmp_path: Path) ->
     whole, question = tmp_path / "whole", study(algorithm=algorithm)
     run(question, whole)
     ends = [0, *(at + 1 for at, byte in enumerate(history(whole)) if byte == ord("\n"))]
-    rows = range(len(ends)) if algorithm == "auto" else (1, 7, 13, len(ends) - 2)
+    rows = (0, 1, 4, 5, 6, 9, 13, 16, 17, len(ends) - 2) if algorithm == "auto" else (1, 7, 13, len(ends) - 2)
     for k in rows:
         folder = tmp_path / str(k)
         cut(whole, folder, ends[k])
         run(question, folder)
         assert history(folder) == history(whole), f"{k} rows were there"
         assert calls(folder) == calls(whole)[k:]
+
+
+@pytest.mark.usefixtures("quick_disk")
+@pytest.mark.parametrize("objective", [{}, {"pareto": ["uniform_coverage", "coverage_p05"]}])
+def test_what_is_learnt_from_few_replicas_is_learnt_again(objective: dict, tmp_path: Path) -> None:
+    """Candidates given up after a few replicas, confirmations repeated with more, two objectives: all from the rows."""
+    question = study(first_replicas=4, confirm_rounds=3).model_copy(update={"objective": Objective(**objective)})
+    whole = tmp_path / "whole"
+    first = run(question, whole)
+    ends = [0, *(at + 1 for at, byte in enumerate(history(whole)) if byte == ord("\n"))]
+    for k in sorted({3, 8, 14, 17, len(ends) - 2}):
+        folder = tmp_path / str(k)
+        cut(whole, folder, ends[k])
+        again = run(question, folder)
+        assert history(folder) == history(whole), f"{k} rows were there"
+        assert (again.gain, again.best.parameters) == (first.gain, first.best.parameters)
 
 
 @pytest.mark.usefixtures("quick_disk")
@@ -102,6 +118,7 @@ def test_killed_at_twenty_random_moments(tmp_path: Path) -> None:
     seconds = time.perf_counter() - began
     expected, evaluated = history(tmp_path / "whole"), calls(tmp_path / "whole")
     moments = np.random.default_rng(20).uniform(0.0, seconds, (20, 2))
+    moments[0, 0] = 0.0  # before anything is on record, which takes a moment only
     kills, stages = 0, set()
     for number, (first, second) in enumerate(moments):
         folder = tmp_path / str(number)

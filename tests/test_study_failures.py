@@ -18,7 +18,7 @@ from chamberopt.cli import main
 from chamberopt.config import load_study
 from chamberopt.estimate import Estimate
 from chamberopt.interrupt import EARLY, FIRST, SECOND
-from chamberopt.judge import FAILED_SCORE
+from chamberopt.judge import FAILED
 from chamberopt.results import load_result
 from tests.resuming import calls, history, logged, run, study
 from tests.synthetic import DESIGNS, plate_design, poisson_evaluation
@@ -117,7 +117,7 @@ def test_no_number_is_no_score(tmp_path: Path) -> None:
         return replace(evaluation, objective=Estimate(math.nan, math.nan)) if len(calls(folder)) == 4 else evaluation
 
     result = run(study(), folder, evaluator=evaluator)
-    assert (result.trials[3].objective, result.trials[3].score) == (None, FAILED_SCORE)
+    assert (result.trials[3].objective, result.trials[3].score) == (None, result.trials[0].score - FAILED)
     assert "nan" in result.trials[3].reason
     assert run(study(), folder).trials == result.trials
 
@@ -162,6 +162,8 @@ design = "{(DESIGNS / "plate.toml").as_posix()}"
 [vary]
 "shot.mass_g" = [1.5, 8.0]
 [optimizer]
+first_replicas = 0
+confirm_rounds = 1
 evaluations = 5
 confirm = 1
 confirm_replicas = 3
