@@ -18,7 +18,7 @@ from benchmarks.analytic_runs import PEENED, Effort, bin_edges, calibrated, rows
 from benchmarks.pictures import IMAGES
 from benchmarks.table import RESULTS, write_csv
 from chamberopt.config import load_design
-from chamberopt.executor import local_executor
+from chamberopt.workers.executor import local_executor
 
 ROOT = Path(__file__).parents[1]
 FULL = Effort(60, 20.0, (8, 16, 32, 64, 128))

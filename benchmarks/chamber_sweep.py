@@ -21,8 +21,8 @@ from benchmarks.table import write_csv
 from chamberopt.accuracy import evaluate
 from chamberopt.chamber import build_chamber
 from chamberopt.config import Design, load_design
-from chamberopt.constraints import standard_error
-from chamberopt.executor import SerialExecutor
+from chamberopt.studies.constraints import standard_error
+from chamberopt.workers.executor import SerialExecutor
 
 ROOT = RESULTS.parents[1]
 VARY = {

@@ -35,9 +35,9 @@ def evaluation(accuracy: float) -> dict[str, Any]:
     from chamberopt.accuracy import evaluate
     from chamberopt.chamber import build_chamber
     from chamberopt.config import load_design
-    from chamberopt.executor import local_executor
-    from chamberopt.knobs import changed
+    from chamberopt.price.knobs import changed
     from chamberopt.process import build_scene, chamber_mesh
+    from chamberopt.workers.executor import local_executor
     from sim_core import compile_simulator
 
     asked = {"shot.mass_g": MASS_G, "process.accuracy.coverage": accuracy, "process.accuracy.most_replicas": 1000}
@@ -74,7 +74,7 @@ def evaluation(accuracy: float) -> dict[str, Any]:
 
 def replica_shares(design: Any, chamber: Any) -> dict[str, float]:
     """Of a replica's CPU seconds: fixed, warm-up, recorded; from replicas with neither, with the first, with both."""
-    from chamberopt.knobs import TIME, WARM_UP, changed
+    from chamberopt.price.knobs import TIME, WARM_UP, changed
     from chamberopt.process import chamber_mesh, replica_seed
     from chamberopt.replicas import simulate_replica
 

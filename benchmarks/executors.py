@@ -32,8 +32,8 @@ ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
 from chamberopt.config import Study, load_study  # noqa: E402
-from chamberopt.executor import SerialExecutor, local_executor, shared  # noqa: E402
-from chamberopt.sweep import judged, plan_sweep  # noqa: E402
+from chamberopt.studies.sweep import judged, plan_sweep  # noqa: E402
+from chamberopt.workers.executor import SerialExecutor, local_executor, shared  # noqa: E402
 
 CANDIDATES, NOTHINGS = 24, 1000
 ASKED = 0.9
@@ -47,7 +47,7 @@ def workers(kind: str, count: int) -> Iterator[Executor]:
         if kind == "dask":
             from distributed import LocalCluster
 
-            from chamberopt.cluster import Cluster
+            from chamberopt.workers.cluster import Cluster
 
             local = LocalCluster(n_workers=count, threads_per_worker=1, processes=True, dashboard_address=":0")
             address = stack.enter_context(local).scheduler_address

@@ -116,8 +116,8 @@ def model_rows(runs: int) -> Iterator[dict[str, Any]]:
 def gear_rows(runs: int, replicas: int) -> Iterator[dict[str, Any]]:
     """Replicas of the shipped gear, simulated once; runs draw eight of them and a window of time in each."""
     from chamberopt.coverage import dent_diameter
-    from chamberopt.executor import local_executor
     from chamberopt.process import build_scene, chamber_mesh, replica_seed
+    from chamberopt.workers.executor import local_executor
     from sim_core import simulate
 
     design = load_design(ROOT / "designs" / "gear.toml")

@@ -22,7 +22,6 @@ from chamberopt.analytic import described
 from chamberopt.coverage import Tally
 from chamberopt.dents import Samples, few_points_note, marked_share, sample_points
 from chamberopt.estimate import Estimate, estimate
-from chamberopt.executor import shared
 from chamberopt.figures import coverage_figures, few_dents_note, surface, time_to_98
 from chamberopt.intensity import intensity_uniformity
 from chamberopt.objective import METRICS, Metric, Objective, objective, on_target
@@ -35,6 +34,7 @@ from chamberopt.replicas import (
     simulate_replicas,
 )
 from chamberopt.stuck import on_the_spot_notes, stuck_notes
+from chamberopt.workers.executor import shared
 
 if TYPE_CHECKING:
     from chamberopt.chamber import Chamber

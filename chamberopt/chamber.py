@@ -18,7 +18,7 @@ from chamberopt.errors import InputError
 from chamberopt.fittings import Cavity, Piece, fitted, piece, swept_faces
 from chamberopt.mesh_io import box_text, place_text
 from chamberopt.part import Part, posed_part, turning_axis
-from chamberopt.reach import part_share, reach
+from chamberopt.reach.reach import part_share, reach
 from chamberopt.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL, is_sonotrode, tag_of_further
 from chamberopt.slivers import THINNEST, without_slivers
 from chamberopt.solids import Solid, Surface, cavities, overlap, solid, subtract, united

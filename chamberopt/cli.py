@@ -32,10 +32,10 @@ if TYPE_CHECKING:
     from chamberopt.chamber import Chamber
     from chamberopt.config import Design, Study
     from chamberopt.estimate import Estimate
-    from chamberopt.interrupt import Interrupt
     from chamberopt.mesh_io import SurfaceError
-    from chamberopt.reach import Reach
-    from chamberopt.record import Record
+    from chamberopt.reach.reach import Reach
+    from chamberopt.studies.interrupt import Interrupt
+    from chamberopt.studies.record import Record
     from sim_core import AnalyticCavity
 
 app = App(
@@ -79,7 +79,7 @@ def check(
         Write a picture (.png) of the part with its target, or of what is wrong with its surface.
     """
     from chamberopt.chamber import build_chamber
-    from chamberopt.checkup import describe, shot_reach
+    from chamberopt.checks.checkup import describe, shot_reach
     from chamberopt.config import Study, load
     from chamberopt.disk import new_folder, write_text
     from chamberopt.mesh_io import SurfaceError
@@ -134,9 +134,9 @@ def simulate(
     from chamberopt.analytic import analytic_cavity
     from chamberopt.chamber import build_chamber
     from chamberopt.config import load_design
-    from chamberopt.executor import open_executor
     from chamberopt.progress import progress_bar
     from chamberopt.results import write_simulation
+    from chamberopt.workers.executor import open_executor
 
     asked = load_design(design)
     chamber = build_chamber(asked)
@@ -164,10 +164,10 @@ def accuracy(design: Path, /, *, budget_s: float = 300.0, json: Json = False, ou
         CPU seconds to spend on simulating; more tell smaller errors apart.
     """
     from chamberopt.config import load_design
-    from chamberopt.executor import local_executor
-    from chamberopt.ladder import climb, require_budget
+    from chamberopt.price.ladder import climb, require_budget
     from chamberopt.price_list import as_json, as_text, write_price_list
     from chamberopt.progress import progress_bar
+    from chamberopt.workers.executor import local_executor
 
     require_budget(budget_s)
     candidate = load_design(design)
@@ -193,13 +193,13 @@ def run(
     study
         Study file (.toml).
     """
-    from chamberopt.interrupt import Interrupt
+    from chamberopt.studies.interrupt import Interrupt
 
     with Interrupt() as interrupt:
         from chamberopt.chamber import build_chamber
         from chamberopt.config import load_study
-        from chamberopt.executor import open_executor
-        from chamberopt.record import open_record
+        from chamberopt.studies.record import open_record
+        from chamberopt.workers.executor import open_executor
 
         question = load_study(study)
         start = build_chamber(question.design)
@@ -230,7 +230,7 @@ def _run(
     from chamberopt.chamber import build_chamber
     from chamberopt.progress import progress_bar
     from chamberopt.results import write_study
-    from chamberopt.study import go_on
+    from chamberopt.studies.study import go_on
 
     question, advice = record.settled(lambda design: _settled(design, start, executor))
     design = question.design
@@ -279,7 +279,7 @@ def _finished(folder: Path, json: bool) -> None:
 
 def _unfinished(study: Path) -> list[str]:
     """Earlier runs of a study that were stopped, by their folders' names: what is run now begins anew."""
-    from chamberopt.record import is_finished, is_study_folder
+    from chamberopt.studies.record import is_finished, is_study_folder
 
     names = [study.stem, *(path.name for path in sorted(Path("results").glob(f"{study.stem}-[0-9]*")))]
     stopped = [folder for name in names if is_study_folder(folder := Path("results", name)) and not is_finished(folder)]
@@ -313,9 +313,9 @@ def sweep(
     from chamberopt import maps
     from chamberopt.chamber import build_chamber
     from chamberopt.config import load_study
-    from chamberopt.executor import open_executor
     from chamberopt.progress import progress_bar
-    from chamberopt.sweep import plan_sweep, run_sweep
+    from chamberopt.studies.sweep import plan_sweep, run_sweep
+    from chamberopt.workers.executor import open_executor
 
     question = load_study(study)
     plan = plan_sweep(question, grid, sobol, seed)
@@ -417,7 +417,7 @@ def _picture_of_fault(fault: SurfaceError, screenshot: Path) -> None:
 
 def _picture_of_target(chamber: Chamber, found: Reach, screenshot: Path) -> None:
     """The part with its target, and what of it the shot does not reach."""
-    from chamberopt.reach import part_share
+    from chamberopt.reach.reach import part_share
     from chamberopt.viewer import part_picture
 
     part = chamber.part
@@ -450,8 +450,8 @@ def _settled(design: Design, chamber: Chamber, executor: Executor) -> tuple[Desi
 def _advice(design: Design, chamber: Chamber) -> list[dict[str, Any]]:
     """Which effects a design needs, by pilot runs."""
     from chamberopt.advice import advise, settled
-    from chamberopt.executor import local_executor
     from chamberopt.progress import progress_bar
+    from chamberopt.workers.executor import local_executor
 
     def prepare(variant: Design) -> None:
         _compile(variant, chamber)
@@ -471,7 +471,7 @@ def _remark(remarks: Sequence[str]) -> None:
 
 def _warn(design: Design, chamber: Chamber) -> None:
     """What `check` would warn of, to stderr."""
-    from chamberopt.checkup import warnings
+    from chamberopt.checks.checkup import warnings
 
     _remark([f"warning: {text}" for text in warnings(design, chamber)])
 

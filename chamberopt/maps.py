@@ -12,15 +12,15 @@ import numpy as np
 
 from chamberopt.config import save_design
 from chamberopt.disk import whole_file, write_text
-from chamberopt.history import Trial, as_csv, read_history
 from chamberopt.pictures import BLUE, GREY, ORANGE
 from chamberopt.results import FORMAT, RESULT, versions
+from chamberopt.studies.history import Trial, as_csv, read_history
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from chamberopt.sweep import Sweep
+    from chamberopt.studies.sweep import Sweep
 
 COLOURS = "viridis"
 MOST_PAIRS = 15  # panels of a picture: six parameters

@@ -12,9 +12,9 @@ from chamberopt.disk import whole_file
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from chamberopt.history import Trial
-    from chamberopt.ladder import Ladder
-    from chamberopt.study import StudyResult
+    from chamberopt.price.ladder import Ladder
+    from chamberopt.studies.history import Trial
+    from chamberopt.studies.study import StudyResult
 
 # Okabe and Ito's colours, told apart by colour-blind readers.
 BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#9aa3ab"
@@ -135,8 +135,8 @@ def price_picture(path: Path, ladder: Ladder) -> None:
 
 def _work_precision(axes: Axes, ladder: Ladder) -> None:
     """Replicas as circles with their law; a knob's bias at the price of the design's own number of replicas."""
-    from chamberopt.law import NORMAL
-    from chamberopt.price import ASKED, recommend
+    from chamberopt.price.law import NORMAL
+    from chamberopt.price.price import ASKED, recommend
 
     axes.set_xscale("log")
     axes.set_yscale("log")
@@ -168,8 +168,8 @@ def _work_precision(axes: Axes, ladder: Ladder) -> None:
 
 def _bias_marks(axes: Axes, ladder: Ladder) -> None:
     """A filled mark with its interval where a bias is known; an open one with an arrow for what it is at most."""
-    from chamberopt.knobs import DESIGNED, TIME
-    from chamberopt.price import short
+    from chamberopt.price.knobs import DESIGNED, TIME
+    from chamberopt.price.price import short
 
     knobs = [knob for knob in dict.fromkeys(rung.knob for rung in ladder.rungs) if knob not in (DESIGNED, TIME)]
     for knob, colour, mark in zip(knobs, (ORANGE, GREEN, PURPLE, SKY, YELLOW), "sD^vP", strict=False):
@@ -183,7 +183,7 @@ def _bias_marks(axes: Axes, ladder: Ladder) -> None:
 
 def _front(axes: Axes, ladder: Ladder) -> None:
     """The Pareto front, numbered where it has become a quarter dearer, and the numbers' names."""
-    from chamberopt.price import choices
+    from chamberopt.price.price import choices
 
     best = choices(ladder)
     axes.plot([one.cpu_s for one in best], [one.error for one in best], color=GREY, lw=7, alpha=0.45, zorder=1,
@@ -207,8 +207,8 @@ def _biases(axes: Axes, ladder: Ladder) -> None:
     """Each rung's bias with its interval and its price, signed, from the top."""
     from matplotlib.ticker import MaxNLocator
 
-    from chamberopt.knobs import TIME
-    from chamberopt.price import ASKED, SHARE, short
+    from chamberopt.price.knobs import TIME
+    from chamberopt.price.price import ASKED, SHARE, short
 
     rungs = ladder.rungs
     place = np.arange(len(rungs))[::-1]

@@ -12,10 +12,10 @@ from typing import Any
 from chamberopt.config import save_design
 from chamberopt.disk import write_text
 from chamberopt.estimate import Estimate
-from chamberopt.ladder import Ladder
 from chamberopt.pictures import price_picture
-from chamberopt.price import ASKED, choices, described, explained, recommend, short, unrecorded
-from chamberopt.rungs import Rung
+from chamberopt.price.ladder import Ladder
+from chamberopt.price.price import ASKED, choices, described, explained, recommend, short, unrecorded
+from chamberopt.price.rungs import Rung
 from chamberopt.versions import versions
 
 FORMAT = 1

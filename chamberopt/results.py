@@ -9,16 +9,16 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from chamberopt import front
 from chamberopt.accuracy import Evaluation
 from chamberopt.config import Design, save_design, with_paths_from
 from chamberopt.design import checked
 from chamberopt.disk import new_folder, write_text
 from chamberopt.errors import InputError
 from chamberopt.estimate import Estimate
-from chamberopt.history import HISTORY, as_csv, read_history
 from chamberopt.objective import METRICS, exposed_target
-from chamberopt.record import RESULT, is_study_folder
+from chamberopt.studies import front
+from chamberopt.studies.history import HISTORY, as_csv, read_history
+from chamberopt.studies.record import RESULT, is_study_folder
 from chamberopt.versions import versions
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from chamberopt.advice import Advice
     from chamberopt.chamber import Chamber
-    from chamberopt.study import StudyResult
+    from chamberopt.studies.study import StudyResult
 
 FORMAT = 1
 LATER = ("time_to_98_s", "intensity_uniformity")  # metrics that results of 0.1.0 may lack

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.chamber import TAG_PART
-from chamberopt.places import around, surface_names
+from chamberopt.checks.places import around, surface_names
 
 if TYPE_CHECKING:
     from chamberopt.chamber import Chamber

@@ -9,8 +9,8 @@ from chamberopt.disk import whole_file
 from chamberopt.pictures import BLUE, GREEN, GREY, ORANGE
 
 if TYPE_CHECKING:
-    from chamberopt.findings import Findings
-    from chamberopt.study import StudyResult
+    from chamberopt.studies.findings import Findings
+    from chamberopt.studies.study import StudyResult
 
 
 def slices_picture(path: Path, result: StudyResult, findings: Findings) -> None:
@@ -41,7 +41,7 @@ def slices_picture(path: Path, result: StudyResult, findings: Findings) -> None:
 
 def front_picture(path: Path, result: StudyResult) -> None:
     """Both objectives of every candidate, the confirmed front with its intervals; .png."""
-    from chamberopt.front import compromises
+    from chamberopt.studies.front import compromises
 
     figure = _figure(8.0, 6.0)
     axes = figure.subplots()

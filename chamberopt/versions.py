@@ -9,7 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
 
-from chamberopt.executor import core_count
+from chamberopt.workers.executor import core_count
 
 # What takes part in a figure; what only draws or prints does not.
 PACKAGES = ("chamberopt", "numpy", "scipy", "numba", "manifold3d", "nlopt", "scikit-learn")

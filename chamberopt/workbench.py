@@ -46,8 +46,8 @@ def simulate(
     from chamberopt.advice import settled
     from chamberopt.analytic import analytic_cavity
     from chamberopt.chamber import build_chamber
-    from chamberopt.executor import local_executor
     from chamberopt.results import load_result, write_simulation
+    from chamberopt.workers.executor import local_executor
 
     _require("design", design, Design, "load_design")
     chamber = build_chamber(design)
@@ -68,10 +68,10 @@ def optimise(study: Study, out: str | Path, *, workers: int | None = None, progr
     """
     from chamberopt.advice import settled
     from chamberopt.chamber import build_chamber
-    from chamberopt.executor import local_executor
-    from chamberopt.record import open_record
     from chamberopt.results import load_result, write_study
-    from chamberopt.study import go_on
+    from chamberopt.studies.record import open_record
+    from chamberopt.studies.study import go_on
+    from chamberopt.workers.executor import local_executor
 
     _require("study", study, Study, "load_study")
     with open_record(study, out) as record, local_executor(workers) as executor:

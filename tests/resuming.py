@@ -8,9 +8,9 @@ import numpy as np
 from chamberopt.accuracy import Evaluation
 from chamberopt.config import Design, Study, load_design
 from chamberopt.errors import InputError
-from chamberopt.executor import SerialExecutor
-from chamberopt.history import Journal
-from chamberopt.study import StudyResult, run_study
+from chamberopt.studies.history import Journal
+from chamberopt.studies.study import StudyResult, run_study
+from chamberopt.workers.executor import SerialExecutor
 from tests.synthetic import DESIGNS, judged
 
 GEAR = load_design(DESIGNS / "gear.toml")

@@ -10,11 +10,11 @@ from chamberopt.coverage import Tally
 from chamberopt.design import checked
 from chamberopt.errors import InputError
 from chamberopt.estimate import Estimate, estimate, independent_difference, paired_difference
-from chamberopt.executor import SerialExecutor, local_executor
 from chamberopt.figures import few_dents_note, surface
 from chamberopt.objective import METRICS, OBJECTIVES
 from chamberopt.patches import patches
 from chamberopt.replicas import LEAST_WATCHED, replicas_wanted
+from chamberopt.workers.executor import SerialExecutor, local_executor
 from tests.synthetic import equal_dents, patchwork, plate_design
 
 TREATMENT = 50.0

@@ -15,9 +15,9 @@ from chamberopt.config import Design
 from chamberopt.design import checked
 from chamberopt.errors import InputError
 from chamberopt.estimate import Estimate
-from chamberopt.executor import SerialExecutor, local_executor
 from chamberopt.objective import exposed_target
 from chamberopt.process import chamber_mesh, scene_physics
+from chamberopt.workers.executor import SerialExecutor, local_executor
 from tests.synthetic import plate_design
 
 PLATE = plate_design()

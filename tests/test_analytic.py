@@ -11,7 +11,7 @@ from chamberopt.chamber import Chamber, Part, build_chamber
 from chamberopt.config import Design, load_design
 from chamberopt.design import checked
 from chamberopt.errors import InputError
-from chamberopt.executor import local_executor
+from chamberopt.workers.executor import local_executor
 from sim_core import ImpactLog, TriangleMesh, prism_cavity
 from tests import cavities
 from tests.synthetic import DESIGNS, plate_design

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from chamberopt.chamber import TAG_SONOTRODE, Chamber, build_chamber
-from chamberopt.checkup import describe, shot_reach, warnings
+from chamberopt.checks.checkup import describe, shot_reach, warnings
+from chamberopt.checks.ledges import ledges
 from chamberopt.config import load_design
 from chamberopt.design import Design, checked
-from chamberopt.ledges import ledges
-from chamberopt.reach import Reach
+from chamberopt.reach.reach import Reach
 from sim_core import SceneError
 
 DESIGNS = Path(__file__).resolve().parents[1] / "designs"

@@ -14,15 +14,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from chamberopt import cluster
 from chamberopt.accuracy import evaluate
 from chamberopt.chamber import build_chamber
 from chamberopt.cli import main
-from chamberopt.cluster import Cluster
 from chamberopt.config import Study, load_design
 from chamberopt.errors import ClusterLostError, InputError, WorkerLostError
-from chamberopt.executor import SerialExecutor, shared
-from chamberopt.sweep import plan_sweep, run_sweep
+from chamberopt.studies.sweep import plan_sweep, run_sweep
+from chamberopt.workers import cluster
+from chamberopt.workers.cluster import Cluster
+from chamberopt.workers.executor import SerialExecutor, shared
 from tests import jobs
 from tests.test_sweep import rows, small_study
 

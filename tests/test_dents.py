@@ -9,8 +9,8 @@ from chamberopt.config import load_design
 from chamberopt.coverage import dent_diameters
 from chamberopt.dents import Samples, few_points_note, mark, marked_share, nearest_on_triangles, sample_points
 from chamberopt.errors import InputError
-from chamberopt.executor import SerialExecutor
 from chamberopt.shot import ShotSize
+from chamberopt.workers.executor import SerialExecutor
 from tests.synthetic import DESIGNS, impact_log, plate_design
 
 UP = np.array([0.0, 0.0, 1.0])

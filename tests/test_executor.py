@@ -11,7 +11,7 @@ import pytest
 from chamberopt import config
 from chamberopt.cli import main
 from chamberopt.errors import InputError, WorkerLostError
-from chamberopt.executor import SerialExecutor, local_executor, open_executor, shared
+from chamberopt.workers.executor import SerialExecutor, local_executor, open_executor, shared
 from tests import jobs
 
 

@@ -11,14 +11,14 @@ import pytest
 import trimesh
 
 from chamberopt.chamber import Chamber, build_chamber
-from chamberopt.checkup import describe
+from chamberopt.checks.checkup import describe
 from chamberopt.config import Study, load_design, save_design
 from chamberopt.design import Design, checked
 from chamberopt.errors import InputError
-from chamberopt.executor import SerialExecutor
 from chamberopt.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL
-from chamberopt.study import run_study
+from chamberopt.studies.study import run_study
 from chamberopt.triangles import area_vectors, areas
+from chamberopt.workers.executor import SerialExecutor
 from tests.synthetic import judged
 
 DESIGNS = Path(__file__).resolve().parents[1] / "designs"

@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from chamberopt import ladder as climbing
 from chamberopt.cli import main
 from chamberopt.config import load_design
 from chamberopt.coverage import Tally
 from chamberopt.estimate import Estimate, estimate, student
-from chamberopt.knobs import FACETS, FLOOR, MOTION, PIECE, TIME, WARM_UP, changed, designs, knobs
-from chamberopt.ladder import Ladder
-from chamberopt.law import Law, Level, fitted, front, law_of, rms_error, rms_interval
-from chamberopt.price import choices, cost, explained, recommend, replicas_for
-from chamberopt.rungs import Rung
+from chamberopt.price import ladder as climbing
+from chamberopt.price.knobs import FACETS, FLOOR, MOTION, PIECE, TIME, WARM_UP, changed, designs, knobs
+from chamberopt.price.ladder import Ladder
+from chamberopt.price.law import Law, Level, fitted, front, law_of, rms_error, rms_interval
+from chamberopt.price.price import choices, cost, explained, recommend, replicas_for
+from chamberopt.price.rungs import Rung
 from tests.synthetic import DESIGNS, equal_dents, plate_design
 
 # Errors and laws
@@ -202,7 +202,7 @@ def marked(design: Any, chamber: Any, mesh: Any, samples: Any, number: int) -> t
 @pytest.fixture
 def no_simulator(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(climbing, "_replica", played)
-    monkeypatch.setattr("chamberopt.dent_rungs._marked", marked)
+    monkeypatch.setattr("chamberopt.price.dent_rungs._marked", marked)
     monkeypatch.setattr("chamberopt.cli._compile", lambda *_: None)
 
 

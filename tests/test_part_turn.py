@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chamberopt.chamber import build_chamber, turning_axis
-from chamberopt.checkup import describe
+from chamberopt.checks.checkup import describe
 from chamberopt.config import load_design, load_study, save_design
 from chamberopt.design import Design
 from chamberopt.errors import InputError

@@ -10,11 +10,11 @@ import pytest
 import trimesh
 
 from chamberopt.chamber import TAG_PART, TAG_SONOTRODE, TAG_WALL, Chamber, Part, build_chamber
+from chamberopt.checks.gaps import gap_warnings, pocket_warnings, target_warnings
 from chamberopt.config import load_design
-from chamberopt.gaps import gap_warnings, pocket_warnings, target_warnings
 from chamberopt.process import build_scene, chamber_mesh
-from chamberopt.reach import FORGIVEN, Reach, part_share, reach
-from chamberopt.touches import largest_balls
+from chamberopt.reach.reach import FORGIVEN, Reach, part_share, reach
+from chamberopt.reach.touches import largest_balls
 from chamberopt.triangles import area_vectors, areas
 from sim_core import simulate
 

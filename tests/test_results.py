@@ -11,9 +11,9 @@ from chamberopt.chamber import build_chamber
 from chamberopt.compare import compare
 from chamberopt.config import Study, load_design
 from chamberopt.errors import InputError
-from chamberopt.executor import SerialExecutor
 from chamberopt.results import load_result, summary, write_simulation, write_study
-from chamberopt.study import run_study
+from chamberopt.studies.study import run_study
+from chamberopt.workers.executor import SerialExecutor
 from tests.synthetic import plate_design, poisson_evaluation
 
 DESIGN = plate_design()

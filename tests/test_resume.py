@@ -18,8 +18,8 @@ from chamberopt.config import Design, Objective, Study
 from chamberopt.errors import InputError
 from chamberopt.estimate import Estimate
 from chamberopt.evaluation_file import load_evaluation, save_evaluation
-from chamberopt.record import Record, open_record
 from chamberopt.results import load_result
+from chamberopt.studies.record import Record, open_record
 from tests.resuming import GEAR, calls, history, logged, run, study
 from tests.synthetic import DESIGNS, plate_design, poisson_evaluation
 

@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 
 from chamberopt.config import Limits, Study, load_design, load_study
-from chamberopt.constraints import shortfall, standing_of
 from chamberopt.errors import InputError
 from chamberopt.estimate import Estimate, estimate
-from chamberopt.executor import SerialExecutor
-from chamberopt.findings import found
-from chamberopt.front import as_csv, compromises
-from chamberopt.history import read_history
-from chamberopt.pareto import on_front, scalarised
-from chamberopt.proposal import propose
-from chamberopt.search import maximise
-from chamberopt.study import run_study
+from chamberopt.studies.constraints import shortfall, standing_of
+from chamberopt.studies.findings import found
+from chamberopt.studies.front import as_csv, compromises
+from chamberopt.studies.history import read_history
+from chamberopt.studies.pareto import on_front, scalarised
+from chamberopt.studies.proposal import propose
+from chamberopt.studies.search import maximise
+from chamberopt.studies.study import run_study
+from chamberopt.studies.surrogate import Surrogate, pooled
 from chamberopt.study_pictures import front_picture, slices_picture
-from chamberopt.surrogate import Surrogate, pooled
+from chamberopt.workers.executor import SerialExecutor
 from tests.synthetic import DESIGNS, judged
 
 GEAR = load_design(DESIGNS / "gear.toml")

@@ -17,7 +17,7 @@ from shapely import affinity
 from chamberopt.chamber import build_chamber
 from chamberopt.config import Design, load_design
 from chamberopt.errors import InputError
-from chamberopt.knobs import FACETS, knobs
+from chamberopt.price.knobs import FACETS, knobs
 from chamberopt.shapes import SHAPES, TAG_SONOTRODE, TAG_WALL
 from chamberopt.shapes.sound import fault
 from chamberopt.shapes.surface import ShapeSurface

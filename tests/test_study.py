@@ -11,16 +11,16 @@ from chamberopt.chamber import build_chamber
 from chamberopt.config import Limits, Study, load_design, load_study
 from chamberopt.disk import new_folder
 from chamberopt.errors import InputError
-from chamberopt.executor import SerialExecutor, local_executor
-from chamberopt.history import as_csv, read_history
-from chamberopt.judge import FAILED
 from chamberopt.objective import METRICS
 from chamberopt.process import require_countable
-from chamberopt.proposal import recommend
 from chamberopt.results import load_result, write_study
-from chamberopt.search import maximise
-from chamberopt.study import kept_target, run_study
-from chamberopt.surrogate import Surrogate
+from chamberopt.studies.history import as_csv, read_history
+from chamberopt.studies.judge import FAILED
+from chamberopt.studies.proposal import recommend
+from chamberopt.studies.search import maximise
+from chamberopt.studies.study import kept_target, run_study
+from chamberopt.studies.surrogate import Surrogate
+from chamberopt.workers.executor import SerialExecutor, local_executor
 from tests.synthetic import DESIGNS, judged, plate_design
 
 GEAR = load_design(DESIGNS / "gear.toml")

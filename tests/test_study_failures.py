@@ -17,9 +17,9 @@ from chamberopt.chamber import build_chamber
 from chamberopt.cli import main
 from chamberopt.config import load_study
 from chamberopt.estimate import Estimate
-from chamberopt.interrupt import EARLY, FIRST, SECOND
-from chamberopt.judge import FAILED
 from chamberopt.results import load_result
+from chamberopt.studies.interrupt import EARLY, FIRST, SECOND
+from chamberopt.studies.judge import FAILED
 from tests.resuming import calls, history, logged, run, study
 from tests.synthetic import DESIGNS, plate_design, poisson_evaluation
 
@@ -188,7 +188,7 @@ class TestCommandLine:
             return poisson_evaluation(design, chamber, 4.0 * design.shot.mass_g, 3, seed=len(stream))
 
         self.at: dict[int, Callable[[], None]] = {}
-        monkeypatch.setattr("chamberopt.study.simulation", lambda *_: evaluator)
+        monkeypatch.setattr("chamberopt.studies.study.simulation", lambda *_: evaluator)
         monkeypatch.setattr("chamberopt.cli._compile", lambda *_: None)
         monkeypatch.setattr("chamberopt.viewer.coverage_picture", lambda *_: None)
         return done

@@ -10,11 +10,11 @@ from chamberopt.accuracy import Evaluation
 from chamberopt.cli import main
 from chamberopt.config import Study, load_design, load_study
 from chamberopt.errors import InputError
-from chamberopt.executor import SerialExecutor, local_executor
-from chamberopt.history import read_history
 from chamberopt.maps import write_sweep
 from chamberopt.results import load_result
-from chamberopt.sweep import plan_sweep, run_sweep
+from chamberopt.studies.history import read_history
+from chamberopt.studies.sweep import plan_sweep, run_sweep
+from chamberopt.workers.executor import SerialExecutor, local_executor
 from tests import jobs
 from tests.synthetic import DESIGNS, plate_design
 
@@ -137,7 +137,7 @@ def test_the_same_rows_whatever_works_on_them(tmp_path: Path) -> None:
 
 
 def test_the_command_line_maps_a_study(tmp_path: Path, capsys) -> None:
-    from chamberopt.study import save_inputs
+    from chamberopt.studies.study import save_inputs
 
     save_inputs(small_study(), tmp_path)
     command = ["sweep", str(tmp_path / "study.toml"), "--sobol", "2", "--workers", "1", "--out", str(tmp_path / "out")]

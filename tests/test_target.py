@@ -8,7 +8,7 @@ import pytest
 import trimesh
 
 from chamberopt.chamber import Chamber, build_chamber
-from chamberopt.checkup import describe
+from chamberopt.checks.checkup import describe
 from chamberopt.config import Design, load_design, save_design
 from chamberopt.errors import InputError
 from chamberopt.triangles import area_vectors

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from chamberopt.accuracy import Evaluation, weighted
-from chamberopt.constraints import shortfall, violations
 from chamberopt.errors import InputError, WorkerLostError
 from chamberopt.estimate import Estimate
-from chamberopt.history import Trial
 from chamberopt.objective import METRICS, objective
+from chamberopt.studies.constraints import shortfall, violations
+from chamberopt.studies.history import Trial
 
 if TYPE_CHECKING:
     from chamberopt.config import Design, Study

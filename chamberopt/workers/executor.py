@@ -36,7 +36,7 @@ def local_executor(workers: int | None = None, kind: Kind = "threads") -> Execut
     count = workers or core_count()
     if kind == "threads":
         return ThreadPoolExecutor(count, thread_name_prefix="replica")
-    from chamberopt.processes import Processes
+    from chamberopt.workers.processes import Processes
 
     return Processes(count)
 
@@ -52,7 +52,7 @@ def open_executor(workers: int | None, cluster: str | None, kind: Kind | None = 
         )
     if workers is not None:
         raise InputError(f"--workers: given {workers}, but --cluster has workers of its own; leave one of the two out")
-    from chamberopt.cluster import Cluster
+    from chamberopt.workers.cluster import Cluster
 
     return Cluster(cluster)
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.rooms import cell_edge, rooms
+from chamberopt.reach.rooms import cell_edge, rooms
+from chamberopt.reach.touches import Touches, touches
 from chamberopt.shapes import TAG_PART, TAG_SONOTRODE
-from chamberopt.touches import Touches, touches
 from chamberopt.triangles import areas
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ import numpy as np
 from chamberopt.triangles import area_vectors
 
 if TYPE_CHECKING:
-    from chamberopt.touches import Touches
+    from chamberopt.reach.touches import Touches
     from sim_core import TriangleMesh
 
 MOST_CELLS = 3e6  # half a second; beyond it cells grow

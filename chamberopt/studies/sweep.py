@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.errors import InputError, WorkerLostError
-from chamberopt.executor import SerialExecutor, shared
-from chamberopt.history import HISTORY, Trial
-from chamberopt.judge import Evaluator, Judge
-from chamberopt.record import Record, open_record
 from chamberopt.replicas import Progress
-from chamberopt.study import kept_target, save_inputs, simulation
+from chamberopt.studies.history import HISTORY, Trial
+from chamberopt.studies.judge import Evaluator, Judge
+from chamberopt.studies.record import Record, open_record
+from chamberopt.studies.study import kept_target, save_inputs, simulation
+from chamberopt.workers.executor import SerialExecutor, shared
 
 if TYPE_CHECKING:
     from chamberopt.accuracy import Evaluation

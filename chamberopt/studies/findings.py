@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from chamberopt.estimate import Estimate
-from chamberopt.surrogate import Surrogate, one_thread
+from chamberopt.studies.surrogate import Surrogate, one_thread
 
 NORMAL = 1.96  # standard deviations of a 95 % interval
 STEPS = 41  # of a slice

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from chamberopt.estimate import student
-from chamberopt.knobs import DESIGNED, FACETS, REFERENCE, TIME, WARM_UP, shown
-from chamberopt.ladder import Ladder
-from chamberopt.law import NORMAL, front
-from chamberopt.rungs import Rung
+from chamberopt.price.knobs import DESIGNED, FACETS, REFERENCE, TIME, WARM_UP, shown
+from chamberopt.price.ladder import Ladder
+from chamberopt.price.law import NORMAL, front
+from chamberopt.price.rungs import Rung
 
 ASKED = (0.05, 0.01, 0.001)  # half-width of the objective, absolute
 SHARE = 1.0 / 3.0  # of it, that the bias of one knob may be

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from chamberopt.chamber import TAG_PART, TAG_SONOTRODE, TAG_WALL
-from chamberopt.places import around, mm2
+from chamberopt.checks.places import around, mm2
 from chamberopt.triangles import area_vectors
 
 if TYPE_CHECKING:

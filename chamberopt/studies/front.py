@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.accuracy import weighted
-from chamberopt.constraints import INFEASIBLE
 from chamberopt.objective import objective
-from chamberopt.pareto import on_front
+from chamberopt.studies.constraints import INFEASIBLE
+from chamberopt.studies.pareto import on_front
 
 if TYPE_CHECKING:
     from chamberopt.estimate import Estimate
-    from chamberopt.study import StudyResult
+    from chamberopt.studies.study import StudyResult
 
 
 @dataclass(frozen=True)

@@ -18,15 +18,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.coverage import Tally
-from chamberopt.dent_rungs import dent_rungs
 from chamberopt.design import Design
 from chamberopt.errors import InputError
 from chamberopt.estimate import Estimate
-from chamberopt.knobs import REFERENCE, designs
-from chamberopt.law import Law, Level, law_of, rms_error, rms_interval
+from chamberopt.price.dent_rungs import dent_rungs
+from chamberopt.price.knobs import REFERENCE, designs
+from chamberopt.price.law import Law, Level, law_of, rms_error, rms_interval
+from chamberopt.price.rungs import Pool, Rung, dents_alone
 from chamberopt.process import chamber_mesh, replica_seed
 from chamberopt.replicas import Progress, simulate_replica
-from chamberopt.rungs import Pool, Rung, dents_alone
 
 if TYPE_CHECKING:
     from chamberopt.chamber import Chamber

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 from chamberopt.accuracy import Evaluation
 from chamberopt.advice import Advice
-from chamberopt.asked import asked, require_same, require_same_files
 from chamberopt.design import Design, checked
 from chamberopt.disk import new_folder, write_text
 from chamberopt.errors import InputError
 from chamberopt.estimate import Estimate
 from chamberopt.evaluation_file import load_evaluation, save_evaluation
-from chamberopt.history import HISTORY, TIMINGS, Journal, Trial, read_seconds
-from chamberopt.lock import only_writer
+from chamberopt.studies.asked import asked, require_same, require_same_files
+from chamberopt.studies.history import HISTORY, TIMINGS, Journal, Trial, read_seconds
+from chamberopt.studies.lock import only_writer
 
 if TYPE_CHECKING:
     from chamberopt.config import Study

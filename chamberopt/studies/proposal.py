@@ -12,8 +12,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from chamberopt.climb import LOCAL, climb
-from chamberopt.surrogate import Surrogate, one_thread
+from chamberopt.studies.climb import LOCAL, climb
+from chamberopt.studies.surrogate import Surrogate, one_thread
 
 # Quantiles of the evaluation's outcome that its worth is averaged over.
 OUTCOMES = 16

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.places import CEILING, SONOTRODE, around, mm2, on_target, one_of, surface_names
-from chamberopt.reach import FORGIVEN
-from chamberopt.touches import Touches
+from chamberopt.checks.places import CEILING, SONOTRODE, around, mm2, on_target, one_of, surface_names
+from chamberopt.reach.reach import FORGIVEN
+from chamberopt.reach.touches import Touches
 
 if TYPE_CHECKING:
     from chamberopt.chamber import Chamber
-    from chamberopt.reach import Reach
+    from chamberopt.reach.reach import Reach
 
 # Two faces hold a ball by friction, however hard it is pushed in, if half the angle between them has a tangent below
 # the coefficient, here that of dry steel: then they count as facing each other. Hollows that open wider are roots.

@@ -15,10 +15,10 @@ from chamberopt.dents import Samples, first_marked, marked_share, sample_points
 from chamberopt.design import Design
 from chamberopt.errors import InputError
 from chamberopt.estimate import estimate, paired_difference
-from chamberopt.knobs import MODEL, changed
 from chamberopt.objective import objective
+from chamberopt.price.knobs import MODEL, changed
+from chamberopt.price.rungs import Pool, Rung, dents_alone, figures
 from chamberopt.process import build_scene, replica_seed
-from chamberopt.rungs import Pool, Rung, dents_alone, figures
 from chamberopt.treatment import LONGEST_MARKED
 
 if TYPE_CHECKING:

@@ -12,18 +12,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.accuracy import Evaluation, evaluate
-from chamberopt.candidates import FIRST_ALONE, Candidates, Confirmed, Stop
 from chamberopt.config import save_design
-from chamberopt.constraints import NOT_KNOWN
 from chamberopt.disk import write_text
 from chamberopt.errors import InputError
 from chamberopt.estimate import Estimate, paired_difference
-from chamberopt.findings import Findings, found
-from chamberopt.history import Trial
-from chamberopt.judge import Evaluator
-from chamberopt.record import STUDY, Record, open_record
 from chamberopt.replicas import Progress
-from chamberopt.search import PARETO_PHASES, maximise
+from chamberopt.studies.candidates import FIRST_ALONE, Candidates, Confirmed, Stop
+from chamberopt.studies.constraints import NOT_KNOWN
+from chamberopt.studies.findings import Findings, found
+from chamberopt.studies.history import Trial
+from chamberopt.studies.judge import Evaluator
+from chamberopt.studies.record import STUDY, Record, open_record
+from chamberopt.studies.search import PARETO_PHASES, maximise
 
 if TYPE_CHECKING:
     from chamberopt.chamber import Chamber

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.chamber import TAG_PART, TAG_SONOTRODE, TAG_WALL, turning_axis
-from chamberopt.gaps import gap_warnings, pocket_warnings, target_warnings
+from chamberopt.checks.gaps import gap_warnings, pocket_warnings, target_warnings
+from chamberopt.checks.ledges import ledges
+from chamberopt.checks.places import CEILING, SIDE_WALL, on_target, surface_names
 from chamberopt.groups import free_path
-from chamberopt.ledges import ledges
-from chamberopt.places import CEILING, SIDE_WALL, on_target, surface_names
 from chamberopt.process import chamber_mesh, require_countable, require_turnable
-from chamberopt.reach import Reach, reach
+from chamberopt.reach.reach import Reach, reach
 from chamberopt.shapes import is_sonotrode
 from chamberopt.shapes.surface import ShapeSurface
 from chamberopt.triangles import areas, tetrahedron_volumes

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.accuracy import Evaluation
-from chamberopt.constraints import FEASIBLE, standing_of
 from chamberopt.estimate import Estimate, paired_difference
-from chamberopt.history import Trial
-from chamberopt.judge import Evaluator, Judge, Reference, scale
-from chamberopt.pareto import scalarised, weights
-from chamberopt.proposal import recommend
-from chamberopt.record import Record
 from chamberopt.replicas import Progress
-from chamberopt.surrogate import Surrogate, pooled
+from chamberopt.studies.constraints import FEASIBLE, standing_of
+from chamberopt.studies.history import Trial
+from chamberopt.studies.judge import Evaluator, Judge, Reference, scale
+from chamberopt.studies.pareto import scalarised, weights
+from chamberopt.studies.proposal import recommend
+from chamberopt.studies.record import Record
+from chamberopt.studies.surrogate import Surrogate, pooled
 
 if TYPE_CHECKING:
     from chamberopt.config import Design, Study

@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from chamberopt.climb import LOCAL, climb, seed_nlopt
-from chamberopt.proposal import propose
-from chamberopt.surrogate import MOST_POINTS, Surrogate
+from chamberopt.studies.climb import LOCAL, climb, seed_nlopt
+from chamberopt.studies.proposal import propose
+from chamberopt.studies.surrogate import MOST_POINTS, Surrogate
 
 # Phases that are not NLopt algorithms: points evenly over the bounds, and a model on which NLopt climbs.
 SPREAD, MODEL = "sobol", "surrogate"

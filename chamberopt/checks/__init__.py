@@ -1,0 +1,1 @@
+"""What is said of a design before anything runs."""

@@ -1,0 +1,1 @@
+"""What accuracy costs: knobs, the ladder that tries them, and what follows from it."""

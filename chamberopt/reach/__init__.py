@@ -1,0 +1,1 @@
+"""What a ball can touch in a cavity."""
