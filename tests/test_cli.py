@@ -255,7 +255,10 @@ class TestCheck:
         warnings = json.loads(out)["warnings"]
         assert status == 0
         assert any("hinder each other" in text for text in warnings)
-        assert any("between part and ceiling is 1 mm" in text for text in warnings)
+        assert any(
+            "gap between the ceiling and the part's upper side" in text and "is 1 to 1.09 mm" in text
+            for text in warnings
+        )
 
     def test_a_guessed_unit_is_said(self, copies: Path, chamberopt: Said) -> None:
         path = copies / "designs" / "gear.toml"
@@ -268,12 +271,11 @@ class TestCheck:
     def test_screenshot_of_the_target_or_of_the_fault(
         self, open_part: bool, copies: Path, chamberopt: Said, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        drawn: list[tuple[str, int, int]] = []
+        drawn: list[tuple[str, int, int, int]] = []
+        none = np.zeros(0)
 
-        nothing = np.zeros(0)
-
-        def draw(corners: np.ndarray, title: str, picture: Path, marked=nothing, edges=nothing) -> None:  # type: ignore[no-untyped-def]
-            drawn.append((title, int(marked.sum()), len(edges)))
+        def draw(corners, title: str, picture, marked=none, edges=none, missed=none) -> None:  # type: ignore[no-untyped-def]
+            drawn.append((title, int(marked.sum()), len(edges), int(missed.sum())))
 
         monkeypatch.setattr("chamberopt.viewer.part_picture", draw)
         if open_part:
@@ -283,7 +285,7 @@ class TestCheck:
         status, out, err = chamberopt(
             "check", "--no-pilot", copies / "designs" / "gear.toml", "--screenshot", "look.png"
         )
-        [(title, marked, edges)] = drawn
+        [(title, marked, edges, missed)] = drawn
         assert "picture in look.png" in err
         assert status == (2 if open_part else 0)
         if open_part:
@@ -292,7 +294,8 @@ class TestCheck:
             assert edges > 3
         else:
             assert "a usable design" in out
-            assert marked > 1000
+            assert marked > missed > 1000  # the sharp roots of the teeth
+            assert "in red where hardly a ball can touch it" in title
 
     def test_out(self, tmp_path: Path, chamberopt: Said) -> None:
         out = tmp_path / "out"
