@@ -92,7 +92,7 @@ def coverage_figures(replicas: Sequence[Tally], chamber: Chamber, ground: Surfac
         dents.append(Dents(patch[there], replica.dent_area[there]))
         parts.append(np.bincount(dents[-1].patch, dents[-1].area, len(ground.area)))
         totals += parts[-1]
-    lost = _variance_within(replicas, ground, chamber, totals) if ground.joined else 0.0
+    lost = _variance_within(replicas, ground, chamber) if ground.joined else 0.0
     mean, std = _mean_and_std(dents, ground, lost)
     return {
         "mean_coverage": mean,
@@ -107,8 +107,9 @@ def _mean_and_std(dents: Sequence[Dents], ground: Surface, lost: float) -> tuple
     seen = 1.0 - ground.hidden
     mean = seen * (1.0 - bare.once)
     variance = seen * (1.0 - 2.0 * bare.once + bare.twice) - mean**2
-    shift = seen * lost * max(bare.once, 0.0) / 4.0  # half of what it takes off the mean, to second order
-    wider = seen * lost * max(bare.twice, 0.0) / 2.0  # ... and of what it adds to the variance
+    off, more = _at_most(lost, bare.once)
+    shift = seen * min(lost * max(bare.once, 0.0) / 2.0, off) / 2.0  # half of what it takes off the mean
+    wider = seen * min(lost * max(bare.twice, 0.0), more) / 2.0  # ... and of what it adds to the variance
     spread = estimate(variance + wider + bare.swing(2.0 * seen * (mean - 1.0), seen), 0.0, 0.25, wider)
     # sqrt is steep at 0: the chord over the interval of the variance instead of the tangent; where that interval
     # reaches 0, so does the one of the spread, with the upper end's own length to each side.
@@ -118,6 +119,20 @@ def _mean_and_std(dents: Sequence[Dents], ground: Surface, lost: float) -> tuple
         slope = (high - low) / (2.0 * reach) if low > 0.0 else high / reach
     moved = value + slope * (np.array(spread.pseudovalues) - spread.value)
     return estimate(mean - shift + bare.swing(-seen, 0.0), 0.0, 1.0, shift), estimate(moved, 0.0, 0.5, slope * wider)
+
+
+def _at_most(lost: float, bare: float) -> tuple[float, float]:
+    """How much an x of this variance at most takes off the mean coverage, and adds to its variance; ``bare``: of the
+    mean x. Second order alone goes beyond all bounds where the variance is large: x is not below 0.
+
+    Of all x >= 0 with one mean and variance, exp(-x) has the largest mean when x is 0 or one other value (the lower
+    principal representation: S. Karlin and W. J. Studden, "Tchebycheff Systems", Wiley 1966, chapter 3).
+    """
+    if not (lost > 0.0 and 0.0 < bare < 1.0):
+        return 0.0, 0.0
+    mean = -math.log(bare)
+    hit, dented = mean**2 / (mean**2 + lost), -math.expm1(-(mean + lost / mean))
+    return 1.0 - bare - hit * dented, hit * (1.0 - hit) * dented**2
 
 
 def time_to_98(poorest: Estimate, seconds: float) -> Estimate:
@@ -174,20 +189,30 @@ def _poorest(
     return estimate(_pseudovalues(-np.expm1(-x)), 0.0, 1.0, bias)
 
 
-def _variance_within(replicas: Sequence[Tally], ground: Surface, chamber: Chamber, totals: np.ndarray) -> float:
-    """Variance of x over the triangles less that over the patches, both free of the dents' own scatter."""
-    scale = ground.stretch / len(replicas)
-    m = len(ground.patch)
-    dented, squares = np.zeros(m), np.zeros(m)
-    for replica in replicas:
-        dented += np.bincount(replica.dent_triangle, replica.dent_area, m)
-        squares += np.bincount(replica.dent_triangle, replica.dent_area**2, m)
-    on = ground.patch >= 0
-    whole = ground.area.sum()
-    triangles = ((dented[on] ** 2 - squares[on]) / chamber.exposed_area[on]).sum()
-    joined = np.bincount(ground.patch[on], squares[on], len(ground.area))
-    together = ((totals**2 - joined) / ground.area).sum()
-    return max(0.0, float(scale**2 * (triangles - together) / whole))
+def _variance_within(replicas: Sequence[Tally], ground: Surface, chamber: Chamber) -> float:
+    """Variance of x over the triangles less that over the patches, both free of the dents' own scatter.
+
+    Squares are made of pairs of dents from different replicas: within one a ball that bounces on its spot puts all of
+    its dents on one triangle, which says nothing of where dents fall in the next. Of a single replica, of all pairs.
+    """
+    on, n = ground.patch >= 0, len(replicas)
+    scale = ground.stretch / n
+    each = np.array([np.bincount(replica.dent_triangle, replica.dent_area, len(on))[on] for replica in replicas])
+    if n > 1:
+        own, scale_squared = each, scale**2 * n / (n - 1)
+    else:
+        alone = np.bincount(replicas[0].dent_triangle, replicas[0].dent_area ** 2, len(on))[on]
+        own, scale_squared = np.sqrt(alone)[None], scale**2
+    exposed, patch, count = chamber.exposed_area[on], ground.patch[on], len(ground.area)
+    triangles = ((each.sum(axis=0) ** 2 - (own**2).sum(axis=0)) / exposed).sum()
+    dented = np.array([np.bincount(patch, one, count) for one in each])
+    alike = np.array([np.bincount(patch, one, count) for one in own]) ** 2 if n > 1 else _summed(patch, own**2, count)
+    together = ((dented.sum(axis=0) ** 2 - alike.sum(axis=0)) / ground.area).sum()
+    return max(0.0, float(scale_squared * (triangles - together) / ground.area.sum()))
+
+
+def _summed(patch: np.ndarray, rows: np.ndarray, count: int) -> np.ndarray:
+    return np.array([np.bincount(patch, one, count) for one in rows])
 
 
 def few_dents_note(replicas: Sequence[Tally], ground: Surface) -> tuple[str, ...]:
