@@ -259,8 +259,9 @@ def _figures(design: Design, chamber: Chamber, executor: Executor) -> dict[str, 
         return np.array([figure(replica) for replica in replicas])
 
     def coverage(half: np.ndarray) -> np.ndarray:
-        area = max(chamber.exposed_area[half].sum(), np.finfo(float).tiny)
-        times = design.process.treatment_time / area
+        if not half.any():  # a target of a triangle or two may be all on one side
+            return np.zeros(len(replicas))
+        times = design.process.treatment_time / chamber.exposed_area[half].sum()
         return -np.expm1(-of_each(lambda t: t.dented_area[half].sum() / t.simulated_time) * times)
 
     return {

@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.errors import InputError
-from chamberopt.fittings import Cavity, Piece, fitted, piece, swept_faces
+from chamberopt.fittings import Cavity, Piece, fitted, notes_on_files, piece, swept_faces
 from chamberopt.mesh_io import box_text, place_text
 from chamberopt.part import Part, posed_part, turning_axis
 from chamberopt.reach.reach import part_share, reach
 from chamberopt.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL, is_sonotrode, tag_of_further
 from chamberopt.slivers import THINNEST, without_slivers
-from chamberopt.solids import Solid, Surface, cavities, overlap, solid, subtract, united
+from chamberopt.solids import Solid, Surface, bodies, cavities, overlap, subtract, united
 from chamberopt.triangles import area_vectors, areas, free_rim, shells_of, tetrahedron_volumes
 
 if TYPE_CHECKING:
@@ -72,10 +72,12 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
     _refuse_misplaced(part, shape.vertices, design)
 
     cavity = fitted(design, shape)
+    notes += notes_on_files(design)
     own = piece(-1, TAG_PART, -area_vectors(part.vertices, part.triangles), np.arange(len(part.triangles)))
     whole = cavity.body.surface()
     if shape.source is None:  # else the part is drawn as what it bounds: there is nothing to cut out
-        body, voids = _body(part)
+        solids, voids = bodies(part.vertices, part.triangles, part.name)
+        body = united(solids, part.name)
         notes += [f"{part.name}: {voids} closed voids inside the part are left out"] if voids else []
         _refuse_in_swing(design, cavity, body)
         whole = subtract(cavity.body, body).surface()
@@ -104,9 +106,11 @@ def _refuse_misplaced(part: Part, shape: np.ndarray, design: Design) -> None:
     """A part that can be seen to be outside, or too low, before anything is cut."""
     distance, amplitude = design.chamber.sonotrode_distance, design.sonotrode.amplitude
     if distance <= amplitude:
+        drawn = design.chamber.sonotrode_distance_mm is None
         raise InputError(
-            f"chamber.sonotrode_distance_mm: given {1e3 * distance:g}, not above the amplitude of "
-            f"{1e6 * amplitude:g} µm: the sonotrode would hit the part; raise it"
+            f"chamber.sonotrode_distance_mm: {'drawn as' if drawn else 'given'} {1e3 * distance:g}, not above the "
+            f"amplitude of {1e6 * amplitude:g} µm: the sonotrode would hit the part; "
+            + ("give one, or check the groups in [chamber]" if drawn else "raise it")
         )
     if design.chamber.setup() is not None:  # the part is where the file has it
         if design.shot.diameter >= distance - amplitude:
@@ -120,8 +124,8 @@ def _refuse_misplaced(part: Part, shape: np.ndarray, design: Design) -> None:
     ceiling = design.chamber.ceiling_key
     if low[2] >= wall_high[2]:
         raise InputError(
-            f"chamber.{ceiling}: given {1e3 * wall_high[2]:g}, but the part begins {1e3 * low[2]:g} mm above "
-            f"the sonotrode, above the ceiling; raise {ceiling} or lower chamber.sonotrode_distance_mm"
+            f"chamber.{ceiling}: with a ceiling at {1e3 * wall_high[2]:g} mm, but the part begins {1e3 * low[2]:g} mm "
+            "above the sonotrode, above the ceiling; raise the ceiling or lower chamber.sonotrode_distance_mm"
         )
     if (low[:2] >= wall_high[:2]).any() or (high[:2] <= wall_low[:2]).any():
         raise InputError(
@@ -129,18 +133,6 @@ def _refuse_misplaced(part: Part, shape: np.ndarray, design: Design) -> None:
             f"({box_text(high - low)}) is beside the chamber ({box_text(wall_high - wall_low)}); "
             "bring it nearer to the axis"
         )
-
-
-def _body(part: Part) -> tuple[Solid, int]:
-    """The part as one solid, and how many closed voids in it were filled: no shot can get there."""
-    shells, volumes = shells_of(part.vertices, part.triangles)
-    if len(volumes) == 1:
-        return solid(part.vertices, part.triangles, part.name), 0
-    # Overlapping bodies in one mesh would be subtracted wrongly, without an error: unite them first. Each
-    # keeps the whole list of triangles' numbering through the index below.
-    bodies = [np.flatnonzero(shells == k) for k in np.flatnonzero(volumes > 0.0)]
-    solids = [solid(part.vertices, part.triangles, part.name, only=body) for body in bodies]
-    return united(solids, part.name), int((volumes < 0.0).sum())
 
 
 def _refuse_in_swing(design: Design, cavity: Cavity, body: Solid) -> None:
@@ -189,7 +181,10 @@ def _room_over_sonotrode(
         )
     top = float(room.vertices[:, 2].max())
     if ceiling is not None and top < ceiling - THINNEST:
-        notes.append(f"the part closes the chamber at z = {1e3 * top:.4g} mm: more chamber.{key} has no effect")
+        notes.append(
+            f"the part closes the chamber at z = {1e3 * top:.4g} mm: "
+            + ("a higher ceiling has no effect" if key == "shape" else f"more chamber.{key} has no effect")
+        )
     return room, notes
 
 

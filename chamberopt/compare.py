@@ -75,7 +75,10 @@ def compare(paths: Sequence[str | Path]) -> Comparison:
     first = results[0]
     for other in results[1:]:
         _require_same_part(first, other)
-    designs = [_flat(result.design.model_dump(mode="json", exclude={"part": {"mesh"}})) for result in results]
+    designs = [
+        {**_flat(result.design.model_dump(mode="json", exclude={"part": {"mesh"}})), **_beside(result)}
+        for result in results
+    ]
     names = dict.fromkeys(name for design in designs for name in design)
     parameters = {name: tuple(design.get(name) for design in designs) for name in names}
     same_goal = all(result.objective_name == first.objective_name for result in results)
@@ -95,6 +98,14 @@ def compare(paths: Sequence[str | Path]) -> Comparison:
             for name, values in metrics.items()
         },
     )
+
+
+def _beside(result: Result) -> dict[str, Any]:
+    """What its design does not say: the content of a shape's own file, and whether the cavity had facets."""
+    return {
+        "shape_sha256": result.data.get("shape_sha256", "")[:12],
+        "analytic": bool(result.data.get("analytic", False)),
+    }
 
 
 def write_comparison(folder: str | Path, comparison: Comparison) -> list[str]:

@@ -6,9 +6,10 @@ Every table is frozen, refuses unknown keys, and holds bounds wide enough for an
 
 import math
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, TypeVar
+from typing import Annotated, Any, Literal, Self, TypeVar, cast
 
 from pydantic import (
     BaseModel,
@@ -35,6 +36,8 @@ from chamberopt.shapes.table import is_own
 from chamberopt.shot import Shot
 from chamberopt.sonotrode import FurtherSonotrode, Sonotrode
 from chamberopt.treatment import Process
+
+MOST_SONOTRODES = 50  # further ones: each has a tag below 255, and takes a cut through all the walls before it
 
 
 class Target(BaseModel):
@@ -120,8 +123,8 @@ class Design(BaseModel):
     part: Part
     chamber: ChamberTable
     sonotrode: Sonotrode
-    sonotrodes: Annotated[tuple[FurtherSonotrode, ...], Field(strict=False)] = listed(
-        "a list of tables, [[sonotrodes]]", "further ones beside the floor", ()
+    sonotrodes: Annotated[tuple[FurtherSonotrode, ...], Field(strict=False, max_length=MOST_SONOTRODES)] = listed(
+        f"a list of at most {MOST_SONOTRODES} tables, [[sonotrodes]]", "further ones beside the floor", ()
     )
     shot: Shot
     materials: Materials
@@ -284,6 +287,11 @@ def design_class(data: Mapping[str, Any], context: Mapping[str, Any] | None = No
         return _designs_with(AnyShape if (context or {}).get("needs_mesh") else KeptShape)
 
 
+def _is_of_own_shape(data: Mapping[str, Any]) -> bool:
+    chamber = data.get("chamber")
+    return isinstance(chamber, Mapping) and is_own(chamber.get("shape"))
+
+
 @cache
 def _designs_with(table: type[ChamberTable]) -> type[Design]:
     chamber = (table, Field(description="the cavity before the part is taken out of it"))
@@ -308,6 +316,9 @@ def checked(
     try:
         return model.model_validate(data, context=context)
     except ValidationError as error:
+        if model is Design and not mesh_must_exist and _is_of_own_shape(data):
+            with suppress(ValidationError):  # the shape's file has changed since
+                return cast(Table, _designs_with(KeptShape).model_validate(data, context=context))
         shown: type[BaseModel] = design_class(data, context) if model is Design else model
         problems = diagnosis.from_validation(error, shown)
         raise InputError(diagnosis.message(problems, path, source)) from None

@@ -59,7 +59,11 @@ def message(problems: Iterable[Problem], path: Path | None = None, source: str =
 def from_validation(error: ValidationError, model: type[BaseModel]) -> list[Problem]:
     """Pydantic's findings in the words of the file."""
     problems: list[Problem] = []
-    for detail in error.errors():
+    details = error.errors()
+    for detail in details:
+        loc = detail["loc"]
+        if detail["type"] == "too_short" and any(other["loc"][: len(loc)] == loc != other["loc"] for other in details):
+            continue  # only without its wrong items, which are told
         cause = detail.get("ctx", {}).get("error")
         if isinstance(cause, CrossCheckError):
             prefix = ".".join(str(step) for step in detail["loc"])
@@ -101,7 +105,7 @@ def numeric_fields(table: BaseModel | type[BaseModel], prefix: str = "") -> Iter
             yield from numeric_fields(inner, f"{prefix}{name}.")
         elif float in kinds or int in kinds:
             yield f"{prefix}{name}", field
-        else:
+        elif isinstance(table, type) or value is not None:
             for kind in kinds:
                 if get_args(kind) and all(item is float for item in get_args(kind)):
                     yield from ((f"{prefix}{name}.{i}", field) for i in range(len(get_args(kind))))
@@ -147,9 +151,10 @@ def _line_of(field: str, lines: Mapping[str, int]) -> int | None:
 
 
 def _kinds(annotation: Any) -> tuple[Any, ...]:
-    """The alternatives of a union, None left out; a plain type alone."""
+    """The alternatives of a union, None and what is said of them left out; a plain type alone."""
     is_union = type(None) in get_args(annotation)
-    return tuple(k for k in get_args(annotation) if k is not type(None)) if is_union else (annotation,)
+    kinds = tuple(k for k in get_args(annotation) if k is not type(None)) if is_union else (annotation,)
+    return tuple(get_args(k)[0] if get_origin(k) is Annotated else k for k in kinds)
 
 
 def _table(field: FieldInfo) -> type[BaseModel] | None:
@@ -162,7 +167,6 @@ def _table(field: FieldInfo) -> type[BaseModel] | None:
 def _row(field: FieldInfo) -> type[BaseModel] | None:
     """The table of each item, where the field is a list of tables."""
     for kind in _kinds(field.annotation):
-        kind = get_args(kind)[0] if get_origin(kind) is Annotated else kind
         items = get_args(kind) if get_origin(kind) is tuple else ()
         if items and isinstance(items[0], type) and issubclass(items[0], BaseModel):
             return items[0]
@@ -231,6 +235,8 @@ def _explain(detail: ErrorDetails, model: type[BaseModel]) -> Problem:
         return Problem(dotted, f"given {_shown(detail['input'])}: {detail['msg']}")
     if kind == "missing":
         return Problem(".".join(str(s) for s in loc[:-1]), f"too short; allowed: {allowed(field)}")
+    if kind in ("value_error", "assertion_error"):  # of a user's own shape
+        return Problem(dotted, detail["msg"].partition(", ")[2])
     said = f"given {_shown(detail['input'])}; allowed: {allowed(field)}"
     if kind == "literal_error" and isinstance(detail["input"], str):
         choices = [str(choice) for choice in get_args(_kinds(field.annotation)[0])]

@@ -24,6 +24,18 @@ def _somewhere(direction: tuple[float, float, float]) -> tuple[float, float, flo
 Direction = Annotated[Triple, AfterValidator(_somewhere)]
 
 
+def _near(place: tuple[float, float, float]) -> tuple[float, float, float]:
+    if max(map(abs, place)) > FARTHEST_MM:
+        raise CrossCheckError(
+            [Problem("", f"given {list(place)}; each must be from -{FARTHEST_MM} to {FARTHEST_MM} mm")]
+        )
+    return place
+
+
+FARTHEST_MM = 10000  # from the middle of the sonotrode: no chamber is larger
+Place = Annotated[Triple, AfterValidator(_near)]
+
+
 def unit_vector(direction: tuple[float, float, float]) -> tuple[float, float, float]:
     """The same direction, of length 1."""
     x, y, z = (float(k) / math.hypot(*direction) for k in direction)

@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.errors import InputError
-from chamberopt.mesh_io import place_text, read_once
+from chamberopt.mesh_io import SurfaceError, place_text, read_once
 from chamberopt.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL, ShapeSurface, is_sonotrode, tag_of_further
 from chamberopt.shapes.loft import lofted
-from chamberopt.solids import Solid, Surface, overlap, solid, subtract, swept, united
+from chamberopt.solids import Solid, Surface, bodies, overlap, solid, subtract, swept, united
 from chamberopt.triangles import area_vectors, areas, rotation
 
 if TYPE_CHECKING:
@@ -94,10 +94,7 @@ def fitted(design: Design, shape: ShapeSurface) -> Cavity:
     for k, one in enumerate(design.sonotrodes):
         at, axis = np.array(one.at), np.array(one.direction)
         cavity = _with_bore(cavity, at, axis, one.diameter, tag_of_further(k), f"sonotrodes.{k}", one.amplitude)
-    swings = swept_faces(design, cavity) if design.chamber.deflectors else []
-    for k, deflector in enumerate(design.chamber.deflectors):
-        cavity = _without(cavity, deflector, f"chamber.deflectors.{k}", swings)
-    return cavity
+    return _without(cavity, design) if design.chamber.deflectors else cavity
 
 
 def swept_faces(design: Design, cavity: Cavity) -> list[tuple[str, Solid]]:
@@ -161,10 +158,24 @@ def _with_bore(
     return after
 
 
-def _without(cavity: Cavity, deflector: Deflector, name: str, swings: Sequence[tuple[str, Solid]]) -> Cavity:
-    vertices, triangles = _body_of(deflector)
-    vertices = vertices @ rotation(deflector.rotate_deg).T + np.array(deflector.at)
-    body = solid(vertices, triangles, name)
+def _without(cavity: Cavity, design: Design) -> Cavity:
+    """Without all deflectors at once: one after the other would take as many cuts through an ever finer surface."""
+    swings, standing, pieces = swept_faces(design, cavity), [], []
+    for k, deflector in enumerate(design.chamber.deflectors):
+        vertices, triangles = _body_of(deflector, f"chamber.deflectors.{k}")
+        vertices = vertices @ rotation(deflector.rotate_deg).T + np.array(deflector.at)
+        own = bodies(vertices, triangles, f"chamber.deflectors.{k}")[0]
+        _refuse_out_of_place(deflector, united(own, own[0].name), cavity, swings)
+        facing = -area_vectors(vertices, triangles)
+        standing += own
+        pieces += [piece(one.label, TAG_WALL, facing) for one in own]
+    return Cavity(subtract(cavity.body, united(standing, "the deflectors")), (*cavity.pieces, *pieces))
+
+
+def _refuse_out_of_place(
+    deflector: Deflector, body: Solid, cavity: Cavity, swings: Sequence[tuple[str, Solid]]
+) -> None:
+    name = body.name
     if overlap(cavity.body, body) <= 0.0:
         raise InputError(
             f"{name}.at_mm: given {list(deflector.at_mm)}, where none of it is in the room; positions count from the "
@@ -175,16 +186,29 @@ def _without(cavity: Cavity, deflector: Deflector, name: str, swings: Sequence[t
             raise InputError(
                 f"{name}.at_mm: given {list(deflector.at_mm)}, where the face of [{whose}] hits it; move it away"
             )
-    own = piece(body.label, TAG_WALL, -area_vectors(vertices, triangles))
-    return Cavity(subtract(cavity.body, body), (*cavity.pieces, own))
 
 
-def _body_of(deflector: Deflector) -> tuple[np.ndarray, np.ndarray]:
+def notes_on_files(design: Design) -> list[str]:
+    """What was guessed and healed in the files of deflectors."""
+    return [
+        note.replace("part.unit", f"chamber.deflectors.{k}.unit").replace("the part measures", "it measures")
+        for k, deflector in enumerate(design.chamber.deflectors)
+        if deflector.mesh is not None
+        for note in read_once(deflector.mesh_path, deflector.unit).notes
+    ]
+
+
+def _body_of(deflector: Deflector, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Vertices [m] and triangles of a deflector about its middle, not yet turned."""
     import trimesh
 
     if deflector.kind == "mesh":
-        mesh = read_once(deflector.mesh_path, deflector.unit)
+        try:
+            mesh = read_once(deflector.mesh_path, deflector.unit)
+        except SurfaceError:
+            raise
+        except InputError as error:  # told of a part
+            raise InputError(f"{name}.mesh: {str(error).replace('part.unit', 'unit')}") from None
         return mesh.vertices - (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2.0, mesh.triangles
     if deflector.kind == "ball":
         ball = trimesh.creation.icosphere(subdivisions=3, radius=deflector.diameter / 2.0)

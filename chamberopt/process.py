@@ -164,7 +164,8 @@ def build_scene(design: Design, mesh: TriangleMesh | AnalyticCavity, seed: int) 
     swing = max(one.amplitude for one in (sonotrode, *design.sonotrodes))
     try:
         diameter = np.array(shot.diameters)
-        positions = pack_balls(mesh, shot.count, diameter, rng, clear=swing, turn=part_turn(design, turn_phase))
+        turn = part_turn(design, turn_phase)
+        positions = pack_balls(mesh, shot.count, diameter, rng, clear=swing, turn=turn, floor=0.0)  # not in a sump
     except SceneError as error:
         raise InputError(f"shot: {error}; see shot.mass_g, shot.diameter_mm and [chamber]") from None
     velocities = start_velocities(rng, len(positions), sonotrode.peak_speed)

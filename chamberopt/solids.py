@@ -97,6 +97,19 @@ def solid(vertices: np.ndarray, triangles: np.ndarray, name: str, only: np.ndarr
     return made
 
 
+def bodies(vertices: np.ndarray, triangles: np.ndarray, name: str) -> tuple[list[Solid], int]:
+    """The solids of a surface of several bodies, (n, 3) m and (m, 3), and how many closed voids in them were filled.
+
+    Sources count in the whole list of triangles. Unite them before use: bodies that overlap in one mesh would be
+    subtracted wrongly, without an error.
+    """
+    shells, volumes = shells_of(vertices, triangles)
+    if len(volumes) == 1:
+        return [solid(vertices, triangles, name)], 0
+    each = [np.flatnonzero(shells == k) for k in np.flatnonzero(volumes > 0.0)]
+    return [solid(vertices, triangles, name, only=body) for body in each], int((volumes < 0.0).sum())
+
+
 def swept(face: Surface, way: np.ndarray, name: str) -> Solid:
     """The room over a flat face, whose normals point away from it, up to as far as ``way`` (3,) [m]."""
     count, (a, b) = len(face.vertices), border(face.triangles).T

@@ -5,7 +5,7 @@ from typing import Literal
 
 from pydantic import BaseModel, Field
 
-from chamberopt.fields import Direction, Triple, listed, metres, quantity, unit_vector
+from chamberopt.fields import Direction, Place, listed, metres, quantity, unit_vector
 from chamberopt.materials import STRICT
 
 
@@ -44,7 +44,7 @@ class Sonotrode(Vibrating):
 class FurtherSonotrode(Vibrating):
     """One more: a round face at the bottom of a well that opens into the room."""
 
-    at_mm: Triple = listed("three numbers [x, y, z] in mm", "middle of the face, in the chamber's frame")
+    at_mm: Place = listed("three numbers [x, y, z] in mm", "middle of the face, in the chamber's frame")
     axis: Direction = listed("three numbers [x, y, z], not all 0", "the way the face looks, into the room")
     diameter_mm: float = quantity(0.5, 2000, "mm", "of the face")
     phase_deg: float = quantity(-360, 360, "degrees", "ahead of the first sonotrode, at the same frequency", 0.0)

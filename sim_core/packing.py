@@ -26,12 +26,14 @@ def pack_balls(
     rng: np.random.Generator,
     clear: float = 0.0,
     turn: Turn | None = None,
+    floor: float = -np.inf,
 ) -> np.ndarray:
     """Positions [m] of ``count`` balls inside the mesh, shape (count, 3), no two overlapping.
 
     ``diameter`` [m], of all or of each, (count,): the larger are placed first; ``clear`` [m] is kept from every surface
     (at least the largest amplitude, if any); ``turn``: a part that turns is where its phase has it. "Low" is along
-    -z. Raises SceneError when they do not fit: random placement reaches about 30 % of the volume a ball can use.
+    -z, but nothing is placed lower than ``floor`` [m]. Raises SceneError when they do not fit: random placement reaches
+    about 30 % of the volume a ball can use.
     """
     sizes = np.asarray(diameter, dtype=np.float64)
     if not (count >= 1 and count == int(count) and (sizes > 0.0).all() and sizes.shape in ((), (count,))):
@@ -42,7 +44,7 @@ def pack_balls(
     positions = np.empty((int(count), 3))
     for size in np.unique(each)[::-1]:
         before = len(placed.points)
-        _place(placed, mesh, free, int((each == size).sum()), float(size), rng, clear)
+        _place(placed, mesh, free, int((each == size).sum()), float(size), rng, clear, floor)
         positions[each == size] = placed.points[before:]
     return positions
 
@@ -68,11 +70,13 @@ def _place(
     diameter: float,
     rng: np.random.Generator,
     clear: float,
+    floor: float,
 ) -> None:
     """So many balls of one size more."""
     radius = 0.5 * diameter + GAP
     reach = radius + clear
     low, high = mesh.bounds[0] + reach, mesh.bounds[1] - reach
+    low[2] = max(low[2], floor + reach)
     if (high < low).any():
         raise SceneError(f"no ball of {diameter * 1e3:.3g} mm fits into the mesh: it is narrower than the ball")
     failures, first = 0, len(placed.points)

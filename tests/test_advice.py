@@ -2,11 +2,13 @@
 
 import math
 from concurrent.futures import Executor
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 
 from chamberopt import advice, groups
 from chamberopt.advice import FIGURES, Advice, advise, settled
@@ -106,6 +108,19 @@ def test_each_effect_is_switched_alone_and_the_most_important_comes_first(monkey
     changed = [design.effects for design in asked if design.effects != PLATE.effects]
     assert len(changed) == 4
     assert all(design.process.accuracy.coverage is None for design in asked)
+
+
+def test_a_target_of_two_triangles_has_figures_too(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Both are as far from the sonotrode: there is no farther half, and no 0 / 0."""
+    trimesh.creation.box((60, 60, 10)).export(tmp_path / "lid.stl")
+    data = PLATE.model_dump()
+    data["part"] = {"mesh": str(tmp_path / "lid.stl"), "unit": "mm", "target": {"direction": (0.0, 0.0, -1.0)}}
+    data["part"]["target"]["angle_deg"] = (0.0, 10.0)
+    lid = checked(Design, data)
+    pretend({"gravity": 0.05}, monkeypatch)
+
+    for one in advise(lid, build_chamber(lid), SerialExecutor()):
+        assert all(math.isfinite(change.value) for change in one.changes.values())
 
 
 def test_auto_keeps_what_matters_and_says_why(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -495,3 +495,15 @@ def test_lines_of_keys() -> None:
     assert diagnosis.key_lines(source) == {
         "a": 2, "t.u": 3, "t.u.b.c": 4, "t.u.d.e": 5, "t.u.long": 6, "v": 9, "v.w": 10,
     }  # fmt: skip
+
+
+def test_a_wrong_number_in_a_list_is_one_problem(tmp_path: Path) -> None:
+    text = (ROOT / "designs" / "plate.toml").read_text(encoding="utf-8").replace("parts/", f"{ROOT}/designs/parts/")
+    chamber = 'shape = "revolve"\nprofile_mm = [[26, 0], [26, nan]]'
+    for line in ('shape = "cylinder"\ndiameter_mm = 50', "height_mm = 20 "):
+        text, chamber = text.replace(line, chamber), "#"
+    (tmp_path / "d.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(InputError) as error:
+        load_design(tmp_path / "d.toml")
+    assert len(str(error.value).splitlines()) == 1
+    assert "chamber.profile_mm.1.1: given nan" in str(error.value)

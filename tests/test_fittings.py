@@ -12,7 +12,7 @@ from chamberopt.chamber import Chamber, build_chamber
 from chamberopt.config import load_design, save_design
 from chamberopt.design import Design, checked
 from chamberopt.errors import InputError
-from chamberopt.process import chamber_mesh, rests, scene_physics
+from chamberopt.process import build_scene, chamber_mesh, rests, scene_physics
 from chamberopt.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL, is_sonotrode, tag_of_further
 from chamberopt.stuck import still
 from chamberopt.triangles import area_vectors, areas
@@ -350,3 +350,74 @@ def test_any_deflector_leaves_a_sound_chamber_or_is_refused(seed: int, plain: Ch
         sound(chamber)
         assert chamber.volume < plain.volume
     assert error.startswith("chamber.deflectors.0.at_mm")
+
+
+def test_bodies_of_one_file_that_overlap_count_once(plain: Chamber, tmp_path: Path) -> None:
+    box = trimesh.creation.box((4, 4, 4))
+    trimesh.util.concatenate([box, box.copy().apply_translation((2, 0, 0))]).export(tmp_path / "two.stl")
+    vane = {"kind": "mesh", "mesh": str(tmp_path / "two.stl"), "unit": "mm", "at_mm": [28.0, 0.0, 12.0]}
+    chamber = build_chamber(design([vane]))
+
+    sound(chamber)
+    assert plain.volume - chamber.volume == pytest.approx(1e-9 * 6 * 4 * 4, rel=1e-6)
+    assert area_of(chamber, TAG_PART) == pytest.approx(area_of(plain, TAG_PART), rel=1e-9)
+
+
+def test_deflectors_in_any_order_make_the_same_chamber() -> None:
+    """One in another, two alike, two that touch: they are united before they are cut out."""
+    inner, beside = (
+        {**PLATE, "size_mm": [2.0, 2.0, 2.0]},
+        {**PLATE, "at_mm": [20.0, 8.0, 12.0], "rotate_deg": [0.0] * 3},
+    )
+    some = [inner, PLATE, PLATE, {**beside, "at_mm": [20.0, 16.0, 12.0]}, beside]
+    one, other = (build_chamber(design(order)) for order in (some, some[::-1]))
+
+    sound(one)
+    assert one.volume == pytest.approx(other.volume, rel=1e-12)
+    assert area_of(one, TAG_WALL) == pytest.approx(area_of(other, TAG_WALL), rel=1e-9)
+
+
+def test_no_shot_starts_in_a_bore_that_leads_below_the_sonotrode() -> None:
+    sump = {"at_mm": [25.0, 0.0, 20.0], "axis": [1.0, 0.0, -1.0], "diameter_mm": 12.0, "depth_mm": 60.0}
+    asked = design(holes=[sump])
+    chamber = build_chamber(asked)
+    scene = build_scene(asked, chamber_mesh(chamber), seed=1)
+
+    assert chamber.vertices[:, 2].min() < -0.02
+    assert scene.balls.positions[:, 2].min() > 0.0
+
+
+def test_a_file_of_a_deflector_is_not_told_as_the_part(tmp_path: Path) -> None:
+    trimesh.creation.box((4, 4, 4)).export(tmp_path / "vane.stl")
+    vane = {"kind": "mesh", "mesh": str(tmp_path / "vane.stl"), "unit": "m", "at_mm": [28.0, 0.0, 12.0]}
+    with pytest.raises(InputError, match=r"chamber\.deflectors\.0\.mesh: .*with unit = 'm' "):
+        build_chamber(design([vane]))
+    notes = build_chamber(design([{**vane, "unit": "guess"}])).notes
+    assert any(
+        "vane.stl: unit guessed as 'mm' (by its size): it measures 4 x 4 x 4 mm; give chamber.def" in n for n in notes
+    )
+    with pytest.raises(InputError, match=r"deflectors\.0\.mesh: given ''; allowed: a text in quotes \(mesh file"):
+        design([{**vane, "mesh": ""}])
+
+
+@pytest.mark.parametrize(
+    ("fittings", "said"),
+    [
+        ({"deflectors": [{**PLATE, "at_mm": [1e300, 0.0, 0.0]}]}, r"chamber\.deflectors\.0\.at_mm: given \[1e\+300"),
+        ({"sonotrodes": [sonotrode(at_mm=[0.0, -1e9, 0.0])]}, r"sonotrodes\.0\.at_mm: .*from -10000 to 10000 mm"),
+        ({"sonotrodes": [sonotrode()] * 51}, "sonotrodes: given .*; allowed: a list of at most 50 tables"),
+    ],
+)
+def test_too_far_and_too_many_are_refused(fittings: dict[str, Any], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        design(**fittings)
+
+
+def test_the_sides_of_a_plate_vary() -> None:
+    asked = design([PLATE])
+    thicker = asked.with_values({"chamber.deflectors.0.size_mm.2": 5.0})
+
+    assert "chamber.deflectors.0.size_mm.2" in asked.numbers()
+    assert thicker.chamber.deflectors[0].size_mm == (10.0, 8.0, 5.0)
+    with pytest.raises(InputError, match=r"size_mm: given \[10.0, 8.0, 0.0\]; each side must be from 0.1 to 2000 mm"):
+        asked.with_values({"chamber.deflectors.0.size_mm.2": 0.0})

@@ -2,6 +2,7 @@
 
 import json
 import pickle
+import re
 from hashlib import sha256
 from pathlib import Path
 
@@ -182,3 +183,92 @@ def test_the_one_in_the_docs_works(folder: Path) -> None:
     (folder / "pyramid.py").write_text(docs.split("```python\n")[1].split("```")[0], encoding="utf-8")
 
     assert build_chamber(load_design(folder / "d.toml")).volume == pytest.approx(1.27e-4, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("raise SystemExit(3)", r"pyramid\.py:14: surface\(\) failed: SystemExit: 3"),
+        ("vertices[:] = 0.0", r"pyramid\.py:14: surface\(\) failed: ValueError: assignment destination is read-only"),
+        ("points = 1e3 * points", r"is 80 m wide, where 10 is the most; its vertices are in metres, not mm"),
+    ],
+)
+def test_what_its_surface_may_not_do(folder: Path, line: str, said: str) -> None:
+    assert re.search(said, said_of(folder, (RETURN, f"{line}\n        {RETURN}")))
+
+
+def test_a_surface_that_crosses_itself_is_refused(folder: Path) -> None:
+    """The tip of a tall notch in one side goes through the other side."""
+    notched = """
+        n = np.array([[-s, -s, 0], [s, -s, 0], [s, s, 0], [-s, s, 0], [0, 0, h], [0, 2 * s, 0.1 * h]])
+        faces = np.array([[0, 2, 1], [0, 3, 2], [5, 0, 1], [5, 1, 4], [5, 4, 0], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
+        return ShapeSurface(n, faces, np.array([1, 1, 2, 2, 2, 2, 2, 2]))"""
+
+    assert re.search(r"surface\(\) of Pyramid crosses itself, near \(", said_of(folder, (RETURN, notched.strip())))
+
+
+def test_lists_will_do_and_what_it_says_of_the_part_does_not_count(folder: Path) -> None:
+    before = build_chamber(load_design(folder / "d.toml"))
+    lists = "return ShapeSurface(points.tolist(), faces.tolist(), [1, 1, 2, 2, 2, 2], [0] * 6)"
+    (folder / "pyramid.py").write_text(PYRAMID.replace(RETURN, lists), encoding="utf-8")
+
+    chamber = build_chamber(load_design(folder / "d.toml"))
+
+    assert np.array_equal(chamber.vertices, before.vertices)
+    assert np.array_equal(chamber.tags, before.tags)
+
+
+@pytest.mark.parametrize(
+    ("method", "said"),
+    [
+        (
+            "def widths_mm(self): return 'wide'",
+            r"widths_mm\(\) of Pyramid gives 'wide'; widths \[mm\] by key are wanted",
+        ),
+        ("def widths_mm(self): return {'side_mm': None}", r"widths_mm\(\) of Pyramid gives .*None"),
+        ("def room(self): return 0.0", r"room\(\) of Pyramid gives 0.0; a volume \[m³\] above 0 is wanted"),
+        ("def notes(self, ball): return 'note'", r"notes\(\) of Pyramid gives 'note'; a list of texts is wanted"),
+    ],
+)
+def test_what_its_other_methods_must_give(folder: Path, method: str, said: str) -> None:
+    assert re.search(said, said_of(folder, ("    def surface", f"    {method}\n\n    def surface")))
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        ("ZeroDivisionError('why')", r"pyramid\.py:\d+: its checks failed: ZeroDivisionError: why"),
+        ("ValueError('too, steep')", r"d\.toml:\d+: chamber: too, steep"),
+    ],
+)
+def test_what_its_validators_raise_is_said(folder: Path, error: str, said: str) -> None:
+    check = f"    @pydantic.model_validator(mode='after')\n    def _agree(self): raise {error}\n\n    def surface"
+    assert re.search(
+        said, said_of(folder, ("import numpy as np", "import numpy as np, pydantic"), ("    def surface", check))
+    )
+
+
+def test_without_a_height_no_key_is_blamed_for_the_ceiling(folder: Path) -> None:
+    """The tip at 80 mm is cut off by the block, as wide as the pyramid there."""
+    trimesh.creation.box((60, 60, 10)).export(folder / "block.stl")
+    notes = build_chamber(load_design(folder / "d.toml")).notes
+
+    assert any("a higher ceiling has no effect" in note for note in notes)
+    assert not any("height_mm" in note for note in notes)
+
+
+def test_results_of_a_file_that_was_edited_are_told_apart_and_still_read(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(viewer, "coverage_picture", lambda *_: None)
+    for name, text in (("first", PYRAMID), ("second", PYRAMID.replace("0.5e-3 *", "0.4e-3 *"))):
+        (folder / "pyramid.py").write_text(text, encoding="utf-8")
+        design = load_design(folder / "d.toml")
+        chamber = build_chamber(design)
+        write_simulation(folder / name, design, chamber, poisson_evaluation(design, chamber))
+
+    assert set(compare([folder / "first", folder / "second"]).parameters) == {"shape_sha256"}
+    (folder / "pyramid.py").write_text(PYRAMID.replace("side_mm", "edge_mm"), encoding="utf-8")
+    assert load_result(folder / "first").design.chamber.side_mm == 80.0
+    with pytest.raises(InputError, match=r"chamber\.side_mm: unknown key"):
+        load_design(folder / "d.toml")

@@ -6,7 +6,7 @@ from typing import Literal, Self
 from pydantic import BaseModel, Field, model_validator
 
 from chamberopt.diagnosis import CrossCheckError, Problem
-from chamberopt.fields import Direction, MeshFile, Triple, Unit, listed, metres, quantity, unit_vector
+from chamberopt.fields import Direction, MeshFile, Place, Triple, Unit, listed, metres, quantity, unit_vector
 from chamberopt.materials import STRICT
 
 SIZES = {"plate": ("size_mm",), "rod": ("diameter_mm", "length_mm"), "ball": ("diameter_mm",), "mesh": ("mesh",)}
@@ -20,7 +20,7 @@ class Deflector(BaseModel):
     model_config = STRICT
 
     kind: Literal["plate", "rod", "ball", "mesh"] = Field(description="what it is")
-    at_mm: Triple = listed("three numbers [x, y, z] in mm", "its middle (of a mesh: its box's), in the chamber's frame")
+    at_mm: Place = listed("three numbers [x, y, z] in mm", "its middle (of a mesh: its box's), in the chamber's frame")
     rotate_deg: Triple = listed("three numbers [x, y, z] in degrees", "turns about x, then y, then z", (0.0, 0.0, 0.0))
     size_mm: Triple | None = listed("three numbers [x, y, z] in mm, above 0", "sides of a plate", None)
     diameter_mm: float | None = quantity(0.1, 2000, "mm", "of a rod or ball", None)
@@ -75,7 +75,7 @@ class Hole(BaseModel):
 
     model_config = STRICT
 
-    at_mm: Triple = listed("three numbers [x, y, z] in mm", "in the room, on the bore's axis; in the chamber's frame")
+    at_mm: Place = listed("three numbers [x, y, z] in mm", "in the room, on the bore's axis; in the chamber's frame")
     axis: Direction = listed("three numbers [x, y, z], not all 0", "the way out of the room")
     diameter_mm: float = quantity(0.1, 2000, "mm", "of the bore")
     depth_mm: float = quantity(0.1, 2000, "mm", "beyond the wall, along the axis")

@@ -1,9 +1,15 @@
 """What a cavity's surface must be before a part can be taken out of it."""
 
+from pathlib import Path
+
 import numpy as np
 
+from chamberopt.mesh_io import SurfaceError, place_text
+from chamberopt.mesh_io.crossings import refuse_crossings
 from chamberopt.shapes.surface import TAG_SONOTRODE, TAG_WALL, ShapeSurface
 from chamberopt.triangles import area_vectors, shells_of
+
+MOST_ACROSS = 10.0  # m: more than the shipped shapes can be, less than a chamber whose mm are taken for m
 
 
 def fault(cavity: object) -> str | None:
@@ -23,7 +29,19 @@ def fault(cavity: object) -> str | None:
         return "has triangles whose vertices do not exist, or are no finite numbers"
     if tags.shape != triangles.shape[:1] or not np.isin(tags, (TAG_SONOTRODE, TAG_WALL)).all():
         return "must tag each triangle as TAG_SONOTRODE or TAG_WALL"
-    return _open_or_turned(vertices, triangles) or _no_floor(vertices, triangles, tags)
+    across = float(np.ptp(vertices, axis=0).max())
+    if across > MOST_ACROSS:
+        return f"is {across:.4g} m wide, where {MOST_ACROSS:g} is the most; its vertices are in metres, not mm"
+    return _open_or_turned(vertices, triangles) or _no_floor(vertices, triangles, tags) or _crossed(vertices, triangles)
+
+
+def in_arrays(cavity: ShapeSurface) -> ShapeSurface:
+    """One without a fault as the arrays that a ShapeSurface is said to hold; of a part it knows nothing."""
+    return ShapeSurface(
+        np.asarray(cavity.vertices, dtype=np.float64),
+        np.asarray(cavity.triangles, dtype=np.int32),
+        np.asarray(cavity.tags, dtype=np.uint8),
+    )
 
 
 def _open_or_turned(vertices: np.ndarray, triangles: np.ndarray) -> str | None:
@@ -38,6 +56,15 @@ def _open_or_turned(vertices: np.ndarray, triangles: np.ndarray) -> str | None:
     if len(volumes) > 1:
         return f"is in {len(volumes)} pieces; one closed surface is wanted"
     return "is inside out: normals must point out of the cavity" if volumes[0] <= 0.0 else None
+
+
+def _crossed(vertices: np.ndarray, triangles: np.ndarray) -> str | None:
+    try:
+        refuse_crossings(Path(), vertices, triangles)
+    except SurfaceError as error:
+        places = place_text(error.edges.reshape(-1, 3).mean(axis=0))
+        return f"crosses itself, near {places}"
+    return None
 
 
 def _no_floor(vertices: np.ndarray, triangles: np.ndarray, tags: np.ndarray) -> str | None:

@@ -23,7 +23,7 @@ class ChamberTable(BaseModel):
     model_config = STRICT
 
     sha256: ClassVar[str] = ""  # of the file, where the shape is a user's own
-    ceiling_key: ClassVar[str] = "height_mm"  # what to change when the ceiling is too low
+    ceiling_key: ClassVar[str] = "shape"  # what to change when the ceiling is too low
 
     shape: str = Field(description="form of the cavity")
     sonotrode_distance_mm: float = quantity(0.1, 2000, "mm", "mean sonotrode face to lowest point of the part")
@@ -87,6 +87,8 @@ class WalledChamber(ChamberTable):
 
 class ParametricChamber(WalledChamber):
     """A cavity made from its parameters: floor, sides that may lean, flat ceiling."""
+
+    ceiling_key: ClassVar[str] = "height_mm"
 
     height_mm: float = quantity(2, 2000, "mm", "inner height, sonotrode to ceiling")
 

@@ -29,3 +29,11 @@ def test_too_much_shot_and_too_narrow_a_room_are_refused() -> None:
         pack_balls(box((0.02, 0.02, 0.02)), 400, 3e-3, np.random.default_rng(0))
     with pytest.raises(SceneError, match="narrower than the ball"):
         pack_balls(box((0.002, 0.02, 0.02)), 1, 3e-3, np.random.default_rng(0))
+
+
+def test_nothing_is_placed_below_the_floor() -> None:
+    """The box is in layers of 1.5 diameters, filled from the floor up, not from the bottom."""
+    room = box((0.02, 0.02, 0.04))
+    placed = pack_balls(room, 10, 2e-3, np.random.default_rng(5), clear=50e-6, floor=0.02)
+    assert placed[:, 2].min() >= 0.021 + 50e-6
+    assert placed[:, 2].max() < 0.025
