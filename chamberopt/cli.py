@@ -76,13 +76,14 @@ def check(
     pilot
         --no-pilot: nothing is simulated.
     screenshot
-        Write a picture (.png) of the part with its target, or of what is wrong with its surface.
+        Write a picture (.png) of the part with its target and of its chamber, or of what is wrong with its surface.
     """
     from chamberopt.chamber import build_chamber
     from chamberopt.checks.checkup import describe, shot_reach
     from chamberopt.config import Study, load
     from chamberopt.disk import new_folder, write_text
     from chamberopt.mesh_io import SurfaceError
+    from chamberopt.viewer import write_chamber
 
     loaded = load(file)
     design = loaded.design if isinstance(loaded, Study) else loaded
@@ -112,6 +113,7 @@ def check(
             print("\n".join(f"effect: {one['said']}" for one in facts["effects"]))
     if out is not None:
         write_text(out / "check.json", json_format.dumps(facts, indent=2) + "\n")
+        write_chamber(out, chamber)
     if json:
         print(json_format.dumps(facts, indent=2))
 
@@ -424,7 +426,8 @@ def _picture_of_target(chamber: Chamber, found: Reach, screenshot: Path) -> None
     missed = part.target & (part_share(found, chamber.source, len(part.triangles)) <= 0.5)
     title = f"{part.name}: the target in orange" + (", in red where hardly a ball can touch it" if missed.any() else "")
     corners = part.vertices[part.triangles]
-    _remark([part_picture(corners, title, screenshot, part.target, missed=missed) or f"picture in {screenshot}"])
+    drawn = part_picture(corners, title, screenshot, part.target, missed=missed, chamber=chamber)
+    _remark([drawn or f"picture in {screenshot}"])
 
 
 def _compile(design: Design, chamber: Chamber, cavity: AnalyticCavity | None = None) -> None:

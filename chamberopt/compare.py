@@ -150,6 +150,8 @@ def _require_same_part(first: Result, other: Result) -> None:
 def _flat(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     flat: dict[str, Any] = {}
     for name, value in table.items():
+        if isinstance(value, list | tuple) and any(isinstance(one, Mapping) for one in value):
+            value = {str(place): one for place, one in enumerate(value)}
         if isinstance(value, Mapping):
             flat |= _flat(value, f"{prefix}{name}.")
         else:
@@ -168,4 +170,4 @@ def _labels(folders: Sequence[Path]) -> tuple[str, ...]:
 
 
 def _shown(value: Any) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
+    return "-" if value is None else f"{value:g}" if isinstance(value, float) else str(value)

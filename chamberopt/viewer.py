@@ -138,11 +138,12 @@ def part_picture(
     marked: np.ndarray | None = None,
     edges: np.ndarray | None = None,
     missed: np.ndarray | None = None,
+    chamber: Chamber | None = None,
 ) -> str | None:
     """Draw a part as its file has it into a .png, from two sides; for what is wrong with it, or what its target is.
 
     corners (m, 3, 3) m · marked (m,) bool: triangles in orange · missed (m,) bool: in red · edges (k, 2, 3) m: drawn
-    red, through the part.
+    red, through the part · chamber: drawn as glass round the part, beside the two.
     Returns None, or one line saying why there is no picture. Raises InputError where no such file can be.
     """
     path = _picture_path(picture)
@@ -153,7 +154,11 @@ def part_picture(
         )
         edges = np.zeros((0, 2, 3)) if edges is None else edges
         np.savez(part, corners=corners * MM, marked=marked & ~missed, missed=missed, edges=edges * MM)
-        return _drawn_apart({"part": str(part), "title": title}, path)
+        job = {"part": str(part), "title": title}
+        if chamber is not None:
+            write_chamber(Path(folder), chamber)
+            job["chamber"] = str(Path(folder) / CHAMBER)
+        return _drawn_apart(job, path)
 
 
 def _picture_path(picture: str | Path) -> Path:
@@ -231,16 +236,21 @@ def _draw(job: dict[str, Any]) -> None:
 
 
 def _draw_part(job: dict[str, Any]) -> None:
-    """The part's surface from two opposite sides; edges shine through it, where there are any."""
+    """The part's surface from two opposite sides, edges shining through it, where there are any; and in its chamber."""
     pyvista = _pyvista()
     with np.load(job["part"]) as data:
         corners, marked, missed, edges = data["corners"], data["marked"], data["missed"], data["edges"]
     surface = pyvista.PolyData.from_regular_faces(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
     lines = pyvista.line_segments_from_points(edges.reshape(-1, 3)) if len(edges) else None
-    plotter = pyvista.Plotter(off_screen=True, shape=(1, 2), window_size=[1800, 900], border=False)
-    for column, side in enumerate((1.0, -1.0)):
+    room = read_surface(Path(job["chamber"])) if "chamber" in job else None
+    views = (1.0, -1.0) if room is None else (1.0, -1.0, 0.0)
+    plotter = pyvista.Plotter(off_screen=True, shape=(1, len(views)), window_size=[900 * len(views), 900], border=False)
+    for column, side in enumerate(views):
         plotter.subplot(0, column)
         plotter.set_background(BACKGROUND)
+        if room is not None and side == 0.0:
+            _room(plotter, room)
+            side = 1.0
         for chosen, colour in ((~(marked | missed), GREY), (marked, SONOTRODE), (missed, FAULT)):
             if chosen.any():
                 plotter.add_mesh(surface.extract_cells(chosen), color=colour, opacity=1.0 if lines is None else 0.35)
@@ -325,6 +335,17 @@ def _show(plotter: Any, part: _Part, limits: tuple[float, float], bar: bool) -> 
 def _scene(plotter: Any, part: _Part, chamber: Surface, title: str, limits: tuple[float, float], bar: bool) -> None:
     """The part inside the glass chamber, over the sonotrode."""
     _show(plotter, part, limits, bar)
+    _room(plotter, chamber)
+    plotter.add_text(title, position="upper_left", font_size=13, color=DARK)
+    legend = "orange: sonotrode   grey: not in the target"
+    plotter.add_text(legend, position="lower_left", font_size=9, color=DARK)
+    plotter.camera_position = [(1.0, -1.6, 0.35), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
+    plotter.reset_camera()
+    plotter.enable_anti_aliasing("ssaa")
+
+
+def _room(plotter: Any, chamber: Surface) -> None:
+    """The sonotrode, and the walls as glass with their edges."""
     tags = np.asarray(chamber["tag"])
     sonotrode, wall = (
         chamber.extract_cells(chosen).extract_surface(algorithm="dataset_surface")
@@ -334,12 +355,6 @@ def _scene(plotter: Any, part: _Part, chamber: Surface, title: str, limits: tupl
     plotter.add_mesh(wall, color=GLASS, opacity=0.16, specular=0.3)
     rims = wall.extract_feature_edges(30, non_manifold_edges=False, manifold_edges=False)
     plotter.add_mesh(rims, color=DARK, line_width=2, opacity=0.6)
-    plotter.add_text(title, position="upper_left", font_size=13, color=DARK)
-    legend = "orange: sonotrode   grey: not in the target"
-    plotter.add_text(legend, position="lower_left", font_size=9, color=DARK)
-    plotter.camera_position = [(1.0, -1.6, 0.35), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
-    plotter.reset_camera()
-    plotter.enable_anti_aliasing("ssaa")
 
 
 def _near(plotter: Any, part: _Part, limits: tuple[float, float], bar: bool) -> None:

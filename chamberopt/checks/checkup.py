@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 # and event-driven simulation slows down, because collisions crowd.
 CROWDED = 0.3
 CLEAR_AMPLITUDES = 10.0  # between part and sonotrode, as a design's sonotrode_distance_mm has to have
+MUCH_HIDDEN = 0.05  # of the target's area: cut off by a ceiling or wall that is in the wrong place
 THIN = 10.0  # chamber heights between two meetings of a ball: from there on few dents come from balls that met
 
 
@@ -105,6 +106,13 @@ def warnings(design: Design, chamber: Chamber, found: Reach | None = None) -> li
         said.append(
             f"shot.mass_g = {shot.mass_g:g} is rounded to {shot.count} whole ball(s) of "
             f"{shot.ball_mass * 1e6:.3g} mg: the charge differs by more than 5 %"
+        )
+    part = chamber.part
+    hidden = 1.0 - chamber.exposed_area[part.target].sum() / part.area[part.target].sum()
+    if hidden > MUCH_HIDDEN:
+        said.append(
+            f"{hidden:.0%} of the target's area is outside the chamber and counts as not covered: enlarge the chamber, "
+            "or narrow [part.target] to what is to be peened"
         )
     path = free_path(design, chamber)
     if not design.effects.ball_collisions and path < THIN:

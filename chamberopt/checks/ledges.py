@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 LEVEL = 1e-9  # m: corners whose heights differ by less are level but for rounding
 UPWARD = 1e-6  # of a triangle's area: what faces up by less is upright but for rounding
 REMEDY = {
-    TAG_PART: "turn it (effects.part_turn), tilt it (part.rotate_deg), or lower chamber.height_mm to its top side",
+    TAG_PART: "turn it (effects.part_turn), tilt it (part.rotate_deg), or lower chamber.{key} to its top side",
     TAG_WALL: "make it slope towards the sonotrode",
 }
 
@@ -56,7 +56,7 @@ def ledges(design: Design, chamber: Chamber) -> list[Ledge]:
         found.append(
             Ledge(
                 f"balls can come to rest {where} the {name}, which neither vibrates nor turns: {how}, "
-                f"{_place(chamber, shown, area)}; {REMEDY[tag]}",
+                f"{_place(chamber, shown, area)}; {REMEDY[tag].format(key=design.chamber.ceiling_key)}",
                 level,
             )
         )
