@@ -274,7 +274,7 @@ class TestCheck:
         drawn: list[tuple[str, int, int, int]] = []
         none = np.zeros(0)
 
-        def draw(corners, title: str, picture, marked=none, edges=none, missed=none) -> None:  # type: ignore[no-untyped-def]
+        def draw(corners, title: str, picture, marked=none, edges=none, missed=none, chamber=None) -> None:  # type: ignore[no-untyped-def]
             drawn.append((title, int(marked.sum()), len(edges), int(missed.sum())))
 
         monkeypatch.setattr("chamberopt.viewer.part_picture", draw)
