@@ -185,6 +185,7 @@ def test_two_objectives_give_a_front(tmp_path: Path) -> None:
 
     question = {"pareto": ["coverage_p05", "intensity_uniformity"]}
     result = run(tmp_path / "out", evaluator, {"evaluations": 24, "confirm": 4}, objective=question)
+    assert all(np.isfinite(goal.value) for one in compromises(result) for goal in one.goals)
     front = [one for one in compromises(result) if one.stage == "confirm" and one.on_front]
     assert len(front) >= 3
     places = np.array(

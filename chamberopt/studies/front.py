@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chamberopt.accuracy import weighted
-from chamberopt.objective import objective
 from chamberopt.studies.constraints import INFEASIBLE
 from chamberopt.studies.pareto import on_front
 
@@ -39,14 +37,7 @@ def compromises(result: StudyResult) -> list[Compromise]:
     searched = [trial for trial in result.trials if trial.stage == "search" and trial.objective]
     stages = {
         "confirm": [(one.parameters, one.goals, one.standing) for one in result.confirmed],
-        "search": [
-            (
-                trial.parameters,
-                tuple(weighted(objective(name), trial.metrics) for name in names),
-                "feasible" if trial.feasible else INFEASIBLE,
-            )
-            for trial in searched
-        ],
+        "search": [(trial.parameters, trial.goals, "feasible" if trial.feasible else INFEASIBLE) for trial in searched],
     }
     made = []
     for stage, rows in stages.items():
