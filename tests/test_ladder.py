@@ -203,7 +203,7 @@ def marked(design: Any, chamber: Any, mesh: Any, samples: Any, number: int) -> t
 def no_simulator(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(climbing, "_replica", played)
     monkeypatch.setattr("chamberopt.price.dent_rungs._marked", marked)
-    monkeypatch.setattr("chamberopt.cli._compile", lambda *_: None)
+    monkeypatch.setattr("chamberopt.cli.designs.compiled", lambda *_: None)
 
 
 @pytest.mark.usefixtures("no_simulator")

@@ -189,7 +189,7 @@ class TestCommandLine:
 
         self.at: dict[int, Callable[[], None]] = {}
         monkeypatch.setattr("chamberopt.studies.study.simulation", lambda *_: evaluator)
-        monkeypatch.setattr("chamberopt.cli._compile", lambda *_: None)
+        monkeypatch.setattr("chamberopt.cli.studies.compiled", lambda *_: None)
         monkeypatch.setattr("chamberopt.viewer.coverage_picture", lambda *_: None)
         return done
 
@@ -235,12 +235,12 @@ class TestCommandLine:
         self, evaluated: list, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
     ) -> None:
         """Wherever it comes: an exception would be dropped in an import, and crash in the compiler."""
-        monkeypatch.setattr("chamberopt.cli._compile", lambda *_: os.kill(os.getpid(), signal.SIGINT))
+        monkeypatch.setattr("chamberopt.cli.studies.compiled", lambda *_: os.kill(os.getpid(), signal.SIGINT))
         child = fork.Process(target=main, args=(["run", "small.toml"],))
         child.start()
         child.join(60)
         assert (child.exitcode, EARLY in capfd.readouterr().err) == (130, True)
-        monkeypatch.setattr("chamberopt.cli._compile", lambda *_: None)
+        monkeypatch.setattr("chamberopt.cli.studies.compiled", lambda *_: None)
         assert main(["run", "small.toml"]) == 0
         assert [path.name for path in Path("results").iterdir()] == ["small"]
 
