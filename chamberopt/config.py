@@ -1,5 +1,6 @@
 """The door: design and study files in, frozen and checked nouns out; all that is wrong in one message."""
 
+import math
 import os
 import re
 import tomllib
@@ -20,18 +21,18 @@ from chamberopt.shapes.table import is_own
 
 __all__ = ["METRICS", "Design", "Limits", "Study", "load", "load_design", "load_study", "save_design"]
 
-# What a study may ask for. objective.py computes them, a test holds the two lists together.
+# What a study may ask for, and the range it can have. objective.py computes them, a test holds the two together.
 ObjectiveName = Literal["uniform_coverage", "coverage_p05", "time_to_98", "intensity_uniformity"]
-METRICS = (
-    "mean_coverage",
-    "std_coverage",
-    "p05_coverage",
-    "time_to_98_s",
-    "intensity_uniformity",
-    "mean_normal_speed_m_s",
-    "impacts_per_mm2_s",
-    "shot_count",
-)
+METRICS = {
+    "mean_coverage": (0.0, 1.0),
+    "std_coverage": (0.0, 0.5),
+    "p05_coverage": (0.0, 1.0),
+    "time_to_98_s": (0.0, 1e6),
+    "intensity_uniformity": (-math.inf, math.inf),
+    "mean_normal_speed_m_s": (0.0, math.inf),
+    "impacts_per_mm2_s": (0.0, math.inf),
+    "shot_count": (0.0, math.inf),
+}
 # NLopt's own names without the "NLOPT_" prefix, and two phases that are none of them: points spread evenly, and a model
 # of the scores on which NLopt looks for the next; "auto" is these two, one after the other.
 Algorithm = Literal[
@@ -61,7 +62,9 @@ class Objective(BaseModel):
 
     name: ObjectiveName = Field(default="uniform_coverage", description="what is maximised")
     sum: dict[str, float] = Field(
-        default_factory=dict, description="NAME = WEIGHT of objectives and metrics, in place of a name"
+        default_factory=dict,
+        description="of objectives and metrics, in place of a name",
+        json_schema_extra={"form": "{ NAME = WEIGHT, ... }, e.g. { uniform_coverage = 1.0, time_to_98_s = -0.001 }"},
     )
     pareto: Annotated[tuple[ObjectiveName, ObjectiveName], Field(strict=False)] | None = listed(
         'two names, e.g. ["uniform_coverage", "time_to_98"]', "two objectives at once, in place of a name", None
@@ -132,8 +135,8 @@ class Optimizer(BaseModel):
     model_config = STRICT
 
     algorithm: Algorithm = Field(default="auto", description="auto, sobol, surrogate, or an NLopt name without prefix")
-    phases: Annotated[tuple[Phase, ...], Field(strict=False)] = Field(
-        default=(), description="several algorithms one after another, in place of one"
+    phases: Annotated[tuple[Phase, ...], Field(strict=False)] = listed(
+        "a table [[optimizer.phases]] each", "several algorithms one after another, in place of one", ()
     )
     initial_step: float = quantity(0.001, 1, "of the bounds", "first step of local algorithms", 0.15)
     tolerance: float = quantity(1e-6, 0.5, "of the bounds", "step at which local algorithms end", 0.02)
@@ -148,7 +151,7 @@ class Optimizer(BaseModel):
         description="after so many a candidate plainly worse than the best gets no more; 0: all",
     )
     confirm_rounds: int = Field(
-        default=1,
+        default=2,
         ge=1,
         le=10,
         description="while the best cannot be told apart: again, each time with twice the replicas",
@@ -191,6 +194,7 @@ class Study(BaseModel):
     draft: dict[str, int | float | str] = Field(
         default_factory=dict,
         description="while searching, in place of the design's own: keys of [process.accuracy], and facets",
+        json_schema_extra={"form": "a number or a text"},
     )
 
     def drafted(self, design: Design) -> Design:
@@ -204,11 +208,8 @@ class Study(BaseModel):
     @model_validator(mode="after")
     def _agree(self) -> Self:
         problems = [p for name, bounds in self.vary.items() for p in _vary_problems(self.design, name, bounds)]
-        for name in self.constraints:
-            if name not in METRICS and name not in self.design.numbers():
-                known = (*METRICS, *(self.design.numbers() if "." in name else ()))
-                text = f"not a metric; {diagnosis.did_you_mean(name, known)}"
-                problems.append(Problem(f"constraints.{name}", text))
+        for name, limits in self.constraints.items():
+            problems += [Problem(f"constraints.{name}", text) for text in self._constraint_problems(name, limits)]
         phases = [phase.algorithm for phase in self.optimizer.phases] or [self.optimizer.algorithm]
         if self.objective.pareto and not {"auto", "sobol", "surrogate"}.issuperset(phases):
             text = "given two objectives, which only auto, sobol and surrogate can search"
@@ -217,6 +218,29 @@ class Study(BaseModel):
         if problems:
             raise CrossCheckError(problems)
         return self
+
+    def _constraint_problems(self, name: str, limits: Limits) -> list[str]:
+        """No figure of a candidate, or one that no candidate can have: better said before the search than after it."""
+        numbers = self.design.numbers()
+        if name in METRICS:
+            low, high = METRICS[name]
+        elif name in self.vary:
+            low, high = self.vary[name]
+        elif name in numbers:
+            try:
+                low = high = self.design.value(name)
+            except InputError as error:
+                return [str(error).removeprefix(f"{name}: ")]
+        else:
+            return [f"not a metric; {diagnosis.did_you_mean(name, (*METRICS, *(numbers if '.' in name else ())))}"]
+        within = f"{low:g}" if low == high else f"from {low:g} to {high:g}"
+        remedy = f"but it is {within} in every candidate; change the limit{' or [vary]' if name in numbers else ''}"
+        said = []
+        if limits.min is not None and limits.min > high:
+            said.append(f"given min = {limits.min:g}, {remedy}")
+        if limits.max is not None and limits.max < low:
+            said.append(f"given max = {limits.max:g}, {remedy}")
+        return said
 
     def _draft_problems(self) -> list[Problem]:
         try:
@@ -369,7 +393,7 @@ def _vary_problems(design: Design, name: str, bounds: tuple[float, float]) -> li
     if name.startswith("process.accuracy."):
         return [Problem(field, "not a choice of design, but of how well it is known; see [draft]")]
     if name not in numbers:
-        return [Problem(field, f"a whole number cannot vary; {diagnosis.did_you_mean(name, numbers)}")]
+        return [Problem(field, "a whole number cannot vary; leave it out")]
     if low >= high:
         return [Problem(field, f"given [{low:g}, {high:g}]; low must be below high")]
     if not low <= start <= high:

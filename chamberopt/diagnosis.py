@@ -12,6 +12,9 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
+# Pydantic ends the place of a fault with the alternative of a union that it tried; no field has such a name.
+ALTERNATIVES = ("int", "float", "str")
+
 
 @dataclass(frozen=True)
 class Problem:
@@ -70,7 +73,7 @@ def from_validation(error: ValidationError, model: type[BaseModel]) -> list[Prob
             problems += [Problem(".".join(filter(None, (prefix, p.field))), p.text) for p in cause.problems]
         else:
             problems.append(_explain(detail, model))
-    return problems
+    return list(dict.fromkeys(problems))  # a union says the same for each of its alternatives
 
 
 def not_found(path: Path, what: str, pattern: str) -> str:
@@ -224,6 +227,8 @@ def _shown(value: Any) -> str:
 
 def _explain(detail: ErrorDetails, model: type[BaseModel]) -> Problem:
     loc = detail["loc"]
+    if loc[-1] in ALTERNATIVES:
+        loc = loc[:-1]
     dotted = ".".join(str(step) for step in loc)
     table, field = _walk(model, loc)
     kind = detail["type"]

@@ -58,7 +58,7 @@ def _about(sweep: Sweep) -> dict[str, Any]:
         "format": FORMAT,
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "sweep": {
-            "objective": study.objective.name,
+            "objective": study.objective.goals[0],
             "vary": {name: list(bounds) for name, bounds in study.vary.items()},
             "method": plan.method,
             "count": plan.count,
@@ -180,4 +180,4 @@ def _marks(axes: Axes, sweep: Sweep, across: str, up: str) -> None:
 
 
 def _goal(sweep: Sweep) -> str:
-    return sweep.study.objective.name.replace("_", " ")
+    return sweep.study.objective.goals[0].replace("_", " ")

@@ -12,6 +12,7 @@ from chamberopt.disk import whole_file
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from chamberopt.estimate import Estimate
     from chamberopt.price.ladder import Ladder
     from chamberopt.studies.history import Trial
     from chamberopt.studies.study import StudyResult
@@ -80,6 +81,7 @@ def _convergence(axes: Axes, result: StudyResult) -> None:
     axes.set_xlabel("evaluation")
     axes.set_ylabel(_label(result))
     axes.set_xlim(0.5, result.trials[-1].number + 1.5)
+    axes.set_ylim(*reach([t.objective for t in (*search, *confirmed) if t.objective]))
     _plain(axes)
     axes.legend(fontsize=8, ncols=3, frameon=False, loc="lower right")
 
@@ -230,6 +232,18 @@ def _biases(axes: Axes, ladder: Ladder) -> None:
     axes.set_title("one knob off the reference (CPU time over its)", loc="left", fontsize=11)
     _plain(axes)
     axes.legend(fontsize=8, frameon=False, loc="lower left")
+
+
+def reach(goals: list[Estimate]) -> tuple[float, float]:
+    """From where to where an axis shows these: every value, and of each interval no more to a side than the span of the
+    values. The interval of a time that may be never would press all else into one line.
+    """
+    values, half_widths = np.array([goal.value for goal in goals]), np.array([goal.half_width for goal in goals])
+    span = float(np.ptp(values))
+    shown = np.minimum(half_widths, span) if span > 0.0 else np.where(np.isfinite(half_widths), half_widths, 0.0)
+    low, high = float((values - shown).min()), float((values + shown).max())
+    margin = 0.05 * (high - low) or 0.5
+    return low - margin, high + margin
 
 
 def _label(result: StudyResult) -> str:

@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from chamberopt.disk import whole_file
-from chamberopt.pictures import BLUE, GREEN, GREY, ORANGE
+from chamberopt.estimate import Estimate
+from chamberopt.pictures import BLUE, GREEN, GREY, ORANGE, reach
 
 if TYPE_CHECKING:
     from chamberopt.studies.findings import Findings
@@ -58,11 +59,16 @@ def front_picture(path: Path, result: StudyResult) -> None:
             key=lambda goals: goals[0].value,
         )
         x, y = ([goals[k].value for goals in shown] for k in (0, 1))
-        reach: dict[str, Any] = {}
+        bars: dict[str, Any] = {}
         if stage == "confirm":
-            reach = {"xerr": [goals[0].half_width for goals in shown], "yerr": [goals[1].half_width for goals in shown]}
+            bars = {"xerr": [goals[0].half_width for goals in shown], "yerr": [goals[1].half_width for goals in shown]}
         line = "--" if stage == "confirm" and there else ""
-        axes.errorbar(x, y, **reach, fmt=mark, ls=line, lw=1, ms=5 if reach else 3, color=colour, label=label)
+        axes.errorbar(x, y, **bars, fmt=mark, ls=line, lw=1, ms=5 if bars else 3, color=colour, label=label)
+    confirmed = [one.goals for one in every if one.stage == "confirm"]
+    bare = [tuple(Estimate(goal.value, 0.0) for goal in one.goals) for one in every if one.stage == "search"]
+    across, up = zip(*confirmed, *bare, strict=True)
+    axes.set_xlim(*reach(list(across)))
+    axes.set_ylim(*reach(list(up)))
     x_name, y_name = (name.replace("_", " ") for name in result.study.objective.goals)
     axes.set_xlabel(f"{x_name}, better to the right")
     axes.set_ylabel(f"{y_name}, better upwards")

@@ -411,7 +411,7 @@ class TestStudies:
             (("[35, 60]", "[10, 60]"), "the design cannot have chamber.height_mm = 10"),
             (("[35, 60]", "[35, 60, 70]"), "allowed: [low, high]"),
             (("[35, 60]", "35"), "allowed: [low, high]"),
-            (("chamber.height_mm", "chamber.facets"), "a whole number cannot vary"),
+            (("chamber.height_mm", "chamber.facets"), "a whole number cannot vary; leave it out"),
             (("chamber.height_mm", "shot.density_kg_m3"), "not set in this design"),
             (('"chamber.height_mm" = [35, 60]', ""), "vary"),
             (
@@ -421,6 +421,21 @@ class TestStudies:
             (("[vary]", "[constraints]\nmean_coverage = { minn = 1 }\n[vary]"), "did you mean 'min'?"),
             (("[vary]", "[constraints]\nmean_coverage = {}\n[vary]"), "give min, max or both"),
             (("[vary]", "[constraints]\nmean_coverage = { min = 1, max = 0 }\n[vary]"), "above max = 0"),
+            (
+                ("[vary]", "[constraints]\nmean_coverage = { min = 1.1 }\n[vary]"),
+                "mean_coverage: given min = 1.1, but it is from 0 to 1 in every candidate; change the limit",
+            ),
+            (("[vary]", "[constraints]\ntime_to_98_s = { max = -1 }\n[vary]"), "given max = -1, but it is from 0 to"),
+            (
+                ("[vary]", '[constraints]\n"chamber.height_mm" = { min = 61 }\n[vary]'),
+                "given min = 61, but it is from 35 to 60 in every candidate; change the limit or [vary]",
+            ),
+            (
+                ("[vary]", '[constraints]\n"shot.density_kg_m3" = { min = 61 }\n[vary]'),
+                "constraints.shot.density_kg_m3: not set in this design",
+            ),
+            (("[vary]", '[objective]\nsum = { shot_count = "a" }\n[vary]'), "given 'a'; allowed: { NAME = WEIGHT, "),
+            (("[vary]", '[optimizer]\nphases = "sobol"\n[vary]'), "allowed: a table [[optimizer.phases]] each"),
             (("[vary]", '[optimizer]\nalgorithm = "LN_BOBYQ"\n[vary]'), "did you mean 'LN_BOBYQA'?"),
             (("[vary]", "[optimizer]\nevaluations = 1\n[vary]"), "allowed: a whole number from 2"),
             (("[vary]", '[objective]\nname = "coverage"\n[vary]'), '"uniform_coverage"'),
@@ -431,6 +446,11 @@ class TestStudies:
     )
     def test_wrong_studies(self, study_file: Path, change: tuple[str, str], said: str) -> None:
         assert said in edited(study_file, change)
+
+    def test_one_fault_is_said_once(self, study_file: Path) -> None:
+        said = edited(study_file, ("[vary]", "[draft]\nfacets = [1]\n[vary]"))
+        assert ":3: draft.facets: given [1]; allowed: a number or a text (while searching" in said
+        assert "\n" not in said
 
     def test_study_and_its_design_at_once(self, study_file: Path) -> None:
         design_file = study_file.with_name("design.toml")

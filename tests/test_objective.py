@@ -93,7 +93,7 @@ def test_nothing_hit() -> None:
 
 
 def test_the_names_a_study_may_use_are_these() -> None:
-    assert tuple(METRICS) == config.METRICS
+    assert {name: (metric.lowest, metric.highest) for name, metric in METRICS.items()} == config.METRICS
     for name in OBJECTIVES:
         assert config.Objective(name=name).name == name
     with pytest.raises(InputError, match="uniform_coverage"):

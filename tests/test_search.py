@@ -10,6 +10,7 @@ import pytest
 from chamberopt.config import Limits, Study, load_design, load_study
 from chamberopt.errors import InputError
 from chamberopt.estimate import Estimate, estimate
+from chamberopt.pictures import reach
 from chamberopt.studies.constraints import shortfall, standing_of
 from chamberopt.studies.findings import found
 from chamberopt.studies.front import as_csv, compromises
@@ -194,7 +195,14 @@ def test_two_objectives_give_a_front(tmp_path: Path) -> None:
     places = (places - [35.0, 2.0]) / [25.0, 8.0]
     assert np.abs(places[:, 1] - 0.5).max() < 0.1
     assert np.ptp(places[:, 0]) > 0.3
-    assert as_csv(result).splitlines()[0].startswith("stage,on_front,standing,coverage_p05,coverage_p05_pm,intensity_")
+    header, *table = as_csv(result).splitlines()
+    assert header.startswith("stage,on_front,standing,coverage_p05,coverage_p05_pm,intensity_")
+    searched = [row.split(",") for row in table if row.startswith("search,")]
+    expected = [trial.goals for trial in result.trials if trial.stage == "search"]
+    assert [[float(x) for x in row[3:7]] for row in searched] == [
+        [number for goal in goals for number in (goal.value, goal.half_width)] for goals in expected
+    ]
+    assert all(np.isfinite(goal.half_width) for goals in expected for goal in goals)
     front_picture(tmp_path / "pareto.png", result)
     assert (tmp_path / "pareto.png").stat().st_size > 10000
     assert load_study(tmp_path / "out" / "study.toml").objective.pareto == ("coverage_p05", "intensity_uniformity")
@@ -243,3 +251,13 @@ def test_the_plainly_bad_get_few_replicas_and_close_calls_more(tmp_path: Path) -
     assert 8 in confirmed
     best, start = (one.evaluation.objective.pseudovalues for one in (result.best, result.start))
     assert len(best) == len(start) == max(confirmed)  # pair by pair, as the gain needs
+
+
+def test_an_interval_that_says_nothing_does_not_spoil_the_axis() -> None:
+    low, high = reach([Estimate(-43.0, 5e5), Estimate(-6.0, 4.0), Estimate(-12.0, np.inf)])
+    assert -150 < low < -43 - 37
+    assert 25 <= high < 60
+    assert reach([Estimate(1.0, np.inf)]) == (0.5, 1.5)
+    low, high = reach([Estimate(0.4, 0.1), Estimate(0.8, 0.1)])  # all of what says something
+    assert low < 0.3
+    assert high > 0.9

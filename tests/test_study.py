@@ -205,7 +205,7 @@ def test_the_start_is_confirmed_on_the_same_fresh_seeds(tmp_path: Path) -> None:
 def test_a_flat_function_gains_nothing(tmp_path: Path) -> None:
     result = run(study(evaluations=12), tmp_path, lambda *_: judged(np.array([0.5, 0.4, 0.6])))
     assert not result.improved
-    assert result.gain.value == 0.0
+    assert (result.gain.value, result.gain.half_width) == (0.0, 0.0)
     assert result.best is result.start
 
 

@@ -171,3 +171,21 @@ def test_a_sweep_that_was_stopped_goes_on(tmp_path: Path, kept: int) -> None:
     assert len(calls) == 9 - kept
     with pytest.raises(InputError, match=r"sweep\.count: was 9, is 5"):
         run_sweep(question, plan_sweep(question, 5, None), folder, SerialExecutor(), None, jobs.hill)
+
+
+def test_a_sweep_names_what_it_maximises(tmp_path: Path) -> None:
+    """A sum or a pair has no name of its own: the first goal is what its figures are of."""
+    question = study(objective={"sum": {"shot_count": 1.0}})
+    sweep = run_sweep(question, plan_sweep(question, 2, None), tmp_path, SerialExecutor(), None, jobs.hill)
+    write_sweep(tmp_path, sweep)
+    assert json.loads((tmp_path / "result.json").read_text())["sweep"]["objective"] == "1 shot_count"
+
+
+def test_another_plan_on_a_finished_sweep_is_refused_as_another(tmp_path: Path) -> None:
+    question = study()
+    folder = tmp_path / "map"
+    write_sweep(folder, run_sweep(question, plan_sweep(question, 3, None), folder, SerialExecutor(), None, jobs.hill))
+    with pytest.raises(InputError, match=r"sweep\.count: was 3, is 2"):
+        run_sweep(question, plan_sweep(question, 2, None), folder, SerialExecutor(), None, jobs.hill)
+    with pytest.raises(InputError, match="is finished"):
+        run_sweep(question, plan_sweep(question, 3, None), folder, SerialExecutor(), None, jobs.hill)

@@ -172,7 +172,7 @@ def sweep(
     best = found.best
     if best is not None and best.objective is not None:
         lines += ["", f"best, number {best.number}", *(f"{name:34}{x:12.5g}" for name, x in best.parameters.items())]
-        goal = {question.objective.name: best.objective, **best.metrics}
+        goal = {question.objective.goals[0]: best.objective, **best.metrics}
         lines += [row(name, estimate) for name, estimate in goal.items()]
     failed = [trial for trial in found.trials if trial.objective is None]
     reasons = [f"{len(failed)} candidates could not be simulated, the first for: {failed[0].reason}"] if failed else []

@@ -34,7 +34,7 @@ class Compromise:
 def compromises(result: StudyResult) -> list[Compromise]:
     """The candidates as confirmed, then those of the search; the start is the first of each."""
     names = result.study.objective.goals
-    searched = [trial for trial in result.trials if trial.stage == "search" and trial.objective]
+    searched = [trial for trial in result.trials if trial.stage == "search" and trial.goals]
     stages = {
         "confirm": [(one.parameters, one.goals, one.standing) for one in result.confirmed],
         "search": [(trial.parameters, trial.goals, "feasible" if trial.feasible else INFEASIBLE) for trial in searched],

@@ -151,7 +151,7 @@ class Record:
             return
         before, now = _read_json(self.folder / ASKED), self._asked
         if self.finished:  # its result stands, whatever program is asked for it
-            before, now = ({"study": one.get("study")} for one in (before, now))
+            before, now = ({key: one.get(key) for key in ("study", "sweep")} for one in (before, now))
         require_same(self.folder, before, now)
 
     def _read_trials(self) -> list[Trial]:

@@ -153,7 +153,7 @@ def go_on(
         start=start,
         confirmed=tuple(confirmed),
         best=best,
-        gain=paired_difference(best.evaluation.objective, start.evaluation.objective),
+        gain=Estimate(0.0, 0.0) if best is start else paired_difference(best.goals[0], start.goals[0]),
         seconds=record.seconds,
         target=target,
         findings=found(
