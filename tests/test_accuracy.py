@@ -10,7 +10,7 @@ from chamberopt.coverage import Tally
 from chamberopt.design import checked
 from chamberopt.errors import InputError
 from chamberopt.estimate import Estimate, estimate, independent_difference, paired_difference
-from chamberopt.figures import few_dents_note, surface
+from chamberopt.figures import _at_most, few_dents_note, surface
 from chamberopt.objective import METRICS, OBJECTIVES
 from chamberopt.patches import patches
 from chamberopt.replicas import LEAST_WATCHED, replicas_wanted
@@ -320,3 +320,37 @@ def test_real_simulations_hold_their_long_run_value() -> None:
         for name in held:
             held[name] += got[name].low <= truth_of[name].value <= got[name].high
     assert all(184 <= count <= 200 for count in held.values()), held
+
+
+def test_a_ball_that_bounces_on_its_spot_does_not_empty_the_mean() -> None:
+    """Few dents, and in each replica forty on one triangle, another each time: what one ball did says nothing
+    of how coverage varies, and the figures stay where Poisson dents alone would have them, or say that they may not.
+    """
+    rng, chamber = np.random.default_rng(3), patchwork(np.full(700, 1e-6))
+    rate = 0.6 / (0.03 * TREATMENT)  # dents per triangle and second: 45 % covered, 0.03 of a triangle a dent
+
+    def replica(spots: int) -> Tally:
+        dents = rng.poisson(rate * 2.0, 700)
+        dents[rng.choice(700, spots, replace=False)] += 40
+        return equal_dents(2.0, dents, 0.03e-6)
+
+    names = ("mean_coverage", "std_coverage")
+    mean, std = jackknife([replica(1) for _ in range(4)], [METRICS[n] for n in names], chamber, DESIGN)
+    assert abs(mean.value + np.expm1(-0.6)) < mean.half_width + 0.02
+    assert mean.value > 0.35
+    assert mean.half_width < 0.15
+    assert std.value < 0.3
+
+
+def test_what_variance_can_take_off_the_mean_is_bounded() -> None:
+    """exp(-x) of any x >= 0 has no larger mean than that of 0 or one other value with its mean and variance."""
+    rng = np.random.default_rng(5)
+    for _ in range(200):
+        x = rng.gamma(rng.uniform(0.05, 5.0), rng.uniform(0.1, 2.0), 20)
+        off, _ = _at_most(float(x.var()), float(np.exp(-x.mean())))
+        assert np.exp(-x).mean() - np.exp(-x.mean()) <= off + 1e-12
+    two = np.array([0.0, 0.0, 0.0, 1.7])
+    off, more = _at_most(float(two.var()), float(np.exp(-two.mean())))
+    assert off == pytest.approx(np.exp(-two).mean() - np.exp(-two.mean()))
+    assert more == pytest.approx(np.exp(-two).var())
+    assert _at_most(0.0, 0.5) == _at_most(1.0, 1.0) == (0.0, 0.0)
