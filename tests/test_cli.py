@@ -89,7 +89,7 @@ WRONG = [
     Wrong("bounds reversed", ("[28, 60]", "[60, 28]"), ("given [60, 28]", "low must be below high"), STUDY),
     Wrong("start out of bounds", ("[28, 60]", "[50, 60]"), ("starts at 45", "widen"), STUDY),
     Wrong("unknown algorithm", ('"auto"', '"BOBYQA"'), ("did you mean 'LN_BOBYQA'",), STUDY),
-    Wrong("no budget", ("evaluations = 15", "evaluations = 0"), ("evaluations: given 0", "from 2"), STUDY),
+    Wrong("no budget", ("evaluations = 20", "evaluations = 0"), ("evaluations: given 0", "from 2"), STUDY),
     Wrong("design not there", ("gear.toml", "gaer.toml"), (":2", "no such design file", "gear.toml?"), STUDY),
     Wrong(
         "unknown metric",
