@@ -22,9 +22,9 @@ from typing import Any
 ROOT = Path(__file__).parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "designs" / "parts")]
 
-EDGES = {"10k": (1.3, 2.5), "100k": (0.41, 0.7), "1M": (0.13, 0.2)}  # mm: of the teeth's and the shaft's triangles
+EDGES = {"10k": (1.3, 2.5), "100k": (0.39, 0.66)}  # mm: of the teeth's and the shaft's triangles
 RUNS = 3
-MOST_FOR_VTK = 200_000  # triangles: minutes beyond
+MOST_FOR_VTK = 20_000  # triangles: beyond, it is not tried
 
 
 def gear_file(folder: Path, size: str) -> Path:
