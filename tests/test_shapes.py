@@ -530,7 +530,9 @@ def test_points_of_a_profile_vary(tmp_path: Path) -> None:
     assert wider.chamber.profile_mm[1] == (33.0, 20.0)
     with pytest.raises(InputError, match=r"chamber\.profile_mm: begins at z = 2"):
         design.with_values({"chamber.profile_mm.0.1": 2.0})
-    with pytest.raises(InputError, match=r"chamber\.profile_mm: with a ceiling at 60 mm, but the part begins 70 mm above"):
+    with pytest.raises(
+        InputError, match=r"chamber\.profile_mm: with a ceiling at 60 mm, but the part begins 70 mm above"
+    ):
         build_chamber(design.with_values({"chamber.sonotrode_distance_mm": 70.0}))
 
 
