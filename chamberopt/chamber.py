@@ -208,6 +208,11 @@ def _only_reachable(part: Part, room: Surface, traced: Piece, design: Design) ->
     )
 
 
+def hidden_share(part: Part, exposed: np.ndarray) -> float:
+    """The share of the target's area that is outside the cavity; exposed (m,) m²: what of each triangle is not."""
+    return float(1.0 - exposed[part.target].sum() / part.area[part.target].sum())
+
+
 def _hidden_target_note(part: Part, exposed: np.ndarray) -> list[str]:
     """How much of the target no ball can reach, because it lies outside the cavity. InputError when it is all."""
     if not (exposed[part.target] > 0.0).any():
@@ -215,7 +220,7 @@ def _hidden_target_note(part: Part, exposed: np.ndarray) -> list[str]:
             f"part.target: none of its {int(part.target.sum())} triangles bounds the cavity, so no shot "
             "reaches it; check part.rotate_deg (which side faces the sonotrode) and the sizes in [chamber]"
         )
-    hidden = 1.0 - exposed[part.target].sum() / part.area[part.target].sum()
+    hidden = hidden_share(part, exposed)
     if hidden < 1e-3:
         return []
     return [

@@ -196,23 +196,17 @@ def _variance_within(replicas: Sequence[Tally], ground: Surface, chamber: Chambe
     its dents on one triangle, which says nothing of where dents fall in the next. Of a single replica, of all pairs.
     """
     on, n = ground.patch >= 0, len(replicas)
-    scale = ground.stretch / n
-    each = np.array([np.bincount(replica.dent_triangle, replica.dent_area, len(on))[on] for replica in replicas])
-    if n > 1:
-        own, scale_squared = each, scale**2 * n / (n - 1)
-    else:
-        alone = np.bincount(replicas[0].dent_triangle, replicas[0].dent_area ** 2, len(on))[on]
-        own, scale_squared = np.sqrt(alone)[None], scale**2
     exposed, patch, count = chamber.exposed_area[on], ground.patch[on], len(ground.area)
-    triangles = ((each.sum(axis=0) ** 2 - (own**2).sum(axis=0)) / exposed).sum()
+    each = np.array([np.bincount(replica.dent_triangle, replica.dent_area, len(on))[on] for replica in replicas])
     dented = np.array([np.bincount(patch, one, count) for one in each])
-    alike = np.array([np.bincount(patch, one, count) for one in own]) ** 2 if n > 1 else _summed(patch, own**2, count)
-    together = ((dented.sum(axis=0) ** 2 - alike.sum(axis=0)) / ground.area).sum()
-    return max(0.0, float(scale_squared * (triangles - together) / ground.area.sum()))
-
-
-def _summed(patch: np.ndarray, rows: np.ndarray, count: int) -> np.ndarray:
-    return np.array([np.bincount(patch, one, count) for one in rows])
+    if n > 1:
+        own, own_together, pairs = (each**2).sum(axis=0), (dented**2).sum(axis=0), n / (n - 1)
+    else:
+        own = np.bincount(replicas[0].dent_triangle, replicas[0].dent_area ** 2, len(on))[on]
+        own_together, pairs = np.bincount(patch, own, count), 1.0
+    triangles = ((each.sum(axis=0) ** 2 - own) / exposed).sum()
+    together = ((dented.sum(axis=0) ** 2 - own_together) / ground.area).sum()
+    return max(0.0, float((ground.stretch / n) ** 2 * pairs * (triangles - together) / ground.area.sum()))
 
 
 def few_dents_note(replicas: Sequence[Tally], ground: Surface) -> tuple[str, ...]:

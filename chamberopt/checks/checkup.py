@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chamberopt.chamber import TAG_PART, TAG_SONOTRODE, TAG_WALL, turning_axis
+from chamberopt.chamber import TAG_PART, TAG_SONOTRODE, TAG_WALL, hidden_share, turning_axis
 from chamberopt.checks.gaps import gap_warnings, pocket_warnings, target_warnings
 from chamberopt.checks.ledges import ledges
 from chamberopt.checks.places import CEILING, SIDE_WALL, on_target, surface_names
@@ -107,8 +107,7 @@ def warnings(design: Design, chamber: Chamber, found: Reach | None = None) -> li
             f"shot.mass_g = {shot.mass_g:g} is rounded to {shot.count} whole ball(s) of "
             f"{shot.ball_mass * 1e6:.3g} mg: the charge differs by more than 5 %"
         )
-    part = chamber.part
-    hidden = 1.0 - chamber.exposed_area[part.target].sum() / part.area[part.target].sum()
+    hidden = hidden_share(chamber.part, chamber.exposed_area)
     if hidden > MUCH_HIDDEN:
         said.append(
             f"{hidden:.0%} of the target's area is outside the chamber and counts as not covered: enlarge the chamber, "

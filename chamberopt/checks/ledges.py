@@ -77,9 +77,7 @@ def _in_hollows(chamber: Chamber, upward: np.ndarray, downward: np.ndarray) -> n
     links = coo_array((np.ones(alike.sum(), dtype=bool), (one[alike], two[alike])), shape=(count, count))
     plateaus, plateau = connected_components(links, directed=False)
     bottom = np.ones(plateaus, dtype=bool)
-    lower = height[two] < height[one] - LEVEL
-    bottom[plateau[one[lower]]] = False
-    bottom[plateau[two[height[one] < height[two] - LEVEL]]] = False
+    bottom[plateau[one[height[two] < height[one] - LEVEL]]] = False  # each edge is there both ways round
     bottom[plateau[chamber.triangles[downward | (chamber.tags == TAG_SONOTRODE)]]] = False
     return np.asarray(upward & bottom[plateau[chamber.triangles]].any(axis=1))
 
