@@ -21,8 +21,9 @@ import numpy as np
 from chamberopt.analytic import described
 from chamberopt.coverage import Tally
 from chamberopt.dents import Samples, few_points_note, marked_share, sample_points
-from chamberopt.estimate import Estimate, estimate
+from chamberopt.estimate import Estimate, estimate, student
 from chamberopt.figures import coverage_figures, few_dents_note, surface, time_to_98
+from chamberopt.hits import Hits
 from chamberopt.intensity import intensity_uniformity
 from chamberopt.objective import METRICS, Metric, Objective, objective, on_target
 from chamberopt.process import chamber_mesh
@@ -53,8 +54,9 @@ class Evaluation:
     collisions: numbers of simulated collisions by kind, warm-up included · notes: what to know before
     trusting it · stopped_by: what ended it, "replicas" (a number was asked for), "accuracy" or "most_replicas" ·
     analytic: in an exact cavity, not the chamber's mesh ·
-    marked (m,): share of each part triangle inside dents, NaN unexposed, and against_time: (time s, mean coverage of
-    the target) pairs; both only where every dent is marked.
+    hits: of each replica, its impacts one by one ·
+    marked (m,): share of each part triangle inside dents, NaN unexposed, marked_interval (m,): width of its 95 %
+    interval, and against_time: (time s, mean coverage of the target) pairs; all only where every dent is marked.
     """
 
     objective_name: str
@@ -68,7 +70,9 @@ class Evaluation:
     stream: str = "search"
     stopped_by: str = "replicas"
     analytic: bool = False
+    hits: tuple[Hits, ...] = ()
     marked: np.ndarray | None = None
+    marked_interval: np.ndarray | None = None
     against_time: tuple[tuple[float, Estimate], ...] = ()
 
 
@@ -192,7 +196,9 @@ def evaluate(
         stream=stream,
         stopped_by=stopped_by,
         analytic=cavity is not None,
+        hits=tuple(replica.hits for replica in done),
         marked=None if samples is None else np.mean(_shares(done, samples, chamber, design), axis=0),
+        marked_interval=None if samples is None else _width(_shares(done, samples, chamber, design)),
         against_time=() if samples is None else _against_time(done, samples, chamber, design),
     )
 
@@ -216,6 +222,14 @@ def _metrics(done: Sequence[Replica], chamber: Chamber, design: Design, samples:
 def _shares(done: Sequence[Replica], samples: Samples, chamber: Chamber, design: Design) -> list[np.ndarray]:
     """Marked share of each part triangle at the treatment time, (m,), a replica each."""
     return _shares_at(done, samples, chamber, design.process.treatment_time)
+
+
+def _width(shares: Sequence[np.ndarray]) -> np.ndarray:
+    """Width (m,) of the 95 % interval of the mean of these (m,), each a replica's; NaN where it has only one."""
+    n = len(shares)
+    if n < 2:
+        return np.full(len(shares[0]), np.nan)
+    return np.asarray(2.0 * student(n - 1) * np.std(shares, axis=0, ddof=1) / math.sqrt(n))
 
 
 def _shares_at(done: Sequence[Replica], samples: Samples, chamber: Chamber, at: float) -> list[np.ndarray]:

@@ -20,8 +20,9 @@ from chamberopt.coverage import Tally
 from chamberopt.disk import whole_file
 from chamberopt.errors import InputError
 from chamberopt.estimate import Estimate
+from chamberopt.hits import Hits
 
-CLASSES = {kind.__name__: kind for kind in (Evaluation, Estimate, Tally)}
+CLASSES = {kind.__name__: kind for kind in (Evaluation, Estimate, Hits, Tally)}
 
 
 def save_evaluation(path: Path, evaluation: Evaluation) -> None:

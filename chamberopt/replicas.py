@@ -14,6 +14,7 @@ from chamberopt.analytic import on_chamber
 from chamberopt.coverage import Tally, tally
 from chamberopt.dents import Samples, first_marked
 from chamberopt.errors import WorkerLostError
+from chamberopt.hits import Hits, hits_on_part
 from chamberopt.process import build_scene, replica_seed
 from chamberopt.stuck import Stuck, share_on_the_spot, still
 
@@ -41,6 +42,7 @@ class Replica:
     stuck: Stuck | None
     on_the_spot: float
     first_marked: np.ndarray | None
+    hits: Hits
 
 
 def simulate_replicas(
@@ -91,4 +93,5 @@ def simulate_replica(
         on_the_spot=share_on_the_spot(result.balls.velocities),
         stuck=still(result.resting, len(result.balls), shot.diameter, chamber, design.effects.part_turn is not None),
         first_marked=None if samples is None else first_marked(samples, impacts, chamber, design),
+        hits=hits_on_part(impacts, chamber, design),
     )

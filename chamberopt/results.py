@@ -15,10 +15,13 @@ from chamberopt.design import checked
 from chamberopt.disk import new_folder, write_text
 from chamberopt.errors import InputError
 from chamberopt.estimate import Estimate
+from chamberopt.hits import HITS, save_hits, sorted_hits
 from chamberopt.objective import METRICS, exposed_target
+from chamberopt.quantities import per_triangle
 from chamberopt.studies import front
 from chamberopt.studies.history import HISTORY, as_csv, read_history
 from chamberopt.studies.record import RESULT, is_study_folder
+from chamberopt.timeline import against_time
 from chamberopt.versions import versions
 
 if TYPE_CHECKING:
@@ -59,7 +62,7 @@ def write_simulation(
 
     advice: why its effects were chosen, if the design left them to us.
 
-    design.toml · result.json · coverage.vtp · chamber.stl, chamber.vtp · coverage.png.
+    design.toml · result.json · coverage.vtp · hits.npz · chamber.stl, chamber.vtp · coverage.png.
     """
     folder = new_folder(folder)
     save_design(design, folder / "design.toml")
@@ -72,7 +75,7 @@ def write_study(folder: str | Path, study_result: StudyResult, advice: Sequence[
     """Complete the folder of a study that has ended; returns remarks, such as why a picture was skipped.
 
     Beside design.toml, study.toml and history.jsonl, which run_study wrote: best.toml · result.json ·
-    history.csv · convergence.png · the best's coverage.vtp, chamber.stl, chamber.vtp, coverage.png ·
+    history.csv · convergence.png · the best's coverage.vtp, hits.npz, chamber.stl, chamber.vtp, coverage.png ·
     before_after.png · slices.png where there is enough to fit · pareto.csv and pareto.png of two objectives · start/, a
     results folder of the start as confirmed on the same seeds. result.json is the last: a study that is stopped while
     it writes has none, and writes all of them again.
@@ -150,7 +153,9 @@ def _write_candidate(folder: Path, design: Design, chamber: Chamber, evaluation:
     """Write the surfaces of one candidate; what there is to say of it, for result.json."""
     from chamberopt.viewer import COVERAGE, write_chamber, write_coverage
 
-    write_coverage(folder / COVERAGE, chamber, evaluation.total, design.process.treatment_time, evaluation.marked)
+    write_coverage(folder / COVERAGE, chamber, per_triangle(design, chamber, evaluation))
+    if evaluation.hits:
+        save_hits(folder / HITS, sorted_hits(evaluation.hits, len(chamber.part.triangles)))
     write_chamber(folder, chamber)
     return _about(folder, design, chamber, evaluation)
 
@@ -178,16 +183,12 @@ def _share(estimate: Estimate) -> str:
 
 def _about(folder: Path, design: Design, chamber: Chamber, evaluation: Evaluation) -> dict[str, Any]:
     target = exposed_target(chamber)
-    curve = [
-        {"time_s": at, "mean_coverage": mean.value, "half_width": mean.half_width}
-        for at, mean in evaluation.against_time
-    ]
     return {
         "format": FORMAT,
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "objective": {"name": evaluation.objective_name, **_plain(evaluation.objective, "")},
         "metrics": {name: _plain(value, METRICS[name].unit) for name, value in evaluation.metrics.items()},
-        **({"coverage_against_time": curve} if curve else {}),
+        "coverage_against_time": against_time(design, chamber, evaluation),
         "seed": design.process.seed,
         "stream": evaluation.stream,
         "replicas": len(evaluation.replicas),

@@ -1,6 +1,7 @@
 """Scene in, Result out: sets up the columns, runs the compiled event loop, checks what must never break."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -18,7 +19,7 @@ from sim_core.effects.restitution import Restitution, checked_restitution
 from sim_core.effects.sonotrodes import Waves, new_waves, whole_periods
 from sim_core.effects.turn import Turning, angle_now, checked_axle, checked_turn
 from sim_core.effects.vibration import Wave, checked_waves
-from sim_core.errors import SimulationError
+from sim_core.errors import SceneError, SimulationError
 from sim_core.events import DONE, PAGE_FULL, STORM, TOO_FAST, advance
 from sim_core.flight import WINDOW
 from sim_core.grounded import hide_all
@@ -57,26 +58,43 @@ class Collisions:
 
 @dataclass(frozen=True)
 class Result:
-    """The recorded impacts, the balls at the end, counts of the collisions, and who lies still at the end."""
+    """The recorded impacts, the balls at the end, counts of the collisions, and who lies still at the end.
+
+    ``frames`` (f, n, 3) [m]: where the balls' centres were at the times asked for.
+    """
 
     impacts: ImpactLog
     balls: Balls
     collisions: Collisions
     resting: Resting
+    frames: np.ndarray
 
 
-def simulate(scene: Scene) -> Result:
+def simulate(scene: Scene, frames: Sequence[float] | np.ndarray = ()) -> Result:
     """Plays the scene from its start to the end of its duration.
 
-    Releases the GIL while it runs; the same scene gives the same bits on any thread. Raises SimulationError when a
-    ball is lost, jams, or stops being a number.
+    ``frames`` (f,) [s since the end of the warm-up], ascending: when to note where the balls are, each on its flight at
+    that very time. It changes no bit of the rest. Releases the GIL while it runs; the same scene gives the same bits
+    on any thread. Raises SimulationError when a ball is lost, jams, or stops being a number.
     """
     run = _Run(scene)
     run.play(scene.warmup, record=False)
-    run.play(scene.warmup + scene.duration, record=True)
+    seen = run.play(scene.warmup + scene.duration, record=True, frames=_checked_frames(frames, scene))
     balls = run.balls()
     still = resting(run.footing, run.ground, balls.positions, run.centre, scene.warmup)
-    return Result(impact_log(run.pages, run.centre), balls, Collisions(*(int(n) for n in run.count)), still)
+    return Result(impact_log(run.pages, run.centre), balls, Collisions(*(int(n) for n in run.count)), still, seen)
+
+
+def _checked_frames(frames: Sequence[float] | np.ndarray, scene: Scene) -> np.ndarray:
+    """Frame times on the scene's clock [s]. SceneError for what is not in its duration, or in no order."""
+    times = np.asarray(frames, dtype=float).reshape(-1)
+    if not np.isfinite(times).all() or (np.diff(times) <= 0.0).any():
+        raise SceneError("frames: not ascending times; give each once, in order")
+    if len(times) and not 0.0 <= times[0] <= times[-1] <= scene.duration:
+        raise SceneError(
+            f"frames: from {times[0]:g} to {times[-1]:g} s; allowed: 0 to the duration, {scene.duration:g} s"
+        )
+    return scene.warmup + times
 
 
 _ground = lru_cache(maxsize=8)(build_ground)  # replicas of one chamber share it
@@ -141,15 +159,21 @@ class _Run:
         hide_all(self.footing, crowd)
         return Shot(self.motion, crowd)
 
-    def play(self, until: float, record: bool) -> None:
-        """Advance to ``until`` [s], checking containment on the way."""
+    def play(self, until: float, record: bool, frames: Sequence[float] | np.ndarray = ()) -> np.ndarray:
+        """Advance to ``until`` [s], checking containment on the way; positions (f, n, 3) [m] at ``frames`` [s]."""
         page = new_page(self._recorded_tags() if record else np.zeros(MAX_TAGS, dtype=np.bool_))
         origin = self.scene.warmup
         start = self.now[0] + self.now[1] * self.window
-        for stop in np.linspace(start, until, 1 + max(1, math.ceil((until - start) / CHECK_EVERY)))[1:]:
+        checks = np.linspace(start, until, 1 + max(1, math.ceil((until - start) / CHECK_EVERY)))[1:]
+        due, noted, seen = set(checks), set(frames), []
+        for stop in sorted({*checks, *frames}):
             self._advance(Clock(self.now, self.window, float(stop), origin), page)
-            self._require_sound()
+            if stop in noted:
+                seen.append(self._states()[0])
+            if stop in due:
+                self._require_sound()
         self._turn(page)
+        return np.array(seen).reshape(-1, len(self.motion), 3)
 
     def _recorded_tags(self) -> np.ndarray:
         record = np.zeros(MAX_TAGS, dtype=np.bool_)

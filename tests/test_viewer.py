@@ -10,15 +10,26 @@ import pytest
 import trimesh
 from matplotlib.image import imread
 
-from chamberopt import viewer
 from chamberopt.chamber import build_chamber
 from chamberopt.coverage import coverage_at
 from chamberopt.errors import InputError
-from chamberopt.viewer import coverage_picture, inspect, part_picture, read_surface, write_chamber, write_coverage
+from chamberopt.quantities import per_triangle
+from chamberopt.viewer import (
+    apart,
+    coverage_picture,
+    inspect,
+    part_picture,
+    read_surface,
+    why_no_pictures,
+    window,
+    write_chamber,
+    write_coverage,
+)
+from chamberopt.viewer.part import averaged
 from tests.synthetic import plate_design, poisson_evaluation
 
 DESIGN = plate_design()
-needs_opengl = pytest.mark.skipif(viewer.why_no_pictures() is not None, reason="no OpenGL library")
+needs_opengl = pytest.mark.skipif(why_no_pictures() is not None, reason="no OpenGL library")
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +38,7 @@ def case(tmp_path_factory: pytest.TempPathFactory) -> tuple:
     folder.mkdir()
     chamber = build_chamber(DESIGN)
     evaluation = poisson_evaluation(DESIGN, chamber)
-    write_coverage(folder / "coverage.vtp", chamber, evaluation.total, DESIGN.process.treatment_time)
+    write_coverage(folder / "coverage.vtp", chamber, per_triangle(DESIGN, chamber, evaluation))
     write_chamber(folder, chamber)
     return folder, chamber, evaluation
 
@@ -97,7 +108,7 @@ def test_side_by_side(case: tuple, tmp_path: Path) -> None:
 
 def test_screenshot_without_a_display(case: tuple, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     drawn: list = []
-    monkeypatch.setattr(viewer, "coverage_picture", lambda *arguments: drawn.append(arguments))
+    monkeypatch.setattr(window, "coverage_picture", lambda *arguments: drawn.append(arguments))
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     inspect(case[0], tmp_path / "shot.png")
@@ -109,7 +120,7 @@ def test_screenshot_without_a_display(case: tuple, tmp_path: Path, monkeypatch: 
         inspect(case[0], tmp_path / "shot.bmp")
     with pytest.raises(InputError, match="does not exist"):
         inspect(case[0], tmp_path / "nowhere" / "shot.png")
-    monkeypatch.setattr(viewer, "coverage_picture", lambda *_: "shot.png skipped: install this")
+    monkeypatch.setattr(window, "coverage_picture", lambda *_: "shot.png skipped: install this")
     with pytest.raises(InputError, match="install this"):
         inspect(case[0], tmp_path / "shot.png")
 
@@ -117,8 +128,8 @@ def test_screenshot_without_a_display(case: tuple, tmp_path: Path, monkeypatch: 
 def test_without_an_opengl_library_one_line_says_what_to_install(
     case: tuple, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(viewer.sys, "platform", "linux")
-    monkeypatch.setattr(viewer, "_offscreen_window", lambda: None)
+    monkeypatch.setattr(apart.sys, "platform", "linux")
+    monkeypatch.setattr(apart, "offscreen_window", lambda: None)
     remark = coverage_picture([case[0]], ["plate"], tmp_path / "coverage.png")
     assert remark is not None
     assert "coverage.png skipped" in remark
@@ -148,13 +159,13 @@ def test_averaging_keeps_the_mean_and_does_not_cross_edges() -> None:
     normal = np.repeat([[0, 0, 1.0], [0, 0, -1.0]], 900, axis=0)
     truth = np.repeat([1.0, 3.0], 900)
     dents = rng.poisson(truth)
-    shown, reach = viewer._averaged(centre, normal, dents.astype(float), np.ones(1800), dents)
+    shown, reach = averaged(centre, normal, dents.astype(float), np.ones(1800), dents)
     assert 1.0 < reach < 3.0
     for side in (slice(0, 900), slice(900, 1800)):
         assert shown[side].std() < 0.5 * dents[side].std()
         assert shown[side].mean() == pytest.approx(truth[side].mean(), rel=0.1)
     plenty = np.full(1800, 100)
-    np.testing.assert_array_equal(viewer._averaged(centre, normal, truth, np.ones(1800), plenty)[0], truth)
+    np.testing.assert_array_equal(averaged(centre, normal, truth, np.ones(1800), plenty)[0], truth)
 
 
 def test_importing_chamberopt_does_not_import_pyvista() -> None:

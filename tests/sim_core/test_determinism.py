@@ -15,6 +15,7 @@ from sim_core import (
     Restitution,
     Result,
     Scene,
+    SceneError,
     Vibration,
     pack_balls,
     simulate,
@@ -80,3 +81,27 @@ def test_stopping_and_going_on_changes_nothing() -> None:
     late = whole.impacts.time > 0.2
     np.testing.assert_array_equal(whole.impacts.triangle[late], warm.impacts.triangle)
     np.testing.assert_allclose(whole.impacts.time[late] - 0.2, warm.impacts.time, atol=1e-15)
+
+
+def test_frames_show_the_balls_on_their_flights_and_change_nothing() -> None:
+    """A ball that nothing meets falls as a parabola; and every impact of a scene that is watched is the same bits."""
+    scene = small_scene(0.2)
+    times = np.linspace(0.0, scene.duration, 301)
+    plain, watched = simulate(scene), simulate(scene, frames=times)
+    for column in ("time", "ball", "triangle", "position", "velocity", "normal_speed"):
+        np.testing.assert_array_equal(getattr(plain.impacts, column), getattr(watched.impacts, column))
+    np.testing.assert_array_equal(plain.balls.positions, watched.balls.positions)
+    assert plain.frames.shape == (0, len(scene.balls), 3)
+    np.testing.assert_array_equal(watched.frames[-1], watched.balls.positions)
+
+    # The frame at an impact has the ball where the log has it.
+    rows = np.flatnonzero(np.diff(plain.impacts.time, append=np.inf) > 1e-9)[10:20]
+    at = simulate(scene, frames=plain.impacts.time[rows]).frames
+    there = at[np.arange(len(rows)), plain.impacts.ball[rows]]
+    np.testing.assert_allclose(there, plain.impacts.position[rows], atol=1e-12)
+
+
+@pytest.mark.parametrize("frames", [[-1e-9], [0.0, 0.0], [2.0, 1.0], [1e9], [np.nan]])
+def test_frames_outside_the_duration_or_out_of_order_are_refused(frames: list[float]) -> None:
+    with pytest.raises(SceneError, match="frames"):
+        simulate(small_scene(0.2), frames=frames)

@@ -1,0 +1,49 @@
+"""Coverage against peening time, mean and poorest twentieth, with intervals: for result.json."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chamberopt.figures import coverage_figures, surface
+
+if TYPE_CHECKING:
+    from chamberopt.accuracy import Evaluation
+    from chamberopt.chamber import Chamber
+    from chamberopt.config import Design
+
+POINTS = 20
+FARTHEST = 5.0  # treatment times: what is beyond is rather another treatment
+
+
+def against_time(design: Design, chamber: Chamber, evaluation: Evaluation) -> list[dict[str, Any]]:
+    """Rows of time_s, mean_coverage, half_width, p05_coverage, p05_half_width, from the first moments to the end.
+
+    From dent rates: to where 98 % is reached, the treatment time at least, FARTHEST times it at most. Where every dent
+    is marked: to the treatment's end, the mean alone.
+    """
+    if evaluation.against_time:
+        return [
+            {"time_s": at, "mean_coverage": mean.value, "half_width": mean.half_width}
+            for at, mean in evaluation.against_time
+        ]
+    treatment = design.process.treatment_time
+    full = evaluation.metrics["time_to_98_s"].value
+    end = float(np.clip(1.1 * full, treatment, FARTHEST * treatment))
+    times = sorted({treatment, *(end * np.arange(1, POINTS + 1) / POINTS).tolist()})
+    rows = []
+    for at in times:
+        then = design.with_values({"process.treatment_time_s": at})
+        found = coverage_figures(evaluation.replicas, chamber, surface(evaluation.replicas, chamber, then))
+        mean, poorest = found["mean_coverage"], found["p05_coverage"]
+        rows.append(
+            {
+                "time_s": at,
+                "mean_coverage": mean.value,
+                "half_width": mean.half_width,
+                "p05_coverage": poorest.value,
+                "p05_half_width": poorest.half_width,
+            }
+        )
+    return rows

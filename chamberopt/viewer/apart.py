@@ -1,0 +1,66 @@
+"""Drawing in a process of its own: where an OpenGL library is there but its driver is not, VTK does not raise, it takes
+the process down, and a picture must never cost the results.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from chamberopt.errors import InputError
+
+INSTALL = "install OpenGL for machines without a display (Debian: apt install libegl1 libgl1-mesa-dri)"
+
+
+def why_no_pictures() -> str | None:
+    """None when pictures can be tried on this machine, else one line that says what is missing."""
+    if not sys.platform.startswith("linux") or offscreen_window():
+        return None
+    return f"no OpenGL library found: {INSTALL}"
+
+
+def offscreen_window() -> str | None:
+    """VTK's name for the window that needs no display, by what is installed."""
+    windows = (("libEGL.so.1", "vtkEGLRenderWindow"), ("libOSMesa.so.8", "vtkOSOpenGLRenderWindow"))
+    for library, window in windows:
+        try:
+            ctypes.CDLL(library)
+        except OSError:
+            continue
+        return window
+    return None
+
+
+def picture_path(picture: str | Path) -> Path:
+    """Where --screenshot may write. InputError for what is no .png, or in no folder."""
+    path = Path(picture)
+    if path.suffix.lower() != ".png":
+        raise InputError(f"--screenshot {path}: pictures are written as .png; give such a name")
+    if not path.resolve().parent.is_dir():
+        raise InputError(f"--screenshot {path}: the folder does not exist; make it first")
+    return path
+
+
+def drawn_apart(job: dict[str, Any], picture: str | Path) -> str | None:
+    """Does a drawing job in a process of its own. None, or one line saying why there is no picture."""
+    missing = why_no_pictures()
+    if missing:
+        return f"{Path(picture).name} skipped: {missing}"
+    job = {**job, "picture": str(picture)}
+    environment = dict(os.environ)
+    window = offscreen_window()
+    if sys.platform.startswith("linux") and window:
+        environment["VTK_DEFAULT_OPENGL_WINDOW"] = window
+        environment.pop("DISPLAY", None)
+    command = [sys.executable, "-m", "chamberopt.viewer", json.dumps(job)]
+    run = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=600, check=False)
+    if run.returncode == 0 and Path(picture).is_file():
+        return None
+    if run.returncode == 2:
+        raise InputError(run.stderr.strip().splitlines()[-1])
+    return f"{Path(picture).name} skipped: drawing failed (status {run.returncode}); {INSTALL}"

@@ -1,0 +1,86 @@
+"""A part ready to be drawn: its target with one quantity on it, and the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from chamberopt.errors import InputError
+from chamberopt.quantities import QUANTITIES, Quantity
+from chamberopt.viewer.surfaces import Surface
+
+# Pictures average coverage over so many dents or more where triangles got fewer: single dents would be confetti.
+DENTS_SHOWN = 15
+# ... but over no more than this share of the target's size, so that a picture never hides a pattern.
+WIDEST = 0.06
+
+
+class Part:
+    """A part ready to be drawn: `target` with one quantity as cell data "shown", in the unit shown, and the `rest`.
+
+    reach [mm]: how far around a triangle coverage is averaged, 0 where it is not.
+    """
+
+    def __init__(self, surface: Surface, quantity: Quantity = QUANTITIES["coverage"]) -> None:
+        if quantity.column not in surface.cell_data:
+            raise InputError(f"coverage.vtp has no {quantity.column}: an older result; simulate again")
+        wanted = (surface["target"] > 0) & (surface["exposed_area_mm2"] > 0)
+        self.quantity = quantity
+        self.target = surface.extract_cells(wanted).extract_surface(algorithm="dataset_surface")
+        self.rest = surface.extract_cells(~wanted)
+        self.reach = 0.0
+        if quantity.name != "coverage":
+            self.target["shown"] = quantity.factor * np.asarray(self.target[quantity.column])
+            return
+        density, self.reach = averaged(
+            np.asarray(self.target.cell_centers().points),
+            np.asarray(self.target.cell_normals),
+            np.asarray(self.target["dent_density"]),
+            np.asarray(self.target["exposed_area_mm2"]),
+            np.asarray(self.target["dents"]),
+        )
+        self.target["shown"] = -100.0 * np.expm1(-density)
+
+
+def averaged(
+    centre: np.ndarray, normal: np.ndarray, density: np.ndarray, area: np.ndarray, dents: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """Dent density averaged over discs of one radius [mm], just wide enough to hold DENTS_SHOWN dents; and that radius.
+
+    Only over neighbours that face the same way, so that a flank is not mixed with the next one. 0.0: as it is.
+    """
+    if not len(centre) or np.mean(dents) >= DENTS_SHOWN:
+        return density, 0.0
+    from scipy.spatial import cKDTree
+
+    per_mm2 = max(float(dents.sum() / area.sum()), 1e-12)
+    size = float(np.linalg.norm(np.ptp(centre, axis=0)))
+    reach = min(np.sqrt(DENTS_SHOWN / (np.pi * per_mm2)), WIDEST * size)
+    pairs = cKDTree(centre).query_pairs(reach, output_type="ndarray")
+    i, j = pairs[np.einsum("ij,ij->i", normal[pairs[:, 0]], normal[pairs[:, 1]]) > 0.7].T
+    sums, areas = density * area, area.astype(float).copy()
+    for here, there in ((i, j), (j, i)):
+        sums = sums + np.bincount(here, (density * area)[there], len(area))
+        areas = areas + np.bincount(here, area[there], len(area))
+    return sums / areas, float(reach)
+
+
+def colour_range(parts: Sequence[Part]) -> tuple[float, float]:
+    """Round limits that hold nearly all of what is shown on every part."""
+    values = np.concatenate([part.target["shown"] for part in parts])
+    values = values[np.isfinite(values)]
+    if parts[0].quantity.unit != "%":
+        return _round_range(*np.percentile(values, [1.0, 99.0])) if len(values) else (0.0, 1.0)
+    low, high = np.percentile(values, [1.0, 99.5]) if len(values) else (0.0, 100.0)
+    step = 5.0 if high - low < 20.0 else 10.0
+    low = max(0.0, step * np.floor(low / step))
+    return low, min(100.0, max(low + step, step * np.ceil(high / step)))
+
+
+def _round_range(low: float, high: float) -> tuple[float, float]:
+    """Limits outward to round numbers; 0 where it is not far."""
+    span = high - low if high > low else max(abs(high), 1e-12)
+    step = 10.0 ** np.floor(np.log10(span)) / 2.0
+    low = 0.0 if 0.0 <= low < 0.4 * high else step * np.floor(low / step)
+    return float(low), float(max(step * np.ceil(high / step), low + step))

@@ -1,0 +1,40 @@
+"""Coverage of one result, or of several side by side on one colour scale, as a .png."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from chamberopt.disk import whole_file
+from chamberopt.viewer.apart import drawn_apart
+from chamberopt.viewer.part import Part, colour_range
+from chamberopt.viewer.scene import in_chamber, near
+from chamberopt.viewer.surfaces import CHAMBER, COVERAGE, pyvista, read_surface
+
+
+def coverage_picture(folders: Sequence[str | Path], titles: Sequence[str], picture: str | Path) -> str | None:
+    """Draw the coverage of one result, or of several side by side on one colour scale, into a .png.
+
+    folders: each with coverage.vtp and chamber.vtp. Returns None, or one line saying why there is no picture.
+    """
+    return drawn_apart({"draw": "coverage", "folders": [str(f) for f in folders], "titles": list(titles)}, picture)
+
+
+def draw(job: dict[str, Any]) -> None:
+    """Each result twice: in its chamber, and the target from near; several results side by side."""
+    folders = [Path(folder) for folder in job["folders"]]
+    parts = [Part(read_surface(folder / COVERAGE)) for folder in folders]
+    chambers = [read_surface(folder / CHAMBER) for folder in folders]
+    limits = colour_range(parts)
+    single = len(folders) == 1
+    shape = (1, 2) if single else (2, len(folders))
+    size = [1800, 900] if single else [900 * len(folders), 1500]
+    plotter = pyvista().Plotter(off_screen=True, shape=shape, window_size=size, border=False)
+    for column, (part, chamber, title) in enumerate(zip(parts, chambers, job["titles"], strict=True)):
+        plotter.subplot(0, 0 if single else column)
+        in_chamber(plotter, part, chamber, title, limits, bar=False)
+        plotter.subplot(*((0, 1) if single else (1, column)))
+        near(plotter, part, limits, bar=single or column == len(folders) - 1)
+    with whole_file(Path(job["picture"])) as temporary:
+        plotter.screenshot(temporary)

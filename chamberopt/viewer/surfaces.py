@@ -1,0 +1,60 @@
+"""Surfaces of a results folder: the part with what its triangles got, and the chamber. Both open in ParaView."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chamberopt.disk import whole_file
+from chamberopt.errors import InputError
+
+if TYPE_CHECKING:
+    from chamberopt.chamber import Chamber
+
+COVERAGE, CHAMBER = "coverage.vtp", "chamber.vtp"
+MM = 1e3
+
+Surface = Any
+"""A pyvista.PolyData: pyvista's own annotations refuse numpy's."""
+
+
+def pyvista() -> Any:
+    """The library, imported when it is needed: half a second."""
+    import pyvista
+
+    return pyvista
+
+
+def write_coverage(path: Path, chamber: Chamber, fields: dict[str, np.ndarray]) -> None:
+    """The user's part, posed in the chamber [mm], with cell data (m,) each: quantities.per_triangle's."""
+    _write_surface(path, chamber.part.vertices, chamber.part.triangles, fields)
+
+
+def write_chamber(folder: Path, chamber: Chamber) -> None:
+    """The closed cavity [mm]: chamber.stl for CAD, chamber.vtp with tags (0 part, 1 sonotrode, 2 wall, 3 ... more)."""
+    fields = {"tag": chamber.tags, "source": chamber.source}
+    _write_surface(folder / CHAMBER, chamber.vertices, chamber.triangles, fields)
+    _write_surface(folder / "chamber.stl", chamber.vertices, chamber.triangles, {})
+
+
+def _write_surface(path: Path, vertices: np.ndarray, triangles: np.ndarray, fields: dict[str, np.ndarray]) -> None:
+    surface = pyvista().PolyData.from_regular_faces(vertices * MM, triangles)
+    for name, values in fields.items():
+        surface.cell_data[name] = values
+    with whole_file(path) as temporary:
+        surface.save(temporary)
+
+
+def read_surface(path: Path) -> Surface:
+    """A .vtp of a results folder. VTK reads a damaged one as an empty mesh: here that is an InputError."""
+    if not path.is_file():
+        raise InputError(f"{path}: not there; give a results folder that simulate or run has finished")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of a damaged file VTK warns, in words nobody can act on
+        surface = pyvista().read(path)
+    if not isinstance(surface, pyvista().PolyData) or surface.n_cells == 0:
+        raise InputError(f"{path}: damaged, no triangles could be read; simulate again")
+    return surface
