@@ -87,7 +87,7 @@ def per_triangle(design: Design, chamber: Chamber, evaluation: Evaluation) -> di
         ),
         "coverage_interval": evaluation.marked_interval
         if evaluation.marked_interval is not None
-        else _interval(hits, exposed_mm2 * 1e-6, times),
+        else np.subtract(*reversed(coverage_bounds(hits, exposed_mm2 * 1e-6, times))),
     }
     return found
 
@@ -107,8 +107,8 @@ def _quantile(hits: SortedHits, share: float) -> np.ndarray:
     return found
 
 
-def _interval(hits: SortedHits, area: np.ndarray, times: float) -> np.ndarray:
-    """Width (m,) of the 95 % interval of the coverage 1 - exp(-x), area (m,) m², times: treatment over simulated time.
+def coverage_bounds(hits: SortedHits, area: np.ndarray, times: float) -> tuple[np.ndarray, np.ndarray]:
+    """Ends (m,) of the 95 % interval of the coverage 1 - exp(-x), area (m,) m², times: treatment over simulated time.
 
     x is a sum of dents that fall as Poisson has it, each with its own weight: the gamma interval of M. P. Fay and
     E. J. Feuer, "Confidence intervals for directly standardized rates", Statistics in Medicine 16 (1997) 791. It
@@ -120,11 +120,12 @@ def _interval(hits: SortedHits, area: np.ndarray, times: float) -> np.ndarray:
     y, v = _sums(hits, dent), _sums(hits, dent**2)
     largest = float(dent.max()) if len(dent) else 0.0
     if largest == 0.0:
-        return np.where(np.isnan(area), np.nan, 1.0)  # nothing is known
+        nothing = np.where(np.isnan(area), np.nan, 0.0)
+        return nothing, nothing + 1.0
     tail = 0.5 * (1.0 - CONFIDENCE)
     some = v > 0.0
-    low, high = np.zeros(len(y)), np.zeros(len(y))
+    low = np.zeros(len(y))
     low[some] = v[some] / y[some] * gammaincinv(y[some] ** 2 / v[some], tail)
     more, wider = y + largest, v + largest**2
     high = wider / more * gammaincinv(more**2 / wider, 1.0 - tail)
-    return np.exp(-low / area * times) - np.exp(-high / area * times)
+    return -np.expm1(-low / area * times), -np.expm1(-high / area * times)

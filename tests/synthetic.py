@@ -11,6 +11,7 @@ from chamberopt.chamber import Chamber, Part
 from chamberopt.config import Design, load_design
 from chamberopt.coverage import Tally
 from chamberopt.estimate import Estimate, estimate
+from chamberopt.hits import Hits
 from chamberopt.objective import METRICS, OBJECTIVES
 
 DESIGNS = Path(__file__).resolve().parents[1] / "designs"
@@ -80,7 +81,13 @@ def poisson_evaluation(
     rng = np.random.default_rng(seed)
     mean = per_mm2 * 1e6 * chamber.exposed_area / replicas
     seconds = design.process.accuracy.simulated_time
-    tallies = [equal_dents(seconds, rng.poisson(mean), 1e-8, 3.0, 70.0) for _ in range(replicas)]
+    return evaluation_of(
+        design, chamber, [equal_dents(seconds, rng.poisson(mean), 1e-8, 3.0, 70.0) for _ in range(replicas)]
+    )
+
+
+def evaluation_of(design: Design, chamber: Chamber, tallies: list[Tally]) -> Evaluation:
+    """The evaluation of replicas whose dents are known, with hits that leave these dents."""
     metrics = dict(zip(METRICS, jackknife(tallies, list(METRICS.values()), chamber, design), strict=True))
     return Evaluation(
         "uniform_coverage",
@@ -90,4 +97,13 @@ def poisson_evaluation(
         tuple(tallies),
         {"chamber": 0.1, "simulate": 1.0, "coverage": 0.1},
         {"walls": 5, "balls": 3, "sonotrode": 2, "total": 10},
+        hits=tuple(hits_of(tally) for tally in tallies),
     )
+
+
+def hits_of(tally: Tally) -> Hits:
+    """The dents of a replica as hits, with the mean speed and angle of their triangle, 1 µJ each."""
+    triangle = tally.dent_triangle.astype(np.int32)
+    speed, angle = (sums[triangle] / tally.impacts[triangle] for sums in (tally.speed_sum, tally.angle_sum))
+    dent = np.sqrt(4.0 / np.pi * tally.dent_area)
+    return Hits(triangle, *(column.astype(np.float32) for column in (speed, angle, dent, np.full(len(dent), 1e-6))))
