@@ -15,6 +15,7 @@ CHAMBEROPT_ORDER = (
     ("effects", "mesh_io", "shot", "slivers", "sonotrode", "treatment", "versions"),
     ("shapes",),
     ("design", "reach"),
+    ("question",),
     ("config", "fittings", "target"),
     ("part",),
     ("chamber",),

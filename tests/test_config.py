@@ -476,7 +476,7 @@ class TestStudies:
 
         import nlopt
 
-        from chamberopt.config import Algorithm
+        from chamberopt.question import Algorithm
 
         ours = {"auto", "sobol", "surrogate"}
         assert ours < set(typing.get_args(Algorithm))

@@ -14,10 +14,11 @@ import pytest
 from chamberopt.accuracy import Evaluation
 from chamberopt.advice import Advice
 from chamberopt.chamber import build_chamber
-from chamberopt.config import Design, Objective, Study
+from chamberopt.config import Design, Study
 from chamberopt.errors import InputError
 from chamberopt.estimate import Estimate
 from chamberopt.evaluation_file import load_evaluation, save_evaluation
+from chamberopt.question import Objective
 from chamberopt.results import load_result
 from chamberopt.studies.record import Record, open_record
 from tests.resuming import GEAR, calls, history, logged, run, study
