@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -28,7 +28,8 @@ class Part:
     unless the file draws it as the piece that bounds the room of a whole set-up.
 
     vertices (n, 3) m · triangles (m, 3) int32 · area (m,) m² · target (m,) bool: what must be covered · name ·
-    sha256 of the mesh file as it was read · unit that its numbers were taken in · names that the file gives.
+    sha256 of the mesh file as it was read · unit that its numbers were taken in · names that the file gives · elements
+    (m,) int64: which of the file's each triangle is of, `mesh_io.Numbering`; from 1 on if not given.
     """
 
     vertices: np.ndarray
@@ -39,6 +40,11 @@ class Part:
     sha256: str = ""
     unit: str = ""
     names: tuple[str, ...] = ()
+    elements: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+
+    def __post_init__(self) -> None:
+        if not len(self.elements):
+            object.__setattr__(self, "elements", np.arange(1, len(self.triangles) + 1))
 
 
 def posed_part(design: Design) -> tuple[Part, list[str]]:
@@ -53,7 +59,16 @@ def posed_part(design: Design) -> tuple[Part, list[str]]:
     vertices = snapped(mesh.vertices @ turn.T + shift)
     area = areas(vertices, mesh.triangles)
     name, names = design.part.mesh_path.name, tuple(mesh.groups)
-    return Part(vertices, mesh.triangles, area, target, name, mesh.sha256, mesh.unit, names), list(mesh.notes)
+    part = Part(vertices, mesh.triangles, area, target, name, mesh.sha256, mesh.unit, names, mesh.elements)
+    return part, list(mesh.notes)
+
+
+def part_meshes(design: Design) -> tuple[PartMesh, PartMesh]:
+    """The part as its file has it, and as it is simulated, triangle by triangle that of `posed_part`; both in the
+    file's frame. They differ where target.element_mm asks for other triangles.
+    """
+    setup = design.chamber.setup()
+    return read_once(design.part.mesh_path, design.part.unit) if setup is None else setup.part, _mesh(design)[0]
 
 
 def turning_axis(design: Design) -> tuple[np.ndarray, np.ndarray]:
@@ -100,9 +115,26 @@ def _in_elements(mesh: PartMesh, target: np.ndarray, size: float) -> tuple[PartM
         f"sides {1e3 * np.median(longest):.3g} mm in the middle and {1e3 * longest.max():.3g} mm at most, shape "
         f"{shape.min():.2f} at worst (1: equilateral)"
     )
-    groups = {name: mask[source] for name, mask in mesh.groups.items()}
     triangles = triangles.astype(np.int32)
-    return replace(mesh, vertices=vertices, triangles=triangles, groups=groups, notes=(*mesh.notes, note)), chosen
+    places = _places(mesh, vertices[triangles], source)
+    groups = {name: mask[places] for name, mask in mesh.groups.items()}
+    numbering = mesh.numbering.of(places)
+    notes = (*mesh.notes, note)
+    meshed = replace(mesh, vertices=vertices, triangles=triangles, numbering=numbering, groups=groups, notes=notes)
+    return meshed, chosen
+
+
+def _places(mesh: PartMesh, corners: np.ndarray, source: np.ndarray) -> np.ndarray:
+    """The triangle of the mesh (k,) that the middle of each of corners (k, 3, 3) [m] lies in: where they are not those
+    of its source, that is only one in the same flat face.
+    """
+    from sim_core import TriangleMesh, nearest
+
+    moved = np.flatnonzero((corners != mesh.vertices[mesh.triangles[source]]).any(axis=(1, 2)))
+    surface = TriangleMesh(mesh.vertices, mesh.triangles, np.zeros(len(mesh.triangles), dtype=np.uint8))
+    places = source.copy()
+    places[moved] = nearest(surface, corners[moved].mean(axis=1), float(np.ptp(mesh.vertices))).triangle
+    return places
 
 
 def _pose(mesh: PartMesh, design: Design) -> tuple[np.ndarray, np.ndarray]:

@@ -57,8 +57,8 @@ def per_triangle(design: Design, chamber: Chamber, evaluation: Evaluation) -> di
     coverage (0..1), impacts_per_mm2 and energy_per_mm2 [mJ/mm²] at the treatment time; dent_density (dented area per
     area then: coverage is 1 - exp(-it), or the share of the triangle inside dents where every dent is marked);
     impacts, dents (simulated numbers), mean_normal_speed [m/s], mean_angle_deg (90 is head on), exposed_area_mm2,
-    target. From single hits, where the evaluation has them: p90_normal_speed [m/s], mean_dent_um (of the impacts that
-    leave one), coverage_interval (width of the 95 % interval).
+    target, element (its number in the part's file). From single hits, where the evaluation has them: p90_normal_speed
+    [m/s], mean_dent_um (of the impacts that leave one), coverage_interval (width of the 95 % interval).
     """
     total, marked = evaluation.total, evaluation.marked
     exposed_mm2 = np.where(chamber.exposed_area > 0.0, chamber.exposed_area * 1e6, np.nan)
@@ -74,6 +74,7 @@ def per_triangle(design: Design, chamber: Chamber, evaluation: Evaluation) -> di
         "mean_angle_deg": mean_impact_angle_deg(total),
         "exposed_area_mm2": chamber.exposed_area * 1e6,
         "target": chamber.part.target.astype(np.uint8),
+        "element": chamber.part.elements,
     }
     if not evaluation.hits:
         return found

@@ -30,7 +30,7 @@ CHAMBEROPT_ORDER = (
     ("pictures",),
     ("price_list", "study_pictures"),
     ("results",),
-    ("compare", "maps", "workbench"),
+    ("compare", "export", "maps", "workbench"),
     ("cli",),
     ("__main__",),
 )

@@ -21,10 +21,12 @@ from chamberopt.mesh_io.faults import OpenSurfaceError, SurfaceError, box_text, 
 from chamberopt.mesh_io.formats import FORMATS, read_raw
 from chamberopt.mesh_io.healing import outward, sewn
 from chamberopt.mesh_io.names import named
+from chamberopt.mesh_io.numbering import Numbering, by_place
 from chamberopt.mesh_io.units import unit_of
 
 __all__ = [
     "FORMATS",
+    "Numbering",
     "OpenSurfaceError",
     "PartMesh",
     "SurfaceError",
@@ -43,17 +45,23 @@ __all__ = [
 class PartMesh:
     """A closed part in its file's own frame.
 
-    vertices (n, 3) float64 m · triangles (m, 3) int32, normals outward, in the file's order · notes: what was
-    changed · sha256 of the file as read · groups: name -> (m,) bool, what the file calls some of its triangles
-    · unit that the file's numbers were taken in.
+    vertices (n, 3) float64 m · triangles (m, 3) int32, normals outward, in the file's order · numbering: which of its
+    elements each one is of · notes: what was changed · sha256 of the file as read · groups: name -> (m,) bool, what
+    the file calls some of its triangles · unit that the file's numbers were taken in.
     """
 
     vertices: np.ndarray
     triangles: np.ndarray
+    numbering: Numbering
     notes: tuple[str, ...]
     sha256: str
     groups: dict[str, np.ndarray] = field(default_factory=dict)
     unit: str = "m"
+
+    @property
+    def elements(self) -> np.ndarray:
+        """The number (m,) int64 of the element that each triangle is of; 0: of none in the file."""
+        return self.numbering.elements
 
     @property
     def size(self) -> np.ndarray:
@@ -65,11 +73,13 @@ class PartMesh:
 class Triangles:
     """What a file holds, in metres and its own frame, before it is made one closed surface.
 
-    path · corners (m, 3, 3) · groups: name -> (m,) bool · notes · sha256 of the file · unit of its numbers.
+    path · corners (m, 3, 3) · numbering of its elements · groups: name -> (m,) bool · notes · sha256 of the file ·
+    unit of its numbers.
     """
 
     path: Path
     corners: np.ndarray
+    numbering: Numbering
     groups: dict[str, np.ndarray]
     notes: tuple[str, ...]
     sha256: str
@@ -101,7 +111,8 @@ def read_triangles(path: Path, unit: str = "guess") -> Triangles:
     unit, told = unit_of(path, content, corners, unit, raw.unit)
     corners = corners * METRES_PER[unit] + 0.0  # + 0.0: -0 and 0 are one place
     digest = hashlib.sha256(content).hexdigest()
-    return Triangles(path, corners, raw.groups, (*raw.notes, *told), digest, unit)
+    numbering = raw.numbering or by_place(len(corners))
+    return Triangles(path, corners, numbering, raw.groups, (*raw.notes, *told), digest, unit)
 
 
 def closed(read: Triangles, only: np.ndarray | None = None) -> PartMesh:
@@ -115,7 +126,8 @@ def closed(read: Triangles, only: np.ndarray | None = None) -> PartMesh:
     refuse_crossings(path, vertices, triangles)
     groups = {name: np.where(source >= 0, mask[chosen][source], False) for name, mask in read.groups.items()}
     notes = tuple(f"{path.name}: {note}" for note in (*read.notes, *healed, *turned))
-    return PartMesh(vertices, triangles.astype(np.int32), notes, read.sha256, groups, read.unit)
+    numbering = read.numbering.of(np.where(source >= 0, chosen[source], -1))
+    return PartMesh(vertices, triangles.astype(np.int32), numbering, notes, read.sha256, groups, read.unit)
 
 
 def read_once(path: Path, unit: str = "guess") -> PartMesh:

@@ -210,9 +210,19 @@ def _assembled(scopes: dict[str, _Scope], instances: dict[str, _Instance], notes
     mesh = Elements(np.concatenate(points) if points else np.zeros((0, 3)), [], notes=notes)
     mesh.blocks = [Block(kind, np.array(rows)) for (kind, _), rows in groups.items()]
     index = {who: starts[key] + row for who, (key, row) in members.items()}
+    _number(mesh, index, list(instances))
     for at, (scope, _) in enumerate(placed):
         _name(mesh, scope, at, index, row_of, list(instances))
     return mesh
+
+
+def _number(mesh: Elements, index: dict[tuple[int, int], int], instances: list[str]) -> None:
+    """The elements' own numbers; their places where several instances count each for itself."""
+    mesh.own = len({at for at, _ in index}) < 2 and len(instances) < 2
+    mesh.instance = instances[0] if len(instances) == 1 else ""
+    mesh.numbers = np.arange(1, len(index) + 1)
+    for (_, number), row in index.items() if mesh.own else ():
+        mesh.numbers[row] = number
 
 
 def _row(row_of: dict[tuple[int, int], int], at: int, node: int, element: int) -> int:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from chamberopt.mesh_io.numbering import Numbering
 from chamberopt.mesh_io.raw import RawMesh
 
 Face = tuple[int, ...]
@@ -54,12 +55,16 @@ class Block:
 class Elements:
     """A finite element mesh. Elements count through all blocks.
 
-    points (n, 3) in the file's numbers · element_sets: name -> elements · face_sets: name -> (elements, which
-    face of each) · node_sets: name -> points; a triangle belongs where all of its corners do.
+    points (n, 3) in the file's numbers · numbers (e,): what the file calls each element, its own number if ``own``,
+    else its place · instance: Abaqus's, in which the numbers count · element_sets: name -> elements · face_sets: name
+    -> (elements, which face of each) · node_sets: name -> points; a triangle belongs where all of its corners do.
     """
 
     points: np.ndarray
     blocks: list[Block]
+    numbers: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    own: bool = True
+    instance: str = ""
     element_sets: dict[str, np.ndarray] = field(default_factory=dict)
     face_sets: dict[str, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
     node_sets: dict[str, np.ndarray] = field(default_factory=dict)
@@ -85,7 +90,7 @@ class _Polygons:
 def surface_of(mesh: Elements) -> RawMesh:
     """The triangles that bound the elements, in their order, with the sets' names."""
     soup, groups, notes = [], [], list(mesh.notes)
-    order = []
+    order, origins = [], []
     for n in (3, 4):
         shells, solids = _polygons(mesh, n, SHELLS), _polygons(mesh, n, tuple(set(FACES) - set(SHELLS)))
         if any(block.kind not in SHELLS for block in mesh.blocks):
@@ -96,12 +101,27 @@ def surface_of(mesh: Elements) -> RawMesh:
             faces = shells
         triangles, of_face = _triangulated(faces, mesh.points)
         order.append(faces.owner[of_face])
+        origins.append(np.stack(_origin(mesh, faces), axis=1)[of_face])
         soup.append(mesh.points[triangles])
         groups.append({name: mask[of_face] for name, mask in _named(mesh, faces).items()})
     sequence = np.argsort(np.concatenate(order), kind="stable")
     masks = {name: np.concatenate([part[name] for part in groups])[sequence] for name in groups[0]}
     named = {name: mask for name, mask in masks.items() if mask.any()}
-    return RawMesh(np.concatenate(soup)[sequence].reshape(-1, 3, 3), named, None, tuple(notes))
+    elements, sides = np.concatenate(origins)[sequence].T
+    numbering = Numbering(elements, sides.astype(np.int8), mesh.own, mesh.instance)
+    return RawMesh(np.concatenate(soup)[sequence].reshape(-1, 3, 3), named, None, tuple(notes), numbering)
+
+
+def _origin(mesh: Elements, faces: _Polygons) -> tuple[np.ndarray, np.ndarray]:
+    """Number (k,) of the element that each face is of, and which of a solid's faces it is, from 1; 0: a shell.
+
+    A shell that lies on a solid is what the file's author looks at the surface with: it comes first.
+    """
+    coated = faces.shell != NONE
+    solid = [np.full(len(block.nodes), block.kind not in SHELLS) for block in mesh.blocks]
+    of_solid = np.concatenate([np.zeros(0, dtype=bool), *solid])[faces.owner]
+    number = mesh.numbers[np.where(coated, faces.shell, faces.owner)]
+    return number, np.where(of_solid & ~coated, faces.side + 1, 0)
 
 
 def _polygons(mesh: Elements, n: int, kinds: tuple[str, ...]) -> _Polygons:

@@ -84,7 +84,9 @@ class _Stream:
 
 @dataclass
 class _Mesh:
-    """Node numbers and places, then elements in batches (type, nodes (k, p) by number, physical tags of all k)."""
+    """Node numbers and places, then elements in batches: type, own number and nodes (k, 1 + p) by number, physical tags
+    of all k.
+    """
 
     numbers: list[np.ndarray] = field(default_factory=list)
     places: list[np.ndarray] = field(default_factory=list)
@@ -135,15 +137,16 @@ def _read_2(streams: dict[str, _Stream], mesh: _Mesh) -> None:
     rows: dict[tuple[int, tuple[int, ...]], list[np.ndarray]] = {}
     while left > 0:
         if elements.text:
-            _, kind, tags = elements.ints(3).tolist()
+            own, kind, tags = elements.ints(3).tolist()
             count = 1
         else:
             kind, count, tags = elements.ints(3).tolist()
         for _ in range(count):
             if not elements.text:
-                elements.ints(1)  # the element's own number
+                own = int(elements.ints(1)[0])
             physical = elements.ints(tags)[:1].tolist()
-            rows.setdefault((kind, tuple(physical)), []).append(elements.ints(_size(elements.path, kind)))
+            nodes_of = elements.ints(_size(elements.path, kind))
+            rows.setdefault((kind, tuple(physical)), []).append(np.r_[own, nodes_of])
         left -= count
     mesh.batches += [(kind, np.array(nodes), physical) for (kind, physical), nodes in rows.items()]
 
@@ -169,7 +172,7 @@ def _read_4(streams: dict[str, _Stream], mesh: _Mesh) -> None:
     for _ in range(int(elements.sizes(4)[0])):
         dimension, tag, kind = elements.ints(3).tolist()
         count, width = int(elements.sizes(1)[0]), _size(elements.path, kind) + 1
-        rows = elements.sizes(count * width).reshape(count, width)[:, 1:]
+        rows = elements.sizes(count * width).reshape(count, width)
         mesh.batches.append((kind, rows, physical.get((dimension, tag), ())))
 
 
@@ -188,9 +191,12 @@ def _elements(path: Path, mesh: _Mesh, names: dict[tuple[int, int], str]) -> Ele
     by_number = np.argsort(numbers, kind="stable")
     made, first = Elements(places, []), 0
     members: dict[str, list[np.ndarray]] = {}
-    for kind, rows, groups in mesh.batches:
-        if kind in WITHOUT_SURFACE or not len(rows):
+    own: list[np.ndarray] = []
+    for kind, numbered, groups in mesh.batches:
+        if kind in WITHOUT_SURFACE or not len(numbered):
             continue
+        rows = numbered[:, 1:]
+        own.append(numbered[:, 0])
         at = by_number[np.minimum(np.searchsorted(numbers, rows, sorter=by_number), len(numbers) - 1)]
         if not np.array_equal(numbers[at], rows):
             raise InputError(f"{path}: an element names a node that is not there; export it again")
@@ -201,6 +207,7 @@ def _elements(path: Path, mesh: _Mesh, names: dict[tuple[int, int], str]) -> Ele
                 told = names.get((dimension, group), f"physical {group}")
                 members.setdefault(told, []).append(np.arange(first, first + len(rows)))
         first += len(rows)
+    made.numbers = np.concatenate([np.zeros(0, dtype=np.int64), *own])
     made.element_sets = {name: np.concatenate(parts) for name, parts in members.items()}
     return made
 

@@ -195,6 +195,7 @@ def _add_elements(
                 raise ValueError(f"line {line}: {card} {numbers[-1]} has fewer than {CORNERS[kind]} corners")
         if len(nodes):
             mesh.blocks.append(Block(kind, nodes[:, REORDERED.get(kind, range(size))]))
+    mesh.numbers = np.array(numbers, dtype=np.int64)
     of_property = np.array(properties, dtype=np.int64)
     for number in np.unique(of_property).tolist():
         members = np.flatnonzero(of_property == number)

@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from chamberopt.mesh_io.numbering import Numbering
+
 
 @dataclass(frozen=True)
 class RawMesh:
@@ -13,13 +15,14 @@ class RawMesh:
 
     corners (m, 3, 3) in the file's numbers and order · groups: name -> (m,) bool, the file's sets, groups,
     properties, colours · unit: what the file states its numbers are in, None where it does not · notes: what
-    was left out or turned into triangles.
+    was left out or turned into triangles · numbering of its elements, None where triangles are all it has.
     """
 
     corners: np.ndarray
     groups: dict[str, np.ndarray] = field(default_factory=dict)
     unit: str | None = None
     notes: tuple[str, ...] = ()
+    numbering: Numbering | None = None
 
 
 def joined(pieces: list[tuple[str, np.ndarray]]) -> RawMesh:

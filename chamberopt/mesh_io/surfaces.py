@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from chamberopt.errors import InputError
+from chamberopt.mesh_io.numbering import Numbering
 from chamberopt.mesh_io.raw import RawMesh, joined
 
 MOST_COLOURS = 64  # a photograph on the part is no set of names
@@ -156,6 +157,7 @@ def read_obj(path: Path, content: bytes) -> RawMesh:
     """Faces of any number of corners, as fans; objects (o), groups (g) and materials (usemtl) give names."""
     points: list[list[float]] = []
     triangles: list[tuple[int, int, int]] = []
+    fans: list[int] = []  # triangles of each face
     names: dict[str, tuple[str, ...]] = {}  # by keyword, those in force
     runs: list[tuple[int, tuple[str, ...]]] = []  # from which triangle on, which names
     for number, line in enumerate(content.decode("utf-8", errors="replace").splitlines(), start=1):
@@ -176,6 +178,7 @@ def read_obj(path: Path, content: bytes) -> RawMesh:
                     f"{path}: line {number}: a face of {len(ring)} corners that are not there; export again"
                 )
             triangles += [(ring[0], ring[k], ring[k + 1]) for k in range(1, len(ring) - 1)]
+            fans.append(len(ring) - 2)
         elif keyword in ("o", "g", "usemtl"):
             names[keyword] = tuple(words) if keyword == "g" else (" ".join(words),)
             runs.append((len(triangles), tuple(dict.fromkeys(name for kept in names.values() for name in kept))))
@@ -187,4 +190,5 @@ def read_obj(path: Path, content: bytes) -> RawMesh:
     for (start, told), end in zip(runs, ends, strict=True) if runs else ():
         for name in told if end > start else ():
             groups.setdefault(name, np.zeros(len(triangles), dtype=bool))[start:end] = True
-    return RawMesh(corners, groups)
+    faces = Numbering(np.repeat(np.arange(1, len(fans) + 1), fans), np.zeros(len(triangles), dtype=np.int8))
+    return RawMesh(corners, groups, numbering=faces)

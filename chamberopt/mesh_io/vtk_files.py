@@ -43,7 +43,7 @@ def read_vtk(path: Path, content: bytes) -> RawMesh:
         types = np.select([sizes == 3, sizes == 4], [5, 9], 7)
     else:
         types = vtk_to_numpy(data.GetCellTypes())
-    made = Elements(vtk_to_numpy(data.GetPoints().GetData()).astype(np.float64), [])
+    made = Elements(vtk_to_numpy(data.GetPoints().GetData()).astype(np.float64), [], own=False)
     cells = []
     for kind, size in np.unique(np.stack([types, sizes], axis=1), axis=0).tolist():
         rows = np.flatnonzero((types == kind) & (sizes == size))
@@ -55,6 +55,7 @@ def read_vtk(path: Path, content: bytes) -> RawMesh:
         made.blocks.append(Block(KINDS[kind], nodes[offsets[rows][:, None] + np.arange(size)].astype(np.int64)))
         cells.append(before + rows)
     if cells:
+        made.numbers = np.concatenate(cells) + 1
         made.element_sets = _named_by_fields(data.GetCellData(), np.concatenate(cells))
     return surface_of(made)
 

@@ -120,7 +120,8 @@ def _piece(mesh: PartMesh, own: np.ndarray) -> PartMesh:
     used, numbers = np.unique(mesh.triangles[own][:, ::-1], return_inverse=True)
     triangles = numbers.reshape(-1, 3).astype(np.int32)
     groups = {name: mask[own] for name, mask in mesh.groups.items() if mask[own].any()}
-    return replace(mesh, vertices=mesh.vertices[used], triangles=triangles, groups=groups)
+    numbering = mesh.numbering.of(own)
+    return replace(mesh, vertices=mesh.vertices[used], triangles=triangles, numbering=numbering, groups=groups)
 
 
 def _room_of_sonotrode(mesh: PartMesh, sonotrode: tuple[str, ...]) -> tuple[PartMesh, list[str]]:
@@ -152,7 +153,9 @@ def _room_of_sonotrode(mesh: PartMesh, sonotrode: tuple[str, ...]) -> tuple[Part
     rows = np.isin(shells, [first, *inside])
     used, numbers = np.unique(triangles[rows], return_inverse=True)
     groups = {name: mask[rows] for name, mask in mesh.groups.items()}
-    room = replace(mesh, vertices=mesh.vertices[used], triangles=numbers.reshape(-1, 3).astype(np.int32), groups=groups)
+    kept = numbers.reshape(-1, 3).astype(np.int32)
+    numbering = mesh.numbering.of(rows)
+    room = replace(mesh, vertices=mesh.vertices[used], triangles=kept, numbering=numbering, groups=groups)
     left = len(volumes) - 1 - len(inside)
     return room, [f"{left} closed surfaces that are not in the room over the sonotrode are left out"] if left else []
 
