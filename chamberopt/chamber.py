@@ -40,7 +40,8 @@ class Chamber:
     vertices (n, 3) float64 m · triangles (k, 3) int32, closed, normals pointing out of the cavity · tags
     (k,) uint8 · source (k,) int32: the part triangle that a TAG_PART triangle lies on, else -1 · volume m³
     · part · exposed_area (m,) m² of each part triangle that bounds the cavity · notes: what was done on the
-    user's behalf.
+    user's behalf · fitting (k,) int32: the hole or deflector that a TAG_WALL triangle is of, by its place in
+    `fittings.fitting_names`, else -1; None where that is not known.
     """
 
     vertices: np.ndarray
@@ -51,6 +52,7 @@ class Chamber:
     part: Part
     exposed_area: np.ndarray
     notes: tuple[str, ...]
+    fitting: np.ndarray | None = None
 
     @property
     def height(self) -> float:
@@ -99,7 +101,9 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
     notes += _hidden_target_note(part, exposed)
     notes += room_notes + _crooked_note(room, traced.facing) + _hold_note(room, on_part, part.name)
     volume = float(tetrahedron_volumes(room.vertices, room.triangles).sum())
-    return Chamber(room.vertices, room.triangles, traced.tags, traced.source, volume, part, exposed, tuple(notes))
+    return Chamber(
+        room.vertices, room.triangles, traced.tags, traced.source, volume, part, exposed, tuple(notes), traced.fitting
+    )
 
 
 def _refuse_misplaced(part: Part, shape: np.ndarray, design: Design) -> None:

@@ -100,10 +100,11 @@ def first_marked(samples: Samples, impacts: ImpactLog, chamber: Chamber, design:
 
 
 def nearest_on_triangles(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """The contact of a ball at each point (n, 3) with its triangle (n, 3, 3): its nearest point, on an edge or not."""
+    """The contact of a ball at each point (n, 3) m with its triangle (n, 3, 3): the nearest one, on an edge or not."""
     from trimesh.triangles import closest_point
 
-    return np.asarray(closest_point(corners, points)) if len(points) else points
+    # In mm: it takes fourth powers of lengths below 1e-13 for zero, which in metres is a triangle of half a millimetre.
+    return np.asarray(closest_point(corners * 1e3, points * 1e3)) * 1e-3 if len(points) else points
 
 
 def mark(samples: Samples, place: np.ndarray, normal: np.ndarray, radius: np.ndarray, time: np.ndarray) -> np.ndarray:

@@ -39,6 +39,22 @@ def new_folder(path: str | Path) -> Path:
     return folder
 
 
+def new_file(path: Path) -> Path:
+    """The path, where a file can be made in a folder that is there; InputError for one that is there: nothing is ever
+    overwritten.
+    """
+    if os.path.lexists(path):
+        raise InputError(f"{path}: is there already, and nothing is ever overwritten: choose another name or remove it")
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: the folder {path.parent} does not exist; make it first")
+    try:
+        with tempfile.TemporaryFile(dir=path.parent):  # better now than after an hour's work
+            pass
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror}; choose another place") from None
+    return path
+
+
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
     """A temporary path beside `path`, with the same suffix, that takes its place when the block ends well.

@@ -37,20 +37,29 @@ END = 255  # tag of a bore's end, which must vanish
 @dataclass(frozen=True)
 class Piece:
     """A solid whose triangles bound the cavity: its label, and of each of its triangles the tag, the area vector
-    [m²] out of the cavity, and the part triangle it lies on, else -1.
+    [m²] out of the cavity, the part triangle it lies on, else -1, and the fitting it is of (`fitting_names`), else -1.
     """
 
     label: int
     tags: np.ndarray
     facing: np.ndarray
     source: np.ndarray
+    fitting: np.ndarray
 
 
-def piece(label: int, tags: np.ndarray | int, facing: np.ndarray, source: np.ndarray | None = None) -> Piece:
-    """One whose triangles have these tags, (k,) or one of all."""
+def piece(
+    label: int, tags: np.ndarray | int, facing: np.ndarray, source: np.ndarray | None = None, fitting: int = -1
+) -> Piece:
+    """One whose triangles have these tags, (k,) or one of all, and are of this fitting."""
     none = np.full(len(facing), -1, dtype=np.int32)
     each = np.broadcast_to(np.asarray(tags, dtype=np.uint8), len(facing))
-    return Piece(label, each, facing, none if source is None else source)
+    return Piece(label, each, facing, none if source is None else source, np.full_like(none, fitting))
+
+
+def fitting_names(design: Design) -> list[str]:
+    """The holes of a chamber, then its deflectors, as the design names them."""
+    holes, deflectors = len(design.chamber.holes), len(design.chamber.deflectors)
+    return [*(f"chamber.holes.{k}" for k in range(holes)), *(f"chamber.deflectors.{k}" for k in range(deflectors))]
 
 
 @dataclass(frozen=True)
@@ -61,7 +70,7 @@ class Cavity:
     pieces: tuple[Piece, ...]
 
     def traced(self, surface: Surface, part: Piece) -> Piece:
-        """Tag, facing and part triangle of each triangle of a surface; what comes from none of the pieces is part."""
+        """Tag, facing, part triangle and fitting of each triangle of a surface; of none of the pieces is the part's."""
         taken = [np.zeros((len(surface.solid), *column.shape[1:]), column.dtype) for column in _columns(part)]
         left = np.ones(len(surface.solid), dtype=bool)
         for one in self.pieces:
@@ -74,8 +83,8 @@ class Cavity:
         return Piece(-1, *taken)
 
 
-def _columns(one: Piece) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    return one.tags, one.facing, one.source
+def _columns(one: Piece) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    return one.tags, one.facing, one.source, one.fitting
 
 
 NOTHING = piece(-1, 0, np.zeros((0, 3)))
@@ -90,7 +99,7 @@ def fitted(design: Design, shape: ShapeSurface) -> Cavity:
     own = piece(shell.label, shape.tags, area_vectors(shape.vertices, shape.triangles), shape.source)
     cavity = Cavity(shell, (own,))
     for k, hole in enumerate(design.chamber.holes):
-        cavity = _with_hole(cavity, hole, f"chamber.holes.{k}")
+        cavity = _with_hole(cavity, hole, f"chamber.holes.{k}", k)
     for k, one in enumerate(design.sonotrodes):
         at, axis = np.array(one.at), np.array(one.direction)
         cavity = _with_bore(cavity, at, axis, one.diameter, tag_of_further(k), f"sonotrodes.{k}", one.amplitude)
@@ -109,7 +118,7 @@ def swept_faces(design: Design, cavity: Cavity) -> list[tuple[str, Solid]]:
     ]
 
 
-def _with_hole(cavity: Cavity, hole: Hole, name: str) -> Cavity:
+def _with_hole(cavity: Cavity, hole: Hole, name: str, fitting: int) -> Cavity:
     at, out = np.array(hole.at), np.array(hole.direction)
     reach, entering = _crossings(cavity.body.surface(), at[None], out, -AT_WALL)
     if entering[0] or not np.isfinite(reach[0]):
@@ -118,12 +127,13 @@ def _with_hole(cavity: Cavity, hole: Hole, name: str) -> Cavity:
             "in the chamber's frame (z = 0: the sonotrode), and the way out as axis"
         )
     bottom = at + (reach[0] + hole.depth) * out
-    return _with_bore(cavity, bottom, -out, hole.diameter, TAG_WALL, name, 0.0)
+    return _with_bore(cavity, bottom, -out, hole.diameter, TAG_WALL, name, 0.0, fitting)
 
 
 def _with_bore(
-    cavity: Cavity, bottom: np.ndarray, axis: np.ndarray, diameter: float, tag: int, name: str, swing: float
-) -> Cavity:
+    cavity: Cavity, bottom: np.ndarray, axis: np.ndarray, diameter: float, tag: int, name: str, swing: float,
+    fitting: int = -1,
+) -> Cavity:  # fmt: skip
     """United with a bore from its bottom (3,) [m] along its axis (3,) into the room."""
     aside = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
     aside /= np.linalg.norm(aside)
@@ -143,7 +153,7 @@ def _with_bore(
     bore = solid(made.vertices, made.triangles, name)
     facing = area_vectors(made.vertices, made.triangles)
     body = united([cavity.body, bore], f"the chamber with {name}")
-    after = Cavity(body, (*cavity.pieces, piece(bore.label, tags, facing)))
+    after = Cavity(body, (*cavity.pieces, piece(bore.label, tags, facing, None, fitting)))
     now = _area_by_tag(after)
     if now[END] > 0.0:
         raise InputError(
@@ -168,7 +178,7 @@ def _without(cavity: Cavity, design: Design) -> Cavity:
         _refuse_out_of_place(deflector, united(own, own[0].name), cavity, swings)
         facing = -area_vectors(vertices, triangles)
         standing += own
-        pieces += [piece(one.label, TAG_WALL, facing) for one in own]
+        pieces += [piece(one.label, TAG_WALL, facing, None, len(design.chamber.holes) + k) for one in own]
     return Cavity(subtract(cavity.body, united(standing, "the deflectors")), (*cavity.pieces, *pieces))
 
 

@@ -76,8 +76,13 @@ def turning_axis(design: Design) -> tuple[np.ndarray, np.ndarray]:
     turn = design.effects.part_turn
     if turn is None:
         raise ValueError("nothing turns in this design")
-    matrix, shift = _pose(_mesh(design)[0], design)
+    matrix, shift = part_pose(design)
     return matrix @ np.array(turn.through) + shift, matrix @ np.array(turn.axis)
+
+
+def part_pose(design: Design) -> tuple[np.ndarray, np.ndarray]:
+    """From the part file's frame to the chamber's: matrix (3, 3), then shift (3,) [m]."""
+    return _pose(_mesh(design)[0], design)
 
 
 def _mesh(design: Design) -> tuple[PartMesh, np.ndarray]:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -21,8 +22,9 @@ from chamberopt.stuck import Stuck, share_on_the_spot, still
 if TYPE_CHECKING:
     from chamberopt.chamber import Chamber
     from chamberopt.config import Design
-    from sim_core import AnalyticCavity, TriangleMesh
+    from sim_core import AnalyticCavity, Result, TriangleMesh
 
+T = TypeVar("T")
 Progress = Callable[[int, int, "float | None"], None]
 """Called as progress(done, total, best so far or None)."""
 
@@ -53,17 +55,40 @@ def simulate_replicas(
     setting: (design, chamber, mesh, samples) as executor.shared hands them over; keep it until the last replica, for
     it goes to a worker once · seed: of the design's process.
     """
-    futures = [executor.submit(_replica, setting, replica_seed(seed, number, stream)) for number in numbers]
+    return in_order(_replica, setting, seed, executor, stream, numbers, len(numbers))
+
+
+def in_order(
+    task: Callable[[Any, int], T],
+    setting: Any,
+    seed: int,
+    executor: Executor,
+    stream: str,
+    numbers: Sequence[int],
+    ahead: int,
+) -> Iterator[T]:
+    """task(setting, seed of the replica) of these numbers, in order, on the workers; begun are those that are asked for
+    and ``ahead`` of them, so that no more wait in memory.
+    """
+    waiting: deque[tuple[int, Future[T]]] = deque()
     try:
-        for number, future in zip(numbers, futures, strict=True):
-            try:
-                yield future.result()
-            except WorkerLostError as error:
-                raise WorkerLostError(f"replica {number}: {error}") from None
+        for number in numbers:
+            waiting.append((number, executor.submit(task, setting, replica_seed(seed, number, stream))))
+            if len(waiting) > ahead:
+                yield _answer(*waiting.popleft())
+        while waiting:
+            yield _answer(*waiting.popleft())
     finally:
         # One replica failed, or the user pressed Ctrl-C: the rest need not be simulated.
-        for future in futures:
+        for _, future in waiting:
             future.cancel()
+
+
+def _answer(number: int, future: Future[T]) -> T:
+    try:
+        return future.result()
+    except WorkerLostError as error:
+        raise WorkerLostError(f"replica {number}: {error}") from None
 
 
 def replicas_wanted(done: int, half_width: float, wanted: float, most: int) -> int:
@@ -82,10 +107,8 @@ def simulate_replica(
     design: Design, chamber: Chamber, mesh: TriangleMesh | AnalyticCavity, samples: Samples | None, seed: int
 ) -> Replica:
     """One replica, on a worker."""
-    from sim_core import TriangleMesh, simulate
-
-    result = simulate(build_scene(design, mesh, seed))
-    impacts = result.impacts if isinstance(mesh, TriangleMesh) else on_chamber(result.impacts, chamber)
+    result = simulated(design, chamber, mesh, seed)
+    impacts = result.impacts
     shot, kinds = design.shot, ("walls", "balls", "sonotrode", "total")
     return Replica(
         tally=tally(impacts, chamber, design),
@@ -95,3 +118,13 @@ def simulate_replica(
         first_marked=None if samples is None else first_marked(samples, impacts, chamber, design),
         hits=hits_on_part(impacts, chamber, design),
     )
+
+
+def simulated(design: Design, chamber: Chamber, mesh: TriangleMesh | AnalyticCavity, seed: int) -> Result:
+    """What the simulator has to say of one replica; its impacts are on the chamber's triangles."""
+    from sim_core import TriangleMesh, simulate
+
+    result = simulate(build_scene(design, mesh, seed))
+    if isinstance(mesh, TriangleMesh):
+        return result
+    return replace(result, impacts=on_chamber(result.impacts, chamber))

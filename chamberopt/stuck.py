@@ -11,6 +11,7 @@ import numpy as np
 
 from chamberopt.chamber import TAG_PART
 from chamberopt.checks.places import around, surface_names
+from chamberopt.dents import nearest_on_triangles
 
 if TYPE_CHECKING:
     from chamberopt.chamber import Chamber
@@ -105,11 +106,9 @@ def _between(at: str, names: list[str]) -> str:
 
 def _touched(chamber: Chamber, asked: np.ndarray, position: np.ndarray, reach: float) -> np.ndarray:
     """Which of the triangles ``asked`` are within ``reach`` [m] of a position (3,)."""
-    from trimesh.triangles import closest_point
-
     corners = chamber.vertices[chamber.triangles[asked]]
     near = (np.abs(position - np.clip(position, corners.min(axis=1), corners.max(axis=1))) <= reach).all(axis=1)
-    found = closest_point(corners[near], np.broadcast_to(position, (near.sum(), 3)))
+    found = nearest_on_triangles(corners[near], np.broadcast_to(position, (near.sum(), 3)))
     return np.asarray(asked[near][np.linalg.norm(found - position, axis=1) <= reach])
 
 

@@ -30,7 +30,9 @@ CHAMBEROPT_ORDER = (
     ("pictures",),
     ("price_list", "study_pictures"),
     ("results",),
-    ("compare", "export", "maps", "workbench"),
+    ("impacts",),
+    ("export",),
+    ("compare", "maps", "workbench"),
     ("cli",),
     ("__main__",),
 )

@@ -11,6 +11,8 @@ import pytest
 from chamberopt import config
 from chamberopt.cli import main
 from chamberopt.errors import InputError, WorkerLostError
+from chamberopt.process import replica_seed
+from chamberopt.replicas import in_order
 from chamberopt.workers.executor import SerialExecutor, local_executor, open_executor, shared
 from tests import jobs
 
@@ -28,6 +30,24 @@ def test_processes_answer_in_order_and_share_the_work(processes: Executor) -> No
     busy = Counter(processes.map(jobs.pid_of, range(8)))
     assert set(busy) == set(processes.pids)  # type: ignore[attr-defined]
     assert min(busy.values()) >= 3
+
+
+def test_replicas_come_in_order_and_no_more_are_begun_than_asked_for() -> None:
+    begun: list[int] = []
+
+    def task(setting: str, seed: int) -> str:
+        begun.append(seed)
+        return f"{setting} {seed}"
+
+    seeds = [replica_seed(7, number, "confirm") for number in range(6)]
+    for ahead in (0, 2, 6):
+        begun.clear()
+        came = []
+        for one in in_order(task, "this", 7, SerialExecutor(), "confirm", range(6), ahead):
+            came.append(one)
+            assert len(begun) == min(6, len(came) + ahead)
+        assert came == [f"this {seed}" for seed in seeds]
+        assert begun == seeds
 
 
 def test_an_error_travels_as_what_it_is(processes: Executor) -> None:

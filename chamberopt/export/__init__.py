@@ -1,1 +1,1 @@
-"""Results in the formats of other programs, in the numbers of the part's own file."""
+"""What other programs read: impacts, fields on the part's mesh, the chamber, a study's table. One kind a file."""

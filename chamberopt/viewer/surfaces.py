@@ -34,8 +34,12 @@ def write_coverage(path: Path, chamber: Chamber, fields: dict[str, np.ndarray]) 
 
 
 def write_chamber(folder: Path, chamber: Chamber) -> None:
-    """The closed cavity [mm]: chamber.stl for CAD, chamber.vtp with tags (0 part, 1 sonotrode, 2 wall, 3 ... more)."""
+    """The closed cavity [mm]: chamber.stl for CAD, chamber.vtp with tags (0 part, 1 sonotrode, 2 wall, 3 ... more),
+    and which hole or deflector (fittings.fitting_names), -1: none.
+    """
     fields = {"tag": chamber.tags, "source": chamber.source}
+    if chamber.fitting is not None:
+        fields["fitting"] = chamber.fitting
     _write_surface(folder / CHAMBER, chamber.vertices, chamber.triangles, fields)
     _write_surface(folder / "chamber.stl", chamber.vertices, chamber.triangles, {})
 
