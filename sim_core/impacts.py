@@ -69,13 +69,20 @@ class ImpactLog:
 
 def impact_log(pages: list[tuple[np.ndarray, np.ndarray]], centre: np.ndarray) -> ImpactLog:
     """Joins pages of (numbers, names) into one log, positions in the user's coordinates again."""
-    numbers = np.concatenate([page[0] for page in pages]) if pages else np.zeros((0, 8))
-    names = np.concatenate([page[1] for page in pages]) if pages else np.zeros((0, 2), dtype=np.int32)
+    numbers, names = [page[0] for page in pages], [page[1] for page in pages]
+    numbers = numbers or [np.zeros((0, 8))]
+    names = names or [np.zeros((0, 2), dtype=np.int32)]
+
+    def column(of: list[np.ndarray], part: int | slice) -> np.ndarray:  # one by one: ten million impacts are a gigabyte
+        return np.concatenate([page[:, part] for page in of])
+
+    position = column(numbers, slice(1, 4))
+    position += centre
     return ImpactLog(
-        time=numbers[:, 0].copy(),
-        ball=names[:, 0].copy(),
-        triangle=names[:, 1].copy(),
-        position=numbers[:, 1:4] + centre,
-        velocity=numbers[:, 4:7].copy(),
-        normal_speed=numbers[:, 7].copy(),
+        time=column(numbers, 0),
+        ball=column(names, 0),
+        triangle=column(names, 1),
+        position=position,
+        velocity=column(numbers, slice(4, 7)),
+        normal_speed=column(numbers, 7),
     )
