@@ -37,6 +37,7 @@ def estimate(
     lowest: float = -math.inf,
     highest: float = math.inf,
     bias: float = 0.0,
+    confidence: float = CONFIDENCE,
 ) -> Estimate:
     """Mean of the pseudo-values, clipped to the range the quantity can have, with its Student-t interval.
 
@@ -49,18 +50,18 @@ def estimate(
     n = len(values)
     half_width, bias = float("inf"), float(bias)
     if n > 1:
-        half_width = student(n - 1) * float(values.std(ddof=1)) / math.sqrt(n) + bias
+        half_width = student(n - 1, confidence) * float(values.std(ddof=1)) / math.sqrt(n) + bias
     return Estimate(mean, half_width, tuple(values.tolist()), bias)
 
 
-def student(freedom: float) -> float:
-    """How many standard errors the 95 % interval reaches to each side."""
+def student(freedom: float, confidence: float = CONFIDENCE) -> float:
+    """How many standard errors the interval reaches to each side."""
     from scipy.special import stdtrit  # scipy.stats would take a second to import
 
-    return float(stdtrit(freedom, 0.5 + CONFIDENCE / 2.0))
+    return float(stdtrit(freedom, 0.5 + confidence / 2.0))
 
 
-def paired_difference(after: Estimate, before: Estimate) -> Estimate:
+def paired_difference(after: Estimate, before: Estimate, confidence: float = CONFIDENCE) -> Estimate:
     """after - before with its 95 % interval, from replicas run on the same seeds, pair by pair.
 
     The jackknife of the difference: its pseudo-values are the differences of the two. A peening chamber is
@@ -68,19 +69,32 @@ def paired_difference(after: Estimate, before: Estimate) -> Estimate:
     replicas make no pairs: they are taken as independent.
     """
     if not after.pseudovalues or len(after.pseudovalues) != len(before.pseudovalues):
-        return independent_difference(after, before)
-    pairs = estimate(np.subtract(after.pseudovalues, before.pseudovalues), bias=after.bias + before.bias)
+        return independent_difference(after, before, confidence)
+    gaps = np.subtract(after.pseudovalues, before.pseudovalues)
+    pairs = estimate(gaps, bias=after.bias + before.bias, confidence=confidence)
     return Estimate(after.value - before.value, pairs.half_width, pairs.pseudovalues, pairs.bias)
 
 
-def independent_difference(after: Estimate, before: Estimate) -> Estimate:
+def independent_difference(after: Estimate, before: Estimate, confidence: float = CONFIDENCE) -> Estimate:
     """after - before with its 95 % interval when the two were simulated independently (Welch's t)."""
-    a, b = np.asarray(after.pseudovalues), np.asarray(before.pseudovalues)
     value, bias = after.value - before.value, after.bias + before.bias
-    if min(len(a), len(b)) < 2:  # no replicas to count with: the intervals in quadrature
+    if min(len(after.pseudovalues), len(before.pseudovalues)) < 2:  # nothing to count with: intervals in quadrature
         return Estimate(value, math.hypot(after.half_width, before.half_width), (), bias)
-    va, vb = a.var(ddof=1) / len(a), b.var(ddof=1) / len(b)
+    scatter = welch_half_width(after.pseudovalues, before.pseudovalues, confidence)
+    return Estimate(value, scatter + bias, (), bias)
+
+
+def welch_half_width(
+    after: Sequence[float], before: Sequence[float], confidence: float = CONFIDENCE, times: float = 1.0
+) -> float:
+    """Half-width of the interval of a difference of means, had each so many times as many values of this scatter.
+
+    B. L. Welch, "The generalization of 'Student's' problem when several different population variances are
+    involved", Biometrika 34 (1947) 28.
+    """
+    a, b = times * len(after), times * len(before)
+    va, vb = float(np.var(after, ddof=1)) / a, float(np.var(before, ddof=1)) / b
     if va + vb == 0.0:
-        return Estimate(value, bias, (), bias)
-    freedom = (va + vb) ** 2 / (va**2 / (len(a) - 1) + vb**2 / (len(b) - 1))
-    return Estimate(value, student(freedom) * math.sqrt(va + vb) + bias, (), bias)
+        return 0.0
+    freedom = (va + vb) ** 2 / (va**2 / (a - 1.0) + vb**2 / (b - 1.0))
+    return student(freedom, confidence) * math.sqrt(va + vb)

@@ -12,6 +12,8 @@ from chamberopt.estimate import CONFIDENCE
 from chamberopt.hits import SortedHits, sorted_hits
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from chamberopt.accuracy import Evaluation
     from chamberopt.chamber import Chamber
     from chamberopt.config import Design
@@ -108,8 +110,12 @@ def _quantile(hits: SortedHits, share: float) -> np.ndarray:
     return found
 
 
-def coverage_bounds(hits: SortedHits, area: np.ndarray, times: float) -> tuple[np.ndarray, np.ndarray]:
+def coverage_bounds(
+    hits: SortedHits, area: np.ndarray, times: float, over: Callable[[np.ndarray], np.ndarray] = np.asarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Ends (m,) of the 95 % interval of the coverage 1 - exp(-x), area (m,) m², times: treatment over simulated time.
+
+    over: sums what the triangles have, (m,), over the neighbours of each; area then is such a sum too.
 
     x is a sum of dents that fall as Poisson has it, each with its own weight: the gamma interval of M. P. Fay and
     E. J. Feuer, "Confidence intervals for directly standardized rates", Statistics in Medicine 16 (1997) 791. It
@@ -118,7 +124,7 @@ def coverage_bounds(hits: SortedHits, area: np.ndarray, times: float) -> tuple[n
     from scipy.special import gammaincinv
 
     dent = np.pi / 4.0 * hits.hits.dent.astype(float) ** 2
-    y, v = _sums(hits, dent), _sums(hits, dent**2)
+    y, v = over(_sums(hits, dent)), over(_sums(hits, dent**2))
     largest = float(dent.max()) if len(dent) else 0.0
     if largest == 0.0:
         nothing = np.where(np.isnan(area), np.nan, 0.0)

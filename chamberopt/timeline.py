@@ -15,13 +15,14 @@ if TYPE_CHECKING:
 
 POINTS = 20
 FARTHEST = 5.0  # treatment times: what is beyond is rather another treatment
+VAGUE = 0.1  # half-width of the mean's 95 % interval beyond which a curve would only mislead
 
 
 def against_time(design: Design, chamber: Chamber, evaluation: Evaluation) -> list[dict[str, Any]]:
     """Rows of time_s, mean_coverage, half_width, p05_coverage, p05_half_width, from the first moments to the end.
 
-    From dent rates: to where 98 % is reached, the treatment time at least, FARTHEST times it at most. Where every dent
-    is marked: to the treatment's end, the mean alone.
+    From dent rates: to where 98 % is reached, the treatment time at least, FARTHEST times it at most, as far as the mean is known. Where every
+    dent is marked: to the treatment's end, the mean alone.
     """
     if evaluation.against_time:
         return [
@@ -37,6 +38,8 @@ def against_time(design: Design, chamber: Chamber, evaluation: Evaluation) -> li
         then = design.with_values({"process.treatment_time_s": at})
         found = coverage_figures(evaluation.replicas, chamber, surface(evaluation.replicas, chamber, then))
         mean, poorest = found["mean_coverage"], found["p05_coverage"]
+        if at > treatment and mean.half_width > VAGUE:
+            break
         rows.append(
             {
                 "time_s": at,

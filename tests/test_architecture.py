@@ -31,8 +31,7 @@ CHAMBEROPT_ORDER = (
     ("price_list", "study_pictures"),
     ("results",),
     ("impacts",),
-    ("export",),
-    ("compare", "maps", "workbench"),
+    ("comparing", "export", "maps", "workbench"),
     ("cli",),
     ("__main__",),
 )

@@ -365,6 +365,39 @@ class TestWhole:
         assert compared["differences_to_first"]["mean_coverage"][0]["value"] == 0.0
         assert Path(compared["folder"], "compare.txt").is_file()
 
+    def test_compare_simulates_designs_on_common_seeds(
+        self, small: Path, chamberopt: Said, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("chamberopt.viewer.apart.why_no_pictures", lambda: "not in this test")
+        text = Path("designs/plate.toml").read_text(encoding="utf-8")
+        heavier = text.replace("mass_g = 3.308", "mass_g = 9.9").replace("seed = 1", "seed = 5")
+        Path("designs/heavier.toml").write_text(heavier, encoding="utf-8")
+        files = ("designs/plate.toml", "designs/heavier.toml")
+        status, out, err = chamberopt("compare", *files, "--workers", 1, "--json")
+        compared = json.loads(out)
+        assert (status, compared["folder"]) == (0, str(Path("results/compare")))
+        assert compared["parameters"] == {"shot.mass_g": [3.308, 9.9]}
+        assert compared["differences_to_first"]["impacts_per_mm2_s"][0]["paired"]
+        assert "heavier: seed = 1 in place of 5, as the first candidate" in err
+
+        # The folders that it left are results: simulated so by themselves, and compared again to the same figures.
+        status, out, _ = chamberopt("simulate", "results/compare/heavier/design.toml", "--json")
+        alone = json.loads(out)["metrics"]["mean_coverage"]["value"]
+        assert alone == compared["metrics"]["mean_coverage"][1]["value"]
+        status, out, err = chamberopt("compare", "results/compare/plate", "results/compare/heavier")
+        assert (status, "shot.mass_g" in out, "in place of" in err) == (0, True, False)
+        assert out.splitlines()[-1] == f"results in {Path('results/compare-2')}"
+
+    def test_compare_refuses_before_it_makes_a_folder(self, small: Path, chamberopt: Said) -> None:
+        text = Path("designs/plate.toml").read_text(encoding="utf-8")
+        Path("designs/longer.toml").write_text(text.replace("time_s = 5", "time_s = 7"), encoding="utf-8")
+        status, out, err = chamberopt("compare", "designs/plate.toml", "designs/longer.toml")
+        assert (status, out, err.count("\n")) == (2, "", 1)
+        assert "--treatment-time-s" in err
+        status, _, err = chamberopt("compare", "designs/plate.toml")
+        assert (status, "two or more" in err) == (2, True)
+        assert not Path("results").exists()
+
     def test_simulate_analytically(self, small: Path, chamberopt: Said) -> None:
         status, out, _ = chamberopt("simulate", "designs/plate.toml", "--analytic", "--json")
         folder = Path(json.loads(out)["folder"])

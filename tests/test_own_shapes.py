@@ -13,7 +13,7 @@ import trimesh
 from chamberopt import viewer
 from chamberopt.chamber import build_chamber
 from chamberopt.cli import main
-from chamberopt.compare import compare
+from chamberopt.comparing.comparison import compare
 from chamberopt.config import load_design, load_study, save_design
 from chamberopt.errors import InputError
 from chamberopt.results import load_result, write_simulation

@@ -8,7 +8,7 @@ import pytest
 
 from chamberopt import viewer
 from chamberopt.chamber import build_chamber
-from chamberopt.compare import compare
+from chamberopt.comparing.comparison import compare
 from chamberopt.config import Study, load_design
 from chamberopt.errors import InputError
 from chamberopt.results import load_result, summary, write_simulation, write_study
@@ -32,7 +32,7 @@ def test_simulation_reads_back(tmp_path: Path) -> None:
     remarks = write_simulation(folder, DESIGN, CHAMBER, EVALUATION)
     assert remarks == ["coverage.png skipped: no OpenGL library found"]
     names = {path.name for path in folder.iterdir()}
-    assert names == {"design.toml", "result.json", "coverage.vtp", "chamber.stl", "chamber.vtp"}
+    assert names == {"design.toml", "result.json", "coverage.vtp", "hits.npz", "chamber.stl", "chamber.vtp"}
     result = load_result(folder)
     assert result == load_result(folder / "result.json")
     assert result.kind == "simulation"
@@ -121,7 +121,7 @@ def test_a_study_leaves_everything_and_its_best_design_can_be_used(tmp_path: Pat
     assert names == {
         "design.toml", "study.toml", "history.jsonl", "history.csv", "best.toml", "result.json", "coverage.vtp",
         "chamber.stl", "chamber.vtp", "convergence.png", "slices.png", "start", "asked.json", "timings.jsonl",
-        "confirm", ".lock",
+        "confirm", ".lock", "hits.npz",
     }  # fmt: skip
     result = load_result(folder)
     assert result.kind == "study"

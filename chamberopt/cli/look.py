@@ -1,36 +1,12 @@
-"""compare, inspect: results."""
+"""inspect: a result."""
 
 from __future__ import annotations
 
 import json as json_format
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from chamberopt.cli.app import Json, Out, app
-from chamberopt.cli.said import remark, results_folder
-
-if TYPE_CHECKING:
-    pass
-
-
-@app.command
-def compare(*results: Path, json: Json = False, out: Out = None) -> None:
-    """Compare results of the same part: what differs in the designs, and what that did to the coverage.
-
-    Parameters
-    ----------
-    results
-        Two or more results folders.
-    """
-    from chamberopt import compare as comparing
-
-    comparison = comparing.compare(results)
-    with results_folder(out, "compare") as folder:
-        remark(comparing.write_comparison(folder, comparison))
-    if json:
-        print(json_format.dumps({**comparison.as_json(), "folder": str(folder)}, indent=2))
-    else:
-        print(f"{comparison.as_text()}\nresults in {folder}")
+from chamberopt.cli.said import results_folder
 
 
 @app.command

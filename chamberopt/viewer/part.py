@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -50,20 +50,35 @@ def averaged(
 
     Only over neighbours that face the same way, so that a flank is not mixed with the next one. 0.0: as it is.
     """
-    if not len(centre) or np.mean(dents) >= DENTS_SHOWN:
+    reach = reach_wanted(centre, area, dents)
+    if reach == 0.0:
         return density, 0.0
-    from scipy.spatial import cKDTree
+    over = over_discs(centre, normal, reach)
+    return over(density * area) / over(area), reach
 
+
+def reach_wanted(centre: np.ndarray, area: np.ndarray, dents: np.ndarray, wanted: float = DENTS_SHOWN) -> float:
+    """Radius [mm] of discs that hold so many dents in the mean; 0.0 where triangles do."""
+    if not len(centre) or np.mean(dents) >= wanted:
+        return 0.0
     per_mm2 = max(float(dents.sum() / area.sum()), 1e-12)
     size = float(np.linalg.norm(np.ptp(centre, axis=0)))
-    reach = min(np.sqrt(DENTS_SHOWN / (np.pi * per_mm2)), WIDEST * size)
+    return float(min(np.sqrt(wanted / (np.pi * per_mm2)), WIDEST * size))
+
+
+def over_discs(centre: np.ndarray, normal: np.ndarray, reach: float) -> Callable[[np.ndarray], np.ndarray]:
+    """A function that sums what triangles have, (m,), over the disc round each: neighbours that face the same way."""
+    if reach == 0.0:
+        return np.asarray
+    from scipy.spatial import cKDTree
+
     pairs = cKDTree(centre).query_pairs(reach, output_type="ndarray")
     i, j = pairs[np.einsum("ij,ij->i", normal[pairs[:, 0]], normal[pairs[:, 1]]) > 0.7].T
-    sums, areas = density * area, area.astype(float).copy()
-    for here, there in ((i, j), (j, i)):
-        sums = sums + np.bincount(here, (density * area)[there], len(area))
-        areas = areas + np.bincount(here, area[there], len(area))
-    return sums / areas, float(reach)
+
+    def over(own: np.ndarray) -> np.ndarray:
+        return np.asarray(own + np.bincount(i, own[j], len(own)) + np.bincount(j, own[i], len(own)))
+
+    return over
 
 
 def colour_range(parts: Sequence[Part]) -> tuple[float, float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,8 @@ from chamberopt.viewer.apart import drawn_apart
 from chamberopt.viewer.part import Part, colour_range
 from chamberopt.viewer.scene import in_chamber, near
 from chamberopt.viewer.surfaces import CHAMBER, COVERAGE, pyvista, read_surface
+
+COLUMNS = 4  # results beside each other: more go below
 
 
 def coverage_picture(folders: Sequence[str | Path], titles: Sequence[str], picture: str | Path) -> str | None:
@@ -28,13 +30,28 @@ def draw(job: dict[str, Any]) -> None:
     chambers = [read_surface(folder / CHAMBER) for folder in folders]
     limits = colour_range(parts)
     single = len(folders) == 1
-    shape = (1, 2) if single else (2, len(folders))
-    size = [1800, 900] if single else [900 * len(folders), 1500]
-    plotter = pyvista().Plotter(off_screen=True, shape=shape, window_size=size, border=False)
+    plotter, place = panels(len(folders))
     for column, (part, chamber, title) in enumerate(zip(parts, chambers, job["titles"], strict=True)):
-        plotter.subplot(0, 0 if single else column)
+        plotter.subplot(*place(0, column))
         in_chamber(plotter, part, chamber, title, limits, bar=False)
-        plotter.subplot(*((0, 1) if single else (1, column)))
+        plotter.subplot(*place(1, column))
         near(plotter, part, limits, bar=single or column == len(folders) - 1)
     with whole_file(Path(job["picture"])) as temporary:
         plotter.screenshot(temporary)
+
+
+def panels(count: int) -> tuple[Any, Callable[[int, int], tuple[int, int]]]:
+    """A plotter for so many results with two views each, and where view 0 or 1 of the k-th goes: (row, column).
+
+    One result has its views beside each other, several below, in bands of COLUMNS results.
+    """
+    if count == 1:
+        return pyvista().Plotter(off_screen=True, shape=(1, 2), window_size=[1800, 900], border=False), lambda v, k: (
+            0,
+            v,
+        )
+    columns, bands = min(count, COLUMNS), -(-count // COLUMNS)
+    plotter = pyvista().Plotter(
+        off_screen=True, shape=(2 * bands, columns), window_size=[900 * columns, 1500 * bands], border=False
+    )
+    return plotter, lambda view, k: (2 * (k // COLUMNS) + view, k % COLUMNS)

@@ -1,0 +1,61 @@
+"""The target of one result, triangle by triangle, as its folder has it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from chamberopt.hits import HITS, Hits, SortedHits, load_hits
+from chamberopt.results import Result
+from chamberopt.viewer import COVERAGE, read_surface
+
+
+@dataclass(frozen=True)
+class Covered:
+    """Triangles of a part, (m,) each, of which only the target's count.
+
+    centre (m, 3) mm, in the chamber · normal (m, 3), unit vectors · target bool · area, exposed mm² · coverage 0..1, 0
+    where hidden from the shot · dents: simulated numbers · times: treatment over simulated time · hits: None in results
+    of older versions.
+    """
+
+    centre: np.ndarray
+    normal: np.ndarray
+    target: np.ndarray
+    area: np.ndarray
+    exposed: np.ndarray
+    coverage: np.ndarray
+    dents: np.ndarray
+    times: float
+    hits: SortedHits | None
+
+    @property
+    def hits_on_target(self) -> Hits | None:
+        """The impacts that count, one by one."""
+        return None if self.hits is None else self.hits.on(self.target & (self.exposed > 0.0))
+
+    @property
+    def dents_a_triangle(self) -> float:
+        """Mean over the target."""
+        return float(self.dents[self.target].mean())
+
+
+def covered(result: Result) -> Covered:
+    """Read a results folder. Raises InputError for files gone or damaged."""
+    surface = read_surface(result.folder / COVERAGE)
+    corners = np.asarray(surface.points, dtype=float)[surface.regular_faces]
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    twice = np.linalg.norm(cross, axis=1)
+    file = result.folder / HITS
+    return Covered(
+        centre=corners.mean(axis=1),
+        normal=cross / np.maximum(twice, 1e-300)[:, None],
+        target=np.asarray(surface["target"]) > 0,
+        area=0.5 * twice,
+        exposed=np.asarray(surface["exposed_area_mm2"], dtype=float),
+        coverage=np.nan_to_num(np.asarray(surface["coverage"], dtype=float)),
+        dents=np.asarray(surface["dents"], dtype=float),
+        times=result.design.process.treatment_time_s / float(result.data["simulated_time_s"]),
+        hits=load_hits(file) if file.is_file() else None,
+    )
