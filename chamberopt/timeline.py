@@ -21,8 +21,8 @@ VAGUE = 0.1  # half-width of the mean's 95 % interval beyond which a curve would
 def against_time(design: Design, chamber: Chamber, evaluation: Evaluation) -> list[dict[str, Any]]:
     """Rows of time_s, mean_coverage, half_width, p05_coverage, p05_half_width, from the first moments to the end.
 
-    From dent rates: to where 98 % is reached, the treatment time at least, FARTHEST times it at most, as far as the mean is known. Where every
-    dent is marked: to the treatment's end, the mean alone.
+    From dent rates: to where 98 % is reached, the treatment time at least, FARTHEST times it at most, and as far as the
+    mean is known. Where every dent is marked: to the treatment's end, the mean alone.
     """
     if evaluation.against_time:
         return [
