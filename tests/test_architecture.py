@@ -31,7 +31,7 @@ CHAMBEROPT_ORDER = (
     ("price_list", "study_pictures"),
     ("results",),
     ("impacts",),
-    ("comparing", "export", "maps", "workbench"),
+    ("comparing", "export", "maps", "report", "workbench"),
     ("cli",),
     ("__main__",),
 )

@@ -318,6 +318,7 @@ def test_help_loads_nothing_heavy() -> None:
         "vtkmodules",
         "nlopt",
         "manifold3d",
+        "plotly",
         "scipy",
         "matplotlib",
         "numpy",
