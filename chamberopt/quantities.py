@@ -24,7 +24,10 @@ EVEN, COUNTS, DOUBT = "viridis", "cividis", "magma"
 
 @dataclass(frozen=True)
 class Quantity:
-    """One number a triangle. column: its cell data in coverage.vtp · factor: from there to the unit that is shown."""
+    """One number a triangle.
+
+    column: its cell data in coverage.vtp · factor: from there to the unit that is shown · grows: in proportion to time.
+    """
 
     name: str
     label: str
@@ -32,6 +35,7 @@ class Quantity:
     column: str
     factor: float = 1.0
     colours: str = EVEN
+    grows: bool = False
 
     @property
     def title(self) -> str:
@@ -42,12 +46,12 @@ QUANTITIES = {
     one.name: one
     for one in (
         Quantity("coverage", "coverage", "%", "coverage", 100.0),
-        Quantity("impacts", "impacts per area", "1/mm²", "impacts_per_mm2", colours=COUNTS),
+        Quantity("impacts", "impacts per area", "1/mm²", "impacts_per_mm2", colours=COUNTS, grows=True),
         Quantity("speed", "mean normal speed", "m/s", "mean_normal_speed"),
         Quantity("p90-speed", "normal speed, 90th percentile", "m/s", "p90_normal_speed"),
         Quantity("angle", "mean impact angle, 90° is head on", "°", "mean_angle_deg"),
         Quantity("dent", "mean dent diameter", "µm", "mean_dent_um"),
-        Quantity("energy", "energy of impacts per area", "mJ/mm²", "energy_per_mm2", colours=COUNTS),
+        Quantity("energy", "energy of impacts per area", "mJ/mm²", "energy_per_mm2", colours=COUNTS, grows=True),
         Quantity("interval", "width of coverage's 95 % interval", "%", "coverage_interval", 100.0, DOUBT),
     )
 }

@@ -85,11 +85,11 @@ def optimise(study: Study, out: str | Path, *, workers: int | None = None, progr
 
 def show(result: Result, screenshot: str | Path | None = None) -> None:
     """The part coloured by coverage in its chamber: in a window, or as a picture in the file ``screenshot``."""
-    from chamberopt.results import Result, summary
-    from chamberopt.viewer import inspect
+    from chamberopt.results import Result, subject
+    from chamberopt.viewer import Look, inspect
 
     _require("result", result, Result, "simulate")
-    inspect(result.folder, screenshot, title=f"{result.folder.resolve().name}\n{summary(result)}")
+    inspect([subject(result)], Look(), screenshot)
 
 
 def _require(name: str, given: object, kind: type, maker: str) -> None:

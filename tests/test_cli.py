@@ -417,6 +417,19 @@ class TestWhole:
         status, out, _ = chamberopt("inspect", "results/plate", "--screenshot", "look.png")
         assert (status, out.splitlines()[-1]) == (0, "picture in look.png")
         assert Path("look.png").stat().st_size > 10_000
+        options = ["--quantity", "speed", "--below", "90", "--clip", "Y=1", "--triangle", "7", "--view", "1,-1,1"]
+        status, out, _ = chamberopt("inspect", "results/plate", "results/plate", *options, "--off-screen", "--json")
+        said = json.loads(out)
+        assert (status, said["screenshot"], len(said["folders"])) == (0, str(Path("results/inspect/inspect.png")), 2)
+        assert Path("results/inspect/inspect.png").stat().st_size > 10_000
+        for wrong, why in (
+            (["--quantity", "sped"], "did you mean speed"),
+            (["--triangle", "999999"], "has triangles 0 to"),
+            (["--below", "120"], "up to 100 %"),
+            (["--screenshot", "a.png", "--out", "out"], "give one of them"),
+        ):
+            status, out, err = chamberopt("inspect", "results/plate", "--off-screen", *wrong)
+            assert (status, why in err, err.count("\n")) == (2, True, 1), err
 
     def test_run(self, small: Path, chamberopt: Said) -> None:
         status, out, _ = chamberopt("run", "studies/small.toml", "--json")

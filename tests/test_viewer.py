@@ -1,8 +1,10 @@
 """Surfaces read back to the last bit, pictures that show something, and no crash where none can be drawn."""
 
+import json
 import os
 import subprocess
 import sys
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +17,8 @@ from chamberopt.coverage import coverage_at
 from chamberopt.errors import InputError
 from chamberopt.quantities import per_triangle
 from chamberopt.viewer import (
+    Look,
+    Subject,
     apart,
     coverage_picture,
     inspect,
@@ -108,21 +112,24 @@ def test_side_by_side(case: tuple, tmp_path: Path) -> None:
 
 def test_screenshot_without_a_display(case: tuple, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     drawn: list = []
-    monkeypatch.setattr(window, "coverage_picture", lambda *arguments: drawn.append(arguments))
+    monkeypatch.setattr(window, "drawn_apart", lambda *arguments: drawn.append(arguments))
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    inspect(case[0], tmp_path / "shot.png")
-    assert drawn == [([case[0]], ["a plate, simulated"], tmp_path / "shot.png")]
+    subject, look = Subject(str(case[0]), "a plate", 5.0, 25.0, 336, 5.0), Look("speed", below=90.0)
+    inspect([subject], look, tmp_path / "shot.png")
+    ((job, picture),) = drawn
+    assert (job["draw"], job["subjects"], picture) == ("inspect", [asdict(subject)], tmp_path / "shot.png")
+    assert Look.from_json(json.loads(json.dumps(job["look"]))) == look
     if sys.platform.startswith("linux"):
         with pytest.raises(InputError, match=r"no display.*--screenshot"):
-            inspect(case[0])
+            inspect([subject], look)
     with pytest.raises(InputError, match=r"\.png"):
-        inspect(case[0], tmp_path / "shot.bmp")
+        inspect([subject], look, tmp_path / "shot.bmp")
     with pytest.raises(InputError, match="does not exist"):
-        inspect(case[0], tmp_path / "nowhere" / "shot.png")
-    monkeypatch.setattr(window, "coverage_picture", lambda *_: "shot.png skipped: install this")
+        inspect([subject], look, tmp_path / "nowhere" / "shot.png")
+    monkeypatch.setattr(window, "drawn_apart", lambda *_: "shot.png skipped: install this")
     with pytest.raises(InputError, match="install this"):
-        inspect(case[0], tmp_path / "shot.png")
+        inspect([subject], look, tmp_path / "shot.png")
 
 
 def test_without_an_opengl_library_one_line_says_what_to_install(

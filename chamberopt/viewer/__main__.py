@@ -4,9 +4,14 @@ import json
 import sys
 
 from chamberopt.errors import InputError
-from chamberopt.viewer import difference, side_by_side, two_sides
+from chamberopt.viewer import difference, side_by_side, two_sides, window
 
-DRAWERS = {"coverage": side_by_side.draw, "difference": difference.draw, "part": two_sides.draw}
+DRAWERS = {
+    "coverage": side_by_side.draw,
+    "difference": difference.draw,
+    "inspect": window.draw,
+    "part": two_sides.draw,
+}
 
 if __name__ == "__main__":
     job = json.loads(sys.argv[1])

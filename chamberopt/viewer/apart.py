@@ -36,6 +36,16 @@ def offscreen_window() -> str | None:
     return None
 
 
+def without_display() -> dict[str, str]:
+    """The environment of a process that draws without a display."""
+    environment = dict(os.environ)
+    window = offscreen_window()
+    if sys.platform.startswith("linux") and window:
+        environment["VTK_DEFAULT_OPENGL_WINDOW"] = window
+        environment.pop("DISPLAY", None)
+    return environment
+
+
 def picture_path(picture: str | Path) -> Path:
     """Where --screenshot may write. InputError for what is no .png, or in no folder."""
     path = Path(picture)
@@ -52,15 +62,12 @@ def drawn_apart(job: dict[str, Any], picture: str | Path) -> str | None:
     if missing:
         return f"{Path(picture).name} skipped: {missing}"
     job = {**job, "picture": str(picture)}
-    environment = dict(os.environ)
-    window = offscreen_window()
-    if sys.platform.startswith("linux") and window:
-        environment["VTK_DEFAULT_OPENGL_WINDOW"] = window
-        environment.pop("DISPLAY", None)
     command = [sys.executable, "-m", "chamberopt.viewer", json.dumps(job)]
-    run = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=600, check=False)
+    run = subprocess.run(command, env=without_display(), capture_output=True, text=True, timeout=600, check=False)
     if run.returncode == 0 and Path(picture).is_file():
         return None
     if run.returncode == 2:
         raise InputError(run.stderr.strip().splitlines()[-1])
+    if "Traceback" in run.stderr:
+        return f"{Path(picture).name} skipped: drawing failed ({run.stderr.strip().splitlines()[-1]})"
     return f"{Path(picture).name} skipped: drawing failed (status {run.returncode}); {INSTALL}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -19,28 +20,48 @@ WIDEST = 0.06
 class Part:
     """A part ready to be drawn: `target` with one quantity as cell data "shown", in the unit shown, and the `rest`.
 
-    reach [mm]: how far around a triangle coverage is averaged, 0 where it is not.
+    Both have cell data "row", the triangle's row in coverage.vtp. reach [mm]: how far around a triangle coverage is
+    averaged, 0 where it is not. marked: whether coverage is from dents marked one by one, known at one time only.
     """
 
     def __init__(self, surface: Surface, quantity: Quantity = QUANTITIES["coverage"]) -> None:
-        if quantity.column not in surface.cell_data:
-            raise InputError(f"coverage.vtp has no {quantity.column}: an older result; simulate again")
         wanted = (surface["target"] > 0) & (surface["exposed_area_mm2"] > 0)
-        self.quantity = quantity
+        surface["row"] = np.arange(surface.n_cells)
         self.target = surface.extract_cells(wanted).extract_surface(algorithm="dataset_surface")
         self.rest = surface.extract_cells(~wanted)
-        self.reach = 0.0
+        self.marked = not np.allclose(self.target["coverage"], -np.expm1(-self.target["dent_density"]), atol=1e-9)
+        self.show(quantity)
+
+    def show(self, quantity: Quantity, times: float = 1.0) -> None:
+        """Another quantity; coverage and what is counted per area at so many treatment times."""
+        self.quantity = quantity
+        self.reach = self.coverage_reach if quantity.name == "coverage" else 0.0
+        self.target["shown"] = self.values(quantity, times)
+
+    def values(self, quantity: Quantity, times: float = 1.0) -> np.ndarray:
+        """Of the target's triangles, in the unit shown."""
+        if quantity.column not in self.target.cell_data:
+            raise InputError(f"coverage.vtp has no {quantity.column}: an older result; simulate again")
         if quantity.name != "coverage":
-            self.target["shown"] = quantity.factor * np.asarray(self.target[quantity.column])
-            return
-        density, self.reach = averaged(
+            return quantity.factor * np.asarray(self.target[quantity.column]) * (times if quantity.grows else 1.0)
+        value = self._averages[0]
+        return 100.0 * value if self.marked else -100.0 * np.expm1(-value * times)
+
+    @property
+    def coverage_reach(self) -> float:
+        """The reach of coverage, whatever is shown."""
+        return self._averages[1]
+
+    @cached_property
+    def _averages(self) -> tuple[np.ndarray, float]:
+        """What coverage is computed from, averaged: its dent density, or itself where dents are marked; and reach."""
+        return averaged(
             np.asarray(self.target.cell_centers().points),
             np.asarray(self.target.cell_normals),
-            np.asarray(self.target["dent_density"]),
+            np.asarray(self.target["coverage" if self.marked else "dent_density"]),
             np.asarray(self.target["exposed_area_mm2"]),
             np.asarray(self.target["dents"]),
         )
-        self.target["shown"] = -100.0 * np.expm1(-density)
 
 
 def averaged(

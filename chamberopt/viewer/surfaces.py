@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -56,9 +59,21 @@ def read_surface(path: Path) -> Surface:
     """A .vtp of a results folder. VTK reads a damaged one as an empty mesh: here that is an InputError."""
     if not path.is_file():
         raise InputError(f"{path}: not there; give a results folder that simulate or run has finished")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of a damaged file VTK warns, in words nobody can act on
+    with _quietly():
         surface = pyvista().read(path)
     if not isinstance(surface, pyvista().PolyData) or surface.n_cells == 0:
         raise InputError(f"{path}: damaged, no triangles could be read; simulate again")
     return surface
+
+
+@contextmanager
+def _quietly() -> Iterator[None]:
+    """Without what VTK says of a damaged file, on three ways, in words nobody can act on."""
+    disabled = logging.root.manager.disable
+    with warnings.catch_warnings(), pyvista().vtk_verbosity("off"):
+        warnings.simplefilter("ignore")
+        logging.disable(logging.ERROR)
+        try:
+            yield
+        finally:
+            logging.disable(disabled)
