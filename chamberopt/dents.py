@@ -23,6 +23,8 @@ from chamberopt.objective import exposed_target
 from chamberopt.triangles import area_vectors
 
 if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
+
     from chamberopt.chamber import Chamber
     from chamberopt.config import Design
     from sim_core import ImpactLog
@@ -40,6 +42,21 @@ class Samples:
     normal: np.ndarray
     triangle: np.ndarray
     area: np.ndarray
+
+
+@dataclass(frozen=True)
+class Dents:
+    """Dents in order of time: place of the contact, normal of the triangle that was hit (k, 3) m · radius (k,) m ·
+    time (k,) s. Places are in the part's own frame.
+    """
+
+    place: np.ndarray
+    normal: np.ndarray
+    radius: np.ndarray
+    time: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.time)
 
 
 def few_points_note(samples: Samples, chamber: Chamber) -> tuple[str, ...]:
@@ -90,13 +107,19 @@ def sample_points(chamber: Chamber, spacing: float) -> Samples:
 
 def first_marked(samples: Samples, impacts: ImpactLog, chamber: Chamber, design: Design) -> np.ndarray:
     """When each point is first inside a dent [s], (p,); inf for never."""
+    dents = dents_on_part(impacts, chamber, design)
+    return mark(samples, dents.place, dents.normal, dents.radius, dents.time)
+
+
+def dents_on_part(impacts: ImpactLog, chamber: Chamber, design: Design) -> Dents:
+    """The dents that impacts leave on the part; impacts below its yield speed leave none."""
     diameter = dent_diameters(impacts, design)
     dents = np.flatnonzero((diameter > 0.0) & (chamber.source[impacts.triangle] >= 0))
     corners = chamber.vertices[chamber.triangles[impacts.triangle[dents]]]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     place = nearest_on_triangles(corners, impacts.position[dents])
-    return mark(samples, place, normal, 0.5 * diameter[dents], impacts.time[dents])
+    return Dents(place, normal, 0.5 * diameter[dents], impacts.time[dents])
 
 
 def nearest_on_triangles(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -114,18 +137,32 @@ def mark(samples: Samples, place: np.ndarray, normal: np.ndarray, radius: np.nda
     first = np.full(len(samples.area), np.inf)
     tree = cKDTree(samples.place)
     for begin in range(0, len(place), AT_ONCE):
-        part = slice(begin, begin + AT_ONCE)
-        # No way along a surface is shorter than the straight one: what is near in space holds all candidates.
-        pairs = tree.sparse_distance_matrix(cKDTree(place[part]), radius[part].max(), output_type="ndarray")
-        point, dent = pairs["i"], pairs["j"] + begin
-        cosine = (samples.normal[point] * normal[dent]).sum(axis=1)
-        away = place[dent] - samples.place[point]
-        bend = (away * samples.normal[point]).sum(axis=1) * -(away * normal[dent]).sum(axis=1)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            detour = np.where(bend > 0.0, 2.0 * bend / (1.0 + cosine), 0.0)
-        hit = pairs["v"] ** 2 + detour <= radius[dent] ** 2
-        np.minimum.at(first, point[hit], time[dent[hit]])
+        some = slice(begin, begin + AT_ONCE)
+        point, dent, _ = inside(tree, samples.normal, place[some], normal[some], radius[some])
+        np.minimum.at(first, point, time[some][dent])
     return first
+
+
+def inside(
+    tree: cKDTree, facing: np.ndarray, place: np.ndarray, normal: np.ndarray, radius: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Which points lie in which discs: rows of point, dent, and their distance as a share of the dent's radius.
+
+    tree: of the points, facing (p, 3) their normals · place, normal (k, 3), radius (k,): of the discs.
+    """
+    from scipy.spatial import cKDTree
+
+    # No way along a surface is shorter than the straight one: what is near in space holds all candidates.
+    pairs = tree.sparse_distance_matrix(cKDTree(place), radius.max(), output_type="ndarray")
+    point, dent = pairs["i"], pairs["j"]
+    cosine = (facing[point] * normal[dent]).sum(axis=1)
+    away = place[dent] - tree.data[point]
+    bend = (away * facing[point]).sum(axis=1) * -(away * normal[dent]).sum(axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        detour = np.where(bend > 0.0, 2.0 * bend / (1.0 + cosine), 0.0)
+    square = pairs["v"] ** 2 + detour
+    hit = square <= radius[dent] ** 2
+    return point[hit], dent[hit], np.sqrt(square[hit]) / radius[dent[hit]]
 
 
 def marked_share(samples: Samples, first: np.ndarray, time: float, triangles: int) -> np.ndarray:

@@ -9,28 +9,24 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, fields, replace
 from functools import reduce
 from operator import add
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chamberopt.analytic import analytic_cavity
-from chamberopt.chamber import build_chamber
 from chamberopt.coverage import Tally, mean_normal_speed, tally
 from chamberopt.errors import InputError
-from chamberopt.part import posed_part
+from chamberopt.ground import REMEDY, Ground, made_by
 from chamberopt.process import chamber_mesh
 from chamberopt.replicas import Progress, in_order, simulated
-from chamberopt.viewer import CHAMBER, COVERAGE, read_surface
+from chamberopt.viewer import COVERAGE, read_surface
 from chamberopt.workers.executor import core_count, shared
 
 if TYPE_CHECKING:
     from chamberopt.chamber import Chamber
     from chamberopt.results import Result
-    from sim_core import AnalyticCavity, ImpactLog
+    from sim_core import ImpactLog
 
-MM = 1e3
 AT_ONCE = 4e6  # impacts in memory, some 200 bytes each while they are simulated
-REMEDY = "simulate the design again, and use that result"
 
 
 @dataclass(frozen=True)
@@ -44,37 +40,6 @@ class ReplicaImpacts:
     number: int
     log: ImpactLog
     part_triangle: np.ndarray
-
-
-@dataclass(frozen=True)
-class Ground:
-    """Where a result was simulated: its chamber, built again, and the analytical cavity if it was simulated in one."""
-
-    chamber: Chamber
-    cavity: AnalyticCavity | None
-
-
-def ground_of(result: Result) -> Ground:
-    """The chamber of a simulation, or of a study's best or start, as it was simulated; its target is the result's.
-
-    Raises InputError when a file that the design names has changed since, or this version builds another chamber.
-    """
-    part = posed_part(result.design)[0]
-    kept = read_surface(result.folder / COVERAGE)
-    if part.sha256 != result.part_sha256 or kept.n_cells != len(part.triangles):
-        _refuse_file(result, "part.mesh", result.design.part.mesh_path)
-    if result.design.chamber.sha256 != result.data.get("shape_sha256", ""):
-        _refuse_file(result, "chamber", "the file of its shape")
-    target = np.asarray(kept["target"]) > 0 if result.design.part.target.reachable else None
-    chamber = build_chamber(result.design, target)
-    drawn = read_surface(result.folder / CHAMBER)
-    same = np.array_equal(drawn.points, chamber.vertices * MM) and np.array_equal(drawn["tag"], chamber.tags)
-    if not same or not np.array_equal(drawn.regular_faces, chamber.triangles):
-        raise InputError(
-            f"{result.folder}: its chamber comes out differently now: a file that the design names has changed, or "
-            f"another version made it ({_made_by(result)}); {REMEDY}"
-        )
-    return Ground(chamber, analytic_cavity(result.design, chamber) if result.data.get("analytic") else None)
 
 
 def impacts_of(
@@ -147,15 +112,5 @@ def _require_same_figures(result: Result, total: Tally) -> None:
             raise InputError(
                 f"{result.folder}: this program on this machine does not simulate it again bit for bit: {name} of "
                 f"{wrong.sum()} of {len(wrong)} triangles differ, the first is triangle {np.flatnonzero(wrong)[0]} "
-                f"(made by {_made_by(result)}); {REMEDY}"
+                f"(made by {made_by(result)}); {REMEDY}"
             )
-
-
-def _refuse_file(result: Result, field: str, path: object) -> NoReturn:
-    raise InputError(f"{field}: {path}: not what {result.folder} was simulated with; restore it, or {REMEDY}")
-
-
-def _made_by(result: Result) -> str:
-    made = result.data.get("versions", {})
-    names = ("chamberopt", "manifold3d", "numba", "numpy", "system")
-    return ", ".join(f"{name} {made[name]}" for name in names if name in made) or "an unknown version"

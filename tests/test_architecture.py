@@ -10,7 +10,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 # Each line may import from the lines above it, and from its own line. A folder stands for all of its files.
 CHAMBEROPT_ORDER = (
-    ("errors", "diagnosis", "estimate", "materials", "mixture", "patches", "triangles", "uncovered"),
+    ("errors", "diagnosis", "estimate", "materials", "mixture", "patches", "sight", "triangles", "uncovered"),
     ("disk", "fields", "remesh", "solids", "workers"),
     ("effects", "mesh_io", "shot", "slivers", "sonotrode", "treatment", "versions"),
     ("shapes",),
@@ -20,9 +20,9 @@ CHAMBEROPT_ORDER = (
     ("part",),
     ("chamber",),
     ("analytic", "coverage", "groups", "process"),
-    ("checks", "hits", "objective"),
+    ("checks", "hits", "objective", "replayed"),
     ("dents", "figures", "stuck"),
-    ("intensity", "replicas"),
+    ("dent_map", "flight_frames", "intensity", "replicas"),
     ("accuracy", "progress"),
     ("advice", "evaluation_file", "price", "quantities", "timeline"),
     ("viewer",),
@@ -30,6 +30,7 @@ CHAMBEROPT_ORDER = (
     ("pictures",),
     ("price_list", "study_pictures"),
     ("results",),
+    ("ground",),
     ("impacts",),
     ("comparing", "export", "maps", "report", "workbench"),
     ("cli",),

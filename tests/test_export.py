@@ -27,7 +27,7 @@ from chamberopt.export.chamber_files import read_cavity, write_3mf, write_stl, w
 from chamberopt.export.frame import FrameName
 from chamberopt.export.impact_columns import PIECE
 from chamberopt.export.impacts_table import write_impacts
-from chamberopt.impacts import ground_of
+from chamberopt.ground import ground_of
 from chamberopt.results import load_result, write_simulation, write_study
 from chamberopt.studies.study import run_study
 from chamberopt.viewer import read_surface

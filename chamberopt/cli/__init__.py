@@ -14,12 +14,12 @@ from io import TextIOWrapper
 
 from cyclopts import CycloptsError
 
-from chamberopt.cli import comparing, designs, handing, look, reporting, studies
+from chamberopt.cli import comparing, designs, flight, handing, look, reporting, studies
 from chamberopt.cli.app import app
 from chamberopt.errors import InputError
 
 # The modules register their commands.
-__all__ = ["app", "comparing", "designs", "handing", "look", "main", "reporting", "studies"]
+__all__ = ["app", "comparing", "designs", "flight", "handing", "look", "main", "reporting", "studies"]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

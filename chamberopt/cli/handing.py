@@ -87,7 +87,8 @@ def _files(formats: dict[str, Format], out: Path | None, name: str) -> Iterator[
 def _impacts(result: Result, files: list[Path], frame: FrameName, replicas: int | None, workers: int | None) -> int:
     """Simulates the result again into these files; how many impacts there are."""
     from chamberopt.export.impacts_table import require_writable, write_impacts
-    from chamberopt.impacts import asked_replicas, ground_of
+    from chamberopt.ground import ground_of
+    from chamberopt.impacts import asked_replicas
     from chamberopt.progress import progress_bar
     from chamberopt.workers.executor import open_executor
 

@@ -4,13 +4,14 @@ import json
 import sys
 
 from chamberopt.errors import InputError
-from chamberopt.viewer import difference, side_by_side, two_sides, window
+from chamberopt.viewer import difference, replay, side_by_side, two_sides, window
 
 DRAWERS = {
     "coverage": side_by_side.draw,
     "difference": difference.draw,
     "inspect": window.draw,
     "part": two_sides.draw,
+    "replay": replay.draw,
 }
 
 if __name__ == "__main__":

@@ -46,24 +46,32 @@ def without_display() -> dict[str, str]:
     return environment
 
 
-def picture_path(picture: str | Path) -> Path:
-    """Where --screenshot may write. InputError for what is no .png, or in no folder."""
-    path = Path(picture)
-    if path.suffix.lower() != ".png":
-        raise InputError(f"--screenshot {path}: pictures are written as .png; give such a name")
+def picture_path(picture: str | Path, option: str = "--screenshot ") -> Path:
+    """Where --screenshot, or another option, may write. InputError for what is no .png, or in no folder."""
+    return file_path(picture, (".png",), "pictures are written as .png", option)
+
+
+def file_path(file: str | Path, suffixes: tuple[str, ...], written: str, option: str = "") -> Path:
+    """Where a file may be written. InputError for another suffix, or in no folder."""
+    path = Path(file)
+    if path.suffix.lower() not in suffixes:
+        raise InputError(f"{option}{path}: {written}; give such a name")
     if not path.resolve().parent.is_dir():
-        raise InputError(f"--screenshot {path}: the folder does not exist; make it first")
+        raise InputError(f"{option}{path}: the folder does not exist; make it first")
     return path
 
 
-def drawn_apart(job: dict[str, Any], picture: str | Path) -> str | None:
-    """Does a drawing job in a process of its own. None, or one line saying why there is no picture."""
+def drawn_apart(job: dict[str, Any], picture: str | Path, patience: float = 600.0) -> str | None:
+    """Does a drawing job in a process of its own. None, or one line saying why there is no picture.
+
+    patience [s]: subprocess.TimeoutExpired after so long.
+    """
     missing = why_no_pictures()
     if missing:
         return f"{Path(picture).name} skipped: {missing}"
     job = {**job, "picture": str(picture)}
     command = [sys.executable, "-m", "chamberopt.viewer", json.dumps(job)]
-    run = subprocess.run(command, env=without_display(), capture_output=True, text=True, timeout=600, check=False)
+    run = subprocess.run(command, env=without_display(), capture_output=True, text=True, timeout=patience, check=False)
     if run.returncode == 0 and Path(picture).is_file():
         return None
     if run.returncode == 2:

@@ -68,16 +68,18 @@ def in_chamber(plotter: Any, part: Part, chamber: Surface, title: str, limits: t
     plotter.enable_anti_aliasing("ssaa")
 
 
-def room(plotter: Any, chamber: Surface) -> list[Any]:
-    """The sonotrode, and the walls as glass with their edges: their actors, which no click finds."""
+def room(plotter: Any, chamber: Surface) -> tuple[dict[int, Any], list[Any]]:
+    """The sonotrodes, and the walls as glass with their edges: the actors of the former by tag, and of the latter. No
+    click finds them.
+    """
     tags = np.asarray(chamber["tag"])
-    sonotrode, wall = (
-        chamber.extract_cells(chosen).extract_surface(algorithm="dataset_surface")
-        for chosen in (is_sonotrode(tags), tags == TAG_WALL)
-    )
+    faces = {}
+    for tag in np.unique(tags[is_sonotrode(tags)]):
+        face = chamber.extract_cells(tags == tag).extract_surface(algorithm="dataset_surface")
+        faces[int(tag)] = plotter.add_mesh(face, color=SONOTRODE, lighting=False, pickable=False, **STILL)
+    wall = chamber.extract_cells(tags == TAG_WALL).extract_surface(algorithm="dataset_surface")
     rims = wall.extract_feature_edges(30, non_manifold_edges=False, manifold_edges=False)
-    return [
-        plotter.add_mesh(sonotrode, color=SONOTRODE, lighting=False, pickable=False, **STILL),
+    return faces, [
         plotter.add_mesh(wall, color=GLASS, opacity=0.16, specular=0.3, pickable=False, **STILL),
         plotter.add_mesh(rims, color=DARK, line_width=2, opacity=0.6, pickable=False, **STILL),
     ]

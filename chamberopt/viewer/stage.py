@@ -110,7 +110,8 @@ class Stage:
         passed = one.passed(look)
         actors = target_and_rest(plotter, one.part, scale, passed)
         if look.chamber:
-            actors += room(plotter, one.chamber)
+            faces, walls = room(plotter, one.chamber)
+            actors += [*faces.values(), *walls]
         if look.cut is not None:
             kept = actors if look.cut_part else actors[2:]
             _cut(kept, look.cut, one)
