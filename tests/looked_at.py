@@ -32,7 +32,12 @@ def ball_result(folder: Path, marked: bool = False, moved: float = 0.0, lost: in
     tags = np.where(room.triangles_center[:, 2] < -0.015, 1, 2).astype(np.uint8)
     part = SimpleNamespace(vertices=ball.vertices + np.array([moved * 1e-3, 0.0, 0.0]), triangles=faces)
     chamber: Any = SimpleNamespace(
-        part=part, vertices=np.asarray(room.vertices), triangles=np.asarray(room.faces), tags=tags, source=tags
+        part=part,
+        vertices=np.asarray(room.vertices),
+        triangles=np.asarray(room.faces),
+        tags=tags,
+        source=tags,
+        fitting=None,
     )
     height = 50.0 + 4500.0 * middle[:, 2]  # % of the way up: 5 to 95
     impacts = np.arange(count) % 5

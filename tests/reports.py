@@ -32,7 +32,7 @@ def simulated(folder: Path, per_mm2: float = 60.0, hits: bool = True) -> tuple[P
     """A simulation's folder; hits False: as older versions left it."""
     chamber = build_chamber(DESIGN)
     evaluation = poisson_evaluation(DESIGN, chamber, per_mm2)
-    write_simulation(folder, DESIGN, chamber, replace(evaluation, hits=hits_of(evaluation)) if hits else evaluation)
+    write_simulation(folder, DESIGN, chamber, replace(evaluation, hits=hits_of(evaluation) if hits else ()))
     return folder, chamber
 
 
