@@ -26,6 +26,6 @@ def test_the_readmes_python_runs_as_printed(snippet: str, tmp_path: Path) -> Non
 
 
 def test_files_named_in_the_readme_exist() -> None:
-    named = re.findall(r"(?:designs|studies|docs)/[\w/.-]+\.(?:toml|png)", README)
+    named = re.findall(r"(?:designs|studies|docs)/[\w/.-]+\.(?:toml|png|gif|md)", README)
     assert len(set(named)) >= 5
     assert [name for name in named if not (ROOT / name).is_file()] == []
