@@ -15,7 +15,8 @@ from chamberopt.comparing.comparison import compare
 from chamberopt.comparing.difference import LONGEST, confidence_of_each, difference
 from chamberopt.comparing.files import write_comparison
 from chamberopt.comparing.table import as_text
-from chamberopt.config import load_design
+from chamberopt.config import Design, load_design
+from chamberopt.design import checked
 from chamberopt.errors import InputError
 from chamberopt.estimate import Estimate, estimate
 from chamberopt.objective import LONGEST as NEVER
@@ -181,6 +182,23 @@ def test_results_without_single_impacts_are_compared_all_the_same(tmp_path: Path
     assert about["local_differences_to_first"] is None
     assert about["distributions"]["angle"]["shares"][1] is None
     assert about["distributions"]["impacts"][1] is None
+
+
+def test_two_ways_of_counting_are_said(tmp_path: Path) -> None:
+    data = PLATE.model_dump()
+    data["process"]["accuracy"] |= {"coverage_model": "dents"}
+    dents = checked(Design, data)
+    text = as_text(compare([left(tmp_path / "a", 20), left(tmp_path / "b", 20, 0, dents)]))
+    assert "counted in two ways (process.accuracy.coverage_model)" in text
+    assert "two ways" not in as_text(compare([tmp_path / "a", left(tmp_path / "c", 20)]))
+
+
+def test_single_impacts_of_another_result_are_refused(tmp_path: Path) -> None:
+    both = compare([left(tmp_path / "a", 20), left(tmp_path / "b", 30)])
+    (tmp_path / "b" / "hits.npz").write_bytes((tmp_path / "a" / "hits.npz").read_bytes())
+    with pytest.raises(InputError, match=r"hits\.npz: its impacts are not those of the coverage\.vtp beside it"):
+        write_comparison(tmp_path / "out", both)
+    assert not (tmp_path / "out").exists()
 
 
 def test_targets_of_other_triangles_are_refused(tmp_path: Path) -> None:

@@ -200,6 +200,14 @@ def test_csv_holds_what_parquet_holds_whatever_the_number_of_workers(
     assert about == json.loads(schema.metadata[b"chamberopt"])
 
 
+def test_endings_in_capitals_mean_the_same(simulated: Path, tmp_path: Path) -> None:
+    result = load_result(simulated)
+    files = [tmp_path / name for name in ("I.PARQUET", "I.CSV.GZ")]
+    written = write_impacts(files, result, ground_of(result), SerialExecutor(), replicas=1)
+    assert pyarrow.parquet.read_table(files[0]).num_rows == written
+    assert gzip.decompress(files[1].read_bytes()).count(b"\n") == written + 1
+
+
 def test_a_study_gives_the_impacts_of_its_best_and_of_its_start(study: Path, tmp_path: Path) -> None:
     for folder in (study, study / "start"):
         table = table_of(folder, tmp_path / f"{folder.name}.parquet")

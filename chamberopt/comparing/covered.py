@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
+from chamberopt.errors import InputError
 from chamberopt.hits import HITS, Hits, SortedHits, load_hits
 from chamberopt.results import Result
 from chamberopt.viewer import COVERAGE, read_surface
@@ -47,7 +49,6 @@ def covered(result: Result) -> Covered:
     corners = np.asarray(surface.points, dtype=float)[surface.regular_faces]
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     twice = np.linalg.norm(cross, axis=1)
-    file = result.folder / HITS
     return Covered(
         centre=corners.mean(axis=1),
         normal=cross / np.maximum(twice, 1e-300)[:, None],
@@ -57,5 +58,15 @@ def covered(result: Result) -> Covered:
         coverage=np.nan_to_num(np.asarray(surface["coverage"], dtype=float)),
         dents=np.asarray(surface["dents"], dtype=float),
         times=result.design.process.treatment_time_s / float(result.data["simulated_time_s"]),
-        hits=load_hits(file) if file.is_file() else None,
+        hits=_hits(result.folder / HITS, np.asarray(surface["impacts"])),
     )
+
+
+def _hits(file: Path, impacts: np.ndarray) -> SortedHits | None:
+    """The single impacts, None of an older result. InputError where they are not as many as each triangle had, (m,)."""
+    if not file.is_file():
+        return None
+    hits = load_hits(file)
+    if not np.array_equal(np.diff(hits.first), impacts):
+        raise InputError(f"{file}: its impacts are not those of the {COVERAGE} beside it; simulate again")
+    return hits

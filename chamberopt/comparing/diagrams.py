@@ -48,12 +48,17 @@ def distributions_picture(path: Path, comparison: Comparison, found: Distributio
 def _coverage(axes: Axes, comparison: Comparison, found: Distributions) -> None:
     means = comparison.metrics["mean_coverage"]
     said = [
-        f"{label}: mean {100.0 * mean.value:.1f} ± {two_digits(100.0 * mean.half_width)} %, {dents:.0f} dents each"
+        f"{label}: mean {100.0 * mean.value:.1f} ± {two_digits(100.0 * mean.half_width)} %, {_few(dents)} dents each"
         for label, mean, dents in zip(comparison.labels, means, found.dents, strict=True)
     ]
     _steps(axes, found.coverage, said, "coverage of a triangle [%]", "target area")
     if min(found.dents) < DENTS_SHOWN:
         axes.set_title("few dents were simulated: their own scatter widens this", loc="left", fontsize=9)
+
+
+def _few(dents: float) -> str:
+    """A mean number, whole unless that says too little: 0.5, 23."""
+    return f"{dents:.0f}" if dents >= 10.0 else f"{dents:.2g}"
 
 
 def _against_time(axes: Axes, comparison: Comparison) -> None:

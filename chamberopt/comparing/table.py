@@ -11,6 +11,7 @@ from chamberopt.comparing.difference import LONGEST, NOTHING, Difference
 from chamberopt.estimate import CONFIDENCE, Estimate
 from chamberopt.objective import LONGEST as NEVER
 
+COUNTED = "process.accuracy.coverage_model"
 HEADER = ("difference", "real", "to know: simulate")
 
 
@@ -61,6 +62,10 @@ def _legend(comparison: Comparison) -> list[str]:
             lines.append(f"{label} - {first}: as independent, for they have not the same number of replicas.")
         else:
             lines.append(f"{label} - {first}: independent, on other seeds.")
+    if COUNTED in comparison.parameters:
+        lines.append(
+            f"Coverage is counted in two ways ({COUNTED}): differences may be of the counting, not of the chambers."
+        )
     return [*lines[:-1], lines[-1] + ")"]
 
 

@@ -59,7 +59,7 @@ def write_impacts(
 def require_writable(files: Sequence[Path]) -> None:
     """InputError where a file asked for needs pyarrow and it is not installed, or one is there already."""
     for file in files:
-        if file.suffix == PARQUET:
+        if _is_parquet(file):
             _pyarrow()
         else:
             new_file(beside(file))
@@ -95,8 +95,12 @@ def _about(result: Result, ground: Ground, frame: Frame, columns: Sequence[Colum
     }
 
 
+def _is_parquet(file: Path) -> bool:
+    return file.suffix.lower() == PARQUET
+
+
 def _sink(file: Path) -> Callable[..., Any]:
-    return _parquet if file.suffix == PARQUET else _csv
+    return _parquet if _is_parquet(file) else _csv
 
 
 @contextmanager
@@ -122,7 +126,7 @@ def _csv(file: Path, columns: Sequence[Column], about: dict[str, Any]) -> Iterat
     line = ",".join(column.text for column in columns) + "\n"
     with whole_file(file) as temporary, open(temporary, "wb") as plain, ExitStack() as stack:
         # Without a name and a time in it the same impacts give the same bytes.
-        out = stack.enter_context(gzip.GzipFile("", "wb", PACKED, plain, 0)) if file.suffix == ".gz" else plain
+        out = stack.enter_context(gzip.GzipFile("", "wb", PACKED, plain, 0)) if file.suffix.lower() == ".gz" else plain
         out.write((",".join(column.name for column in columns) + "\n").encode())
 
         def put(values: Sequence[np.ndarray]) -> None:
