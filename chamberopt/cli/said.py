@@ -25,11 +25,9 @@ def results_folder(out: Path | None, name: str) -> Iterator[Path]:
 
     When nothing came of it the folder does not stay behind empty.
     """
-    from chamberopt.disk import is_free, new_folder
+    from chamberopt.disk import new_folder
 
-    names = (name if number == 1 else f"{name}-{number}" for number in count(1))
-    free = (folder for name in names if is_free(folder := Path("results", name)))
-    folder = new_folder(next(free) if out is None else out)
+    folder = new_folder(out) if out is not None else _claimed(name)
     try:
         yield folder
     except BaseException:
@@ -37,6 +35,22 @@ def results_folder(out: Path | None, name: str) -> Iterator[Path]:
             if not any(folder.iterdir()):
                 folder.rmdir()
         raise
+
+
+def _claimed(name: str) -> Path:
+    """The first free folder results/NAME, results/NAME-2 ...: whoever makes it has it, if two look at once."""
+    from chamberopt.disk import is_free, new_folder
+
+    for number in count(1):
+        folder = Path("results", name if number == 1 else f"{name}-{number}")
+        if not is_free(folder):
+            continue
+        with suppress(FileExistsError):
+            if not folder.exists():
+                new_folder(folder.parent)
+                folder.mkdir()
+            break
+    return new_folder(folder)
 
 
 def remark(remarks: Sequence[str]) -> None:
