@@ -28,6 +28,7 @@ PAIRS = 1_000_000  # of pixel and dent looked at together: 200 MB
 MOST_DENTS = 20_000  # looked at together
 NOTHING, REST, TARGET = 0, 1, 2
 EDGE_ON = 1e-6
+THINNEST = 4  # pixels of the picture's shorter side
 FLAT = 0.9  # a target is seen face on where its mean normal is this long
 ROUND = ((1.0, -1.4, -0.5), (-1.0, 1.4, 0.5))  # from near and a little below, where the shot comes from; and opposite
 
@@ -87,7 +88,10 @@ def default_views(chamber: Chamber) -> Sequence[tuple[float, float, float]]:
 
 
 def dent_map(chamber: Chamber, dents: Dents, towards: Sequence[float], longest: int) -> DentMap:
-    """The target and its dents from the direction of the eye, (3,); the picture's longer side in pixels."""
+    """The target and its dents from the direction of the eye, (3,); the picture's longer side in pixels.
+
+    Raises InputError for a direction from which a flat target is a line.
+    """
     part = chamber.part
     exposed = np.flatnonzero(chamber.source >= 0)
     corners = chamber.vertices[chamber.triangles[exposed]]
@@ -95,6 +99,8 @@ def dent_map(chamber: Chamber, dents: Dents, towards: Sequence[float], longest: 
     everything = np.concatenate([corners, part.vertices[part.triangles]])
     on_target = part.target[chamber.source[exposed]]
     view = view_of(corners[on_target].reshape(-1, 3), np.asarray(towards), longest)
+    if min(view.shape) < THINNEST:
+        raise InputError("--view: from there the target is seen edge on; give another direction")
     which = seen(view, everything)
     row, column = np.nonzero(which >= 0)
     triangle = which[row, column]

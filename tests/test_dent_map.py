@@ -200,6 +200,7 @@ def test_on_the_command_line(result: Result, tmp_path: Path, capsys: pytest.Capt
         ([folder, str(tmp_path / "a.jpg")], "pictures are written as .png"),
         ([folder, picture, "--at-s", "-1"], "--at-s: given -1"),
         ([folder, picture, "--view", "0,0,0"], "--view 0,0,0: give the direction"),
+        ([folder, picture, "--view", "1,0,0", "--at-s", "0.1"], "seen edge on"),
         ([folder, picture, "--pixels", "99"], "--pixels: given 99; 200 to 1500"),
         ([folder, picture, "--replica", "3"], "--replica: given 3"),
         ([str(tmp_path), picture], "not a results folder"),

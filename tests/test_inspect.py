@@ -15,8 +15,10 @@ from chamberopt.quantities import QUANTITIES
 from chamberopt.viewer import Look, Subject, cut_across, eye_at, read_surface, why_no_pictures
 from chamberopt.viewer.apart import without_display
 from chamberopt.viewer.look import pressed
-from chamberopt.viewer.scene import ticks
+from chamberopt.viewer.scene import as_it_stands, ticks
 from chamberopt.viewer.seen import Seen, limits, same_part
+from chamberopt.viewer.stage import where_the_target_is_seen
+from chamberopt.viewer.surfaces import pyvista
 from tests.looked_at import TREATMENT, ball_result
 
 ALL = list(QUANTITIES)
@@ -60,7 +62,7 @@ def test_a_plane_is_said_by_its_axis() -> None:
 
 def test_an_eye_is_said_by_a_direction() -> None:
     assert eye_at("1,-1.4,-0.8") == (1.0, -1.4, -0.8)
-    for text in ("0,0,0", "1,2", "x", "1,2,inf"):
+    for text in ("0,0,0", "1,2", "x", "1,2,inf", "0,0,1e300", "1e-300,0,0"):
         with pytest.raises(InputError, match="direction"):
             eye_at(text)
 
@@ -190,6 +192,20 @@ def test_only_views_of_the_same_part_are_linked(tmp_path: Path, ball: Subject) -
     moved, other = ball_result(tmp_path / "moved", moved=1.0), ball_result(tmp_path / "other", lost=7)
     assert same_part([Seen(ball), Seen(moved)])
     assert not same_part([Seen(ball), Seen(other)])
+
+
+def test_a_target_that_looks_down_is_seen_from_below() -> None:
+    for looks, side in ((-1.0, -1.0), (1.0, 1.0)):
+        plate = pyvista().Plane(direction=(0.0, 0.0, looks), i_resolution=2, j_resolution=2).triangulate()
+        plate["exposed_area_mm2"] = np.full(plate.n_cells, 0.125)
+        assert np.sign(where_the_target_is_seen(plate)[2]) == side
+    ball = pyvista().Sphere()
+    ball["exposed_area_mm2"] = np.ones(ball.n_cells)
+    assert where_the_target_is_seen(ball)[2] > 0.0
+
+
+def test_a_dollar_in_a_name_is_no_formula() -> None:
+    assert as_it_stands("x$y$_{z}") == r"x\$y\$_{z}"
 
 
 # The window, driven without a display

@@ -17,7 +17,7 @@ from chamberopt.flight_frames import angle, displacement, flight
 from chamberopt.ground import replica_of
 from chamberopt.replayed import Replayed
 from chamberopt.results import Result, load_result
-from chamberopt.viewer import film, why_no_pictures
+from chamberopt.viewer import apart, film, why_no_pictures
 from chamberopt.viewer.film import film_path, write_film
 from chamberopt.viewer.replay import replay, turn_matrix
 from sim_core import Balls, Gravity, Physics, Scene, Turn, simulate
@@ -157,6 +157,17 @@ def test_where_no_film_can_be_is_said(tmp_path: Path, monkeypatch: pytest.Monkey
         film_path(tmp_path / "shot.avi")
     with pytest.raises(InputError, match="the folder does not exist"):
         film_path(tmp_path / "nowhere" / "shot.gif")
+    (tmp_path / "shot.gif").mkdir()
+    with pytest.raises(InputError, match=r"shot\.gif: is a folder"):
+        film_path(tmp_path / "shot.gif")
+
+    def refuse(**_: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(apart.tempfile, "TemporaryFile", refuse)
+        with pytest.raises(InputError, match=r"a\.gif: cannot be written: Permission"):
+            film_path(tmp_path / "a.gif")
     monkeypatch.setattr(film, "find_spec", lambda _: None)
     with pytest.raises(InputError, match=r"pip install 'chamberopt\[mp4\]'"):
         film_path(tmp_path / "shot.mp4")

@@ -349,6 +349,14 @@ def test_a_part_too_large_for_a_page_is_drawn_less_and_says_so(simulation: Path)
     assert any("chamberopt inspect shows it" in remark for remark in none.remarks)
 
 
+def test_a_surface_of_another_result_is_refused(study: Path, tmp_path: Path) -> None:
+    mixed = tmp_path / "mixed"
+    shutil.copytree(study, mixed)
+    shutil.copy(study / "start" / "coverage.vtp", mixed)
+    with pytest.raises(InputError, match="of another result"):
+        write_report(mixed)
+
+
 def test_parts_side_by_side(simulation: Path, study: Path, tmp_path: Path) -> None:
     remarks = write_part_page([study / "start", study], tmp_path / "parts.html")
     page = Page(tmp_path / "parts.html")

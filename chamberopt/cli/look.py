@@ -50,7 +50,7 @@ def inspect(
     triangle
         Show this triangle's numbers and impact speeds; its row in coverage.vtp, from 0.
     view
-        Direction from the part to the eye, X,Y,Z.
+        Direction from the part to the eye, X,Y,Z; chosen to show the target if left out.
     screenshot
         Write a picture to this file instead of opening a window.
     off_screen

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import version
@@ -60,6 +61,11 @@ def write_part_page(results: Sequence[Path], path: Path) -> list[str]:
     for scene, one in zip(scenes, loaded, strict=True):
         if scene.data is None:
             raise InputError(f"{one.folder}: {scene.remarks[-1]}")
+    if len(scenes) > 1:
+        named = (
+            tuple(f"{name}: {remark}" for remark in scene.remarks) for name, scene in zip(names, scenes, strict=True)
+        )
+        scenes = [replace(scene, remarks=remarks) for scene, remarks in zip(scenes, named, strict=True)]
     said = [f"{name}: {summary(one)}" for name, one in zip(names, loaded, strict=True)]
     title = ", ".join(names)
     content = html.section("Part in its chamber", html.items(said), viewer(scenes))
@@ -110,7 +116,7 @@ def viewer(scenes: Sequence[Scene]) -> str:
         '<label><input type="checkbox" id="glass" checked> show the chamber</label>'
         '<label><input type="checkbox" id="fit"> fit the colours to what is there</label>'
         f'<span id="times"><label for="time">after</label><input type="range" id="time" min="0" max="{most:g}" '
-        f'step="{now / 60.0:g}" value="{now:g}"><output id="at" for="time"></output></span></div>'
+        f'step="{now / 60.0:.15g}" value="{now:g}"><output id="at" for="time"></output></span></div>'
         f'<div class="panels">{panels}</div><div id="label" role="status" hidden></div>'
         f"{html.paragraph(f'{HOW} Grey: not in the target, or out of reach; light grey: never hit.', 'soft')}{remarks}"
         "<noscript><p>The pictures of this page are drawn by a script, which this browser does not run.</p></noscript>"

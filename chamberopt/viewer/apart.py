@@ -9,6 +9,7 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -52,12 +53,19 @@ def picture_path(picture: str | Path, option: str = "--screenshot ") -> Path:
 
 
 def file_path(file: str | Path, suffixes: tuple[str, ...], written: str, option: str = "") -> Path:
-    """Where a file may be written. InputError for another suffix, or in no folder."""
+    """Where a file may be written. InputError for another suffix, in no folder, or where none can be made."""
     path = Path(file)
     if path.suffix.lower() not in suffixes:
         raise InputError(f"{option}{path}: {written}; give such a name")
     if not path.resolve().parent.is_dir():
         raise InputError(f"{option}{path}: the folder does not exist; make it first")
+    if path.is_dir():
+        raise InputError(f"{option}{path}: is a folder; give another name")
+    try:
+        with tempfile.TemporaryFile(dir=path.resolve().parent):  # better now than after all is simulated and drawn
+            pass
+    except OSError as error:
+        raise InputError(f"{option}{path}: cannot be written: {error.strerror}; choose another place") from None
     return path
 
 

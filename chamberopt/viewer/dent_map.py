@@ -55,8 +55,8 @@ def dent_picture(maps: Sequence[DentMap], dents: Dents, title: str, picture: Pat
         axes.set_axis_off()
         _scale(axes, one)
     legend = "black: not peened   grey: not in the target"
-    text = fill(title, int(LETTERS * size[0]))
-    figure.suptitle(f"{text}\n{legend}", x=0.01, ha="left", fontsize=10)
+    text = "\n".join(fill(one, int(LETTERS * size[0])) for one in (title, legend))
+    figure.suptitle(text, x=0.01, ha="left", fontsize=10, parse_math=False)
     bar = figure.colorbar(ScalarMappable(limits, colours), ax=list(every), shrink=0.7, extend="both", pad=0.01)
     bar.set_label("dent diameter [µm]")
     with whole_file(picture) as temporary:

@@ -17,6 +17,7 @@ Vector = tuple[float, float, float]
 # What a plane across an axis cuts away: the side that faces the eye.
 CUT_AWAY: dict[str, Vector] = {"X": (1.0, 0.0, 0.0), "Y": (0.0, -1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 FROM: Vector = (1.0, -1.6, 0.35)
+SHORT = 1e-6  # of a direction; a picture of a longer or shorter one would be empty
 THRESHOLDS = (98.0, 90.0, 75.0, 50.0)  # % of coverage, one after the other by the key b
 
 KEYS = f"""1 to {len(QUANTITIES)}   the quantity
@@ -88,7 +89,7 @@ def eye_at(text: str) -> Vector:
         x, y, z = (float(number) for number in text.split(","))
     except ValueError:
         x = y = z = 0.0
-    if not 0.0 < math.hypot(x, y, z) < math.inf:
+    if not SHORT < math.hypot(x, y, z) < 1.0 / SHORT:
         raise InputError(f"--view {text}: give the direction from the part to the eye as X,Y,Z, such as 1,-1.4,-0.8")
     return x, y, z
 

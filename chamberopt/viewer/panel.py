@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from chamberopt.quantities import Quantity
-from chamberopt.viewer.scene import DARK, STILL, ticks
+from chamberopt.viewer.scene import DARK, STILL, as_it_stands, ticks
 from chamberopt.viewer.surfaces import pyvista
 
 SMALL, LARGE = 8, 10  # fonts, in views of NARROW pixels or more
@@ -120,4 +120,4 @@ def keys(plotter: Any, text: str, size: Size) -> None:
 
 def _words(plotter: Any, name: str, text: str, place: tuple[float, float], font: int) -> Any:
     """A text at a place [pixels] of the view, its lower left corner there."""
-    return plotter.add_text(text, position=place, font_size=font, color=DARK, name=name, render=False)
+    return plotter.add_text(as_it_stands(text), position=place, font_size=font, color=DARK, name=name, render=False)

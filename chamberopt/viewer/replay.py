@@ -14,7 +14,7 @@ import numpy as np
 
 from chamberopt.viewer.apart import drawn_apart
 from chamberopt.viewer.film import write_film
-from chamberopt.viewer.scene import BACKGROUND, DARK, room
+from chamberopt.viewer.scene import BACKGROUND, DARK, as_it_stands, room
 from chamberopt.viewer.surfaces import CHAMBER, COVERAGE, MM, pyvista, read_surface
 
 if TYPE_CHECKING:
@@ -121,7 +121,7 @@ class _Stage:
         self._replace("trails", pyvista().PolyData(trail * MM) if len(trail) else None, color=TRAIL, point_size=2.0)
         impacts = int((flight["hit_time"] <= now).sum())
         clock = f"{1e3 * now:.3f} ms after the warm-up   {impacts} impacts on the part, {int(there.sum())} dents"
-        text = f"{clock} since {1e3 * flight['time'][0]:g} ms\n{self.title}"
+        text = as_it_stands(f"{clock} since {1e3 * flight['time'][0]:g} ms\n{self.title}")
         self.plotter.add_text(text, position="lower_left", font_size=8, color=DARK, name="clock", render=False)
         self.plotter.render()
 

@@ -60,7 +60,7 @@ def in_chamber(plotter: Any, part: Part, chamber: Surface, title: str, limits: t
     """The part inside the glass chamber, over the sonotrode."""
     show(plotter, part, limits, bar)
     room(plotter, chamber)
-    plotter.add_text(title, position="upper_left", font_size=13, color=DARK)
+    plotter.add_text(as_it_stands(title), position="upper_left", font_size=13, color=DARK)
     legend = "orange: sonotrode   grey: not in the target"
     plotter.add_text(legend, position="lower_left", font_size=9, color=DARK)
     plotter.camera_position = [(1.0, -1.6, 0.35), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
@@ -95,6 +95,11 @@ def near(plotter: Any, part: Part, limits: tuple[float, float], bar: bool) -> No
     plotter.reset_camera(bounds=part.target.bounds)
     plotter.camera.SetWindowCenter(0.14 if bar else 0.0, 0.0)  # makes room for the colour bar
     plotter.enable_anti_aliasing("ssaa")
+
+
+def as_it_stands(text: str) -> str:
+    """Text for VTK, which would set what is between two $ as a formula: a folder's name is none."""
+    return text.replace("$", r"\$")
 
 
 def ticks(limits: tuple[float, float]) -> tuple[int, str]:

@@ -46,13 +46,7 @@ class Seen:
         self.chamber = _with_columns(self.folder / CHAMBER, ("tag",))
         self.part = Part(self.surface)
         area, impacts = (np.asarray(self.part.target[name]) for name in ("exposed_area_mm2", "impacts_per_mm2"))
-        mean = float((area * impacts).sum() / area.sum()) if len(area) else 0.0
-        if len(area) != subject.triangles or not np.isclose(mean, subject.impacts_per_mm2, rtol=1e-6):
-            raise InputError(
-                f"{self.folder / COVERAGE}: of another result than result.json: a target of {len(area)} triangles with "
-                f"{mean:.6g} impacts per mm², not {subject.triangles} with "
-                f"{subject.impacts_per_mm2:.6g}; simulate again"
-            )
+        require_own(subject, area, impacts)
 
     @property
     def offered(self) -> list[str]:
@@ -123,6 +117,17 @@ class Seen:
         if name == "coverage" and not self.part.marked:
             return -100.0 * float(np.expm1(-self.surface["dent_density"][triangle] * self.times(look)))
         return one.factor * float(self.surface[one.column][triangle]) * (self.times(look) if one.grows else 1.0)
+
+
+def require_own(subject: Subject, area: np.ndarray, impacts: np.ndarray) -> None:
+    """InputError where exposed area (k,) [mm²] and impacts (k,) [1/mm²] of the target are not those of result.json."""
+    mean = float((area * impacts).sum() / area.sum()) if len(area) else 0.0
+    if len(area) != subject.triangles or not np.isclose(mean, subject.impacts_per_mm2, rtol=1e-6):
+        raise InputError(
+            f"{Path(subject.folder) / COVERAGE}: of another result than result.json: a target of {len(area)} triangles "
+            f"with {mean:.6g} impacts per mm², not {subject.triangles} with "
+            f"{subject.impacts_per_mm2:.6g}; simulate again"
+        )
 
 
 def _with_columns(path: Path, names: Sequence[str]) -> Surface:

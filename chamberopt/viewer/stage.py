@@ -14,10 +14,12 @@ from chamberopt.viewer import panel
 from chamberopt.viewer.look import FROM, KEYS, Look, Vector
 from chamberopt.viewer.scene import GREY, PALE, SONOTRODE, light, room, target_and_rest
 from chamberopt.viewer.seen import Seen, limits, offered, same_part
-from chamberopt.viewer.surfaces import pyvista
+from chamberopt.viewer.surfaces import Surface, pyvista
 
 MOST = 6
 PER_VIEW = {1: (1400, 900), 2: (1000, 900), 3: (800, 800), 4: (900, 700)}  # pixels, by the number of results
+VIEW_ANGLE = 30.0  # degrees
+BELOW = 2.0  # times as steep as from above: past the sonotrode
 SCREEN = 1500, 850  # pixels: a window no larger fits on most
 
 
@@ -66,6 +68,7 @@ class Stage:
             eye, middle = _eye(one, look), box.mean(axis=1)
             up = (0.0, 1.0, 0.0) if abs(eye[2]) > 0.99 * np.linalg.norm(eye) else (0.0, 0.0, 1.0)
             self.plotter.camera_position = [tuple(middle + eye), tuple(middle), up]
+            self.plotter.camera.view_angle = VIEW_ANGLE  # zooming narrows it, each time again
             self.plotter.reset_camera(bounds=box.ravel().tolist())
             self.plotter.camera.zoom(1.15)
         if self.linked:
@@ -171,10 +174,18 @@ def _colours(one: Seen, look: Look) -> list[tuple[str, str]]:
 def _eye(one: Seen, look: Look) -> np.ndarray:
     """Where it is seen from: in front of the triangle that is asked about, if any."""
     if look.eye is not None or look.triangle is None or look.triangle >= one.surface.n_cells:
-        return np.array(FROM if look.eye is None else look.eye)
+        return where_the_target_is_seen(one.part.target) if look.eye is None else np.array(look.eye)
     corners = one.surface.points[one.surface.regular_faces[look.triangle]]
     normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
     return np.asarray(normal / np.linalg.norm(normal) + [0.2, -0.3, 0.1])
+
+
+def where_the_target_is_seen(target: Surface) -> np.ndarray:
+    """From a little above, where the rim of the chamber hides least, unless twice as much is to be seen from below."""
+    above, below = np.array(FROM), np.array(FROM) * [1.0, 1.0, -BELOW]
+    area, normal = np.asarray(target["exposed_area_mm2"]), np.asarray(target.cell_normals)
+    seen = [float(area @ np.maximum(normal @ eye, 0.0)) / float(np.linalg.norm(eye)) for eye in (above, below)]
+    return below if seen[1] > 2.0 * seen[0] else above
 
 
 def _cut(actors: Sequence[Any], cut: tuple[Vector, Vector | None], one: Seen) -> None:

@@ -105,6 +105,7 @@ class Window:
         self.change(pressed(self.look, key, self.first, self.stage.offered))
         if key in "rg":
             self.stage.aim(self.look)
+            self.stage.plotter.render()
 
     def slid(self, seconds: float) -> None:
         """The time slider, let go at so many seconds."""
@@ -144,7 +145,7 @@ class Window:
             plotter.subplot(self.stage.shape[0] - 1, 0)  # the view at the window's corner, which VTK measures from
             self.slider = plotter.add_slider_widget(
                 self.slid, (0.0, max(one.subject.longest_s for one in seen)), value=self._seconds(), title="time [s]",
-                color=DARK, pointa=(0.3, 0.06), pointb=(0.6, 0.06), fmt="%.4g", title_height=0.018,
+                color=DARK, pointa=(0.42, 0.06), pointb=(0.6, 0.06), fmt="%.4g", title_height=0.018,
                 slider_width=0.03, tube_width=0.005,
             )  # fmt: skip
         if self.slider is not None:
