@@ -85,7 +85,9 @@ def _stretched(moves: np.ndarray, first: np.ndarray, whole: np.ndarray) -> np.nd
     if first[0, 0] <= 0.0:
         return moves
     whole_top = max(whole[0, 0], first[0, 0])
-    rest = first[1, 1] - first[0, 1] ** 2 / first[0, 0]
+    rest = max(
+        0.0, first[1, 1] - first[0, 1] ** 2 / first[0, 0]
+    )  # rounding leaves less than 0 where dents lie on one patch
     whole_rest = max(whole[1, 1] - whole[0, 1] ** 2 / whole_top, rest)
     along = moves[0] / np.sqrt(first[0, 0])
     across = (moves[1] - first[0, 1] / first[0, 0] * moves[0]) / np.sqrt(rest) if rest > 0.0 else 0.0 * along

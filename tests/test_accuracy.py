@@ -354,3 +354,16 @@ def test_what_variance_can_take_off_the_mean_is_bounded() -> None:
     assert off == pytest.approx(np.exp(-two).mean() - np.exp(-two.mean()))
     assert more == pytest.approx(np.exp(-two).var())
     assert _at_most(0.0, 0.5) == _at_most(1.0, 1.0) == (0.0, 0.0)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("dents", [0, 1, 2])
+def test_a_handful_of_dents_gives_figures(dents: int) -> None:
+    """So few that they all lie on one patch: the two means then move as one."""
+    chamber = patchwork(np.full(50, 1e-6))
+    counts = np.zeros((3, 50), dtype=int)
+    counts[:dents, 7] = 1
+    tallies = [equal_dents(1e-3, count, 1e-8) for count in counts]
+    for found in jackknife(tallies, list(METRICS.values()), chamber, plate_design()):
+        assert np.isfinite(found.value)
+        assert not np.isnan(found.half_width)

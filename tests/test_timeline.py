@@ -28,6 +28,9 @@ def test_the_curve_goes_through_the_figures_of_the_treatment_time(dents: float, 
         assert row["mean_coverage"] == pytest.approx(
             -np.expm1(-rate * row["time_s"]), abs=3.0 * row["half_width"] + 0.02
         )
+        assert row["half_width"] >= 0.0
+    for name in ("mean_coverage", "p05_coverage"):
+        assert np.diff([row[name] for row in rows]).min() >= 0.0
     times = [row["time_s"] for row in rows]
     assert times == sorted(times)
     full = evaluation.metrics["time_to_98_s"].value

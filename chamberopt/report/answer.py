@@ -50,6 +50,6 @@ def full_coverage(result: Result) -> str:
     if full.value >= LONGEST:
         return "at this rate 95 % of its area would never be covered to 98 %"
     if full.half_width >= full.value:
-        said = "is not known yet, longer simulation would tell"
+        said = "is not known yet"
         return f"how long it takes until 95 % of its area is covered to 98 % {said}"
     return f"95 % of its area is covered to 98 % after {estimated(full, 1.0, 's')}"

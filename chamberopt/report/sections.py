@@ -66,6 +66,8 @@ def _answer(said: Facts) -> str:
 
 
 def _figure(row: Facts, which: str) -> str:
+    if row["name"] == "time_to_98_s" and row[which]["half_width"] >= row[which]["value"]:
+        return "not known yet"
     return with_interval(row[which]["value"], row[which]["half_width"], row["unit"])
 
 
