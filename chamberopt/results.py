@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from chamberopt.advice import Advice
     from chamberopt.chamber import Chamber
     from chamberopt.studies.study import StudyResult
-    from chamberopt.viewer import Subject
 
 FORMAT = 1
 LATER = ("time_to_98_s", "intensity_uniformity")  # metrics that results of 0.1.0 may lack
@@ -176,21 +175,6 @@ def summary(evaluation: Evaluation | Result) -> str:
     name = evaluation.objective_name.replace("_", " ")
     figures = f"mean {_share(mean)}   std {_share(spread)}"
     return f"{name} {goal.value:.3f} ± {goal.half_width:.3f}   {figures}"
-
-
-def subject(result: Result) -> Subject:
-    """A result as inspect's window wants it."""
-    from chamberopt.viewer import Subject
-
-    treatment = result.design.process.treatment_time
-    return Subject(
-        folder=str(result.folder),
-        title=f"{result.folder.resolve().name}\n{summary(result)}",
-        treatment_s=treatment,
-        longest_s=max([treatment, *(row["time_s"] for row in result.data.get("coverage_against_time", []))]),
-        triangles=result.data["chamber"]["target_triangles"],
-        impacts_per_mm2=result.metrics["impacts_per_mm2_s"].value * treatment,
-    )
 
 
 def _share(estimate: Estimate) -> str:

@@ -85,7 +85,8 @@ def optimise(study: Study, out: str | Path, *, workers: int | None = None, progr
 
 def show(result: Result, screenshot: str | Path | None = None) -> None:
     """The part coloured by coverage in its chamber: in a window, or as a picture in the file ``screenshot``."""
-    from chamberopt.results import Result, subject
+    from chamberopt.opened import subject
+    from chamberopt.results import Result
     from chamberopt.viewer import Look, inspect
 
     _require("result", result, Result, "simulate")

@@ -30,7 +30,7 @@ CHAMBEROPT_ORDER = (
     ("pictures",),
     ("price_list", "study_pictures"),
     ("results",),
-    ("ground",),
+    ("ground", "opened"),
     ("impacts",),
     ("comparing", "export", "maps", "report", "workbench"),
     ("cli",),

@@ -59,7 +59,8 @@ def inspect(
         Write a page that shows the parts in a browser, with switches of its own.
     """
     from chamberopt import viewer
-    from chamberopt.results import load_result, subject, summary
+    from chamberopt.opened import subject
+    from chamberopt.results import load_result, summary
 
     look = viewer.Look(
         quantity=quantity, time_s=time_s, below=below, cut=viewer.cut_across(clip) if clip else None, cut_part=cut_part,

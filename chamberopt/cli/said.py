@@ -45,12 +45,17 @@ def _claimed(name: str) -> Path:
         folder = Path("results", name if number == 1 else f"{name}-{number}")
         if not is_free(folder):
             continue
-        with suppress(FileExistsError):
-            if not folder.exists():
-                new_folder(folder.parent)
+        try:
+            if not folder.is_dir():
+                folder.parent.mkdir(parents=True, exist_ok=True)
                 folder.mkdir()
-            break
-    return new_folder(folder)
+        except FileExistsError:
+            if folder.exists():  # another command was faster
+                continue
+        except OSError:
+            pass  # new_folder says what is wrong
+        return new_folder(folder)
+    raise AssertionError("there is always a next number")
 
 
 def remark(remarks: Sequence[str]) -> None:

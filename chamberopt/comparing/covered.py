@@ -9,8 +9,9 @@ import numpy as np
 
 from chamberopt.errors import InputError
 from chamberopt.hits import HITS, Hits, SortedHits, load_hits
+from chamberopt.opened import own_coverage
 from chamberopt.results import Result
-from chamberopt.viewer import COVERAGE, read_surface
+from chamberopt.viewer import COVERAGE
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class Covered:
 
 def covered(result: Result) -> Covered:
     """Read a results folder. Raises InputError for files gone or damaged."""
-    surface = read_surface(result.folder / COVERAGE)
+    surface = own_coverage(result)
     corners = np.asarray(surface.points, dtype=float)[surface.regular_faces]
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     twice = np.linalg.norm(cross, axis=1)

@@ -14,9 +14,10 @@ from chamberopt.export.abaqus import abaqus_deck
 from chamberopt.export.elements import COLUMNS, ElementFields, of_elements, of_other_triangles
 from chamberopt.export.nastran import nastran_deck
 from chamberopt.mesh_io import PartMesh
+from chamberopt.opened import own_coverage
 from chamberopt.part import part_meshes
 from chamberopt.results import Result, load_result
-from chamberopt.viewer import COVERAGE, read_surface
+from chamberopt.viewer import COVERAGE
 
 DECKS: dict[str, Callable[[list[str], PartMesh, ElementFields], dict[str, str]]] = {
     "abaqus": abaqus_deck,
@@ -41,7 +42,7 @@ def write_fields(folder: str | Path, to: str, path: str | Path) -> list[str]:
     if not path.resolve().parent.is_dir() or path.is_dir():
         raise InputError(f"{path}: is no file in a folder that is there; make the folder, or give a file's name")
     result = load_result(folder)
-    surface = read_surface(result.folder / COVERAGE)
+    surface = own_coverage(result)
     if "element" not in surface.cell_data:
         raise InputError(f"{result.folder / COVERAGE}: from a version that kept no element numbers; simulate again")
     try:

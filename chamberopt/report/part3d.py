@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
+from chamberopt.opened import own_coverage
 from chamberopt.quantities import QUANTITIES
-from chamberopt.results import Result, subject
+from chamberopt.results import Result
 from chamberopt.shapes import TAG_PART, TAG_WALL, is_sonotrode
-from chamberopt.viewer import CHAMBER, COVERAGE, read_surface
+from chamberopt.viewer import CHAMBER, read_surface
 from chamberopt.viewer.part import averaged
-from chamberopt.viewer.seen import require_own
 
 # A triangle costs about 80 bytes of the page: with this many it stays below 60 MB and opens.
 MOST_TRIANGLES = 600_000
@@ -47,7 +47,7 @@ def part_scene(result: Result, title: str, most: int = MOST_TRIANGLES) -> Scene:
 
     most: triangles that may be drawn; of a larger part the target alone is, and nothing where that is still too large.
     """
-    surface = read_surface(result.folder / COVERAGE)
+    surface = own_coverage(result)
     points, triangles = np.asarray(surface.points, dtype=float), np.asarray(surface.regular_faces)
     fields = {name: np.asarray(surface.cell_data[name]) for name in surface.cell_data}
     corners = points[triangles]
@@ -55,7 +55,6 @@ def part_scene(result: Result, title: str, most: int = MOST_TRIANGLES) -> Scene:
     area = 0.5 * np.linalg.norm(normal, axis=1)
     target = fields["target"] > 0
     seen = target & (fields["exposed_area_mm2"] > 0.0)
-    require_own(subject(result), *(fields[name][seen] for name in ("exposed_area_mm2", "impacts_per_mm2")))
     unit = normal[seen] / np.maximum(2.0 * area[seen], 1e-300)[:, None]
     density, reach = averaged(
         corners[seen].mean(axis=1),

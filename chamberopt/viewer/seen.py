@@ -45,8 +45,7 @@ class Seen:
         self.surface = _with_columns(self.folder / COVERAGE, NEEDED)
         self.chamber = _with_columns(self.folder / CHAMBER, ("tag",))
         self.part = Part(self.surface)
-        area, impacts = (np.asarray(self.part.target[name]) for name in ("exposed_area_mm2", "impacts_per_mm2"))
-        require_own(subject, area, impacts)
+        require_own(subject, self.surface)
 
     @property
     def offered(self) -> list[str]:
@@ -119,8 +118,10 @@ class Seen:
         return one.factor * float(self.surface[one.column][triangle]) * (self.times(look) if one.grows else 1.0)
 
 
-def require_own(subject: Subject, area: np.ndarray, impacts: np.ndarray) -> None:
-    """InputError where exposed area (k,) [mm²] and impacts (k,) [1/mm²] of the target are not those of result.json."""
+def require_own(subject: Subject, surface: Surface) -> None:
+    """InputError where the target of coverage.vtp is not the one that result.json tells of."""
+    wanted = (np.asarray(surface["target"]) > 0) & (np.asarray(surface["exposed_area_mm2"]) > 0.0)
+    area, impacts = (np.asarray(surface[name])[wanted] for name in ("exposed_area_mm2", "impacts_per_mm2"))
     mean = float((area * impacts).sum() / area.sum()) if len(area) else 0.0
     if len(area) != subject.triangles or not np.isclose(mean, subject.impacts_per_mm2, rtol=1e-6):
         raise InputError(
