@@ -56,22 +56,32 @@ class Result:
 
 
 def write_simulation(
-    folder: str | Path, design: Design, chamber: Chamber, evaluation: Evaluation, advice: Sequence[Advice] = ()
+    folder: str | Path,
+    design: Design,
+    chamber: Chamber,
+    evaluation: Evaluation,
+    advice: Sequence[Advice] = (),
+    warned: Sequence[str] | None = None,
 ) -> list[str]:
     """Leave a simulation in a new or empty folder; returns remarks, such as why a picture was skipped.
 
-    advice: why its effects were chosen, if the design left them to us.
+    advice: why its effects were chosen, if the design left them to us · warned: what `check` warns of, if it was asked.
 
     design.toml · result.json · coverage.vtp · hits.npz · chamber.stl, chamber.vtp · coverage.png.
     """
     folder = new_folder(folder)
     save_design(design, folder / "design.toml")
     about = _write_candidate(folder, design, chamber, evaluation)
-    _write_json(folder, {"kind": "simulation", **about, **_chosen(advice)})
+    _write_json(folder, {"kind": "simulation", **about, **_chosen(advice), **_warned(warned)})
     return _picture([folder], [evaluation], [folder.resolve().name], folder / "coverage.png")
 
 
-def write_study(folder: str | Path, study_result: StudyResult, advice: Sequence[Advice] = ()) -> list[str]:
+def write_study(
+    folder: str | Path,
+    study_result: StudyResult,
+    advice: Sequence[Advice] = (),
+    warned: Sequence[str] | None = None,
+) -> list[str]:
     """Complete the folder of a study that has ended; returns remarks, such as why a picture was skipped.
 
     Beside design.toml, study.toml and history.jsonl, which run_study wrote: best.toml · result.json ·
@@ -104,7 +114,9 @@ def write_study(folder: str | Path, study_result: StudyResult, advice: Sequence[
     remarks = _picture([folder], [best.evaluation], ["best design"], folder / "coverage.png")
     pair, names = [start.evaluation, best.evaluation], ["start", "best design"]
     remarks += _picture([folder / "start", folder], pair, names, folder / "before_after.png")
-    _write_json(folder, {"kind": "study", **about, "study": _about_study(study_result), **_chosen(advice)})
+    _write_json(
+        folder, {"kind": "study", **about, "study": _about_study(study_result), **_chosen(advice), **_warned(warned)}
+    )
     return list(dict.fromkeys(remarks))
 
 
@@ -214,6 +226,10 @@ def _about(folder: Path, design: Design, chamber: Chamber, evaluation: Evaluatio
 def _chosen(advice: Sequence[Advice]) -> dict[str, Any]:
     """What a pilot said of each effect of a design that left them to us: result.json's "effects"."""
     return {"effects": [one.as_json() for one in advice]} if advice else {}
+
+
+def _warned(warned: Sequence[str] | None) -> dict[str, Any]:
+    return {} if warned is None else {"warnings": list(warned)}
 
 
 def _about_study(result: StudyResult) -> dict[str, Any]:

@@ -459,7 +459,7 @@ class TestWhole:
         for command, file in (("simulate", path), ("run", study)):
             status, out, err = chamberopt(command, file, "--json")
             assert (status, bool(json.loads(out))) == (0, True)
-            assert err.count("warning: shot.mass_g = ") == 1
+            assert err.count(": shot.mass_g = ") == 1
 
     def test_shot_that_does_not_fit(self, small: Path, chamberopt: Said) -> None:
         """45 % of the cylinder passes the file's check, but the plate takes a quarter of that: no room."""

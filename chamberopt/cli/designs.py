@@ -98,13 +98,13 @@ def simulate(
     asked = load_design(design)
     chamber = build_chamber(asked)
     cavity = analytic_cavity(asked, chamber) if analytic else None
-    warn(asked, chamber)
+    warned = warn(asked, chamber)
     with results_folder(out, design.stem) as folder, open_executor(workers, cluster) as executor:
         candidate, advice = settled_effects(asked, chamber, executor)
         compiled(candidate, chamber, cavity)
         with progress_bar("replicas") as progress:
             evaluation = evaluate(candidate, chamber, executor, progress, cavity=cavity)
-        remark(write_simulation(folder, candidate, chamber, evaluation, advice))
+        remark(write_simulation(folder, candidate, chamber, evaluation, advice, warned))
     notes = (*map(str, advice), *chamber.notes, *evaluation.notes)
     say([*estimates(evaluation), *notes_said(notes)], folder, json)
 

@@ -59,11 +59,11 @@ def export(
     folder = loaded.folder if loaded else result
     impacts = 0
     with _files(formats, out, f"{folder.resolve().name}-export") as files:
+        if loaded and again:  # first: they are refused where they do not give the result's figures again
+            impacts = _impacts(loaded, [files[name] for name in again], frame or "part", replicas, workers)
         for name, one in formats.items():
             if one.write is not None:
                 remark(one.write(folder, files[name]) or [])
-        if loaded and again:
-            impacts = _impacts(loaded, [files[name] for name in again], frame or "part", replicas, workers)
     if json:
         told = {name: str(file) for name, file in files.items()}
         print(json_format.dumps({"result": str(folder), "files": told, **({"impacts": impacts} if again else {})}))

@@ -64,11 +64,13 @@ def remark(remarks: Sequence[str]) -> None:
         print(remark, file=sys.stderr)
 
 
-def warn(design: Design, chamber: Chamber) -> None:
-    """What `check` would warn of, to stderr."""
+def warn(design: Design, chamber: Chamber, which: str = "") -> list[str]:
+    """What `check` would warn of, to stderr, and for result.json; which: the design, where it is one of several."""
     from chamberopt.checks.checkup import warnings
 
-    remark([f"warning: {text}" for text in warnings(design, chamber)])
+    found = warnings(design, chamber)
+    remark([f"warning{which}: {text}" for text in found])
+    return found
 
 
 def estimates(evaluation: Evaluation) -> list[str]:

@@ -80,8 +80,8 @@ def _run(
     with progress_bar("evaluations") as progress:
         interrupt.be_patient(how_to_go_on)
         result = go_on(question, record, executor, progress, stop=lambda: interrupt.asked)
-    remark(write_study(record.folder, result, advice))
-    warn(result.best.design, build_chamber(result.best.design, result.target))
+    warned = warn(result.best.design, build_chamber(result.best.design, result.target), " of the best design")
+    remark(write_study(record.folder, result, advice, warned))
     lines = [f"{'parameter':34}{'start':>12}{'best':>12}"]
     lines += [
         f"{name:34}{question.design.value(name):12.5g}{result.best.design.value(name):12.5g}" for name in question.vary
@@ -107,6 +107,8 @@ def _run(
     ]
     notes = (*map(str, advice), *result.doubts, *result.at_bounds, *start.notes, *result.best.evaluation.notes)
     say([*lines, *notes_said(notes)], record.folder, json)
+    if not json:
+        print(f"to see it: {_command('report', record.folder)}; the design: {record.folder / 'best.toml'}")
 
 
 def _finished(folder: Path, json: bool) -> None:

@@ -50,6 +50,7 @@ def facts(folder: str | Path) -> dict[str, Any]:
         "cost": price_paid(result, study, rows),
         "effects": _effects(result),
         "notes": _notes(result, study),
+        "warnings": result.data.get("warnings"),
         "design": _design(result, start),
         "identity": {
             "part, SHA-256": result.part_sha256,

@@ -11,6 +11,10 @@ from chamberopt.report.numbers import plain, share, with_interval, with_unit
 from chamberopt.report.part3d import Scene
 
 Facts = Mapping[str, Any]
+SURE = (
+    "The intervals count chance: how far the figures would move if the same design were simulated anew. How well its "
+    "restitution, friction and materials fit your machine they cannot know: calibrate those."
+)
 TILES = ("mean_coverage", "p05_coverage", "time_to_98_s")  # beside the objective
 
 
@@ -61,7 +65,7 @@ def _answer(said: Facts) -> str:
             continue
         was = f'<dd class="was">start: {html.text(_figure(row, "start"))}</dd>' if "start" in row else ""
         tiles.append(f"<div><dt>{html.text(row['label'])}</dt><dd>{html.text(_figure(row, 'result'))}</dd>{was}</div>")
-    inside = f'{told}<dl class="tiles">{"".join(tiles)}</dl>'
+    inside = f'{told}<dl class="tiles">{"".join(tiles)}</dl>{html.paragraph(SURE, "soft")}'
     return f'<section class="answer"><h2>The answer</h2>{inside}</section>'
 
 
@@ -199,10 +203,14 @@ def _changed(change: Facts) -> str:
 
 
 def _notes(said: Facts) -> str:
-    notes = said["notes"]
-    if not notes:
-        return html.section("Notes", html.paragraph("The run left no notes or warnings."))
-    return html.section("Notes", "".join(html.paragraph(note, "warning") for note in notes))
+    warned = said["warnings"]
+    found = [*(f"Warning: {text}" for text in warned or ()), *said["notes"]]
+    told = [html.paragraph(note, "warning") for note in found]
+    if warned is None:
+        told.append(html.paragraph("Whether the design itself gives cause for warnings, “chamberopt check” tells."))
+    elif not found:
+        told.append(html.paragraph("The run left no notes or warnings."))
+    return html.section("Notes and warnings", "".join(told))
 
 
 def _design(said: Facts, name: str, text: str) -> str:
