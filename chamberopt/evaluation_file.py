@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import json
 import zipfile
+import zlib
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
@@ -43,7 +44,7 @@ def load_evaluation(path: Path) -> Evaluation:
         evaluation = _put_together(json.loads(arrays.pop("tree").tobytes()), arrays)
         if not isinstance(evaluation, Evaluation):
             raise TypeError("another kind of file")
-    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         why = getattr(error, "strerror", None) or f"damaged ({error})"
         raise InputError(f"{path}: {why}; restore the file or run the study in a new folder") from None
     return evaluation

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zipfile
+import zlib
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -99,7 +100,7 @@ def load_hits(path: Path) -> SortedHits:
         found = SortedHits(first, Hits(np.repeat(np.arange(len(first) - 1, dtype=np.int32), np.diff(first)), **columns))
     except FileNotFoundError:
         raise InputError(f"{path}: not there: an older result, without single impacts; simulate again") from None
-    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise InputError(f"{path}: damaged ({error}); simulate again") from None
     if any(len(column) != first[-1] for column in columns.values()):
         raise InputError(f"{path}: damaged (columns of different lengths); simulate again")

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chamberopt import config
+from chamberopt import question
 from chamberopt.accuracy import jackknife
 from chamberopt.errors import InputError
 from chamberopt.objective import LONGEST, METRICS, OBJECTIVES, objective
@@ -93,9 +93,9 @@ def test_nothing_hit() -> None:
 
 
 def test_the_names_a_study_may_use_are_these() -> None:
-    assert {name: (metric.lowest, metric.highest) for name, metric in METRICS.items()} == config.METRICS
+    assert {name: (metric.lowest, metric.highest) for name, metric in METRICS.items()} == question.METRICS
     for name in OBJECTIVES:
-        assert config.Objective(name=name).name == name
+        assert question.Objective(name=name).name == name
     with pytest.raises(InputError, match="uniform_coverage"):
         objective("shiny")
 
