@@ -12,7 +12,7 @@ import time
 from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from functools import reduce
+from functools import cached_property, reduce
 from operator import add
 from typing import TYPE_CHECKING
 
@@ -23,7 +23,7 @@ from chamberopt.coverage import Tally
 from chamberopt.dents import Samples, few_points_note, marked_share, sample_points
 from chamberopt.estimate import Estimate, estimate, student
 from chamberopt.figures import coverage_figures, few_dents_note, surface, time_to_98
-from chamberopt.hits import Hits
+from chamberopt.hits import Hits, SortedHits, sorted_hits
 from chamberopt.intensity import intensity_uniformity
 from chamberopt.objective import METRICS, Metric, Objective, objective, on_target
 from chamberopt.process import chamber_mesh
@@ -74,6 +74,11 @@ class Evaluation:
     marked: np.ndarray | None = None
     marked_interval: np.ndarray | None = None
     against_time: tuple[tuple[float, Estimate], ...] = ()
+
+    @cached_property
+    def sorted_hits(self) -> SortedHits | None:
+        """The hits of all replicas by part triangle; None where there are none to tell of."""
+        return sorted_hits(self.hits, len(self.total.impacts)) if self.hits else None
 
 
 def jackknife(
@@ -184,6 +189,7 @@ def evaluate(
         notes += few_points_note(samples, chamber)
     else:
         notes += few_dents_note(tallies, surface(tallies, chamber, design))
+    shares = None if samples is None else _shares(done, samples, chamber, design)
     return Evaluation(
         objective_name=objective_name,
         objective=goal,
@@ -197,8 +203,8 @@ def evaluate(
         stopped_by=stopped_by,
         analytic=cavity is not None,
         hits=tuple(replica.hits for replica in done),
-        marked=None if samples is None else np.mean(_shares(done, samples, chamber, design), axis=0),
-        marked_interval=None if samples is None else _width(_shares(done, samples, chamber, design)),
+        marked=None if shares is None else np.mean(shares, axis=0),
+        marked_interval=None if shares is None else _width(shares),
         against_time=() if samples is None else _against_time(done, samples, chamber, design),
     )
 

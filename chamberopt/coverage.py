@@ -61,12 +61,17 @@ def dent_diameter(
     return 1.278 * diameter * (np.maximum(1.0 - e * e, 0.0) * density * speed * speed / hardness) ** 0.25
 
 
+def ball_diameters(impacts: ImpactLog, design: Design) -> float | np.ndarray:
+    """Diameter [m] of the ball of each impact, (n,); one number where all are alike."""
+    shot = design.shot
+    return shot.diameter if shot.mix is None else np.array(shot.diameters)[impacts.ball]
+
+
 def dent_diameters(impacts: ImpactLog, design: Design) -> np.ndarray:
     """Diameter [m] of the dent each impact would leave on the part, (n,), each ball with its own size."""
-    material, shot = design.materials.part, design.shot
-    ball = shot.diameter if shot.mix is None else np.array(shot.diameters)[impacts.ball]
+    material, ball = design.materials.part, ball_diameters(impacts, design)
     return dent_diameter(
-        impacts.normal_speed, ball, shot.density, material.hardness, material.restitution, material.yield_speed
+        impacts.normal_speed, ball, design.shot.density, material.hardness, material.restitution, material.yield_speed
     )
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 CONFIDENCE = 0.95
+NOTHING = 1e-12  # what rounding leaves of a zero
 
 
 @dataclass(frozen=True)

@@ -61,7 +61,7 @@ def flight(replayed: Replayed, start: float, span: float, frames: int, trail: in
     seen = simulate(replace(scene, duration=end), frames=every)  # the same bits as of the whole, as far as it goes
     impacts = replayed.booked(seen.impacts)
     shown = (impacts.time >= start) & (replayed.chamber.source[impacts.triangle] >= 0)
-    impacts = replace(impacts, **{name: column[shown] for name, column in vars(impacts).items()})
+    impacts = impacts.only(shown)
     time, turn = every[::trail], scene.physics.turn
     waving = () if scene.physics.random_phase else scene.physics.vibrations
     before = np.full((1, trail, *seen.frames.shape[1:]), np.nan)

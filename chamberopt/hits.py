@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.coverage import dent_diameters, impact_angle_deg
+from chamberopt.coverage import ball_diameters, dent_diameters, impact_angle_deg
 from chamberopt.disk import whole_file
 from chamberopt.errors import InputError
 
@@ -65,10 +65,8 @@ def hits_on_part(impacts: ImpactLog, chamber: Chamber, design: Design) -> Hits:
     """The impacts of a log that are on the part."""
     source = chamber.source[impacts.triangle]
     on_part = source >= 0
-    shot = design.shot
     speed = np.asarray(impacts.normal_speed)
-    ball = shot.diameter if shot.mix is None else np.array(shot.diameters)[impacts.ball]
-    mass = shot.density * np.pi / 6.0 * ball**3
+    mass = design.shot.density * np.pi / 6.0 * ball_diameters(impacts, design) ** 3
     columns = (
         impact_angle_deg(np.asarray(impacts.velocity), speed),
         dent_diameters(impacts, design),
@@ -104,6 +102,21 @@ def load_hits(path: Path) -> SortedHits:
         raise InputError(f"{path}: damaged ({error}); simulate again") from None
     if any(len(column) != first[-1] for column in columns.values()):
         raise InputError(f"{path}: damaged (columns of different lengths); simulate again")
+    return found
+
+
+def own_hits(folder: Path, impacts: np.ndarray) -> SortedHits | None:
+    """The single impacts of a results folder, None of an older result. impacts (m,): how many each triangle had, as
+    coverage.vtp says; InputError where these are others.
+    """
+    path = folder / HITS
+    if not path.is_file():
+        return None
+    found = load_hits(path)
+    if not np.array_equal(np.diff(found.first), impacts):
+        raise InputError(
+            f"{path}: its impacts are not those of the coverage.vtp beside it, but of another result; simulate again"
+        )
     return found
 
 

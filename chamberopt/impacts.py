@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from concurrent.futures import Executor
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import reduce
 from operator import add
 from typing import TYPE_CHECKING, Any
@@ -96,8 +96,7 @@ def _on_part(number: int, log: ImpactLog, chamber: Chamber) -> ReplicaImpacts:
     source = chamber.source[log.triangle]
     if (source < 0).any():
         on_part = source >= 0
-        log = replace(log, **{column.name: getattr(log, column.name)[on_part] for column in fields(log)})
-        source = source[on_part]
+        log, source = log.only(on_part), source[on_part]
     return ReplicaImpacts(number, log, source)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from chamberopt.coverage import coverage_at, mean_impact_angle_deg, mean_normal_speed
 from chamberopt.estimate import CONFIDENCE
-from chamberopt.hits import SortedHits, sorted_hits
+from chamberopt.hits import SortedHits
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -82,9 +82,9 @@ def per_triangle(design: Design, chamber: Chamber, evaluation: Evaluation) -> di
         "target": chamber.part.target.astype(np.uint8),
         "element": chamber.part.elements,
     }
-    if not evaluation.hits:
+    hits = evaluation.sorted_hits
+    if hits is None:
         return found
-    hits = sorted_hits(evaluation.hits, len(exposed_mm2))
     energy = _sums(hits, hits.hits.energy)
     found |= {
         "energy_per_mm2": energy * 1e3 * times / exposed_mm2,

@@ -15,7 +15,7 @@ from chamberopt.design import checked
 from chamberopt.disk import new_folder, write_text
 from chamberopt.errors import InputError
 from chamberopt.estimate import Estimate
-from chamberopt.hits import HITS, save_hits, sorted_hits
+from chamberopt.hits import HITS, save_hits
 from chamberopt.objective import METRICS, exposed_target
 from chamberopt.quantities import per_triangle
 from chamberopt.studies import front
@@ -166,8 +166,8 @@ def _write_candidate(folder: Path, design: Design, chamber: Chamber, evaluation:
     from chamberopt.viewer import COVERAGE, write_chamber, write_coverage
 
     write_coverage(folder / COVERAGE, chamber, per_triangle(design, chamber, evaluation))
-    if evaluation.hits:
-        save_hits(folder / HITS, sorted_hits(evaluation.hits, len(chamber.part.triangles)))
+    if evaluation.sorted_hits is not None:
+        save_hits(folder / HITS, evaluation.sorted_hits)
     write_chamber(folder, chamber)
     return _about(folder, design, chamber, evaluation)
 

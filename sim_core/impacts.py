@@ -66,6 +66,10 @@ class ImpactLog:
     def __len__(self) -> int:
         return len(self.time)
 
+    def only(self, rows: np.ndarray) -> "ImpactLog":
+        """Some of the impacts: those marked (n,) bool, or by index."""
+        return ImpactLog(**{name: column[rows] for name, column in vars(self).items()})
+
 
 def impact_log(pages: list[tuple[np.ndarray, np.ndarray]], centre: np.ndarray) -> ImpactLog:
     """Joins pages of (numbers, names) into one log, positions in the user's coordinates again."""

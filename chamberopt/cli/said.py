@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from chamberopt.config import Design
     from chamberopt.estimate import Estimate
 
-NOTHING = 1e-12  # what rounding leaves of a zero
-
 
 @contextmanager
 def results_folder(out: Path | None, name: str) -> Iterator[Path]:
@@ -80,6 +78,8 @@ def estimates(evaluation: Evaluation) -> list[str]:
 
 
 def row(name: str, estimate: Estimate) -> str:
+    from chamberopt.estimate import NOTHING
+
     value, half_width = (0.0 if abs(x) < NOTHING else x for x in (estimate.value, estimate.half_width))
     return f"{name:34}{value:12.5g} ± {half_width:.2g}"
 

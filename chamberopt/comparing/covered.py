@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
-from chamberopt.errors import InputError
-from chamberopt.hits import HITS, Hits, SortedHits, load_hits
+from chamberopt.hits import Hits, SortedHits, own_hits
 from chamberopt.opened import own_coverage
 from chamberopt.results import Result
-from chamberopt.viewer import COVERAGE
+from chamberopt.triangles import area_vectors
 
 
 @dataclass(frozen=True)
@@ -47,27 +45,17 @@ class Covered:
 def covered(result: Result) -> Covered:
     """Read a results folder. Raises InputError for files gone or damaged."""
     surface = own_coverage(result)
-    corners = np.asarray(surface.points, dtype=float)[surface.regular_faces]
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    twice = np.linalg.norm(cross, axis=1)
+    points, triangles = np.asarray(surface.points, dtype=float), np.asarray(surface.regular_faces)
+    vectors = area_vectors(points, triangles)
+    area = np.linalg.norm(vectors, axis=1)
     return Covered(
-        centre=corners.mean(axis=1),
-        normal=cross / np.maximum(twice, 1e-300)[:, None],
+        centre=points[triangles].mean(axis=1),
+        normal=vectors / np.maximum(area, 1e-300)[:, None],
         target=np.asarray(surface["target"]) > 0,
-        area=0.5 * twice,
+        area=area,
         exposed=np.asarray(surface["exposed_area_mm2"], dtype=float),
         coverage=np.nan_to_num(np.asarray(surface["coverage"], dtype=float)),
         dents=np.asarray(surface["dents"], dtype=float),
         times=result.design.process.treatment_time_s / float(result.data["simulated_time_s"]),
-        hits=_hits(result.folder / HITS, np.asarray(surface["impacts"])),
+        hits=own_hits(result.folder, np.asarray(surface["impacts"])),
     )
-
-
-def _hits(file: Path, impacts: np.ndarray) -> SortedHits | None:
-    """The single impacts, None of an older result. InputError where they are not as many as each triangle had, (m,)."""
-    if not file.is_file():
-        return None
-    hits = load_hits(file)
-    if not np.array_equal(np.diff(hits.first), impacts):
-        raise InputError(f"{file}: its impacts are not those of the {COVERAGE} beside it; simulate again")
-    return hits

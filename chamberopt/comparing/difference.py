@@ -12,6 +12,7 @@ import numpy as np
 
 from chamberopt.estimate import (
     CONFIDENCE,
+    NOTHING,
     Estimate,
     independent_difference,
     paired_difference,
@@ -19,7 +20,6 @@ from chamberopt.estimate import (
     welch_half_width,
 )
 
-NOTHING = 1e-12  # what rounding leaves of a zero
 LONGEST = 1000  # times as long as was simulated: what takes more is not foretold
 
 

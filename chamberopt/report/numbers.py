@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from chamberopt.estimate import NOTHING
+
 if TYPE_CHECKING:
     from chamberopt.estimate import Estimate
 
-NOTHING = 1e-12  # what floating point leaves of an exact zero, in any unit shown here
 GAP = "\u202f"  # between thousands; narrow, and no line breaks there
 
 

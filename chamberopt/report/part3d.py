@@ -18,6 +18,7 @@ from chamberopt.opened import own_coverage
 from chamberopt.quantities import QUANTITIES
 from chamberopt.results import Result
 from chamberopt.shapes import TAG_PART, TAG_WALL, is_sonotrode
+from chamberopt.triangles import area_vectors
 from chamberopt.viewer import CHAMBER, read_surface
 from chamberopt.viewer.part import averaged
 
@@ -51,11 +52,11 @@ def part_scene(result: Result, title: str, most: int = MOST_TRIANGLES) -> Scene:
     points, triangles = np.asarray(surface.points, dtype=float), np.asarray(surface.regular_faces)
     fields = {name: np.asarray(surface.cell_data[name]) for name in surface.cell_data}
     corners = points[triangles]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = 0.5 * np.linalg.norm(normal, axis=1)
+    vectors = area_vectors(points, triangles)
+    area = np.linalg.norm(vectors, axis=1)
     target = fields["target"] > 0
     seen = target & (fields["exposed_area_mm2"] > 0.0)
-    unit = normal[seen] / np.maximum(2.0 * area[seen], 1e-300)[:, None]
+    unit = vectors[seen] / np.maximum(area[seen], 1e-300)[:, None]
     density, reach = averaged(
         corners[seen].mean(axis=1),
         unit,
@@ -76,7 +77,7 @@ def part_scene(result: Result, title: str, most: int = MOST_TRIANGLES) -> Scene:
         columns["shown-density"] = _packed(density)  # what the colours are made of
         columns["density"] = _packed(fields["dent_density"][seen])
     chamber = read_surface(result.folder / CHAMBER)
-    eye = _eye(normal[seen])
+    eye = _eye(vectors[seen])
     rest = triangles[~seen] if len(triangles) <= most else triangles[:0]
     data = {
         "title": title,

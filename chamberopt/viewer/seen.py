@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from chamberopt.errors import InputError
-from chamberopt.hits import HITS, SortedHits, load_hits
+from chamberopt.hits import SortedHits, own_hits
 from chamberopt.quantities import QUANTITIES
 from chamberopt.viewer.look import Look
 from chamberopt.viewer.part import Part, colour_range
@@ -55,13 +55,7 @@ class Seen:
     @cached_property
     def hits(self) -> SortedHits | None:
         """Its single impacts, None where it has none. Read when first asked for: they are most of a result."""
-        path = self.folder / HITS
-        if not path.is_file():
-            return None
-        hits = load_hits(path)
-        if not np.array_equal(np.diff(hits.first), self.surface["impacts"]):
-            raise InputError(f"{path}: the impacts of another result than {COVERAGE}; simulate again")
-        return hits
+        return own_hits(self.folder, np.asarray(self.surface["impacts"]))
 
     def times(self, look: Look) -> float:
         """The time looked at in treatment times. InputError where dents are marked: their coverage has one time."""
