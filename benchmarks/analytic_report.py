@@ -20,10 +20,10 @@ from benchmarks.analytic_runs import (
     hotelling,
     relative,
 )
-from chamberopt.estimate import Estimate, estimate
+from chamberopt.coverage.statistics.interval import Estimate, estimate
 
 if TYPE_CHECKING:
-    from chamberopt.config import Design
+    from chamberopt.design.load import Design
 
 CHANCE = 0.05  # less is no accident
 WIDTH = 120

@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from chamberopt.accuracy import jackknife
-from chamberopt.analytic import analytic_cavity, on_chamber
-from chamberopt.chamber import Chamber, build_chamber
-from chamberopt.config import Design
-from chamberopt.coverage import Tally, impact_angle_deg, tally
-from chamberopt.estimate import Estimate, estimate
-from chamberopt.objective import METRICS
-from chamberopt.process import build_scene, chamber_mesh, replica_seed
+from chamberopt.chamber.analytic import analytic_cavity, on_chamber
+from chamberopt.chamber.build import Chamber, build_chamber
+from chamberopt.chamber.scene import build_scene, chamber_mesh, replica_seed
+from chamberopt.coverage.metrics import METRICS
+from chamberopt.coverage.statistics.interval import Estimate, estimate
+from chamberopt.coverage.tally import Tally, impact_angle_deg, tally
+from chamberopt.design.load import Design
+from chamberopt.simulation.evaluate import jackknife
 from sim_core import AnalyticCavity, ImpactLog, TriangleMesh, simulate
 
 MEASURED, PEENED = 0.39, 50.0  # the paper's experiment: coverage, and after how long [s]

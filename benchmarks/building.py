@@ -46,13 +46,13 @@ def timed(work: Callable[[], Any]) -> tuple[float, Any]:
 
 def row(path: Path, runs: int) -> dict[str, Any]:
     """One mesh."""
-    from chamberopt.chamber import build_chamber
-    from chamberopt.config import load_design
-    from chamberopt.design import checked
-    from chamberopt.mesh_io import read_part
-    from chamberopt.process import chamber_mesh
+    from chamberopt.chamber.build import build_chamber
+    from chamberopt.chamber.scene import chamber_mesh
+    from chamberopt.design.design import checked
+    from chamberopt.design.load import load_design
+    from chamberopt.geometry.mesh_io import read_part
     from sim_core import compile_simulator  # noqa: F401  its import is not timed
-    from sim_core.surfaces.ground import build_ground
+    from sim_core.geometry.obstacle_set import build_ground
 
     data = load_design(ROOT / "designs" / "gear.toml").model_dump()
     data["part"]["mesh"] = str(path)
@@ -77,8 +77,8 @@ def vtk_columns(design: Any, runs: int) -> dict[str, Any]:
     import numpy as np
     import pyvista
 
-    from chamberopt.chamber import build_chamber
-    from chamberopt.part import posed_part
+    from chamberopt.chamber.build import build_chamber
+    from chamberopt.chamber.part import posed_part
 
     part = posed_part(design)[0]
     if len(part.triangles) > MOST_FOR_VTK:

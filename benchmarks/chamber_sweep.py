@@ -18,11 +18,11 @@ import numpy as np
 
 from benchmarks.noisy_problems import RESULTS
 from benchmarks.table import write_csv
-from chamberopt.accuracy import evaluate
-from chamberopt.chamber import build_chamber
-from chamberopt.config import Design, load_design
-from chamberopt.studies.constraints import standard_error
-from chamberopt.workers.executor import SerialExecutor
+from chamberopt.chamber.build import build_chamber
+from chamberopt.common.parallel.executor import SerialExecutor
+from chamberopt.design.load import Design, load_design
+from chamberopt.optimize.constraints import standard_error
+from chamberopt.simulation.evaluate import evaluate
 
 ROOT = RESULTS.parents[1]
 VARY = {

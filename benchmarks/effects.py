@@ -78,7 +78,7 @@ def play(effect: str, on: bool) -> None:
     import sim_core
     from benchmarks.events import advance
     from benchmarks.table import array_bytes
-    from sim_core.simulate import _Run
+    from sim_core.loop.simulate import _Run
 
     run = _Run(effect_scene(effect, on))
     start = time.process_time()

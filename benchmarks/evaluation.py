@@ -32,12 +32,12 @@ ASKED, ASKED_QUICK = 0.01, 0.03
 
 def evaluation(accuracy: float) -> dict[str, Any]:
     """The row of one evaluation in this process; nothing of chamberopt may have been imported before."""
-    from chamberopt.accuracy import evaluate
-    from chamberopt.chamber import build_chamber
-    from chamberopt.config import load_design
-    from chamberopt.price.knobs import changed
-    from chamberopt.process import build_scene, chamber_mesh
-    from chamberopt.workers.executor import local_executor
+    from chamberopt.chamber.build import build_chamber
+    from chamberopt.chamber.scene import build_scene, chamber_mesh
+    from chamberopt.common.parallel.executor import local_executor
+    from chamberopt.design.load import load_design
+    from chamberopt.simulation.convergence.parameters import changed
+    from chamberopt.simulation.evaluate import evaluate
     from sim_core import compile_simulator
 
     asked = {"shot.mass_g": MASS_G, "process.accuracy.coverage": accuracy, "process.accuracy.most_replicas": 1000}
@@ -74,9 +74,9 @@ def evaluation(accuracy: float) -> dict[str, Any]:
 
 def replica_shares(design: Any, chamber: Any) -> dict[str, float]:
     """Of a replica's CPU seconds: fixed, warm-up, recorded; from replicas with neither, with the first, with both."""
-    from chamberopt.price.knobs import TIME, WARM_UP, changed
-    from chamberopt.process import chamber_mesh, replica_seed
-    from chamberopt.replicas import simulate_replica
+    from chamberopt.chamber.scene import chamber_mesh, replica_seed
+    from chamberopt.simulation.convergence.parameters import TIME, WARM_UP, changed
+    from chamberopt.simulation.replicas import simulate_replica
 
     mesh = chamber_mesh(chamber)
     lengths = [changed(design, {TIME: NO_TIME, WARM_UP: 0.0}), changed(design, {TIME: NO_TIME}), design]

@@ -29,12 +29,12 @@ from benchmarks import embree, paper_method
 from benchmarks.scenes import MESHES, PHYSICS, ROOT, mesh, scene
 from benchmarks.table import print_table, write_csv
 from sim_core import compile_simulator
-from sim_core._compile import jit
 from sim_core.detect.ball_mesh import first_contact
-from sim_core.flight import point_at
-from sim_core.impacts import new_page
-from sim_core.simulate import Clock, _Run
-from sim_core.surfaces.mesh import MAX_TAGS
+from sim_core.geometry.mesh import MAX_TAGS
+from sim_core.loop.impact_log import new_page
+from sim_core.loop.simulate import Clock, _Run
+from sim_core.motion import point_at
+from sim_core.numerics.jit import jit
 
 STEADY = 0.3  # s
 FLIGHT = 0.01  # s: the length of arc that the wall queries search

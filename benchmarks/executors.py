@@ -31,9 +31,9 @@ import numpy as np
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
-from chamberopt.config import Study, load_study  # noqa: E402
-from chamberopt.studies.sweep import judged, plan_sweep  # noqa: E402
-from chamberopt.workers.executor import SerialExecutor, local_executor, shared  # noqa: E402
+from chamberopt.common.parallel.executor import SerialExecutor, local_executor, shared  # noqa: E402
+from chamberopt.design.load import Study, load_study  # noqa: E402
+from chamberopt.optimize.run_sweep import judged, plan_sweep  # noqa: E402
 
 CANDIDATES, NOTHINGS = 24, 1000
 ASKED = 0.9
@@ -47,7 +47,7 @@ def workers(kind: str, count: int) -> Iterator[Executor]:
         if kind == "dask":
             from distributed import LocalCluster
 
-            from chamberopt.workers.cluster import Cluster
+            from chamberopt.common.parallel.dask_cluster import Cluster
 
             local = LocalCluster(n_workers=count, threads_per_worker=1, processes=True, dashboard_address=":0")
             address = stack.enter_context(local).scheduler_address
@@ -167,9 +167,9 @@ def overhead(executor: Executor) -> float:
 
 def sizes(study: Study) -> dict[str, int]:
     """Bytes of a task and its answer: a candidate of a sweep; a replica, whose chamber is shared."""
-    from chamberopt.chamber import build_chamber
-    from chamberopt.process import chamber_mesh
-    from chamberopt.replicas import _replica
+    from chamberopt.chamber.build import build_chamber
+    from chamberopt.chamber.scene import chamber_mesh
+    from chamberopt.simulation.replicas import _replica
 
     design = study.drafted(study.design)
     chamber = build_chamber(design)

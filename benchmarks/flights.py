@@ -4,7 +4,7 @@ import numpy as np
 
 from benchmarks.structures import product
 from benchmarks.structures.shell import FALL, PIECE, Shell, ask
-from sim_core.vec3 import Vec3, along
+from sim_core.numerics.vec3 import Vec3, along
 
 SPEEDS = (1.5, 8.5)  # m/s, evenly
 AT_ONCE = 1e-7  # s: a flight this short leads into the wall it starts from

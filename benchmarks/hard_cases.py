@@ -17,8 +17,8 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from tests.hard_cases.cases import CASES
+from tests.hard_cases.cases.tested import CASES as TESTED
 from tests.hard_cases.outcome import Case, Outcome
-from tests.hard_cases.tested import CASES as TESTED
 
 NOT_YET = "not supported yet: it needs balls that can lie still"
 

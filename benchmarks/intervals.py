@@ -18,13 +18,13 @@ from typing import Any
 import numpy as np
 
 from benchmarks.table import print_table, write_csv
-from chamberopt.accuracy import jackknife, weighted
-from chamberopt.chamber import Chamber, Part, build_chamber
-from chamberopt.config import Design, load_design
-from chamberopt.coverage import Tally
-from chamberopt.estimate import estimate
-from chamberopt.objective import METRICS, OBJECTIVES
-from chamberopt.replicas import LEAST_WATCHED, replicas_wanted
+from chamberopt.chamber.build import Chamber, Part, build_chamber
+from chamberopt.coverage.metrics import METRICS, OBJECTIVES
+from chamberopt.coverage.statistics.interval import estimate
+from chamberopt.coverage.tally import Tally
+from chamberopt.design.load import Design, load_design
+from chamberopt.simulation.evaluate import jackknife, weighted
+from chamberopt.simulation.replicas import LEAST_WATCHED, replicas_wanted
 
 ROOT = Path(__file__).parents[1]
 NAMES = ("mean_coverage", "std_coverage", "p05_coverage")
@@ -115,9 +115,9 @@ def model_rows(runs: int) -> Iterator[dict[str, Any]]:
 
 def gear_rows(runs: int, replicas: int) -> Iterator[dict[str, Any]]:
     """Replicas of the shipped gear, simulated once; runs draw eight of them and a window of time in each."""
-    from chamberopt.coverage import dent_diameter
-    from chamberopt.process import build_scene, chamber_mesh, replica_seed
-    from chamberopt.workers.executor import local_executor
+    from chamberopt.chamber.scene import build_scene, chamber_mesh, replica_seed
+    from chamberopt.common.parallel.executor import local_executor
+    from chamberopt.coverage.tally import dent_diameter
     from sim_core import simulate
 
     design = load_design(ROOT / "designs" / "gear.toml")

@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from benchmarks.events import advance, steady
 from benchmarks.scenes import MESHES
-from sim_core.stopwatch import PARTS, new_stopwatch
+from sim_core.numerics.profiler import PARTS, new_stopwatch
 
 WINDOW = 0.4  # CPU s a measurement
 

@@ -33,10 +33,10 @@ RUNS = 3
 def written(folder: Path, size: str, impacts: int) -> tuple[int, int]:
     """A results folder of so many impacts at random; its part's triangles, and one of them that was hit."""
     from benchmarks.building import gear_file
-    from chamberopt.chamber import build_chamber
-    from chamberopt.config import load_design
-    from chamberopt.design import checked
-    from chamberopt.results import write_simulation
+    from chamberopt.chamber.build import build_chamber
+    from chamberopt.design.design import checked
+    from chamberopt.design.load import load_design
+    from chamberopt.output.results.results import write_simulation
 
     gear = load_design(ROOT / "designs" / "gear.toml")
     data = gear.model_dump()
@@ -49,10 +49,10 @@ def written(folder: Path, size: str, impacts: int) -> tuple[int, int]:
 
 def evaluation(design: Any, chamber: Any, impacts: int) -> Any:
     """So many impacts, anywhere on what is exposed, in replicas."""
-    from chamberopt.accuracy import Evaluation, jackknife, weighted
-    from chamberopt.coverage import Tally
-    from chamberopt.hits import Hits
-    from chamberopt.objective import METRICS, OBJECTIVES
+    from chamberopt.coverage.hits import Hits
+    from chamberopt.coverage.metrics import METRICS, OBJECTIVES
+    from chamberopt.coverage.tally import Tally
+    from chamberopt.simulation.evaluate import Evaluation, jackknife, weighted
 
     rng = np.random.default_rng(1)
     share = chamber.exposed_area / chamber.exposed_area.sum()

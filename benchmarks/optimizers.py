@@ -21,9 +21,9 @@ import numpy as np
 
 from benchmarks.noisy_problems import REPLICAS, Problem, chambers, functions
 from benchmarks.table import print_table, write_csv
-from chamberopt.studies.proposal import recommend
-from chamberopt.studies.search import maximise
-from chamberopt.studies.surrogate import Surrogate, pooled
+from chamberopt.optimize.search.acquisition import recommend
+from chamberopt.optimize.search.gaussian_process import Surrogate, pooled
+from chamberopt.optimize.search.phases import maximise
 
 EVALUATIONS, SEEDS = 40, 10
 

@@ -57,8 +57,8 @@ def cylinder(radius: float, height: float, triangles: int) -> TriangleMesh:
 
 def gear(subdivisions: int) -> TriangleMesh:
     """The chamber of designs/gear.toml, every triangle split in four so many times."""
-    from chamberopt.chamber import build_chamber
-    from chamberopt.config import load_design
+    from chamberopt.chamber.build import build_chamber
+    from chamberopt.design.load import load_design
 
     chamber = build_chamber(load_design(ROOT / "designs" / "gear.toml"))
     vertices, triangles, tags = chamber.vertices, chamber.triangles, chamber.tags

@@ -9,9 +9,9 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from benchmarks.pictures import IMAGES
-from chamberopt.chamber import build_chamber
-from chamberopt.design import Design
-from chamberopt.shapes import TAG_SONOTRODE, ShapeSurface
+from chamberopt.chamber.build import build_chamber
+from chamberopt.design.design import Design
+from chamberopt.design.shapes import TAG_SONOTRODE, ShapeSurface
 
 SHOWN: dict[str, dict[str, Any]] = {
     "cylinder": {"diameter_mm": 60, "height_mm": 57, "corner_radius_mm": 8},

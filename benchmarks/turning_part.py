@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from benchmarks.events import STEADY, TARGET, advance
 from benchmarks.scenes import PART, PHYSICS, scene
 from sim_core import Scene, Turn, compile_simulator
-from sim_core.simulate import _Run
+from sim_core.loop.simulate import _Run
 
 NAME = "gear-200-10k"
 MOTIONS: dict[str, Turn | None] = {

@@ -1,4 +1,4 @@
-"""chamberopt: designs ultrasonic shot peening chambers. See chamberopt.workbench for use from Python."""
+"""chamberopt: designs ultrasonic shot peening chambers. See chamberopt.api for use from Python."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from chamberopt.workbench import Design, Study, load_design, load_study, optimise, show, simulate
+    from chamberopt.api import Design, Study, load_design, load_study, optimise, show, simulate
 
 __all__ = ["Design", "Study", "load_design", "load_study", "optimise", "show", "simulate"]
 
@@ -14,7 +14,7 @@ __all__ = ["Design", "Study", "load_design", "load_study", "optimise", "show", "
 def __getattr__(name: str) -> Any:
     """The workbench's names, imported when first asked for: `chamberopt --help` needs none of them."""
     if name in __all__:
-        return getattr(import_module("chamberopt.workbench"), name)
+        return getattr(import_module("chamberopt.api"), name)
     raise AttributeError(f"module 'chamberopt' has no attribute {name!r}")
 
 

@@ -5,27 +5,27 @@ throughout.
 """
 
 from sim_core.balls import Balls
+from sim_core.contact.resting_balls import Resting, can_rest
 from sim_core.effects.ball_collisions import BallCollisions
+from sim_core.effects.contact_mode import Rest
 from sim_core.effects.drag import Drag, drag_coefficient
 from sim_core.effects.friction import Friction
 from sim_core.effects.gravity import Gravity
+from sim_core.effects.part_rotation import Turn
 from sim_core.effects.random_phase import RandomPhase
-from sim_core.effects.rest import Rest
 from sim_core.effects.restitution import Restitution, restitution_at
-from sim_core.effects.turn import Turn
 from sim_core.effects.vibration import Vibration
 from sim_core.errors import SceneError, SimulationError
-from sim_core.impacts import ImpactLog
-from sim_core.nearest import Nearest, nearest
-from sim_core.packing import pack_balls
-from sim_core.physics import Physics
-from sim_core.resting import Resting, can_rest
-from sim_core.scene import Scene, require_free_turn
-from sim_core.simulate import Collisions, Result, simulate
-from sim_core.surfaces.analytic import AnalyticCavity, cylinder_cavity, prism_cavity
-from sim_core.surfaces.locate import triangles_at
-from sim_core.surfaces.mesh import TriangleMesh
-from sim_core.warm_up import compile_simulator, is_compiled
+from sim_core.geometry.analytic import AnalyticCavity, cylinder_cavity, prism_cavity
+from sim_core.geometry.closest_point import Nearest, nearest
+from sim_core.geometry.mesh import TriangleMesh
+from sim_core.geometry.triangle_lookup import triangles_at
+from sim_core.loop.compile_ahead import compile_simulator, is_compiled
+from sim_core.loop.impact_log import ImpactLog
+from sim_core.loop.simulate import Collisions, Result, simulate
+from sim_core.scene.packing import pack_balls
+from sim_core.scene.physics import Physics
+from sim_core.scene.scene import Scene, require_free_turn
 
 __all__ = [
     "AnalyticCavity",

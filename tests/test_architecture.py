@@ -1,4 +1,4 @@
-"""The walls of the house, read from the sources: imports point one way, heavy libraries have one door."""
+"""The structure, read from the sources: imports point one way, each heavy library has one importer."""
 
 import ast
 from collections.abc import Iterator
@@ -8,70 +8,32 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 
-# Each line may import from the lines above it, and from its own line. A folder stands for all of its files.
-CHAMBEROPT_ORDER = (
-    ("errors", "diagnosis", "estimate", "materials", "mixture", "patches", "sight", "triangles", "uncovered"),
-    ("disk", "fields", "remesh", "solids", "workers"),
-    ("effects", "mesh_io", "shot", "slivers", "sonotrode", "treatment", "versions"),
-    ("shapes",),
-    ("design", "reach"),
-    ("question",),
-    ("config", "fittings", "target"),
-    ("part",),
-    ("chamber",),
-    ("analytic", "coverage", "groups", "process"),
-    ("checks", "hits", "objective", "replayed"),
-    ("dents", "figures", "stuck"),
-    ("dent_map", "flight_frames", "intensity", "replicas"),
-    ("accuracy", "progress"),
-    ("advice", "evaluation_file", "price", "quantities", "timeline"),
-    ("viewer",),
-    ("studies",),
-    ("pictures",),
-    ("price_list", "study_pictures"),
-    ("results",),
-    ("ground", "opened"),
-    ("impacts",),
-    ("comparing", "export", "maps", "report", "workbench"),
-    ("cli",),
-    ("__main__",),
-)
-SIM_CORE_ORDER = (
-    ("errors", "_compile", "simd"),
-    ("vec3", "stopwatch"),
-    ("roots",),
-    ("surfaces", "balls", "effects"),
-    ("invariants", "nearest", "sizes"),
-    ("packing",),
-    ("physics",),
-    ("flight",),
-    ("detect", "resolve"),
-    ("calendar", "blocks", "neighbours", "grounded", "impacts"),
-    ("loop",),
-    ("hits",),
-    ("events",),
-    ("pinches",),
-    ("analytic_scene",),
-    ("scene", "resting"),
-    ("jams",),
-    ("simulate",),
-    ("warm_up",),
-)
-ORDER = {"chamberopt": CHAMBEROPT_ORDER, "sim_core": SIM_CORE_ORDER}
-# Package fronts gather names for users and may import everything below them.
-FRONTS = {"chamberopt/__init__.py", "sim_core/__init__.py"}
-ONE_DOOR = {
-    "sklearn": "studies/surrogate.py",
-    "manifold3d": "solids.py",
-    "nlopt": "studies/climb.py",
-    "pyvista": "viewer/",
-    "vtk": "viewer/",
-    "distributed": "workers/cluster.py",
-    "dask": "workers/cluster.py",
+# Who may import whom: each package from those before it in its row, and from itself.
+ORDER = {
+    "chamberopt": "common geometry design chamber coverage simulation optimize output api cli __main__",
+    "chamberopt/design": "materials shapes effects+process+shot+sonotrode design study load",
+    "chamberopt/chamber": "target fittings reach part build dimensionless scene analytic checks",
+    "chamberopt/coverage": "statistics tally hits+metrics dents estimators intensity",
+    "chamberopt/simulation": "resting_balls replicas evaluate "
+    "triangle_fields time_curve effect_pilot evaluation_file convergence",
+    "chamberopt/optimize": "constraints pareto interrupt search storage "
+    "evaluate_candidate sensitivity candidates run_study pareto_table run_sweep",
+    "chamberopt/output": "vtp_files plots resimulate+viewer+results report+export+compare",
+    "sim_core": "errors numerics balls effects geometry motion impulses scene contact detect loop",
 }
-# VTK's file readers alone, which need no OpenGL.
-ONE_DOOR["plotly"] = "report/"
-ONE_DOOR["vtkmodules"] = "mesh_io/vtk_files.py"
+# Only this file or package imports the library.
+ONE_IMPORTER = {
+    "sklearn": "optimize/search/gaussian_process.py",
+    "manifold3d": "geometry/solids.py",
+    "nlopt": "optimize/search/nlopt_search.py",
+    "pyvista": "output/",
+    "vtk": "output/",
+    "distributed": "common/parallel/dask_cluster.py",
+    "dask": "common/parallel/dask_cluster.py",
+    "plotly": "output/report/",
+    "vtkmodules": "geometry/mesh_io/readers/vtk.py",  # VTK's file readers alone, which need no OpenGL
+}
+MOST_ENTRIES = 12
 
 
 def sources(package: str) -> list[Path]:
@@ -89,43 +51,53 @@ def imports(path: Path) -> Iterator[tuple[str, tuple[str, ...], int]]:
             yield node.module or "", tuple(alias.name for alias in node.names), node.lineno
 
 
-def rooms(module: str, names: tuple[str, ...]) -> list[str]:
-    """The rooms of its package that an import reaches: `from sim_core import roots` reaches roots."""
-    parts = module.split(".")
-    return [parts[1]] if len(parts) > 1 else list(names)
-
-
 def relative(path: Path) -> str:
     return path.relative_to(ROOT).as_posix()
 
 
-@pytest.mark.parametrize("package", ["chamberopt", "sim_core"])
+def level_of(order: str) -> dict[str, int]:
+    """Position of every name in a row; names joined by + share one."""
+    return {name: level for level, group in enumerate(order.split()) for name in group.split("+")}
+
+
+@pytest.mark.parametrize("package", ORDER)
 def test_every_file_has_its_place_in_the_order(package: str) -> None:
-    known = {room for line in ORDER[package] for room in line}
+    known = {*level_of(ORDER[package]), "__init__"}
     homeless = {
-        relative(path)
-        for path in sources(package)
-        if relative(path) not in FRONTS and path.relative_to(ROOT / package).parts[0].removesuffix(".py") not in known
-    }
-    assert not homeless, f"give these a line in {package}'s order: {sorted(homeless)}"
+        path.stem for path in (ROOT / package).iterdir() if path.suffix == ".py" or (path / "__init__.py").is_file()
+    } - known
+    assert not homeless, f"give these a place in {package}'s row: {sorted(homeless)}"
 
 
-@pytest.mark.parametrize("package", ["chamberopt", "sim_core"])
+@pytest.mark.parametrize("package", ORDER)
 def test_imports_point_one_way(package: str) -> None:
-    level = {room: depth for depth, line in enumerate(ORDER[package]) for room in line}
+    level, dotted = level_of(ORDER[package]), package.replace("/", ".")
     wrong = []
     for path in sources(package):
-        if relative(path) in FRONTS:
+        own = path.relative_to(ROOT / package).parts[0].removesuffix(".py")
+        if own == "__init__":  # gathers the names of its package for users
             continue
-        room = path.relative_to(ROOT / package).parts[0].removesuffix(".py")
-        wrong += [
-            f"{relative(path)}:{line}: {room} must not import {other}"
-            for module, names, line in imports(path)
-            if module.split(".")[0] == package
-            for other in rooms(module, names)
-            if other in level and room in level and level[other] > level[room]
-        ]
+        for module, names, line in imports(path):
+            reached = [f"{module}.{name}" for name in names] if module == dotted else [module]
+            others = [one.removeprefix(f"{dotted}.").split(".")[0] for one in reached if one.startswith(f"{dotted}.")]
+            wrong += [
+                f"{relative(path)}:{line}: {own} must not import {other}"
+                for other in others
+                if level.get(other, 0) > level[own]
+            ]
     assert not wrong, "\n".join(wrong)
+
+
+@pytest.mark.parametrize("package", ["chamberopt", "sim_core", "tests"])
+def test_no_folder_is_crowded(package: str) -> None:
+    crowded = {
+        relative(folder): len(entries)
+        for folder in (ROOT / package, *(ROOT / package).rglob("*"))
+        if folder.is_dir() and folder.name != "__pycache__"
+        for entries in [[e for e in folder.iterdir() if e.name != "__pycache__" and not e.name.startswith(".")]]
+        if len(entries) > MOST_ENTRIES
+    }
+    assert not crowded, f"more than {MOST_ENTRIES} entries: {crowded}"
 
 
 @pytest.mark.parametrize("package", ["chamberopt", "sim_core"])
@@ -198,16 +170,16 @@ def test_nothing_imports_the_command_line() -> None:
     assert not wrong, wrong
 
 
-@pytest.mark.parametrize("library", sorted(ONE_DOOR))
-def test_heavy_libraries_have_one_door(library: str) -> None:
-    doors = {
+@pytest.mark.parametrize("library", sorted(ONE_IMPORTER))
+def test_heavy_libraries_have_one_importer(library: str) -> None:
+    importers = {
         relative(path)
         for package in ("chamberopt", "sim_core")
         for path in sources(package)
         for module, _, _ in imports(path)
         if module.split(".")[0] == library
     }
-    assert all(door.startswith(f"chamberopt/{ONE_DOOR[library]}") for door in doors), doors
+    assert all(one.startswith(f"chamberopt/{ONE_IMPORTER[library]}") for one in importers), importers
 
 
 def test_the_only_compiler_of_sim_core_is_one_file() -> None:
@@ -215,11 +187,11 @@ def test_the_only_compiler_of_sim_core_is_one_file() -> None:
     wrong = [
         relative(path)
         for path in sources("sim_core")
-        if path.name not in ("_compile.py", "simd.py")
+        if path.name not in ("jit.py", "simd.py")
         for module, _, _ in imports(path)
         if module.split(".")[0] == "numba"
     ]
-    assert not wrong, f"use sim_core._compile.jit: {wrong}"
+    assert not wrong, f"use sim_core.numerics.jit.jit: {wrong}"
 
 
 def _run_time_imports(path: Path) -> Iterator[tuple[str, tuple[str, ...], int]]:

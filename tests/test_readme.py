@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from chamberopt.viewer import why_no_pictures
+from chamberopt.output.viewer import why_no_pictures
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

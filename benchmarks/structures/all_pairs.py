@@ -7,7 +7,7 @@ import numpy as np
 from benchmarks.gas import Gas
 from benchmarks.structures.compiled import jit, searches
 from benchmarks.structures.pairs import sooner
-from sim_core.roots import NEVER
+from sim_core.numerics.roots import NEVER
 
 
 class AllPairs(NamedTuple):

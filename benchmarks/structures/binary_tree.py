@@ -12,7 +12,7 @@ import numpy as np
 
 from benchmarks.structures.compiled import jit, searches
 from benchmarks.structures.shell import Rows, Shell, answer, chord_of, nearer, padding, sort_rows, within_slab
-from sim_core.vec3 import Vec3, dot
+from sim_core.numerics.vec3 import Vec3, dot
 
 LEAF = 4  # obstacles a leaf holds at most; 1 measured 10 % slower, 2 and 8 alike
 BINS = 16

@@ -12,8 +12,8 @@ import numpy as np
 from benchmarks.gas import HEIGHT, PER_BALL, Gas
 from benchmarks.structures.compiled import jit, searches
 from benchmarks.structures.pairs import sooner
-from sim_core.calendar import Calendar, new_calendar, reschedule
-from sim_core.roots import NEVER
+from sim_core.loop.event_queue import Calendar, new_calendar, reschedule
+from sim_core.numerics.roots import NEVER
 
 HELD = 0.3  # balls a cell on average; 0.7 and 1.5 measured 15 and 30 % slower
 

@@ -7,8 +7,8 @@ balls, enters among the answers what it sees later, and returns how many flights
 
 from benchmarks.structures.compiled import jit, search
 from sim_core.detect.ball_ball import meeting_delay
-from sim_core.flight import drift
-from sim_core.vec3 import Vec3, sub
+from sim_core.motion import drift
+from sim_core.numerics.vec3 import Vec3, sub
 
 
 @jit

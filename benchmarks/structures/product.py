@@ -8,10 +8,10 @@ from benchmarks.structures.compiled import searches
 from benchmarks.structures.shell import Shell
 from sim_core import Gravity
 from sim_core.detect.ball_mesh import Scratch, first_contact, new_scratch
-from sim_core.surfaces.ground import build_ground
-from sim_core.surfaces.locate import Locator
-from sim_core.surfaces.obstacles import Obstacles
-from sim_core.surfaces.tree import Tree, build_tree
+from sim_core.geometry.bvh import Tree, build_tree
+from sim_core.geometry.obstacle_set import build_ground
+from sim_core.geometry.obstacles import Obstacles
+from sim_core.geometry.triangle_lookup import Locator
 
 
 class EightWide(NamedTuple):

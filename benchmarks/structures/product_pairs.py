@@ -9,9 +9,9 @@ import numpy as np
 
 from benchmarks.gas import HEIGHT, Gas
 from benchmarks.structures.compiled import jit, searches
-from sim_core.flight import WINDOW
-from sim_core.neighbours import Crowd, follow, new_crowd, next_meeting, set_crowd
-from sim_core.roots import NEVER
+from sim_core.loop.neighbours import Crowd, follow, new_crowd, next_meeting, set_crowd
+from sim_core.motion import WINDOW
+from sim_core.numerics.roots import NEVER
 
 
 class ProductPairs(NamedTuple):

@@ -7,11 +7,11 @@ import numpy as np
 from benchmarks.structures.compiled import jit, search
 from sim_core import Gravity, TriangleMesh
 from sim_core.detect.ball_triangle import capsule_delay, face_delay
-from sim_core.flight import Point
-from sim_core.roots import NEVER
-from sim_core.surfaces.flats import LONE, Flats
-from sim_core.surfaces.obstacles import CAPSULE, build_obstacles, seam
-from sim_core.vec3 import Vec3
+from sim_core.geometry.flat_faces import LONE, Flats
+from sim_core.geometry.obstacles import CAPSULE, build_obstacles, seam
+from sim_core.motion import Point
+from sim_core.numerics.roots import NEVER
+from sim_core.numerics.vec3 import Vec3
 
 PIECE = 0.01  # s: arcs are searched in pieces of at most this, as the product does
 TINY = 1e-30  # stands for a chord component of zero, whose inverse would be infinite

@@ -23,8 +23,8 @@ from benchmarks.structures.shell import (
     padding,
     sort_rows,
 )
-from sim_core.roots import NEVER
-from sim_core.surfaces.obstacles import CAPSULE
+from sim_core.geometry.obstacles import CAPSULE
+from sim_core.numerics.roots import NEVER
 
 CELLS = 8  # per obstacle; memory grows with it and empty cells are leapt over
 NUDGE = 1e-9  # m: how far past a cell's face the walk goes on; obstacles are listed this much wider

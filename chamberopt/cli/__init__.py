@@ -14,12 +14,12 @@ from io import TextIOWrapper
 
 from cyclopts import CycloptsError
 
-from chamberopt.cli import comparing, designs, flight, handing, look, reporting, studies
-from chamberopt.cli.app import app
-from chamberopt.errors import InputError
+from chamberopt.cli import compare, designs, export, flight, inspect, report, studies
+from chamberopt.cli.options import app
+from chamberopt.common.errors import InputError
 
 # The modules register their commands.
-__all__ = ["app", "comparing", "designs", "flight", "handing", "look", "main", "reporting", "studies"]
+__all__ = ["app", "compare", "designs", "export", "flight", "inspect", "main", "report", "studies"]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

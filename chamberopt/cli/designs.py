@@ -7,14 +7,14 @@ from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING
 
-from chamberopt.cli.app import Cluster, Json, Out, Workers, app
-from chamberopt.cli.ready import compiled, effects_advised, settled_effects
-from chamberopt.cli.said import estimates, facts_said, notes_said, remark, results_folder, say, warn
+from chamberopt.cli.console import estimates, facts_said, notes_said, remark, results_folder, say, warn
+from chamberopt.cli.options import Cluster, Json, Out, Workers, app
+from chamberopt.cli.prepare import compiled, effects_advised, settled_effects
 
 if TYPE_CHECKING:
-    from chamberopt.chamber import Chamber
-    from chamberopt.mesh_io import SurfaceError
-    from chamberopt.reach.reach import Reach
+    from chamberopt.chamber.build import Chamber
+    from chamberopt.chamber.reach.reach import Reach
+    from chamberopt.geometry.mesh_io import SurfaceError
 
 
 @app.command
@@ -33,12 +33,12 @@ def check(
     screenshot
         Write a picture (.png) of the part with its target and of its chamber, or of what is wrong with its surface.
     """
-    from chamberopt.chamber import build_chamber
-    from chamberopt.checks.checkup import describe, shot_reach
-    from chamberopt.config import Study, load
-    from chamberopt.disk import new_folder, write_text
-    from chamberopt.mesh_io import SurfaceError
-    from chamberopt.viewer import write_chamber
+    from chamberopt.chamber.build import build_chamber
+    from chamberopt.chamber.checks.check import describe, shot_reach
+    from chamberopt.common.files import new_folder, write_text
+    from chamberopt.design.load import Study, load
+    from chamberopt.geometry.mesh_io import SurfaceError
+    from chamberopt.output.viewer import write_chamber
 
     loaded = load(file)
     design = loaded.design if isinstance(loaded, Study) else loaded
@@ -87,13 +87,13 @@ def simulate(
     analytic
         In an exact cylinder, box or prism, if the chamber is one, in place of its triangles.
     """
-    from chamberopt.accuracy import evaluate
-    from chamberopt.analytic import analytic_cavity
-    from chamberopt.chamber import build_chamber
-    from chamberopt.config import load_design
-    from chamberopt.progress import progress_bar
-    from chamberopt.results import write_simulation
-    from chamberopt.workers.executor import open_executor
+    from chamberopt.chamber.analytic import analytic_cavity
+    from chamberopt.chamber.build import build_chamber
+    from chamberopt.common.parallel.executor import open_executor
+    from chamberopt.common.progress import progress_bar
+    from chamberopt.design.load import load_design
+    from chamberopt.output.results.results import write_simulation
+    from chamberopt.simulation.evaluate import evaluate
 
     asked = load_design(design)
     chamber = build_chamber(asked)
@@ -120,11 +120,11 @@ def accuracy(design: Path, /, *, budget_s: float = 300.0, json: Json = False, ou
     budget_s
         CPU seconds to spend on simulating; more tell smaller errors apart.
     """
-    from chamberopt.config import load_design
-    from chamberopt.price.ladder import climb, require_budget
-    from chamberopt.price_list import as_json, as_text, write_price_list
-    from chamberopt.progress import progress_bar
-    from chamberopt.workers.executor import local_executor
+    from chamberopt.common.parallel.executor import local_executor
+    from chamberopt.common.progress import progress_bar
+    from chamberopt.design.load import load_design
+    from chamberopt.output.results.accuracy_results import as_json, as_text, write_price_list
+    from chamberopt.simulation.convergence.study import climb, require_budget
 
     require_budget(budget_s)
     candidate = load_design(design)
@@ -140,7 +140,7 @@ def accuracy(design: Path, /, *, budget_s: float = 300.0, json: Json = False, ou
 
 def _picture_of_fault(fault: SurfaceError, screenshot: Path) -> None:
     """What is wrong with a part's surface, in red; the message itself follows on stderr."""
-    from chamberopt.viewer import part_picture
+    from chamberopt.output.viewer import part_picture
 
     text = fill(str(fault), 110)
     remark([part_picture(fault.corners, text, screenshot, edges=fault.edges) or f"picture in {screenshot}"])
@@ -148,8 +148,8 @@ def _picture_of_fault(fault: SurfaceError, screenshot: Path) -> None:
 
 def _picture_of_target(chamber: Chamber, found: Reach, screenshot: Path) -> None:
     """The part with its target, and what of it the shot does not reach."""
-    from chamberopt.reach.reach import part_share
-    from chamberopt.viewer import part_picture
+    from chamberopt.chamber.reach.reach import part_share
+    from chamberopt.output.viewer import part_picture
 
     part = chamber.part
     missed = part.target & (part_share(found, chamber.source, len(part.triangles)) <= 0.5)

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from chamberopt.cli.app import app
-from chamberopt.errors import InputError
+from chamberopt.cli.options import app
+from chamberopt.common.errors import InputError
 
 if TYPE_CHECKING:
-    from chamberopt.replayed import Replayed
-    from chamberopt.results import Result
+    from chamberopt.output.resimulate.replica import Replayed
+    from chamberopt.output.results.results import Result
 
 Size = Annotated[tuple[int, int], Parameter(negative="", help="Width and height in pixels.")]
 View = Annotated[
@@ -44,11 +44,11 @@ def replay(
     fps
         Pictures a second: how slowly it is played.
     """
-    from chamberopt.flight_frames import flight
-    from chamberopt.viewer import eye_at
-    from chamberopt.viewer.film import film_path, require_playable
-    from chamberopt.viewer.replay import EYE
-    from chamberopt.viewer.replay import replay as draw_replay
+    from chamberopt.output.resimulate.flight import flight
+    from chamberopt.output.viewer import eye_at
+    from chamberopt.output.viewer.images.film import film_path, require_playable
+    from chamberopt.output.viewer.images.flight_film import EYE
+    from chamberopt.output.viewer.images.flight_film import replay as draw_replay
 
     path = film_path(film)
     require_playable(fps, size, frames, path)
@@ -81,10 +81,10 @@ def dents(
     pixels
         Longer side of what is drawn from one side.
     """
-    from chamberopt.dent_map import coverage, default_views, dent_map, peened
-    from chamberopt.viewer import eye_at
-    from chamberopt.viewer.apart import picture_path
-    from chamberopt.viewer.dent_map import FINER, dent_picture, require_pixels
+    from chamberopt.output.resimulate.dent_map import coverage, default_views, dent_map, peened
+    from chamberopt.output.viewer import eye_at
+    from chamberopt.output.viewer.images.dent_map import FINER, dent_picture, require_pixels
+    from chamberopt.output.viewer.subprocess_drawing import picture_path
 
     path = picture_path(picture, "")
     eye = eye_at(view) if view else None
@@ -103,9 +103,9 @@ def dents(
 
 def _again(folder: Path, replica: int) -> tuple[Result, Replayed]:
     """A result and one of its replicas, ready to be simulated again."""
-    from chamberopt.cli.ready import compiled
-    from chamberopt.ground import replica_of
-    from chamberopt.results import load_result
+    from chamberopt.cli.prepare import compiled
+    from chamberopt.output.resimulate.rebuild import replica_of
+    from chamberopt.output.results.results import load_result
 
     loaded = load_result(folder)
     replayed = replica_of(loaded, replica)

@@ -7,18 +7,18 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from chamberopt.cli.app import Cluster, Json, Resumable, Workers, app
-from chamberopt.cli.ready import compiled, settled_effects
-from chamberopt.cli.said import accuracy_said, estimates, notes_said, remark, results_folder, row, say, warn
-from chamberopt.errors import InputError
+from chamberopt.cli.console import accuracy_said, estimates, notes_said, remark, results_folder, row, say, warn
+from chamberopt.cli.options import Cluster, Json, Resumable, Workers, app
+from chamberopt.cli.prepare import compiled, settled_effects
+from chamberopt.common.errors import InputError
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from chamberopt.chamber import Chamber
-    from chamberopt.config import Study
-    from chamberopt.studies.interrupt import Interrupt
-    from chamberopt.studies.record import Record
+    from chamberopt.chamber.build import Chamber
+    from chamberopt.design.load import Study
+    from chamberopt.optimize.interrupt import Interrupt
+    from chamberopt.optimize.storage.study_folder import Record
 
 
 @app.command
@@ -33,13 +33,13 @@ def run(
     study
         Study file (.toml).
     """
-    from chamberopt.studies.interrupt import Interrupt
+    from chamberopt.optimize.interrupt import Interrupt
 
     with Interrupt() as interrupt:
-        from chamberopt.chamber import build_chamber
-        from chamberopt.config import load_study
-        from chamberopt.studies.record import open_record
-        from chamberopt.workers.executor import open_executor
+        from chamberopt.chamber.build import build_chamber
+        from chamberopt.common.parallel.executor import open_executor
+        from chamberopt.design.load import load_study
+        from chamberopt.optimize.storage.study_folder import open_record
 
         question = load_study(study)
         start = build_chamber(question.design)
@@ -67,10 +67,10 @@ def _run(
     json: bool,
 ) -> None:  # fmt: skip
     """A study from where its record stands to what is said of its result. start: the chamber of its design."""
-    from chamberopt.chamber import build_chamber
-    from chamberopt.progress import progress_bar
-    from chamberopt.results import write_study
-    from chamberopt.studies.study import go_on
+    from chamberopt.chamber.build import build_chamber
+    from chamberopt.common.progress import progress_bar
+    from chamberopt.optimize.run_study import go_on
+    from chamberopt.output.results.results import write_study
 
     question, advice = record.settled(lambda design: settled_effects(design, start, executor))
     design = question.design
@@ -113,7 +113,7 @@ def _run(
 
 def _finished(folder: Path, json: bool) -> None:
     """What `run` says of a study that needs nothing more."""
-    from chamberopt.results import load_result, summary
+    from chamberopt.output.results.results import load_result, summary
 
     remark([f"{folder}: this study is finished, nothing was run; to run it anew give another folder (--out)"])
     say([f"best design: {summary(load_result(folder))}"], folder, json)
@@ -121,7 +121,7 @@ def _finished(folder: Path, json: bool) -> None:
 
 def _unfinished(study: Path) -> list[str]:
     """Earlier runs of a study that were stopped, by their folders' names: what is run now begins anew."""
-    from chamberopt.studies.record import is_finished, is_study_folder
+    from chamberopt.optimize.storage.study_folder import is_finished, is_study_folder
 
     names = [study.stem, *(path.name for path in sorted(Path("results").glob(f"{study.stem}-[0-9]*")))]
     stopped = [folder for name in names if is_study_folder(folder := Path("results", name)) and not is_finished(folder)]
@@ -152,12 +152,12 @@ def sweep(
     seed
         Of the Sobol points; the study's optimizer.seed if left out.
     """
-    from chamberopt import maps
-    from chamberopt.chamber import build_chamber
-    from chamberopt.config import load_study
-    from chamberopt.progress import progress_bar
-    from chamberopt.studies.sweep import plan_sweep, run_sweep
-    from chamberopt.workers.executor import open_executor
+    from chamberopt.chamber.build import build_chamber
+    from chamberopt.common.parallel.executor import open_executor
+    from chamberopt.common.progress import progress_bar
+    from chamberopt.design.load import load_study
+    from chamberopt.optimize.run_sweep import plan_sweep, run_sweep
+    from chamberopt.output.results import sweep_results
 
     question = load_study(study)
     plan = plan_sweep(question, grid, sobol, seed)
@@ -169,7 +169,7 @@ def sweep(
         compiled(design, start)
         with progress_bar("candidates") as progress:
             found = run_sweep(question, plan, folder, executor, progress)
-        remark(maps.write_sweep(folder, found))
+        remark(sweep_results.write_sweep(folder, found))
     lines = [f"{len(found.trials)} candidates in {found.seconds:.0f} s, {accuracy_said(question.drafted(design))} each"]
     best = found.best
     if best is not None and best.objective is not None:
@@ -178,4 +178,4 @@ def sweep(
         lines += [row(name, estimate) for name, estimate in goal.items()]
     failed = [trial for trial in found.trials if trial.objective is None]
     reasons = [f"{len(failed)} candidates could not be simulated, the first for: {failed[0].reason}"] if failed else []
-    say([*lines, *notes_said([*map(str, advice), *reasons, maps.caution(found)])], folder, json)
+    say([*lines, *notes_said([*map(str, advice), *reasons, sweep_results.caution(found)])], folder, json)

@@ -6,9 +6,9 @@ errors like those of the shipped shapes; so are those it has from ParametricCham
 
 import numpy as np
 
-from chamberopt.errors import InputError
-from chamberopt.fields import quantity
-from chamberopt.shapes import ParametricChamber, ShapeSurface, lofted
+from chamberopt.common.errors import InputError
+from chamberopt.common.fields import quantity
+from chamberopt.design.shapes import ParametricChamber, ShapeSurface, lofted
 
 
 class Oblong(ParametricChamber):

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from sim_core._compile import jit
 from sim_core.detect.ball_triangle import CONTACT, HALF, STEPS
-from sim_core.roots import NEVER, first_approach
-from sim_core.vec3 import Vec3, along, dot
+from sim_core.numerics.jit import jit
+from sim_core.numerics.roots import NEVER, first_approach
+from sim_core.numerics.vec3 import Vec3, along, dot
 
 STANDING = 1e-12  # m/s: what rounding leaves of a normal velocity that was taken away
 

@@ -4,22 +4,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim_core._compile import inlined, jit
-from sim_core.detect.ball_bore import bore_delay, is_round
-from sim_core.detect.ball_footing import out_of_reach
+from sim_core.contact.path_end import out_of_reach
+from sim_core.detect.ball_cylinder import bore_delay, is_round
 from sim_core.detect.ball_sonotrode import meets_later, same_plane, waving_plane_delay, within_waving_borders
 from sim_core.detect.ball_triangle import capsule_delay, face_delay
+from sim_core.effects.contact_mode import Footing
 from sim_core.effects.gravity import Gravity, acceleration
-from sim_core.effects.rest import Footing
 from sim_core.effects.sonotrodes import Waves, face_wave, move_alike
 from sim_core.effects.vibration import Wave
-from sim_core.flight import Point
-from sim_core.roots import NEVER
-from sim_core.simd import BOXES, boxes_hit, lowest_bit
-from sim_core.sizes import Sizes, own_radius, own_root
-from sim_core.surfaces.obstacles import CAPSULE, FACE, Bore
-from sim_core.surfaces.tree import STACK, Tree
-from sim_core.vec3 import Vec3
+from sim_core.geometry.ball_sizes import Sizes, own_radius, own_root
+from sim_core.geometry.bvh import STACK, Tree
+from sim_core.geometry.obstacles import CAPSULE, FACE, Bore
+from sim_core.motion import Point
+from sim_core.numerics.jit import inlined, jit
+from sim_core.numerics.roots import NEVER
+from sim_core.numerics.simd import BOXES, boxes_hit, lowest_bit
+from sim_core.numerics.vec3 import Vec3
 
 SLACK = np.float32(1.000001)  # on float32 times: ten times their rounding, so that an equal time is never pruned
 TINY = 1e-30  # stands for a chord component of zero, whose inverse would be infinite

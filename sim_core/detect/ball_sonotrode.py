@@ -4,15 +4,15 @@ import math
 
 import numpy as np
 
-from sim_core._compile import jit
 from sim_core.detect.ball_triangle import HALF, face_normal, within_borders
 from sim_core.effects.sonotrodes import Waves, move_alike
 from sim_core.effects.vibration import Wave
-from sim_core.flight import Point
-from sim_core.roots import NEVER, WaveGap, first_wave_approach, next_wave_approach
-from sim_core.surfaces.obstacles import WAVING_FACE
-from sim_core.surfaces.tree import Tree
-from sim_core.vec3 import Vec3, along, dot
+from sim_core.geometry.bvh import Tree
+from sim_core.geometry.obstacles import WAVING_FACE
+from sim_core.motion import Point
+from sim_core.numerics.jit import jit
+from sim_core.numerics.roots import NEVER, WaveGap, first_wave_approach, next_wave_approach
+from sim_core.numerics.vec3 import Vec3, along, dot
 
 
 @jit

@@ -5,11 +5,11 @@ The ball is its centre; see surfaces/obstacles.py for what it meets.
 
 import numpy as np
 
-from sim_core._compile import jit
-from sim_core.flight import Point
-from sim_core.roots import NEVER, first_approach
-from sim_core.surfaces.obstacles import PAST_CORNERS
-from sim_core.vec3 import Vec3, along, cross, dot, sub
+from sim_core.geometry.obstacles import PAST_CORNERS
+from sim_core.motion import Point
+from sim_core.numerics.jit import jit
+from sim_core.numerics.roots import NEVER, first_approach
+from sim_core.numerics.vec3 import Vec3, along, cross, dot, sub
 
 CONTACT = (
     1e-13  # m: a gap this small is contact with a capsule; a thousandth of what would count as early, 100 x rounding

@@ -16,8 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim_core._compile import jit
 from sim_core.errors import SceneError, number
+from sim_core.numerics.jit import jit
 
 TURBULENT = 1000.0  # Re from which C_d is NEWTON; the two laws differ by 0.3 % there
 NEWTON = 0.44

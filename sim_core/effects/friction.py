@@ -15,10 +15,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim_core._compile import inlined, jit
-from sim_core.effects.surface_table import surface_table
+from sim_core.effects.per_surface import surface_table
 from sim_core.errors import SceneError
-from sim_core.vec3 import Vec3
+from sim_core.numerics.jit import inlined, jit
+from sim_core.numerics.vec3 import Vec3
 
 OF_BALLS = -1  # in place of a surface's tag
 

@@ -5,9 +5,9 @@ eq. 1.
 import math
 from typing import NamedTuple
 
-from sim_core._compile import jit
 from sim_core.errors import SceneError
-from sim_core.vec3 import Vec3
+from sim_core.numerics.jit import jit
+from sim_core.numerics.vec3 import Vec3
 
 STANDARD = 9.80665  # m/s², CGPM 1901
 

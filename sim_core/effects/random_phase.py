@@ -15,11 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim_core._compile import inlined, jit
 from sim_core.effects.vibration import Wave
 from sim_core.errors import SceneError
-from sim_core.roots import first_approach
-from sim_core.vec3 import Vec3, dot
+from sim_core.numerics.jit import inlined, jit
+from sim_core.numerics.roots import first_approach
+from sim_core.numerics.vec3 import Vec3, dot
 
 CLEAR = 1e-9  # m: a ball this far above the swing is out of it; less would be rounding in a chamber a kilometre wide
 SEEDS = 2**32

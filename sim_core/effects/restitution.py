@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim_core._compile import jit
-from sim_core.effects.surface_table import surface_table
+from sim_core.effects.per_surface import surface_table
 from sim_core.errors import SceneError
+from sim_core.numerics.jit import jit
 
 # 10 mm/s [m/s]: a thousandth of the shot's speed. Mean speeds change by < 3 % between 1 and 100 mm/s; lower values
 # spend

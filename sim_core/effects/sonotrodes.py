@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim_core._compile import inlined, jit
 from sim_core.effects.vibration import Vibration, Wave
-from sim_core.vec3 import Vec3
+from sim_core.numerics.jit import inlined, jit
+from sim_core.numerics.vec3 import Vec3
 
 PARTS = 2**62  # of a turn: the sum of two is still an int64
 PART = PARTS - 1

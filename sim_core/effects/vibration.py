@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim_core._compile import jit
 from sim_core.errors import SceneError, number
-from sim_core.vec3 import Vec3
+from sim_core.numerics.jit import jit
+from sim_core.numerics.vec3 import Vec3
 
 HIGHEST = 1e9  # Hz: generators have 1e5 at most; a wave of 1e300 would be searched for ever, period after period
 

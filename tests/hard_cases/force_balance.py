@@ -5,7 +5,7 @@ from scipy.optimize import linprog
 from scipy.sparse import coo_array
 
 from sim_core import Balls, TriangleMesh
-from sim_core.invariants import clearance
+from sim_core.scene.invariants import clearance
 
 SIDES = 8  # of the pyramid that stands for the cone of friction
 STEP = 1e-7  # m: over which a distance is differentiated

@@ -8,13 +8,13 @@ import numpy as np
 from hypothesis import strategies as st
 
 from sim_core import Balls, Physics, Scene, SceneError, SimulationError, TriangleMesh, pack_balls
-from sim_core.resolve.pushing import SHORTEST_HOP
-from tests.cavities import CEILING, FLOOR, SIDES, box_around
-from tests.fuzzed_chambers import FAMILIES, WITH_FLOOR, Chamber, Surface
+from sim_core.contact.constrained_impulse import SHORTEST_HOP
 from tests.hard_cases.fuzzed_effects import LID, SIZES, SONOTRODES, Strengths, physics_of, powers, strengths
 from tests.hard_cases.outcome import allowed, energy_above_floor, is_still, play
 from tests.hard_cases.saved_scene import FOLDER, save_scene
-from tests.hard_cases.turning_scenes import BODIES, PART
+from tests.helpers.scenes.cavities import CEILING, FLOOR, SIDES, box_around
+from tests.helpers.scenes.fuzzed_chambers import FAMILIES, WITH_FLOOR, Chamber, Surface
+from tests.helpers.scenes.turning_parts import BODIES, PART
 
 FOUND = FOLDER / "found.npz"  # the last failure: what hypothesis ends with is the simplest; give it a name and keep it
 TRAVERSES = 12.0  # of the chamber's width by a ball at the shot's speed

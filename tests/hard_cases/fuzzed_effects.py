@@ -19,9 +19,9 @@ from sim_core import (
     Vibration,
 )
 from sim_core.effects.drag import SHORTEST
-from tests.cavities import FLOOR
 from tests.hard_cases.outcome import CONSTANT
-from tests.hard_cases.turning_scenes import PART
+from tests.helpers.scenes.cavities import FLOOR
+from tests.helpers.scenes.turning_parts import PART
 
 SIZES = "sizes"  # beside the fields of Physics: balls of several diameters and densities
 SONOTRODES = "sonotrodes"  # the same: a lid that vibrates as well as the floor

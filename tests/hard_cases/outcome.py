@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from sim_core import Balls, Gravity, Physics, Restitution, Scene, SceneError, SimulationError, TriangleMesh, simulate
-from sim_core.invariants import clearance, contained, narrowest_gap, posed
-from tests.fuzzed_chambers import Chamber
-from tests.sim_core.test_containment import REACH, ROUNDING, clearance_at, later
+from sim_core.scene.invariants import clearance, contained, narrowest_gap, posed
+from tests.helpers.scenes.fuzzed_chambers import Chamber
+from tests.sim_core.loop.test_containment import REACH, ROUNDING, clearance_at, later
 
 WATCHED = 20_000  # impacts of each piece whose overlap is measured: where a ball is deepest, if it is ever too deep
 NOT_ELASTIC = math.nan

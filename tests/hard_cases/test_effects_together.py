@@ -11,14 +11,14 @@ import pytest
 import trimesh
 
 from sim_core import Balls, Drag, Friction, Gravity, Physics, RandomPhase, Rest, Scene, TriangleMesh, Turn, Vibration
+from sim_core.effects.contact_mode import ASLEEP, MODE, SLIDING
 from sim_core.effects.gravity import STANDARD as G
-from sim_core.effects.rest import ASLEEP, MODE, SLIDING
-from sim_core.invariants import energy
-from sim_core.simulate import _Run
-from tests.cavities import FLOOR, box_around
+from sim_core.loop.simulate import _Run
+from sim_core.scene.invariants import energy
 from tests.hard_cases.outcome import LOSSLESS
-from tests.hard_cases.test_resting_beside_a_turning_part import HALF, WIDE, arrival, paddle
-from tests.hard_cases.turning_scenes import PART
+from tests.helpers.scenes.cavities import FLOOR, box_around
+from tests.helpers.scenes.turning_parts import PART
+from tests.sim_core.contact.test_beside_turning_part import HALF, WIDE, arrival, paddle
 
 R = 1.5e-3
 STICKS = 1e9  # mu

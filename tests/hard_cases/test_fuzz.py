@@ -20,11 +20,11 @@ from sim_core import (
     SimulationError,
     Vibration,
 )
-from tests.cavities import CEILING, FLOOR
-from tests.fuzzed_chambers import Chamber, random_chamber
 from tests.hard_cases.fuzz import Plan, judge, plans, require_invariants
 from tests.hard_cases.fuzzed_effects import FEW, MANY
 from tests.hard_cases.saved_scene import FOLDER, load_scene, save_scene
+from tests.helpers.scenes.cavities import CEILING, FLOOR
+from tests.helpers.scenes.fuzzed_chambers import Chamber, random_chamber
 
 SAVED = sorted(FOLDER.glob("*.npz"))
 SLOW = [HealthCheck.too_slow, HealthCheck.data_too_large]

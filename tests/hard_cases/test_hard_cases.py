@@ -2,8 +2,7 @@
 
 import pytest
 
-from tests.hard_cases import tested
-from tests.hard_cases.cases import CASES
+from tests.hard_cases.cases import CASES, tested
 from tests.hard_cases.outcome import Case
 
 

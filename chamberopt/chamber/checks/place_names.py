@@ -1,0 +1,53 @@
+"""Where something is, in the words of a chamber's designer."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from chamberopt.chamber.build import TAG_PART, TAG_SONOTRODE, TAG_WALL
+from chamberopt.design.shapes import tag_of_further
+from chamberopt.geometry.triangles import area_vectors
+
+if TYPE_CHECKING:
+    from chamberopt.chamber.build import Chamber
+
+STEEP = 0.5  # cosine to the vertical: what is steeper than 60 degrees is a side, neither top nor underside
+CEILING, SIDE_WALL, SONOTRODE = "the ceiling", "the wall", "the sonotrode"
+
+
+def surface_names(chamber: Chamber) -> np.ndarray:
+    """What a designer calls each triangle, (k,) of str."""
+    normal = -area_vectors(chamber.vertices, chamber.triangles)  # to the shot
+    size = np.linalg.norm(normal, axis=1)
+    up = np.divide(normal[:, 2], size, out=np.zeros_like(size), where=size > 0.0)
+    on_part = np.select([up > STEEP, up < -STEEP], ["the part's upper side", "the part's underside"], "the part's side")
+    on_wall = np.select([up > STEEP, up < -STEEP], ["a ledge of the wall", CEILING], SIDE_WALL)
+    words = np.where(chamber.tags == TAG_PART, on_part, on_wall).astype(object)
+    words[chamber.tags == TAG_SONOTRODE] = SONOTRODE
+    for tag in np.unique(chamber.tags[chamber.tags > TAG_WALL]):
+        words[chamber.tags == tag] = f"sonotrodes.{tag - tag_of_further(0)}"
+    return words
+
+
+def around(points: np.ndarray, weights: np.ndarray | None = None) -> str:
+    """The middle of points (n, 3) [m] as "(x, y, z) mm"; ``weights`` (n,): what each counts."""
+    middle = np.average(1e3 * points, axis=0, weights=weights)
+    return f"({', '.join(f'{x:.1f}' for x in np.round(middle, 1) + 0.0)}) mm"
+
+
+def mm2(area: float) -> str:
+    """An area [m²] to three figures."""
+    return f"{float(f'{1e6 * area:.3g}'):g} mm²"
+
+
+def one_of(points: np.ndarray, weights: np.ndarray) -> str:
+    """That of the points (n, 3) [m] nearest to their middle, as ``around``: of a ring the middle is nowhere near."""
+    middle = np.average(points, axis=0, weights=weights)
+    return around(points[[np.linalg.norm(points - middle, axis=1).argmin()]])
+
+
+def on_target(chamber: Chamber) -> np.ndarray:
+    """Which of the cavity's triangles (k,) lie on the target."""
+    return np.asarray((chamber.tags == TAG_PART) & chamber.part.target[np.maximum(chamber.source, 0)])

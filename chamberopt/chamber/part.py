@@ -1,0 +1,155 @@
+"""Design -> Part: the triangles of the part's file, its target chosen and meshed, posed in the chamber."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from chamberopt.chamber.target import chosen_triangles
+from chamberopt.common.errors import InputError
+from chamberopt.geometry.mesh_io import PartMesh, read_once
+from chamberopt.geometry.remesh import quality, remeshed
+from chamberopt.geometry.solids import snapped
+from chamberopt.geometry.triangles import areas, rotation
+
+if TYPE_CHECKING:
+    from chamberopt.design.design import Design, Target
+
+MOST_ELEMENTS = 3e5  # a few minutes of meshing; what follows is slow too
+
+
+@dataclass(frozen=True)
+class Part:
+    """The user's own triangles, in the file's order (unless target.element_mm asks for others), in the chamber: closed,
+    unless the file draws it as the piece that bounds the room of a whole set-up.
+
+    vertices (n, 3) m · triangles (m, 3) int32 · area (m,) m² · target (m,) bool: what must be covered · name ·
+    sha256 of the mesh file as it was read · unit that its numbers were taken in · names that the file gives · elements
+    (m,) int64: which of the file's each triangle is of, `mesh_io.Numbering`; from 1 on if not given.
+    """
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+    area: np.ndarray
+    target: np.ndarray
+    name: str
+    sha256: str = ""
+    unit: str = ""
+    names: tuple[str, ...] = ()
+    elements: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+
+    def __post_init__(self) -> None:
+        if not len(self.elements):
+            object.__setattr__(self, "elements", np.arange(1, len(self.triangles) + 1))
+
+
+def posed_part(design: Design) -> tuple[Part, list[str]]:
+    """The part turned about the file's x, then y, then z, its box centred on the axis, then moved; and notes.
+
+    Sideways by the offset, up or down so that its lowest point is at the sonotrode distance. One that is drawn with
+    its chamber stays in it as it is drawn, and may be only the piece of its surface that is drawn. Raises InputError
+    when the file cannot be used or the target is empty.
+    """
+    mesh, target = _mesh(design)
+    turn, shift = _pose(mesh, design)
+    vertices = snapped(mesh.vertices @ turn.T + shift)
+    area = areas(vertices, mesh.triangles)
+    name, names = design.part.mesh_path.name, tuple(mesh.groups)
+    part = Part(vertices, mesh.triangles, area, target, name, mesh.sha256, mesh.unit, names, mesh.elements)
+    return part, list(mesh.notes)
+
+
+def part_meshes(design: Design) -> tuple[PartMesh, PartMesh]:
+    """The part as its file has it, and as it is simulated, triangle by triangle that of `posed_part`; both in the
+    file's frame. They differ where target.element_mm asks for other triangles.
+    """
+    setup = design.chamber.setup()
+    return read_once(design.part.mesh_path, design.part.unit) if setup is None else setup.part, _mesh(design)[0]
+
+
+def turning_axis(design: Design) -> tuple[np.ndarray, np.ndarray]:
+    """Point [m] and direction, (3,) each, of the axis that effects.part_turn names, in the chamber's frame."""
+    turn = design.effects.part_turn
+    if turn is None:
+        raise ValueError("nothing turns in this design")
+    matrix, shift = part_pose(design)
+    return matrix @ np.array(turn.through) + shift, matrix @ np.array(turn.axis)
+
+
+def part_pose(design: Design) -> tuple[np.ndarray, np.ndarray]:
+    """From the part file's frame to the chamber's: matrix (3, 3), then shift (3,) [m]."""
+    return _pose(_mesh(design)[0], design)
+
+
+def _mesh(design: Design) -> tuple[PartMesh, np.ndarray]:
+    """The part's mesh and target, meshed once per file: a study builds a hundred chambers around the same part."""
+    part, setup = design.part, design.chamber.setup()
+    mesh = read_once(part.mesh_path, part.unit) if setup is None else setup.part
+    if part.target.element is None:
+        return mesh, chosen_triangles(mesh, part.target)
+    return _meshed_once(part.mesh_path, part.unit, part.target, mesh.sha256)
+
+
+@lru_cache(maxsize=4)
+def _meshed_once(path: Path, unit: str, target: Target, _sha256: str) -> tuple[PartMesh, np.ndarray]:
+    mesh = read_once(path, unit)
+    return _in_elements(mesh, chosen_triangles(mesh, target), target.element)  # type: ignore[arg-type]
+
+
+def _in_elements(mesh: PartMesh, target: np.ndarray, size: float) -> tuple[PartMesh, np.ndarray]:
+    """The part with its target in triangles with sides of about size [m], and that target."""
+    area = float(areas(mesh.vertices, mesh.triangles)[target].sum())
+    count = area / (np.sqrt(3.0) / 4.0 * size * size)
+    if count > MOST_ELEMENTS:
+        fits = 1e3 * size * np.sqrt(count / MOST_ELEMENTS)
+        raise InputError(
+            f"part.target.element_mm: given {1e3 * size:g}, which makes some {1e-6 * count:.3g} million triangles of "
+            f"the target's {1e6 * area:.4g} mm²; give at least {fits:.2g}"
+        )
+    vertices, triangles, source = remeshed(mesh.vertices, mesh.triangles, target, target.astype(np.int64), size)
+    chosen = target[source]
+    sides = vertices[triangles[chosen]]
+    longest = np.linalg.norm(sides - np.roll(sides, 1, axis=1), axis=2).max(axis=1)
+    shape = quality(vertices, triangles[chosen])
+    note = (
+        f"target.element_mm = {1e3 * size:g}: the target's {target.sum()} triangles became {chosen.sum()}, longest "
+        f"sides {1e3 * np.median(longest):.3g} mm in the middle and {1e3 * longest.max():.3g} mm at most, shape "
+        f"{shape.min():.2f} at worst (1: equilateral)"
+    )
+    triangles = triangles.astype(np.int32)
+    places = _places(mesh, vertices[triangles], source)
+    groups = {name: mask[places] for name, mask in mesh.groups.items()}
+    numbering = mesh.numbering.of(places)
+    notes = (*mesh.notes, note)
+    meshed = replace(mesh, vertices=vertices, triangles=triangles, numbering=numbering, groups=groups, notes=notes)
+    return meshed, chosen
+
+
+def _places(mesh: PartMesh, corners: np.ndarray, source: np.ndarray) -> np.ndarray:
+    """The triangle of the mesh (k,) that the middle of each of corners (k, 3, 3) [m] lies in: where they are not those
+    of its source, that is only one in the same flat face.
+    """
+    from sim_core import TriangleMesh, nearest
+
+    moved = np.flatnonzero((corners != mesh.vertices[mesh.triangles[source]]).any(axis=(1, 2)))
+    surface = TriangleMesh(mesh.vertices, mesh.triangles, np.zeros(len(mesh.triangles), dtype=np.uint8))
+    places = source.copy()
+    places[moved] = nearest(surface, corners[moved].mean(axis=1), float(np.ptp(mesh.vertices))).triangle
+    return places
+
+
+def _pose(mesh: PartMesh, design: Design) -> tuple[np.ndarray, np.ndarray]:
+    """From the part file's frame to the chamber's: matrix (3, 3), then shift (3,) [m]."""
+    setup = design.chamber.setup()
+    if setup is not None:
+        return setup.turn, setup.shift + np.array([0.0, 0.0, design.chamber.sonotrode_distance - setup.distance])
+    turn = rotation(design.part.rotate_deg)
+    vertices = mesh.vertices @ turn.T
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    centre = (low + high) / 2.0
+    x, y = design.part.offset
+    return turn, np.array([x - centre[0], y - centre[1], design.chamber.sonotrode_distance - low[2]])

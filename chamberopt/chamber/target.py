@@ -1,0 +1,44 @@
+"""Which triangles of the part must be covered: by the file's names, by direction, by box; conditions intersect."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from chamberopt.common.errors import InputError
+from chamberopt.geometry.mesh_io import PartMesh, named
+from chamberopt.geometry.triangles import area_vectors
+
+if TYPE_CHECKING:
+    from chamberopt.design.design import Target
+
+
+def chosen_triangles(mesh: PartMesh, wanted: Target) -> np.ndarray:
+    """The target's triangles (m,) bool, chosen in the file's own frame.
+
+    Raises InputError for a name that the file does not have, and when nothing is chosen.
+    """
+    chosen = named(mesh.groups, wanted.surface, len(mesh.triangles), "part.target.surface")
+    if wanted.direction is not None and wanted.angle_deg is not None:
+        normal = area_vectors(mesh.vertices, mesh.triangles)
+        direction = np.asarray(wanted.direction) / np.linalg.norm(wanted.direction)
+        # atan2 of sine and cosine: acos alone is a hundred times coarser near 0 and 180 degrees
+        angle = np.degrees(np.arctan2(np.linalg.norm(np.cross(normal, direction), axis=1), normal @ direction))
+        low, high = wanted.angle_deg
+        chosen &= (angle >= low) & (angle <= high)
+    if wanted.box_mm is not None:
+        centroid_mm = mesh.vertices[mesh.triangles].mean(axis=1) * 1e3
+        low_corner, high_corner = np.asarray(wanted.box_mm)
+        chosen &= ((centroid_mm >= low_corner) & (centroid_mm <= high_corner)).all(axis=1)
+    if not chosen.any():
+        low_text, high_text = _corner(mesh.vertices.min(axis=0)), _corner(mesh.vertices.max(axis=0))
+        raise InputError(
+            f"part.target: chooses none of the {len(chosen)} triangles; in its own file the part goes from "
+            f"{low_text} to {high_text} mm: widen box_mm or angle_deg"
+        )
+    return chosen
+
+
+def _corner(point: np.ndarray) -> str:
+    return str([float(f"{1e3 * value:.6g}") for value in point])

@@ -1,0 +1,1 @@
+"""What every package uses: errors, messages about TOML files, file writing, progress, workers."""

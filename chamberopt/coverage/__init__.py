@@ -1,0 +1,1 @@
+"""From impacts to dents, from dents to coverage, from coverage to metrics with intervals."""

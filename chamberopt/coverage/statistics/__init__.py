@@ -1,0 +1,1 @@
+"""Estimators of a covered share and their confidence intervals."""

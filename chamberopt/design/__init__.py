@@ -1,0 +1,1 @@
+"""What a design file and a study file contain, and how they are loaded."""

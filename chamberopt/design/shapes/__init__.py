@@ -1,0 +1,44 @@
+"""Cavities, one per file, by the name a design gives them.
+
+A new shape: a file with a subclass of ChamberTable, and its name here.
+"""
+
+from chamberopt.design.shapes.base import ChamberTable, ParametricChamber, WalledChamber
+from chamberopt.design.shapes.box import Box
+from chamberopt.design.shapes.conformal import Conformal
+from chamberopt.design.shapes.construction.loft import lofted
+from chamberopt.design.shapes.construction.surface import (
+    TAG_PART,
+    TAG_SONOTRODE,
+    TAG_WALL,
+    ShapeSurface,
+    is_sonotrode,
+    tag_of_further,
+)
+from chamberopt.design.shapes.cylinder import Cylinder
+from chamberopt.design.shapes.imported import Imported
+from chamberopt.design.shapes.prism import Prism
+from chamberopt.design.shapes.revolve import Revolve
+
+__all__ = [
+    "SHAPES",
+    "TAG_PART",
+    "TAG_SONOTRODE",
+    "TAG_WALL",
+    "ChamberTable",
+    "ParametricChamber",
+    "ShapeSurface",
+    "WalledChamber",
+    "is_sonotrode",
+    "lofted",
+    "tag_of_further",
+]
+
+SHAPES: dict[str, type[ChamberTable]] = {
+    "cylinder": Cylinder,
+    "box": Box,
+    "prism": Prism,
+    "revolve": Revolve,
+    "conformal": Conformal,
+    "imported": Imported,
+}

@@ -1,0 +1,24 @@
+"""A rectangular chamber: flat walls square to x and y."""
+
+from typing import Literal
+
+import numpy as np
+
+from chamberopt.common.fields import quantity
+from chamberopt.design.shapes.polygon import PolygonChamber
+
+
+class Box(PolygonChamber):
+    """Four sides."""
+
+    shape: Literal["box"]
+    length_mm: float = quantity(2, 2000, "mm", "inner size along x, at the sonotrode")
+    width_mm: float = quantity(2, 2000, "mm", "inner size along y, at the sonotrode")
+
+    def floor(self) -> np.ndarray:
+        """From the corner at +x, -y on."""
+        return 0.5e-3 * np.array([self.length_mm, self.width_mm]) * np.array([[1, -1], [1, 1], [-1, 1], [-1, -1]])
+
+    def widths_mm(self) -> dict[str, float]:
+        """Along, across and up."""
+        return {"length_mm": self.length_mm, "width_mm": self.width_mm, "height_mm": self.height_mm}

@@ -1,0 +1,1 @@
+"""Geometry that several chamber shapes share."""

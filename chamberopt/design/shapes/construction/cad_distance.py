@@ -1,0 +1,86 @@
+"""The sonotrode of a set-up from CAD at another distance from the part than it is drawn at."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from chamberopt.common.errors import InputError
+from chamberopt.design.shapes.construction.cad_setup import Setup
+from chamberopt.design.shapes.construction.surface import TAG_SONOTRODE, TAG_WALL, ShapeSurface
+from chamberopt.geometry.solids import Surface, overlap, snapped, solid, subtract, swept
+from chamberopt.geometry.triangles import border
+
+SAME = 1e-6  # of a volume
+SAME_DISTANCE = 1e-9  # m
+
+
+def moved(setup: Setup, distance: float) -> ShapeSurface:
+    """The room with its sonotrode at another distance [m] from the lowest point of the part.
+
+    Raises InputError where the walls do not rise straight from the sonotrode as far as it is to come nearer.
+    """
+    room, farther = setup.room, distance - setup.distance
+    if abs(farther) < SAME_DISTANCE:
+        return room
+    lifted = replace(room, vertices=snapped(room.vertices + np.array([0.0, 0.0, farther])))
+    return _carried_down(lifted, setup) if farther > 0.0 else _cut_off(lifted, -farther, setup)
+
+
+def _carried_down(room: ShapeSurface, setup: Setup) -> ShapeSurface:
+    """The walls go on straight down from the sonotrode's outline to z = 0."""
+    on_face = room.tags == TAG_SONOTRODE
+    face, count = room.triangles[on_face], len(room.vertices)
+    used, numbers = np.unique(face, return_inverse=True)
+    floor = room.vertices[used] * [1.0, 1.0, 0.0]
+    below = Surface(floor, numbers.reshape(-1, 3).astype(np.int32), on_face[on_face], on_face[on_face])
+    shaft = swept(below, np.array([0.0, 0.0, room.vertices[used[0], 2]]), "the room under the sonotrode as drawn")
+    if overlap(solid(room.vertices, room.triangles, "the set-up"), shaft) > SAME * shaft.volume:
+        raise _refused(setup, "farther", "another part of the room is in the way under it")
+    a, b = border(face).T
+    c, d = (count + np.searchsorted(used, side) for side in (b, a))
+    walls = np.concatenate([np.c_[a, b, c], np.c_[a, c, d]])
+    triangles = room.triangles.copy()
+    triangles[on_face] = count + numbers.reshape(-1, 3)
+    return ShapeSurface(
+        np.concatenate([room.vertices, floor]),
+        np.concatenate([triangles, walls]).astype(np.int32),
+        np.r_[room.tags, np.full(len(walls), TAG_WALL, dtype=np.uint8)],
+        None if room.source is None else np.r_[room.source, np.full(len(walls), -1, dtype=np.int32)],
+    )
+
+
+def _cut_off(room: ShapeSurface, height: float, setup: Setup) -> ShapeSurface:
+    """Without what lies lower than z = 0: the lowest ``height`` [m], where the walls rise straight."""
+    whole = solid(room.vertices, room.triangles, "the set-up")
+    face = whole.surface().only(room.tags[whole.surface().source] == TAG_SONOTRODE)
+    shaft = swept(face, np.array([0.0, 0.0, height]), "the room over the sonotrode as drawn")
+    low, high = room.vertices.min(axis=0) - height, room.vertices.max(axis=0) + height
+    bottom = swept(_rectangle(low, high), np.array([0.0, 0.0, -low[2]]), "what lies under the sonotrode")
+    rest = subtract(whole, bottom)
+    straight = overlap(whole, shaft) > (1.0 - SAME) * shaft.volume
+    if not straight or whole.volume - rest.volume > (1.0 + SAME) * shaft.volume:
+        raise _refused(setup, "nearer", "its walls do not rise straight from the sonotrode's outline so far")
+    cut = rest.surface()
+    kept = cut.solid == whole.label
+    rows = np.where(kept, cut.source, 0)
+    return ShapeSurface(
+        cut.vertices,
+        cut.triangles,
+        np.where(kept, room.tags[rows], TAG_SONOTRODE).astype(np.uint8),
+        None if room.source is None else np.where(kept, room.source[rows], -1).astype(np.int32),
+    )
+
+
+def _rectangle(low: np.ndarray, high: np.ndarray) -> Surface:
+    """A box's underside."""
+    corners = np.array([[x, y, low[2]] for x, y in ((low[0], low[1]), (high[0], low[1]), high[:2], (low[0], high[1]))])
+    return Surface(corners, np.array([[0, 2, 1], [0, 3, 2]], dtype=np.int32), np.zeros(2), np.zeros(2))
+
+
+def _refused(setup: Setup, way: str, why: str) -> InputError:
+    return InputError(
+        f"chamber.sonotrode_distance_mm: the set-up is drawn with {1e3 * setup.distance:.4g}, and the sonotrode cannot "
+        f"be moved {way} as asked: {why}; give a distance nearer to that, or draw it anew"
+    )

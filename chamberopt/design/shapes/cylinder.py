@@ -1,0 +1,38 @@
+"""A round chamber on the sonotrode: the floor shakes, the side and the ceiling stand still.
+
+ ___________  z = height      ceiling: wall
+/           \\  corner radius
+|           |                 side: wall, `facets` flat sides; upright, or leaning: a cone
+|___________|  z = 0          floor: sonotrode
+      |
+      axis x = y = 0
+"""
+
+from typing import Literal
+
+import numpy as np
+
+from chamberopt.common.fields import quantity
+from chamberopt.design.shapes.base import ParametricChamber
+from chamberopt.design.shapes.round import RoundChamber
+
+
+class Cylinder(RoundChamber, ParametricChamber):
+    """Round, the side wall straight."""
+
+    shape: Literal["cylinder"]
+    diameter_mm: float = quantity(2, 2000, "mm", "inner diameter, at the sonotrode")
+
+    @property
+    def diameter(self) -> float:
+        """Inner diameter at the sonotrode [m]."""
+        return self.diameter_mm * 1e-3
+
+    def upright(self) -> np.ndarray:
+        """Up the side, then in along the ceiling."""
+        radius = self.diameter / 2.0
+        return np.array([[radius, 0.0], [radius, self.height], [0.0, self.height]])
+
+    def widths_mm(self) -> dict[str, float]:
+        """Across and up."""
+        return {"diameter_mm": self.diameter_mm, "height_mm": self.height_mm}

@@ -1,0 +1,50 @@
+"""A whole set-up from CAD: sonotrode, chamber and part meshed in one file, the sonotrode's distance still free.
+
+ as drawn        farther                nearer
+|  part  |      |  part  |             |  part  |
+|        |      |        |             |________|  <- cut off where the walls still rise straight
+|________|      |        |
+ sonotrode      |        |  <- walls carried on straight down from the sonotrode's outline
+                |________|
+"""
+
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from chamberopt.common.fields import File, Names, Unit, listed, quantity
+from chamberopt.design.shapes.base import ChamberTable
+from chamberopt.design.shapes.construction.cad_distance import moved
+from chamberopt.design.shapes.construction.cad_setup import Setup, read_setup
+from chamberopt.design.shapes.construction.surface import ShapeSurface
+
+IMPORTED = "imported"
+
+
+class Imported(ChamberTable):
+    """The file is the part's. What is neither part nor sonotrode in it is wall."""
+
+    shape: Literal["imported"]
+    sonotrode_distance_mm: float | None = quantity(  # type: ignore[assignment]
+        0.1, 2000, "mm", "mean sonotrode face to lowest point of the part; absent: as drawn", None
+    )
+    part: Names = listed("a name in quotes, or a list of names", "groups of the file: the part")
+    sonotrode: Names = listed("a name in quotes, or a list of names", "groups of the file: the sonotrode's flat face")
+    mesh: File = Field(description="the set-up's file: that of [part], so leave it out")
+    unit: Unit = Field(default="guess", description="of its numbers: that of [part], so leave it out")
+
+    @property
+    def sonotrode_distance(self) -> float:
+        """Mean sonotrode face to lowest point of the part [m]."""
+        given = self.sonotrode_distance_mm
+        return self.setup().distance if given is None else given * 1e-3
+
+    def setup(self) -> Setup:
+        """As drawn. Raises InputError for a file that is no closed room with a flat sonotrode."""
+        return read_setup(Path(self.mesh), self.unit, self.part, self.sonotrode)
+
+    def surface(self, vertices: np.ndarray, triangles: np.ndarray) -> ShapeSurface:
+        """As drawn, the floor moved to the distance that is asked for."""
+        return moved(self.setup(), self.sonotrode_distance)

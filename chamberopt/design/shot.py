@@ -1,0 +1,113 @@
+"""The charge of a design: balls of one size or a mix, by mass."""
+
+import math
+from collections.abc import Iterator
+from typing import Annotated, Self
+
+from pydantic import BaseModel, Field, model_validator
+
+from chamberopt.common.fields import listed, quantity
+from chamberopt.common.toml_errors import CrossCheckError, Problem
+from chamberopt.design.materials import SHOT_DENSITY, STRICT, ShotMaterial
+
+
+class ShotSize(BaseModel):
+    """One of several sizes of balls."""
+
+    model_config = STRICT
+
+    diameter_mm: float = quantity(0.1, 20, "mm", "of one ball of this size")
+    share: float = quantity(1e-6, 1, "of the charge's mass", "the shares of all sizes add up to 1")
+
+
+class Shot(BaseModel):
+    """The charge: balls of one size, or a mix. Give exactly one of diameter_mm and mix, and of material and
+    density_kg_m3.
+    """
+
+    model_config = STRICT
+
+    mass_g: float = quantity(1e-4, 10000, "g", "of all balls together")
+    diameter_mm: float | None = quantity(0.1, 20, "mm", "of one ball", None)
+    mix: Annotated[tuple[ShotSize, ...], Field(strict=False)] | None = listed(
+        "a list of { diameter_mm = ..., share = ... }", "2 to 8 sizes and their shares of the mass", None
+    )
+    material: ShotMaterial | None = Field(default=None, description="sets the density")
+    density_kg_m3: float | None = quantity(500, 25000, "kg/m³", "instead of material", None)
+
+    @model_validator(mode="after")
+    def _agree(self) -> Self:
+        problems = [*self._density_problems(), *self._size_problems()]
+        if problems:
+            raise CrossCheckError(problems)
+        return self
+
+    def _size_problems(self) -> Iterator[Problem]:
+        if self.mix is None:
+            if self.diameter_mm is None:
+                yield Problem("diameter_mm", "missing; a number from 0.1 to 20 mm (of one ball), or several sizes: mix")
+            return
+        if self.diameter_mm is not None:
+            yield Problem("diameter_mm", f"given {self.diameter_mm:g} beside mix; keep one of the two")
+        if not 2 <= len(self.mix) <= 8:
+            yield Problem("mix", f"given {len(self.mix)} sizes; allowed: 2 to 8, or one as diameter_mm")
+        if len({size.diameter_mm for size in self.mix}) < len(self.mix):
+            yield Problem("mix", "given one diameter_mm twice; add up its shares")
+        whole = sum(size.share for size in self.mix)
+        if abs(whole - 1.0) > 1e-6:
+            yield Problem("mix", f"given shares that add up to {whole:g}; they must add up to 1")
+
+    def _density_problems(self) -> Iterator[Problem]:
+        if self.material is None and self.density_kg_m3 is None:
+            materials = ", ".join(f'"{name}"' for name in SHOT_DENSITY)
+            yield Problem("material", f"missing; give material (one of {materials}) or density_kg_m3")
+        if self.material is not None and self.density_kg_m3 is not None:
+            text = f"given {self.density_kg_m3:g} beside material = {self.material!r}; keep one of the two"
+            yield Problem("density_kg_m3", text)
+
+    @property
+    def sizes(self) -> tuple[tuple[float, int], ...]:
+        """Diameter [m] and number of the balls of each size: the mass asked for, rounded to whole balls, at least
+        one.
+        """
+        alone = () if self.diameter_mm is None else ((self.diameter_mm * 1e-3, 1.0),)
+        asked = alone if self.mix is None else tuple((size.diameter_mm * 1e-3, size.share) for size in self.mix)
+        whole = self.mass / (self.density * math.pi / 6.0)
+        return tuple((diameter, max(1, round(share * whole / diameter**3))) for diameter, share in asked)
+
+    @property
+    def diameter(self) -> float:
+        """Ball diameter [m]; of the largest, if there are several sizes."""
+        return max(diameter for diameter, _ in self.sizes)
+
+    @property
+    def diameters(self) -> tuple[float, ...]:
+        """Diameter of each ball [m], in the order of the balls of a scene: size by size."""
+        return tuple(diameter for diameter, count in self.sizes for _ in range(count))
+
+    @property
+    def density(self) -> float:
+        """Ball density [kg/m³]."""
+        return self.density_kg_m3 if self.material is None else SHOT_DENSITY[self.material]  # type: ignore[return-value]
+
+    @property
+    def mass(self) -> float:
+        """Mass of the whole charge [kg], as asked for."""
+        return self.mass_g * 1e-3
+
+    @property
+    def volume(self) -> float:
+        """Volume of all balls [m³]."""
+        return math.pi / 6.0 * sum(count * diameter**3 for diameter, count in self.sizes)
+
+    @property
+    def ball_mass(self) -> float:
+        """Mass of one ball [kg]; the mean, if there are several sizes."""
+        if self.mix is None:
+            return self.density * math.pi / 6.0 * self.diameter**3
+        return self.density * self.volume / self.count
+
+    @property
+    def count(self) -> int:
+        """Number of balls."""
+        return sum(count for _, count in self.sizes)

@@ -1,0 +1,220 @@
+"""Gmsh's .msh, versions 2.2 and 4.1, text and binary; physical groups give names.
+
+Both encodings hold the same numbers in the same order, so one reader asks for "two int, three double" and a
+stream answers. Formats: Gmsh reference manual, sections "MSH file format" and "Node ordering".
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from chamberopt.common.errors import InputError
+from chamberopt.geometry.mesh_io.readers.elements import CORNERS, EDGES, Block, Elements, surface_of
+from chamberopt.geometry.mesh_io.readers.raw_mesh import RawMesh
+
+# Gmsh's number of an element type: kind, nodes.
+TYPES = {
+    2: ("triangle", 3), 9: ("triangle", 6), 3: ("quad", 4), 16: ("quad", 8), 10: ("quad", 9),
+    4: ("tetra", 4), 11: ("tetra", 10), 7: ("pyramid", 5), 19: ("pyramid", 13), 14: ("pyramid", 14),
+    6: ("wedge", 6), 18: ("wedge", 15), 13: ("wedge", 18), 5: ("hexahedron", 8), 17: ("hexahedron", 20),
+    12: ("hexahedron", 27),
+}  # fmt: skip
+WITHOUT_SURFACE = {15: 1, 1: 2, 8: 3, 26: 4, 27: 5}  # points and lines: nodes
+# Where Gmsh's order of mid-edge nodes is not that of `elements.EDGES`.
+MIDS = {
+    "tetra": ((0, 1), (1, 2), (0, 2), (0, 3), (2, 3), (1, 3)),
+    "pyramid": ((0, 1), (0, 3), (0, 4), (1, 2), (1, 4), (2, 3), (2, 4), (3, 4)),
+    "wedge": ((0, 1), (0, 2), (0, 3), (1, 2), (1, 4), (2, 5), (3, 4), (3, 5), (4, 5)),
+    "hexahedron": (
+        (0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 7), (5, 6), (6, 7),
+    ),
+}  # fmt: skip
+PHYSICAL = re.compile(rb"^\s*(\d)\s+(-?\d+)\s+\"([^\"]*)\"", re.M)
+
+
+class _Stream:
+    """The numbers of one section, as text or as bytes."""
+
+    def __init__(self, path: Path, section: bytes, text: bool, order: str) -> None:
+        self.path, self.text, self.order, self.at = path, text, order, 0
+        self.tokens = np.array(section.split()) if text else np.zeros(0)
+        self.bytes = section
+
+    def _take(self, count: int, kind: str) -> np.ndarray:
+        if self.text:
+            taken = self.tokens[self.at : self.at + count].astype(np.float64 if kind == "f8" else np.int64)
+            self.at += count
+        else:
+            size = count * int(kind[1])
+            taken = np.frombuffer(self.bytes[self.at : self.at + size], dtype=self.order + kind)
+            self.at += size
+        if len(taken) < count or count < 0:
+            raise InputError(f"{self.path}: truncated or damaged; export or copy it again")
+        return taken
+
+    def ints(self, count: int) -> np.ndarray:
+        return self._take(count, "i4")
+
+    def sizes(self, count: int) -> np.ndarray:
+        return self._take(count, "u8").astype(np.int64)
+
+    def reals(self, count: int) -> np.ndarray:
+        return self._take(count, "f8")
+
+    def numbered(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """An int and three doubles, count times: numbers (count,) and places (count, 3)."""
+        if self.text:
+            rows = self.reals(4 * count).reshape(count, 4)
+            return rows[:, 0].astype(np.int64), rows[:, 1:]
+        kind = np.dtype([("number", self.order + "i4"), ("place", self.order + "f8", 3)])
+        records = np.frombuffer(self.bytes[self.at : self.at + count * kind.itemsize], dtype=kind)
+        return records["number"].astype(np.int64), records["place"]
+
+    def whole(self) -> int:
+        """A number that stands as text in binary files too."""
+        if self.text:
+            return int(self.sizes(1)[0])
+        line, _, self.bytes = self.bytes.partition(b"\n")
+        return int(line)
+
+
+@dataclass
+class _Mesh:
+    """Node numbers and places, then elements in batches: type, own number and nodes (k, 1 + p) by number, physical tags
+    of all k.
+    """
+
+    numbers: list[np.ndarray] = field(default_factory=list)
+    places: list[np.ndarray] = field(default_factory=list)
+    batches: list[tuple[int, np.ndarray, tuple[int, ...]]] = field(default_factory=list)
+
+
+def read_gmsh(path: Path, content: bytes) -> RawMesh:
+    """The surface in a .msh. Raises InputError for other versions and for elements that are not understood."""
+    found = re.match(rb"\s*\$MeshFormat\s+([\d.]+)\s+([01])\s+(\d+)[ \t]*\r?\n?(.{0,4})", content, re.S)
+    if not found or found[1] not in (b"2.2", b"2", b"4.1"):
+        version = found[1].decode() if found else "?"
+        raise InputError(f"{path}: version {version} of Gmsh's format is not supported; save as 4.1 or 2.2")
+    text = found[2] == b"0"
+    order = "<" if found[4][:1] == b"\x01" else ">"
+    streams = {name: _Stream(path, body, text, order) for name, body in _sections(path, content).items()}
+    mesh = _Mesh()
+    (_read_2 if found[1][:1] == b"2" else _read_4)(streams, mesh)
+    names = {(int(d), int(n)): name.decode("utf-8", "replace") for d, n, name in PHYSICAL.findall(_names(content))}
+    return surface_of(_elements(path, mesh, names))
+
+
+def _names(content: bytes) -> bytes:
+    return content.partition(b"$PhysicalNames")[2].partition(b"$EndPhysicalNames")[0]
+
+
+def _sections(path: Path, content: bytes) -> dict[str, bytes]:
+    sections = {}
+    for name in ("Entities", "Nodes", "Elements"):
+        start = content.find(f"${name}".encode())
+        if start < 0:
+            continue
+        end = content.rfind(f"$End{name}".encode())
+        if end < 0:
+            raise InputError(f"{path}: truncated: ${name} has no $End{name}; export or copy it again")
+        sections[name] = content[start:end].partition(b"\n")[2]
+    for name in ("Nodes", "Elements"):
+        if name not in sections:
+            raise InputError(f"{path}: holds no ${name}; mesh it and save it again")
+    return sections
+
+
+def _read_2(streams: dict[str, _Stream], mesh: _Mesh) -> None:
+    nodes, elements = streams["Nodes"], streams["Elements"]
+    numbers, places = nodes.numbered(nodes.whole())
+    mesh.numbers.append(numbers)
+    mesh.places.append(places)
+    left = elements.whole()
+    rows: dict[tuple[int, tuple[int, ...]], list[np.ndarray]] = {}
+    while left > 0:
+        if elements.text:
+            own, kind, tags = elements.ints(3).tolist()
+            count = 1
+        else:
+            kind, count, tags = elements.ints(3).tolist()
+        for _ in range(count):
+            if not elements.text:
+                own = int(elements.ints(1)[0])
+            physical = elements.ints(tags)[:1].tolist()
+            nodes_of = elements.ints(_size(elements.path, kind))
+            rows.setdefault((kind, tuple(physical)), []).append(np.r_[own, nodes_of])
+        left -= count
+    mesh.batches += [(kind, np.array(nodes), physical) for (kind, physical), nodes in rows.items()]
+
+
+def _read_4(streams: dict[str, _Stream], mesh: _Mesh) -> None:
+    physical: dict[tuple[int, int], tuple[int, ...]] = {}
+    if "Entities" in streams:
+        entities = streams["Entities"]
+        for dimension, count in enumerate(entities.sizes(4).tolist()):
+            for _ in range(count):
+                tag = int(entities.ints(1)[0])
+                entities.reals(3 if dimension == 0 else 6)
+                physical[dimension, tag] = tuple(entities.ints(int(entities.sizes(1)[0])).tolist())
+                if dimension > 0:
+                    entities.ints(int(entities.sizes(1)[0]))  # what bounds it
+    nodes, elements = streams["Nodes"], streams["Elements"]
+    for _ in range(int(nodes.sizes(4)[0])):
+        dimension, _, parametric = nodes.ints(3).tolist()
+        count = int(nodes.sizes(1)[0])
+        mesh.numbers.append(nodes.sizes(count))
+        width = 3 + (dimension if parametric else 0)
+        mesh.places.append(nodes.reals(width * count).reshape(count, width)[:, :3])
+    for _ in range(int(elements.sizes(4)[0])):
+        dimension, tag, kind = elements.ints(3).tolist()
+        count, width = int(elements.sizes(1)[0]), _size(elements.path, kind) + 1
+        rows = elements.sizes(count * width).reshape(count, width)
+        mesh.batches.append((kind, rows, physical.get((dimension, tag), ())))
+
+
+def _size(path: Path, kind: int) -> int:
+    if kind in WITHOUT_SURFACE:
+        return WITHOUT_SURFACE[kind]
+    if kind not in TYPES:
+        raise InputError(f"{path}: elements of Gmsh's type {kind} are not supported; mesh with order 1 or 2")
+    return TYPES[kind][1]
+
+
+def _elements(path: Path, mesh: _Mesh, names: dict[tuple[int, int], str]) -> Elements:
+    """The elements that have a surface, and those of each physical group; 0 is none."""
+    numbers = np.concatenate([np.zeros(0, dtype=np.int64), *mesh.numbers])
+    places = np.concatenate([np.zeros((0, 3)), *(place.reshape(-1, 3) for place in mesh.places)])
+    by_number = np.argsort(numbers, kind="stable")
+    made, first = Elements(places, []), 0
+    members: dict[str, list[np.ndarray]] = {}
+    own: list[np.ndarray] = []
+    for kind, numbered, groups in mesh.batches:
+        if kind in WITHOUT_SURFACE or not len(numbered):
+            continue
+        rows = numbered[:, 1:]
+        own.append(numbered[:, 0])
+        at = by_number[np.minimum(np.searchsorted(numbers, rows, sorter=by_number), len(numbers) - 1)]
+        if not np.array_equal(numbers[at], rows):
+            raise InputError(f"{path}: an element names a node that is not there; export it again")
+        name, dimension = TYPES[kind][0], 2 if TYPES[kind][0] in ("triangle", "quad") else 3
+        made.blocks.append(Block(name, _reordered(name, at)))
+        for group in groups:
+            if group:
+                told = names.get((dimension, group), f"physical {group}")
+                members.setdefault(told, []).append(np.arange(first, first + len(rows)))
+        first += len(rows)
+    made.numbers = np.concatenate([np.zeros(0, dtype=np.int64), *own])
+    made.element_sets = {name: np.concatenate(parts) for name, parts in members.items()}
+    return made
+
+
+def _reordered(kind: str, nodes: np.ndarray) -> np.ndarray:
+    corners = CORNERS[kind]
+    if kind not in MIDS or nodes.shape[1] == corners:
+        return nodes
+    at = {frozenset(edge): corners + k for k, edge in enumerate(MIDS[kind])}
+    return nodes[:, [*range(corners), *(at[frozenset(edge)] for edge in EDGES[kind])]]

@@ -1,0 +1,231 @@
+"""Nastran bulk data (CATIA V5, Patran, HyperMesh ...): GRID, shells, solids; properties and sets give names.
+
+A card of geometry that is not understood is refused by name rather than passed over. Fields as in the MSC
+Nastran Quick Reference Guide: small (8 columns), large (16, name with *) and free (commas) format.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from chamberopt.common.errors import InputError
+from chamberopt.geometry.mesh_io.readers.elements import CORNERS, EDGES, NONE, Block, Elements, surface_of
+from chamberopt.geometry.mesh_io.readers.raw_mesh import RawMesh
+
+KINDS = {
+    "CTRIA3": "triangle", "CTRIAR": "triangle", "CTRIA6": "triangle",
+    "CQUAD4": "quad", "CQUADR": "quad", "CQUAD8": "quad",
+    "CTETRA": "tetra", "CPYRAM": "pyramid", "CPENTA": "wedge", "CHEXA": "hexahedron",
+}  # fmt: skip
+# Nastran counts mid-edge nodes of these bottom, upright, top; here they are bottom, top, upright.
+REORDERED = {
+    "wedge": [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 13, 14, 9, 10, 11],
+    "hexahedron": [*range(12), 16, 17, 18, 19, 12, 13, 14, 15],
+}
+REFUSED = {
+    "INCLUDE": "put the included file's text in its place",
+    "CORD1R": "use CORD2R", "CORD1C": "use CORD2C", "CORD1S": "use CORD2S", "CORD3G": "use CORD2R",
+    "SPOINT": "remove it", "GRDSET": "write its values into each GRID",
+    "CQUAD": "export CQUAD4 or CQUAD8", "CTRIAX6": "export a solid's surface",
+}  # fmt: skip
+WITHOUT_SURFACE = re.compile(r"C(BAR|BEAM|ROD|TUBE|BUSH|ELAS|DAMP|MASS|ONM|ONROD|GAP|WELD|FAST|VISC|BEND|SEAM|HBDY)")
+SYSTEMS = ("CORD2R", "CORD2C", "CORD2S")
+KEPT = {"GRID", *KINDS, *SYSTEMS, *REFUSED}
+NUMBER = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+))(?:[ED]?([-+]?\d+))?$")
+Card = tuple[str, list[str], int]
+
+
+def read_nastran(path: Path, content: bytes) -> RawMesh:
+    """The surface in bulk data. Raises InputError with card and line for what is missing or not understood."""
+    text = content.decode("latin-1")
+    cards: dict[str, list[Card]] = defaultdict(list)
+    passed: Counter[str] = Counter()
+    for name, fields, line in _cards(text):
+        if name in KEPT:
+            cards[name].append((name, fields, line))
+        elif WITHOUT_SURFACE.match(name):
+            passed[name] += 1
+    for name, remedy in REFUSED.items():
+        if cards[name]:
+            raise InputError(f"{path}: line {cards[name][0][2]}: {name} is not supported; {remedy}")
+    try:
+        points, row_of = _points(path, cards)
+        mesh = Elements(points, [])
+        _add_elements(path, mesh, cards, row_of, _property_names(text), _sets(text))
+    except (ValueError, IndexError) as error:
+        raise InputError(f"{path}: cannot be read as Nastran bulk data: {error}; export it again") from None
+    mesh.notes += [f"left out {count} {name}: it has no surface" for name, count in passed.items()]
+    return surface_of(mesh)
+
+
+def _cards(text: str) -> Iterator[Card]:
+    """Name, fields after the name, and line number of each card; continuation lines joined."""
+    lines = text.splitlines()
+    start = next((k + 1 for k, line in enumerate(lines) if re.match(r"\s*BEGIN\s+BULK", line, re.I)), 0)
+    name, fields, first = "", [], 0
+    for number, line in enumerate(lines[start:], start=start + 1):
+        line = line.split("$")[0].rstrip()
+        if not line.strip():
+            continue
+        if line.upper().startswith("ENDDATA"):
+            break
+        head, values = _fields(line)
+        if head[:1] in ("", "+", "*"):
+            fields += values
+            continue
+        if name:
+            yield name, fields, first
+        name, fields, first = head, values, number
+    if name:
+        yield name, fields, first
+
+
+def _fields(line: str) -> tuple[str, list[str]]:
+    """What stands in the first field, without the large format's *, and the values after it."""
+    if "," in line:
+        head, *values = (value.strip() for value in line.split(","))
+        values = values[: 4 if "*" in head else 8]
+        values += [""] * ((4 if "*" in head else 8) - len(values))
+    else:
+        line = line.expandtabs(8)
+        head, width = line[:8].strip(), 16 if "*" in line[:8] else 8
+        values = [line[at : at + width].strip() for at in range(8, 72, width)]
+    return (head if head[:1] in ("", "+", "*") else head.rstrip("*").strip().upper()), values
+
+
+def _number(text: str, line: int, what: str) -> float:
+    """1.5, 1.5E-3, 1.5D-3 and Nastran's 1.5-3; blank is 0."""
+    if not text:
+        return 0.0
+    found = NUMBER.match(text.upper())
+    if not found:
+        raise ValueError(f"line {line}: {what} is {text!r}, which is no number")
+    return float(f"{found[1]}e{found[2] or 0}")
+
+
+def _whole(text: str, line: int, what: str) -> int:
+    if not re.fullmatch(r"\d*", text):
+        raise ValueError(f"line {line}: {what} is {text!r}, which is no whole number")
+    return int(text or 0)
+
+
+def _points(path: Path, cards: dict[str, list[Card]]) -> tuple[np.ndarray, dict[int, int]]:
+    """Points (n, 3) in the basic coordinate system, and the row of each grid number."""
+    systems = _Systems(path, [card for name in SYSTEMS for card in cards[name]])
+    row_of: dict[int, int] = {}
+    points = np.zeros((len(cards["GRID"]), 3))
+    own: dict[int, list[int]] = defaultdict(list)
+    for row, (_, fields, line) in enumerate(cards["GRID"]):
+        number = _whole(fields[0], line, "GRID's number")
+        points[row] = [_number(text, line, "a GRID coordinate") for text in fields[2:5]]
+        if (points[row] != points[row_of.setdefault(number, row)]).any():
+            raise ValueError(f"line {line}: GRID {number} is given twice, at two places; give each number once")
+        if fields[1] not in ("", "0"):
+            own[_whole(fields[1], line, "GRID's coordinate system")].append(row)
+    for system, rows in own.items():
+        points[rows] = systems.basic(system, points[rows])
+    return points, row_of
+
+
+class _Systems:
+    """CORD2R, CORD2C, CORD2S, each perhaps given in another: origin A, a point B on z, a point C in the xz plane."""
+
+    def __init__(self, path: Path, cards: list[Card]) -> None:
+        self.path = path
+        self.cards = {_whole(fields[0], line, f"{name}'s number"): (name, fields, line) for name, fields, line in cards}
+        self.frames: dict[int, tuple[np.ndarray, np.ndarray]] = {0: (np.zeros(3), np.eye(3))}
+
+    def basic(self, number: int, points: np.ndarray) -> np.ndarray:
+        """Points (n, 3) given in a coordinate system, in the basic one."""
+        origin, axes = self._frame(number, ())
+        name = "CORD2R" if number == 0 else self.cards[number][0]
+        if name != "CORD2R":
+            radius, theta, z = points[:, 0], np.radians(points[:, 1]), points[:, 2]
+            if name == "CORD2S":  # r, theta from z, phi
+                phi, r = np.radians(points[:, 2]), points[:, 0]
+                radius, theta, z = r * np.sin(theta), phi, r * np.cos(theta)
+            points = np.stack([radius * np.cos(theta), radius * np.sin(theta), z], axis=1)
+        return origin + points @ axes
+
+    def _frame(self, number: int, above: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+        if number in above or (number != 0 and number not in self.cards):
+            raise ValueError(f"coordinate system {number} is not defined; export it along with the mesh")
+        if number not in self.frames:
+            _, fields, line = self.cards[number]
+            parent = _whole(fields[1], line, "the reference system")
+            self._frame(parent, (*above, number))
+            given = np.array([_number(text, line, "a coordinate") for text in fields[2:11]]).reshape(3, 3)
+            a, b, c = self.basic(parent, given)
+            z = (b - a) / np.linalg.norm(b - a)
+            y = np.cross(z, c - a)
+            y /= np.linalg.norm(y)
+            self.frames[number] = a, np.array([np.cross(y, z), y, z])
+        return self.frames[number]
+
+
+def _add_elements(
+    path: Path,
+    mesh: Elements,
+    cards: dict[str, list[Card]],
+    row_of: dict[int, int],
+    names: dict[int, str],
+    sets: dict[int, set[int]],
+) -> None:
+    """Blocks of elements, in the file's order within each kind, and who belongs to which property and set."""
+    numbers: list[int] = []
+    properties: list[int] = []
+    for card, kind in KINDS.items():
+        size = CORNERS[kind] + len(EDGES[kind])
+        nodes = np.full((len(cards[card]), size), NONE)
+        for row, (_, fields, line) in enumerate(cards[card]):
+            numbers.append(_whole(fields[0], line, f"{card}'s number"))
+            properties.append(_whole(fields[1], line, f"{card}'s property") or numbers[-1])
+            count = CORNERS[kind] if card.endswith(("3", "4", "R")) else size
+            for column, text in enumerate(fields[2 : 2 + count]):
+                grid = _whole(text, line, f"a grid of {card}")
+                if grid and grid not in row_of:
+                    raise ValueError(f"line {line}: {card} {numbers[-1]} names grid {grid}, which is not there")
+                nodes[row, column] = row_of[grid] if grid else NONE
+            if (nodes[row, : CORNERS[kind]] == NONE).any():
+                raise ValueError(f"line {line}: {card} {numbers[-1]} has fewer than {CORNERS[kind]} corners")
+        if len(nodes):
+            mesh.blocks.append(Block(kind, nodes[:, REORDERED.get(kind, range(size))]))
+    mesh.numbers = np.array(numbers, dtype=np.int64)
+    of_property = np.array(properties, dtype=np.int64)
+    for number in np.unique(of_property).tolist():
+        members = np.flatnonzero(of_property == number)
+        mesh.element_sets[f"PID {number}"] = members
+        if number in names:
+            mesh.element_sets[names[number]] = members
+    for number, elements in sets.items():
+        mesh.element_sets[f"SET {number}"] = np.flatnonzero(np.isin(numbers, list(elements)))
+
+
+def _property_names(text: str) -> dict[int, str]:
+    """Names of properties that preprocessors leave in comments: HyperMesh, ANSA, Patran, Femap."""
+    names = {}
+    for pattern in (
+        r"^\$HMNAME (?:PROP|COMP)\s+(?P<number>\d+)\s*\"(?P<name>[^\"]+)\"",
+        r"^\$ANSA_NAME(?:_COMMENT)?;(?P<number>\d+);P\w+;(?P<name>[^;\n\r]+)",
+        r"^\$ Elements and Element Properties for region : (?P<name>[^\n\r]+)\s+P\w+\s+(?P<number>\d+)",
+        r"^\$ Femap(?: with NX Nastran)? Property (?P<number>\d+) : (?P<name>[^\n\r]+)",
+    ):
+        for found in re.finditer(pattern, text, re.M):
+            names[int(found["number"])] = found["name"].strip()
+    return names
+
+
+def _sets(text: str) -> dict[int, set[int]]:
+    """Case control's SET n = 1, 2, 10 THRU 20: taken as elements."""
+    sets = {}
+    for found in re.finditer(r"^\s*SET\s+(\d+)\s*=((?:[^\n,]*,\s*\n?)*[^\n]*)", text, re.M | re.I):
+        members: set[int] = set()
+        for first, last in re.findall(r"(\d+)(?:\s+THRU\s+(\d+))?", found[2], re.I):
+            members.update(range(int(first), int(last or first) + 1))
+        sets[int(found[1])] = members
+    return sets

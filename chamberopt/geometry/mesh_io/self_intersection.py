@@ -1,0 +1,124 @@
+"""Does a surface cross itself? Cutting such a part out of a chamber goes wrong without an error, so it is refused.
+
+Candidates come from a tree of boxes over the triangles in Morton order, met with itself level by level; each pair
+is then judged by T. Möller, "A fast triangle-triangle intersection test", J. Graphics Tools 2 (1997) 25.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from chamberopt.geometry.mesh_io.surface_error import SurfaceError, place_text
+from chamberopt.geometry.triangles import heights, shells_of
+
+CHUNK = 1 << 18  # pairs looked at together: bounds memory at some 100 MB
+TOUCH = 1e-6  # of the bounding box's diagonal: surfaces that pass through each other by less only touch
+
+
+def refuse_crossings(path: Path, vertices: np.ndarray, triangles: np.ndarray) -> None:
+    """Raises SurfaceError with the place when a body's closed surface (vertices [m], triangles (m, 3)) crosses itself.
+
+    Several bodies may overlap: they are united where the chamber is made.
+    """
+    corners = vertices[triangles]
+    touch = TOUCH * float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    shells, _ = shells_of(vertices, triangles)
+    usable = np.flatnonzero(heights(vertices, triangles) > touch)  # a thinner one has no direction
+    found = []
+    for a, b in _close_pairs(corners[usable]):
+        a, b = usable[a], usable[b]
+        same = shells[a] == shells[b]
+        found.append(np.stack(_crossing(corners, a[same], b[same], touch)))
+    pairs = np.concatenate(found, axis=1) if found else np.zeros((2, 0), dtype=np.int64)
+    if not pairs.shape[1]:
+        return
+    first = pairs[:, int(np.argmin(pairs[0]))]
+    middle = corners[first].reshape(-1, 3).mean(axis=0)
+    sides = corners[np.unique(pairs)][:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2, 3)
+    raise SurfaceError(
+        f"{path}: the surface crosses itself: {pairs.shape[1]} pairs of triangles, the first near "
+        f"{place_text(middle)} (triangles {first.min() + 1} and {first.max() + 1}); heal it in the CAD program, or "
+        "make its pieces bodies of their own",
+        corners,
+        sides,
+    )
+
+
+def _close_pairs(corners: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Pairs of triangles (m, 3, 3) whose boxes overlap, each pair once, in chunks."""
+    order = _morton_order(corners.mean(axis=1))
+    levels = [(corners.min(axis=1)[order].T.copy(), corners.max(axis=1)[order].T.copy())]  # (3, m): by axis
+    while levels[-1][0].shape[1] > 1:
+        low, high = levels[-1]
+        if low.shape[1] % 2:
+            low, high = np.c_[low, np.full(3, np.inf)], np.c_[high, np.full(3, -np.inf)]
+        levels.append((np.minimum(low[:, ::2], low[:, 1::2]), np.maximum(high[:, ::2], high[:, 1::2])))
+    waiting = [(len(levels) - 1, np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64))]
+    while waiting:
+        level, i, j = waiting.pop()
+        for low, high in zip(*levels[level], strict=True):
+            near = (low[i] <= high[j]) & (low[j] <= high[i])
+            i, j = i[near], j[near]
+        if level == 0:
+            apart = i != j
+            yield order[i[apart]], order[j[apart]]
+            continue
+        below = levels[level - 1][0].shape[1]
+        alone = i == j
+        i, j = np.r_[2 * i, 2 * i + 1, 2 * i, 2 * i[~alone] + 1], np.r_[2 * j, 2 * j + 1, 2 * j + 1, 2 * j[~alone]]
+        there = (i < below) & (j < below)
+        i, j = i[there], j[there]
+        waiting += [(level - 1, i[at : at + CHUNK], j[at : at + CHUNK]) for at in range(0, len(i), CHUNK)]
+
+
+def _morton_order(points: np.ndarray) -> np.ndarray:
+    """Order (m,) along a curve that keeps neighbours together: bits of x, y, z interleaved."""
+    low, size = points.min(axis=0), np.ptp(points, axis=0).max()
+    cells = ((points - low) / (size or 1.0) * (2**20 - 1)).astype(np.uint64)
+    code = np.zeros(len(points), dtype=np.uint64)
+    for bit in range(20):
+        for axis in range(3):
+            code |= ((cells[:, axis] >> np.uint64(bit)) & np.uint64(1)) << np.uint64(3 * bit + axis)
+    return np.argsort(code, kind="stable")
+
+
+def _crossing(corners: np.ndarray, a: np.ndarray, b: np.ndarray, touch: float) -> tuple[np.ndarray, np.ndarray]:
+    """Those pairs of triangles a, b (k,) that pass through each other by more than touch [m]."""
+    for one, other in ((0, 1), (1, 0)):  # each must reach to both sides of the other's plane
+        pair = (a, b)
+        distance = _distances(corners[pair[one]], corners[pair[other]])
+        through = (distance.min(axis=1) < -touch) & (distance.max(axis=1) > touch)
+        a, b = a[through], b[through]
+    if not len(a):
+        return a, b
+    of_a, of_b = corners[a], corners[b]
+    along = np.cross(_normals(of_a), _normals(of_b))
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    low_a, high_a = _interval(of_a, _distances(of_a, of_b), along)
+    low_b, high_b = _interval(of_b, _distances(of_b, of_a), along)
+    common = np.minimum(high_a, high_b) - np.maximum(low_a, low_b)
+    return a[common > touch], b[common > touch]
+
+
+def _normals(corners: np.ndarray) -> np.ndarray:
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return across / np.linalg.norm(across, axis=1)[:, None]
+
+
+def _distances(corners: np.ndarray, planes: np.ndarray) -> np.ndarray:
+    """Distances (k, 3) of the corners of triangles from the planes of others."""
+    return np.einsum("kij,kj->ki", corners - planes[:, :1], _normals(planes))
+
+
+def _interval(corners: np.ndarray, distance: np.ndarray, along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where triangles meet the other's plane: first and last position (k,) along the line of both planes."""
+    places = []
+    for i, j in ((0, 1), (1, 2), (2, 0)):
+        through = distance[:, i] * distance[:, j] < 0.0
+        share = np.divide(distance[:, i], distance[:, i] - distance[:, j], out=np.zeros(len(along)), where=through)
+        point = corners[:, i] + share[:, None] * (corners[:, j] - corners[:, i])
+        places.append(np.where(through, np.einsum("kj,kj->k", point, along), np.nan))
+    return np.nanmin(places, axis=0), np.nanmax(places, axis=0)

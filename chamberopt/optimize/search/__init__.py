@@ -1,0 +1,1 @@
+"""Where the search looks next: Sobol points, NLopt, and a Gaussian process."""

@@ -1,0 +1,114 @@
+"""A comparison as text: what differs, every figure, and what is to be made of each difference."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from chamberopt.coverage.metrics import LONGEST as NEVER
+from chamberopt.coverage.statistics.interval import CONFIDENCE, Estimate
+from chamberopt.output.compare.comparison import TIME, Comparison
+from chamberopt.output.compare.difference import LONGEST, NOTHING, Difference
+
+COUNTED = "process.accuracy.coverage_model"
+HEADER = ("difference", "real", "to know: simulate")
+
+
+def as_text(comparison: Comparison) -> str:
+    """Two candidates in one table; of more, what they are and then each later one against the first."""
+    first, *later = comparison.labels
+    rows = [[name, *(_shown(value) for value in values)] for name, values in comparison.parameters.items()]
+    if not rows:
+        rows = [["the designs do not differ"]]
+    figures = {
+        name: [_figure(name, estimate) for estimate in estimates] for name, estimates in comparison.metrics.items()
+    }
+    gaps = {name: [_cells(gap) for gap in several] for name, several in comparison.differences.items()}
+    if len(later) == 1:
+        heads = [f"{later[0]} - {first}", *HEADER[1:]]
+        rows += [[name, *cells, *gaps[name][0]] for name, cells in figures.items()]
+        blocks = [_aligned([["", *comparison.labels, *heads], *rows])]
+    else:
+        rows += [[name, *cells] for name, cells in figures.items()]
+        blocks = [_aligned([["", *comparison.labels], *rows])]
+        for k, label in enumerate(later):
+            table = [[f"{label} - {first}", *HEADER], *([name, *gaps[name][k]] for name in figures)]
+            blocks.append(_aligned(table))
+    return "\n\n".join(["\n".join(block) for block in blocks] + ["\n".join(_legend(comparison))])
+
+
+def _legend(comparison: Comparison) -> list[str]:
+    """How the table is to be read."""
+    first, *later = comparison.labels
+    lines = [
+        "(± 95 % interval. real: the difference is larger than its own interval, which holds for each figure alone."
+    ]
+    if any(gap.replicas for several in comparison.differences.values() for gap in several):
+        lines.append(
+            "to know: times what was simulated, and replicas, if the difference is as large as it looks; even then it "
+            "shows in one case of two."
+        )
+    if len(later) > 1:
+        lines.append(
+            f"Differences have intervals of {100.0 * comparison.confidence:.4g} %, so that all {len(later)} of a "
+            f"figure hold together with {100.0 * CONFIDENCE:g} % (Bonferroni)."
+        )
+    for k, label in enumerate(later):
+        paired = [several[k].paired for several in comparison.differences.values()]
+        if any(paired):
+            lines.append(f"{label} - {first}: paired, replica by replica on the same seeds.")
+        elif comparison.results[k + 1].seeds == comparison.results[0].seeds:
+            lines.append(f"{label} - {first}: as independent, for they have not the same number of replicas.")
+        else:
+            lines.append(f"{label} - {first}: independent, on other seeds.")
+    if COUNTED in comparison.parameters:
+        lines.append(
+            f"Coverage is counted in two ways ({COUNTED}): differences may be of the counting, not of the chambers."
+        )
+    return [*lines[:-1], lines[-1] + ")"]
+
+
+def two_digits(half_width: float) -> str:
+    """Of an interval, without an exponent where that is short: 1300, 0.0048."""
+    return f"{float(f'{half_width:.2g}'):g}"
+
+
+def _cells(gap: Difference) -> list[str]:
+    """Difference, whether it is real, and what it takes to know."""
+    shown = _value(gap.value, "+.4g" if gap.value else "g", gap.half_width)
+    if gap.value == 0.0:
+        return [shown, "no", ""]
+    if gap.real:
+        return [shown, "yes", ""]
+    if gap.times is None or gap.replicas is None:
+        return [shown, "no", f"more than {LONGEST} × as long"]
+    return [shown, "no", f"{_times(gap.times)} × as long, {gap.replicas} replicas"]
+
+
+def _times(times: float) -> str:
+    return f"{times:.1f}" if times < 10.0 else f"{math.ceil(times)}"
+
+
+def _figure(name: str, estimate: Estimate) -> str:
+    if name == TIME and estimate.value >= NEVER:
+        return "never"
+    return _value(estimate.value, ".4g", estimate.half_width)
+
+
+def _value(value: float, form: str, half_width: float) -> str:
+    """A number, and its interval if it has one; of what rounding leaves of a zero, 0."""
+    value, half_width = (0.0 if abs(x) < NOTHING else x for x in (value, half_width))
+    return f"{value:{form}}" + (f" ± {two_digits(half_width)}" if half_width else "")
+
+
+def _shown(value: Any) -> str:
+    return "-" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Cells under each other; the first row is the header."""
+    count = max(map(len, rows))
+    whole = [[*row, *[""] * (count - len(row))] for row in rows]
+    widths = [max(len(row[i]) for row in whole) for i in range(count)]
+    return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in whole]

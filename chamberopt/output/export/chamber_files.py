@@ -1,0 +1,117 @@
+"""The chamber for the workshop, in mm: the cavity as one closed body, and the surfaces it is made of by name.
+
+Normals point out of the cavity. The 3MF file holds one closed object whose triangles carry named base materials, one a
+surface (3MF Core Specification 1.3, chapters 3.3, 4.1 and 5.1): programs that know no materials see the cavity whole.
+"""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from chamberopt.chamber.fittings import fitting_names
+from chamberopt.common.files import new_folder, whole_file
+from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL, tag_of_further
+from chamberopt.output.results.results import load_result
+from chamberopt.output.viewer import CHAMBER, read_surface
+
+NAMES = {TAG_PART: "part", TAG_SONOTRODE: "sonotrode", TAG_WALL: "wall"}
+GREY, GLASS, ORANGE = "#B9BEC4", "#9DB7CC", "#E08A2E"
+EPOCH = (1980, 1, 1, 0, 0, 0)  # the first date a .zip knows: the same chamber gives the same bytes
+CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
+MODEL = "3D/3dmodel.model"
+
+
+class Cavity(NamedTuple):
+    """vertices (n, 3) mm · triangles (k, 3), closed, normals out · surfaces: name -> which triangles (k,) bool."""
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+    surfaces: dict[str, np.ndarray]
+
+
+def read_cavity(folder: Path) -> Cavity:
+    """The chamber of a results folder: part, sonotrode, wall, and as the design names them sonotrodes.0 ...,
+    chamber.holes.0 ..., chamber.deflectors.0 ...; older results do not tell the last two from the wall.
+    """
+    drawn = read_surface(folder / CHAMBER)
+    tags = np.asarray(drawn["tag"])
+    fitting = np.asarray(drawn["fitting"]) if "fitting" in drawn.array_names else np.full(len(tags), -1)
+    surfaces = {_name(int(tag)): (tags == tag) & (fitting < 0) for tag in np.unique(tags)}
+    for number, name in enumerate(fitting_names(load_result(folder).design)):
+        surfaces[name] = fitting == number
+    surfaces = {name: own for name, own in surfaces.items() if own.any()}
+    return Cavity(np.asarray(drawn.points), np.asarray(drawn.regular_faces), surfaces)
+
+
+def write_stl(folder: Path, file: Path) -> None:
+    """The whole cavity as binary STL."""
+    cavity = read_cavity(folder)
+    _write_stl(file, cavity.vertices, cavity.triangles)
+
+
+def write_stl_per_surface(folder: Path, place: Path) -> None:
+    """A binary STL of each surface of the cavity, by its name, into a new folder."""
+    cavity, place = read_cavity(folder), new_folder(place)
+    for name, own in cavity.surfaces.items():
+        _write_stl(place / f"{name}.stl", cavity.vertices, cavity.triangles[own])
+
+
+def write_3mf(folder: Path, file: Path) -> None:
+    """The cavity as 3MF."""
+    cavity = read_cavity(folder)
+    parts = {
+        "[Content_Types].xml": '<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">'
+        '<Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>'
+        '<Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/></Types>',
+        "_rels/.rels": '<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">'
+        f'<Relationship Id="rel0" Target="/{MODEL}" '
+        'Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>',
+        MODEL: _model(cavity),
+    }
+    with whole_file(file) as temporary, zipfile.ZipFile(temporary, "w") as package:
+        for name, text in parts.items():
+            entry = zipfile.ZipInfo(name, EPOCH)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            package.writestr(entry, f'<?xml version="1.0" encoding="UTF-8"?>\n{text}')
+
+
+def _model(cavity: Cavity) -> str:
+    surface = np.zeros(len(cavity.triangles), dtype=int)
+    for number, own in enumerate(cavity.surfaces.values()):
+        surface[own] = number
+    bases = [f'<base name="{name}" displaycolor="{_colour(name)}"/>' for name in cavity.surfaces]
+    vertices = [f'<vertex x="{x!r}" y="{y!r}" z="{z!r}"/>' for x, y, z in cavity.vertices.tolist()]
+    triangles = [
+        f'<triangle v1="{a}" v2="{b}" v3="{c}" pid="1" p1="{number}"/>'
+        for (a, b, c), number in zip(cavity.triangles.tolist(), surface.tolist(), strict=True)
+    ]
+    return "\n".join(
+        [
+            f'<model unit="millimeter" xml:lang="en" xmlns="{CORE}">',
+            f'<resources><basematerials id="1">{"".join(bases)}</basematerials>',
+            '<object id="2" name="chamber" type="model" pid="1" pindex="0"><mesh><vertices>',
+            *vertices,
+            "</vertices><triangles>",
+            *triangles,
+            '</triangles></mesh></object></resources><build><item objectid="2"/></build></model>',
+        ]
+    )
+
+
+def _name(tag: int) -> str:
+    return NAMES.get(tag) or f"sonotrodes.{tag - tag_of_further(0)}"
+
+
+def _colour(name: str) -> str:
+    return ORANGE if name.startswith("sonotrode") else GREY if name == "part" else GLASS
+
+
+def _write_stl(file: Path, vertices: np.ndarray, triangles: np.ndarray) -> None:
+    from trimesh import Trimesh
+
+    with whole_file(file) as temporary:
+        Trimesh(vertices, triangles, process=False).export(temporary, file_type="stl")

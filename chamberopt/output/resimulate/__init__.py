@@ -1,0 +1,1 @@
+"""A stored result simulated again, for its single impacts and flights."""

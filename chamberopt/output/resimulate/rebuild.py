@@ -1,0 +1,80 @@
+"""What a result was simulated in, and its replicas: the same design, chamber and seed make the same scene again, to the
+last bit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NoReturn
+
+import numpy as np
+
+from chamberopt.chamber.analytic import analytic_cavity
+from chamberopt.chamber.build import build_chamber
+from chamberopt.chamber.part import posed_part
+from chamberopt.chamber.scene import build_scene, chamber_mesh, replica_seed
+from chamberopt.common.errors import InputError
+from chamberopt.output.resimulate.replica import Replayed
+from chamberopt.output.vtp_files import CHAMBER, COVERAGE, MM, read_surface
+
+if TYPE_CHECKING:
+    from chamberopt.chamber.build import Chamber
+    from chamberopt.output.results.results import Result
+    from sim_core import AnalyticCavity
+
+REMEDY = "simulate the design again, and use that result"
+
+
+@dataclass(frozen=True)
+class Ground:
+    """Where a result was simulated: its chamber, built again, and the analytical cavity if it was simulated in one."""
+
+    chamber: Chamber
+    cavity: AnalyticCavity | None
+
+
+def ground_of(result: Result) -> Ground:
+    """The chamber of a simulation, or of a study's best or start, as it was simulated; its target is the result's.
+
+    Raises InputError when a file that the design names has changed since, or this version builds another chamber.
+    """
+    part = posed_part(result.design)[0]
+    kept = read_surface(result.folder / COVERAGE)
+    if part.sha256 != result.part_sha256 or kept.n_cells != len(part.triangles):
+        _refuse_file(result, "part.mesh", result.design.part.mesh_path)
+    if result.design.chamber.sha256 != result.data.get("shape_sha256", ""):
+        _refuse_file(result, "chamber", "the file of its shape")
+    target = np.asarray(kept["target"]) > 0 if result.design.part.target.reachable else None
+    chamber = build_chamber(result.design, target)
+    drawn = read_surface(result.folder / CHAMBER)
+    same = np.array_equal(drawn.points, chamber.vertices * MM) and np.array_equal(drawn["tag"], chamber.tags)
+    if not same or not np.array_equal(drawn.regular_faces, chamber.triangles):
+        raise InputError(
+            f"{result.folder}: its chamber comes out differently now: a file that the design names has changed, or "
+            f"another version made it ({made_by(result)}); {REMEDY}"
+        )
+    return Ground(chamber, analytic_cavity(result.design, chamber) if result.data.get("analytic") else None)
+
+
+def replica_of(result: Result, number: int = 0) -> Replayed:
+    """A replica of a simulation, or of a study's best or start. InputError for one that is not there, or cannot be
+    simulated again.
+    """
+    there = int(result.data["replicas"])
+    if not 0 <= number < there:
+        raise InputError(f"--replica: given {number}; the result has {there}, give 0 to {there - 1}")
+    ground, (seed, stream) = ground_of(result), result.seeds
+    mesh = ground.cavity or chamber_mesh(ground.chamber)
+    scene = build_scene(result.design, mesh, replica_seed(seed, number, stream))
+    return Replayed(result.design, ground.chamber, ground.cavity, scene)
+
+
+def _refuse_file(result: Result, field: str, path: object) -> NoReturn:
+    raise InputError(f"{field}: {path}: not what {result.folder} was simulated with; restore it, or {REMEDY}")
+
+
+def made_by(result: Result) -> str:
+    """The versions that a result was made by."""
+    made = result.data.get("versions", {})
+    names = ("chamberopt", "manifold3d", "numba", "numpy", "system")
+    return ", ".join(f"{name} {made[name]}" for name in names if name in made) or "an unknown version"

@@ -1,0 +1,1 @@
+"""Results folders: written, and read back."""

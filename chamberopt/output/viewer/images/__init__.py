@@ -1,0 +1,1 @@
+"""Images and films that are drawn without a window."""

@@ -1,6 +1,0 @@
-"""A result as one page for a browser, with all it needs inside. The only room that imports plotly."""
-
-from chamberopt.report.facts import facts
-from chamberopt.report.page import write_part_page, write_report
-
-__all__ = ["facts", "write_part_page", "write_report"]

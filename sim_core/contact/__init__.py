@@ -1,0 +1,1 @@
+"""Contact mode: balls that slide, roll or lie still on surfaces and on one another."""

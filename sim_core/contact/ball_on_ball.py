@@ -1,0 +1,120 @@
+"""Two balls meet, and at least one is not in free flight.
+
+A fast hit is the ordinary one: what a surface behind the ball does to it is the next event. To a slow one (below
+Restitution.elastic_below) a ball that lies still is a still surface: friction holds it, and what would be handed on
+is below elastic_below²/2 of energy per mass. Between balls on the move a slow hit is a single constrained impact: a
+ball that stands on feet takes from an impulse along d only what they leave of it, P(d), so its share of the inverse
+mass is |P(d)|² in place of 1, and elastic means elastic for the two together (Brogliato, Nonsmooth Mechanics (2016),
+section 5.2). Slow hits between moving balls do not rub.
+"""
+
+import math
+
+import numpy as np
+
+from sim_core.contact.constrained_impulse import BLOCKED, SHORTEST_HOP, impart, place, pull, response
+from sim_core.contact.jamming import watch
+from sim_core.contact.pushed_by_part import is_pressed, let_go, touch
+from sim_core.contact.support_changes import BOUNCES, touch_down
+from sim_core.effects.contact_mode import ASLEEP, MODE, ON_BALL, Footing
+from sim_core.effects.friction import OF_BALLS, Grip
+from sim_core.effects.restitution import Restitution, restitution_law
+from sim_core.impulses.ball_ball import pair_kick
+from sim_core.impulses.friction import rub_pair, rub_surface
+from sim_core.motion import Point
+from sim_core.numerics.jit import jit
+from sim_core.numerics.vec3 import Vec3, dot, sub, times
+
+# m/s: balls in touch that part by less are in touch for good. Slow hits part them twice as fast: two that went on as
+# one (e = 0) would meet for ever by rounding
+PARTING = 1e-9
+
+
+@jit
+def meet(
+    footing: Footing,
+    motion: np.ndarray,
+    one: int,
+    two: int,
+    time: float,
+    moment: float,
+    restitution: Restitution | None,
+    radius: float,
+) -> bool:
+    """Two balls meet now; True when one that lay still is moved, so that what leans on it must be woken."""
+    first, second = place(footing, motion, one, time), place(footing, motion, two, time)
+    apart, closing = sub(second.position, first.position), sub(second.velocity, first.velocity)
+    distance = math.sqrt(dot(apart, apart))
+    into = -dot(apart, closing) / distance
+    if into < -PARTING:
+        return False
+    into = max(into, 0.0)  # pressed together without any speed
+    still_one, still_two = footing.marks[one, MODE] >= ASLEEP, footing.marks[two, MODE] >= ASLEEP
+    slow = into < footing.slow
+    pressed = is_pressed(footing, one, moment) or is_pressed(footing, two, moment)
+    scale = 1.0 / distance
+    normal = Vec3(scale * apart.x, scale * apart.y, scale * apart.z)
+    if slow and still_one and not pressed:
+        _land_on(footing, motion, two, one, time, moment, second, normal, into, restitution, radius)
+    elif slow and still_two and not pressed:
+        _land_on(footing, motion, one, two, time, moment, first, times(-1.0, normal), into, restitution, radius)
+    elif not slow:
+        change = pair_kick(apart, closing, restitution)
+        change = rub_pair(footing.grip, one, two, time, apart, closing, change)
+        impart(footing, motion, one, time, moment, first, change)
+        impart(footing, motion, two, time, moment, second, times(-1.0, change))
+    else:
+        if pressed:
+            let_go(footing, one, times(-1.0, normal))
+            let_go(footing, two, normal)
+        give_one, give_two = response(footing, one, times(-1.0, normal)), response(footing, two, normal)
+        total = max(dot(give_two, normal) - dot(give_one, normal), BLOCKED)
+        press = _press(footing.grip, footing, one, two, normal)
+        push = (into + max(into, SHORTEST_HOP * press, 2.0 * PARTING)) / total
+        impart(footing, motion, one, time, moment, first, times(push, give_one))
+        impart(footing, motion, two, time, moment, second, times(push, give_two))
+    if pressed:
+        touch(footing, one, moment)
+        touch(footing, two, moment)
+    watch(footing, motion, one, time, moment, first.position, slow, radius)
+    watch(footing, motion, two, time, moment, second.position, slow, radius)
+    return (still_one or still_two) and (pressed or not slow)
+
+
+@jit
+def _land_on(
+    footing: Footing,
+    motion: np.ndarray,
+    ball: int,
+    other: int,
+    time: float,
+    moment: float,
+    here: Point,
+    normal: Vec3,
+    into: float,
+    restitution: Restitution | None,
+    radius: float,
+) -> None:
+    """A ball meets one that lies still: a surface like others."""
+    if footing.marks[ball, MODE] >= ASLEEP:
+        return
+    landed = touch_down(footing, motion, ball, ON_BALL - other, 2.0 * radius, time, moment, here, normal)
+    if landed == BOUNCES:
+        e = 1.0 if restitution is None else _law(restitution, into)
+        change = times((1.0 + e) * into, normal)
+        change = rub_surface(footing.grip, ball, time, normal, here.velocity, change, OF_BALLS)
+        impart(footing, motion, ball, time, moment, here, change)
+
+
+@jit
+def _law(restitution: Restitution, speed: float) -> float:
+    return restitution_law(speed, restitution.balls[0], restitution.balls[1])
+
+
+@jit
+def _press(grip: Grip | None, footing: Footing, one: int, two: int, normal: Vec3) -> float:
+    """How hard two balls are pressed together [m/s²]; by a slip that ends soon no harder than by two weights."""
+    press = -dot(sub(pull(footing, two), pull(footing, one)), normal)
+    if grip is None:
+        return press
+    return min(press, 2.0 * math.sqrt(dot(footing.gravity, footing.gravity)))

@@ -1,0 +1,44 @@
+"""What a push does to a ball, in flight or on its feet."""
+
+import numpy as np
+
+from sim_core.contact.support_changes import settle
+from sim_core.effects.contact_mode import FLYING, MODE, Footing, onto_cone
+from sim_core.motion import Point, kick, point_under
+from sim_core.numerics.jit import jit
+from sim_core.numerics.vec3 import Vec3, along
+
+BLOCKED = 0.01  # of an inverse mass: a push on balls that give way by less is no greater for it
+# s: balls pressed together without any speed would meet again at once; they part for so long, which lifts them 50 nm
+SHORTEST_HOP = 1e-4
+
+
+@jit
+def pull(footing: Footing, ball: int) -> Vec3:
+    """A ball's acceleration [m/s²]."""
+    return Vec3(footing.pull[ball, 0], footing.pull[ball, 1], footing.pull[ball, 2])
+
+
+@jit
+def place(footing: Footing, motion: np.ndarray, ball: int, time: float) -> Point:
+    """Where a ball is [m], and its velocity [m/s], at a time of the window's clock."""
+    return point_under(motion, ball, time, pull(footing, ball))
+
+
+@jit
+def response(footing: Footing, ball: int, push: Vec3) -> Vec3:
+    """Velocity change of a ball for a unit push per mass."""
+    if footing.marks[ball, MODE] == FLYING:
+        return push
+    return onto_cone(footing, ball, push)
+
+
+@jit
+def impart(
+    footing: Footing, motion: np.ndarray, ball: int, time: float, moment: float, at: Point, change: Vec3
+) -> None:
+    """Change a ball's velocity by ``change`` [m/s]; one in contact mode keeps of it what its feet leave."""
+    if footing.marks[ball, MODE] == FLYING:
+        kick(motion, ball, time, change)
+    else:
+        settle(footing, motion, ball, time, moment, Point(at.position, along(at.velocity, 1.0, change)))

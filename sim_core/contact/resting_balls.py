@@ -1,0 +1,89 @@
+"""Where balls can lie still, and which do: what a designer wants to know of pockets, slots and dead corners."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim_core.effects.contact_mode import ASLEEP, FEET, JAMMED, LIES_SINCE, MODE, MOST_FEET, ON_BALL, Footing
+from sim_core.effects.gravity import Gravity
+from sim_core.geometry.analytic import AnalyticCavity
+from sim_core.geometry.mesh import TriangleMesh, towards_shot
+from sim_core.geometry.obstacle_set import Ground
+from sim_core.geometry.obstacles import CAPSULE
+from sim_core.geometry.triangle_lookup import triangle_at
+from sim_core.numerics.vec3 import Vec3
+
+UPWARD = 1e-6  # of the weight: a wall that bears less is upright but for rounding
+NONE = -1
+
+
+@dataclass(frozen=True)
+class Resting:
+    """The k balls that lie still at the end, by number.
+
+    ``ball`` (k,): which; ``position`` (k, 3) [m]; ``since`` (k,) [s]: when each came to lie still, on the clock of the
+    impacts, so negative when it was during the warm-up; ``triangles`` (k, 4) and ``balls`` (k, 4): what each stands
+    on, -1 where there is no more; ``jammed`` (k,) bool: held by balls around it, not by what it stands on alone.
+    """
+
+    ball: np.ndarray
+    position: np.ndarray
+    since: np.ndarray
+    triangles: np.ndarray
+    balls: np.ndarray
+    jammed: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.ball)
+
+
+def resting(
+    footing: Footing | None, ground: Ground, positions: np.ndarray, middle: np.ndarray, origin: float
+) -> Resting:
+    """Who lies still now; ``positions`` (n, 3) [m], ``middle`` (3,) of the mesh, ``origin`` [s] of their clock."""
+    if footing is None:
+        return Resting(*(np.zeros(shape, kind) for shape, kind in _EMPTY))
+    still = np.flatnonzero(footing.marks[:, MODE] >= ASLEEP)
+    triangles = np.full((len(still), MOST_FEET), NONE)
+    balls = triangles.copy()
+    for i, ball in enumerate(still):
+        for foot in range(footing.marks[ball, FEET]):
+            row = int(footing.rows[ball, foot])
+            if row <= ON_BALL:
+                balls[i, foot] = ON_BALL - row
+            else:
+                seed = int(ground.tree.triangles[row, 0])
+                at = Vec3(*(float(x) for x in positions[ball] - middle))
+                lone = ground.tree.kinds[row] == CAPSULE
+                triangles[i, foot] = seed if lone else triangle_at(ground.locator, seed, at)
+    return Resting(
+        still,
+        positions[still],
+        footing.memory[still, LIES_SINCE] - origin,
+        triangles,
+        balls,
+        footing.marks[still, MODE] == JAMMED,
+    )
+
+
+_EMPTY = (
+    ((0,), np.int64),
+    ((0, 3), np.float64),
+    ((0,), np.float64),
+    ((0, MOST_FEET), np.int64),
+    ((0, MOST_FEET), np.int64),
+    ((0,), np.bool_),
+)
+
+
+def can_rest(mesh: TriangleMesh | AnalyticCavity, gravity: Gravity | None, *moving: int) -> bool:
+    """True when a ball can lie still in the chamber: gravity presses it onto some triangle that keeps still.
+
+    ``moving``: the tags of the surfaces that vibrate or turn.
+    """
+    if gravity is None:
+        return False
+    pull = np.array(gravity, dtype=np.float64)
+    normals, doubled = towards_shot(mesh.corners)
+    still = (doubled > 0.0) & ~np.isin(mesh.tags, moving)
+    return bool((normals[still] @ pull < -UPWARD * np.linalg.norm(pull)).any())

@@ -1,0 +1,239 @@
+"""An eight-wide tree of bounding boxes over the obstacles.
+
+Built top down by the surface area heuristic: a group of boxes is cut where the areas of the two halves' boxes,
+weighted by what they hold, are least, since a box is entered in proportion to its area (Goldsmith & Salmon, IEEE
+Computer Graphics and Applications 7(5) (1987) 14). Eight groups make a node: the largest is cut again until there are
+eight (Wald, Benthin & Boulos, IEEE Symposium on Interactive Ray Tracing 2008). Every leaf is one obstacle, so that
+the box test, eight at once, decides which exact tests are worth their price.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sim_core.errors import SceneError
+from sim_core.geometry.obstacles import Obstacles
+from sim_core.numerics.jit import jit
+from sim_core.numerics.simd import BOXES
+
+FAR = np.float32(1e30)  # an empty child is a box no flight reaches
+LEVELS = 64  # a tree of 10 million obstacles has about 10
+STACK = BOXES * LEVELS  # a walk keeps at most 7 siblings a level
+BINS = 16  # places tried for a cut along each axis; 8 to 32 measured alike
+EMPTY = -(2**31)
+
+
+class Tree(NamedTuple):
+    """The obstacles and their boxes, ready for compiled code; coordinates relative to the scene's centre.
+
+    ``bounds`` (nodes, 6, 8) float32: low x, y, z and high x, y, z of each node's eight children, padded outward;
+    ``children`` (nodes, 8) int32: >= 0 a node, < 0 obstacle -1 - child; ``numbers``, ``kinds``, ``triangles``: the
+    obstacles, neighbours in space near each other in memory; ``radius`` [m] of the balls they were made for.
+    """
+
+    bounds: np.ndarray
+    children: np.ndarray
+    numbers: np.ndarray
+    kinds: np.ndarray
+    triangles: np.ndarray
+    radius: float
+
+
+def build_tree(obstacles: Obstacles, radius: float) -> Tree:
+    """The tree over the obstacles of balls of this radius [m]."""
+    count = len(obstacles.low)
+    size = max(np.abs(obstacles.low).max(), np.abs(obstacles.high).max())
+    pad = 16.0 * np.finfo(np.float32).eps * size  # float32 boxes are never smaller than the float64 ones
+    low, high = obstacles.low - pad, obstacles.high + pad
+    order = np.arange(count)
+    most = count + 2  # a node has at least two children
+    bounds = np.full((most, 6, BOXES), FAR, dtype=np.float32)
+    children = np.full((most, BOXES), EMPTY, dtype=np.int32)
+    ranges = np.zeros((most, 3), dtype=np.int64)  # first and last obstacle, and level, of each node
+    bins = np.zeros((BINS, 7))
+    nodes = _grow(low, high, order, bounds, children, ranges, bins, np.zeros((BINS, 7)), np.zeros((BOXES, 2), np.int64))
+    if ranges[:nodes, 2].max() > LEVELS:
+        raise SceneError(
+            f"the mesh's triangles are spread so unevenly that their tree is more than {LEVELS} levels deep; "
+            "look for triangles crowded into one point"
+        )
+    return Tree(
+        np.ascontiguousarray(bounds[:nodes]),
+        np.ascontiguousarray(children[:nodes]),
+        np.ascontiguousarray(obstacles.numbers[order]),
+        np.ascontiguousarray(obstacles.kinds[order]),
+        np.ascontiguousarray(obstacles.triangles[order]),
+        radius,
+    )
+
+
+def joined(trees: list[Tree]) -> tuple[Tree, np.ndarray]:
+    """Several trees as one, and the node (k,) int64 each begins at; the tree's radius is the last's."""
+    if len(trees) == 1:
+        return trees[0], np.zeros(1, dtype=np.int64)
+    roots = np.cumsum([0, *(len(tree.children) for tree in trees[:-1])])
+    rows = np.cumsum([0, *(len(tree.kinds) for tree in trees[:-1])])
+    children = [
+        np.where(tree.children >= 0, tree.children + root, np.where(tree.children == EMPTY, EMPTY, tree.children - row))
+        for tree, root, row in zip(trees, roots, rows, strict=True)
+    ]
+    whole = Tree(
+        np.concatenate([tree.bounds for tree in trees]),
+        np.concatenate(children).astype(np.int32),
+        np.concatenate([tree.numbers for tree in trees]),
+        np.concatenate([tree.kinds for tree in trees]),
+        np.concatenate([tree.triangles for tree in trees]),
+        trees[-1].radius,
+    )
+    return whole, roots.astype(np.int64)
+
+
+@jit
+def _grow(
+    low: np.ndarray,
+    high: np.ndarray,
+    order: np.ndarray,
+    bounds: np.ndarray,
+    children: np.ndarray,
+    ranges: np.ndarray,
+    bins: np.ndarray,
+    sweep: np.ndarray,
+    groups: np.ndarray,
+) -> int:
+    """Fill bounds and children, sorting ``order`` so that a leaf's obstacle is its place; returns the node count."""
+    ranges[0, 0], ranges[0, 1], ranges[0, 2] = 0, len(order), 1
+    nodes = 1
+    node = 0
+    while node < nodes:
+        groups[0, 0], groups[0, 1] = ranges[node, 0], ranges[node, 1]
+        count = 1
+        while count < BOXES:
+            chosen, widest = -1, -1.0
+            for g in range(count):
+                if groups[g, 1] - groups[g, 0] > 1:
+                    area = _area_of(low, high, order, groups[g, 0], groups[g, 1])
+                    if area > widest:
+                        chosen, widest = g, area
+            if chosen < 0:
+                break
+            cut = _cut(low, high, order, groups[chosen, 0], groups[chosen, 1], bins, sweep)
+            groups[count, 0], groups[count, 1] = cut, groups[chosen, 1]
+            groups[chosen, 1] = cut
+            count += 1
+        for g in range(count):
+            start, end = groups[g, 0], groups[g, 1]
+            for axis in range(3):
+                lowest, highest = np.inf, -np.inf
+                for k in range(start, end):
+                    lowest = min(lowest, low[order[k], axis])
+                    highest = max(highest, high[order[k], axis])
+                bounds[node, axis, g] = np.float32(lowest)
+                bounds[node, 3 + axis, g] = np.float32(highest)
+            if end - start == 1:
+                children[node, g] = -1 - start
+            else:
+                children[node, g] = nodes
+                ranges[nodes, 0], ranges[nodes, 1], ranges[nodes, 2] = start, end, ranges[node, 2] + 1
+                nodes += 1
+        node += 1
+    return nodes
+
+
+@jit
+def _area_of(low: np.ndarray, high: np.ndarray, order: np.ndarray, start: int, end: int) -> float:
+    """Half the surface area of the box round a group [m²]."""
+    x0, y0, z0, x1, y1, z1 = np.inf, np.inf, np.inf, -np.inf, -np.inf, -np.inf
+    for k in range(start, end):
+        i = order[k]
+        x0, y0, z0 = min(x0, low[i, 0]), min(y0, low[i, 1]), min(z0, low[i, 2])
+        x1, y1, z1 = max(x1, high[i, 0]), max(y1, high[i, 1]), max(z1, high[i, 2])
+    return (x1 - x0) * (y1 - y0) + (y1 - y0) * (z1 - z0) + (z1 - z0) * (x1 - x0)
+
+
+@jit
+def _half_area(box: np.ndarray, row: int) -> float:
+    x, y, z = box[row, 3] - box[row, 0], box[row, 4] - box[row, 1], box[row, 5] - box[row, 2]
+    return x * y + y * z + z * x
+
+
+@jit
+def _widen(box: np.ndarray, row: int, low: np.ndarray, high: np.ndarray, i: int) -> None:
+    for axis in range(3):
+        box[row, axis] = min(box[row, axis], low[i, axis])
+        box[row, 3 + axis] = max(box[row, 3 + axis], high[i, axis])
+
+
+@jit
+def _merge(box: np.ndarray, row: int, other: np.ndarray, other_row: int) -> None:
+    for axis in range(3):
+        box[row, axis] = min(box[row, axis], other[other_row, axis])
+        box[row, 3 + axis] = max(box[row, 3 + axis], other[other_row, 3 + axis])
+    box[row, 6] += other[other_row, 6]
+
+
+@jit
+def _cheapest(bins: np.ndarray, left: np.ndarray) -> tuple[float, int]:
+    """Least area x count of the two sides, and the last bin of the left one."""
+    _clear(left)
+    for b in range(BINS):  # left[b]: all bins up to b
+        if b > 0:
+            _merge(left, b, left, b - 1)
+        _merge(left, b, bins, b)
+    best, place = np.inf, 0
+    for b in range(BINS - 1, 0, -1):  # bins[b]: all bins from b on
+        if b < BINS - 1:
+            _merge(bins, b, bins, b + 1)
+        if bins[b, 6] > 0.0 and left[b - 1, 6] > 0.0:
+            cost = _half_area(bins, b) * bins[b, 6] + _half_area(left, b - 1) * left[b - 1, 6]
+            if cost < best:
+                best, place = cost, b - 1
+    return best, place
+
+
+@jit
+def _clear(bins: np.ndarray) -> None:
+    for b in range(BINS):
+        for axis in range(3):
+            bins[b, axis] = np.inf
+            bins[b, 3 + axis] = -np.inf
+        bins[b, 6] = 0.0
+
+
+@jit
+def _bin_of(low: np.ndarray, high: np.ndarray, i: int, axis: int, first: float, scale: float) -> int:
+    return min(BINS - 1, int((0.5 * (low[i, axis] + high[i, axis]) - first) * scale))
+
+
+@jit
+def _cut(
+    low: np.ndarray, high: np.ndarray, order: np.ndarray, start: int, end: int, bins: np.ndarray, sweep: np.ndarray
+) -> int:
+    """Sort a group into two at the cheapest of BINS - 1 places along each axis; returns where the second begins."""
+    best, best_axis, best_bin, best_first, best_scale = np.inf, -1, 0, 0.0, 0.0
+    for axis in range(3):
+        first, last = np.inf, -np.inf
+        for k in range(start, end):
+            middle = 0.5 * (low[order[k], axis] + high[order[k], axis])
+            first, last = min(first, middle), max(last, middle)
+        if not last > first:
+            continue
+        scale = BINS / (last - first)
+        _clear(bins)
+        for k in range(start, end):
+            i = order[k]
+            b = _bin_of(low, high, i, axis, first, scale)
+            _widen(bins, b, low, high, i)
+            bins[b, 6] += 1.0
+        cost, place = _cheapest(bins, sweep)
+        if cost < best:
+            best, best_axis, best_bin, best_first, best_scale = cost, axis, place, first, scale
+    if best_axis < 0:
+        return (start + end) // 2  # all centres in one point
+    left, right = start, end - 1
+    while left <= right:
+        if _bin_of(low, high, order[left], best_axis, best_first, best_scale) <= best_bin:
+            left += 1
+        else:
+            order[left], order[right] = order[right], order[left]
+            right -= 1
+    return left

@@ -1,0 +1,133 @@
+"""The surface point nearest to a place in the cavity, for many places at once: how large a ball fits there.
+
+A walk through the tree of boxes that leaves out what is farther than the nearest found so far; the distance to a
+triangle after C. Ericson, Real-Time Collision Detection (2005), section 5.1.5.
+"""
+
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from sim_core.errors import SceneError
+from sim_core.geometry.bvh import STACK, Tree, build_tree
+from sim_core.geometry.mesh import TriangleMesh
+from sim_core.geometry.obstacles import FACE, Obstacles
+from sim_core.numerics.jit import jit
+from sim_core.numerics.simd import BOXES
+from sim_core.numerics.vec3 import Vec3, along, dot, sub
+
+
+class Nearest(NamedTuple):
+    """``distance`` (n,) [m], ``triangle`` (n,) int32, ``point`` (n, 3) [m] on it; of a place with nothing within its
+    reach: the reach, -1, and the place itself.
+    """
+
+    distance: np.ndarray
+    triangle: np.ndarray
+    point: np.ndarray
+
+
+def nearest(mesh: TriangleMesh, places: np.ndarray, reach: float | np.ndarray, tag: int | None = None) -> Nearest:
+    """The surface point nearest to each of the places (n, 3) [m], if one is nearer than ``reach`` [m], () or (n,).
+
+    ``tag``: only the triangles that have it count.
+    """
+    middle = mesh.middle
+    found = Nearest(
+        np.array(np.broadcast_to(np.asarray(reach, dtype=np.float64), len(places))),
+        np.full(len(places), -1, dtype=np.int32),
+        np.ascontiguousarray(places, dtype=np.float64) - middle,
+    )
+    _find(_tree_of(mesh, tag), found, np.zeros(STACK, dtype=np.int32), np.zeros(STACK))
+    return found._replace(point=found.point + middle)
+
+
+@lru_cache(maxsize=8)
+def _tree_of(mesh: TriangleMesh, tag: int | None) -> Tree:
+    """The triangles themselves as obstacles: their corners, relative to the mesh's middle, are their nine numbers."""
+    own = np.flatnonzero((mesh.tags == tag) | (tag is None)).astype(np.int32)
+    if not len(own):
+        raise SceneError(f"the mesh has no triangle of tag {tag}")
+    corners = mesh.corners[own] - mesh.middle
+    numbers = np.ascontiguousarray(corners.reshape(len(own), 9))
+    triangles = np.repeat(own[:, None], 2, axis=1)
+    kinds = np.full(len(own), FACE, dtype=np.uint8)
+    return build_tree(Obstacles(numbers, kinds, triangles, corners.min(axis=1), corners.max(axis=1)), 0.0)
+
+
+@jit
+def _find(tree: Tree, found: Nearest, stack: np.ndarray, entry: np.ndarray) -> None:
+    """``found`` comes with reaches and places; ``stack`` and ``entry`` are room for the walk: nodes, and how near."""
+    for i in range(len(found.distance)):
+        at = Vec3(found.point[i, 0], found.point[i, 1], found.point[i, 2])
+        least = found.distance[i] * found.distance[i]
+        size = 1
+        stack[0], entry[0] = 0, 0.0
+        while size > 0:
+            size -= 1
+            if entry[size] >= least:
+                continue
+            node = stack[size]
+            first = size
+            for child in range(BOXES):
+                away = _box_distance_squared(tree.bounds, node, child, at)
+                if away >= least:
+                    continue
+                number = tree.children[node, child]
+                if number >= 0:
+                    stack[size], entry[size] = number, away
+                    size += 1
+                    continue
+                point = _on_triangle(tree.numbers, -1 - number, at)
+                offset = sub(at, point)
+                if dot(offset, offset) < least:
+                    least = dot(offset, offset)
+                    found.triangle[i] = tree.triangles[-1 - number, 0]
+                    found.point[i, 0], found.point[i, 1], found.point[i, 2] = point.x, point.y, point.z
+            for k in range(first, size - 1):  # the nearest of the new ones is looked into next
+                if entry[k] < entry[size - 1]:
+                    stack[k], stack[size - 1] = stack[size - 1], stack[k]
+                    entry[k], entry[size - 1] = entry[size - 1], entry[k]
+        if found.triangle[i] >= 0:
+            found.distance[i] = math.sqrt(least)
+
+
+@jit
+def _box_distance_squared(bounds: np.ndarray, node: int, child: int, at: Vec3) -> float:
+    x = max(bounds[node, 0, child] - at.x, at.x - bounds[node, 3, child], 0.0)
+    y = max(bounds[node, 1, child] - at.y, at.y - bounds[node, 4, child], 0.0)
+    z = max(bounds[node, 2, child] - at.z, at.z - bounds[node, 5, child], 0.0)
+    return x * x + y * y + z * z
+
+
+@jit
+def _on_triangle(numbers: np.ndarray, row: int, at: Vec3) -> Vec3:
+    """The point of a triangle nearest to a place."""
+    a = Vec3(numbers[row, 0], numbers[row, 1], numbers[row, 2])
+    b = Vec3(numbers[row, 3], numbers[row, 4], numbers[row, 5])
+    c = Vec3(numbers[row, 6], numbers[row, 7], numbers[row, 8])
+    ab, ac, ap = sub(b, a), sub(c, a), sub(at, a)
+    bb, bc, cc, pb, pc = dot(ab, ab), dot(ab, ac), dot(ac, ac), dot(ap, ab), dot(ap, ac)
+    det = bb * cc - bc * bc
+    if det > 0.0:
+        v, w = (cc * pb - bc * pc) / det, (bb * pc - bc * pb) / det
+        if v >= 0.0 and w >= 0.0 and v + w <= 1.0:
+            return along(along(a, v, ab), w, ac)
+    best = _on_side(a, b, at)  # outside the face: on the nearest of its three sides
+    for other in (_on_side(b, c, at), _on_side(c, a, at)):
+        offset, so_far = sub(at, other), sub(at, best)
+        if dot(offset, offset) < dot(so_far, so_far):
+            best = other
+    return best
+
+
+@jit
+def _on_side(a: Vec3, b: Vec3, at: Vec3) -> Vec3:
+    side = sub(b, a)
+    length = dot(side, side)
+    share = 0.0
+    if length > 0.0:
+        share = min(max(dot(sub(at, a), side) / length, 0.0), 1.0)
+    return along(a, share, side)

@@ -1,0 +1,1 @@
+"""The event loop: event queue, neighbour filter, handlers of events, and simulate()."""

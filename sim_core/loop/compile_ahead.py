@@ -1,0 +1,86 @@
+"""Compiling ahead of time, so that a program can say what takes so long the first time."""
+
+import contextlib
+import math
+import time
+from pathlib import Path
+
+import numpy as np
+
+from sim_core.balls import Balls
+from sim_core.geometry.analytic import cylinder_cavity
+from sim_core.geometry.mesh import TriangleMesh
+from sim_core.loop.simulate import simulate
+from sim_core.loop.spatial_blocks import MANY
+from sim_core.numerics.jit import CACHE_FOLDER
+from sim_core.scene.physics import Physics
+from sim_core.scene.scene import Scene
+
+
+def _mark(physics: Physics, balls: int, alike: bool, bore: bool) -> Path:
+    """A file that says that this set of effects has been compiled: what is absent is not in the machine code."""
+    present = [name for name, effect in zip(physics._fields, physics, strict=True) if effect is not None]
+    kind = ["many" if balls >= MANY else "few", "alike" if alike else "mixed"]
+    if len(physics.vibrations) > 1:
+        kind.append("sonotrodes")
+    return CACHE_FOLDER / "-".join(["compiled", *present, *kind, *["bore"] * bore])
+
+
+def is_compiled(physics: Physics, balls: int, alike: bool = True, bore: bool = False) -> bool:
+    """True when compile_simulator has done this before, with this version of the sources."""
+    return _mark(physics, balls, alike, bore).exists()
+
+
+def compile_simulator(physics: Physics, balls: int = 1, alike: bool = True, bore: bool = False) -> float:
+    """Compiles (or loads from the cache) what a scene with these effects and so many balls, ``alike`` or of several
+    sizes, needs, in a mesh or a prism, or in the ``bore`` of an analytical cylinder; returns the seconds it took.
+    """
+    start = time.perf_counter()
+    if len(physics.vibrations) > 2:
+        physics = physics._replace(vibration=physics.vibrations[:2])  # the same machine code
+    shaken = [one.tag for one in physics.vibrations]
+    vertices = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
+    quads = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
+    triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    tags = np.full(len(triangles), next(tag for tag in range(3) if tag not in shaken))
+    for height, tag in enumerate(shaken):  # floor and ceiling
+        tags[(vertices[triangles][:, :, 2] == height).all(axis=1)] = tag
+    for law in (physics.restitution, physics.friction):
+        if law is not None:
+            tags = np.minimum(tags, len(law.surfaces) - 1)
+    if physics.turn is not None:
+        physics, vertices, triangles, tags = _with_a_turning_box(physics, vertices, triangles, tags)
+    side = math.ceil(MANY ** (1 / 3)) if balls >= MANY else 2
+    places = np.stack(np.meshgrid(*[np.linspace(0.1, 0.9, side)] * 3), axis=-1).reshape(-1, 3)
+    diameter = 0.05 if alike else np.linspace(0.04, 0.05, len(places)).round(2)
+    shot = Balls(places, np.random.default_rng(1).normal(size=places.shape), diameter)
+    mesh = TriangleMesh(vertices, triangles, tags)
+    floor = (vertices[triangles][:, :, 2] == 0.0).all(axis=1)
+    walls = int(tags[~floor][0])
+    room = cylinder_cavity(2.0, 0.0, 1.0, (int(tags[floor][0]), walls, walls), (0.5, 0.5)) if bore else mesh
+    simulate(Scene(room, shot, physics, duration=0.01))
+    with contextlib.suppress(OSError):  # a cache that cannot be written: every process compiles for itself
+        _mark(physics, balls, alike, bore).touch()
+    return time.perf_counter() - start
+
+
+def _with_a_turning_box(
+    physics: Physics, vertices: np.ndarray, triangles: np.ndarray, tags: np.ndarray
+) -> tuple[Physics, np.ndarray, np.ndarray, np.ndarray]:
+    """The cube with a small box in a corner, which turns."""
+    turn = physics.turn
+    assert turn is not None
+    shaken = [one.tag for one in physics.vibrations]
+    still = next(tag for tag in range(4) if tag not in (turn.tag, *shaken))
+    for name in ("restitution", "friction"):
+        law = getattr(physics, name)
+        if law is not None:
+            wider = law._replace(surfaces=[law.surfaces[0]] * max(4, len(law.surfaces)))
+            physics = physics._replace(**{name: wider})
+    box = len(vertices) + triangles[:, ::-1]
+    return (
+        physics._replace(turn=turn._replace(axis_point=(0.03, 0.03, 0.03))),
+        np.concatenate([vertices, 0.02 * vertices + 0.02]),
+        np.concatenate([triangles, box]),
+        np.concatenate([np.where(np.isin(tags, shaken), tags, still), np.full(len(box), turn.tag)]),
+    )

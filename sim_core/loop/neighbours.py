@@ -1,0 +1,215 @@
+"""Who can meet whom: all balls, sixteen at a time through a float32 filter, then exactly.
+
+In the free-fall frame two balls' paths are straight lines, so how near they come does not depend on the time asked:
+with b the difference of their bases and w that of their velocities the miss distance² is b² - (b w)² / w², and they
+still approach while b w + t w² < 0. The filter keeps every pair whose paths could come within reach, rounding
+included; what it lets through is decided in float64, so results do not depend on it.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sim_core.detect.ball_ball import meeting_delay
+from sim_core.loop.spatial_blocks import MANY, Blocks, ball_in, new_blocks, slot_of, sort_blocks, widen
+from sim_core.motion import drift
+from sim_core.numerics.jit import inlined, jit
+from sim_core.numerics.roots import NEVER
+from sim_core.numerics.simd import BOXES, LANES, balls_near, boxes_hit, lowest_bit
+from sim_core.numerics.vec3 import Vec3, sub
+
+FAR_SHARE = np.float32(1.0 - 1e-6)  # of distance²: float32 loses 2e-7 of it in the miss distance
+SLACK = np.float32(1.000001)  # on float32 times: ten times their rounding
+ROUNDINGS = 16.0 * float(np.finfo(np.float32).eps)  # of the largest number in a sum of three products, and to spare
+
+
+FINITE = 1e150  # m/s: its square is finite
+TINY = 1e-30  # stands for a velocity component of zero, whose inverse would be infinite
+
+
+class Crowd(NamedTuple):
+    """The balls as the filter sees them.
+
+    ``lanes`` (6, m) float32: base and velocity, a column a ball, padded with NaN, which meets no one; ``probe`` (10,)
+    float32: the column of the ball that asks, its time, and what the filter allows for rounding, good for speeds up
+    to ``fastest`` [m/s]; ``reach`` [m], the sum of two radii; ``window`` [s]; ``blocks``: only for many balls;
+    ``radii`` (n,) [m]: only for several sizes, whose ``reach`` is that of the largest.
+    """
+
+    lanes: np.ndarray
+    probe: np.ndarray
+    reach: float
+    fastest: float
+    window: float
+    blocks: Blocks | None
+    radii: np.ndarray | None = None
+
+
+def new_crowd(
+    motion: np.ndarray,
+    low: np.ndarray,
+    high: np.ndarray,
+    reach: float,
+    fastest: float,
+    window: float,
+    radii: np.ndarray | None = None,
+) -> Crowd:
+    """The crowd of balls with this motion (n, 6) in a room from ``low`` to ``high`` (3,) [m]."""
+    furthest = float(np.max(high - low)) + fastest * window  # a base lies up to a window's flight outside the room
+    margin = ROUNDINGS * furthest
+    probe = np.zeros(10, dtype=np.float32)
+    probe[7:] = (
+        FAR_SHARE,
+        -((reach + margin) ** 2),
+        margin * fastest,
+    )  # the last: b w + t w² of one that still approaches
+    lanes = np.full((6, -(-len(motion) // LANES) * LANES), np.nan, dtype=np.float32)
+    blocks = new_blocks(len(motion), low, high, reach + 2.0 * margin) if len(motion) >= MANY else None
+    crowd = Crowd(lanes, probe, reach, fastest, window, blocks, radii)
+    set_crowd(crowd, motion)
+    return crowd
+
+
+@jit
+def set_crowd(crowd: Crowd | None, motion: np.ndarray) -> None:
+    """See all balls anew, at a window's start."""
+    if crowd is None:
+        return
+    sort_blocks(crowd.blocks, motion, crowd.window)
+    for ball in range(len(motion)):
+        _see(crowd, motion, ball)
+
+
+@inlined
+def follow(crowd: Crowd | None, motion: np.ndarray, ball: int, time: float) -> None:
+    """See the new path of a ball hit at ``time`` [s]."""
+    if crowd is None:
+        return
+    _see(crowd, motion, ball)
+    widen(crowd.blocks, motion, ball, time, crowd.window)
+
+
+@inlined
+def speed_limit(crowd: Crowd | None) -> float:
+    """Speed [m/s] up to which the filter's margins are good; every finite one without it."""
+    if crowd is None:
+        return FINITE
+    return crowd.fastest
+
+
+@inlined
+def _pair_reach(radii: np.ndarray | None, reach: float, one: int, two: int) -> float:
+    """Distance [m] at which these two touch."""
+    if radii is None:
+        return reach
+    return radii[one] + radii[two]
+
+
+@inlined
+def reach_of(crowd: Crowd | None) -> float:
+    """Distance [m] at which two balls touch; 0 where they never do."""
+    if crowd is None:
+        return 0.0
+    return crowd.reach
+
+
+@inlined
+def _see(crowd: Crowd, motion: np.ndarray, ball: int) -> None:
+    slot = slot_of(crowd.blocks, ball)
+    lanes = crowd.lanes
+    lanes[0, slot] = np.float32(motion[ball, 0])
+    lanes[1, slot] = np.float32(motion[ball, 1])
+    lanes[2, slot] = np.float32(motion[ball, 2])
+    lanes[3, slot] = np.float32(motion[ball, 3])
+    lanes[4, slot] = np.float32(motion[ball, 4])
+    lanes[5, slot] = np.float32(motion[ball, 5])
+
+
+@inlined
+def next_meeting(crowd: Crowd, motion: np.ndarray, ball: int, time: float, before: float) -> tuple[float, int]:
+    """Time [s] and partner of the ball's first meeting after ``time`` and before ``before``.
+
+    If there is none: -1, and the time up to which that is known, NEVER for few balls and the window's end for many.
+    """
+    probe = crowd.probe
+    slot = slot_of(crowd.blocks, ball)
+    for k in range(6):
+        probe[k] = crowd.lanes[k, slot]
+    probe[6] = np.float32(time)
+    return _search(crowd.blocks, crowd, motion, ball, time, before)
+
+
+@inlined
+def _search(
+    blocks: Blocks | None, crowd: Crowd, motion: np.ndarray, ball: int, time: float, before: float
+) -> tuple[float, int]:
+    """What next_meeting returns, from all lanes, or from the blocks that the ball's path enters."""
+    if blocks is None:
+        here = drift(motion, ball, time)
+        velocity = Vec3(motion[ball, 3], motion[ball, 4], motion[ball, 5])
+        best = before - time
+        partner = -1
+        for first in range(0, len(motion), LANES):
+            near = _without(balls_near(crowd.lanes, first, crowd.probe), ball - first)
+            while near != 0:
+                other = first + lowest_bit(near)
+                near &= near - 1
+                closing = sub(Vec3(motion[other, 3], motion[other, 4], motion[other, 5]), velocity)
+                reach = _pair_reach(crowd.radii, crowd.reach, ball, other)
+                delay = meeting_delay(sub(drift(motion, other, time), here), closing, reach)
+                if delay < best:
+                    best = delay
+                    partner = other
+        if partner < 0:
+            return NEVER, -1
+        return time + best, partner
+    best, partner = min(before, crowd.window) - time, -1
+    _aim(blocks.ray, motion, ball, time)
+    slot = slot_of(blocks, ball)
+    for node in range(len(blocks.boxes)):
+        entered = boxes_hit(blocks.boxes, node, blocks.ray, np.float32(best) * SLACK, blocks.enter)
+        while entered != 0:
+            block = BOXES * node + lowest_bit(entered)
+            entered &= entered - 1
+            near = _without(balls_near(crowd.lanes, LANES * block, crowd.probe), slot - LANES * block)
+            if near != 0:
+                best, partner = _nearest(crowd, motion, ball, time, LANES * block, near, best, partner)
+    return (time + best, partner) if partner >= 0 else (crowd.window, -1)
+
+
+@inlined
+def _without(near: int, lane: int) -> int:
+    """The marks of the lanes without the ball's own, if it is among them."""
+    return near & ~(1 << lane) if 0 <= lane < LANES else near
+
+
+@inlined
+def _aim(ray: np.ndarray, motion: np.ndarray, ball: int, time: float) -> None:
+    """The ball's straight path from now on, as boxes_hit wants it."""
+    here = drift(motion, ball, time)
+    for axis in range(3):
+        speed = motion[ball, 3 + axis]
+        ray[axis] = ray[3 + axis] = np.float32(here[axis])
+        ray[6 + axis] = np.float32(1.0 / (speed if abs(speed) >= TINY else TINY))
+
+
+@inlined
+def _nearest(
+    crowd: Crowd, motion: np.ndarray, ball: int, time: float, first: int, near: int, best: float, partner: int
+) -> tuple[float, int]:
+    """The earlier of the best meeting so far (a delay [s]) and those with the balls in the lanes that ``near`` marks.
+
+    Ties go to the lower ball, so that the order of the lanes does not matter.
+    """
+    here = drift(motion, ball, time)
+    velocity = Vec3(motion[ball, 3], motion[ball, 4], motion[ball, 5])
+    while near != 0:
+        other = ball_in(crowd.blocks, first + lowest_bit(near))
+        near &= near - 1
+        closing = sub(Vec3(motion[other, 3], motion[other, 4], motion[other, 5]), velocity)
+        reach = _pair_reach(crowd.radii, crowd.reach, ball, other)
+        delay = meeting_delay(sub(drift(motion, other, time), here), closing, reach)
+        if delay < best or (delay == best and other < partner):
+            best = delay
+            partner = other
+    return best, partner

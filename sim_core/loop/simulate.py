@@ -1,0 +1,295 @@
+"""Scene in, Result out: sets up the columns, runs the compiled event loop, checks what must never break."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from sim_core.balls import Balls
+from sim_core.contact.resting_balls import Resting, resting
+from sim_core.detect.ball_mesh import Scratch, new_scratch
+from sim_core.effects.contact_mode import Footing, checked_rest, new_footing
+from sim_core.effects.drag import Air, checked_drag, new_air
+from sim_core.effects.friction import Grip, checked_friction, new_grip
+from sim_core.effects.gravity import acceleration, checked_gravity
+from sim_core.effects.part_rotation import Turning, angle_now, checked_axle, checked_turn
+from sim_core.effects.random_phase import Phases, checked_random_phase, new_phases
+from sim_core.effects.restitution import Restitution, checked_restitution
+from sim_core.effects.sonotrodes import Waves, new_waves, whole_periods
+from sim_core.effects.vibration import Wave, checked_waves
+from sim_core.errors import SceneError, SimulationError
+from sim_core.geometry.analytic import AnalyticCavity
+from sim_core.geometry.ball_sizes import Sizes, new_sizes
+from sim_core.geometry.mesh import MAX_TAGS
+from sim_core.geometry.obstacle_set import build_ground
+from sim_core.impulses.drag import catch_all_up
+from sim_core.loop.contact_neighbours import hide_all
+from sim_core.loop.event_queue import Calendar, new_calendar
+from sim_core.loop.events import DONE, PAGE_FULL, STORM, TOO_FAST, advance
+from sim_core.loop.impact_log import ImpactLog, ImpactPage, impact_log, new_page
+from sim_core.loop.jam_message import touching
+from sim_core.loop.neighbours import new_crowd
+from sim_core.loop.state import Clock, Loop, Shot
+from sim_core.motion import WINDOW
+from sim_core.numerics.profiler import Stopwatch
+from sim_core.scene.invariants import contained, narrowest_gap, posed
+from sim_core.scene.scene import TOUCH, Scene
+
+CHECK_EVERY = 1.0  # s simulated between checks that every ball is still inside; one check costs about a ms
+
+
+@dataclass(frozen=True)
+class Collisions:
+    """How many collisions there were, warm-up included, and how often the loop searched for one."""
+
+    walls: int
+    balls: int
+    sonotrode: int
+    searches: int
+    stale: int
+
+    @property
+    def total(self) -> int:
+        """Real collisions."""
+        return self.walls + self.balls + self.sonotrode
+
+
+@dataclass(frozen=True)
+class Result:
+    """The recorded impacts, the balls at the end, counts of the collisions, and who lies still at the end.
+
+    ``frames`` (f, n, 3) [m]: where the balls' centres were at the times asked for.
+    """
+
+    impacts: ImpactLog
+    balls: Balls
+    collisions: Collisions
+    resting: Resting
+    frames: np.ndarray
+
+
+def simulate(scene: Scene, frames: Sequence[float] | np.ndarray = ()) -> Result:
+    """Plays the scene from its start to the end of its duration.
+
+    ``frames`` (f,) [s since the end of the warm-up], ascending: when to note where the balls are, each on its flight at
+    that very time. It changes no bit of the rest. Releases the GIL while it runs; the same scene gives the same bits
+    on any thread. Raises SimulationError when a ball is lost, jams, or stops being a number.
+    """
+    run = _Run(scene)
+    run.play(scene.warmup, record=False)
+    seen = run.play(scene.warmup + scene.duration, record=True, frames=_checked_frames(frames, scene))
+    balls = run.balls()
+    still = resting(run.footing, run.ground, balls.positions, run.centre, scene.warmup)
+    return Result(impact_log(run.pages, run.centre), balls, Collisions(*(int(n) for n in run.count)), still, seen)
+
+
+def _checked_frames(frames: Sequence[float] | np.ndarray, scene: Scene) -> np.ndarray:
+    """Frame times on the scene's clock [s]. SceneError for what is not in its duration, or in no order."""
+    times = np.asarray(frames, dtype=float).reshape(-1)
+    if not np.isfinite(times).all() or (np.diff(times) <= 0.0).any():
+        raise SceneError("frames: not ascending times; give each once, in order")
+    if len(times) and not 0.0 <= times[0] <= times[-1] <= scene.duration:
+        raise SceneError(
+            f"frames: from {times[0]:g} to {times[-1]:g} s; allowed: 0 to the duration, {scene.duration:g} s"
+        )
+    return scene.warmup + times
+
+
+_ground = lru_cache(maxsize=8)(build_ground)  # replicas of one chamber share it
+
+
+class _Run:
+    """A scene being played: the columns the loop works on, and what it has written so far."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.gravity = checked_gravity(scene.physics.gravity)
+        vibrations, waves = scene.physics.vibrations, checked_waves(scene.physics.vibration)
+        self.wave: Wave | None = min(waves, key=lambda wave: wave.omega, default=None)
+        self.restitution: Restitution | None = None
+        tags = int(scene.mesh.tags.max()) + 1
+        if scene.physics.restitution is not None:
+            self.restitution = checked_restitution(scene.physics.restitution, tags)
+        self.centre = scene.mesh.middle
+        self.window = whole_periods(vibrations, WINDOW)
+        tags_waving, swings = tuple(one.tag for one in vibrations), tuple(float(one.amplitude) for one in vibrations)
+        vibrating = scene.mesh.corners[np.isin(scene.mesh.tags, tags_waving)] - self.centre
+        random_phase = checked_random_phase(scene.physics.random_phase, len(vibrations))
+        self.phases: Phases | None = new_phases(random_phase, self.wave, vibrating, 0.5 * scene.balls.diameters)
+        self.turning: Turning | None = checked_turn(scene.physics.turn, self.centre)
+        radii = tuple(float(r) for r in 0.5 * scene.balls.sizes)
+        self.ground = _ground(scene.mesh, radii, tags_waving, swings, checked_axle(scene.physics.turn))
+        self.waves: Waves | None = new_waves(vibrations, waves, self.window, self._tags_of_obstacles())
+        self.sizes: Sizes | None = new_sizes(scene.balls, self.ground.roots)
+        self.collide = scene.physics.ball_collisions is not None
+        self.motion = np.concatenate([scene.balls.positions - self.centre, scene.balls.velocities], axis=1)
+        self.calendar: Calendar = new_calendar(len(self.motion), self.collide)
+        self.scratch: Scratch = new_scratch()
+        self.grip = self._grip(tags)
+        self.footing: Footing | None = new_footing(
+            checked_rest(scene.physics.rest), len(self.motion), self.gravity, self.restitution, self.grip
+        )
+        drag = checked_drag(scene.physics.drag)
+        self.air: Air | None = new_air(drag, scene.balls.diameters, scene.balls.densities)
+        self.shot = self._shot(2.0 * max(1.0, float(np.abs(scene.balls.velocities).max())))
+        self.watch: Stopwatch | None = None
+        self.now = np.zeros(2)
+        self.count = np.zeros(5, dtype=np.int64)
+        self.pages: list[tuple[np.ndarray, np.ndarray]] = []
+
+    def _grip(self, tags: int) -> Grip | None:
+        friction, balls = self.scene.physics.friction, self.scene.balls
+        if friction is None:
+            return None
+        spins = np.zeros_like(balls.positions) if balls.spins is None else balls.spins
+        return new_grip(checked_friction(friction, tags), spins, balls.radius, self._tags_of_obstacles())
+
+    def _tags_of_obstacles(self) -> np.ndarray:
+        return np.asarray(self.ground.tags[self.ground.tree.triangles[:, 0]])
+
+    def _shot(self, fastest: float) -> Shot:
+        if not self.collide:
+            return Shot(self.motion, None)
+        low, high = self.scene.mesh.bounds - self.centre
+        balls = self.scene.balls
+        radii = None if balls.alike else 0.5 * balls.diameters
+        crowd = new_crowd(self.motion, low, high, 2.0 * balls.radius, fastest, self.window, radii)
+        hide_all(self.footing, crowd)
+        return Shot(self.motion, crowd)
+
+    def play(self, until: float, record: bool, frames: Sequence[float] | np.ndarray = ()) -> np.ndarray:
+        """Advance to ``until`` [s], checking containment on the way; positions (f, n, 3) [m] at ``frames`` [s]."""
+        page = new_page(self._recorded_tags() if record else np.zeros(MAX_TAGS, dtype=np.bool_))
+        origin = self.scene.warmup
+        start = self.now[0] + self.now[1] * self.window
+        checks = np.linspace(start, until, 1 + max(1, math.ceil((until - start) / CHECK_EVERY)))[1:]
+        due, noted, seen = set(checks), set(frames), []
+        for stop in sorted({*checks, *frames}):
+            self._advance(Clock(self.now, self.window, float(stop), origin), page)
+            if stop in noted:
+                seen.append(self._states()[0])
+            if stop in due:
+                self._require_sound()
+        self._turn(page)
+        return np.array(seen).reshape(-1, len(self.motion), 3)
+
+    def _recorded_tags(self) -> np.ndarray:
+        record = np.zeros(MAX_TAGS, dtype=np.bool_)
+        record[np.arange(MAX_TAGS) if self.scene.record is None else list(self.scene.record)] = True
+        return record
+
+    def _advance(self, clock: Clock, page: ImpactPage) -> None:
+        while True:
+            status, ball = advance(
+                Loop(
+                    self.shot,
+                    self.ground,
+                    self.calendar,
+                    self.scratch,
+                    self.gravity,
+                    self.restitution,
+                    self.wave,
+                    self.turning,
+                    clock,
+                    page,
+                    self.count,
+                    self.watch,
+                    self.footing,
+                    self.grip,
+                    self.phases,
+                    self.air,
+                    self.sizes,
+                    self.waves,
+                )
+            )
+            if status == DONE:
+                return
+            if status == PAGE_FULL:
+                self._turn(page)
+            elif status == TOO_FAST:
+                speed = float(np.abs(self.motion[ball, 3:]).max())
+                if not math.isfinite(speed):
+                    raise SimulationError(f"ball {ball}: its velocity is not a number any more; {self._when()}")
+                self.shot = self._shot(4.0 * speed)
+            elif status == STORM:
+                raise SimulationError(self._jam(ball))
+
+    def _jam(self, ball: int) -> str:
+        positions = self._states()[0]
+        where = np.round(positions[ball], 6).tolist()
+        between, by_part = touching(self.scene, self._corners(), positions, ball)
+        if self.turning is not None and (by_part or self.footing is not None):
+            through = "" if by_part else ", and the turning part presses on it through other balls"
+            return (
+                f"ball {ball} is caught between {between}{through}, at {where} m, {self._when()}; make room there for "
+                "a ball between the part and what it turns past, or so little that none gets in"
+            )
+        return (
+            f"ball {ball} jams at {where} m{f', between {between}' if between else ''}: more than ten million events "
+            f"a second; {self._when()}. Look for a gap just as wide as the ball there"
+            + ("" if self.footing is not None else "; if balls can lie still there, switch contact mode on")
+        )
+
+    def _turn(self, page: ImpactPage) -> None:
+        """Put away what the loop has written, and give it the empty page."""
+        rows = int(page.filled[0])
+        if rows:
+            self.pages.append((page.numbers[:rows].copy(), page.names[:rows].copy()))
+            page.filled[0] = 0
+
+    def _when(self) -> str:
+        return f"{self.now[0] + self.now[1] * self.window:.6f} s after the start"
+
+    def _states(self) -> tuple[np.ndarray, np.ndarray]:
+        """Positions [m] and velocities [m/s] now, (n, 3) each: point_at for all balls at once."""
+        now = self.now[0]
+        fall = np.array(acceleration(self.gravity)) if self.footing is None else self.footing.pull
+        base, velocities = self.motion[:, :3], self.motion[:, 3:]
+        velocities_now = velocities + now * fall
+        catch_all_up(self.air, self.footing, velocities_now, now)
+        return base + velocities * now + 0.5 * now * now * fall + self.centre, velocities_now
+
+    def _require_sound(self) -> None:
+        points, _ = self._states()
+        bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+        if len(bad):
+            raise SimulationError(f"ball {bad[0]}: its position is not a number any more; {self._when()}")
+        outside = np.flatnonzero(~self._inside(points))
+        if len(outside):
+            raise SimulationError(
+                f"ball {outside[0]} has left the mesh at {np.round(points[outside[0]], 6).tolist()} m, {self._when()}. "
+                "Look for surfaces that overlap or cross there; if there are none, please report the scene"
+            )
+        if not self.collide:
+            return
+        gap, one, two = narrowest_gap(self.balls())
+        if gap < -TOUCH:
+            raise SimulationError(
+                f"balls {one} and {two} overlap by {-gap:.3g} m, {self._when()}; please report the scene"
+            )
+
+    def _inside(self, points: np.ndarray) -> np.ndarray:
+        """Which points (n, 3) [m] are in the chamber; also down to where a face that swings wider than a ball is."""
+        mesh, corners = self.scene.mesh, self._corners()
+        if isinstance(mesh, AnalyticCavity):
+            return mesh.contains(points, max((one.amplitude for one in self.scene.physics.vibrations), default=0.0))
+        inside = contained(mesh, points, corners)
+        for one in self.scene.physics.vibrations:
+            if one.amplitude >= 0.5 * self.scene.balls.sizes[0] and not inside.all():
+                inside |= contained(mesh, points + one.peak, corners) | contained(mesh, points - one.peak, corners)
+        return inside
+
+    def _corners(self) -> np.ndarray | None:
+        """The triangles where they are now, if some of them turn."""
+        turn = self.scene.physics.turn
+        mesh = self.scene.mesh
+        if turn is None or self.turning is None or isinstance(mesh, AnalyticCavity):
+            return None
+        return posed(mesh, turn, angle_now(self.turning, float(self.now[0])))
+
+    def balls(self) -> Balls:
+        """The balls as they are now."""
+        spins = None if self.grip is None else self.grip.spins + self.now[0] * self.grip.twists
+        return Balls(*self._states(), self.scene.balls.diameter, self.scene.balls.density, spins)

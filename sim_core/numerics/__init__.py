@@ -1,0 +1,1 @@
+"""Compilation, vectors, roots of polynomials, SIMD filters, profiler."""

@@ -1,0 +1,1 @@
+"""What is simulated: scene, physics, packing, and what is refused."""

@@ -1,0 +1,71 @@
+"""What a scene with an analytical cavity must fulfil."""
+
+import numpy as np
+
+from sim_core.balls import Balls
+from sim_core.effects.vibration import Vibration
+from sim_core.errors import SceneError
+from sim_core.geometry.analytic import CEILING, FLOOR, AnalyticCavity
+from sim_core.scene.narrow_gaps import TIGHT
+from sim_core.scene.physics import Physics
+
+
+def require_supported(cavity: AnalyticCavity, physics: Physics) -> None:
+    """Raises SceneError for effects that are not supported in an analytical cavity."""
+    remedy = "leave it out, or give the cavity as a mesh"
+    for name in ("rest", "turn"):
+        if getattr(physics, name) is not None:
+            raise SceneError(f"physics.{name} is not supported with an analytical cavity; {remedy}")
+    gravity = physics.gravity
+    if cavity.radius is not None and gravity is not None and (gravity[0] != 0.0 or gravity[1] != 0.0):
+        raise SceneError(
+            f"physics.gravity is {tuple(gravity)}: not supported with an analytical cylinder unless along z; {remedy}"
+        )
+    if len(physics.vibrations) > 1:
+        raise SceneError(f"several vibrations are not supported with an analytical cavity; {remedy}")
+    for vibration in physics.vibrations:
+        _require_floor(cavity, vibration, remedy)
+
+
+def _require_floor(cavity: AnalyticCavity, vibration: Vibration, remedy: str) -> None:
+    if not (vibration.axis[0] == 0.0 and vibration.axis[1] == 0.0):
+        raise SceneError(
+            f"vibration.axis is {vibration.axis}: not supported with an analytical cavity unless along z; {remedy}"
+        )
+    swings = np.flatnonzero(cavity.tags == vibration.tag)
+    if len(swings) and swings.tolist() != [FLOOR]:
+        others = ", ".join(cavity.name(int(k)) for k in swings)
+        raise SceneError(
+            f"vibration.tag is {vibration.tag}, that of {others}: not supported; the floor "
+            "alone of an analytical cavity can vibrate, give it a tag of its own"
+        )
+
+
+def require_clear(cavity: AnalyticCavity, balls: Balls, vibrations: tuple[Vibration, ...], touch: float) -> None:
+    """Raises SceneError for a ball outside the cavity, in a surface by more than ``touch`` [m], or wider than the
+    cavity where it is narrowest; the vibrating floor is where its phase has it.
+    """
+    gap, radii = cavity.gaps(balls.positions), 0.5 * balls.diameters
+    swing = 0.0
+    for vibration in vibrations:
+        swing = vibration.amplitude
+        gap[:, FLOOR] -= swing * np.sin(vibration.phase) * np.sign(vibration.axis[2])
+    over = gap - radii[:, None]
+    ball, surface = (int(k) for k in np.unravel_index(over.argmin(), over.shape))
+    where = f"ball {ball} at {balls.positions[ball].tolist()} m"
+    if gap[ball, surface] <= 0.0:
+        raise SceneError(f"{where} is outside the cavity, beyond {cavity.name(surface)}")
+    if over[ball, surface] < -touch:
+        moving = " (displaced by its phase at the start)" if surface == FLOOR and swing > 0.0 else ""
+        raise SceneError(
+            f"{where} overlaps {cavity.name(surface)}{moving} by {-over[ball, surface]:.3g} m; "
+            "move it or make it smaller"
+        )
+    height = cavity.top - cavity.bottom - swing
+    for room, one, two in (cavity.narrowest(), (height, FLOOR, CEILING)):
+        if room < 2.0 * radii.max() - TIGHT:
+            between = f"between {cavity.name(one)} and {cavity.name(two)}" if one != two else "in the cylinder"
+            raise SceneError(
+                f"ball {int(radii.argmax())} does not fit {between}: the gap is narrower than the ball by "
+                f"{2.0 * radii.max() - room:.3g} m; widen it or make the ball smaller"
+            )

@@ -1,0 +1,243 @@
+"""What must never break, checked by other means than the code under test.
+
+Containment by counting ray crossings (not by contact times), overlap by plain distances, energy and momentum by
+their sums.
+"""
+
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from sim_core.balls import Balls
+from sim_core.effects.gravity import Gravity
+from sim_core.effects.part_rotation import Turn, angle_now, checked_axle, checked_turn, turned
+from sim_core.geometry.mesh import TriangleMesh
+from sim_core.numerics.jit import jit
+from sim_core.numerics.vec3 import Vec3, cross, dot, sub
+
+# Ray directions no designer's edge is parallel to, so that a ray through an edge or corner is a coincidence; where it
+# happens all the same, the next direction is asked.
+RAYS = np.array([[0.3671, 0.2113, 0.9058], [-0.5317, 0.7411, 0.4098], [0.6119, -0.4733, -0.6337]])
+BORDER = 1e-12  # of the mesh's size squared: a ray passing an edge by less is asked again along the next direction
+
+
+class _Shadows(NamedTuple):
+    """The triangles seen along a ray.
+
+    ``corners`` (m, 3, 3) with the ray as third axis; ``boxes`` (m, 4): low, high of the first axis and of the second;
+    ``turn`` (3, 3), rows the axes; ``border`` [m²].
+    """
+
+    corners: np.ndarray
+    boxes: np.ndarray
+    turn: np.ndarray
+    border: float
+
+
+@lru_cache(maxsize=32)
+def _shadows(mesh: TriangleMesh, k: int) -> _Shadows:
+    return _cast(mesh.corners, mesh, k)
+
+
+def _cast(triangles: np.ndarray, mesh: TriangleMesh, k: int) -> _Shadows:
+    """The triangles (m, 3, 3) seen along ray k; the ``mesh`` gives the scale."""
+    ray = RAYS[k] / np.linalg.norm(RAYS[k])
+    side = np.cross(ray, [1.0, 0.0, 0.0])
+    side /= np.linalg.norm(side)
+    turn = np.stack([side, np.cross(ray, side), ray])
+    corners = np.ascontiguousarray(triangles @ turn.T)
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    boxes = np.stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1]], axis=1)
+    return _Shadows(corners, boxes, turn, BORDER * float(np.ptp(mesh.vertices, axis=0).max()) ** 2)
+
+
+@jit
+def _crossings(shadows: _Shadows, u: float, v: float, w: float) -> int:
+    """Triangles that the ray from (u, v, w) along the third axis crosses; -1: too near an edge to tell."""
+    crossed = 0
+    corners, boxes = shadows.corners, shadows.boxes
+    for t in range(len(boxes)):
+        if u < boxes[t, 0] or u > boxes[t, 1] or v < boxes[t, 2] or v > boxes[t, 3]:
+            continue
+        au, av = corners[t, 0, 0] - u, corners[t, 0, 1] - v
+        bu, bv = corners[t, 1, 0] - u, corners[t, 1, 1] - v
+        cu, cv = corners[t, 2, 0] - u, corners[t, 2, 1] - v
+        a, b, c = bu * cv - bv * cu, cu * av - cv * au, au * bv - av * bu  # twice the areas seen from the ray
+        if min(abs(a), abs(b), abs(c)) <= shadows.border:
+            return -1
+        if (a > 0.0) == (b > 0.0) == (c > 0.0):
+            above = a * corners[t, 0, 2] + b * corners[t, 1, 2] + c * corners[t, 2, 2]
+            if above / (a + b + c) > w:
+                crossed += 1
+    return crossed
+
+
+@jit
+def _count(shadows: _Shadows, points: np.ndarray, crossed: np.ndarray) -> None:
+    for i in range(len(points)):
+        crossed[i] = _crossings(shadows, points[i, 0], points[i, 1], points[i, 2])
+
+
+def contained(mesh: TriangleMesh, points: np.ndarray, corners: np.ndarray | None = None) -> np.ndarray:
+    """Which points (n, 3) [m] lie inside the mesh, shape (n,) bool, by the parity of crossings along a ray.
+
+    ``corners`` (m, 3, 3) [m]: where the triangles are now, if not where the mesh has them. Where a turned part goes
+    through a wall the surface has slits: who is out by the parity, is out only if the surface's solid angle, which a
+    slit hardly changes, says so too.
+    """
+    points = np.asarray(points, dtype=np.float64)
+    inside = np.zeros(len(points), dtype=np.bool_)
+    asked = np.arange(len(points))
+    for k in range(len(RAYS)):
+        shadows = _shadows(mesh, k) if corners is None else _cast(corners, mesh, k)
+        crossed = np.zeros(len(asked), dtype=np.int64)
+        _count(shadows, np.ascontiguousarray(points[asked] @ shadows.turn.T), crossed)
+        inside[asked] = crossed % 2 == 1
+        asked = asked[crossed < 0]
+        if len(asked) == 0:
+            break
+    if corners is not None:
+        inside[~inside] = enclosed(corners, points[~inside])
+    return inside
+
+
+def enclosed(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Which points (n, 3) [m] the triangles (m, 3, 3) [m] go round, shape (n,) bool, by their solid angle."""
+    angle = np.zeros(len(points))
+    _solid_angles(np.ascontiguousarray(corners), np.ascontiguousarray(points, dtype=np.float64), angle)
+    return np.asarray(angle > 2.0 * math.pi)
+
+
+@jit
+def _solid_angles(corners: np.ndarray, points: np.ndarray, angle: np.ndarray) -> None:
+    """Of all triangles, seen from each point: van Oosterom & Strackee, IEEE Trans. Biomed. Eng. 30 (1983) 125."""
+    for i in range(len(points)):
+        at = Vec3(points[i, 0], points[i, 1], points[i, 2])
+        for t in range(len(corners)):
+            a = sub(Vec3(corners[t, 0, 0], corners[t, 0, 1], corners[t, 0, 2]), at)
+            b = sub(Vec3(corners[t, 1, 0], corners[t, 1, 1], corners[t, 1, 2]), at)
+            c = sub(Vec3(corners[t, 2, 0], corners[t, 2, 1], corners[t, 2, 2]), at)
+            p, q, r = math.sqrt(dot(a, a)), math.sqrt(dot(b, b)), math.sqrt(dot(c, c))
+            below = p * q * r + dot(a, b) * r + dot(b, c) * p + dot(c, a) * q
+            angle[i] += 2.0 * math.atan2(dot(a, cross(b, c)), below)
+
+
+def posed(mesh: TriangleMesh, turn: Turn, angle: float | None = None) -> np.ndarray:
+    """Corners (m, 3, 3) [m] of the mesh's triangles, those of the part turned by ``angle`` [rad]: at the start, if
+    none is given.
+    """
+    turning = checked_turn(turn, mesh.middle)
+    assert turning is not None
+    angle = angle_now(turning, 0.0) if angle is None else angle
+    axle = checked_axle(turn)
+    assert axle is not None
+    corners = mesh.corners.copy()
+    own = mesh.tags == axle.tag
+    corners[own] = turned(corners[own], np.array(axle.point), np.array(axle.axis), angle)
+    return corners
+
+
+@jit
+def _distance_squared(corners: np.ndarray, t: int, px: float, py: float, pz: float) -> float:
+    """Squared distance from a point to a triangle: Ericson, Real-Time Collision Detection (2005), section 5.1.5."""
+    ax, ay, az = corners[t, 0, 0], corners[t, 0, 1], corners[t, 0, 2]
+    bx, by, bz = corners[t, 1, 0] - ax, corners[t, 1, 1] - ay, corners[t, 1, 2] - az
+    cx, cy, cz = corners[t, 2, 0] - ax, corners[t, 2, 1] - ay, corners[t, 2, 2] - az
+    x, y, z = px - ax, py - ay, pz - az
+    bb, bc, cc = bx * bx + by * by + bz * bz, bx * cx + by * cy + bz * cz, cx * cx + cy * cy + cz * cz
+    xb, xc = x * bx + y * by + z * bz, x * cx + y * cy + z * cz
+    det = bb * cc - bc * bc
+    v, w = -1.0, -1.0
+    if det > 0.0:
+        v, w = (cc * xb - bc * xc) / det, (bb * xc - bc * xb) / det
+    if v >= 0.0 and w >= 0.0 and v + w <= 1.0:
+        dx, dy, dz = x - v * bx - w * cx, y - v * by - w * cy, z - v * bz - w * cz
+        return dx * dx + dy * dy + dz * dz
+    nearest = math.inf
+    for side in range(3):  # outside the face: the nearest of the three borders
+        if side == 0:
+            ox, oy, oz, ex, ey, ez = x, y, z, bx, by, bz
+        elif side == 1:
+            ox, oy, oz, ex, ey, ez = x, y, z, cx, cy, cz
+        else:
+            ox, oy, oz, ex, ey, ez = x - bx, y - by, z - bz, cx - bx, cy - by, cz - bz
+        length = ex * ex + ey * ey + ez * ez
+        s = 0.0
+        if length > 0.0:
+            s = min(max((ox * ex + oy * ey + oz * ez) / length, 0.0), 1.0)
+        dx, dy, dz = ox - s * ex, oy - s * ey, oz - s * ez
+        nearest = min(nearest, dx * dx + dy * dy + dz * dz)
+    return nearest
+
+
+@jit
+def _clear(
+    corners: np.ndarray, low: np.ndarray, high: np.ndarray, points: np.ndarray, reach: float, gap: np.ndarray
+) -> None:
+    for i in range(len(points)):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        nearest = reach * reach
+        for t in range(len(corners)):
+            if (
+                low[t, 0] - reach < x < high[t, 0] + reach
+                and low[t, 1] - reach < y < high[t, 1] + reach
+                and low[t, 2] - reach < z < high[t, 2] + reach
+            ):
+                nearest = min(nearest, _distance_squared(corners, t, x, y, z))
+        gap[i] = math.sqrt(nearest)
+
+
+def clearance(corners: np.ndarray, points: np.ndarray, reach: float) -> np.ndarray:
+    """Distance (n,) [m] from points (n, 3) to the nearest of the triangles (m, 3 corners, 3), at most ``reach`` [m]."""
+    points = np.ascontiguousarray(points, dtype=np.float64)
+    gap = np.zeros(len(points))
+    _clear(corners, corners.min(axis=1), corners.max(axis=1), points, reach, gap)
+    return gap
+
+
+def closest_pair(balls: Balls) -> tuple[float, int, int]:
+    """Smallest centre distance [m] among the balls, and which two; (inf, -1, -1) for a single ball."""
+    if len(balls) < 2:
+        return math.inf, -1, -1
+    from scipy.spatial import KDTree
+
+    distance, partner = KDTree(balls.positions).query(balls.positions, k=2)
+    one = int(distance[:, 1].argmin())
+    two = int(partner[one, 1])  # of balls in one place the first found may be either
+    return float(distance[one, 1]), one, two if two != one else int(partner[one, 0])
+
+
+def narrowest_gap(balls: Balls) -> tuple[float, int, int]:
+    """Smallest gap [m] between the surfaces of two balls, negative when they overlap, and which two.
+
+    (inf, -1, -1) for a single ball; of several sizes also when no two are nearer than the largest's diameter.
+    """
+    if np.ndim(balls.diameter) == 0:
+        distance, one, two = closest_pair(balls)
+        return distance - float(balls.diameter), one, two
+    from scipy.spatial import KDTree
+
+    pairs = KDTree(balls.positions).query_pairs(2.0 * balls.radius, output_type="ndarray")
+    if len(pairs) == 0:
+        return math.inf, -1, -1
+    apart = np.linalg.norm(balls.positions[pairs[:, 0]] - balls.positions[pairs[:, 1]], axis=1)
+    gap = apart - 0.5 * balls.diameters[pairs].sum(axis=1)
+    worst = int(gap.argmin())
+    return float(gap[worst]), int(pairs[worst, 0]), int(pairs[worst, 1])
+
+
+def energy(balls: Balls, gravity: Gravity | None = None) -> float:
+    """Kinetic plus potential energy [J], that of spins included, potential zero at the origin."""
+    each = 0.5 * np.einsum("ij,ij->i", balls.velocities, balls.velocities)
+    if balls.spins is not None:  # the moment of inertia of a solid sphere: 2/5 m R²
+        each += 0.2 * (0.5 * balls.diameters) ** 2 * np.einsum("ij,ij->i", balls.spins, balls.spins)
+    if gravity is not None:
+        each -= balls.positions @ np.array([gravity.x, gravity.y, gravity.z])
+    return float(balls.masses @ each)
+
+
+def momentum(balls: Balls) -> np.ndarray:
+    """Total momentum [kg m/s], shape (3,)."""
+    return np.asarray(balls.masses @ balls.velocities)

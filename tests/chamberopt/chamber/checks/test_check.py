@@ -1,0 +1,187 @@
+"""What `check` says before anything runs: where shot can come to rest, how the part turns, what sticks out."""
+
+import math
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from chamberopt.chamber.build import TAG_SONOTRODE, Chamber, build_chamber
+from chamberopt.chamber.checks.check import describe, shot_reach, warnings
+from chamberopt.chamber.checks.ledges import ledges
+from chamberopt.chamber.reach.reach import Reach
+from chamberopt.design.design import Design, checked
+from chamberopt.design.load import load_design
+from sim_core import SceneError
+
+DESIGNS = Path(__file__).resolve().parents[4] / "designs"
+
+
+@cache
+def made(name: str, **values: float) -> tuple[Design, Chamber]:
+    design = load_design(DESIGNS / f"{name}.toml").with_values({k.replace("__", "."): v for k, v in values.items()})
+    return design, build_chamber(design)
+
+
+KNOWN: list[tuple[Chamber, Reach]] = []
+
+
+def found_in(design: Design, chamber: Chamber) -> Reach:
+    """What the shot reaches, found once a chamber: none of these tests changes its balls."""
+    for other, reach in KNOWN:
+        if other is chamber:
+            return reach
+    KNOWN.append((chamber, shot_reach(design, chamber)))
+    return KNOWN[-1][1]
+
+
+def warned(design: Design, chamber: Chamber) -> list[str]:
+    return warnings(design, chamber, found_in(design, chamber))
+
+
+def described(design: Design, chamber: Chamber) -> dict[str, Any]:
+    return describe(design, chamber, found_in(design, chamber))
+
+
+def without_gravity(design: Design) -> Design:
+    return design.model_copy(update={"effects": design.effects.model_copy(update={"gravity": False})})
+
+
+@pytest.fixture(scope="module")
+def gear() -> tuple[Design, Chamber]:
+    return made("gear")
+
+
+def test_a_level_top_is_warned_of_with_area_place_and_remedy(gear: tuple[Design, Chamber]) -> None:
+    """The gear's upper face: a disc with teeth, 20 mm from root to root and 22 to their tips, less the shaft."""
+    design, chamber = gear
+    (said,) = (text for text in warned(design, chamber) if "come to rest" in text)
+    assert "come to rest on the part, which neither vibrates nor turns" in said
+    assert "around (0.0, 0.0, 25.0) mm, at z = 25 mm" in said
+    assert "effects.part_turn" in said
+    area = float(said.split("turns: ")[1].split(" mm²")[0])
+    shaft = math.pi * 8**2
+    assert 0.5 * math.pi * 22**2 - shaft < area < math.pi * 22**2 - shaft / 2
+    (ledge,) = ledges(design, chamber)
+    assert ledge.level
+    assert not ledges(without_gravity(design), chamber)
+
+
+def test_slopes_are_a_note_and_no_warning() -> None:
+    """A gutter round the wall; the blade's own slopes, and walls that lean out, lead down to the sonotrode."""
+    design, chamber = made("blade")
+    assert not ledges(design, chamber)
+    data = design.model_dump()
+    data["chamber"] = {"shape": "prism", "sides": 6, "across_mm": 50.0, "height_mm": 57.0, "inclination_deg": 10.0}
+    leaning = checked(Design, {**data, "chamber": {**data["chamber"], "sonotrode_distance_mm": 15.0}})
+    assert not ledges(leaning, build_chamber(leaning))
+    profile = [[24, 0], [24, 12], [28, 8], [32, 12], [32, 57]]
+    data["chamber"] = {"shape": "revolve", "profile_mm": profile, "sonotrode_distance_mm": 15.0}
+    gutter = checked(Design, data)
+    (found,) = ledges(gutter, build_chamber(gutter))
+    assert not found.level
+    assert "in hollows of the wall" in found.said
+    assert "none level" in found.said
+    assert "z = 8 to 12 mm" in found.said
+
+
+def test_nothing_comes_to_rest_under_a_lid_or_on_a_part_that_turns() -> None:
+    for name in ("plate", "gear_turning"):
+        assert not ledges(*made(name)), name
+
+
+def test_a_turning_part_is_described_in_the_chambers_frame() -> None:
+    design, chamber = made("gear_turning")
+    turn = described(design, chamber)["part_turn"]
+    assert turn["rpm"] == 30.0
+    assert turn["axis"] == pytest.approx([0.0, -1.0, 0.0], abs=1e-12)
+    assert turn["through_mm"][0] == pytest.approx(0.0, abs=1e-3)
+    assert turn["through_mm"][2] == pytest.approx(15.0 + 22.0, abs=0.1)
+    assert "part_turn" not in described(*made("plate"))
+
+
+def test_a_part_through_the_side_wall_is_warned_of(gear: tuple[Design, Chamber]) -> None:
+    """Not of a shaft that goes out through the ceiling, nor of a lid, nor of a shaft that turns in the wall."""
+    assert not any("side wall between z" in text for text in warned(*gear))
+    for name in ("plate", "gear_turning"):
+        assert not any("side wall between z" in text for text in warned(*made(name))), name
+    said = " ".join(warned(*made("gear", chamber__diameter_mm=42.0)))
+    assert "goes out through the side wall between z = 15 and 25 mm" in said
+    assert "chamber.diameter_mm" in said
+
+
+def test_a_part_that_turns_down_to_the_sonotrode_is_warned_of() -> None:
+    """The gear of 22 mm, 15 mm over the sonotrode, turned about a line 6.9 mm under its own axis: down to 1.2 mm."""
+    eccentric = {"effects.part_turn.through_mm.1": -6.9}
+    design, chamber = made("gear_turning")
+    said = " ".join(warned(design.with_values(eccentric), chamber))
+    assert "the gap between turning part and sonotrode is 1.16 mm, narrower than a ball of 1.5 mm" in said
+    assert "turning part" not in " ".join(warned(design, chamber))
+    # 5 degrees to each side, a point 22 mm under the gear's axis hardly gets lower than at rest
+    swings = design.with_values(eccentric)
+    motion = swings.effects.part_turn.model_copy(update={"rpm": None, "angle_deg": 5.0, "frequency_hz": 1.0})  # type: ignore[union-attr]
+    swings = swings.model_copy(update={"effects": swings.effects.model_copy(update={"part_turn": motion})})
+    assert "turning part" not in " ".join(warned(swings, chamber))
+
+
+def test_balls_that_would_meet_but_are_let_through_each_other_are_warned_of() -> None:
+    design, chamber = made("gear")
+    through = design.model_copy(update={"effects": design.effects.model_copy(update={"ball_collisions": False})})
+    assert any("effects.ball_collisions is false" in text for text in warned(through, chamber))
+    assert not any("ball_collisions" in text for text in warned(design, chamber))
+    alone = through.with_values({"shot.mass_g": 1e-3 * round(1e6 * design.shot.ball_mass)})
+    assert not any("ball_collisions" in text for text in warned(alone, chamber))
+
+
+def test_what_a_ball_can_touch_is_a_fact_and_what_it_cannot_a_warning(gear: tuple[Design, Chamber]) -> None:
+    design, chamber = gear
+    facts = described(design, chamber)
+    reach = facts["reach"]
+    assert reach["ball_mm"] == 1.5
+    assert reach["target_reachable_mm2"] == pytest.approx(
+        reach["target_reachable_share"] * facts["target"]["exposed_area_mm2"], rel=1e-3
+    )
+    (said,) = (text for text in facts["warnings"] if "cannot be touched by a ball of 1.5 mm" in text)
+    share = 100.0 * (1.0 - reach["target_reachable_share"])
+    assert float(said.split("%")[0]) == pytest.approx(share, abs=0.1)
+    assert 5.0 < share < 25.0  # the sharp roots of the teeth
+    assert "part.target.reachable = true" in said
+    assert not any("cannot be touched" in text for text in warned(*made("plate")))
+
+
+def test_a_gap_too_low_for_a_ball_is_warned_of_with_its_place_and_width() -> None:
+    (said,) = (text for text in warned(*made("gear", chamber__height_mm=26.0)) if "the gap between" in text)
+    assert "the gap between the ceiling and the part's upper side at (" in said
+    assert ", 25.5) mm is 1 to 1.0" in said
+    assert "narrower than a ball of 1.5 mm: no ball gets in there; raise chamber.height_mm or close the gap" in said
+    (said,) = (text for text in warned(*made("gear", chamber__diameter_mm=46.0)) if "gaps between" in text)
+    assert said.startswith("each of 20 gaps between the part's side and the wall, one at (")
+    assert "no ball gets in there; enlarge the chamber" in said
+
+
+def test_a_chamber_that_leaks_is_refused_with_the_place(gear: tuple[Design, Chamber]) -> None:
+    design, chamber = gear
+    assert described(design, chamber)["chamber"]["closed"] == "yes"
+    gone = int((chamber.tags == TAG_SONOTRODE).argmax())
+    columns = {name: np.delete(getattr(chamber, name), gone, axis=0) for name in ("triangles", "tags", "source")}
+    corners = chamber.vertices[chamber.triangles[gone]]
+    with pytest.raises(SceneError, match=r"mesh is not closed: 3 open edge\(s\), the first on triangle") as refused:
+        describe(design, replace(chamber, **columns))
+    place = np.array([float(x) for x in str(refused.value).split("at [")[1].split("]")[0].split(",")])
+    middles = 0.5 * (corners + np.roll(corners, -1, axis=0))
+    assert np.linalg.norm(middles - place, axis=1).min() < 2e-6
+
+
+def test_a_sonotrode_that_comes_near_the_part_is_warned_of(gear: tuple[Design, Chamber]) -> None:
+    """A design is kept ten amplitudes away; a cavity made elsewhere may be nearer."""
+    design, chamber = gear
+    assert described(design, chamber)["chamber"]["sonotrode_clearance_mm"] == pytest.approx(15.0)
+    floor = np.unique(chamber.triangles[chamber.tags == TAG_SONOTRODE])
+    vertices = chamber.vertices.copy()
+    vertices[floor, 2] = 14.7e-3
+    (said,) = (text for text in warned(design, replace(chamber, vertices=vertices)) if "apart" in text)
+    assert "part and sonotrode are only 0.3 mm apart, less than ten amplitudes of 40 µm" in said
+    assert "chamber.sonotrode_distance_mm" in said

@@ -1,0 +1,492 @@
+"""The command line as a user meets it: a wrong file is one message on stderr, status 2, no traceback."""
+
+import io
+import json
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chamberopt.cli import main
+from chamberopt.common.progress import progress_bar
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+@dataclass(frozen=True)
+class Wrong:
+    """One mistake in a copy of the shipped gear design or study, and what must be said of it."""
+
+    name: str
+    change: tuple[str, str] | bytes
+    said: tuple[str, ...]
+    file: str = "designs/gear.toml"
+
+
+STUDY = "studies/quickstart.toml"
+WRONG = [
+    Wrong("empty", b"", ("gear.toml", "empty", "copy of a shipped one")),
+    Wrong("not utf-8", b'[part]\nmesh = "\xff"', ("not UTF-8", "byte 15", "save it as UTF-8")),
+    Wrong("binary stl", b"solid\x00\x01\x02 = \x80", ("not UTF-8",)),
+    Wrong("not toml", ("height_mm = 45", "height_mm : 45"), (":15", "not valid TOML", "column")),
+    Wrong("key given twice", ("height_mm = 45", "height_mm = 45\nheight_mm = 46"), ("not valid TOML", ":16")),
+    Wrong(
+        "misspelt key",
+        ("height_mm = 45", "heigth_mm = 45"),
+        (":15", "unknown key", "did you mean 'height_mm'"),
+    ),
+    Wrong("misspelt table", ("[sonotrode]", "[sonotrod]"), (":18", "did you mean 'sonotrode'")),
+    Wrong(
+        "effect not there yet",
+        ("gravity = true", "wind = 0.3"),
+        ("effects.wind: unknown key", "gravity"),
+    ),
+    Wrong(
+        "key of another table",
+        ("[shot]", "[shot]\nheight_mm = 3"),
+        ("did you mean 'height_mm' in [chamber]",),
+    ),
+    Wrong("missing key", ("diameter_mm = 70\n", ""), ("chamber.diameter_mm: missing", "from 2 to 2000 mm")),
+    Wrong("no such unit", ('unit = "mm"', "unit = 1"), ("part.unit: given 1", '"mm"')),
+    Wrong("unknown unit", ('unit = "mm"', 'unit = "millimetre"'), ("given 'millimetre'", '"um", "mm"')),
+    Wrong(
+        "negative mass",
+        ("mass_g = 5", "mass_g = -5"),
+        (":23", "shot.mass_g: given -5", "from 0.0001 to 10000 g"),
+    ),
+    Wrong("metres for mm", ("height_mm = 45", "height_mm = 0.045"), ("given 0.045", "from 2 to 2000 mm")),
+    Wrong("quoted number", ("amplitude_um = 40", 'amplitude_um = "40"'), ("given '40'", "without quotes")),
+    Wrong("true for a number", ("replicas = 8", "replicas = true"), ("replicas: given true", "a whole number")),
+    Wrong("fraction of a replica", ("replicas = 8", "replicas = 8.5"), ("given 8.5", "a whole number")),
+    Wrong("two replicas", ("replicas = 8", "replicas = 2"), ("given 2", "confidence interval")),
+    Wrong("not a number", ("simulated_time_s = 1.5", "simulated_time_s = nan"), ("given nan",)),
+    Wrong("unknown material", ('"steel"', '"steal"'), ("given 'steal'", "did you mean 'steel'")),
+    Wrong("two densities", ('"steel"', '"steel"\ndensity_kg_m3 = 7800'), ("keep one of the two",)),
+    Wrong("restitution above 1", ("shot = { C0 = 0.91", "shot = { C0 = 1.2"), ("C0: given 1.2", "0.05 to 1")),
+    Wrong("no hardness", (", hardness_HB = 300", ""), (":33", "hardness_HB: missing", "HB")),
+    Wrong("unknown shape", ('"cylinder"', '"cylindre"'), ("given 'cylindre'", "did you mean 'cylinder'")),
+    Wrong(
+        "part above the lid",
+        ("sonotrode_distance_mm = 15", "sonotrode_distance_mm = 50"),
+        ("given 50", "lower it"),
+    ),
+    Wrong("ball too big", ("diameter_mm = 1.5 ", "diameter_mm = 18 "), ("given 18", "smaller ball")),
+    Wrong("mesh not there", ("parts/gear.stl", "parts/gaer.stl"), (":4", "no such mesh file", "gear.stl")),
+    Wrong("angle without direction", ("direction = [0, 0, 1]\n", ""), ("angle_deg", "give both or neither")),
+    Wrong("two of three", ("[0, 0, 1]", "[0, 1]"), ("direction: too short", "three numbers")),
+    Wrong(
+        "misspelt parameter",
+        ("chamber.height_mm", "chamber.hight_mm"),
+        (":5", "did you mean 'chamber.height_mm'"),
+        STUDY,
+    ),
+    Wrong("bounds reversed", ("[28, 60]", "[60, 28]"), ("given [60, 28]", "low must be below high"), STUDY),
+    Wrong("start out of bounds", ("[28, 60]", "[50, 60]"), ("starts at 45", "widen"), STUDY),
+    Wrong("unknown algorithm", ('"auto"', '"BOBYQA"'), ("did you mean 'LN_BOBYQA'",), STUDY),
+    Wrong("no budget", ("evaluations = 20", "evaluations = 0"), ("evaluations: given 0", "from 2"), STUDY),
+    Wrong("design not there", ("gear.toml", "gaer.toml"), (":2", "no such design file", "gear.toml?"), STUDY),
+    Wrong(
+        "unknown metric",
+        ("[optimizer]", "[constraints]\ncoverage = { min = 1 }\n[optimizer]"),
+        ("not a metric", "mean_coverage"),
+        STUDY,
+    ),
+]
+
+
+@pytest.fixture
+def copies(tmp_path: Path) -> Path:
+    """The shipped designs and studies in a folder of their own."""
+    shutil.copytree(ROOT / "designs", tmp_path / "designs")
+    shutil.copytree(ROOT / "studies", tmp_path / "studies")
+    return tmp_path
+
+
+def spoil(wrong: Wrong, folder: Path) -> Path:
+    path = folder / wrong.file
+    if isinstance(wrong.change, bytes):
+        path.write_bytes(wrong.change)
+    else:
+        text = path.read_text(encoding="utf-8")
+        assert wrong.change[0] in text
+        path.write_text(text.replace(*wrong.change, 1), encoding="utf-8")
+    return path
+
+
+Said = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def chamberopt(capsys: pytest.CaptureFixture[str]) -> Said:
+    """Runs a command in this process: status, stdout, stderr."""
+
+    def call(*arguments: object) -> tuple[int, str, str]:
+        status = main([str(argument) for argument in arguments])
+        out, err = capsys.readouterr()
+        return status, out, err
+
+    return call
+
+
+def in_a_shell(*arguments: object) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "chamberopt", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, encoding="utf-8", check=False, timeout=120)
+
+
+@pytest.mark.parametrize("wrong", WRONG, ids=lambda wrong: wrong.name)
+def test_wrong_files(wrong: Wrong, copies: Path, chamberopt: Said) -> None:
+    path = spoil(wrong, copies)
+    status, out, err = chamberopt("check", "--no-pilot", path)
+    assert (status, out) == (2, "")
+    assert err.startswith(str(path.parent)[: len(str(copies))])  # the message begins with the file
+    assert path.name in err.splitlines()[0]
+    assert "Traceback" not in err
+    for word in wrong.said:
+        assert word in err, f"{word!r} is not in: {err}"
+
+
+@pytest.mark.parametrize(
+    ("name", "command"),
+    [("misspelt key", "check"), ("negative mass", "simulate"), ("bounds reversed", "run")],
+)
+def test_wrong_files_from_a_shell(name: str, command: str, copies: Path) -> None:
+    path = spoil(next(wrong for wrong in WRONG if wrong.name == name), copies)
+    done = in_a_shell(command, path, "--out", copies / "out")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith(f"{path}:")
+    assert len(done.stderr.splitlines()) <= 2
+    assert not (copies / "out").exists()
+
+
+class TestWrongCalls:
+    """Not the file but the call is wrong: still one message, still 2."""
+
+    def test_no_such_file(self, copies: Path, chamberopt: Said) -> None:
+        status, _, err = chamberopt("check", copies / "designs" / "gera.toml")
+        assert (status, err.count("\n")) == (2, 1)
+        assert "no such design or study file; did you mean" in err
+        assert "gear.toml?" in err
+
+    def test_no_such_folder(self, tmp_path: Path, chamberopt: Said) -> None:
+        status, _, err = chamberopt("simulate", tmp_path / "nowhere" / "gear.toml")
+        assert status == 2
+        assert f"the folder {tmp_path / 'nowhere'} does not exist" in err
+
+    def test_a_folder(self, copies: Path, chamberopt: Said) -> None:
+        status, _, err = chamberopt("check", copies / "designs")
+        assert status == 2
+        assert "is a folder; give a design or study file (.toml); files in it: blade.toml, blade_conformal.toml" in err
+
+    def test_study_to_simulate_and_design_to_run(self, copies: Path, chamberopt: Said) -> None:
+        status, _, err = chamberopt("simulate", copies / "studies" / "gear.toml")
+        assert (status, "this is a study file" in err) == (2, True)
+        status, _, err = chamberopt("run", copies / "designs" / "gear.toml")
+        assert (status, "this is a design file" in err) == (2, True)
+
+    def test_misspelt_command_and_option(self, copies: Path, chamberopt: Said) -> None:
+        status, _, err = chamberopt("chek")
+        assert (status, 'Did you mean "check"' in err) == (2, True)
+        status, _, err = chamberopt("check", copies / "designs" / "gear.toml", "--jsn")
+        assert (status, "Did you mean --json" in err) == (2, True)
+
+    def test_missing_argument(self, chamberopt: Said) -> None:
+        status, _, err = chamberopt("simulate")
+        assert status == 2
+        assert "requires an argument" in err
+
+    def test_results_are_never_overwritten(self, copies: Path, chamberopt: Said) -> None:
+        (copies / "out").mkdir()
+        (copies / "out" / "result.json").write_text("{}")
+        status, _, err = chamberopt("simulate", copies / "designs" / "gear.toml", "--out", copies / "out")
+        assert (status, "never overwritten" in err) == (2, True)
+        assert (copies / "out" / "result.json").read_text() == "{}"
+
+    @pytest.mark.parametrize("command", ["inspect", "compare"])
+    def test_not_a_results_folder(self, command: str, tmp_path: Path, chamberopt: Said) -> None:
+        folders = [tmp_path] if command == "inspect" else [tmp_path, tmp_path]
+        status, out, err = chamberopt(command, *folders)
+        assert (status, out) == (2, "")
+        assert str(tmp_path) in err
+
+    def test_damaged_mesh(self, copies: Path, chamberopt: Said) -> None:
+        mesh = copies / "designs" / "parts" / "gear.stl"
+        mesh.write_bytes(mesh.read_bytes()[:5000])
+        status, _, err = chamberopt("check", "--no-pilot", copies / "designs" / "gear.toml")
+        assert status == 2
+        assert str(mesh) in err
+
+    def test_interrupt(self, copies: Path, chamberopt: Said, monkeypatch: pytest.MonkeyPatch) -> None:
+        def ctrl_c(*_: object) -> None:
+            raise KeyboardInterrupt
+
+        monkeypatch.setattr("chamberopt.chamber.build.build_chamber", ctrl_c)
+        status, _, err = chamberopt("check", "--no-pilot", copies / "designs" / "gear.toml")
+        assert (status, "interrupted" in err) == (130, True)
+
+
+class TestCheck:
+    @pytest.mark.parametrize("name", ["designs/gear", "designs/plate", "designs/blade", "studies/gear"])
+    def test_shipped(self, name: str, chamberopt: Said) -> None:
+        status, out, err = chamberopt("check", "--no-pilot", ROOT / f"{name}.toml")
+        assert (status, err) == (0, "")
+        assert "shot.balls" in out
+
+    def test_plate_has_the_papers_thirty_balls(self, chamberopt: Said) -> None:
+        status, out, _ = chamberopt("check", "--no-pilot", ROOT / "designs" / "plate.toml", "--json")
+        facts = json.loads(out)
+        assert status == 0
+        assert facts["shot"]["balls"] == 30
+        # a 64-sided prism of 50 mm, 15 mm high: the plate is the lid
+        area = 64 / 2 * 25**2 * 0.0980171403295606  # n/2 r² sin(2 pi / n)
+        assert facts["chamber"]["free_volume_cm3"] == pytest.approx(area * 15 / 1000, rel=1e-5)
+        assert facts["part"]["exposed_area_mm2"] == pytest.approx(area, rel=1e-5)
+
+    def test_warns_of_a_crowded_and_of_a_narrow_chamber(self, copies: Path, chamberopt: Said) -> None:
+        path = copies / "designs" / "gear.toml"
+        text = path.read_text(encoding="utf-8").replace("mass_g = 5", "mass_g = 240")
+        path.write_text(text.replace("height_mm = 45", "height_mm = 26"), encoding="utf-8")
+        status, out, _ = chamberopt("check", "--no-pilot", path, "--json")
+        warnings = json.loads(out)["warnings"]
+        assert status == 0
+        assert any("hinder each other" in text for text in warnings)
+        assert any(
+            "gap between the ceiling and the part's upper side" in text and "is 1 to 1.09 mm" in text
+            for text in warnings
+        )
+
+    def test_a_guessed_unit_is_said(self, copies: Path, chamberopt: Said) -> None:
+        path = copies / "designs" / "gear.toml"
+        path.write_text(path.read_text(encoding="utf-8").replace('unit = "mm"', ""), encoding="utf-8")
+        status, out, _ = chamberopt("check", "--no-pilot", path)
+        assert status == 0
+        assert "unit guessed as 'mm' (by its size): the part measures 44 x 44 x 70 mm" in out
+
+    @pytest.mark.parametrize("open_part", [True, False])
+    def test_screenshot_of_the_target_or_of_the_fault(
+        self, open_part: bool, copies: Path, chamberopt: Said, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        drawn: list[tuple[str, int, int, int]] = []
+        none = np.zeros(0)
+
+        def draw(corners, title: str, picture, marked=none, edges=none, missed=none, chamber=None) -> None:  # type: ignore[no-untyped-def]
+            drawn.append((title, int(marked.sum()), len(edges), int(missed.sum())))
+
+        monkeypatch.setattr("chamberopt.output.viewer.part_picture", draw)
+        if open_part:
+            mesh = copies / "designs" / "parts" / "gear.stl"
+            content = mesh.read_bytes()  # without its last 100 triangles
+            mesh.write_bytes(content[:80] + (9820).to_bytes(4, "little") + content[84:-5000])
+        status, out, err = chamberopt(
+            "check", "--no-pilot", copies / "designs" / "gear.toml", "--screenshot", "look.png"
+        )
+        [(title, marked, edges, missed)] = drawn
+        assert "picture in look.png" in err
+        assert status == (2 if open_part else 0)
+        if open_part:
+            assert "the surface is not closed" in err
+            assert "the surface is not closed" in " ".join(title.split())
+            assert edges > 3
+        else:
+            assert "a usable design" in out
+            assert marked > missed > 1000  # the sharp roots of the teeth
+            assert "in red where hardly a ball can touch it" in title
+
+    def test_out(self, tmp_path: Path, chamberopt: Said) -> None:
+        out = tmp_path / "out"
+        status, said, _ = chamberopt("check", "--no-pilot", ROOT / "designs" / "gear.toml", "--out", out)
+        assert status == 0
+        assert str(out) in said
+        assert json.loads((out / "check.json").read_text(encoding="utf-8"))["shot"]["balls"] == 363
+
+
+def test_version(chamberopt: Said) -> None:
+    assert chamberopt("--version")[:2] == (0, version("chamberopt") + "\n")
+
+
+def test_help_loads_nothing_heavy() -> None:
+    """`--help` answers at once: numba, vtk and the rest cost seconds."""
+    heavy = {
+        "numba",
+        "trimesh",
+        "pyvista",
+        "vtkmodules",
+        "nlopt",
+        "manifold3d",
+        "plotly",
+        "scipy",
+        "matplotlib",
+        "numpy",
+    }
+    code = f"import sys; from chamberopt.cli import main; main(['--help']); print({heavy} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "set()"
+
+
+class TestWhole:
+    """Small but real: the plate with a few balls and a few milliseconds, through every command."""
+
+    @pytest.fixture
+    def small(self, copies: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+        """The folder with small copies of the plate's design and study, as the working folder."""
+        monkeypatch.chdir(copies)
+        design = Path("designs/plate.toml")
+        text = design.read_text(encoding="utf-8")
+        for line in ("replicas = 8", "simulated_time_s = 4.0", "warmup_time_s = 0.2"):
+            assert line in text
+        text = text.replace("replicas = 8", "replicas = 3").replace("time_s = 4.0", "time_s = 0.05")
+        design.write_text(text.replace("warmup_time_s = 0.2", "warmup_time_s = 0.01"), encoding="utf-8")
+        study = "[optimizer]\nevaluations = 3\nconfirm = 1\nconfirm_replicas = 3\n"
+        study += '[vary]\n"shot.mass_g" = [2, 5]\n'
+        Path("studies/small.toml").write_text(f'design = "../designs/plate.toml"\n{study}', encoding="utf-8")
+        return copies
+
+    def test_simulate_compare_inspect(self, small: Path, chamberopt: Said) -> None:
+        status, out, _ = chamberopt("simulate", "designs/plate.toml", "--json")
+        first = json.loads(out)
+        assert (status, first["folder"]) == (0, str(Path("results/plate")))
+        assert 0.0 < first["metrics"]["mean_coverage"]["value"] <= 1.0
+
+        # What was saved is the same design, gives the same bits, and goes to the next free folder.
+        status, out, _ = chamberopt("simulate", Path("results/plate/design.toml"), "--out", "again", "--json")
+        again = json.loads(out)
+        assert status == 0
+        assert (again["objective"], again["metrics"]) == (first["objective"], first["metrics"])
+        status, out, _ = chamberopt("simulate", "designs/plate.toml")
+        assert (status, out.splitlines()[-1]) == (0, f"results in {Path('results/plate-2')}")
+
+        status, out, _ = chamberopt("compare", "results/plate", "again", "--json")
+        compared = json.loads(out)
+        assert (status, compared["parameters"]) == (0, {})
+        assert compared["differences_to_first"]["mean_coverage"][0]["value"] == 0.0
+        assert Path(compared["folder"], "compare.txt").is_file()
+
+    def test_compare_simulates_designs_on_common_seeds(
+        self, small: Path, chamberopt: Said, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("chamberopt.output.viewer.subprocess_drawing.why_no_pictures", lambda: "not in this test")
+        text = Path("designs/plate.toml").read_text(encoding="utf-8")
+        heavier = text.replace("mass_g = 3.308", "mass_g = 9.9").replace("seed = 1", "seed = 5")
+        Path("designs/heavier.toml").write_text(heavier, encoding="utf-8")
+        files = ("designs/plate.toml", "designs/heavier.toml")
+        status, out, err = chamberopt("compare", *files, "--workers", 1, "--json")
+        compared = json.loads(out)
+        assert (status, compared["folder"]) == (0, str(Path("results/compare")))
+        assert compared["parameters"] == {"shot.mass_g": [3.308, 9.9]}
+        assert compared["differences_to_first"]["impacts_per_mm2_s"][0]["paired"]
+        assert "heavier: seed = 1 in place of 5, as the first candidate" in err
+
+        # The folders that it left are results: simulated so by themselves, and compared again to the same figures.
+        status, out, _ = chamberopt("simulate", "results/compare/heavier/design.toml", "--json")
+        alone = json.loads(out)["metrics"]["mean_coverage"]["value"]
+        assert alone == compared["metrics"]["mean_coverage"][1]["value"]
+        status, out, err = chamberopt("compare", "results/compare/plate", "results/compare/heavier")
+        assert (status, "shot.mass_g" in out, "in place of" in err) == (0, True, False)
+        assert out.splitlines()[-1] == f"results in {Path('results/compare-2')}"
+
+    def test_compare_refuses_before_it_makes_a_folder(self, small: Path, chamberopt: Said) -> None:
+        text = Path("designs/plate.toml").read_text(encoding="utf-8")
+        Path("designs/longer.toml").write_text(text.replace("time_s = 5", "time_s = 7"), encoding="utf-8")
+        status, out, err = chamberopt("compare", "designs/plate.toml", "designs/longer.toml")
+        assert (status, out, err.count("\n")) == (2, "", 1)
+        assert "--treatment-time-s" in err
+        status, _, err = chamberopt("compare", "designs/plate.toml")
+        assert (status, "two or more" in err) == (2, True)
+        assert not Path("results").exists()
+
+    def test_simulate_analytically(self, small: Path, chamberopt: Said) -> None:
+        status, out, _ = chamberopt("simulate", "designs/plate.toml", "--analytic", "--json")
+        folder = Path(json.loads(out)["folder"])
+        assert (status, json.loads((folder / "result.json").read_text(encoding="utf-8"))["analytic"]) == (0, True)
+        status, _, err = chamberopt("simulate", "designs/gear.toml", "--analytic")
+        assert (status, err.count("\n")) == (2, 1)
+        assert "the part reaches into the cavity" in err
+        assert not Path("results/gear").exists()
+
+    def test_inspect(self, small: Path, chamberopt: Said) -> None:
+        from chamberopt.output.viewer import why_no_pictures
+
+        if why_no_pictures():
+            pytest.skip(why_no_pictures() or "")
+        assert chamberopt("simulate", "designs/plate.toml")[0] == 0
+        status, out, _ = chamberopt("inspect", "results/plate", "--screenshot", "look.png")
+        assert (status, out.splitlines()[-1]) == (0, "picture in look.png")
+        assert Path("look.png").stat().st_size > 10_000
+        options = ["--quantity", "speed", "--below", "90", "--clip", "Y=1", "--triangle", "7", "--view", "1,-1,1"]
+        status, out, _ = chamberopt("inspect", "results/plate", "results/plate", *options, "--off-screen", "--json")
+        said = json.loads(out)
+        assert (status, said["screenshot"], len(said["folders"])) == (0, str(Path("results/inspect/inspect.png")), 2)
+        assert Path("results/inspect/inspect.png").stat().st_size > 10_000
+        for wrong, why in (
+            (["--quantity", "sped"], "did you mean speed"),
+            (["--triangle", "999999"], "has triangles 0 to"),
+            (["--below", "120"], "up to 100 %"),
+            (["--screenshot", "a.png", "--out", "out"], "give one of them"),
+        ):
+            status, out, err = chamberopt("inspect", "results/plate", "--off-screen", *wrong)
+            assert (status, why in err, err.count("\n")) == (2, True, 1), err
+
+    def test_run(self, small: Path, chamberopt: Said) -> None:
+        status, out, _ = chamberopt("run", "studies/small.toml", "--json")
+        result = json.loads(out)
+        assert (status, result["folder"]) == (0, str(Path("results/small")))
+        assert result["study"]["evaluations"] == 3
+        best = Path("results/small/best.toml")
+        status, out, _ = chamberopt("check", "--no-pilot", best, "--json")
+        assert status == 0
+        assert 2 <= json.loads(out)["shot"]["mass_g"] <= 5.1
+        status, again, err = chamberopt("run", "studies/small.toml", "--out", "results/small", "--json")
+        assert (status, json.loads(again), "nothing was run" in err) == (0, result, True)
+        status, _, err = chamberopt("run", "studies/gear.toml", "--out", "results/small")
+        assert (status, "began otherwise" in err) == (2, True)
+        Path("out").mkdir()
+        Path("out/precious.txt").write_text("keep me")
+        status, _, err = chamberopt("run", "studies/small.toml", "--out", "out")
+        assert (status, "never overwritten" in err) == (2, True)
+
+    def test_simulate_and_run_warn_as_check_does(self, small: Path, chamberopt: Said) -> None:
+        """To stderr, so that --json stays clean; a study warns of its best design."""
+        path = Path("designs/plate.toml")
+        text = path.read_text(encoding="utf-8")
+        path.write_text(text.replace("mass_g = 3.308", "mass_g = 0.5"), encoding="utf-8")
+        study = Path("studies/small.toml")
+        study.write_text(study.read_text(encoding="utf-8").replace("[2, 5]", "[0.48, 0.5]"), encoding="utf-8")
+        for command, file in (("simulate", path), ("run", study)):
+            status, out, err = chamberopt(command, file, "--json")
+            assert (status, bool(json.loads(out))) == (0, True)
+            assert err.count(": shot.mass_g = ") == 1
+
+    def test_shot_that_does_not_fit(self, small: Path, chamberopt: Said) -> None:
+        """45 % of the cylinder passes the file's check, but the plate takes a quarter of that: no room."""
+        path = Path("designs/plate.toml")
+        path.write_text(path.read_text(encoding="utf-8").replace("mass_g = 3.308", "mass_g = 140"), encoding="utf-8")
+        status, out, err = chamberopt("simulate", path)
+        assert (status, out) == (2, "")
+        assert "Traceback" not in err
+        assert not Path("results/plate").exists()
+
+
+class TestProgress:
+    """The bar is for people: on a terminal it shows the best so far, in a pipe it is silent."""
+
+    def test_silent_in_a_pipe(self) -> None:
+        stream = io.StringIO()
+        with progress_bar("evaluations", stream) as progress:
+            progress(1, 10, 0.5)
+        assert stream.getvalue() == ""
+
+    def test_best_so_far_on_a_terminal(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        stream = io.StringIO()
+        monkeypatch.setattr(stream, "isatty", lambda: True)
+        monkeypatch.setenv("TERM", "xterm")
+        monkeypatch.setenv("COLUMNS", "120")
+        with progress_bar("evaluations", stream) as progress:
+            progress(4, 10, 0.51234)
+        assert "evaluations" in stream.getvalue()
+        assert "4/10" in stream.getvalue()
+        assert "best 0.5123" in stream.getvalue()

@@ -1,0 +1,198 @@
+"""A real Dask scheduler and two workers, each a process of its own: same bits, and one killed costs its task only."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from concurrent.futures import CancelledError, Future
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chamberopt.chamber.build import build_chamber
+from chamberopt.cli import main
+from chamberopt.common.errors import ClusterLostError, InputError, WorkerLostError
+from chamberopt.common.parallel import dask_cluster
+from chamberopt.common.parallel.dask_cluster import Cluster
+from chamberopt.common.parallel.executor import SerialExecutor, shared
+from chamberopt.design.load import Study, load_design
+from chamberopt.optimize.run_sweep import plan_sweep, run_sweep
+from chamberopt.simulation.evaluate import evaluate
+from tests.chamberopt.optimize.test_run_sweep import rows, small_study
+from tests.helpers import worker_jobs
+
+distributed = pytest.importorskip("distributed", reason="Dask is not installed: pip install 'chamberopt[dask]'")
+
+ROOT = Path(__file__).parents[4]
+
+
+@dataclass
+class Dask:
+    """Programs of one dask_cluster."""
+
+    folder: Path
+    programs: list[subprocess.Popen]
+
+    @property
+    def scheduler_file(self) -> Path:
+        return self.folder / "scheduler.json"
+
+    def start(self, *words: str) -> subprocess.Popen:
+        log = open(self.folder / f"{words[0]}-{len(self.programs)}.log", "wb")  # noqa: SIM115
+        command = [sys.executable, "-m", "dask", *words, "--scheduler-file", str(self.scheduler_file), "--no-dashboard"]
+        setting = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])}
+        program = subprocess.Popen(command, stdout=log, stderr=log, env=setting, cwd=self.folder)
+        log.close()
+        self.programs.append(program)
+        return program
+
+    def start_worker(self) -> subprocess.Popen:
+        return self.start("worker", "--nthreads", "1", "--no-nanny")
+
+    def kill_a_worker(self) -> None:
+        """One that is there, with no time for a farewell."""
+        next(program for program in self.programs[1:] if program.poll() is None).kill()
+
+    def end(self) -> None:
+        for program in self.programs:
+            program.kill()
+            program.wait()
+
+
+@pytest.fixture(scope="module")
+def dask(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Dask]:
+    started = Dask(tmp_path_factory.mktemp("dask"), [])
+    try:
+        started.start("scheduler", "--host", "127.0.0.1", "--port", "0")
+        started.start_worker()
+        started.start_worker()
+        until = time.monotonic() + 60
+        while not started.scheduler_file.exists() and time.monotonic() < until:
+            time.sleep(0.1)
+        with Cluster(str(started.scheduler_file), 60) as executor:
+            executor._client.wait_for_workers(2, timeout=60)
+        yield started
+    finally:
+        started.end()
+
+
+def test_a_scheduler_file_and_its_address_lead_to_the_same_workers(dask: Dask) -> None:
+    address = dask_cluster._address(str(dask.scheduler_file))
+    assert address.startswith("tcp://")
+    for where in (str(dask.scheduler_file), address):
+        with Cluster(where) as executor:
+            assert list(executor.map(worker_jobs.square, range(8))) == [n * n for n in range(8)]
+            assert len(set(executor.map(worker_jobs.pid_of, range(8)))) == 2
+            with pytest.raises(InputError, match=r"^shot: too many$"):
+                executor.submit(worker_jobs.refuse, "shot: too many").result()
+
+
+def test_what_is_shared_travels_once_a_worker(dask: Dask, tmp_path: Path) -> None:
+    with Cluster(str(dask.scheduler_file)) as executor:
+        parcel = shared(executor, worker_jobs.Counted(tmp_path, 1000))
+        assert set(executor.map(worker_jobs.size_of, [parcel] * 20, range(20))) == {1000}
+    counts = worker_jobs.marks(tmp_path)
+    assert len(counts) == 2
+    assert sum(counts.values()) <= 3  # opened by one worker, given on to the other
+
+
+def test_a_killed_worker_costs_its_task_only(dask: Dask, tmp_path: Path) -> None:
+    with Cluster(str(dask.scheduler_file)) as executor:
+        parcel = shared(executor, worker_jobs.Counted(tmp_path, 1000))
+        assert executor.submit(worker_jobs.size_of, parcel, -1).result() == 1000
+        victim, heir = (int(name) for name in (*worker_jobs.marks(tmp_path), "0")[:2])
+        futures = [executor.submit(worker_jobs.size_of, parcel, n) for n in range(40)]
+        futures[5].result()
+        os.kill(victim, signal.SIGKILL)  # the one that had opened what is shared
+        assert [future.result(60) for future in futures] == [1000] * 40
+        assert victim != heir
+        dask.start_worker()
+        executor._client.wait_for_workers(2, timeout=60)
+
+
+def test_a_sweep_goes_on_when_a_worker_is_killed(dask: Dask, tmp_path: Path) -> None:
+    question = Study(design=load_design(ROOT / "designs" / "gear.toml"), vary={"shot.mass_g": (2.0, 10.0)})
+    plan = plan_sweep(question, 40, None)
+    run_sweep(question, plan, tmp_path / "serial", SerialExecutor(), None, worker_jobs.hill)
+    done = []
+
+    def progress(count: int, total: int, best: float | None) -> None:
+        done.append(count)
+        if count == 5:
+            dask.kill_a_worker()
+
+    with Cluster(str(dask.scheduler_file)) as executor:
+        run_sweep(question, plan, tmp_path / "cluster", executor, progress, worker_jobs.hill)
+        dask.start_worker()
+        executor._client.wait_for_workers(2, timeout=60)
+    assert done == list(range(1, 41))
+    assert rows(tmp_path / "cluster") == rows(tmp_path / "serial")
+
+
+def test_the_same_bits_as_on_this_machine(dask: Dask, tmp_path: Path) -> None:
+    """Candidates as tasks, which build their chamber on the worker; replicas as tasks, to which it travels."""
+    question = small_study()
+    plan = plan_sweep(question, None, 4)
+    chamber = build_chamber(question.design)
+    evaluations = []
+    for name, executor in (("serial", SerialExecutor()), ("cluster", Cluster(str(dask.scheduler_file)))):
+        with executor:
+            run_sweep(question, plan, tmp_path / name, executor)
+            evaluations.append(evaluate(question.design, chamber, executor, replicas=5))
+    assert rows(tmp_path / "cluster") == rows(tmp_path / "serial")
+    one, other = evaluations
+    assert one.metrics == other.metrics
+    np.testing.assert_array_equal(one.total.speed_sum, other.total.speed_sum)
+
+
+def test_a_scheduler_that_is_not_there_is_status_2(tmp_path: Path, capsys, monkeypatch) -> None:
+    monkeypatch.setattr(dask_cluster, "PATIENCE", 0.5)
+    with socket.socket() as closed:
+        closed.bind(("127.0.0.1", 0))
+        address = f"tcp://127.0.0.1:{closed.getsockname()[1]}"
+        command = ["simulate", str(ROOT / "designs" / "plate.toml"), "--cluster", address, "--out", str(tmp_path / "o")]
+        assert main(command) == 2
+    said = capsys.readouterr().err
+    assert f"--cluster: no scheduler answers at {address} within 0.5 s" in said
+    assert "start one with `dask scheduler`" in said
+    assert not (tmp_path / "o").exists()
+
+
+def test_a_scheduler_without_workers_is_said(tmp_path: Path) -> None:
+    alone = Dask(tmp_path, [])
+    try:
+        alone.start("scheduler", "--host", "127.0.0.1", "--port", "0")
+        while not alone.scheduler_file.exists():
+            time.sleep(0.1)
+        with pytest.raises(InputError, match="has no workers; start some with `dask worker tcp://"):
+            Cluster(str(alone.scheduler_file), 1.0)
+    finally:
+        alone.end()
+
+
+def test_another_version_on_a_worker_is_refused(dask: Dask, monkeypatch: pytest.MonkeyPatch) -> None:
+    real = dask_cluster.fingerprint()
+    monkeypatch.setattr(dask_cluster, "version", lambda name: "0.0" if name == "numba" else real[name])
+    with pytest.raises(InputError, match=rf"numba {real['numba']} \(0\.0 here\): figures could differ"):
+        Cluster(str(dask.scheduler_file))
+
+
+def test_tasks_that_the_cluster_gives_up_say_why() -> None:
+    killed: Future = Future()
+    worker = type("Worker", (), {"address": "tcp://10.0.0.7:1"})()
+    killed.set_exception(distributed.KilledWorker("task", worker, 3))
+    gone: Future = Future()
+    gone.set_exception(CancelledError())
+    for theirs, kind, said in (
+        (killed, WorkerLostError, "4 workers died .* tcp://10.0.0.7"),
+        (gone, ClusterLostError, "ended"),
+    ):
+        ours: Future = Future()
+        dask_cluster._copy_outcome(theirs, ours)
+        with pytest.raises(kind, match=said):
+            ours.result()

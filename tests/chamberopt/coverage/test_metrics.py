@@ -1,0 +1,146 @@
+"""Averages over the exposed target, weighted with area, on parts of a few triangles."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from chamberopt.common.errors import InputError
+from chamberopt.coverage.metrics import LONGEST, METRICS, OBJECTIVES, objective
+from chamberopt.design import study
+from chamberopt.simulation.evaluate import jackknife
+from tests.helpers.synthetic import dented, equal_dents, patchwork, plate_design
+
+MM2 = 1e-6
+
+
+def coverage(share: np.ndarray, area: np.ndarray, treatment_time: float) -> np.ndarray:
+    """The dented area that covers these shares of these areas at the treatment time, simulated for 1 s."""
+    return -np.log1p(-np.asarray(share)) * area / treatment_time
+
+
+def goal(*case) -> float:
+    """Uniform coverage as plain numbers."""
+    return sum(weight * METRICS[name].function(*case) for name, weight in objective("uniform_coverage").terms.items())
+
+
+@pytest.fixture
+def case() -> tuple:
+    # 1, 2, 1 mm² covered 0.9, 0.6, 0.3: mean 0.6, variance (0.09 + 0 + 0.09) / 4 = 0.045
+    design = plate_design(process__treatment_time_s=50)
+    area = np.array([1.0, 2.0, 1.0]) * MM2
+    total = dented(coverage([0.9, 0.6, 0.3], area, 50.0), 1.0, dents=np.array([4, 2, 2]), speed=3.0)
+    return total, patchwork(area), design
+
+
+def test_by_hand(case: tuple) -> None:
+    values = {name: metric.function(*case) for name, metric in METRICS.items()}
+    assert values["mean_coverage"] == pytest.approx(0.6)
+    assert values["std_coverage"] == pytest.approx(np.sqrt(0.045))
+    assert values["impacts_per_mm2_s"] == pytest.approx(8 / 4)
+    assert values["mean_normal_speed_m_s"] == pytest.approx(3.0)
+    assert values["shot_count"] == case[2].shot.count
+    assert goal(*case) == pytest.approx(0.6 - np.sqrt(0.045))
+
+
+def test_evenly_covered_is_worth_its_mean_and_full_is_one() -> None:
+    design = plate_design(process__treatment_time_s=50)
+    area = np.array([1.0, 2.0, 3.0]) * MM2
+    even = dented(coverage(np.full(3, 0.8), area, 50.0), 1.0)
+    assert goal(even, patchwork(area), design) == pytest.approx(0.8)
+    full = dented(1e3 * area, 1.0)
+    assert goal(full, patchwork(area), design) == pytest.approx(1.0)
+
+
+def test_fifth_percentile_of_a_ramp() -> None:
+    design = plate_design(process__treatment_time_s=50)
+    share = np.linspace(0.0, 0.999, 1000)
+    area = np.full(1000, MM2)
+    total = dented(coverage(share, area, 50.0), 1.0)
+    p05 = METRICS["p05_coverage"].function(total, patchwork(area), design)
+    assert p05 == pytest.approx(0.05, abs=0.001)
+
+
+def test_hidden_target_counts_as_not_covered(case: tuple) -> None:
+    """Else a study would lower the ceiling over whatever is hard to reach."""
+    total, chamber, design = case
+    whole, area = METRICS["mean_coverage"].function(total, chamber, design), chamber.part.area
+    third = METRICS["mean_coverage"].function(
+        total, replace(chamber, part=replace(chamber.part, target=np.array([False, False, True]))), design
+    )
+    hidden = replace(chamber, exposed_area=chamber.exposed_area * [1, 1, 0])
+    assert METRICS["mean_coverage"].function(total, hidden, design) == pytest.approx(
+        whole - third * area[2] / area.sum()
+    )
+
+
+def test_what_is_not_target_does_not_count(case: tuple) -> None:
+    total, chamber, design = case
+    aside = replace(chamber, part=replace(chamber.part, target=np.array([True, False, False])))
+    assert METRICS["mean_coverage"].function(total, aside, design) == pytest.approx(0.9)
+    nothing = replace(chamber, part=replace(chamber.part, target=np.zeros(3, dtype=bool)))
+    with pytest.raises(InputError, match=r"part\.target"):
+        METRICS["mean_coverage"].function(total, nothing, design)
+
+
+def test_nothing_hit() -> None:
+    design, area = plate_design(), np.full(2, MM2)
+    none = dented(np.zeros(2), 1.0, dents=np.zeros(2, dtype=int))
+    values = {name: metric.function(none, patchwork(area), design) for name, metric in METRICS.items()}
+    assert values.pop("shot_count") > 0
+    assert values.pop("time_to_98_s") == LONGEST
+    assert set(values.values()) == {0.0}
+
+
+def test_the_names_a_study_may_use_are_these() -> None:
+    assert {name: (metric.lowest, metric.highest) for name, metric in METRICS.items()} == study.METRICS
+    for name in OBJECTIVES:
+        assert study.Objective(name=name).name == name
+    with pytest.raises(InputError, match="uniform_coverage"):
+        objective("shiny")
+
+
+def test_a_sum_weighs_objectives_and_metrics() -> None:
+    made = objective("1 uniform_coverage + -0.001 time_to_98_s + 2 mean_coverage")
+    assert made.terms == {"mean_coverage": 3.0, "std_coverage": -1.0, "time_to_98_s": -0.001}
+    for wrong in ("1 shiny", "x mean_coverage", "mean_coverage"):
+        with pytest.raises(InputError, match="not an objective"):
+            objective(wrong)
+
+
+def test_time_to_98_is_when_the_poorest_twentieth_is_covered() -> None:
+    """Dents at random at one rate: exp(-rate · time) = 0.02."""
+    rng, area, size = np.random.default_rng(1), np.full(400, 4.0 * MM2), 0.02 * MM2
+    design = plate_design(process__treatment_time_s=100.0)
+    chamber = patchwork(area)
+    per_second = 0.02  # dented area over area
+    truth = np.log(50.0) / per_second
+    held = []
+    for _ in range(10):
+        replicas = [equal_dents(10.0, rng.poisson(per_second * 10.0 * area / size), size) for _ in range(8)]
+        [got] = jackknife(replicas, [METRICS["time_to_98_s"]], chamber, design)
+        assert got.value == pytest.approx(truth, rel=0.1)
+        held.append(got.low <= truth <= got.high)
+    assert sum(held) >= 8
+    unhit = [equal_dents(10.0, np.zeros(400, dtype=int), size) for _ in range(3)]
+    [never] = jackknife(unhit, [METRICS["time_to_98_s"]], chamber, design)
+    assert never.value == LONGEST
+
+
+def test_intensity_uniformity_knows_places_from_scatter() -> None:
+    """Half the surface hit at 1 m/s and half at 3: mean 2, spread 1. Scatter from hit to hit is no unevenness."""
+    rng, area = np.random.default_rng(2), np.full(200, MM2)
+    design, chamber = plate_design(), patchwork(area)
+
+    def replicas(local: np.ndarray) -> list:
+        made = []
+        for _ in range(8):
+            dents = rng.poisson(4.0, len(area))
+            speeds = np.array([rng.gamma(4.0, speed / 4.0, n).sum() for speed, n in zip(local, dents, strict=True)])
+            made.append(replace(equal_dents(1.0, dents, 0.1 * MM2), speed_sum=speeds))
+        return made
+
+    for local, truth in ((np.repeat([1.0, 3.0], 100), 0.5), (np.full(200, 2.0), 1.0)):
+        [got] = jackknife(replicas(local), [METRICS["intensity_uniformity"]], chamber, design)
+        assert abs(got.value - truth) < max(got.half_width, 0.06)
+        assert got.value == pytest.approx(truth, abs=0.08)

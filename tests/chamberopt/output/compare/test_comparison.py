@@ -1,0 +1,246 @@
+"""Results side by side: what differs is named, differences have intervals, what it takes to know is right."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from chamberopt.chamber.build import build_chamber
+from chamberopt.common.errors import InputError
+from chamberopt.coverage.metrics import LONGEST as NEVER
+from chamberopt.coverage.statistics.interval import Estimate, estimate
+from chamberopt.design.design import checked
+from chamberopt.design.load import Design, load_design
+from chamberopt.output import viewer
+from chamberopt.output.compare import files, plots
+from chamberopt.output.compare.comparison import compare
+from chamberopt.output.compare.difference import LONGEST, confidence_of_each, difference
+from chamberopt.output.compare.files import write_comparison
+from chamberopt.output.compare.table import as_text
+from chamberopt.output.results.results import write_simulation
+from tests.helpers.synthetic import DESIGNS, plate_design, poisson_evaluation
+
+PLATE = plate_design()
+CHAMBER = build_chamber(PLATE)
+
+
+@pytest.fixture(autouse=True)
+def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(viewer, "coverage_picture", lambda *_: "skipped")
+    for name in ("coverage_picture", "difference_picture"):
+        monkeypatch.setattr(files, name, lambda *_: "skipped")
+
+
+def left(folder: Path, per_mm2: float, seed: int = 0, design=PLATE, **changes: object) -> Path:
+    evaluation = poisson_evaluation(design, CHAMBER, per_mm2, 6, seed)
+    write_simulation(folder, design, CHAMBER, replace(evaluation, **changes))
+    return folder
+
+
+def row(text: str, name: str) -> str:
+    return next(line for line in text.splitlines() if line.startswith(name))
+
+
+def test_the_same_twice(tmp_path: Path) -> None:
+    both = compare([left(tmp_path / "a", 20), left(tmp_path / "b", 20)])
+    assert both.parameters == {}
+    for name, (gap,) in both.differences.items():
+        assert gap.value == 0.0
+        assert gap.paired
+        assert not gap.real
+        assert gap.times is None
+        if name not in ("p05_coverage", "time_to_98_s"):  # their intervals hold a bias that knows nothing of pairs
+            assert gap.half_width == 0.0
+    text = as_text(both)
+    assert "the designs do not differ" in text
+    assert row(text, "mean_coverage").endswith("no")
+    assert "b - a: paired" in text
+
+
+def test_what_differs_is_named_and_measured(tmp_path: Path) -> None:
+    heavier = plate_design(shot__mass_g=6.0, process__seed=2)
+    both = compare([left(tmp_path / "light", 10), left(tmp_path / "heavy", 30, 1, heavier)])
+    assert both.parameters["shot.mass_g"] == (PLATE.shot.mass_g, 6.0)
+    assert set(both.parameters) == {"shot.mass_g", "process.seed"}
+    assert both.labels == ("light", "heavy")
+    first, second = both.metrics["mean_coverage"]
+    (gap,) = both.differences["mean_coverage"]
+    assert gap.value == pytest.approx(second.value - first.value)
+    assert gap.real  # three times the dents
+    # Other seeds: independent, so the variances add.
+    assert not gap.paired
+    assert gap.half_width == pytest.approx(np.hypot(first.half_width, second.half_width), rel=0.3)
+    assert row(as_text(both), "mean_coverage").endswith("yes")
+    assert "heavy - light: independent, on other seeds" in as_text(both)
+
+
+def test_pairs_by_hand() -> None:
+    """Six differences 1 ... 6: mean 3.5, deviation sqrt(3.5), Student's t of 5 at 97.5 % is 2.5706."""
+    before = estimate([10.0, 20.0, 30.0, 40.0, 50.0, 60.0])
+    after = estimate([11.0, 22.0, 33.0, 44.0, 55.0, 66.0])
+    gap = difference(after, before, same_seeds=True)
+    assert gap.value == pytest.approx(3.5)
+    assert gap.half_width == pytest.approx(2.5706 * np.sqrt(3.5 / 6.0), rel=1e-4)
+    assert gap.real
+    apart = difference(after, before, same_seeds=False)
+    assert (apart.paired, apart.real) == (False, False)
+    expected = stats.ttest_ind(after.pseudovalues, before.pseudovalues, equal_var=False).confidence_interval(0.95)
+    assert (apart.value - apart.half_width, apart.value + apart.half_width) == pytest.approx(tuple(expected))
+    assert not difference(estimate([1.0, 2.0, 3.0, 4.0, 5.0]), before, same_seeds=True).paired
+
+
+def test_several_later_candidates_widen_each_interval() -> None:
+    """Bonferroni: with four the two-sided error of each is 1.25 %."""
+    before, after = estimate([1.0, 2.0, 4.0, 8.0]), estimate([2.0, 2.5, 7.0, 9.0])
+    confidence = confidence_of_each(4)
+    assert confidence == pytest.approx(0.9875)
+    one, four = (difference(after, before, True, c).half_width for c in (0.95, confidence))
+    assert four / one == pytest.approx(stats.t.ppf(1 - 0.0125 / 2, 3) / stats.t.ppf(0.975, 3))
+
+
+@pytest.mark.parametrize("paired", [True, False])
+def test_simulated_so_much_longer_the_difference_shows_in_half_of_the_cases(paired: bool) -> None:
+    rng = np.random.default_rng(1)
+    count, true_gap, spread = 8, 0.3, 1.0
+    noise = stats.zscore(rng.normal(size=(2, count)), axis=1, ddof=1) * spread
+    if paired:  # the pairs' own scatter is the spread
+        noise[0] = 0.0
+    gap = difference(estimate(true_gap + noise[1]), estimate(noise[0]), same_seeds=paired)
+    assert not gap.real
+    assert gap.replicas is not None
+    assert gap.times == pytest.approx(gap.replicas / count)
+    # 1.96 standard errors in the limit: the foretold number is not far above (Student's t of more replicas is near it).
+    limit = (1.96 * spread / true_gap) ** 2 * (1 if paired else 2)
+    assert limit < gap.replicas < 1.2 * limit
+    drawn = rng.normal(0.0, spread, (2, 4000, gap.replicas)) + np.array([0.0, true_gap])[:, None, None]
+    if paired:
+        found = stats.ttest_1samp(drawn[1], 0.0, axis=1).pvalue < 0.05
+    else:
+        found = stats.ttest_ind(drawn[1], drawn[0], axis=1, equal_var=False).pvalue < 0.05
+    assert found.mean() == pytest.approx(0.5, abs=0.04)
+
+
+def test_what_would_take_for_ever_is_not_foretold(tmp_path: Path) -> None:
+    values = np.array([1.0, 2.0, 3.0, 4.0])
+    tiny = difference(estimate(values[::-1] + 1e-4), estimate(values), same_seeds=True)
+    assert (tiny.real, tiny.times, tiny.replicas) == (False, None, None)
+    both = compare([left(tmp_path / "a", 20), left(tmp_path / "b", 20)])
+    text = as_text(replace(both, differences={name: (tiny,) for name in both.differences}))
+    assert row(text, "mean_coverage").endswith(f"more than {LONGEST} × as long")
+
+
+def test_never_is_not_told_from_late(tmp_path: Path) -> None:
+    """A time of never has replicas that all say never: no scatter, but nothing is known of it."""
+    folders = [left(tmp_path / "late", 20)]
+    evaluation = poisson_evaluation(PLATE, CHAMBER, 20, 6)
+    never = Estimate(NEVER, NEVER, (NEVER,) * 6)
+    folders.append(left(tmp_path / "never", 20, metrics={**evaluation.metrics, "time_to_98_s": never}))
+    both = compare(folders)
+    (gap,) = both.differences["time_to_98_s"]
+    assert not gap.real
+    assert "never " in row(as_text(both), "time_to_98_s")
+
+
+def test_three_results_and_what_is_written(tmp_path: Path) -> None:
+    folders = [left(tmp_path / name / "result", 10 + 10 * i, i) for i, name in enumerate("abc")]
+    three = compare(folders)
+    assert three.labels == ("a/result", "b/result", "c/result")
+    assert len(three.differences["mean_coverage"]) == 2
+    assert three.confidence == pytest.approx(0.975)
+    assert "hold together with 95 % (Bonferroni)" in as_text(three)
+    assert write_comparison(tmp_path / "out", three) == ["skipped"] * 2
+    assert (tmp_path / "out" / "compare.txt").read_text() == as_text(three) + "\n"
+    about = json.loads((tmp_path / "out" / "compare.json").read_text())
+    assert [gap["real"] for gap in about["differences_to_first"]["mean_coverage"]] == [True, True]
+    assert len(about["coverage_against_time"][2]) > 5
+    assert about["metrics"]["time_to_98_s"][0]["half_width"] > 0
+    for name in ("coverage", "normal_speed", "angle"):
+        histogram = about["distributions"][name]
+        for shares in histogram["shares"]:
+            assert len(shares) == len(histogram["edges"]) - 1
+            assert sum(shares) == pytest.approx(1.0)
+    # All synthetic impacts come at 3 m/s and 70 degrees; the mean of the coverage's histogram is the mean coverage.
+    assert about["distributions"]["mean_normal_speed_m_s"] == pytest.approx([3.0] * 3)
+    assert about["distributions"]["mean_angle_deg"] == pytest.approx([70.0] * 3)
+    edges = np.array(about["distributions"]["coverage"]["edges"])
+    for shares, mean in zip(about["distributions"]["coverage"]["shares"], three.metrics["mean_coverage"], strict=True):
+        assert 0.5 * (edges[1:] + edges[:-1]) @ shares == pytest.approx(100.0 * mean.value, abs=edges[1] - edges[0])
+    assert (tmp_path / "out" / "distributions.png").stat().st_size > 50_000
+    with pytest.raises(InputError, match="never overwritten"):
+        write_comparison(tmp_path / "out", three)
+
+
+def test_results_without_single_impacts_are_compared_all_the_same(tmp_path: Path) -> None:
+    both = compare([left(tmp_path / "new", 20), left(tmp_path / "older", 30, hits=())])
+    remarks = write_comparison(tmp_path / "out", both)
+    assert remarks[0] == "skipped"
+    assert "difference.png skipped: older: no single impacts" in remarks[1]
+    about = json.loads((tmp_path / "out" / "compare.json").read_text())
+    assert about["local_differences_to_first"] is None
+    assert about["distributions"]["angle"]["shares"][1] is None
+    assert about["distributions"]["impacts"][1] is None
+
+
+def test_two_ways_of_counting_are_said(tmp_path: Path) -> None:
+    data = PLATE.model_dump()
+    data["process"]["accuracy"] |= {"coverage_model": "dents"}
+    dents = checked(Design, data)
+    text = as_text(compare([left(tmp_path / "a", 20), left(tmp_path / "b", 20, 0, dents)]))
+    assert "counted in two ways (process.accuracy.coverage_model)" in text
+    assert "two ways" not in as_text(compare([tmp_path / "a", left(tmp_path / "c", 20)]))
+
+
+def test_single_impacts_of_another_result_are_refused(tmp_path: Path) -> None:
+    both = compare([left(tmp_path / "a", 20), left(tmp_path / "b", 30)])
+    (tmp_path / "b" / "hits.npz").write_bytes((tmp_path / "a" / "hits.npz").read_bytes())
+    with pytest.raises(InputError, match=r"hits\.npz: its impacts are not those of the coverage\.vtp beside it"):
+        write_comparison(tmp_path / "out", both)
+    assert not (tmp_path / "out").exists()
+
+
+def test_targets_of_other_triangles_are_refused(tmp_path: Path) -> None:
+    both = compare([left(tmp_path / "a", 20), left(tmp_path / "b", 30)])
+    surface = viewer.read_surface(tmp_path / "b" / "coverage.vtp")
+    surface["target"][np.flatnonzero(surface["target"])[:3]] = 0
+    surface.save(tmp_path / "b" / "coverage.vtp")
+    with pytest.raises(InputError, match=r"of another result than result\.json: a target of 333 triangles"):
+        write_comparison(tmp_path / "out", both)
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_cannot_be_compared(tmp_path: Path) -> None:
+    one = left(tmp_path / "one", 20)
+    with pytest.raises(InputError, match="two or more"):
+        compare([one])
+    with pytest.raises(InputError, match="given twice"):
+        compare([one, one / ".." / "one"])
+    with pytest.raises(InputError, match="not a results folder"):
+        compare([one, tmp_path])
+    blade = load_design(DESIGNS / "blade.toml")
+    other = build_chamber(blade)
+    write_simulation(tmp_path / "blade", blade, other, poisson_evaluation(blade, other))
+    with pytest.raises(InputError, match=r"another part \(blade.stl\).*plate.stl"):
+        compare([one, tmp_path / "blade"])
+    part = PLATE.part.model_copy(update={"target": type(PLATE.part.target)()})
+    elsewhere = left(tmp_path / "all", 20, 0, PLATE.model_copy(update={"part": part}))
+    with pytest.raises(InputError, match=r"part\.target differs"):
+        compare([one, elsewhere])
+    longer = left(tmp_path / "longer", 20, 0, plate_design(process__treatment_time_s=10))
+    with pytest.raises(InputError, match=r"peened for 10 s.*for 5 s.*--treatment-time-s"):
+        compare([one, longer])
+
+
+def test_curves_end_where_nobody_knows_any_more() -> None:
+    widths = ((0.01, 0.02), (0.1, 0.2), (0.2, 0.1))
+    rows = [
+        {"time_s": k + 1.0, "mean_coverage": 0.5, "half_width": mean, "p05_coverage": 0.4, "p05_half_width": poorest}
+        for k, (mean, poorest) in enumerate(widths)
+    ]
+    mean, poorest = plots._known(rows)
+    np.testing.assert_array_equal(mean[0], [1.0, 2.0])
+    np.testing.assert_array_equal(poorest[0], [1.0])
+    marked = plots._known([{"time_s": 1.0, "mean_coverage": 0.5, "half_width": 0.01}])[1]  # has no poorest twentieth
+    assert marked.shape == (3, 0)

@@ -1,0 +1,394 @@
+"""What a report says is what the result holds, and the page that says it needs nothing but itself."""
+
+import base64
+import json
+import math
+import re
+import shutil
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chamberopt.cli import main
+from chamberopt.common.errors import InputError
+from chamberopt.output import viewer
+from chamberopt.output.report import charts, facts, write_part_page, write_report
+from chamberopt.output.report.formatting import plain, with_interval
+from chamberopt.output.report.influence import influence
+from chamberopt.output.report.part3d import part_scene
+from chamberopt.output.report.words import Words, goal_words
+from chamberopt.output.results.results import load_result
+from tests.helpers.results.report_folders import simulated, studied
+
+NASTY = "a <img src=x onerror=alert(1)> & b"
+
+
+@pytest.fixture(scope="module")
+def no_pictures():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(viewer, "coverage_picture", lambda *_: None)
+        yield
+
+
+@pytest.fixture(scope="module")
+def simulation(tmp_path_factory: pytest.TempPathFactory, no_pictures: None) -> Path:
+    return simulated(tmp_path_factory.mktemp("report") / NASTY)[0]
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory, no_pictures: None) -> Path:
+    return studied(tmp_path_factory.mktemp("report") / "study")
+
+
+class Page(HTMLParser):
+    """The elements of a page as a browser would see them, and its text outside scripts and styles."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.elements: list[tuple[str, dict]] = []
+        self.scripts: list[str] = []
+        self.said = ""
+        self._inside = ""
+        self.feed(path.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag: str, attributes: list) -> None:
+        self.elements.append((tag, dict(attributes)))
+        self._inside = tag
+        if tag == "script":
+            self.scripts.append("")
+
+    def handle_data(self, data: str) -> None:
+        if self._inside == "script":
+            self.scripts[-1] += data
+        elif self._inside != "style":
+            self.said += data
+
+    def handle_endtag(self, tag: str) -> None:
+        self._inside = ""
+
+    def parts(self) -> dict:
+        (place,) = (i for i, e in enumerate(self._kind("script")) if e.get("id") == "parts")
+        return json.loads(self.scripts[place])
+
+    def _kind(self, tag: str) -> list[dict]:
+        return [attributes for name, attributes in self.elements if name == tag]
+
+
+def unpacked(text: str, kind: str = "<f4") -> np.ndarray:
+    return np.frombuffer(base64.b64decode(text), dtype=kind)
+
+
+def changed(folder: Path, copy: Path, change) -> Path:
+    """A copy of a results folder with another result.json."""
+    shutil.copytree(folder, copy)
+    data = json.loads((copy / "result.json").read_text())
+    change(data)
+    (copy / "result.json").write_text(json.dumps(data))
+    return copy
+
+
+@pytest.mark.parametrize(
+    ("value", "half_width", "said"),
+    [
+        (0.80934, 0.00407, "0.809 ± 0.004"),
+        (0.2301, 0.0132, "0.230 ± 0.013"),
+        (0.577, 0.00996, "0.577 ± 0.010"),
+        (5e-18, 1e-18, "0"),
+        (5e-18, 0.02, "0.000 ± 0.020"),
+        (-0.0001, 0.02, "0.000 ± 0.020"),
+        (2166.9, 1678.4, "2200 ± 1700"),
+        (3708.0, 497781.0, "4000 ± 500\u202f000"),
+        (363.0, 0.0, "363"),
+        (-9.96, 0.5, "−10.0 ± 0.5"),
+        (1.5, math.inf, "1.5 ± not known"),
+        (math.nan, 1.0, "not known"),
+    ],
+)
+def test_an_interval_has_one_or_two_digits_and_its_value_the_same_decimals(value, half_width, said) -> None:
+    assert with_interval(value, half_width) == said
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [(33.9552, "33.96"), (5e-18, "0"), (4311860.0, "4\u202f311\u202f860"), (1e-7, "1e-07"), (120.0, "120")],
+)
+def test_a_number_alone_has_four_digits_that_count(value: float, said: str) -> None:
+    assert plain(value) == said
+
+
+def test_a_goal_that_is_a_metric_reads_as_the_metric() -> None:
+    assert goal_words("time_to_98") == Words("time until 95 % of the target's area is 98 % covered", "s", -1.0)
+    assert goal_words("coverage_p05").unit == "%"
+    assert goal_words("uniform_coverage").meaning == "mean minus standard deviation of coverage"
+    assert goal_words("of a later version").label == "of a later version"
+
+
+def test_a_simulation_is_answered_in_one_sentence(simulation: Path) -> None:
+    said, result = facts(simulation), load_result(simulation)
+    mean = result.metrics["mean_coverage"]
+    assert with_interval(100 * mean.value, 100 * mean.half_width, "%") in said["answer"]
+    assert said["answer"].startswith("After 5 s the target is covered to ")
+    assert said["influence"] is None
+    assert said["evaluations"] == []
+    assert not said["effects"]["pilot"]
+    assert {"effect": "gravity", "value": "on"} in said["effects"]["effects"]
+    assert said["identity"]["part, SHA-256"] == result.part_sha256
+    json.dumps(said, allow_nan=False)
+
+
+def test_a_study_is_answered_with_its_gain(study: Path) -> None:
+    said, about = facts(study), load_result(study).data["study"]
+    gain = about["gain"]
+    assert with_interval(gain["value"], gain["half_width"], sign=True) in said["answer"]
+    assert "more than noise" in said["answer"]
+    first = said["metrics"][0]
+    assert (first["change"]["value"], first["change"]["half_width"]) == (gain["value"], gain["half_width"])
+    assert first["real"]
+    assert [one["name"] for one in said["question"]["vary"]] == list(about["vary"])
+    assert said["question"]["constraints"] == ["chamber.sonotrode_distance_mm ≥ 9.5"]
+    failed = [one for one in said["evaluations"] if one["value"] is None]
+    assert len(failed) == about["failed"] > 0
+    assert all(one["reason"] == "<b>not</b> this one" for one in failed)
+    changed = {row["name"] for row in said["design"] if "start" in row}
+    assert changed <= set(about["vary"])
+    assert changed
+    json.dumps(said, allow_nan=False)
+
+
+def test_no_gain_is_said_to_be_none(study: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "flat"
+    shutil.copytree(study, folder)
+    best = json.loads((folder / "result.json").read_text())
+    best["study"]["best"] = {"searched_as": 0, "parameters": best["study"]["start"]["parameters"]}
+    (folder / "result.json").write_text(json.dumps(best))
+    start = json.loads((folder / "start" / "result.json").read_text())
+    same = {name: best[name] for name in ("objective", "metrics")}
+    (folder / "start" / "result.json").write_text(json.dumps(start | same))
+    said = facts(folder)
+    assert "No better chamber than the start was found" in said["answer"]
+    assert not said["metrics"][0]["real"]
+
+
+def a_model(mean: list, half_width: list, **other: object) -> dict:
+    """result.json's "study" of one parameter x in 0 .. 2, best at 0."""
+    curve = {"values": [0.0, 1.0, 2.0], "mean": mean, "half_width": half_width, "main_effect": mean}
+    return {
+        "evaluations": 20,
+        "vary": {"x": [0.0, 2.0]},
+        "start": {"parameters": {"x": 1.0}},
+        "best": {"parameters": {"x": 0.0}},
+        "model": {
+            "noise": 0.01, "expected": {"value": mean[0], "half_width": half_width[0]}, "together": 1.0,
+            "parameters": {"x": {"flat": [0.0, 0.1], "share_of_variance": 1.0, **curve}},
+        },
+        **other,
+    }  # fmt: skip
+
+
+def test_what_a_parameter_costs_has_an_interval() -> None:
+    """It may cost 0.5 ± 0.5 at its far end, but 0.4 ± 0.05 in the middle: 0.35 for sure."""
+    told = influence(a_model([1.0, 0.6, 0.5], [0.03, 0.04, 0.5]), Words("goal"))
+    (one,) = told["parameters"]
+    assert (one["loss"], one["loss_half_width"]) == pytest.approx((0.5, math.hypot(0.5, 0.03)))
+    assert one["surely"] == pytest.approx(0.35)
+    assert told["said"][0].startswith("x mattered most")
+    assert "0.5 ± 0.5" in told["said"][0]
+    assert "0.35 or more" in told["said"][0]
+
+
+def test_too_little_to_tell_is_said() -> None:
+    unsure = influence(a_model([1.0, 0.9, 0.8], [0.2, 0.2, 0.2]), Words("goal"))
+    assert unsure["parameters"][0]["surely"] == 0.0
+    assert "20 evaluations are too few to tell the influence of x from none" in unsure["said"][0]
+    none = influence({**a_model([1.0] * 3, [0.0] * 3), "model": None, "evaluations": 3, "failed": 1}, Words("goal"))
+    assert none["parameters"] == []
+    assert none["said"] == [
+        "3 evaluations, 1 of them failed, are too few to tell what each parameter does: 4 or more are needed for a "
+        "model of them."
+    ]
+
+
+def test_a_time_that_shall_be_short_is_shown_as_a_time() -> None:
+    told = influence(a_model([-400.0, -900.0, -2000.0], [10.0] * 3), goal_words("time_to_98"))["parameters"][0]
+    assert told["mean"] == [400.0, 900.0, 2000.0]
+    assert told["loss"] == pytest.approx(1600.0)
+    rows = [
+        {"number": i + 1, "stage": "search", "value": v, "half_width": 1.0, "feasible": True, "parameters": {}}
+        for i, v in enumerate((900.0, 400.0, 600.0))
+    ]
+    best = charts.convergence(rows, "time [s]", smaller=True)["data"][1]
+    assert best["y"] == [900.0, 400.0, 400.0, 400.0]
+
+
+def test_a_front_of_two_objectives_is_listed(study: Path, tmp_path: Path) -> None:
+    goals = {"uniform_coverage": {"value": 0.5, "half_width": 0.01}, "time_to_98": {"value": -71.3, "half_width": 2.0}}
+    front = [{"parameters": {"shot.mass_g": 7.5}, "standing": "feasible", "objectives": goals}]
+    folder = changed(study, tmp_path / "front", lambda data: data["study"].update(front=front))
+    said = Page(write_report(folder)[0]).said
+    assert "Two objectives were sought at once" in said
+    assert "71.3\u00a0±\u00a02.0" in said  # seconds, not their negative
+
+
+def test_what_failed_or_missed_is_marked(study: Path) -> None:
+    drawn = charts.convergence(facts(study)["evaluations"], "goal", smaller=False)
+    shown = {trace["name"]: trace["x"] for trace in drawn["data"]}
+    assert shown["could not be simulated"]
+    assert shown["confirmed on fresh seeds"]
+    assert shown["misses a constraint"]
+    best = next(trace["y"] for trace in drawn["data"] if trace["name"] == "best so far")
+    assert best == sorted(best)
+
+
+def test_a_histogram_holds_all_of_the_area() -> None:
+    coverage, area = np.array([0.0, 0.5, 1.0]), np.array([1.0, 2.0, 1.0])
+    (trace,) = charts.histogram({"result": (coverage, area)})["data"]
+    assert sum(trace["y"]) == pytest.approx(200.0)  # each class has two corners
+
+
+@pytest.mark.parametrize("kind", ["simulation", "study"])
+def test_the_page_needs_nothing_but_itself(kind: str, tmp_path: Path, request: pytest.FixtureRequest) -> None:
+    path, _ = write_report(request.getfixturevalue(kind), tmp_path / "page.html")
+    page = Page(path)
+    for tag, attributes in page.elements:
+        assert tag not in ("link", "iframe", "object", "embed", "base", "img"), tag
+        for name in ("src", "href", "action", "srcset", "poster"):
+            assert attributes.get(name, "data:").startswith("data:"), (tag, attributes)
+    text = path.read_text(encoding="utf-8")
+    assert not re.findall(r"@import|url\(\s*['\"]?(?!data:)", text[: text.index("</style>")])
+    assert sum("plotly.js v" in script[:200] for script in page.scripts) == 1
+    policy = next(a["content"] for tag, a in page.elements if tag == "meta" and "http-equiv" in a)
+    assert policy.startswith("default-src 'none'")
+    assert "http" not in policy
+    own = [script for script in page.scripts if "plotly.js v" not in script[:200]]
+    assert not any("http" in script for script in own)
+    assert ("html", {"lang": "en"}) in page.elements
+    charts_shown = [a for tag, a in page.elements if tag == "div" and a.get("role") == "img"]
+    assert charts_shown
+    assert all(a["aria-label"] for a in charts_shown)
+
+
+def test_what_others_wrote_stays_text(simulation: Path, tmp_path: Path) -> None:
+    note = "</script><script>alert(2)</script>"
+
+    def spoil(data: dict) -> None:
+        data["notes"] = [note]
+        data["versions"]["<i>python"] = "</style>"
+
+    page = Page(write_report(changed(simulation, tmp_path / NASTY, spoil))[0])
+    assert not any(tag in ("img", "i") for tag, _ in page.elements)
+    assert not any("alert(2)" in script for script in page.scripts)
+    assert page.parts()["scenes"][0]["title"] == NASTY
+    for said in (NASTY, note, "<i>python", "</style>"):
+        assert said in page.said
+
+
+def test_the_page_carries_the_columns_of_the_target(simulation: Path, tmp_path: Path) -> None:
+    surface = viewer.read_surface(simulation / "coverage.vtp")
+    target = (surface["target"] > 0) & (surface["exposed_area_mm2"] > 0)
+    carried = Page(write_report(simulation, tmp_path / "page.html")[0]).parts()
+    (scene,) = carried["scenes"]
+    for name, column, factor in (("coverage", "coverage", 100.0), ("p90-speed", "p90_normal_speed", 1.0)):
+        np.testing.assert_array_equal(
+            unpacked(scene["columns"][name]), (factor * surface[column][target]).astype(np.float32)
+        )
+    np.testing.assert_array_equal(unpacked(scene["number"], "<i4"), np.flatnonzero(target))
+    part = next(trace for trace in scene["figure"] if trace["name"] == "part")
+    corners = np.stack([unpacked(part[axis]["bdata"]) for axis in "xyz"], axis=1)
+    faces = np.stack([np.frombuffer(base64.b64decode(part[k]["bdata"]), part[k]["dtype"]) for k in "ijk"], axis=1)
+    expected = np.asarray(surface.points)[surface.regular_faces[target]]
+    np.testing.assert_allclose(corners[faces], expected, atol=1e-4)
+    density = unpacked(scene["columns"]["density"])
+    np.testing.assert_allclose(-100.0 * np.expm1(-density), unpacked(scene["columns"]["coverage"]), rtol=1e-4)
+    assert {one["name"] for one in carried["quantities"]} == set(scene["columns"]) - {"density", "shown-density"}
+    assert set(carried["scales"]) == {"viridis", "cividis", "magma"}
+
+
+def test_an_older_result_without_single_hits_shows_what_it_has(tmp_path: Path, no_pictures: None) -> None:
+    folder, _ = simulated(tmp_path / "older", hits=False)
+    data = json.loads((folder / "result.json").read_text())
+    for later in ("coverage_against_time", "stopped_by", "analytic"):
+        del data[later]
+    for later in ("time_to_98_s", "intensity_uniformity"):
+        del data["metrics"][later]
+    (folder / "result.json").write_text(json.dumps(data))
+    page = Page(write_report(folder)[0])
+    assert "older result does not say" in page.said
+    assert [one["name"] for one in page.parts()["quantities"]] == ["coverage", "impacts", "speed", "angle"]
+
+
+def test_coverage_of_marked_dents_is_told_at_no_other_time(simulation: Path, tmp_path: Path) -> None:
+    def marks(data: dict) -> None:
+        data["design"]["process"]["accuracy"]["coverage_model"] = "dents"
+
+    page = Page(write_report(changed(simulation, tmp_path / "marked", marks))[0])
+    assert not {"density", "shown-density"} & set(page.parts()["scenes"][0]["columns"])
+    assert "Every dent was marked" in page.said
+
+
+def test_what_a_pilot_estimated_of_each_effect_is_told(simulation: Path, tmp_path: Path) -> None:
+    said = "drag is on: needed (0.1 of the speed is lost on the way up; pilot: ...)"
+    changes = {"mean impact speed": {"value": -0.042, "half_width": 0.004}}
+    advice = {"effect": "drag", "on": True, "verdict": "matters", "said": said, "changes": changes}
+    folder = changed(simulation, tmp_path / "auto", lambda data: data.update(effects=[advice]))
+    page = Page(write_report(folder)[0])
+    assert "chosen by a short pilot run" in page.said
+    assert "−4.2\u00a0±\u00a00.4 %" in page.said
+    assert said in page.said
+
+
+def test_a_part_too_large_for_a_page_is_drawn_less_and_says_so(simulation: Path) -> None:
+    result, surface = load_result(simulation), viewer.read_surface(simulation / "coverage.vtp")
+    target = int(((surface["target"] > 0) & (surface["exposed_area_mm2"] > 0)).sum())
+    less = part_scene(result, "", most=target)
+    assert any("the target alone is drawn" in remark for remark in less.remarks)
+    assert next(trace for trace in less.data["figure"] if trace["name"] == "rest")["i"] == []
+    none = part_scene(result, "", most=target - 1)
+    assert none.data is None
+    assert any("chamberopt inspect shows it" in remark for remark in none.remarks)
+
+
+def test_a_surface_of_another_result_is_refused(study: Path, tmp_path: Path) -> None:
+    mixed = tmp_path / "mixed"
+    shutil.copytree(study, mixed)
+    shutil.copy(study / "start" / "coverage.vtp", mixed)
+    with pytest.raises(InputError, match="of another result"):
+        write_report(mixed)
+
+
+def test_parts_side_by_side(simulation: Path, study: Path, tmp_path: Path) -> None:
+    remarks = write_part_page([study / "start", study], tmp_path / "parts.html")
+    page = Page(tmp_path / "parts.html")
+    assert [scene["title"] for scene in page.parts()["scenes"]] == ["study/start", f"{study.parent.name}/study"]
+    assert all(remark in page.said for remark in remarks)
+
+
+def test_only_a_report_of_ours_is_replaced(simulation: Path, tmp_path: Path) -> None:
+    path, _ = write_report(simulation, tmp_path / "page.html")
+    write_report(simulation, path)
+    precious = tmp_path / "precious.html"
+    precious.write_text("<p>keep me</p>")
+    with pytest.raises(InputError, match=r"precious\.html: is there, and no report of ours"):
+        write_report(simulation, precious)
+    assert precious.read_text() == "<p>keep me</p>"
+    with pytest.raises(InputError, match=r"one \.html file"):
+        write_report(simulation, tmp_path / "page.pdf")
+    with pytest.raises(InputError, match="folder does not exist"):
+        write_report(simulation, tmp_path / "gone" / "page.html")
+
+
+def test_the_command(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    folder = tmp_path / "study"
+    shutil.copytree(study, folder)
+    assert main(["report", str(folder)]) == 0
+    out = capsys.readouterr().out
+    assert f"report in {folder / 'report.html'}" in out
+    assert facts(folder)["answer"] in out
+    assert load_result(folder).data == load_result(study).data
+    assert main(["report", str(folder), "--json", "--out", str(tmp_path / "r.html")]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["report"] == str(tmp_path / "r.html")
+    assert told["metrics"] == facts(folder)["metrics"]
+    assert main(["report", str(tmp_path)]) == 2
+    assert "not a results folder" in capsys.readouterr().err

@@ -1,0 +1,149 @@
+"""The page opened and used in a real browser without a display: it draws, answers to its controls, asks for nothing."""
+
+import io
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+from chamberopt.output import viewer
+from chamberopt.output.report import write_part_page, write_report
+from tests.helpers.results.report_folders import studied
+
+playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium, chromium-browser or google-chrome on PATH")
+
+SOFTWARE = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]  # WebGL without a graphics card
+DRAWN = "body[data-drawn=yes]"
+WAIT = 60_000  # ms; a busy machine draws slowly
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(viewer, "coverage_picture", lambda *_: None)
+        return studied(tmp_path_factory.mktemp("report") / "study")
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with playwright.sync_playwright() as session:
+        browser = session.chromium.launch(executable_path=CHROMIUM, args=SOFTWARE)
+        yield browser
+        browser.close()
+
+
+class Watched:
+    """A page that was opened, with all it said and asked for meanwhile."""
+
+    def __init__(self, browser: Any, path: Path, width: int = 1280) -> None:
+        self.troubles: list[str] = []
+        self.requests: list[str] = []
+        self.page = browser.new_page(viewport={"width": width, "height": 800})
+        self.page.on("pageerror", lambda error: self.troubles.append(str(error)))
+        self.page.on("console", lambda said: self.troubles.append(said.text) if said.type == "error" else None)
+        self.page.on("request", lambda request: self.requests.append(request.url))
+        self.page.goto(path.as_uri())
+        self.page.wait_for_selector(DRAWN, timeout=WAIT)
+
+    def pixels(self, place: str = "#part-0") -> np.ndarray:
+        """What is on the screen there, (rows, columns, 3) in 0..1."""
+        self.page.wait_for_timeout(600)  # drawn in the next frame
+        return imread(io.BytesIO(self.page.locator(place).first.screenshot()), format="png")[..., :3]
+
+
+@pytest.fixture(scope="module")
+def shown(browser: Any, study: Path, tmp_path_factory: pytest.TempPathFactory) -> Watched:
+    path, _ = write_report(study, tmp_path_factory.mktemp("page") / "report.html")
+    return Watched(browser, path)
+
+
+def coloured(pixels: np.ndarray) -> float:
+    """Share of pixels with a strong colour: of the part's map and its bar, for all else there is pale or grey."""
+    return float((np.ptp(pixels, axis=2) > 0.25).mean())
+
+
+def test_it_is_drawn_and_asks_for_nothing(shown: Watched, tmp_path: Path) -> None:
+    shown.page.screenshot(path=tmp_path / "report.png", full_page=True)
+    assert (tmp_path / "report.png").stat().st_size > 50_000
+    assert shown.troubles == []
+    assert all(url.startswith(("file:", "data:", "blob:")) for url in shown.requests)
+    assert len([url for url in shown.requests if url.startswith("file:")]) == 1
+    assert coloured(shown.pixels()) > 0.02
+    for name in ("convergence", "slices", "histogram", "against-time"):
+        assert shown.page.locator(f"#{name} .main-svg").count() > 0
+    assert shown.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+
+
+def test_another_quantity_has_its_own_bar(shown: Watched) -> None:
+    bar = shown.page.locator("#part-0 .infolayer")
+    assert "coverage [%]" in bar.text_content()
+    before = shown.pixels()
+    shown.page.select_option("#quantity", label="impacts per area")
+    shown.page.wait_for_function("document.querySelector('#part-0 .infolayer').textContent.includes('1/mm²')")
+    assert "coverage [%]" not in bar.text_content()
+    assert not shown.page.locator("#times").is_visible()
+    assert np.abs(shown.pixels() - before).max() > 0.2
+    shown.page.select_option("#quantity", label="coverage")
+    shown.page.wait_for_function("document.querySelector('#part-0 .infolayer').textContent.includes('coverage [%]')")
+
+
+def test_time_goes_by(shown: Watched) -> None:
+    before, said = shown.pixels(), shown.page.locator("#at").text_content()
+    slider = shown.page.locator("#time")
+    slider.focus()
+    slider.press("Home")
+    begun = "0 s: the target is covered to 0.0 %"
+    shown.page.wait_for_function(f"document.getElementById('at').textContent.startsWith('{begun}')")
+    after = shown.pixels()
+    assert np.abs(after - before).max() > 0.2
+    values = shown.page.evaluate("document.getElementById('part-0').data[0].intensity")
+    assert set(values.values() if isinstance(values, dict) else values) == {0}
+    slider.press("End")
+    shown.page.wait_for_function(f"!['{said}'].includes(document.getElementById('at').textContent)")
+    shown.page.wait_for_function("document.getElementById('part-0').data[0].intensity[0] > 50")
+
+
+def test_a_triangle_tells_its_figures(shown: Watched) -> None:
+    shown.page.evaluate("document.getElementById('part-0').scrollIntoView({block: 'center'})")
+    box = shown.page.locator("#part-0").bounding_box()
+    label = shown.page.locator("#label")
+    for across in np.linspace(0.35, 0.6, 6):
+        for down in np.linspace(0.3, 0.6, 4):
+            shown.page.mouse.move(box["x"] + across * box["width"], box["y"] + down * box["height"])
+            shown.page.wait_for_timeout(150)
+            if label.is_visible():
+                told = label.inner_text()
+                assert "triangle" in told
+                for unit in ("%", "1/mm²", "m/s", "°"):
+                    assert unit in told
+                return
+    pytest.fail("no triangle of the target answered to the pointer")
+
+
+def test_the_chamber_can_be_hidden_and_what_is_folded_opens(shown: Watched) -> None:
+    before = shown.pixels()
+    shown.page.uncheck("#glass")
+    assert np.abs(shown.pixels() - before).max() > 0.05
+    fold = shown.page.locator("details", has_text="best.toml").last
+    assert not fold.locator("pre").is_visible()
+    fold.locator("summary").click()
+    assert "[sonotrode]" in fold.locator("pre").inner_text()
+
+
+def test_a_narrow_window_needs_no_scrolling_sideways(browser: Any, study: Path, tmp_path: Path) -> None:
+    """Two parts, side by side where there is room, turn together."""
+    write_part_page([study / "start", study], tmp_path / "parts.html")
+    narrow = Watched(browser, tmp_path / "parts.html", 800)
+    assert narrow.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    narrow.page.evaluate(
+        "Plotly.relayout(document.getElementById('part-0'), {'scene.camera': {eye: {x: 0.1, y: 0.2, z: 1.5}}})"
+    )
+    turned = "document.getElementById('part-1').layout.scene.camera.eye.z == 1.5"
+    narrow.page.wait_for_function(turned, timeout=WAIT)
+    assert narrow.troubles == []

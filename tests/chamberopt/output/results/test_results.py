@@ -1,0 +1,142 @@
+"""What is left on disk reads back as what was computed, and a damaged folder is said to be one."""
+
+import hashlib
+import json
+from pathlib import Path
+
+import pytest
+
+from chamberopt.chamber.build import build_chamber
+from chamberopt.common.errors import InputError
+from chamberopt.common.parallel.executor import SerialExecutor
+from chamberopt.design.load import Study, load_design
+from chamberopt.optimize.run_study import run_study
+from chamberopt.output import viewer
+from chamberopt.output.compare.comparison import compare
+from chamberopt.output.results.results import load_result, summary, write_simulation, write_study
+from tests.helpers.synthetic import plate_design, poisson_evaluation
+
+DESIGN = plate_design()
+CHAMBER = build_chamber(DESIGN)
+EVALUATION = poisson_evaluation(DESIGN, CHAMBER)
+
+
+@pytest.fixture
+def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(viewer, "coverage_picture", lambda *_: "coverage.png skipped: no OpenGL library found")
+
+
+@pytest.mark.usefixtures("no_pictures")
+def test_simulation_reads_back(tmp_path: Path) -> None:
+    folder = tmp_path / "plate"
+    remarks = write_simulation(folder, DESIGN, CHAMBER, EVALUATION)
+    assert remarks == ["coverage.png skipped: no OpenGL library found"]
+    names = {path.name for path in folder.iterdir()}
+    assert names == {"design.toml", "result.json", "coverage.vtp", "hits.npz", "chamber.stl", "chamber.vtp"}
+    result = load_result(folder)
+    assert result == load_result(folder / "result.json")
+    assert result.kind == "simulation"
+    assert result.design == DESIGN
+    assert load_design(folder / "design.toml") == DESIGN
+    assert result.objective == EVALUATION.objective
+    assert result.metrics == EVALUATION.metrics
+    assert result.part_sha256 == hashlib.sha256(DESIGN.part.mesh_path.read_bytes()).hexdigest()
+    assert result.seeds == (DESIGN.process.seed, "search")
+    assert list(CHAMBER.notes) == list(result.notes)
+    for name in ("python", "chamberopt", "numpy", "numba", "manifold3d", "nlopt"):
+        assert result.data["versions"][name][0].isdigit()
+    assert result.data["timings_s"]["simulate"] == 1.0
+    assert summary(result) == summary(EVALUATION)
+
+
+@pytest.mark.usefixtures("no_pictures")
+def test_results_are_never_overwritten(tmp_path: Path) -> None:
+    write_simulation(tmp_path / "plate", DESIGN, CHAMBER, EVALUATION)
+    before = {path.name: path.read_bytes() for path in (tmp_path / "plate").iterdir()}
+    with pytest.raises(InputError, match="never overwritten"):
+        write_simulation(tmp_path / "plate", DESIGN, CHAMBER, EVALUATION)
+    assert {path.name: path.read_bytes() for path in (tmp_path / "plate").iterdir()} == before
+
+
+def wrong_figures(text: str) -> list[str]:
+    """The same result.json, well formed, with an objective that is no figure and a metric missing."""
+    wrong = []
+    for value in ("x", None, float("nan"), []):
+        data = json.loads(text)
+        data["objective"]["value"] = value
+        wrong.append(json.dumps(data))
+    data = json.loads(text)
+    del data["metrics"]["std_coverage"]
+    return [*wrong, json.dumps(data)]
+
+
+@pytest.mark.usefixtures("no_pictures")
+def test_a_result_can_be_looked_at_without_the_parts_file(tmp_path: Path) -> None:
+    folder = tmp_path / "plate"
+    write_simulation(folder, DESIGN, CHAMBER, EVALUATION)
+    data = json.loads((folder / "result.json").read_text())
+    data["design"]["part"]["mesh"] = "gone.stl"
+    (folder / "result.json").write_text(json.dumps(data))
+    assert not load_result(folder).design.part.mesh_path.exists()
+    assert load_result(folder).objective.value == EVALUATION.objective.value
+
+
+@pytest.mark.usefixtures("no_pictures")
+def test_what_is_no_result_is_said(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="not a results folder"):
+        load_result(tmp_path)
+    (tmp_path / "history.jsonl").write_text("{}\n")
+    with pytest.raises(InputError, match="did not finish"):
+        load_result(tmp_path)
+    folder = tmp_path / "plate"
+    write_simulation(folder, DESIGN, CHAMBER, EVALUATION)
+    text = (folder / "result.json").read_text()
+    for damaged in (text[: len(text) // 2], "[]", "{}", text.replace('"metrics"', '"metric"'), *wrong_figures(text)):
+        (folder / "result.json").write_text(damaged)
+        with pytest.raises(InputError, match="damaged"):
+            load_result(folder)
+    (folder / "result.json").write_text(text.replace('"format": 1', '"format": 99'))
+    with pytest.raises(InputError, match="format 99"):
+        load_result(folder)
+
+
+@pytest.mark.usefixtures("no_pictures")
+def test_a_study_leaves_everything_and_its_best_design_can_be_used(tmp_path: Path) -> None:
+    question = Study(
+        design=DESIGN,
+        vary={"shot.mass_g": (1.5, 8.0), "chamber.sonotrode_distance_mm": (8.0, 19.0)},
+        optimizer={"evaluations": 12, "confirm": 2, "confirm_replicas": 4},
+    )
+
+    def evaluator(design, stream, replicas):
+        if design.chamber.sonotrode_distance_mm > 17:
+            raise InputError("not this one")
+        # More shot, more dents: the best is at the upper bound.
+        return poisson_evaluation(design, CHAMBER, 4.0 * design.shot.mass_g, replicas or 4, seed=len(stream))
+
+    folder = tmp_path / "study"
+    outcome = run_study(question, folder, SerialExecutor(), evaluator=evaluator)
+    write_study(folder, outcome)
+    names = {path.name for path in folder.iterdir()}
+    assert names == {
+        "design.toml", "study.toml", "history.jsonl", "history.csv", "best.toml", "result.json", "coverage.vtp",
+        "chamber.stl", "chamber.vtp", "convergence.png", "slices.png", "start", "asked.json", "timings.jsonl",
+        "confirm", ".lock", "hits.npz",
+    }  # fmt: skip
+    result = load_result(folder)
+    assert result.kind == "study"
+    assert result.design == outcome.best.design == load_design(folder / "best.toml")
+    assert load_design(folder / "design.toml") == DESIGN
+    assert result.seeds == (DESIGN.process.seed, outcome.best.evaluation.stream)
+    # The start stands beside it, judged on the same seeds: comparing the two gives the gain again.
+    both = compare([folder / "start", folder])
+    (gain,) = both.differences["uniform_coverage"]
+    assert (gain.value, gain.half_width) == pytest.approx((outcome.gain.value, outcome.gain.half_width))
+    about = result.data["study"]
+    assert about["improved"]
+    assert about["gain"]["value"] == outcome.gain.value
+    assert about["evaluations"] == 12
+    assert about["failed"] == sum(trial.objective is None for trial in outcome.trials)
+    assert (folder / "convergence.png").stat().st_size > 20_000
+    assert len((folder / "history.csv").read_text().splitlines()) == len(outcome.trials) + 1
+    json.loads((folder / "result.json").read_text(), parse_constant=lambda name: pytest.fail(name))

@@ -1,0 +1,74 @@
+"""Pictures of a fixed result against committed ones: other colours, another scale or another mesh are noticed.
+
+Compared are means over blocks of 20 by 20 pixels, which hardly depend on how a driver smooths edges. TOLERANCE, of 1:
+softening every edge over three pixels changes a block by 0.011, losing one triangle in ten by 0.035 and more.
+To draw them anew, after a change that is meant and looked at: python -m tests.chamberopt.output.viewer.test_images
+"""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from scipy.ndimage import uniform_filter
+
+from chamberopt.output.viewer import why_no_pictures
+from chamberopt.output.viewer.subprocess_drawing import without_display
+
+REFERENCES = Path(__file__).parents[4] / "pictures"
+BLOCK, TOLERANCE = 20, 0.02
+
+pytestmark = pytest.mark.skipif(why_no_pictures() is not None, reason="no OpenGL library")
+
+
+def drawn(folder: Path) -> dict[str, np.ndarray]:
+    """Of tests/looked_at.py, in a process of its own."""
+    command = [sys.executable, "-m", "tests.helpers.results.sphere_in_sphere", "pictures", str(folder)]
+    subprocess.run(command, check=True, env=without_display(), cwd=REFERENCES.parents[1])
+    with np.load(folder / "pictures.npz") as pictures:
+        return {name: pictures[name] for name in pictures.files}
+
+
+def reference(name: str) -> np.ndarray:
+    return np.asarray(Image.open(REFERENCES / f"{name}.png").convert("RGB"))
+
+
+def difference(one: np.ndarray, other: np.ndarray) -> float:
+    """The largest between the means of their blocks, of 1."""
+    assert one.shape == other.shape
+    means = [
+        image.reshape(image.shape[0] // BLOCK, BLOCK, image.shape[1] // BLOCK, BLOCK, 3).mean(axis=(1, 3)) / 255.0
+        for image in (one, other)
+    ]
+    return float(np.abs(means[0] - means[1]).max())
+
+
+@pytest.fixture(scope="module")
+def pictures(tmp_path_factory: pytest.TempPathFactory) -> dict[str, np.ndarray]:
+    return drawn(tmp_path_factory.mktemp("pictures"))
+
+
+@pytest.mark.parametrize("name", ["coverage", "pick"])
+def test_a_result_looks_as_it_did(pictures: dict[str, np.ndarray], name: str) -> None:
+    assert difference(pictures[name], reference(name)) < TOLERANCE
+
+
+@pytest.mark.parametrize("wrong", ["other colours", "other limits", "moved", "lost"])
+def test_what_is_wrong_is_noticed(pictures: dict[str, np.ndarray], wrong: str) -> None:
+    assert difference(pictures[wrong], reference("coverage")) > TOLERANCE
+
+
+@pytest.mark.parametrize("name", ["coverage", "pick"])
+def test_softer_edges_are_no_change(name: str) -> None:
+    assert difference(uniform_filter(reference(name), (3, 3, 1)), reference(name)) < TOLERANCE
+
+
+if __name__ == "__main__":
+    import tempfile
+
+    with tempfile.TemporaryDirectory() as temporary:
+        redrawn = drawn(Path(temporary))
+    for name in ("coverage", "pick"):
+        Image.fromarray(redrawn[name]).save(REFERENCES / f"{name}.png", optimize=True)

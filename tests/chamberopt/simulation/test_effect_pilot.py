@@ -1,0 +1,170 @@
+"""Advice on effects: the groups, what is made of a pilot's figures, and what effects = "auto" chooses of it."""
+
+import math
+from concurrent.futures import Executor
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+from chamberopt.chamber import dimensionless
+from chamberopt.chamber.build import build_chamber
+from chamberopt.chamber.scene import chamber_mesh, scene_physics
+from chamberopt.common.errors import InputError
+from chamberopt.common.parallel.executor import SerialExecutor, local_executor
+from chamberopt.coverage.metrics import exposed_target
+from chamberopt.coverage.statistics.interval import Estimate
+from chamberopt.design.design import checked
+from chamberopt.design.load import Design
+from chamberopt.simulation import effect_pilot
+from chamberopt.simulation.effect_pilot import FIGURES, Advice, advise, settled
+from tests.helpers.synthetic import plate_design
+
+PLATE = plate_design()
+CHAMBER = build_chamber(PLATE)
+
+
+def with_effects(effects: Any) -> Design:
+    return checked(Design, {**PLATE.model_dump(), "effects": effects})
+
+
+def test_groups_are_what_their_formulas_say() -> None:
+    speed = PLATE.sonotrode.peak_speed
+    assert dimensionless.fall(PLATE, CHAMBER) == pytest.approx(9.80665 * CHAMBER.height / speed**2)
+    # A dilute gas: the packing does not matter, and twice the balls halve the path.
+    each = 1e3 * PLATE.shot.ball_mass  # g
+    thin, thinner = (plate_design(shot__mass_g=balls * each) for balls in (8, 4))
+    assert thin.shot.count == 2 * thinner.shot.count
+    assert dimensionless.free_path(thinner, CHAMBER) == pytest.approx(
+        2 * dimensionless.free_path(thin, CHAMBER), rel=0.01
+    )
+    assert math.isinf(dimensionless.free_path(plate_design(shot__mass_g=each), CHAMBER))
+    big = plate_design(shot__diameter_mm=8)  # Re above 1000: C_d is 0.44
+    expected = 0.75 * 0.44 * 1.204 / 7800 * CHAMBER.height / 8e-3
+    assert dimensionless.drag_loss(big, CHAMBER) == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("value", "half_width", "on", "said"),
+    [
+        (0.002, 0.003, True, "off is safe at 1 %"),
+        (-0.002, 0.003, False, "off is safe at 1 %"),
+        (0.3, 0.01, True, "needed"),
+        (-0.3, 0.01, False, "switch it on"),
+        (0.008, 0.01, True, "keep it"),
+        (0.008, 0.01, False, "on is the safe side"),
+        (0.0, math.inf, True, "keep it"),
+    ],
+)
+def test_a_verdict_follows_from_the_largest_change_and_its_interval(
+    value: float, half_width: float, on: bool, said: str
+) -> None:
+    changes = {FIGURES[0]: Estimate(value, half_width), FIGURES[1]: Estimate(0.0, 0.001)}
+    one = Advice("drag", on, "because", changes, 0.01)
+    assert said in str(one)
+    assert "because" in str(one)
+    assert one.as_json()["verdict"] == one.verdict
+
+
+def pretend(strength: dict[str, float], monkeypatch: pytest.MonkeyPatch) -> list[Design]:
+    """Stands in for the simulation: each effect that is on multiplies speeds and dents; returns the designs asked."""
+    asked: list[Design] = []
+
+    def evaluate(design: Design, chamber: Any, executor: Executor) -> Any:
+        asked.append(design)
+        on = {
+            "gravity": design.effects.gravity,
+            "ball_collisions": design.effects.ball_collisions,
+            "friction": design.effects.friction is not None,
+            "drag": design.effects.drag,
+        }
+        factor = math.prod(1.0 + strength.get(name, 0.0) * there for name, there in on.items())
+        target = exposed_target(chamber)
+        count = target * 1000
+        tallies = [
+            SimpleNamespace(
+                impacts=count,
+                speed_sum=count * 3.0 * factor * (1.0 + 1e-4 * k),
+                dented_area=chamber.exposed_area * 0.01 * factor,
+                simulated_time=1.0,
+            )
+            for k in range(effect_pilot.REPLICAS)
+        ]
+        return SimpleNamespace(replicas=tallies, total=SimpleNamespace(impacts=count))
+
+    monkeypatch.setattr(effect_pilot, "evaluate", evaluate)
+    return asked
+
+
+def test_each_effect_is_switched_alone_and_the_most_important_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = pretend({"gravity": 0.05, "ball_collisions": -0.5, "friction": -0.3, "drag": -0.001}, monkeypatch)
+    order = advise(PLATE, CHAMBER, SerialExecutor())
+    said = {one.effect: one for one in order}
+    assert [one.effect for one in order] == ["ball_collisions", "friction", "gravity", "drag"]
+    assert [one.on for one in order] == [True, False, True, False]
+    assert [one.verdict for one in order] == ["matters"] * 3 + ["makes no difference"]
+    assert said["friction"].changes["mean impact speed"].value == pytest.approx(-0.3)
+    assert said["gravity"].changes["mean impact speed"].value == pytest.approx(0.05)
+    changed = [design.effects for design in asked if design.effects != PLATE.effects]
+    assert len(changed) == 4
+    assert all(design.process.accuracy.coverage is None for design in asked)
+
+
+def test_a_target_of_two_triangles_has_figures_too(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Both are as far from the sonotrode: there is no farther half, and no 0 / 0."""
+    trimesh.creation.box((60, 60, 10)).export(tmp_path / "lid.stl")
+    data = PLATE.model_dump()
+    data["part"] = {"mesh": str(tmp_path / "lid.stl"), "unit": "mm", "target": {"direction": (0.0, 0.0, -1.0)}}
+    data["part"]["target"]["angle_deg"] = (0.0, 10.0)
+    lid = checked(Design, data)
+    pretend({"gravity": 0.05}, monkeypatch)
+
+    for one in advise(lid, build_chamber(lid), SerialExecutor()):
+        assert all(math.isfinite(change.value) for change in one.changes.values())
+
+
+def test_auto_keeps_what_matters_and_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    pretend({"gravity": 0.002, "ball_collisions": -0.5, "friction": -0.3, "drag": -0.001}, monkeypatch)
+    design = with_effects("auto")
+    assert design.effects.auto
+    chosen, why = settled(design, CHAMBER, SerialExecutor())
+    effects = chosen.effects
+    assert (effects.auto, effects.gravity, effects.ball_collisions, effects.drag) == (False, False, True, False)
+    assert effects.friction is not None
+    assert len(why) == 4
+    assert settled(PLATE, CHAMBER, SerialExecutor()) == (PLATE, [])
+
+
+def test_effects_that_are_small_alone_but_not_together_are_not_all_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    pretend({"gravity": 0.009, "drag": 0.0085, "friction": -0.3, "ball_collisions": 0.5}, monkeypatch)
+    effects = settled(with_effects("auto"), CHAMBER, SerialExecutor())[0].effects
+    assert (effects.gravity, effects.drag) == (True, False)
+
+
+def test_figures_given_beside_auto_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    pretend({"friction": -0.3}, monkeypatch)
+    design = with_effects({"auto": True, "friction": {"mu": 0.7, "beta0": -0.1}})
+    friction = settled(design, CHAMBER, SerialExecutor())[0].effects.friction
+    assert friction is not None
+    assert (friction.mu, friction.beta0) == (0.7, -0.1)
+
+
+def test_a_design_that_is_not_settled_is_not_simulated() -> None:
+    with pytest.raises(InputError, match="effects: still"):
+        scene_physics(with_effects("auto"), chamber_mesh(CHAMBER))
+    with pytest.raises(InputError, match="effects"):
+        with_effects("all")
+
+
+@pytest.mark.long
+def test_the_pilot_sees_what_a_long_run_sees() -> None:
+    """On the plate friction takes a large part of the speed, and the air next to nothing."""
+    with local_executor() as executor:
+        said = {one.effect: one for one in advise(PLATE, CHAMBER, executor)}
+    assert said["friction"].verdict == "matters"
+    assert said["friction"].changes["mean impact speed"].high < -0.05
+    assert abs(said["drag"].changes["mean impact speed"].value) < 0.02
+    assert all(np.isfinite(e.half_width) for one in said.values() for e in one.changes.values())

@@ -1,0 +1,120 @@
+"""Balls at rest in a designer's words: a part in the middle of a room, and balls put where one knows what to say."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from chamberopt.chamber.build import Chamber, Part, build_chamber
+from chamberopt.chamber.scene import build_scene, chamber_mesh, replica_seed
+from chamberopt.design.effects import Friction
+from chamberopt.simulation.resting_balls import Stuck, on_the_spot_notes, share_on_the_spot, still, stuck_notes
+from sim_core import Resting, simulate
+from tests.helpers.scenes.cavities import box_around
+from tests.helpers.synthetic import plate_design
+
+BALL = 3e-3  # m
+NOBODY = [-1, -1, -1, -1]
+
+
+@pytest.fixture(scope="module")
+def chamber() -> Chamber:
+    """A room of 20 mm, and in its middle a part of 14 x 8 x 8 mm: 3 mm from the walls at x = -10 and x = 10 mm."""
+    mesh = box_around(trimesh.creation.box((14e-3, 8e-3, 8e-3)), 10e-3)
+    part = Part(mesh.vertices, mesh.triangles, np.ones(len(mesh.triangles)), np.ones(1, dtype=bool), "box")
+    none = np.zeros(len(mesh.triangles), dtype=np.int32)
+    return Chamber(mesh.vertices, mesh.triangles, mesh.tags, none, 1.0, part, none, ())
+
+
+def triangle(chamber: Chamber, tag: int, axis: int, at: float) -> int:
+    """One that lies in a plane ``axis`` = ``at`` [m]."""
+    corners = chamber.vertices[chamber.triangles]
+    return int(np.flatnonzero((chamber.tags == tag) & np.isclose(corners[..., axis], at).all(axis=1))[0])
+
+
+def resting(*balls: tuple[list[float], float, int, int, bool]) -> Resting:
+    """Balls given by place [mm], since when [s], the triangle and the ball under them, and whether jammed."""
+    place, since, under, on, jammed = zip(*balls, strict=True)
+    return Resting(
+        np.arange(len(balls)),
+        1e-3 * np.array(place),
+        np.array(since),
+        np.array([[t, *NOBODY[1:]] for t in under]),
+        np.array([[t, *NOBODY[1:]] for t in on]),
+        np.array(jammed),
+    )
+
+
+def test_groups_say_how_many_on_what_and_where(chamber: Chamber) -> None:
+    top, floor = triangle(chamber, 0, 2, 4e-3), triangle(chamber, 2, 2, -10e-3)
+    balls = resting(
+        ([-3.0, 0.0, 5.5], 0.7, top, -1, False),
+        ([0.0, 0.0, 5.5], 0.41, top, -1, False),
+        ([-1.5, 0.0, 8.1], 0.9, -1, 0, False),  # on those two
+        ([8.5, 0.0, 0.0], 0.2, -1, -1, True),
+        ([-5.0, -5.0, -8.5], -0.1, floor, -1, False),
+    )
+    found = still(balls, 200, BALL, chamber, part_turns=False)
+    assert found is not None
+    assert found.share == 0.025
+    assert found.line == (
+        "5 of 200 balls lie still at the end: "
+        "3 on the part's upper side around (-1.5, 0.0, 6.4) mm, the longest since 0.41 s; "
+        "1 jammed between the part's side and the wall at (8.5, 0.0, 0.0) mm, since 0.20 s; "
+        "1 on a ledge of the wall at (-5.0, -5.0, -8.5) mm, since -0.10 s"
+    )
+
+
+def test_a_part_that_turns_is_elsewhere_by_then(chamber: Chamber) -> None:
+    found = still(resting(([8.5, 0.0, 0.0], 0.2, -1, -1, True)), 20, BALL, chamber, part_turns=True)
+    assert found is not None
+    assert "1 jammed between the wall and other balls or the part at (8.5, 0.0, 0.0) mm" in found.line
+
+
+def test_far_apart_is_two_places_and_the_smallest_are_counted_only(chamber: Chamber) -> None:
+    top = triangle(chamber, 0, 2, 4e-3)
+    ends = [([x, y, 5.5], 0.5, top, -1, False) for x in (-6.0, 6.0) for y in (-1.5, 1.5)]
+    floor = triangle(chamber, 2, 2, -10e-3)
+    corners = [([x, y, -8.5], 0.5, floor, -1, False) for x in (-8.0, 8.0) for y in (-8.0, 8.0)]
+    found = still(resting(*ends, *corners), 10, BALL, chamber, part_turns=False)
+    assert found is not None
+    assert found.line.count("2 on the part's upper side around") == 2
+    assert found.line.endswith("; 3 elsewhere")
+
+
+def test_between_other_balls_only(chamber: Chamber) -> None:
+    found = still(resting(([0.0, 0.0, 8.0], 0.2, -1, -1, True)), 20, BALL, chamber, part_turns=False)
+    assert found is not None
+    assert "1 jammed among other balls at" in found.line
+
+
+def test_nothing_lies_still(chamber: Chamber) -> None:
+    nothing = Resting(np.zeros(0, int), np.zeros((0, 3)), np.zeros(0), *(np.zeros((0, 4), int),) * 2, np.zeros(0, bool))
+    assert still(nothing, 20, BALL, chamber, part_turns=False) is None
+
+
+def test_one_note_on_all_replicas() -> None:
+    assert stuck_notes([], 8) == ()
+    notes = stuck_notes([Stuck(0.1, "few"), Stuck(0.3, "many"), Stuck(0.2, "some")], 8)
+    assert notes == (
+        "balls came to rest in 3 of 8 replicas and peen no more: by the end 7.5 % of the shot, on average of all; "
+        "where it is most, many",
+    )
+
+
+def test_shot_that_bounces_on_the_spot_is_said() -> None:
+    velocities = np.array([[0.0, 0.0, 5.0], [1e-9, 0.0, -4.0], [1.0, 0.0, 3.0], [0.0, 0.0, 0.0]])
+    assert share_on_the_spot(velocities) == 0.5
+    (note,) = on_the_spot_notes([0.0, 0.5, 0.2])
+    assert "in 2 of 3 replicas up to 50 %" in note
+    assert on_the_spot_notes([0.0, 0.05]) == ()
+
+
+def test_between_parallel_plates_friction_leaves_a_ball_no_sideways_speed() -> None:
+    """What the note is about; without friction its sideways speed lasts."""
+    plate = plate_design(process__accuracy__simulated_time_s=5.0)
+    plate = plate.with_values({"shot.mass_g": 1e3 * plate.shot.ball_mass})
+    chamber = build_chamber(plate)
+    rubs = plate.effects.model_copy(update={"friction": Friction(mu=0.3, beta0=0.2)})
+    for design, caught in ((plate, 0.0), (plate.model_copy(update={"effects": rubs}), 1.0)):
+        end = simulate(build_scene(design, chamber_mesh(chamber), replica_seed(1, 0))).balls
+        assert share_on_the_spot(end.velocities) == caught

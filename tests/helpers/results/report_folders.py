@@ -1,0 +1,55 @@
+"""Results folders to report on: a simulation and a study of the plate, whose dents fell at random."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from chamberopt.chamber.build import Chamber, build_chamber
+from chamberopt.common.errors import InputError
+from chamberopt.common.parallel.executor import SerialExecutor
+from chamberopt.coverage.hits import Hits
+from chamberopt.design.load import Study
+from chamberopt.optimize.run_study import run_study
+from chamberopt.output.results.results import write_simulation, write_study
+from chamberopt.simulation.evaluate import Evaluation
+from tests.helpers.synthetic import plate_design, poisson_evaluation
+
+DESIGN = plate_design()
+
+
+def hits_of(evaluation: Evaluation) -> tuple[Hits, ...]:
+    """Single impacts as the evaluation's tallies have them: all at 3 m/s and 70 degrees."""
+    found = []
+    for tally in evaluation.replicas:
+        triangle = np.repeat(np.arange(len(tally.impacts), dtype=np.int32), tally.impacts)
+        same = [np.full(len(triangle), value, dtype=np.float32) for value in (3.0, 70.0, 1e-4, 1e-5)]
+        found.append(Hits(triangle, *same))
+    return tuple(found)
+
+
+def simulated(folder: Path, per_mm2: float = 60.0, hits: bool = True) -> tuple[Path, Chamber]:
+    """A simulation's folder; hits False: as older versions left it."""
+    chamber = build_chamber(DESIGN)
+    evaluation = poisson_evaluation(DESIGN, chamber, per_mm2)
+    write_simulation(folder, DESIGN, chamber, replace(evaluation, hits=hits_of(evaluation) if hits else ()))
+    return folder, chamber
+
+
+def studied(folder: Path, evaluations: int = 12) -> Path:
+    """A study's folder. More shot makes more dents, far sonotrodes cannot be simulated, near ones miss a constraint."""
+    chamber = build_chamber(DESIGN)
+    question = Study(
+        design=DESIGN,
+        vary={"shot.mass_g": (1.5, 8.0), "chamber.sonotrode_distance_mm": (8.0, 19.0)},
+        optimizer={"evaluations": evaluations, "confirm": 2, "confirm_replicas": 4},
+        constraints={"chamber.sonotrode_distance_mm": {"min": 9.5}},
+    )
+
+    def evaluator(design, stream, replicas):
+        if design.chamber.sonotrode_distance_mm > 17:
+            raise InputError("<b>not</b> this one")
+        return poisson_evaluation(design, chamber, 80.0 * design.shot.mass_g, replicas or 4, seed=len(stream))
+
+    write_study(folder, run_study(question, folder, SerialExecutor(), evaluator=evaluator))
+    return folder

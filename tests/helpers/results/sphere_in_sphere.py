@@ -1,0 +1,168 @@
+"""A result that is a ball in a ball, without a simulation: what it shows is known in closed form."""
+
+import json
+import sys
+from dataclasses import asdict, replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import trimesh
+
+from chamberopt.coverage.hits import Hits, save_hits, sorted_hits
+from chamberopt.output.viewer import Look, Subject, write_chamber, write_coverage
+from chamberopt.output.vtp_files import pyvista
+from chamberopt.simulation.triangle_fields import QUANTITIES
+
+TREATMENT = 10.0  # s
+SIZE = 480, 340  # pixels
+
+
+def ball_result(folder: Path, marked: bool = False, moved: float = 0.0, lost: int = 0) -> Subject:
+    """A results folder: coverage rises from pole to pole, the target is all but a cap.
+
+    Triangle k has k % 5 simulated impacts, of 1 ... 4 m/s. moved: by so many mm · lost: each so-manyth triangle.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    ball, room = (trimesh.creation.icosphere(subdivisions=3, radius=radius) for radius in (0.01, 0.02))
+    kept = np.arange(len(ball.faces)) % lost != 0 if lost else np.ones(len(ball.faces), dtype=bool)
+    faces, middle = np.asarray(ball.faces)[kept], ball.triangles_center[kept]
+    count = len(faces)
+    tags = np.where(room.triangles_center[:, 2] < -0.015, 1, 2).astype(np.uint8)
+    part = SimpleNamespace(vertices=ball.vertices + np.array([moved * 1e-3, 0.0, 0.0]), triangles=faces)
+    chamber: Any = SimpleNamespace(
+        part=part,
+        vertices=np.asarray(room.vertices),
+        triangles=np.asarray(room.faces),
+        tags=tags,
+        source=tags,
+        fitting=None,
+    )
+    height = 50.0 + 4500.0 * middle[:, 2]  # % of the way up: 5 to 95
+    impacts = np.arange(count) % 5
+    hits = Hits(np.repeat(np.arange(count), impacts), *(np.zeros(impacts.sum(), np.float32) for _ in range(4)))
+    hits = replace(hits, speed=np.concatenate([np.arange(1, n + 1) for n in impacts]).astype(np.float32))
+    target = middle[:, 0] < 0.008
+    fields = {
+        "coverage": height / 100.0,
+        "dent_density": -np.log1p(-height / 100.0) * (2.0 if marked else 1.0),
+        "impacts": impacts,
+        "dents": np.full(count, 20),
+        "impacts_per_mm2": 2.0 * height,
+        "exposed_area_mm2": np.ones(count),
+        "target": target.astype(np.uint8),
+        "mean_normal_speed": np.where(impacts > 0, (1.0 + impacts) / 2.0, np.nan),
+        "p90_normal_speed": np.where(impacts > 0, impacts, np.nan).astype(float),
+    }
+    write_coverage(folder / "coverage.vtp", chamber, fields)
+    write_chamber(folder, chamber)
+    save_hits(folder / "hits.npz", sorted_hits([hits], count))
+    mean = float(fields["impacts_per_mm2"][target].mean())
+    return Subject(str(folder), f"{folder.name}\nnot simulated", TREATMENT, 50.0, int(target.sum()), mean)
+
+
+def picture(subject: Subject, look: Look) -> np.ndarray:
+    """What the window would show of it, (height, width, 3) uint8."""
+    from chamberopt.output.viewer.plotter import Stage
+    from chamberopt.output.viewer.window import opened
+
+    stage = Stage(opened([subject], look), off_screen=True, size=SIZE)
+    stage.draw(look)
+    stage.aim(look)
+    image = np.asarray(stage.plotter.screenshot(None))[..., :3]
+    stage.plotter.close()
+    return image
+
+
+LOOKS = {
+    "coverage": Look(),
+    "pick": Look("speed", below=60.0, cut=((0.0, -1.0, 0.0), None), triangle=404, eye=(-1.0, -1.0, 0.5)),
+}
+
+
+def right_and_wrong(folder: Path) -> dict[str, np.ndarray]:
+    """The pictures as they are, and as they must not be: other colours, another scale, another mesh."""
+    from chamberopt.output.viewer import plotter
+
+    right = ball_result(folder / "ball")
+    drawn = {name: picture(right, look) for name, look in LOOKS.items()}
+    coverage, scale = QUANTITIES["coverage"], plotter.limits
+    QUANTITIES["coverage"] = replace(coverage, colours="cividis")
+    drawn["other colours"] = picture(right, LOOKS["coverage"])
+    QUANTITIES["coverage"] = coverage
+    plotter.limits = lambda seen, look: (scale(seen, look)[0], 1.25 * scale(seen, look)[1])
+    drawn["other limits"] = picture(right, LOOKS["coverage"])
+    plotter.limits = scale
+    drawn["moved"] = picture(ball_result(folder / "moved" / "ball", moved=1.0), LOOKS["coverage"])
+    drawn["lost"] = picture(ball_result(folder / "lost" / "ball", lost=10), LOOKS["coverage"])
+    return drawn
+
+
+def driven(folder: Path) -> list[dict[str, Any]]:
+    """What a window shows after each key, click and slide: its look, and what is in its views."""
+    from chamberopt.output.viewer.window import Window, opened
+
+    subjects = [ball_result(folder / "one"), ball_result(folder / "two"), ball_result(folder / "marked", marked=True)]
+    window = Window(opened(subjects[:2], Look()), Look(), off_screen=True)
+    steps: list[dict[str, Any]] = []
+
+    def step(name: str) -> None:
+        stage = window.stage
+        stage.plotter.screenshot(None)
+        views = []
+        for renderer in stage.plotter.renderers:
+            actors = renderer.actors
+            mesh = next(a.mapper.dataset for a in actors.values() if "drawn" in _columns(a))
+            views.append({
+                "drawn": np.nan_to_num(mesh["drawn"], nan=-1.0, posinf=-2.0).tolist(),
+                "words": [a.GetInput() for a in actors.values() if a.IsA("vtkTextActor")],
+                "planes": [_planes(a) for a in actors.values() if hasattr(a, "mapper") and a.mapper is not None],
+                "charts": len(renderer.get_charts()), "eye": list(renderer.camera.position),
+            })  # fmt: skip
+        steps.append({
+            "step": name, "look": asdict(window.look), "views": views,
+            "slider": bool(window.slider is not None and window.slider.GetEnabled()), "plane": window.plane is not None,
+        })  # fmt: skip
+
+    step("opened")
+    for key in "3b1cxg":
+        window.pressed(key)
+        step(key)
+    window.cut((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    step("cut")
+    window.clicked(1, 404)
+    step("clicked")
+    window.pressed("h")
+    step("h")
+    window.slid(25.0)
+    step("slid")
+    window.pressed("6")  # no result has it
+    step("6")
+    window.pressed("r")
+    step("r")
+    width = window.stage.plotter.window_size[0]
+    window.stage.plotter.subplot(0, 1)
+    steps[-1]["picked"] = window.stage.row_picked(int(0.75 * width), 450)
+    steps[-1]["beside"] = window.stage.row_picked(int(0.55 * width), 450)
+    window = Window(opened(subjects[2:], Look()), Look(), off_screen=True)
+    step("marked")
+    return steps
+
+
+def _columns(actor: Any) -> list[str]:
+    data = getattr(getattr(actor, "mapper", None), "dataset", None)
+    return list(data.cell_data) if isinstance(data, pyvista().PolyData) else []
+
+
+def _planes(actor: Any) -> int:
+    planes = actor.mapper.GetClippingPlanes()
+    return 0 if planes is None else int(planes.GetNumberOfItems())
+
+
+if __name__ == "__main__":
+    here = Path(sys.argv[2])
+    if sys.argv[1] == "pictures":
+        np.savez(here / "pictures.npz", **right_and_wrong(here))
+    else:
+        (here / "steps.json").write_text(json.dumps(driven(here)), encoding="utf-8")

@@ -1,0 +1,96 @@
+"""Jobs for workers of every kind: small functions that their processes can import, and that leave marks in a folder."""
+
+import os
+import signal
+import time
+from pathlib import Path
+
+import numpy as np
+
+from chamberopt.common.errors import InputError
+from chamberopt.design.load import Design
+from chamberopt.simulation.evaluate import Evaluation
+from tests.helpers.synthetic import judged
+
+
+def mark(folder: Path, name: object) -> None:
+    """One more byte in the file of that name: how often something happened, in whatever process."""
+    with open(folder / str(name), "ab") as file:
+        file.write(b".")
+
+
+def marks(folder: Path) -> dict[str, int]:
+    return {path.name: path.stat().st_size for path in folder.iterdir()}
+
+
+def square(number: int, folder: Path | None = None, seconds: float = 0.0) -> int:
+    if folder is not None:
+        mark(folder, number)
+    time.sleep(seconds)
+    return number * number
+
+
+def pid_of(_: object) -> int:
+    time.sleep(0.05)
+    return os.getpid()
+
+
+def die(folder: Path, times: int = 1) -> str:
+    """Takes its process down so many times, then answers."""
+    mark(folder, "die")
+    if marks(folder)["die"] <= times:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return "alive"
+
+
+def refuse(text: str) -> None:
+    raise InputError(text)
+
+
+def open_nothing(folder: Path) -> bytes:
+    mark(folder, "tried")
+    return (folder / "nothing").read_bytes()
+
+
+class AwkwardError(InputError):
+    """Cannot be unpickled: its class takes two arguments and keeps one."""
+
+    def __init__(self, text: str, more: int) -> None:
+        super().__init__(text)
+        self.more = more
+
+
+def refuse_awkwardly() -> None:
+    raise AwkwardError("open edges", 3)
+
+
+class Counted:
+    """Says in a folder in which process it was opened."""
+
+    def __init__(self, folder: Path, size: int) -> None:
+        self.folder, self.ballast = folder, np.zeros(size)
+
+    def __setstate__(self, state: dict) -> None:
+        self.__dict__.update(state)
+        mark(self.folder, os.getpid())
+
+
+def size_of(counted: Counted, _: int) -> int:
+    time.sleep(0.02)
+    return counted.ballast.size
+
+
+def hill(design: Design, stream: str, replicas: int | None) -> Evaluation:
+    """An evaluator: heavier shot is better up to 6 g; above 9 g nothing can be simulated."""
+    mass = design.shot.mass_g
+    if mass > 9.0:
+        raise InputError(f"shot: {mass:g} g do not fit")
+    time.sleep(0.02)
+    return judged(0.5 - 0.01 * (mass - 6.0) ** 2 + np.linspace(-0.01, 0.01, 4), mean_coverage=mass / 10.0)
+
+
+def deadly(design: Design, stream: str, replicas: int | None) -> Evaluation:
+    """An evaluator whose process does not survive 6 g."""
+    if abs(design.shot.mass_g - 6.0) < 1e-9:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return hill(design, stream, replicas)

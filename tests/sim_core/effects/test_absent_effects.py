@@ -1,0 +1,135 @@
+"""An effect that a scene does not ask for is in none of its arrays and in none of the machine code it runs."""
+
+import json
+import os
+import subprocess
+import sys
+from operator import attrgetter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sim_core import (
+    BallCollisions,
+    Balls,
+    Drag,
+    Friction,
+    Gravity,
+    Physics,
+    RandomPhase,
+    Rest,
+    Restitution,
+    Scene,
+    Turn,
+    Vibration,
+)
+from sim_core.loop.simulate import _Run
+from tests.helpers.scenes.cavities import box
+
+# what the loop keeps of an effect, by the name of the field and the kind of thing it is when the effect is there
+KEPT = {
+    "gravity": ("gravity", "Gravity"),
+    "restitution": ("restitution", "Restitution"),
+    "vibration": ("wave", "Wave"),
+    "rest": ("footing", "Footing"),
+    "turn": ("turning", "Turning"),
+    "friction": ("grip", "Grip"),
+    "random_phase": ("phases", "Phases"),
+    "drag": ("air", "Air"),
+    "ball_collisions": ("shot.crowd", "Crowd"),
+}
+STEEL = (0.9, 1.0)
+PRESENT = {
+    "gravity": Gravity(),
+    "restitution": Restitution((STEEL,) * 3, STEEL),
+    "vibration": Vibration(0, 25e-6, 20e3),
+    "rest": Rest(),
+    "turn": Turn(0, rpm=10.0),
+    "friction": Friction(((0.3, 0.2),) * 3, (0.3, 0.2)),
+    "random_phase": RandomPhase(1),
+    "drag": Drag(),
+    "ball_collisions": BallCollisions(),
+}
+NEEDS = {"rest": "gravity", "random_phase": "vibration"}
+BARE = Physics(ball_collisions=None)
+
+
+def bare_scene(physics: Physics = BARE) -> Scene:
+    places = np.array([[0.005, 0.005, 0.005], [0.012, 0.01, 0.01]])
+    return Scene(
+        box((0.02, 0.02, 0.02)), Balls(places, np.array([[1.0, 0.5, 0.2], [-1.0, 0.3, 0.4]]), 3e-3), physics, 0.05
+    )
+
+
+def compiled_functions() -> dict[str, list[str]]:
+    """Every function of the simulator that was compiled in this process, with the types it was compiled for."""
+    found = {}
+    for name, module in list(sys.modules.items()):
+        if name.startswith("sim_core."):
+            for function in vars(module).values():
+                if getattr(function, "signatures", None) and function.py_func.__module__ == name:
+                    found[f"{name}.{function.py_func.__name__}"] = [str(types) for types in function.signatures]
+    return found
+
+
+def test_every_effect_is_in_the_table() -> None:
+    assert set(KEPT) == set(Physics._fields) == set(PRESENT)
+
+
+@pytest.fixture(scope="module")
+def bare(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
+    """What a scene without any effect compiles, from nothing."""
+    code = (
+        "import json; from sim_core import simulate; from tests.sim_core.effects.test_absent_effects import *;"
+        "simulate(bare_scene()); print(json.dumps(compiled_functions()))"
+    )
+    answer = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=Path(__file__).parents[3],
+        env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path_factory.mktemp("cache"))},
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    found: dict[str, list[str]] = json.loads(answer.stdout)
+    return found
+
+
+def test_the_machine_code_of_a_bare_scene_knows_no_effect(bare: dict[str, list[str]]) -> None:
+    assert "sim_core.loop.events.advance" in bare
+    wrong = {
+        f"{function}{types}"
+        for function, signatures in bare.items()
+        for types in signatures
+        for _, kind in KEPT.values()
+        if f"{kind}(" in types
+    }
+    assert not wrong
+    # what only an effect calls was never compiled, so it cannot be in what was
+    for function in (
+        "roots.first_wave_approach",
+        "resolve.footing.touch_down",
+        "resolve.leaning.meet",
+        "effects.turn.seen_from_part",
+        "effects.restitution.restitution_law",
+        "resolve.rubbing._rub",
+        "neighbours.next_meeting",
+    ):
+        module, _, name = f"sim_core.{function}".rpartition(".")
+        assert hasattr(sys.modules.get(module) or __import__(module, fromlist=[name]), name), f"{function} is no more"
+        assert f"sim_core.{function}" not in bare
+
+
+@pytest.mark.parametrize("effect", sorted(KEPT))
+def test_the_arrays_of_an_absent_effect_do_not_exist(effect: str) -> None:
+    field, _ = KEPT[effect]
+    assert attrgetter(field)(_Run(bare_scene())) is None
+
+
+@pytest.mark.parametrize("effect", sorted(set(KEPT) - {"turn"}))
+def test_the_table_names_what_a_present_effect_keeps(effect: str) -> None:
+    field, kind = KEPT[effect]
+    needed = {name: PRESENT[name] for name in (effect, NEEDS.get(effect)) if name}
+    run = _Run(bare_scene(BARE._replace(**needed)))  # type: ignore[arg-type]
+    assert type(attrgetter(field)(run)).__name__ == kind

@@ -1,0 +1,106 @@
+"""Fine triangles on a flat are one face to the ball: contacts are those of the fine mesh, hits are booked on its
+triangles.
+"""
+
+import numpy as np
+import pytest
+import shapely
+import trimesh
+
+from sim_core import Balls, Gravity, Physics, Scene, TriangleMesh, simulate
+from sim_core.detect.ball_mesh import first_contact, new_scratch
+from sim_core.geometry import obstacle_set as ground_module
+from sim_core.geometry.flat_faces import LONE, Flats
+from sim_core.geometry.obstacle_set import Ground, build_ground
+from sim_core.geometry.rectangle_cover import cover
+from sim_core.motion import Point
+from sim_core.numerics.vec3 import Vec3
+from sim_core.scene.invariants import clearance, contained
+from tests.helpers.scenes.cavities import CEILING, box_around, cylinder
+
+RADIUS = 1.5e-3
+
+
+def fine(mesh: TriangleMesh, times: int) -> TriangleMesh:
+    """Every triangle split in four so many times."""
+    vertices, triangles, tags = mesh.vertices, mesh.triangles, mesh.tags
+    for _ in range(times):
+        vertices, triangles, parents = trimesh.remesh.subdivide(vertices, triangles, return_index=True)
+        origin = np.empty(len(triangles), dtype=int)
+        for old, new in parents.items():
+            origin[new] = old
+        tags = tags[origin]
+    return TriangleMesh(vertices, triangles, tags)
+
+
+def slanted_block() -> TriangleMesh:
+    """A room with a block in it that lies along no axis: 24 edges' worth of flats, inside and outside."""
+    block = trimesh.creation.box((0.02, 0.015, 0.01))
+    block.apply_transform(trimesh.transformations.rotation_matrix(0.7, [0.3, 0.5, 0.8]))
+    return box_around(block, 0.03)
+
+
+def without_flats(mesh: TriangleMesh, monkeypatch: pytest.MonkeyPatch) -> Ground:
+    def none(corners: np.ndarray, *_: object) -> Flats:
+        return Flats(np.full(len(corners), LONE, np.int32), np.zeros(0, np.int32), np.zeros((0, 3, 3)), [])
+
+    with monkeypatch.context() as patch:
+        patch.setattr(ground_module, "find_flats", none)
+        return build_ground(mesh, RADIUS)
+
+
+def places_for_a_ball(room: TriangleMesh, count: int, rng: np.random.Generator) -> np.ndarray:
+    """Random places (count, 3) [m] in the cavity, clear of its surface."""
+    places = rng.uniform(room.vertices.min(axis=0), room.vertices.max(axis=0), (8 * count, 3))
+    places = places[contained(room, places)]
+    return places[clearance(room.corners, places, 2 * RADIUS) > 1.01 * RADIUS][:count]
+
+
+@pytest.mark.parametrize("mesh", [fine(slanted_block(), 3), cylinder(0.03, 0.03, 48, 3)], ids=["block", "cylinder"])
+def test_contacts_with_a_flat_are_those_with_its_triangles(mesh: TriangleMesh, monkeypatch: pytest.MonkeyPatch) -> None:
+    merged, split = build_ground(mesh, RADIUS), without_flats(mesh, monkeypatch)
+    assert len(merged.tree.kinds) < 0.1 * len(split.tree.kinds)
+    scratch, rng = new_scratch(), np.random.default_rng(1)
+    for place in places_for_a_ball(mesh, 2000, rng) - mesh.middle:
+        ball = Point(Vec3(*place.tolist()), Vec3(*rng.normal(0.0, 3.0, 3).tolist()))
+        one = first_contact(merged.tree, scratch, ball, Gravity(), None, merged.seam, 0.0, 0.1)
+        two = first_contact(split.tree, scratch, ball, Gravity(), None, split.seam, 0.0, 0.1)
+        speed = np.linalg.norm(ball.velocity) + 1.0
+        assert one[0] == two[0] or abs(one[0] - two[0]) * speed < 5e-12  # metres along the path, for any angle
+
+
+def test_a_hit_on_a_flat_is_booked_on_the_triangle_under_the_ball() -> None:
+    room = fine(slanted_block(), 3)
+    rng = np.random.default_rng(2)
+    logs = []
+    for place in places_for_a_ball(room, 300, rng):
+        ball = Balls(place[None], rng.normal(0.0, 3.0, (1, 3)), 2 * RADIUS)
+        logs.append(simulate(Scene(room, ball, Physics(), duration=0.03)).impacts)
+    triangle = np.concatenate([log.triangle for log in logs])
+    centre = np.concatenate([log.position for log in logs])
+    gap = [clearance(room.corners[[t]], c[None], 2 * RADIUS)[0] for t, c in zip(triangle, centre, strict=True)]
+    assert len(triangle) > 1000
+    assert len(np.unique(triangle)) > 300
+    assert (room.tags[triangle] == CEILING).any()
+    np.testing.assert_allclose(gap, RADIUS, rtol=0, atol=1e-12)
+
+
+def outline(*rings: list[tuple[float, float]]) -> np.ndarray:
+    """Segments (n, 2, 2) of closed rings."""
+    return np.concatenate([np.stack([np.array(ring), np.roll(ring, -1, axis=0)], axis=1) for ring in rings])
+
+
+def test_a_cover_fills_an_outline_with_holes_once() -> None:
+    rng = np.random.default_rng(3)
+    angle = np.sort(rng.uniform(0.0, 2.0 * np.pi, 200))
+    star = np.column_stack([np.cos(angle), np.sin(angle)]) * rng.uniform(0.6, 1.0, 200)[:, None]
+    hole = np.array([[-0.1, -0.1], [0.2, -0.1], [0.2, 0.2], [-0.1, 0.2]])
+    segments = outline(star.tolist(), hole.tolist())
+    region = shapely.Polygon(star, [hole])
+    faces = shapely.polygons(cover(segments, region.area))
+    assert shapely.area(faces).sum() == pytest.approx(region.area, rel=1e-12)
+    assert shapely.union_all(faces).symmetric_difference(region).area < 1e-12
+
+
+def test_an_outline_that_crosses_itself_is_left_to_its_triangles() -> None:
+    assert cover(outline([(0, 0), (1, 1), (1, 0), (0, 1)]), 1.0) is None

@@ -1,0 +1,48 @@
+"""The independent checks, checked themselves against libraries."""
+
+import numpy as np
+import trimesh
+
+from sim_core.scene.invariants import clearance, closest_pair, contained
+from tests.helpers.scenes.cavities import balls_at, box, box_around, cylinder
+
+
+def test_containment_agrees_with_what_the_shape_says() -> None:
+    rng = np.random.default_rng(1)
+    points = rng.uniform(-0.06, 0.06, (20_000, 3))
+    inside_box = (np.abs(points) < 0.05).all(axis=1)
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.03)
+    planes = np.einsum("ij,pj->pi", ball.face_normals, points) - np.einsum(
+        "ij,ij->i", ball.face_normals, ball.triangles[:, 0]
+    )
+    inside_body = (planes < 0.0).all(axis=1)
+    np.testing.assert_array_equal(contained(box_around(ball, 0.05), points), inside_box & ~inside_body)
+
+
+def test_a_point_in_line_with_edges_and_corners_is_judged_by_another_ray() -> None:
+    from sim_core.scene.invariants import RAYS
+
+    room = box((1.0, 1.0, 1.0))
+    middle = np.array([0.5, 0.5, 0.5])
+    through_corner = np.array([1.0, 1.0, 1.0]) - 0.4 * RAYS[0]
+    through_edge = np.array([1.0, 1.0, 0.6]) - 0.3 * RAYS[0]
+    points = np.array([middle, through_corner, through_edge, through_edge + np.array([0.9, 0, 0])])
+    np.testing.assert_array_equal(contained(room, points), [True, True, True, False])
+
+
+def test_clearance_agrees_with_trimesh() -> None:
+    room = cylinder(0.035, 0.04, sections=24)
+    points = np.random.default_rng(2).uniform(-0.03, 0.03, (300, 3)) + np.array([0, 0, 0.02])
+    expected = [
+        np.linalg.norm(
+            trimesh.triangles.closest_point(room.corners, np.tile(p, (len(room.corners), 1))) - p, axis=1
+        ).min()
+        for p in points
+    ]
+    np.testing.assert_allclose(clearance(room.corners, points, 0.01), np.minimum(expected, 0.01), atol=1e-12)
+
+
+def test_the_closest_pair_is_found() -> None:
+    balls = balls_at(np.array([[0, 0, 0], [0.1, 0, 0], [0.1, 0.02, 0], [0, 0.5, 0]]))
+    assert closest_pair(balls) == (0.02, 1, 2)
+    assert closest_pair(balls_at(np.zeros((1, 3)))) == (np.inf, -1, -1)
