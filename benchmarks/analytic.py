@@ -26,9 +26,15 @@ QUICK = Effort(12, 1.0, (8, 64))
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--quick", action="store_true", help="rough, in seconds")
-    parser.add_argument("--out", type=Path, help="folder for all three files instead of docs/ and benchmarks/results/")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        help="folder for all three files instead of docs/ and benchmarks/results/",
+    )
     asked = parser.parse_args(arguments)
     if asked.quick and asked.out is None:
         parser.error("--quick is too rough for the documentation: give --out")
@@ -40,11 +46,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
         edges = bin_edges(design)
         exact = run(design, effort, edges, executor, "confirm", True)
         meshed = {
-            n: run(design.with_values({"chamber.facets": n}), effort, edges, executor, "search", False)
+            n: run(
+                design.with_values({"chamber.facets": n}), effort, edges, executor, "search", False
+            )
             for n in effort.facets
         }
     facets = design.chamber.facets
-    document, image, table = ROOT / "docs" / "analytic.md", IMAGES / "analytic.png", RESULTS / "analytic.csv"
+    document, image, table = (
+        ROOT / "docs" / "analytic.md",
+        IMAGES / "analytic.png",
+        RESULTS / "analytic.csv",
+    )
     if asked.out is not None:
         asked.out.mkdir(parents=True, exist_ok=True)
         document, image, table = (asked.out / file.name for file in (document, image, table))

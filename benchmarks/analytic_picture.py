@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-def picture(path: Path, exact: Run, meshed: dict[int, Run], facets: int, edges: dict[str, np.ndarray]) -> None:
+def picture(
+    path: Path, exact: Run, meshed: dict[int, Run], facets: int, edges: dict[str, np.ndarray]
+) -> None:
     """The three profiles, analytical and meshed, with their ratio below; and how the mesh's figures converge."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -25,7 +27,14 @@ def picture(path: Path, exact: Run, meshed: dict[int, Run], facets: int, edges: 
     grid = figure.add_gridspec(2, 4, height_ratios=[2.2, 1.0])
     for column, name in enumerate(PROFILES):
         axes = figure.add_subplot(grid[0, column])
-        _profile(axes, figure.add_subplot(grid[1, column], sharex=axes), exact, meshed[facets], name, edges[name])
+        _profile(
+            axes,
+            figure.add_subplot(grid[1, column], sharex=axes),
+            exact,
+            meshed[facets],
+            name,
+            edges[name],
+        )
         if column == 0:
             axes.legend(frameon=False, labels=["analytical", f"meshed, {facets} facets"])
     _converges(figure.add_subplot(grid[:, 3]), exact, meshed)
@@ -41,16 +50,33 @@ def _profile(axes: Axes, below: Axes, exact: Run, mesh: Run, name: str, edges: n
     size = np.pi * np.diff(edges**2) / 100.0 if area else np.diff(edges)
     middle = 0.5 * (edges[1:] + edges[:-1])
     both = [[estimate(run.shares[name][:, k]) for k in range(BINS)] for run in (exact, mesh)]
-    for estimates, colour, shift, mark in zip(both, ("#000000", COLOURS[0]), (-0.06, 0.06), "os", strict=True):
-        value, half_width = (np.array([getattr(e, what) for e in estimates]) / size for what in ("value", "half_width"))
+    for estimates, colour, shift, mark in zip(
+        both, ("#000000", COLOURS[0]), (-0.06, 0.06), "os", strict=True
+    ):
+        value, half_width = (
+            np.array([getattr(e, what) for e in estimates]) / size
+            for what in ("value", "half_width")
+        )
         axes.stairs(value, edges, color=colour, lw=1.2, ls="-" if mark == "o" else "--")
-        axes.errorbar(middle + shift * np.diff(edges), value, half_width, color=colour, ls="none", marker=mark, ms=3)
+        axes.errorbar(
+            middle + shift * np.diff(edges),
+            value,
+            half_width,
+            color=colour,
+            ls="none",
+            marker=mark,
+            ms=3,
+        )
     axes.set_title(f"impacts by {name}", loc="left")
-    axes.set_ylabel(f"share of impacts per {'cm²' if area else PROFILES[name].replace('degrees', 'degree')}")
+    axes.set_ylabel(
+        f"share of impacts per {'cm²' if area else PROFILES[name].replace('degrees', 'degree')}"
+    )
     axes.set_ylim(0.0)
     axes.tick_params(labelbottom=False)
     one, two = (np.array([e.value for e in estimates]) for estimates in both)
-    spread = [np.hypot(a.half_width / a.value, b.half_width / b.value) for a, b in zip(*both, strict=True)]
+    spread = [
+        np.hypot(a.half_width / a.value, b.half_width / b.value) for a, b in zip(*both, strict=True)
+    ]
     below.errorbar(middle, two / one, spread, color=COLOURS[0], ls="none", marker="s", ms=3)
     below.axhline(1.0, color="#000000", lw=1.0)
     below.set_xlabel(f"{name}, {PROFILES[name]}")
@@ -62,15 +88,27 @@ def _converges(axes: Axes, exact: Run, meshed: dict[int, Run]) -> None:
     facets = np.array(list(meshed))
     off = np.array([1.0 - run.volume / exact.volume for run in meshed.values()])
     axes.loglog(facets, off, color="#000000", marker="o", label="volume (too small)")
-    for shift, name, colour, mark in zip((0.94, 1.0, 1.06), FIGURES, COLOURS[:3], "v^s", strict=True):
+    for shift, name, colour, mark in zip(
+        (0.94, 1.0, 1.06), FIGURES, COLOURS[:3], "v^s", strict=True
+    ):
         for n, run in meshed.items():
             value, half_width = relative(run, exact, name)
             fill = colour if abs(value) > half_width else "white"
             label = FIGURES[name].split(",")[0] if n == facets[0] else None
             axes.errorbar(
-                shift * n, abs(value), half_width, color=colour, marker=mark, mfc=fill, ms=6, ls="none", label=label
+                shift * n,
+                abs(value),
+                half_width,
+                color=colour,
+                marker=mark,
+                mfc=fill,
+                ms=6,
+                ls="none",
+                label=label,
             )
-    axes.plot(facets, -INSCRIBED / facets**2, color="#888888", ls=":", label=f"{-INSCRIBED:.2f} / n²")
+    axes.plot(
+        facets, -INSCRIBED / facets**2, color="#888888", ls=":", label=f"{-INSCRIBED:.2f} / n²"
+    )
     axes.set_ylim(2e-4, 1.0)
     axes.set_xticks(facets, [str(n) for n in facets])
     axes.minorticks_off()

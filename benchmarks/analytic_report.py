@@ -122,7 +122,10 @@ def _agreement(design: Design, exact: Run, mesh: Run) -> list[str]:
             f"| {said} | {a.value:.4f} ± {a.half_width:.4f} | {b.value:.4f} ± {b.half_width:.4f} | "
             f"{_off(*relative(mesh, exact, name))} |"
         )
-    lines += ["", "| impacts by | bins | largest difference, in half-widths | p of all together | |"]
+    lines += [
+        "",
+        "| impacts by | bins | largest difference, in half-widths | p of all together | |",
+    ]
     lines += ["|---|--:|--:|--:|---|"]
     for name in PROFILES:
         p = hotelling(exact.shares[name], mesh.shares[name])
@@ -157,9 +160,15 @@ def _convergence(exact: Run, meshed: dict[int, Run]) -> list[str]:
     ]
     for n, run in meshed.items():
         cells = [_off(*relative(run, exact, name)) for name in FIGURES]
-        lines.append(f"| {n} | {_thousandth(run.volume / exact.volume - 1)} | " + " | ".join(cells) + " |")
+        lines.append(
+            f"| {n} | {_thousandth(run.volume / exact.volume - 1)} | " + " | ".join(cells) + " |"
+        )
     fits = [fit(exact, meshed, name) for name in FIGURES]
-    lines.append(f"| k | {_signed(INSCRIBED)} | " + " | ".join(f"{_signed(k)} ± {w:.2f}" for k, w, _ in fits) + " |")
+    lines.append(
+        f"| k | {_signed(INSCRIBED)} | "
+        + " | ".join(f"{_signed(k)} ± {w:.2f}" for k, w, _ in fits)
+        + " |"
+    )
     lines.append("| p | | " + " | ".join(f"{p:.2f}" for *_, p in fits) + " |")
     return lines
 
@@ -169,7 +178,9 @@ def _ring_lost(design: Design) -> float:
     n, radius = design.chamber.facets, 0.5 * design.chamber.diameter
     ball = 0.5 * design.shot.diameter
     circle = np.pi * (radius - ball) ** 2
-    return float(BINS * (1.0 - n * np.tan(np.pi / n) * (radius * np.cos(np.pi / n) - ball) ** 2 / circle))
+    return float(
+        BINS * (1.0 - n * np.tan(np.pi / n) * (radius * np.cos(np.pi / n) - ball) ** 2 / circle)
+    )
 
 
 def _apart(exact: Run, mesh: Run, name: str) -> np.ndarray:

@@ -18,14 +18,20 @@ from sim_core import AnalyticCavity, ImpactLog, TriangleMesh, simulate
 
 MEASURED, PEENED = 0.39, 50.0  # the paper's experiment: coverage, and after how long [s]
 BINS = 10
-GUESS, SLOPE, STEPS = 5.0, 2.5, 3  # µm to start from; of exponent against amplitude, both logarithmic
+GUESS, SLOPE, STEPS = (
+    5.0,
+    2.5,
+    3,
+)  # µm to start from; of exponent against amplitude, both logarithmic
 FAR = 0.01  # of a logarithm: nearer to one another two points give no slope but noise
 FIGURES = {
     "mean_coverage": "coverage",
     "impacts_per_mm2_s": "impacts / mm² s",
     "mean_normal_speed_m_s": "normal speed, m/s",
 }
-INSCRIBED = -2.0 * np.pi**2 / 3.0  # relative volume of a polygon in its circle, less 1, times n² (first order)
+INSCRIBED = (
+    -2.0 * np.pi**2 / 3.0
+)  # relative volume of a polygon in its circle, less 1, times n² (first order)
 PROFILES = {  # of the impacts on the plate: name, unit
     "distance from the axis": "mm",
     "normal speed": "m/s",
@@ -79,17 +85,25 @@ def replica(
 
 
 def run(
-    design: Design, effort: Effort, edges: dict[str, np.ndarray], executor: Executor, stream: str, analytic: bool
+    design: Design,
+    effort: Effort,
+    edges: dict[str, np.ndarray],
+    executor: Executor,
+    stream: str,
+    analytic: bool,
 ) -> Run:
     """Simulate a design's chamber, analytical or meshed, on one of the two streams of seeds."""
     chamber = build_chamber(design)
     surface = analytic_cavity(design, chamber) if analytic else chamber_mesh(chamber)
 
     def one(number: int) -> tuple[Tally, list[np.ndarray]]:
-        got, log = replica(design, chamber, surface, replica_seed(design.process.seed, number, stream))
+        got, log = replica(
+            design, chamber, surface, replica_seed(design.process.seed, number, stream)
+        )
         seen = values(log)
         return got, [
-            np.histogram(np.clip(seen[name], *bins[[0, -1]]), bins)[0] / len(log) for name, bins in edges.items()
+            np.histogram(np.clip(seen[name], *bins[[0, -1]]), bins)[0] / len(log)
+            for name, bins in edges.items()
         ]
 
     tallies, counts = zip(*executor.map(one, range(effort.replicas)), strict=True)
@@ -121,7 +135,10 @@ def bin_edges(design: Design) -> dict[str, np.ndarray]:
     """
     chamber = build_chamber(design)
     log = replica(design, chamber, analytic_cavity(design, chamber), replica_seed(0, 0))[1]
-    edges = {name: np.quantile(seen, np.linspace(0.0, 1.0, BINS + 1)) for name, seen in values(log).items()}
+    edges = {
+        name: np.quantile(seen, np.linspace(0.0, 1.0, BINS + 1))
+        for name, seen in values(log).items()
+    }
     reach = 1e3 * 0.5 * (design.chamber.diameter - design.shot.diameter)
     edges["distance from the axis"] = reach * np.sqrt(np.linspace(0.0, 1.0, BINS + 1))
     return edges
@@ -166,7 +183,9 @@ def fit(exact: Run, meshed: dict[int, Run], name: str) -> tuple[float, float, fl
     return k, float((weight * square**2).sum() ** -0.5), float(chi2.sf(misfit, len(meshed) - 1))
 
 
-def rows(exact: Run, meshed: dict[int, Run], facets: int, edges: dict[str, np.ndarray]) -> list[dict[str, Any]]:
+def rows(
+    exact: Run, meshed: dict[int, Run], facets: int, edges: dict[str, np.ndarray]
+) -> list[dict[str, Any]]:
     """For the CSV: figures of every mesh, bins of the design's own, each beside the analytical chamber's."""
     found = [
         (f"{name}, {n} facets", "", exact.figures[name], run.figures[name])
@@ -176,7 +195,9 @@ def rows(exact: Run, meshed: dict[int, Run], facets: int, edges: dict[str, np.nd
     for name in PROFILES:
         for k in range(BINS):
             a, b = (estimate(one.shares[name][:, k]) for one in (exact, meshed[facets]))
-            found.append((name, f"{edges[name][k]:.4g} to {edges[name][k + 1]:.4g} {PROFILES[name]}", a, b))
+            found.append(
+                (name, f"{edges[name][k]:.4g} to {edges[name][k + 1]:.4g} {PROFILES[name]}", a, b)
+            )
     return [
         {
             "quantity": name,
@@ -185,7 +206,9 @@ def rows(exact: Run, meshed: dict[int, Run], facets: int, edges: dict[str, np.nd
             "half_width": f"{a.half_width:.2g}",
             "meshed": f"{b.value:.6g}",
             "meshed_half_width": f"{b.half_width:.2g}",
-            "difference_over_half_width": round(difference(b, a).value / difference(b, a).half_width, 2),
+            "difference_over_half_width": round(
+                difference(b, a).value / difference(b, a).half_width, 2
+            ),
         }
         for name, where, a, b in found
     ]

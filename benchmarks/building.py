@@ -69,7 +69,12 @@ def row(path: Path, runs: int) -> dict[str, Any]:
         spent, _ = timed(lambda: build_ground(mesh, 0.75e-3, 1, 40e-6))  # noqa: B023
         seconds["tree"].append(spent)
     median = {step: round(statistics.median(values), 3) for step, values in seconds.items()}
-    return {"triangles": len(part.triangles), "read": round(read, 3), **median, **vtk_columns(design, runs)}
+    return {
+        "triangles": len(part.triangles),
+        "read": round(read, 3),
+        **median,
+        **vtk_columns(design, runs),
+    }
 
 
 def vtk_columns(design: Any, runs: int) -> dict[str, Any]:
@@ -84,7 +89,10 @@ def vtk_columns(design: Any, runs: int) -> dict[str, Any]:
     if len(part.triangles) > MOST_FOR_VTK:
         return {"vtk": "", "vtk_volume_off": ""}
     shape = design.chamber.surface(part.vertices, part.triangles)
-    bodies = [pyvista.PolyData.from_regular_faces(m.vertices, np.asarray(m.triangles)) for m in (shape, part)]
+    bodies = [
+        pyvista.PolyData.from_regular_faces(m.vertices, np.asarray(m.triangles))
+        for m in (shape, part)
+    ]
     seconds, cut = timed(lambda: bodies[0].boolean_difference(bodies[1]))
     volume = build_chamber(design).volume
     return {"vtk": round(seconds, 3), "vtk_volume_off": f"{abs(cut.volume / volume - 1.0):.1e}"}
@@ -93,13 +101,20 @@ def vtk_columns(design: Any, runs: int) -> dict[str, Any]:
 def main() -> None:
     from benchmarks.table import machine, print_table, write_csv
 
-    asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    asked.add_argument("--quick", action="store_true", help="the smallest mesh alone, once; no file")
+    asked = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    asked.add_argument(
+        "--quick", action="store_true", help="the smallest mesh alone, once; no file"
+    )
     asked.add_argument("--json", action="store_true", help="rows as JSON on stdout")
     options = asked.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         sizes = list(EDGES)[:1] if options.quick else list(EDGES)
-        rows = [{"part": size, **row(gear_file(Path(folder), size), 1 if options.quick else RUNS)} for size in sizes]
+        rows = [
+            {"part": size, **row(gear_file(Path(folder), size), 1 if options.quick else RUNS)}
+            for size in sizes
+        ]
     if options.json:
         print(json.dumps([{"machine": machine(), **one} for one in rows], indent=2))
     else:

@@ -40,14 +40,22 @@ def swept(name: str) -> list[dict[str, Any]]:
     if not path.is_file():
         return []
     with path.open(encoding="utf-8", newline="") as file:
-        rows = [{key: float(value) for key, value in row.items() if key != "machine"} for row in csv.DictReader(file)]
+        rows = [
+            {key: float(value) for key, value in row.items() if key != "machine"}
+            for row in csv.DictReader(file)
+        ]
     return rows
 
 
-def row(design: Design, vary: dict[str, tuple[float, float]], u: float, v: float, replicas: int) -> dict[str, Any]:
+def row(
+    design: Design, vary: dict[str, tuple[float, float]], u: float, v: float, replicas: int
+) -> dict[str, Any]:
     """One design of the sweep, simulated."""
     began = time.process_time()
-    values = {name: low + x * (high - low) for (name, (low, high)), x in zip(vary.items(), (u, v), strict=True)}
+    values = {
+        name: low + x * (high - low)
+        for (name, (low, high)), x in zip(vary.items(), (u, v), strict=True)
+    }
     candidate = design.with_values(values)
     found = evaluate(
         candidate, build_chamber(candidate), SerialExecutor(), stream="confirm", replicas=replicas
@@ -61,7 +69,8 @@ def row(design: Design, vary: dict[str, tuple[float, float]], u: float, v: float
         **values,
         "uniform_coverage": found.value,
         "standard_error": error,
-        "search_error": error * np.sqrt(replicas * design.process.accuracy.simulated_time_s / usual),
+        "search_error": error
+        * np.sqrt(replicas * design.process.accuracy.simulated_time_s / usual),
         "start_u": start[0],
         "start_v": start[1],
         "cpu_s": round(time.process_time() - began, 2),
@@ -75,7 +84,9 @@ def usual_seconds(design: Design) -> float:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("name", choices=list(VARY))
     parser.add_argument("--steps", type=int, default=8, help="designs along each parameter")
     parser.add_argument("--replicas", type=int, default=8)
@@ -83,7 +94,10 @@ def main() -> None:
     asked = parser.parse_args()
     design = load_design(ROOT / "designs" / f"{asked.name}.toml")
     design = design.with_values(
-        {"process.accuracy.simulated_time_s": asked.seconds, "process.treatment_time_s": TREATMENT[asked.name]}
+        {
+            "process.accuracy.simulated_time_s": asked.seconds,
+            "process.treatment_time_s": TREATMENT[asked.name],
+        }
     )
     rows = swept(asked.name)
     done = {(one["u"], one["v"]) for one in rows}

@@ -19,14 +19,20 @@ class Effect(NamedTuple):
     asked: tuple[str, ...]
 
 
-LOSSLESS = PHYSICS._replace(restitution=None)  # between still walls, shot that loses energy would come to rest
+LOSSLESS = PHYSICS._replace(
+    restitution=None
+)  # between still walls, shot that loses energy would come to rest
 EFFECTS = {
     "gravity": Effect(PHYSICS._replace(gravity=None), PHYSICS, ("gravity",)),
     "restitution": Effect(PHYSICS._replace(restitution=None), PHYSICS, ("restitution",)),
     "vibration": Effect(LOSSLESS._replace(vibration=None), LOSSLESS, ("wave",)),
     "random_phase": Effect(PHYSICS, PHYSICS._replace(random_phase=RandomPhase(1)), ("phases",)),
-    "ball_collisions": Effect(PHYSICS._replace(ball_collisions=None), PHYSICS, ("crowd", "pair_time")),
-    "friction": Effect(PHYSICS, PHYSICS._replace(friction=Friction((STEEL,) * 3, STEEL)), ("grip",)),
+    "ball_collisions": Effect(
+        PHYSICS._replace(ball_collisions=None), PHYSICS, ("crowd", "pair_time")
+    ),
+    "friction": Effect(
+        PHYSICS, PHYSICS._replace(friction=Friction((STEEL,) * 3, STEEL)), ("grip",)
+    ),
     "drag": Effect(PHYSICS, PHYSICS._replace(drag=Drag()), ("air",)),
     "rest": Effect(PHYSICS, PHYSICS._replace(rest=Rest()), ("footing",)),
     "turn": Effect(PHYSICS, PHYSICS._replace(turn=Turn(PART, rpm=30.0)), ("turning", "part")),
@@ -41,4 +47,6 @@ def effect_scene(effect: str, on: bool) -> Scene:
     if effect == "sizes" and on:
         diameters = np.where(np.arange(len(balls)) % 2, balls.diameter, 0.75 * balls.diameters)
         balls = Balls(balls.positions, balls.velocities, diameters, balls.density)
-    return Scene(still.mesh, balls, EFFECTS[effect].on if on else EFFECTS[effect].off, still.duration)
+    return Scene(
+        still.mesh, balls, EFFECTS[effect].on if on else EFFECTS[effect].off, still.duration
+    )

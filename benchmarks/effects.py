@@ -87,9 +87,21 @@ def play(effect: str, on: bool) -> None:
     advance(run, STEADY)
     collisions, spent = advance(run, 0.02)
     piece = 0.02 * TARGET / max(spent, 1e-6)
-    kept = (run.motion, run.calendar, run.shot.crowd, run.footing, run.grip, run.phases, run.air, run.sizes)
+    kept = (
+        run.motion,
+        run.calendar,
+        run.shot.crowd,
+        run.footing,
+        run.grip,
+        run.phases,
+        run.air,
+        run.sizes,
+    )
     size = sum(map(array_bytes, kept)) / len(run.motion)
-    print(json.dumps({"simulator": sim_core.__file__, "compile_s": compiled, "bytes_per_ball": size}), flush=True)
+    print(
+        json.dumps({"simulator": sim_core.__file__, "compile_s": compiled, "bytes_per_ball": size}),
+        flush=True,
+    )
     for _ in sys.stdin:
         collisions, spent = advance(run, piece)
         print(json.dumps({"ns": 1e9 * spent / max(collisions, 1)}), flush=True)
@@ -103,7 +115,8 @@ def measure(effect: str, rounds: int) -> dict[str, Any]:
         stripped = never_had(EFFECTS[effect].asked, place / "without")
         sources = {"on": (True, ROOT), "off": (False, ROOT), "never": (False, stripped)}
         programs = {
-            name: Program(effect, on, source, place / f"cache-{name}") for name, (on, source) in sources.items()
+            name: Program(effect, on, source, place / f"cache-{name}")
+            for name, (on, source) in sources.items()
         }
         for turn in range(rounds):
             for program in list(programs.values())[:: 1 if turn % 2 else -1]:
@@ -132,7 +145,9 @@ def measure(effect: str, rounds: int) -> dict[str, Any]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--quick", action="store_true", help="three rounds instead of nine")
     parser.add_argument("--json", action="store_true", help="rows as JSON on stdout")
     parser.add_argument("--effects", nargs="*", choices=list(EFFECTS), help="only these")
@@ -146,7 +161,11 @@ def main() -> None:
     for name in names:
         rows.append(measure(name, 3 if options.quick else ROUNDS))
         if not options.json:
-            print(" ".join(f"{key} {value}" for key, value in rows[-1].items()), file=sys.stderr, flush=True)
+            print(
+                " ".join(f"{key} {value}" for key, value in rows[-1].items()),
+                file=sys.stderr,
+                flush=True,
+            )
     if options.json:
         print(json.dumps(rows, indent=1))
     else:

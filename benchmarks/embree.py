@@ -20,4 +20,8 @@ def build(corners: np.ndarray) -> Any | None:
 
 def ask(scene: Any, positions: np.ndarray, velocities: np.ndarray) -> np.ndarray:
     """First triangle on each ray (n, 3), -1 for none."""
-    return np.asarray(scene.run(positions.astype(np.float32, copy=False), velocities.astype(np.float32, copy=False)))
+    return np.asarray(
+        scene.run(
+            positions.astype(np.float32, copy=False), velocities.astype(np.float32, copy=False)
+        )
+    )

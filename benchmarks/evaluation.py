@@ -40,7 +40,11 @@ def evaluation(accuracy: float) -> dict[str, Any]:
     from chamberopt.simulation.evaluate import evaluate
     from sim_core import compile_simulator
 
-    asked = {"shot.mass_g": MASS_G, "process.accuracy.coverage": accuracy, "process.accuracy.most_replicas": 1000}
+    asked = {
+        "shot.mass_g": MASS_G,
+        "process.accuracy.coverage": accuracy,
+        "process.accuracy.most_replicas": 1000,
+    }
     clock = [("import", time.process_time())]
     design = changed(load_design(ROOT / "designs" / "gear.toml"), asked)
     chamber = build_chamber(design)
@@ -79,8 +83,14 @@ def replica_shares(design: Any, chamber: Any) -> dict[str, float]:
     from chamberopt.simulation.replicas import simulate_replica
 
     mesh = chamber_mesh(chamber)
-    lengths = [changed(design, {TIME: NO_TIME, WARM_UP: 0.0}), changed(design, {TIME: NO_TIME}), design]
-    simulate_replica(lengths[0], chamber, mesh, None, 0)  # builds the search tree, once for all replicas
+    lengths = [
+        changed(design, {TIME: NO_TIME, WARM_UP: 0.0}),
+        changed(design, {TIME: NO_TIME}),
+        design,
+    ]
+    simulate_replica(
+        lengths[0], chamber, mesh, None, 0
+    )  # builds the search tree, once for all replicas
     spent = [0.0] * len(lengths)
     for number in range(TIMED):
         for i, cut in enumerate(lengths):
@@ -88,23 +98,35 @@ def replica_shares(design: Any, chamber: Any) -> dict[str, float]:
             simulate_replica(cut, chamber, mesh, None, replica_seed(cut.process.seed, number))
             spent[i] += time.process_time() - begin
     fixed, warm, whole = spent
-    return {"fixed": fixed / whole, "warm_up": (warm - fixed) / whole, "recorded": (whole - warm) / whole}
+    return {
+        "fixed": fixed / whole,
+        "warm_up": (warm - fixed) / whole,
+        "recorded": (whole - warm) / whole,
+    }
 
 
 def in_a_process(accuracy: float, cache: str | None) -> dict[str, Any]:
     """The same in a fresh process, with its compiled code in that folder."""
     setting = {**os.environ, **({"NUMBA_CACHE_DIR": cache} if cache else {})}
     command = [sys.executable, __file__, "--here", str(accuracy)]
-    done = subprocess.run(command, env=setting, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True)
+    done = subprocess.run(
+        command, env=setting, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True
+    )
     row: dict[str, Any] = json.loads(done.stdout)
     return row
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="± 0.03 with your own cache of compiled code")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--quick", action="store_true", help="± 0.03 with your own cache of compiled code"
+    )
     parser.add_argument("--json", action="store_true", help="rows as JSON on stdout")
-    parser.add_argument("--here", type=float, metavar="ACCURACY", help="in this process, a row as JSON")
+    parser.add_argument(
+        "--here", type=float, metavar="ACCURACY", help="in this process, a row as JSON"
+    )
     options = parser.parse_args()
     if options.here:
         print(json.dumps(evaluation(options.here)))
@@ -113,7 +135,9 @@ def main() -> None:
         rows = [{"cache": "yours", **in_a_process(ASKED_QUICK, None)}]
     else:
         with tempfile.TemporaryDirectory() as folder:
-            rows = [{"cache": cache, **in_a_process(ASKED, folder)} for cache in ("empty", "filled")]
+            rows = [
+                {"cache": cache, **in_a_process(ASKED, folder)} for cache in ("empty", "filled")
+            ]
     if options.json:
         print(json.dumps(rows, indent=1))
     else:

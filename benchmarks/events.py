@@ -63,7 +63,9 @@ def rate(run: _Run, windows: int) -> list[float]:
     """Collisions a CPU second in each window."""
     _, spent = advance(run, 0.01)
     piece = 0.01 * TARGET / max(spent, 1e-6)
-    return [collisions / spent for collisions, spent in (advance(run, piece) for _ in range(windows))]
+    return [
+        collisions / spent for collisions, spent in (advance(run, piece) for _ in range(windows))
+    ]
 
 
 @jit
@@ -80,7 +82,16 @@ def _queries(tree, scratch, motion, gravity, wave, seam, time, length, repeats):
 
 def query_ns(run: _Run, repeats: int = 50) -> float:
     """Our wall query [ns]: first contact of every ball along its next FLIGHT, walls held still."""
-    arguments = (run.ground.tree, run.scratch, run.motion, run.gravity, run.wave, run.ground.seam, run.now[0], FLIGHT)
+    arguments = (
+        run.ground.tree,
+        run.scratch,
+        run.motion,
+        run.gravity,
+        run.wave,
+        run.ground.seam,
+        run.now[0],
+        FLIGHT,
+    )
     _queries(*arguments, 1)
     start = time.process_time()
     _queries(*arguments, repeats)
@@ -89,8 +100,12 @@ def query_ns(run: _Run, repeats: int = 50) -> float:
 
 def flights(run: _Run) -> tuple[np.ndarray, np.ndarray]:
     """Positions [m] and velocities [m/s] of the balls now, (n, 3) each."""
-    points = [point_at(run.motion, ball, run.now[0], run.gravity) for ball in range(len(run.motion))]
-    return np.array([p.position for p in points]) + run.centre, np.array([p.velocity for p in points])
+    points = [
+        point_at(run.motion, ball, run.now[0], run.gravity) for ball in range(len(run.motion))
+    ]
+    return np.array([p.position for p in points]) + run.centre, np.array(
+        [p.velocity for p in points]
+    )
 
 
 def ray_ns(rays: Any, run: _Run, repeats: int = 50) -> float:
@@ -146,7 +161,11 @@ class Contestant:
         balls = len(run.motion)
         shares = run.count / run.count[:3].sum()
         walls = [*run.ground.tree[:-1], *run.ground.locator]
-        columns = [run.motion, *run.calendar, *(a for a in run.shot.crowd if isinstance(a, np.ndarray))]
+        columns = [
+            run.motion,
+            *run.calendar,
+            *(a for a in run.shot.crowd if isinstance(a, np.ndarray)),
+        ]
         return {
             "scene": self.name,
             "balls": balls,
@@ -186,7 +205,12 @@ def compile_seconds() -> dict[str, float]:
         spent = [
             float(
                 subprocess.run(
-                    [sys.executable, "-c", code], env=setting, cwd=ROOT, capture_output=True, text=True, check=True
+                    [sys.executable, "-c", code],
+                    env=setting,
+                    cwd=ROOT,
+                    capture_output=True,
+                    text=True,
+                    check=True,
                 ).stdout
             )
             for _ in range(2)
@@ -195,8 +219,12 @@ def compile_seconds() -> dict[str, float]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="three rounds of short windows, within a minute")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--quick", action="store_true", help="three rounds of short windows, within a minute"
+    )
     parser.add_argument("--json", action="store_true", help="rows as JSON on stdout")
     parser.add_argument("--scenes", nargs="*", choices=list(MESHES), help="only these")
     options = parser.parse_args()

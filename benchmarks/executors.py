@@ -49,7 +49,9 @@ def workers(kind: str, count: int) -> Iterator[Executor]:
 
             from chamberopt.common.parallel.dask_cluster import Cluster
 
-            local = LocalCluster(n_workers=count, threads_per_worker=1, processes=True, dashboard_address=":0")
+            local = LocalCluster(
+                n_workers=count, threads_per_worker=1, processes=True, dashboard_address=":0"
+            )
             address = stack.enter_context(local).scheduler_address
             yield stack.enter_context(Cluster(address))
         else:
@@ -131,7 +133,9 @@ def compete(kinds: list[str], study: Study, count: int, rounds: int) -> list[dic
             contests.append(Contest(kind, one, two, start, []))
         for _ in range(rounds):
             for contest in contests:
-                contest.played.append((play(contest.one, study, tasks), play(contest.two, study, tasks)))
+                contest.played.append(
+                    (play(contest.one, study, tasks), play(contest.two, study, tasks))
+                )
         return [_row(contest, count) for contest in contests]
 
 
@@ -150,7 +154,9 @@ def _row(contest: Contest, count: int) -> dict[str, Any]:
         "highest": round(max(each), 3),
         "busy": round(middle(b.inside / (2.0 * b.wall) for b in two), 3),
         "cpu_ratio": round(middle(a.cpu / b.cpu for a, b in contest.played), 3),
-        "others_cores": round(middle(played.others for pair in contest.played for played in pair), 2),
+        "others_cores": round(
+            middle(played.others for pair in contest.played for played in pair), 2
+        ),
         "start_s": round(contest.start_s, 2),
         "candidate_cpu_s": round(middle(a.cpu for a in one) / count, 3),
         "overhead_ms": round(1e3 * overhead(contest.two), 3),
@@ -205,15 +211,27 @@ def on_paper(overhead_s: float, candidate_s: float, size: dict[str, int]) -> lis
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--quick", action="store_true", help="short candidates, one round, no CSV")
-    parser.add_argument("--rounds", type=int, default=3, help="of every kind with one and with two workers")
-    parser.add_argument("--kinds", nargs="+", default=["threads", "processes", "dask"], help="threads processes dask")
+    parser.add_argument(
+        "--rounds", type=int, default=3, help="of every kind with one and with two workers"
+    )
+    parser.add_argument(
+        "--kinds",
+        nargs="+",
+        default=["threads", "processes", "dask"],
+        help="threads processes dask",
+    )
     options = parser.parse_args()
     study = load_study(ROOT / "studies" / "quickstart.toml")
     count, rounds = CANDIDATES, options.rounds
     if options.quick:
-        study, rounds = study.model_copy(update={"draft": {"replicas": 3, "simulated_time_s": 0.2}}), 1
+        study, rounds = (
+            study.model_copy(update={"draft": {"replicas": 3, "simulated_time_s": 0.2}}),
+            1,
+        )
     play(SerialExecutor(), study, candidates(study, 1))  # compiles, if need be, for all
     from benchmarks.table import print_table, write_csv
 

@@ -8,7 +8,9 @@ from scipy.spatial import cKDTree
 from benchmarks.scenes import DIAMETER
 
 HEIGHT = 0.04  # m
-PER_BALL = np.pi * 0.035**2 * HEIGHT / 200  # m³ of chamber: 200 balls in the benchmark cylinder, 1.8 % of it steel
+PER_BALL = (
+    np.pi * 0.035**2 * HEIGHT / 200
+)  # m³ of chamber: 200 balls in the benchmark cylinder, 1.8 % of it steel
 SPREAD = 2.0  # m/s, standard deviation of each velocity component
 
 
@@ -31,8 +33,12 @@ def sample_gas(balls: int, rng: np.random.Generator) -> Gas:
         way = np.sqrt(rng.random(2 * balls)) * (radius - 0.5 * DIAMETER)
         angle = rng.uniform(0.0, 2.0 * np.pi, 2 * balls)
         z = rng.uniform(0.5 * DIAMETER, HEIGHT - 0.5 * DIAMETER, 2 * balls)
-        positions = np.concatenate([positions, np.stack([way * np.cos(angle), way * np.sin(angle), z], axis=1)])
-        later = cKDTree(positions).query_pairs(DIAMETER, output_type="ndarray").max(axis=1, initial=0)
+        positions = np.concatenate(
+            [positions, np.stack([way * np.cos(angle), way * np.sin(angle), z], axis=1)]
+        )
+        later = (
+            cKDTree(positions).query_pairs(DIAMETER, output_type="ndarray").max(axis=1, initial=0)
+        )
         positions = np.delete(positions, later[later > 0], axis=0)[:balls]
     velocities = rng.normal(0.0, SPREAD, (balls, 3))
     limit = float(np.median(_time_to_wall(positions, velocities, radius - 0.5 * DIAMETER)))

@@ -45,7 +45,9 @@ def line(row: dict[str, Any], wide: int) -> str:
     numbers = [
         f"{row['collisions']:>10}" if row["collisions"] else f"{'-':>10}",
         *(
-            f"{row[name]:>11.2e}" if row[name] and math.isfinite(row[name]) else f"{_none(row[name]):>11}"
+            f"{row[name]:>11.2e}"
+            if row[name] and math.isfinite(row[name])
+            else f"{_none(row[name]):>11}"
             for name in ("events_per_s", "penetration", "energy_drift")
         ),
     ]
@@ -59,15 +61,26 @@ def _none(value: float) -> str:
 def plain(row: dict[str, Any]) -> dict[str, Any]:
     """The same for JSON, which has neither NaN nor infinity."""
     return {
-        name: None if isinstance(value, float) and not math.isfinite(value) else value for name, value in row.items()
+        name: None if isinstance(value, float) and not math.isfinite(value) else value
+        for name, value in row.items()
     }
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--json", action="store_true", help="rows as JSON on stdout")
-    parser.add_argument("--long", action="store_true", help="with the case of 10^8 collisions: minutes")
-    parser.add_argument("--cases", nargs="*", default=[], metavar="WORD", help="only cases with a word in their names")
+    parser.add_argument(
+        "--long", action="store_true", help="with the case of 10^8 collisions: minutes"
+    )
+    parser.add_argument(
+        "--cases",
+        nargs="*",
+        default=[],
+        metavar="WORD",
+        help="only cases with a word in their names",
+    )
     options = parser.parse_args()
     cases = chosen(options.cases, options.long)
     wide = max((len(case.name) for case in cases), default=0)

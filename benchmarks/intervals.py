@@ -48,7 +48,9 @@ def model_chamber() -> Chamber:
     """A flat square of separate triangles, 50 by 40."""
     row, column = np.divmod(np.arange(TRIANGLES), 50)
     corner = np.stack([column * SIDE, row * SIDE, np.zeros(TRIANGLES)], axis=1)
-    vertices = np.concatenate([corner + SIDE * np.array(step) for step in ((0, 0, 0), (1, 0, 0), (0, 1, 0))])
+    vertices = np.concatenate(
+        [corner + SIDE * np.array(step) for step in ((0, 0, 0), (1, 0, 0), (0, 1, 0))]
+    )
     triangles = np.arange(3 * TRIANGLES, dtype=np.int32).reshape(3, -1).T
     area = np.full(TRIANGLES, 0.5 * SIDE**2)
     part = Part(vertices, triangles, area, np.ones(TRIANGLES, dtype=bool), "model")
@@ -63,19 +65,31 @@ def poisson_replicas(rng: np.random.Generator, x: np.ndarray, seconds: float) ->
     for _ in range(REPLICAS):
         count = rng.poisson(x * 0.5 * SIDE**2 / DENT * seconds / TREATMENT)
         triangle = np.repeat(np.arange(TRIANGLES), count)
-        tallies.append(tally_of(seconds, triangle, DENT / shape * rng.gamma(shape, size=len(triangle)), TRIANGLES))
+        tallies.append(
+            tally_of(
+                seconds, triangle, DENT / shape * rng.gamma(shape, size=len(triangle)), TRIANGLES
+            )
+        )
     return tallies
 
 
 def tally_of(seconds: float, triangle: np.ndarray, area: np.ndarray, triangles: int) -> Tally:
     """A replica's tally of nothing but dents."""
     count = np.bincount(triangle, minlength=triangles)
-    return Tally(seconds, count, count, np.bincount(triangle, area, triangles), count, count, triangle, area)
+    return Tally(
+        seconds, count, count, np.bincount(triangle, area, triangles), count, count, triangle, area
+    )
 
 
 def figures(replicas: list[Tally], chamber: Chamber, design: Design) -> dict[str, Any]:
     """The three figures of coverage and the objective, as evaluate() makes them."""
-    got = dict(zip(NAMES, jackknife(replicas, [METRICS[name] for name in NAMES], chamber, design), strict=True))
+    got = dict(
+        zip(
+            NAMES,
+            jackknife(replicas, [METRICS[name] for name in NAMES], chamber, design),
+            strict=True,
+        )
+    )
     return {**got, "uniform_coverage": weighted(OBJECTIVES["uniform_coverage"], got)}
 
 
@@ -86,7 +100,9 @@ def exact(x: np.ndarray, weight: np.ndarray) -> dict[str, float]:
     return {**true, "uniform_coverage": true["mean_coverage"] - true["std_coverage"]}
 
 
-def rows_of(case: str, seconds: float, truth: dict[str, float], runs: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+def rows_of(
+    case: str, seconds: float, truth: dict[str, float], runs: list[dict[str, Any]]
+) -> Iterator[dict[str, Any]]:
     for name, wanted in truth.items():
         got = [run[name] for run in runs]
         mean = float(np.mean([one.value for one in got]))
@@ -105,11 +121,15 @@ def rows_of(case: str, seconds: float, truth: dict[str, float], runs: list[dict[
 
 def model_rows(runs: int) -> Iterator[dict[str, Any]]:
     chamber = model_chamber()
-    design = load_design(ROOT / "designs" / "plate.toml").with_values({"process.treatment_time_s": TREATMENT})
+    design = load_design(ROOT / "designs" / "plate.toml").with_values(
+        {"process.treatment_time_s": TREATMENT}
+    )
     for case, x in models().items():
         rng = np.random.default_rng(1)
         for seconds in (0.25, 1.0, 4.0, 16.0):
-            done = [figures(poisson_replicas(rng, x, seconds), chamber, design) for _ in range(runs)]
+            done = [
+                figures(poisson_replicas(rng, x, seconds), chamber, design) for _ in range(runs)
+            ]
             yield from rows_of(case, seconds, exact(x, chamber.exposed_area), done)
 
 
@@ -126,7 +146,9 @@ def gear_rows(runs: int, replicas: int) -> Iterator[dict[str, Any]]:
     material, shot = design.materials.part, design.shot
 
     def dents(number: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        log = simulate(build_scene(design, mesh, replica_seed(design.process.seed, number, "confirm"))).impacts
+        log = simulate(
+            build_scene(design, mesh, replica_seed(design.process.seed, number, "confirm"))
+        ).impacts
         size = dent_diameter(
             log.normal_speed,
             shot.diameter,
@@ -165,19 +187,36 @@ def stopping_rows(runs: int) -> Iterator[dict[str, Any]]:
             half_width, held, spent = 1.96 / np.sqrt(wanted), 0, 0
             for _ in range(runs):
                 sample, count = rng.normal(size=400), first
-                while (more := replicas_wanted(count, estimate(sample[:count]).half_width, half_width, 400)) > count:
+                while (
+                    more := replicas_wanted(
+                        count, estimate(sample[:count]).half_width, half_width, 400
+                    )
+                ) > count:
                     count = more
                 got = estimate(sample[:count])
                 held, spent = held + (got.low <= 0.0 <= got.high), spent + count
-            yield {"first_replicas": first, "needed": wanted, "spent": round(spent / runs, 1), "held": held / runs}
+            yield {
+                "first_replicas": first,
+                "needed": wanted,
+                "spent": round(spent / runs, 1),
+                "held": held / runs,
+            }
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--gear", action="store_true", help="the shipped gear's chamber instead of models")
-    parser.add_argument("--stopping", action="store_true", help="the rule that adds replicas instead")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--gear", action="store_true", help="the shipped gear's chamber instead of models"
+    )
+    parser.add_argument(
+        "--stopping", action="store_true", help="the rule that adds replicas instead"
+    )
     parser.add_argument("--runs", type=int, default=200)
-    parser.add_argument("--replicas", type=int, default=400, help="of the gear, that runs draw from")
+    parser.add_argument(
+        "--replicas", type=int, default=400, help="of the gear, that runs draw from"
+    )
     parser.add_argument("--json", action="store_true")
     asked = parser.parse_args()
     name, made = "intervals.csv", model_rows(asked.runs)

@@ -36,22 +36,41 @@ def profile(name: str, repeats: int = 5) -> tuple[list[float], dict[str, float],
         parts.append(ticks / ticks.sum() * longer / seen * 1e9)
         ratios.append((longer / seen) / (spent / collisions))
     count = watched.count / watched.count[:3].sum()
-    calls = {"walls": count[0], "balls": count[1], "sonotrode": count[2], "searches": count[3], "stale": count[4]}
-    return [statistics.median(column) for column in zip(*parts, strict=True)], calls, statistics.median(ratios)
+    calls = {
+        "walls": count[0],
+        "balls": count[1],
+        "sonotrode": count[2],
+        "searches": count[3],
+        "stale": count[4],
+    }
+    return (
+        [statistics.median(column) for column in zip(*parts, strict=True)],
+        calls,
+        statistics.median(ratios),
+    )
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("scenes", nargs="*", metavar="scene", help=", ".join(MESHES))
     names = parser.parse_args().scenes or list(MESHES)
     for name in names:
         if name not in MESHES:
             parser.error(f"no scene {name}: choose from {', '.join(MESHES)}")
-    print("ns a collision | " + " | ".join(PARTS) + " | all | wall searches a collision | with / without stopwatch")
+    print(
+        "ns a collision | "
+        + " | ".join(PARTS)
+        + " | all | wall searches a collision | with / without stopwatch"
+    )
     for name in names:
         parts, calls, ratio = profile(name)
         cells = [f"{part:.0f}" for part in parts]
-        print(f"{name} | {' | '.join(cells)} | {sum(parts):.0f} | {calls['searches']:.2f} | {ratio:.2f}", flush=True)
+        print(
+            f"{name} | {' | '.join(cells)} | {sum(parts):.0f} | {calls['searches']:.2f} | {ratio:.2f}",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

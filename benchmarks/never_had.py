@@ -21,7 +21,9 @@ class _Without(ast.NodeTransformer):
 
     def visit_Compare(self, node: ast.Compare) -> ast.AST:
         self.generic_visit(node)
-        asked = node.left.attr if isinstance(node.left, ast.Attribute) else getattr(node.left, "id", "")
+        asked = (
+            node.left.attr if isinstance(node.left, ast.Attribute) else getattr(node.left, "id", "")
+        )
         none = isinstance(node.comparators[0], ast.Constant) and node.comparators[0].value is None
         if asked not in self.names or not none or not isinstance(node.ops[0], (ast.Is, ast.IsNot)):
             return node

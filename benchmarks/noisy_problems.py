@@ -22,7 +22,9 @@ NOISES = (0.02, 0.1)
 # parameters, four local maxima, the best 3.86278.
 HARTMANN_HEIGHT = np.array([1.0, 1.2, 3.0, 3.2])
 HARTMANN_STEEP = np.array([[3.0, 10, 30], [0.1, 10, 35], [3.0, 10, 30], [0.1, 10, 35]])
-HARTMANN_PLACE = 1e-4 * np.array([[3689, 1170, 2673], [4699, 4387, 7470], [1091, 8732, 5547], [381, 5743, 8828]])
+HARTMANN_PLACE = 1e-4 * np.array(
+    [[3689, 1170, 2673], [4699, 4387, 7470], [1091, 8732, 5547], [381, 5743, 8828]]
+)
 
 
 @dataclass(frozen=True)
@@ -43,8 +45,12 @@ class Problem:
         """score(point) -> mean of the replicas and its squared standard error; the same point, the same answer."""
 
         def score(point: np.ndarray) -> tuple[float, float]:
-            bits = np.frombuffer(np.ascontiguousarray(point, dtype=float).tobytes(), dtype=np.uint32)
-            scatter = np.random.default_rng([seed, *bits]).normal(0.0, self.noise * np.sqrt(REPLICAS), REPLICAS)
+            bits = np.frombuffer(
+                np.ascontiguousarray(point, dtype=float).tobytes(), dtype=np.uint32
+            )
+            scatter = np.random.default_rng([seed, *bits]).normal(
+                0.0, self.noise * np.sqrt(REPLICAS), REPLICAS
+            )
             return self.truth(point) + float(scatter.mean()), float(scatter.var(ddof=1)) / REPLICAS
 
         return score
@@ -59,7 +65,9 @@ class Problem:
 def ridge(x: np.ndarray) -> float:
     """A curved ridge, steep across and gentle along: 0.8 on it, at x0 = 0.65."""
     across = x[1] - (0.25 + 0.9 * (x[0] - 0.2) ** 2)
-    return float(0.8 - 1.6 * across**2 - 0.25 * (x[0] - 0.65) ** 2 - 0.5 * (x[2] - 0.35 - 0.2 * x[0]) ** 2)
+    return float(
+        0.8 - 1.6 * across**2 - 0.25 * (x[0] - 0.65) ** 2 - 0.5 * (x[2] - 0.35 - 0.2 * x[0]) ** 2
+    )
 
 
 def hartmann(x: np.ndarray) -> float:
@@ -70,7 +78,9 @@ def hartmann(x: np.ndarray) -> float:
 
 def corner(x: np.ndarray) -> float:
     """Best on two bounds, 0.8 at (1, 0, 0.6): it saturates in one parameter and has a kink in another."""
-    return float(0.8 * np.expm1(-3.0 * x[0]) / np.expm1(-3.0) - 0.4 * x[1] ** 1.5 - 0.6 * (x[2] - 0.6) ** 2)
+    return float(
+        0.8 * np.expm1(-3.0 * x[0]) / np.expm1(-3.0) - 0.4 * x[1] ** 1.5 - 0.6 * (x[2] - 0.6) ** 2
+    )
 
 
 FUNCTIONS = {"ridge": ridge, "hartmann": hartmann, "corner": corner}
@@ -78,7 +88,11 @@ FUNCTIONS = {"ridge": ridge, "hartmann": hartmann, "corner": corner}
 
 def functions() -> list[Problem]:
     """The three functions with little and with much noise."""
-    return [Problem(f"{name} ±{noise}", 3, truth, 0.8, noise) for name, truth in FUNCTIONS.items() for noise in NOISES]
+    return [
+        Problem(f"{name} ±{noise}", 3, truth, 0.8, noise)
+        for name, truth in FUNCTIONS.items()
+        for noise in NOISES
+    ]
 
 
 def chamber(name: str) -> Problem:
@@ -98,4 +112,6 @@ def chamber(name: str) -> Problem:
 
 def chambers() -> list[Problem]:
     """The chambers that were swept."""
-    return [chamber(path.stem.removeprefix("sweep_")) for path in sorted(RESULTS.glob("sweep_*.csv"))]
+    return [
+        chamber(path.stem.removeprefix("sweep_")) for path in sorted(RESULTS.glob("sweep_*.csv"))
+    ]

@@ -65,12 +65,23 @@ def evaluation(design: Any, chamber: Any, impacts: int) -> Any:
         angle = rng.uniform(20.0, 90.0, len(triangle)).astype(np.float32)
         dent = np.float32(4e-5) * np.sqrt(speed)
         hits.append(Hits(triangle, speed, angle, dent, np.float32(7e-6) * speed * speed))
-        sums = [np.bincount(triangle, one, len(count)) for one in (np.pi / 4.0 * dent.astype(float) ** 2, speed, angle)]
-        tallies.append(Tally(design.process.recorded_time, count, count, *sums, triangle, np.pi / 4.0 * dent**2))
-    metrics = dict(zip(METRICS, jackknife(tallies, list(METRICS.values()), chamber, design), strict=True))
+        sums = [
+            np.bincount(triangle, one, len(count))
+            for one in (np.pi / 4.0 * dent.astype(float) ** 2, speed, angle)
+        ]
+        tallies.append(
+            Tally(
+                design.process.recorded_time, count, count, *sums, triangle, np.pi / 4.0 * dent**2
+            )
+        )
+    metrics = dict(
+        zip(METRICS, jackknife(tallies, list(METRICS.values()), chamber, design), strict=True)
+    )
     goal = weighted(OBJECTIVES["uniform_coverage"], metrics)
     total = sum(tallies[1:], tallies[0])
-    return Evaluation("uniform_coverage", goal, metrics, total, tuple(tallies), {}, {}, hits=tuple(hits))
+    return Evaluation(
+        "uniform_coverage", goal, metrics, total, tuple(tallies), {}, {}, hits=tuple(hits)
+    )
 
 
 def opened(result: Path, *options: str) -> tuple[float, float]:
@@ -81,11 +92,27 @@ def opened(result: Path, *options: str) -> tuple[float, float]:
         "print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)"
     )
     picture = str(result.parent / "picture.png")
-    command = [sys.executable, "-c", code, "inspect", str(result), "--screenshot", picture, *options]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])}
+    command = [
+        sys.executable,
+        "-c",
+        code,
+        "inspect",
+        str(result),
+        "--screenshot",
+        picture,
+        *options,
+    ]
+    environment = {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]),
+    }
     began = time.perf_counter()
     run = subprocess.run(
-        [sys.executable, "-c", watch, *command], check=True, capture_output=True, text=True, env=environment
+        [sys.executable, "-c", watch, *command],
+        check=True,
+        capture_output=True,
+        text=True,
+        env=environment,
     )
     unit = 1e6 if sys.platform == "darwin" else 1e3  # bytes there, kilobytes elsewhere
     return time.perf_counter() - began, int(run.stdout.split()[-1]) / unit
@@ -98,8 +125,14 @@ def row(size: str, impacts: int, runs: int) -> dict[str, Any]:
         triangles, picked = written(Path(temporary), size, impacts)
         wrote = time.perf_counter() - began
         result = Path(temporary) / "result"
-        measured: dict[str, Any] = {"triangles": triangles, "impacts": impacts, "written_s": round(wrote, 1)}
-        measured["result_mb"] = round(sum(file.stat().st_size for file in result.iterdir()) / 1e6, 1)
+        measured: dict[str, Any] = {
+            "triangles": triangles,
+            "impacts": impacts,
+            "written_s": round(wrote, 1),
+        }
+        measured["result_mb"] = round(
+            sum(file.stat().st_size for file in result.iterdir()) / 1e6, 1
+        )
         for name, options in (("picture", ()), ("pick", ("--triangle", str(picked)))):
             seconds, peak = zip(*(opened(result, *options) for _ in range(runs)), strict=True)
             measured[f"{name}_s"] = round(statistics.median(seconds), 2)
@@ -111,8 +144,12 @@ def main(arguments: list[str] | None = None) -> None:
     """The table, and the CSV unless it is quick."""
     from benchmarks.table import print_table, write_csv
 
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="a small result, once, nothing written")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--quick", action="store_true", help="a small result, once, nothing written"
+    )
     parser.add_argument("--json", action="store_true", help="print JSON")
     asked = parser.parse_args(arguments)
     sizes = {"10k": 100_000} if asked.quick else SIZES

@@ -92,9 +92,9 @@ def sobol(record: Record, evaluations: int) -> np.ndarray:
     from scipy.stats.qmc import Sobol
 
     record.ask(record.problem.begin(record.seed))
-    for point in Sobol(record.problem.parameters, seed=record.seed).random_base2(evaluations.bit_length())[
-        : evaluations - 1
-    ]:
+    for point in Sobol(record.problem.parameters, seed=record.seed).random_base2(
+        evaluations.bit_length()
+    )[: evaluations - 1]:
         record.ask(point)
     return record.luckiest
 
@@ -120,11 +120,18 @@ def optuna_with(sampler: str) -> Optimizer:
 
         optuna.logging.set_verbosity(optuna.logging.ERROR)
         warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
-        study = optuna.create_study(direction="maximize", sampler=getattr(optuna.samplers, sampler)(seed=record.seed))
+        study = optuna.create_study(
+            direction="maximize", sampler=getattr(optuna.samplers, sampler)(seed=record.seed)
+        )
         names = [f"x{i}" for i in range(record.problem.parameters)]
-        study.enqueue_trial(dict(zip(names, record.problem.begin(record.seed).tolist(), strict=True)))
+        study.enqueue_trial(
+            dict(zip(names, record.problem.begin(record.seed).tolist(), strict=True))
+        )
         study.optimize(
-            lambda trial: record.ask(np.array([trial.suggest_float(name, 0.0, 1.0) for name in names])), evaluations
+            lambda trial: record.ask(
+                np.array([trial.suggest_float(name, 0.0, 1.0) for name in names])
+            ),
+            evaluations,
         )
         return np.array([study.best_params[name] for name in names])
 
@@ -142,14 +149,18 @@ OPTIMIZERS: dict[str, Optimizer] = {
 }
 
 
-def row(problem: Problem, name: str, seeds: int, evaluations: int, first_seed: int = 0) -> dict[str, Any]:
+def row(
+    problem: Problem, name: str, seeds: int, evaluations: int, first_seed: int = 0
+) -> dict[str, Any]:
     """An optimiser's regret on a problem over so many seeds."""
     regrets, fitted, began = [], [], time.process_time()
     for seed in range(first_seed, first_seed + seeds):
         record = Record(problem, seed)
         recommended = OPTIMIZERS[name](record, evaluations)
         if len(record.points) > evaluations:
-            raise RuntimeError(f"{name} asked {len(record.points)} times, {evaluations} are allowed")
+            raise RuntimeError(
+                f"{name} asked {len(record.points)} times, {evaluations} are allowed"
+            )
         regrets.append(problem.best - problem.truth(recommended))
         fitted.append(problem.best - problem.truth(record.fitted))
     return {
@@ -158,14 +169,18 @@ def row(problem: Problem, name: str, seeds: int, evaluations: int, first_seed: i
         "evaluations": evaluations,
         "seeds": seeds,
         "mean_regret": round(float(np.mean(regrets)), 5),
-        "standard_error": round(float(np.std(regrets, ddof=1) / np.sqrt(seeds)), 5) if seeds > 1 else None,
+        "standard_error": round(float(np.std(regrets, ddof=1) / np.sqrt(seeds)), 5)
+        if seeds > 1
+        else None,
         "median_regret": round(float(np.median(regrets)), 5),
         "mean_regret_fit": round(float(np.mean(fitted)), 5),
         "cpu_s": round((time.process_time() - began) / seeds, 2),
     }
 
 
-def rows(problem_name: str, names: list[str], seeds: int, evaluations: int, first: int) -> Iterator[dict[str, Any]]:
+def rows(
+    problem_name: str, names: list[str], seeds: int, evaluations: int, first: int
+) -> Iterator[dict[str, Any]]:
     for problem in [*functions(), *chambers()]:
         if problem.name.startswith(problem_name):
             for name in names:
@@ -179,18 +194,24 @@ def verdict(made: list[dict[str, Any]]) -> str:
         if one["optimizer"] != "nlopt-mlsl":
             by_problem.setdefault(one["problem"], {})[one["optimizer"]] = one["mean_regret"]
     first = sum(regrets["ours"] <= min(regrets.values()) for regrets in by_problem.values())
-    worst = max(regrets["ours"] / max(min(regrets.values()), 1e-9) for regrets in by_problem.values())
-    return (
-        f"ours has the lowest mean regret on {first} of {len(by_problem)} problems; at worst {worst:.2f} times the best"
+    worst = max(
+        regrets["ours"] / max(min(regrets.values()), 1e-9) for regrets in by_problem.values()
     )
+    return f"ours has the lowest mean regret on {first} of {len(by_problem)} problems; at worst {worst:.2f} times the best"
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--only", help=f"names with commas, of {', '.join(OPTIMIZERS)}")
-    parser.add_argument("--problem", default="", help="only those whose names begin so, e.g. hartmann or plate")
+    parser.add_argument(
+        "--problem", default="", help="only those whose names begin so, e.g. hartmann or plate"
+    )
     parser.add_argument("--seeds", type=int, default=SEEDS)
-    parser.add_argument("--first-seed", type=int, default=0, help="tune on some seeds, report on others")
+    parser.add_argument(
+        "--first-seed", type=int, default=0, help="tune on some seeds, report on others"
+    )
     parser.add_argument("--evaluations", type=int, default=EVALUATIONS)
     parser.add_argument("--json", action="store_true")
     asked = parser.parse_args()
@@ -200,7 +221,9 @@ def main() -> None:
     try:
         made = list(rows(asked.problem, names, asked.seeds, asked.evaluations, asked.first_seed))
     except ImportError as error:
-        parser.error(f"{error}; pip install chamberopt[bench] (and torch for optuna-gp), or leave it out with --only")
+        parser.error(
+            f"{error}; pip install chamberopt[bench] (and torch for optuna-gp), or leave it out with --only"
+        )
     if asked.json:
         print(json.dumps(made, indent=1))
         return

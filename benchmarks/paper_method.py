@@ -74,7 +74,9 @@ def planes(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return corners, normals / np.linalg.norm(normals, axis=1)[:, None]
 
 
-def ask(corners: np.ndarray, normals: np.ndarray, positions: np.ndarray, velocities: np.ndarray) -> float:
+def ask(
+    corners: np.ndarray, normals: np.ndarray, positions: np.ndarray, velocities: np.ndarray
+) -> float:
     """Sum of the contact times [s] of these flights (n, 3)."""
     return float(_all(corners, normals, positions, velocities, -Gravity().z))
 

@@ -14,30 +14,53 @@ MARGIN = 0.3  # decades beside a panel's lines
 
 
 def lines_picture(
-    path: Path, rows: Sequence[dict[str, Any]], panel: str, across: str, up: str, product: str, title: str
+    path: Path,
+    rows: Sequence[dict[str, Any]],
+    panel: str,
+    across: str,
+    up: str,
+    product: str,
+    title: str,
 ) -> None:
     """Column ``up`` [ns] against column ``across``, a line for each structure, a panel for each value of ``panel``."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    panels, structures = (list(dict.fromkeys(row[column] for row in rows)) for column in (panel, "structure"))
+    panels, structures = (
+        list(dict.fromkeys(row[column] for row in rows)) for column in (panel, "structure")
+    )
     others = [structure for structure in structures if structure != product]
-    looks = {name: (COLOURS[i], MARKS[i], 1.5) for i, name in enumerate(others)} | {product: ("#000000", "o", 2.6)}
+    looks = {name: (COLOURS[i], MARKS[i], 1.5) for i, name in enumerate(others)} | {
+        product: ("#000000", "o", 2.6)
+    }
     figure = Figure(figsize=(3.0 + 4.0 * len(panels), 5.4), dpi=130, layout="constrained")
     FigureCanvasAgg(figure)
-    spans = [(min(numbers), max(numbers)) for numbers in ([r[across] for r in rows if r[panel] == p] for p in panels)]
-    decades = [MARGIN + np.log10(last / first) for first, last in spans]  # as wide in all panels: slopes compare
+    spans = [
+        (min(numbers), max(numbers))
+        for numbers in ([r[across] for r in rows if r[panel] == p] for p in panels)
+    ]
+    decades = [
+        MARGIN + np.log10(last / first) for first, last in spans
+    ]  # as wide in all panels: slopes compare
     grid = figure.subplots(1, len(panels), sharey=True, squeeze=False, width_ratios=decades)[0]
     for axes, name, span in zip(grid, panels, spans, strict=True):
         for structure in structures:
-            points = [(row[across], row[up]) for row in rows if (row[panel], row["structure"]) == (name, structure)]
+            points = [
+                (row[across], row[up])
+                for row in rows
+                if (row[panel], row["structure"]) == (name, structure)
+            ]
             colour, mark, width = looks[structure]
-            axes.loglog(*zip(*points, strict=True), marker=mark, color=colour, lw=width, label=structure)
+            axes.loglog(
+                *zip(*points, strict=True), marker=mark, color=colour, lw=width, label=structure
+            )
         axes.set_xlim(span[0] / 10 ** (MARGIN / 2), span[1] * 10 ** (MARGIN / 2))
         axes.set_title(name, loc="left")
         axes.set_xlabel(across)
         axes.grid(which="major", color="#dddddd", lw=0.7)
         axes.spines[["top", "right"]].set_visible(False)
     grid[0].set_ylabel(title)
-    figure.legend(*grid[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
+    figure.legend(
+        *grid[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False
+    )
     figure.savefig(path)

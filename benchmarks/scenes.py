@@ -8,12 +8,23 @@ import numpy as np
 import trimesh
 from scipy.spatial import Delaunay
 
-from sim_core import Balls, Gravity, Physics, Restitution, Scene, TriangleMesh, Vibration, pack_balls
+from sim_core import (
+    Balls,
+    Gravity,
+    Physics,
+    Restitution,
+    Scene,
+    TriangleMesh,
+    Vibration,
+    pack_balls,
+)
 
 PART, SONOTRODE, WALL = 0, 1, 2
 DIAMETER = 3e-3  # m
 STEEL = (0.91, 1.0)  # C0 and v0 [m/s], for every surface
-PHYSICS = Physics(Gravity(), Restitution((STEEL,) * 3, STEEL), Vibration(SONOTRODE, 25e-6, 20e3, 0.3))
+PHYSICS = Physics(
+    Gravity(), Restitution((STEEL,) * 3, STEEL), Vibration(SONOTRODE, 25e-6, 20e3, 0.3)
+)
 ROOT = Path(__file__).parents[1]
 
 
@@ -47,7 +58,10 @@ def cylinder(radius: float, height: float, triangles: int) -> TriangleMesh:
     faces = [ends[:, ::-1], ends + offset]
     for low, high in pairwise(layers):
         next_low, next_high = np.roll(low, -1), np.roll(high, -1)
-        faces += [np.column_stack([low, next_low, next_high]), np.column_stack([low, next_high, high])]
+        faces += [
+            np.column_stack([low, next_low, next_high]),
+            np.column_stack([low, next_high, high]),
+        ]
     points, shell = np.concatenate(vertices), np.concatenate(faces)
     z = points[shell][:, :, 2]
     tags = np.full(len(shell), WALL)
@@ -63,7 +77,9 @@ def gear(subdivisions: int) -> TriangleMesh:
     chamber = build_chamber(load_design(ROOT / "designs" / "gear.toml"))
     vertices, triangles, tags = chamber.vertices, chamber.triangles, chamber.tags
     for _ in range(subdivisions):
-        vertices, triangles, index = trimesh.remesh.subdivide(vertices, triangles, return_index=True)
+        vertices, triangles, index = trimesh.remesh.subdivide(
+            vertices, triangles, return_index=True
+        )
         origin = np.empty(len(triangles), dtype=int)
         for old, new in index.items():
             origin[new] = old
@@ -93,4 +109,6 @@ def scene(name: str, duration: float = 1.0, seed: int = 1) -> Scene:
     rng = np.random.default_rng(seed)
     count = MESHES[name][1]
     positions = pack_balls(mesh(name), count, DIAMETER, rng, clear=50e-6)
-    return Scene(mesh(name), Balls(positions, rng.normal(0.0, 2.0, (count, 3)), DIAMETER), PHYSICS, duration)
+    return Scene(
+        mesh(name), Balls(positions, rng.normal(0.0, 2.0, (count, 3)), DIAMETER), PHYSICS, duration
+    )

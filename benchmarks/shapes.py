@@ -17,13 +17,24 @@ SHOWN: dict[str, dict[str, Any]] = {
     "cylinder": {"diameter_mm": 60, "height_mm": 57, "corner_radius_mm": 8},
     "cylinder, leaning": {"diameter_mm": 56, "height_mm": 57, "inclination_deg": -7},
     "box": {"length_mm": 60, "width_mm": 44, "height_mm": 57, "corner_radius_mm": 8},
-    "prism, leaning": {"sides": 6, "across_mm": 44, "height_mm": 57, "inclination_deg": 7, "corner_radius_mm": 4},
+    "prism, leaning": {
+        "sides": 6,
+        "across_mm": 44,
+        "height_mm": 57,
+        "inclination_deg": 7,
+        "corner_radius_mm": 4,
+    },
     "revolve": {
         "profile_mm": [[26, 0], [26, 12], [32, 18], [32, 44], [24, 57], [0, 57]],
         "corner_radius_mm": 3,
     },
     "conformal, hull": {"outline": "hull", "gap_mm": 9, "height_mm": 57},
-    "conformal, silhouette": {"outline": "silhouette", "gap_mm": 5, "height_mm": 54, "corner_radius_mm": 3},
+    "conformal, silhouette": {
+        "outline": "silhouette",
+        "gap_mm": 5,
+        "height_mm": 54,
+        "corner_radius_mm": 3,
+    },
     "shapes/oblong.py": {"length_mm": 66, "width_mm": 44, "height_mm": 57},
 }
 LIGHT = np.array([0.5, -0.7, 0.5]) / np.sqrt(0.99)
@@ -67,9 +78,13 @@ def _draw(axes: Any, title: str, cavity: ShapeSurface, part: np.ndarray) -> None
     grey = np.array([0.66, 0.70, 0.73]) * (0.75 + 0.25 * _unit(part) @ LIGHT)[:, None]
     orange = np.tile([0.90, 0.62, 0.0], (int(floor.sum()), 1))
     for triangles, colours in ((corners[floor], orange), (part, grey)):
-        axes.add_collection3d(Poly3DCollection(triangles, facecolors=colours, edgecolors=colours, linewidths=0.3))
+        axes.add_collection3d(
+            Poly3DCollection(triangles, facecolors=colours, edgecolors=colours, linewidths=0.3)
+        )
     axes.add_collection3d(Poly3DCollection(corners[~floor], facecolors=(0.35, 0.55, 0.75, 0.06)))
-    axes.add_collection3d(Line3DCollection(_edges(cavity), colors="#334455", linewidths=0.6, alpha=0.8))
+    axes.add_collection3d(
+        Line3DCollection(_edges(cavity), colors="#334455", linewidths=0.6, alpha=0.8)
+    )
     axes.set(xlim=(-23, 23), ylim=(-23, 23), zlim=(4, 53))
     axes.set_aspect("equal")
     axes.view_init(elev=20, azim=-58)
@@ -84,7 +99,9 @@ def _edges(cavity: ShapeSurface) -> np.ndarray:
     for number, row in enumerate(cavity.triangles.tolist()):
         for a, b in zip(row, [*row[1:], row[0]], strict=True):
             sides.setdefault((min(a, b), max(a, b)), []).append(number)
-    sharp = [side for side, (i, j) in sides.items() if normal[i] @ normal[j] < np.cos(np.radians(10.0))]
+    sharp = [
+        side for side, (i, j) in sides.items() if normal[i] @ normal[j] < np.cos(np.radians(10.0))
+    ]
     return 1e3 * cavity.vertices[np.array(sharp)]
 
 

@@ -34,7 +34,11 @@ def array_bytes(built: Any) -> int:
     if not isinstance(built, tuple):
         return 0
     fields = getattr(built, "_fields", ("",) * len(built))
-    parts = (part for field, part in zip(fields, built, strict=True) if field not in ("stack", "scratch", "probe"))
+    parts = (
+        part
+        for field, part in zip(fields, built, strict=True)
+        if field not in ("stack", "scratch", "probe")
+    )
     return sum(map(array_bytes, parts))
 
 
@@ -49,6 +53,8 @@ def print_table(rows: Sequence[dict[str, Any]]) -> None:
 def _processor() -> str:
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-        return next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
+        return next(
+            line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")
+        )
     except (OSError, StopIteration):
         return platform.processor()

@@ -67,8 +67,12 @@ def measure(windows: int) -> list[dict[str, Any]]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="three windows a motion instead of nine")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--quick", action="store_true", help="three windows a motion instead of nine"
+    )
     parser.add_argument("--json", action="store_true", help="rows as JSON on stdout")
     options = parser.parse_args()
     for physics in (PHYSICS, PHYSICS._replace(turn=MOTIONS["1 rpm"])):

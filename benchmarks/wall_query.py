@@ -45,8 +45,15 @@ TURN = 0.1  # CPU s: shorter turns ask the same flights again, longer ones ask f
 LEAST = 20  # flights
 
 # name: mesh of fineness n, finenesses, those of --quick, and a place [m] well inside
-MESHES: dict[str, tuple[Callable[[int], TriangleMesh], list[int], list[int], tuple[float, float, float]]] = {
-    "cylinder": (lambda n: cylinder(0.035, 0.04, 10**n), [2, 3, 4, 5, 6], [2, 3, 4], (0.0, 0.0, 0.02)),
+MESHES: dict[
+    str, tuple[Callable[[int], TriangleMesh], list[int], list[int], tuple[float, float, float]]
+] = {
+    "cylinder": (
+        lambda n: cylinder(0.035, 0.04, 10**n),
+        [2, 3, 4, 5, 6],
+        [2, 3, 4],
+        (0.0, 0.0, 0.02),
+    ),
     "gear": (gear, [0, 1, 2, 3], [0], (0.0, 0.0, 0.0075)),  # as designed, 9k triangles, and finer
 }
 
@@ -74,7 +81,9 @@ STRUCTURES = {
     "binary tree, oriented boxes": Structure(lambda shell: binary_tree.build(shell, oriented=True)),
     "binary tree, boxes": Structure(lambda shell: binary_tree.build(shell, oriented=False)),
     REFERENCE: Structure(product.build),
-    PRODUCT: Structure(product.build_product, lambda built, *question: ask(built[0], *question), False),
+    PRODUCT: Structure(
+        product.build_product, lambda built, *question: ask(built[0], *question), False
+    ),
     "embree, thin ray": Structure(
         lambda shell: embree.build(shell.corners),
         lambda built, asked, *_: embree.ask(built, asked[:, :3], asked[:, 3:]),
@@ -106,7 +115,14 @@ def enter(structure: Structure, built: Any, asked: np.ndarray) -> Contest:
     """As many flights as a turn has time for."""
 
     def contest(count: int, passes: int) -> Contest:
-        return Contest(structure, built, asked[:count], passes, np.empty(count), np.empty(count, dtype=np.int64))
+        return Contest(
+            structure,
+            built,
+            asked[:count],
+            passes,
+            np.empty(count),
+            np.empty(count, dtype=np.int64),
+        )
 
     trial = contest(LEAST, 1)
     trial.turn()  # compiles
@@ -177,23 +193,34 @@ def require_agreement(shell: Shell, contests: dict[str, Contest]) -> float:
                 f"{contest.delays[i]} and {reference.delays[i]} s"
             )
         for i in np.flatnonzero(contest.obstacles[:count] != reference.obstacles[:count]):
-            one, two = (_alone(shell, c.obstacles[i], contest.asked[i]) for c in (contest, reference))
+            one, two = (
+                _alone(shell, c.obstacles[i], contest.asked[i]) for c in (contest, reference)
+            )
             if one != two:
-                raise SystemExit(f"{label} and {REFERENCE} meet different obstacles at different times on flight {i}")
+                raise SystemExit(
+                    f"{label} and {REFERENCE} meet different obstacles at different times on flight {i}"
+                )
     merged = contests[PRODUCT]
     count = min(len(merged.asked), len(reference.asked))
     asked, delay = merged.asked[:count], merged.delays[:count, None]
     at = asked[:, :3] + delay * asked[:, 3:] + 0.5 * delay * delay * np.array(FALL)
     off = float(np.abs(gaps(shell, reference.obstacles[:count], at)).max())
     if not off <= SAME_CONTACT:
-        raise SystemExit(f"{PRODUCT}: its contacts are up to {off:.1e} m from what {REFERENCE} meets")
+        raise SystemExit(
+            f"{PRODUCT}: its contacts are up to {off:.1e} m from what {REFERENCE} meets"
+        )
     return off
 
 
 def _alone(shell: Shell, obstacle: int, flight: np.ndarray) -> float:
     """When [s] a flight meets this one obstacle, searched as all are."""
     delays, obstacles = np.empty(1), np.empty(1, dtype=np.int64)
-    ask(every_obstacle.EveryObstacle(sort_rows(shell, np.array([obstacle]))), flight[None], delays, obstacles)
+    ask(
+        every_obstacle.EveryObstacle(sort_rows(shell, np.array([obstacle]))),
+        flight[None],
+        delays,
+        obstacles,
+    )
     return float(delays[0])
 
 
@@ -206,7 +233,9 @@ def add_growth(rows: list[dict[str, Any]]) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--quick", action="store_true", help="no mesh above 10^4 triangles")
     parser.add_argument("--json", action="store_true", help="rows as JSON on stdout")
     parser.add_argument("--picture", action="store_true", help=f"write {PICTURE.name}")
@@ -224,7 +253,9 @@ def main() -> None:
     if not options.quick:
         write_csv("wall_query.csv", rows)
     if options.picture:
-        lines_picture(PICTURE, rows, "mesh", "triangles", "ns_per_query", PRODUCT, "time of a query [ns]")
+        lines_picture(
+            PICTURE, rows, "mesh", "triangles", "ns_per_query", PRODUCT, "time of a query [ns]"
+        )
 
 
 if __name__ == "__main__":

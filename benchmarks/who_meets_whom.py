@@ -76,7 +76,9 @@ def require_agreement(found: dict[str, Answers]) -> None:
     """Exits unless all answers are those of all pairs."""
     times, partners = found["all pairs"]
     for label, (others, mates) in found.items():
-        wrong = np.flatnonzero((mates != partners) | ~np.isclose(others, times, rtol=0.0, atol=CLOSE))
+        wrong = np.flatnonzero(
+            (mates != partners) | ~np.isclose(others, times, rtol=0.0, atol=CLOSE)
+        )
         if len(wrong):
             i = wrong[0]
             raise SystemExit(
@@ -159,7 +161,9 @@ def upkeep_ns(module: Any, moments: Sequence[Moment]) -> float:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--quick", action="store_true", help="no more than 1,000 balls")
     parser.add_argument("--json", action="store_true", help="rows as JSON on stdout")
     parser.add_argument("--picture", action="store_true", help=f"write {PICTURE.name}")
@@ -179,10 +183,15 @@ def main() -> None:
     if options.picture:
         panels = [
             {**row, "cost": name, "ns": row[column]}
-            for name, column in (("finding the meeting", "ns_per_query"), ("with keeping the structure true", "sum_ns"))
+            for name, column in (
+                ("finding the meeting", "ns_per_query"),
+                ("with keeping the structure true", "sum_ns"),
+            )
             for row in rows
         ]
-        lines_picture(PICTURE, panels, "cost", "balls", "ns", PRODUCT, "time of a flight's query [ns]")
+        lines_picture(
+            PICTURE, panels, "cost", "balls", "ns", PRODUCT, "time of a flight's query [ns]"
+        )
 
 
 if __name__ == "__main__":

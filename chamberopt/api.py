@@ -55,11 +55,19 @@ def simulate(
     with local_executor(workers) as executor:
         design, advice = settled(design, chamber, executor)
         evaluation = evaluate(design, chamber, executor, progress, cavity=cavity)
-    _warn([*map(str, advice), *evaluation.notes, *write_simulation(out, design, chamber, evaluation, advice)])
+    _warn(
+        [
+            *map(str, advice),
+            *evaluation.notes,
+            *write_simulation(out, design, chamber, evaluation, advice),
+        ]
+    )
     return load_result(out)
 
 
-def optimise(study: Study, out: str | Path, *, workers: int | None = None, progress: Progress | None = None) -> Result:
+def optimise(
+    study: Study, out: str | Path, *, workers: int | None = None, progress: Progress | None = None
+) -> Result:
     """Run a study into the folder ``out``; the result stands for its best design, as confirmed.
 
     ``out``: new, empty, or of the same study: a run that was stopped goes on, of one that has ended the result is read.
@@ -79,7 +87,9 @@ def optimise(study: Study, out: str | Path, *, workers: int | None = None, progr
             start = build_chamber(study.design)
             study, advice = record.settled(lambda design: settled(design, start, executor))
             found = go_on(study, record, executor, progress)
-            _warn([*map(str, advice), *found.best.evaluation.notes, *write_study(out, found, advice)])
+            _warn(
+                [*map(str, advice), *found.best.evaluation.notes, *write_study(out, found, advice)]
+            )
     return load_result(out)
 
 
@@ -96,7 +106,9 @@ def show(result: Result, screenshot: str | Path | None = None) -> None:
 def _require(name: str, given: object, kind: type, maker: str) -> None:
     """InputError for what is no design, study or result, such as the path of one."""
     if not isinstance(given, kind):
-        raise InputError(f"{name}: given {given!r}; give a {kind.__name__}, as chamberopt.{maker} makes it")
+        raise InputError(
+            f"{name}: given {given!r}; give a {kind.__name__}, as chamberopt.{maker} makes it"
+        )
 
 
 def _warn(remarks: list[str]) -> None:

@@ -6,7 +6,9 @@ import numpy as np
 
 from sim_core.errors import SceneError, number
 
-MOST_SIZES = 8  # each has obstacles of its own; more is a distribution, which a few sizes stand for well
+MOST_SIZES = (
+    8  # each has obstacles of its own; more is a distribution, which a few sizes stand for well
+)
 FASTEST = 1e6  # m/s: shot has 20; the filters' float32 squares of much more overflow
 
 
@@ -28,7 +30,9 @@ class Balls:
 
     def __post_init__(self) -> None:
         for name in ("diameter", "density"):
-            object.__setattr__(self, name, _each(name, getattr(self, name), np.shape(self.positions)[:1]))
+            object.__setattr__(
+                self, name, _each(name, getattr(self, name), np.shape(self.positions)[:1])
+            )
         if len(self.sizes) > MOST_SIZES:
             raise SceneError(
                 f"balls.diameter has {len(self.sizes)} different values: at most {MOST_SIZES} sizes are supported"
@@ -41,16 +45,23 @@ class Balls:
             except (TypeError, ValueError):
                 raise SceneError(f"balls.{name} must be numbers of shape (n, 3)") from None
             if array.ndim != 2 or array.shape[1] != 3 or len(array) == 0:
-                raise SceneError(f"balls.{name} must have shape (n, 3) with n >= 1, not {array.shape}")
+                raise SceneError(
+                    f"balls.{name} must have shape (n, 3) with n >= 1, not {array.shape}"
+                )
             bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
             if len(bad):
-                raise SceneError(f"balls.{name}: ball {bad[0]} has {array[bad[0]].tolist()}; give finite numbers")
-            most, unit = {"velocities": (FASTEST, "m/s"), "spins": (FASTEST / self.radius, "rad/s")}.get(
-                name, (np.inf, "")
-            )
+                raise SceneError(
+                    f"balls.{name}: ball {bad[0]} has {array[bad[0]].tolist()}; give finite numbers"
+                )
+            most, unit = {
+                "velocities": (FASTEST, "m/s"),
+                "spins": (FASTEST / self.radius, "rad/s"),
+            }.get(name, (np.inf, ""))
             if np.abs(array).max() > most:
                 worst = int(np.abs(array).max(axis=1).argmax())
-                raise SceneError(f"balls.{name}: ball {worst} has {array[worst].tolist()} {unit}; at most {most:g}")
+                raise SceneError(
+                    f"balls.{name}: ball {worst} has {array[worst].tolist()} {unit}; at most {most:g}"
+                )
             array.flags.writeable = False
             object.__setattr__(self, name, array)
         for name, others in (("velocities", self.velocities), ("spins", self.spins)):
@@ -108,7 +119,9 @@ def _each(name: str, given: object, count: tuple[int, ...]) -> float | np.ndarra
         except (TypeError, ValueError):
             raise SceneError(f"balls.{name} must be one number, or one for each ball") from None
         if values.shape != count:
-            raise SceneError(f"balls.{name} has shape {values.shape} for {count} balls: give one number, or one each")
+            raise SceneError(
+                f"balls.{name} has shape {values.shape} for {count} balls: give one number, or one each"
+            )
     bad = np.flatnonzero(~(np.isfinite(values) & (values > 0.0)))
     if len(bad):
         which = "" if np.ndim(given) == 0 else f" of ball {bad[0]}"  # type: ignore[arg-type]

@@ -14,9 +14,7 @@ from sim_core.effects.gravity import Gravity, acceleration
 from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.vec3 import Vec3, along
 
-WINDOW = (
-    0.02  # s: rounding of t is 3e-18 s here, a ball at 20 m/s moves 0.4 m; longer loses digits, shorter costs set-backs
-)
+WINDOW = 0.02  # s: rounding of t is 3e-18 s here, a ball at 20 m/s moves 0.4 m; longer loses digits, shorter costs set-backs
 
 
 class Point(NamedTuple):
@@ -70,7 +68,9 @@ def set_off(motion: np.ndarray, ball: int, time: float, here: Point, fall: Vec3)
 
 
 @jit
-def set_back(motion: np.ndarray, window: float, gravity: Gravity | None, footing: Footing | None = None) -> None:
+def set_back(
+    motion: np.ndarray, window: float, gravity: Gravity | None, footing: Footing | None = None
+) -> None:
     """Move the clock's zero forward by ``window`` [s]."""
     for ball in range(len(motion)):
         fall = own_pull(footing, ball, gravity)

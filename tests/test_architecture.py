@@ -47,7 +47,9 @@ def imports(path: Path) -> Iterator[tuple[str, tuple[str, ...], int]]:
         if isinstance(node, ast.Import):
             yield from ((alias.name, (), node.lineno) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{path}:{node.lineno}: relative import; write the package's name"
+            assert node.level == 0, (
+                f"{path}:{node.lineno}: relative import; write the package's name"
+            )
             yield node.module or "", tuple(alias.name for alias in node.names), node.lineno
 
 
@@ -64,7 +66,9 @@ def level_of(order: str) -> dict[str, int]:
 def test_every_file_has_its_place_in_the_order(package: str) -> None:
     known = {*level_of(ORDER[package]), "__init__"}
     homeless = {
-        path.stem for path in (ROOT / package).iterdir() if path.suffix == ".py" or (path / "__init__.py").is_file()
+        path.stem
+        for path in (ROOT / package).iterdir()
+        if path.suffix == ".py" or (path / "__init__.py").is_file()
     } - known
     assert not homeless, f"give these a place in {package}'s row: {sorted(homeless)}"
 
@@ -79,7 +83,11 @@ def test_imports_point_one_way(package: str) -> None:
             continue
         for module, names, line in imports(path):
             reached = [f"{module}.{name}" for name in names] if module == dotted else [module]
-            others = [one.removeprefix(f"{dotted}.").split(".")[0] for one in reached if one.startswith(f"{dotted}.")]
+            others = [
+                one.removeprefix(f"{dotted}.").split(".")[0]
+                for one in reached
+                if one.startswith(f"{dotted}.")
+            ]
             wrong += [
                 f"{relative(path)}:{line}: {own} must not import {other}"
                 for other in others
@@ -94,7 +102,9 @@ def test_no_folder_is_crowded(package: str) -> None:
         relative(folder): len(entries)
         for folder in (ROOT / package, *(ROOT / package).rglob("*"))
         if folder.is_dir() and folder.name != "__pycache__"
-        for entries in [[e for e in folder.iterdir() if e.name != "__pycache__" and not e.name.startswith(".")]]
+        for entries in [
+            [e for e in folder.iterdir() if e.name != "__pycache__" and not e.name.startswith(".")]
+        ]
         if len(entries) > MOST_ENTRIES
     }
     assert not crowded, f"more than {MOST_ENTRIES} entries: {crowded}"
@@ -179,7 +189,9 @@ def test_heavy_libraries_have_one_importer(library: str) -> None:
         for module, _, _ in imports(path)
         if module.split(".")[0] == library
     }
-    assert all(one.startswith(f"chamberopt/{ONE_IMPORTER[library]}") for one in importers), importers
+    assert all(one.startswith(f"chamberopt/{ONE_IMPORTER[library]}") for one in importers), (
+        importers
+    )
 
 
 def test_the_only_compiler_of_sim_core_is_one_file() -> None:

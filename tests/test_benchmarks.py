@@ -30,11 +30,15 @@ def test_all_structures_find_the_same_contacts() -> None:
     for label, structure in wall_query.STRUCTURES.items():
         if structure.exact or label == wall_query.PRODUCT:
             answers = np.empty(FLIGHTS), np.empty(FLIGHTS, dtype=np.int64)
-            contests[label] = wall_query.Contest(structure, structure.build(shell), asked, 1, *answers)
+            contests[label] = wall_query.Contest(
+                structure, structure.build(shell), asked, 1, *answers
+            )
             contests[label].turn()
     assert len(contests) == 6
     wall_query.require_agreement(shell, contests)
-    assert np.isfinite(contests[wall_query.PRODUCT].delays).all(), "the chamber is closed: every flight ends"
+    assert np.isfinite(contests[wall_query.PRODUCT].delays).all(), (
+        "the chamber is closed: every flight ends"
+    )
 
 
 def test_all_structures_find_the_same_meetings() -> None:
@@ -58,7 +62,9 @@ def test_the_analytical_chamber_beside_the_meshed_one(tmp_path: Path) -> None:
     assert abs(covered - 0.39) < 3.0 * float(rows["mean_coverage, 64 facets"]["half_width"])
     for figure in ("mean_coverage", "impacts_per_mm2_s", "mean_normal_speed_m_s"):
         assert abs(float(rows[f"{figure}, 64 facets"]["difference_over_half_width"])) < 2.0
-    assert float(rows["impacts_per_mm2_s, 8 facets"]["difference_over_half_width"]) > 0.0, "less room, more impacts"
+    assert float(rows["impacts_per_mm2_s, 8 facets"]["difference_over_half_width"]) > 0.0, (
+        "less room, more impacts"
+    )
 
 
 def test_a_quick_comparison_does_not_go_into_the_documentation() -> None:

@@ -20,7 +20,9 @@ def test_the_readmes_python_runs_as_printed(snippet: str, tmp_path: Path) -> Non
         (tmp_path / folder).symlink_to(ROOT / folder)
     if why_no_pictures():  # the only line that needs OpenGL
         snippet = re.sub(r"chamberopt\.show\(.*", "", snippet)
-    answer = subprocess.run([sys.executable, "-c", snippet], cwd=tmp_path, capture_output=True, text=True, check=False)
+    answer = subprocess.run(
+        [sys.executable, "-c", snippet], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
     assert answer.returncode == 0, answer.stderr
     assert "±" in answer.stdout or "impacts" in answer.stdout
 

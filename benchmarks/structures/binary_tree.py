@@ -11,7 +11,16 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.structures.compiled import jit, searches
-from benchmarks.structures.shell import Rows, Shell, answer, chord_of, nearer, padding, sort_rows, within_slab
+from benchmarks.structures.shell import (
+    Rows,
+    Shell,
+    answer,
+    chord_of,
+    nearer,
+    padding,
+    sort_rows,
+    within_slab,
+)
 from sim_core.numerics.vec3 import Vec3, dot
 
 LEAF = 4  # obstacles a leaf holds at most; 1 measured 10 % slower, 2 and 8 alike
@@ -91,7 +100,11 @@ def _enter(frames, slabs, node, chord, longest):  # type: ignore[no-untyped-def]
             origin, velocity, bulge = chord.origin[axis], chord.velocity[axis], chord.bulge[axis]
         else:
             a = Vec3(frames[node, axis, 0], frames[node, axis, 1], frames[node, axis, 2])
-            origin, velocity, bulge = dot(a, chord.origin), dot(a, chord.velocity), dot(a, chord.bulge)
+            origin, velocity, bulge = (
+                dot(a, chord.origin),
+                dot(a, chord.velocity),
+                dot(a, chord.bulge),
+            )
         enter, leave = within_slab(origin, velocity, bulge, low, high, enter, leave)
     return enter if enter <= leave else 2.0 * longest
 

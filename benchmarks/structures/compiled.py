@@ -14,8 +14,12 @@ from numba.extending import overload
 from sim_core.numerics import jit as sim_core_jit
 
 _settings: Any = numba.config
-_digest = hashlib.sha256(b"".join(source.read_bytes() for source in sorted(Path(__file__).parent.glob("*.py"))))
-_FOLDER = sim_core_jit.CACHE_FOLDER / f"structures-{_digest.hexdigest()[:16]}"  # never stale, see sim_core/jit.py
+_digest = hashlib.sha256(
+    b"".join(source.read_bytes() for source in sorted(Path(__file__).parent.glob("*.py")))
+)
+_FOLDER = (
+    sim_core_jit.CACHE_FOLDER / f"structures-{_digest.hexdigest()[:16]}"
+)  # never stale, see sim_core/jit.py
 _SEARCHES: dict[type, Any] = {}
 
 
@@ -24,7 +28,9 @@ def jit(function: Callable[..., Any], arrays: bool = False) -> Any:
     before = _settings.CACHE_DIR
     _settings.CACHE_DIR = str(_FOLDER)
     try:
-        return numba.njit(cache=sim_core_jit._CACHED, nogil=True, error_model="numpy", _nrt=arrays)(function)
+        return numba.njit(cache=sim_core_jit._CACHED, nogil=True, error_model="numpy", _nrt=arrays)(
+            function
+        )
     finally:
         _settings.CACHE_DIR = before
 

@@ -42,7 +42,9 @@ def build(gas: Gas) -> LinkedCells:
     where = np.floor(gas.motion[:, :3] / edge).astype(np.int32)
     first = np.full(int(shape.prod()), -1, dtype=np.int32)
     after, before = np.full((2, len(where)), -1, dtype=np.int32)
-    cells = LinkedCells(gas.motion, gas.reach, edge, shape, where, new_calendar(len(where)), first, after, before)
+    cells = LinkedCells(
+        gas.motion, gas.reach, edge, shape, where, new_calendar(len(where)), first, after, before
+    )
     _join_all(cells)
     return cells
 
@@ -57,7 +59,9 @@ def _cell_at(cells, x, y, z):  # type: ignore[no-untyped-def]
 @jit
 def _cell_of(cells, ball):  # type: ignore[no-untyped-def]
     where = cells.where
-    return _cell_at(cells, np.int64(where[ball, 0]), np.int64(where[ball, 1]), np.int64(where[ball, 2]))
+    return _cell_at(
+        cells, np.int64(where[ball, 0]), np.int64(where[ball, 1]), np.int64(where[ball, 2])
+    )
 
 
 @jit
@@ -68,7 +72,9 @@ def _next_border(cells, ball):  # type: ignore[no-untyped-def]
         velocity = cells.motion[ball, 3 + axis]
         if velocity != 0.0:
             side = 1 if velocity > 0.0 else 0
-            time = ((cells.where[ball, axis] + side) * cells.edge - cells.motion[ball, axis]) / velocity
+            time = (
+                (cells.where[ball, axis] + side) * cells.edge - cells.motion[ball, axis]
+            ) / velocity
             if time < when:
                 when, chosen, way = time, axis, 2 * side - 1
     return when, chosen, way
@@ -114,7 +120,9 @@ def search(cells, ball, time, before):  # type: ignore[no-untyped-def]
                 other = np.int64(cells.first[_cell_at(cells, x + i, y + j, z + k)])
                 while other >= 0:
                     if other != ball:
-                        best, partner = sooner(cells.motion, cells.reach, ball, other, time, best, partner)
+                        best, partner = sooner(
+                            cells.motion, cells.reach, ball, other, time, best, partner
+                        )
                     other = np.int64(cells.after[other])
     return (time + best, partner) if partner >= 0 else (NEVER, -1)
 
@@ -126,7 +134,9 @@ def upkeep(cells, ends, before, times, partners):  # type: ignore[no-untyped-def
     while True:
         ball = np.int64(cells.calendar.winners[1])
         time = cells.calendar.next_time[ball]
-        if time >= before:  # what was played past the ends of flights counts as that many flights more
+        if (
+            time >= before
+        ):  # what was played past the ends of flights counts as that many flights more
             return len(ends) * max(1, crossings) / max(1, in_flight)
         crossings += 1
         if time < ends[ball]:
@@ -139,7 +149,15 @@ def upkeep(cells, ends, before, times, partners):  # type: ignore[no-untyped-def
             for j in range(-1, 2):
                 for k in range(-1, 2):
                     if (i, j, k)[axis] == way:  # ahead
-                        _tell(cells, _cell_at(cells, x + i, y + j, z + k), ball, time, before, times, partners)
+                        _tell(
+                            cells,
+                            _cell_at(cells, x + i, y + j, z + k),
+                            ball,
+                            time,
+                            before,
+                            times,
+                            partners,
+                        )
         _join(cells, ball)
 
 

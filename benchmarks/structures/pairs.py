@@ -18,7 +18,9 @@ def sooner(motion, reach, ball, other, time, best, partner):  # type: ignore[no-
     """
     here, there = drift(motion, ball, time), drift(motion, other, time)
     closing = Vec3(
-        motion[other, 3] - motion[ball, 3], motion[other, 4] - motion[ball, 4], motion[other, 5] - motion[ball, 5]
+        motion[other, 3] - motion[ball, 3],
+        motion[other, 4] - motion[ball, 4],
+        motion[other, 5] - motion[ball, 5],
     )
     delay = meeting_delay(sub(there, here), closing, reach)
     return (delay, other) if delay < best else (best, partner)

@@ -39,5 +39,7 @@ def build_product(shell: Shell) -> tuple[EightWide, Locator]:
 @searches(EightWide)
 def nearest(eight, ball, fall, length):  # type: ignore[no-untyped-def]
     """Delay [s] and name of the first contact within ``length`` [s]: the shell's row, or the product's triangle."""
-    delay, row = first_contact(eight.tree, eight.scratch, ball, eight.gravity, None, eight.seam, 0.0, length)
+    delay, row = first_contact(
+        eight.tree, eight.scratch, ball, eight.gravity, None, eight.seam, 0.0, length
+    )
     return delay, int(eight.tree.triangles[row, 0]) if row >= 0 else -1

@@ -48,7 +48,9 @@ def _follow_all(pairs):  # type: ignore[no-untyped-def]
 @searches(ProductPairs)
 def search(pairs, ball, time, before):  # type: ignore[no-untyped-def]
     """Time [s] and partner of the ball's first meeting before ``before`` and the window's end."""
-    time, partner = next_meeting(pairs.crowd, pairs.motion, ball, pairs.now + time, pairs.now + before)
+    time, partner = next_meeting(
+        pairs.crowd, pairs.motion, ball, pairs.now + time, pairs.now + before
+    )
     return (time - pairs.now, partner) if partner >= 0 else (NEVER, -1)
 
 

@@ -32,7 +32,9 @@ class Shell(NamedTuple):
     radius: float
     seam: float
     mesh: TriangleMesh
-    corners: np.ndarray  # of the mesh itself (m, 3, 3) [m] about its middle, for those who ignore the obstacles
+    corners: (
+        np.ndarray
+    )  # of the mesh itself (m, 3, 3) [m] about its middle, for those who ignore the obstacles
 
 
 class Rows(NamedTuple):
@@ -118,7 +120,11 @@ def answer(rows, best, found):  # type: ignore[no-untyped-def]
 def chord_of(ball, fall, length):  # type: ignore[no-untyped-def]
     """The chord of the ball's next ``length`` [s]."""
     half, bulge = 0.5 * length, -0.125 * length * length
-    velocity = Vec3(ball.velocity.x + half * fall.x, ball.velocity.y + half * fall.y, ball.velocity.z + half * fall.z)
+    velocity = Vec3(
+        ball.velocity.x + half * fall.x,
+        ball.velocity.y + half * fall.y,
+        ball.velocity.z + half * fall.z,
+    )
     return Chord(ball.position, velocity, Vec3(bulge * fall.x, bulge * fall.y, bulge * fall.z))
 
 

@@ -33,7 +33,9 @@ def build(gas: Gas) -> SweepAndPrune:
     high = np.maximum(start, end) + 0.5 * gas.reach + MARGIN
     order = np.argsort(low)
     longest = np.array([(high - low).max()])
-    return SweepAndPrune(gas.motion, gas.reach, low[order], high[order], order, np.argsort(order), longest)
+    return SweepAndPrune(
+        gas.motion, gas.reach, low[order], high[order], order, np.argsort(order), longest
+    )
 
 
 @searches(SweepAndPrune)
@@ -45,7 +47,9 @@ def search(sweep, ball, time, before):  # type: ignore[no-untyped-def]
     k = own - 1
     while k >= 0 and sweep.low[k] + sweep.longest[0] >= low:
         if sweep.high[k] >= low:
-            best, partner = sooner(sweep.motion, sweep.reach, ball, sweep.names[k], time, best, partner)
+            best, partner = sooner(
+                sweep.motion, sweep.reach, ball, sweep.names[k], time, best, partner
+            )
         k -= 1
     k = own + 1
     while k < len(sweep.low) and sweep.low[k] <= high:

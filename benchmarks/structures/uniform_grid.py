@@ -29,7 +29,9 @@ from sim_core.numerics.roots import NEVER
 CELLS = 8  # per obstacle; memory grows with it and empty cells are leapt over
 NUDGE = 1e-9  # m: how far past a cell's face the walk goes on; obstacles are listed this much wider
 FARTHEST = 255  # cells
-BATCH = 20_000  # obstacles listed at a time: 9 fine cells a side about a capsule make 10 million pairs
+BATCH = (
+    20_000  # obstacles listed at a time: 9 fine cells a side about a capsule make 10 million pairs
+)
 
 
 class UniformGrid(NamedTuple):
@@ -70,14 +72,18 @@ def build(shell: Shell, cells: float = CELLS) -> UniformGrid:
     starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
     empty = distance_transform_cdt((counts == 0).reshape(shape), "chessboard")
     empty = np.minimum(empty, FARTHEST).astype(np.uint8).ravel()
-    return UniformGrid(bottom, edge, shape, empty, starts, item[by_cell].astype(np.int32), sort_rows(shell, order))
+    return UniformGrid(
+        bottom, edge, shape, empty, starts, item[by_cell].astype(np.int32), sort_rows(shell, order)
+    )
 
 
 def _cell(index: np.ndarray, shape: np.ndarray) -> np.ndarray:
     return (index[:, 0] * shape[1] + index[:, 1]) * shape[2] + index[:, 2]
 
 
-def _overlaps(first: np.ndarray, last: np.ndarray, shape: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _overlaps(
+    first: np.ndarray, last: np.ndarray, shape: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Every (cell, obstacle) whose boxes overlap."""
     width = last - first + 1
     count = width.prod(axis=1)
@@ -117,7 +123,11 @@ def nearest(grid, ball, fall, length):  # type: ignore[no-untyped-def]
         for slot in range(grid.starts[cell], grid.starts[cell + 1]):
             best, found = nearer(grid.rows, int(grid.items[slot]), ball, fall, best, found)
         room = max(1, int(grid.empty[cell])) - 1  # cells to leap over on every side
-        leave = min(_leave(grid, chord, 0, i, room), _leave(grid, chord, 1, j, room), _leave(grid, chord, 2, k, room))
+        leave = min(
+            _leave(grid, chord, 0, i, room),
+            _leave(grid, chord, 1, j, room),
+            _leave(grid, chord, 2, k, room),
+        )
         time = max(leave, time) + nudge
     return answer(grid.rows, best, found)
 

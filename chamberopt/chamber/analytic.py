@@ -38,7 +38,9 @@ def analytic_cavity(design: Design, chamber: Chamber) -> AnalyticCavity:
 
     for name in ("part_turn", "rest"):
         if getattr(design.effects, name):
-            raise InputError(f"effects.{name}: not supported with an analytical cavity; leave it out, or {REMEDY}")
+            raise InputError(
+                f"effects.{name}: not supported with an analytical cavity; leave it out, or {REMEDY}"
+            )
     bottom, top = (float(z) for z in (chamber.vertices[:, 2].min(), chamber.vertices[:, 2].max()))
     _require_plain(chamber, bottom, top)
     outline = _outline(chamber, bottom, top)
@@ -63,7 +65,9 @@ def on_chamber(impacts: ImpactLog, chamber: Chamber) -> ImpactLog:
 
     ceiling = np.flatnonzero(chamber.tags == TAG_PART)
     corners = chamber.vertices[chamber.triangles[ceiling]]
-    return replace(impacts, triangle=ceiling[triangles_at(corners, impacts.position)].astype(np.int32))
+    return replace(
+        impacts, triangle=ceiling[triangles_at(corners, impacts.position)].astype(np.int32)
+    )
 
 
 def _refused(why: str) -> InputError:
@@ -76,7 +80,9 @@ def _require_plain(chamber: Chamber, bottom: float, top: float) -> None:
     heights = chamber.vertices[chamber.triangles][:, :, 2]
     along = area_vectors(chamber.vertices, chamber.triangles)[:, 2]
     floor, ceiling = heights.max(axis=1) < bottom + FLAT, heights.min(axis=1) > top - FLAT
-    upright = np.abs(along) <= UPRIGHT * np.linalg.norm(area_vectors(chamber.vertices, chamber.triangles), axis=1)
+    upright = np.abs(along) <= UPRIGHT * np.linalg.norm(
+        area_vectors(chamber.vertices, chamber.triangles), axis=1
+    )
     seen = area > NO_AREA
     for tag, own, name, wanted in (
         (TAG_PART, ceiling, "the part reaches into the cavity", "a flat ceiling"),
@@ -100,7 +106,9 @@ def _outline(chamber: Chamber, bottom: float, top: float) -> np.ndarray:
         hull.volume * (top - bottom)
     )
     if abs(missing) > SAME_VOLUME:
-        raise _refused(f"its sides are not convex: it lacks {missing:.2g} of the volume between its floor and ceiling")
+        raise _refused(
+            f"its sides are not convex: it lacks {missing:.2g} of the volume between its floor and ceiling"
+        )
     return outline
 
 

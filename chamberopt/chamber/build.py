@@ -22,15 +22,31 @@ from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL, is_sonot
 from chamberopt.geometry.mesh_io import box_text, place_text
 from chamberopt.geometry.slivers import THINNEST, without_slivers
 from chamberopt.geometry.solids import Solid, Surface, bodies, cavities, overlap, subtract, united
-from chamberopt.geometry.triangles import area_vectors, areas, free_rim, shells_of, tetrahedron_volumes
+from chamberopt.geometry.triangles import (
+    area_vectors,
+    areas,
+    free_rim,
+    shells_of,
+    tetrahedron_volumes,
+)
 
 if TYPE_CHECKING:
     from chamberopt.design.load import Design
 
 KEPT = "target.reachable: the target is what the shot reaches in the study's start"
-CROOKED = 1e-3  # rad: turns a ball's path by less than the facets of a round wall do, by a hundred times
+CROOKED = (
+    1e-3  # rad: turns a ball's path by less than the facets of a round wall do, by a hundred times
+)
 
-__all__ = ["TAG_PART", "TAG_SONOTRODE", "TAG_WALL", "Chamber", "Part", "build_chamber", "turning_axis"]
+__all__ = [
+    "TAG_PART",
+    "TAG_SONOTRODE",
+    "TAG_WALL",
+    "Chamber",
+    "Part",
+    "build_chamber",
+    "turning_axis",
+]
 
 
 @dataclass(frozen=True)
@@ -75,20 +91,32 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
 
     cavity = fitted(design, shape)
     notes += notes_on_files(design)
-    own = piece(-1, TAG_PART, -area_vectors(part.vertices, part.triangles), np.arange(len(part.triangles)))
+    own = piece(
+        -1, TAG_PART, -area_vectors(part.vertices, part.triangles), np.arange(len(part.triangles))
+    )
     whole = cavity.body.surface()
-    if shape.source is None:  # else the part is drawn as what it bounds: there is nothing to cut out
+    if (
+        shape.source is None
+    ):  # else the part is drawn as what it bounds: there is nothing to cut out
         solids, voids = bodies(part.vertices, part.triangles, part.name)
         body = united(solids, part.name)
-        notes += [f"{part.name}: {voids} closed voids inside the part are left out"] if voids else []
+        notes += (
+            [f"{part.name}: {voids} closed voids inside the part are left out"] if voids else []
+        )
         _refuse_in_swing(design, cavity, body)
         whole = subtract(cavity.body, body).surface()
     if not (cavity.traced(whole, own).tags == TAG_PART).any():
         drawn = design.chamber.setup() is not None
-        remedy = "check the groups in [chamber]" if drawn else "change part.offset_mm or the sizes in [chamber]"
+        remedy = (
+            "check the groups in [chamber]"
+            if drawn
+            else "change part.offset_mm or the sizes in [chamber]"
+        )
         raise InputError(f"{part.name}: no part of it is inside the chamber; {remedy}")
     ceiling = float(shape.vertices[:, 2].max()) if design.chamber.setup() is None else None
-    room, room_notes = _room_over_sonotrode(whole, cavity.traced(whole, own).tags, ceiling, design.chamber.ceiling_key)
+    room, room_notes = _room_over_sonotrode(
+        whole, cavity.traced(whole, own).tags, ceiling, design.chamber.ceiling_key
+    )
     room = without_slivers(room)[0]
     traced = cavity.traced(room, own)
     on_part = traced.tags == TAG_PART
@@ -102,7 +130,15 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
     notes += room_notes + _crooked_note(room, traced.facing) + _hold_note(room, on_part, part.name)
     volume = float(tetrahedron_volumes(room.vertices, room.triangles).sum())
     return Chamber(
-        room.vertices, room.triangles, traced.tags, traced.source, volume, part, exposed, tuple(notes), traced.fitting
+        room.vertices,
+        room.triangles,
+        traced.tags,
+        traced.source,
+        volume,
+        part,
+        exposed,
+        tuple(notes),
+        traced.fitting,
     )
 
 
@@ -143,14 +179,18 @@ def _refuse_in_swing(design: Design, cavity: Cavity, body: Solid) -> None:
     """A part in the way of a further sonotrode; of the first the distance has been asked."""
     for name, swing in swept_faces(design, cavity)[1:] if design.sonotrodes else ():
         if overlap(swing, body) > 0.0:
-            raise InputError(f"{name}.at_mm: its face would hit the part; move it back along its axis, or the part")
+            raise InputError(
+                f"{name}.at_mm: its face would hit the part; move it back along its axis, or the part"
+            )
 
 
 def _refuse_rims(design: Design, room: Surface, tags: np.ndarray) -> None:
     """A sonotrode without a room, or one that walls do not rise from all round: a moving edge."""
     for k in range(len(design.sonotrodes)):
         if not (tags == tag_of_further(k)).any():
-            raise InputError(f"sonotrodes.{k}.at_mm: the part cuts its face off from the room; move one of them")
+            raise InputError(
+                f"sonotrodes.{k}.at_mm: the part cuts its face off from the room; move one of them"
+            )
     rim = free_rim(room.vertices, room.triangles, is_sonotrode(tags))
     if rim is not None:
         raise InputError(
@@ -169,7 +209,9 @@ def _room_over_sonotrode(
     floor = tags == TAG_SONOTRODE
     over = [room for room in rooms if (room & floor).any()]
     if not over:
-        raise InputError("the part leaves no room over the sonotrode; raise chamber.sonotrode_distance_mm")
+        raise InputError(
+            "the part leaves no room over the sonotrode; raise chamber.sonotrode_distance_mm"
+        )
     kept = max(over, key=lambda room: areas(whole.vertices, whole.triangles[room & floor]).sum())
     notes = []
     rest = [whole.only(room) for room in rooms if room is not kept]
@@ -187,7 +229,11 @@ def _room_over_sonotrode(
     if ceiling is not None and top < ceiling - THINNEST:
         notes.append(
             f"the part closes the chamber at z = {1e3 * top:.4g} mm: "
-            + ("a higher ceiling has no effect" if key == "shape" else f"more chamber.{key} has no effect")
+            + (
+                "a higher ceiling has no effect"
+                if key == "shape"
+                else f"more chamber.{key} has no effect"
+            )
         )
     return room, notes
 

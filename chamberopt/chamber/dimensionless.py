@@ -13,7 +13,9 @@ if TYPE_CHECKING:
     from chamberopt.design.load import Design
 
 STANDARD_GRAVITY = 9.80665  # m/s², CGPM 1901
-MOST_INTO_SPIN = 2.0 / 7.0  # of a solid sphere's tangential velocity, by an impact that sticks (Walton's formula)
+MOST_INTO_SPIN = (
+    2.0 / 7.0
+)  # of a solid sphere's tangential velocity, by an impact that sticks (Walton's formula)
 
 
 def fall(design: Design, chamber: Chamber) -> float:
@@ -43,5 +45,7 @@ def drag_loss(design: Design, chamber: Chamber) -> float:
 
     air, shot = Drag(), design.shot
     reynolds = air.density * design.sonotrode.peak_speed * shot.diameter / air.viscosity
-    slowing = 0.75 * drag_coefficient(reynolds) * air.density / (shot.density * shot.diameter)  # 1/m
+    slowing = (
+        0.75 * drag_coefficient(reynolds) * air.density / (shot.density * shot.diameter)
+    )  # 1/m
     return slowing * chamber.height

@@ -17,10 +17,26 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL, ShapeSurface, is_sonotrode, tag_of_further
+from chamberopt.design.shapes import (
+    TAG_PART,
+    TAG_SONOTRODE,
+    TAG_WALL,
+    ShapeSurface,
+    is_sonotrode,
+    tag_of_further,
+)
 from chamberopt.design.shapes.construction.loft import lofted
 from chamberopt.geometry.mesh_io import SurfaceError, place_text, read_once
-from chamberopt.geometry.solids import Solid, Surface, bodies, overlap, solid, subtract, swept, united
+from chamberopt.geometry.solids import (
+    Solid,
+    Surface,
+    bodies,
+    overlap,
+    solid,
+    subtract,
+    swept,
+    united,
+)
 from chamberopt.geometry.triangles import area_vectors, areas, rotation
 
 if TYPE_CHECKING:
@@ -48,18 +64,27 @@ class Piece:
 
 
 def piece(
-    label: int, tags: np.ndarray | int, facing: np.ndarray, source: np.ndarray | None = None, fitting: int = -1
+    label: int,
+    tags: np.ndarray | int,
+    facing: np.ndarray,
+    source: np.ndarray | None = None,
+    fitting: int = -1,
 ) -> Piece:
     """One whose triangles have these tags, (k,) or one of all, and are of this fitting."""
     none = np.full(len(facing), -1, dtype=np.int32)
     each = np.broadcast_to(np.asarray(tags, dtype=np.uint8), len(facing))
-    return Piece(label, each, facing, none if source is None else source, np.full_like(none, fitting))
+    return Piece(
+        label, each, facing, none if source is None else source, np.full_like(none, fitting)
+    )
 
 
 def fitting_names(design: Design) -> list[str]:
     """The holes of a chamber, then its deflectors, as the design names them."""
     holes, deflectors = len(design.chamber.holes), len(design.chamber.deflectors)
-    return [*(f"chamber.holes.{k}" for k in range(holes)), *(f"chamber.deflectors.{k}" for k in range(deflectors))]
+    return [
+        *(f"chamber.holes.{k}" for k in range(holes)),
+        *(f"chamber.deflectors.{k}" for k in range(deflectors)),
+    ]
 
 
 @dataclass(frozen=True)
@@ -71,7 +96,10 @@ class Cavity:
 
     def traced(self, surface: Surface, part: Piece) -> Piece:
         """Tag, facing, part triangle and fitting of each triangle of a surface; of none of the pieces is the part's."""
-        taken = [np.zeros((len(surface.solid), *column.shape[1:]), column.dtype) for column in _columns(part)]
+        taken = [
+            np.zeros((len(surface.solid), *column.shape[1:]), column.dtype)
+            for column in _columns(part)
+        ]
         left = np.ones(len(surface.solid), dtype=bool)
         for one in self.pieces:
             rows = surface.solid == one.label
@@ -96,13 +124,17 @@ def fitted(design: Design, shape: ShapeSurface) -> Cavity:
     Raises InputError, by the fitting's name, for one that is out of place.
     """
     shell = solid(shape.vertices, shape.triangles, "the chamber")
-    own = piece(shell.label, shape.tags, area_vectors(shape.vertices, shape.triangles), shape.source)
+    own = piece(
+        shell.label, shape.tags, area_vectors(shape.vertices, shape.triangles), shape.source
+    )
     cavity = Cavity(shell, (own,))
     for k, hole in enumerate(design.chamber.holes):
         cavity = _with_hole(cavity, hole, f"chamber.holes.{k}", k)
     for k, one in enumerate(design.sonotrodes):
         at, axis = np.array(one.at), np.array(one.direction)
-        cavity = _with_bore(cavity, at, axis, one.diameter, tag_of_further(k), f"sonotrodes.{k}", one.amplitude)
+        cavity = _with_bore(
+            cavity, at, axis, one.diameter, tag_of_further(k), f"sonotrodes.{k}", one.amplitude
+        )
     return _without(cavity, design) if design.chamber.deflectors else cavity
 
 
@@ -111,7 +143,10 @@ def swept_faces(design: Design, cavity: Cavity) -> list[tuple[str, Solid]]:
     surface = cavity.body.surface()
     tags = cavity.traced(surface, NOTHING).tags
     faces = [("sonotrode", TAG_SONOTRODE, (0.0, 0.0, 1.0), design.sonotrode.amplitude)]
-    faces += [(f"sonotrodes.{k}", tag_of_further(k), s.direction, s.amplitude) for k, s in enumerate(design.sonotrodes)]
+    faces += [
+        (f"sonotrodes.{k}", tag_of_further(k), s.direction, s.amplitude)
+        for k, s in enumerate(design.sonotrodes)
+    ]
     return [
         (name, swept(surface.only(tags == tag), np.array(axis) * amplitude, f"the swing of {name}"))
         for name, tag, axis, amplitude in faces
@@ -138,11 +173,17 @@ def _with_bore(
     aside = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
     aside /= np.linalg.norm(aside)
     angle = 2.0 * np.pi * np.arange(ROUND) / ROUND
-    rim = bottom + diameter / 2.0 * (np.outer(np.cos(angle), aside) + np.outer(np.sin(angle), np.cross(axis, aside)))
+    rim = bottom + diameter / 2.0 * (
+        np.outer(np.cos(angle), aside) + np.outer(np.sin(angle), np.cross(axis, aside))
+    )
     room = cavity.body.surface()
     reach, entering = _crossings(room, np.r_[rim, bottom[None]], axis, 0.0)
     if not (entering & np.isfinite(reach) & (reach > swing)).all():
-        moves = "raise depth_mm" if tag == TAG_WALL else "move at_mm back along the axis, by its amplitude at least"
+        moves = (
+            "raise depth_mm"
+            if tag == TAG_WALL
+            else "move at_mm back along the axis, by its amplitude at least"
+        )
         raise InputError(
             f"{name}.at_mm: a bore of {1e3 * diameter:g} mm from {place_text(bottom)} along {_shown(axis)} does not "
             f"lead into the room all round: where its bottom is in the room, {moves}; where it passes by the room, "
@@ -164,7 +205,9 @@ def _with_bore(
     was[tag] += np.linalg.norm(facing[:ROUND], axis=1).sum() if tag != TAG_WALL else 0.0
     kept = [other for other in range(END) if other == TAG_PART or is_sonotrode(np.array(other))]
     if (np.abs(now - was)[kept] > INTACT * was[kept]).any():
-        raise InputError(f"{name}.at_mm: its bore cuts into a sonotrode's face or the part; move it")
+        raise InputError(
+            f"{name}.at_mm: its bore cuts into a sonotrode's face or the part; move it"
+        )
     return after
 
 
@@ -178,8 +221,12 @@ def _without(cavity: Cavity, design: Design) -> Cavity:
         _refuse_out_of_place(deflector, united(own, own[0].name), cavity, swings)
         facing = -area_vectors(vertices, triangles)
         standing += own
-        pieces += [piece(one.label, TAG_WALL, facing, None, len(design.chamber.holes) + k) for one in own]
-    return Cavity(subtract(cavity.body, united(standing, "the deflectors")), (*cavity.pieces, *pieces))
+        pieces += [
+            piece(one.label, TAG_WALL, facing, None, len(design.chamber.holes) + k) for one in own
+        ]
+    return Cavity(
+        subtract(cavity.body, united(standing, "the deflectors")), (*cavity.pieces, *pieces)
+    )
 
 
 def _refuse_out_of_place(
@@ -201,7 +248,9 @@ def _refuse_out_of_place(
 def notes_on_files(design: Design) -> list[str]:
     """What was guessed and healed in the files of deflectors."""
     return [
-        note.replace("part.unit", f"chamber.deflectors.{k}.unit").replace("the part measures", "it measures")
+        note.replace("part.unit", f"chamber.deflectors.{k}.unit").replace(
+            "the part measures", "it measures"
+        )
         for k, deflector in enumerate(design.chamber.deflectors)
         if deflector.mesh is not None
         for note in read_once(deflector.mesh_path, deflector.unit).notes
@@ -219,7 +268,9 @@ def _body_of(deflector: Deflector, name: str) -> tuple[np.ndarray, np.ndarray]:
             raise
         except InputError as error:  # told of a part
             raise InputError(f"{name}.mesh: {str(error).replace('part.unit', 'unit')}") from None
-        return mesh.vertices - (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2.0, mesh.triangles
+        return mesh.vertices - (
+            mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)
+        ) / 2.0, mesh.triangles
     if deflector.kind == "ball":
         ball = trimesh.creation.icosphere(subdivisions=3, radius=deflector.diameter / 2.0)
         return np.asarray(ball.vertices), np.asarray(ball.faces)
@@ -233,7 +284,9 @@ def _body_of(deflector: Deflector, name: str) -> tuple[np.ndarray, np.ndarray]:
     return rod.vertices, rod.triangles
 
 
-def _crossings(surface: Surface, points: np.ndarray, way: np.ndarray, beyond: float) -> tuple[np.ndarray, np.ndarray]:
+def _crossings(
+    surface: Surface, points: np.ndarray, way: np.ndarray, beyond: float
+) -> tuple[np.ndarray, np.ndarray]:
     """How far [m] from points (p, 3) along the unit vector ``way`` the surface is crossed first, farther than
     ``beyond``; inf where it is not; and whether from outside in, (p,) each. A line along an edge crosses it.
     """
@@ -245,7 +298,8 @@ def _crossings(surface: Surface, points: np.ndarray, way: np.ndarray, beyond: fl
     t = (np.einsum("ij,ij->i", a, normal) - points @ normal.T) / slope
     hit = points[:, None] + t[..., None] * way
     weights = [
-        np.einsum("pij,ij->pi", np.cross(v - u, hit - u), normal) / np.einsum("ij,ij->i", normal, normal)
+        np.einsum("pij,ij->pi", np.cross(v - u, hit - u), normal)
+        / np.einsum("ij,ij->i", normal, normal)
         for u, v in ((a, b), (b, c), (c, a))
     ]
     t = np.where((np.array(weights) >= -1e-9).all(axis=0) & (t > beyond), t, np.inf)

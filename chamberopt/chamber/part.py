@@ -59,7 +59,9 @@ def posed_part(design: Design) -> tuple[Part, list[str]]:
     vertices = snapped(mesh.vertices @ turn.T + shift)
     area = areas(vertices, mesh.triangles)
     name, names = design.part.mesh_path.name, tuple(mesh.groups)
-    part = Part(vertices, mesh.triangles, area, target, name, mesh.sha256, mesh.unit, names, mesh.elements)
+    part = Part(
+        vertices, mesh.triangles, area, target, name, mesh.sha256, mesh.unit, names, mesh.elements
+    )
     return part, list(mesh.notes)
 
 
@@ -68,7 +70,9 @@ def part_meshes(design: Design) -> tuple[PartMesh, PartMesh]:
     file's frame. They differ where target.element_mm asks for other triangles.
     """
     setup = design.chamber.setup()
-    return read_once(design.part.mesh_path, design.part.unit) if setup is None else setup.part, _mesh(design)[0]
+    return read_once(
+        design.part.mesh_path, design.part.unit
+    ) if setup is None else setup.part, _mesh(design)[0]
 
 
 def turning_axis(design: Design) -> tuple[np.ndarray, np.ndarray]:
@@ -95,7 +99,9 @@ def _mesh(design: Design) -> tuple[PartMesh, np.ndarray]:
 
 
 @lru_cache(maxsize=4)
-def _meshed_once(path: Path, unit: str, target: Target, _sha256: str) -> tuple[PartMesh, np.ndarray]:
+def _meshed_once(
+    path: Path, unit: str, target: Target, _sha256: str
+) -> tuple[PartMesh, np.ndarray]:
     mesh = read_once(path, unit)
     return _in_elements(mesh, chosen_triangles(mesh, target), target.element)  # type: ignore[arg-type]
 
@@ -110,7 +116,9 @@ def _in_elements(mesh: PartMesh, target: np.ndarray, size: float) -> tuple[PartM
             f"part.target.element_mm: given {1e3 * size:g}, which makes some {1e-6 * count:.3g} million triangles of "
             f"the target's {1e6 * area:.4g} mm²; give at least {fits:.2g}"
         )
-    vertices, triangles, source = remeshed(mesh.vertices, mesh.triangles, target, target.astype(np.int64), size)
+    vertices, triangles, source = remeshed(
+        mesh.vertices, mesh.triangles, target, target.astype(np.int64), size
+    )
     chosen = target[source]
     sides = vertices[triangles[chosen]]
     longest = np.linalg.norm(sides - np.roll(sides, 1, axis=1), axis=2).max(axis=1)
@@ -125,7 +133,14 @@ def _in_elements(mesh: PartMesh, target: np.ndarray, size: float) -> tuple[PartM
     groups = {name: mask[places] for name, mask in mesh.groups.items()}
     numbering = mesh.numbering.of(places)
     notes = (*mesh.notes, note)
-    meshed = replace(mesh, vertices=vertices, triangles=triangles, numbering=numbering, groups=groups, notes=notes)
+    meshed = replace(
+        mesh,
+        vertices=vertices,
+        triangles=triangles,
+        numbering=numbering,
+        groups=groups,
+        notes=notes,
+    )
     return meshed, chosen
 
 
@@ -136,9 +151,13 @@ def _places(mesh: PartMesh, corners: np.ndarray, source: np.ndarray) -> np.ndarr
     from sim_core import TriangleMesh, nearest
 
     moved = np.flatnonzero((corners != mesh.vertices[mesh.triangles[source]]).any(axis=(1, 2)))
-    surface = TriangleMesh(mesh.vertices, mesh.triangles, np.zeros(len(mesh.triangles), dtype=np.uint8))
+    surface = TriangleMesh(
+        mesh.vertices, mesh.triangles, np.zeros(len(mesh.triangles), dtype=np.uint8)
+    )
     places = source.copy()
-    places[moved] = nearest(surface, corners[moved].mean(axis=1), float(np.ptp(mesh.vertices))).triangle
+    places[moved] = nearest(
+        surface, corners[moved].mean(axis=1), float(np.ptp(mesh.vertices))
+    ).triangle
     return places
 
 
@@ -146,10 +165,14 @@ def _pose(mesh: PartMesh, design: Design) -> tuple[np.ndarray, np.ndarray]:
     """From the part file's frame to the chamber's: matrix (3, 3), then shift (3,) [m]."""
     setup = design.chamber.setup()
     if setup is not None:
-        return setup.turn, setup.shift + np.array([0.0, 0.0, design.chamber.sonotrode_distance - setup.distance])
+        return setup.turn, setup.shift + np.array(
+            [0.0, 0.0, design.chamber.sonotrode_distance - setup.distance]
+        )
     turn = rotation(design.part.rotate_deg)
     vertices = mesh.vertices @ turn.T
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     centre = (low + high) / 2.0
     x, y = design.part.offset
-    return turn, np.array([x - centre[0], y - centre[1], design.chamber.sonotrode_distance - low[2]])
+    return turn, np.array(
+        [x - centre[0], y - centre[1], design.chamber.sonotrode_distance - low[2]]
+    )

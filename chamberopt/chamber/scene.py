@@ -119,13 +119,29 @@ def scene_physics(
     ``phase`` and ``turn_phase`` [rad]: of the sonotrode and of a part that turns, at the start; ``draws``: the seed
     of arrival phases that are drawn anew.
     """
-    from sim_core import BallCollisions, Drag, Friction, Gravity, Physics, RandomPhase, Rest, Restitution
+    from sim_core import (
+        BallCollisions,
+        Drag,
+        Friction,
+        Gravity,
+        Physics,
+        RandomPhase,
+        Rest,
+        Restitution,
+    )
 
     sonotrode, effects, materials = design.sonotrode, design.effects, design.materials
     if effects.auto:
-        raise InputError('effects: still "auto"; advice.settled decides them, as simulate and run do')
+        raise InputError(
+            'effects: still "auto"; advice.settled decides them, as simulate and run do'
+        )
     # One (C0, v0) per tag, in the order of the tags: TAG_PART, TAG_SONOTRODE, TAG_WALL, further sonotrodes.
-    pairs = (materials.part, materials.sonotrode, materials.wall, *(materials.sonotrode for _ in design.sonotrodes))
+    pairs = (
+        materials.part,
+        materials.sonotrode,
+        materials.wall,
+        *(materials.sonotrode for _ in design.sonotrodes),
+    )
     surfaces = tuple((pair.restitution, pair.yield_speed) for pair in pairs)
     of_balls = (materials.shot.restitution, materials.shot.yield_speed)
     rubs, accuracy = effects.friction, design.process.accuracy
@@ -135,7 +151,9 @@ def scene_physics(
         vibration=vibrations(design, phase),
         turn=part_turn(design, turn_phase),
         rest=Rest() if rests(design, mesh) else None,
-        friction=Friction((rubs.surfaces,) * len(surfaces), rubs.balls) if rubs is not None else None,
+        friction=Friction((rubs.surfaces,) * len(surfaces), rubs.balls)
+        if rubs is not None
+        else None,
         drag=Drag(piece=accuracy.drag_piece) if effects.drag else None,
         ball_collisions=BallCollisions() if effects.ball_collisions else None,
         random_phase=RandomPhase(draws) if sonotrode.motion == "random_phase" else None,
@@ -165,9 +183,13 @@ def build_scene(design: Design, mesh: TriangleMesh | AnalyticCavity, seed: int) 
     try:
         diameter = np.array(shot.diameters)
         turn = part_turn(design, turn_phase)
-        positions = pack_balls(mesh, shot.count, diameter, rng, clear=swing, turn=turn, floor=0.0)  # not in a sump
+        positions = pack_balls(
+            mesh, shot.count, diameter, rng, clear=swing, turn=turn, floor=0.0
+        )  # not in a sump
     except SceneError as error:
-        raise InputError(f"shot: {error}; see shot.mass_g, shot.diameter_mm and [chamber]") from None
+        raise InputError(
+            f"shot: {error}; see shot.mass_g, shot.diameter_mm and [chamber]"
+        ) from None
     velocities = start_velocities(rng, len(positions), sonotrode.peak_speed)
     draws = int(rng.integers(2**32)) if sonotrode.motion == "random_phase" else 0
     accuracy = design.process.accuracy

@@ -24,7 +24,9 @@ def chosen_triangles(mesh: PartMesh, wanted: Target) -> np.ndarray:
         normal = area_vectors(mesh.vertices, mesh.triangles)
         direction = np.asarray(wanted.direction) / np.linalg.norm(wanted.direction)
         # atan2 of sine and cosine: acos alone is a hundred times coarser near 0 and 180 degrees
-        angle = np.degrees(np.arctan2(np.linalg.norm(np.cross(normal, direction), axis=1), normal @ direction))
+        angle = np.degrees(
+            np.arctan2(np.linalg.norm(np.cross(normal, direction), axis=1), normal @ direction)
+        )
         low, high = wanted.angle_deg
         chosen &= (angle >= low) & (angle <= high)
     if wanted.box_mm is not None:

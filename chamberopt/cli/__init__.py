@@ -26,7 +26,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one command; its exit status. Every error a user can put right is one message on stderr."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")  # a terminal without ± must not cost the figures
+            stream.reconfigure(
+                errors="backslashreplace"
+            )  # a terminal without ± must not cost the figures
     try:
         app(
             list(sys.argv[1:] if arguments is None else arguments),
@@ -45,13 +47,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
-        return _failed(f"{where}{error.strerror or error}; what had been finished stays on disk", 1, error)
+        return _failed(
+            f"{where}{error.strerror or error}; what had been finished stays on disk", 1, error
+        )
     except MemoryError as error:
         return _failed("out of memory; what had been finished stays on disk", 1, error)
     except BrokenExecutor as error:
-        what = (
-            f"{str(error) or 'a worker process died, twice'} (killed from outside, or out of memory: use fewer workers)"
-        )
+        what = f"{str(error) or 'a worker process died, twice'} (killed from outside, or out of memory: use fewer workers)"
         return _failed(f"{what}; what had been finished stays on disk", 1, error)
     except (ValueError, RuntimeError) as error:
         return _simulator_failed(error)

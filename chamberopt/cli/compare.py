@@ -41,7 +41,9 @@ def compare(
 
     found = gathered(candidates, treatment_time_s)
     with results_folder(out, "compare") as folder:
-        comparison = comparison_of(_results(found, folder, workers, cluster), [one.label for one in found])
+        comparison = comparison_of(
+            _results(found, folder, workers, cluster), [one.label for one in found]
+        )
         remark(write_comparison(folder, comparison))
     if json:
         about = json_format.loads((folder / COMPARE).read_text(encoding="utf-8"))
@@ -50,7 +52,9 @@ def compare(
         print(f"{as_text(comparison)}\nresults in {folder}")
 
 
-def _results(candidates: list[Candidate], folder: Path, workers: int | None, cluster: str | None) -> list[Result]:
+def _results(
+    candidates: list[Candidate], folder: Path, workers: int | None, cluster: str | None
+) -> list[Result]:
     """The results of all; those that are missing are simulated."""
     from chamberopt.common.parallel.executor import open_executor
     from chamberopt.output.compare.candidates import simulated
@@ -59,7 +63,9 @@ def _results(candidates: list[Candidate], folder: Path, workers: int | None, clu
         return [one.result for one in candidates if one.result is not None]
     with open_executor(workers, cluster) as executor:
 
-        def prepare(design: Design, chamber: Chamber, cavity: AnalyticCavity | None) -> tuple[Design, list[Advice]]:
+        def prepare(
+            design: Design, chamber: Chamber, cavity: AnalyticCavity | None
+        ) -> tuple[Design, list[Advice]]:
             warn(design, chamber)
             settled, advice = settled_effects(design, chamber, executor)
             compiled(settled, chamber, cavity)

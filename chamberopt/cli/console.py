@@ -80,7 +80,9 @@ def estimates(evaluation: Evaluation) -> list[str]:
 def row(name: str, estimate: Estimate) -> str:
     from chamberopt.coverage.statistics.interval import NOTHING
 
-    value, half_width = (0.0 if abs(x) < NOTHING else x for x in (estimate.value, estimate.half_width))
+    value, half_width = (
+        0.0 if abs(x) < NOTHING else x for x in (estimate.value, estimate.half_width)
+    )
     return f"{name:34}{value:12.5g} ± {half_width:.2g}"
 
 
@@ -101,7 +103,9 @@ def facts_said(table: Mapping[str, Any], prefix: str = "") -> list[str]:
     lines: list[str] = []
     for name, value in table.items():
         if isinstance(value, Mapping) and set(value) == {"low", "start", "high"}:
-            lines.append(f"{prefix + name:33} {value['start']:g} in {value['low']:g} .. {value['high']:g}")
+            lines.append(
+                f"{prefix + name:33} {value['start']:g} in {value['low']:g} .. {value['high']:g}"
+            )
         elif isinstance(value, Mapping):
             lines += facts_said(value, f"{prefix}{name}.")
         elif name in ("notes", "warnings"):
@@ -115,7 +119,9 @@ def facts_said(table: Mapping[str, Any], prefix: str = "") -> list[str]:
 def _listed(values: list[Any], name: str) -> str:
     """Sizes as 1 x 2 x 3, other numbers and names with commas."""
     if values and isinstance(values[0], float):
-        return (" x " if name.startswith("bounding_box") else ", ").join(f"{value:g}" for value in values)
+        return (" x " if name.startswith("bounding_box") else ", ").join(
+            f"{value:g}" for value in values
+        )
     return ", ".join(values) or "none"
 
 

@@ -7,7 +7,15 @@ from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING
 
-from chamberopt.cli.console import estimates, facts_said, notes_said, remark, results_folder, say, warn
+from chamberopt.cli.console import (
+    estimates,
+    facts_said,
+    notes_said,
+    remark,
+    results_folder,
+    say,
+    warn,
+)
 from chamberopt.cli.options import Cluster, Json, Out, Workers, app
 from chamberopt.cli.prepare import compiled, effects_advised, settled_effects
 
@@ -19,7 +27,13 @@ if TYPE_CHECKING:
 
 @app.command
 def check(
-    file: Path, /, *, pilot: bool = True, screenshot: Path | None = None, json: Json = False, out: Out = None
+    file: Path,
+    /,
+    *,
+    pilot: bool = True,
+    screenshot: Path | None = None,
+    json: Json = False,
+    out: Out = None,
 ) -> None:
     """Check a design or study file: geometry, volumes, shot, warnings; and, by a short pilot run with each effect
     switched, which effects it needs.
@@ -54,7 +68,8 @@ def check(
         _picture_of_target(chamber, found, screenshot)
     if isinstance(loaded, Study):
         facts["vary"] = {
-            name: {"low": low, "start": design.value(name), "high": high} for name, (low, high) in loaded.vary.items()
+            name: {"low": low, "start": design.value(name), "high": high}
+            for name, (low, high) in loaded.vary.items()
         }
         facts["evaluations"] = loaded.optimizer.evaluations
     if out is not None:
@@ -110,7 +125,9 @@ def simulate(
 
 
 @app.command
-def accuracy(design: Path, /, *, budget_s: float = 300.0, json: Json = False, out: Out = None) -> None:
+def accuracy(
+    design: Path, /, *, budget_s: float = 300.0, json: Json = False, out: Out = None
+) -> None:
     """What accuracy costs: every knob that trades it for time against a reference, and what to set for 5, 1, 0.1 %.
 
     Parameters
@@ -143,7 +160,12 @@ def _picture_of_fault(fault: SurfaceError, screenshot: Path) -> None:
     from chamberopt.output.viewer import part_picture
 
     text = fill(str(fault), 110)
-    remark([part_picture(fault.corners, text, screenshot, edges=fault.edges) or f"picture in {screenshot}"])
+    remark(
+        [
+            part_picture(fault.corners, text, screenshot, edges=fault.edges)
+            or f"picture in {screenshot}"
+        ]
+    )
 
 
 def _picture_of_target(chamber: Chamber, found: Reach, screenshot: Path) -> None:
@@ -153,7 +175,9 @@ def _picture_of_target(chamber: Chamber, found: Reach, screenshot: Path) -> None
 
     part = chamber.part
     missed = part.target & (part_share(found, chamber.source, len(part.triangles)) <= 0.5)
-    title = f"{part.name}: the target in orange" + (", in red where hardly a ball can touch it" if missed.any() else "")
+    title = f"{part.name}: the target in orange" + (
+        ", in red where hardly a ball can touch it" if missed.any() else ""
+    )
     corners = part.vertices[part.triangles]
     drawn = part_picture(corners, title, screenshot, part.target, missed=missed, chamber=chamber)
     remark([drawn or f"picture in {screenshot}"])

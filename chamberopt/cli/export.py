@@ -14,7 +14,14 @@ from chamberopt.cli.console import remark, results_folder
 from chamberopt.cli.options import Json, Workers, app
 from chamberopt.cli.prepare import compiled
 from chamberopt.common.errors import InputError
-from chamberopt.output.export.formats import FORMATS, STUDY, Format, FrameName, asked_formats, is_file
+from chamberopt.output.export.formats import (
+    FORMATS,
+    STUDY,
+    Format,
+    FrameName,
+    asked_formats,
+    is_file,
+)
 
 if TYPE_CHECKING:
     from chamberopt.output.results.results import Result
@@ -54,19 +61,29 @@ def export(
     again = [name for name, one in formats.items() if one.write is None]
     for name, given in (("frame", frame), ("replicas", replicas)):
         if given is not None and not again:
-            raise InputError(f"--{name}: counts for impacts alone; leave it out, or add --to impacts-parquet")
+            raise InputError(
+                f"--{name}: counts for impacts alone; leave it out, or add --to impacts-parquet"
+            )
     loaded = None if set(formats) == {STUDY} else load_result(result)
     folder = loaded.folder if loaded else result
     impacts = 0
     with _files(formats, out, f"{folder.resolve().name}-export") as files:
-        if loaded and again:  # first: they are refused where they do not give the result's figures again
-            impacts = _impacts(loaded, [files[name] for name in again], frame or "part", replicas, workers)
+        if (
+            loaded and again
+        ):  # first: they are refused where they do not give the result's figures again
+            impacts = _impacts(
+                loaded, [files[name] for name in again], frame or "part", replicas, workers
+            )
         for name, one in formats.items():
             if one.write is not None:
                 remark(one.write(folder, files[name]) or [])
     if json:
         told = {name: str(file) for name, file in files.items()}
-        print(json_format.dumps({"result": str(folder), "files": told, **({"impacts": impacts} if again else {})}))
+        print(
+            json_format.dumps(
+                {"result": str(folder), "files": told, **({"impacts": impacts} if again else {})}
+            )
+        )
         return
     lines = [f"{impacts:,} impacts"] if again else []
     print("\n".join([*lines, *(f"{name:24}{file}" for name, file in files.items())]))
@@ -84,7 +101,9 @@ def _files(formats: dict[str, Format], out: Path | None, name: str) -> Iterator[
         yield {name: folder / one.file for name, one in formats.items()}
 
 
-def _impacts(result: Result, files: list[Path], frame: FrameName, replicas: int | None, workers: int | None) -> int:
+def _impacts(
+    result: Result, files: list[Path], frame: FrameName, replicas: int | None, workers: int | None
+) -> int:
     """Simulates the result again into these files; how many impacts there are."""
     from chamberopt.common.parallel.executor import open_executor
     from chamberopt.common.progress import progress_bar
@@ -97,7 +116,11 @@ def _impacts(result: Result, files: list[Path], frame: FrameName, replicas: int 
     ground = ground_of(result)
     compiled(result.design, ground.chamber, ground.cavity)
     with open_executor(workers, None) as executor, progress_bar("replicas") as progress:
-        impacts = write_impacts(files, result, ground, executor, frame=frame, replicas=replicas, progress=progress)
+        impacts = write_impacts(
+            files, result, ground, executor, frame=frame, replicas=replicas, progress=progress
+        )
     if fewer:
-        remark([f"only {replicas} of {result.data['replicas']} replicas: not compared with the result"])
+        remark(
+            [f"only {replicas} of {result.data['replicas']} replicas: not compared with the result"]
+        )
     return impacts

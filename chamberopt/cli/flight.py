@@ -16,7 +16,10 @@ if TYPE_CHECKING:
 
 Size = Annotated[tuple[int, int], Parameter(negative="", help="Width and height in pixels.")]
 View = Annotated[
-    str | None, Parameter(help="Direction from what is drawn to the eye, X,Y,Z; chosen to show it if left out.")
+    str | None,
+    Parameter(
+        help="Direction from what is drawn to the eye, X,Y,Z; chosen to show it if left out."
+    ),
 ]
 
 
@@ -94,8 +97,15 @@ def dents(
     time = design.process.treatment_time if at_s is None else at_s
     left = peened(replayed, time)
     share = coverage(left, chamber, design.process.accuracy.sample_spacing)
-    maps = [dent_map(chamber, left, side, FINER * pixels) for side in ([eye] if eye else default_views(chamber))]
-    beyond = f", simulated on from {replayed.scene.duration:g} s" if time > replayed.scene.duration else ""
+    maps = [
+        dent_map(chamber, left, side, FINER * pixels)
+        for side in ([eye] if eye else default_views(chamber))
+    ]
+    beyond = (
+        f", simulated on from {replayed.scene.duration:g} s"
+        if time > replayed.scene.duration
+        else ""
+    )
     said = f"{len(left):,} dents after {time:g} s in replica {replica}{beyond}: {share:.1%} of the target"
     dent_picture(maps, left, f"{loaded.folder.resolve().name}: {said}", path)
     print(f"{said}\npicture in {path}")

@@ -69,7 +69,9 @@ def inspect(
     if not results:
         raise InputError("inspect: requires an argument: one or more results folders")
     if screenshot is not None and out is not None:
-        raise InputError("inspect: --screenshot and --out both say where the picture goes; give one of them")
+        raise InputError(
+            "inspect: --screenshot and --out both say where the picture goes; give one of them"
+        )
     loaded = [load_result(path) for path in results]
     lines = [summary(one) for one in loaded]
     if not json:
@@ -78,7 +80,9 @@ def inspect(
         from chamberopt.output.report import write_part_page
 
         if look != viewer.Look():
-            raise InputError("inspect: the page of --html has switches of its own; leave out what says how to look")
+            raise InputError(
+                "inspect: the page of --html has switches of its own; leave out what says how to look"
+            )
         remark(write_part_page([one.folder for one in loaded], html))
     if screenshot is None and (off_screen or out is not None):
         with results_folder(out, "inspect") as folder:
@@ -89,9 +93,16 @@ def inspect(
     if json:
         first = {**loaded[0].data, "folder": str(loaded[0].folder)} if len(loaded) == 1 else {}
         written = {"screenshot": _text(screenshot), "page": _text(html)}
-        print(json_format.dumps({**first, "folders": [str(one.folder) for one in loaded], **written}))
+        print(
+            json_format.dumps({**first, "folders": [str(one.folder) for one in loaded], **written})
+        )
         return
-    print("\n".join([f"page in {html}"] * (html is not None) + [f"picture in {screenshot}"] * (screenshot is not None)))
+    print(
+        "\n".join(
+            [f"page in {html}"] * (html is not None)
+            + [f"picture in {screenshot}"] * (screenshot is not None)
+        )
+    )
 
 
 def _text(path: Path | None) -> str | None:

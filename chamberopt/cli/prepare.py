@@ -22,16 +22,22 @@ def compiled(design: Design, chamber: Chamber, cavity: AnalyticCavity | None = N
     require_countable(design)
     shot = design.shot
     physics = scene_physics(design, cavity or chamber_mesh(chamber))
-    announce_compilation(physics, shot.count, shot.mix is None, cavity is not None and cavity.radius is not None)
+    announce_compilation(
+        physics, shot.count, shot.mix is None, cavity is not None and cavity.radius is not None
+    )
 
 
-def settled_effects(design: Design, chamber: Chamber, executor: Executor) -> tuple[Design, list[Advice]]:
+def settled_effects(
+    design: Design, chamber: Chamber, executor: Executor
+) -> tuple[Design, list[Advice]]:
     """The design with its effects chosen, and why, where it leaves them to us."""
     from chamberopt.common.progress import progress_bar
     from chamberopt.simulation.effect_pilot import settled
 
     with progress_bar("pilot runs") as progress:
-        return settled(design, chamber, executor, progress, lambda variant: compiled(variant, chamber))
+        return settled(
+            design, chamber, executor, progress, lambda variant: compiled(variant, chamber)
+        )
 
 
 def effects_advised(design: Design, chamber: Chamber) -> list[dict[str, Any]]:
@@ -43,7 +49,11 @@ def effects_advised(design: Design, chamber: Chamber) -> list[dict[str, Any]]:
     def prepare(variant: Design) -> None:
         compiled(variant, chamber)
 
-    print("pilot runs, with each effect switched (--no-pilot skips them) ...", file=sys.stderr, flush=True)
+    print(
+        "pilot runs, with each effect switched (--no-pilot skips them) ...",
+        file=sys.stderr,
+        flush=True,
+    )
     with local_executor() as executor, progress_bar("pilot runs") as progress:
         advice = settled(design, chamber, executor, progress, prepare)[1]
         advice = advice or advise(design, chamber, executor, progress, prepare)

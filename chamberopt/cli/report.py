@@ -10,7 +10,9 @@ from cyclopts import Parameter
 
 from chamberopt.cli.options import Json, app
 
-Page = Annotated[Path | None, Parameter(name="--out", help="The page, .html; RESULT/report.html if left out.")]
+Page = Annotated[
+    Path | None, Parameter(name="--out", help="The page, .html; RESULT/report.html if left out.")
+]
 
 
 @app.command
@@ -29,4 +31,12 @@ def report(result: Path, /, *, json: Json = False, out: Page = None) -> None:
     if json:
         print(json_format.dumps({**said, "report": str(path)}, indent=2))
     else:
-        print("\n".join([said["answer"], *said["remarks"], f"report in {path}, {path.stat().st_size / 1e6:.1f} MB"]))
+        print(
+            "\n".join(
+                [
+                    said["answer"],
+                    *said["remarks"],
+                    f"report in {path}, {path.stat().st_size / 1e6:.1f} MB",
+                ]
+            )
+        )

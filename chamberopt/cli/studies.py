@@ -7,7 +7,16 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from chamberopt.cli.console import accuracy_said, estimates, notes_said, remark, results_folder, row, say, warn
+from chamberopt.cli.console import (
+    accuracy_said,
+    estimates,
+    notes_said,
+    remark,
+    results_folder,
+    row,
+    say,
+    warn,
+)
 from chamberopt.cli.options import Cluster, Json, Resumable, Workers, app
 from chamberopt.cli.prepare import compiled, settled_effects
 from chamberopt.common.errors import InputError
@@ -23,7 +32,13 @@ if TYPE_CHECKING:
 
 @app.command
 def run(
-    study: Path, /, *, workers: Workers = None, cluster: Cluster = None, json: Json = False, out: Resumable = None
+    study: Path,
+    /,
+    *,
+    workers: Workers = None,
+    cluster: Cluster = None,
+    json: Json = False,
+    out: Resumable = None,
 ) -> None:
     """Run a study: search for a better design, confirm it on fresh seeds, write it as best.toml. With the --out of a
     run that was stopped it goes on from there. Ctrl-C: once to stop after this evaluation, twice to stop now.
@@ -76,15 +91,20 @@ def _run(
     design = question.design
     compiled(design, start)
     if record.trials:
-        remark([f"{record.folder}: {len(record.trials)} evaluations are there; going on from the next"])
+        remark(
+            [f"{record.folder}: {len(record.trials)} evaluations are there; going on from the next"]
+        )
     with progress_bar("evaluations") as progress:
         interrupt.be_patient(how_to_go_on)
         result = go_on(question, record, executor, progress, stop=lambda: interrupt.asked)
-    warned = warn(result.best.design, build_chamber(result.best.design, result.target), " of the best design")
+    warned = warn(
+        result.best.design, build_chamber(result.best.design, result.target), " of the best design"
+    )
     remark(write_study(record.folder, result, advice, warned))
     lines = [f"{'parameter':34}{'start':>12}{'best':>12}"]
     lines += [
-        f"{name:34}{question.design.value(name):12.5g}{result.best.design.value(name):12.5g}" for name in question.vary
+        f"{name:34}{question.design.value(name):12.5g}{result.best.design.value(name):12.5g}"
+        for name in question.vary
     ]
     lines += [
         "",
@@ -99,23 +119,38 @@ def _run(
     if result.findings:
         lines += ["", *result.findings.sentences(), ""]
     if question.objective.pareto:
-        lines += [f"the front of {' and '.join(question.objective.pareto)}: pareto.csv, pareto.png", ""]
+        lines += [
+            f"the front of {' and '.join(question.objective.pareto)}: pareto.csv, pareto.png",
+            "",
+        ]
     fine = result.best.evaluation
     lines += [
         f"± 95 % intervals; start and best from {len(fine.replicas)} replicas of {design.process.recorded_time:g} s on "
         f"seeds of their own, the search's figures in history.csv from {accuracy_said(question.drafted(design))}"
     ]
-    notes = (*map(str, advice), *result.doubts, *result.at_bounds, *start.notes, *result.best.evaluation.notes)
+    notes = (
+        *map(str, advice),
+        *result.doubts,
+        *result.at_bounds,
+        *start.notes,
+        *result.best.evaluation.notes,
+    )
     say([*lines, *notes_said(notes)], record.folder, json)
     if not json:
-        print(f"to see it: {_command('report', record.folder)}; the design: {record.folder / 'best.toml'}")
+        print(
+            f"to see it: {_command('report', record.folder)}; the design: {record.folder / 'best.toml'}"
+        )
 
 
 def _finished(folder: Path, json: bool) -> None:
     """What `run` says of a study that needs nothing more."""
     from chamberopt.output.results.results import load_result, summary
 
-    remark([f"{folder}: this study is finished, nothing was run; to run it anew give another folder (--out)"])
+    remark(
+        [
+            f"{folder}: this study is finished, nothing was run; to run it anew give another folder (--out)"
+        ]
+    )
     say([f"best design: {summary(load_result(folder))}"], folder, json)
 
 
@@ -123,9 +158,19 @@ def _unfinished(study: Path) -> list[str]:
     """Earlier runs of a study that were stopped, by their folders' names: what is run now begins anew."""
     from chamberopt.optimize.storage.study_folder import is_finished, is_study_folder
 
-    names = [study.stem, *(path.name for path in sorted(Path("results").glob(f"{study.stem}-[0-9]*")))]
-    stopped = [folder for name in names if is_study_folder(folder := Path("results", name)) and not is_finished(folder)]
-    return [f"{folder}: not finished; to go on there: {_command('run', study, '--out', folder)}" for folder in stopped]
+    names = [
+        study.stem,
+        *(path.name for path in sorted(Path("results").glob(f"{study.stem}-[0-9]*"))),
+    ]
+    stopped = [
+        folder
+        for name in names
+        if is_study_folder(folder := Path("results", name)) and not is_finished(folder)
+    ]
+    return [
+        f"{folder}: not finished; to go on there: {_command('run', study, '--out', folder)}"
+        for folder in stopped
+    ]
 
 
 def _command(*words: object) -> str:
@@ -170,12 +215,26 @@ def sweep(
         with progress_bar("candidates") as progress:
             found = run_sweep(question, plan, folder, executor, progress)
         remark(sweep_results.write_sweep(folder, found))
-    lines = [f"{len(found.trials)} candidates in {found.seconds:.0f} s, {accuracy_said(question.drafted(design))} each"]
+    lines = [
+        f"{len(found.trials)} candidates in {found.seconds:.0f} s, {accuracy_said(question.drafted(design))} each"
+    ]
     best = found.best
     if best is not None and best.objective is not None:
-        lines += ["", f"best, number {best.number}", *(f"{name:34}{x:12.5g}" for name, x in best.parameters.items())]
+        lines += [
+            "",
+            f"best, number {best.number}",
+            *(f"{name:34}{x:12.5g}" for name, x in best.parameters.items()),
+        ]
         goal = {question.objective.goals[0]: best.objective, **best.metrics}
         lines += [row(name, estimate) for name, estimate in goal.items()]
     failed = [trial for trial in found.trials if trial.objective is None]
-    reasons = [f"{len(failed)} candidates could not be simulated, the first for: {failed[0].reason}"] if failed else []
-    say([*lines, *notes_said([*map(str, advice), *reasons, sweep_results.caution(found)])], folder, json)
+    reasons = (
+        [f"{len(failed)} candidates could not be simulated, the first for: {failed[0].reason}"]
+        if failed
+        else []
+    )
+    say(
+        [*lines, *notes_said([*map(str, advice), *reasons, sweep_results.caution(found)])],
+        folder,
+        json,
+    )

@@ -17,7 +17,9 @@ Triple = Annotated[tuple[float, float, float], Field(strict=False)]
 
 def _somewhere(direction: tuple[float, float, float]) -> tuple[float, float, float]:
     if not any(direction):
-        raise CrossCheckError([Problem("", "given [0, 0, 0], which points nowhere; e.g. [0, 0, -1] is down")])
+        raise CrossCheckError(
+            [Problem("", "given [0, 0, 0], which points nowhere; e.g. [0, 0, -1] is down")]
+        )
     return direction
 
 
@@ -27,7 +29,11 @@ Direction = Annotated[Triple, AfterValidator(_somewhere)]
 def _near(place: tuple[float, float, float]) -> tuple[float, float, float]:
     if max(map(abs, place)) > FARTHEST_MM:
         raise CrossCheckError(
-            [Problem("", f"given {list(place)}; each must be from -{FARTHEST_MM} to {FARTHEST_MM} mm")]
+            [
+                Problem(
+                    "", f"given {list(place)}; each must be from -{FARTHEST_MM} to {FARTHEST_MM} mm"
+                )
+            ]
         )
     return place
 
@@ -59,7 +65,9 @@ def _absolute(path: str, info: ValidationInfo) -> str:
 def _there(mesh: str, info: ValidationInfo) -> str:
     path = from_file(mesh, info.context)
     if (info.context or {}).get("needs_mesh") and not path.is_file():
-        raise CrossCheckError([Problem("", f"given {mesh!r}: {toml_errors.not_found(path, 'mesh file', '*')}")])
+        raise CrossCheckError(
+            [Problem("", f"given {mesh!r}: {toml_errors.not_found(path, 'mesh file', '*')}")]
+        )
     return str(path)
 
 

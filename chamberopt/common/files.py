@@ -23,7 +23,9 @@ def new_folder(path: str | Path) -> Path:
     """The folder, made if need be; InputError when something is in it: results are never overwritten."""
     folder = Path(path)
     if os.path.lexists(folder) and not os.path.isdir(folder):
-        raise InputError(f"{folder}: is a file; results need a folder: choose another folder (out, or --out)")
+        raise InputError(
+            f"{folder}: is a file; results need a folder: choose another folder (out, or --out)"
+        )
     try:
         if not is_free(folder):
             raise InputError(
@@ -34,7 +36,9 @@ def new_folder(path: str | Path) -> Path:
         with tempfile.TemporaryFile(dir=folder):  # better now than after an hour's work
             pass
     except OSError as error:
-        why = f"{folder}: cannot be written: {error.strerror}; choose another folder (out, or --out)"
+        why = (
+            f"{folder}: cannot be written: {error.strerror}; choose another folder (out, or --out)"
+        )
         raise InputError(why) from None
     return folder
 
@@ -44,14 +48,18 @@ def new_file(path: Path) -> Path:
     overwritten.
     """
     if os.path.lexists(path):
-        raise InputError(f"{path}: is there already, and nothing is ever overwritten: choose another name or remove it")
+        raise InputError(
+            f"{path}: is there already, and nothing is ever overwritten: choose another name or remove it"
+        )
     if not path.parent.is_dir():
         raise InputError(f"{path}: the folder {path.parent} does not exist; make it first")
     try:
         with tempfile.TemporaryFile(dir=path.parent):  # better now than after an hour's work
             pass
     except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}; choose another place") from None
+        raise InputError(
+            f"{path}: cannot be written: {error.strerror}; choose another place"
+        ) from None
     return path
 
 

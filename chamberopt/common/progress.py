@@ -44,17 +44,25 @@ def progress_bar(what: str, stream: TextIO | None = None) -> Iterator[Progress]:
         # An evaluation can take seconds: the estimate looks back over all of them (speed_estimate_period).
         TimeRemainingColumn(),
     )
-    with Bar(*columns, console=Console(file=stream), speed_estimate_period=3600, transient=True) as bar:
+    with Bar(
+        *columns, console=Console(file=stream), speed_estimate_period=3600, transient=True
+    ) as bar:
         task = bar.add_task(what, total=None, best="")
 
         def show(done: int, total: int, best: float | None) -> None:
-            bar.update(task, completed=done, total=total, best="" if best is None else f"best {best:.4f}")
+            bar.update(
+                task, completed=done, total=total, best="" if best is None else f"best {best:.4f}"
+            )
 
         yield show
 
 
 def announce_compilation(
-    physics: Physics, balls: int, alike: bool = True, bore: bool = False, stream: TextIO | None = None
+    physics: Physics,
+    balls: int,
+    alike: bool = True,
+    bore: bool = False,
+    stream: TextIO | None = None,
 ) -> float:
     """Compiles the simulator for these effects if it never was, here, and says so; seconds it took, else 0."""
     import sim_core

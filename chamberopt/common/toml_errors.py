@@ -35,7 +35,10 @@ class CrossCheckError(ValueError):
 def nearest(name: str, known: Iterable[str], count: int = 1) -> list[str]:
     """The known spellings nearest to `name`, best first; empty when nothing is near. Case is ignored."""
     by_lower = {word.lower(): word for word in known}
-    return [by_lower[word] for word in difflib.get_close_matches(name.lower(), by_lower, n=count, cutoff=0.6)]
+    return [
+        by_lower[word]
+        for word in difflib.get_close_matches(name.lower(), by_lower, n=count, cutoff=0.6)
+    ]
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
@@ -65,12 +68,16 @@ def from_validation(error: ValidationError, model: type[BaseModel]) -> list[Prob
     details = error.errors()
     for detail in details:
         loc = detail["loc"]
-        if detail["type"] == "too_short" and any(other["loc"][: len(loc)] == loc != other["loc"] for other in details):
+        if detail["type"] == "too_short" and any(
+            other["loc"][: len(loc)] == loc != other["loc"] for other in details
+        ):
             continue  # only without its wrong items, which are told
         cause = detail.get("ctx", {}).get("error")
         if isinstance(cause, CrossCheckError):
             prefix = ".".join(str(step) for step in detail["loc"])
-            problems += [Problem(".".join(filter(None, (prefix, p.field))), p.text) for p in cause.problems]
+            problems += [
+                Problem(".".join(filter(None, (prefix, p.field))), p.text) for p in cause.problems
+            ]
         else:
             problems.append(_explain(detail, model))
     return list(dict.fromkeys(problems))  # a union says the same for each of its alternatives
@@ -82,14 +89,18 @@ def not_found(path: Path, what: str, pattern: str) -> str:
     if not folder.is_dir():
         return f"{path}: no such {what}; the folder {folder} does not exist"
     there = sorted(p.name for p in folder.glob(pattern) if p.is_file())
-    near = nearest(path.stem, (Path(name).stem for name in there))  # the endings are alike and would mislead
+    near = nearest(
+        path.stem, (Path(name).stem for name in there)
+    )  # the endings are alike and would mislead
     likely = [str(folder / name) for name in there if Path(name).stem in near]
     if likely:
         return f"{path}: no such {what}; did you mean {' or '.join(likely)}?"
     return f"{path}: no such {what}; in {folder} there is {', '.join(there[:8]) or 'none'}"
 
 
-def numeric_fields(table: BaseModel | type[BaseModel], prefix: str = "") -> Iterator[tuple[str, FieldInfo]]:
+def numeric_fields(
+    table: BaseModel | type[BaseModel], prefix: str = ""
+) -> Iterator[tuple[str, FieldInfo]]:
     """Dotted name and field of every number in a table; those of lists by index: part.offset_mm.0.
 
     Of a class, what its tables can hold; of an instance, the tables of its lists too.
@@ -103,7 +114,11 @@ def numeric_fields(table: BaseModel | type[BaseModel], prefix: str = "") -> Iter
             for i, item in enumerate(value):
                 yield from numeric_fields(item, f"{prefix}{name}.{i}.")
         elif isinstance(value, tuple) and value and isinstance(value[0], tuple):
-            yield from ((f"{prefix}{name}.{i}.{j}", field) for i, row in enumerate(value) for j in range(len(row)))
+            yield from (
+                (f"{prefix}{name}.{i}.{j}", field)
+                for i, row in enumerate(value)
+                for j in range(len(row))
+            )
         elif inner is not None:
             yield from numeric_fields(inner, f"{prefix}{name}.")
         elif float in kinds or int in kinds:
@@ -128,7 +143,9 @@ def key_lines(source: str) -> dict[str, int]:
             in_string = "" if in_string in line else in_string
             continue
         header = re.match(r"\s*(\[+)\s*([^\]]+?)\s*\]+\s*(#.*)?$", line)
-        key = re.match(r"""\s*((?:[\w-]+|"[^"]*"|'[^']*')(?:\s*\.\s*(?:[\w-]+|"[^"]*"|'[^']*'))*)\s*=""", line)
+        key = re.match(
+            r"""\s*((?:[\w-]+|"[^"]*"|'[^']*')(?:\s*\.\s*(?:[\w-]+|"[^"]*"|'[^']*'))*)\s*=""", line
+        )
         if header:
             table = _plain(header[2])
             lines.setdefault(table, number)
@@ -150,13 +167,18 @@ def _plain(key: str) -> str:
 
 def _line_of(field: str, lines: Mapping[str, int]) -> int | None:
     steps = field.split(".")
-    return next((lines[name] for n in range(len(steps), 0, -1) if (name := ".".join(steps[:n])) in lines), None)
+    return next(
+        (lines[name] for n in range(len(steps), 0, -1) if (name := ".".join(steps[:n])) in lines),
+        None,
+    )
 
 
 def _kinds(annotation: Any) -> tuple[Any, ...]:
     """The alternatives of a union, None and what is said of them left out; a plain type alone."""
     is_union = type(None) in get_args(annotation)
-    kinds = tuple(k for k in get_args(annotation) if k is not type(None)) if is_union else (annotation,)
+    kinds = (
+        tuple(k for k in get_args(annotation) if k is not type(None)) if is_union else (annotation,)
+    )
     return tuple(get_args(k)[0] if get_origin(k) is Annotated else k for k in kinds)
 
 
@@ -176,7 +198,9 @@ def _row(field: FieldInfo) -> type[BaseModel] | None:
     return None
 
 
-def _walk(model: type[BaseModel], loc: tuple[int | str, ...]) -> tuple[type[BaseModel], FieldInfo | None]:
+def _walk(
+    model: type[BaseModel], loc: tuple[int | str, ...]
+) -> tuple[type[BaseModel], FieldInfo | None]:
     """The innermost table on the way to `loc`, and the field there when the table knows it."""
     field: FieldInfo | None = None
     free_name = False
@@ -196,7 +220,12 @@ def _walk(model: type[BaseModel], loc: tuple[int | str, ...]) -> tuple[type[Base
 
 def allowed(field: FieldInfo) -> str:
     """What a field takes, from its own bounds: 'a number from 2 to 2000 mm (inner height of the chamber)'."""
-    bounds = {name: getattr(meta, name) for meta in field.metadata for name in ("ge", "le") if hasattr(meta, name)}
+    bounds = {
+        name: getattr(meta, name)
+        for meta in field.metadata
+        for name in ("ge", "le")
+        if hasattr(meta, name)
+    }
     extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
     unit = f" {extra['unit']}" if extra.get("unit") else ""
     kinds = _kinds(field.annotation)
@@ -204,7 +233,12 @@ def allowed(field: FieldInfo) -> str:
     if not what and _table(field):
         what = "a table"
     if not what:
-        names = {float: "a number", int: "a whole number", str: "a text in quotes", bool: "true or false"}
+        names = {
+            float: "a number",
+            int: "a whole number",
+            str: "a text in quotes",
+            bool: "true or false",
+        }
         what = names.get(kinds[0], "")
         if not what and get_args(kinds[0]):
             what = ", ".join(f'"{choice}"' for choice in get_args(kinds[0]))

@@ -31,7 +31,9 @@ if TYPE_CHECKING:
 
 MOST_POINTS = 5_000_000  # about a gigabyte with what is computed on the way
 AT_ONCE = 5_000  # dents looked up together
-FEW_POINTS = 25  # a triangle; with 13 of them the gear's uniform_coverage is 0.03 too low (docs/accuracy.md)
+FEW_POINTS = (
+    25  # a triangle; with 13 of them the gear's uniform_coverage is 0.03 too low (docs/accuracy.md)
+)
 
 
 @dataclass(frozen=True)
@@ -93,7 +95,10 @@ def sample_points(chamber: Chamber, spacing: float) -> Samples:
     number = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
     plastic = 1.32471795724474602596
     # Each triangle begins elsewhere in the sequence: else all single points would be at the same corner.
-    u, v = (((number + 0.5) / plastic**power + owner / plastic ** (power + 2) + 0.5) % 1.0 for power in (1, 2))
+    u, v = (
+        ((number + 0.5) / plastic**power + owner / plastic ** (power + 2) + 0.5) % 1.0
+        for power in (1, 2)
+    )
     folded = u + v > 1.0
     u, v = np.where(folded, 1.0 - u, u), np.where(folded, 1.0 - v, v)
     a, b, c = (chamber.vertices[chamber.triangles[index[owner], k]] for k in range(3))
@@ -105,7 +110,9 @@ def sample_points(chamber: Chamber, spacing: float) -> Samples:
     )
 
 
-def first_marked(samples: Samples, impacts: ImpactLog, chamber: Chamber, design: Design) -> np.ndarray:
+def first_marked(
+    samples: Samples, impacts: ImpactLog, chamber: Chamber, design: Design
+) -> np.ndarray:
     """When each point is first inside a dent [s], (p,); inf for never."""
     dents = dents_on_part(impacts, chamber, design)
     return mark(samples, dents.place, dents.normal, dents.radius, dents.time)
@@ -130,7 +137,9 @@ def nearest_on_triangles(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
     return np.asarray(closest_point(corners * 1e3, points * 1e3)) * 1e-3 if len(points) else points
 
 
-def mark(samples: Samples, place: np.ndarray, normal: np.ndarray, radius: np.ndarray, time: np.ndarray) -> np.ndarray:
+def mark(
+    samples: Samples, place: np.ndarray, normal: np.ndarray, radius: np.ndarray, time: np.ndarray
+) -> np.ndarray:
     """First time (p,) at which each point is inside one of these discs: place, normal (k, 3), radius, time (k,)."""
     from scipy.spatial import cKDTree
 

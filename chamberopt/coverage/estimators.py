@@ -64,14 +64,18 @@ def surface(replicas: Sequence[Tally], chamber: Chamber, design: Design) -> Surf
     target = np.flatnonzero(exposed)
     area = chamber.exposed_area[target]
     stretch = design.process.treatment_time / replicas[0].simulated_time
-    sizes = np.concatenate([replica.dent_area[exposed[replica.dent_triangle]] for replica in replicas])
+    sizes = np.concatenate(
+        [replica.dent_area[exposed[replica.dent_triangle]] for replica in replicas]
+    )
     dent = float((sizes**2).sum() / sizes.sum()) if len(sizes) else 0.0
     exposure = area * len(replicas) / stretch / dent if dent else np.full(len(area), LEAST_EXPOSURE)
     patch = np.full(len(chamber.part.triangles), -1)
     patch[target] = patches(_places(chamber, target, exposure), exposure, LEAST_EXPOSURE)
     sizes_of = np.bincount(patch[target], area)
     all_area = chamber.part.area[chamber.part.target].sum()
-    return Surface(patch, sizes_of, max(0.0, 1.0 - float(area.sum() / all_area)), stretch, dent, len(target))
+    return Surface(
+        patch, sizes_of, max(0.0, 1.0 - float(area.sum() / all_area)), stretch, dent, len(target)
+    )
 
 
 def _places(chamber: Chamber, target: np.ndarray, exposure: np.ndarray) -> np.ndarray:
@@ -79,11 +83,15 @@ def _places(chamber: Chamber, target: np.ndarray, exposure: np.ndarray) -> np.nd
     corners = chamber.part.vertices[chamber.part.triangles[target]]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-    wide = math.sqrt(chamber.exposed_area[target].sum() * LEAST_EXPOSURE / max(exposure.sum(), LEAST_EXPOSURE))
+    wide = math.sqrt(
+        chamber.exposed_area[target].sum() * LEAST_EXPOSURE / max(exposure.sum(), LEAST_EXPOSURE)
+    )
     return np.concatenate([corners.mean(axis=1), 2.0 * wide * normal], axis=1)
 
 
-def coverage_figures(replicas: Sequence[Tally], chamber: Chamber, ground: Surface) -> dict[str, Estimate]:
+def coverage_figures(
+    replicas: Sequence[Tally], chamber: Chamber, ground: Surface
+) -> dict[str, Estimate]:
     """mean_coverage, std_coverage and p05_coverage at the treatment time, dents falling as Avrami has it."""
     dents, parts, totals = [], [], np.zeros(len(ground.area))
     for replica in replicas:
@@ -101,16 +109,24 @@ def coverage_figures(replicas: Sequence[Tally], chamber: Chamber, ground: Surfac
     }
 
 
-def _mean_and_std(dents: Sequence[Dents], ground: Surface, lost: float) -> tuple[Estimate, Estimate]:
+def _mean_and_std(
+    dents: Sequence[Dents], ground: Surface, lost: float
+) -> tuple[Estimate, Estimate]:
     """From the means of exp(-x) and exp(-2 x); lost: variance of x within patches."""
     bare = Bare(dents, ground.area, ground.stretch, ground.dent)
     seen = 1.0 - ground.hidden
     mean = seen * (1.0 - bare.once)
     variance = seen * (1.0 - 2.0 * bare.once + bare.twice) - mean**2
     off, more = _at_most(lost, bare.once)
-    shift = seen * min(lost * max(bare.once, 0.0) / 2.0, off) / 2.0  # half of what it takes off the mean
-    wider = seen * min(lost * max(bare.twice, 0.0), more) / 2.0  # ... and of what it adds to the variance
-    spread = estimate(variance + wider + bare.swing(2.0 * seen * (mean - 1.0), seen), 0.0, 0.25, wider)
+    shift = (
+        seen * min(lost * max(bare.once, 0.0) / 2.0, off) / 2.0
+    )  # half of what it takes off the mean
+    wider = (
+        seen * min(lost * max(bare.twice, 0.0), more) / 2.0
+    )  # ... and of what it adds to the variance
+    spread = estimate(
+        variance + wider + bare.swing(2.0 * seen * (mean - 1.0), seen), 0.0, 0.25, wider
+    )
     # sqrt is steep at 0: the chord over the interval of the variance instead of the tangent; where that interval
     # reaches 0, so does the one of the spread, with the upper end's own length to each side.
     value, reach, slope = math.sqrt(spread.value), spread.half_width, 0.0
@@ -118,7 +134,9 @@ def _mean_and_std(dents: Sequence[Dents], ground: Surface, lost: float) -> tuple
         low, high = math.sqrt(max(0.0, spread.value - reach)), math.sqrt(spread.value + reach)
         slope = (high - low) / (2.0 * reach) if low > 0.0 else high / reach
     moved = value + slope * (np.array(spread.pseudovalues) - spread.value)
-    return estimate(mean - shift + bare.swing(-seen, 0.0), 0.0, 1.0, shift), estimate(moved, 0.0, 0.5, slope * wider)
+    return estimate(mean - shift + bare.swing(-seen, 0.0), 0.0, 1.0, shift), estimate(
+        moved, 0.0, 0.5, slope * wider
+    )
 
 
 def _at_most(lost: float, bare: float) -> tuple[float, float]:
@@ -160,7 +178,12 @@ def _pseudovalues(values: np.ndarray) -> np.ndarray:
 
 
 def _poorest(
-    parts: Sequence[np.ndarray], totals: np.ndarray, ground: Surface, lost: float, mean: Estimate, std: Estimate
+    parts: Sequence[np.ndarray],
+    totals: np.ndarray,
+    ground: Surface,
+    lost: float,
+    mean: Estimate,
+    std: Estimate,
 ) -> Estimate:
     """The coverage that 95 % of the target's area exceeds; hidden area comes first, at 0."""
     n = len(parts)
@@ -170,13 +193,19 @@ def _poorest(
     exposure = ground.area * n / (ground.stretch * ground.dent)
     counts = totals / ground.dent
     mixture = Mixture(exposure, ground.area, counts)
-    without = [n / (n - 1) * mixture.poorest(counts - part / ground.dent, share) for part in parts] if n > 1 else []
+    without = (
+        [n / (n - 1) * mixture.poorest(counts - part / ground.dent, share) for part in parts]
+        if n > 1
+        else []
+    )
     x = np.array([mixture.poorest(counts, share), *without])
     middle, variance = mixture.moments(counts)
     # ... and had the patches all of the variance, this one as far below the mean as before in standard deviations.
     wider = math.sqrt(1.0 + lost / variance) if lost > 0.0 else 1.0
     joined = max(0.0, middle - (middle - x[0]) * wider)
-    shaped = np.array([mixture.poorest(counts, share, MANY_STEPS), mixture.poorest_drawn_in(counts, share)])
+    shaped = np.array(
+        [mixture.poorest(counts, share, MANY_STEPS), mixture.poorest_drawn_in(counts, share)]
+    )
     value = -math.expm1(-x[0])
     bias = float(np.abs(value + np.expm1(-shaped)).max()) + abs(value + math.expm1(-joined))
     # How far it lies below the mean goes with the spread, and is no better known; where that may be nothing at all, a
@@ -197,7 +226,9 @@ def _variance_within(replicas: Sequence[Tally], ground: Surface, chamber: Chambe
     """
     on, n = ground.patch >= 0, len(replicas)
     exposed, patch, count = chamber.exposed_area[on], ground.patch[on], len(ground.area)
-    each = np.array([np.bincount(replica.dent_triangle, replica.dent_area, len(on))[on] for replica in replicas])
+    each = np.array(
+        [np.bincount(replica.dent_triangle, replica.dent_area, len(on))[on] for replica in replicas]
+    )
     dented = np.array([np.bincount(patch, one, count) for one in each])
     if n > 1:
         own, own_together, pairs = (each**2).sum(axis=0), (dented**2).sum(axis=0), n / (n - 1)
@@ -206,7 +237,9 @@ def _variance_within(replicas: Sequence[Tally], ground: Surface, chamber: Chambe
         own_together, pairs = np.bincount(patch, own, count), 1.0
     triangles = ((each.sum(axis=0) ** 2 - own) / exposed).sum()
     together = ((dented.sum(axis=0) ** 2 - own_together) / ground.area).sum()
-    return max(0.0, float((ground.stretch / n) ** 2 * pairs * (triangles - together) / ground.area.sum()))
+    return max(
+        0.0, float((ground.stretch / n) ** 2 * pairs * (triangles - together) / ground.area.sum())
+    )
 
 
 def few_dents_note(replicas: Sequence[Tally], ground: Surface) -> tuple[str, ...]:

@@ -72,19 +72,27 @@ def hits_on_part(impacts: ImpactLog, chamber: Chamber, design: Design) -> Hits:
         dent_diameters(impacts, design),
         0.5 * mass * speed * speed,
     )
-    return Hits(source[on_part], *(column[on_part].astype(np.float32) for column in (speed, *columns)))
+    return Hits(
+        source[on_part], *(column[on_part].astype(np.float32) for column in (speed, *columns))
+    )
 
 
 def sorted_hits(hits: Sequence[Hits], triangles: int) -> SortedHits:
     """Hits of replicas together, by part triangle; triangles: how many the part has."""
-    whole = Hits(*(np.concatenate([getattr(one, column.name) for one in hits]) for column in fields(Hits)))
+    whole = Hits(
+        *(np.concatenate([getattr(one, column.name) for one in hits]) for column in fields(Hits))
+    )
     first = np.concatenate([[0], np.cumsum(np.bincount(whole.triangle, minlength=triangles))])
     return SortedHits(first, _rows(whole, np.argsort(whole.triangle, kind="stable")))
 
 
 def save_hits(path: Path, found: SortedHits) -> None:
     """Write them, whole or not at all: a .npz without the triangles, which `first` says."""
-    columns = {column.name: getattr(found.hits, column.name) for column in fields(Hits) if column.name != "triangle"}
+    columns = {
+        column.name: getattr(found.hits, column.name)
+        for column in fields(Hits)
+        if column.name != "triangle"
+    }
     with whole_file(path) as temporary, temporary.open("wb") as file:
         np.savez(file, first=found.first, **columns)
 
@@ -95,10 +103,23 @@ def load_hits(path: Path) -> SortedHits:
         with np.load(path, allow_pickle=False) as file:
             columns = {name: file[name] for name in file.files}
         first = columns.pop("first")
-        found = SortedHits(first, Hits(np.repeat(np.arange(len(first) - 1, dtype=np.int32), np.diff(first)), **columns))
+        found = SortedHits(
+            first,
+            Hits(np.repeat(np.arange(len(first) - 1, dtype=np.int32), np.diff(first)), **columns),
+        )
     except FileNotFoundError:
-        raise InputError(f"{path}: not there: an older result, without single impacts; simulate again") from None
-    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        raise InputError(
+            f"{path}: not there: an older result, without single impacts; simulate again"
+        ) from None
+    except (
+        OSError,
+        ValueError,
+        KeyError,
+        TypeError,
+        EOFError,
+        zipfile.BadZipFile,
+        zlib.error,
+    ) as error:
         raise InputError(f"{path}: damaged ({error}); simulate again") from None
     if any(len(column) != first[-1] for column in columns.values()):
         raise InputError(f"{path}: damaged (columns of different lengths); simulate again")

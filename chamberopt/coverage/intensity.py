@@ -47,7 +47,9 @@ def _uniformity(speeds: np.ndarray, hits: np.ndarray, ground: Surface) -> float:
     if mean == 0.0:
         return 0.0
     noise = np.zeros(len(total))
-    if count > 1:  # of a ratio of sums, from how each replica's sum misses it (Cochran, "Sampling Techniques", 1977)
+    if (
+        count > 1
+    ):  # of a ratio of sums, from how each replica's sum misses it (Cochran, "Sampling Techniques", 1977)
         misses = ((speeds - local * hits) ** 2).sum(axis=0) * count / (count - 1)
         np.divide(misses, total.astype(float) ** 2, out=noise, where=total > 0)
     variance = float(weight @ (local**2 - noise)) - mean**2

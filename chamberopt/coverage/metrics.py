@@ -114,7 +114,9 @@ def impacts_per_mm2_s(total: Tally, chamber: Chamber, design: Design) -> float:
 def time_to_98(total: Tally, chamber: Chamber, design: Design) -> float:
     """Treatment time [s] after which 95 % of the target's area is covered to 98 %; see seconds_to_98."""
     seconds = design.process.treatment_time
-    return seconds_to_98(p05_coverage(*on_target(coverage_at(total, chamber, seconds), chamber)), seconds)
+    return seconds_to_98(
+        p05_coverage(*on_target(coverage_at(total, chamber, seconds), chamber)), seconds
+    )
 
 
 def seconds_to_98(poorest: float, seconds: float) -> float:
@@ -145,7 +147,9 @@ def _coverage_metric(name: str, summary: str, over_surface: OverSurface, highest
     """Its plain function takes the dents of a tally for all there are: figures.py corrects for a short simulation."""
 
     def plain(total: Tally, chamber: Chamber, design: Design) -> float:
-        return over_surface(*on_target(coverage_at(total, chamber, design.process.treatment_time), chamber))
+        return over_surface(
+            *on_target(coverage_at(total, chamber, design.process.treatment_time), chamber)
+        )
 
     return Metric(name, "", summary, plain, 0.0, highest, over_surface)
 
@@ -154,12 +158,36 @@ METRICS = {
     metric.name: metric
     for metric in (
         _coverage_metric("mean_coverage", "mean coverage of the target", mean_coverage, 1.0),
-        _coverage_metric("std_coverage", "standard deviation of coverage over the target", std_coverage, 0.5),
-        _coverage_metric("p05_coverage", "coverage that 95 % of the target's area exceeds", p05_coverage, 1.0),
-        Metric("time_to_98_s", "s", "time until 95 % of the target's area is 98 % covered", time_to_98, 0.0, LONGEST),
-        Metric("intensity_uniformity", "", "1 - relative spread of the local impact speed", intensity_uniformity),
-        Metric("mean_normal_speed_m_s", "m/s", "mean normal speed of the impacts", mean_normal_speed, 0.0),
-        Metric("impacts_per_mm2_s", "1/(mm² s)", "impacts per area and second", impacts_per_mm2_s, 0.0),
+        _coverage_metric(
+            "std_coverage", "standard deviation of coverage over the target", std_coverage, 0.5
+        ),
+        _coverage_metric(
+            "p05_coverage", "coverage that 95 % of the target's area exceeds", p05_coverage, 1.0
+        ),
+        Metric(
+            "time_to_98_s",
+            "s",
+            "time until 95 % of the target's area is 98 % covered",
+            time_to_98,
+            0.0,
+            LONGEST,
+        ),
+        Metric(
+            "intensity_uniformity",
+            "",
+            "1 - relative spread of the local impact speed",
+            intensity_uniformity,
+        ),
+        Metric(
+            "mean_normal_speed_m_s",
+            "m/s",
+            "mean normal speed of the impacts",
+            mean_normal_speed,
+            0.0,
+        ),
+        Metric(
+            "impacts_per_mm2_s", "1/(mm² s)", "impacts per area and second", impacts_per_mm2_s, 0.0
+        ),
         Metric("shot_count", "balls", "number of balls", shot_count, 0.0),
     )
 }
@@ -173,9 +201,17 @@ OBJECTIVES = {
             "mean minus standard deviation of coverage",
             {"mean_coverage": 1.0, "std_coverage": -1.0},
         ),
-        Objective("coverage_p05", "coverage of the least covered 5 % of the area", {"p05_coverage": 1.0}),
-        Objective("time_to_98", "time to full coverage, the shorter the better", {"time_to_98_s": -1.0}),
-        Objective("intensity_uniformity", "how evenly hard the target is hit", {"intensity_uniformity": 1.0}),
+        Objective(
+            "coverage_p05", "coverage of the least covered 5 % of the area", {"p05_coverage": 1.0}
+        ),
+        Objective(
+            "time_to_98", "time to full coverage, the shorter the better", {"time_to_98_s": -1.0}
+        ),
+        Objective(
+            "intensity_uniformity",
+            "how evenly hard the target is hit",
+            {"intensity_uniformity": 1.0},
+        ),
     )
 }
 
@@ -200,4 +236,8 @@ def objective(name: str) -> Objective:
 
 def _terms(name: str) -> dict[str, float]:
     """Metrics and weights of an objective or a metric. KeyError when it is neither."""
-    return {METRICS[name].name: 1.0} if name in METRICS and name not in OBJECTIVES else OBJECTIVES[name].terms
+    return (
+        {METRICS[name].name: 1.0}
+        if name in METRICS and name not in OBJECTIVES
+        else OBJECTIVES[name].terms
+    )

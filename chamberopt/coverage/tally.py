@@ -44,7 +44,12 @@ SUMS = tuple(column.name for column in fields(Tally) if not column.name.startswi
 
 
 def dent_diameter(
-    normal_speed: np.ndarray, diameter: float | np.ndarray, density: float, hardness: float, c0: float, v0: float
+    normal_speed: np.ndarray,
+    diameter: float | np.ndarray,
+    density: float,
+    hardness: float,
+    c0: float,
+    v0: float,
 ) -> np.ndarray:
     """Diameter [m] of the dent a ball leaves; 0 where the normal speed is not above the yield speed v0.
 
@@ -58,7 +63,11 @@ def dent_diameter(
     # Below v0 the contact is elastic (the paper): what C0 < 1 loses there goes into waves, not into a dent.
     dents = speed > v0
     e = np.where(dents, restitution_at(speed, c0, v0), 1.0)
-    return 1.278 * diameter * (np.maximum(1.0 - e * e, 0.0) * density * speed * speed / hardness) ** 0.25
+    return (
+        1.278
+        * diameter
+        * (np.maximum(1.0 - e * e, 0.0) * density * speed * speed / hardness) ** 0.25
+    )
 
 
 def ball_diameters(impacts: ImpactLog, design: Design) -> float | np.ndarray:
@@ -71,7 +80,12 @@ def dent_diameters(impacts: ImpactLog, design: Design) -> np.ndarray:
     """Diameter [m] of the dent each impact would leave on the part, (n,), each ball with its own size."""
     material, ball = design.materials.part, ball_diameters(impacts, design)
     return dent_diameter(
-        impacts.normal_speed, ball, design.shot.density, material.hardness, material.restitution, material.yield_speed
+        impacts.normal_speed,
+        ball,
+        design.shot.density,
+        material.hardness,
+        material.restitution,
+        material.yield_speed,
     )
 
 
@@ -118,7 +132,9 @@ def coverage_at(total: Tally, chamber: Chamber, time: float) -> np.ndarray:
     """
     exposed = chamber.exposed_area > 0.0
     rate = np.full(len(exposed), np.nan)
-    np.divide(total.dented_area, chamber.exposed_area * total.simulated_time, out=rate, where=exposed)
+    np.divide(
+        total.dented_area, chamber.exposed_area * total.simulated_time, out=rate, where=exposed
+    )
     return -np.expm1(-rate * time)
 
 

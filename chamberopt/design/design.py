@@ -25,7 +25,16 @@ from pydantic import (
 
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
-from chamberopt.common.fields import MeshFile, Names, Pair, Triple, Unit, from_file, listed, quantity
+from chamberopt.common.fields import (
+    MeshFile,
+    Names,
+    Pair,
+    Triple,
+    Unit,
+    from_file,
+    listed,
+    quantity,
+)
 from chamberopt.common.toml_errors import CrossCheckError, Problem
 from chamberopt.design.effects import Effects
 from chamberopt.design.materials import STRICT, Materials
@@ -37,7 +46,9 @@ from chamberopt.design.shapes.imported import IMPORTED, Imported
 from chamberopt.design.shot import Shot
 from chamberopt.design.sonotrode import FurtherSonotrode, Sonotrode
 
-MOST_SONOTRODES = 50  # further ones: each has a tag below 255, and takes a cut through all the walls before it
+MOST_SONOTRODES = (
+    50  # further ones: each has a tag below 255, and takes a cut through all the walls before it
+)
 
 
 class Target(BaseModel):
@@ -67,7 +78,9 @@ class Target(BaseModel):
     element_mm: float | None = quantity(
         0.01, 1000, "mm", "wished side of the target's triangles; absent: the file's", None
     )
-    reachable: bool = Field(default=False, description="only what a ball can touch, in the design's own chamber")
+    reachable: bool = Field(
+        default=False, description="only what a ball can touch, in the design's own chamber"
+    )
 
     @property
     def element(self) -> float | None:
@@ -78,16 +91,24 @@ class Target(BaseModel):
     def _agree(self) -> Self:
         problems = []
         if (self.direction is None) != (self.angle_deg is None):
-            given, lacking = ("direction", "angle_deg") if self.angle_deg is None else ("angle_deg", "direction")
+            given, lacking = (
+                ("direction", "angle_deg") if self.angle_deg is None else ("angle_deg", "direction")
+            )
             problems.append(Problem(given, f"given without {lacking}; give both or neither"))
         if self.direction is not None and not any(self.direction):
-            problems.append(Problem("direction", "given [0, 0, 0], which points nowhere; e.g. [0, 0, -1] is down"))
+            problems.append(
+                Problem(
+                    "direction", "given [0, 0, 0], which points nowhere; e.g. [0, 0, -1] is down"
+                )
+            )
         if self.angle_deg is not None and not 0 <= self.angle_deg[0] < self.angle_deg[1] <= 180:
             text = f"given {list(self.angle_deg)}; allowed: [low, high] with 0 <= low < high <= 180 degrees"
             problems.append(Problem("angle_deg", text))
         if self.box_mm is not None and not all(a < b for a, b in zip(*self.box_mm, strict=True)):
             corners = [list(corner) for corner in self.box_mm]
-            problems.append(Problem("box_mm", f"given {corners}; each low corner must be below its high corner"))
+            problems.append(
+                Problem("box_mm", f"given {corners}; each low corner must be below its high corner")
+            )
         if problems:
             raise CrossCheckError(problems)
         return self
@@ -100,8 +121,12 @@ class Part(BaseModel):
 
     mesh: MeshFile = Field(description="mesh file, path relative to the design file")
     unit: Unit = Field(default="guess", description="of the numbers in the mesh file")
-    rotate_deg: Triple = listed("three numbers [x, y, z] in degrees", "turns about x, then y, then z", (0.0, 0.0, 0.0))
-    offset_mm: Pair = listed("two numbers [x, y] in mm", "sideways from the chamber axis", (0.0, 0.0))
+    rotate_deg: Triple = listed(
+        "three numbers [x, y, z] in degrees", "turns about x, then y, then z", (0.0, 0.0, 0.0)
+    )
+    offset_mm: Pair = listed(
+        "two numbers [x, y] in mm", "sideways from the chamber axis", (0.0, 0.0)
+    )
     target: Target = Field(default_factory=Target, description="which triangles must be covered")
 
     @property
@@ -123,8 +148,12 @@ class Design(BaseModel):
     part: Part
     chamber: ChamberTable
     sonotrode: Sonotrode
-    sonotrodes: Annotated[tuple[FurtherSonotrode, ...], Field(strict=False, max_length=MOST_SONOTRODES)] = listed(
-        f"a list of at most {MOST_SONOTRODES} tables, [[sonotrodes]]", "further ones beside the floor", ()
+    sonotrodes: Annotated[
+        tuple[FurtherSonotrode, ...], Field(strict=False, max_length=MOST_SONOTRODES)
+    ] = listed(
+        f"a list of at most {MOST_SONOTRODES} tables, [[sonotrodes]]",
+        "further ones beside the floor",
+        (),
     )
     shot: Shot
     materials: Materials
@@ -133,7 +162,9 @@ class Design(BaseModel):
 
     @model_validator(mode="wrap")
     @classmethod
-    def _of_its_shape(cls, data: Any, rest: ModelWrapValidatorHandler["Design"], info: ValidationInfo) -> "Design":
+    def _of_its_shape(
+        cls, data: Any, rest: ModelWrapValidatorHandler["Design"], info: ValidationInfo
+    ) -> "Design":
         """The chamber's table has the keys of its shape: each shape has a subclass, with no more than that table."""
         if cls is not Design or not isinstance(data, Mapping):
             return rest(data)
@@ -147,7 +178,9 @@ class Design(BaseModel):
     @classmethod
     def _one_file(cls, data: Any) -> Any:
         """A set-up and its part are one file, named once."""
-        if not isinstance(data, Mapping) or not all(isinstance(data.get(k), Mapping) for k in ("part", "chamber")):
+        if not isinstance(data, Mapping) or not all(
+            isinstance(data.get(k), Mapping) for k in ("part", "chamber")
+        ):
             return data
         if data["chamber"].get("shape") != IMPORTED:
             return data
@@ -179,10 +212,17 @@ class Design(BaseModel):
         if 10 * self.sonotrode.amplitude_um >= 1e3 * distance:
             why = f"less than ten amplitudes of the sonotrode ({self.sonotrode.amplitude_um:g} µm); raise it"
             wrong("chamber.sonotrode_distance_mm", distance, why)
-        field, largest = ("shot.diameter_mm" if shot.mix is None else "shot.mix"), 1e3 * shot.diameter
+        field, largest = (
+            ("shot.diameter_mm" if shot.mix is None else "shot.mix"),
+            1e3 * shot.diameter,
+        )
         narrow = [f"chamber.{key} = {width:g}" for key, width in widths.items() if largest >= width]
         if narrow:
-            wrong(field, largest, f"which does not fit a chamber with {' and '.join(narrow)}; use a smaller ball")
+            wrong(
+                field,
+                largest,
+                f"which does not fit a chamber with {' and '.join(narrow)}; use a smaller ball",
+            )
         elif largest >= distance - 1e-3 * self.sonotrode.amplitude_um:
             swing = f"less the amplitude of {self.sonotrode.amplitude_um:g} µm"
             why = f"not below chamber.sonotrode_distance_mm = {distance:g} {swing}: no ball fits under the part"
@@ -209,24 +249,33 @@ class Design(BaseModel):
         if not isinstance(chamber, Imported):
             return
         if (chamber.mesh, chamber.unit) != (part.mesh, part.unit):
-            yield Problem("chamber.mesh", "not as in [part], though a set-up is one file; leave mesh and unit out")
+            yield Problem(
+                "chamber.mesh",
+                "not as in [part], though a set-up is one file; leave mesh and unit out",
+            )
         for key, value in (("rotate_deg", part.rotate_deg), ("offset_mm", part.offset_mm)):
             if any(value):
                 text = f'given {list(value)} beside chamber.shape = "{IMPORTED}": the part is where its file has it'
                 yield Problem(f"part.{key}", f"{text}; leave it out")
         if part.target.element_mm is not None:
-            text = f'given beside chamber.shape = "{IMPORTED}": not supported together; leave it out'
+            text = (
+                f'given beside chamber.shape = "{IMPORTED}": not supported together; leave it out'
+            )
             yield Problem("part.target.element_mm", text)
 
     def numbers(self) -> tuple[str, ...]:
         """Dotted names of every continuous number: what a study may vary."""
-        return tuple(name for name, field in toml_errors.numeric_fields(self) if field.annotation is not int)
+        return tuple(
+            name for name, field in toml_errors.numeric_fields(self) if field.annotation is not int
+        )
 
     def value(self, name: str) -> float:
         """The number at a dotted name, in the file's unit. InputError for a name that is none."""
         known = [known for known, _ in toml_errors.numeric_fields(self)]
         if name not in known:
-            raise InputError(f"{name}: not a number of a design; {toml_errors.did_you_mean(name, known)}")
+            raise InputError(
+                f"{name}: not a number of a design; {toml_errors.did_you_mean(name, known)}"
+            )
         at: Any = self
         for step in name.split("."):
             at = at[int(step)] if isinstance(at, tuple) else getattr(at, step)
@@ -243,7 +292,9 @@ class Design(BaseModel):
         data = self.model_dump()
         for name, number in values.items():
             was = self.value(name)
-            whole = isinstance(was, int) and name not in self.numbers() and float(number).is_integer()
+            whole = (
+                isinstance(was, int) and name not in self.numbers() and float(number).is_integer()
+            )
             *tables, last = name.split(".")
             at: Any = data
             for step in tables:
@@ -251,7 +302,9 @@ class Design(BaseModel):
                 if isinstance(at[place], tuple):
                     at[place] = list(at[place])
                 at = at[place]
-            at[int(last) if isinstance(at, list) else last] = int(number) if whole else float(number)
+            at[int(last) if isinstance(at, list) else last] = (
+                int(number) if whole else float(number)
+            )
         return checked(Design, data)
 
 

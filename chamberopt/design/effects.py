@@ -15,27 +15,45 @@ class PartTurn(BaseModel):
 
     model_config = STRICT
 
-    rpm: float | None = quantity(-10000, 10000, "1/min", "right-handed about the axis; real set-ups: 1 to 100", None)
+    rpm: float | None = quantity(
+        -10000, 10000, "1/min", "right-handed about the axis; real set-ups: 1 to 100", None
+    )
     angle_deg: float | None = quantity(0.01, 3600, "degrees", "to and fro, to each side", None)
     frequency_hz: float | None = quantity(1e-4, 100, "Hz", "of the motion to and fro", None)
-    axis: Triple = listed("three numbers [x, y, z], not all 0", "direction, in the part file's frame", (0.0, 0.0, 1.0))
-    through_mm: Triple = listed("three numbers [x, y, z] in mm", "a point on it, same frame", (0.0, 0.0, 0.0))
+    axis: Triple = listed(
+        "three numbers [x, y, z], not all 0", "direction, in the part file's frame", (0.0, 0.0, 1.0)
+    )
+    through_mm: Triple = listed(
+        "three numbers [x, y, z] in mm", "a point on it, same frame", (0.0, 0.0, 0.0)
+    )
 
     @model_validator(mode="after")
     def _agree(self) -> Self:
         problems = []
         if not any(self.axis):
-            problems.append(Problem("axis", "given [0, 0, 0], which points nowhere; e.g. [0, 0, 1]"))
+            problems.append(
+                Problem("axis", "given [0, 0, 0], which points nowhere; e.g. [0, 0, 1]")
+            )
         if (self.angle_deg is None) != (self.frequency_hz is None):
             given, lacking = (
-                ("angle_deg", "frequency_hz") if self.frequency_hz is None else ("frequency_hz", "angle_deg")
+                ("angle_deg", "frequency_hz")
+                if self.frequency_hz is None
+                else ("frequency_hz", "angle_deg")
             )
-            remedy = "rpm is given: remove it" if self.rpm is not None else "give both, or rpm instead"
+            remedy = (
+                "rpm is given: remove it" if self.rpm is not None else "give both, or rpm instead"
+            )
             problems.append(Problem(given, f"given without {lacking}; {remedy}"))
         elif self.rpm is not None and self.angle_deg is not None:
-            problems.append(Problem("rpm", "given beside angle_deg and frequency_hz; keep rpm or the other two"))
+            problems.append(
+                Problem("rpm", "given beside angle_deg and frequency_hz; keep rpm or the other two")
+            )
         elif self.rpm is None and self.angle_deg is None:
-            problems.append(Problem("", "says no motion; e.g. { rpm = 30 } or { angle_deg = 20, frequency_hz = 1 }"))
+            problems.append(
+                Problem(
+                    "", "says no motion; e.g. { rpm = 30 } or { angle_deg = 20, frequency_hz = 1 }"
+                )
+            )
         if problems:
             raise CrossCheckError(problems)
         return self
@@ -64,10 +82,20 @@ class Friction(BaseModel):
 
     model_config = STRICT
 
-    mu: float = Field(ge=0.0, le=10.0, description="coefficient of friction; 0 is smooth, metals: tenths")
-    beta0: float = Field(ge=-1.0, le=1.0, description="of a hit that sticks, slip after over slip before, turned round")
-    mu_balls: float | None = Field(default=None, ge=0.0, le=10.0, description="mu of ball on ball, if not the same")
-    beta0_balls: float | None = Field(default=None, ge=-1.0, le=1.0, description="beta0 of ball on ball, likewise")
+    mu: float = Field(
+        ge=0.0, le=10.0, description="coefficient of friction; 0 is smooth, metals: tenths"
+    )
+    beta0: float = Field(
+        ge=-1.0,
+        le=1.0,
+        description="of a hit that sticks, slip after over slip before, turned round",
+    )
+    mu_balls: float | None = Field(
+        default=None, ge=0.0, le=10.0, description="mu of ball on ball, if not the same"
+    )
+    beta0_balls: float | None = Field(
+        default=None, ge=-1.0, le=1.0, description="beta0 of ball on ball, likewise"
+    )
 
     @property
     def surfaces(self) -> tuple[float, float]:
@@ -97,7 +125,8 @@ class Effects(BaseModel):
         default=None, description="{ rpm = ... } or { angle_deg = ..., frequency_hz = ... }"
     )
     friction: Friction | None = Field(
-        default=None, description="balls rub and spin: { mu = 0.3, beta0 = 0.2 }; left out: smooth, no rotation"
+        default=None,
+        description="balls rub and spin: { mu = 0.3, beta0 = 0.2 }; left out: smooth, no rotation",
     )
     rest: bool | None = Field(
         default=None,
@@ -105,11 +134,17 @@ class Effects(BaseModel):
         "has some that face up",
     )
 
-    drag: bool = Field(default=False, description="of still air at 20 °C: 0.4 m/s² for 3 mm of steel at 5 m/s")
-    ball_collisions: bool = Field(default=True, description="false: balls fly through each other; for very little shot")
+    drag: bool = Field(
+        default=False, description="of still air at 20 °C: 0.4 m/s² for 3 mm of steel at 5 m/s"
+    )
+    ball_collisions: bool = Field(
+        default=True, description="false: balls fly through each other; for very little shot"
+    )
 
     @model_validator(mode="after")
     def _agree(self) -> Self:
         if self.rest and not self.gravity:
-            raise CrossCheckError([Problem("rest", "given true with gravity = false; nothing lies still without")])
+            raise CrossCheckError(
+                [Problem("rest", "given true with gravity = false; nothing lies still without")]
+            )
         return self

@@ -17,7 +17,16 @@ from chamberopt.design.design import Design, checked
 from chamberopt.design.shapes.base import is_own
 from chamberopt.design.study import METRICS, Limits, Study
 
-__all__ = ["METRICS", "Design", "Limits", "Study", "load", "load_design", "load_study", "save_design"]
+__all__ = [
+    "METRICS",
+    "Design",
+    "Limits",
+    "Study",
+    "load",
+    "load_design",
+    "load_study",
+    "save_design",
+]
 
 
 def load_design(path: str | Path) -> Design:
@@ -25,7 +34,9 @@ def load_design(path: str | Path) -> Design:
     path = Path(path)
     source, data = _read(path, "design")
     if _is_study(data):
-        raise InputError(f"{path}: this is a study file; a design file is wanted: give the one it names")
+        raise InputError(
+            f"{path}: this is a study file; a design file is wanted: give the one it names"
+        )
     return _design(path, source, data)
 
 
@@ -34,7 +45,9 @@ def load_study(path: str | Path) -> Study:
     path = Path(path)
     source, data = _read(path, "study")
     if not _is_study(data):
-        raise InputError(f"{path}: this is a design file; a study file is wanted: one with design = ... and [vary]")
+        raise InputError(
+            f"{path}: this is a design file; a study file is wanted: one with design = ... and [vary]"
+        )
     return _study(path, source, data)
 
 
@@ -67,7 +80,11 @@ def with_paths_from(folder: Path, value: Any) -> Any:
             else with_paths_from(folder, inner)
             for name, inner in value.items()
         }
-    return [with_paths_from(folder, inner) for inner in value] if isinstance(value, list | tuple) else value
+    return (
+        [with_paths_from(folder, inner) for inner in value]
+        if isinstance(value, list | tuple)
+        else value
+    )
 
 
 def _relative(path: str, folder: Path) -> str:
@@ -88,7 +105,9 @@ def _read(path: Path, kind: str) -> tuple[str, dict[str, Any]]:
     except FileNotFoundError:
         raise InputError(toml_errors.not_found(path, f"{kind} file", "*.toml")) from None
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}; check its permissions") from None
+        raise InputError(
+            f"{path}: cannot be read: {error.strerror}; check its permissions"
+        ) from None
     except UnicodeDecodeError as error:
         raise InputError(
             f"{path}: not UTF-8 text (byte {error.start}); a {kind} file is TOML, save it as UTF-8"
@@ -96,19 +115,32 @@ def _read(path: Path, kind: str) -> tuple[str, dict[str, Any]]:
     except ValueError:  # a null character in the name
         raise InputError(f"{str(path)!r}: not a file name; check the path") from None
     if not source.strip():
-        raise InputError(f"{path}: the file is empty; a {kind} file is TOML, start from a copy of a shipped one")
+        raise InputError(
+            f"{path}: the file is empty; a {kind} file is TOML, start from a copy of a shipped one"
+        )
     try:
         return source, tomllib.loads(source)
     except tomllib.TOMLDecodeError as error:
         found = re.search(r"^(.*?) \(at line (\d+), column (\d+)\)$", str(error), re.DOTALL)
-        place, text = (f"{path}:{found[2]}", f"{found[1]}, column {found[3]}") if found else (path, error)
-        raise InputError(f"{place}: not valid TOML: {text}; correct the line, e.g. name = 1.5") from None
-    except (ValueError, RecursionError) as error:  # a number of thousands of digits, brackets thousands deep
-        raise InputError(f"{path}: no {kind} file: {error}; start from a copy of a shipped one") from None
+        place, text = (
+            (f"{path}:{found[2]}", f"{found[1]}, column {found[3]}") if found else (path, error)
+        )
+        raise InputError(
+            f"{place}: not valid TOML: {text}; correct the line, e.g. name = 1.5"
+        ) from None
+    except (
+        ValueError,
+        RecursionError,
+    ) as error:  # a number of thousands of digits, brackets thousands deep
+        raise InputError(
+            f"{path}: no {kind} file: {error}; start from a copy of a shipped one"
+        ) from None
 
 
 def _is_study(data: Mapping[str, Any]) -> bool:
-    return isinstance(data.get("design"), str) or any(name in data for name in ("vary", "optimizer"))
+    return isinstance(data.get("design"), str) or any(
+        name in data for name in ("vary", "optimizer")
+    )
 
 
 def _design(path: Path, source: str, data: Mapping[str, Any]) -> Design:
@@ -121,12 +153,20 @@ def _study(path: Path, source: str, data: dict[str, Any]) -> Study:
         given = "missing" if named is None else f"given {named!r}"
         text = f'{given}; give the path of a design file, relative to this file: design = "../designs/gear.toml"'
         raise InputError(toml_errors.message([Problem("design", text)], path, source))
-    values = {**data, "vary": _flattened(data["vary"])} if isinstance(data.get("vary"), Mapping) else data
+    values = (
+        {**data, "vary": _flattened(data["vary"])}
+        if isinstance(data.get("vary"), Mapping)
+        else data
+    )
     try:
         design = load_design(Path(os.path.normpath(path.parent / named)))
     except InputError as error:
-        said = toml_errors.message([Problem("design", f"given {named!r}, which cannot be used:")], path, source)
-        raise InputError("\n".join([said, str(error), *_also_wrong(values, path, source)])) from None
+        said = toml_errors.message(
+            [Problem("design", f"given {named!r}, which cannot be used:")], path, source
+        )
+        raise InputError(
+            "\n".join([said, str(error), *_also_wrong(values, path, source)])
+        ) from None
     return checked(Study, {**values, "design": design}, path, source)
 
 
@@ -155,7 +195,11 @@ def _flattened(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
 def _without_none(value: Any) -> Any:
     """Without what is not set, and without empty lists."""
     if isinstance(value, Mapping):
-        return {name: _without_none(inner) for name, inner in value.items() if inner is not None and inner != ()}
+        return {
+            name: _without_none(inner)
+            for name, inner in value.items()
+            if inner is not None and inner != ()
+        }
     return [_without_none(inner) for inner in value] if isinstance(value, tuple) else value
 
 
@@ -171,6 +215,7 @@ def _lists_on_one_line(toml: str) -> str:
         if opened or line.endswith("= ["):
             opened += line.count("[") - line.count("]")
     joined = (
-        re.sub(r",\s*\]", "]", re.sub(r"= \[.*", lambda m: m[0].replace("[ ", "["), line)).rstrip() for line in lines
+        re.sub(r",\s*\]", "]", re.sub(r"= \[.*", lambda m: m[0].replace("[ ", "["), line)).rstrip()
+        for line in lines
     )
     return "\n".join(joined) + "\n"

@@ -30,7 +30,10 @@ class RestitutionLaw(BaseModel):
 
     C0: float = Field(ge=0.05, le=1.0, description="restitution below v0")
     v0_m_s: float = Field(
-        ge=1e-4, le=100.0, description="normal speed where yielding starts", json_schema_extra={"unit": "m/s"}
+        ge=1e-4,
+        le=100.0,
+        description="normal speed where yielding starts",
+        json_schema_extra={"unit": "m/s"},
     )
 
     @property
@@ -48,7 +51,10 @@ class PartMaterial(RestitutionLaw):
     """The part's rebound law and its hardness, which sets how big a dent is."""
 
     hardness_HB: float = Field(  # noqa: N815 -- HB is how hardness is written
-        ge=5.0, le=1000.0, description="Brinell hardness of the part", json_schema_extra={"unit": "HB"}
+        ge=5.0,
+        le=1000.0,
+        description="Brinell hardness of the part",
+        json_schema_extra={"unit": "HB"},
     )
 
     @property

@@ -14,17 +14,29 @@ class Accuracy(BaseModel):
 
     model_config = STRICT
 
-    replicas: int = Field(default=8, ge=3, le=100000, description="3 is the least that gives a confidence interval")
+    replicas: int = Field(
+        default=8, ge=3, le=100000, description="3 is the least that gives a confidence interval"
+    )
     simulated_time_s: float = quantity(1e-4, 10000, "s", "of each replica, after warm-up", 1.0)
     warmup_time_s: float = quantity(0, 10000, "s", "simulated first and not counted", 0.2)
-    coverage: float | None = quantity(1e-4, 0.5, "", "wanted half-width of the objective's 95 % interval", None)
-    most_replicas: int = Field(default=200, ge=3, le=100000, description="where the wish for accuracy ends")
+    coverage: float | None = quantity(
+        1e-4, 0.5, "", "wanted half-width of the objective's 95 % interval", None
+    )
+    most_replicas: int = Field(
+        default=200, ge=3, le=100000, description="where the wish for accuracy ends"
+    )
     coverage_model: Literal["avrami", "dents"] = Field(
         default="avrami", description="from dent rates, or dent by dent over the whole treatment"
     )
-    sample_mm: float = quantity(0.005, 10, "mm", 'spacing of the points that coverage_model = "dents" marks', 0.1)
-    elastic_below_mm_s: float = quantity(0.1, 1000, "mm/s", "slower hits lose nothing: ends endless bouncing", 10.0)
-    drag_piece_ms: float = quantity(0.1, 1000, "ms", "longest flight between two kicks of the air, effects.drag", 10.0)
+    sample_mm: float = quantity(
+        0.005, 10, "mm", 'spacing of the points that coverage_model = "dents" marks', 0.1
+    )
+    elastic_below_mm_s: float = quantity(
+        0.1, 1000, "mm/s", "slower hits lose nothing: ends endless bouncing", 10.0
+    )
+    drag_piece_ms: float = quantity(
+        0.1, 1000, "ms", "longest flight between two kicks of the air, effects.drag", 10.0
+    )
 
     @model_validator(mode="after")
     def _agree(self) -> Self:
@@ -76,7 +88,9 @@ class Process(BaseModel):
     def _agree(self) -> Self:
         if self.accuracy.coverage_model == "dents" and self.treatment_time_s > LONGEST_MARKED:
             text = f'given "dents", which simulates all of treatment_time_s = {self.treatment_time_s:g} in each replica'
-            wants = f'at most {LONGEST_MARKED:g} s are supported; shorten the treatment or use "avrami"'
+            wants = (
+                f'at most {LONGEST_MARKED:g} s are supported; shorten the treatment or use "avrami"'
+            )
             raise CrossCheckError([Problem("accuracy.coverage_model", f"{text}; {wants}")])
         return self
 

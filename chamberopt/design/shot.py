@@ -30,7 +30,9 @@ class Shot(BaseModel):
     mass_g: float = quantity(1e-4, 10000, "g", "of all balls together")
     diameter_mm: float | None = quantity(0.1, 20, "mm", "of one ball", None)
     mix: Annotated[tuple[ShotSize, ...], Field(strict=False)] | None = listed(
-        "a list of { diameter_mm = ..., share = ... }", "2 to 8 sizes and their shares of the mass", None
+        "a list of { diameter_mm = ..., share = ... }",
+        "2 to 8 sizes and their shares of the mass",
+        None,
     )
     material: ShotMaterial | None = Field(default=None, description="sets the density")
     density_kg_m3: float | None = quantity(500, 25000, "kg/m³", "instead of material", None)
@@ -45,12 +47,19 @@ class Shot(BaseModel):
     def _size_problems(self) -> Iterator[Problem]:
         if self.mix is None:
             if self.diameter_mm is None:
-                yield Problem("diameter_mm", "missing; a number from 0.1 to 20 mm (of one ball), or several sizes: mix")
+                yield Problem(
+                    "diameter_mm",
+                    "missing; a number from 0.1 to 20 mm (of one ball), or several sizes: mix",
+                )
             return
         if self.diameter_mm is not None:
-            yield Problem("diameter_mm", f"given {self.diameter_mm:g} beside mix; keep one of the two")
+            yield Problem(
+                "diameter_mm", f"given {self.diameter_mm:g} beside mix; keep one of the two"
+            )
         if not 2 <= len(self.mix) <= 8:
-            yield Problem("mix", f"given {len(self.mix)} sizes; allowed: 2 to 8, or one as diameter_mm")
+            yield Problem(
+                "mix", f"given {len(self.mix)} sizes; allowed: 2 to 8, or one as diameter_mm"
+            )
         if len({size.diameter_mm for size in self.mix}) < len(self.mix):
             yield Problem("mix", "given one diameter_mm twice; add up its shares")
         whole = sum(size.share for size in self.mix)
@@ -60,7 +69,9 @@ class Shot(BaseModel):
     def _density_problems(self) -> Iterator[Problem]:
         if self.material is None and self.density_kg_m3 is None:
             materials = ", ".join(f'"{name}"' for name in SHOT_DENSITY)
-            yield Problem("material", f"missing; give material (one of {materials}) or density_kg_m3")
+            yield Problem(
+                "material", f"missing; give material (one of {materials}) or density_kg_m3"
+            )
         if self.material is not None and self.density_kg_m3 is not None:
             text = f"given {self.density_kg_m3:g} beside material = {self.material!r}; keep one of the two"
             yield Problem("density_kg_m3", text)
@@ -71,9 +82,15 @@ class Shot(BaseModel):
         one.
         """
         alone = () if self.diameter_mm is None else ((self.diameter_mm * 1e-3, 1.0),)
-        asked = alone if self.mix is None else tuple((size.diameter_mm * 1e-3, size.share) for size in self.mix)
+        asked = (
+            alone
+            if self.mix is None
+            else tuple((size.diameter_mm * 1e-3, size.share) for size in self.mix)
+        )
         whole = self.mass / (self.density * math.pi / 6.0)
-        return tuple((diameter, max(1, round(share * whole / diameter**3))) for diameter, share in asked)
+        return tuple(
+            (diameter, max(1, round(share * whole / diameter**3))) for diameter, share in asked
+        )
 
     @property
     def diameter(self) -> float:

@@ -37,17 +37,24 @@ class Sonotrode(Vibrating):
     """The vibrating floor."""
 
     motion: Literal["sinusoidal", "random_phase"] = Field(
-        default="sinusoidal", description="how the face moves: as it does, or met by each ball at a phase drawn anew"
+        default="sinusoidal",
+        description="how the face moves: as it does, or met by each ball at a phase drawn anew",
     )
 
 
 class FurtherSonotrode(Vibrating):
     """One more: a round face at the bottom of a well that opens into the room."""
 
-    at_mm: Place = listed("three numbers [x, y, z] in mm", "middle of the face, in the chamber's frame")
-    axis: Direction = listed("three numbers [x, y, z], not all 0", "the way the face looks, into the room")
+    at_mm: Place = listed(
+        "three numbers [x, y, z] in mm", "middle of the face, in the chamber's frame"
+    )
+    axis: Direction = listed(
+        "three numbers [x, y, z], not all 0", "the way the face looks, into the room"
+    )
     diameter_mm: float = quantity(0.5, 2000, "mm", "of the face")
-    phase_deg: float = quantity(-360, 360, "degrees", "ahead of the first sonotrode, at the same frequency", 0.0)
+    phase_deg: float = quantity(
+        -360, 360, "degrees", "ahead of the first sonotrode, at the same frequency", 0.0
+    )
 
     @property
     def at(self) -> tuple[float, float, float]:

@@ -55,24 +55,33 @@ class Objective(BaseModel):
     sum: dict[str, float] = Field(
         default_factory=dict,
         description="of objectives and metrics, in place of a name",
-        json_schema_extra={"form": "{ NAME = WEIGHT, ... }, e.g. { uniform_coverage = 1.0, time_to_98_s = -0.001 }"},
+        json_schema_extra={
+            "form": "{ NAME = WEIGHT, ... }, e.g. { uniform_coverage = 1.0, time_to_98_s = -0.001 }"
+        },
     )
     pareto: Annotated[tuple[ObjectiveName, ObjectiveName], Field(strict=False)] | None = listed(
-        'two names, e.g. ["uniform_coverage", "time_to_98"]', "two objectives at once, in place of a name", None
+        'two names, e.g. ["uniform_coverage", "time_to_98"]',
+        "two objectives at once, in place of a name",
+        None,
     )
 
     @model_validator(mode="after")
     def _agree(self) -> Self:
         names = (*get_args(ObjectiveName), *METRICS)
         problems = [
-            Problem(f"sum.{name}", f"not an objective or a metric; {toml_errors.did_you_mean(name, names)}")
+            Problem(
+                f"sum.{name}",
+                f"not an objective or a metric; {toml_errors.did_you_mean(name, names)}",
+            )
             for name in self.sum
             if name not in names
         ]
         if self.sum and not any(self.sum.values()):
             problems.append(Problem("sum", "all weights are 0; give one another value"))
         if self.pareto and self.pareto[0] == self.pareto[1]:
-            problems.append(Problem("pareto", f"given {self.pareto[0]} twice; give two different objectives"))
+            problems.append(
+                Problem("pareto", f"given {self.pareto[0]} twice; give two different objectives")
+            )
         given = [self.name != "uniform_coverage", bool(self.sum), self.pareto is not None]
         if given.count(True) > 1:
             problems.append(Problem("", "more than one of name, sum and pareto; give one"))
@@ -110,13 +119,19 @@ class Phase(BaseModel):
 
     model_config = STRICT
 
-    algorithm: Algorithm = Field(description='"sobol", "surrogate" or an NLopt name without its prefix')
-    share: float = quantity(0.001, 1, "of the evaluations", "the last phase has what the others leave", 1.0)
+    algorithm: Algorithm = Field(
+        description='"sobol", "surrogate" or an NLopt name without its prefix'
+    )
+    share: float = quantity(
+        0.001, 1, "of the evaluations", "the last phase has what the others leave", 1.0
+    )
 
     @model_validator(mode="after")
     def _agree(self) -> Self:
         if self.algorithm == "auto":
-            raise CrossCheckError([Problem("algorithm", 'given "auto", which is phases itself; leave phases out')])
+            raise CrossCheckError(
+                [Problem("algorithm", 'given "auto", which is phases itself; leave phases out')]
+            )
         return self
 
 
@@ -125,16 +140,32 @@ class Optimizer(BaseModel):
 
     model_config = STRICT
 
-    algorithm: Algorithm = Field(default="auto", description="auto, sobol, surrogate, or an NLopt name without prefix")
-    phases: Annotated[tuple[Phase, ...], Field(strict=False)] = listed(
-        "a table [[optimizer.phases]] each", "several algorithms one after another, in place of one", ()
+    algorithm: Algorithm = Field(
+        default="auto", description="auto, sobol, surrogate, or an NLopt name without prefix"
     )
-    initial_step: float = quantity(0.001, 1, "of the bounds", "first step of local algorithms", 0.15)
-    tolerance: float = quantity(1e-6, 0.5, "of the bounds", "step at which local algorithms end", 0.02)
-    evaluations: int = Field(default=40, ge=2, le=1000000, description="designs simulated while searching")
-    seed: int = Field(default=1, ge=0, le=2**31 - 1, description="of the search's own random numbers")
-    confirm: int = Field(default=3, ge=1, le=1000, description="best candidates simulated again on fresh seeds")
-    confirm_replicas: int = Field(default=16, ge=3, le=100000, description="replicas of each confirmation")
+    phases: Annotated[tuple[Phase, ...], Field(strict=False)] = listed(
+        "a table [[optimizer.phases]] each",
+        "several algorithms one after another, in place of one",
+        (),
+    )
+    initial_step: float = quantity(
+        0.001, 1, "of the bounds", "first step of local algorithms", 0.15
+    )
+    tolerance: float = quantity(
+        1e-6, 0.5, "of the bounds", "step at which local algorithms end", 0.02
+    )
+    evaluations: int = Field(
+        default=40, ge=2, le=1000000, description="designs simulated while searching"
+    )
+    seed: int = Field(
+        default=1, ge=0, le=2**31 - 1, description="of the search's own random numbers"
+    )
+    confirm: int = Field(
+        default=3, ge=1, le=1000, description="best candidates simulated again on fresh seeds"
+    )
+    confirm_replicas: int = Field(
+        default=16, ge=3, le=100000, description="replicas of each confirmation"
+    )
     first_replicas: int = Field(
         default=4,
         ge=0,
@@ -155,9 +186,17 @@ class Optimizer(BaseModel):
             text = f"given {self.first_replicas}; 3 is the least that gives an interval, 0 gives all of them to each"
             problems.append(Problem("first_replicas", text))
         if self.phases and self.algorithm != "auto":
-            problems.append(Problem("phases", f"given beside algorithm = {self.algorithm!r}; give one of the two"))
+            problems.append(
+                Problem(
+                    "phases", f"given beside algorithm = {self.algorithm!r}; give one of the two"
+                )
+            )
         if sum(phase.share for phase in self.phases[:-1]) >= 1.0:
-            problems.append(Problem("phases", "the shares before the last phase add up to 1 or more; lower them"))
+            problems.append(
+                Problem(
+                    "phases", "the shares before the last phase add up to 1 or more; lower them"
+                )
+            )
         if problems:
             raise CrossCheckError(problems)
         return self
@@ -179,7 +218,8 @@ class Study(BaseModel):
     )
     objective: Objective = Field(default_factory=Objective)
     constraints: dict[str, Limits] = Field(
-        default_factory=dict, description="METRIC = { min =, max = }, or a number of the design in quotes"
+        default_factory=dict,
+        description="METRIC = { min =, max = }, or a number of the design in quotes",
     )
     optimizer: Optimizer = Field(default_factory=Optimizer)
     draft: dict[str, int | float | str] = Field(
@@ -198,9 +238,16 @@ class Study(BaseModel):
 
     @model_validator(mode="after")
     def _agree(self) -> Self:
-        problems = [p for name, bounds in self.vary.items() for p in _vary_problems(self.design, name, bounds)]
+        problems = [
+            p
+            for name, bounds in self.vary.items()
+            for p in _vary_problems(self.design, name, bounds)
+        ]
         for name, limits in self.constraints.items():
-            problems += [Problem(f"constraints.{name}", text) for text in self._constraint_problems(name, limits)]
+            problems += [
+                Problem(f"constraints.{name}", text)
+                for text in self._constraint_problems(name, limits)
+            ]
         phases = [phase.algorithm for phase in self.optimizer.phases] or [self.optimizer.algorithm]
         if self.objective.pareto and not {"auto", "sobol", "surrogate"}.issuperset(phases):
             text = "given two objectives, which only auto, sobol and surrogate can search"
@@ -223,7 +270,9 @@ class Study(BaseModel):
             except InputError as error:
                 return [str(error).removeprefix(f"{name}: ")]
         else:
-            return [f"not a metric; {toml_errors.did_you_mean(name, (*METRICS, *(numbers if '.' in name else ())))}"]
+            return [
+                f"not a metric; {toml_errors.did_you_mean(name, (*METRICS, *(numbers if '.' in name else ())))}"
+            ]
         within = f"{low:g}" if low == high else f"from {low:g} to {high:g}"
         remedy = f"but it is {within} in every candidate; change the limit{' or [vary]' if name in numbers else ''}"
         said = []
@@ -237,7 +286,11 @@ class Study(BaseModel):
         try:
             self.drafted(self.design)
         except InputError as error:
-            return [Problem("draft", str(error).replace("process.accuracy.", "").replace("chamber.", ""))]
+            return [
+                Problem(
+                    "draft", str(error).replace("process.accuracy.", "").replace("chamber.", "")
+                )
+            ]
         return []
 
 
@@ -248,7 +301,12 @@ def _vary_problems(design: Design, name: str, bounds: tuple[float, float]) -> li
         start = design.value(name)
     except InputError as error:
         near = toml_errors.did_you_mean(name, numbers)
-        return [Problem(field, str(error).removeprefix(f"{name}: ") if name in numbers else f"unknown; {near}")]
+        return [
+            Problem(
+                field,
+                str(error).removeprefix(f"{name}: ") if name in numbers else f"unknown; {near}",
+            )
+        ]
     if name.startswith("process.accuracy."):
         return [Problem(field, "not a choice of design, but of how well it is known; see [draft]")]
     if name not in numbers:

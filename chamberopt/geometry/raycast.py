@@ -56,7 +56,9 @@ def seen(view: View, corners: np.ndarray) -> np.ndarray:
     nearest = np.full(rows * columns, -np.inf)
     which = np.full(rows * columns, -1, dtype=np.int32)
     boxes = np.cumsum((np.ptp(u, axis=1) + 1.0) * (np.ptp(v, axis=1) + 1.0))
-    ends = np.unique([*np.searchsorted(boxes, np.arange(AT_ONCE, boxes[-1], AT_ONCE)), len(corners)])
+    ends = np.unique(
+        [*np.searchsorted(boxes, np.arange(AT_ONCE, boxes[-1], AT_ONCE)), len(corners)]
+    )
     for begin, end in zip([0, *ends[:-1]], ends, strict=True):
         own = slice(begin, end)
         triangle, row, column = _pixels(u[own], v[own], view.shape)
@@ -70,13 +72,19 @@ def seen(view: View, corners: np.ndarray) -> np.ndarray:
     return which.reshape(rows, columns)
 
 
-def places(view: View, corners: np.ndarray, triangle: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:
+def places(
+    view: View, corners: np.ndarray, triangle: np.ndarray, row: np.ndarray, column: np.ndarray
+) -> np.ndarray:
     """Where the sight lines of pixels meet the triangles seen in them, all (k,), of (m, 3, 3): (k, 3) [m]."""
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     slope, level = normal @ view.towards, ((corners[:, 0] - view.centre) * normal).sum(axis=1)
     depth = (corners - view.centre) @ view.towards
     across, above = view.offsets(row, column)
-    gap = level[triangle] - across * (normal @ view.right)[triangle] - above * (normal @ view.up)[triangle]
+    gap = (
+        level[triangle]
+        - across * (normal @ view.right)[triangle]
+        - above * (normal @ view.up)[triangle]
+    )
     reach = np.divide(gap, slope[triangle], out=depth[triangle, 0], where=slope[triangle] != 0.0)
     reach = np.clip(reach, depth.min(axis=1)[triangle], depth.max(axis=1)[triangle])
     found = np.empty((len(row), 3))
@@ -86,7 +94,9 @@ def places(view: View, corners: np.ndarray, triangle: np.ndarray, row: np.ndarra
     return found
 
 
-def _pixels(u: np.ndarray, v: np.ndarray, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _pixels(
+    u: np.ndarray, v: np.ndarray, shape: tuple[int, int]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """All pixels inside triangles with corners u, v (m, 3) [pixels]: triangle, row, column, row after row."""
     rows, columns = shape
     triangle, row = _ranges(np.ceil(v.min(axis=1) - TOUCH), np.floor(v.max(axis=1) + TOUCH), rows)
@@ -114,7 +124,12 @@ def _ranges(low: np.ndarray, high: np.ndarray, end: int) -> tuple[np.ndarray, np
 
 
 def _depth(
-    u: np.ndarray, v: np.ndarray, depth: np.ndarray, triangle: np.ndarray, row: np.ndarray, column: np.ndarray
+    u: np.ndarray,
+    v: np.ndarray,
+    depth: np.ndarray,
+    triangle: np.ndarray,
+    row: np.ndarray,
+    column: np.ndarray,
 ) -> np.ndarray:
     """How near each pixel's triangle is, (k,) [pixels]; -inf for one seen edge on."""
     du, dv, dd = (x[:, 1:] - x[:, :1] for x in (u, v, depth))
@@ -124,6 +139,10 @@ def _depth(
         along_v = (dd[:, 1] * du[:, 0] - dd[:, 0] * du[:, 1]) / twice
     found = depth[:, 0][triangle]
     with np.errstate(invalid="ignore"):
-        found = found + along_u[triangle] * (column - u[triangle, 0]) + along_v[triangle] * (row - v[triangle, 0])
+        found = (
+            found
+            + along_u[triangle] * (column - u[triangle, 0])
+            + along_v[triangle] * (row - v[triangle, 0])
+        )
     found = np.clip(found, depth.min(axis=1)[triangle], depth.max(axis=1)[triangle])
     return np.where(np.abs(twice)[triangle] > TOUCH, found, -np.inf)

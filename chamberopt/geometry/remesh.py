@@ -12,7 +12,10 @@ import numpy as np
 
 from chamberopt.geometry.triangles import area_vectors, edge_keys
 
-LONG, SHORT = 4.0 / 3.0, 0.6  # of the size; a halved side is 2/3 of it, so that nothing is split and closed in turn
+LONG, SHORT = (
+    4.0 / 3.0,
+    0.6,
+)  # of the size; a halved side is 2/3 of it, so that nothing is split and closed in turn
 FLAT = 1e-6  # of the bounding box's diagonal: what a text format with 6 digits rounds away
 STRAIGHT = 1e-3  # rad; turns a ball's path by less than roughness does
 ROUNDS = 5
@@ -41,7 +44,9 @@ def quality(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     corners = vertices[triangles]
     squares = ((corners - np.roll(corners, 1, axis=1)) ** 2).sum(axis=(1, 2))
     area = np.linalg.norm(area_vectors(vertices, triangles), axis=1)
-    return np.divide(4.0 * np.sqrt(3.0) * area, squares, out=np.zeros_like(area), where=squares > 0.0)
+    return np.divide(
+        4.0 * np.sqrt(3.0) * area, squares, out=np.zeros_like(area), where=squares > 0.0
+    )
 
 
 def _faces(vertices: np.ndarray, triangles: np.ndarray, kinds: np.ndarray) -> np.ndarray:
@@ -52,14 +57,18 @@ def _faces(vertices: np.ndarray, triangles: np.ndarray, kinds: np.ndarray) -> np
     reach = FLAT * float(np.linalg.norm(np.ptp(vertices, axis=0)))
     normal = _unit(area_vectors(vertices, triangles))
     a, b = (np.argsort(edge_keys(triangles), kind="stable").reshape(-1, 2) // 3).T
-    level = (kinds[a] == kinds[b]) & (np.einsum("ij,ij->i", normal[a], normal[b]) > np.cos(STRAIGHT))
+    level = (kinds[a] == kinds[b]) & (
+        np.einsum("ij,ij->i", normal[a], normal[b]) > np.cos(STRAIGHT)
+    )
     graph = coo_array((np.ones(level.sum()), (a[level], b[level])), shape=(len(triangles),) * 2)
     count, face = connected_components(graph, directed=False)
     area = np.zeros((count, 3))
     np.add.at(area, face, area_vectors(vertices, triangles))
     first = np.zeros(count, dtype=np.int64)
     first[face[::-1]] = triangles[::-1, 0]
-    off = np.einsum("mkj,mj->mk", vertices[triangles] - vertices[first[face]][:, None], _unit(area)[face])
+    off = np.einsum(
+        "mkj,mj->mk", vertices[triangles] - vertices[first[face]][:, None], _unit(area)[face]
+    )
     bent = np.zeros(count, dtype=bool)
     bent[face[np.abs(off).max(axis=1) > reach]] = True  # many small steps that add up to a curve
     return np.where(bent[face], count + np.arange(len(face)), face)
@@ -74,13 +83,20 @@ class _Net:
     """A closed surface under way. Each change is made at many places at once, none of which touch one another."""
 
     def __init__(
-        self, vertices: np.ndarray, triangles: np.ndarray, target: np.ndarray, face: np.ndarray, size: float
+        self,
+        vertices: np.ndarray,
+        triangles: np.ndarray,
+        target: np.ndarray,
+        face: np.ndarray,
+        size: float,
     ) -> None:
         self.vertices, self.triangles, self.size = vertices, triangles.astype(np.int64), size
         self.target, self.face, self.source = target, face, np.arange(len(triangles))
         self.links = np.zeros(0, dtype=np.int64)  # keys of all edges, in order
         self.lots = np.random.default_rng(0)
-        self.touched = target.copy()  # outside of the target, only what its edges had to split may change
+        self.touched = (
+            target.copy()
+        )  # outside of the target, only what its edges had to split may change
 
     def split(self) -> bool:
         """Halves sides of the target that are too long, until there is none; was there any?"""
@@ -126,14 +142,20 @@ class _Net:
             a, b = self.triangles[t, k], self.triangles[t, (k + 1) % 3]
             c, d = self.triangles[t, (k + 2) % 3], self.triangles[u, (j + 2) % 3]
             one, two = np.stack([c, a, d], axis=1), np.stack([d, b, c], axis=1)
-            normal = area_vectors(self.vertices, self.triangles[t]) + area_vectors(self.vertices, self.triangles[u])
+            normal = area_vectors(self.vertices, self.triangles[t]) + area_vectors(
+                self.vertices, self.triangles[u]
+            )
             wanted = c != d
             for new in (one, two):  # else the two are no convex quadrilateral
                 wanted &= np.einsum("ij,ij->i", area_vectors(self.vertices, new), normal) > 0.0
             wanted &= ~self._linked(c, d)
             chosen = self._independent(np.stack([t, u], axis=1), -excess, wanted)
             # Two edges turned at once could become one and the same: only the first of such is turned.
-            chosen = chosen[np.unique(np.sort(np.stack([c, d], axis=1)[chosen], axis=1), axis=0, return_index=True)[1]]
+            chosen = chosen[
+                np.unique(
+                    np.sort(np.stack([c, d], axis=1)[chosen], axis=1), axis=0, return_index=True
+                )[1]
+            ]
             if not len(chosen):
                 return
             self.triangles[t[chosen]], self.triangles[u[chosen]] = one[chosen], two[chosen]
@@ -146,7 +168,9 @@ class _Net:
             crease = self.face[sides // 3][:, 0] != self.face[sides // 3][:, 1]
             free, along = self._free(edges, crease)
             length = self._lengths(edges)
-            short = np.flatnonzero((length < SHORT * self.size) & self.touched[sides // 3].all(axis=1))
+            short = np.flatnonzero(
+                (length < SHORT * self.size) & self.touched[sides // 3].all(axis=1)
+            )
             moved, kept = edges[short].T
             swap = ~free[moved] & ~(crease[short] & along[moved])
             moved, kept = np.where(swap, kept, moved), np.where(swap, moved, kept)
@@ -180,7 +204,10 @@ class _Net:
         np.add.at(sums, ends, self.vertices[others])
         count = np.maximum(np.bincount(ends, minlength=len(self.vertices)), 1)[:, None]
         moved = np.where(free[:, None], 0.5 * (self.vertices + sums / count), self.vertices)
-        before, old = quality(self.vertices, self.triangles), area_vectors(self.vertices, self.triangles)
+        before, old = (
+            quality(self.vertices, self.triangles),
+            area_vectors(self.vertices, self.triangles),
+        )
         worst = np.full(len(self.vertices), np.inf)
         np.minimum.at(worst, self.triangles, before[:, None])
         for _ in range(20):
@@ -207,7 +234,9 @@ class _Net:
     def _linked(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Are points a and b (e,) ends of an edge, of those that `_edges` saw last?"""
         keys = np.minimum(a, b) * (int(self.triangles.max()) + 1) + np.maximum(a, b)
-        return self.links[np.minimum(np.searchsorted(self.links, keys), len(self.links) - 1)] == keys
+        return (
+            self.links[np.minimum(np.searchsorted(self.links, keys), len(self.links) - 1)] == keys
+        )
 
     def _lengths(self, edges: np.ndarray) -> np.ndarray:
         a, b = self.vertices[edges].transpose(1, 0, 2)
@@ -217,9 +246,13 @@ class _Net:
         """The angle (e,) of triangles t opposite their sides k."""
         a, b, apex = (self.vertices[self.triangles[t, (k + j) % 3]] for j in range(3))
         to_a, to_b = a - apex, b - apex
-        return np.arctan2(np.linalg.norm(np.cross(to_a, to_b), axis=1), np.einsum("ij,ij->i", to_a, to_b))
+        return np.arctan2(
+            np.linalg.norm(np.cross(to_a, to_b), axis=1), np.einsum("ij,ij->i", to_a, to_b)
+        )
 
-    def _independent(self, touching: np.ndarray, rank: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    def _independent(
+        self, touching: np.ndarray, rank: np.ndarray, wanted: np.ndarray
+    ) -> np.ndarray:
         """Those wanted (e,) that come first, by rank, in both triangles (e, 2) they touch."""
         at = np.flatnonzero(wanted)
         place = np.empty(len(at), dtype=np.int64)
@@ -251,7 +284,9 @@ class _Net:
         inside = np.arange(len(whose)) - np.repeat(np.cumsum(count) - count, count)
         return corner[start[points][whose] + inside] // 3, whose
 
-    def _closes_well(self, moved: np.ndarray, kept: np.ndarray, ring: np.ndarray, whose: np.ndarray) -> np.ndarray:
+    def _closes_well(
+        self, moved: np.ndarray, kept: np.ndarray, ring: np.ndarray, whose: np.ndarray
+    ) -> np.ndarray:
         """Does the surface stay a surface, the same, without sides too long or thinner triangles?"""
         old = self.triangles[ring]
         new = np.where(old == moved[whose][:, None], kept[whose][:, None], old)
@@ -272,7 +307,9 @@ class _Net:
         shared = (other != moved[who]) & (other != kept[who]) & self._linked(other, kept[who])
         return ~bad & (np.bincount(who[shared], minlength=len(moved)) == 2)
 
-    def _apart(self, moved: np.ndarray, kept: np.ndarray, rank: np.ndarray, fine: np.ndarray) -> np.ndarray:
+    def _apart(
+        self, moved: np.ndarray, kept: np.ndarray, rank: np.ndarray, fine: np.ndarray
+    ) -> np.ndarray:
         """Those fine (p,) that come first, by rank, in every triangle around both of their ends."""
         at = np.flatnonzero(fine)
         place = np.empty(len(at), dtype=np.int64)

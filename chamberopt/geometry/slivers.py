@@ -46,7 +46,9 @@ class _Web:
         self.triangles: dict[int, Triangle] = {}
         self.of_edge: dict[tuple[int, int], int] = {}
         self.of_vertex: dict[int, set[int]] = {}
-        self.suspects = np.flatnonzero(heights(surface.vertices, surface.triangles) < THINNEST).tolist()
+        self.suspects = np.flatnonzero(
+            heights(surface.vertices, surface.triangles) < THINNEST
+        ).tolist()
         for index, (a, b, c) in enumerate(surface.triangles.tolist()):
             self._put(index, (a, b, c))
 
@@ -61,7 +63,9 @@ class _Web:
         kept = np.array(sorted(self.triangles))
         triangles = np.array([self.triangles[index] for index in kept.tolist()], dtype=np.int32)
         everything = np.ones(len(kept), dtype=bool)
-        return Surface(self.vertices, triangles, self.solid[kept], self.source[kept]).only(everything)
+        return Surface(self.vertices, triangles, self.solid[kept], self.source[kept]).only(
+            everything
+        )
 
     def merge(self, index: int) -> bool:
         """Closes the triangle's shortest edge if it is shorter than THINNEST and the surface stays closed."""
@@ -90,7 +94,10 @@ class _Web:
             if c == d or (c, d) in self.of_edge or (d, c) in self.of_edge:
                 continue
             new = (c, a, d), (d, b, c)
-            same = self.solid[index] == self.solid[beyond] and self.source[index] == self.source[beyond]
+            same = (
+                self.solid[index] == self.solid[beyond]
+                and self.source[index] == self.source[beyond]
+            )
             if not (self._faces_as(new, index, beyond) if same else self._apex_on(a, b, c)):
                 continue
             now = min(self.height(self.triangles[index]), self.height(self.triangles[beyond]))
@@ -110,7 +117,9 @@ class _Web:
 
     def _faces_as(self, new: tuple[Triangle, Triangle], index: int, beyond: int) -> bool:
         """Do both new triangles face as the pair does (that is: is the pair a convex quadrilateral)?"""
-        facing = self._area_vector(self.triangles[index]) + self._area_vector(self.triangles[beyond])
+        facing = self._area_vector(self.triangles[index]) + self._area_vector(
+            self.triangles[beyond]
+        )
         return all(float(self._area_vector(triangle) @ facing) > 0.0 for triangle in new)
 
     def _apex_on(self, a: int, b: int, c: int) -> bool:

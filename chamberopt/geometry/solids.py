@@ -20,8 +20,12 @@ from chamberopt.geometry.triangles import border, shells_of, winding_number
 if TYPE_CHECKING:
     from manifold3d import CrossSection, Manifold
 
-GRID_MM = 2.0**-20  # 1 nm: a thousandth of the finest surface roughness, yet 1e7 steps of a double at 100 mm
-SAME_VOLUME = 1e-9  # relative; a boolean that went wrong is off by whole triangles, rounding by 1e-13
+GRID_MM = (
+    2.0**-20
+)  # 1 nm: a thousandth of the finest surface roughness, yet 1e7 steps of a double at 100 mm
+SAME_VOLUME = (
+    1e-9  # relative; a boolean that went wrong is off by whole triangles, rounding by 1e-13
+)
 
 
 @dataclass(frozen=True)
@@ -73,7 +77,9 @@ def snapped(vertices: np.ndarray) -> np.ndarray:
     return _grid_mm(vertices) * 1e-3
 
 
-def solid(vertices: np.ndarray, triangles: np.ndarray, name: str, only: np.ndarray | None = None) -> Solid:
+def solid(
+    vertices: np.ndarray, triangles: np.ndarray, name: str, only: np.ndarray | None = None
+) -> Solid:
     """A solid from a closed surface: vertices (n, 3) m, triangles (m, 3), outward.
 
     only: indices of the triangles to use (one body of several); sources still count in the whole list.
@@ -93,7 +99,9 @@ def solid(vertices: np.ndarray, triangles: np.ndarray, name: str, only: np.ndarr
     )
     made = Solid(_checked(Manifold(mesh), f"{name}: cannot be made a solid"), label, name)
     if made.volume <= 0.0:  # subtracting it would ADD material, without an error
-        raise InputError(f"{name}: the surface is inside out or encloses nothing; make its normals point outward")
+        raise InputError(
+            f"{name}: the surface is inside out or encloses nothing; make its normals point outward"
+        )
     return made
 
 
@@ -107,7 +115,9 @@ def bodies(vertices: np.ndarray, triangles: np.ndarray, name: str) -> tuple[list
     if len(volumes) == 1:
         return [solid(vertices, triangles, name)], 0
     each = [np.flatnonzero(shells == k) for k in np.flatnonzero(volumes > 0.0)]
-    return [solid(vertices, triangles, name, only=body) for body in each], int((volumes < 0.0).sum())
+    return [solid(vertices, triangles, name, only=body) for body in each], int(
+        (volumes < 0.0).sum()
+    )
 
 
 def swept(face: Surface, way: np.ndarray, name: str) -> Solid:
@@ -134,7 +144,9 @@ def subtract(whole: Solid, taken: Solid) -> Solid:
     Raises InputError when they disagree: the surfaces cross themselves.
     """
     rest = _checked(whole.body - taken.body, f"{taken.name}: cannot be cut out of {whole.name}")
-    common = _checked(whole.body ^ taken.body, f"{taken.name}: cannot be intersected with {whole.name}")
+    common = _checked(
+        whole.body ^ taken.body, f"{taken.name}: cannot be intersected with {whole.name}"
+    )
     gap = rest.volume() - (whole.body.volume() - common.volume())
     if abs(gap) > SAME_VOLUME * abs(whole.body.volume()):
         raise InputError(
@@ -175,10 +187,12 @@ def shadow(vertices: np.ndarray, triangles: np.ndarray, below: float) -> Outline
 
     shells, volumes = shells_of(vertices, triangles)
     bodies = [
-        solid(vertices, triangles, "the part", only=np.flatnonzero(shells == k)) for k in np.flatnonzero(volumes > 0.0)
+        solid(vertices, triangles, "the part", only=np.flatnonzero(shells == k))
+        for k in np.flatnonzero(volumes > 0.0)
     ]
     sections = [
-        CrossSection(one.body.trim_by_plane((0.0, 0.0, -1.0), -1e3 * below).project().to_polygons()) for one in bodies
+        CrossSection(one.body.trim_by_plane((0.0, 0.0, -1.0), -1e3 * below).project().to_polygons())
+        for one in bodies
     ]
     return Outline(CrossSection.batch_boolean(sections, OpType.Add))
 
@@ -188,13 +202,17 @@ def extruded(outline: np.ndarray, height: float) -> tuple[np.ndarray, np.ndarray
     from manifold3d import CrossSection
 
     mesh = CrossSection([1e3 * outline]).extrude(1e3 * height).to_mesh64()
-    return 1e-3 * np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts).astype(np.int32)
+    return 1e-3 * np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts).astype(
+        np.int32
+    )
 
 
 def overlap(one: Solid, two: Solid) -> float:
     """The volume [m³] that both have in common."""
     common = one.body ^ two.body
-    return float(_checked(common, f"{one.name} and {two.name} cannot be intersected").volume()) * 1e-9
+    return (
+        float(_checked(common, f"{one.name} and {two.name} cannot be intersected").volume()) * 1e-9
+    )
 
 
 def cavities(surface: Surface) -> list[np.ndarray]:

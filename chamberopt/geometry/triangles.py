@@ -39,7 +39,9 @@ def shells_of(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, 
     from scipy.sparse.csgraph import connected_components
 
     a, b = triangles[:, [0, 1]].T.ravel(), triangles[:, [1, 2]].T.ravel()
-    graph = coo_array((np.ones(len(a), dtype=np.int8), (a, b)), shape=(len(vertices), len(vertices)))
+    graph = coo_array(
+        (np.ones(len(a), dtype=np.int8), (a, b)), shape=(len(vertices), len(vertices))
+    )
     _, piece = connected_components(graph, directed=False)
     shells = np.unique(piece[triangles[:, 0]], return_inverse=True)[1].reshape(-1)
     return shells, np.bincount(shells, tetrahedron_volumes(vertices, triangles))
@@ -60,7 +62,10 @@ def winding_number(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
     a, b, c = (corners[None, :, k] - points[:, None] for k in range(3))
     la, lb, lc = (np.linalg.norm(side, axis=2) for side in (a, b, c))
     top = np.einsum("pij,pij->pi", a, np.cross(b, c))
-    dot = {pair: np.einsum("pij,pij->pi", u, v) for pair, u, v in (("ab", a, b), ("bc", b, c), ("ca", c, a))}
+    dot = {
+        pair: np.einsum("pij,pij->pi", u, v)
+        for pair, u, v in (("ab", a, b), ("bc", b, c), ("ca", c, a))
+    }
     bottom = la * lb * lc + dot["ab"] * lc + dot["bc"] * la + dot["ca"] * lb
     return np.arctan2(top, bottom).sum(axis=1) / (2.0 * np.pi)
 
@@ -70,7 +75,9 @@ def free_rim(vertices: np.ndarray, triangles: np.ndarray, face: np.ndarray) -> n
     none. Normals point out of the room; face (m,) bool.
     """
     sides = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    order = np.argsort(edge_keys(triangles), kind="stable").reshape(-1, 2)  # the two sides of each edge
+    order = np.argsort(edge_keys(triangles), kind="stable").reshape(
+        -1, 2
+    )  # the two sides of each edge
     one, two = order[face[order[:, 0] // 3] != face[order[:, 1] // 3]].T
     of_face, beside = np.where(face[one // 3], one, two), np.where(face[one // 3], two, one)
     normal = area_vectors(vertices, triangles)[of_face // 3]
@@ -88,7 +95,9 @@ def heights(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Smallest height [m] of each triangle, shape (m,): 0 for one without area."""
     corners = vertices[triangles]
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    twice = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    twice = np.linalg.norm(
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+    )
     return np.divide(twice, longest, out=np.zeros_like(twice), where=longest > 0.0)
 
 

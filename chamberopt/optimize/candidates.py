@@ -99,7 +99,9 @@ class Candidates:
         values = np.array([[goal.value for goal in goals] for goals in rows])
         variances = np.array([_variances([goals[k] for goals in rows]) for k in range(len(some))]).T
         score, variance = values[:, 0], variances[:, 0]
-        penalty = self._judge.reference.scale * np.array([trial.penalty for trial in self.trials[: len(rows)]])
+        penalty = self._judge.reference.scale * np.array(
+            [trial.penalty for trial in self.trials[: len(rows)]]
+        )
         if len(some) > 1 and weight is not FIRST_ALONE:
             weight = weights(self._study.optimizer.seed, len(rows)) if weight is None else weight
             score, variance = scalarised(values, variances, weight, ~failed)
@@ -115,11 +117,20 @@ class Candidates:
         told from the next, and the study has rounds left, these and the start again with twice the replicas.
         """
         settings = self._study.optimizer
-        replicas = settings.confirm_replicas if self._study.design.process.accuracy.coverage is None else None
+        replicas = (
+            settings.confirm_replicas
+            if self._study.design.process.accuracy.coverage is None
+            else None
+        )
         promising = self._promising(settings.confirm)
-        confirmed = {i: self._confirmed(searched, point, replicas) for i, (searched, point) in enumerate(promising)}
+        confirmed = {
+            i: self._confirmed(searched, point, replicas)
+            for i, (searched, point) in enumerate(promising)
+        }
         for _ in range(settings.confirm_rounds - 1):
-            again = hard_to_tell_apart([one for one in confirmed.values() if one]) if replicas else []
+            again = (
+                hard_to_tell_apart([one for one in confirmed.values() if one]) if replicas else []
+            )
             if not again:
                 break
             replicas = 2 * (replicas or 0)
@@ -128,7 +139,9 @@ class Candidates:
                     confirmed[i] = self._confirmed(*promising[i], replicas) or one
         return [one for one in confirmed.values() if one]
 
-    def _confirmed(self, searched: int | None, point: np.ndarray, replicas: int | None) -> Confirmed | None:
+    def _confirmed(
+        self, searched: int | None, point: np.ndarray, replicas: int | None
+    ) -> Confirmed | None:
         trial, evaluation = self._judged(point, "confirm", replicas)
         if evaluation is None or not trial.goals:
             return None
@@ -150,7 +163,8 @@ class Candidates:
         several = len(self._study.objective.goals) > 1
         first = (np.arange(count) + 0.5) / count
         recommended = [
-            self._recommended(weight) for weight in (np.stack([first, 1.0 - first], axis=1) if several else [None])
+            self._recommended(weight)
+            for weight in (np.stack([first, 1.0 - first], axis=1) if several else [None])
         ]
         proposed = [point for point in recommended if point is not None]
         scores = np.array([trial.score for trial in self.trials[: len(self._points)]])
@@ -176,7 +190,9 @@ class Candidates:
         model = self.model(weight)
         return None if model is None else recommend(model, self._study.optimizer.seed)
 
-    def _judged(self, point: np.ndarray, stage: str, replicas: int | None) -> tuple[Trial, Evaluation | None]:
+    def _judged(
+        self, point: np.ndarray, stage: str, replicas: int | None
+    ) -> tuple[Trial, Evaluation | None]:
         """From the record, or by an evaluation that is on record when this returns."""
         number = len(self.trials)
         trial = self._record.replayed(number, stage, point.tolist())
@@ -187,11 +203,18 @@ class Candidates:
             if self._stop and self._stop():
                 raise KeyboardInterrupt
             began = time.perf_counter()
-            bar = max((t.objective.low for t in self.trials if t.feasible and t.objective), default=-np.inf)
-            trial, evaluation = self._judge.trial(number, point, stage, replicas, bar if number else None)
+            bar = max(
+                (t.objective.low for t in self.trials if t.feasible and t.objective),
+                default=-np.inf,
+            )
+            trial, evaluation = self._judge.trial(
+                number, point, stage, replicas, bar if number else None
+            )
             self._record.append(trial, evaluation, time.perf_counter() - began)
         if number == 0:
-            self._judge.reference = Reference(trial.score, scale(self._study.objective.goals[0], trial.metrics))
+            self._judge.reference = Reference(
+                trial.score, scale(self._study.objective.goals[0], trial.metrics)
+            )
         self.trials.append(trial)
         if number + 1 >= len(self._record.trials):
             self._report(stage)
@@ -201,14 +224,18 @@ class Candidates:
         if self._progress:
             settings = self._study.optimizer
             total = max(len(self.trials), settings.evaluations + 1 + settings.confirm)
-            best = max((t.score for t in self.trials if t.feasible and t.stage == stage), default=None)
+            best = max(
+                (t.score for t in self.trials if t.feasible and t.stage == stage), default=None
+            )
             self._progress(len(self.trials), total, best)
 
 
 def _variances(goals: list[Estimate]) -> np.ndarray:
     """Squared standard errors (n,), pooled over the candidates."""
     replicas = np.array([max(1, len(goal.pseudovalues)) for goal in goals])
-    spreads = [float(np.var(g.pseudovalues, ddof=1)) if len(g.pseudovalues) > 1 else np.nan for g in goals]
+    spreads = [
+        float(np.var(g.pseudovalues, ddof=1)) if len(g.pseudovalues) > 1 else np.nan for g in goals
+    ]
     return pooled(np.array(spreads), replicas)
 
 
@@ -218,5 +245,9 @@ def hard_to_tell_apart(confirmed: list[Confirmed]) -> list[Confirmed]:
     if not feasible:
         return []
     best = max(feasible, key=lambda one: one.goals[0].value)
-    close = [one for one in feasible if one is not best and paired_difference(best.goals[0], one.goals[0]).low <= 0.0]
+    close = [
+        one
+        for one in feasible
+        if one is not best and paired_difference(best.goals[0], one.goals[0]).low <= 0.0
+    ]
     return [best, *close] if close else []

@@ -25,9 +25,9 @@ def shortfall(figure: Estimate, limits: Limits) -> float:
         error = standard_error(figure)
         if error > 0.0:
             z = beyond / error
-            beyond = 0.5 * beyond * math.erfc(-z / math.sqrt(2.0)) + error * math.exp(-0.5 * z * z) / math.sqrt(
-                2.0 * math.pi
-            )
+            beyond = 0.5 * beyond * math.erfc(-z / math.sqrt(2.0)) + error * math.exp(
+                -0.5 * z * z
+            ) / math.sqrt(2.0 * math.pi)
         missed += max(0.0, beyond) / (abs(limit) or 1.0)
     return missed
 
@@ -42,7 +42,9 @@ def violations(name: str, figure: Estimate, limits: Limits) -> list[str]:
     return said
 
 
-def standing_of(constraints: Mapping[str, Limits], figures: Mapping[str, Estimate]) -> tuple[str, str]:
+def standing_of(
+    constraints: Mapping[str, Limits], figures: Mapping[str, Estimate]
+) -> tuple[str, str]:
     """Whether all limits are kept, to the end of the 95 % intervals, and why not, or why it is not known."""
     standing, reasons = FEASIBLE, []
     for name, limits in constraints.items():

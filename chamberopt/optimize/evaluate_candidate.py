@@ -48,7 +48,9 @@ class Judge:
 
     def parameters(self, point: np.ndarray) -> dict[str, float]:
         """The varied parameters at a point of the unit cube, in the file's units."""
-        if np.array_equal(point, self.start):  # as written in the file: through the unit cube they could be rounded
+        if np.array_equal(
+            point, self.start
+        ):  # as written in the file: through the unit cube they could be rounded
             return {name: self._study.design.value(name) for name in self._study.vary}
         # BOBYQA can leave the bounds by rounding.
         values = np.clip(self._low + point * (self._high - self._low), self._low, self._high)
@@ -60,9 +62,14 @@ class Judge:
     def goals(self, evaluation: Evaluation) -> tuple[Estimate, ...]:
         """Every objective of the study."""
         others = self._study.objective.goals[1:]
-        return (evaluation.objective, *(weighted(objective(name), evaluation.metrics) for name in others))
+        return (
+            evaluation.objective,
+            *(weighted(objective(name), evaluation.metrics) for name in others),
+        )
 
-    def constrained(self, parameters: dict[str, float], evaluation: Evaluation) -> dict[str, Estimate]:
+    def constrained(
+        self, parameters: dict[str, float], evaluation: Evaluation
+    ) -> dict[str, Estimate]:
         """The figures that the constraints are about: metrics, and numbers of the design, which are exact."""
         design = self._study.design
         return {
@@ -73,7 +80,12 @@ class Judge:
         }
 
     def trial(
-        self, number: int, point: np.ndarray, stage: str, replicas: int | None = None, bar: float | None = None
+        self,
+        number: int,
+        point: np.ndarray,
+        stage: str,
+        replicas: int | None = None,
+        bar: float | None = None,
     ) -> tuple[Trial, Evaluation | None]:
         """The candidate's row, and its evaluation unless it failed. A search's first, the start, raises if it fails.
 
@@ -101,9 +113,15 @@ class Judge:
             raise
         else:
             first = stage == "search" and number == 0
-            unit = scale(self._study.objective.goals[0], evaluation.metrics) if first else self.reference.scale
+            unit = (
+                scale(self._study.objective.goals[0], evaluation.metrics)
+                if first
+                else self.reference.scale
+            )
             figures = self.constrained(parameters, evaluation)
-            penalty = sum(shortfall(figures[name], limits) for name, limits in self._study.constraints.items())
+            penalty = sum(
+                shortfall(figures[name], limits) for name, limits in self._study.constraints.items()
+            )
             missed = [
                 miss
                 for name, limits in self._study.constraints.items()
@@ -116,7 +134,9 @@ class Judge:
             point=tuple(point.tolist()),
             parameters=parameters,
             goals=goals,
-            metrics={name: _bare(metric) for name, metric in evaluation.metrics.items()} if evaluation else {},
+            metrics={name: _bare(metric) for name, metric in evaluation.metrics.items()}
+            if evaluation
+            else {},
             penalty=penalty,
             score=score,
             feasible=not reason,
@@ -124,7 +144,9 @@ class Judge:
         )
         return trial, evaluation
 
-    def _evaluation(self, design: Design, stage: str, replicas: int | None, bar: float | None) -> Evaluation:
+    def _evaluation(
+        self, design: Design, stage: str, replicas: int | None, bar: float | None
+    ) -> Evaluation:
         """A candidate of the search that a few replicas show to be plainly worse than the best gets no more of them."""
         if stage == "confirm":
             return self._simulated(design, "confirm", replicas)

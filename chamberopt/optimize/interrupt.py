@@ -29,7 +29,9 @@ class Interrupt:
 
     def __enter__(self) -> Self:
         self._before = signal.getsignal(signal.SIGINT)
-        if self._before is not signal.SIG_IGN:  # as in the background of a script, where Ctrl-C is not meant for us
+        if (
+            self._before is not signal.SIG_IGN
+        ):  # as in the background of a script, where Ctrl-C is not meant for us
             signal.signal(signal.SIGINT, self._on_signal)
         return self
 

@@ -37,13 +37,22 @@ def compromises(result: StudyResult) -> list[Compromise]:
     searched = [trial for trial in result.trials if trial.stage == "search" and trial.goals]
     stages = {
         "confirm": [(one.parameters, one.goals, one.standing) for one in result.confirmed],
-        "search": [(trial.parameters, trial.goals, "feasible" if trial.feasible else INFEASIBLE) for trial in searched],
+        "search": [
+            (trial.parameters, trial.goals, "feasible" if trial.feasible else INFEASIBLE)
+            for trial in searched
+        ],
     }
     made = []
     for stage, rows in stages.items():
-        values = np.array([[goal.value for goal in goals] for _, goals, _ in rows]).reshape(-1, len(names))
-        front = on_front(values, np.array([standing != INFEASIBLE for *_, standing in rows], dtype=bool))
-        made += [Compromise(stage, *row, bool(there)) for row, there in zip(rows, front, strict=True)]
+        values = np.array([[goal.value for goal in goals] for _, goals, _ in rows]).reshape(
+            -1, len(names)
+        )
+        front = on_front(
+            values, np.array([standing != INFEASIBLE for *_, standing in rows], dtype=bool)
+        )
+        made += [
+            Compromise(stage, *row, bool(there)) for row, there in zip(rows, front, strict=True)
+        ]
     return made
 
 

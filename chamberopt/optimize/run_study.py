@@ -62,7 +62,9 @@ class StudyResult:
             value = self.best.design.value(name)
             for bound, side in ((low, "lower"), (high, "upper")):
                 if abs(value - bound) < 1e-3 * (high - low):
-                    said.append(f"{name} = {value:g} lies on its {side} bound: better may lie beyond; widen [vary]")
+                    said.append(
+                        f"{name} = {value:g} lies on its {side} bound: better may lie beyond; widen [vary]"
+                    )
         return tuple(said)
 
     @property
@@ -118,7 +120,9 @@ def go_on(
     evaluator = evaluator or simulation(study, executor, target)
     candidates = Candidates(study, record, evaluator, progress, stop)
     settings = study.optimizer
-    phases: Sequence[tuple[str, float]] = [(phase.algorithm, phase.share) for phase in settings.phases]
+    phases: Sequence[tuple[str, float]] = [
+        (phase.algorithm, phase.share) for phase in settings.phases
+    ]
     if study.objective.pareto and settings.algorithm == "auto" and not phases:
         phases = PARETO_PHASES
     algorithm = maximise(
@@ -136,9 +140,13 @@ def go_on(
     record.require_no_more(len(candidates.trials))
     if not confirmed or confirmed[0].searched != 0:
         first = next(trial for trial in candidates.trials if trial.stage == "confirm")
-        raise InputError(f"the start could not be simulated on the confirmation's seeds: {first.reason}")
+        raise InputError(
+            f"the start could not be simulated on the confirmation's seeds: {first.reason}"
+        )
     start = confirmed[0]
-    winners = [one for one in confirmed if one.feasible] or [one for one in confirmed if one.standing == NOT_KNOWN]
+    winners = [one for one in confirmed if one.feasible] or [
+        one for one in confirmed if one.standing == NOT_KNOWN
+    ]
     if not winners:
         raise InputError(
             f"constraints: no candidate meets them (the start: {start.reason}); loosen them, widen [vary] or "
@@ -153,11 +161,16 @@ def go_on(
         start=start,
         confirmed=tuple(confirmed),
         best=best,
-        gain=Estimate(0.0, 0.0) if best is start else paired_difference(best.goals[0], start.goals[0]),
+        gain=Estimate(0.0, 0.0)
+        if best is start
+        else paired_difference(best.goals[0], start.goals[0]),
         seconds=record.seconds,
         target=target,
         findings=found(
-            candidates.model(FIRST_ALONE), study.vary, best.parameters, best.evaluation.objective.half_width
+            candidates.model(FIRST_ALONE),
+            study.vary,
+            best.parameters,
+            best.evaluation.objective.half_width,
         ),
     )
 
@@ -173,7 +186,9 @@ def kept_target(study: Study) -> np.ndarray | None:
         return None
     varied = [name for name in study.vary if name.startswith("part.target.")]
     if varied:
-        raise InputError(f"vary: {varied[0]} with part.target.reachable: not supported; leave one of the two out")
+        raise InputError(
+            f"vary: {varied[0]} with part.target.reachable: not supported; leave one of the two out"
+        )
     return build_chamber(study.design).part.target
 
 
@@ -192,7 +207,9 @@ def simulation(study: Study, executor: Executor, target: np.ndarray | None) -> E
     """The real thing: chamber, replicas, coverage. Asked again for more replicas it adds to those it has."""
     from chamberopt.chamber.build import build_chamber
 
-    known: dict[str, tuple[Chamber, list[Replica]]] = {}  # of the confirmation, and of the search's last candidate
+    known: dict[
+        str, tuple[Chamber, list[Replica]]
+    ] = {}  # of the confirmation, and of the search's last candidate
 
     def simulate_candidate(design: Design, stream: str, replicas: int | None) -> Evaluation:
         began = time.perf_counter()
@@ -204,7 +221,15 @@ def simulation(study: Study, executor: Executor, target: np.ndarray | None) -> E
         chamber, done = known[key]
         built = time.perf_counter() - began
         name = study.objective.goals[0]
-        result = evaluate(design, chamber, executor, objective_name=name, stream=stream, replicas=replicas, done=done)
+        result = evaluate(
+            design,
+            chamber,
+            executor,
+            objective_name=name,
+            stream=stream,
+            replicas=replicas,
+            done=done,
+        )
         return replace(result, timings={"chamber": built, **result.timings})
 
     return simulate_candidate

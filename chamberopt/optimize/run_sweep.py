@@ -73,10 +73,14 @@ def plan_sweep(study: Study, grid: int | None, sobol: int | None, seed: int | No
     dimensions = len(study.vary)
     if (grid is None) == (sobol is None):
         given = "neither" if grid is None else "both"
-        raise InputError(f"--grid, --sobol: {given} given; give one: values a parameter, or points in all")
+        raise InputError(
+            f"--grid, --sobol: {given} given; give one: values a parameter, or points in all"
+        )
     if grid is not None:
         if seed is not None:
-            raise InputError(f"--seed: given {seed}, but a grid draws nothing; leave it out, or take --sobol")
+            raise InputError(
+                f"--seed: given {seed}, but a grid draws nothing; leave it out, or take --sobol"
+            )
         if grid < 2:
             raise InputError(f"--grid: given {grid}; give at least 2 values a parameter")
         _require_few(grid**dimensions, f"--grid: {grid} values of {dimensions} parameters")
@@ -156,7 +160,10 @@ def _judged(
     """
     target = shared(executor, kept_target(study) if evaluator is None else None)
     numbers = range(first, len(plan.points))
-    futures = [executor.submit(judged, study, number, plan.points[number], target, evaluator) for number in numbers]
+    futures = [
+        executor.submit(judged, study, number, plan.points[number], target, evaluator)
+        for number in numbers
+    ]
     try:
         for number, future in zip(numbers, futures, strict=True):
             try:
@@ -169,7 +176,11 @@ def _judged(
 
 
 def judged(
-    study: Study, number: int, point: np.ndarray, target: np.ndarray | None = None, evaluator: Evaluator | None = None
+    study: Study,
+    number: int,
+    point: np.ndarray,
+    target: np.ndarray | None = None,
+    evaluator: Evaluator | None = None,
 ) -> tuple[Trial, float]:
     """One candidate from chamber to figures, on one worker, and the seconds it took."""
     began = time.perf_counter()
@@ -191,7 +202,9 @@ def _sobol(dimensions: int, count: int, seed: int) -> np.ndarray:
     from scipy.stats import qmc
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # not a power of 2: spread a little less evenly, no error
+        warnings.simplefilter(
+            "ignore", UserWarning
+        )  # not a power of 2: spread a little less evenly, no error
         return np.asarray(qmc.Sobol(dimensions, scramble=True, seed=seed).random(count))
 
 

@@ -52,7 +52,10 @@ class Findings:
             f"{self.noise:.2g}"
             for one in self.slices
         ]
-        return [*said, f"of all designs within these ranges {self.together:.0%} lose no more than that"]
+        return [
+            *said,
+            f"of all designs within these ranges {self.together:.0%} lose no more than that",
+        ]
 
     def as_json(self) -> dict[str, Any]:
         """As plain JSON values."""
@@ -75,7 +78,10 @@ class Findings:
 
 
 def found(
-    model: Surrogate | None, vary: Mapping[str, tuple[float, float]], best: Mapping[str, float], noise: float
+    model: Surrogate | None,
+    vary: Mapping[str, tuple[float, float]],
+    best: Mapping[str, float],
+    noise: float,
 ) -> Findings | None:
     """What the model says about a best design, by dotted name in the file's units; None without a model."""
     from scipy.stats.qmc import Sobol

@@ -47,7 +47,9 @@ def write_chamber(folder: Path, chamber: Chamber) -> None:
     _write_surface(folder / "chamber.stl", chamber.vertices, chamber.triangles, {})
 
 
-def _write_surface(path: Path, vertices: np.ndarray, triangles: np.ndarray, fields: dict[str, np.ndarray]) -> None:
+def _write_surface(
+    path: Path, vertices: np.ndarray, triangles: np.ndarray, fields: dict[str, np.ndarray]
+) -> None:
     surface = pyvista().PolyData.from_regular_faces(vertices * MM, triangles)
     for name, values in fields.items():
         surface.cell_data[name] = values
@@ -58,7 +60,9 @@ def _write_surface(path: Path, vertices: np.ndarray, triangles: np.ndarray, fiel
 def read_surface(path: Path) -> Surface:
     """A .vtp of a results folder. VTK reads a damaged one as an empty mesh: here that is an InputError."""
     if not path.is_file():
-        raise InputError(f"{path}: not there; give a results folder that simulate or run has finished")
+        raise InputError(
+            f"{path}: not there; give a results folder that simulate or run has finished"
+        )
     with _quietly():
         surface = pyvista().read(path)
     if not isinstance(surface, pyvista().PolyData) or surface.n_cells == 0:

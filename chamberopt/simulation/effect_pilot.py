@@ -80,8 +80,16 @@ class Advice:
 
     def as_json(self) -> dict[str, Any]:
         """Plain JSON values."""
-        changes = {name: {"value": e.value, "half_width": e.half_width} for name, e in self.changes.items()}
-        return {"effect": self.effect, "on": self.on, "verdict": self.verdict, "said": str(self), "changes": changes}
+        changes = {
+            name: {"value": e.value, "half_width": e.half_width} for name, e in self.changes.items()
+        }
+        return {
+            "effect": self.effect,
+            "on": self.on,
+            "verdict": self.verdict,
+            "said": str(self),
+            "changes": changes,
+        }
 
     def __str__(self) -> str:
         """One sentence for a person."""
@@ -117,7 +125,9 @@ SWITCHES = (
         "ball_collisions",
         lambda design, chamber: design.effects.ball_collisions,
         _set("ball_collisions", True, False),
-        lambda design, chamber: f"mean free path {dimensionless.free_path(design, chamber):.2g} chamber heights",
+        lambda design, chamber: (
+            f"mean free path {dimensionless.free_path(design, chamber):.2g} chamber heights"
+        ),
     ),
     Switch(
         "friction",
@@ -131,7 +141,9 @@ SWITCHES = (
         "drag",
         lambda design, chamber: design.effects.drag,
         _set("drag", True, False),
-        lambda design, chamber: f"{dimensionless.drag_loss(design, chamber):.2g} of the speed is lost on the way up",
+        lambda design, chamber: (
+            f"{dimensionless.drag_loss(design, chamber):.2g} of the speed is lost on the way up"
+        ),
     ),
     Switch(
         "rest",
@@ -183,7 +195,9 @@ def settled(
     """
     if not design.effects.auto:
         return design, []
-    whole = _with(design, {switch: True for switch in SWITCHES if _applies(switch, design, chamber)})
+    whole = _with(
+        design, {switch: True for switch in SWITCHES if _applies(switch, design, chamber)}
+    )
     advice = advise(whole, chamber, executor, progress, prepare)
     off = [one.effect for one in advice if one.verdict == "makes no difference"]
     pilot = _Pilot(whole, chamber, executor, prepare) if len(off) > 1 else None
@@ -199,8 +213,15 @@ def settled(
 class _Pilot:
     """Short runs of a design with some effects switched; ``base``: the figures of none switched."""
 
-    def __init__(self, design: Design, chamber: Chamber, executor: Executor, prepare: Prepare | None) -> None:
-        self._design, self._chamber, self._executor, self._prepare = design, chamber, executor, prepare
+    def __init__(
+        self, design: Design, chamber: Chamber, executor: Executor, prepare: Prepare | None
+    ) -> None:
+        self._design, self._chamber, self._executor, self._prepare = (
+            design,
+            chamber,
+            executor,
+            prepare,
+        )
         look = evaluate(self._switched({}, FIRST_LOOK), chamber, executor)
         hits = look.total.impacts[exposed_target(chamber)].sum()
         self._seconds = float(np.clip(FIRST_LOOK * IMPACTS / max(hits, 1), FIRST_LOOK, LONGEST))
@@ -227,7 +248,9 @@ class _Pilot:
 def _applies(switch: Switch, design: Design, chamber: Chamber) -> bool:
     """Whether an effect can be switched in this design at all."""
     if switch.effect == "rest":
-        loose = design.model_copy(update={"effects": design.effects.model_copy(update={"rest": None})})
+        loose = design.model_copy(
+            update={"effects": design.effects.model_copy(update={"rest": None})}
+        )
         return rests(loose, chamber_mesh(chamber))
     if design.shot.mix is not None and switch.effect == "friction":
         return False  # not supported together

@@ -160,7 +160,11 @@ def evaluate(
     if wanted is not None:
         planned = min(max(planned, LEAST_WATCHED), accuracy.most_replicas)
     mesh = cavity or chamber_mesh(chamber)
-    samples = sample_points(chamber, accuracy.sample_spacing) if accuracy.coverage_model == "dents" else None
+    samples = (
+        sample_points(chamber, accuracy.sample_spacing)
+        if accuracy.coverage_model == "dents"
+        else None
+    )
     setting = shared(executor, (design, chamber, mesh, samples))
     done = [] if done is None else done
     clock = {"simulate": 0.0, "coverage": 0.0}
@@ -182,7 +186,13 @@ def evaluate(
         if planned == len(done):
             break
     tallies = [replica.tally for replica in done]
-    stopped_by = "replicas" if wanted is None else "accuracy" if goal.half_width <= wanted else "most_replicas"
+    stopped_by = (
+        "replicas"
+        if wanted is None
+        else "accuracy"
+        if goal.half_width <= wanted
+        else "most_replicas"
+    )
     notes: tuple[str, ...] = (described(cavity),) if cavity else ()
     notes += _accuracy_note(stopped_by, len(done), goal, wanted)
     if samples is not None:
@@ -197,7 +207,9 @@ def evaluate(
         total=reduce(add, tallies),
         replicas=tuple(tallies),
         timings=clock,
-        collisions={kind: sum(replica.collisions[kind] for replica in done) for kind in done[0].collisions},
+        collisions={
+            kind: sum(replica.collisions[kind] for replica in done) for kind in done[0].collisions
+        },
         notes=(*notes, *_motion_notes(done)),
         stream=stream,
         stopped_by=stopped_by,
@@ -212,20 +224,31 @@ def evaluate(
 def _motion_notes(done: Sequence[Replica]) -> tuple[str, ...]:
     """What became of the shot by the replicas' ends."""
     stuck = [replica.stuck for replica in done if replica.stuck]
-    return (*stuck_notes(stuck, len(done)), *on_the_spot_notes([replica.on_the_spot for replica in done]))
+    return (
+        *stuck_notes(stuck, len(done)),
+        *on_the_spot_notes([replica.on_the_spot for replica in done]),
+    )
 
 
-def _metrics(done: Sequence[Replica], chamber: Chamber, design: Design, samples: Samples | None) -> dict[str, Estimate]:
+def _metrics(
+    done: Sequence[Replica], chamber: Chamber, design: Design, samples: Samples | None
+) -> dict[str, Estimate]:
     tallies = [replica.tally for replica in done]
     if samples is None:
-        return dict(zip(METRICS, jackknife(tallies, list(METRICS.values()), chamber, design), strict=True))
+        return dict(
+            zip(METRICS, jackknife(tallies, list(METRICS.values()), chamber, design), strict=True)
+        )
     others = [metric for metric in METRICS.values() if metric.over_surface is None]
-    named = {m.name: e for m, e in zip(others, jackknife(tallies, others, chamber, design), strict=True)}
+    named = {
+        m.name: e for m, e in zip(others, jackknife(tallies, others, chamber, design), strict=True)
+    }
     named |= marked_figures(_shares(done, samples, chamber, design), chamber)
     return {name: named[name] for name in METRICS}
 
 
-def _shares(done: Sequence[Replica], samples: Samples, chamber: Chamber, design: Design) -> list[np.ndarray]:
+def _shares(
+    done: Sequence[Replica], samples: Samples, chamber: Chamber, design: Design
+) -> list[np.ndarray]:
     """Marked share of each part triangle at the treatment time, (m,), a replica each."""
     return _shares_at(done, samples, chamber, design.process.treatment_time)
 
@@ -238,7 +261,9 @@ def _width(shares: Sequence[np.ndarray]) -> np.ndarray:
     return np.asarray(2.0 * student(n - 1) * np.std(shares, axis=0, ddof=1) / math.sqrt(n))
 
 
-def _shares_at(done: Sequence[Replica], samples: Samples, chamber: Chamber, at: float) -> list[np.ndarray]:
+def _shares_at(
+    done: Sequence[Replica], samples: Samples, chamber: Chamber, at: float
+) -> list[np.ndarray]:
     firsts = [replica.first_marked for replica in done if replica.first_marked is not None]
     return [marked_share(samples, first, at, len(chamber.part.triangles)) for first in firsts]
 
@@ -249,17 +274,27 @@ def _against_time(
     """Mean coverage of the target at even steps of time up to the treatment's end."""
     times = np.linspace(0.0, design.process.treatment_time, CURVE + 1)[1:]
     return tuple(
-        (float(at), marked_figures(_shares_at(done, samples, chamber, at), chamber)["mean_coverage"]) for at in times
+        (
+            float(at),
+            marked_figures(_shares_at(done, samples, chamber, at), chamber)["mean_coverage"],
+        )
+        for at in times
     )
 
 
-def _accuracy_note(stopped_by: str, replicas: int, goal: Estimate, wanted: float | None) -> tuple[str, ...]:
+def _accuracy_note(
+    stopped_by: str, replicas: int, goal: Estimate, wanted: float | None
+) -> tuple[str, ...]:
     """Which of the two ended an evaluation that was to be accurate: the accuracy or the budget."""
     if stopped_by == "accuracy":
         return (f"the accuracy asked for, ± {wanted:g}, was reached after {replicas} replicas",)
     if stopped_by == "replicas" or wanted is None:
         return ()
-    more = math.ceil(replicas * (goal.half_width / wanted) ** 2) if math.isfinite(goal.half_width) else "many more"
+    more = (
+        math.ceil(replicas * (goal.half_width / wanted) ** 2)
+        if math.isfinite(goal.half_width)
+        else "many more"
+    )
     remedy = "raise process.accuracy.most_replicas or simulated_time_s"
     return (
         f"the accuracy asked for, ± {wanted:g}, was not reached: process.accuracy.most_replicas = {replicas} ended it "

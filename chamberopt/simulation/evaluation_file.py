@@ -44,9 +44,19 @@ def load_evaluation(path: Path) -> Evaluation:
         evaluation = _put_together(json.loads(arrays.pop("tree").tobytes()), arrays)
         if not isinstance(evaluation, Evaluation):
             raise TypeError("another kind of file")
-    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+    except (
+        OSError,
+        ValueError,
+        KeyError,
+        TypeError,
+        EOFError,
+        zipfile.BadZipFile,
+        zlib.error,
+    ) as error:
         why = getattr(error, "strerror", None) or f"damaged ({error})"
-        raise InputError(f"{path}: {why}; restore the file or run the study in a new folder") from None
+        raise InputError(
+            f"{path}: {why}; restore the file or run the study in a new folder"
+        ) from None
     return evaluation
 
 
@@ -57,10 +67,16 @@ def _taken_apart(value: Any, arrays: dict[str, np.ndarray]) -> Any:
         arrays[name] = value
         return {"array": name}
     if is_dataclass(value):
-        parts = {column.name: _taken_apart(getattr(value, column.name), arrays) for column in fields(value)}
+        parts = {
+            column.name: _taken_apart(getattr(value, column.name), arrays)
+            for column in fields(value)
+        }
         return {"is": type(value).__name__, "of": parts}
     if isinstance(value, dict):
-        return {"is": "dict", "of": {name: _taken_apart(item, arrays) for name, item in value.items()}}
+        return {
+            "is": "dict",
+            "of": {name: _taken_apart(item, arrays) for name, item in value.items()},
+        }
     if isinstance(value, (tuple, list)):
         return [_taken_apart(item, arrays) for item in value]
     return value.item() if isinstance(value, np.generic) else value

@@ -71,7 +71,9 @@ def in_order(
     waiting: deque[tuple[int, Future[T]]] = deque()
     try:
         for number in numbers:
-            waiting.append((number, executor.submit(task, setting, replica_seed(seed, number, stream))))
+            waiting.append(
+                (number, executor.submit(task, setting, replica_seed(seed, number, stream)))
+            )
             if len(waiting) > ahead:
                 yield _answer(*waiting.popleft())
         while waiting:
@@ -97,12 +99,18 @@ def replicas_wanted(done: int, half_width: float, wanted: float, most: int) -> i
     return min(most, math.ceil(min(max(foretold, STEP * done), LEAP * done)))
 
 
-def _replica(setting: tuple[Design, Chamber, TriangleMesh | AnalyticCavity, Samples | None], seed: int) -> Replica:
+def _replica(
+    setting: tuple[Design, Chamber, TriangleMesh | AnalyticCavity, Samples | None], seed: int
+) -> Replica:
     return simulate_replica(*setting, seed)
 
 
 def simulate_replica(
-    design: Design, chamber: Chamber, mesh: TriangleMesh | AnalyticCavity, samples: Samples | None, seed: int
+    design: Design,
+    chamber: Chamber,
+    mesh: TriangleMesh | AnalyticCavity,
+    samples: Samples | None,
+    seed: int,
 ) -> Replica:
     """One replica, on a worker."""
     result = simulated(design, chamber, mesh, seed)
@@ -112,13 +120,21 @@ def simulate_replica(
         tally=tally(impacts, chamber, design),
         collisions={kind: int(getattr(result.collisions, kind)) for kind in kinds},
         on_the_spot=share_on_the_spot(result.balls.velocities),
-        stuck=still(result.resting, len(result.balls), shot.diameter, chamber, design.effects.part_turn is not None),
+        stuck=still(
+            result.resting,
+            len(result.balls),
+            shot.diameter,
+            chamber,
+            design.effects.part_turn is not None,
+        ),
         first_marked=None if samples is None else first_marked(samples, impacts, chamber, design),
         hits=hits_on_part(impacts, chamber, design),
     )
 
 
-def simulated(design: Design, chamber: Chamber, mesh: TriangleMesh | AnalyticCavity, seed: int) -> Result:
+def simulated(
+    design: Design, chamber: Chamber, mesh: TriangleMesh | AnalyticCavity, seed: int
+) -> Result:
     """What the simulator has to say of one replica; its impacts are on the chamber's triangles."""
     from sim_core import TriangleMesh, simulate
 

@@ -21,7 +21,9 @@ TOUCHES = 2e-5  # m: a ball held still is this near to what holds it, or nearer
 ONE_PLACE = 3.0  # diameters: balls nearer to each other than that lie in one place
 MOST_PLACES = 3  # named, those with most balls first
 ON_BALLS = ""
-STRAIGHT = 1e-6  # of its speed: what goes sideways by less will be on its spot for thousands of hits
+STRAIGHT = (
+    1e-6  # of its speed: what goes sideways by less will be on its spot for thousands of hits
+)
 MUCH = 0.1  # of the shot
 
 
@@ -33,7 +35,9 @@ class Stuck:
     line: str
 
 
-def still(resting: Resting, balls: int, diameter: float, chamber: Chamber, part_turns: bool) -> Stuck | None:
+def still(
+    resting: Resting, balls: int, diameter: float, chamber: Chamber, part_turns: bool
+) -> Stuck | None:
     """What lies still of a shot of so many ``balls`` of this ``diameter`` [m]; None if nothing does.
 
     Of a part that turns it is not known here where it is at the end, so that nothing is said to touch it.
@@ -41,18 +45,27 @@ def still(resting: Resting, balls: int, diameter: float, chamber: Chamber, part_
     if len(resting) == 0:
         return None
     surfaces = surface_names(chamber)
-    kinds = [_kind(resting, i, surfaces, chamber, 0.5 * diameter, part_turns) for i in range(len(resting))]
+    kinds = [
+        _kind(resting, i, surfaces, chamber, 0.5 * diameter, part_turns)
+        for i in range(len(resting))
+    ]
     places = _places(resting, _inherited(resting, kinds), diameter)
     said = [_said(resting, members, kind) for kind, members in places[:MOST_PLACES]]
     others = sum(len(members) for _, members in places[MOST_PLACES:])
     said += [f"{others} elsewhere"] if others else []
     verb = "lies" if len(resting) == 1 else "lie"
-    return Stuck(len(resting) / balls, f"{len(resting)} of {balls} balls {verb} still at the end: {'; '.join(said)}")
+    return Stuck(
+        len(resting) / balls,
+        f"{len(resting)} of {balls} balls {verb} still at the end: {'; '.join(said)}",
+    )
 
 
 def share_on_the_spot(velocities: np.ndarray) -> float:
     """The share of balls, of velocities (n, 3), that go straight up and down: for ever, if nothing meets them."""
-    sideways, speed = np.hypot(velocities[:, 0], velocities[:, 1]), np.linalg.norm(velocities, axis=1)
+    sideways, speed = (
+        np.hypot(velocities[:, 0], velocities[:, 1]),
+        np.linalg.norm(velocities, axis=1),
+    )
     return float(((sideways < STRAIGHT * speed) & (speed > 0.0)).mean())
 
 
@@ -84,12 +97,21 @@ def _percent(share: float) -> str:
     return f"{100.0 * share:.2g} %"
 
 
-def _kind(resting: Resting, i: int, surfaces: np.ndarray, chamber: Chamber, radius: float, part_turns: bool) -> str:
+def _kind(
+    resting: Resting,
+    i: int,
+    surfaces: np.ndarray,
+    chamber: Chamber,
+    radius: float,
+    part_turns: bool,
+) -> str:
     """E.g. "on the part's upper side", "jammed between the part's side and the wall"; ON_BALLS if it has only those."""
     under = resting.triangles[i][resting.triangles[i] >= 0]
     if resting.jammed[i]:
         known = chamber.tags != TAG_PART if part_turns else np.ones(len(chamber.tags), dtype=bool)
-        under = np.union1d(under, _touched(chamber, np.flatnonzero(known), resting.position[i], radius + TOUCHES))
+        under = np.union1d(
+            under, _touched(chamber, np.flatnonzero(known), resting.position[i], radius + TOUCHES)
+        )
     names = sorted(set(surfaces[under]))
     if not resting.jammed[i]:
         return ON_BALLS if not names else _between("on", names)
@@ -101,13 +123,19 @@ def _kind(resting: Resting, i: int, surfaces: np.ndarray, chamber: Chamber, radi
 
 
 def _between(at: str, names: list[str]) -> str:
-    return f"{at} {names[0]}" if len(names) == 1 else f"between {', '.join(names[:-1])} and {names[-1]}"
+    return (
+        f"{at} {names[0]}"
+        if len(names) == 1
+        else f"between {', '.join(names[:-1])} and {names[-1]}"
+    )
 
 
 def _touched(chamber: Chamber, asked: np.ndarray, position: np.ndarray, reach: float) -> np.ndarray:
     """Which of the triangles ``asked`` are within ``reach`` [m] of a position (3,)."""
     corners = chamber.vertices[chamber.triangles[asked]]
-    near = (np.abs(position - np.clip(position, corners.min(axis=1), corners.max(axis=1))) <= reach).all(axis=1)
+    near = (
+        np.abs(position - np.clip(position, corners.min(axis=1), corners.max(axis=1))) <= reach
+    ).all(axis=1)
     found = nearest_on_triangles(corners[near], np.broadcast_to(position, (near.sum(), 3)))
     return np.asarray(asked[near][np.linalg.norm(found - position, axis=1) <= reach])
 

@@ -36,7 +36,9 @@ def against_time(design: Design, chamber: Chamber, evaluation: Evaluation) -> li
     rows = []
     for at in times:
         then = design.with_values({"process.treatment_time_s": at})
-        found = coverage_figures(evaluation.replicas, chamber, surface(evaluation.replicas, chamber, then))
+        found = coverage_figures(
+            evaluation.replicas, chamber, surface(evaluation.replicas, chamber, then)
+        )
         mean, poorest = found["mean_coverage"], found["p05_coverage"]
         if at > treatment and mean.half_width > VAGUE:
             break
@@ -50,7 +52,9 @@ def against_time(design: Design, chamber: Chamber, evaluation: Evaluation) -> li
         "p05_coverage": _rising(poorest_value, poorest_width, kept),
         "p05_half_width": poorest_width,
     }
-    return [dict(zip(columns, row, strict=True)) for row in np.array(list(columns.values())).T.tolist()]
+    return [
+        dict(zip(columns, row, strict=True)) for row in np.array(list(columns.values())).T.tolist()
+    ]
 
 
 def _rising(value: np.ndarray, half_width: np.ndarray, kept: np.ndarray) -> np.ndarray:

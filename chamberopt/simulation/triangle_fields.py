@@ -46,13 +46,24 @@ QUANTITIES = {
     one.name: one
     for one in (
         Quantity("coverage", "coverage", "%", "coverage", 100.0),
-        Quantity("impacts", "impacts per area", "1/mm²", "impacts_per_mm2", colours=COUNTS, grows=True),
+        Quantity(
+            "impacts", "impacts per area", "1/mm²", "impacts_per_mm2", colours=COUNTS, grows=True
+        ),
         Quantity("speed", "mean normal speed", "m/s", "mean_normal_speed"),
         Quantity("p90-speed", "normal speed, 90th percentile", "m/s", "p90_normal_speed"),
         Quantity("angle", "mean impact angle, 90° is head on", "°", "mean_angle_deg"),
         Quantity("dent", "mean dent diameter", "µm", "mean_dent_um"),
-        Quantity("energy", "energy of impacts per area", "mJ/mm²", "energy_per_mm2", colours=COUNTS, grows=True),
-        Quantity("interval", "width of coverage's 95 % interval", "%", "coverage_interval", 100.0, DOUBT),
+        Quantity(
+            "energy",
+            "energy of impacts per area",
+            "mJ/mm²",
+            "energy_per_mm2",
+            colours=COUNTS,
+            grows=True,
+        ),
+        Quantity(
+            "interval", "width of coverage's 95 % interval", "%", "coverage_interval", 100.0, DOUBT
+        ),
     )
 }
 
@@ -90,7 +101,10 @@ def per_triangle(design: Design, chamber: Chamber, evaluation: Evaluation) -> di
         "energy_per_mm2": energy * 1e3 * times / exposed_mm2,
         "p90_normal_speed": _quantile(hits, 0.9),
         "mean_dent_um": np.divide(
-            1e6 * _sums(hits, hits.hits.dent), total.dents, out=np.full(len(energy), np.nan), where=total.dents > 0
+            1e6 * _sums(hits, hits.hits.dent),
+            total.dents,
+            out=np.full(len(energy), np.nan),
+            where=total.dents > 0,
         ),
         "coverage_interval": evaluation.marked_interval
         if evaluation.marked_interval is not None
@@ -115,7 +129,10 @@ def _quantile(hits: SortedHits, share: float) -> np.ndarray:
 
 
 def coverage_bounds(
-    hits: SortedHits, area: np.ndarray, times: float, over: Callable[[np.ndarray], np.ndarray] = np.asarray
+    hits: SortedHits,
+    area: np.ndarray,
+    times: float,
+    over: Callable[[np.ndarray], np.ndarray] = np.asarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Ends (m,) of the 95 % interval of the coverage 1 - exp(-x), area (m,) m², times: treatment over simulated time.
 

@@ -45,7 +45,8 @@ def half_thickness(x: np.ndarray, thickness: float) -> np.ndarray:
 def fine_section(span: float) -> np.ndarray:
     """One section (n, 2) mm, finely sampled, counter-clockwise from the trailing edge over the upper side."""
     chord, thickness, camber, stagger = (
-        pair[0] + (pair[1] - pair[0]) * span for pair in (CHORD, THICKNESS, CAMBER, np.radians(STAGGER_DEG))
+        pair[0] + (pair[1] - pair[0]) * span
+        for pair in (CHORD, THICKNESS, CAMBER, np.radians(STAGGER_DEG))
     )
     around = np.linspace(0.0, 2 * np.pi, 4001)
     x = (1 + np.cos(around)) / 2
@@ -72,7 +73,11 @@ def stops(curve: np.ndarray) -> np.ndarray:
     heading = np.arctan2(step[:, 1], step[:, 0])
     turn = np.abs((np.diff(heading, append=heading[0]) + np.pi) % (2 * np.pi) - np.pi)
     cost = np.cumsum(np.hypot(length / EDGE, turn / TURN_PER_EDGE))
-    return np.interp(np.linspace(0.0, cost[-1], round(cost[-1]) + 1)[:-1], np.r_[0.0, cost], np.arange(len(curve) + 1))
+    return np.interp(
+        np.linspace(0.0, cost[-1], round(cost[-1]) + 1)[:-1],
+        np.r_[0.0, cost],
+        np.arange(len(curve) + 1),
+    )
 
 
 def rectangle(z: float) -> np.ndarray:
@@ -90,7 +95,9 @@ def lattice(spacing: float) -> np.ndarray:
     """Points (n, 2) of a regular triangular pattern over the block."""
     y = np.arange(-BLOCK[1] / 2, BLOCK[1] / 2, spacing * np.sqrt(3) / 2)
     x = np.arange(-BLOCK[0] / 2, BLOCK[0] / 2, spacing)
-    return np.concatenate([np.c_[x + spacing / 2 * (row % 2), np.full_like(x, at)] for row, at in enumerate(y)])
+    return np.concatenate(
+        [np.c_[x + spacing / 2 * (row % 2), np.full_like(x, at)] for row, at in enumerate(y)]
+    )
 
 
 def main(path: Path) -> None:

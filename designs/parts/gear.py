@@ -73,10 +73,14 @@ def profile() -> np.ndarray:
     root_angle = np.linspace(-1.0, 1.0, 101) * np.arctan2(root_to_form[0, 0], root_to_form[0, 1])
     root = ROOT_RADIUS * np.c_[np.sin(root_angle), np.cos(root_angle)]
     mirrored = root_to_form[::-1] * [-1.0, 1.0]
-    space = evenly(np.r_[mirrored[:-1], root, root_to_form[1:]], 0.5 * EDGE)  # the fillet is strongly curved
+    space = evenly(
+        np.r_[mirrored[:-1], root, root_to_form[1:]], 0.5 * EDGE
+    )  # the fillet is strongly curved
     right = evenly(flank(np.linspace(np.hypot(*root_to_form[-1]), TIP_RADIUS, 2000)), EDGE)
     half_tip = np.pi / TEETH - np.arctan2(right[-1, 0], right[-1, 1])  # half the tip's angle
-    tip_count = 2 * max(1, round(half_tip * TIP_RADIUS / EDGE))  # even: a corner on the tip circle's full radius
+    tip_count = 2 * max(
+        1, round(half_tip * TIP_RADIUS / EDGE)
+    )  # even: a corner on the tip circle's full radius
     tip_angle = np.pi / TEETH + half_tip * np.linspace(-1.0, 1.0, tip_count + 1)[1:-1]
     tip = TIP_RADIUS * np.c_[np.sin(tip_angle), np.cos(tip_angle)]
     left = right[::-1] * [-1.0, 1.0]
@@ -105,7 +109,9 @@ def main(path: Path) -> None:
     top = FACE_WIDTH + SHAFT_LENGTH
     step = EDGE * np.sqrt(3) / 2
     disc = rings_of_points(np.arange(shaft_radius, TIP_RADIUS, step), EDGE, TEETH)
-    core = np.r_[rings_of_points(np.arange(step, shaft_radius - step / 2, step), EDGE, 6), [[0.0, 0.0]]]
+    core = np.r_[
+        rings_of_points(np.arange(step, shaft_radius - step / 2, step), EDGE, 6), [[0.0, 0.0]]
+    ]
     save(
         path,
         [

@@ -29,7 +29,9 @@ def outline(z: float) -> np.ndarray:
     count = round(SIDE / EDGE)
     line = np.linspace(-SIDE / 2, SIDE / 2, count + 1)[:-1]
     side = np.full_like(line, SIDE / 2)
-    border = np.concatenate([np.c_[line, -side], np.c_[side, line], np.c_[-line, side], np.c_[-side, -line]])
+    border = np.concatenate(
+        [np.c_[line, -side], np.c_[side, line], np.c_[-line, side], np.c_[-side, -line]]
+    )
     return np.c_[border, np.full(len(border), z)]
 
 

@@ -27,9 +27,14 @@ def lid() -> list[Patch]:
     count = round(2 * MIDDLE / EDGE)
     line = -MIDDLE + EDGE * np.arange(count)
     side = np.full(count, MIDDLE)
-    square = np.concatenate([np.c_[line, -side], np.c_[side, line], np.c_[-line, side], np.c_[-side, -line]])
+    square = np.concatenate(
+        [np.c_[line, -side], np.c_[side, line], np.c_[-line, side], np.c_[-side, -line]]
+    )
     between = rings_of_points(np.arange(MIDDLE, RADIUS, SPACING), SPACING, 4)
-    return [(points, triangles[inside]), planar([circle(), square], between, SPACING, HEIGHT, up=True)]
+    return [
+        (points, triangles[inside]),
+        planar([circle(), square], between, SPACING, HEIGHT, up=True),
+    ]
 
 
 def circle() -> np.ndarray:
@@ -39,23 +44,37 @@ def circle() -> np.ndarray:
 
 
 def main(path: Path) -> None:
-    floor = planar([circle()], rings_of_points(np.arange(SPACING, RADIUS, SPACING), SPACING, 4), SPACING, 0.0, up=False)
+    floor = planar(
+        [circle()],
+        rings_of_points(np.arange(SPACING, RADIUS, SPACING), SPACING, 4),
+        SPACING,
+        0.0,
+        up=False,
+    )
     levels = np.linspace(0.0, HEIGHT, 6)
     wall = tube(np.stack([np.c_[circle(), np.full(FACETS, z)] for z in levels]))
     patches = [(1, patch) for patch in lid()] + [(2, floor), (3, wall)]
     corners = np.concatenate([points[triangles] for _, (points, triangles) in patches])
-    group = np.repeat([number for number, _ in patches], [len(triangles) for _, (_, triangles) in patches])
-    cells, nodes = np.unique(np.round(corners.reshape(-1, 3) / GRID_MM).astype(np.int64), axis=0, return_inverse=True)
+    group = np.repeat(
+        [number for number, _ in patches], [len(triangles) for _, (_, triangles) in patches]
+    )
+    cells, nodes = np.unique(
+        np.round(corners.reshape(-1, 3) / GRID_MM).astype(np.int64), axis=0, return_inverse=True
+    )
     x, y, z = (cells * GRID_MM).T
     lines = ["$ millimetres, written by plate_setup.py", "CEND", "BEGIN BULK"]
-    lines += [f"$ANSA_NAME_COMMENT;{number};PSHELL;{name}" for number, name in enumerate(GROUPS, start=1)]
+    lines += [
+        f"$ANSA_NAME_COMMENT;{number};PSHELL;{name}" for number, name in enumerate(GROUPS, start=1)
+    ]
     lines += [
         f"GRID,{number},,{SONOTRODE_AT - up:.4f},{across:.4f},{along:.4f}"
         for number, (up, across, along) in enumerate(zip(z, y, x, strict=True), start=1)
     ]
     lines += [
         f"CTRIA3,{number},{pid},{a + 1},{b + 1},{c + 1}"
-        for number, (pid, (a, b, c)) in enumerate(zip(group, nodes.reshape(-1, 3), strict=True), start=1)
+        for number, (pid, (a, b, c)) in enumerate(
+            zip(group, nodes.reshape(-1, 3), strict=True), start=1
+        )
     ]
     path.write_text("\n".join([*lines, "ENDDATA"]) + "\n", encoding="ascii", newline="\n")
     print(f"{path.name}: {len(corners)} triangles, {len(cells)} nodes")

@@ -13,7 +13,9 @@ from scipy.spatial import Delaunay
 
 GRID_MM = 1e-4  # every corner is put on this grid (0.1 µm, far below any dent), so that patches share corners
 
-Patch = tuple[np.ndarray, np.ndarray]  # corners (n, 3) mm, triangles (m, 3), counter-clockwise seen from outside
+Patch = tuple[
+    np.ndarray, np.ndarray
+]  # corners (n, 3) mm, triangles (m, 3), counter-clockwise seen from outside
 
 
 def tube(rings: np.ndarray, closed: bool = True) -> Patch:
@@ -42,7 +44,9 @@ def planar(loops: list[np.ndarray], inner: np.ndarray, spacing: float, z: float,
     """
     border = np.round(np.concatenate(loops) / GRID_MM) * GRID_MM
     starts = np.concatenate([np.roll(np.arange(len(loop)), 0) for loop in loops])
-    offsets = np.repeat(np.cumsum([0] + [len(loop) for loop in loops[:-1]]), [len(loop) for loop in loops])
+    offsets = np.repeat(
+        np.cumsum([0] + [len(loop) for loop in loops[:-1]]), [len(loop) for loop in loops]
+    )
     lengths = np.repeat([len(loop) for loop in loops], [len(loop) for loop in loops])
     edges = np.c_[starts + offsets, (starts + 1) % lengths + offsets]
 
@@ -54,10 +58,14 @@ def planar(loops: list[np.ndarray], inner: np.ndarray, spacing: float, z: float,
         points = _average_of_neighbours(np.r_[border, points], triangles)[len(border) :]
     triangles = _fill(border, edges, points)
 
-    present = {tuple(sorted(edge)) for edge in triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).tolist()}
+    present = {
+        tuple(sorted(edge)) for edge in triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).tolist()
+    }
     missing = [edge for edge in edges.tolist() if tuple(sorted(edge)) not in present]
     if missing:
-        raise ValueError(f"{len(missing)} edges of the border are missing from the face, first {border[missing[0]]}")
+        raise ValueError(
+            f"{len(missing)} edges of the border are missing from the face, first {border[missing[0]]}"
+        )
     flat = np.r_[border, points]
     return np.c_[flat, np.full(len(flat), z)], triangles if up else triangles[:, ::-1]
 
@@ -76,7 +84,9 @@ def save(path: Path, patches: list[Patch]) -> None:
     """Sews the patches together, makes sure that they close and face outward, and writes a binary STL."""
     shift = np.cumsum([0] + [len(points) for points, _ in patches[:-1]])
     points = np.concatenate([points for points, _ in patches])
-    triangles = np.concatenate([tri + start for (_, tri), start in zip(patches, shift, strict=True)])
+    triangles = np.concatenate(
+        [tri + start for (_, tri), start in zip(patches, shift, strict=True)]
+    )
     cells = np.round(points / GRID_MM).astype(np.int64)
     _, first, welded = np.unique(cells, axis=0, return_index=True, return_inverse=True)
     corners = (np.round(points / GRID_MM) * GRID_MM)[first].astype(np.float32) + np.float32(0.0)
@@ -91,13 +101,17 @@ def save(path: Path, patches: list[Patch]) -> None:
     if (facets[:, 0] * normal).sum() <= 0:
         raise ValueError(f"{path.name}: the surface is inside out")
 
-    record = np.zeros(len(facets), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("unused", "<u2")])
+    record = np.zeros(
+        len(facets), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("unused", "<u2")]
+    )
     record["normal"] = np.round(normal / np.linalg.norm(normal, axis=1)[:, None], 6) + 0.0
     record["corners"] = facets
     header = f"{path.stem}, millimetres, closed, written by {path.stem}.py".encode().ljust(80)
     path.write_bytes(header + np.uint32(len(facets)).tobytes() + record.tobytes())
     size = corners.max(axis=0) - corners.min(axis=0)
-    print(f"{path.name}: {len(facets)} triangles, {' x '.join(f'{length:.3f}' for length in size)} mm")
+    print(
+        f"{path.name}: {len(facets)} triangles, {' x '.join(f'{length:.3f}' for length in size)} mm"
+    )
 
 
 def _fill(border: np.ndarray, edges: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -105,11 +119,15 @@ def _fill(border: np.ndarray, edges: np.ndarray, points: np.ndarray) -> np.ndarr
     points = np.round(np.r_[border, points] / GRID_MM) * GRID_MM
     triangles = np.asarray(Delaunay(points).simplices, dtype=np.int64)
     a, b, c = (points[triangles[:, k]] for k in range(3))
-    twice_area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+    twice_area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (
+        c[:, 0] - a[:, 0]
+    )
     triangles = np.where((twice_area < 0)[:, None], triangles[:, ::-1], triangles)
     keep = (np.abs(twice_area) > 1e-6) & _inside((a + b + c) / 3, border, edges)
     triangles = triangles[keep]
-    first = np.argmin(triangles, axis=1)  # start each triangle at its lowest corner, then sort: one fixed order
+    first = np.argmin(
+        triangles, axis=1
+    )  # start each triangle at its lowest corner, then sort: one fixed order
     triangles = np.take_along_axis(triangles, (first[:, None] + np.arange(3)) % 3, axis=1)
     return triangles[np.lexsort(triangles.T[::-1])]
 

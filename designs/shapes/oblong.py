@@ -27,10 +27,14 @@ class Oblong(ParametricChamber):
             )
         angle = np.pi * (np.arange(self.facets // 2 + 1) / (self.facets // 2) - 0.5)
         end = np.c_[np.cos(angle), np.sin(angle)]
-        outward = np.concatenate([end, -end])  # counter-clockwise: the end at +x, then the one at -x
+        outward = np.concatenate(
+            [end, -end]
+        )  # counter-clockwise: the end at +x, then the one at -x
         middle = np.repeat([[0.5 * straight, 0.0], [-0.5 * straight, 0.0]], len(end), axis=0)
         low, high = (middle + r * outward for r in (radius, radius + self.lean))
-        return lofted([np.c_[low, np.zeros(len(low))], np.c_[high, np.full(len(high), self.height)]])
+        return lofted(
+            [np.c_[low, np.zeros(len(low))], np.c_[high, np.full(len(high), self.height)]]
+        )
 
     @property
     def is_round(self) -> bool:

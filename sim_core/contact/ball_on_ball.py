@@ -12,7 +12,14 @@ import math
 
 import numpy as np
 
-from sim_core.contact.constrained_impulse import BLOCKED, SHORTEST_HOP, impart, place, pull, response
+from sim_core.contact.constrained_impulse import (
+    BLOCKED,
+    SHORTEST_HOP,
+    impart,
+    place,
+    pull,
+    response,
+)
 from sim_core.contact.jamming import watch
 from sim_core.contact.pushed_by_part import is_pressed, let_go, touch
 from sim_core.contact.support_changes import BOUNCES, touch_down
@@ -57,7 +64,19 @@ def meet(
     if slow and still_one and not pressed:
         _land_on(footing, motion, two, one, time, moment, second, normal, into, restitution, radius)
     elif slow and still_two and not pressed:
-        _land_on(footing, motion, one, two, time, moment, first, times(-1.0, normal), into, restitution, radius)
+        _land_on(
+            footing,
+            motion,
+            one,
+            two,
+            time,
+            moment,
+            first,
+            times(-1.0, normal),
+            into,
+            restitution,
+            radius,
+        )
     elif not slow:
         change = pair_kick(apart, closing, restitution)
         change = rub_pair(footing.grip, one, two, time, apart, closing, change)
@@ -67,7 +86,10 @@ def meet(
         if pressed:
             let_go(footing, one, times(-1.0, normal))
             let_go(footing, two, normal)
-        give_one, give_two = response(footing, one, times(-1.0, normal)), response(footing, two, normal)
+        give_one, give_two = (
+            response(footing, one, times(-1.0, normal)),
+            response(footing, two, normal),
+        )
         total = max(dot(give_two, normal) - dot(give_one, normal), BLOCKED)
         press = _press(footing.grip, footing, one, two, normal)
         push = (into + max(into, SHORTEST_HOP * press, 2.0 * PARTING)) / total
@@ -98,7 +120,9 @@ def _land_on(
     """A ball meets one that lies still: a surface like others."""
     if footing.marks[ball, MODE] >= ASLEEP:
         return
-    landed = touch_down(footing, motion, ball, ON_BALL - other, 2.0 * radius, time, moment, here, normal)
+    landed = touch_down(
+        footing, motion, ball, ON_BALL - other, 2.0 * radius, time, moment, here, normal
+    )
     if landed == BOUNCES:
         e = 1.0 if restitution is None else _law(restitution, into)
         change = times((1.0 + e) * into, normal)

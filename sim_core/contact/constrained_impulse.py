@@ -35,10 +35,18 @@ def response(footing: Footing, ball: int, push: Vec3) -> Vec3:
 
 @jit
 def impart(
-    footing: Footing, motion: np.ndarray, ball: int, time: float, moment: float, at: Point, change: Vec3
+    footing: Footing,
+    motion: np.ndarray,
+    ball: int,
+    time: float,
+    moment: float,
+    at: Point,
+    change: Vec3,
 ) -> None:
     """Change a ball's velocity by ``change`` [m/s]; one in contact mode keeps of it what its feet leave."""
     if footing.marks[ball, MODE] == FLYING:
         kick(motion, ball, time, change)
     else:
-        settle(footing, motion, ball, time, moment, Point(at.position, along(at.velocity, 1.0, change)))
+        settle(
+            footing, motion, ball, time, moment, Point(at.position, along(at.velocity, 1.0, change))
+        )

@@ -24,7 +24,9 @@ from sim_core.motion import Point
 from sim_core.numerics.jit import jit
 from sim_core.numerics.vec3 import Vec3, dot, sub
 
-JAM_HITS = 64  # slow hits in a row within HELD: a ball sliding off another is further along after a few
+JAM_HITS = (
+    64  # slow hits in a row within HELD: a ball sliding off another is further along after a few
+)
 HELD = 0.01  # of a radius
 PRESS = 1e-4  # s: so many in so short a time are no hops under weight (SHORTEST_HOP): a turning part closes the gap
 WAIT = 1e-3  # s: what is held a second time at one place is not called up for so long, and each time twice as long
@@ -33,7 +35,13 @@ MOST_HOLDS = 40  # after which that is for ever
 
 @jit
 def hold(
-    footing: Footing, motion: np.ndarray, ball: int, time: float, moment: float, position: Vec3, radius: float
+    footing: Footing,
+    motion: np.ndarray,
+    ball: int,
+    time: float,
+    moment: float,
+    position: Vec3,
+    radius: float,
 ) -> None:
     """Hold a ball still where it is; one that was held there before is left alone for longer."""
     nothing = Vec3(0.0, 0.0, 0.0)

@@ -44,7 +44,9 @@ def out_of_reach(footing: Footing | None, tree: Tree, ball: int, position: Vec3,
     if footing is None:
         return False
     for foot in range(footing.marks[ball, FEET]):
-        if footing.rows[ball, foot] == row or _lies_behind(tree, row, foot_normal(footing, ball, foot), position):
+        if footing.rows[ball, foot] == row or _lies_behind(
+            tree, row, foot_normal(footing, ball, foot), position
+        ):
             return True
     return False
 
@@ -97,7 +99,9 @@ def end_of_path(
     for foot in range(footing.marks[ball, FEET]):
         row = footing.rows[ball, foot]
         if row < 0:
-            delay = _leaves_round(footing, ball, foot, here.position, here.velocity, pull, Vec3(0.0, 0.0, 0.0))
+            delay = _leaves_round(
+                footing, ball, foot, here.position, here.velocity, pull, Vec3(0.0, 0.0, 0.0)
+            )
         elif tree.kinds[row] == FACE:
             delay = _leaves_face(tree.numbers, row, here, pull, OVER * seam)
         else:
@@ -125,13 +129,22 @@ def _leaves_face(numbers: np.ndarray, row: int, here: Point, pull: Vec3, over: f
     for k in range(4, 20, 4):
         inward = Vec3(numbers[row, k], numbers[row, k + 1], numbers[row, k + 2])
         inside = dot(inward, here.position) - numbers[row, k + 3] + over
-        soonest = min(soonest, first_approach(inside, dot(inward, here.velocity), 0.5 * dot(inward, pull), math.inf))
+        soonest = min(
+            soonest,
+            first_approach(inside, dot(inward, here.velocity), 0.5 * dot(inward, pull), math.inf),
+        )
     return soonest
 
 
 @jit
 def _leaves_edge(
-    footing: Footing, numbers: np.ndarray, ball: int, foot: int, here: Point, pull: Vec3, over: float
+    footing: Footing,
+    numbers: np.ndarray,
+    ball: int,
+    foot: int,
+    here: Point,
+    pull: Vec3,
+    over: float,
 ) -> float:
     """On an edge the foot is a plane that touches the capsule: good for a short way across it, and to its ends."""
     row = footing.rows[ball, foot]
@@ -140,7 +153,9 @@ def _leaves_edge(
     length = numbers[row, 6]
     place = dot(sub(here.position, start), line)
     if not 0.0 <= place <= length:
-        return _leaves_round(footing, ball, foot, here.position, here.velocity, pull, Vec3(0.0, 0.0, 0.0))
+        return _leaves_round(
+            footing, ball, foot, here.position, here.velocity, pull, Vec3(0.0, 0.0, 0.0)
+        )
     speed, change = dot(here.velocity, line), 0.5 * dot(pull, line)
     return min(
         first_approach(place + over, speed, change, math.inf),

@@ -4,7 +4,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim_core.effects.contact_mode import ASLEEP, FEET, JAMMED, LIES_SINCE, MODE, MOST_FEET, ON_BALL, Footing
+from sim_core.effects.contact_mode import (
+    ASLEEP,
+    FEET,
+    JAMMED,
+    LIES_SINCE,
+    MODE,
+    MOST_FEET,
+    ON_BALL,
+    Footing,
+)
 from sim_core.effects.gravity import Gravity
 from sim_core.geometry.analytic import AnalyticCavity
 from sim_core.geometry.mesh import TriangleMesh, towards_shot
@@ -38,7 +47,11 @@ class Resting:
 
 
 def resting(
-    footing: Footing | None, ground: Ground, positions: np.ndarray, middle: np.ndarray, origin: float
+    footing: Footing | None,
+    ground: Ground,
+    positions: np.ndarray,
+    middle: np.ndarray,
+    origin: float,
 ) -> Resting:
     """Who lies still now; ``positions`` (n, 3) [m], ``middle`` (3,) of the mesh, ``origin`` [s] of their clock."""
     if footing is None:

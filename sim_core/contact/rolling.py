@@ -68,7 +68,9 @@ def _resisted(footing: Footing, ball: int, velocity: Vec3, pull: Vec3) -> tuple[
 
 
 @jit
-def _rubbed(grip: Grip, footing: Footing, ball: int, time: float, velocity: Vec3, pull: Vec3) -> tuple[Vec3, Vec3, int]:
+def _rubbed(
+    grip: Grip, footing: Footing, ball: int, time: float, velocity: Vec3, pull: Vec3
+) -> tuple[Vec3, Vec3, int]:
     weight, size = _size(footing.gravity), _size(pull)
     load = _load(weight, size)
     up, arm, hold, axis = _stand(grip, footing, ball, sub(pull, footing.gravity))
@@ -94,7 +96,9 @@ def _rubbed(grip: Grip, footing: Footing, ball: int, time: float, velocity: Vec3
             drift = along(drift, -brake / size, pull)
         drilling = times(dot(spin, up), up)
         rolling = times(1.0 / arm, cross(up, velocity))
-        set_spin(grip, ball, time, along(rolling, 1.0, drilling), times(1.0 / arm, cross(up, drift)))
+        set_spin(
+            grip, ball, time, along(rolling, 1.0, drilling), times(1.0 / arm, cross(up, drift))
+        )
         return _kept_to(footing, ball, velocity, drift)
     if _size(velocity) <= ROUNDING and hold == 0.0 and size <= STILL_BELOW * weight:
         return NOTHING, NOTHING, ASLEEP
@@ -135,7 +139,10 @@ def _stand(grip: Grip, footing: Footing, ball: int, push: Vec3) -> tuple[Vec3, f
             square = 1.0 - c * c
             if square < BEARS:
                 continue
-            a, b = (dot(n, push) - c * dot(m, push)) / square, (dot(m, push) - c * dot(n, push)) / square
+            a, b = (
+                (dot(n, push) - c * dot(m, push)) / square,
+                (dot(m, push) - c * dot(n, push)) / square,
+            )
             if a < 0.0 or b < 0.0 or _size(along(along(push, -a, n), -b, m)) > BEARS * load:
                 continue
             middle, across = along(n, 1.0, m), sub(n, m)
@@ -171,7 +178,9 @@ def off_its_feet(grip: Grip | None, ball: int, time: float, mode: int) -> None:
     if grip is None:
         return
     if mode != SLIDING:
-        set_spin(grip, ball, time, spin_at(grip, ball, time) if mode == FLYING else NOTHING, NOTHING)
+        set_spin(
+            grip, ball, time, spin_at(grip, ball, time) if mode == FLYING else NOTHING, NOTHING
+        )
 
 
 @jit

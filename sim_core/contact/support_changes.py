@@ -38,7 +38,9 @@ from sim_core.numerics.vec3 import Vec3, along, cross, dot
 # how a hit on a still surface ends
 BOUNCES, ROLLS, CAUGHT = 0, 1, 2
 
-ONE_SURFACE = math.cos(math.radians(25.0))  # faces that meet at less than 25 degrees stand for a smooth surface
+ONE_SURFACE = math.cos(
+    math.radians(25.0)
+)  # faces that meet at less than 25 degrees stand for a smooth surface
 SAME_HOP = 1.05  # of the speed a facet's turn gives: landing on the next facet, not from a height
 SHARE = 0.5  # of capture: how fast a ball may come down again when the plane under it has left what is round
 NO_WAY_OUT = 0.01  # wedged between its feet and an edge a ball would have to go ten times as far as it is deep
@@ -47,7 +49,9 @@ LAST_LEFT = -2
 
 
 @jit
-def settle(footing: Footing, motion: np.ndarray, ball: int, time: float, moment: float, at: Point) -> None:
+def settle(
+    footing: Footing, motion: np.ndarray, ball: int, time: float, moment: float, at: Point
+) -> None:
     """Let a ball go on from ``at`` on those of its feet that hold it. ``time``, ``moment`` [s]: on the window's clock,
     and since the start.
 
@@ -90,7 +94,14 @@ def settle(footing: Footing, motion: np.ndarray, ball: int, time: float, moment:
 
 @jit
 def move_on(
-    footing: Footing, motion: np.ndarray, ball: int, time: float, moment: float, at: Point, pull: Vec3, mode: int
+    footing: Footing,
+    motion: np.ndarray,
+    ball: int,
+    time: float,
+    moment: float,
+    at: Point,
+    pull: Vec3,
+    mode: int,
 ) -> None:
     """Give a ball its path and its place on the roster."""
     if mode >= ASLEEP and footing.marks[ball, MODE] < ASLEEP:
@@ -107,7 +118,13 @@ def move_on(
 
 @inlined
 def deflect(
-    footing: Footing | None, motion: np.ndarray, ball: int, time: float, moment: float, here: Point, change: Vec3
+    footing: Footing | None,
+    motion: np.ndarray,
+    ball: int,
+    time: float,
+    moment: float,
+    here: Point,
+    change: Vec3,
 ) -> None:
     """Change a ball's velocity by ``change`` [m/s]."""
     if footing is None:
@@ -117,12 +134,25 @@ def deflect(
     if footing.marks[ball, MODE] == FLYING:
         kick(motion, ball, time, change)
     else:
-        settle(footing, motion, ball, time, moment, Point(here.position, along(here.velocity, 1.0, change)))
+        settle(
+            footing,
+            motion,
+            ball,
+            time,
+            moment,
+            Point(here.position, along(here.velocity, 1.0, change)),
+        )
 
 
 @inlined
 def set_out(
-    footing: Footing | None, motion: np.ndarray, ball: int, time: float, here: Point, away: Vec3, radius: float
+    footing: Footing | None,
+    motion: np.ndarray,
+    ball: int,
+    time: float,
+    here: Point,
+    away: Vec3,
+    radius: float,
 ) -> Point:
     """Put a ball that meets an edge back to ``radius`` [m] from it: contact is up to 1e-13 m deep there, and thousands
     of small hops on one edge would add up. It goes out along the planes of its feet, not into them.
@@ -133,11 +163,15 @@ def set_out(
     if distance >= radius:
         return here
     free = onto_cone(footing, ball, away)
-    share = dot(free, free) / (distance * distance)  # of a step along ``free``: how far it leads out
+    share = dot(free, free) / (
+        distance * distance
+    )  # of a step along ``free``: how far it leads out
     if share < NO_WAY_OUT:
         return here
     pull = Vec3(footing.pull[ball, 0], footing.pull[ball, 1], footing.pull[ball, 2])
-    there = Point(along(here.position, (radius - distance) / (distance * share), free), here.velocity)
+    there = Point(
+        along(here.position, (radius - distance) / (distance * share), free), here.velocity
+    )
     set_off(motion, ball, time, there, pull)
     return there
 
@@ -183,14 +217,21 @@ def touch_down(
     scope = math.inf
     if round_over < math.inf:  # so far, that coming down on the round again is slower than capture
         weight = math.sqrt(dot(footing.gravity, footing.gravity))
-        scope = SHARE * round_over * footing.capture / max(speed, math.sqrt(weight * round_over), footing.capture)
+        scope = (
+            SHARE
+            * round_over
+            * footing.capture
+            / max(speed, math.sqrt(weight * round_over), footing.capture)
+        )
     came_from, last = _smooth_neighbour(footing, ball, normal)
     footing.marks[ball, ROLLING] = 0
     if came_from != NO_FOOT and presses:
         crease = cross(last, normal)
         sine = math.sqrt(dot(crease, crease))
         if into <= SAME_HOP * speed * sine + footing.capture:
-            stays = came_from >= 0 and _lies_in_valley(footing, last, normal, velocity, crease, sine)
+            stays = came_from >= 0 and _lies_in_valley(
+                footing, last, normal, velocity, crease, sine
+            )
             if came_from >= 0 and not stays:
                 drop_foot(footing, ball, came_from)
             flat = along(velocity, into, normal)
@@ -225,7 +266,9 @@ def _smooth_neighbour(footing: Footing, ball: int, normal: Vec3) -> tuple[int, V
 
 
 @jit
-def _lies_in_valley(footing: Footing, one: Vec3, two: Vec3, velocity: Vec3, crease: Vec3, sine: float) -> bool:
+def _lies_in_valley(
+    footing: Footing, one: Vec3, two: Vec3, velocity: Vec3, crease: Vec3, sine: float
+) -> bool:
     """True when both faces run down to their crease and the ball hardly moves across it: it stays on both."""
     pull = footing.gravity
     down_one = along(pull, -dot(pull, one), one)
@@ -238,7 +281,13 @@ def _lies_in_valley(footing: Footing, one: Vec3, two: Vec3, velocity: Vec3, crea
 
 @inlined
 def step(
-    footing: Footing | None, motion: np.ndarray, ball: int, what: int, time: float, moment: float, here: Point
+    footing: Footing | None,
+    motion: np.ndarray,
+    ball: int,
+    what: int,
+    time: float,
+    moment: float,
+    here: Point,
 ) -> bool:
     """A ball comes to the end of its path in contact (see end_of_path); False if it does not."""
     if footing is None:
@@ -247,7 +296,15 @@ def step(
 
 
 @jit
-def _step(footing: Footing, motion: np.ndarray, ball: int, what: int, time: float, moment: float, here: Point) -> bool:
+def _step(
+    footing: Footing,
+    motion: np.ndarray,
+    ball: int,
+    what: int,
+    time: float,
+    moment: float,
+    here: Point,
+) -> bool:
     if what <= LEAVES:
         foot = LEAVES - what
         for axis in range(3):

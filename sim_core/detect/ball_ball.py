@@ -29,7 +29,9 @@ def meeting_delay(apart: Vec3, closing: Vec3, reach: float) -> float:
 
 
 @jit
-def pulled_meeting_delay(apart: Vec3, closing: Vec3, pull: Vec3, reach: float, limit: float) -> float:
+def pulled_meeting_delay(
+    apart: Vec3, closing: Vec3, pull: Vec3, reach: float, limit: float
+) -> float:
     """The same under a relative acceleration ``pull`` [m/s²], within ``limit`` [s]; by the steps of capsule_delay."""
     delay = 0.0
     for _ in range(STEPS):
@@ -40,7 +42,9 @@ def pulled_meeting_delay(apart: Vec3, closing: Vec3, pull: Vec3, reach: float, l
         rate = dot(at, velocity) / distance
         if gap <= CONTACT and rate < -STANDING:
             return delay
-        if gap <= CONTACT:  # not approaching: on until it could be as near as now, at once if pressed together
+        if (
+            gap <= CONTACT
+        ):  # not approaching: on until it could be as near as now, at once if pressed together
             gap, rate = 0.0, max(rate, 0.0)
         step = first_approach(gap, rate, 0.5 * dot(at, pull) / distance, HALF * reach)
         if not delay + step < limit:

@@ -32,7 +32,9 @@ def bore_delay(bore: Bore | None, numbers: np.ndarray, row: int, ball: Point) ->
     x, y = ball.position.x - bore.x, ball.position.y - bore.y
     vx, vy = ball.velocity.x, ball.velocity.y
     reach = numbers[row, 3]
-    return first_approach(reach * reach - (x * x + y * y), -2.0 * (x * vx + y * vy), -(vx * vx + vy * vy), math.inf)
+    return first_approach(
+        reach * reach - (x * x + y * y), -2.0 * (x * vx + y * vy), -(vx * vx + vy * vy), math.inf
+    )
 
 
 @jit

@@ -6,7 +6,12 @@ import numpy as np
 
 from sim_core.contact.path_end import out_of_reach
 from sim_core.detect.ball_cylinder import bore_delay, is_round
-from sim_core.detect.ball_sonotrode import meets_later, same_plane, waving_plane_delay, within_waving_borders
+from sim_core.detect.ball_sonotrode import (
+    meets_later,
+    same_plane,
+    waving_plane_delay,
+    within_waving_borders,
+)
 from sim_core.detect.ball_triangle import capsule_delay, face_delay
 from sim_core.effects.contact_mode import Footing
 from sim_core.effects.gravity import Gravity, acceleration
@@ -21,7 +26,9 @@ from sim_core.numerics.roots import NEVER
 from sim_core.numerics.simd import BOXES, boxes_hit, lowest_bit
 from sim_core.numerics.vec3 import Vec3
 
-SLACK = np.float32(1.000001)  # on float32 times: ten times their rounding, so that an equal time is never pruned
+SLACK = np.float32(
+    1.000001
+)  # on float32 times: ten times their rounding, so that an equal time is never pruned
 TINY = 1e-30  # stands for a chord component of zero, whose inverse would be infinite
 
 
@@ -101,7 +108,9 @@ def first_contact(
     first.
     """
     fall = acceleration(gravity)
-    return first_contact_from(None, None, None, -1, tree, scratch, ball, fall, wave, None, seam, time, length)
+    return first_contact_from(
+        None, None, None, -1, tree, scratch, ball, fall, wave, None, seam, time, length
+    )
 
 
 @inlined
@@ -157,14 +166,28 @@ def first_contact_from(
                     if plane_row >= 0 and plane_delay < best:  # and no face was there
                         last = face_wave(waves, wave, plane_row)
                         later, face = meets_later(
-                            tree, waves, radius, plane_row, ball, fall, seam, last, time, plane_delay, best
+                            tree,
+                            waves,
+                            radius,
+                            plane_row,
+                            ball,
+                            fall,
+                            seam,
+                            last,
+                            time,
+                            plane_delay,
+                            best,
                         )
                         if face >= 0:
                             best, found = later, face
                     plane_row = row
-                    plane_delay = waving_plane_delay(tree.numbers, row, ball, fall, radius, own, time, best)
+                    plane_delay = waving_plane_delay(
+                        tree.numbers, row, ball, fall, radius, own, time, best
+                    )
                 delay = plane_delay
-                if delay <= best and not within_waving_borders(tree.numbers, row, ball, fall, seam, own, time, delay):
+                if delay <= best and not within_waving_borders(
+                    tree.numbers, row, ball, fall, seam, own, time, delay
+                ):
                     delay = NEVER
             if out_of_reach(footing, tree, number, ball.position, row):
                 delay = NEVER
@@ -175,7 +198,9 @@ def first_contact_from(
         depth = stack_children(tree, scratch, code, depth, longest)
     if plane_row >= 0 and plane_delay < best:  # and no face was there
         last = face_wave(waves, wave, plane_row)
-        later, face = meets_later(tree, waves, radius, plane_row, ball, fall, seam, last, time, plane_delay, best)
+        later, face = meets_later(
+            tree, waves, radius, plane_row, ball, fall, seam, last, time, plane_delay, best
+        )
         if face >= 0:
             return later, face
     if found < 0:

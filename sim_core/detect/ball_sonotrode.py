@@ -47,7 +47,9 @@ def waving_plane_delay(
 
 
 @jit
-def _gap(numbers: np.ndarray, row: int, ball: Point, fall: Vec3, wave: Wave, time: float) -> WaveGap:
+def _gap(
+    numbers: np.ndarray, row: int, ball: Point, fall: Vec3, wave: Wave, time: float
+) -> WaveGap:
     """The gap between the centre and the face's moving plane."""
     normal = face_normal(numbers, row)
     lift = dot(normal, wave.axis)

@@ -11,12 +11,8 @@ from sim_core.numerics.jit import jit
 from sim_core.numerics.roots import NEVER, first_approach
 from sim_core.numerics.vec3 import Vec3, along, cross, dot, sub
 
-CONTACT = (
-    1e-13  # m: a gap this small is contact with a capsule; a thousandth of what would count as early, 100 x rounding
-)
-STEPS = (
-    1000  # 3 to 6 are used; a grazing touch converges by a factor of four a step, a ball sliding over an edge needs 300
-)
+CONTACT = 1e-13  # m: a gap this small is contact with a capsule; a thousandth of what would count as early, 100 x rounding
+STEPS = 1000  # 3 to 6 are used; a grazing touch converges by a factor of four a step, a ball sliding over an edge needs 300
 ROUNDING = 1e-15  # m: of a place in a face's plane
 HALF = 0.5  # of a radius: an overlap deeper than this is the far side of a one-sided face
 
@@ -71,7 +67,9 @@ def face_normal(numbers: np.ndarray, row: int) -> Vec3:
 
 
 @jit
-def face_delay(numbers: np.ndarray, row: int, ball: Point, fall: Vec3, radius: float, seam: float) -> float:
+def face_delay(
+    numbers: np.ndarray, row: int, ball: Point, fall: Vec3, radius: float, seam: float
+) -> float:
     """Time [s] until the centre meets the moved face from its shot side; NEVER if it does not."""
     normal = face_normal(numbers, row)
     gap = dot(normal, ball.position) - numbers[row, 3]
@@ -100,7 +98,9 @@ def nearer_neighbour(numbers: np.ndarray, row: int, away: Vec3) -> int:
 
 
 @jit
-def capsule_delay(numbers: np.ndarray, row: int, ball: Point, fall: Vec3, radius: float, limit: float) -> float:
+def capsule_delay(
+    numbers: np.ndarray, row: int, ball: Point, fall: Vec3, radius: float, limit: float
+) -> float:
     """Time [s] until the centre meets the capsule; NEVER if it does not within ``limit`` [s].
 
     The distance to a convex body is never below the distance to the plane that touches it at the nearest point.

@@ -10,7 +10,13 @@ again. Every stop lies before the contact, so nothing is stepped over, and near 
 import numpy as np
 
 from sim_core.detect.ball_mesh import SLACK, TINY, Scratch, stack_children
-from sim_core.detect.ball_triangle import CONTACT, HALF, away_from_capsule, face_normal, within_borders
+from sim_core.detect.ball_triangle import (
+    CONTACT,
+    HALF,
+    away_from_capsule,
+    face_normal,
+    within_borders,
+)
 from sim_core.effects.part_rotation import Seen, Turning, jerk_bound, seen_from_part
 from sim_core.geometry.bvh import Tree
 from sim_core.geometry.obstacles import CAPSULE
@@ -72,7 +78,9 @@ def first_part_contact(
             code = scratch.nodes[depth]
             if code < 0:
                 row = -1 - code
-                delay, sure = _delay(part.tree, row, turning, ball, fall, seen, seam, time, begin, end, jerk)
+                delay, sure = _delay(
+                    part.tree, row, turning, ball, fall, seen, seam, time, begin, end, jerk
+                )
                 if delay < end:
                     end = delay
                     best = delay
@@ -194,8 +202,12 @@ def _delay(
             if delay + step > end:
                 return NEVER, True
             if not round_edge and gap > CONTACT and jerk * near * step * step <= 3.0 * CONTACT:
-                at = along(along(seen.position, step, seen.velocity), 0.5 * step * step, seen.acceleration)
-                if rate + 2.0 * bend * step < -jerk * step * step and within_borders(tree.numbers, row, at, seam):
+                at = along(
+                    along(seen.position, step, seen.velocity), 0.5 * step * step, seen.acceleration
+                )
+                if rate + 2.0 * bend * step < -jerk * step * step and within_borders(
+                    tree.numbers, row, at, seam
+                ):
                     return delay + step, True
         else:  # behind a plane beside its face: on until it could come out in front
             step = first_approach(max(-gap, 0.0), -rate, -(bend + jerk * left / 6.0), 0.0)

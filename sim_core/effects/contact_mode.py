@@ -164,7 +164,11 @@ def static_law(footing: Footing | None, restitution: Restitution | None) -> Rest
 @jit
 def foot_normal(footing: Footing, ball: int, foot: int) -> Vec3:
     """Unit normal of a foot, towards the ball."""
-    return Vec3(footing.normals[ball, foot, 0], footing.normals[ball, foot, 1], footing.normals[ball, foot, 2])
+    return Vec3(
+        footing.normals[ball, foot, 0],
+        footing.normals[ball, foot, 1],
+        footing.normals[ball, foot, 2],
+    )
 
 
 @jit
@@ -236,7 +240,9 @@ def drop_foot(footing: Footing, ball: int, foot: int) -> None:
 
 
 @jit
-def add_foot(footing: Footing, ball: int, row: int, normal: Vec3, position: Vec3, scope: float) -> None:
+def add_foot(
+    footing: Footing, ball: int, row: int, normal: Vec3, position: Vec3, scope: float
+) -> None:
     """Stand on an obstacle too, good up to ``scope`` [m] from here; the oldest foot gives way to a fifth."""
     if footing.marks[ball, FEET] == MOST_FEET:
         drop_foot(footing, ball, 0)

@@ -53,12 +53,16 @@ def checked_drag(drag: Drag | None) -> Drag | None:
     """The same as plain floats; raises SceneError for numbers out of range."""
     if drag is None:
         return None
-    plain = Drag(*(number(f"drag.{name}", value) for name, value in zip(Drag._fields, drag, strict=True)))
+    plain = Drag(
+        *(number(f"drag.{name}", value) for name, value in zip(Drag._fields, drag, strict=True))
+    )
     for name, value in plain._asdict().items():
         if not 0.0 < value < math.inf:
             raise SceneError(f"drag.{name} is {value}: it must be positive")
     if plain.piece < SHORTEST:
-        raise SceneError(f"drag.piece is {plain.piece:g} s: it must be {SHORTEST:g} or more; the path is off by less")
+        raise SceneError(
+            f"drag.piece is {plain.piece:g} s: it must be {SHORTEST:g} or more; the path is off by less"
+        )
     return plain
 
 

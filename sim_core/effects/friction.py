@@ -64,7 +64,9 @@ def checked_friction(friction: Friction, tags: int) -> Friction:
     return Friction(surfaces, of_balls)
 
 
-def new_grip(friction: Friction, spins: np.ndarray, radius: float, tags_of_rows: np.ndarray) -> Grip:
+def new_grip(
+    friction: Friction, spins: np.ndarray, radius: float, tags_of_rows: np.ndarray
+) -> Grip:
     """All balls in flight, with their spins (n, 3) [rad/s], for a checked Friction.
 
     ``radius`` [m]; ``tags_of_rows`` (m,): the tag of each obstacle a ball can stand on.

@@ -115,13 +115,19 @@ def checked_axle(turn: Turn | None) -> Axle | None:
     for name in ("rpm", "swing", "frequency", "phase"):
         if getattr(turn, name) is not None:
             number(f"turn.{name}", getattr(turn, name))
-    if (turn.rpm is None) == (turn.swing is None) or (turn.swing is None) != (turn.frequency is None):
+    if (turn.rpm is None) == (turn.swing is None) or (turn.swing is None) != (
+        turn.frequency is None
+    ):
         raise SceneError("turn: give either rpm, or swing and frequency")
     if turn.rpm is not None and not abs(turn.rpm) <= FASTEST:
-        raise SceneError(f"turn.rpm is {turn.rpm}: it must lie between {-FASTEST:g} and {FASTEST:g}")
+        raise SceneError(
+            f"turn.rpm is {turn.rpm}: it must lie between {-FASTEST:g} and {FASTEST:g}"
+        )
     if turn.swing is not None and turn.frequency is not None:
         if not 0.0 <= turn.swing <= LARGEST_SWING:
-            raise SceneError(f"turn.swing is {turn.swing} rad: it must lie between 0 and {LARGEST_SWING:.0f}")
+            raise SceneError(
+                f"turn.swing is {turn.swing} rad: it must lie between 0 and {LARGEST_SWING:.0f}"
+            )
         if not 0.0 < turn.frequency < math.inf:
             raise SceneError(f"turn.frequency is {turn.frequency} Hz: it must be positive")
         if not TURN * turn.frequency * turn.swing <= fastest:
@@ -137,7 +143,12 @@ def checked_axle(turn: Turn | None) -> Axle | None:
     length = math.hypot(*turn.axis)
     x, y, z = (float(k) / length for k in turn.axis)
     px, py, pz = (float(k) for k in turn.axis_point)
-    return Axle(int(turn.tag), (px, py, pz), (x, y, z), math.inf if turn.swing is None else float(turn.swing))
+    return Axle(
+        int(turn.tag),
+        (px, py, pz),
+        (x, y, z),
+        math.inf if turn.swing is None else float(turn.swing),
+    )
 
 
 def angle_now(turning: Turning, time: float) -> float:
@@ -151,7 +162,9 @@ def turned(points: np.ndarray, point: np.ndarray, axis: np.ndarray, angle: float
     offset = points - point
     lift = (offset @ axis)[..., None] * axis
     across = offset - lift
-    return np.asarray(point + lift + math.cos(angle) * across + math.sin(angle) * np.cross(axis, across))
+    return np.asarray(
+        point + lift + math.cos(angle) * across + math.sin(angle) * np.cross(axis, across)
+    )
 
 
 @jit
@@ -187,7 +200,9 @@ def _turn_back(turning: Turning, vector: Vec3, c: float, s: float) -> Vec3:
 
 
 @jit
-def seen_from_part(turning: Turning, position: Vec3, velocity: Vec3, fall: Vec3, time: float) -> Seen:
+def seen_from_part(
+    turning: Turning, position: Vec3, velocity: Vec3, fall: Vec3, time: float
+) -> Seen:
     """A ball as the part sees it; all arguments in the room's frame, ``time`` [s] of the current window."""
     argument = turning.argument[0] + turning.rate * time
     angle, speed, change = argument, turning.rate, 0.0

@@ -55,7 +55,9 @@ def checked_random_phase(random_phase: RandomPhase | None, vibrating: int) -> Ra
     if not isinstance(seed, (int, np.integer)) or not 0 <= seed < SEEDS:
         raise SceneError(f"random_phase.seed is {seed!r}: give a whole number from 0 to {WORD}")
     if vibrating == 0:
-        raise SceneError("physics.random_phase is given without physics.vibration: nothing has a phase; give both")
+        raise SceneError(
+            "physics.random_phase is given without physics.vibration: nothing has a phase; give both"
+        )
     if vibrating > 1:
         raise SceneError(
             f"physics.random_phase is given, and {vibrating} vibrating surfaces: not supported together yet; give one "
@@ -100,7 +102,9 @@ def drawn(seed: int, ball: int, draw: int) -> float:
 
 
 @inlined
-def arrival(phases: Phases | None, position: Vec3, velocity: Vec3, pull: Vec3, ball: int, length: float) -> float:
+def arrival(
+    phases: Phases | None, position: Vec3, velocity: Vec3, pull: Vec3, ball: int, length: float
+) -> float:
     """Draw the phase anew for a ball that is out of the swing; one within it keeps it, and is to be looked at again
     when it gets out, if that is within ``length`` [s]: returns for how long [s] the phase is good.
     """
@@ -111,7 +115,10 @@ def arrival(phases: Phases | None, position: Vec3, velocity: Vec3, pull: Vec3, b
         phases.draws[ball] += 1
         phases.phase[ball] = drawn(phases.seed, ball, phases.draws[ball])
         return length
-    return min(length, first_approach(CLEAR - height, -dot(phases.up, velocity), -0.5 * dot(phases.up, pull), 0.0))
+    return min(
+        length,
+        first_approach(CLEAR - height, -dot(phases.up, velocity), -0.5 * dot(phases.up, pull), 0.0),
+    )
 
 
 @inlined

@@ -40,9 +40,13 @@ def checked_restitution(restitution: Restitution, tags: int) -> Restitution:
     pairs = [(f"surfaces[{i}]", *pair) for i, pair in enumerate(surfaces)] + [("balls", *of_balls)]
     for name, c0, v0 in pairs:
         if not 0.0 <= c0 <= 1.0 or not 0.0 < v0 < math.inf:
-            raise SceneError(f"restitution.{name} is ({c0}, {v0}): C0 must lie in [0, 1] and v0 be positive [m/s]")
+            raise SceneError(
+                f"restitution.{name} is ({c0}, {v0}): C0 must lie in [0, 1] and v0 be positive [m/s]"
+            )
     if not 0.0 <= restitution.elastic_below < math.inf:
-        raise SceneError(f"restitution.elastic_below is {restitution.elastic_below}: it must be 0 or more [m/s]")
+        raise SceneError(
+            f"restitution.elastic_below is {restitution.elastic_below}: it must be 0 or more [m/s]"
+        )
     return Restitution(surfaces, of_balls, float(restitution.elastic_below))
 
 

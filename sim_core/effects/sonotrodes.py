@@ -53,7 +53,10 @@ def new_waves(
     if len(waves) < 2:
         return None
     fastest = Fraction(float(max(one.frequency for one in vibrations)))
-    periods = [Fraction(float(one.frequency)) / fastest * round(Fraction(window) * fastest) for one in vibrations]
+    periods = [
+        Fraction(float(one.frequency)) / fastest * round(Fraction(window) * fastest)
+        for one in vibrations
+    ]
     phases = np.array([wave.phase for wave in waves])
     faces = np.zeros(len(tags), dtype=np.int64)
     for k, one in enumerate(vibrations):
@@ -73,7 +76,12 @@ def face_wave(waves: Waves | None, wave: Wave | None, face: int) -> Wave | None:
     if waves is None or wave is None:
         return wave
     k, numbers = waves.faces[face], waves.numbers
-    return Wave(numbers[k, 0], numbers[k, 1], numbers[k, 2], Vec3(numbers[k, 3], numbers[k, 4], numbers[k, 5]))
+    return Wave(
+        numbers[k, 0],
+        numbers[k, 1],
+        numbers[k, 2],
+        Vec3(numbers[k, 3], numbers[k, 4], numbers[k, 5]),
+    )
 
 
 @inlined

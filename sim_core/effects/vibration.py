@@ -56,11 +56,15 @@ def checked_waves(vibration: Vibration | tuple[Vibration, ...] | None) -> tuple[
         return (_checked_wave("vibration", vibration),)
     each: list[Vibration] = [*vibration] if isinstance(vibration, tuple) else []
     if not each or not all(isinstance(one, Vibration) for one in each):
-        raise SceneError(f"physics.vibration is {vibration!r}: give a Vibration, several of them in a tuple, or None")
+        raise SceneError(
+            f"physics.vibration is {vibration!r}: give a Vibration, several of them in a tuple, or None"
+        )
     tags = [one.tag for one in each]
     for k, tag in enumerate(tags):
         if tag in tags[:k]:
-            raise SceneError(f"vibration[{k}].tag is {tag}, as vibration[{tags.index(tag)}].tag: give each its own")
+            raise SceneError(
+                f"vibration[{k}].tag is {tag}, as vibration[{tags.index(tag)}].tag: give each its own"
+            )
     return tuple(_checked_wave(f"vibration[{k}]", one) for k, one in enumerate(each))
 
 

@@ -41,8 +41,14 @@ class AnalyticCavity:
     @property
     def bounds(self) -> np.ndarray:
         """Lowest and highest corner of the bounding box [m], (2, 3)."""
-        flat = self.outline if self.radius is None else self.centre + self.radius * np.array([[-1.0], [1.0]])
-        return np.column_stack([np.stack([flat.min(axis=0), flat.max(axis=0)]), [self.bottom, self.top]])
+        flat = (
+            self.outline
+            if self.radius is None
+            else self.centre + self.radius * np.array([[-1.0], [1.0]])
+        )
+        return np.column_stack(
+            [np.stack([flat.min(axis=0), flat.max(axis=0)]), [self.bottom, self.top]]
+        )
 
     @property
     def middle(self) -> np.ndarray:
@@ -53,7 +59,11 @@ class AnalyticCavity:
     def volume(self) -> float:
         """Enclosed volume [m³]."""
         x, y = self.outline.T
-        area = 0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1)) if self.radius is None else np.pi * self.radius**2
+        area = (
+            0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1))
+            if self.radius is None
+            else np.pi * self.radius**2
+        )
         return float(area * (self.top - self.bottom))
 
     @property
@@ -61,7 +71,9 @@ class AnalyticCavity:
         """Unit normals towards the shot (p, 3) and offsets (p,) [m] of the plane surfaces, by number."""
         edge = np.roll(self.outline, -1, axis=0) - self.outline
         inward = np.column_stack([-edge[:, 1], edge[:, 0]]) / np.hypot(*edge.T)[:, None]
-        normals = np.concatenate([[[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]], np.column_stack([inward, 0.0 * edge[:, 0]])])
+        normals = np.concatenate(
+            [[[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]], np.column_stack([inward, 0.0 * edge[:, 0]])]
+        )
         offsets = [self.bottom, -self.top, *np.einsum("ij,ij->i", inward, self.outline)]
         return normals, np.array(offsets)
 
@@ -80,7 +92,9 @@ class AnalyticCavity:
         flat = points @ normals.T - offsets
         if self.radius is None:
             return np.asarray(flat)
-        return np.column_stack([flat, self.radius - np.linalg.norm(points[:, :2] - self.centre, axis=1)])
+        return np.column_stack(
+            [flat, self.radius - np.linalg.norm(points[:, :2] - self.centre, axis=1)]
+        )
 
     def contains(self, points: np.ndarray, swing: float = 0.0) -> np.ndarray:
         """Which points (n, 3) [m] are inside, (n,) bool; also down to where a floor that swings so far [m] gets."""
@@ -114,7 +128,11 @@ class AnalyticCavity:
 
 
 def cylinder_cavity(
-    diameter: float, bottom: float, top: float, tags: Sequence[int], centre: tuple[float, float] = (0.0, 0.0)
+    diameter: float,
+    bottom: float,
+    top: float,
+    tags: Sequence[int],
+    centre: tuple[float, float] = (0.0, 0.0),
 ) -> AnalyticCavity:
     """An upright cylinder of ``diameter`` [m] between the heights ``bottom`` and ``top`` [m] about ``centre`` [m].
 
@@ -128,15 +146,24 @@ def cylinder_cavity(
     return _cavity(bottom, top, tags, 1, np.zeros((0, 2)), middle, 0.5 * float(diameter))
 
 
-def prism_cavity(outline: np.ndarray, bottom: float, top: float, tags: Sequence[int]) -> AnalyticCavity:
+def prism_cavity(
+    outline: np.ndarray, bottom: float, top: float, tags: Sequence[int]
+) -> AnalyticCavity:
     """An upright prism over the convex ``outline`` (n, 2) [m], anticlockwise seen from above; a box has n = 4.
 
     ``bottom``, ``top`` [m]; ``tags``: of floor, ceiling and sides, one for all sides or one each. Raises SceneError for
     an outline that is not convex, naming the corner, and for numbers that make no prism.
     """
     corners = np.array(outline, dtype=np.float64)
-    if corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < 3 or not np.isfinite(corners).all():
-        raise SceneError(f"prism_cavity: outline must be finite numbers of shape (n, 2) with n >= 3, not {outline}")
+    if (
+        corners.ndim != 2
+        or corners.shape[1] != 2
+        or len(corners) < 3
+        or not np.isfinite(corners).all()
+    ):
+        raise SceneError(
+            f"prism_cavity: outline must be finite numbers of shape (n, 2) with n >= 3, not {outline}"
+        )
     edge = np.roll(corners, -1, axis=0) - corners
     back = np.roll(edge, 1, axis=0)
     length = np.hypot(*edge.T)
@@ -164,7 +191,9 @@ def _cavity(
     if not (np.isfinite([bottom, top]).all() and bottom < top):
         raise SceneError(f"an analytical cavity from {bottom} to {top} m: top must be above bottom")
     given = [*tags, *([tags[-1]] * (sides - 1) if len(tags) == SIDE + 1 else [])]
-    if len(given) != SIDE + sides or not all(tag == int(tag) and 0 <= tag < MAX_TAGS for tag in given):
+    if len(given) != SIDE + sides or not all(
+        tag == int(tag) and 0 <= tag < MAX_TAGS for tag in given
+    ):
         raise SceneError(
             f"an analytical cavity's tags are {tuple(tags)}: give floor, ceiling and sides, 0 to {MAX_TAGS - 1}"
         )

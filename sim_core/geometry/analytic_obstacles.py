@@ -8,10 +8,16 @@ from sim_core.geometry.obstacles import FACE, NUMBERS, ROUND, WAVING_FACE, Bore,
 
 def bore_of(cavity: AnalyticCavity) -> Bore | None:
     """The axis of a cylinder, relative to the middle; None for a prism."""
-    return None if cavity.radius is None else Bore(*(float(x) for x in (cavity.centre - cavity.middle[:2])))
+    return (
+        None
+        if cavity.radius is None
+        else Bore(*(float(x) for x in (cavity.centre - cavity.middle[:2])))
+    )
 
 
-def analytic_obstacles(cavity: AnalyticCavity, radius: float, waving_tag: int, swing: float) -> Obstacles:
+def analytic_obstacles(
+    cavity: AnalyticCavity, radius: float, waving_tag: int, swing: float
+) -> Obstacles:
     """Obstacles for balls of one radius [m], relative to the cavity's middle; the floor vibrates by ``swing`` [m] if it
     has the ``waving_tag``.
 

@@ -43,7 +43,9 @@ def build_tree(obstacles: Obstacles, radius: float) -> Tree:
     """The tree over the obstacles of balls of this radius [m]."""
     count = len(obstacles.low)
     size = max(np.abs(obstacles.low).max(), np.abs(obstacles.high).max())
-    pad = 16.0 * np.finfo(np.float32).eps * size  # float32 boxes are never smaller than the float64 ones
+    pad = (
+        16.0 * np.finfo(np.float32).eps * size
+    )  # float32 boxes are never smaller than the float64 ones
     low, high = obstacles.low - pad, obstacles.high + pad
     order = np.arange(count)
     most = count + 2  # a node has at least two children
@@ -51,7 +53,17 @@ def build_tree(obstacles: Obstacles, radius: float) -> Tree:
     children = np.full((most, BOXES), EMPTY, dtype=np.int32)
     ranges = np.zeros((most, 3), dtype=np.int64)  # first and last obstacle, and level, of each node
     bins = np.zeros((BINS, 7))
-    nodes = _grow(low, high, order, bounds, children, ranges, bins, np.zeros((BINS, 7)), np.zeros((BOXES, 2), np.int64))
+    nodes = _grow(
+        low,
+        high,
+        order,
+        bounds,
+        children,
+        ranges,
+        bins,
+        np.zeros((BINS, 7)),
+        np.zeros((BOXES, 2), np.int64),
+    )
     if ranges[:nodes, 2].max() > LEVELS:
         raise SceneError(
             f"the mesh's triangles are spread so unevenly that their tree is more than {LEVELS} levels deep; "
@@ -74,7 +86,11 @@ def joined(trees: list[Tree]) -> tuple[Tree, np.ndarray]:
     roots = np.cumsum([0, *(len(tree.children) for tree in trees[:-1])])
     rows = np.cumsum([0, *(len(tree.kinds) for tree in trees[:-1])])
     children = [
-        np.where(tree.children >= 0, tree.children + root, np.where(tree.children == EMPTY, EMPTY, tree.children - row))
+        np.where(
+            tree.children >= 0,
+            tree.children + root,
+            np.where(tree.children == EMPTY, EMPTY, tree.children - row),
+        )
         for tree, root, row in zip(trees, roots, rows, strict=True)
     ]
     whole = Tree(
@@ -133,7 +149,11 @@ def _grow(
                 children[node, g] = -1 - start
             else:
                 children[node, g] = nodes
-                ranges[nodes, 0], ranges[nodes, 1], ranges[nodes, 2] = start, end, ranges[node, 2] + 1
+                ranges[nodes, 0], ranges[nodes, 1], ranges[nodes, 2] = (
+                    start,
+                    end,
+                    ranges[node, 2] + 1,
+                )
                 nodes += 1
         node += 1
     return nodes
@@ -200,13 +220,21 @@ def _clear(bins: np.ndarray) -> None:
 
 
 @jit
-def _bin_of(low: np.ndarray, high: np.ndarray, i: int, axis: int, first: float, scale: float) -> int:
+def _bin_of(
+    low: np.ndarray, high: np.ndarray, i: int, axis: int, first: float, scale: float
+) -> int:
     return min(BINS - 1, int((0.5 * (low[i, axis] + high[i, axis]) - first) * scale))
 
 
 @jit
 def _cut(
-    low: np.ndarray, high: np.ndarray, order: np.ndarray, start: int, end: int, bins: np.ndarray, sweep: np.ndarray
+    low: np.ndarray,
+    high: np.ndarray,
+    order: np.ndarray,
+    start: int,
+    end: int,
+    bins: np.ndarray,
+    sweep: np.ndarray,
 ) -> int:
     """Sort a group into two at the cheapest of BINS - 1 places along each axis; returns where the second begins."""
     best, best_axis, best_bin, best_first, best_scale = np.inf, -1, 0, 0.0, 0.0

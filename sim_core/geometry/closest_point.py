@@ -29,7 +29,9 @@ class Nearest(NamedTuple):
     point: np.ndarray
 
 
-def nearest(mesh: TriangleMesh, places: np.ndarray, reach: float | np.ndarray, tag: int | None = None) -> Nearest:
+def nearest(
+    mesh: TriangleMesh, places: np.ndarray, reach: float | np.ndarray, tag: int | None = None
+) -> Nearest:
     """The surface point nearest to each of the places (n, 3) [m], if one is nearer than ``reach`` [m], () or (n,).
 
     ``tag``: only the triangles that have it count.
@@ -54,7 +56,9 @@ def _tree_of(mesh: TriangleMesh, tag: int | None) -> Tree:
     numbers = np.ascontiguousarray(corners.reshape(len(own), 9))
     triangles = np.repeat(own[:, None], 2, axis=1)
     kinds = np.full(len(own), FACE, dtype=np.uint8)
-    return build_tree(Obstacles(numbers, kinds, triangles, corners.min(axis=1), corners.max(axis=1)), 0.0)
+    return build_tree(
+        Obstacles(numbers, kinds, triangles, corners.min(axis=1), corners.max(axis=1)), 0.0
+    )
 
 
 @jit
@@ -85,7 +89,11 @@ def _find(tree: Tree, found: Nearest, stack: np.ndarray, entry: np.ndarray) -> N
                 if dot(offset, offset) < least:
                     least = dot(offset, offset)
                     found.triangle[i] = tree.triangles[-1 - number, 0]
-                    found.point[i, 0], found.point[i, 1], found.point[i, 2] = point.x, point.y, point.z
+                    found.point[i, 0], found.point[i, 1], found.point[i, 2] = (
+                        point.x,
+                        point.y,
+                        point.z,
+                    )
             for k in range(first, size - 1):  # the nearest of the new ones is looked into next
                 if entry[k] < entry[size - 1]:
                     stack[k], stack[size - 1] = stack[size - 1], stack[k]

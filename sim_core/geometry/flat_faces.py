@@ -50,7 +50,9 @@ def in_plane(vertices: np.ndarray) -> float:
     return min(max(IN_PLANE, rounding), MOST_IN_PLANE)
 
 
-def find_flats(corners: np.ndarray, partners: np.ndarray, surface: np.ndarray, tolerance: float) -> Flats:
+def find_flats(
+    corners: np.ndarray, partners: np.ndarray, surface: np.ndarray, tolerance: float
+) -> Flats:
     """Flats of LEAST triangles and more.
 
     ``corners`` (m, 3, 3) [m]; ``partners`` as edge_partners gives them; ``surface`` (m,): only triangles of one number
@@ -62,7 +64,19 @@ def find_flats(corners: np.ndarray, partners: np.ndarray, surface: np.ndarray, t
     seeds = np.zeros(len(corners), dtype=np.int32)
     queue = np.zeros(len(corners), dtype=np.int32)
     tried = np.zeros(len(corners), dtype=np.bool_)
-    count = _grow(corners, normals, doubled, partners, surface, tolerance, largest_first, flat, seeds, queue, tried)
+    count = _grow(
+        corners,
+        normals,
+        doubled,
+        partners,
+        surface,
+        tolerance,
+        largest_first,
+        flat,
+        seeds,
+        queue,
+        tried,
+    )
     seed = seeds[:count].copy()
     rims = _rims(flat, partners, count)
     frames = np.zeros((count, 3, 3))
@@ -131,7 +145,9 @@ def _grow(
 
 
 @jit
-def _lies_in(corners: np.ndarray, normals: np.ndarray, triangle: int, seed: int, tolerance: float) -> bool:
+def _lies_in(
+    corners: np.ndarray, normals: np.ndarray, triangle: int, seed: int, tolerance: float
+) -> bool:
     """True when the triangle lies in the seed's plane and faces the same way."""
     facing = 0.0
     for axis in range(3):
@@ -141,7 +157,9 @@ def _lies_in(corners: np.ndarray, normals: np.ndarray, triangle: int, seed: int,
     for corner in range(3):
         height = 0.0
         for axis in range(3):
-            height += normals[seed, axis] * (corners[triangle, corner, axis] - corners[seed, 0, axis])
+            height += normals[seed, axis] * (
+                corners[triangle, corner, axis] - corners[seed, 0, axis]
+            )
         if abs(height) > tolerance:
             return False
     return True

@@ -42,20 +42,32 @@ class TriangleMesh:
         if vertices.ndim != 2 or vertices.shape[1] != 3:
             raise SceneError(f"mesh vertices must have shape (n, 3), not {vertices.shape}")
         if triangles.ndim != 2 or triangles.shape[1] != 3 or len(triangles) < 4:
-            raise SceneError(f"mesh triangles must have shape (m, 3) with m >= 4, not {triangles.shape}")
+            raise SceneError(
+                f"mesh triangles must have shape (m, 3) with m >= 4, not {triangles.shape}"
+            )
         triangles = _whole("triangles", triangles).astype(np.int32)
         tags = np.asarray(self.tags)
         if tags.shape != (len(triangles),):
-            raise SceneError(f"mesh tags must have shape ({len(triangles)},), one a triangle, not {tags.shape}")
+            raise SceneError(
+                f"mesh tags must have shape ({len(triangles)},), one a triangle, not {tags.shape}"
+            )
         tags = _whole("tags", tags)
         if tags.min() < 0 or tags.max() >= MAX_TAGS:
-            raise SceneError(f"mesh tags must lie between 0 and {MAX_TAGS - 1}, not {tags.min()} to {tags.max()}")
+            raise SceneError(
+                f"mesh tags must lie between 0 and {MAX_TAGS - 1}, not {tags.min()} to {tags.max()}"
+            )
         bad = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
         if len(bad):
-            raise SceneError(f"mesh vertex {bad[0]} is {vertices[bad[0]].tolist()}: coordinates must be finite")
-        wrong = np.flatnonzero((triangles < 0).any(axis=1) | (triangles >= len(vertices)).any(axis=1))
+            raise SceneError(
+                f"mesh vertex {bad[0]} is {vertices[bad[0]].tolist()}: coordinates must be finite"
+            )
+        wrong = np.flatnonzero(
+            (triangles < 0).any(axis=1) | (triangles >= len(vertices)).any(axis=1)
+        )
         if len(wrong):
-            raise SceneError(f"mesh triangle {wrong[0]} names a vertex outside 0 to {len(vertices) - 1}")
+            raise SceneError(
+                f"mesh triangle {wrong[0]} names a vertex outside 0 to {len(vertices) - 1}"
+            )
         _require_closed(vertices, triangles)
         for array in (vertices, triangles):
             array.flags.writeable = False
@@ -94,7 +106,9 @@ def _whole(name: str, numbers: np.ndarray) -> np.ndarray:
         raise SceneError(f"mesh {name} must be whole numbers, not {numbers.dtype}") from None
     wrong = np.flatnonzero(~whole.reshape(len(numbers), -1).all(axis=1))
     if len(wrong):
-        raise SceneError(f"mesh {name} must be whole numbers: of triangle {wrong[0]}, {numbers[wrong[0]].tolist()}")
+        raise SceneError(
+            f"mesh {name} must be whole numbers: of triangle {wrong[0]}, {numbers[wrong[0]].tolist()}"
+        )
     return numbers.astype(np.int64)
 
 
@@ -114,7 +128,11 @@ def towards_shot(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _require_closed(vertices: np.ndarray, triangles: np.ndarray) -> None:
     """Every directed edge once, its reverse once, and the volume positive."""
-    edges = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2).astype(np.int64)
+    edges = (
+        np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1)
+        .reshape(-1, 2)
+        .astype(np.int64)
+    )
     twice = np.flatnonzero(edges[:, 0] == edges[:, 1])
     if len(twice):
         raise SceneError(f"mesh triangle {twice[0] // 3} uses one vertex twice; remove it")
@@ -124,7 +142,9 @@ def _require_closed(vertices: np.ndarray, triangles: np.ndarray) -> None:
     if counts.max() > 1:
         edge = np.flatnonzero(forward == keys[counts > 1][0])
         named = f"triangles {edge[0] // 3} and {edge[1] // 3}"
-        raise SceneError(f"mesh {named} run along a shared edge the same way: flipped or overlapping triangles")
+        raise SceneError(
+            f"mesh {named} run along a shared edge the same way: flipped or overlapping triangles"
+        )
     lonely = np.flatnonzero(~np.isin(backward, keys))
     if len(lonely):
         where = vertices[edges[lonely[0]]].mean(axis=0)

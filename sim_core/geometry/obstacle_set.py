@@ -63,7 +63,13 @@ def build_ground(
     turns = part_of(obstacles, mesh, axle, radius)
     part = part_tree(chosen(obstacles, turns), mesh, axle, radius)
     return Ground(
-        build_tree(chosen(obstacles, ~turns), radius), locator, mesh.tags, overlap, part, np.zeros(1, np.int64), None
+        build_tree(chosen(obstacles, ~turns), radius),
+        locator,
+        mesh.tags,
+        overlap,
+        part,
+        np.zeros(1, np.int64),
+        None,
     )
 
 
@@ -74,6 +80,8 @@ def _analytic_ground(
     trees = [build_tree(analytic_obstacles(cavity, r, waving_tag, swing), r) for r in radii]
     tree, roots = joined(trees)
     count, overlap = len(cavity.tags), seam(radii[-1])
-    lone = Flats(np.full(count, LONE, dtype=np.int32), np.zeros(0, dtype=np.int32), np.zeros((0, 3, 3)), [])
+    lone = Flats(
+        np.full(count, LONE, dtype=np.int32), np.zeros(0, dtype=np.int32), np.zeros((0, 3, 3)), []
+    )
     locator = build_locator(np.zeros((count, 3, 3)), lone, overlap)
     return Ground(tree, locator, cavity.tags, overlap, None, roots, bore_of(cavity))

@@ -132,16 +132,22 @@ def _faces(
     )
 
 
-def _few_faces(corners: np.ndarray, outline: np.ndarray, frame: np.ndarray, area: float) -> np.ndarray | None:
+def _few_faces(
+    corners: np.ndarray, outline: np.ndarray, frame: np.ndarray, area: float
+) -> np.ndarray | None:
     """Corners (k, 4, 3) [m] of the faces that cover a flat of this area [m²]; None if its outline is not understood."""
     origin, axes = frame[0], frame[1:]
-    ends = np.stack([corners[outline // 3, outline % 3], corners[outline // 3, (outline % 3 + 1) % 3]], axis=1)
+    ends = np.stack(
+        [corners[outline // 3, outline % 3], corners[outline // 3, (outline % 3 + 1) % 3]], axis=1
+    )
     faces = cover((ends - origin) @ axes.T, area)
     if faces is None:
         return None
     pieces = origin + faces[:, ::-1] @ axes
     sides = np.linalg.norm(pieces - np.roll(pieces, -1, axis=1), axis=2) > 0.0
-    return np.asarray(pieces[sides.sum(axis=1) >= 3])  # one that rounding made a point or a line would have no borders
+    return np.asarray(
+        pieces[sides.sum(axis=1) >= 3]
+    )  # one that rounding made a point or a line would have no borders
 
 
 def _share_plane(numbers: np.ndarray, waving: np.ndarray) -> None:
@@ -167,7 +173,9 @@ def _capsules(
     two = edge_partners(mesh.triangles)
     one = np.flatnonzero(np.arange(len(two)) < two)  # each edge once, as two directed edges 3 t + k
     two = two[one]
-    swap = flats.flat[one // 3] > flats.flat[two // 3]  # all edges between two flats have them in one order
+    swap = (
+        flats.flat[one // 3] > flats.flat[two // 3]
+    )  # all edges between two flats have them in one order
     one, two = np.where(swap, two, one), np.where(swap, one, two)
     t_one, k_one, t_two, k_two = one // 3, one % 3, two // 3, two % 3
     start = corners[t_one, k_one]
@@ -183,7 +191,9 @@ def _capsules(
     # where many flat edges meet, the moved faces part further than they reach: there a capsule's end is the corner
     turn = np.where(flat & behind & ~waving[t_one] & ~waving[t_two], bend, 0.0)
     tips = np.stack([mesh.triangles[t_one, k_one], mesh.triangles[t_two, k_two]])
-    around = np.bincount(tips.ravel(), np.tile(turn, 2))  # of each corner: four times how far its faces part, or more
+    around = np.bincount(
+        tips.ravel(), np.tile(turn, 2)
+    )  # of each corner: four times how far its faces part, or more
     convex |= (turn > 0.0) & (around[tips] > 4.0 * PAST_CORNERS * seam(radius) / radius).any(axis=0)
     rim = convex & (waving[t_one] | waving[t_two])
     if rim.any():
@@ -206,9 +216,9 @@ def _capsules(
     return Obstacles(
         numbers,
         np.full(len(keep), CAPSULE, dtype=np.uint8),
-        np.stack([np.where(solid[t_one], t_one, t_two), np.where(solid[t_two], t_two, t_one)], axis=1)[keep].astype(
-            np.int32
-        ),
+        np.stack(
+            [np.where(solid[t_one], t_one, t_two), np.where(solid[t_two], t_two, t_one)], axis=1
+        )[keep].astype(np.int32),
         ends.min(axis=1) - radius,
         ends.max(axis=1) + radius,
     )
@@ -225,7 +235,9 @@ def _straight_runs(
     head = triangles.reshape(-1)[one]
     tail = triangles[one // 3, (one % 3 + 1) % 3]
     sides = flats.flat[np.stack([one // 3, two // 3])]
-    follower = dict(zip(zip(head.tolist(), *sides.tolist(), strict=True), range(len(one)), strict=True))
+    follower = dict(
+        zip(zip(head.tolist(), *sides.tolist(), strict=True), range(len(one)), strict=True)
+    )
     in_run = (sides != LONE).all(axis=0)
     chosen, finish = [], []
     begun_by = {(int(tail[i]), int(sides[0, i]), int(sides[1, i])) for i in np.flatnonzero(in_run)}

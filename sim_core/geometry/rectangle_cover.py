@@ -53,11 +53,16 @@ def _cut(region: shapely.Geometry) -> list[shapely.Geometry]:
                 simple.append(polygon)
                 continue
             x0, y0, x1, y1 = shapely.bounds(polygon)
-            wide, high = x1 - x0 >= 0.5 * (y1 - y0), y1 - y0 >= 0.5 * (x1 - x0)  # a strip is cut across only
+            wide, high = (
+                x1 - x0 >= 0.5 * (y1 - y0),
+                y1 - y0 >= 0.5 * (x1 - x0),
+            )  # a strip is cut across only
             x = [x0, 0.5 * (x0 + x1), x1] if wide else [x0, x1]
             y = [y0, 0.5 * (y0 + y1), y1] if high else [y0, y1]
             quarters = [
-                shapely.box(x[i], y[j], x[i + 1], y[j + 1]) for i in range(len(x) - 1) for j in range(len(y) - 1)
+                shapely.box(x[i], y[j], x[i + 1], y[j + 1])
+                for i in range(len(x) - 1)
+                for j in range(len(y) - 1)
             ]
             todo += [(part, depth + 1) for part in shapely.intersection(polygon, quarters)]
     return simple
@@ -73,5 +78,7 @@ def _quadrangles(polygon: shapely.Geometry) -> np.ndarray:
         last = len(ring) - 1
         return np.array([ring[[0, k, k + 1, min(k + 2, last)]] for k in range(1, last, 2)])
     parts = shapely.get_parts(shapely.constrained_delaunay_triangles(polygon))
-    corners = np.array([shapely.get_coordinates(shapely.orient_polygons(part))[:3] for part in parts])
+    corners = np.array(
+        [shapely.get_coordinates(shapely.orient_polygons(part))[:3] for part in parts]
+    )
     return corners.reshape(-1, 3, 2)[:, [0, 1, 2, 2]]  # none of a piece that is but a line

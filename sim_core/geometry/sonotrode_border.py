@@ -51,7 +51,13 @@ def find_rim(
     rise = np.linalg.norm(np.cross(normals[face], normals[slope]), axis=1)
     run = np.einsum("ij,ij->i", normals[face], normals[slope])
     gentle = np.flatnonzero((run > 0.0) & (radius * (1.0 - run) < own))
-    still, slope, rise, run, own = still[gentle], slope[gentle], rise[gentle], run[gentle], own[gentle]
+    still, slope, rise, run, own = (
+        still[gentle],
+        slope[gentle],
+        rise[gentle],
+        run[gentle],
+        own[gentle],
+    )
     flat = np.flatnonzero(own * run > radius * rise)
     if len(flat):
         raise SceneError(
@@ -78,7 +84,11 @@ def require_room_at_joints(
     two = edge_partners(mesh.triangles)
     one = np.flatnonzero(np.arange(len(two)) < two)
     face, other = one // 3, two[one] // 3
-    room = radius * (1.0 - np.einsum("ij,ij->i", normals[face], normals[other])) - swing[face] - swing[other]
+    room = (
+        radius * (1.0 - np.einsum("ij,ij->i", normals[face], normals[other]))
+        - swing[face]
+        - swing[other]
+    )
     apart = waving[face] & waving[other] & (mesh.tags[face] != mesh.tags[other])
     tight = np.flatnonzero(apart & (room < 0.0))
     if len(tight):
@@ -90,7 +100,9 @@ def require_room_at_joints(
         )
 
 
-def carry_on(numbers: np.ndarray, triangle: np.ndarray, waving: np.ndarray, flats: Flats, rim: Rim) -> np.ndarray:
+def carry_on(
+    numbers: np.ndarray, triangle: np.ndarray, waving: np.ndarray, flats: Flats, rim: Rim
+) -> np.ndarray:
     """Moves the borders of faces out over gentle edges; returns how far (k,) [m] each face goes on at most.
 
     ``numbers`` (k, 20): faces as obstacles hold them, changed in place; ``triangle`` (k,): which each is booked on;

@@ -82,8 +82,16 @@ def triangle_at(locator: Locator, seed: int, at: Vec3) -> int:
         at.y - locator.frames[flat, 0, 1],
         at.z - locator.frames[flat, 0, 2],
     )
-    u = dx * locator.frames[flat, 1, 0] + dy * locator.frames[flat, 1, 1] + dz * locator.frames[flat, 1, 2]
-    v = dx * locator.frames[flat, 2, 0] + dy * locator.frames[flat, 2, 1] + dz * locator.frames[flat, 2, 2]
+    u = (
+        dx * locator.frames[flat, 1, 0]
+        + dy * locator.frames[flat, 1, 1]
+        + dz * locator.frames[flat, 1, 2]
+    )
+    v = (
+        dx * locator.frames[flat, 2, 0]
+        + dy * locator.frames[flat, 2, 1]
+        + dz * locator.frames[flat, 2, 2]
+    )
     across, along = locator.counts[flat, 0], locator.counts[flat, 1]
     x = int((u - locator.squares[flat, 0]) * locator.squares[flat, 2])
     y = int((v - locator.squares[flat, 1]) * locator.squares[flat, 3])
@@ -103,13 +111,18 @@ def triangles_at(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
 
     Triangles wound as in a TriangleMesh, normals away from the shot; a point off the plane is seen along its normal.
     """
-    corners, points = np.ascontiguousarray(corners, np.float64), np.ascontiguousarray(points, np.float64)
+    corners, points = (
+        np.ascontiguousarray(corners, np.float64),
+        np.ascontiguousarray(points, np.float64),
+    )
     normals, doubled = towards_shot(corners)
     seed = int(doubled.argmax())
     along = corners[seed, 1] - corners[seed, 0]
     along /= np.linalg.norm(along)
     frame = np.stack([corners[seed, 0], along, np.cross(normals[seed], along)])
-    flats = Flats(np.zeros(len(corners), dtype=np.int32), np.array([seed], dtype=np.int32), frame[None], [])
+    flats = Flats(
+        np.zeros(len(corners), dtype=np.int32), np.array([seed], dtype=np.int32), frame[None], []
+    )
     found = np.zeros(len(points), dtype=np.int64)
     _locate(build_locator(corners, flats, 0.0), seed, points, found)
     return found
@@ -127,7 +140,10 @@ def _outside(plan: np.ndarray, triangle: int, u: float, v: float) -> float:
     worst = -np.inf
     for k in range(3):
         a, b = 2 * k, 2 * ((k + 1) % 3)
-        along_u, along_v = plan[triangle, b] - plan[triangle, a], plan[triangle, b + 1] - plan[triangle, a + 1]
+        along_u, along_v = (
+            plan[triangle, b] - plan[triangle, a],
+            plan[triangle, b + 1] - plan[triangle, a + 1],
+        )
         turn = along_u * (v - plan[triangle, a + 1]) - along_v * (u - plan[triangle, a])
         length = np.sqrt(along_u * along_u + along_v * along_v)
         worst = max(worst, turn / length if length > 0.0 else -np.inf)

@@ -75,7 +75,10 @@ def part_tree(obstacles: Obstacles, mesh: TriangleMesh, axle: Axle, radius: floa
     height, across = _about(corners, axle)
     margin = 1.001 * radius  # and what faces overlap
     # balls are seen from the part as far off as the room and the axis go: float32 rounds that, not the part's size
-    furthest = np.abs(mesh.vertices - mesh.middle).max() + 2.0 * np.abs(np.array(axle.point) - mesh.middle).max()
+    furthest = (
+        np.abs(mesh.vertices - mesh.middle).max()
+        + 2.0 * np.abs(np.array(axle.point) - mesh.middle).max()
+    )
     pad = ROUNDINGS * np.finfo(np.float32).eps * furthest
     return PartTree(
         build_tree(obstacles._replace(low=obstacles.low - pad, high=obstacles.high + pad), radius),
@@ -155,7 +158,10 @@ def _require_free_corners(
     """``joint`` (n, 2, 3) [m]: beside these edges a corner may pass through what it is joined to."""
     part, room = np.unique(mesh.triangles[turning]), np.unique(mesh.triangles[~turning])
     line = _stacked(joint, axle)
-    for corners, triangles in ((np.setdiff1d(part, room), ~turning), (np.setdiff1d(room, part), turning)):
+    for corners, triangles in (
+        (np.setdiff1d(part, room), ~turning),
+        (np.setdiff1d(room, part), turning),
+    ):
         place = np.zeros(2, dtype=np.int64)
         if _passes_through(
             _stacked(mesh.vertices[corners], axle),
@@ -174,7 +180,12 @@ def _require_free_corners(
 
 @jit
 def _passes_through(
-    corners: np.ndarray, triangles: np.ndarray, joint: np.ndarray, swing: float, beside: float, place: np.ndarray
+    corners: np.ndarray,
+    triangles: np.ndarray,
+    joint: np.ndarray,
+    swing: float,
+    beside: float,
+    place: np.ndarray,
 ) -> bool:
     """True when a corner's circle about the axis, as far as it swings, crosses a triangle; ``place``: which two.
 
@@ -184,7 +195,9 @@ def _passes_through(
         a, b, c = triangles[t, 0, 2], triangles[t, 1, 2], triangles[t, 2, 2]
         low, high = min(a, b, c) + TOUCH, max(a, b, c) - TOUCH
         for i in range(len(corners)):
-            if low < corners[i, 2] < high and _crosses(triangles, t, corners, i, joint, swing, beside):
+            if low < corners[i, 2] < high and _crosses(
+                triangles, t, corners, i, joint, swing, beside
+            ):
                 place[0], place[1] = i, t
                 return True
     return False
@@ -192,7 +205,13 @@ def _passes_through(
 
 @jit
 def _crosses(
-    triangles: np.ndarray, t: int, corners: np.ndarray, i: int, joint: np.ndarray, swing: float, beside: float
+    triangles: np.ndarray,
+    t: int,
+    corners: np.ndarray,
+    i: int,
+    joint: np.ndarray,
+    swing: float,
+    beside: float,
 ) -> bool:
     """True when corner i turned by at most ``swing`` [rad] crosses triangle t, away from the joint."""
     height = corners[i, 2]

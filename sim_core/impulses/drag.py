@@ -39,7 +39,13 @@ def piece_left(air: Air | None, footing: Footing | None, ball: int, time: float)
 
 @inlined
 def _change(
-    air: Air, footing: Footing | None, motion: np.ndarray, ball: int, time: float, gravity: Gravity | None, span: float
+    air: Air,
+    footing: Footing | None,
+    motion: np.ndarray,
+    ball: int,
+    time: float,
+    gravity: Gravity | None,
+    span: float,
 ) -> Vec3:
     """Of the velocity [m/s], by so many seconds of air."""
     velocity = point_under(motion, ball, time, own_pull(footing, ball, gravity)).velocity
@@ -49,7 +55,12 @@ def _change(
 
 @inlined
 def catch_up(
-    air: Air | None, footing: Footing | None, motion: np.ndarray, ball: int, time: float, gravity: Gravity | None
+    air: Air | None,
+    footing: Footing | None,
+    motion: np.ndarray,
+    ball: int,
+    time: float,
+    gravity: Gravity | None,
 ) -> None:
     """Make the ball's velocity what the air has made of it by now."""
     if air is None:
@@ -62,7 +73,12 @@ def catch_up(
 
 @inlined
 def goes_on(
-    air: Air | None, footing: Footing | None, motion: np.ndarray, ball: int, time: float, gravity: Gravity | None
+    air: Air | None,
+    footing: Footing | None,
+    motion: np.ndarray,
+    ball: int,
+    time: float,
+    gravity: Gravity | None,
 ) -> bool:
     """The ball flies on: True if it is in the middle of a piece, and its path now another."""
     if air is None:
@@ -76,7 +92,9 @@ def goes_on(
 
 
 @jit
-def catch_all_up(air: Air | None, footing: Footing | None, velocities: np.ndarray, time: float) -> None:
+def catch_all_up(
+    air: Air | None, footing: Footing | None, velocities: np.ndarray, time: float
+) -> None:
     """Make velocities (n, 3) [m/s] in flight what the air has made of them by ``time``, no half piece ahead."""
     if air is None:
         return

@@ -10,12 +10,16 @@ from sim_core.effects.friction import OF_BALLS, Grip, law_of, spin_at
 from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.vec3 import Vec3, along, cross, dot, sub
 
-STICK = 2.0 / 7.0  # of solid spheres: share of v_t that a kick has to take from the centre to stop the touching point
+STICK = (
+    2.0 / 7.0
+)  # of solid spheres: share of v_t that a kick has to take from the centre to stop the touching point
 ALONE, PAIR = 1.0, 0.5  # m_eff over m
 
 
 @inlined
-def rub_surface(grip: Grip | None, ball: int, time: float, away: Vec3, relative: Vec3, change: Vec3, tag: int) -> Vec3:
+def rub_surface(
+    grip: Grip | None, ball: int, time: float, away: Vec3, relative: Vec3, change: Vec3, tag: int
+) -> Vec3:
     """The velocity change [m/s] of a ball at a surface, with friction; the ball's spin is changed.
 
     ``change`` [m/s]: that without; ``away``: any vector along the normal, from the surface to the ball; ``relative``
@@ -31,7 +35,9 @@ def rub_surface(grip: Grip | None, ball: int, time: float, away: Vec3, relative:
 
 
 @inlined
-def rub_pair(grip: Grip | None, one: int, two: int, time: float, apart: Vec3, closing: Vec3, change: Vec3) -> Vec3:
+def rub_pair(
+    grip: Grip | None, one: int, two: int, time: float, apart: Vec3, closing: Vec3, change: Vec3
+) -> Vec3:
     """The same for two balls that meet: the velocity change of the first, and minus that of the second.
 
     ``apart`` [m], ``closing`` [m/s]: second minus first.

@@ -19,7 +19,9 @@ from sim_core.scene.scene import Scene
 
 def _mark(physics: Physics, balls: int, alike: bool, bore: bool) -> Path:
     """A file that says that this set of effects has been compiled: what is absent is not in the machine code."""
-    present = [name for name, effect in zip(physics._fields, physics, strict=True) if effect is not None]
+    present = [
+        name for name, effect in zip(physics._fields, physics, strict=True) if effect is not None
+    ]
     kind = ["many" if balls >= MANY else "few", "alike" if alike else "mixed"]
     if len(physics.vibrations) > 1:
         kind.append("sonotrodes")
@@ -31,7 +33,9 @@ def is_compiled(physics: Physics, balls: int, alike: bool = True, bore: bool = F
     return _mark(physics, balls, alike, bore).exists()
 
 
-def compile_simulator(physics: Physics, balls: int = 1, alike: bool = True, bore: bool = False) -> float:
+def compile_simulator(
+    physics: Physics, balls: int = 1, alike: bool = True, bore: bool = False
+) -> float:
     """Compiles (or loads from the cache) what a scene with these effects and so many balls, ``alike`` or of several
     sizes, needs, in a mesh or a prism, or in the ``bore`` of an analytical cylinder; returns the seconds it took.
     """
@@ -40,7 +44,9 @@ def compile_simulator(physics: Physics, balls: int = 1, alike: bool = True, bore
         physics = physics._replace(vibration=physics.vibrations[:2])  # the same machine code
     shaken = [one.tag for one in physics.vibrations]
     vertices = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
-    quads = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
+    quads = np.array(
+        [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    )
     triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
     tags = np.full(len(triangles), next(tag for tag in range(3) if tag not in shaken))
     for height, tag in enumerate(shaken):  # floor and ceiling
@@ -57,9 +63,15 @@ def compile_simulator(physics: Physics, balls: int = 1, alike: bool = True, bore
     mesh = TriangleMesh(vertices, triangles, tags)
     floor = (vertices[triangles][:, :, 2] == 0.0).all(axis=1)
     walls = int(tags[~floor][0])
-    room = cylinder_cavity(2.0, 0.0, 1.0, (int(tags[floor][0]), walls, walls), (0.5, 0.5)) if bore else mesh
+    room = (
+        cylinder_cavity(2.0, 0.0, 1.0, (int(tags[floor][0]), walls, walls), (0.5, 0.5))
+        if bore
+        else mesh
+    )
     simulate(Scene(room, shot, physics, duration=0.01))
-    with contextlib.suppress(OSError):  # a cache that cannot be written: every process compiles for itself
+    with contextlib.suppress(
+        OSError
+    ):  # a cache that cannot be written: every process compiles for itself
         _mark(physics, balls, alike, bore).touch()
     return time.perf_counter() - start
 

@@ -129,7 +129,13 @@ def wake_if_it_moves(
 
 @jit
 def wake_neighbours(
-    footing: Footing, calendar: Calendar, motion: np.ndarray, ball: int, time: float, moment: float, reach: float
+    footing: Footing,
+    calendar: Calendar,
+    motion: np.ndarray,
+    ball: int,
+    time: float,
+    moment: float,
+    reach: float,
 ) -> None:
     """Call up the balls that stand on one that has begun to move, and those held still beside it.
 

@@ -8,7 +8,17 @@ from sim_core.contact.pushed_by_part import drive, taken_from_part
 from sim_core.contact.support_changes import BOUNCES, ROLLS, deflect, land, set_out, step
 from sim_core.detect.ball_cylinder import facing
 from sim_core.detect.ball_triangle import away_from_capsule, face_normal, nearer_neighbour
-from sim_core.effects.contact_mode import ASLEEP, CALLED, DRIVEN, JAMMED, LOOKS, MODE, Footing, own_pull, static_law
+from sim_core.effects.contact_mode import (
+    ASLEEP,
+    CALLED,
+    DRIVEN,
+    JAMMED,
+    LOOKS,
+    MODE,
+    Footing,
+    own_pull,
+    static_law,
+)
 from sim_core.effects.friction import Grip
 from sim_core.effects.part_rotation import Turning, from_part, seen_from_part, slip
 from sim_core.effects.random_phase import own_wave
@@ -75,7 +85,9 @@ def hit_surface(loop: Loop, ball: int, obstacle: int, time: float) -> None:
     follow(shot.crowd, shot.motion, ball, time)
     hide(loop.footing, shot.crowd, ball)
     if lay_still:
-        wake_if_it_moves(loop.footing, loop.calendar, shot.motion, ball, time, moment, reach_of(shot.crowd))
+        wake_if_it_moves(
+            loop.footing, loop.calendar, shot.motion, ball, time, moment, reach_of(shot.crowd)
+        )
     if landed == ROLLS:
         return
     if kind == WAVING_FACE:
@@ -85,11 +97,26 @@ def hit_surface(loop: Loop, ball: int, obstacle: int, time: float) -> None:
     speed = -dot(away, relative) / math.sqrt(dot(away, away))
     if page.record[tag] and speed > 0.0:
         when = clock.now[1] * clock.window + time - clock.origin
-        note_impact(page, when, ball, triangle_at(ground.locator, triangle, touched), here.position, relative, speed)
+        note_impact(
+            page,
+            when,
+            ball,
+            triangle_at(ground.locator, triangle, touched),
+            here.position,
+            relative,
+            speed,
+        )
 
 
 @inlined
-def hit_part(turning: Turning | None, part: PartTree | None, loop: Loop, ball: int, obstacle: int, time: float) -> bool:
+def hit_part(
+    turning: Turning | None,
+    part: PartTree | None,
+    loop: Loop,
+    ball: int,
+    obstacle: int,
+    time: float,
+) -> bool:
     """The same for an obstacle of the turning part, seen and written down in the part's frame; False if it is none."""
     if turning is None or part is None:
         return False
@@ -122,7 +149,9 @@ def hit_part(turning: Turning | None, part: PartTree | None, loop: Loop, ball: i
     follow(shot.crowd, shot.motion, ball, time)
     hide(loop.footing, shot.crowd, ball)
     if lay_still:
-        wake_if_it_moves(loop.footing, loop.calendar, shot.motion, ball, time, moment, reach_of(shot.crowd))
+        wake_if_it_moves(
+            loop.footing, loop.calendar, shot.motion, ball, time, moment, reach_of(shot.crowd)
+        )
     if page.record[tag] and speed > 0.0:
         when = clock.now[1] * clock.window + time - clock.origin
         touched = triangle_at(loop.ground.locator, triangle, sub(seen.position, away))
@@ -132,7 +161,14 @@ def hit_part(turning: Turning | None, part: PartTree | None, loop: Loop, ball: i
 
 @inlined
 def _rub_part(
-    grip: Grip | None, turning: Turning, ball: int, time: float, away: Vec3, relative: Vec3, change: Vec3, tag: int
+    grip: Grip | None,
+    turning: Turning,
+    ball: int,
+    time: float,
+    away: Vec3,
+    relative: Vec3,
+    change: Vec3,
+    tag: int,
 ) -> Vec3:
     """rub_surface for ``away`` and ``relative`` in the part's frame; spins are those of the room."""
     if grip is None:
@@ -170,7 +206,11 @@ def _kick_both(footing: Footing | None, loop: Loop, one: int, two: int, time: fl
             count_props(footing, motion, two, time, reach)
         return
     apart = sub(drift(motion, two, time), drift(motion, one, time))
-    closing = Vec3(motion[two, 3] - motion[one, 3], motion[two, 4] - motion[one, 4], motion[two, 5] - motion[one, 5])
+    closing = Vec3(
+        motion[two, 3] - motion[one, 3],
+        motion[two, 4] - motion[one, 4],
+        motion[two, 5] - motion[one, 5],
+    )
     change = pair_kick(apart, closing, loop.restitution)
     change = rub_pair(loop.grip, one, two, time, apart, closing, change)
     kick(motion, one, time, by_mass(loop.sizes, one, two, change))
@@ -197,7 +237,9 @@ def take_step(footing: Footing | None, loop: Loop, ball: int, what: int, time: f
     follow(loop.shot.crowd, motion, ball, time)
     hide(footing, loop.shot.crowd, ball)
     if lay_still:
-        wake_if_it_moves(footing, loop.calendar, motion, ball, time, moment, reach_of(loop.shot.crowd))
+        wake_if_it_moves(
+            footing, loop.calendar, motion, ball, time, moment, reach_of(loop.shot.crowd)
+        )
     return True
 
 

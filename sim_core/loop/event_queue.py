@@ -47,7 +47,9 @@ def new_calendar(balls: int, pairs: bool = True) -> Calendar:
     for match in range(seats - 1, 0, -1):
         one, two = winners[2 * match], winners[2 * match + 1]
         winners[match] = one if next_time[one] <= next_time[two] else two
-    return Calendar(np.full(balls, NEVER) if pairs else None, np.zeros(balls), marks, next_time, winners)
+    return Calendar(
+        np.full(balls, NEVER) if pairs else None, np.zeros(balls), marks, next_time, winners
+    )
 
 
 @inlined

@@ -46,7 +46,9 @@ STORM = 2
 TOO_FAST = 3
 
 PIECE = 0.01  # s: longest arc searched at once; its chord is off by g PIECE²/8 = 0.12 mm, so boxes stay tight
-STORM_EVENTS = 200_000  # of one ball in one window (20 ms): ten million a second is no gas but a jam
+STORM_EVENTS = (
+    200_000  # of one ball in one window (20 ms): ten million a second is no gas but a jam
+)
 
 # what to predict
 ALL, PAIRS, WALL = 0, 1, 2
@@ -75,7 +77,9 @@ def _predict_meeting(
 
 
 @inlined
-def _until_meeting(pair_time: np.ndarray | None, marks: np.ndarray, ball: int, time: float) -> float:
+def _until_meeting(
+    pair_time: np.ndarray | None, marks: np.ndarray, ball: int, time: float
+) -> float:
     """How far [s] a wall is looked for: no further than the ball is known to get, until its meeting, or one piece."""
     if pair_time is None:
         return PIECE
@@ -118,7 +122,9 @@ def _predict(loop: Loop, ball: int, time: float, what: int) -> None:
         length = arrival(loop.phases, here.position, here.velocity, pull, ball, length)
         wave = own_wave(loop.phases, loop.wave, ball)
         moment = loop.clock.now[1] * loop.clock.window + time
-        length, end = end_of_path(loop.footing, tree, seam, wave, here, pull, ball, time, moment, length)
+        length, end = end_of_path(
+            loop.footing, tree, seam, wave, here, pull, ball, time, moment, length
+        )
         look = one_turn(loop.turning, length) if end == STILL else length
         delay, obstacle = first_contact_from(
             loop.footing,

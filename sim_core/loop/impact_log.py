@@ -26,12 +26,23 @@ class ImpactPage(NamedTuple):
 
 def new_page(record: np.ndarray) -> ImpactPage:
     """An empty page recording the tags marked in ``record`` (256,) bool."""
-    return ImpactPage(np.zeros((CHUNK, 8)), np.zeros((CHUNK, 2), dtype=np.int32), np.zeros(1, dtype=np.int64), record)
+    return ImpactPage(
+        np.zeros((CHUNK, 8)),
+        np.zeros((CHUNK, 2), dtype=np.int32),
+        np.zeros(1, dtype=np.int64),
+        record,
+    )
 
 
 @inlined
 def note_impact(
-    page: ImpactPage, time: float, ball: int, triangle: int, position: Vec3, velocity: Vec3, speed: float
+    page: ImpactPage,
+    time: float,
+    ball: int,
+    triangle: int,
+    position: Vec3,
+    velocity: Vec3,
+    speed: float,
 ) -> None:
     """Write one impact down."""
     row = page.filled[0]
@@ -77,7 +88,9 @@ def impact_log(pages: list[tuple[np.ndarray, np.ndarray]], centre: np.ndarray) -
     numbers = numbers or [np.zeros((0, 8))]
     names = names or [np.zeros((0, 2), dtype=np.int32)]
 
-    def column(of: list[np.ndarray], part: int | slice) -> np.ndarray:  # one by one: ten million impacts are a gigabyte
+    def column(
+        of: list[np.ndarray], part: int | slice
+    ) -> np.ndarray:  # one by one: ten million impacts are a gigabyte
         return np.concatenate([page[:, part] for page in of])
 
     position = column(numbers, slice(1, 4))

@@ -13,7 +13,9 @@ MOST_NAMED = 4  # of the surfaces, and of the balls, nearest first
 ONE_WAY = 0.99  # cosine: triangles that face alike are one surface
 
 
-def touching(scene: Scene, corners: np.ndarray | None, positions: np.ndarray, ball: int) -> tuple[str, bool]:
+def touching(
+    scene: Scene, corners: np.ndarray | None, positions: np.ndarray, ball: int
+) -> tuple[str, bool]:
     """What touches the ball, e.g. "triangle 7, the turning part (triangle 12) and ball 3", and whether the part does.
 
     ``corners`` (m, 3, 3) [m]: the triangles where they are now, if some of them turn; ``positions`` (n, 3) [m].
@@ -22,12 +24,16 @@ def touching(scene: Scene, corners: np.ndarray | None, positions: np.ndarray, ba
     radius = float(radii[ball])
     names, held_by_part = _surfaces(scene, corners, here, radius)
     apart = np.linalg.norm(positions - here, axis=1) - radii - radius
-    meets = (apart <= LEANING) & (np.arange(len(apart)) != ball) & (physics.ball_collisions is not None)
+    meets = (
+        (apart <= LEANING) & (np.arange(len(apart)) != ball) & (physics.ball_collisions is not None)
+    )
     names += [f"ball {k}" for k in np.argsort(apart) if meets[k]][:MOST_NAMED]
     return " and ".join(filter(None, [", ".join(names[:-1]), *names[-1:]])), held_by_part
 
 
-def _surfaces(scene: Scene, corners: np.ndarray | None, here: np.ndarray, radius: float) -> tuple[list[str], bool]:
+def _surfaces(
+    scene: Scene, corners: np.ndarray | None, here: np.ndarray, radius: float
+) -> tuple[list[str], bool]:
     """The surfaces that touch a ball ``here`` (1, 3) [m], nearest first, and whether the turning part does."""
     physics = scene.physics
     if isinstance(scene.mesh, AnalyticCavity):
@@ -43,7 +49,10 @@ def _surfaces(scene: Scene, corners: np.ndarray | None, here: np.ndarray, radius
     normals = towards_shot(corners)[0]
     found: list[int] = []
     for t in sorted((t for t in near if gap[t] <= slack[t]), key=lambda t: gap[t]):
-        alike = (normals[t] @ normals[k] > ONE_WAY and scene.mesh.tags[t] == scene.mesh.tags[k] for k in found)
+        alike = (
+            normals[t] @ normals[k] > ONE_WAY and scene.mesh.tags[t] == scene.mesh.tags[k]
+            for k in found
+        )
         if not any(alike) and len(found) < MOST_NAMED:
             found.append(t)
     tags = [int(scene.mesh.tags[t]) for t in found]

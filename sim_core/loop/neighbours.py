@@ -11,7 +11,15 @@ from typing import NamedTuple
 import numpy as np
 
 from sim_core.detect.ball_ball import meeting_delay
-from sim_core.loop.spatial_blocks import MANY, Blocks, ball_in, new_blocks, slot_of, sort_blocks, widen
+from sim_core.loop.spatial_blocks import (
+    MANY,
+    Blocks,
+    ball_in,
+    new_blocks,
+    slot_of,
+    sort_blocks,
+    widen,
+)
 from sim_core.motion import drift
 from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.roots import NEVER
@@ -20,7 +28,9 @@ from sim_core.numerics.vec3 import Vec3, sub
 
 FAR_SHARE = np.float32(1.0 - 1e-6)  # of distance²: float32 loses 2e-7 of it in the miss distance
 SLACK = np.float32(1.000001)  # on float32 times: ten times their rounding
-ROUNDINGS = 16.0 * float(np.finfo(np.float32).eps)  # of the largest number in a sum of three products, and to spare
+ROUNDINGS = 16.0 * float(
+    np.finfo(np.float32).eps
+)  # of the largest number in a sum of three products, and to spare
 
 
 FINITE = 1e150  # m/s: its square is finite
@@ -55,7 +65,9 @@ def new_crowd(
     radii: np.ndarray | None = None,
 ) -> Crowd:
     """The crowd of balls with this motion (n, 6) in a room from ``low`` to ``high`` (3,) [m]."""
-    furthest = float(np.max(high - low)) + fastest * window  # a base lies up to a window's flight outside the room
+    furthest = (
+        float(np.max(high - low)) + fastest * window
+    )  # a base lies up to a window's flight outside the room
     margin = ROUNDINGS * furthest
     probe = np.zeros(10, dtype=np.float32)
     probe[7:] = (
@@ -64,7 +76,9 @@ def new_crowd(
         margin * fastest,
     )  # the last: b w + t w² of one that still approaches
     lanes = np.full((6, -(-len(motion) // LANES) * LANES), np.nan, dtype=np.float32)
-    blocks = new_blocks(len(motion), low, high, reach + 2.0 * margin) if len(motion) >= MANY else None
+    blocks = (
+        new_blocks(len(motion), low, high, reach + 2.0 * margin) if len(motion) >= MANY else None
+    )
     crowd = Crowd(lanes, probe, reach, fastest, window, blocks, radii)
     set_crowd(crowd, motion)
     return crowd
@@ -126,7 +140,9 @@ def _see(crowd: Crowd, motion: np.ndarray, ball: int) -> None:
 
 
 @inlined
-def next_meeting(crowd: Crowd, motion: np.ndarray, ball: int, time: float, before: float) -> tuple[float, int]:
+def next_meeting(
+    crowd: Crowd, motion: np.ndarray, ball: int, time: float, before: float
+) -> tuple[float, int]:
     """Time [s] and partner of the ball's first meeting after ``time`` and before ``before``.
 
     If there is none: -1, and the time up to which that is known, NEVER for few balls and the window's end for many.
@@ -171,9 +187,13 @@ def _search(
         while entered != 0:
             block = BOXES * node + lowest_bit(entered)
             entered &= entered - 1
-            near = _without(balls_near(crowd.lanes, LANES * block, crowd.probe), slot - LANES * block)
+            near = _without(
+                balls_near(crowd.lanes, LANES * block, crowd.probe), slot - LANES * block
+            )
             if near != 0:
-                best, partner = _nearest(crowd, motion, ball, time, LANES * block, near, best, partner)
+                best, partner = _nearest(
+                    crowd, motion, ball, time, LANES * block, near, best, partner
+                )
     return (time + best, partner) if partner >= 0 else (crowd.window, -1)
 
 
@@ -195,7 +215,14 @@ def _aim(ray: np.ndarray, motion: np.ndarray, ball: int, time: float) -> None:
 
 @inlined
 def _nearest(
-    crowd: Crowd, motion: np.ndarray, ball: int, time: float, first: int, near: int, best: float, partner: int
+    crowd: Crowd,
+    motion: np.ndarray,
+    ball: int,
+    time: float,
+    first: int,
+    near: int,
+    best: float,
+    partner: int,
 ) -> tuple[float, int]:
     """The earlier of the best meeting so far (a delay [s]) and those with the balls in the lanes that ``near`` marks.
 

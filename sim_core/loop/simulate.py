@@ -37,7 +37,9 @@ from sim_core.numerics.profiler import Stopwatch
 from sim_core.scene.invariants import contained, narrowest_gap, posed
 from sim_core.scene.scene import TOUCH, Scene
 
-CHECK_EVERY = 1.0  # s simulated between checks that every ball is still inside; one check costs about a ms
+CHECK_EVERY = (
+    1.0  # s simulated between checks that every ball is still inside; one check costs about a ms
+)
 
 
 @dataclass(frozen=True)
@@ -79,10 +81,18 @@ def simulate(scene: Scene, frames: Sequence[float] | np.ndarray = ()) -> Result:
     """
     run = _Run(scene)
     run.play(scene.warmup, record=False)
-    seen = run.play(scene.warmup + scene.duration, record=True, frames=_checked_frames(frames, scene))
+    seen = run.play(
+        scene.warmup + scene.duration, record=True, frames=_checked_frames(frames, scene)
+    )
     balls = run.balls()
     still = resting(run.footing, run.ground, balls.positions, run.centre, scene.warmup)
-    return Result(impact_log(run.pages, run.centre), balls, Collisions(*(int(n) for n in run.count)), still, seen)
+    return Result(
+        impact_log(run.pages, run.centre),
+        balls,
+        Collisions(*(int(n) for n in run.count)),
+        still,
+        seen,
+    )
 
 
 def _checked_frames(frames: Sequence[float] | np.ndarray, scene: Scene) -> np.ndarray:
@@ -114,22 +124,37 @@ class _Run:
             self.restitution = checked_restitution(scene.physics.restitution, tags)
         self.centre = scene.mesh.middle
         self.window = whole_periods(vibrations, WINDOW)
-        tags_waving, swings = tuple(one.tag for one in vibrations), tuple(float(one.amplitude) for one in vibrations)
+        tags_waving, swings = (
+            tuple(one.tag for one in vibrations),
+            tuple(float(one.amplitude) for one in vibrations),
+        )
         vibrating = scene.mesh.corners[np.isin(scene.mesh.tags, tags_waving)] - self.centre
         random_phase = checked_random_phase(scene.physics.random_phase, len(vibrations))
-        self.phases: Phases | None = new_phases(random_phase, self.wave, vibrating, 0.5 * scene.balls.diameters)
+        self.phases: Phases | None = new_phases(
+            random_phase, self.wave, vibrating, 0.5 * scene.balls.diameters
+        )
         self.turning: Turning | None = checked_turn(scene.physics.turn, self.centre)
         radii = tuple(float(r) for r in 0.5 * scene.balls.sizes)
-        self.ground = _ground(scene.mesh, radii, tags_waving, swings, checked_axle(scene.physics.turn))
-        self.waves: Waves | None = new_waves(vibrations, waves, self.window, self._tags_of_obstacles())
+        self.ground = _ground(
+            scene.mesh, radii, tags_waving, swings, checked_axle(scene.physics.turn)
+        )
+        self.waves: Waves | None = new_waves(
+            vibrations, waves, self.window, self._tags_of_obstacles()
+        )
         self.sizes: Sizes | None = new_sizes(scene.balls, self.ground.roots)
         self.collide = scene.physics.ball_collisions is not None
-        self.motion = np.concatenate([scene.balls.positions - self.centre, scene.balls.velocities], axis=1)
+        self.motion = np.concatenate(
+            [scene.balls.positions - self.centre, scene.balls.velocities], axis=1
+        )
         self.calendar: Calendar = new_calendar(len(self.motion), self.collide)
         self.scratch: Scratch = new_scratch()
         self.grip = self._grip(tags)
         self.footing: Footing | None = new_footing(
-            checked_rest(scene.physics.rest), len(self.motion), self.gravity, self.restitution, self.grip
+            checked_rest(scene.physics.rest),
+            len(self.motion),
+            self.gravity,
+            self.restitution,
+            self.grip,
         )
         drag = checked_drag(scene.physics.drag)
         self.air: Air | None = new_air(drag, scene.balls.diameters, scene.balls.densities)
@@ -144,7 +169,9 @@ class _Run:
         if friction is None:
             return None
         spins = np.zeros_like(balls.positions) if balls.spins is None else balls.spins
-        return new_grip(checked_friction(friction, tags), spins, balls.radius, self._tags_of_obstacles())
+        return new_grip(
+            checked_friction(friction, tags), spins, balls.radius, self._tags_of_obstacles()
+        )
 
     def _tags_of_obstacles(self) -> np.ndarray:
         return np.asarray(self.ground.tags[self.ground.tree.triangles[:, 0]])
@@ -159,7 +186,9 @@ class _Run:
         hide_all(self.footing, crowd)
         return Shot(self.motion, crowd)
 
-    def play(self, until: float, record: bool, frames: Sequence[float] | np.ndarray = ()) -> np.ndarray:
+    def play(
+        self, until: float, record: bool, frames: Sequence[float] | np.ndarray = ()
+    ) -> np.ndarray:
         """Advance to ``until`` [s], checking containment on the way; positions (f, n, 3) [m] at ``frames`` [s]."""
         page = new_page(self._recorded_tags() if record else np.zeros(MAX_TAGS, dtype=np.bool_))
         origin = self.scene.warmup
@@ -211,7 +240,9 @@ class _Run:
             elif status == TOO_FAST:
                 speed = float(np.abs(self.motion[ball, 3:]).max())
                 if not math.isfinite(speed):
-                    raise SimulationError(f"ball {ball}: its velocity is not a number any more; {self._when()}")
+                    raise SimulationError(
+                        f"ball {ball}: its velocity is not a number any more; {self._when()}"
+                    )
                 self.shot = self._shot(4.0 * speed)
             elif status == STORM:
                 raise SimulationError(self._jam(ball))
@@ -229,7 +260,11 @@ class _Run:
         return (
             f"ball {ball} jams at {where} m{f', between {between}' if between else ''}: more than ten million events "
             f"a second; {self._when()}. Look for a gap just as wide as the ball there"
-            + ("" if self.footing is not None else "; if balls can lie still there, switch contact mode on")
+            + (
+                ""
+                if self.footing is not None
+                else "; if balls can lie still there, switch contact mode on"
+            )
         )
 
     def _turn(self, page: ImpactPage) -> None:
@@ -255,7 +290,9 @@ class _Run:
         points, _ = self._states()
         bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
         if len(bad):
-            raise SimulationError(f"ball {bad[0]}: its position is not a number any more; {self._when()}")
+            raise SimulationError(
+                f"ball {bad[0]}: its position is not a number any more; {self._when()}"
+            )
         outside = np.flatnonzero(~self._inside(points))
         if len(outside):
             raise SimulationError(
@@ -274,11 +311,15 @@ class _Run:
         """Which points (n, 3) [m] are in the chamber; also down to where a face that swings wider than a ball is."""
         mesh, corners = self.scene.mesh, self._corners()
         if isinstance(mesh, AnalyticCavity):
-            return mesh.contains(points, max((one.amplitude for one in self.scene.physics.vibrations), default=0.0))
+            return mesh.contains(
+                points, max((one.amplitude for one in self.scene.physics.vibrations), default=0.0)
+            )
         inside = contained(mesh, points, corners)
         for one in self.scene.physics.vibrations:
             if one.amplitude >= 0.5 * self.scene.balls.sizes[0] and not inside.all():
-                inside |= contained(mesh, points + one.peak, corners) | contained(mesh, points - one.peak, corners)
+                inside |= contained(mesh, points + one.peak, corners) | contained(
+                    mesh, points - one.peak, corners
+                )
         return inside
 
     def _corners(self) -> np.ndarray | None:

@@ -113,5 +113,9 @@ def widen(blocks: Blocks | None, motion: np.ndarray, ball: int, time: float, win
         end = motion[ball, axis] + motion[ball, 3 + axis] * window
         low = np.float32(min(start, end) - blocks.grow)
         high = np.float32(max(start, end) + blocks.grow)
-        blocks.boxes[node, axis, child] = low if empty else min(low, blocks.boxes[node, axis, child])
-        blocks.boxes[node, 3 + axis, child] = high if empty else max(high, blocks.boxes[node, 3 + axis, child])
+        blocks.boxes[node, axis, child] = (
+            low if empty else min(low, blocks.boxes[node, axis, child])
+        )
+        blocks.boxes[node, 3 + axis, child] = (
+            high if empty else max(high, blocks.boxes[node, 3 + axis, child])
+        )

@@ -52,7 +52,9 @@ CACHE_FOLDER = _cache_root() / f"sim_core-{_sources_digest()}"
 
 def _remove_old_caches() -> None:
     """Keep the newest few folders; a folder in use by another process is simply made again there."""
-    folders = sorted(CACHE_FOLDER.parent.glob("sim_core-*"), key=lambda f: f.stat().st_mtime, reverse=True)
+    folders = sorted(
+        CACHE_FOLDER.parent.glob("sim_core-*"), key=lambda f: f.stat().st_mtime, reverse=True
+    )
     for folder in folders[KEPT_DIGESTS:]:
         shutil.rmtree(folder, ignore_errors=True)
 
@@ -73,11 +75,18 @@ _CACHED = _cache_is_usable() and not _settings.DISABLE_JIT
 
 def _compiled(function: Callable[..., Any], inline: bool) -> Callable[..., Any]:
     before = _settings.CACHE_DIR
-    _settings.CACHE_DIR = str(CACHE_FOLDER)  # read when the decorator runs; other packages keep theirs
+    _settings.CACHE_DIR = str(
+        CACHE_FOLDER
+    )  # read when the decorator runs; other packages keep theirs
     try:
-        return _njit(cache=_CACHED, nogil=True, error_model="numpy", fastmath=False, _nrt=False, forceinline=inline)(
-            function
-        )
+        return _njit(
+            cache=_CACHED,
+            nogil=True,
+            error_model="numpy",
+            fastmath=False,
+            _nrt=False,
+            forceinline=inline,
+        )(function)
     finally:
         _settings.CACHE_DIR = before
 

@@ -180,7 +180,9 @@ def first_wave_approach(w: WaveGap, limit: float, depth: float) -> float:
             if s >= limit:
                 return NEVER
         angle = w.omega * s + w.theta
-        half = float(math.floor((angle - alpha) / math.pi))  # pieces begin at half π ± alpha; even ones are convex
+        half = float(
+            math.floor((angle - alpha) / math.pi)
+        )  # pieces begin at half π ± alpha; even ones are convex
         while _piece_start(half + 1.0, alpha) <= angle:
             half += 1.0
         while _piece_start(half, alpha) > angle:
@@ -200,7 +202,9 @@ def first_wave_approach(w: WaveGap, limit: float, depth: float) -> float:
 def next_wave_approach(w: WaveGap, s: float, limit: float, depth: float) -> float:
     """First approach within ``limit`` [s] after the one at s, as if the ball had passed through the face there."""
     out = s + first_wave_approach(
-        _later(WaveGap(-w.c, -w.b, -w.a, w.swing, w.omega, w.theta + math.pi), s), limit - s, math.inf
+        _later(WaveGap(-w.c, -w.b, -w.a, w.swing, w.omega, w.theta + math.pi), s),
+        limit - s,
+        math.inf,
     )
     if out >= limit:
         return NEVER
@@ -209,7 +213,9 @@ def next_wave_approach(w: WaveGap, s: float, limit: float, depth: float) -> floa
 
 @jit
 def _later(w: WaveGap, s: float) -> WaveGap:
-    return WaveGap(w.c + s * (w.b + w.a * s), w.b + 2.0 * w.a * s, w.a, w.swing, w.omega, w.theta + w.omega * s)
+    return WaveGap(
+        w.c + s * (w.b + w.a * s), w.b + 2.0 * w.a * s, w.a, w.swing, w.omega, w.theta + w.omega * s
+    )
 
 
 @jit

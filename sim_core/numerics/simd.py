@@ -53,7 +53,9 @@ class _Vectors:
     def fused(self, a: Any, b: Any, c: Any) -> Any:
         """a b + c in one rounding: a filter may round as it likes."""
         kind = ir.FunctionType(self.type, [self.type] * 3)
-        function = cgutils.get_or_insert_function(self.builder.module, kind, f"llvm.fma.v{self.width}f32")
+        function = cgutils.get_or_insert_function(
+            self.builder.module, kind, f"llvm.fma.v{self.width}f32"
+        )
         return self.builder.call(function, [a, b, c])
 
     def sum(self, total: Any | None, a: Any, b: Any) -> Any:
@@ -71,7 +73,9 @@ def _data_of(context: Any, builder: Any, array_type: Any, array: Any) -> Any:
 
 
 @intrinsic
-def _boxes_hit(typing_context: Any, bounds: Any, node: Any, ray: Any, longest: Any, enter: Any) -> Any:
+def _boxes_hit(
+    typing_context: Any, bounds: Any, node: Any, ray: Any, longest: Any, enter: Any
+) -> Any:
     signature = types.int64(bounds, types.int64, ray, types.float32, enter)
 
     def codegen(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
@@ -86,7 +90,9 @@ def _boxes_hit(typing_context: Any, bounds: Any, node: Any, ray: Any, longest: A
         for axis in range(3):
 
             def number(k: int, axis: int = axis) -> Any:
-                return v.spread(builder.load(builder.gep(rays, [ir.Constant(node.type, 3 * k + axis)])))
+                return v.spread(
+                    builder.load(builder.gep(rays, [ir.Constant(node.type, 3 * k + axis)]))
+                )
 
             low = v.load(boxes, builder.add(first, ir.Constant(node.type, axis * BOXES)))
             high = v.load(boxes, builder.add(first, ir.Constant(node.type, (3 + axis) * BOXES)))
@@ -122,7 +128,9 @@ def _balls_near(typing_context: Any, lanes: Any, first: Any, probe: Any) -> Any:
         v = _Vectors(builder, WIDTH)
         columns = _data_of(context, builder, lanes_type, lanes)
         probes = _data_of(context, builder, probe_type, probe)
-        shape = cgutils.unpack_tuple(builder, context.make_array(lanes_type)(context, builder, lanes).shape)
+        shape = cgutils.unpack_tuple(
+            builder, context.make_array(lanes_type)(context, builder, lanes).shape
+        )
         width = shape[1]
         constant = width.type
 
@@ -133,7 +141,9 @@ def _balls_near(typing_context: Any, lanes: Any, first: Any, probe: Any) -> Any:
             square = closing = speed = None
             for axis in range(3):
                 place, velocity = (
-                    v.load(columns, builder.add(builder.mul(width, ir.Constant(constant, k)), start))
+                    v.load(
+                        columns, builder.add(builder.mul(width, ir.Constant(constant, k)), start)
+                    )
                     for k in (axis, 3 + axis)
                 )
                 apart = builder.fsub(place, number(axis))
@@ -143,7 +153,9 @@ def _balls_near(typing_context: Any, lanes: Any, first: Any, probe: Any) -> Any:
                 speed = v.sum(speed, relative, relative)
             miss = v.fused(square, number(7), number(8))
             # or equal: a touching pair may have one velocity in float32
-            may_meet = builder.fcmp_ordered(">=", builder.fmul(closing, closing), builder.fmul(speed, miss))
+            may_meet = builder.fcmp_ordered(
+                ">=", builder.fmul(closing, closing), builder.fmul(speed, miss)
+            )
             approaching = builder.fcmp_ordered("<", v.fused(speed, number(6), closing), number(9))
             return v.mask(builder.and_(may_meet, approaching))
 
@@ -190,7 +202,9 @@ def _ticks(typing_context: Any) -> Any:
 
     def codegen(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
         kind = ir.FunctionType(ir.IntType(64), [])
-        return builder.call(cgutils.get_or_insert_function(builder.module, kind, "llvm.readcyclecounter"), [])
+        return builder.call(
+            cgutils.get_or_insert_function(builder.module, kind, "llvm.readcyclecounter"), []
+        )
 
     return signature, codegen
 

@@ -17,12 +17,18 @@ def require_supported(cavity: AnalyticCavity, physics: Physics) -> None:
         if getattr(physics, name) is not None:
             raise SceneError(f"physics.{name} is not supported with an analytical cavity; {remedy}")
     gravity = physics.gravity
-    if cavity.radius is not None and gravity is not None and (gravity[0] != 0.0 or gravity[1] != 0.0):
+    if (
+        cavity.radius is not None
+        and gravity is not None
+        and (gravity[0] != 0.0 or gravity[1] != 0.0)
+    ):
         raise SceneError(
             f"physics.gravity is {tuple(gravity)}: not supported with an analytical cylinder unless along z; {remedy}"
         )
     if len(physics.vibrations) > 1:
-        raise SceneError(f"several vibrations are not supported with an analytical cavity; {remedy}")
+        raise SceneError(
+            f"several vibrations are not supported with an analytical cavity; {remedy}"
+        )
     for vibration in physics.vibrations:
         _require_floor(cavity, vibration, remedy)
 
@@ -41,7 +47,9 @@ def _require_floor(cavity: AnalyticCavity, vibration: Vibration, remedy: str) ->
         )
 
 
-def require_clear(cavity: AnalyticCavity, balls: Balls, vibrations: tuple[Vibration, ...], touch: float) -> None:
+def require_clear(
+    cavity: AnalyticCavity, balls: Balls, vibrations: tuple[Vibration, ...], touch: float
+) -> None:
     """Raises SceneError for a ball outside the cavity, in a surface by more than ``touch`` [m], or wider than the
     cavity where it is narrowest; the vibrating floor is where its phase has it.
     """
@@ -56,7 +64,9 @@ def require_clear(cavity: AnalyticCavity, balls: Balls, vibrations: tuple[Vibrat
     if gap[ball, surface] <= 0.0:
         raise SceneError(f"{where} is outside the cavity, beyond {cavity.name(surface)}")
     if over[ball, surface] < -touch:
-        moving = " (displaced by its phase at the start)" if surface == FLOOR and swing > 0.0 else ""
+        moving = (
+            " (displaced by its phase at the start)" if surface == FLOOR and swing > 0.0 else ""
+        )
         raise SceneError(
             f"{where} overlaps {cavity.name(surface)}{moving} by {-over[ball, surface]:.3g} m; "
             "move it or make it smaller"
@@ -64,7 +74,11 @@ def require_clear(cavity: AnalyticCavity, balls: Balls, vibrations: tuple[Vibrat
     height = cavity.top - cavity.bottom - swing
     for room, one, two in (cavity.narrowest(), (height, FLOOR, CEILING)):
         if room < 2.0 * radii.max() - TIGHT:
-            between = f"between {cavity.name(one)} and {cavity.name(two)}" if one != two else "in the cylinder"
+            between = (
+                f"between {cavity.name(one)} and {cavity.name(two)}"
+                if one != two
+                else "in the cylinder"
+            )
             raise SceneError(
                 f"ball {int(radii.argmax())} does not fit {between}: the gap is narrower than the ball by "
                 f"{2.0 * radii.max() - room:.3g} m; widen it or make the ball smaller"

@@ -64,7 +64,11 @@ def _crossings(shadows: _Shadows, u: float, v: float, w: float) -> int:
         au, av = corners[t, 0, 0] - u, corners[t, 0, 1] - v
         bu, bv = corners[t, 1, 0] - u, corners[t, 1, 1] - v
         cu, cv = corners[t, 2, 0] - u, corners[t, 2, 1] - v
-        a, b, c = bu * cv - bv * cu, cu * av - cv * au, au * bv - av * bu  # twice the areas seen from the ray
+        a, b, c = (
+            bu * cv - bv * cu,
+            cu * av - cv * au,
+            au * bv - av * bu,
+        )  # twice the areas seen from the ray
         if min(abs(a), abs(b), abs(c)) <= shadows.border:
             return -1
         if (a > 0.0) == (b > 0.0) == (c > 0.0):
@@ -80,7 +84,9 @@ def _count(shadows: _Shadows, points: np.ndarray, crossed: np.ndarray) -> None:
         crossed[i] = _crossings(shadows, points[i, 0], points[i, 1], points[i, 2])
 
 
-def contained(mesh: TriangleMesh, points: np.ndarray, corners: np.ndarray | None = None) -> np.ndarray:
+def contained(
+    mesh: TriangleMesh, points: np.ndarray, corners: np.ndarray | None = None
+) -> np.ndarray:
     """Which points (n, 3) [m] lie inside the mesh, shape (n,) bool, by the parity of crossings along a ray.
 
     ``corners`` (m, 3, 3) [m]: where the triangles are now, if not where the mesh has them. Where a turned part goes
@@ -106,7 +112,9 @@ def contained(mesh: TriangleMesh, points: np.ndarray, corners: np.ndarray | None
 def enclosed(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Which points (n, 3) [m] the triangles (m, 3, 3) [m] go round, shape (n,) bool, by their solid angle."""
     angle = np.zeros(len(points))
-    _solid_angles(np.ascontiguousarray(corners), np.ascontiguousarray(points, dtype=np.float64), angle)
+    _solid_angles(
+        np.ascontiguousarray(corners), np.ascontiguousarray(points, dtype=np.float64), angle
+    )
     return np.asarray(angle > 2.0 * math.pi)
 
 
@@ -146,7 +154,11 @@ def _distance_squared(corners: np.ndarray, t: int, px: float, py: float, pz: flo
     bx, by, bz = corners[t, 1, 0] - ax, corners[t, 1, 1] - ay, corners[t, 1, 2] - az
     cx, cy, cz = corners[t, 2, 0] - ax, corners[t, 2, 1] - ay, corners[t, 2, 2] - az
     x, y, z = px - ax, py - ay, pz - az
-    bb, bc, cc = bx * bx + by * by + bz * bz, bx * cx + by * cy + bz * cz, cx * cx + cy * cy + cz * cz
+    bb, bc, cc = (
+        bx * bx + by * by + bz * bz,
+        bx * cx + by * cy + bz * cz,
+        cx * cx + cy * cy + cz * cz,
+    )
     xb, xc = x * bx + y * by + z * bz, x * cx + y * cy + z * cz
     det = bb * cc - bc * bc
     v, w = -1.0, -1.0
@@ -174,7 +186,12 @@ def _distance_squared(corners: np.ndarray, t: int, px: float, py: float, pz: flo
 
 @jit
 def _clear(
-    corners: np.ndarray, low: np.ndarray, high: np.ndarray, points: np.ndarray, reach: float, gap: np.ndarray
+    corners: np.ndarray,
+    low: np.ndarray,
+    high: np.ndarray,
+    points: np.ndarray,
+    reach: float,
+    gap: np.ndarray,
 ) -> None:
     for i in range(len(points)):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]

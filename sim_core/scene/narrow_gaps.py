@@ -14,7 +14,9 @@ from sim_core.scene.invariants import clearance
 from sim_core.scene.physics import Physics
 
 TIGHT = 1e-13  # m: narrower by less is rounding; a contact is found as exactly
-OPPOSED = -1.0 + 1e-9  # cosine: parallel but for 0.05 mrad; a ball that overlaps by 1 nm would have 40 um to move out
+OPPOSED = (
+    -1.0 + 1e-9
+)  # cosine: parallel but for 0.05 mrad; a ball that overlaps by 1 nm would have 40 um to move out
 
 
 class Pinch(NamedTuple):
@@ -29,14 +31,20 @@ class Pinch(NamedTuple):
     swings: bool
 
 
-def find_pinch(mesh: TriangleMesh, physics: Physics, balls: Balls, corners: np.ndarray) -> Pinch | None:
+def find_pinch(
+    mesh: TriangleMesh, physics: Physics, balls: Balls, corners: np.ndarray
+) -> Pinch | None:
     """The first ball that does not fit where it starts; ``corners`` (m, 3, 3) [m]: the triangles at the start."""
     radius, swing = 0.5 * balls.diameters, _swing(physics)
-    asked = clearance(corners, balls.positions, balls.radius) < radius - 0.5 * TIGHT  # two such gaps, or one of more
+    asked = (
+        clearance(corners, balls.positions, balls.radius) < radius - 0.5 * TIGHT
+    )  # two such gaps, or one of more
     for vibration in physics.vibrations:
         waving = mesh.tags == vibration.tag
         both = [corners[own] for own in (waving, ~waving) if own.any()]
-        near = [clearance(some, balls.positions, balls.radius + swing) < radius + swing for some in both]
+        near = [
+            clearance(some, balls.positions, balls.radius + swing) < radius + swing for some in both
+        ]
         asked |= np.all(near, axis=0)
     for ball in np.flatnonzero(asked):
         found = _tightest(mesh, physics, balls.positions[ball], float(radius[ball]), corners)
@@ -74,7 +82,11 @@ def _tightest(
     away = here - _nearest_points(corners[near], here)
     distance = np.linalg.norm(away, axis=1)
     touched = (distance <= reach) & (distance > 0.0)
-    near, gap, away = near[touched], distance[touched] - radius, away[touched] / distance[touched, None]
+    near, gap, away = (
+        near[touched],
+        distance[touched] - radius,
+        away[touched] / distance[touched, None],
+    )
     least, moves = gap.copy(), np.full(len(near), -1)  # which of the vibrations has it, if any
     turns = np.zeros(len(near), np.bool_) if turn is None else mesh.tags[near] == turn.tag
     for k, vibration in enumerate(physics.vibrations):
@@ -95,7 +107,9 @@ def _nearest_points(corners: np.ndarray, point: np.ndarray) -> np.ndarray:
     """The point (m, 3) of each triangle (m, 3, 3) nearest to a point (3,): on its face, or else on its border."""
     a, edge = corners, np.roll(corners, -1, axis=1) - corners
     tiny = np.finfo(float).tiny  # a triangle may have no area
-    share = np.einsum("mki,mki->mk", point - a, edge) / np.maximum(np.einsum("mki,mki->mk", edge, edge), tiny)
+    share = np.einsum("mki,mki->mk", point - a, edge) / np.maximum(
+        np.einsum("mki,mki->mk", edge, edge), tiny
+    )
     border = a + np.clip(share, 0.0, 1.0)[..., None] * edge
     nearest = np.linalg.norm(point - border, axis=2).argmin(axis=1)
     found = border[np.arange(len(corners)), nearest]
@@ -103,6 +117,8 @@ def _nearest_points(corners: np.ndarray, point: np.ndarray) -> np.ndarray:
     square = np.einsum("mi,mi->m", normal, normal)
     height = np.einsum("mi,mi->m", point - a[:, 0], normal) / np.maximum(square, tiny)
     foot = point - height[:, None] * normal
-    over = (square > 0.0) & (np.einsum("mki,mi->mk", np.cross(edge, foot[:, None] - a), normal) >= 0.0).all(axis=1)
+    over = (square > 0.0) & (
+        np.einsum("mki,mi->mk", np.cross(edge, foot[:, None] - a), normal) >= 0.0
+    ).all(axis=1)
     found[over] = foot[over]
     return found

@@ -36,8 +36,12 @@ def pack_balls(
     about 30 % of the volume a ball can use.
     """
     sizes = np.asarray(diameter, dtype=np.float64)
-    if not (count >= 1 and count == int(count) and (sizes > 0.0).all() and sizes.shape in ((), (count,))):
-        raise SceneError(f"cannot place {count} balls of {diameter} m: give a whole number and a positive diameter")
+    if not (
+        count >= 1 and count == int(count) and (sizes > 0.0).all() and sizes.shape in ((), (count,))
+    ):
+        raise SceneError(
+            f"cannot place {count} balls of {diameter} m: give a whole number and a positive diameter"
+        )
     each = np.broadcast_to(sizes, int(count))
     placed = _Placed(2.0 * (0.5 * float(each.max()) + GAP))
     free = _free_of(mesh, turn)
@@ -49,7 +53,9 @@ def pack_balls(
     return positions
 
 
-def _free_of(mesh: TriangleMesh | AnalyticCavity, turn: Turn | None) -> Callable[[np.ndarray, float], np.ndarray]:
+def _free_of(
+    mesh: TriangleMesh | AnalyticCavity, turn: Turn | None
+) -> Callable[[np.ndarray, float], np.ndarray]:
     """Those of points (n, 3) [m] that are inside and so far [m] from every surface, as a function of the two."""
     if isinstance(mesh, AnalyticCavity):
         return lambda points, reach: points[(mesh.gaps(points) >= reach).all(axis=1)]
@@ -78,7 +84,9 @@ def _place(
     low, high = mesh.bounds[0] + reach, mesh.bounds[1] - reach
     low[2] = max(low[2], floor + reach)
     if (high < low).any():
-        raise SceneError(f"no ball of {diameter * 1e3:.3g} mm fits into the mesh: it is narrower than the ball")
+        raise SceneError(
+            f"no ball of {diameter * 1e3:.3g} mm fits into the mesh: it is narrower than the ball"
+        )
     failures, first = 0, len(placed.points)
     top = min(low[2] + FIRST_LAYER * diameter, high[2])
     while len(placed.points) - first < count:
@@ -113,7 +121,9 @@ class _Placed:
     def add(self, point: np.ndarray, radius: float) -> None:
         """Take the point in, unless it is too near to another."""
         i, j, k = (int(c) for c in np.floor(point / self.edge))
-        for cell in ((i + a, j + b, k + c) for a in (-1, 0, 1) for b in (-1, 0, 1) for c in (-1, 0, 1)):
+        for cell in (
+            (i + a, j + b, k + c) for a in (-1, 0, 1) for b in (-1, 0, 1) for c in (-1, 0, 1)
+        ):
             for other, its_radius in self.cells.get(cell, ()):
                 if ((point - other) ** 2).sum() < (radius + its_radius) ** 2:
                     return

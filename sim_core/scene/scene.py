@@ -25,7 +25,9 @@ from sim_core.scene.narrow_gaps import find_pinch, surface_name, vibrating_name
 from sim_core.scene.physics import Physics
 
 LONGEST = 1e6  # s: eleven days of peening
-STEP = 1e-4  # of a triangle's size: how far before and behind it is asked which side the cavity is on
+STEP = (
+    1e-4  # of a triangle's size: how far before and behind it is asked which side the cavity is on
+)
 TOUCH = 1e-9  # m: overlap at the start that is taken for rounding of the input; ten thousand times less than a dent
 
 KINDS = {  # of the effects that are checked by name; gravity may be any three numbers
@@ -76,7 +78,11 @@ class Scene:
             if kind is not None and effect is not None and not isinstance(effect, kind):
                 raise SceneError(f"physics.{name} is {effect!r}: give a {kind.__name__}, or None")
         checked_waves(self.physics.vibration)
-        vibrations, restitution, turn = self.physics.vibrations, self.physics.restitution, self.physics.turn
+        vibrations, restitution, turn = (
+            self.physics.vibrations,
+            self.physics.restitution,
+            self.physics.turn,
+        )
         checked_gravity(self.physics.gravity)
         checked_rest(self.physics.rest)
         for name in ("rest", "turn", "friction"):
@@ -101,7 +107,9 @@ class Scene:
             if turn.tag not in tags:
                 raise SceneError(f"turn.tag is {turn.tag}, but the mesh has tags {tags}")
             if turn.tag in [one.tag for one in vibrations]:
-                raise SceneError(f"turn.tag and vibration.tag are both {turn.tag}: one surface cannot do both")
+                raise SceneError(
+                    f"turn.tag and vibration.tag are both {turn.tag}: one surface cannot do both"
+                )
             require_free_axle(self.mesh, axle, self.balls.radius)
         for one in vibrations:
             if one.tag not in tags:
@@ -118,7 +126,9 @@ class Scene:
             return
         gap_between, one, two = narrowest_gap(self.balls)
         if gap_between < -TOUCH:
-            raise SceneError(f"balls {one} and {two} overlap by {-gap_between:.3g} m at the start; move one of them")
+            raise SceneError(
+                f"balls {one} and {two} overlap by {-gap_between:.3g} m at the start; move one of them"
+            )
 
     def _require_room_in_mesh(self) -> None:
         assert isinstance(self.mesh, TriangleMesh)
@@ -131,12 +141,20 @@ class Scene:
             )
         turn = self.physics.turn
         corners = None if turn is None else posed(self.mesh, turn)
-        inside = contained(self.mesh, balls.positions) if corners is None else enclosed(corners, balls.positions)
+        inside = (
+            contained(self.mesh, balls.positions)
+            if corners is None
+            else enclosed(corners, balls.positions)
+        )
         outside = np.flatnonzero(~inside)
         if len(outside):
             where = balls.positions[outside[0]].tolist()
-            raise SceneError(f"ball {outside[0]} at {where} m is outside the mesh ({len(outside)} in all)")
-        still = self.mesh.corners if corners is None else corners  # where its phase has a turning part
+            raise SceneError(
+                f"ball {outside[0]} at {where} m is outside the mesh ({len(outside)} in all)"
+            )
+        still = (
+            self.mesh.corners if corners is None else corners
+        )  # where its phase has a turning part
         # a vibrating face is not where the mesh has it; it is judged at its phase, below
         still = still[~np.isin(self.mesh.tags, [one.tag for one in self.physics.vibrations])]
         gap = clearance(still, balls.positions, balls.radius) - 0.5 * balls.diameters
@@ -155,7 +173,10 @@ class Scene:
         for vibration in self.physics.vibrations:
             waving = self.mesh.tags == vibration.tag
             corners[waving] += np.sin(vibration.phase) * vibration.peak
-            gap = clearance(corners[waving], self.balls.positions, self.balls.radius) - 0.5 * self.balls.diameters
+            gap = (
+                clearance(corners[waving], self.balls.positions, self.balls.radius)
+                - 0.5 * self.balls.diameters
+            )
             worst = int(gap.argmin())
             if gap[worst] < -TOUCH:
                 raise SceneError(
@@ -169,7 +190,9 @@ class Scene:
         pinch = find_pinch(self.mesh, self.physics, self.balls, corners)
         if pinch is None:
             return
-        one, two = (surface_name(self.mesh, self.physics, triangle) for triangle in (pinch.one, pinch.two))
+        one, two = (
+            surface_name(self.mesh, self.physics, triangle) for triangle in (pinch.one, pinch.two)
+        )
         when = " at the end of its swing" if pinch.swings else ""
         raise SceneError(
             f"ball {pinch.ball} at {self.balls.positions[pinch.ball].tolist()} m does not fit between {one} and {two}: "
@@ -199,13 +222,18 @@ def _inside_out(mesh: TriangleMesh) -> int:
 
     ends = mesh.triangles[:, [0, 1]].T, mesh.triangles[:, [1, 2]].T
     rows, columns = np.concatenate(ends, axis=1)
-    links = coo_array((np.ones(len(rows), dtype=np.bool_), (rows, columns)), shape=(len(mesh.vertices),) * 2)
+    links = coo_array(
+        (np.ones(len(rows), dtype=np.bool_), (rows, columns)), shape=(len(mesh.vertices),) * 2
+    )
     shell = connected_components(links, directed=False)[1][mesh.triangles[:, 0]]
     normals, doubled = towards_shot(mesh.corners)
     order = np.lexsort((-doubled, shell))  # the largest of each shell first
     largest = order[np.unique(shell[order], return_index=True)[1]]
     if len(largest) == 1:
         return -1
-    middle, step = mesh.corners[largest].mean(axis=1), STEP * np.sqrt(doubled[largest])[:, None] * normals[largest]
+    middle, step = (
+        mesh.corners[largest].mean(axis=1),
+        STEP * np.sqrt(doubled[largest])[:, None] * normals[largest],
+    )
     wrong = largest[~contained(mesh, middle + step) & contained(mesh, middle - step)]
     return int(wrong[0]) if len(wrong) else -1

@@ -9,18 +9,32 @@ from hypothesis import strategies as st
 
 from sim_core import Balls, Physics, Scene, SceneError, SimulationError, TriangleMesh, pack_balls
 from sim_core.contact.constrained_impulse import SHORTEST_HOP
-from tests.hard_cases.fuzzed_effects import LID, SIZES, SONOTRODES, Strengths, physics_of, powers, strengths
+from tests.hard_cases.fuzzed_effects import (
+    LID,
+    SIZES,
+    SONOTRODES,
+    Strengths,
+    physics_of,
+    powers,
+    strengths,
+)
 from tests.hard_cases.outcome import allowed, energy_above_floor, is_still, play
 from tests.hard_cases.saved_scene import FOLDER, save_scene
 from tests.helpers.scenes.cavities import CEILING, FLOOR, SIDES, box_around
 from tests.helpers.scenes.fuzzed_chambers import FAMILIES, WITH_FLOOR, Chamber, Surface
 from tests.helpers.scenes.turning_parts import BODIES, PART
 
-FOUND = FOLDER / "found.npz"  # the last failure: what hypothesis ends with is the simplest; give it a name and keep it
+FOUND = (
+    FOLDER / "found.npz"
+)  # the last failure: what hypothesis ends with is the simplest; give it a name and keep it
 TRAVERSES = 12.0  # of the chamber's width by a ball at the shot's speed
 PIECES = 3
 MOST_BALLS = 12  # more make a jam a matter of minutes
-BROKEN = ("has left the mesh", "not a number", "report the scene")  # in messages of runs: not a way out
+BROKEN = (
+    "has left the mesh",
+    "not a number",
+    "report the scene",
+)  # in messages of runs: not a way out
 TURNING = {f"turning {name}": body for name, body in BODIES.items()}
 
 
@@ -48,7 +62,13 @@ def plans(combinations: tuple[str, ...]) -> st.SearchStrategy[Plan]:
 
 
 def _plans(effects: frozenset[str]) -> st.SearchStrategy[Plan]:
-    families = set(TURNING) if "turn" in effects else WITH_FLOOR if "vibration" in effects else set(FAMILIES)
+    families = (
+        set(TURNING)
+        if "turn" in effects
+        else WITH_FLOOR
+        if "vibration" in effects
+        else set(FAMILIES)
+    )
     return st.builds(
         Plan,
         family=st.sampled_from(sorted(families)),
@@ -73,7 +93,9 @@ def chamber_of(plan: Plan) -> Chamber:
         tags[(vertices[triangles][:, :, 2] == vertices[:, 2].max()).all(axis=1)] = LID
     mesh = TriangleMesh(plan.wide * (vertices + plan.far), triangles, tags)
     middle = np.full(3, plan.wide * plan.far)
-    physics = physics_of(plan.effects, plan.much, plan.wide, plan.speed, diameter, middle, plan.seed)
+    physics = physics_of(
+        plan.effects, plan.much, plan.wide, plan.speed, diameter, middle, plan.seed
+    )
     size: float | np.ndarray = diameter
     density: float | np.ndarray = 7800.0
     if SIZES in plan.effects:
@@ -82,7 +104,11 @@ def chamber_of(plan: Plan) -> Chamber:
     clear = max((one.amplitude for one in physics.vibrations), default=0.0)
     positions = pack_balls(mesh, plan.count, size, rng, clear, physics.turn)
     velocities = rng.normal(0.0, plan.speed, positions.shape)
-    spins = None if physics.friction is None else rng.normal(0.0, plan.speed / diameter, positions.shape)
+    spins = (
+        None
+        if physics.friction is None
+        else rng.normal(0.0, plan.speed / diameter, positions.shape)
+    )
     return Chamber(mesh, Balls(positions, velocities, size, density, spins), physics)
 
 
@@ -139,7 +165,9 @@ def judge(plan: Plan, keep: Path = FOUND) -> str:
 def require_invariants(chamber: Chamber, duration: float) -> None:
     """Plays it: no ball leaves, none overlaps, energy is kept or lost, never won from walls that stand still."""
     physics = chamber.physics
-    pieces = 1 if physics.random_phase is not None else PIECES  # where each ball sees the face is not handed on
+    pieces = (
+        1 if physics.random_phase is not None else PIECES
+    )  # where each ball sees the face is not handed on
     seen = play(chamber, duration, pieces)
     size = float(np.ptp(chamber.mesh.vertices, axis=0).max())
     far = float(np.abs(chamber.mesh.vertices).max())

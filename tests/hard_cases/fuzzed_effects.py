@@ -84,7 +84,9 @@ def powers(low: float, high: float) -> st.SearchStrategy[float]:
 
 def strengths() -> st.SearchStrategy[Strengths]:
     """Of any size, the extremes often."""
-    rough = st.tuples(st.sampled_from([0.0, 0.1, 0.5, 10.0]) | powers(-3.0, 1.0), st.floats(-1.0, 1.0))
+    rough = st.tuples(
+        st.sampled_from([0.0, 0.1, 0.5, 10.0]) | powers(-3.0, 1.0), st.floats(-1.0, 1.0)
+    )
     return st.builds(
         Strengths,
         weight=st.just(0.0) | powers(-3.0, 2.0),
@@ -101,7 +103,13 @@ def strengths() -> st.SearchStrategy[Strengths]:
 
 
 def physics_of(
-    effects: frozenset[str], much: Strengths, wide: float, speed: float, diameter: float, middle: np.ndarray, seed: int
+    effects: frozenset[str],
+    much: Strengths,
+    wide: float,
+    speed: float,
+    diameter: float,
+    middle: np.ndarray,
+    seed: int,
 ) -> Physics:
     """The effects named, for a chamber ``wide`` [m] about ``middle`` (3,) [m] and shot of so much ``speed`` [m/s]."""
     law = (much.restitution, CONSTANT if much.restitution == 1.0 else speed)
@@ -112,7 +120,9 @@ def physics_of(
         turn = turn._replace(rpm=None, swing=0.7, frequency=max(rate, 1e-6) / (0.7 * math.tau))
     # of steel, at speed: 3/4 C_d air / (rho D) = slowing / wide, with C_d 0.44
     air = much.slowing * 7800.0 * diameter / (0.33 * wide)
-    floor = Vibration(FLOOR, amplitude, much.beat * speed / (math.tau * amplitude) if amplitude else 20e3)
+    floor = Vibration(
+        FLOOR, amplitude, much.beat * speed / (math.tau * amplitude) if amplitude else 20e3
+    )
     lid = Vibration(LID, 0.7 * amplitude, 0.83 * floor.frequency, 1.0, (0.0, 0.0, -1.0))
     present = Physics(
         Gravity(z=-much.weight * speed**2 / wide),
@@ -125,4 +135,6 @@ def physics_of(
         BallCollisions(),
         Drag(air, air * speed * diameter / 1e4, max(0.1 * wide / speed, SHORTEST)),
     )
-    return Physics(**{name: effect if name in effects else None for name, effect in present._asdict().items()})
+    return Physics(
+        **{name: effect if name in effects else None for name, effect in present._asdict().items()}
+    )

@@ -8,7 +8,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim_core import Balls, Gravity, Physics, Restitution, Scene, SceneError, SimulationError, TriangleMesh, simulate
+from sim_core import (
+    Balls,
+    Gravity,
+    Physics,
+    Restitution,
+    Scene,
+    SceneError,
+    SimulationError,
+    TriangleMesh,
+    simulate,
+)
 from sim_core.scene.invariants import clearance, contained, narrowest_gap, posed
 from tests.helpers.scenes.fuzzed_chambers import Chamber
 from tests.sim_core.loop.test_containment import REACH, ROUNDING, clearance_at, later
@@ -123,7 +133,9 @@ class Played:
         return np.concatenate([row[k] for row in self.impacts])
 
 
-def play(chamber: Chamber, duration: float, pieces: int = 1, record: tuple[int, ...] | None = None) -> Played:
+def play(
+    chamber: Chamber, duration: float, pieces: int = 1, record: tuple[int, ...] | None = None
+) -> Played:
     """Plays the chamber for ``duration`` [s] and looks at all overlaps, energies and who is still inside at the end of
     each of the ``pieces``. Raises SimulationError when a ball is outside.
     """
@@ -139,9 +151,13 @@ def play(chamber: Chamber, duration: float, pieces: int = 1, record: tuple[int, 
         here = np.flatnonzero(_in_the_room(mesh, physics)[log.triangle])[-WATCHED:]
         if len(here):
             gap = clearance_at(Chamber(mesh, balls, physics), log.position[here], log.time[here])
-            seen.penetration = max(seen.penetration, float((0.5 * balls.diameters[log.ball[here]] - gap).max()))
+            seen.penetration = max(
+                seen.penetration, float((0.5 * balls.diameters[log.ball[here]] - gap).max())
+            )
         start = piece * duration / pieces
-        seen.impacts.append((start + log.time, log.ball, log.triangle, log.position, log.normal_speed))
+        seen.impacts.append(
+            (start + log.time, log.ball, log.triangle, log.position, log.normal_speed)
+        )
         physics = later(physics, duration / pieces)
         seen.penetration = max(seen.penetration, overlap(Chamber(mesh, result.balls, physics)))
         seen.track.append(result.balls)
@@ -151,7 +167,9 @@ def play(chamber: Chamber, duration: float, pieces: int = 1, record: tuple[int, 
         inside = contained(mesh, result.balls.positions, corners_now(mesh, physics))
         outside = np.flatnonzero(~inside & ~_beneath_the_mesh(Chamber(mesh, result.balls, physics)))
         if len(outside):
-            raise SimulationError(f"ball {outside[0]} is outside at {result.balls.positions[outside[0]].tolist()} m")
+            raise SimulationError(
+                f"ball {outside[0]} is outside at {result.balls.positions[outside[0]].tolist()} m"
+            )
         if elastic and before > 0.0:
             drift = abs(energy_above_floor(mesh, result.balls, physics) / before - 1.0)
             seen.energy_drift = max(seen.energy_drift, drift)
@@ -180,13 +198,19 @@ def _beneath_the_mesh(chamber: Chamber) -> np.ndarray:
     above = ((balls.positions > low) & (balls.positions < high))[:, :2].all(axis=1)
     height, beyond = balls.positions[:, 2], np.zeros(len(balls), dtype=np.bool_)
     for one, depth in zip(vibrations, (low[2] - height, height - high[2]), strict=False):
-        beyond |= above & (depth >= 0.0) & (depth <= one.amplitude - 0.5 * balls.diameters + DEEPEST)
+        beyond |= (
+            above & (depth >= 0.0) & (depth <= one.amplitude - 0.5 * balls.diameters + DEEPEST)
+        )
     return beyond
 
 
 def _in_the_room(mesh: TriangleMesh, physics: Physics) -> np.ndarray:
     """True (m,) for triangles whose impacts are logged where they happen, and not as a turning part sees them."""
-    return np.ones(len(mesh.tags), dtype=np.bool_) if physics.turn is None else mesh.tags != physics.turn.tag
+    return (
+        np.ones(len(mesh.tags), dtype=np.bool_)
+        if physics.turn is None
+        else mesh.tags != physics.turn.tag
+    )
 
 
 def corners_now(mesh: TriangleMesh, physics: Physics) -> np.ndarray | None:
@@ -242,7 +266,10 @@ def verdict(played: Played, expected: str, *claims: Claim, drift: float = DRIFT)
     deepest = allowed(played.mesh)
     every = [
         *claims,
-        Claim(played.penetration <= deepest, f"overlap {played.penetration:.2g} m (allowed {deepest:.2g})"),
+        Claim(
+            played.penetration <= deepest,
+            f"overlap {played.penetration:.2g} m (allowed {deepest:.2g})",
+        ),
         Claim(not played.energy_drift > drift, f"energy drifts by {played.energy_drift:.2g}"),
     ]
     broken = [claim.said for claim in every if not claim.holds]
@@ -258,14 +285,18 @@ def verdict(played: Played, expected: str, *claims: Claim, drift: float = DRIFT)
 
 
 def refusal(
-    attempt: Callable[[], object], message: str, error: type[Exception] | tuple[type[Exception], ...] = SceneError
+    attempt: Callable[[], object],
+    message: str,
+    error: type[Exception] | tuple[type[Exception], ...] = SceneError,
 ) -> Outcome:
     """The attempt must be refused with an ``error`` whose message matches the pattern: it names who and where."""
     try:
         attempt()
     except error as said:
         ok = re.search(message, str(said)) is not None
-        return Outcome("", ok, f"refused: {said}" if ok else f"refused without saying {message!r}: {said}")
+        return Outcome(
+            "", ok, f"refused: {said}" if ok else f"refused without saying {message!r}: {said}"
+        )
     return Outcome("", False, f"not refused, though it should be with {message!r}")
 
 

@@ -42,7 +42,9 @@ def load_scene(path: Path) -> Scene:
         diameter, density, duration, warmup = (float(number) for number in file["numbers"])
         effects = json.loads(str(file["physics"]))
         kinds = get_type_hints(Physics)
-        physics = Physics(**{name: _effect(kinds[name], numbers) for name, numbers in effects.items()})
+        physics = Physics(
+            **{name: _effect(kinds[name], numbers) for name, numbers in effects.items()}
+        )
         mesh = TriangleMesh(file["vertices"], file["triangles"], file["tags"])
         sizes = file["each"].T if "each" in file else (diameter, density)
         balls = Balls(file["positions"], file["velocities"], *sizes, file.get("spins"))

@@ -10,7 +10,19 @@ import numpy as np
 import pytest
 import trimesh
 
-from sim_core import Balls, Drag, Friction, Gravity, Physics, RandomPhase, Rest, Scene, TriangleMesh, Turn, Vibration
+from sim_core import (
+    Balls,
+    Drag,
+    Friction,
+    Gravity,
+    Physics,
+    RandomPhase,
+    Rest,
+    Scene,
+    TriangleMesh,
+    Turn,
+    Vibration,
+)
 from sim_core.effects.contact_mode import ASLEEP, MODE, SLIDING
 from sim_core.effects.gravity import STANDARD as G
 from sim_core.loop.simulate import _Run
@@ -48,7 +60,9 @@ def rough(mu: float, beta0: float) -> Friction:
 
 def shot(positions: object, velocities: object = 0.0, spins: object = 0.0) -> Balls:
     places = np.atleast_2d(np.array(positions, dtype=float))
-    speeds, turns = (np.broadcast_to(np.array(x, dtype=float), places.shape) for x in (velocities, spins))
+    speeds, turns = (
+        np.broadcast_to(np.array(x, dtype=float), places.shape) for x in (velocities, spins)
+    )
     return Balls(places, speeds, 2 * R, spins=turns)
 
 
@@ -58,7 +72,9 @@ def test_a_ball_dropped_on_a_turntable_goes_round_with_two_sevenths_of_its_speed
     """
     omega, drop, hops = 10.0, 2e-4, 60
     disk = trimesh.creation.cylinder(radius=0.03, height=0.004, sections=48)
-    physics = EVERYTHING._replace(turn=Turn(PART, rpm=60.0 * omega / math.tau), friction=rough(STICKS, 0.0))
+    physics = EVERYTHING._replace(
+        turn=Turn(PART, rpm=60.0 * omega / math.tau), friction=rough(STICKS, 0.0)
+    )
     first = math.sqrt(2.0 * drop / G)
     start = shot([0.015, 0.0, 0.002 + R + drop])
     run = _Run(Scene(room(box_around(disk, 0.04)), start, physics, 2.0))
@@ -75,11 +91,18 @@ def test_a_ball_dropped_on_a_turntable_goes_round_with_two_sevenths_of_its_speed
 def test_a_ball_that_a_rough_paddle_pushes_slips_on_the_floor_until_it_rolls(mu: float) -> None:
     """The paddle's face passes the ball at omega times half its width, and rubs; then the floor takes 2/7 of it all."""
     x, y, omega, beta0 = 0.002, 0.012, 10.0, 0.5
-    physics = EVERYTHING._replace(turn=Turn(PART, rpm=60.0 * omega / math.tau), friction=rough(mu, beta0))
+    physics = EVERYTHING._replace(
+        turn=Turn(PART, rpm=60.0 * omega / math.tau), friction=rough(mu, beta0)
+    )
     angle = arrival(x, y)
-    out, along = np.array([-np.sin(angle), np.cos(angle), 0.0]), np.array([np.cos(angle), np.sin(angle), 0.0])
+    out, along = (
+        np.array([-np.sin(angle), np.cos(angle), 0.0]),
+        np.array([np.cos(angle), np.sin(angle), 0.0]),
+    )
     speed = omega * math.sqrt(x * x + y * y - (WIDE + R) ** 2)
-    rub = min(mu * 2.0 * speed, 2.0 / 7.0 * (1.0 + beta0) * omega * WIDE)  # along the face, which moves inwards
+    rub = min(
+        mu * 2.0 * speed, 2.0 / 7.0 * (1.0 + beta0) * omega * WIDE
+    )  # along the face, which moves inwards
     kicked = 2.0 * speed * out - rub * along
     rolls = 2.0 / 7.0 * np.linalg.norm(kicked) / (mu * G)
     run = _Run(Scene(room(paddle()), shot([x, y, R - HALF]), physics, 1.0))
@@ -88,7 +111,9 @@ def test_a_ball_that_a_rough_paddle_pushes_slips_on_the_floor_until_it_rolls(mu:
     assert run.footing.marks[0, MODE] == ASLEEP
     run.play(angle / omega * (1.0 + 1e-9), record=False)
     np.testing.assert_allclose(run.balls().velocities[0], kicked, atol=1e-6)
-    np.testing.assert_allclose(run.balls().spins[0], -2.5 / R * np.cross(out, -rub * along), atol=1e-6)  # type: ignore[index]
+    np.testing.assert_allclose(
+        run.balls().spins[0], -2.5 / R * np.cross(out, -rub * along), atol=1e-6
+    )  # type: ignore[index]
     where = angle / omega + 0.5 * rolls
     run.play(where, record=False)
     np.testing.assert_allclose(run.balls().velocities[0], 6.0 / 7.0 * kicked, rtol=1e-6, atol=1e-7)
@@ -111,7 +136,9 @@ def test_air_does_not_wake_nor_slow_what_lies_or_rolls_on_the_floor() -> None:
     assert run.footing.marks[:, MODE].tolist() == [SLIDING, ASLEEP]
     assert (run.count[:3] == events[:3]).all()
     np.testing.assert_allclose(run.balls().velocities[0], [speed, 0.0, 0.0], atol=1e-9)
-    np.testing.assert_allclose(run.balls().positions[0, 0] - before.positions[0, 0], 0.49 * speed, atol=1e-9)
+    np.testing.assert_allclose(
+        run.balls().positions[0, 0] - before.positions[0, 0], 0.49 * speed, atol=1e-9
+    )
     np.testing.assert_array_equal(run.balls().positions[1], before.positions[1])
     assert (run.balls().velocities[1] == 0.0).all()
 
@@ -120,7 +147,10 @@ def test_balls_that_do_not_meet_rub_roll_and_rest_as_each_does_alone() -> None:
     rng = np.random.default_rng(4)
     law = ((0.7, 1.0),) * 3
     physics = EVERYTHING._replace(
-        restitution=LOSSLESS._replace(surfaces=law), friction=rough(0.3, 0.4), drag=Drag(), turn=Turn(PART, rpm=40.0)
+        restitution=LOSSLESS._replace(surfaces=law),
+        friction=rough(0.3, 0.4),
+        drag=Drag(),
+        turn=Turn(PART, rpm=40.0),
     )
     places = rng.uniform([0.004, 0.004, -0.018], [0.018, 0.018, 0.018], (6, 3))
     speeds, turns = rng.normal(0.0, 0.4, (6, 3)), rng.normal(0.0, 200.0, (6, 3))

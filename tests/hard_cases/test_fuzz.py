@@ -30,14 +30,21 @@ SAVED = sorted(FOLDER.glob("*.npz"))
 SLOW = [HealthCheck.too_slow, HealthCheck.data_too_large]
 
 
-@settings(max_examples=60, derandomize=True, deadline=None, database=None, suppress_health_check=SLOW)
+@settings(
+    max_examples=60, derandomize=True, deadline=None, database=None, suppress_health_check=SLOW
+)
 @given(plans(FEW))
 def test_any_scene_runs_or_says_why_not(plan: Plan) -> None:
     judge(plan)
 
 
 @pytest.mark.long
-@settings(max_examples=5_000, deadline=None, suppress_health_check=SLOW, phases=set(Phase) - {Phase.explain})
+@settings(
+    max_examples=5_000,
+    deadline=None,
+    suppress_health_check=SLOW,
+    phases=set(Phase) - {Phase.explain},
+)
 @given(plans(MANY))
 def test_many_scenes_run_or_say_why_not(plan: Plan) -> None:
     judge(plan)
@@ -61,15 +68,24 @@ LAWS = Physics(Gravity(), Restitution((LAW, LAW), LAW), Vibration(FLOOR, 25e-6, 
     [
         (LAWS._replace(friction=Friction((LAW, LAW), LAW), rest=Rest()), True),
         (LAWS._replace(random_phase=RandomPhase(7), drag=Drag(), ball_collisions=None), False),
-        (LAWS._replace(vibration=(Vibration(FLOOR, 0.0, 20e3), Vibration(CEILING, 0.0, 19e3)), drag=Drag()), False),
+        (
+            LAWS._replace(
+                vibration=(Vibration(FLOOR, 0.0, 20e3), Vibration(CEILING, 0.0, 19e3)), drag=Drag()
+            ),
+            False,
+        ),
     ],
 )
-def test_a_scene_comes_back_from_its_file_as_it_was(tmp_path: Path, physics: Physics, alike: bool) -> None:
+def test_a_scene_comes_back_from_its_file_as_it_was(
+    tmp_path: Path, physics: Physics, alike: bool
+) -> None:
     chamber = random_chamber("geared", 3)
     balls = dataclasses.replace(chamber.balls, spins=chamber.balls.velocities if alike else None)
     if not alike:
         shares = np.where(np.arange(len(balls)) % 3, 1.0, 0.7)
-        balls = dataclasses.replace(balls, diameter=shares * balls.diameter, density=7800.0 * shares)
+        balls = dataclasses.replace(
+            balls, diameter=shares * balls.diameter, density=7800.0 * shares
+        )
     scene = Scene(chamber.mesh, balls, physics, 0.5)
     save_scene(tmp_path / "scene.npz", scene)
     again = load_scene(tmp_path / "scene.npz")

@@ -11,7 +11,14 @@ def with_and_without_jit(code: str) -> tuple[str, str]:
     settings = (dict(os.environ), {**os.environ, "NUMBA_DISABLE_JIT": "1"})
     here = Path(__file__).parents[2]
     compiled, interpreted = (
-        subprocess.run([sys.executable, "-c", code], cwd=here, env=env, check=True, capture_output=True, text=True)
+        subprocess.run(
+            [sys.executable, "-c", code],
+            cwd=here,
+            env=env,
+            check=True,
+            capture_output=True,
+            text=True,
+        )
         for env in settings
     )
     return compiled.stdout, interpreted.stdout

@@ -23,13 +23,19 @@ def plate_design(**values: float) -> Design:
     return load_design(DESIGNS / "plate.toml").with_values(changes)
 
 
-def patchwork(area: np.ndarray, exposed: np.ndarray | None = None, target: np.ndarray | None = None) -> Chamber:
+def patchwork(
+    area: np.ndarray, exposed: np.ndarray | None = None, target: np.ndarray | None = None
+) -> Chamber:
     """A chamber whose part is m separate triangles of the given areas [m²], each its own cavity triangle."""
     m = len(area)
     corner = np.stack([np.arange(m) * 1.0, np.zeros(m), np.zeros(m)], axis=1)
     side = np.sqrt(2.0 * area)[:, None]
-    vertices = np.concatenate([corner, corner + side * [1.0, 0.0, 0.0], corner + side * [0.0, 1.0, 0.0]])
-    triangles = np.stack([np.arange(m), np.arange(m) + m, np.arange(m) + 2 * m], axis=1).astype(np.int32)
+    vertices = np.concatenate(
+        [corner, corner + side * [1.0, 0.0, 0.0], corner + side * [0.0, 1.0, 0.0]]
+    )
+    triangles = np.stack([np.arange(m), np.arange(m) + m, np.arange(m) + 2 * m], axis=1).astype(
+        np.int32
+    )
     target = np.ones(m, dtype=bool) if target is None else target
     return Chamber(
         vertices=vertices,
@@ -53,13 +59,17 @@ def impact_log(triangle: Any, velocity: Any, normal_speed: Any, ball: Any = 0) -
     )
 
 
-def dented(area: np.ndarray, time: float, dents: np.ndarray | None = None, speed: float = 1.0) -> Tally:
+def dented(
+    area: np.ndarray, time: float, dents: np.ndarray | None = None, speed: float = 1.0
+) -> Tally:
     """A tally of given dented areas [m²]."""
     count = np.ones(len(area), dtype=int) if dents is None else dents
     return Tally(time, count, count, np.asarray(area, dtype=float), speed * count, 90.0 * count)
 
 
-def equal_dents(time: float, dents: np.ndarray, size: float, speed: float = 1.0, angle: float = 90.0) -> Tally:
+def equal_dents(
+    time: float, dents: np.ndarray, size: float, speed: float = 1.0, angle: float = 90.0
+) -> Tally:
     """One replica's tally: so many dents (m,) of one size [m²]."""
     triangle = np.repeat(np.arange(len(dents)), dents)
     each = np.full(len(triangle), size)
@@ -69,9 +79,14 @@ def equal_dents(time: float, dents: np.ndarray, size: float, speed: float = 1.0,
 def judged(objective: np.ndarray, **metrics: float) -> Evaluation:
     """An evaluation whose replicas said these objectives; metrics given are exact, the others 0."""
     empty = dented(np.zeros(1), 1.0)
-    exact = {name: Estimate(metrics.get(name, 0.0), 0.0, (metrics.get(name, 0.0),) * 3) for name in METRICS}
+    exact = {
+        name: Estimate(metrics.get(name, 0.0), 0.0, (metrics.get(name, 0.0),) * 3)
+        for name in METRICS
+    }
     goal = estimate(objective)
-    return Evaluation("uniform_coverage", goal, exact, empty, (empty,) * len(objective), {"simulate": 0.0}, {})
+    return Evaluation(
+        "uniform_coverage", goal, exact, empty, (empty,) * len(objective), {"simulate": 0.0}, {}
+    )
 
 
 def poisson_evaluation(
@@ -82,13 +97,17 @@ def poisson_evaluation(
     mean = per_mm2 * 1e6 * chamber.exposed_area / replicas
     seconds = design.process.accuracy.simulated_time
     return evaluation_of(
-        design, chamber, [equal_dents(seconds, rng.poisson(mean), 1e-8, 3.0, 70.0) for _ in range(replicas)]
+        design,
+        chamber,
+        [equal_dents(seconds, rng.poisson(mean), 1e-8, 3.0, 70.0) for _ in range(replicas)],
     )
 
 
 def evaluation_of(design: Design, chamber: Chamber, tallies: list[Tally]) -> Evaluation:
     """The evaluation of replicas whose dents are known, with hits that leave these dents."""
-    metrics = dict(zip(METRICS, jackknife(tallies, list(METRICS.values()), chamber, design), strict=True))
+    metrics = dict(
+        zip(METRICS, jackknife(tallies, list(METRICS.values()), chamber, design), strict=True)
+    )
     return Evaluation(
         "uniform_coverage",
         weighted(OBJECTIVES["uniform_coverage"], metrics),
@@ -104,6 +123,11 @@ def evaluation_of(design: Design, chamber: Chamber, tallies: list[Tally]) -> Eva
 def hits_of(tally: Tally) -> Hits:
     """The dents of a replica as hits, with the mean speed and angle of their triangle, 1 µJ each."""
     triangle = tally.dent_triangle.astype(np.int32)
-    speed, angle = (sums[triangle] / tally.impacts[triangle] for sums in (tally.speed_sum, tally.angle_sum))
+    speed, angle = (
+        sums[triangle] / tally.impacts[triangle] for sums in (tally.speed_sum, tally.angle_sum)
+    )
     dent = np.sqrt(4.0 / np.pi * tally.dent_area)
-    return Hits(triangle, *(column.astype(np.float32) for column in (speed, angle, dent, np.full(len(dent), 1e-6))))
+    return Hits(
+        triangle,
+        *(column.astype(np.float32) for column in (speed, angle, dent, np.full(len(dent), 1e-6))),
+    )

@@ -86,7 +86,9 @@ def hill(design: Design, stream: str, replicas: int | None) -> Evaluation:
     if mass > 9.0:
         raise InputError(f"shot: {mass:g} g do not fit")
     time.sleep(0.02)
-    return judged(0.5 - 0.01 * (mass - 6.0) ** 2 + np.linspace(-0.01, 0.01, 4), mean_coverage=mass / 10.0)
+    return judged(
+        0.5 - 0.01 * (mass - 6.0) ** 2 + np.linspace(-0.01, 0.01, 4), mean_coverage=mass / 10.0
+    )
 
 
 def deadly(design: Design, stream: str, replicas: int | None) -> Evaluation:

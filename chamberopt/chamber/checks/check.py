@@ -25,7 +25,9 @@ if TYPE_CHECKING:
 # Above this share of the free volume the shot is a shaken bed rather than a gas: few balls reach the part,
 # and event-driven simulation slows down, because collisions crowd.
 CROWDED = 0.3
-CLEAR_AMPLITUDES = 10.0  # between part and sonotrode, as a design's sonotrode_distance_mm has to have
+CLEAR_AMPLITUDES = (
+    10.0  # between part and sonotrode, as a design's sonotrode_distance_mm has to have
+)
 MUCH_HIDDEN = 0.05  # of the target's area: cut off by a ceiling or wall that is in the wrong place
 THIN = 10.0  # chamber heights between two meetings of a ball: from there on few dents come from balls that met
 
@@ -63,7 +65,9 @@ def describe(design: Design, chamber: Chamber, found: Reach | None = None) -> di
         },
         "chamber": {
             "shape": design.chamber.shape,
-            "shape_volume_cm3": _rounded(float(tetrahedron_volumes(shape.vertices, shape.triangles).sum()) * 1e6),
+            "shape_volume_cm3": _rounded(
+                float(tetrahedron_volumes(shape.vertices, shape.triangles).sum()) * 1e6
+            ),
             "free_volume_cm3": _rounded(chamber.volume * 1e6),
             "closed": "yes",  # what leaks has been refused above
             "sonotrode_clearance_mm": _rounded(sonotrode_clearance(found.mesh) * 1e3),
@@ -81,7 +85,10 @@ def describe(design: Design, chamber: Chamber, found: Reach | None = None) -> di
         },
         "reach": _reach_facts(found, chamber),
         "simulated_time_s": _rounded(simulated),
-        "notes": [*chamber.notes, *(ledge.said for ledge in ledges(design, chamber) if not ledge.level)],
+        "notes": [
+            *chamber.notes,
+            *(ledge.said for ledge in ledges(design, chamber) if not ledge.level),
+        ],
         "warnings": warnings(design, chamber, found),
     }
 
@@ -119,7 +126,10 @@ def warnings(design: Design, chamber: Chamber, found: Reach | None = None) -> li
             f"effects.ball_collisions is false, though a ball would meet another every {path:.2g} chamber heights: "
             "they fly through each other; switch it on"
         )
-    turn, recorded = design.effects.part_turn, design.process.accuracy.replicas * design.process.recorded_time
+    turn, recorded = (
+        design.effects.part_turn,
+        design.process.accuracy.replicas * design.process.recorded_time,
+    )
     if turn is not None and turn.rpm != 0.0 and recorded < turn.period:
         said.append(
             f"the part takes {turn.period:.3g} s to turn once, the replicas together last "
@@ -127,7 +137,9 @@ def warnings(design: Design, chamber: Chamber, found: Reach | None = None) -> li
             "raise process.accuracy"
         )
     said += _sonotrode_warnings(design, found.mesh)
-    said += target_warnings(found, chamber, design.part.target.reachable) + pocket_warnings(found, chamber)
+    said += target_warnings(found, chamber, design.part.target.reachable) + pocket_warnings(
+        found, chamber
+    )
     said += gap_warnings(found, chamber, ball, turns=turn is not None)
     crossing = _through_side_wall(design, chamber)
     if crossing is not None:
@@ -158,7 +170,9 @@ def _turn(design: Design) -> dict[str, Any]:
         return {}
     point, axis = turning_axis(design)
     motion = (
-        {"rpm": turn.rpm} if turn.rpm is not None else {"angle_deg": turn.angle_deg, "frequency_hz": turn.frequency_hz}
+        {"rpm": turn.rpm}
+        if turn.rpm is not None
+        else {"angle_deg": turn.angle_deg, "frequency_hz": turn.frequency_hz}
     )
     return {
         "part_turn": {
@@ -175,7 +189,11 @@ def _through_side_wall(design: Design, chamber: Chamber) -> tuple[float, float] 
     Not asked of a part that closes the chamber like a lid, nor of one that turns: its joint is a round shaft; nor
     where there is a hole for a fixture, or the part is drawn with its chamber.
     """
-    if design.chamber.holes or design.effects.part_turn is not None or design.chamber.setup() is not None:
+    if (
+        design.chamber.holes
+        or design.effects.part_turn is not None
+        or design.chamber.setup() is not None
+    ):
         return None
     names = surface_names(chamber)
     if not (names == CEILING).any():
@@ -183,7 +201,9 @@ def _through_side_wall(design: Design, chamber: Chamber) -> tuple[float, float] 
     edges = chamber.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     own = np.repeat(chamber.tags == TAG_PART, 3)
     beside = np.repeat(names == SIDE_WALL, 3)
-    of_part, of_wall = ({tuple(edge) for edge in np.sort(edges[rows]).tolist()} for rows in (own, beside))
+    of_part, of_wall = (
+        {tuple(edge) for edge in np.sort(edges[rows]).tolist()} for rows in (own, beside)
+    )
     height = chamber.vertices[np.array(sorted(of_part & of_wall), dtype=int).reshape(-1, 2), 2]
     return (float(height.min()), float(height.max())) if height.size else None
 
@@ -235,7 +255,9 @@ def _lowest_on_its_way(design: Design, points: np.ndarray, swing: float | None) 
     offset = points - point
     along = (offset @ axis)[:, None] * axis
     across, ahead = (offset - along)[:, 2], np.cross(axis, offset)[:, 2]
-    furthest = np.minimum(np.abs(np.arctan2(ahead, across)) + (np.pi if swing is None else swing), np.pi)
+    furthest = np.minimum(
+        np.abs(np.arctan2(ahead, across)) + (np.pi if swing is None else swing), np.pi
+    )
     return float((point[2] + along[:, 2] + np.hypot(across, ahead) * np.cos(furthest)).min())
 
 

@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.chamber.checks.place_names import CEILING, SONOTRODE, around, mm2, on_target, one_of, surface_names
+from chamberopt.chamber.checks.place_names import (
+    CEILING,
+    SONOTRODE,
+    around,
+    mm2,
+    on_target,
+    one_of,
+    surface_names,
+)
 from chamberopt.chamber.reach.largest_ball import Touches
 from chamberopt.chamber.reach.reach import FORGIVEN
 
@@ -32,7 +40,9 @@ def gap_warnings(reach: Reach, chamber: Chamber, largest: float, turns: bool = F
     found = reach.touches
     facing = (found.against >= 0) & (found.opposite < FACING)
     narrow = facing & (found.radius < 0.5 * largest)
-    entrance = found.only(facing & reach.reached & ~narrow & (found.radius < 0.5 * (1.0 + PASSING) * largest)).centre
+    entrance = found.only(
+        facing & reach.reached & ~narrow & (found.radius < 0.5 * (1.0 + PASSING) * largest)
+    ).centre
     inside, names = found.only(narrow), surface_names(chamber)
     alike: dict[tuple[str, str, bool], list[Touches]] = {}
     for members in _clusters(inside.centre, 2.0 * reach.spacing):
@@ -40,7 +50,9 @@ def gap_warnings(reach: Reach, chamber: Chamber, largest: float, turns: bool = F
         if gap.area.sum() > (0.5 * largest) ** 2:
             wedge = _meets(gap, entrance, largest, 2.0 * reach.spacing)
             alike.setdefault((*_sides(gap, names), wedge), []).append(gap)
-    largest_first = sorted(alike.items(), key=lambda item: -sum(gap.area.sum() for gap in item[1]))[:MOST_SAID]
+    largest_first = sorted(alike.items(), key=lambda item: -sum(gap.area.sum() for gap in item[1]))[
+        :MOST_SAID
+    ]
     return [_said(*kind, gaps, reach.diameter, largest, turns) for kind, gaps in largest_first]
 
 
@@ -75,7 +87,9 @@ def target_warnings(reach: Reach, chamber: Chamber, only_reachable: bool = False
         return []
     sharp = own & ~reach.fits
     place = one_of(found.point[missed], found.area[missed])
-    remedy = "narrow [part.target]" + ("" if only_reachable else ", or set part.target.reachable = true")
+    remedy = "narrow [part.target]" + (
+        "" if only_reachable else ", or set part.target.reachable = true"
+    )
     if found.area[sharp].sum() > 0.5 * left:
         order = np.argsort(found.radius[own])
         beyond = np.cumsum(found.area[own][order]) > 0.5 * left
@@ -118,14 +132,29 @@ def _sides(gap: Touches, names: np.ndarray) -> tuple[str, str]:
     return str(one), str(two)
 
 
-def _said(one: str, two: str, wedge: bool, gaps: list[Touches], smallest: float, largest: float, turns: bool) -> str:
+def _said(
+    one: str,
+    two: str,
+    wedge: bool,
+    gaps: list[Touches],
+    smallest: float,
+    largest: float,
+    turns: bool,
+) -> str:
     """One sentence on gaps of a kind."""
     biggest = max(gaps, key=lambda gap: gap.area.sum())
     radius = np.concatenate([gap.radius for gap in gaps])
-    low, high = (max(0.0, 1e3 * (2.0 * end - FORGIVEN * 0.5 * smallest)) for end in (radius.min(), radius.max()))
+    low, high = (
+        max(0.0, 1e3 * (2.0 * end - FORGIVEN * 0.5 * smallest))
+        for end in (radius.min(), radius.max())
+    )
     between = f"between {one} and {two}" if one != two else f"of {one}"
     where = f"at {one_of(biggest.centre, biggest.area)}"
-    what = f"the gap {between} {where}" if len(gaps) == 1 else f"each of {len(gaps)} gaps {between}, one {where},"
+    what = (
+        f"the gap {between} {where}"
+        if len(gaps) == 1
+        else f"each of {len(gaps)} gaps {between}, one {where},"
+    )
     ball = f"a ball of {1e3 * largest:g} mm"
     if wedge:
         caught = f"narrows from more than {ball} to {low:.3g} mm, so gently that friction holds it: it can wedge there"
@@ -138,7 +167,11 @@ def _said(one: str, two: str, wedge: bool, gaps: list[Touches], smallest: float,
 
 
 def _kept_out(width_mm: float, smallest: float) -> str:
-    return "no ball gets in there" if width_mm < 1e3 * smallest else "only the smaller balls get in there"
+    return (
+        "no ball gets in there"
+        if width_mm < 1e3 * smallest
+        else "only the smaller balls get in there"
+    )
 
 
 def _remedy(sides: set[str]) -> str:

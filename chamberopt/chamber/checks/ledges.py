@@ -52,7 +52,11 @@ def ledges(design: Design, chamber: Chamber) -> list[Ledge]:
         if not shown.any():
             continue
         much = mm2(area[shown].sum())
-        where, how = ("on", f"{much} of it are level") if level else ("in hollows of", f"{much} face up, none level")
+        where, how = (
+            ("on", f"{much} of it are level")
+            if level
+            else ("in hollows of", f"{much} face up, none level")
+        )
         found.append(
             Ledge(
                 f"balls can come to rest {where} the {name}, which neither vibrates nor turns: {how}, "
@@ -72,12 +76,18 @@ def _in_hollows(chamber: Chamber, upward: np.ndarray, downward: np.ndarray) -> n
     from scipy.sparse.csgraph import connected_components
 
     count, height = len(chamber.vertices), chamber.vertices[:, 2]
-    one, two = chamber.triangles[:, [0, 1, 2, 1, 2, 0]].reshape(-1, 2, 3).transpose(1, 0, 2).reshape(2, -1)
+    one, two = (
+        chamber.triangles[:, [0, 1, 2, 1, 2, 0]].reshape(-1, 2, 3).transpose(1, 0, 2).reshape(2, -1)
+    )
     alike = np.abs(height[one] - height[two]) <= LEVEL
-    links = coo_array((np.ones(alike.sum(), dtype=bool), (one[alike], two[alike])), shape=(count, count))
+    links = coo_array(
+        (np.ones(alike.sum(), dtype=bool), (one[alike], two[alike])), shape=(count, count)
+    )
     plateaus, plateau = connected_components(links, directed=False)
     bottom = np.ones(plateaus, dtype=bool)
-    bottom[plateau[one[height[two] < height[one] - LEVEL]]] = False  # each edge is there both ways round
+    bottom[plateau[one[height[two] < height[one] - LEVEL]]] = (
+        False  # each edge is there both ways round
+    )
     bottom[plateau[chamber.triangles[downward | (chamber.tags == TAG_SONOTRODE)]]] = False
     return np.asarray(upward & bottom[plateau[chamber.triangles]].any(axis=1))
 

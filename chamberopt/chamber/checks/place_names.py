@@ -22,7 +22,11 @@ def surface_names(chamber: Chamber) -> np.ndarray:
     normal = -area_vectors(chamber.vertices, chamber.triangles)  # to the shot
     size = np.linalg.norm(normal, axis=1)
     up = np.divide(normal[:, 2], size, out=np.zeros_like(size), where=size > 0.0)
-    on_part = np.select([up > STEEP, up < -STEEP], ["the part's upper side", "the part's underside"], "the part's side")
+    on_part = np.select(
+        [up > STEEP, up < -STEEP],
+        ["the part's upper side", "the part's underside"],
+        "the part's side",
+    )
     on_wall = np.select([up > STEEP, up < -STEEP], ["a ledge of the wall", CEILING], SIDE_WALL)
     words = np.where(chamber.tags == TAG_PART, on_part, on_wall).astype(object)
     words[chamber.tags == TAG_SONOTRODE] = SONOTRODE
@@ -50,4 +54,6 @@ def one_of(points: np.ndarray, weights: np.ndarray) -> str:
 
 def on_target(chamber: Chamber) -> np.ndarray:
     """Which of the cavity's triangles (k,) lie on the target."""
-    return np.asarray((chamber.tags == TAG_PART) & chamber.part.target[np.maximum(chamber.source, 0)])
+    return np.asarray(
+        (chamber.tags == TAG_PART) & chamber.part.target[np.maximum(chamber.source, 0)]
+    )

@@ -43,7 +43,9 @@ class Cells(NamedTuple):
 
     def at(self, places: np.ndarray) -> np.ndarray:
         """The open space (n,) at each of the places (n, 3) [m]."""
-        index = np.clip(((places - self.low) / self.edge).astype(np.int64), 0, np.array(self.space.shape) - 1)
+        index = np.clip(
+            ((places - self.low) / self.edge).astype(np.int64), 0, np.array(self.space.shape) - 1
+        )
         return np.asarray(self.space[tuple(index.T)])
 
 
@@ -84,7 +86,9 @@ def _halved(cells: np.ndarray) -> np.ndarray:
     return cells
 
 
-def rooms(mesh: TriangleMesh, touches: Touches, radius: float, spacing: float) -> tuple[np.ndarray, np.ndarray]:
+def rooms(
+    mesh: TriangleMesh, touches: Touches, radius: float, spacing: float
+) -> tuple[np.ndarray, np.ndarray]:
     """The room (p,) int that each touch lies in, -1 where a ball of this radius [m] does not fit, and the volume [m³]
     that its centre has in each room; ``spacing`` [m] of the touches, at most.
     """
@@ -104,12 +108,16 @@ def rooms(mesh: TriangleMesh, touches: Touches, radius: float, spacing: float) -
     count = spaces + len(tights)
 
     def joined(links: np.ndarray) -> np.ndarray:
-        graph = coo_array((np.ones(len(links), dtype=np.int8), (links[:, 0], links[:, 1])), shape=(count, count))
+        graph = coo_array(
+            (np.ones(len(links), dtype=np.int8), (links[:, 0], links[:, 1])), shape=(count, count)
+        )
         return np.asarray(connected_components(graph, directed=False)[1])
 
     links = _ways_out(mesh, cells, tights, radius, spacing) + np.array([spaces, 0])
     room = joined(links)
-    room = joined(np.concatenate([links, _ways_on(mesh, tights, room[spaces:], radius, spacing) + spaces]))
+    room = joined(
+        np.concatenate([links, _ways_on(mesh, tights, room[spaces:], radius, spacing) + spaces])
+    )
     which = np.full(len(touches.point), -1)
     which[fits] = room[node]
     filled = np.bincount(cells.space.ravel(), minlength=spaces + 1)[1:]
@@ -126,7 +134,9 @@ def _midways(mesh: TriangleMesh, cells: Cells, radius: float) -> np.ndarray:
     from sim_core import nearest
 
     highest = maximum_filter(cells.space, size=NEARBY)
-    lowest = minimum_filter(np.where(cells.space > 0, cells.space, np.iinfo(np.int32).max), size=NEARBY)
+    lowest = minimum_filter(
+        np.where(cells.space > 0, cells.space, np.iinfo(np.int32).max), size=NEARBY
+    )
     place = cells.middles(cells.unsure & ((highest == 0) | (highest != lowest)))
     beside = nearest(mesh, place, radius + DIAGONAL * cells.edge)
     outward = area_vectors(mesh.vertices, mesh.triangles)[beside.triangle]
@@ -143,7 +153,9 @@ def _midways(mesh: TriangleMesh, cells: Cells, radius: float) -> np.ndarray:
     return best[widest >= radius]
 
 
-def _ways_out(mesh: TriangleMesh, cells: Cells, centre: np.ndarray, radius: float, spacing: float) -> np.ndarray:
+def _ways_out(
+    mesh: TriangleMesh, cells: Cells, centre: np.ndarray, radius: float, spacing: float
+) -> np.ndarray:
     """Links (k, 2) from tight places to open spaces nearby, one for each of both."""
     from scipy.ndimage import binary_erosion
     from scipy.spatial import KDTree
@@ -168,13 +180,17 @@ def _ways_out(mesh: TriangleMesh, cells: Cells, centre: np.ndarray, radius: floa
     return np.column_stack([start, led[start, column]])
 
 
-def _ways_on(mesh: TriangleMesh, centre: np.ndarray, room: np.ndarray, radius: float, spacing: float) -> np.ndarray:
+def _ways_on(
+    mesh: TriangleMesh, centre: np.ndarray, room: np.ndarray, radius: float, spacing: float
+) -> np.ndarray:
     """Links (k, 2) between tight places near each other that are not yet known to be in one room."""
     from scipy.spatial import KDTree
 
     if len(centre) < 2:
         return np.zeros((0, 2), dtype=np.int64)
-    away, found = KDTree(centre).query(centre, k=min(3 * NEIGHBOURS, len(centre)), distance_upper_bound=3.0 * spacing)
+    away, found = KDTree(centre).query(
+        centre, k=min(3 * NEIGHBOURS, len(centre)), distance_upper_bound=3.0 * spacing
+    )
     here, k = np.nonzero(np.isfinite(away))
     there = found[here, k]
     new = room[here] != room[there]

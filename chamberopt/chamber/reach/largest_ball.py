@@ -56,8 +56,12 @@ def touches(mesh: TriangleMesh, spacing: np.ndarray, most: float, forgiven: floa
     triangle, point, area = spread(mesh.vertices, mesh.triangles, spacing)
     outward = area_vectors(mesh.vertices, mesh.triangles)
     size = np.linalg.norm(outward, axis=1)
-    normal = -np.divide(outward, size[:, None], out=np.zeros_like(outward), where=size[:, None] > 0.0)[triangle]
-    return Touches(triangle, point, normal, area, *largest_balls(mesh, point, normal, most, forgiven))
+    normal = -np.divide(
+        outward, size[:, None], out=np.zeros_like(outward), where=size[:, None] > 0.0
+    )[triangle]
+    return Touches(
+        triangle, point, normal, area, *largest_balls(mesh, point, normal, most, forgiven)
+    )
 
 
 def spread(
@@ -72,7 +76,11 @@ def spread(
     fold = u + v > 1.0  # the square's other half falls onto the triangle
     u, v = np.where(fold, 1.0 - u, u), np.where(fold, 1.0 - v, v)
     a, b, c = (vertices[triangles[triangle, k]] for k in range(3))
-    return triangle, a + u[:, None] * (b - a) + v[:, None] * (c - a), (size / np.maximum(count, 1))[triangle]
+    return (
+        triangle,
+        a + u[:, None] * (b - a) + v[:, None] * (c - a),
+        (size / np.maximum(count, 1))[triangle],
+    )
 
 
 def largest_balls(
@@ -97,11 +105,15 @@ def largest_balls(
         to = found.point[hit] - point[asked]
         ahead = np.einsum("ij,ij->i", to, normal[asked]) - forgiven
         square = np.einsum("ij,ij->i", to, to) - forgiven**2
-        fits = np.divide(square, 2.0 * ahead, out=np.zeros_like(ahead), where=(ahead > 0.0) & (square > 0.0))
+        fits = np.divide(
+            square, 2.0 * ahead, out=np.zeros_like(ahead), where=(ahead > 0.0) & (square > 0.0)
+        )
         against[asked] = found.triangle[hit]
         shrunk = fits < (1.0 - 1e-9) * radius[asked]
         radius[asked] = np.minimum(np.maximum(fits, forgiven), radius[asked])
-        across = np.einsum("ij,ij->i", point[asked] - found.point[hit], normal[asked]) + radius[asked]
+        across = (
+            np.einsum("ij,ij->i", point[asked] - found.point[hit], normal[asked]) + radius[asked]
+        )
         opposite[asked] = across / np.maximum(radius[asked] - forgiven, forgiven)
         asked = asked[shrunk & (fits > forgiven)]
     return radius, against, opposite

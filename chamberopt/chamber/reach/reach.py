@@ -52,7 +52,9 @@ def reach(mesh: TriangleMesh, diameter: float, largest: float | None = None) -> 
     """
     radius = 0.5 * diameter
     forgiven = FORGIVEN * radius
-    most = max(radius + 1.01 * np.sqrt(3.0) * cell_edge(mesh, radius), WIDER * 0.5 * (largest or diameter))
+    most = max(
+        radius + 1.01 * np.sqrt(3.0) * cell_edge(mesh, radius), WIDER * 0.5 * (largest or diameter)
+    )
     spacing = _spacing(mesh, FINE * radius)
     found = touches(mesh, spacing, most, forgiven)
     room, volume = rooms(mesh, found, radius - forgiven, float(spacing.max()))
@@ -73,7 +75,9 @@ def part_share(found: Reach, source: np.ndarray, count: int) -> np.ndarray:
     ``source`` (k,): the part's triangle that each of the cavity's lies on, else -1. 0 of what is not in the cavity.
     """
     size, own = areas(found.mesh.vertices, found.mesh.triangles), source >= 0
-    touched, whole = (np.bincount(source[own], weights[own], count) for weights in (found.share * size, size))
+    touched, whole = (
+        np.bincount(source[own], weights[own], count) for weights in (found.share * size, size)
+    )
     return np.divide(touched, whole, out=np.zeros(count), where=whole > 0.0)
 
 

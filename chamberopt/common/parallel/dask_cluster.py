@@ -49,7 +49,9 @@ class Cluster(Executor):
 
     def share(self, value: Any) -> Any:
         """A task's result rather than scattered data: should its workers be lost, the scheduler makes it again."""
-        return self._client.submit(pickle.loads, pickle.dumps(value, pickle.HIGHEST_PROTOCOL), pure=False)
+        return self._client.submit(
+            pickle.loads, pickle.dumps(value, pickle.HIGHEST_PROTOCOL), pure=False
+        )
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         theirs = self._executor.submit(fn, *args, **kwargs)
@@ -83,7 +85,9 @@ class Cluster(Executor):
         for worker, found in theirs.items():
             if found != mine:
                 differ = ", ".join(
-                    f"{name} {found[name]} ({mine[name]} here)" for name in mine if found[name] != mine[name]
+                    f"{name} {found[name]} ({mine[name]} here)"
+                    for name in mine
+                    if found[name] != mine[name]
                 )
                 raise InputError(
                     f"--cluster: worker {worker} has {differ}: figures could differ; install the same there"
@@ -107,14 +111,14 @@ def _address(cluster: str) -> str:
         return cluster
     path = Path(cluster)
     if not path.is_file():
-        text = (
-            "neither an address nor a file; give tcp://HOST:PORT, or what `dask scheduler --scheduler-file FILE` wrote"
-        )
+        text = "neither an address nor a file; give tcp://HOST:PORT, or what `dask scheduler --scheduler-file FILE` wrote"
         raise InputError(f"--cluster: given {cluster!r}, {text}")
     try:
         return str(json.loads(path.read_text(encoding="utf-8"))["address"])
     except (OSError, ValueError, KeyError, TypeError):
-        text = "holds no scheduler's address; give what `dask scheduler --scheduler-file FILE` wrote"
+        text = (
+            "holds no scheduler's address; give what `dask scheduler --scheduler-file FILE` wrote"
+        )
         raise InputError(f"--cluster: {cluster} {text}") from None
 
 
@@ -132,10 +136,16 @@ def _copy_outcome(theirs: Future[Any], ours: Future[Any]) -> None:
     try:
         ours.set_result(theirs.result())
     except CancelledError:
-        ours.set_exception(ClusterLostError("the cluster gave its tasks up: its scheduler has ended"))
+        ours.set_exception(
+            ClusterLostError("the cluster gave its tasks up: its scheduler has ended")
+        )
     except KilledWorker as error:
         count = error.allowed_failures + 1
         where = error.last_worker.address
-        ours.set_exception(WorkerLostError(f"{count} workers died of its task, the last at {where}; see their logs"))
+        ours.set_exception(
+            WorkerLostError(
+                f"{count} workers died of its task, the last at {where}; see their logs"
+            )
+        )
     except Exception as error:
         ours.set_exception(error)

@@ -32,7 +32,9 @@ def local_executor(workers: int | None = None, kind: Kind = "threads") -> Execut
     in parallel too. InputError for no workers.
     """
     if workers is not None and workers < 1:
-        raise InputError(f"--workers: given {workers}; give at least 1, or leave it out for one per core")
+        raise InputError(
+            f"--workers: given {workers}; give at least 1, or leave it out for one per core"
+        )
     count = workers or core_count()
     if kind == "threads":
         return ThreadPoolExecutor(count, thread_name_prefix="replica")
@@ -48,10 +50,13 @@ def open_executor(workers: int | None, cluster: str | None, kind: Kind | None = 
     """
     if cluster is None:
         return local_executor(
-            workers, kind or ("threads" if (workers or core_count()) <= MOST_THREADS else "processes")
+            workers,
+            kind or ("threads" if (workers or core_count()) <= MOST_THREADS else "processes"),
         )
     if workers is not None:
-        raise InputError(f"--workers: given {workers}, but --cluster has workers of its own; leave one of the two out")
+        raise InputError(
+            f"--workers: given {workers}, but --cluster has workers of its own; leave one of the two out"
+        )
     from chamberopt.common.parallel.dask_cluster import Cluster
 
     return Cluster(cluster)

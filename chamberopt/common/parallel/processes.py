@@ -78,7 +78,10 @@ class Processes(Executor):
             self._end()
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         if kind is not None:
             self._feeders.shutdown(wait=False, cancel_futures=True)
@@ -88,7 +91,11 @@ class Processes(Executor):
     @property
     def pids(self) -> list[int]:
         """Of the processes that are there."""
-        return [worker.process.pid for worker in self._workers if worker.process.pid and worker.process.is_alive()]
+        return [
+            worker.process.pid
+            for worker in self._workers
+            if worker.process.pid and worker.process.is_alive()
+        ]
 
     def _run(self, fn: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
         task = pickle.dumps((fn, args, kwargs), pickle.HIGHEST_PROTOCOL)

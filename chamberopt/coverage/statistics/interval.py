@@ -62,7 +62,9 @@ def student(freedom: float, confidence: float = CONFIDENCE) -> float:
     return float(stdtrit(freedom, 0.5 + confidence / 2.0))
 
 
-def paired_difference(after: Estimate, before: Estimate, confidence: float = CONFIDENCE) -> Estimate:
+def paired_difference(
+    after: Estimate, before: Estimate, confidence: float = CONFIDENCE
+) -> Estimate:
     """after - before with its 95 % interval, from replicas run on the same seeds, pair by pair.
 
     The jackknife of the difference: its pseudo-values are the differences of the two. A peening chamber is
@@ -76,17 +78,24 @@ def paired_difference(after: Estimate, before: Estimate, confidence: float = CON
     return Estimate(after.value - before.value, pairs.half_width, pairs.pseudovalues, pairs.bias)
 
 
-def independent_difference(after: Estimate, before: Estimate, confidence: float = CONFIDENCE) -> Estimate:
+def independent_difference(
+    after: Estimate, before: Estimate, confidence: float = CONFIDENCE
+) -> Estimate:
     """after - before with its 95 % interval when the two were simulated independently (Welch's t)."""
     value, bias = after.value - before.value, after.bias + before.bias
-    if min(len(after.pseudovalues), len(before.pseudovalues)) < 2:  # nothing to count with: intervals in quadrature
+    if (
+        min(len(after.pseudovalues), len(before.pseudovalues)) < 2
+    ):  # nothing to count with: intervals in quadrature
         return Estimate(value, math.hypot(after.half_width, before.half_width), (), bias)
     scatter = welch_half_width(after.pseudovalues, before.pseudovalues, confidence)
     return Estimate(value, scatter + bias, (), bias)
 
 
 def welch_half_width(
-    after: Sequence[float], before: Sequence[float], confidence: float = CONFIDENCE, times: float = 1.0
+    after: Sequence[float],
+    before: Sequence[float],
+    confidence: float = CONFIDENCE,
+    times: float = 1.0,
 ) -> float:
     """Half-width of the interval of a difference of means, had each so many times as many values of this scatter.
 

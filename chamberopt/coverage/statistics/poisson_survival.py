@@ -37,10 +37,14 @@ class Bare:
     dent: area [m²] of dents that, all alike, would scatter as these do.
     """
 
-    def __init__(self, replicas: Sequence[Dents], area: np.ndarray, stretch: float, dent: float) -> None:
+    def __init__(
+        self, replicas: Sequence[Dents], area: np.ndarray, stretch: float, dent: float
+    ) -> None:
         n = len(replicas)
         per_area, weight = stretch / n / area, area / area.sum()
-        every = Dents(np.concatenate([d.patch for d in replicas]), np.concatenate([d.area for d in replicas]))
+        every = Dents(
+            np.concatenate([d.patch for d in replicas]), np.concatenate([d.area for d in replicas])
+        )
         products = [_products(every, power * per_area) for power in (1, 2, 3, 4)]
         self.once, self.twice = float(weight @ products[0]), float(weight @ products[1])
 
@@ -48,7 +52,9 @@ class Bare:
         x = _likely(per_area * dented.sum(axis=0), per_area * dent, weight)
         slopes = [-power * weight * np.exp(-power * x) for power in (1, 2)]
         share = np.array([n * (dented @ (slope * per_area)) for slope in slopes])
-        first = _products_of(slopes, per_area**2 * np.bincount(every.patch, every.area**2, len(area)))
+        first = _products_of(
+            slopes, per_area**2 * np.bincount(every.patch, every.area**2, len(area))
+        )
         weighted = [weight * product for product in products[:2]]
         # Without bias, as the products are: the mean of the square less the square of the mean.
         whole = _products_of(weighted, np.ones(len(area)))
@@ -67,7 +73,9 @@ def _likely(seen: np.ndarray, noise: np.ndarray, weight: np.ndarray) -> np.ndarr
     """
     mean = float(weight @ seen)
     variance = max(0.0, float(weight @ (seen - mean) ** 2 - weight @ (noise * seen)))
-    trust = np.divide(variance, variance + noise * mean, out=np.zeros_like(seen), where=noise * mean > 0.0)
+    trust = np.divide(
+        variance, variance + noise * mean, out=np.zeros_like(seen), where=noise * mean > 0.0
+    )
     return np.maximum(0.0, mean + np.sqrt(np.maximum(trust, 0.25)) * (seen - mean))
 
 
@@ -90,9 +98,16 @@ def _stretched(moves: np.ndarray, first: np.ndarray, whole: np.ndarray) -> np.nd
     )  # rounding leaves less than 0 where dents lie on one patch
     whole_rest = max(whole[1, 1] - whole[0, 1] ** 2 / whole_top, rest)
     along = moves[0] / np.sqrt(first[0, 0])
-    across = (moves[1] - first[0, 1] / first[0, 0] * moves[0]) / np.sqrt(rest) if rest > 0.0 else 0.0 * along
+    across = (
+        (moves[1] - first[0, 1] / first[0, 0] * moves[0]) / np.sqrt(rest)
+        if rest > 0.0
+        else 0.0 * along
+    )
     return np.array(
-        [np.sqrt(whole_top) * along, whole[0, 1] / np.sqrt(whole_top) * along + np.sqrt(whole_rest) * across]
+        [
+            np.sqrt(whole_top) * along,
+            whole[0, 1] / np.sqrt(whole_top) * along + np.sqrt(whole_rest) * across,
+        ]
     )
 
 

@@ -34,7 +34,9 @@ class Mixture:
         self._columns = int(FINE * np.sqrt((most * self._scale).max(initial=0.0))) + 2
         mean, variance = self.moments(most)
         reach = 6.0 * np.sqrt(variance)
-        self._rates = np.linspace(np.sqrt(max(0.0, mean - reach)), np.sqrt(mean + reach), NODES) ** 2
+        self._rates = (
+            np.linspace(np.sqrt(max(0.0, mean - reach)), np.sqrt(mean + reach), NODES) ** 2
+        )
         counts = (np.arange(self._columns) / FINE) ** 2
         expected = np.maximum(np.outer(middle, self._rates), 1e-9)  # (kinds, rates)
         logs = counts[None, :, None] * np.log(expected)[:, None] - expected[:, None]
@@ -45,7 +47,9 @@ class Mixture:
         """Mean and variance of x over the surface, the counts' own scatter taken off; the variance kept above 0."""
         x = counts / self._exposure
         mean = float(self._weight @ x)
-        variance = float(self._weight @ (x - mean) ** 2 - self._weight @ (counts / self._exposure**2))
+        variance = float(
+            self._weight @ (x - mean) ** 2 - self._weight @ (counts / self._exposure**2)
+        )
         return mean, max(variance, 1e-4 * mean**2)
 
     def _start(self, mean: float, variance: float) -> np.ndarray:
@@ -54,7 +58,9 @@ class Mixture:
         shape = mean**2 / variance
         edges = np.append(0.5 * (self._rates[1:] + self._rates[:-1]), np.inf)
         gamma = np.diff(gammainc(shape, shape * edges / mean), prepend=0.0)
-        return 0.98 * gamma / gamma.sum() + 0.02 / NODES  # a little everywhere: EM cannot fill what is empty
+        return (
+            0.98 * gamma / gamma.sum() + 0.02 / NODES
+        )  # a little everywhere: EM cannot fill what is empty
 
     def poorest(self, counts: np.ndarray, share: float, steps: int = STEPS) -> float:
         """The x that all but the `share` of the area exceed."""

@@ -26,7 +26,9 @@ class ChamberTable(BaseModel):
     ceiling_key: ClassVar[str] = "shape"  # what to change when the ceiling is too low
 
     shape: str = Field(description="form of the cavity")
-    sonotrode_distance_mm: float = quantity(0.1, 2000, "mm", "mean sonotrode face to lowest point of the part")
+    sonotrode_distance_mm: float = quantity(
+        0.1, 2000, "mm", "mean sonotrode face to lowest point of the part"
+    )
     deflectors: Annotated[tuple[Deflector, ...], Field(strict=False)] = listed(
         "a list of tables, [[chamber.deflectors]]", "bodies that stand in the chamber", ()
     )
@@ -76,8 +78,15 @@ class ChamberTable(BaseModel):
 class WalledChamber(ChamberTable):
     """A cavity with side walls all round, that may lean."""
 
-    inclination_deg: float = quantity(-45, 45, "degrees", "of the side walls: above 0 wider at the ceiling", 0.0)
-    facets: int = Field(default=64, ge=8, le=1024, description="flat sides that stand for a full turn of a round wall")
+    inclination_deg: float = quantity(
+        -45, 45, "degrees", "of the side walls: above 0 wider at the ceiling", 0.0
+    )
+    facets: int = Field(
+        default=64,
+        ge=8,
+        le=1024,
+        description="flat sides that stand for a full turn of a round wall",
+    )
 
     @property
     def slope(self) -> float:

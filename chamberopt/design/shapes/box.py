@@ -17,7 +17,11 @@ class Box(PolygonChamber):
 
     def floor(self) -> np.ndarray:
         """From the corner at +x, -y on."""
-        return 0.5e-3 * np.array([self.length_mm, self.width_mm]) * np.array([[1, -1], [1, 1], [-1, 1], [-1, -1]])
+        return (
+            0.5e-3
+            * np.array([self.length_mm, self.width_mm])
+            * np.array([[1, -1], [1, 1], [-1, 1], [-1, -1]])
+        )
 
     def widths_mm(self) -> dict[str, float]:
         """Along, across and up."""

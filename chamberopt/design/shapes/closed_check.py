@@ -9,7 +9,9 @@ from chamberopt.geometry.mesh_io import SurfaceError, place_text
 from chamberopt.geometry.mesh_io.self_intersection import refuse_crossings
 from chamberopt.geometry.triangles import area_vectors, shells_of
 
-MOST_ACROSS = 10.0  # m: more than the shipped shapes can be, less than a chamber whose mm are taken for m
+MOST_ACROSS = (
+    10.0  # m: more than the shipped shapes can be, less than a chamber whose mm are taken for m
+)
 
 
 def fault(cavity: object) -> str | None:
@@ -21,7 +23,12 @@ def fault(cavity: object) -> str | None:
         triangles, tags = np.asarray(cavity.triangles), np.asarray(cavity.tags)
     except (TypeError, ValueError):
         return "holds what is no array of numbers"
-    if vertices.ndim != 2 or vertices.shape[1:] != (3,) or triangles.ndim != 2 or triangles.shape[1:] != (3,):
+    if (
+        vertices.ndim != 2
+        or vertices.shape[1:] != (3,)
+        or triangles.ndim != 2
+        or triangles.shape[1:] != (3,)
+    ):
         return f"has vertices {vertices.shape} and triangles {triangles.shape}; (n, 3) and (m, 3) are wanted"
     if triangles.dtype.kind not in "iu" or len(triangles) < 4:
         return "has triangles that are not at least four rows of vertex numbers"
@@ -32,7 +39,11 @@ def fault(cavity: object) -> str | None:
     across = float(np.ptp(vertices, axis=0).max())
     if across > MOST_ACROSS:
         return f"is {across:.4g} m wide, where {MOST_ACROSS:g} is the most; its vertices are in metres, not mm"
-    return _open_or_turned(vertices, triangles) or _no_floor(vertices, triangles, tags) or _crossed(vertices, triangles)
+    return (
+        _open_or_turned(vertices, triangles)
+        or _no_floor(vertices, triangles, tags)
+        or _crossed(vertices, triangles)
+    )
 
 
 def in_arrays(cavity: ShapeSurface) -> ShapeSurface:
@@ -50,8 +61,14 @@ def _open_or_turned(vertices: np.ndarray, triangles: np.ndarray) -> str | None:
     there, back = np.sort(a * count + b), np.sort(b * count + a)
     if (there[1:] == there[:-1]).any() or not np.array_equal(there, back):
         lone = np.setdiff1d(there, back)
-        place = f", near {np.round(1e3 * vertices[lone[0] // count], 3).tolist()} mm" if lone.size else ""
-        return f"is not closed: each side of a triangle must meet one other, run the other way{place}"
+        place = (
+            f", near {np.round(1e3 * vertices[lone[0] // count], 3).tolist()} mm"
+            if lone.size
+            else ""
+        )
+        return (
+            f"is not closed: each side of a triangle must meet one other, run the other way{place}"
+        )
     _, volumes = shells_of(vertices, triangles)
     if len(volumes) > 1:
         return f"is in {len(volumes)} pieces; one closed surface is wanted"

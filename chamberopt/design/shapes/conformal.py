@@ -33,9 +33,15 @@ class Conformal(ParametricChamber):
     outline: Literal["hull", "silhouette"] = Field(
         description="what is grown: the convex hull of the part's shadow on the floor, or the shadow itself"
     )
-    gap_mm: float = quantity(0.1, 1000, "mm", "between the part's outline and the wall, at the sonotrode")
+    gap_mm: float = quantity(
+        0.1, 1000, "mm", "between the part's outline and the wall, at the sonotrode"
+    )
     corner_radius_mm: float = quantity(
-        0, 1000, "mm", "of corners that jut into the chamber: the wall spans narrower notches of a silhouette", 0.0
+        0,
+        1000,
+        "mm",
+        "of corners that jut into the chamber: the wall spans narrower notches of a silhouette",
+        0.0,
     )
 
     @property
@@ -73,7 +79,12 @@ class Conformal(ParametricChamber):
         corners = outline.hull(SIMPLIFIED)
         owner, out = arcs(corners, self.facets)
         plans = [corners[owner] + (self.gap + lean) * out for lean in (0.0, self.lean)]
-        return lofted([np.c_[plan, np.full(len(plan), z)] for plan, z in zip(plans, (0.0, self.height), strict=True)])
+        return lofted(
+            [
+                np.c_[plan, np.full(len(plan), z)]
+                for plan, z in zip(plans, (0.0, self.height), strict=True)
+            ]
+        )
 
     def _upright(self, outline: Outline) -> ShapeSurface:
         radius = 1e-3 * self.corner_radius_mm
@@ -86,7 +97,9 @@ class Conformal(ParametricChamber):
             )
         vertices, triangles = extruded(around[0], self.height)
         low = (vertices[triangles][..., 2] == 0.0).all(axis=1)
-        return ShapeSurface(vertices, triangles, np.where(low, TAG_SONOTRODE, TAG_WALL).astype(np.uint8))
+        return ShapeSurface(
+            vertices, triangles, np.where(low, TAG_SONOTRODE, TAG_WALL).astype(np.uint8)
+        )
 
     def widths_mm(self) -> dict[str, float]:
         """Up; across is as wide as the part."""

@@ -28,7 +28,11 @@ class KeptShape(ChamberTable):
 
     def surface(self, vertices: np.ndarray, triangles: np.ndarray) -> ShapeSurface:
         """By the file, should it be back; else InputError that says what is wrong with it."""
-        return own_shape(Path(self.shape)).model_validate(self.model_dump()).surface(vertices, triangles)
+        return (
+            own_shape(Path(self.shape))
+            .model_validate(self.model_dump())
+            .surface(vertices, triangles)
+        )
 
 
 # What the methods that a shape may define give, and whether something is that.
@@ -52,7 +56,9 @@ def own_shape(path: Path) -> type[ChamberTable]:
     except FileNotFoundError:
         raise InputError(toml_errors.not_found(path, "shape file", "*.py")) from None
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}; check its permissions") from None
+        raise InputError(
+            f"{path}: cannot be read: {error.strerror}; check its permissions"
+        ) from None
     return _shape_in(path, source)
 
 
@@ -66,12 +72,18 @@ def _shape_in(path: Path, source: bytes) -> type[ChamberTable]:
         exec(compile(source, str(path), "exec"), vars(module))
     except (Exception, SystemExit) as error:
         raise InputError(_said(path, "cannot be run", error)) from None
-    made = [cls for cls in vars(module).values() if isinstance(cls, type) and issubclass(cls, ChamberTable)]
+    made = [
+        cls
+        for cls in vars(module).values()
+        if isinstance(cls, type) and issubclass(cls, ChamberTable)
+    ]
     bases = {base for cls in made for base in cls.__bases__}
     shapes = [cls for cls in made if cls.__module__ == module.__name__ and cls not in bases]
     names = " and ".join(cls.__name__ for cls in shapes) or "none"
     if len(shapes) != 1:
-        raise InputError(f"{path}: one subclass of chamberopt.design.shapes.ChamberTable is wanted, it defines {names}")
+        raise InputError(
+            f"{path}: one subclass of chamberopt.design.shapes.ChamberTable is wanted, it defines {names}"
+        )
     if inspect.isabstract(shapes[0]):
         lacking = ", ".join(sorted(shapes[0].__abstractmethods__))
         raise InputError(f"{path}: {names} does not define {lacking}(); see docs/chambers.md")
@@ -91,7 +103,9 @@ def _guarded(path: Path, shape: type[ChamberTable], digest: str) -> type[Chamber
                 raise InputError(_said(path, f"{name}() failed", error)) from None
             wanted, is_right = GIVES.get(name, ("", lambda _: True))
             if not is_right(found):
-                raise InputError(f"{path}: {name}() of {shape.__name__} gives {found!r}; {wanted} wanted")
+                raise InputError(
+                    f"{path}: {name}() of {shape.__name__} gives {found!r}; {wanted} wanted"
+                )
             return found
 
         method.__doc__ = getattr(shape, name).__doc__
@@ -136,7 +150,11 @@ def _read_only(array: np.ndarray) -> np.ndarray:
 
 def _said(path: Path, what: str, error: BaseException) -> str:
     """Where in the user's file an error came from."""
-    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
+    lines = [
+        frame.lineno
+        for frame in traceback.extract_tb(error.__traceback__)
+        if frame.filename == str(path)
+    ]
     line = error.lineno if isinstance(error, SyntaxError) else (lines or [None])[-1]
     place = f"{path}:{line}" if line else str(path)
     said = error.msg if isinstance(error, SyntaxError) else " ".join(str(error).split())

@@ -5,11 +5,26 @@ from typing import Literal, Self
 
 from pydantic import BaseModel, Field, model_validator
 
-from chamberopt.common.fields import Direction, MeshFile, Place, Triple, Unit, listed, metres, quantity, unit_vector
+from chamberopt.common.fields import (
+    Direction,
+    MeshFile,
+    Place,
+    Triple,
+    Unit,
+    listed,
+    metres,
+    quantity,
+    unit_vector,
+)
 from chamberopt.common.toml_errors import CrossCheckError, Problem
 from chamberopt.design.materials import STRICT
 
-SIZES = {"plate": ("size_mm",), "rod": ("diameter_mm", "length_mm"), "ball": ("diameter_mm",), "mesh": ("mesh",)}
+SIZES = {
+    "plate": ("size_mm",),
+    "rod": ("diameter_mm", "length_mm"),
+    "ball": ("diameter_mm",),
+    "mesh": ("mesh",),
+}
 
 
 class Deflector(BaseModel):
@@ -20,9 +35,15 @@ class Deflector(BaseModel):
     model_config = STRICT
 
     kind: Literal["plate", "rod", "ball", "mesh"] = Field(description="what it is")
-    at_mm: Place = listed("three numbers [x, y, z] in mm", "its middle (of a mesh: its box's), in the chamber's frame")
-    rotate_deg: Triple = listed("three numbers [x, y, z] in degrees", "turns about x, then y, then z", (0.0, 0.0, 0.0))
-    size_mm: Triple | None = listed("three numbers [x, y, z] in mm, above 0", "sides of a plate", None)
+    at_mm: Place = listed(
+        "three numbers [x, y, z] in mm", "its middle (of a mesh: its box's), in the chamber's frame"
+    )
+    rotate_deg: Triple = listed(
+        "three numbers [x, y, z] in degrees", "turns about x, then y, then z", (0.0, 0.0, 0.0)
+    )
+    size_mm: Triple | None = listed(
+        "three numbers [x, y, z] in mm, above 0", "sides of a plate", None
+    )
     diameter_mm: float | None = quantity(0.1, 2000, "mm", "of a rod or ball", None)
     length_mm: float | None = quantity(0.1, 2000, "mm", "of a rod", None)
     mesh: MeshFile | None = Field(default=None, description="mesh file of a closed body")
@@ -34,12 +55,18 @@ class Deflector(BaseModel):
         for name in ("size_mm", "diameter_mm", "length_mm", "mesh"):
             wanted, given = name in SIZES[self.kind], getattr(self, name)
             if wanted and given is None:
-                problems.append(Problem(name, f"missing; a {self.kind} has {' and '.join(SIZES[self.kind])}"))
+                problems.append(
+                    Problem(name, f"missing; a {self.kind} has {' and '.join(SIZES[self.kind])}")
+                )
             if given is not None and not wanted:
                 text = f"not of a {self.kind}, which has {' and '.join(SIZES[self.kind])}; leave it out"
                 problems.append(Problem(name, text))
         if self.size_mm is not None and not all(0.1 <= side <= 2000 for side in self.size_mm):
-            problems.append(Problem("size_mm", f"given {list(self.size_mm)}; each side must be from 0.1 to 2000 mm"))
+            problems.append(
+                Problem(
+                    "size_mm", f"given {list(self.size_mm)}; each side must be from 0.1 to 2000 mm"
+                )
+            )
         if problems:
             raise CrossCheckError(problems)
         return self
@@ -75,7 +102,9 @@ class Hole(BaseModel):
 
     model_config = STRICT
 
-    at_mm: Place = listed("three numbers [x, y, z] in mm", "in the room, on the bore's axis; in the chamber's frame")
+    at_mm: Place = listed(
+        "three numbers [x, y, z] in mm", "in the room, on the bore's axis; in the chamber's frame"
+    )
     axis: Direction = listed("three numbers [x, y, z], not all 0", "the way out of the room")
     diameter_mm: float = quantity(0.1, 2000, "mm", "of the bore")
     depth_mm: float = quantity(0.1, 2000, "mm", "beyond the wall, along the axis")

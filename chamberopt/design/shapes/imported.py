@@ -31,9 +31,13 @@ class Imported(ChamberTable):
         0.1, 2000, "mm", "mean sonotrode face to lowest point of the part; absent: as drawn", None
     )
     part: Names = listed("a name in quotes, or a list of names", "groups of the file: the part")
-    sonotrode: Names = listed("a name in quotes, or a list of names", "groups of the file: the sonotrode's flat face")
+    sonotrode: Names = listed(
+        "a name in quotes, or a list of names", "groups of the file: the sonotrode's flat face"
+    )
     mesh: File = Field(description="the set-up's file: that of [part], so leave it out")
-    unit: Unit = Field(default="guess", description="of its numbers: that of [part], so leave it out")
+    unit: Unit = Field(
+        default="guess", description="of its numbers: that of [part], so leave it out"
+    )
 
     @property
     def sonotrode_distance(self) -> float:

@@ -24,7 +24,11 @@ class PolygonChamber(ParametricChamber):
     """Flat sides over a convex polygon."""
 
     corner_radius_mm: float = quantity(
-        0, 1000, "mm", "of the upright edges between side walls, seen from above; up to 0.05: sharp", 0.0
+        0,
+        1000,
+        "mm",
+        "of the upright edges between side walls, seen from above; up to 0.05: sharp",
+        0.0,
     )
 
     @abstractmethod
@@ -47,17 +51,37 @@ class PolygonChamber(ParametricChamber):
         refuse_inward(self.slope, [-most / self.height], self.inclination_deg)
         most += min(0.0, self.lean)
         fits = max(LEAST_MM, 1e3 * most)
-        refuse_beyond("corner_radius_mm", self.corner_radius_mm, fits, "too large for the sides between the edges")
+        refuse_beyond(
+            "corner_radius_mm",
+            self.corner_radius_mm,
+            fits,
+            "too large for the sides between the edges",
+        )
         return self
 
     def surface(self, vertices: np.ndarray, triangles: np.ndarray) -> ShapeSurface:
         """4 triangles for each corner of the rounded polygon."""
         floor = self.floor()
-        owner, out = arcs(floor, self.facets) if self.radius else (np.arange(len(floor)), np.zeros((len(floor), 2)))
-        plans = [moved(floor, lean - self.radius)[owner] + self.radius * out for lean in (0.0, self.lean)]
-        return lofted([np.c_[plan, np.full(len(plan), z)] for plan, z in zip(plans, (0.0, self.height), strict=True)])
+        owner, out = (
+            arcs(floor, self.facets)
+            if self.radius
+            else (np.arange(len(floor)), np.zeros((len(floor), 2)))
+        )
+        plans = [
+            moved(floor, lean - self.radius)[owner] + self.radius * out for lean in (0.0, self.lean)
+        ]
+        return lofted(
+            [
+                np.c_[plan, np.full(len(plan), z)]
+                for plan, z in zip(plans, (0.0, self.height), strict=True)
+            ]
+        )
 
     def room(self) -> float:
         """Of the cavity, its edges sharp [m³]: Simpson's rule, exact here."""
         floor = self.floor()
-        return self.height / 6.0 * sum(w * area(floor, s * self.lean) for s, w in ((0.0, 1.0), (0.5, 4.0), (1.0, 1.0)))
+        return (
+            self.height
+            / 6.0
+            * sum(w * area(floor, s * self.lean) for s, w in ((0.0, 1.0), (0.5, 4.0), (1.0, 1.0)))
+        )

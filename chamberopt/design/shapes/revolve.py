@@ -25,9 +25,11 @@ class Revolve(RoundChamber):
     ceiling_key: ClassVar[str] = "profile_mm"
 
     shape: Literal["revolve"]
-    profile_mm: Annotated[tuple[Pair, ...], Field(strict=False, min_length=2, max_length=200)] = listed(
-        "2 to 200 points [[r, z], ...] in mm, the first at z = 0, none beyond 2000",
-        "the wall from the sonotrode's rim up to the ceiling; r = 0 at its end: on the axis",
+    profile_mm: Annotated[tuple[Pair, ...], Field(strict=False, min_length=2, max_length=200)] = (
+        listed(
+            "2 to 200 points [[r, z], ...] in mm, the first at z = 0, none beyond 2000",
+            "the wall from the sonotrode's rim up to the ceiling; r = 0 at its end: on the axis",
+        )
     )
 
     @field_validator("profile_mm")

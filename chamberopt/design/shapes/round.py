@@ -9,8 +9,19 @@ from pydantic import model_validator
 from chamberopt.common.fields import quantity
 from chamberopt.common.toml_errors import CrossCheckError, Problem
 from chamberopt.design.shapes.base import WalledChamber
-from chamberopt.design.shapes.construction.limits import LEAST, LEAST_MM, refuse_beyond, refuse_inward
-from chamberopt.design.shapes.construction.profile import crosses, largest_radius, revolved, rounded, volume
+from chamberopt.design.shapes.construction.limits import (
+    LEAST,
+    LEAST_MM,
+    refuse_beyond,
+    refuse_inward,
+)
+from chamberopt.design.shapes.construction.profile import (
+    crosses,
+    largest_radius,
+    revolved,
+    rounded,
+    volume,
+)
 from chamberopt.design.shapes.construction.surface import ShapeSurface
 
 
@@ -44,9 +55,16 @@ class RoundChamber(WalledChamber):
         wall = line[(line[:, 0] > 0.0) & (line[:, 1] > 0.0)]
         refuse_inward(self.slope, (LEAST - wall[:, 0]) / wall[:, 1], self.inclination_deg)
         most = max(LEAST_MM, 1e3 * largest_radius(self.profile()))
-        refuse_beyond("corner_radius_mm", self.corner_radius_mm, most, "too large for the sides beside an edge")
+        refuse_beyond(
+            "corner_radius_mm",
+            self.corner_radius_mm,
+            most,
+            "too large for the sides beside an edge",
+        )
         if crosses(self._rounded()):
-            text = f"given {self.corner_radius_mm:g}, with which the profile crosses itself; lower it"
+            text = (
+                f"given {self.corner_radius_mm:g}, with which the profile crosses itself; lower it"
+            )
             raise CrossCheckError([Problem("corner_radius_mm", text)])
         return self
 

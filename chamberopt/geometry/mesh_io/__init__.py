@@ -21,7 +21,12 @@ from chamberopt.geometry.mesh_io.groups import named
 from chamberopt.geometry.mesh_io.healing import outward, sewn
 from chamberopt.geometry.mesh_io.readers.element_numbers import Numbering, by_place
 from chamberopt.geometry.mesh_io.self_intersection import refuse_crossings
-from chamberopt.geometry.mesh_io.surface_error import OpenSurfaceError, SurfaceError, box_text, place_text
+from chamberopt.geometry.mesh_io.surface_error import (
+    OpenSurfaceError,
+    SurfaceError,
+    box_text,
+    place_text,
+)
 from chamberopt.geometry.mesh_io.units import unit_of
 
 __all__ = [
@@ -124,10 +129,15 @@ def closed(read: Triangles, only: np.ndarray | None = None) -> PartMesh:
     vertices, triangles, source, healed = sewn(path, read.corners[chosen])
     triangles, turned = outward(path, vertices, triangles)
     refuse_crossings(path, vertices, triangles)
-    groups = {name: np.where(source >= 0, mask[chosen][source], False) for name, mask in read.groups.items()}
+    groups = {
+        name: np.where(source >= 0, mask[chosen][source], False)
+        for name, mask in read.groups.items()
+    }
     notes = tuple(f"{path.name}: {note}" for note in (*read.notes, *healed, *turned))
     numbering = read.numbering.of(np.where(source >= 0, chosen[source], -1))
-    return PartMesh(vertices, triangles.astype(np.int32), numbering, notes, read.sha256, groups, read.unit)
+    return PartMesh(
+        vertices, triangles.astype(np.int32), numbering, notes, read.sha256, groups, read.unit
+    )
 
 
 def read_once(path: Path, unit: str = "guess") -> PartMesh:
@@ -149,11 +159,15 @@ def _content(path: Path) -> bytes:
     if path.is_dir():
         raise InputError(f"{path}: is a folder; give a mesh file")
     if not path.is_file():
-        raise InputError(f"{path}: no such mesh file; check part.mesh, which counts from the design file's folder")
+        raise InputError(
+            f"{path}: no such mesh file; check part.mesh, which counts from the design file's folder"
+        )
     try:
         content = path.read_bytes()
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}; check its permissions") from None
+        raise InputError(
+            f"{path}: cannot be read: {error.strerror}; check its permissions"
+        ) from None
     if not content.strip():
         raise InputError(f"{path}: the file is empty; export the mesh again")
     return content

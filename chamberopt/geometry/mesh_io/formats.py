@@ -12,7 +12,14 @@ from chamberopt.geometry.mesh_io.readers.abaqus import read_abaqus
 from chamberopt.geometry.mesh_io.readers.gmsh import read_gmsh
 from chamberopt.geometry.mesh_io.readers.nastran import read_nastran
 from chamberopt.geometry.mesh_io.readers.raw_mesh import RawMesh
-from chamberopt.geometry.mesh_io.readers.surfaces import is_text_stl, read_3mf, read_obj, read_ply, read_step, read_stl
+from chamberopt.geometry.mesh_io.readers.surfaces import (
+    is_text_stl,
+    read_3mf,
+    read_obj,
+    read_ply,
+    read_step,
+    read_stl,
+)
 from chamberopt.geometry.mesh_io.readers.vtk import read_vtk
 
 
@@ -41,7 +48,12 @@ FORMATS = (
     Format("STEP", (".step", ".stp"), _first("ISO-10303-21"), read_step),
     Format("PLY", (".ply",), _first(r"ply\s"), read_ply),
     Format("Gmsh", (".msh",), _first(r"\$MeshFormat"), read_gmsh),
-    Format("VTK", (".vtk", ".vtp", ".vtu"), _first(r"# vtk DataFile|(?:<\?xml[^>]*>\s*)?<VTKFile"), read_vtk),
+    Format(
+        "VTK",
+        (".vtk", ".vtp", ".vtu"),
+        _first(r"# vtk DataFile|(?:<\?xml[^>]*>\s*)?<VTKFile"),
+        read_vtk,
+    ),
     Format("STL", (".stl",), _first(r"solid[^\0]*facet"), read_stl),
     Format(
         "Nastran",
@@ -63,7 +75,9 @@ def read_raw(path: Path, content: bytes) -> RawMesh:
     except (InputError, MemoryError):
         raise
     except Exception as error:  # each library fails in its own way on a damaged file
-        reason = str(error).strip().splitlines()[0][:120] if str(error).strip() else type(error).__name__
+        reason = (
+            str(error).strip().splitlines()[0][:120] if str(error).strip() else type(error).__name__
+        )
         raise InputError(
             f"{path}: cannot be read as {found.name}, it is damaged or truncated ({reason}); export it again"
         ) from None
@@ -81,7 +95,9 @@ def _format_of(path: Path, content: bytes) -> Format:
             return one
     if by_suffix is None:
         told = ", ".join(suffix for one in FORMATS for suffix in one.suffixes)
-        raise InputError(f"{path}: not a mesh file that is known, by its content or name; use {told}")
+        raise InputError(
+            f"{path}: not a mesh file that is known, by its content or name; use {told}"
+        )
     return by_suffix
 
 

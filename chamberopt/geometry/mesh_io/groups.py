@@ -10,7 +10,9 @@ from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
 
 
-def named(groups: Mapping[str, np.ndarray], names: Iterable[str], count: int, field: str) -> np.ndarray:
+def named(
+    groups: Mapping[str, np.ndarray], names: Iterable[str], count: int, field: str
+) -> np.ndarray:
     """Which of ``count`` triangles have one of the names, (count,) bool; case counts only where the file needs it to.
 
     "all" are all. Raises InputError, naming the design's field, for a name that the file does not have.
@@ -22,7 +24,11 @@ def named(groups: Mapping[str, np.ndarray], names: Iterable[str], count: int, fi
         if name == "all" and known is None:
             chosen[:] = True
         elif known is None:
-            told = toml_errors.did_you_mean(name, ["all", *groups]) if groups else "its file names none: 'all'"
+            told = (
+                toml_errors.did_you_mean(name, ["all", *groups])
+                if groups
+                else "its file names none: 'all'"
+            )
             raise InputError(f"{field}: {name!r} is no name in the part's file; {told}")
         else:
             chosen |= groups[known]

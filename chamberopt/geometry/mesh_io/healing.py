@@ -27,7 +27,9 @@ def sewn(path: Path, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nd
     reach = WELD * float(np.linalg.norm(np.ptp(points, axis=0)))
     if len(_edges(triangles, count=1)):  # perhaps only the file's rounding keeps the edges apart
         closer, renumbered = _welded(points, reach)
-        points2, triangles2, source2, notes2 = _without_repeats(closer, renumbered[triangles], source)
+        points2, triangles2, source2, notes2 = _without_repeats(
+            closer, renumbered[triangles], source
+        )
         if len(_edges(triangles2, count=1)) < len(_edges(triangles, count=1)):
             merged = len(points) - len(points2)
             notes += [f"merged {merged} vertices less than {1e3 * reach:.2g} mm apart", *notes2]
@@ -67,9 +69,13 @@ def _without_repeats(
     a, b, c = triangles.T
     flat = (a == b) | (b == c) | (c == a)
     if flat.any():
-        notes.append(f"dropped {flat.sum()} triangles without area, the first is triangle {source[flat][0] + 1}")
+        notes.append(
+            f"dropped {flat.sum()} triangles without area, the first is triangle {source[flat][0] + 1}"
+        )
         triangles, source = triangles[~flat], source[~flat]
-    turned = np.take_along_axis(triangles, (triangles.argmin(axis=1)[:, None] + np.arange(3)) % 3, axis=1)
+    turned = np.take_along_axis(
+        triangles, (triangles.argmin(axis=1)[:, None] + np.arange(3)) % 3, axis=1
+    )
     first = np.sort(distinct_rows(turned)[0])
     if len(first) < len(triangles):
         notes.append(f"dropped {len(triangles) - len(first)} triangles that were there twice")
@@ -98,7 +104,9 @@ def _edges(triangles: np.ndarray, count: int) -> np.ndarray:
     return np.stack(np.divmod(chosen, int(triangles.max()) + 1), axis=1)
 
 
-def outward(path: Path, vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, list[str]]:
+def outward(
+    path: Path, vertices: np.ndarray, triangles: np.ndarray
+) -> tuple[np.ndarray, list[str]]:
     """Closed triangles (m, 3) turned so that neighbours agree and every body encloses a positive volume."""
     notes = []
     against = _against_neighbours(path, triangles)
@@ -127,7 +135,9 @@ def _against_neighbours(path: Path, triangles: np.ndarray) -> np.ndarray:
     from scipy.sparse.csgraph import connected_components
 
     m = len(triangles)
-    order = np.argsort(edge_keys(triangles), kind="stable").reshape(-1, 2)  # the two sides of each edge
+    order = np.argsort(edge_keys(triangles), kind="stable").reshape(
+        -1, 2
+    )  # the two sides of each edge
     sides = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     agree = sides[order[:, 0], 0] != sides[order[:, 1], 0]
     if agree.all():
@@ -139,15 +149,22 @@ def _against_neighbours(path: Path, triangles: np.ndarray) -> np.ndarray:
     count, half = connected_components(graph, directed=False)
     plain, turned = half[:m], half[m:]
     if (plain == turned).any():
-        raise InputError(f"{path}: the surface has no inside (one-sided, like a Moebius band); redraw it")
+        raise InputError(
+            f"{path}: the surface has no inside (one-sided, like a Moebius band); redraw it"
+        )
     as_they_are = np.bincount(plain, minlength=count)
     fewer = as_they_are[plain] < as_they_are[turned]
     return fewer | ((as_they_are[plain] == as_they_are[turned]) & (plain > turned))
 
 
-def _stands_in_another(vertices: np.ndarray, triangles: np.ndarray, shells: np.ndarray, k: np.integer) -> bool:
+def _stands_in_another(
+    vertices: np.ndarray, triangles: np.ndarray, shells: np.ndarray, k: np.integer
+) -> bool:
     """Is closed piece k inside another closed piece (whichever way that one faces)?"""
     points = vertices[triangles[shells == k]].mean(axis=1)
     points = points[:: max(1, len(points) // 8)]
     others = (other for other in range(int(shells.max()) + 1) if other != k)
-    return any(abs(np.median(winding_number(points, vertices[triangles[shells == other]]))) > 0.5 for other in others)
+    return any(
+        abs(np.median(winding_number(points, vertices[triangles[shells == other]]))) > 0.5
+        for other in others
+    )

@@ -41,7 +41,9 @@ def filled(
         told = f"the widest {1e3 * widest:.3g} mm at {place_text(where)}"
         notes.append(f"closed {holes} small hole{'s' * (holes > 1)}, {told}")
     if cracks:
-        notes.append(f"closed {cracks} crack{'s' * (cracks > 1)} less than {1e3 * reach:.2g} mm wide")
+        notes.append(
+            f"closed {cracks} crack{'s' * (cracks > 1)} less than {1e3 * reach:.2g} mm wide"
+        )
     return np.array(more, dtype=np.int64).reshape(-1, 3), notes
 
 
@@ -97,7 +99,9 @@ def _patch(corners: np.ndarray) -> tuple[float, list[tuple[int, int, int]]]:
             last = first + span
             between = np.arange(first + 1, last)
             across = np.cross(corners[between] - corners[first], corners[last] - corners[first])
-            total = least[first, between] + least[between, last] + 0.5 * np.linalg.norm(across, axis=1)
+            total = (
+                least[first, between] + least[between, last] + 0.5 * np.linalg.norm(across, axis=1)
+            )
             best = int(total.argmin())
             least[first, last], middle[first, last] = total[best], between[best]
     patch, waiting = [], [(0, n - 1)]

@@ -15,7 +15,9 @@ from chamberopt.geometry.mesh_io.surface_error import SurfaceError, place_text
 from chamberopt.geometry.triangles import heights, shells_of
 
 CHUNK = 1 << 18  # pairs looked at together: bounds memory at some 100 MB
-TOUCH = 1e-6  # of the bounding box's diagonal: surfaces that pass through each other by less only touch
+TOUCH = (
+    1e-6  # of the bounding box's diagonal: surfaces that pass through each other by less only touch
+)
 
 
 def refuse_crossings(path: Path, vertices: np.ndarray, triangles: np.ndarray) -> None:
@@ -50,12 +52,16 @@ def refuse_crossings(path: Path, vertices: np.ndarray, triangles: np.ndarray) ->
 def _close_pairs(corners: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Pairs of triangles (m, 3, 3) whose boxes overlap, each pair once, in chunks."""
     order = _morton_order(corners.mean(axis=1))
-    levels = [(corners.min(axis=1)[order].T.copy(), corners.max(axis=1)[order].T.copy())]  # (3, m): by axis
+    levels = [
+        (corners.min(axis=1)[order].T.copy(), corners.max(axis=1)[order].T.copy())
+    ]  # (3, m): by axis
     while levels[-1][0].shape[1] > 1:
         low, high = levels[-1]
         if low.shape[1] % 2:
             low, high = np.c_[low, np.full(3, np.inf)], np.c_[high, np.full(3, -np.inf)]
-        levels.append((np.minimum(low[:, ::2], low[:, 1::2]), np.maximum(high[:, ::2], high[:, 1::2])))
+        levels.append(
+            (np.minimum(low[:, ::2], low[:, 1::2]), np.maximum(high[:, ::2], high[:, 1::2]))
+        )
     waiting = [(len(levels) - 1, np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64))]
     while waiting:
         level, i, j = waiting.pop()
@@ -68,10 +74,15 @@ def _close_pairs(corners: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]
             continue
         below = levels[level - 1][0].shape[1]
         alone = i == j
-        i, j = np.r_[2 * i, 2 * i + 1, 2 * i, 2 * i[~alone] + 1], np.r_[2 * j, 2 * j + 1, 2 * j + 1, 2 * j[~alone]]
+        i, j = (
+            np.r_[2 * i, 2 * i + 1, 2 * i, 2 * i[~alone] + 1],
+            np.r_[2 * j, 2 * j + 1, 2 * j + 1, 2 * j[~alone]],
+        )
         there = (i < below) & (j < below)
         i, j = i[there], j[there]
-        waiting += [(level - 1, i[at : at + CHUNK], j[at : at + CHUNK]) for at in range(0, len(i), CHUNK)]
+        waiting += [
+            (level - 1, i[at : at + CHUNK], j[at : at + CHUNK]) for at in range(0, len(i), CHUNK)
+        ]
 
 
 def _morton_order(points: np.ndarray) -> np.ndarray:
@@ -85,7 +96,9 @@ def _morton_order(points: np.ndarray) -> np.ndarray:
     return np.argsort(code, kind="stable")
 
 
-def _crossing(corners: np.ndarray, a: np.ndarray, b: np.ndarray, touch: float) -> tuple[np.ndarray, np.ndarray]:
+def _crossing(
+    corners: np.ndarray, a: np.ndarray, b: np.ndarray, touch: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Those pairs of triangles a, b (k,) that pass through each other by more than touch [m]."""
     for one, other in ((0, 1), (1, 0)):  # each must reach to both sides of the other's plane
         pair = (a, b)
@@ -113,12 +126,16 @@ def _distances(corners: np.ndarray, planes: np.ndarray) -> np.ndarray:
     return np.einsum("kij,kj->ki", corners - planes[:, :1], _normals(planes))
 
 
-def _interval(corners: np.ndarray, distance: np.ndarray, along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _interval(
+    corners: np.ndarray, distance: np.ndarray, along: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Where triangles meet the other's plane: first and last position (k,) along the line of both planes."""
     places = []
     for i, j in ((0, 1), (1, 2), (2, 0)):
         through = distance[:, i] * distance[:, j] < 0.0
-        share = np.divide(distance[:, i], distance[:, i] - distance[:, j], out=np.zeros(len(along)), where=through)
+        share = np.divide(
+            distance[:, i], distance[:, i] - distance[:, j], out=np.zeros(len(along)), where=through
+        )
         point = corners[:, i] + share[:, None] * (corners[:, j] - corners[:, i])
         places.append(np.where(through, np.einsum("kj,kj->k", point, along), np.nan))
     return np.nanmin(places, axis=0), np.nanmax(places, axis=0)

@@ -11,7 +11,10 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.fields import METRES_PER
 from chamberopt.geometry.mesh_io.surface_error import box_text
 
-SMALLEST, LARGEST = 5e-4, 3.0  # m, longest side of the bounding box: a part that can be peened in a chamber
+SMALLEST, LARGEST = (
+    5e-4,
+    3.0,
+)  # m, longest side of the bounding box: a part that can be peened in a chamber
 # What an exporter would write, likeliest first; inch and cm cannot be told from mm by size, so are not guessed.
 GUESSED = (("mm", 3e-3, 1.5), ("m", 3e-3, 1.5), ("um", 3e-3, 1.5))
 SAID = re.compile(rb"\bunits?\b[\"' ]*[=:][\"' ]*(\w+)", re.I)
@@ -24,7 +27,9 @@ SPELLED = {
 }  # fmt: skip
 
 
-def unit_of(path: Path, content: bytes, corners: np.ndarray, given: str, stated: str | None) -> tuple[str, list[str]]:
+def unit_of(
+    path: Path, content: bytes, corners: np.ndarray, given: str, stated: str | None
+) -> tuple[str, list[str]]:
     """The unit of corners (m, 3, 3), and a note where a person should look at it.
 
     given: the design's part.unit, or "guess" · stated: what the format itself says. Raises InputError when the

@@ -36,15 +36,22 @@ def propose(model: Surrogate, rng: np.random.Generator) -> np.ndarray:
         mean, _ = model(model.points)
         choices = _choices(model.points, mean, rng)
         at, doubt = model(choices)
-        leaders = np.vstack([model.points, choices[np.argsort(-(at + doubt), kind="stable")[:LEADERS]]])
+        leaders = np.vstack(
+            [model.points, choices[np.argsort(-(at + doubt), kind="stable")[:LEADERS]]]
+        )
         worth = _worth(model, leaders)
-        hopeful = np.argsort(-_improvement(at, doubt, float(mean.max())), kind="stable")[:CONSIDERED]
+        hopeful = np.argsort(-_improvement(at, doubt, float(mean.max())), kind="stable")[
+            :CONSIDERED
+        ]
         choices = choices[hopeful]
         best_first = choices[np.argsort(-worth(choices), kind="stable")]
         point = np.round(_climbed(worth, best_first[:2]), DECIMALS)
         if not _is_new(point, model.points):
             new = (np.round(other, DECIMALS) for other in best_first)
-            point = next((other for other in new if _is_new(other, model.points)), np.round(rng.random(len(point)), 4))
+            point = next(
+                (other for other in new if _is_new(other, model.points)),
+                np.round(rng.random(len(point)), 4),
+            )
     return point
 
 
@@ -57,7 +64,9 @@ def recommend(model: Surrogate, seed: int) -> np.ndarray:
 
     with one_thread():
         mean, _ = model(model.points)
-        choices = np.vstack([model.points, _choices(model.points, mean, np.random.default_rng(seed))])
+        choices = np.vstack(
+            [model.points, _choices(model.points, mean, np.random.default_rng(seed))]
+        )
         best_first = choices[np.argsort(-cautious(choices), kind="stable")]
         return np.round(_climbed(cautious, best_first[:2]), DECIMALS)
 
@@ -84,7 +93,9 @@ def _improvement(mean: np.ndarray, deviation: np.ndarray, best: float) -> np.nda
     from scipy.special import ndtr
 
     z = (mean - best) / deviation
-    hoped: np.ndarray = (mean - best) * ndtr(z) + deviation * np.exp(-0.5 * z * z) / np.sqrt(2.0 * np.pi)
+    hoped: np.ndarray = (mean - best) * ndtr(z) + deviation * np.exp(-0.5 * z * z) / np.sqrt(
+        2.0 * np.pi
+    )
     return hoped
 
 

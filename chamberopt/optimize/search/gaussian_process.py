@@ -37,7 +37,11 @@ class Surrogate:
     """
 
     def __init__(
-        self, points: np.ndarray, scores: np.ndarray, variances: np.ndarray | None = None, rough: float = 1.0
+        self,
+        points: np.ndarray,
+        scores: np.ndarray,
+        variances: np.ndarray | None = None,
+        rough: float = 1.0,
     ) -> None:
         keep = np.sort(np.argsort(-scores, kind="stable")[:MOST_POINTS])
         known = np.zeros(len(scores)) if variances is None else variances
@@ -46,7 +50,9 @@ class Surrogate:
         scores = np.maximum(scores, middle - DEEPEST * (float(scores.max()) - middle))
         self._centre, self._spread = float(np.median(scores)), float(scores.std()) or 1.0
         with one_thread():
-            process = _fitted(self.points, (scores - self._centre) / self._spread, known / self._spread**2, rough)
+            process = _fitted(
+                self.points, (scores - self._centre) / self._spread, known / self._spread**2, rough
+            )
             self._inverse = np.linalg.inv(process.L_)
         self._signal = process.kernel_.k1.k1.constant_value
         self._lengths = process.kernel_.k1.k2.length_scale
@@ -63,7 +69,9 @@ class Surrogate:
 
     def covariance(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Of the true scores at points a (k, d) and b (m, d), after what was seen: (k, m)."""
-        seen = (self._kernel(a, self.points) @ self._inverse.T) @ (self._kernel(b, self.points) @ self._inverse.T).T
+        seen = (self._kernel(a, self.points) @ self._inverse.T) @ (
+            self._kernel(b, self.points) @ self._inverse.T
+        ).T
         both: np.ndarray = self._spread**2 * (self._kernel(a, b) - seen)
         return both
 
@@ -95,10 +103,15 @@ def _fitted(points: np.ndarray, values: np.ndarray, noise: np.ndarray, rough: fl
     from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 
     priors = [SIGNAL, *[LENGTH] * points.shape[1], NOISE]
-    middle, width = np.array([np.log(prior[0]) for prior in priors]), np.array([prior[1] for prior in priors])
+    middle, width = (
+        np.array([np.log(prior[0]) for prior in priors]),
+        np.array([prior[1] for prior in priors]),
+    )
 
     def most_probable(
-        misfit: Callable[[np.ndarray], tuple[float, np.ndarray]], begin: np.ndarray, bounds: np.ndarray
+        misfit: Callable[[np.ndarray], tuple[float, np.ndarray]],
+        begin: np.ndarray,
+        bounds: np.ndarray,
     ) -> tuple[np.ndarray, float]:
         from scipy.optimize import minimize
 
@@ -113,16 +126,20 @@ def _fitted(points: np.ndarray, values: np.ndarray, noise: np.ndarray, rough: fl
     kernel = ConstantKernel(SIGNAL[0], SIGNAL_BOUNDS) * Matern(
         np.full(points.shape[1], LENGTH[0]), LENGTH_BOUNDS, nu=2.5
     ) + WhiteKernel(NOISE[0], NOISE_BOUNDS)
-    process = GaussianProcessRegressor(kernel, alpha=np.maximum(noise, 1e-8), optimizer=most_probable)
+    process = GaussianProcessRegressor(
+        kernel, alpha=np.maximum(noise, 1e-8), optimizer=most_probable
+    )
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ConvergenceWarning)  # a length at its bound: a parameter without effect
+        warnings.simplefilter(
+            "ignore", ConvergenceWarning
+        )  # a length at its bound: a parameter without effect
         process.fit(points, values)
         if rough == 1.0:
             return process
         logs = process.kernel_.theta + np.log([1.0, *[rough] * points.shape[1], 1.0])
-        return GaussianProcessRegressor(kernel.clone_with_theta(logs), alpha=process.alpha, optimizer=None).fit(
-            points, values
-        )
+        return GaussianProcessRegressor(
+            kernel.clone_with_theta(logs), alpha=process.alpha, optimizer=None
+        ).fit(points, values)
 
 
 def one_thread() -> Any:

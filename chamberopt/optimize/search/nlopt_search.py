@@ -57,7 +57,9 @@ def climb(
         optimizer.optimize(start)
     except (nlopt.ForcedStop, nlopt.RoundoffLimited):
         pass
-    except Exception as error:  # NLopt's own exceptions share no base class from one version to the next
+    except (
+        Exception
+    ) as error:  # NLopt's own exceptions share no base class from one version to the next
         if not kept:
             raise InputError(
                 f"optimizer.algorithm: NLopt's {algorithm} cannot search {len(start)} parameter(s) "

@@ -89,7 +89,9 @@ class _Search:
     ) -> None:
         self._score, self._start, self._budget, self._seed = score, start, budget, seed
         self._step, self._tolerance = step, tolerance
-        self._seen = seen or (lambda: (np.array(list(self.scores.values())), np.zeros(len(self.scores))))
+        self._seen = seen or (
+            lambda: (np.array(list(self.scores.values())), np.zeros(len(self.scores)))
+        )
         self.scores: dict[bytes, float] = {}  # by the point's exact bytes
         self.points: list[np.ndarray] = []
         self.ran: list[str] = []
@@ -102,7 +104,9 @@ class _Search:
         modelled = min(self._budget, MOST_POINTS)
         spread = max(SPREAD_SHARE * modelled, SPREAD_PER_PARAMETER * len(self._start) + 2)
         ends = (spread, modelled, self._budget)
-        return [(phase, min(1.0, end / self._budget)) for phase, end in zip(AUTO, ends, strict=True)]
+        return [
+            (phase, min(1.0, end / self._budget)) for phase, end in zip(AUTO, ends, strict=True)
+        ]
 
     def run(self, phase: str, stop_at: int) -> None:
         """One phase, until it converges or so many points are judged."""
@@ -128,7 +132,9 @@ class _Search:
         from scipy.stats.qmc import Sobol
 
         wanted = min(stop_at, self._budget) - len(self.scores)
-        for point in Sobol(len(self._start), seed=self._seed).random_base2(max(1, (wanted - 1).bit_length()))[:wanted]:
+        for point in Sobol(len(self._start), seed=self._seed).random_base2(
+            max(1, (wanted - 1).bit_length())
+        )[:wanted]:
             self.judge(point)
 
     def _follow_model(self, stop_at: int) -> None:
@@ -138,7 +144,9 @@ class _Search:
                 self.judge(self._rng.random(len(self._start)))
                 continue
             rough = ROUGH if len(self.points) % DOUBT_EVERY == 0 else 1.0
-            self.judge(propose(Surrogate(np.array(self.points), scores, variances, rough), self._rng))
+            self.judge(
+                propose(Surrogate(np.array(self.points), scores, variances, rough), self._rng)
+            )
 
     def _climb(self, algorithm: str, stop_at: int, step: float) -> None:
         def within(point: np.ndarray) -> float:
@@ -148,7 +156,14 @@ class _Search:
 
         try:
             # `most`: a safety net for algorithms that keep asking for points already seen.
-            climb(within, self._best, algorithm, step=step, tolerance=self._tolerance, most=100 * self._budget)
+            climb(
+                within,
+                self._best,
+                algorithm,
+                step=step,
+                tolerance=self._tolerance,
+                most=100 * self._budget,
+            )
         except _BudgetSpentError:
             if stop_at >= self._budget:
                 raise

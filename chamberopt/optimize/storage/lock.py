@@ -26,11 +26,15 @@ def only_writer(folder: Path) -> Iterator[None]:
     try:
         lock.acquire(timeout=0)
     except Timeout:
-        raise InputError(f"{folder}: {_said(holder)}; wait until it ends, or give another folder (--out)") from None
+        raise InputError(
+            f"{folder}: {_said(holder)}; wait until it ends, or give another folder (--out)"
+        ) from None
     try:
         since = datetime.now().astimezone().isoformat(sep=" ", timespec="seconds")
         with suppress(OSError):  # a full disk is said by what needs it more
-            holder.write_text(f"process {os.getpid()} on {platform.node()} since {since}", encoding="utf-8")
+            holder.write_text(
+                f"process {os.getpid()} on {platform.node()} since {since}", encoding="utf-8"
+            )
         yield
     finally:
         with suppress(OSError):

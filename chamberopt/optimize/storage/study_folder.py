@@ -31,7 +31,9 @@ RESULT = "result.json"  # written last of all (results.py): a study that has it 
 
 
 @contextmanager
-def open_record(study: Study, folder: str | Path, plan: Mapping[str, Any] | None = None) -> Iterator[Record]:
+def open_record(
+    study: Study, folder: str | Path, plan: Mapping[str, Any] | None = None
+) -> Iterator[Record]:
     """The record of a study in a folder that is new, empty or its own, held against other processes.
 
     Raises InputError when the folder holds anything else or is being written, and when study, part or program are not
@@ -59,7 +61,10 @@ class Record:
 
     def __init__(self, study: Study, folder: Path, plan: Mapping[str, Any] | None = None) -> None:
         self.folder, self._study, self._asked = folder, study, asked(study, plan)
-        self._history, self._timings = Journal(folder / HISTORY), Journal(folder / TIMINGS, lasting=False)
+        self._history, self._timings = (
+            Journal(folder / HISTORY),
+            Journal(folder / TIMINGS, lasting=False),
+        )
         self._require_same_study()
         self.trials = self._read_trials()
         self._timings.repair()
@@ -88,7 +93,9 @@ class Record:
             (self.folder / name).unlink(missing_ok=True)
         write_text(path, json.dumps(self._asked, indent=2) + "\n")
 
-    def settled(self, settle: Callable[[Design], tuple[Design, list[Advice]]]) -> tuple[Study, list[Advice]]:
+    def settled(
+        self, settle: Callable[[Design], tuple[Design, list[Advice]]]
+    ) -> tuple[Study, list[Advice]]:
         """The study with the effects of its design chosen, and why, where it leaves them to us: asked of `settle` once,
         for a pilot takes its time.
         """
@@ -99,7 +106,10 @@ class Record:
         path = self.folder / EFFECTS
         if not path.is_file():
             chosen, advice = settle(design)
-            told = {"effects": chosen.effects.model_dump(mode="json"), "advice": [asdict(one) for one in advice]}
+            told = {
+                "effects": chosen.effects.model_dump(mode="json"),
+                "advice": [asdict(one) for one in advice],
+            }
             write_text(path, json.dumps(told, indent=2) + "\n")
         kept = _read_json(path)
         try:
@@ -116,9 +126,14 @@ class Record:
         if number >= len(self.trials):
             return None
         trial = self.trials[number]
-        proposed, recorded = f"{stage} of {_listed(point)}", f"{trial.stage} of {_listed(trial.point)}"
+        proposed, recorded = (
+            f"{stage} of {_listed(point)}",
+            f"{trial.stage} of {_listed(trial.point)}",
+        )
         if proposed != recorded:
-            raise self._foreign(number, f"recorded is the {recorded}, but what comes now is the {proposed}")
+            raise self._foreign(
+                number, f"recorded is the {recorded}, but what comes now is the {proposed}"
+            )
         return trial
 
     def require_no_more(self, number: int) -> None:
@@ -151,7 +166,9 @@ class Record:
             return
         before, now = _read_json(self.folder / ASKED), self._asked
         if self.finished:  # its result stands, whatever program is asked for it
-            before, now = ({key: one.get(key) for key in ("study", "sweep")} for one in (before, now))
+            before, now = (
+                {key: one.get(key) for key in ("study", "sweep")} for one in (before, now)
+            )
         require_same(self.folder, before, now)
 
     def _read_trials(self) -> list[Trial]:
@@ -180,18 +197,25 @@ def _read_json(path: Path) -> dict[str, Any]:
         if not isinstance(data, dict):
             raise TypeError("no table")
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}; check its permissions") from None
+        raise InputError(
+            f"{path}: cannot be read: {error.strerror}; check its permissions"
+        ) from None
     except (ValueError, TypeError) as error:
         raise _damaged(path, error) from None
     return data
 
 
 def _damaged(path: Path, error: Exception) -> InputError:
-    return InputError(f"{path}: damaged ({error}); restore the file or run the study in a new folder (--out)")
+    return InputError(
+        f"{path}: damaged ({error}); restore the file or run the study in a new folder (--out)"
+    )
 
 
 def _advice(changes: dict[str, dict[str, Any]], **others: Any) -> Advice:
-    estimates = {name: Estimate(**{**one, "pseudovalues": tuple(one["pseudovalues"])}) for name, one in changes.items()}
+    estimates = {
+        name: Estimate(**{**one, "pseudovalues": tuple(one["pseudovalues"])})
+        for name, one in changes.items()
+    }
     return Advice(changes=estimates, **others)
 
 

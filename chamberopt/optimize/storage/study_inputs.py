@@ -26,7 +26,9 @@ def asked(study: Study, plan: Mapping[str, Any] | None = None) -> dict[str, Any]
     """
     question = study.model_dump(mode="json", exclude={"design"})
     question["design"] = _with_files(study.design.model_dump(mode="json"))
-    plain = json.loads(json.dumps({"format": FORMAT, "study": question, "sweep": plan, "program": program()}))
+    plain = json.loads(
+        json.dumps({"format": FORMAT, "study": question, "sweep": plan, "program": program()})
+    )
     assert isinstance(plain, dict)
     return plain
 
@@ -35,8 +37,14 @@ def require_same_files(design: Design, before: Mapping[str, Any], folder: Path) 
     """InputError when a file that the design names is not what it was when `before` was asked."""
     changed = differences(before["study"]["design"], _with_files(design.model_dump(mode="json")))
     if changed:
-        lines = [f"{folder}: changed while the study ran, the evaluation under way is not kept:", *changed[:SHOWN]]
-        raise InputError("\n  ".join(lines) + "\nto go on, restore what it was and run the study again on this folder")
+        lines = [
+            f"{folder}: changed while the study ran, the evaluation under way is not kept:",
+            *changed[:SHOWN],
+        ]
+        raise InputError(
+            "\n  ".join(lines)
+            + "\nto go on, restore what it was and run the study again on this folder"
+        )
 
 
 def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
@@ -56,7 +64,9 @@ def require_same(folder: Path, before: Mapping[str, Any], now: Mapping[str, Any]
     if not changed:
         return
     more = [f"and {len(changed) - SHOWN} more"] if len(changed) > SHOWN else []
-    remedy = "to go on there, restore what it was; to run what it is now, give another folder (--out)"
+    remedy = (
+        "to go on there, restore what it was; to run what it is now, give another folder (--out)"
+    )
     lines = [f"{folder}: the study in this folder began otherwise:", *changed[:SHOWN], *more]
     raise InputError("\n  ".join(lines) + f"\n{remedy}")
 

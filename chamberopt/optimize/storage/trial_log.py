@@ -55,7 +55,11 @@ class Trial:
             "stage": self.stage,
             "point": list(self.point),
             "parameters": self.parameters,
-            **(_plain(self.objective) if self.objective else {"objective": None, "half_width": None}),
+            **(
+                _plain(self.objective)
+                if self.objective
+                else {"objective": None, "half_width": None}
+            ),
             "replicas": len(self.objective.pseudovalues) if self.objective else None,
             "goals": [_whole(goal) for goal in self.goals],
             "penalty": self.penalty,
@@ -90,17 +94,29 @@ def _plain(estimate: Estimate, name: str = "objective") -> dict[str, float | Non
 
 def _whole(estimate: Estimate) -> dict[str, Any]:
     """With pseudo-values, from which a model of the search learns how sure it is."""
-    return {**_plain(estimate, "value"), "pseudovalues": list(estimate.pseudovalues), "bias": estimate.bias}
+    return {
+        **_plain(estimate, "value"),
+        "pseudovalues": list(estimate.pseudovalues),
+        "bias": estimate.bias,
+    }
 
 
 def _goal(row: Mapping[str, Any]) -> Estimate:
     bare = _estimate(row, "value")
-    return Estimate(bare.value, bare.half_width, tuple(float(x) for x in row["pseudovalues"]), float(row["bias"]))
+    return Estimate(
+        bare.value,
+        bare.half_width,
+        tuple(float(x) for x in row["pseudovalues"]),
+        float(row["bias"]),
+    )
 
 
 def _estimate(row: Mapping[str, Any], name: str) -> Estimate:
     value, half_width = row[name], row["half_width"]
-    return Estimate(math.nan if value is None else float(value), math.inf if half_width is None else float(half_width))
+    return Estimate(
+        math.nan if value is None else float(value),
+        math.inf if half_width is None else float(half_width),
+    )
 
 
 class Journal:
@@ -142,7 +158,9 @@ class Journal:
 
     def damaged(self, line: int) -> InputError:
         """What to raise about a row, counted from 1."""
-        return InputError(f"{self.path}:{line}: damaged row; restore the file or run the study in a new folder")
+        return InputError(
+            f"{self.path}:{line}: damaged row; restore the file or run the study in a new folder"
+        )
 
     def _read(self) -> tuple[list[dict[str, Any]], int]:
         """The rows, and how many bytes they take."""
@@ -151,7 +169,9 @@ class Journal:
         except FileNotFoundError:
             return [], 0
         except OSError as error:
-            raise InputError(f"{self.path}: cannot be read: {error.strerror}; check its permissions") from None
+            raise InputError(
+                f"{self.path}: cannot be read: {error.strerror}; check its permissions"
+            ) from None
         *lines, torn = content.split(b"\n")  # a row counts when its line is ended
         rows = []
         for number, line in enumerate(lines, start=1):
@@ -171,12 +191,16 @@ def read_history(folder: Path) -> list[dict[str, Any]]:
     if not path.is_file():
         raise InputError(f"{path}: is not there; give a study's results folder")
     seconds = read_seconds(folder)
-    return [{**row, "seconds": seconds.get(number)} for number, row in enumerate(Journal(path).rows())]
+    return [
+        {**row, "seconds": seconds.get(number)} for number, row in enumerate(Journal(path).rows())
+    ]
 
 
 def read_seconds(folder: Path) -> dict[int, float]:
     """Seconds of wall clock that each evaluation took, by its number."""
-    return {row.get("number", -1): row.get("seconds", 0.0) for row in Journal(folder / TIMINGS).rows()}
+    return {
+        row.get("number", -1): row.get("seconds", 0.0) for row in Journal(folder / TIMINGS).rows()
+    }
 
 
 def as_csv(rows: list[dict[str, Any]]) -> str:
@@ -185,7 +209,10 @@ def as_csv(rows: list[dict[str, Any]]) -> str:
     for row in rows:
         line = {key: row[key] for key in ("number", "stage")}
         line |= row["parameters"]
-        line |= {key: row[key] for key in ("objective", "half_width", "score", "feasible", "reason", "seconds")}
+        line |= {
+            key: row[key]
+            for key in ("objective", "half_width", "score", "feasible", "reason", "seconds")
+        }
         for name, metric in row["metrics"].items():
             line |= {name: metric["value"], f"{name}_pm": metric["half_width"]}
         flat.append(line)

@@ -112,7 +112,9 @@ def simulated(
             remarks.append(f"{one.label}: simulated again for {seconds:g} s, on its own seeds")
         else:
             draws = (
-                _draws(results[0]) if results else Draws(one.design.process.seed, "search", None, "uniform_coverage")
+                _draws(results[0])
+                if results
+                else Draws(one.design.process.seed, "search", None, "uniform_coverage")
             )
             remarks += _overridden(one, draws)
         new, said = _simulate(one, draws, folder / name, executor, prepare)
@@ -126,7 +128,11 @@ def _simulate(
 ) -> tuple[Result, list[str]]:
     assert one.chamber is not None
     asked = _drawn(one.design, draws)
-    cavity = analytic_cavity(asked, one.chamber) if one.result and one.result.data.get("analytic") else None
+    cavity = (
+        analytic_cavity(asked, one.chamber)
+        if one.result and one.result.data.get("analytic")
+        else None
+    )
     design, advice = prepare(asked, one.chamber, cavity)
     with progress_bar(f"{one.label}: replicas") as progress:
         evaluation = evaluate(
@@ -153,7 +159,9 @@ def _overridden(one: Candidate, draws: Draws) -> list[str]:
     if process.seed != draws.seed:
         said.append(f"seed = {draws.seed} in place of {process.seed}")
     if draws.replicas is not None and process.accuracy.coverage is not None:
-        said.append(f"{draws.replicas} replicas in place of as many as make ± {process.accuracy.coverage:g}")
+        said.append(
+            f"{draws.replicas} replicas in place of as many as make ± {process.accuracy.coverage:g}"
+        )
     elif draws.replicas not in (None, process.accuracy.replicas):
         said.append(f"{draws.replicas} replicas in place of {process.accuracy.replicas}")
     return [f"{one.label}: {' and '.join(said)}, as the first candidate"] if said else []
@@ -169,12 +177,20 @@ def _read(place: Path) -> Candidate:
 def _peened_for(one: Candidate, seconds: float) -> Candidate:
     if one.design.process.treatment_time_s == seconds:
         return one
-    return replace(one, design=one.design.with_values({"process.treatment_time_s": seconds}), missing=True)
+    return replace(
+        one, design=one.design.with_values({"process.treatment_time_s": seconds}), missing=True
+    )
 
 
 def _named(place: Path) -> Path:
     """A design by its name without .toml, a result by its folder."""
-    return place.with_suffix("") if place.suffix == ".toml" else place.parent if place.name == "result.json" else place
+    return (
+        place.with_suffix("")
+        if place.suffix == ".toml"
+        else place.parent
+        if place.name == "result.json"
+        else place
+    )
 
 
 def _mesh(one: Candidate) -> tuple[str, str]:

@@ -44,8 +44,12 @@ class Comparison:
                 for name, values in self.metrics.items()
             },
             "confidence_of_each_difference": self.confidence,
-            "differences_to_first": {name: [gap.as_json() for gap in gaps] for name, gaps in self.differences.items()},
-            "coverage_against_time": [result.data.get("coverage_against_time", []) for result in self.results],
+            "differences_to_first": {
+                name: [gap.as_json() for gap in gaps] for name, gaps in self.differences.items()
+            },
+            "coverage_against_time": [
+                result.data.get("coverage_against_time", []) for result in self.results
+            ],
         }
 
 
@@ -65,11 +69,19 @@ def comparison_of(results: Sequence[Result], names: Sequence[str]) -> Comparison
 
     Where two were run on the same seeds their replicas are compared pair by pair, else as independent (Welch).
     """
-    first, places, designs = results[0], [result.folder for result in results], [result.design for result in results]
-    require_same_part(places, designs, [(result.part_sha256, part_unit(result)) for result in results])
+    first, places, designs = (
+        results[0],
+        [result.folder for result in results],
+        [result.design for result in results],
+    )
+    require_same_part(
+        places, designs, [(result.part_sha256, part_unit(result)) for result in results]
+    )
     require_one_time(places, designs)
     same_goal = all(result.objective_name == first.objective_name for result in results)
-    metrics = {first.objective_name: tuple(result.objective for result in results)} if same_goal else {}
+    metrics = (
+        {first.objective_name: tuple(result.objective for result in results)} if same_goal else {}
+    )
     shared = [name for name in first.metrics if all(name in result.metrics for result in results)]
     metrics |= {name: tuple(result.metrics[name] for result in results) for name in shared}
     confidence = confidence_of_each(len(results) - 1)
@@ -79,7 +91,8 @@ def comparison_of(results: Sequence[Result], names: Sequence[str]) -> Comparison
         parameters=differing(results),
         metrics=metrics,
         differences={
-            name: tuple(_difference(name, first, other, confidence) for other in results[1:]) for name in metrics
+            name: tuple(_difference(name, first, other, confidence) for other in results[1:])
+            for name in metrics
         },
         confidence=confidence,
     )
@@ -95,6 +108,10 @@ def _difference(name: str, first: Result, other: Result, confidence: float) -> D
     after, before = (one.objective if of_goal else one.metrics[name] for one in (other, first))
     gap = difference(after, before, other.seeds == first.seeds, confidence)
     terms = objective(name).terms if of_goal else {name: 1.0}
-    if TIME in terms and any(one.metrics[TIME].value >= LONGEST for one in (first, other) if TIME in one.metrics):
-        return replace(gap, half_width=LONGEST, times=None, replicas=None)  # "never" has no replicas that scatter
+    if TIME in terms and any(
+        one.metrics[TIME].value >= LONGEST for one in (first, other) if TIME in one.metrics
+    ):
+        return replace(
+            gap, half_width=LONGEST, times=None, replicas=None
+        )  # "never" has no replicas that scatter
     return gap

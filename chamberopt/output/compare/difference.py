@@ -63,7 +63,9 @@ def confidence_of_each(comparisons: int) -> float:
     return 1.0 - (1.0 - CONFIDENCE) / comparisons
 
 
-def difference(after: Estimate, before: Estimate, same_seeds: bool, confidence: float = CONFIDENCE) -> Difference:
+def difference(
+    after: Estimate, before: Estimate, same_seeds: bool, confidence: float = CONFIDENCE
+) -> Difference:
     """after - before, with its interval; as pairs where both have as many replicas, on the same seeds."""
     count = len(after.pseudovalues)
     paired = same_seeds and count == len(before.pseudovalues) > 0
@@ -73,14 +75,18 @@ def difference(after: Estimate, before: Estimate, same_seeds: bool, confidence: 
         return found
     scatter = _of_pairs(gap, confidence) if paired else _of_two(after, before, confidence)
     # The bias in an interval is of what so few dents do not say: it is taken to shrink like the scatter.
-    needed = _smallest(lambda n: scatter(n / count) + gap.bias * math.sqrt(count / n), count, abs(gap.value))
+    needed = _smallest(
+        lambda n: scatter(n / count) + gap.bias * math.sqrt(count / n), count, abs(gap.value)
+    )
     return found if needed is None else replace(found, times=needed / count, replicas=needed)
 
 
 def _of_pairs(gap: Estimate, confidence: float) -> Callable[[float], float]:
     """Half-width from so many times as many pairs of the same scatter."""
     count, deviation = len(gap.pseudovalues), float(np.std(gap.pseudovalues, ddof=1))
-    return lambda times: student(count * times - 1.0, confidence) * deviation / math.sqrt(count * times)
+    return lambda times: (
+        student(count * times - 1.0, confidence) * deviation / math.sqrt(count * times)
+    )
 
 
 def _of_two(after: Estimate, before: Estimate, confidence: float) -> Callable[[float], float]:

@@ -83,13 +83,19 @@ def _of_coverage(candidates: Sequence[Covered]) -> Histogram:
     values = np.concatenate([value for value, _ in columns])
     low, high = 5.0 * np.floor(values.min() / 5.0), 5.0 * np.ceil(values.max() / 5.0)
     edges = np.linspace(low, max(high, low + 5.0), BINS + 1)
-    return Histogram("%", edges, tuple(np.histogram(value, edges, weights=weight)[0] for value, weight in columns))
+    return Histogram(
+        "%",
+        edges,
+        tuple(np.histogram(value, edges, weights=weight)[0] for value, weight in columns),
+    )
 
 
 def _of_impacts(unit: str, edges: np.ndarray, columns: Sequence[np.ndarray | None]) -> Histogram:
     """What is beyond the last edge is in the last bin; no impacts, no shares."""
     shares = [
-        None if one is None else np.histogram(np.minimum(one, edges[-1]), edges)[0] / max(1, len(one))
+        None
+        if one is None
+        else np.histogram(np.minimum(one, edges[-1]), edges)[0] / max(1, len(one))
         for one in columns
     ]
     return Histogram(unit, edges, tuple(shares))
@@ -97,7 +103,9 @@ def _of_impacts(unit: str, edges: np.ndarray, columns: Sequence[np.ndarray | Non
 
 def _fastest(speeds: Sequence[np.ndarray | None]) -> float:
     """The speed that one impact in a thousand exceeds, of the candidate where that is most; at least 0.1 m/s."""
-    return max([0.1, *(float(np.quantile(one, 0.999)) for one in speeds if one is not None and len(one))])
+    return max(
+        [0.1, *(float(np.quantile(one, 0.999)) for one in speeds if one is not None and len(one))]
+    )
 
 
 def _mean(values: np.ndarray | None) -> float | None:

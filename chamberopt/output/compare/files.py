@@ -16,7 +16,12 @@ from chamberopt.output.compare.local import LocalDifference, local_difference
 from chamberopt.output.compare.plots import distributions_picture
 from chamberopt.output.compare.table import as_text
 from chamberopt.output.results.results import summary
-from chamberopt.output.viewer import COVERAGE, coverage_picture, difference_picture, write_differences
+from chamberopt.output.viewer import (
+    COVERAGE,
+    coverage_picture,
+    difference_picture,
+    write_differences,
+)
 
 COMPARE, DIFFERENCE = "compare.json", "difference.vtp"
 
@@ -29,17 +34,23 @@ def write_comparison(folder: str | Path, comparison: Comparison) -> list[str]:
     """
     folder = Path(folder)
     if (folder / COMPARE).exists():
-        raise InputError(f"{folder}: holds a comparison, and results are never overwritten: choose another folder")
+        raise InputError(
+            f"{folder}: holds a comparison, and results are never overwritten: choose another folder"
+        )
     seen = [covered(result) for result in comparison.results]
     for result, one in zip(comparison.results[1:], seen[1:], strict=True):
-        require_same_triangles(result.folder, one.target, comparison.results[0].folder, seen[0].target)
+        require_same_triangles(
+            result.folder, one.target, comparison.results[0].folder, seen[0].target
+        )
     folder.mkdir(parents=True, exist_ok=True)
     write_text(folder / "compare.txt", as_text(comparison) + "\n")
     spread = distributions(seen)
     distributions_picture(folder / "distributions.png", comparison, spread)
     remarks = [comparison_picture(folder / "compare.png", comparison)]
     local: list[LocalDifference] | None = None
-    if older := [label for label, one in zip(comparison.labels, seen, strict=True) if one.hits is None]:
+    if older := [
+        label for label, one in zip(comparison.labels, seen, strict=True) if one.hits is None
+    ]:
         remarks.append(
             f"difference.png skipped: {', '.join(older)}: no single impacts (hits.npz), results of an older version; "
             "simulate again"
@@ -48,7 +59,9 @@ def write_comparison(folder: str | Path, comparison: Comparison) -> list[str]:
         local = [local_difference(seen[0], other) for other in seen[1:]]
         remarks.append(_draw_differences(folder, comparison, local))
     about: dict[str, Any] = comparison.as_json() | {"distributions": spread.as_json()}
-    about["local_differences_to_first"] = None if local is None else [one.as_json() for one in local]
+    about["local_differences_to_first"] = (
+        None if local is None else [one.as_json() for one in local]
+    )
     write_text(folder / COMPARE, json.dumps(about, indent=2, allow_nan=False) + "\n")
     return [text for text in remarks if text]
 
@@ -56,12 +69,15 @@ def write_comparison(folder: str | Path, comparison: Comparison) -> list[str]:
 def comparison_picture(picture: str | Path, comparison: Comparison) -> str | None:
     """The parts side by side on one colour scale, as .png; returns None or one line why there is none."""
     titles = [
-        f"{label}\n{summary(result)}" for label, result in zip(comparison.labels, comparison.results, strict=True)
+        f"{label}\n{summary(result)}"
+        for label, result in zip(comparison.labels, comparison.results, strict=True)
     ]
     return coverage_picture([result.folder for result in comparison.results], titles, picture)
 
 
-def _draw_differences(folder: Path, comparison: Comparison, local: list[LocalDifference]) -> str | None:
+def _draw_differences(
+    folder: Path, comparison: Comparison, local: list[LocalDifference]
+) -> str | None:
     """The map, as a surface and as a picture; None or one line why there is no picture."""
     first, *later = comparison.labels
     columns = [(one.value, one.real) for one in local]

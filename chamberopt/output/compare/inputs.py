@@ -18,12 +18,16 @@ if TYPE_CHECKING:
 def require_several(paths: Sequence[Path]) -> None:
     """InputError for fewer than two, or the same one twice."""
     if len(paths) < 2:
-        raise InputError(f"compare: {len(paths)} candidate given; give two or more designs (.toml) or results folders")
+        raise InputError(
+            f"compare: {len(paths)} candidate given; give two or more designs (.toml) or results folders"
+        )
     seen: dict[Path, Path] = {}
     for path in paths:
         place = path.resolve()
         if place in seen:
-            raise InputError(f"{path}: given twice (as {seen[place]}); it does not differ from itself: leave one out")
+            raise InputError(
+                f"{path}: given twice (as {seen[place]}); it does not differ from itself: leave one out"
+            )
         seen[place] = path
 
 
@@ -39,7 +43,9 @@ def require_one_time(paths: Sequence[Path], designs: Sequence[Design]) -> None:
             )
 
 
-def require_same_part(paths: Sequence[Path], designs: Sequence[Design], meshes: Sequence[tuple[str, str]]) -> None:
+def require_same_part(
+    paths: Sequence[Path], designs: Sequence[Design], meshes: Sequence[tuple[str, str]]
+) -> None:
     """InputError for other parts, units or targets than the first's; a part may stand otherwise in its chamber.
 
     meshes: sha256 of each part's file, and the unit that its numbers were taken in.
@@ -50,7 +56,10 @@ def require_same_part(paths: Sequence[Path], designs: Sequence[Design], meshes: 
                 f"{path}: another part ({design.part.mesh_path.name}) than in {paths[0]} "
                 f"({designs[0].part.mesh_path.name}); only candidates for the same part mesh can be compared"
             )
-        pairs = {"unit": (meshes[0][1], mesh[1]), "target": (designs[0].part.target, design.part.target)}
+        pairs = {
+            "unit": (meshes[0][1], mesh[1]),
+            "target": (designs[0].part.target, design.part.target),
+        }
         for name, (mine, theirs) in pairs.items():
             if mine != theirs:
                 raise InputError(

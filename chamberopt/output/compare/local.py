@@ -12,7 +12,9 @@ from chamberopt.output.viewer.drawn_part import DENTS_SHOWN, over_discs, reach_w
 from chamberopt.simulation.triangle_fields import coverage_bounds
 
 DENT = np.pi / 4.0  # area of a dent of diameter 1
-DENTS = 4.0 * DENTS_SHOWN  # on a disc: a difference of two has more noise than either, and is smaller
+DENTS = (
+    4.0 * DENTS_SHOWN
+)  # on a disc: a difference of two has more noise than either, and is smaller
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,10 @@ def local_difference(first: Covered, other: Covered) -> LocalDifference:
     """
     target = first.target
     centre, normal = first.centre[target], first.normal[target]
-    reach = max(reach_wanted(centre, one.exposed[target], one.dents[target], DENTS) for one in (first, other))
+    reach = max(
+        reach_wanted(centre, one.exposed[target], one.dents[target], DENTS)
+        for one in (first, other)
+    )
     over = over_discs(centre, normal, reach)
     a, a_low, a_high = _with_interval(first, target, over)
     b, b_low, b_high = _with_interval(other, target, over)
@@ -68,7 +73,9 @@ def _with_interval(
     area = np.where(there, over(exposed), np.nan) * 1e-6
     low, high = coverage_bounds(one.hits, area, one.times, lambda own: over(own[target]))
     dented = over(
-        np.bincount(one.hits.hits.triangle, DENT * one.hits.hits.dent.astype(float) ** 2, len(target))[target]
+        np.bincount(
+            one.hits.hits.triangle, DENT * one.hits.hits.dent.astype(float) ** 2, len(target)
+        )[target]
     )
     found = (-np.expm1(-dented * one.times / area), low, high)
     value, low, high = (np.where(there, column, 0.0) for column in found)

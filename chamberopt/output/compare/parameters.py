@@ -12,7 +12,10 @@ if TYPE_CHECKING:
     from chamberopt.output.results.results import Result
 
 # How many replicas there were says more than what was to decide it.
-REPLICAS, DECIDED_BY = "process.accuracy.replicas", ("process.accuracy.coverage", "process.accuracy.most_replicas")
+REPLICAS, DECIDED_BY = (
+    "process.accuracy.replicas",
+    ("process.accuracy.coverage", "process.accuracy.most_replicas"),
+)
 
 
 def differing(results: Sequence[Result]) -> dict[str, tuple[Any, ...]]:

@@ -14,7 +14,15 @@ from chamberopt.coverage.metrics import LONGEST as NEVER
 from chamberopt.output.compare.comparison import TIME, Comparison
 from chamberopt.output.compare.distributions import Distributions, Histogram
 from chamberopt.output.compare.table import two_digits
-from chamberopt.output.plots.study_and_accuracy import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, YELLOW
+from chamberopt.output.plots.study_and_accuracy import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    SKY,
+    YELLOW,
+)
 from chamberopt.output.viewer.drawn_part import DENTS_SHOWN
 
 if TYPE_CHECKING:
@@ -32,7 +40,9 @@ def distributions_picture(path: Path, comparison: Comparison, found: Distributio
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(13.0, 8.4 + 0.34 * len(comparison.labels)), dpi=130, layout="constrained")
+    figure = Figure(
+        figsize=(13.0, 8.4 + 0.34 * len(comparison.labels)), dpi=130, layout="constrained"
+    )
     FigureCanvasAgg(figure)
     panels = figure.subplots(2, 2)
     _coverage(panels[0, 0], comparison, found)
@@ -53,7 +63,9 @@ def _coverage(axes: Axes, comparison: Comparison, found: Distributions) -> None:
     ]
     _steps(axes, found.coverage, said, "coverage of a triangle [%]", "target area")
     if min(found.dents) < DENTS_SHOWN:
-        axes.set_title("few dents were simulated: their own scatter widens this", loc="left", fontsize=9)
+        axes.set_title(
+            "few dents were simulated: their own scatter widens this", loc="left", fontsize=9
+        )
 
 
 def _few(dents: float) -> str:
@@ -63,7 +75,9 @@ def _few(dents: float) -> str:
 
 def _against_time(axes: Axes, comparison: Comparison) -> None:
     """Mean as a line with its band, the poorest twentieth thin; a mark where that reaches 98 %."""
-    curves = [_known(result.data.get("coverage_against_time") or []) for result in comparison.results]
+    curves = [
+        _known(result.data.get("coverage_against_time") or []) for result in comparison.results
+    ]
     seconds = comparison.results[0].design.process.treatment_time_s
     end = max([seconds, *(curve[0][-1] for pair in curves for curve in pair if len(curve[0]))])
     for k, (label, pair) in enumerate(zip(comparison.labels, curves, strict=True)):
@@ -93,7 +107,9 @@ def _known(rows: list[dict[str, float]]) -> list[np.ndarray]:
     found = []
     for name, width in (("mean_coverage", "half_width"), ("p05_coverage", "p05_half_width")):
         there = takewhile(lambda row, width=width: row.get(width, np.inf) <= KNOWN, rows)  # type: ignore[misc]
-        found.append(np.array([[row["time_s"], row[name], row[width]] for row in there]).reshape(-1, 3).T)
+        found.append(
+            np.array([[row["time_s"], row[name], row[width]] for row in there]).reshape(-1, 3).T
+        )
     return found
 
 
@@ -104,28 +120,47 @@ def _mark(axes: Axes, full: float, half_width: float, end: float, colour: str, k
         axes.plot(1.01 * end, high, ">", color=colour, ms=7, clip_on=False)
         return
     axes.errorbar(
-        full, high, xerr=[[min(full, half_width)], [half_width]], fmt="D", ms=5, lw=1.2, capsize=2, color=colour
+        full,
+        high,
+        xerr=[[min(full, half_width)], [half_width]],
+        fmt="D",
+        ms=5,
+        lw=1.2,
+        capsize=2,
+        color=colour,
     )
 
 
 def _time_said(full: float, half_width: float) -> str:
     if full >= NEVER:
         return "98 % are never reached"
-    return f"98 % after {full:.4g} s" + (" or far from it" if half_width > full else f" ± {two_digits(half_width)} s")
+    return f"98 % after {full:.4g} s" + (
+        " or far from it" if half_width > full else f" ± {two_digits(half_width)} s"
+    )
 
 
-def _said(comparison: Comparison, found: Distributions, means: tuple[float | None, ...], unit: str) -> list[str]:
+def _said(
+    comparison: Comparison, found: Distributions, means: tuple[float | None, ...], unit: str
+) -> list[str]:
     """Legend of impacts: their number, and a mean."""
     said = []
     for label, count, mean in zip(comparison.labels, found.impacts, means, strict=True):
-        counted = "no single impacts: an older result" if count is None else f"{count:,} impacts".replace(",", " ")
+        counted = (
+            "no single impacts: an older result"
+            if count is None
+            else f"{count:,} impacts".replace(",", " ")
+        )
         said.append(f"{label}: {counted}" + ("" if mean is None else f", mean {mean:.3g} {unit}"))
     return said
 
 
 def _steps(axes: Axes, histogram: Histogram, said: list[str], across: str, of: str) -> None:
     for k, (shares, label) in enumerate(zip(histogram.shares, said, strict=True)):
-        style: dict[str, Any] = {"color": COLOURS[k % len(COLOURS)], "ls": LINES[k % len(LINES)], "lw": 1.6}
+        style: dict[str, Any] = {
+            "color": COLOURS[k % len(COLOURS)],
+            "ls": LINES[k % len(LINES)],
+            "lw": 1.6,
+        }
         if shares is None:
             axes.plot([], [], label=label, **style)
         else:
@@ -141,4 +176,6 @@ def _finish(axes: Axes, across: str, up: str) -> None:
     axes.set_ylabel(up)
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(alpha=0.25, lw=0.6)
-    axes.legend(fontsize=8, frameon=False, loc="upper left", bbox_to_anchor=(0.0, -0.13), handlelength=4.0)
+    axes.legend(
+        fontsize=8, frameon=False, loc="upper left", bbox_to_anchor=(0.0, -0.13), handlelength=4.0
+    )

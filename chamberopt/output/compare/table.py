@@ -18,13 +18,19 @@ HEADER = ("difference", "real", "to know: simulate")
 def as_text(comparison: Comparison) -> str:
     """Two candidates in one table; of more, what they are and then each later one against the first."""
     first, *later = comparison.labels
-    rows = [[name, *(_shown(value) for value in values)] for name, values in comparison.parameters.items()]
+    rows = [
+        [name, *(_shown(value) for value in values)]
+        for name, values in comparison.parameters.items()
+    ]
     if not rows:
         rows = [["the designs do not differ"]]
     figures = {
-        name: [_figure(name, estimate) for estimate in estimates] for name, estimates in comparison.metrics.items()
+        name: [_figure(name, estimate) for estimate in estimates]
+        for name, estimates in comparison.metrics.items()
     }
-    gaps = {name: [_cells(gap) for gap in several] for name, several in comparison.differences.items()}
+    gaps = {
+        name: [_cells(gap) for gap in several] for name, several in comparison.differences.items()
+    }
     if len(later) == 1:
         heads = [f"{later[0]} - {first}", *HEADER[1:]]
         rows += [[name, *cells, *gaps[name][0]] for name, cells in figures.items()]
@@ -59,7 +65,9 @@ def _legend(comparison: Comparison) -> list[str]:
         if any(paired):
             lines.append(f"{label} - {first}: paired, replica by replica on the same seeds.")
         elif comparison.results[k + 1].seeds == comparison.results[0].seeds:
-            lines.append(f"{label} - {first}: as independent, for they have not the same number of replicas.")
+            lines.append(
+                f"{label} - {first}: as independent, for they have not the same number of replicas."
+            )
         else:
             lines.append(f"{label} - {first}: independent, on other seeds.")
     if COUNTED in comparison.parameters:
@@ -111,4 +119,7 @@ def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
     count = max(map(len, rows))
     whole = [[*row, *[""] * (count - len(row))] for row in rows]
     widths = [max(len(row[i]) for row in whole) for i in range(count)]
-    return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in whole]
+    return [
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in whole
+    ]

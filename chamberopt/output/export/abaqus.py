@@ -45,9 +45,15 @@ def _mesh(mesh: PartMesh) -> list[str]:
     places = mesh.vertices / METRES_PER[mesh.unit]
     return [
         "*Node\n",
-        *(f"{k}, {x:.12g}, {y:.12g}, {z:.12g}\n" for k, (x, y, z) in enumerate(places.tolist(), start=1)),
+        *(
+            f"{k}, {x:.12g}, {y:.12g}, {z:.12g}\n"
+            for k, (x, y, z) in enumerate(places.tolist(), start=1)
+        ),
         "*Element, type=S3, elset=PART\n",
-        *(f"{k}, {a}, {b}, {c}\n" for k, (a, b, c) in enumerate((mesh.triangles + 1).tolist(), start=1)),
+        *(
+            f"{k}, {a}, {b}, {c}\n"
+            for k, (a, b, c) in enumerate((mesh.triangles + 1).tolist(), start=1)
+        ),
     ]
 
 
@@ -60,5 +66,8 @@ def _sets(fields: ElementFields, instance: str) -> list[str]:
         numbers = fields.numbers[inside].tolist()
         if numbers:
             lines.append(f"*Elset, elset=COVERAGE_{100 * low:.0f}_TO_{100 * high:.0f}{instance}\n")
-        lines += [", ".join(map(str, numbers[at : at + A_LINE])) + "\n" for at in range(0, len(numbers), A_LINE)]
+        lines += [
+            ", ".join(map(str, numbers[at : at + A_LINE])) + "\n"
+            for at in range(0, len(numbers), A_LINE)
+        ]
     return lines

@@ -39,7 +39,9 @@ def read_cavity(folder: Path) -> Cavity:
     """
     drawn = read_surface(folder / CHAMBER)
     tags = np.asarray(drawn["tag"])
-    fitting = np.asarray(drawn["fitting"]) if "fitting" in drawn.array_names else np.full(len(tags), -1)
+    fitting = (
+        np.asarray(drawn["fitting"]) if "fitting" in drawn.array_names else np.full(len(tags), -1)
+    )
     surfaces = {_name(int(tag)): (tags == tag) & (fitting < 0) for tag in np.unique(tags)}
     for number, name in enumerate(fitting_names(load_result(folder).design)):
         surfaces[name] = fitting == number

@@ -16,12 +16,18 @@ if TYPE_CHECKING:
 # counts each triangle by its exposed area, its impacts or its dents.
 COLUMNS = {
     "coverage": ("share of the surface that is dented after the treatment, 0 to 1", "area"),
-    "coverage_interval": ("width of coverage's 95 % interval; of several triangles their mean", "area"),
+    "coverage_interval": (
+        "width of coverage's 95 % interval; of several triangles their mean",
+        "area",
+    ),
     "dent_density": ("dented area per area after the treatment", "area"),
     "impacts_per_mm2": ("impacts per mm2 in the treatment", "area"),
     "energy_per_mm2": ("energy of impacts in the treatment, mJ/mm2", "area"),
     "mean_normal_speed": ("mean normal speed of impacts, m/s", "impacts"),
-    "p90_normal_speed": ("90th percentile of their normal speed, m/s; of several triangles their mean", "impacts"),
+    "p90_normal_speed": (
+        "90th percentile of their normal speed, m/s; of several triangles their mean",
+        "impacts",
+    ),
     "mean_angle_deg": ("mean angle of impacts to the surface, degrees, 90 is head on", "impacts"),
     "mean_dent_um": ("mean diameter of dents, micrometres", "dents"),
     "impacts": ("impacts that were simulated, a number", "sum"),
@@ -47,7 +53,9 @@ def of_elements(surface: Any, number: np.ndarray) -> ElementFields:
     return _gathered(surface, cells, number[cells], tuple(COLUMNS))
 
 
-def of_other_triangles(surface: Any, number: np.ndarray, filed: PartMesh, simulated: PartMesh) -> ElementFields:
+def of_other_triangles(
+    surface: Any, number: np.ndarray, filed: PartMesh, simulated: PartMesh
+) -> ElementFields:
     """As of_elements, where the part was simulated in other triangles (simulated) than those of its file (filed).
 
     A triangle counts for the element that its middle lies in. An element without any, smaller than they are, gets what
@@ -63,7 +71,9 @@ def of_other_triangles(surface: Any, number: np.ndarray, filed: PartMesh, simula
         mesh = TriangleMesh(simulated.vertices, simulated.triangles, tags)
         middles = filed.vertices[filed.triangles[small]].mean(axis=1)
         around = nearest(mesh, middles, float(np.ptp(filed.vertices))).triangle
-        share = areas(filed.vertices, filed.triangles[small]) / areas(simulated.vertices, simulated.triangles[around])
+        share = areas(filed.vertices, filed.triangles[small]) / areas(
+            simulated.vertices, simulated.triangles[around]
+        )
         cells, weight = np.r_[cells, around], np.r_[weight, share]
     numbers = np.r_[number[number > 0], filed.elements[small]]
     means = tuple(name for name, (_, how) in COLUMNS.items() if how != "sum")
@@ -71,7 +81,11 @@ def of_other_triangles(surface: Any, number: np.ndarray, filed: PartMesh, simula
 
 
 def _gathered(
-    surface: Any, cells: np.ndarray, number: np.ndarray, names: tuple[str, ...], share: np.ndarray | float = 1.0
+    surface: Any,
+    cells: np.ndarray,
+    number: np.ndarray,
+    names: tuple[str, ...],
+    share: np.ndarray | float = 1.0,
 ) -> ElementFields:
     """Columns of elements, of triangles (cells) that count for them by number, with a share of what they weigh."""
     numbers, which = np.unique(number, return_inverse=True)
@@ -97,5 +111,7 @@ def _gathered(
         else:
             weight = np.where(np.isfinite(values), weights[how][cells] * share, 0.0)
             sums, whole = total(weight * np.nan_to_num(values)), total(weight)
-            columns[name] = np.divide(sums, whole, out=np.full(len(numbers), np.nan), where=whole > 0.0)
+            columns[name] = np.divide(
+                sums, whole, out=np.full(len(numbers), np.nan), where=whole > 0.0
+            )
     return ElementFields(numbers, columns)

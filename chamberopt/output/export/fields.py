@@ -13,7 +13,12 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.files import whole_file, write_text
 from chamberopt.geometry.mesh_io import PartMesh
 from chamberopt.output.export.abaqus import abaqus_deck
-from chamberopt.output.export.elements import COLUMNS, ElementFields, of_elements, of_other_triangles
+from chamberopt.output.export.elements import (
+    COLUMNS,
+    ElementFields,
+    of_elements,
+    of_other_triangles,
+)
 from chamberopt.output.export.nastran import nastran_deck
 from chamberopt.output.results.results import Result, load_result
 from chamberopt.output.results.subject import own_coverage
@@ -38,13 +43,19 @@ def write_fields(folder: str | Path, to: str, path: str | Path) -> list[str]:
     if to not in FIELD_FORMATS:
         raise InputError(f"fields are not written as {to!r}; use one of {', '.join(FIELD_FORMATS)}")
     if to not in DECKS and path.suffix.lower() != f".{to}":
-        raise InputError(f"{path}: {to} files are known by their ending; name it {path.with_suffix('.' + to).name}")
+        raise InputError(
+            f"{path}: {to} files are known by their ending; name it {path.with_suffix('.' + to).name}"
+        )
     if not path.resolve().parent.is_dir() or path.is_dir():
-        raise InputError(f"{path}: is no file in a folder that is there; make the folder, or give a file's name")
+        raise InputError(
+            f"{path}: is no file in a folder that is there; make the folder, or give a file's name"
+        )
     result = load_result(folder)
     surface = own_coverage(result)
     if "element" not in surface.cell_data:
-        raise InputError(f"{result.folder / COVERAGE}: from a version that kept no element numbers; simulate again")
+        raise InputError(
+            f"{result.folder / COVERAGE}: from a version that kept no element numbers; simulate again"
+        )
     try:
         if to not in DECKS:
             with whole_file(path) as temporary:
@@ -52,7 +63,9 @@ def write_fields(folder: str | Path, to: str, path: str | Path) -> list[str]:
             return []
         return _write_deck(result, surface, to, path)
     except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}; choose another place") from None
+        raise InputError(
+            f"{path}: cannot be written: {error.strerror}; choose another place"
+        ) from None
 
 
 def _write_deck(result: Result, surface: Any, to: str, path: Path) -> list[str]:
@@ -64,7 +77,9 @@ def _write_deck(result: Result, surface: Any, to: str, path: Path) -> list[str]:
     if own and simulated is not filed:
         fields = of_other_triangles(surface, number, filed, simulated)
         said = "the target was simulated in triangles of target.element_mm"
-        remarks.append(f"{said}: elements get means over those whose middles they hold, and no sums")
+        remarks.append(
+            f"{said}: elements get means over those whose middles they hold, and no sums"
+        )
     if not own:
         remarks.append(
             f"{result.design.part.mesh_path.name} has no element numbers that stand for one element each: its "
@@ -72,14 +87,18 @@ def _write_deck(result: Result, surface: Any, to: str, path: Path) -> list[str]:
         )
     new = int((number == 0).sum())
     if new:
-        remarks.append(f"left out {new} triangles that are in no element of the file: they close its holes")
+        remarks.append(
+            f"left out {new} triangles that are in no element of the file: they close its holes"
+        )
     remarks += _left_out(fields)
     about = [*_about(result), *(f"{name.upper()}: {COLUMNS[name][0]}" for name in fields.columns)]
     for suffix, text in DECKS[to](about, simulated, fields).items():
         file = path.with_stem(path.stem + suffix) if suffix else path
         write_text(file, text)
         if suffix:
-            remarks.append(f"{file.name}: sets of elements by coverage, to be included inside the deck's *Assembly")
+            remarks.append(
+                f"{file.name}: sets of elements by coverage, to be included inside the deck's *Assembly"
+            )
     return remarks
 
 

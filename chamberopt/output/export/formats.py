@@ -62,23 +62,44 @@ def _study_csv(folder: Path, file: Path) -> None:
 STUDY = "study-csv"  # the only one that a study without a result, or a sweep, can give
 FORMATS = {
     "impacts-parquet": Format(
-        "impacts.parquet", "every impact: time, triangle, place, velocity, ball, dent", None, (".parquet",)
+        "impacts.parquet",
+        "every impact: time, triangle, place, velocity, ball, dent",
+        None,
+        (".parquet",),
     ),
-    "impacts-csv": Format("impacts.csv", "the same as text; with --out FILE.csv.gz packed", None, (".csv", ".csv.gz")),
-    "fields-vtp": Format("fields.vtp", "what each triangle of the part got, for ParaView", _fields("vtp"), (".vtp",)),
+    "impacts-csv": Format(
+        "impacts.csv", "the same as text; with --out FILE.csv.gz packed", None, (".csv", ".csv.gz")
+    ),
+    "fields-vtp": Format(
+        "fields.vtp", "what each triangle of the part got, for ParaView", _fields("vtp"), (".vtp",)
+    ),
     "fields-vtkhdf": Format("fields.vtkhdf", "the same as VTKHDF", _fields("vtkhdf"), (".vtkhdf",)),
     "fields-abaqus": Format(
-        "fields.inp", "distributions on the elements of the part's file", _fields("abaqus"), (".inp", ".inc")
+        "fields.inp",
+        "distributions on the elements of the part's file",
+        _fields("abaqus"),
+        (".inp", ".inc"),
     ),
     "fields-nastran": Format(
-        "fields.bdf", "PLOAD4 on the elements of the part's file", _fields("nastran"), (".bdf", ".nas")
+        "fields.bdf",
+        "PLOAD4 on the elements of the part's file",
+        _fields("nastran"),
+        (".bdf", ".nas"),
     ),
-    "chamber-stl": Format("chamber.stl", "the cavity as one closed body, in mm", _chamber_stl, (".stl",)),
+    "chamber-stl": Format(
+        "chamber.stl", "the cavity as one closed body, in mm", _chamber_stl, (".stl",)
+    ),
     "chamber-stl-per-tag": Format(
-        "chamber-stl", "an STL of each of its surfaces: part, sonotrode, wall ...", _chamber_stl_per_surface
+        "chamber-stl",
+        "an STL of each of its surfaces: part, sonotrode, wall ...",
+        _chamber_stl_per_surface,
     ),
-    "chamber-3mf": Format("chamber.3mf", "the closed cavity, its surfaces named, in mm", _chamber_3mf, (".3mf",)),
-    STUDY: Format("study.csv", "a study's or sweep's evaluations, finished or not", _study_csv, (".csv",)),
+    "chamber-3mf": Format(
+        "chamber.3mf", "the closed cavity, its surfaces named, in mm", _chamber_3mf, (".3mf",)
+    ),
+    STUDY: Format(
+        "study.csv", "a study's or sweep's evaluations, finished or not", _study_csv, (".csv",)
+    ),
 }
 
 
@@ -88,7 +109,9 @@ def asked_formats(names: Sequence[str]) -> dict[str, Format]:
         if name not in FORMATS:
             from chamberopt.common.toml_errors import did_you_mean  # brings pydantic
 
-            raise InputError(f"--to: given {name!r}; {did_you_mean(name, FORMATS)} (chamberopt export --help)")
+            raise InputError(
+                f"--to: given {name!r}; {did_you_mean(name, FORMATS)} (chamberopt export --help)"
+            )
     return {name: FORMATS[name] for name in dict.fromkeys(names)}
 
 
@@ -101,7 +124,11 @@ def is_file(out: Path, formats: dict[str, Format]) -> bool:
     if len(formats) > 1:
         raise InputError(f"--out {out}: one file for {len(formats)} formats; give a folder")
     if _ending(out, single.endings) is None:
-        which = f"a name in {' or '.join(single.endings)}, or a folder" if single.endings else "a folder"
+        which = (
+            f"a name in {' or '.join(single.endings)}, or a folder"
+            if single.endings
+            else "a folder"
+        )
         raise InputError(f"--out {out}: is no file of {name}; give {which}")
     return True
 

@@ -34,27 +34,59 @@ class Column(NamedTuple):
 
 def columns_of(frame: Frame) -> tuple[Column, ...]:
     """The columns in their order."""
-    place = [Column(f"{x}_{frame.unit}", "float64", "%.9g", f"contact point, {x} [{frame.unit}]") for x in "xyz"]
+    place = [
+        Column(f"{x}_{frame.unit}", "float64", "%.9g", f"contact point, {x} [{frame.unit}]")
+        for x in "xyz"
+    ]
     velocity = [
-        Column(f"v{x}_m_s", "float32", "%.7g", f"velocity before the impact, against the surface, {x} [m/s]")
+        Column(
+            f"v{x}_m_s",
+            "float32",
+            "%.7g",
+            f"velocity before the impact, against the surface, {x} [m/s]",
+        )
         for x in "xyz"
     ]
     return (
         Column("replica", "int32", "%d", "replica, from 0; each is a simulation of its own"),
         Column("time_s", "float64", "%.10g", "time since its replica's warm-up ended [s]"),
-        Column("triangle", "int32", "%d", "the part's triangle that was hit, from 0, in the order of coverage.vtp"),
-        Column("element", "int64", "%d", "the element of the part's file that was hit, as in coverage.vtp"),
+        Column(
+            "triangle",
+            "int32",
+            "%d",
+            "the part's triangle that was hit, from 0, in the order of coverage.vtp",
+        ),
+        Column(
+            "element",
+            "int64",
+            "%d",
+            "the element of the part's file that was hit, as in coverage.vtp",
+        ),
         *place,
         *velocity,
         Column("normal_speed_m_s", "float32", "%.7g", "speed across the surface [m/s]"),
-        Column("angle_deg", "float32", "%.6g", "between path and surface [degrees]: 90 is head on, 0 grazing"),
+        Column(
+            "angle_deg",
+            "float32",
+            "%.6g",
+            "between path and surface [degrees]: 90 is head on, 0 grazing",
+        ),
         Column("ball_diameter_mm", "float32", "%.6g", "diameter of the ball [mm]"),
-        Column("dent_diameter_um", "float32", "%.6g", "diameter of its dent [um]; 0 below the part's yield speed"),
+        Column(
+            "dent_diameter_um",
+            "float32",
+            "%.6g",
+            "diameter of its dent [um]; 0 below the part's yield speed",
+        ),
     )
 
 
 def rows(
-    impacts: ReplicaImpacts, chamber: Chamber, design: Design, frame: Frame, columns: tuple[Column, ...]
+    impacts: ReplicaImpacts,
+    chamber: Chamber,
+    design: Design,
+    frame: Frame,
+    columns: tuple[Column, ...],
 ) -> Iterator[list[np.ndarray]]:
     """The values of each column, PIECE rows at a time; in the order of `columns`."""
     log = impacts.log

@@ -27,7 +27,9 @@ if TYPE_CHECKING:
 PARQUET = ".parquet"
 ABOUT = "chamberopt"  # key of a Parquet file's metadata
 PACKED = 3  # level of gzip: 6 takes three times as long for 6 % less
-BESIDE = ".json"  # a .csv has its header alone; what else there is to know of it stands in FILE.json
+BESIDE = (
+    ".json"  # a .csv has its header alone; what else there is to know of it stands in FILE.json
+)
 
 Put = Callable[[Sequence[np.ndarray]], None]
 
@@ -69,11 +71,15 @@ def _pyarrow() -> Any:
     try:
         import pyarrow.parquet
     except ImportError:
-        raise InputError("impacts-parquet: pyarrow is not installed: pip install 'chamberopt[parquet]'") from None
+        raise InputError(
+            "impacts-parquet: pyarrow is not installed: pip install 'chamberopt[parquet]'"
+        ) from None
     return pyarrow
 
 
-def _about(result: Result, ground: Ground, frame: Frame, columns: Sequence[Column], replicas: int) -> dict[str, Any]:
+def _about(
+    result: Result, ground: Ground, frame: Frame, columns: Sequence[Column], replicas: int
+) -> dict[str, Any]:
     """What to know of the rows: where they come from, and in what they are written."""
     design = result.design
     return {
@@ -107,17 +113,29 @@ def _sink(file: Path) -> Callable[..., Any]:
 def _parquet(file: Path, columns: Sequence[Column], about: dict[str, Any]) -> Iterator[Put]:
     pyarrow = _pyarrow()
     fields = [
-        pyarrow.field(column.name, pyarrow.from_numpy_dtype(np.dtype(column.dtype)), False, {"meaning": column.meaning})
+        pyarrow.field(
+            column.name,
+            pyarrow.from_numpy_dtype(np.dtype(column.dtype)),
+            False,
+            {"meaning": column.meaning},
+        )
         for column in columns
     ]
     schema = pyarrow.schema(fields, {ABOUT: json.dumps(about)})
-    smooth = [column.name for column in columns if column.dtype.startswith("float") and "diameter" not in column.name]
+    smooth = [
+        column.name
+        for column in columns
+        if column.dtype.startswith("float") and "diameter" not in column.name
+    ]
     settings = {
         "compression": "zstd",
         "use_dictionary": False,
         "column_encoding": dict.fromkeys(smooth, "BYTE_STREAM_SPLIT"),
     }
-    with whole_file(file) as temporary, pyarrow.parquet.ParquetWriter(temporary, schema, **settings) as writer:
+    with (
+        whole_file(file) as temporary,
+        pyarrow.parquet.ParquetWriter(temporary, schema, **settings) as writer,
+    ):
         yield lambda values: writer.write_batch(pyarrow.record_batch(list(values), schema=schema))
 
 
@@ -126,7 +144,11 @@ def _csv(file: Path, columns: Sequence[Column], about: dict[str, Any]) -> Iterat
     line = ",".join(column.text for column in columns) + "\n"
     with whole_file(file) as temporary, open(temporary, "wb") as plain, ExitStack() as stack:
         # Without a name and a time in it the same impacts give the same bytes.
-        out = stack.enter_context(gzip.GzipFile("", "wb", PACKED, plain, 0)) if file.suffix.lower() == ".gz" else plain
+        out = (
+            stack.enter_context(gzip.GzipFile("", "wb", PACKED, plain, 0))
+            if file.suffix.lower() == ".gz"
+            else plain
+        )
         out.write((",".join(column.name for column in columns) + "\n").encode())
 
         def put(values: Sequence[np.ndarray]) -> None:

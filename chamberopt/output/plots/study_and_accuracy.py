@@ -55,7 +55,13 @@ def _convergence(axes: Axes, result: StudyResult) -> None:
     confirmed = [trial for trial in result.trials if trial.stage == "confirm" and trial.objective]
     good = [trial for trial in search if trial.objective and trial.feasible]
     _bars(axes, good, BLUE, "evaluation, 95 % interval")
-    _bars(axes, [t for t in search if t.objective and not t.feasible], GREY, "misses a constraint", mark="x")
+    _bars(
+        axes,
+        [t for t in search if t.objective and not t.feasible],
+        GREY,
+        "misses a constraint",
+        mark="x",
+    )
     failed = [trial.number + 1 for trial in search if not trial.objective]
     if failed:
         label = "could not be simulated"
@@ -66,7 +72,9 @@ def _convergence(axes: Axes, result: StudyResult) -> None:
     axes.step(np.arange(1, len(search) + 1)[shown], best[shown], where="post", color=BLUE, alpha=0.5,
               label="best so far (as searched)")  # fmt: skip
     if confirmed:
-        axes.axvspan(len(search) + 0.5, result.trials[-1].number + 1.5, color=GREEN, alpha=0.08, lw=0)
+        axes.axvspan(
+            len(search) + 0.5, result.trials[-1].number + 1.5, color=GREEN, alpha=0.08, lw=0
+        )
         _bars(axes, confirmed, GREEN, "confirmed on fresh seeds")
     level = result.start.evaluation.objective.value
     axes.axhline(level, color=ORANGE, lw=1.2, ls="--", label="start, confirmed")
@@ -115,7 +123,9 @@ def _against(axes: Axes, result: StudyResult, search: list[Trial], name: str) ->
 
 
 def _bars(axes: Axes, trials: list[Trial], colour: str, label: str, mark: str = "o") -> None:
-    goals = [(t.number + 1, t.objective.value, t.objective.half_width) for t in trials if t.objective]
+    goals = [
+        (t.number + 1, t.objective.value, t.objective.half_width) for t in trials if t.objective
+    ]
     if goals:
         x, y, error = zip(*goals, strict=True)
         axes.errorbar(x, y, yerr=error, fmt=mark, ms=5, lw=1, color=colour, label=label)
@@ -173,14 +183,26 @@ def _bias_marks(axes: Axes, ladder: Ladder) -> None:
     from chamberopt.simulation.convergence.parameters import DESIGNED, TIME
     from chamberopt.simulation.convergence.recommendation import short
 
-    knobs = [knob for knob in dict.fromkeys(rung.knob for rung in ladder.rungs) if knob not in (DESIGNED, TIME)]
-    for knob, colour, mark in zip(knobs, (ORANGE, GREEN, PURPLE, SKY, YELLOW), "sD^vP", strict=False):
+    knobs = [
+        knob
+        for knob in dict.fromkeys(rung.knob for rung in ladder.rungs)
+        if knob not in (DESIGNED, TIME)
+    ]
+    for knob, colour, mark in zip(
+        knobs, (ORANGE, GREEN, PURPLE, SKY, YELLOW), "sD^vP", strict=False
+    ):
         for rung in (rung for rung in ladder.rungs if rung.knob == knob):
             y = abs(rung.bias.value) if rung.known else rung.bound
-            reach = [[min(rung.bias.half_width, 0.8 * y)], [rung.bias.half_width]] if rung.known else 0.2 * y
+            reach = (
+                [[min(rung.bias.half_width, 0.8 * y)], [rung.bias.half_width]]
+                if rung.known
+                else 0.2 * y
+            )
             axes.errorbar(ladder.design.process.accuracy.replicas * rung.cpu.value, y, yerr=reach, fmt=mark, ms=6, lw=1,
                           uplims=not rung.known, color=colour, mfc=colour if rung.known else "white")  # fmt: skip
-        axes.plot([], [], mark, color=colour, mfc="white", label=f"bias of {short(knob)}; open: at most")
+        axes.plot(
+            [], [], mark, color=colour, mfc="white", label=f"bias of {short(knob)}; open: at most"
+        )
 
 
 def _front(axes: Axes, ladder: Ladder) -> None:
@@ -199,7 +221,8 @@ def _front(axes: Axes, ladder: Ladder) -> None:
         axes.annotate(str(number), (one.cpu_s, one.error), (0, -13), textcoords="offset points", fontsize=7.5,
                       ha="center", va="center", color="#333333")  # fmt: skip
     text = "\n".join(
-        ["on the Pareto front"] + [f"{number:>2}  {one.name}" for number, one in enumerate(named, start=1)]
+        ["on the Pareto front"]
+        + [f"{number:>2}  {one.name}" for number, one in enumerate(named, start=1)]
     )
     axes.text(0.99, 0.99, text, transform=axes.transAxes, fontsize=7.5, va="top", ha="right", multialignment="left",
               color="#333333", bbox={"fc": "white", "ec": "none", "pad": 2.0})  # fmt: skip
@@ -223,7 +246,14 @@ def _biases(axes: Axes, ladder: Ladder) -> None:
     axes.set_ylim(-1.3, len(rungs) - 0.5)  # the legend is below the last
     axes.axvline(0.0, color=GREY, lw=1)
     third = SHARE * ASKED[1]
-    axes.axvspan(-third, third, color=GREEN, alpha=0.12, lw=0, label=f"a third of {ASKED[1]:g}; open: not told from 0")
+    axes.axvspan(
+        -third,
+        third,
+        color=GREEN,
+        alpha=0.12,
+        lw=0,
+        label=f"a third of {ASKED[1]:g}; open: not told from 0",
+    )
     # Short replicas are all noise: their interval may leave the picture.
     wide = 1.15 * max(third, *(rung.bound for rung in rungs if rung.knob != TIME))
     axes.set_xlim(-wide, wide)
@@ -238,9 +268,16 @@ def reach(goals: list[Estimate]) -> tuple[float, float]:
     """From where to where an axis shows these: every value, and of each interval no more to a side than the span of the
     values. The interval of a time that may be never would press all else into one line.
     """
-    values, half_widths = np.array([goal.value for goal in goals]), np.array([goal.half_width for goal in goals])
+    values, half_widths = (
+        np.array([goal.value for goal in goals]),
+        np.array([goal.half_width for goal in goals]),
+    )
     span = float(np.ptp(values))
-    shown = np.minimum(half_widths, span) if span > 0.0 else np.where(np.isfinite(half_widths), half_widths, 0.0)
+    shown = (
+        np.minimum(half_widths, span)
+        if span > 0.0
+        else np.where(np.isfinite(half_widths), half_widths, 0.0)
+    )
     low, high = float((values - shown).min()), float((values + shown).max())
     margin = 0.05 * (high - low) or 0.5
     return low - margin, high + margin

@@ -22,11 +22,24 @@ def slices_picture(path: Path, result: StudyResult, findings: Findings) -> None:
     figure = _figure(3.4 * max(columns, 2), 3.3 * rows + 0.5)
     grid = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
     for axes, one in zip(grid, findings.slices, strict=False):
-        axes.axvspan(*one.flat, color=GREEN, alpha=0.12, lw=0, label=f"loses no more than {findings.noise:.2g}")
-        axes.fill_between(
-            one.values, one.mean - one.half_width, one.mean + one.half_width, color=BLUE, alpha=0.15, lw=0
+        axes.axvspan(
+            *one.flat,
+            color=GREEN,
+            alpha=0.12,
+            lw=0,
+            label=f"loses no more than {findings.noise:.2g}",
         )
-        axes.plot(one.values, one.mean, color=BLUE, label="the others as in the best, 95 % interval")
+        axes.fill_between(
+            one.values,
+            one.mean - one.half_width,
+            one.mean + one.half_width,
+            color=BLUE,
+            alpha=0.15,
+            lw=0,
+        )
+        axes.plot(
+            one.values, one.mean, color=BLUE, label="the others as in the best, 95 % interval"
+        )
         axes.plot(one.values, one.effect, color=GREY, ls="--", label="mean over the others")
         axes.axvline(result.best.parameters[one.name], color=GREEN, lw=1.2, label="best")
         axes.axvline(result.start.parameters[one.name], color=ORANGE, lw=1.0, ls=":", label="start")
@@ -61,11 +74,20 @@ def front_picture(path: Path, result: StudyResult) -> None:
         x, y = ([goals[k].value for goals in shown] for k in (0, 1))
         bars: dict[str, Any] = {}
         if stage == "confirm":
-            bars = {"xerr": [goals[0].half_width for goals in shown], "yerr": [goals[1].half_width for goals in shown]}
+            bars = {
+                "xerr": [goals[0].half_width for goals in shown],
+                "yerr": [goals[1].half_width for goals in shown],
+            }
         line = "--" if stage == "confirm" and there else ""
-        axes.errorbar(x, y, **bars, fmt=mark, ls=line, lw=1, ms=5 if bars else 3, color=colour, label=label)
+        axes.errorbar(
+            x, y, **bars, fmt=mark, ls=line, lw=1, ms=5 if bars else 3, color=colour, label=label
+        )
     confirmed = [one.goals for one in every if one.stage == "confirm"]
-    bare = [tuple(Estimate(goal.value, 0.0) for goal in one.goals) for one in every if one.stage == "search"]
+    bare = [
+        tuple(Estimate(goal.value, 0.0) for goal in one.goals)
+        for one in every
+        if one.stage == "search"
+    ]
     across, up = zip(*confirmed, *bare, strict=True)
     axes.set_xlim(*reach(list(across)))
     axes.set_ylim(*reach(list(up)))

@@ -11,7 +11,11 @@ from chamberopt.output.report.words import goal_words, metric_words
 if TYPE_CHECKING:
     from chamberopt.output.results.results import Result
 
-DOING = {"chamber": "to build the chamber", "simulate": "to simulate", "coverage": "to work out the coverage"}
+DOING = {
+    "chamber": "to build the chamber",
+    "simulate": "to simulate",
+    "coverage": "to work out the coverage",
+}
 STOPPED = {
     "replicas": "the number of replicas asked for",
     "accuracy": "the accuracy asked for was reached",
@@ -24,7 +28,9 @@ def accuracy_reached(result: Result, study: Mapping[str, Any] | None) -> dict[st
     goal, cover = goal_words(result.objective_name), metric_words("mean_coverage")
     found = {
         f"95 % interval of the {goal.label}": estimated(result.objective, goal.factor, goal.unit),
-        f"95 % interval of the {cover.label}": estimated(result.metrics["mean_coverage"], cover.factor, cover.unit),
+        f"95 % interval of the {cover.label}": estimated(
+            result.metrics["mean_coverage"], cover.factor, cover.unit
+        ),
         "replicas, each of its own seed": f"{result.data['replicas']}",
     }
     why = result.data.get("stopped_by", "")
@@ -32,9 +38,13 @@ def accuracy_reached(result: Result, study: Mapping[str, Any] | None) -> dict[st
     if study and "accuracy" in study:
         search = study["accuracy"]["search"]
         found["a candidate of the search"] = (
-            f"± {search['coverage']:g} asked for" if "coverage" in search else f"up to {search['replicas']} replicas"
+            f"± {search['coverage']:g} asked for"
+            if "coverage" in search
+            else f"up to {search['replicas']} replicas"
         ) + (f" of {plain(search['simulated_time_s'])} s" if "simulated_time_s" in search else "")
-    found["chamber's walls"] = "exact planes and cylinders" if result.data.get("analytic") else "triangles"
+    found["chamber's walls"] = (
+        "exact planes and cylinders" if result.data.get("analytic") else "triangles"
+    )
     return {name: value for name, value in found.items() if value}
 
 
@@ -43,12 +53,22 @@ def price_paid(
 ) -> dict[str, dict[str, str]]:
     """ "answer": simulated time, collisions, wall clock of its figures; and, of a study, those of all "evaluations"."""
     data = result.data
-    hits = {"walls": "of walls and part", "balls": "of ball with ball", "sonotrode": "of the sonotrode"}
-    told = [f"{_count(data['collisions'][name])} {what}" for name, what in hits.items() if name in data["collisions"]]
+    hits = {
+        "walls": "of walls and part",
+        "balls": "of ball with ball",
+        "sonotrode": "of the sonotrode",
+    }
+    told = [
+        f"{_count(data['collisions'][name])} {what}"
+        for name, what in hits.items()
+        if name in data["collisions"]
+    ]
     found = {
         "simulated time": f"{plain(data['simulated_time_s'])} s",
         "collisions": f"{_count(data['collisions'].get('total', 0))}: {', '.join(told)}",
-        **{DOING.get(step, step): f"{seconds:.2f} s" for step, seconds in data["timings_s"].items()},
+        **{
+            DOING.get(step, step): f"{seconds:.2f} s" for step, seconds in data["timings_s"].items()
+        },
     }
     if not study:
         return {"answer": found}

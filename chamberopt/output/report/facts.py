@@ -10,7 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from chamberopt.common.errors import InputError
-from chamberopt.coverage.statistics.interval import Estimate, independent_difference, paired_difference
+from chamberopt.coverage.statistics.interval import (
+    Estimate,
+    independent_difference,
+    paired_difference,
+)
 from chamberopt.optimize.storage.study_folder import STUDY
 from chamberopt.optimize.storage.trial_log import HISTORY, read_history
 from chamberopt.output.report.answer import answer
@@ -29,7 +33,9 @@ def facts(folder: str | Path) -> dict[str, Any]:
     """Everything on the page but its pictures, as JSON takes it. Raises InputError for a folder that is no result."""
     result = load_result(folder)
     study = result.data.get("study")
-    start = load_result(result.folder / START) if study and (result.folder / START).is_dir() else None
+    start = (
+        load_result(result.folder / START) if study and (result.folder / START).is_dir() else None
+    )
     gain = None if start is None else _change(result.objective, start.objective, result, start)
     rows = read_history(result.folder) if study and (result.folder / HISTORY).is_file() else []
     goal = goal_words(result.objective_name)
@@ -44,7 +50,8 @@ def facts(folder: str | Path) -> dict[str, Any]:
         "evaluations": [_evaluation(row, goal.factor) for row in rows],
         "influence": influence(study, goal) if study and start else None,
         "coverage_against_time": {
-            name: one.data.get("coverage_against_time", []) for name, one in _candidates(result, start)
+            name: one.data.get("coverage_against_time", [])
+            for name, one in _candidates(result, start)
         },
         "accuracy": accuracy_reached(result, study),
         "cost": price_paid(result, study, rows),
@@ -65,14 +72,26 @@ def _candidates(result: Result, start: Result | None) -> list[tuple[str, Result]
 
 
 def _change(after: Estimate, before: Estimate, result: Result, start: Result) -> Estimate:
-    return paired_difference(after, before) if result.seeds == start.seeds else independent_difference(after, before)
+    return (
+        paired_difference(after, before)
+        if result.seeds == start.seeds
+        else independent_difference(after, before)
+    )
 
 
 def _question(result: Result, study: dict[str, Any] | None) -> dict[str, Any]:
-    goal, design, about = goal_words(result.objective_name), result.design, result.data.get("chamber", {})
+    goal, design, about = (
+        goal_words(result.objective_name),
+        result.design,
+        result.data.get("chamber", {}),
+    )
     asked: dict[str, Any] = {
         "part": design.part.mesh_path.name,
-        "target": {name: about[name] for name in ("target_triangles", "target_exposed_area_mm2") if name in about},
+        "target": {
+            name: about[name]
+            for name in ("target_triangles", "target_exposed_area_mm2")
+            if name in about
+        },
         "shape": design.chamber.shape,
         "treatment_time_s": design.process.treatment_time,
         "objective": {
@@ -88,7 +107,9 @@ def _question(result: Result, study: dict[str, Any] | None) -> dict[str, Any]:
     if not study:
         return asked
     with suppress(OSError, ValueError):
-        limits = tomllib.loads((result.folder / STUDY).read_text(encoding="utf-8")).get("constraints", {})
+        limits = tomllib.loads((result.folder / STUDY).read_text(encoding="utf-8")).get(
+            "constraints", {}
+        )
         asked["constraints"] = [_limits(name, found) for name, found in limits.items()]
     asked["vary"] = [
         {
@@ -104,7 +125,9 @@ def _question(result: Result, study: dict[str, Any] | None) -> dict[str, Any]:
 
 
 def _limits(name: str, limits: Mapping[str, float]) -> str:
-    return " and ".join(f"{name} {'≥' if side == 'min' else '≤'} {limit:g}" for side, limit in limits.items())
+    return " and ".join(
+        f"{name} {'≥' if side == 'min' else '≤'} {limit:g}" for side, limit in limits.items()
+    )
 
 
 def _metrics(result: Result, start: Result | None) -> list[dict[str, Any]]:
@@ -127,7 +150,11 @@ def _metrics(result: Result, start: Result | None) -> list[dict[str, Any]]:
         if start is not None and before is not None:
             change = _change(figure, before, result, start)
             real = abs(change.value) > change.half_width
-            row |= {"start": _shown(before, words.factor), "change": _shown(change, words.factor), "real": real}
+            row |= {
+                "start": _shown(before, words.factor),
+                "change": _shown(change, words.factor),
+                "real": real,
+            }
         rows.append(row)
     return rows
 
@@ -168,7 +195,9 @@ def _effects(result: Result) -> dict[str, Any]:
     chosen = result.design.effects.model_dump(mode="json", exclude={"auto"})
     return {
         "pilot": result.data.get("effects", []),
-        "effects": [{"effect": name, "value": _switched(name, value)} for name, value in chosen.items()],
+        "effects": [
+            {"effect": name, "value": _switched(name, value)} for name, value in chosen.items()
+        ],
     }
 
 
@@ -194,11 +223,20 @@ def _notes(result: Result, study: dict[str, Any] | None) -> list[str]:
 
 def _design(result: Result, start: Result | None) -> list[dict[str, Any]]:
     """Every number of the design by its dotted name, with the start's where it is another."""
-    values, before = dict(_flat(result.data["design"])), dict(_flat(start.data["design"])) if start else {}
-    values["part.mesh"] = before["part.mesh"] = result.design.part.mesh_path.name  # no path of one machine
+    values, before = (
+        dict(_flat(result.data["design"])),
+        dict(_flat(start.data["design"])) if start else {},
+    )
+    values["part.mesh"] = before["part.mesh"] = (
+        result.design.part.mesh_path.name
+    )  # no path of one machine
     return [
         {"name": name, "value": _text(value)}
-        | ({"start": _text(before.get(name))} if start and _text(before.get(name)) != _text(value) else {})
+        | (
+            {"start": _text(before.get(name))}
+            if start and _text(before.get(name)) != _text(value)
+            else {}
+        )
         for name, value in values.items()
     ]
 
@@ -216,7 +254,13 @@ def _text(value: Any) -> str:
         return "yes" if value else "no"
     if isinstance(value, float):
         return f"{value:.6g}"
-    return value if isinstance(value, str) else "–" if value is None else json.dumps(value, ensure_ascii=False)
+    return (
+        value
+        if isinstance(value, str)
+        else "–"
+        if value is None
+        else json.dumps(value, ensure_ascii=False)
+    )
 
 
 def design_file(folder: Path) -> tuple[str, str]:
@@ -225,4 +269,6 @@ def design_file(folder: Path) -> tuple[str, str]:
         path = folder / name
         if path.is_file():
             return name, path.read_text(encoding="utf-8")
-    raise InputError(f"{folder}: neither best.toml nor design.toml is there; give a complete results folder")
+    raise InputError(
+        f"{folder}: neither best.toml nor design.toml is there; give a complete results folder"
+    )

@@ -42,7 +42,9 @@ def with_interval(value: float, half_width: float, unit: str = "", sign: bool = 
         return f"{mark}{plain(value)} ± not known{unit}"
     decimals = fine = _decimals(half_width)
     shown = 0.0 if abs(value) < NOTHING else value
-    if decimals < 0 and 0.0 < abs(shown) < 0.5 * 10.0**-decimals:  # 4000 ± 500 000 says more than 0 ± 500 000
+    if (
+        decimals < 0 and 0.0 < abs(shown) < 0.5 * 10.0**-decimals
+    ):  # 4000 ± 500 000 says more than 0 ± 500 000
         fine = -math.floor(math.log10(abs(shown)))
     return f"{mark}{_rounded(shown, fine)} ± {_rounded(half_width, decimals)}{unit}"
 

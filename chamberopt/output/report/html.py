@@ -25,9 +25,14 @@ def items(values: Iterable[object]) -> str:
     return f"<ul>{rows}</ul>" if rows else ""
 
 
-def table(caption: str, head: Sequence[object], rows: Iterable[Sequence[object]], figures: bool = True) -> str:
+def table(
+    caption: str, head: Sequence[object], rows: Iterable[Sequence[object]], figures: bool = True
+) -> str:
     """The first column heads its row; figures: the others are numbers, to the right."""
-    top = "".join(f'<th scope="col"{FIGURE if figures and i else ""}>{text(cell)}</th>' for i, cell in enumerate(head))
+    top = "".join(
+        f'<th scope="col"{FIGURE if figures and i else ""}>{text(cell)}</th>'
+        for i, cell in enumerate(head)
+    )
     kind = FIGURE if figures else ""
     body = "".join(
         f'<tr><th scope="row">{text(first)}</th>{"".join(f"<td{kind}>{text(cell)}</td>" for cell in rest)}</tr>'

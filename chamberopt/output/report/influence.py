@@ -22,7 +22,8 @@ def influence(study: dict[str, Any], goal: Words) -> dict[str, Any]:
     if not model:
         return {"parameters": [], "said": [_why_none(count, study.get("failed", 0), len(names))]}
     found = sorted(
-        (_parameter(name, model, study, goal) for name in names), key=lambda one: (-one["surely"], -one["loss"])
+        (_parameter(name, model, study, goal) for name in names),
+        key=lambda one: (-one["surely"], -one["loss"]),
     )
     told = [one for one in found if one["surely"]]
     said = []
@@ -35,20 +36,29 @@ def influence(study: dict[str, Any], goal: Words) -> dict[str, Any]:
         )
     unknown = [one["name"] for one in found if not one["surely"]]
     if unknown:
-        few = f"{count} evaluations are too few to tell the influence of {_listed(unknown)} from none"
+        few = (
+            f"{count} evaluations are too few to tell the influence of {_listed(unknown)} from none"
+        )
         said.append(f"{few}: the intervals reach zero.")
     shares = sum(one["share"] for one in found)
     if len(found) > 1:
-        rest = "; the rest is how they act together, so each curve below holds near the best design" * (shares < 0.8)
+        rest = (
+            "; the rest is how they act together, so each curve below holds near the best design"
+            * (shares < 0.8)
+        )
         on_its_own = "Main effects, each parameter on its own, are"
         said.append(f"{on_its_own} {share(shares)} of the variance over the bounds{rest}.")
-    together = f"of all designs with every parameter within these, {share(model['together'])} lose no more"
+    together = (
+        f"of all designs with every parameter within these, {share(model['together'])} lose no more"
+    )
     noise = with_unit(abs(goal.factor) * model["noise"], goal.unit)
     said.append(f"The shaded ranges lose no more than the noise, {noise}, each alone; {together}.")
     return {"parameters": found, "said": said}
 
 
-def _parameter(name: str, model: dict[str, Any], study: dict[str, Any], goal: Words) -> dict[str, Any]:
+def _parameter(
+    name: str, model: dict[str, Any], study: dict[str, Any], goal: Words
+) -> dict[str, Any]:
     one, top = model["parameters"][name], model["expected"]
     size = abs(goal.factor)
     losses = [size * (top["value"] - mean) for mean in one["mean"]]
@@ -74,7 +84,9 @@ def _parameter(name: str, model: dict[str, Any], study: dict[str, Any], goal: Wo
 def _why_none(count: int, failed: int, parameters: int) -> str:
     enough = POINTS_PER_PARAMETER * parameters
     if count - failed < enough:
-        told = f"{count} evaluations, {failed} of them failed," if failed else f"{count} evaluations"
+        told = (
+            f"{count} evaluations, {failed} of them failed," if failed else f"{count} evaluations"
+        )
         return f"{told} are too few to tell what each parameter does: {enough} or more are needed for a model of them."
     return "There is no model of the evaluations in this result, so it cannot tell what each parameter does."
 

@@ -42,7 +42,9 @@ def write_report(result: str | Path, path: str | Path | None = None) -> tuple[Pa
     before = loaded.folder / START
     with_start = said["kind"] == "study" and (before / "coverage.vtp").is_file()
     start = part_scene(load_result(before), START, 0) if with_start else None
-    shown = ({START: start} if start else {}) | {"best" if said["kind"] == "study" else "result": scene}
+    shown = ({START: start} if start else {}) | {
+        "best" if said["kind"] == "study" else "result": scene
+    }
     body = sections(said, viewer([scene]), shown, design_file(loaded.folder))
     head = f"<header><h1>{html.text(said['name'])}</h1>{html.paragraph(_subtitle(said), 'soft')}</header>"
     write_page(path, f"{said['name']}: report", head + body, [scene])
@@ -63,9 +65,12 @@ def write_part_page(results: Sequence[Path], path: Path) -> list[str]:
             raise InputError(f"{one.folder}: {scene.remarks[-1]}")
     if len(scenes) > 1:
         named = (
-            tuple(f"{name}: {remark}" for remark in scene.remarks) for name, scene in zip(names, scenes, strict=True)
+            tuple(f"{name}: {remark}" for remark in scene.remarks)
+            for name, scene in zip(names, scenes, strict=True)
         )
-        scenes = [replace(scene, remarks=remarks) for scene, remarks in zip(scenes, named, strict=True)]
+        scenes = [
+            replace(scene, remarks=remarks) for scene, remarks in zip(scenes, named, strict=True)
+        ]
     said = [f"{name}: {summary(one)}" for name, one in zip(names, loaded, strict=True)]
     title = ", ".join(names)
     content = html.section("Part in its chamber", html.items(said), viewer(scenes))
@@ -88,21 +93,31 @@ def free_page(path: str | Path) -> Path:
     if not path.resolve().parent.is_dir():
         raise InputError(f"{path}: the folder does not exist; make it first")
     try:
-        if os.path.lexists(path) and (not path.is_file() or GENERATOR.encode() not in path.read_bytes()[:2000]):
-            raise InputError(f"{path}: is there, and no report of ours to replace; give another name (--out FILE.html)")
+        if os.path.lexists(path) and (
+            not path.is_file() or GENERATOR.encode() not in path.read_bytes()[:2000]
+        ):
+            raise InputError(
+                f"{path}: is there, and no report of ours to replace; give another name (--out FILE.html)"
+            )
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}; give another name (--out FILE.html)") from None
+        raise InputError(
+            f"{path}: cannot be read: {error.strerror}; give another name (--out FILE.html)"
+        ) from None
     return path
 
 
 def viewer(scenes: Sequence[Scene]) -> str:
     """The place of the parts with their controls, which part.js brings to life."""
     drawn = [scene.data for scene in scenes if scene.data]
-    remarks = "".join(html.paragraph(remark, "soft") for scene in scenes for remark in scene.remarks)
+    remarks = "".join(
+        html.paragraph(remark, "soft") for scene in scenes for remark in scene.remarks
+    )
     if not drawn:
         return remarks
     options = "".join(f"<option>{html.text(one['label'])}</option>" for one in quantities(drawn))
-    most = max(max((time for time, _ in one["curve"]), default=3.0 * one["treatment"]) for one in drawn)
+    most = max(
+        max((time for time, _ in one["curve"]), default=3.0 * one["treatment"]) for one in drawn
+    )
     now = max(one["treatment"] for one in drawn)
     panels = "".join(
         f'<figure><div class="part" id="part-{i}" role="img" aria-label="{html.text(one["title"])}: the part in its '
@@ -130,7 +145,10 @@ def write_page(path: Path, title: str, body: str, scenes: Sequence[Scene]) -> No
     drawn = [scene.data for scene in scenes if scene.data]
     carried = {"quantities": quantities(drawn), "scenes": drawn, "scales": _colour_scales(drawn)}
     parts = html.embedded(carried, 'id="parts"') if drawn else ""
-    scripts = "".join(f"<script>{script}</script>" for script in (get_plotlyjs(), _own("part.js"), _own("charts.js")))
+    scripts = "".join(
+        f"<script>{script}</script>"
+        for script in (get_plotlyjs(), _own("part.js"), _own("charts.js"))
+    )
     page = (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
@@ -146,15 +164,23 @@ def write_page(path: Path, title: str, body: str, scenes: Sequence[Scene]) -> No
 
 
 def _subtitle(said: dict[str, Any]) -> str:
-    what = {"study": "Report of a study: the best chamber found", "simulation": "Report of one simulated chamber"}
+    what = {
+        "study": "Report of a study: the best chamber found",
+        "simulation": "Report of one simulated chamber",
+    }
     made = f"simulated {said['made'][:10]}, " if said["made"] else ""
-    return f"{what.get(said['kind'], '')}; {made}report made {datetime.now(UTC).date()} by chamberopt"
+    return (
+        f"{what.get(said['kind'], '')}; {made}report made {datetime.now(UTC).date()} by chamberopt"
+    )
 
 
 def _colour_scales(drawn: Sequence[dict[str, Any]]) -> dict[str, list[str]]:
     from plotly.colors import sequential
 
-    return {name: getattr(sequential, name.title()) for name in {one["colours"] for one in quantities(drawn)}}
+    return {
+        name: getattr(sequential, name.title())
+        for name in {one["colours"] for one in quantities(drawn)}
+    }
 
 
 @cache

@@ -71,7 +71,9 @@ def part_scene(result: Result, title: str, most: int = MOST_TRIANGLES) -> Scene:
     if seen.sum() > most:
         return Scene(None, remarks, *whole)
     columns = {
-        one.name: _packed(one.factor * fields[one.column][seen]) for one in QUANTITIES.values() if one.column in fields
+        one.name: _packed(one.factor * fields[one.column][seen])
+        for one in QUANTITIES.values()
+        if one.column in fields
     }
     if not marked:
         columns["shown-density"] = _packed(density)  # what the colours are made of
@@ -82,7 +84,10 @@ def part_scene(result: Result, title: str, most: int = MOST_TRIANGLES) -> Scene:
     data = {
         "title": title,
         "treatment": result.design.process.treatment_time,
-        "curve": [[row["time_s"], row["mean_coverage"]] for row in result.data.get("coverage_against_time", [])],
+        "curve": [
+            [row["time_s"], row["mean_coverage"]]
+            for row in result.data.get("coverage_against_time", [])
+        ],
         "columns": columns,
         "number": _packed(np.flatnonzero(seen), "<i4"),
         **({"element": _packed(fields[ELEMENT][seen], "<i4")} if ELEMENT in fields else {}),
@@ -95,7 +100,13 @@ def part_scene(result: Result, title: str, most: int = MOST_TRIANGLES) -> Scene:
 def quantities(scenes: Sequence[dict[str, Any]]) -> list[dict[str, str]]:
     """What can be chosen: the quantities that all of the scenes have."""
     return [
-        {"name": one.name, "label": one.label, "unit": one.unit, "title": one.title, "colours": one.colours}
+        {
+            "name": one.name,
+            "label": one.label,
+            "unit": one.unit,
+            "title": one.title,
+            "colours": one.colours,
+        }
         for one in QUANTITIES.values()
         if all(one.name in scene["columns"] for scene in scenes)
     ]
@@ -109,7 +120,9 @@ def _remarks(triangles: int, target: int, most: int, reach: float, marked: bool)
             "dents to tell; the figures of a triangle are its own."
         )
     if marked:
-        said.append("Every dent was marked in this simulation, to the end of the treatment: it tells no other times.")
+        said.append(
+            "Every dent was marked in this simulation, to the end of the treatment: it tells no other times."
+        )
     if target > most:
         said.append(
             f"The target has {target:,} triangles, more than the {most:,} that a page can draw: no picture here; "
@@ -123,7 +136,9 @@ def _remarks(triangles: int, target: int, most: int, reach: float, marked: bool)
     return tuple(said)
 
 
-def _figure(points: np.ndarray, target: np.ndarray, rest: np.ndarray, chamber: Any, eye: np.ndarray) -> Any:
+def _figure(
+    points: np.ndarray, target: np.ndarray, rest: np.ndarray, chamber: Any, eye: np.ndarray
+) -> Any:
     """Traces by name: part, rest, sonotrode, glass, edges."""
     import plotly.graph_objects as go
 
@@ -131,10 +146,15 @@ def _figure(points: np.ndarray, target: np.ndarray, rest: np.ndarray, chamber: A
     walls, faces = np.asarray(chamber.points, dtype=float), np.asarray(chamber.regular_faces)
     # Flat colours that stay true to the bar: little shading, no shine.
     soft = {"ambient": 0.85, "diffuse": 0.25, "specular": 0.0, "roughness": 1.0, "fresnel": 0.0}
-    soft |= {"facenormalsepsilon": 0.0, "vertexnormalsepsilon": 0.0}  # slivers face as their neighbours do
+    soft |= {
+        "facenormalsepsilon": 0.0,
+        "vertexnormalsepsilon": 0.0,
+    }  # slivers face as their neighbours do
     common = {"flatshading": True, "lighting": soft, "showscale": False}
     traces = [
-        go.Mesh3d(name="part", **_mesh(points, target), intensitymode="cell", hoverinfo="none", **common),
+        go.Mesh3d(
+            name="part", **_mesh(points, target), intensitymode="cell", hoverinfo="none", **common
+        ),
         go.Mesh3d(name="rest", **_mesh(points, rest), color="#b9bec4", hoverinfo="skip", **common),
     ]
     for name, here, colour, opacity in (
@@ -144,7 +164,11 @@ def _figure(points: np.ndarray, target: np.ndarray, rest: np.ndarray, chamber: A
         look = {"color": colour, "opacity": opacity, "hoverinfo": "skip"}
         traces.append(go.Mesh3d(name=name, **_mesh(walls, faces[here]), **look, **common))
     line = {"color": "#6f8796", "width": 2}
-    traces.append(go.Scatter3d(name="edges", mode="lines", line=line, hoverinfo="skip", **_edges(chamber, tags)))
+    traces.append(
+        go.Scatter3d(
+            name="edges", mode="lines", line=line, hoverinfo="skip", **_edges(chamber, tags)
+        )
+    )
     return json.loads(go.Figure(traces, {"template": None}).to_json())["data"]
 
 
@@ -165,7 +189,10 @@ def _view(points: np.ndarray, chamber: Any, eye: np.ndarray) -> dict[str, Any]:
         return dict(zip("xyz", vector.tolist(), strict=True))
 
     return {
-        **{f"{name}axis": {"range": [low[i], high[i]], "visible": False} for i, name in enumerate("xyz")},
+        **{
+            f"{name}axis": {"range": [low[i], high[i]], "visible": False}
+            for i, name in enumerate("xyz")
+        },
         "aspectmode": "manual",
         "aspectratio": named((high - low) / size),
         "camera": {"center": named(middle), "eye": named(middle + eye)},
@@ -178,15 +205,23 @@ def _mesh(points: np.ndarray, triangles: np.ndarray) -> dict[str, np.ndarray]:
     used, faces = np.unique(triangles, return_inverse=True)
     x, y, z = points[used].astype(np.float32).T
     i, j, k = faces.reshape(-1, 3).astype(np.int32).T
-    return {name: np.ascontiguousarray(a) for name, a in zip("xyzijk", (x, y, z, i, j, k), strict=True)}
+    return {
+        name: np.ascontiguousarray(a) for name, a in zip("xyzijk", (x, y, z, i, j, k), strict=True)
+    }
 
 
 def _edges(chamber: Any, tags: np.ndarray) -> dict[str, np.ndarray]:
     """The sharp edges of the cavity around the part, as one line that is broken by NaN."""
     around = chamber.extract_cells(tags != TAG_PART).extract_surface(algorithm="dataset_surface")
-    lines = around.extract_feature_edges(feature_angle=SHARP, manifold_edges=False, non_manifold_edges=False)
+    lines = around.extract_feature_edges(
+        feature_angle=SHARP, manifold_edges=False, non_manifold_edges=False
+    )
     ends = np.asarray(lines.points)[np.asarray(lines.lines).reshape(-1, 3)[:, 1:]]
-    broken = np.concatenate([ends, np.full((len(ends), 1, 3), np.nan)], axis=1).reshape(-1, 3).astype(np.float32)
+    broken = (
+        np.concatenate([ends, np.full((len(ends), 1, 3), np.nan)], axis=1)
+        .reshape(-1, 3)
+        .astype(np.float32)
+    )
     return dict(zip("xyz", broken.T.copy(), strict=True))
 
 

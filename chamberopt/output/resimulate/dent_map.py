@@ -12,7 +12,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.coverage.dents import Dents, dents_on_part, inside, mark, marked_share, sample_points
+from chamberopt.coverage.dents import (
+    Dents,
+    dents_on_part,
+    inside,
+    mark,
+    marked_share,
+    sample_points,
+)
 from chamberopt.coverage.metrics import on_target
 from chamberopt.design.process import LONGEST_MARKED
 from chamberopt.geometry.raycast import View, places, seen, view_of
@@ -30,7 +37,10 @@ NOTHING, REST, TARGET = 0, 1, 2
 EDGE_ON = 1e-6
 THINNEST = 4  # pixels of the picture's shorter side
 FLAT = 0.9  # a target is seen face on where its mean normal is this long
-ROUND = ((1.0, -1.4, -0.5), (-1.0, 1.4, 0.5))  # from near and a little below, where the shot comes from; and opposite
+ROUND = (
+    (1.0, -1.4, -0.5),
+    (-1.0, 1.4, 0.5),
+)  # from near and a little below, where the shot comes from; and opposite
 
 
 @dataclass(frozen=True)
@@ -72,7 +82,8 @@ def coverage(dents: Dents, chamber: Chamber, spacing: float) -> float:
     samples = sample_points(chamber, spacing)
     first = mark(samples, dents.place, dents.normal, dents.radius, dents.time)
     share, weight = on_target(
-        marked_share(samples, first, dents.time.max(initial=0.0), len(chamber.part.triangles)), chamber
+        marked_share(samples, first, dents.time.max(initial=0.0), len(chamber.part.triangles)),
+        chamber,
     )
     return float(share @ weight)
 
@@ -114,15 +125,23 @@ def dent_map(chamber: Chamber, dents: Dents, towards: Sequence[float], longest: 
     own[own] = on_target[triangle[own]]
     row, column, triangle = row[own], column[own], triangle[own]
     ground[row, column] = TARGET
-    last, distance = topmost(places(view, everything, triangle, row, column), normal[triangle], dents, view.pixel)
-    dent, off, of_part = np.full(view.shape, -1, dtype=np.int32), blank.copy(), np.full(view.shape, -1, dtype=np.int32)
+    last, distance = topmost(
+        places(view, everything, triangle, row, column), normal[triangle], dents, view.pixel
+    )
+    dent, off, of_part = (
+        np.full(view.shape, -1, dtype=np.int32),
+        blank.copy(),
+        np.full(view.shape, -1, dtype=np.int32),
+    )
     dent[row, column], off[row, column] = last, distance
     of_part[row, column] = chamber.source[exposed[triangle]]
     area = np.divide(view.pixel**2, facing, out=blank.copy(), where=facing > EDGE_ON)
     return DentMap(view, ground, dent, off, facing, area, of_part)
 
 
-def topmost(place: np.ndarray, normal: np.ndarray, dents: Dents, spacing: float) -> tuple[np.ndarray, np.ndarray]:
+def topmost(
+    place: np.ndarray, normal: np.ndarray, dents: Dents, spacing: float
+) -> tuple[np.ndarray, np.ndarray]:
     """The last dent that holds each point (p, 3), -1 for none, and how far off its middle, as a share of its radius.
 
     spacing [m] of the points: how many a dent holds. From the last dent back: a point that has one is out of the
@@ -140,7 +159,9 @@ def topmost(place: np.ndarray, normal: np.ndarray, dents: Dents, spacing: float)
     end = len(dents)
     while end and len(left):
         some = slice(max(0, end - step), end)
-        point, dent, distance = inside(tree, facing, dents.place[some], dents.normal[some], dents.radius[some])
+        point, dent, distance = inside(
+            tree, facing, dents.place[some], dents.normal[some], dents.radius[some]
+        )
         bare = last[left[point]] < 0
         point, dent, distance = left[point[bare]], some.start + dent[bare], distance[bare]
         np.maximum.at(last, point, dent.astype(np.int32))

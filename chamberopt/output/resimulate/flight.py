@@ -58,7 +58,9 @@ def flight(replayed: Replayed, start: float, span: float, frames: int, trail: in
     _require_simulated(start, span, frames, scene.duration, trail * len(scene.balls))
     end = min(start + span, scene.duration)
     every = np.linspace(start, end, (frames - 1) * trail + 1)
-    seen = simulate(replace(scene, duration=end), frames=every)  # the same bits as of the whole, as far as it goes
+    seen = simulate(
+        replace(scene, duration=end), frames=every
+    )  # the same bits as of the whole, as far as it goes
     impacts = replayed.booked(seen.impacts)
     shown = (impacts.time >= start) & (replayed.chamber.source[impacts.triangle] >= 0)
     impacts = impacts.only(shown)
@@ -68,7 +70,9 @@ def flight(replayed: Replayed, start: float, span: float, frames: int, trail: in
     return Flight(
         time=time,
         balls=seen.frames[::trail],
-        trail=np.concatenate([before, seen.frames[:-1].reshape(frames - 1, trail, *seen.frames.shape[1:])]),
+        trail=np.concatenate(
+            [before, seen.frames[:-1].reshape(frames - 1, trail, *seen.frames.shape[1:])]
+        ),
         diameter=scene.balls.diameters,
         sonotrodes={one.tag: displacement(one, scene.warmup + time) for one in waving},
         amplitude=max((float(one.amplitude) for one in scene.physics.vibrations), default=0.0),
@@ -84,7 +88,10 @@ def flight(replayed: Replayed, start: float, span: float, frames: int, trail: in
 
 def displacement(vibration: Vibration, time: np.ndarray) -> np.ndarray:
     """Where a vibrating face is from its middle (f, 3) [m] at times (f,) [s] from the scene's start."""
-    return np.asarray(np.sin(2.0 * math.pi * vibration.frequency * time + vibration.phase)[:, None] * vibration.peak)
+    return np.asarray(
+        np.sin(2.0 * math.pi * vibration.frequency * time + vibration.phase)[:, None]
+        * vibration.peak
+    )
 
 
 def angle(turn: Turn | None, time: np.ndarray) -> np.ndarray:
@@ -98,9 +105,13 @@ def angle(turn: Turn | None, time: np.ndarray) -> np.ndarray:
     return np.asarray(turn.swing * np.sin(2.0 * math.pi * turn.frequency * time + turn.phase))
 
 
-def _require_simulated(start: float, span: float, frames: int, duration: float, positions: int) -> None:
+def _require_simulated(
+    start: float, span: float, frames: int, duration: float, positions: int
+) -> None:
     if not 0.0 <= start < duration:
-        raise InputError(f"--from-s: given {start:g}; the replica was simulated from 0 to {duration:g} s")
+        raise InputError(
+            f"--from-s: given {start:g}; the replica was simulated from 0 to {duration:g} s"
+        )
     if not SHORTEST <= span <= (duration - start) * (1.0 + 1e-9):
         left = 1e3 * (duration - start)
         raise InputError(

@@ -63,7 +63,9 @@ def impacts_of(
     tallies = []
     for number, log in enumerate(logs):
         counted = tally(log, chamber, design)
-        tallies.append(replace(counted, dent_triangle=np.zeros(0, dtype=np.int32), dent_area=np.zeros(0)))
+        tallies.append(
+            replace(counted, dent_triangle=np.zeros(0, dtype=np.int32), dent_area=np.zeros(0))
+        )
         yield _on_part(number, log, chamber)
         if progress:
             progress(number + 1, count, None)
@@ -103,7 +105,11 @@ def _on_part(number: int, log: ImpactLog, chamber: Chamber) -> ReplicaImpacts:
 
 def _require_same_figures(result: Result, total: Tally) -> None:
     kept = read_surface(result.folder / COVERAGE)
-    again = {"dents": total.dents, "impacts": total.impacts, "mean_normal_speed": mean_normal_speed(total)}
+    again = {
+        "dents": total.dents,
+        "impacts": total.impacts,
+        "mean_normal_speed": mean_normal_speed(total),
+    }
     for name, values in again.items():
         if name not in kept.array_names:
             continue

@@ -47,13 +47,17 @@ def ground_of(result: Result) -> Ground:
     target = np.asarray(kept["target"]) > 0 if result.design.part.target.reachable else None
     chamber = build_chamber(result.design, target)
     drawn = read_surface(result.folder / CHAMBER)
-    same = np.array_equal(drawn.points, chamber.vertices * MM) and np.array_equal(drawn["tag"], chamber.tags)
+    same = np.array_equal(drawn.points, chamber.vertices * MM) and np.array_equal(
+        drawn["tag"], chamber.tags
+    )
     if not same or not np.array_equal(drawn.regular_faces, chamber.triangles):
         raise InputError(
             f"{result.folder}: its chamber comes out differently now: a file that the design names has changed, or "
             f"another version made it ({made_by(result)}); {REMEDY}"
         )
-    return Ground(chamber, analytic_cavity(result.design, chamber) if result.data.get("analytic") else None)
+    return Ground(
+        chamber, analytic_cavity(result.design, chamber) if result.data.get("analytic") else None
+    )
 
 
 def replica_of(result: Result, number: int = 0) -> Replayed:
@@ -62,7 +66,9 @@ def replica_of(result: Result, number: int = 0) -> Replayed:
     """
     there = int(result.data["replicas"])
     if not 0 <= number < there:
-        raise InputError(f"--replica: given {number}; the result has {there}, give 0 to {there - 1}")
+        raise InputError(
+            f"--replica: given {number}; the result has {there}, give 0 to {there - 1}"
+        )
     ground, (seed, stream) = ground_of(result), result.seeds
     mesh = ground.cavity or chamber_mesh(ground.chamber)
     scene = build_scene(result.design, mesh, replica_seed(seed, number, stream))
@@ -70,11 +76,15 @@ def replica_of(result: Result, number: int = 0) -> Replayed:
 
 
 def _refuse_file(result: Result, field: str, path: object) -> NoReturn:
-    raise InputError(f"{field}: {path}: not what {result.folder} was simulated with; restore it, or {REMEDY}")
+    raise InputError(
+        f"{field}: {path}: not what {result.folder} was simulated with; restore it, or {REMEDY}"
+    )
 
 
 def made_by(result: Result) -> str:
     """The versions that a result was made by."""
     made = result.data.get("versions", {})
     names = ("chamberopt", "manifold3d", "numba", "numpy", "system")
-    return ", ".join(f"{name} {made[name]}" for name in names if name in made) or "an unknown version"
+    return (
+        ", ".join(f"{name} {made[name]}" for name in names if name in made) or "an unknown version"
+    )

@@ -31,7 +31,10 @@ FORMAT = 1
 
 def rows(ladder: Ladder) -> list[dict[str, Any]]:
     """Every rung and every level of replicas, one kind of row for all; None where a column says nothing."""
-    found = [_rung_row(rung, ladder.reference) for rung in (ladder.reference, *ladder.rungs, *ladder.dents)]
+    found = [
+        _rung_row(rung, ladder.reference)
+        for rung in (ladder.reference, *ladder.rungs, *ladder.dents)
+    ]
     for level in ladder.levels:
         found.append(
             dict.fromkeys(found[0])
@@ -79,35 +82,46 @@ def as_text(ladder: Ladder) -> list[str]:
     lines = [described(ladder), ""]
     lines += [f"{'replicas':>10}{'CPU s':>9}{'RMS error':>12}{'95 % interval':>20}{'± said':>10}"]
     for one in ladder.levels:
-        lines += [f"{one.replicas:10}{one.cpu_s:9.2f}{one.rms:12.4f}{one.low:11.4f} .. {one.high:.4f}{one.said:10.4f}"]
+        lines += [
+            f"{one.replicas:10}{one.cpu_s:9.2f}{one.rms:12.4f}{one.low:11.4f} .. {one.high:.4f}{one.said:10.4f}"
+        ]
     lines += [explained(ladder), unrecorded(ladder), ""]
-    lines += [f"{'knob':24}{'setting':>24}{'CPU s a replica':>19}{'bias of objective':>21}{'of mean coverage':>21}"]
+    lines += [
+        f"{'knob':24}{'setting':>24}{'CPU s a replica':>19}{'bias of objective':>21}{'of mean coverage':>21}"
+    ]
     for rung in (*ladder.rungs, *ladder.dents):
         cpu = f"{rung.cpu.value:.3f} ± {rung.cpu.half_width:.3f}"
         lines += [
             f"{short(rung.knob):24}{rung.setting:>24}{cpu:>19}{_signed(rung.bias):>21}{_signed(rung.mean_bias):>21}"
         ]
     if ladder.dents:
-        lines += [f"the last {len(ladder.dents)}: from the same impacts of {ladder.dent_time:.3g} s of treatment"]
+        lines += [
+            f"the last {len(ladder.dents)}: from the same impacts of {ladder.dent_time:.3g} s of treatment"
+        ]
     lines += ["", "Pareto front (CPU s, error as the half-width of a 95 % interval, with bias):"]
     lines += [f"{one.cpu_s:10.2f}{one.error:10.4f}   {one.name}" for one in choices(ladder)]
     for accuracy in ASKED:
         lines += ["", *recommend(ladder, accuracy).lines]
-    spent = (
-        f"{ladder.spent_s:.0f} CPU s were spent on simulating, {ladder.wall_s:.0f} s by the clock, compiling included"
-    )
+    spent = f"{ladder.spent_s:.0f} CPU s were spent on simulating, {ladder.wall_s:.0f} s by the clock, compiling included"
     return [*lines, "", spent]
 
 
 def _signed(bias: Estimate) -> str:
-    return "0" if bias.value == bias.half_width == 0.0 else f"{bias.value:+.4f} ± {bias.half_width:.4f}"
+    return (
+        "0"
+        if bias.value == bias.half_width == 0.0
+        else f"{bias.value:+.4f} ± {bias.half_width:.4f}"
+    )
 
 
 def as_json(ladder: Ladder) -> dict[str, Any]:
     """Everything, for accuracy.json."""
     power, halving = ladder.law, ladder.law.halving
     front = [asdict(one) for one in choices(ladder)]
-    advice = [{**asdict(one), "lines": one.lines} for one in (recommend(ladder, accuracy) for accuracy in ASKED)]
+    advice = [
+        {**asdict(one), "lines": one.lines}
+        for one in (recommend(ladder, accuracy) for accuracy in ASKED)
+    ]
     for one in advice:  # JSON has no infinity
         if not one["replicas"]:
             one["cpu_s"] = one["half_width"] = None
@@ -116,14 +130,21 @@ def as_json(ladder: Ladder) -> dict[str, Any]:
         "reference": {"said": described(ladder), "settings": ladder.settings},
         "rows": rows(ladder),
         "law": {"scale": power.scale, "power": power.power, "power_half_width": power.half_width},
-        "halving": {"times": halving[0], "low": halving[1], "high": min(halving[2], 1e9), "said": explained(ladder)},
+        "halving": {
+            "times": halving[0],
+            "low": halving[1],
+            "high": min(halving[2], 1e9),
+            "said": explained(ladder),
+        },
         "a_replica": unrecorded(ladder),
         "dent_time_s": ladder.dent_time,
         "front": front,
         "recommendations": advice,
         "cpu_s": ladder.spent_s,
         "wall_s": ladder.wall_s,
-        "design": ladder.design.model_dump(mode="json", exclude_none=True, exclude={"part": {"mesh"}}),
+        "design": ladder.design.model_dump(
+            mode="json", exclude_none=True, exclude={"part": {"mesh"}}
+        ),
         "versions": versions(),
     }
 
@@ -136,5 +157,7 @@ def write_price_list(folder: Path, ladder: Ladder) -> None:
     writer.writeheader()
     writer.writerows(rows(ladder))
     write_text(folder / "accuracy.csv", table.getvalue())
-    write_text(folder / "accuracy.json", json.dumps(as_json(ladder), indent=2, allow_nan=False) + "\n")
+    write_text(
+        folder / "accuracy.json", json.dumps(as_json(ladder), indent=2, allow_nan=False) + "\n"
+    )
     price_picture(folder / "accuracy.png", ladder)

@@ -104,7 +104,9 @@ def write_study(
     chamber = build_chamber(start.design, target)
     about = _write_candidate(folder / "start", start.design, chamber, start.evaluation)
     _write_json(folder / "start", {"kind": "simulation", **about})
-    about = _write_candidate(folder, best.design, build_chamber(best.design, target), best.evaluation)
+    about = _write_candidate(
+        folder, best.design, build_chamber(best.design, target), best.evaluation
+    )
     convergence_picture(folder / "convergence.png", study_result)
     if study_result.findings:
         slices_picture(folder / "slices.png", study_result, study_result.findings)
@@ -115,7 +117,14 @@ def write_study(
     pair, names = [start.evaluation, best.evaluation], ["start", "best design"]
     remarks += _picture([folder / "start", folder], pair, names, folder / "before_after.png")
     _write_json(
-        folder, {"kind": "study", **about, "study": _about_study(study_result), **_chosen(advice), **_warned(warned)}
+        folder,
+        {
+            "kind": "study",
+            **about,
+            "study": _about_study(study_result),
+            **_chosen(advice),
+            **_warned(warned),
+        },
     )
     return list(dict.fromkeys(remarks))
 
@@ -131,14 +140,20 @@ def load_result(path: str | Path) -> Result:
                 f"{folder}: a study that did not finish: it has no {RESULT} yet; go on with: chamberopt run STUDY.toml "
                 f"--out {shlex.quote(str(folder))}"
             )
-        raise InputError(f"{folder}: not a results folder: {RESULT} is not there; give one made by simulate or run")
+        raise InputError(
+            f"{folder}: not a results folder: {RESULT} is not there; give one made by simulate or run"
+        )
     try:
         data = json.loads(file.read_text(encoding="utf-8"), parse_constant=_refuse_constant)
         if data["format"] != FORMAT:
-            raise InputError(f"{file}: written in format {data['format']}, this version reads {FORMAT}; simulate again")
+            raise InputError(
+                f"{file}: written in format {data['format']}, this version reads {FORMAT}; simulate again"
+            )
         if data["kind"] == "sweep":
             what = "a sweep, a map of candidates that stands for no single one"
-            raise InputError(f"{folder}: {what}; simulate the design you want of it, such as its best.toml")
+            raise InputError(
+                f"{folder}: {what}; simulate the design you want of it, such as its best.toml"
+            )
         return Result(
             folder=folder,
             kind=data["kind"],
@@ -156,12 +171,18 @@ def load_result(path: str | Path) -> Result:
             data=data,
         )
     except OSError as error:
-        raise InputError(f"{file}: cannot be read: {error.strerror}; check its permissions") from None
+        raise InputError(
+            f"{file}: cannot be read: {error.strerror}; check its permissions"
+        ) from None
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise InputError(f"{file}: damaged ({type(error).__name__}: {error}); simulate again") from None
+        raise InputError(
+            f"{file}: damaged ({type(error).__name__}: {error}); simulate again"
+        ) from None
 
 
-def _write_candidate(folder: Path, design: Design, chamber: Chamber, evaluation: Evaluation) -> dict[str, Any]:
+def _write_candidate(
+    folder: Path, design: Design, chamber: Chamber, evaluation: Evaluation
+) -> dict[str, Any]:
     """Write the surfaces of one candidate; what there is to say of it, for result.json."""
     from chamberopt.output.viewer import COVERAGE, write_chamber, write_coverage
 
@@ -172,10 +193,15 @@ def _write_candidate(folder: Path, design: Design, chamber: Chamber, evaluation:
     return _about(folder, design, chamber, evaluation)
 
 
-def _picture(folders: list[Path], evaluations: list[Evaluation], names: list[str], picture: Path) -> list[str]:
+def _picture(
+    folders: list[Path], evaluations: list[Evaluation], names: list[str], picture: Path
+) -> list[str]:
     from chamberopt.output.viewer import coverage_picture
 
-    titles = [f"{name}\n{summary(evaluation)}" for name, evaluation in zip(names, evaluations, strict=True)]
+    titles = [
+        f"{name}\n{summary(evaluation)}"
+        for name, evaluation in zip(names, evaluations, strict=True)
+    ]
     trouble = coverage_picture(folders, titles, picture)
     return [trouble] if trouble else []
 
@@ -193,13 +219,17 @@ def _share(estimate: Estimate) -> str:
     return f"{100.0 * estimate.value:.1f} ± {100.0 * estimate.half_width:.1f} %"
 
 
-def _about(folder: Path, design: Design, chamber: Chamber, evaluation: Evaluation) -> dict[str, Any]:
+def _about(
+    folder: Path, design: Design, chamber: Chamber, evaluation: Evaluation
+) -> dict[str, Any]:
     target = exposed_target(chamber)
     return {
         "format": FORMAT,
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "objective": {"name": evaluation.objective_name, **_plain(evaluation.objective, "")},
-        "metrics": {name: _plain(value, METRICS[name].unit) for name, value in evaluation.metrics.items()},
+        "metrics": {
+            name: _plain(value, METRICS[name].unit) for name, value in evaluation.metrics.items()
+        },
         "coverage_against_time": against_time(design, chamber, evaluation),
         "seed": design.process.seed,
         "stream": evaluation.stream,
@@ -239,12 +269,16 @@ def _about_study(result: StudyResult) -> dict[str, Any]:
         "vary": {name: list(bounds) for name, bounds in result.study.vary.items()},
         "evaluations": len(search),
         "accuracy": {
-            "search": result.study.drafted(result.study.design).process.accuracy.model_dump(exclude_none=True),
+            "search": result.study.drafted(result.study.design).process.accuracy.model_dump(
+                exclude_none=True
+            ),
             "confirm": result.study.design.process.accuracy.model_dump(exclude_none=True)
             | {"replicas": len(result.best.evaluation.replicas)},
         },
         "failed": sum(trial.objective is None for trial in search),
-        "missing_a_constraint": sum(trial.objective is not None and not trial.feasible for trial in search),
+        "missing_a_constraint": sum(
+            trial.objective is not None and not trial.feasible for trial in search
+        ),
         "gain": _plain(result.gain, ""),
         "improved": result.improved,
         "at_bounds": list(result.at_bounds),
@@ -255,7 +289,8 @@ def _about_study(result: StudyResult) -> dict[str, Any]:
             "parameters": result.start.parameters,
             "objective": _plain(result.start.evaluation.objective, ""),
             "metrics": {
-                name: _plain(value, METRICS[name].unit) for name, value in result.start.evaluation.metrics.items()
+                name: _plain(value, METRICS[name].unit)
+                for name, value in result.start.evaluation.metrics.items()
             },
         },
         "confirmed": [
@@ -286,7 +321,9 @@ def _plain(estimate: Estimate, unit: str) -> dict[str, Any]:
 
 def _estimate(data: dict[str, Any]) -> Estimate:
     pseudovalues = tuple(float(x) for x in data["pseudovalues"])
-    return Estimate(float(data["value"]), float(data["half_width"]), pseudovalues, float(data.get("bias", 0.0)))
+    return Estimate(
+        float(data["value"]), float(data["half_width"]), pseudovalues, float(data.get("bias", 0.0))
+    )
 
 
 def _refuse_constant(name: str) -> float:
@@ -295,7 +332,9 @@ def _refuse_constant(name: str) -> float:
 
 def _design_values(design: Design, folder: Path) -> dict[str, Any]:
     """The design as its file would say it, its files relative to the folder."""
-    values: dict[str, Any] = with_paths_from(folder.resolve(), design.model_dump(mode="json", exclude_none=True))
+    values: dict[str, Any] = with_paths_from(
+        folder.resolve(), design.model_dump(mode="json", exclude_none=True)
+    )
     return values
 
 

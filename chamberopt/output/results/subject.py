@@ -15,7 +15,9 @@ def subject(result: Result) -> Subject:
         folder=str(result.folder),
         title=f"{result.folder.resolve().name}\n{summary(result)}",
         treatment_s=treatment,
-        longest_s=max([treatment, *(row["time_s"] for row in result.data.get("coverage_against_time", []))]),
+        longest_s=max(
+            [treatment, *(row["time_s"] for row in result.data.get("coverage_against_time", []))]
+        ),
         triangles=result.data["chamber"]["target_triangles"],
         impacts_per_mm2=result.metrics["impacts_per_mm2_s"].value * treatment,
     )

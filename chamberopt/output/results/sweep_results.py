@@ -37,14 +37,18 @@ def write_sweep(folder: str | Path, sweep: Sweep) -> list[str]:
     if sweep.best is not None:
         save_design(sweep.study.design.with_values(sweep.best.parameters), folder / "best.toml")
     remarks = _picture(folder / "map.png", sweep)
-    write_text(folder / RESULT, json.dumps(_about(sweep), indent=2, allow_nan=False) + "\n")  # last: it is finished
+    write_text(
+        folder / RESULT, json.dumps(_about(sweep), indent=2, allow_nan=False) + "\n"
+    )  # last: it is finished
     return remarks
 
 
 def caution(sweep: Sweep) -> str:
     """What to know of the best row of a sweep."""
     if sweep.best is None:
-        return "no candidate meets the constraints: loosen them or widen [vary]; there is no best.toml"
+        return (
+            "no candidate meets the constraints: loosen them or widen [vary]; there is no best.toml"
+        )
     return (
         f"the best of {len(sweep.trials)} candidates is also the luckiest of them: its figures promise too much; for "
         "ones that do not, simulate best.toml with another process.seed, or search with chamberopt run"
@@ -65,7 +69,9 @@ def _about(sweep: Sweep) -> dict[str, Any]:
             "seed": plan.seed,
             "candidates": len(sweep.trials),
             "failed": sum(trial.objective is None for trial in sweep.trials),
-            "missing_a_constraint": sum(t.objective is not None and not t.feasible for t in sweep.trials),
+            "missing_a_constraint": sum(
+                t.objective is not None and not t.feasible for t in sweep.trials
+            ),
             "accuracy": study.drafted(study.design).process.accuracy.model_dump(exclude_none=True),
             "best": best.row() if best else None,
             "seconds": round(sweep.seconds, 3),
@@ -86,7 +92,9 @@ def _picture(path: Path, sweep: Sweep) -> list[str]:
     pairs = list(combinations(names, 2))
     shown, remarks = pairs[:MOST_PAIRS], []
     if len(pairs) > MOST_PAIRS:
-        remarks.append(f"map.png: shows {MOST_PAIRS} of the {len(pairs)} pairs of parameters; all are in history.csv")
+        remarks.append(
+            f"map.png: shows {MOST_PAIRS} of the {len(pairs)} pairs of parameters; all are in history.csv"
+        )
     columns = min(3, len(shown)) or 1
     rows = -(-len(shown) // columns) or 1
     size = (9.0, 5.6) if len(names) < 3 else (4.6 * columns, 3.9 * rows + 0.8)
@@ -120,15 +128,28 @@ def _line(axes: Axes, sweep: Sweep, name: str) -> None:
         if goals:
             x, y, error = zip(*sorted(goals), strict=True)
             label = "95 % interval" if feasible else "misses a constraint"
-            axes.errorbar(x, y, yerr=error, fmt=f"-{mark}" if feasible else mark, ms=5, lw=1, color=colour, label=label)
-    axes.axvline(sweep.study.design.value(name), color=ORANGE, lw=1, ls="--", label="the design as it is")
+            axes.errorbar(
+                x,
+                y,
+                yerr=error,
+                fmt=f"-{mark}" if feasible else mark,
+                ms=5,
+                lw=1,
+                color=colour,
+                label=label,
+            )
+    axes.axvline(
+        sweep.study.design.value(name), color=ORANGE, lw=1, ls="--", label="the design as it is"
+    )
     axes.set_xlabel(name)
     axes.set_ylabel(_goal(sweep))
     axes.grid(alpha=0.25, lw=0.6)
     axes.legend(fontsize=8, frameon=False)
 
 
-def _maps(figure: Figure, sweep: Sweep, pairs: list[tuple[str, str]], shape: tuple[int, int]) -> None:
+def _maps(
+    figure: Figure, sweep: Sweep, pairs: list[tuple[str, str]], shape: tuple[int, int]
+) -> None:
     judged = [trial for trial in sweep.trials if trial.objective]
     # The good ones on top: of what lies on one spot of a pair the best is seen.
     judged.sort(key=lambda trial: trial.objective.value if trial.objective else 0.0)
@@ -143,14 +164,20 @@ def _maps(figure: Figure, sweep: Sweep, pairs: list[tuple[str, str]], shape: tup
     if drawn is not None:
         figure.colorbar(drawn, ax=panels, label=_goal(sweep))
     figure.legend(
-        *panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=8, frameon=False
+        *panels[0].get_legend_handles_labels(),
+        loc="outside lower center",
+        ncols=4,
+        fontsize=8,
+        frameon=False,
     )
 
 
 def _squares(axes: Axes, sweep: Sweep, across: str, up: str) -> Any:
     """A grid of two parameters; what could not be simulated stays white."""
     goals = [trial.objective.value if trial.objective else np.nan for trial in sweep.trials]
-    values = np.array(goals).reshape(sweep.plan.count, sweep.plan.count)  # the plan's order: the second runs fastest
+    values = np.array(goals).reshape(
+        sweep.plan.count, sweep.plan.count
+    )  # the plan's order: the second runs fastest
     x, y = (np.linspace(*sweep.study.vary[name], sweep.plan.count) for name in (across, up))
     return axes.pcolormesh(x, y, values.T, cmap=COLOURS, shading="nearest")
 
@@ -165,16 +192,36 @@ def _marks(axes: Axes, sweep: Sweep, across: str, up: str) -> None:
     """Start, best, and what is not to be had."""
     design = sweep.study.design
     for trials, label, colour in (
-        ([t for t in sweep.trials if t.objective and not t.feasible], "misses a constraint", "black"),
+        (
+            [t for t in sweep.trials if t.objective and not t.feasible],
+            "misses a constraint",
+            "black",
+        ),
         ([t for t in sweep.trials if not t.objective], "could not be simulated", GREY),
     ):
         if trials:
             x, y = ([trial.parameters[name] for trial in trials] for name in (across, up))
             axes.scatter(x, y, marker="x", s=22, lw=1, color=colour, label=label)
-    axes.plot(design.value(across), design.value(up), "o", color=ORANGE, mec="white", ms=8, label="the design as it is")
+    axes.plot(
+        design.value(across),
+        design.value(up),
+        "o",
+        color=ORANGE,
+        mec="white",
+        ms=8,
+        label="the design as it is",
+    )
     if sweep.best is not None:
         place = sweep.best.parameters
-        axes.plot(place[across], place[up], "*", color="white", mec="black", ms=13, label="best as simulated")
+        axes.plot(
+            place[across],
+            place[up],
+            "*",
+            color="white",
+            mec="black",
+            ms=13,
+            label="best as simulated",
+        )
     axes.set_xlabel(across)
     axes.set_ylabel(up)
 

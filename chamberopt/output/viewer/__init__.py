@@ -7,7 +7,13 @@ from chamberopt.output.viewer.opened_result import Subject
 from chamberopt.output.viewer.subprocess_drawing import why_no_pictures
 from chamberopt.output.viewer.view_state import Look, cut_across, eye_at
 from chamberopt.output.viewer.window import inspect
-from chamberopt.output.vtp_files import CHAMBER, COVERAGE, read_surface, write_chamber, write_coverage
+from chamberopt.output.vtp_files import (
+    CHAMBER,
+    COVERAGE,
+    read_surface,
+    write_chamber,
+    write_coverage,
+)
 
 __all__ = [
     "CHAMBER",

@@ -29,7 +29,9 @@ class Part:
         surface["row"] = np.arange(surface.n_cells)
         self.target = surface.extract_cells(wanted).extract_surface(algorithm="dataset_surface")
         self.rest = surface.extract_cells(~wanted)
-        self.marked = not np.allclose(self.target["coverage"], -np.expm1(-self.target["dent_density"]), atol=1e-9)
+        self.marked = not np.allclose(
+            self.target["coverage"], -np.expm1(-self.target["dent_density"]), atol=1e-9
+        )
         self.show(quantity)
 
     def show(self, quantity: Quantity, times: float = 1.0) -> None:
@@ -41,9 +43,15 @@ class Part:
     def values(self, quantity: Quantity, times: float = 1.0) -> np.ndarray:
         """Of the target's triangles, in the unit shown."""
         if quantity.column not in self.target.cell_data:
-            raise InputError(f"coverage.vtp has no {quantity.column}: an older result; simulate again")
+            raise InputError(
+                f"coverage.vtp has no {quantity.column}: an older result; simulate again"
+            )
         if quantity.name != "coverage":
-            return quantity.factor * np.asarray(self.target[quantity.column]) * (times if quantity.grows else 1.0)
+            return (
+                quantity.factor
+                * np.asarray(self.target[quantity.column])
+                * (times if quantity.grows else 1.0)
+            )
         value = self._averages[0]
         return 100.0 * value if self.marked else -100.0 * np.expm1(-value * times)
 
@@ -78,7 +86,9 @@ def averaged(
     return over(density * area) / over(area), reach
 
 
-def reach_wanted(centre: np.ndarray, area: np.ndarray, dents: np.ndarray, wanted: float = DENTS_SHOWN) -> float:
+def reach_wanted(
+    centre: np.ndarray, area: np.ndarray, dents: np.ndarray, wanted: float = DENTS_SHOWN
+) -> float:
     """Radius [mm] of discs that hold so many dents in the mean; 0.0 where triangles do."""
     if not len(centre) or np.mean(dents) >= wanted:
         return 0.0
@@ -87,7 +97,9 @@ def reach_wanted(centre: np.ndarray, area: np.ndarray, dents: np.ndarray, wanted
     return float(min(np.sqrt(wanted / (np.pi * per_mm2)), WIDEST * size))
 
 
-def over_discs(centre: np.ndarray, normal: np.ndarray, reach: float) -> Callable[[np.ndarray], np.ndarray]:
+def over_discs(
+    centre: np.ndarray, normal: np.ndarray, reach: float
+) -> Callable[[np.ndarray], np.ndarray]:
     """A function that sums what triangles have, (m,), over the disc round each: neighbours that face the same way."""
     if reach == 0.0:
         return np.asarray

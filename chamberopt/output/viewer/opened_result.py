@@ -17,7 +17,15 @@ from chamberopt.output.vtp_files import CHAMBER, COVERAGE, Surface, read_surface
 from chamberopt.simulation.triangle_fields import QUANTITIES
 
 LATER = (0.0, 100.0)  # one scale for all times
-NEEDED = ("coverage", "dent_density", "impacts_per_mm2", "impacts", "dents", "exposed_area_mm2", "target")
+NEEDED = (
+    "coverage",
+    "dent_density",
+    "impacts_per_mm2",
+    "impacts",
+    "dents",
+    "exposed_area_mm2",
+    "target",
+)
 
 
 @dataclass(frozen=True)
@@ -91,7 +99,11 @@ class Seen:
                 f"--triangle {triangle}: {self.folder} has triangles 0 to {self.surface.n_cells - 1}, in the order of "
                 f"{COVERAGE}"
             )
-        element = f", element {self.surface['element'][triangle]}" if "element" in self.surface.cell_data else ""
+        element = (
+            f", element {self.surface['element'][triangle]}"
+            if "element" in self.surface.cell_data
+            else ""
+        )
         lines = [f"triangle {triangle}{element}"]
         if not self.surface["exposed_area_mm2"][triangle] > 0.0:
             return [*lines, "outside the chamber or hidden"]
@@ -99,23 +111,35 @@ class Seen:
             lines.append("not in the target")
         for name in self.offered:
             one, value = QUANTITIES[name], self._value(name, triangle, look)
-            lines.append(f"{one.label}: {f'{value:.4g} {one.unit}' if np.isfinite(value) else 'none'}")
+            lines.append(
+                f"{one.label}: {f'{value:.4g} {one.unit}' if np.isfinite(value) else 'none'}"
+            )
         lines.append(f"exposed area: {self.surface['exposed_area_mm2'][triangle]:.4g} mm²")
-        lines.append(f"simulated: {self.surface['impacts'][triangle]} impacts, {self.surface['dents'][triangle]} dents")
+        lines.append(
+            f"simulated: {self.surface['impacts'][triangle]} impacts, {self.surface['dents'][triangle]} dents"
+        )
         return lines
 
     def _value(self, name: str, triangle: int, look: Look) -> float:
         """The triangle's own, nothing averaged."""
         one = QUANTITIES[name]
         if name == "coverage" and not self.part.marked:
-            return -100.0 * float(np.expm1(-self.surface["dent_density"][triangle] * self.times(look)))
-        return one.factor * float(self.surface[one.column][triangle]) * (self.times(look) if one.grows else 1.0)
+            return -100.0 * float(
+                np.expm1(-self.surface["dent_density"][triangle] * self.times(look))
+            )
+        return (
+            one.factor
+            * float(self.surface[one.column][triangle])
+            * (self.times(look) if one.grows else 1.0)
+        )
 
 
 def require_own(subject: Subject, surface: Surface) -> None:
     """InputError where the target of coverage.vtp is not the one that result.json tells of."""
     wanted = (np.asarray(surface["target"]) > 0) & (np.asarray(surface["exposed_area_mm2"]) > 0.0)
-    area, impacts = (np.asarray(surface[name])[wanted] for name in ("exposed_area_mm2", "impacts_per_mm2"))
+    area, impacts = (
+        np.asarray(surface[name])[wanted] for name in ("exposed_area_mm2", "impacts_per_mm2")
+    )
     mean = float((area * impacts).sum() / area.sum()) if len(area) else 0.0
     if len(area) != subject.triangles or not np.isclose(mean, subject.impacts_per_mm2, rtol=1e-6):
         raise InputError(
@@ -129,7 +153,9 @@ def _with_columns(path: Path, names: Sequence[str]) -> Surface:
     surface = read_surface(path)
     missing = [name for name in names if name not in surface.cell_data]
     if missing:
-        raise InputError(f"{path}: has no {missing[0]}, so it is not the file that was written here; simulate again")
+        raise InputError(
+            f"{path}: has no {missing[0]}, so it is not the file that was written here; simulate again"
+        )
     return surface
 
 
@@ -142,7 +168,11 @@ def limits(seen: Sequence[Seen], look: Look) -> tuple[float, float]:
     """The colour scale of what they all show."""
     for one in seen:
         one.show(look)
-    return LATER if look.quantity == "coverage" and look.time_s is not None else colour_range([s.part for s in seen])
+    return (
+        LATER
+        if look.quantity == "coverage" and look.time_s is not None
+        else colour_range([s.part for s in seen])
+    )
 
 
 def same_part(seen: Sequence[Seen]) -> bool:

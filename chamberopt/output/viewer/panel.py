@@ -39,14 +39,25 @@ def title(plotter: Any, text: str, lines: Sequence[str], size: Size) -> None:
     """In the upper left, as wide as leaves the bar its room; under it a triangle's numbers, if any."""
     small, large = fonts(size)
     above = wrapped(text, 0.72 * size[0], large)
-    _words(plotter, "title", above, (EDGE, size[1] - EDGE), large).prop.justification_vertical = "top"
+    _words(
+        plotter, "title", above, (EDGE, size[1] - EDGE), large
+    ).prop.justification_vertical = "top"
     if lines:
         below = size[1] - 3 * EDGE - HIGH * large * len(above.splitlines())
         numbers = wrapped("\n".join(lines), 0.4 * size[0], small)
-        _words(plotter, "numbers", numbers, (EDGE, below), small).prop.justification_vertical = "top"
+        _words(
+            plotter, "numbers", numbers, (EDGE, below), small
+        ).prop.justification_vertical = "top"
 
 
-def bar(plotter: Any, quantity: Quantity, limits: tuple[float, float], actor: Any, number: int, size: Size) -> None:
+def bar(
+    plotter: Any,
+    quantity: Quantity,
+    limits: tuple[float, float],
+    actor: Any,
+    number: int,
+    size: Size,
+) -> None:
     """The colour bar of an actor at the view's right edge, its title above it with the unit."""
     steps, written = ticks(limits)
     scale = plotter.add_scalar_bar(
@@ -66,7 +77,9 @@ def bar_name(number: int) -> str:
     return " " * (number + 1)
 
 
-def legend(plotter: Any, entries: Sequence[tuple[str, str]], remarks: Sequence[str], size: Size) -> None:
+def legend(
+    plotter: Any, entries: Sequence[tuple[str, str]], remarks: Sequence[str], size: Size
+) -> None:
     """Lower left: a patch of each colour with what it means, and remarks above."""
     small, _ = fonts(size)
     line = HIGH * small
@@ -102,7 +115,9 @@ def mark(plotter: Any, corners: np.ndarray, length: float) -> None:
     foot = corners.mean(axis=0)
     tip = foot + length * normal / max(float(np.linalg.norm(normal)), 1e-30)
     style = {"color": MARK, "lighting": False, "pickable": False, **STILL}
-    plotter.add_mesh(pyvista().MultipleLines(np.vstack([corners, corners[:1]])), line_width=3, **style)
+    plotter.add_mesh(
+        pyvista().MultipleLines(np.vstack([corners, corners[:1]])), line_width=3, **style
+    )
     plotter.add_mesh(pyvista().Line(foot, tip), line_width=3, **style)
     plotter.add_mesh(pyvista().Sphere(radius=0.12 * length, center=tip), **style)
 
@@ -120,4 +135,6 @@ def keys(plotter: Any, text: str, size: Size) -> None:
 
 def _words(plotter: Any, name: str, text: str, place: tuple[float, float], font: int) -> Any:
     """A text at a place [pixels] of the view, its lower left corner there."""
-    return plotter.add_text(as_it_stands(text), position=place, font_size=font, color=DARK, name=name, render=False)
+    return plotter.add_text(
+        as_it_stands(text), position=place, font_size=font, color=DARK, name=name, render=False
+    )

@@ -17,7 +17,12 @@ from chamberopt.output.vtp_files import Surface, pyvista
 from chamberopt.simulation.triangle_fields import QUANTITIES
 
 MOST = 6
-PER_VIEW = {1: (1400, 900), 2: (1000, 900), 3: (800, 800), 4: (900, 700)}  # pixels, by the number of results
+PER_VIEW = {
+    1: (1400, 900),
+    2: (1000, 900),
+    3: (800, 800),
+    4: (900, 700),
+}  # pixels, by the number of results
 VIEW_ANGLE = 30.0  # degrees
 BELOW = 2.0  # times as steep as from above: past the sonotrode
 SCREEN = 1500, 850  # pixels: a window no larger fits on most
@@ -27,11 +32,17 @@ class Stage:
     """A plotter with a view for each result. size: pixels of each · menu: whether the keys of quantities are listed."""
 
     def __init__(
-        self, seen: Sequence[Seen], off_screen: bool, size: tuple[int, int] | None = None, menu: bool = False
+        self,
+        seen: Sequence[Seen],
+        off_screen: bool,
+        size: tuple[int, int] | None = None,
+        menu: bool = False,
     ) -> None:
         self.menu = menu
         if len(seen) > MOST:
-            raise InputError(f"inspect: {len(seen)} results cannot be told apart in one window; give at most {MOST}")
+            raise InputError(
+                f"inspect: {len(seen)} results cannot be told apart in one window; give at most {MOST}"
+            )
         self.seen = list(seen)
         rows = 2 if len(seen) > 3 else 1
         self.shape = rows, -(-len(seen) // rows)
@@ -125,7 +136,9 @@ class Stage:
             panel.mark(plotter, corners, 0.06 * one.part.target.length)
         words = one.subject.title
         if self.menu and number == 0:
-            words += "\n" + panel.wrapped(_menu(self.offered, look), 0.6 * size[0], panel.fonts(size)[1])
+            words += "\n" + panel.wrapped(
+                _menu(self.offered, look), 0.6 * size[0], panel.fonts(size)[1]
+            )
         panel.title(plotter, words, lines, size)
         panel.bar(plotter, quantity, scale, actors[0], number, size)
         panel.legend(plotter, _colours(one, look), _remarks(one, look, passed), size)
@@ -137,7 +150,10 @@ class Stage:
 def _menu(names: Sequence[str], look: Look) -> str:
     """The keys of the quantities, the one that is shown in brackets."""
     keys = [f"{key} {name}" for key, name in enumerate(QUANTITIES, 1) if name in names]
-    return "  ".join(f"[{key}]" if key.endswith(f" {look.quantity}") else key for key in keys) + "  h keys"
+    return (
+        "  ".join(f"[{key}]" if key.endswith(f" {look.quantity}") else key for key in keys)
+        + "  h keys"
+    )
 
 
 def _told(one: Seen, triangle: int, look: Look) -> tuple[list[str], np.ndarray]:
@@ -153,18 +169,26 @@ def _remarks(one: Seen, look: Look, passed: np.ndarray) -> list[str]:
     quantity, remarks = QUANTITIES[look.quantity], []
     if quantity.name == "coverage" or quantity.grows:
         at = one.subject.treatment_s if look.time_s is None else look.time_s
-        remarks.append(f"after {at:.4g} s" + (" (the treatment)" if at == one.subject.treatment_s else ""))
+        remarks.append(
+            f"after {at:.4g} s" + (" (the treatment)" if at == one.subject.treatment_s else "")
+        )
     if look.below is not None:
         area = np.asarray(one.part.target["exposed_area_mm2"])
-        remarks.append(f"below {look.below:g} %: {100.0 * area[~passed].sum() / area.sum():.1f} % of the area")
+        remarks.append(
+            f"below {look.below:g} %: {100.0 * area[~passed].sum() / area.sum():.1f} % of the area"
+        )
     if one.part.coverage_reach and (quantity.name == "coverage" or look.below is not None):
-        remarks.append(f"coverage averaged over {one.part.coverage_reach:.1f} mm around each triangle: few dents")
+        remarks.append(
+            f"coverage averaged over {one.part.coverage_reach:.1f} mm around each triangle: few dents"
+        )
     return remarks
 
 
 def _colours(one: Seen, look: Look) -> list[tuple[str, str]]:
     """(colour, meaning) of what is no quantity."""
-    grey = "not in the target" + (", or no such impact" if np.isnan(one.part.target["shown"]).any() else "")
+    grey = "not in the target" + (
+        ", or no such impact" if np.isnan(one.part.target["shown"]).any() else ""
+    )
     entries = [(GREY, grey)]
     if look.below is not None:
         entries.append((PALE, f"coverage {look.below:g} % or more"))
@@ -184,7 +208,10 @@ def where_the_target_is_seen(target: Surface) -> np.ndarray:
     """From a little above, where the rim of the chamber hides least, unless twice as much is to be seen from below."""
     above, below = np.array(FROM), np.array(FROM) * [1.0, 1.0, -BELOW]
     area, normal = np.asarray(target["exposed_area_mm2"]), np.asarray(target.cell_normals)
-    seen = [float(area @ np.maximum(normal @ eye, 0.0)) / float(np.linalg.norm(eye)) for eye in (above, below)]
+    seen = [
+        float(area @ np.maximum(normal @ eye, 0.0)) / float(np.linalg.norm(eye))
+        for eye in (above, below)
+    ]
     return below if seen[1] > 2.0 * seen[0] else above
 
 
@@ -206,4 +233,6 @@ def _box(one: Seen, look: Look) -> np.ndarray:
 
 def _both(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     """The box round two boxes."""
-    return np.stack([np.minimum(one[:, 0], other[:, 0]), np.maximum(one[:, 1], other[:, 1])], axis=1)
+    return np.stack(
+        [np.minimum(one[:, 0], other[:, 0]), np.maximum(one[:, 1], other[:, 1])], axis=1
+    )

@@ -56,7 +56,9 @@ def target_and_rest(
     return [target, plotter.add_mesh(part.rest, color=GREY, ambient=0.45, diffuse=0.55, **STILL)]
 
 
-def in_chamber(plotter: Any, part: Part, chamber: Surface, title: str, limits: tuple[float, float], bar: bool) -> None:
+def in_chamber(
+    plotter: Any, part: Part, chamber: Surface, title: str, limits: tuple[float, float], bar: bool
+) -> None:
     """The part inside the glass chamber, over the sonotrode."""
     show(plotter, part, limits, bar)
     room(plotter, chamber)
@@ -76,7 +78,9 @@ def room(plotter: Any, chamber: Surface) -> tuple[dict[int, Any], list[Any]]:
     faces = {}
     for tag in np.unique(tags[is_sonotrode(tags)]):
         face = chamber.extract_cells(tags == tag).extract_surface(algorithm="dataset_surface")
-        faces[int(tag)] = plotter.add_mesh(face, color=SONOTRODE, lighting=False, pickable=False, **STILL)
+        faces[int(tag)] = plotter.add_mesh(
+            face, color=SONOTRODE, lighting=False, pickable=False, **STILL
+        )
     wall = chamber.extract_cells(tags == TAG_WALL).extract_surface(algorithm="dataset_surface")
     rims = wall.extract_feature_edges(30, non_manifold_edges=False, manifold_edges=False)
     return faces, [
@@ -108,5 +112,8 @@ def ticks(limits: tuple[float, float]) -> tuple[int, str]:
     for steps in (5, 4, 6, 7, 8, 9, 10, 3):
         step = span / steps
         if any(np.isclose(step / 10.0 ** np.floor(np.log10(step)), one) for one in ROUND):
-            return steps, f"%.{next((n for n in range(9) if np.isclose(round(step, n), step, rtol=1e-6)), 9)}f"
+            return (
+                steps,
+                f"%.{next((n for n in range(9) if np.isclose(round(step, n), step, rtol=1e-6)), 9)}f",
+            )
     return 5, f"%.{max(0, int(np.ceil(1.0 - np.log10(span)))) if span > 0.0 else 2}f"

@@ -15,7 +15,9 @@ from typing import Any
 
 from chamberopt.common.errors import InputError
 
-INSTALL = "install OpenGL for machines without a display (Debian: apt install libegl1 libgl1-mesa-dri)"
+INSTALL = (
+    "install OpenGL for machines without a display (Debian: apt install libegl1 libgl1-mesa-dri)"
+)
 
 
 def why_no_pictures() -> str | None:
@@ -62,10 +64,14 @@ def file_path(file: str | Path, suffixes: tuple[str, ...], written: str, option:
     if path.is_dir():
         raise InputError(f"{option}{path}: is a folder; give another name")
     try:
-        with tempfile.TemporaryFile(dir=path.resolve().parent):  # better now than after all is simulated and drawn
+        with tempfile.TemporaryFile(
+            dir=path.resolve().parent
+        ):  # better now than after all is simulated and drawn
             pass
     except OSError as error:
-        raise InputError(f"{option}{path}: cannot be written: {error.strerror}; choose another place") from None
+        raise InputError(
+            f"{option}{path}: cannot be written: {error.strerror}; choose another place"
+        ) from None
     return path
 
 
@@ -79,11 +85,20 @@ def drawn_apart(job: dict[str, Any], picture: str | Path, patience: float = 600.
         return f"{Path(picture).name} skipped: {missing}"
     job = {**job, "picture": str(picture)}
     command = [sys.executable, "-m", "chamberopt.output.viewer", json.dumps(job)]
-    run = subprocess.run(command, env=without_display(), capture_output=True, text=True, timeout=patience, check=False)
+    run = subprocess.run(
+        command,
+        env=without_display(),
+        capture_output=True,
+        text=True,
+        timeout=patience,
+        check=False,
+    )
     if run.returncode == 0 and Path(picture).is_file():
         return None
     if run.returncode == 2:
         raise InputError(run.stderr.strip().splitlines()[-1])
     if "Traceback" in run.stderr:
-        return f"{Path(picture).name} skipped: drawing failed ({run.stderr.strip().splitlines()[-1]})"
+        return (
+            f"{Path(picture).name} skipped: drawing failed ({run.stderr.strip().splitlines()[-1]})"
+        )
     return f"{Path(picture).name} skipped: drawing failed (status {run.returncode}); {INSTALL}"

@@ -61,21 +61,27 @@ class Look:
         if self.below is not None and not 0.0 < self.below <= 100.0:
             raise InputError(f"--below {self.below:g}: give a coverage above 0 and up to 100 %")
         if self.time_s is not None and self.quantity == "interval":
-            raise InputError("--time-s: not supported for the interval, which is known at the treatment time")
+            raise InputError(
+                "--time-s: not supported for the interval, which is known at the treatment time"
+            )
         if self.cut_part and self.cut is None:
             raise InputError("--cut-part: say where with --clip X, Y or Z")
 
     @staticmethod
     def from_json(values: dict[str, Any]) -> Look:
         """From a drawing job: its lists are vectors."""
-        return Look(**{name: _tuples(values[name]) for name in (field.name for field in fields(Look))})
+        return Look(
+            **{name: _tuples(values[name]) for name in (field.name for field in fields(Look))}
+        )
 
 
 def cut_across(text: str) -> tuple[Vector, Vector | None]:
     """What --clip says: X, Y or Z, and where [mm] on that axis: Z=12.5."""
     found = re.fullmatch(r"([xyzXYZ])(?:=([-+]?\d*\.?\d+))?", text.strip())
     if not found:
-        raise InputError(f"--clip {text}: give an axis and, if not the chamber's middle, where in mm: X, Y=3 or Z=12.5")
+        raise InputError(
+            f"--clip {text}: give an axis and, if not the chamber's middle, where in mm: X, Y=3 or Z=12.5"
+        )
     axis, at = found.groups()
     normal = CUT_AWAY[axis.upper()]
     if at is None:
@@ -90,7 +96,9 @@ def eye_at(text: str) -> Vector:
     except ValueError:
         x = y = z = 0.0
     if not SHORT < math.hypot(x, y, z) < 1.0 / SHORT:
-        raise InputError(f"--view {text}: give the direction from the part to the eye as X,Y,Z, such as 1,-1.4,-0.8")
+        raise InputError(
+            f"--view {text}: give the direction from the part to the eye as X,Y,Z, such as 1,-1.4,-0.8"
+        )
     return x, y, z
 
 
@@ -104,7 +112,9 @@ def pressed(look: Look, key: str, first: Look, offered: Sequence[str]) -> Look:
         rest = (*(one for one in THRESHOLDS if look.below is None or one < look.below), None)
         return replace(look, below=rest[0])
     if key == "c":
-        return replace(look, cut=(CUT_AWAY["Y"], None) if look.cut is None else None, cut_part=False)
+        return replace(
+            look, cut=(CUT_AWAY["Y"], None) if look.cut is None else None, cut_part=False
+        )
     if key == "x":
         return replace(look, cut=look.cut or (CUT_AWAY["Y"], None), cut_part=not look.cut_part)
     if key == "g":

@@ -28,14 +28,20 @@ def inspect(subjects: Sequence[Subject], look: Look, screenshot: str | Path | No
     Raises InputError when a folder has no coverage or another's, lacks what is asked, or there is no display.
     """
     if screenshot is not None:
-        job = {"draw": "inspect", "subjects": [asdict(one) for one in subjects], "look": asdict(look)}
+        job = {
+            "draw": "inspect",
+            "subjects": [asdict(one) for one in subjects],
+            "look": asdict(look),
+        }
         trouble = drawn_apart(job, picture_path(screenshot))
         if trouble:
             raise InputError(trouble)
         return
     on_linux = sys.platform.startswith("linux")
     if on_linux and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        raise InputError("inspect: there is no display to open a window on; write a picture: --screenshot FILE.png")
+        raise InputError(
+            "inspect: there is no display to open a window on; write a picture: --screenshot FILE.png"
+        )
     Window(opened(subjects, look), look).run()
 
 
@@ -80,7 +86,8 @@ class Window:
             plotter.add_key_event(key, lambda key=key: self.pressed(key))
         # Of VTK's own keys only those that quit: the others would act beside ours.
         iren.style.AddObserver(
-            "CharEvent", lambda style, _: style.OnChar() if iren.interactor.GetKeySym() == "q" else 0
+            "CharEvent",
+            lambda style, _: style.OnChar() if iren.interactor.GetKeySym() == "q" else 0,
         )
         iren.add_observer("LeftButtonPressEvent", lambda *_: self._press())
         iren.add_observer("LeftButtonReleaseEvent", lambda *_: self._release())
@@ -134,7 +141,9 @@ class Window:
 
     def _seconds(self) -> float:
         """The time that is shown: of the first result, where each shows its own treatment's."""
-        return self.stage.seen[0].subject.treatment_s if self.look.time_s is None else self.look.time_s
+        return (
+            self.stage.seen[0].subject.treatment_s if self.look.time_s is None else self.look.time_s
+        )
 
     def _handles(self) -> None:
         """The slider where time changes what is shown, and the plane where something is cut."""
@@ -142,7 +151,9 @@ class Window:
         coverage, quantity = self.look.quantity == "coverage", QUANTITIES[self.look.quantity]
         timed = (coverage and not any(one.part.marked for one in seen)) or quantity.grows
         if timed and self.slider is None:
-            plotter.subplot(self.stage.shape[0] - 1, 0)  # the view at the window's corner, which VTK measures from
+            plotter.subplot(
+                self.stage.shape[0] - 1, 0
+            )  # the view at the window's corner, which VTK measures from
             self.slider = plotter.add_slider_widget(
                 self.slid, (0.0, max(one.subject.longest_s for one in seen)), value=self._seconds(), title="time [s]",
                 color=DARK, pointa=(0.42, 0.06), pointb=(0.6, 0.06), fmt="%.4g", title_height=0.018,

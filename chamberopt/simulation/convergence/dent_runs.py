@@ -29,7 +29,9 @@ DENT_REPLICAS = 3  # the least that has an interval
 DENT_LOAD = 8.0  # CPU seconds of simulating and marking over those of simulating, about
 
 
-def dent_rungs(pool: Pool, budget_s: float, executor: Executor) -> tuple[tuple[Rung, ...], float, float]:
+def dent_rungs(
+    pool: Pool, budget_s: float, executor: Executor
+) -> tuple[tuple[Rung, ...], float, float]:
     """Rates, then dents one by one at finer and finer points; seconds of treatment; CPU seconds.
 
     The treatment is cut to what the budget buys. A bias is against the finest points, from the same impacts.
@@ -38,7 +40,9 @@ def dent_rungs(pool: Pool, budget_s: float, executor: Executor) -> tuple[tuple[R
     """
     accuracy = pool.design.process.accuracy
     pace = pool.cost.value / (accuracy.warmup_time + accuracy.simulated_time)
-    affordable = max(budget_s / DENT_REPLICAS / pace / DENT_LOAD - accuracy.warmup_time, accuracy.simulated_time)
+    affordable = max(
+        budget_s / DENT_REPLICAS / pace / DENT_LOAD - accuracy.warmup_time, accuracy.simulated_time
+    )
     seconds = float(min(pool.design.process.treatment_time, LONGEST_MARKED, affordable))
     treated = changed(pool.design, {"process.treatment_time_s": seconds, MODEL: "dents"})
     spacings = [2 * accuracy.sample_mm, accuracy.sample_mm, accuracy.sample_mm / 2]
@@ -46,7 +50,10 @@ def dent_rungs(pool: Pool, budget_s: float, executor: Executor) -> tuple[tuple[R
         samples = [sample_points(pool.chamber, 1e-3 * spacing) for spacing in spacings]
     except InputError:
         return (), seconds, 0.0
-    futures = [executor.submit(_marked, treated, pool.chamber, pool.mesh, samples, n) for n in range(DENT_REPLICAS)]
+    futures = [
+        executor.submit(_marked, treated, pool.chamber, pool.mesh, samples, n)
+        for n in range(DENT_REPLICAS)
+    ]
     try:
         tallies, shares, costs = zip(*(future.result() for future in futures), strict=True)
     finally:
@@ -72,7 +79,9 @@ def dent_rungs(pool: Pool, budget_s: float, executor: Executor) -> tuple[tuple[R
         )
         for i, (name, goal, mean) in enumerate(rows)
     ]
-    spent = sum(sum(each) - (len(each) - 1) * each[0] for each in costs)  # simulated once, marked once a spacing
+    spent = sum(
+        sum(each) - (len(each) - 1) * each[0] for each in costs
+    )  # simulated once, marked once a spacing
     return tuple(rungs), seconds, spent
 
 
@@ -90,6 +99,8 @@ def _marked(
     for points in samples:
         begin = time.thread_time()
         first = first_marked(points, impacts, chamber, design)
-        shares.append(marked_share(points, first, design.process.treatment_time, len(chamber.part.triangles)))
+        shares.append(
+            marked_share(points, first, design.process.treatment_time, len(chamber.part.triangles))
+        )
         costs.append(simulated + time.thread_time() - begin)
     return dents_alone(left), shares, costs

@@ -72,7 +72,9 @@ def rms_interval(rms: float, blocks: int) -> tuple[float, float]:
     from scipy.special import chdtri  # upper tail of chi-square, inverted
 
     freedom, tail = blocks - 1, 0.5 - CONFIDENCE / 2.0
-    return rms * math.sqrt(freedom / chdtri(freedom, tail)), rms * math.sqrt(freedom / chdtri(freedom, 1.0 - tail))
+    return rms * math.sqrt(freedom / chdtri(freedom, tail)), rms * math.sqrt(
+        freedom / chdtri(freedom, 1.0 - tail)
+    )
 
 
 def fitted(costs: Sequence[float], errors: Sequence[float], blocks: Sequence[int]) -> Law:
@@ -98,7 +100,11 @@ def law_of(levels: Sequence[Level], pseudovalues: Sequence[float]) -> Law:
         pool = rng.choice(np.asarray(pseudovalues), len(pseudovalues))
         errors = []
         for level in levels:
-            means = pool[: level.replicas * level.blocks].reshape(level.blocks, level.replicas).mean(axis=1)
+            means = (
+                pool[: level.replicas * level.blocks]
+                .reshape(level.blocks, level.replicas)
+                .mean(axis=1)
+            )
             errors.append(rms_error(means, float(pool.mean()), level.replicas / len(pool)))
         powers.append(fitted(costs, errors, blocks).power)
     return Law(law.scale, law.power, NORMAL * float(np.std(powers)))

@@ -29,7 +29,9 @@ def knobs(design: Design) -> dict[str, tuple[Any, ...]]:
         FLOOR: tuple(sorted({min(1e3, 10 * floor), floor, max(0.1, floor / 10)}, reverse=True)),
     }
     if design.effects.drag:
-        ladder[PIECE] = tuple(sorted({min(1e3, 4 * piece), piece, max(0.1, piece / 4)}, reverse=True))
+        ladder[PIECE] = tuple(
+            sorted({min(1e3, 4 * piece), piece, max(0.1, piece / 4)}, reverse=True)
+        )
     time_s = accuracy.simulated_time_s
     return ladder | {TIME: (max(1e-4, time_s / 4), min(1e4, 4 * time_s), time_s)}
 

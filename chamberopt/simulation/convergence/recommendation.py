@@ -11,7 +11,14 @@ import numpy as np
 
 from chamberopt.coverage.statistics.interval import student
 from chamberopt.simulation.convergence.error_law import NORMAL, front
-from chamberopt.simulation.convergence.parameters import DESIGNED, FACETS, REFERENCE, TIME, WARM_UP, shown
+from chamberopt.simulation.convergence.parameters import (
+    DESIGNED,
+    FACETS,
+    REFERENCE,
+    TIME,
+    WARM_UP,
+    shown,
+)
 from chamberopt.simulation.convergence.runs import Rung
 from chamberopt.simulation.convergence.study import Ladder
 
@@ -39,12 +46,27 @@ class Recommendation:
     def lines(self) -> tuple[str, ...]:
         """To paste into a design; what is no key of [process.accuracy] as a comment."""
         if not self.replicas:
-            return (f"# ± {self.accuracy:g}: not reachable within the ladder", *(f"# {text}" for text in self.remarks))
+            return (
+                f"# ± {self.accuracy:g}: not reachable within the ladder",
+                *(f"# {text}" for text in self.remarks),
+            )
         table = "process.accuracy."
-        inside = [f"{k.removeprefix(table)} = {shown(v)}" for k, v in self.settings.items() if k.startswith(table)]
-        outside = ", ".join(f"{k} = {_toml(v)}" for k, v in self.settings.items() if not k.startswith(table))
+        inside = [
+            f"{k.removeprefix(table)} = {shown(v)}"
+            for k, v in self.settings.items()
+            if k.startswith(table)
+        ]
+        outside = ", ".join(
+            f"{k} = {_toml(v)}" for k, v in self.settings.items() if not k.startswith(table)
+        )
         said = f"# ± {self.accuracy:g}: {_seconds(self.cpu_s)} ± {_seconds(self.half_width)} CPU seconds predicted"
-        lines = (said, f"# with {outside}", "[process.accuracy]", f"replicas = {self.replicas}", *inside)
+        lines = (
+            said,
+            f"# with {outside}",
+            "[process.accuracy]",
+            f"replicas = {self.replicas}",
+            *inside,
+        )
         return (*lines, *(f"# {text}" for text in self.remarks))
 
 
@@ -80,10 +102,20 @@ class Cost:
 
 def cost(ladder: Ladder) -> Cost:
     """A line through the rungs of warm-up and simulated time, each weighted with its own interval."""
-    rungs = [rung for rung in (ladder.reference, *ladder.rungs) if rung.knob in (REFERENCE, TIME, WARM_UP)]
-    settings = [ladder.settings | ({} if rung is ladder.reference else {rung.knob: rung.setting}) for rung in rungs]
+    rungs = [
+        rung
+        for rung in (ladder.reference, *ladder.rungs)
+        if rung.knob in (REFERENCE, TIME, WARM_UP)
+    ]
+    settings = [
+        ladder.settings | ({} if rung is ladder.reference else {rung.knob: rung.setting})
+        for rung in rungs
+    ]
     x = np.array([float(one[TIME]) + float(one[WARM_UP]) for one in settings])
-    y, half_width = (np.array(column) for column in zip(*((r.cpu.value, r.cpu.half_width) for r in rungs), strict=True))
+    y, half_width = (
+        np.array(column)
+        for column in zip(*((r.cpu.value, r.cpu.half_width) for r in rungs), strict=True)
+    )
     error = np.maximum(half_width / NORMAL, 1e-3 * y)
     rows = np.stack([np.ones_like(x), x], axis=1) / error[:, None]
     covariance = np.linalg.inv(rows.T @ rows)
@@ -105,7 +137,9 @@ def replicas_for(ladder: Ladder, accuracy: float, seconds: float) -> int:
     said = np.maximum.accumulate([-math.log(one.said) for one in levels])
     floor = 0.0
     if accuracy >= levels[-1].said:
-        floor = math.exp(np.interp(-math.log(accuracy), said, [math.log(one.replicas) for one in levels]))
+        floor = math.exp(
+            np.interp(-math.log(accuracy), said, [math.log(one.replicas) for one in levels])
+        )
     sigma = math.sqrt(_variance(ladder.reference) * stretch)
     low, high = 3, MOST + 1
     while low < high:
@@ -136,9 +170,13 @@ def recommend(ladder: Ladder, accuracy: float) -> Recommendation:
             settings[knob] = type(ladder.settings[knob])(best.setting)
             saving *= best.cpu.value / reference.cpu.value if knob != WARM_UP else 1.0
         elif knob != TIME and any(not rung.known for rung in cheaper):
-            remarks.append(f"{knob}: cheaper settings may do, but the ladder cannot tell; raise --budget-s")
+            remarks.append(
+                f"{knob}: cheaper settings may do, but the ladder cannot tell; raise --budget-s"
+            )
     remarks += _model_remarks(ladder, accuracy)
-    times = [float(rung.setting) for rung in ladder.rungs if rung.knob == TIME] + [ladder.settings[TIME]]
+    times = [float(rung.setting) for rung in ladder.rungs if rung.knob == TIME] + [
+        ladder.settings[TIME]
+    ]
     line = cost(ladder)
     price, replicas, settings[TIME] = min(
         (count * saving * line.of(seconds + settings[WARM_UP]), count, seconds)
@@ -149,7 +187,9 @@ def recommend(ladder: Ladder, accuracy: float) -> Recommendation:
         remarks.append(f"more than {MOST:,} replicas would be needed, the most that are supported")
         return Recommendation(accuracy, settings, 0, math.inf, math.inf, tuple(remarks))
     # A half-width from n replicas is known to 1/sqrt(2 n) of itself, what it costs to twice that.
-    unsure = math.hypot(NORMAL * math.sqrt(2.0 / reference.replicas), line.pace_half_width / line.pace)
+    unsure = math.hypot(
+        NORMAL * math.sqrt(2.0 / reference.replicas), line.pace_half_width / line.pace
+    )
     return Recommendation(accuracy, settings, replicas, price, price * unsure, tuple(remarks))
 
 
@@ -166,7 +206,11 @@ def _model_remarks(ladder: Ladder, accuracy: float) -> Iterator[str]:
     rates, *spacings = ladder.dents
     off = f"{rates.mean_bias.value:+.4f} ± {rates.mean_bias.half_width:.2g}"
     if abs(rates.mean_bias.value) + rates.mean_bias.half_width > SHARE * accuracy:
-        good = [one for one in spacings if abs(one.mean_bias.value) + one.mean_bias.half_width <= SHARE * accuracy]
+        good = [
+            one
+            for one in spacings
+            if abs(one.mean_bias.value) + one.mean_bias.half_width <= SHARE * accuracy
+        ]
         cheapest = min(good, key=lambda rung: rung.cpu.value)
         yield (
             f"rates give {off} of mean coverage against dents one by one after {ladder.dent_time:.3g} s; for what "
@@ -177,12 +221,24 @@ def _model_remarks(ladder: Ladder, accuracy: float) -> Iterator[str]:
 
 def choices(ladder: Ladder) -> list[Choice]:
     """The Pareto front: sub-pools of every level, with at most one knob off the reference, where that saves time."""
-    others = [rung for rung in ladder.rungs if rung.knob == TIME or (rung.knob != DESIGNED and _saves(ladder, rung))]
+    others = [
+        rung
+        for rung in ladder.rungs
+        if rung.knob == TIME or (rung.knob != DESIGNED and _saves(ladder, rung))
+    ]
     every = []
     for level in ladder.levels:
         for rung in (ladder.reference, *others):
-            wide = math.sqrt(ladder.settings[TIME] / float(rung.setting)) if rung.knob == TIME else 1.0
-            bias = 0.0 if rung.knob in (REFERENCE, TIME) else abs(rung.bias.value) if rung.known else rung.bound
+            wide = (
+                math.sqrt(ladder.settings[TIME] / float(rung.setting)) if rung.knob == TIME else 1.0
+            )
+            bias = (
+                0.0
+                if rung.knob in (REFERENCE, TIME)
+                else abs(rung.bias.value)
+                if rung.known
+                else rung.bound
+            )
             name = f"{level.replicas} replicas"
             name += "" if rung.knob == REFERENCE else f", {short(rung.knob)} {rung.setting}"
             cost = level.cpu_s * rung.cpu.value / ladder.reference.cpu.value
@@ -235,7 +291,9 @@ def described(ladder: Ladder) -> str:
     pool = ladder.reference
     finest = ", ".join(f"{short(knob)} {shown(value)}" for knob, value in ladder.settings.items())
     took = pool.replicas * pool.cpu.value
-    walls = f"; there is no chamber with a round wall to compare {FACETS} with, only the finest facets"
+    walls = (
+        f"; there is no chamber with a round wall to compare {FACETS} with, only the finest facets"
+    )
     return (
         f"reference: {pool.replicas} replicas with {finest}: objective {pool.objective.value:.4f} ± "
         f"{pool.objective.half_width:.2g}, mean coverage {pool.mean.value:.4f} ± {pool.mean.half_width:.2g}, in "

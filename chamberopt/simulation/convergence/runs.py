@@ -70,7 +70,9 @@ class Pool:
         return Rung(knob, setting, len(self.tallies), self.cost, goal, mean, bias, mean_bias)
 
 
-def figures(tallies: Sequence[Tally], chamber: Chamber, design: Design) -> tuple[Estimate, Estimate, bool]:
+def figures(
+    tallies: Sequence[Tally], chamber: Chamber, design: Design
+) -> tuple[Estimate, Estimate, bool]:
     """Objective and mean coverage, as evaluate() has them, and whether triangles were taken together."""
     ground = surface(tallies, chamber, design)
     found = coverage_figures(tallies, chamber, ground)
@@ -80,4 +82,6 @@ def figures(tallies: Sequence[Tally], chamber: Chamber, design: Design) -> tuple
 def dents_alone(whole: Tally) -> Tally:
     """All that the figures of coverage need: hundreds of replicas are held at once."""
     none = np.zeros(0)
-    return Tally(whole.simulated_time, none, none, none, none, none, whole.dent_triangle, whole.dent_area)
+    return Tally(
+        whole.simulated_time, none, none, none, none, none, whole.dent_triangle, whole.dent_area
+    )

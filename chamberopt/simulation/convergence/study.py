@@ -66,7 +66,9 @@ class Ladder:
 def require_budget(budget_s: float) -> None:
     """InputError for CPU seconds that are none."""
     if not 0.0 < budget_s < math.inf:
-        raise InputError(f"--budget-s: given {budget_s:g}; give the CPU seconds to spend, more than 0")
+        raise InputError(
+            f"--budget-s: given {budget_s:g}; give the CPU seconds to spend, more than 0"
+        )
 
 
 def climb(
@@ -115,7 +117,9 @@ def climb(
         design=design,
         settings=settings,
         reference=replace(own, bias=nothing, mean_bias=nothing),
-        rungs=tuple(pool.rung(*key, reference) for key, pool in pools.items() if pool is not reference),
+        rungs=tuple(
+            pool.rung(*key, reference) for key, pool in pools.items() if pool is not reference
+        ),
         levels=levels,
         law=law_of(levels, own.objective.pseudovalues),
         dents=dents,
@@ -131,7 +135,9 @@ def _play_round(pools: Sequence[Pool], executor: Executor) -> float:
     for pool in pools:
         number = len(pool.cpu)
         pool.cpu.append(0.0)
-        futures.append((pool, number, executor.submit(_replica, pool.design, pool.chamber, pool.mesh, number)))
+        futures.append(
+            (pool, number, executor.submit(_replica, pool.design, pool.chamber, pool.mesh, number))
+        )
     spent = 0.0
     try:
         for pool, number, future in futures:
@@ -144,7 +150,9 @@ def _play_round(pools: Sequence[Pool], executor: Executor) -> float:
     return spent
 
 
-def _replica(design: Design, chamber: Chamber, mesh: TriangleMesh, number: int) -> tuple[Tally, float]:
+def _replica(
+    design: Design, chamber: Chamber, mesh: TriangleMesh, number: int
+) -> tuple[Tally, float]:
     """The dents of one replica, and its CPU seconds on this thread."""
     begin = time.thread_time()
     seed = replica_seed(design.process.seed, number)
@@ -166,7 +174,9 @@ def _levels(pool: Pool) -> tuple[Level, ...]:
         cpu = count * pool.cost.value + estimating
         if min(rms, said) < NO_ERROR:
             why = "no dent on the target was simulated, so there is no error to measure"
-            raise InputError(f"process.accuracy.simulated_time_s: {why}; raise it, or see chamberopt check")
+            raise InputError(
+                f"process.accuracy.simulated_time_s: {why}; raise it, or see chamberopt check"
+            )
         joined = any(one[2] for one in found)
         levels.append(Level(count, blocks, rms, *rms_interval(rms, blocks), said, cpu, joined))
         count *= 2

@@ -17,7 +17,13 @@ from tests.helpers.scenes import cavities
 from tests.helpers.synthetic import DESIGNS, plate_design
 
 PLATE = plate_design()
-BOX = {"shape": "box", "length_mm": 30.0, "width_mm": 40.0, "height_mm": 20.0, "sonotrode_distance_mm": 15.0}
+BOX = {
+    "shape": "box",
+    "length_mm": 30.0,
+    "width_mm": 40.0,
+    "height_mm": 20.0,
+    "sonotrode_distance_mm": 15.0,
+}
 EDGED = checked(Design, {**PLATE.model_dump(), "chamber": BOX})
 
 
@@ -30,10 +36,14 @@ def chamber_of(mesh: TriangleMesh) -> Chamber:
     """A chamber with the part for its ceiling."""
     source = np.where(mesh.tags == cavities.CEILING, 0, -1).astype(np.int32)
     part = Part(mesh.vertices, mesh.triangles, np.ones(1), np.ones(1, dtype=bool), "lid")
-    return Chamber(mesh.vertices, mesh.triangles, mesh.tags, source, mesh.volume, part, np.ones(1), ())
+    return Chamber(
+        mesh.vertices, mesh.triangles, mesh.tags, source, mesh.volume, part, np.ones(1), ()
+    )
 
 
-def extruded(outline: list[tuple[float, float]], top: float = 0.015, lean: float = 0.0) -> TriangleMesh:
+def extruded(
+    outline: list[tuple[float, float]], top: float = 0.015, lean: float = 0.0
+) -> TriangleMesh:
     """A room over the outline, fanned from its first corner; the ceiling ``lean`` [m] wider than the floor."""
     from shapely import Polygon
     from trimesh.creation import extrude_polygon
@@ -56,7 +66,12 @@ def test_the_plates_chamber_is_a_true_cylinder() -> None:
 def test_a_box_and_a_prism_are_their_outlines() -> None:
     box = analytic_cavity(EDGED, chamber_of(cavities.box((0.03, 0.04, 0.02))))
     assert box.radius is None
-    assert sorted(map(tuple, box.outline.tolist())) == [(0.0, 0.0), (0.0, 0.04), (0.03, 0.0), (0.03, 0.04)]
+    assert sorted(map(tuple, box.outline.tolist())) == [
+        (0.0, 0.0),
+        (0.0, 0.04),
+        (0.03, 0.0),
+        (0.03, 0.04),
+    ]
     assert box.volume == pytest.approx(0.03 * 0.04 * 0.02)
     # cut in the middle of its sides, as a boolean does: the corner too many is no side
     cut = extruded([(0.0, 0.0), (0.02, 0.0), (0.04, 0.0), (0.03, 0.03), (0.01, 0.04)])
@@ -66,8 +81,16 @@ def test_a_box_and_a_prism_are_their_outlines() -> None:
 @pytest.mark.parametrize(
     ("mesh", "said"),
     [
-        (lambda: extruded([(0, 0), (0.04, 0), (0.04, 0.02), (0.02, 0.02), (0.02, 0.04), (0, 0.04)]), "not convex"),
-        (lambda: extruded([(0, 0), (0.04, 0), (0.04, 0.02), (0, 0.02)], lean=0.1), "wall is not upright at z"),
+        (
+            lambda: extruded(
+                [(0, 0), (0.04, 0), (0.04, 0.02), (0.02, 0.02), (0.02, 0.04), (0, 0.04)]
+            ),
+            "not convex",
+        ),
+        (
+            lambda: extruded([(0, 0), (0.04, 0), (0.04, 0.02), (0, 0.02)], lean=0.1),
+            "wall is not upright at z",
+        ),
     ],
 )
 def test_other_chambers_are_refused(mesh, said: str) -> None:  # type: ignore[no-untyped-def]
@@ -86,14 +109,18 @@ def test_what_is_in_the_way_is_named() -> None:
 @pytest.mark.parametrize(("name", "value"), [("rest", True), ("part_turn", {"rpm": 10.0})])
 def test_effects_that_need_triangles_are_refused(name: str, value: object) -> None:
     effects = type(PLATE.effects).model_validate({name: value})
-    with pytest.raises(InputError, match=f"effects.{name}: not supported with an analytical cavity"):
+    with pytest.raises(
+        InputError, match=f"effects.{name}: not supported with an analytical cavity"
+    ):
         analytic_cavity(PLATE.model_copy(update={"effects": effects}), plate())
 
 
 def test_impacts_are_booked_on_the_triangle_under_them() -> None:
     rng = np.random.default_rng(4)
     angle, distance = 2.0 * np.pi * rng.uniform(size=500), 0.0235 * np.sqrt(rng.uniform(size=500))
-    place = np.column_stack([distance * np.cos(angle), distance * np.sin(angle), np.full(500, 0.0135)])
+    place = np.column_stack(
+        [distance * np.cos(angle), distance * np.sin(angle), np.full(500, 0.0135)]
+    )
     ball, speed = np.zeros(500, dtype=np.int32), np.ones(500)
     log = ImpactLog(speed, ball, np.ones(500, dtype=np.int32), place, np.zeros((500, 3)), speed)
     booked = on_chamber(log, plate()).triangle
@@ -101,7 +128,9 @@ def test_impacts_are_booked_on_the_triangle_under_them() -> None:
     corners = plate().vertices[plate().triangles[booked]][:, :, :2]
     side = np.roll(corners, -1, axis=1) - corners
     to = place[:, None, :2] - corners
-    within = side[..., 0] * to[..., 1] - side[..., 1] * to[..., 0]  # counter-clockwise from above: out of the cavity
+    within = (
+        side[..., 0] * to[..., 1] - side[..., 1] * to[..., 0]
+    )  # counter-clockwise from above: out of the cavity
     assert (within > -1e-12).all()
 
 
@@ -113,13 +142,18 @@ def both(design: Design) -> list[float]:
     assert (exact.analytic, meshed.analytic) == (True, False)
     assert any("an exact cylinder of 29.452 cm³" in note for note in exact.notes)
     assert not any("analytical" in note for note in meshed.notes)
-    pairs = [(exact.metrics[name], meshed.metrics[name]) for name in ("mean_coverage", "impacts_per_mm2_s")]
+    pairs = [
+        (exact.metrics[name], meshed.metrics[name])
+        for name in ("mean_coverage", "impacts_per_mm2_s")
+    ]
     return [(a.value - b.value) / np.hypot(a.half_width, b.half_width) for a, b in pairs]
 
 
 def test_the_plate_is_peened_as_in_its_mesh() -> None:
     """95 % half-widths: the two differ by less than twice their common one, but for one time in ten thousand."""
-    design = PLATE.with_values({"process.accuracy.replicas": 6, "process.accuracy.simulated_time_s": 1.0})
+    design = PLATE.with_values(
+        {"process.accuracy.replicas": 6, "process.accuracy.simulated_time_s": 1.0}
+    )
     assert np.abs(both(design)).max() < 2.0
 
 

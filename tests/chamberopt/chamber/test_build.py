@@ -34,7 +34,9 @@ def with_mesh(folder: Path, mesh: trimesh.Trimesh, **tables: dict[str, Any]) -> 
     return shipped("gear", part=part, **tables)
 
 
-def box(size: tuple[float, float, float], at: tuple[float, float, float] = (0, 0, 0)) -> trimesh.Trimesh:
+def box(
+    size: tuple[float, float, float], at: tuple[float, float, float] = (0, 0, 0)
+) -> trimesh.Trimesh:
     made = trimesh.creation.box(size)
     made.apply_translation(at)
     return made
@@ -53,7 +55,9 @@ def shape_volume(design: Design) -> float:
     shape = chamber.surface(np.zeros((0, 3)), np.zeros((0, 3), dtype=int))
     volume = solid(shape.vertices, shape.triangles, "shape").volume
     polygon = chamber.facets / 2 * (chamber.diameter / 2) ** 2 * np.sin(2 * np.pi / chamber.facets)
-    assert volume == pytest.approx(polygon * chamber.height, rel=4e-9 / chamber.diameter + 2e-9 / chamber.height)
+    assert volume == pytest.approx(
+        polygon * chamber.height, rel=4e-9 / chamber.diameter + 2e-9 / chamber.height
+    )
     return volume
 
 
@@ -76,7 +80,9 @@ def check(design: Design, chamber: Chamber) -> None:
     assert ((chamber.source >= 0) == on_part).all()
     floor = chamber.vertices[chamber.triangles[chamber.tags == TAG_SONOTRODE]]
     assert (floor[..., 2] == 0.0).all()
-    assert chamber.part.vertices[:, 2].min() == pytest.approx(design.chamber.sonotrode_distance, abs=1e-9)
+    assert chamber.part.vertices[:, 2].min() == pytest.approx(
+        design.chamber.sonotrode_distance, abs=1e-9
+    )
 
     check_source(chamber, on_part)
     area = areas(chamber.vertices, chamber.triangles)
@@ -98,7 +104,9 @@ def check_source(chamber: Chamber, on_part: np.ndarray) -> None:
         inward /= np.linalg.norm(inward, axis=1)[:, None]
         assert np.einsum("tki,ti->tk", pieces - start[:, None], inward).min() > -NEAR
     thick = heights(chamber.vertices, chamber.triangles[on_part]) > 10 * NEAR
-    facing = np.einsum("ti,ti->t", area_vectors(chamber.vertices, chamber.triangles[on_part]), normal)
+    facing = np.einsum(
+        "ti,ti->t", area_vectors(chamber.vertices, chamber.triangles[on_part]), normal
+    )
     assert (facing[thick] < 0.0).all()
 
 
@@ -110,7 +118,9 @@ def test_the_shipped_designs_make_chambers(name: str) -> None:
 
     check(design, chamber)
     exposed_target = (chamber.exposed_area > 0) & chamber.part.target
-    assert chamber.exposed_area[exposed_target].sum() > 0.9 * chamber.part.area[exposed_target].sum()
+    assert (
+        chamber.exposed_area[exposed_target].sum() > 0.9 * chamber.part.area[exposed_target].sum()
+    )
     assert not any("rounding" in note for note in chamber.notes)
 
 
@@ -121,7 +131,10 @@ def test_any_size_offset_and_rotation_makes_a_sound_chamber(name: str, seed: int
     turned = rng.uniform(-180, 180, 3) if seed % 3 else rng.choice([0.0, 90.0, 180.0], 3)
     design = shipped(
         name,
-        part={"rotate_deg": tuple(turned.tolist()), "offset_mm": tuple(rng.uniform(-8, 8, 2).tolist())},
+        part={
+            "rotate_deg": tuple(turned.tolist()),
+            "offset_mm": tuple(rng.uniform(-8, 8, 2).tolist()),
+        },
         chamber={
             "height_mm": float(rng.uniform(25, 90)),
             "diameter_mm": float(rng.uniform(40, 110)),
@@ -133,10 +146,15 @@ def test_any_size_offset_and_rotation_makes_a_sound_chamber(name: str, seed: int
     check(design, build_chamber(design))
 
 
-@pytest.mark.parametrize(("diameter", "height"), [(44.0, 45.0), (70.0, 25.0), (44.0, 25.0), (16.0, 45.0)])
+@pytest.mark.parametrize(
+    ("diameter", "height"), [(44.0, 45.0), (70.0, 25.0), (44.0, 25.0), (16.0, 45.0)]
+)
 def test_faces_that_coincide_with_the_gear_stay_sound(diameter: float, height: float) -> None:
     """Tip circle on the wall, ceiling on the upper face, shaft on the wall: where booleans go wrong."""
-    design = shipped("gear", chamber={"diameter_mm": diameter, "height_mm": height, "sonotrode_distance_mm": 15.0})
+    design = shipped(
+        "gear",
+        chamber={"diameter_mm": diameter, "height_mm": height, "sonotrode_distance_mm": 15.0},
+    )
 
     check(design, build_chamber(design))
 
@@ -165,17 +183,24 @@ def test_a_rod_through_the_ceiling_is_held_and_cut_at_the_ceiling(tmp_path: Path
     assert chamber.exposed_area.sum() == pytest.approx(1e-4 + 4 * 0.01 * inside, rel=1e-9)
     hidden = 1.0 - (1e-4 + 4 * 0.01 * inside) / (2e-4 + 4 * 0.01 * 0.1)
     (note,) = chamber.notes
-    assert note.startswith(f"{hidden:.1%} of the target's area is outside the cavity and counts as not covered")
+    assert note.startswith(
+        f"{hidden:.1%} of the target's area is outside the cavity and counts as not covered"
+    )
 
 
 def test_a_plate_closes_the_chamber_and_the_room_above_is_left_out() -> None:
-    low, high = (shipped("plate", chamber={"height_mm": height, "diameter_mm": 50.0}) for height in (40.0, 60.0))
+    low, high = (
+        shipped("plate", chamber={"height_mm": height, "diameter_mm": 50.0})
+        for height in (40.0, 60.0)
+    )
     first, second = build_chamber(low), build_chamber(high)
 
     distance = low.chamber.sonotrode_distance
     for design, chamber in ((low, first), (high, second)):
         check(design, chamber)
-        assert chamber.volume == pytest.approx(shape_volume(design) * distance / design.chamber.height, rel=1e-9)
+        assert chamber.volume == pytest.approx(
+            shape_volume(design) * distance / design.chamber.height, rel=1e-9
+        )
         assert any("cuts off a closed room" in note for note in chamber.notes)
         assert any("chamber.height_mm has no effect" in note for note in chamber.notes)
     assert chamber.exposed_area.sum() == pytest.approx(first.volume / distance, rel=1e-9)
@@ -202,7 +227,9 @@ def test_overlapping_bodies_in_one_file_count_once(tmp_path: Path) -> None:
     union = 20 * 10 * 10 + 10 * 20 * 10.5 - common
     assert chamber.volume == pytest.approx(shape_volume(design) - union * 1e-9, rel=1e-9)
     check_source(chamber, chamber.tags == TAG_PART)
-    hidden = chamber.exposed_area < 0.99 * chamber.part.area  # some of each body is inside the other
+    hidden = (
+        chamber.exposed_area < 0.99 * chamber.part.area
+    )  # some of each body is inside the other
     assert hidden[:12].any()
 
 
@@ -229,7 +256,9 @@ def test_rotation_is_about_x_then_y_then_z(tmp_path: Path) -> None:
 
 def test_a_rotation_turns_the_way_the_right_hand_says(tmp_path: Path) -> None:
     """A wedge whose thick end is at +x points down with it after +90 degrees about y."""
-    wedge = trimesh.convex.convex_hull([[0, 0, 0], [20, -5, -5], [20, 5, -5], [20, 5, 5], [20, -5, 5]])
+    wedge = trimesh.convex.convex_hull(
+        [[0, 0, 0], [20, -5, -5], [20, 5, -5], [20, 5, 5], [20, -5, 5]]
+    )
     design = with_mesh(tmp_path, wedge, part={"rotate_deg": (0.0, 90.0, 0.0)})
 
     part = build_chamber(design).part
@@ -239,11 +268,15 @@ def test_a_rotation_turns_the_way_the_right_hand_says(tmp_path: Path) -> None:
 
 
 def test_the_offset_moves_the_part_sideways(tmp_path: Path) -> None:
-    design = with_mesh(tmp_path, box((10, 10, 10), at=(100, 200, 300)), part={"offset_mm": (3.0, -4.0)})
+    design = with_mesh(
+        tmp_path, box((10, 10, 10), at=(100, 200, 300)), part={"offset_mm": (3.0, -4.0)}
+    )
 
     part = build_chamber(design).part
 
-    assert (part.vertices.min(axis=0) + part.vertices.max(axis=0))[:2] / 2 == pytest.approx([0.003, -0.004], abs=1e-9)
+    assert (part.vertices.min(axis=0) + part.vertices.max(axis=0))[:2] / 2 == pytest.approx(
+        [0.003, -0.004], abs=1e-9
+    )
 
 
 def test_the_target_is_chosen_in_the_files_own_frame(tmp_path: Path) -> None:
@@ -253,7 +286,9 @@ def test_the_target_is_chosen_in_the_files_own_frame(tmp_path: Path) -> None:
 
     def part(target: dict[str, Any]) -> Part:
         turned = {"rotate_deg": (180.0, 0.0, 0.0), "target": target}
-        return build_chamber(with_mesh(tmp_path, box((10, 20, 30), at=(100, 0, 0)), part=turned)).part
+        return build_chamber(
+            with_mesh(tmp_path, box((10, 20, 30), at=(100, 0, 0)), part=turned)
+        ).part
 
     lowest, side = part(top), part(right)
     assert lowest.area[lowest.target].sum() == pytest.approx(200e-6)
@@ -276,8 +311,16 @@ def test_the_gears_target_is_its_toothed_rim() -> None:
 @pytest.mark.parametrize(
     ("size", "tables", "said"),
     [
-        ((10, 10, 10), {"part": {"offset_mm": (80.0, 0.0)}}, r"part\.offset_mm.*beside the chamber"),
-        ((10, 10, 10), {"part": {"offset_mm": (31.0, 31.0)}}, "no part of it is inside the chamber"),
+        (
+            (10, 10, 10),
+            {"part": {"offset_mm": (80.0, 0.0)}},
+            r"part\.offset_mm.*beside the chamber",
+        ),
+        (
+            (10, 10, 10),
+            {"part": {"offset_mm": (31.0, 31.0)}},
+            "no part of it is inside the chamber",
+        ),
         (
             (90, 90, 10),
             {"part": {"target": {"direction": (0.0, 0.0, 1.0), "angle_deg": (0.0, 5.0)}}},
@@ -290,15 +333,21 @@ def test_the_gears_target_is_its_toothed_rim() -> None:
         ),
     ],
 )
-def test_what_cannot_be_a_chamber_is_refused(tmp_path: Path, size: Any, tables: dict[str, Any], said: str) -> None:
+def test_what_cannot_be_a_chamber_is_refused(
+    tmp_path: Path, size: Any, tables: dict[str, Any], said: str
+) -> None:
     design = with_mesh(tmp_path, box(size), **tables)
 
     with pytest.raises(InputError, match=said):
         build_chamber(design)
 
 
-@pytest.mark.parametrize(("distance", "said"), [(0.02, "would hit the part"), (60.0, "above the ceiling")])
-def test_a_part_too_low_or_too_high_is_refused_even_if_the_design_was_not_checked(distance: float, said: str) -> None:
+@pytest.mark.parametrize(
+    ("distance", "said"), [(0.02, "would hit the part"), (60.0, "above the ceiling")]
+)
+def test_a_part_too_low_or_too_high_is_refused_even_if_the_design_was_not_checked(
+    distance: float, said: str
+) -> None:
     design = shipped("gear")
     unchecked = design.chamber.model_copy(update={"sonotrode_distance_mm": distance})
 
@@ -317,7 +366,9 @@ def test_the_same_design_gives_the_same_chamber() -> None:
 
 def test_a_mesh_file_that_changes_is_read_again(tmp_path: Path) -> None:
     first = build_chamber(with_mesh(tmp_path, box((10, 10, 10))))
-    second = build_chamber(with_mesh(tmp_path, trimesh.creation.icosphere(subdivisions=2, radius=5)))
+    second = build_chamber(
+        with_mesh(tmp_path, trimesh.creation.icosphere(subdivisions=2, radius=5))
+    )
 
     assert len(first.part.triangles) == 12
     assert len(second.part.triangles) == 320

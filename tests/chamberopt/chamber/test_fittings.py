@@ -20,7 +20,12 @@ from sim_core import Resting, Vibration
 
 DESIGNS = Path(__file__).resolve().parents[3] / "designs"
 FACETS, DIAMETER, HEIGHT = 64, 70.0, 45.0
-PLATE = {"kind": "plate", "at_mm": [20.0, 0.0, 12.0], "size_mm": [10.0, 8.0, 4.0], "rotate_deg": [0.0, 0.0, 30.0]}
+PLATE = {
+    "kind": "plate",
+    "at_mm": [20.0, 0.0, 12.0],
+    "size_mm": [10.0, 8.0, 4.0],
+    "rotate_deg": [0.0, 0.0, 30.0],
+}
 
 
 def design(deflectors: Any = (), holes: Any = (), sonotrodes: Any = (), **chamber: Any) -> Design:
@@ -34,7 +39,12 @@ def design(deflectors: Any = (), holes: Any = (), sonotrodes: Any = (), **chambe
 
 def sonotrode(**values: Any) -> dict[str, Any]:
     """One that looks down from a well in the ceiling, beside the shaft."""
-    own = {"at_mm": [22.0, 0.0, 50.0], "axis": [0.0, 0.0, -1.0], "diameter_mm": 12.0, "frequency_khz": 20.0}
+    own = {
+        "at_mm": [22.0, 0.0, 50.0],
+        "axis": [0.0, 0.0, -1.0],
+        "diameter_mm": 12.0,
+        "frequency_khz": 20.0,
+    }
     return {**own, "amplitude_um": 10.0, **values}
 
 
@@ -72,7 +82,13 @@ def grown(chamber: Chamber, plain: Chamber) -> float:
     [
         (PLATE, 10 * 8 * 4, 2 * (80 + 40 + 32)),
         (
-            {"kind": "rod", "at_mm": [0, 26, 14], "diameter_mm": 5.0, "length_mm": 12.0, "rotate_deg": [0, 90, 0]},
+            {
+                "kind": "rod",
+                "at_mm": [0, 26, 14],
+                "diameter_mm": 5.0,
+                "length_mm": 12.0,
+                "rotate_deg": [0, 90, 0],
+            },
             12 * polygon(5.0),
             2 * polygon(5.0) + 12 * 64 * 5 * np.sin(np.pi / 64),
         ),
@@ -86,7 +102,9 @@ def test_a_deflector_in_the_room_takes_its_volume_and_is_wall(
     sound(chamber)
     assert grown(chamber, plain) == pytest.approx(-volume, rel=1e-5)
     assert area_of(chamber, TAG_WALL) - area_of(plain, TAG_WALL) == pytest.approx(area, rel=1e-5)
-    assert area_of(chamber, TAG_SONOTRODE) == pytest.approx(area_of(plain, TAG_SONOTRODE), rel=1e-12)
+    assert area_of(chamber, TAG_SONOTRODE) == pytest.approx(
+        area_of(plain, TAG_SONOTRODE), rel=1e-12
+    )
     assert chamber.exposed_area == pytest.approx(plain.exposed_area, abs=1e-15)
     assert not any("rounding" in note for note in chamber.notes)
 
@@ -97,7 +115,12 @@ def test_a_ball_and_a_file_are_deflectors_too(plain: Chamber, tmp_path: Path) ->
     box.apply_translation((100, 200, 300))
     box.export(tmp_path / "block.stl")
     ball = {"kind": "ball", "at_mm": [28.0, 0.0, 12.0], "diameter_mm": 8.0}
-    block = {"kind": "mesh", "at_mm": [-28.0, 0.0, 20.0], "mesh": str(tmp_path / "block.stl"), "unit": "mm"}
+    block = {
+        "kind": "mesh",
+        "at_mm": [-28.0, 0.0, 20.0],
+        "mesh": str(tmp_path / "block.stl"),
+        "unit": "mm",
+    }
 
     chamber = build_chamber(design(deflectors=[ball, block]))
 
@@ -119,17 +142,29 @@ def test_a_deflector_through_the_wall_counts_as_far_as_it_is_inside(plain: Chamb
 
 def test_a_hole_goes_its_depth_beyond_the_wall(plain: Chamber) -> None:
     """Through the flat ceiling its volume is that of a prism; through the round wall nearly so."""
-    up = build_chamber(design(holes=[{"at_mm": [25, 0, 40], "axis": [0, 0, 2], "diameter_mm": 8.0, "depth_mm": 6.0}]))
-    out = build_chamber(design(holes=[{"at_mm": [0, 20, 9], "axis": [0, 1, 0], "diameter_mm": 8.0, "depth_mm": 6.0}]))
+    up = build_chamber(
+        design(
+            holes=[{"at_mm": [25, 0, 40], "axis": [0, 0, 2], "diameter_mm": 8.0, "depth_mm": 6.0}]
+        )
+    )
+    out = build_chamber(
+        design(
+            holes=[{"at_mm": [0, 20, 9], "axis": [0, 1, 0], "diameter_mm": 8.0, "depth_mm": 6.0}]
+        )
+    )
 
     for chamber in (up, out):
         sound(chamber)
         assert set(np.unique(chamber.tags)) == {TAG_PART, TAG_SONOTRODE, TAG_WALL}
     assert grown(up, plain) == pytest.approx(6 * polygon(8.0), rel=1e-6)
     assert 1e3 * up.height == pytest.approx(HEIGHT + 6.0)
-    radius = DIAMETER / 2  # the wall lies back from its highest line: the circle by r²/(8 R) on average over the bore
+    radius = (
+        DIAMETER / 2
+    )  # the wall lies back from its highest line: the circle by r²/(8 R) on average over the bore
     facets = 2 / 3 * radius * (1 - np.cos(np.pi / FACETS))  # and the polygon behind the circle
-    assert grown(out, plain) == pytest.approx((6 + 4**2 / (8 * radius) + facets) * polygon(8.0), rel=1e-4)
+    assert grown(out, plain) == pytest.approx(
+        (6 + 4**2 / (8 * radius) + facets) * polygon(8.0), rel=1e-4
+    )
     assert 1e3 * out.vertices[:, 1].max() == pytest.approx(radius + 6.0, abs=1e-6)
 
 
@@ -140,12 +175,18 @@ def test_a_hole_takes_the_shaft_of_the_part(plain: Chamber) -> None:
 
     sound(chamber)
     assert grown(chamber, plain) == pytest.approx(5 * (polygon(34.0) - np.pi * 8**2), rel=2e-3)
-    assert chamber.exposed_area.sum() - plain.exposed_area.sum() == pytest.approx(np.pi * 16 * 5 * 1e-6, rel=2e-3)
+    assert chamber.exposed_area.sum() - plain.exposed_area.sum() == pytest.approx(
+        np.pi * 16 * 5 * 1e-6, rel=2e-3
+    )
 
 
 @pytest.mark.parametrize(
     ("at", "axis"),
-    [((22.0, 0.0, 50.0), (0.0, 0.0, -1.0)), ((50.0, 0.0, 20.0), (-1.0, 0.0, 0.2)), ((0, -40, 9), (0, 3, 0))],
+    [
+        ((22.0, 0.0, 50.0), (0.0, 0.0, -1.0)),
+        ((50.0, 0.0, 20.0), (-1.0, 0.0, 0.2)),
+        ((0, -40, 9), (0, 3, 0)),
+    ],
 )
 def test_a_further_sonotrode_is_the_bottom_of_a_well(plain: Chamber, at: Any, axis: Any) -> None:
     made = design(sonotrodes=[sonotrode(at_mm=at, axis=axis)])
@@ -157,10 +198,14 @@ def test_a_further_sonotrode_is_the_bottom_of_a_well(plain: Chamber, at: Any, ax
     assert area_of(chamber, tag) == pytest.approx(polygon(12.0), rel=1e-6)
     normals = -area_vectors(chamber.vertices, chamber.triangles)[face]
     normals /= np.linalg.norm(normals, axis=1)[:, None]
-    assert normals == pytest.approx(np.tile(np.array(axis) / np.linalg.norm(axis), (len(normals), 1)), abs=1e-5)
+    assert normals == pytest.approx(
+        np.tile(np.array(axis) / np.linalg.norm(axis), (len(normals), 1)), abs=1e-5
+    )
     middle = 1e3 * chamber.vertices[np.unique(chamber.triangles[face])]
     assert np.linalg.norm(middle - np.array(at), axis=1).max() == pytest.approx(6.0, abs=1e-5)
-    assert area_of(chamber, TAG_SONOTRODE) == pytest.approx(area_of(plain, TAG_SONOTRODE), rel=1e-12)
+    assert area_of(chamber, TAG_SONOTRODE) == pytest.approx(
+        area_of(plain, TAG_SONOTRODE), rel=1e-12
+    )
     assert grown(chamber, plain) > 0.0
     assert is_sonotrode(chamber.tags).sum() == face.sum() + (chamber.tags == TAG_SONOTRODE).sum()
 
@@ -169,7 +214,9 @@ def test_a_ball_on_it_is_said_to_lie_there() -> None:
     chamber = build_chamber(design(sonotrodes=[sonotrode(at_mm=(0, -40, 9), axis=(0, 3, 0))]))
     on = np.full((1, 4), -1)
     on[0, 0] = np.flatnonzero(chamber.tags == tag_of_further(0))[0]
-    ball = Resting(np.zeros(1, int), np.zeros((1, 3)), np.zeros(1), on, np.full((1, 4), -1), np.zeros(1, bool))
+    ball = Resting(
+        np.zeros(1, int), np.zeros((1, 3)), np.zeros(1), on, np.full((1, 4), -1), np.zeros(1, bool)
+    )
 
     found = still(ball, 10, 2e-3, chamber, part_turns=False)
 
@@ -179,7 +226,12 @@ def test_a_ball_on_it_is_said_to_lie_there() -> None:
 
 def test_each_sonotrode_vibrates_its_own_way() -> None:
     """A phase is ahead of the first's, whatever the first's is; the law of the sonotrode holds for its tag too."""
-    made = design(sonotrodes=[sonotrode(phase_deg=90.0, frequency_khz=30.0), sonotrode(at_mm=[-22.0, 0.0, 48.0])])
+    made = design(
+        sonotrodes=[
+            sonotrode(phase_deg=90.0, frequency_khz=30.0),
+            sonotrode(at_mm=[-22.0, 0.0, 48.0]),
+        ]
+    )
     mesh = chamber_mesh(build_chamber(made))
 
     physics = scene_physics(made, mesh, phase=1.0)
@@ -199,7 +251,9 @@ def test_balls_do_not_rest_on_a_sonotrode_that_looks_up(tmp_path: Path) -> None:
     """Beside the gear's own face there is none to lie on but a second sonotrode's, sunk into the floor's plane."""
     data = design().model_dump()
     trimesh.creation.icosphere(subdivisions=2, radius=3).export(tmp_path / "part.stl")
-    rod = trimesh.convex.convex_hull([[0, 0, 0], [4, -4, 80], [4, 4, 80], [-4, 4, 80], [-4, -4, 80]])
+    rod = trimesh.convex.convex_hull(
+        [[0, 0, 0], [4, -4, 80], [4, 4, 80], [-4, 4, 80], [-4, -4, 80]]
+    )
     rod.export(tmp_path / "part.stl")
     data["part"] = {"mesh": str(tmp_path / "part.stl"), "unit": "mm"}
     up = sonotrode(at_mm=[45.0, 0.0, 10.0], axis=[-1.0, 0.0, 0.5])
@@ -218,7 +272,10 @@ OUTSIDE, WELL, AXIS = {**PLATE, "at_mm": [200.0, 0.0, 12.0]}, sonotrode(), [0.0,
 @pytest.mark.parametrize(
     ("fittings", "said"),
     [
-        ({"deflectors": [PLATE, OUTSIDE]}, r"chamber\.deflectors\.1\.at_mm: given \[200.0.*none of it is in the room"),
+        (
+            {"deflectors": [PLATE, OUTSIDE]},
+            r"chamber\.deflectors\.1\.at_mm: given \[200.0.*none of it is in the room",
+        ),
         (
             {"deflectors": [{**PLATE, "at_mm": [20.0, 0.0, 2.01]}]},
             r"chamber\.deflectors\.0\.at_mm.*face of \[sonotrode\] hits it",
@@ -236,23 +293,41 @@ OUTSIDE, WELL, AXIS = {**PLATE, "at_mm": [200.0, 0.0, 12.0]}, sonotrode(), [0.0,
             r"holes\.0\.at_mm: a b",
         ),
         (
-            {"holes": [{"at_mm": [25, 0, 20], "axis": [0, 0, -1], "diameter_mm": 5.0, "depth_mm": 5.0}]},
+            {
+                "holes": [
+                    {"at_mm": [25, 0, 20], "axis": [0, 0, -1], "diameter_mm": 5.0, "depth_mm": 5.0}
+                ]
+            },
             r"holes\.0\.at_mm: its bore cuts into a sonotrode's face",
         ),
         (
-            {"holes": [{"at_mm": [25, 0, 40], "axis": [1, 0, 1], "diameter_mm": 10.0, "depth_mm": 0.5}]},
+            {
+                "holes": [
+                    {"at_mm": [25, 0, 40], "axis": [1, 0, 1], "diameter_mm": 10.0, "depth_mm": 0.5}
+                ]
+            },
             r"holes\.0\.at_mm.*raise depth_mm",
         ),
-        ({"sonotrodes": [sonotrode(at_mm=[22.0, 0.0, 44.0])]}, r"sonotrodes\.0\.at_mm.*move at_mm back along the axis"),
+        (
+            {"sonotrodes": [sonotrode(at_mm=[22.0, 0.0, 44.0])]},
+            r"sonotrodes\.0\.at_mm.*move at_mm back along the axis",
+        ),
         (
             {"sonotrodes": [sonotrode(at_mm=[33.0, 0.0, 50.0])]},
             r"sonotrodes\.0\.at_mm.*does not lead into the room all",
         ),
-        ({"sonotrodes": [sonotrode(axis=[0.0, 0.0, 1.0])]}, r"sonotrodes\.0\.at_mm.*does not lead into the room all"),
+        (
+            {"sonotrodes": [sonotrode(axis=[0.0, 0.0, 1.0])]},
+            r"sonotrodes\.0\.at_mm.*does not lead into the room all",
+        ),
         ({"sonotrodes": [WELL, sonotrode(at_mm=[27.0, 0.0, 48.0])]}, r"sonotrodes\.1\.at_mm"),
         ({"sonotrodes": [sonotrode(at_mm=[0.0, 0.0, 50.0])]}, r"sonotrodes\.0\.at_mm: .*the part"),
         (
-            {"sonotrodes": [sonotrode(at_mm=[0.0, -40.0, 6.0], axis=[0.0, 1.0, 0.0], diameter_mm=14.0)]},
+            {
+                "sonotrodes": [
+                    sonotrode(at_mm=[0.0, -40.0, 6.0], axis=[0.0, 1.0, 0.0], diameter_mm=14.0)
+                ]
+            },
             "does not lead into the room all round|free rim",
         ),
     ],
@@ -265,27 +340,54 @@ def test_what_is_out_of_place_is_refused_by_name(fittings: dict[str, Any], said:
 @pytest.mark.parametrize(
     ("fittings", "said"),
     [
-        ({"deflectors": [{"kind": "rod", "at_mm": [0, 0, 20]}]}, "chamber.deflectors.0.length_mm: missing; a rod has"),
-        ({"deflectors": [{**PLATE, "length_mm": 3.0}]}, "chamber.deflectors.0.length_mm: not of a plate"),
-        ({"deflectors": [{**PLATE, "size_mm": [1.0, 0.0, 1.0]}]}, "chamber.deflectors.0.size_mm: given"),
-        ({"deflectors": [{**PLATE, "sise_mm": 3.0}]}, "deflectors.0.sise_mm: unknown key; did you mean 'size_mm'?"),
-        ({"deflectors": [{**PLATE, "kind": "wedge"}]}, 'deflectors.0.kind: given \'wedge\'; allowed: "plate", "rod"'),
+        (
+            {"deflectors": [{"kind": "rod", "at_mm": [0, 0, 20]}]},
+            "chamber.deflectors.0.length_mm: missing; a rod has",
+        ),
+        (
+            {"deflectors": [{**PLATE, "length_mm": 3.0}]},
+            "chamber.deflectors.0.length_mm: not of a plate",
+        ),
+        (
+            {"deflectors": [{**PLATE, "size_mm": [1.0, 0.0, 1.0]}]},
+            "chamber.deflectors.0.size_mm: given",
+        ),
+        (
+            {"deflectors": [{**PLATE, "sise_mm": 3.0}]},
+            "deflectors.0.sise_mm: unknown key; did you mean 'size_mm'?",
+        ),
+        (
+            {"deflectors": [{**PLATE, "kind": "wedge"}]},
+            'deflectors.0.kind: given \'wedge\'; allowed: "plate", "rod"',
+        ),
         (
             {"holes": [{"at_mm": [0, 0, 9], "axis": AXIS, "depth_mm": 5.0}]},
             "holes.0.diameter_mm: missing; give a number",
         ),
-        ({"sonotrodes": [sonotrode(axis=[0.0, 0.0, 0.0])]}, "sonotrodes.0.axis: given [0, 0, 0], which points nowhere"),
-        ({"sonotrodes": [sonotrode(amplitude_um=0.0)]}, "sonotrodes.0.amplitude_um: given 0.0; allowed: a number from"),
+        (
+            {"sonotrodes": [sonotrode(axis=[0.0, 0.0, 0.0])]},
+            "sonotrodes.0.axis: given [0, 0, 0], which points nowhere",
+        ),
+        (
+            {"sonotrodes": [sonotrode(amplitude_um=0.0)]},
+            "sonotrodes.0.amplitude_um: given 0.0; allowed: a number from",
+        ),
     ],
 )
-def test_wrong_tables_are_told_by_their_place_in_the_list(fittings: dict[str, Any], said: str) -> None:
+def test_wrong_tables_are_told_by_their_place_in_the_list(
+    fittings: dict[str, Any], said: str
+) -> None:
     with pytest.raises(InputError) as error:
         design(**fittings)
     assert said in str(error.value)
 
 
 def test_a_wrong_table_in_a_file_is_told_by_its_line(tmp_path: Path) -> None:
-    text = (DESIGNS / "gear.toml").read_text(encoding="utf-8").replace("parts/", f"{DESIGNS.as_posix()}/parts/")
+    text = (
+        (DESIGNS / "gear.toml")
+        .read_text(encoding="utf-8")
+        .replace("parts/", f"{DESIGNS.as_posix()}/parts/")
+    )
     plate = '\n[[chamber.deflectors]]\nkind = "plate"\nat_mm = [20, 0, 12]\nsize_mm = [1, 2, {}]\n'
     path = tmp_path / "design.toml"
     path.write_text(text + plate.format(3) + plate.format("true"), encoding="utf-8")
@@ -300,7 +402,9 @@ def test_a_wrong_table_in_a_file_is_told_by_its_line(tmp_path: Path) -> None:
 def test_random_phases_of_several_sonotrodes_are_refused() -> None:
     data = design(sonotrodes=[WELL]).model_dump()
     data["sonotrode"]["motion"] = "random_phase"
-    with pytest.raises(InputError, match=r"sonotrode\.motion: given .random_phase. beside sonotrodes"):
+    with pytest.raises(
+        InputError, match=r"sonotrode\.motion: given .random_phase. beside sonotrodes"
+    ):
         checked(Design, data)
 
 
@@ -309,7 +413,11 @@ def test_their_numbers_vary_and_are_saved(tmp_path: Path) -> None:
     block = {"kind": "mesh", "at_mm": [0.0, 25.0, 20.0], "mesh": str(tmp_path / "block.stl")}
     hole = {"at_mm": [0, 0, 40], "axis": AXIS, "diameter_mm": 34.0, "depth_mm": 5.0}
     made = design(deflectors=[PLATE, block], holes=[hole], sonotrodes=[WELL])
-    names = ("chamber.deflectors.0.rotate_deg.1", "chamber.holes.0.depth_mm", "sonotrodes.0.at_mm.2")
+    names = (
+        "chamber.deflectors.0.rotate_deg.1",
+        "chamber.holes.0.depth_mm",
+        "sonotrodes.0.at_mm.2",
+    )
 
     other = made.with_values(dict(zip(names, (12.5, 6.0, 51.0), strict=True)))
 
@@ -335,7 +443,11 @@ def test_any_deflector_leaves_a_sound_chamber_or_is_refused(seed: int, plain: Ch
     rng = np.random.default_rng(seed)
     kinds = [
         {"kind": "plate", "size_mm": rng.uniform(0.5, 30, 3).tolist()},
-        {"kind": "rod", "diameter_mm": float(rng.uniform(1, 12)), "length_mm": float(rng.uniform(2, 60))},
+        {
+            "kind": "rod",
+            "diameter_mm": float(rng.uniform(1, 12)),
+            "length_mm": float(rng.uniform(2, 60)),
+        },
         {"kind": "ball", "diameter_mm": float(rng.uniform(1, 25))},
     ]
     place = rng.uniform((-40, -40, -2), (40, 40, 50)).tolist()
@@ -354,8 +466,15 @@ def test_any_deflector_leaves_a_sound_chamber_or_is_refused(seed: int, plain: Ch
 
 def test_bodies_of_one_file_that_overlap_count_once(plain: Chamber, tmp_path: Path) -> None:
     box = trimesh.creation.box((4, 4, 4))
-    trimesh.util.concatenate([box, box.copy().apply_translation((2, 0, 0))]).export(tmp_path / "two.stl")
-    vane = {"kind": "mesh", "mesh": str(tmp_path / "two.stl"), "unit": "mm", "at_mm": [28.0, 0.0, 12.0]}
+    trimesh.util.concatenate([box, box.copy().apply_translation((2, 0, 0))]).export(
+        tmp_path / "two.stl"
+    )
+    vane = {
+        "kind": "mesh",
+        "mesh": str(tmp_path / "two.stl"),
+        "unit": "mm",
+        "at_mm": [28.0, 0.0, 12.0],
+    }
     chamber = build_chamber(design([vane]))
 
     sound(chamber)
@@ -378,7 +497,12 @@ def test_deflectors_in_any_order_make_the_same_chamber() -> None:
 
 
 def test_no_shot_starts_in_a_bore_that_leads_below_the_sonotrode() -> None:
-    sump = {"at_mm": [25.0, 0.0, 20.0], "axis": [1.0, 0.0, -1.0], "diameter_mm": 12.0, "depth_mm": 60.0}
+    sump = {
+        "at_mm": [25.0, 0.0, 20.0],
+        "axis": [1.0, 0.0, -1.0],
+        "diameter_mm": 12.0,
+        "depth_mm": 60.0,
+    }
     asked = design(holes=[sump])
     chamber = build_chamber(asked)
     scene = build_scene(asked, chamber_mesh(chamber), seed=1)
@@ -389,23 +513,41 @@ def test_no_shot_starts_in_a_bore_that_leads_below_the_sonotrode() -> None:
 
 def test_a_file_of_a_deflector_is_not_told_as_the_part(tmp_path: Path) -> None:
     trimesh.creation.box((4, 4, 4)).export(tmp_path / "vane.stl")
-    vane = {"kind": "mesh", "mesh": str(tmp_path / "vane.stl"), "unit": "m", "at_mm": [28.0, 0.0, 12.0]}
+    vane = {
+        "kind": "mesh",
+        "mesh": str(tmp_path / "vane.stl"),
+        "unit": "m",
+        "at_mm": [28.0, 0.0, 12.0],
+    }
     with pytest.raises(InputError, match=r"chamber\.deflectors\.0\.mesh: .*with unit = 'm' "):
         build_chamber(design([vane]))
     notes = build_chamber(design([{**vane, "unit": "guess"}])).notes
     assert any(
-        "vane.stl: unit guessed as 'mm' (by its size): it measures 4 x 4 x 4 mm; give chamber.def" in n for n in notes
+        "vane.stl: unit guessed as 'mm' (by its size): it measures 4 x 4 x 4 mm; give chamber.def"
+        in n
+        for n in notes
     )
-    with pytest.raises(InputError, match=r"deflectors\.0\.mesh: given ''; allowed: a text in quotes \(mesh file"):
+    with pytest.raises(
+        InputError, match=r"deflectors\.0\.mesh: given ''; allowed: a text in quotes \(mesh file"
+    ):
         design([{**vane, "mesh": ""}])
 
 
 @pytest.mark.parametrize(
     ("fittings", "said"),
     [
-        ({"deflectors": [{**PLATE, "at_mm": [1e300, 0.0, 0.0]}]}, r"chamber\.deflectors\.0\.at_mm: given \[1e\+300"),
-        ({"sonotrodes": [sonotrode(at_mm=[0.0, -1e9, 0.0])]}, r"sonotrodes\.0\.at_mm: .*from -10000 to 10000 mm"),
-        ({"sonotrodes": [sonotrode()] * 51}, "sonotrodes: given .*; allowed: a list of at most 50 tables"),
+        (
+            {"deflectors": [{**PLATE, "at_mm": [1e300, 0.0, 0.0]}]},
+            r"chamber\.deflectors\.0\.at_mm: given \[1e\+300",
+        ),
+        (
+            {"sonotrodes": [sonotrode(at_mm=[0.0, -1e9, 0.0])]},
+            r"sonotrodes\.0\.at_mm: .*from -10000 to 10000 mm",
+        ),
+        (
+            {"sonotrodes": [sonotrode()] * 51},
+            "sonotrodes: given .*; allowed: a list of at most 50 tables",
+        ),
     ],
 )
 def test_too_far_and_too_many_are_refused(fittings: dict[str, Any], said: str) -> None:
@@ -419,5 +561,8 @@ def test_the_sides_of_a_plate_vary() -> None:
 
     assert "chamber.deflectors.0.size_mm.2" in asked.numbers()
     assert thicker.chamber.deflectors[0].size_mm == (10.0, 8.0, 5.0)
-    with pytest.raises(InputError, match=r"size_mm: given \[10.0, 8.0, 0.0\]; each side must be from 0.1 to 2000 mm"):
+    with pytest.raises(
+        InputError,
+        match=r"size_mm: given \[10.0, 8.0, 0.0\]; each side must be from 0.1 to 2000 mm",
+    ):
         asked.with_values({"chamber.deflectors.0.size_mm.2": 0.0})

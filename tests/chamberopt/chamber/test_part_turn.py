@@ -29,7 +29,9 @@ def mesh(design: Design):  # type: ignore[no-untyped-def]
 def written(tmp_path: Path, motion: str) -> Path:
     text = DESIGN.read_text(encoding="utf-8")
     line = next(line for line in text.splitlines() if line.startswith("part_turn"))
-    text = text.replace(line, f"part_turn = {motion}").replace('"parts/', f'"{(ROOT / "designs/parts").as_posix()}/')
+    text = text.replace(line, f"part_turn = {motion}").replace(
+        '"parts/', f'"{(ROOT / "designs/parts").as_posix()}/'
+    )
     path = tmp_path / "design.toml"
     path.write_text(text, encoding="utf-8")
     return path
@@ -42,9 +44,18 @@ def written(tmp_path: Path, motion: str) -> Path:
         ("{ rpm = 30, angle_deg = 20, frequency_hz = 1 }", "effects.part_turn.rpm: given beside"),
         ("{ angle_deg = 20 }", "effects.part_turn.angle_deg: given without frequency_hz"),
         ("{ frequency_hz = 2 }", "effects.part_turn.frequency_hz: given without angle_deg"),
-        ("{ rpm = 30, axis = [0, 0, 0] }", "effects.part_turn.axis: given .0, 0, 0., which points nowhere"),
-        ("{ rpm = 30, axis = [0, 1] }", "effects.part_turn.axis: too short; allowed: three numbers"),
-        ("{ rpm = 30, through_mm = 3 }", "effects.part_turn.through_mm: given 3; allowed: three numbers"),
+        (
+            "{ rpm = 30, axis = [0, 0, 0] }",
+            "effects.part_turn.axis: given .0, 0, 0., which points nowhere",
+        ),
+        (
+            "{ rpm = 30, axis = [0, 1] }",
+            "effects.part_turn.axis: too short; allowed: three numbers",
+        ),
+        (
+            "{ rpm = 30, through_mm = 3 }",
+            "effects.part_turn.through_mm: given 3; allowed: three numbers",
+        ),
         ("{ rpm = 100000 }", "effects.part_turn.rpm: given 100000"),
         ('{ rpm = "30" }', "write it without quotes"),
         ("{ rpn = 30 }", "unknown key; did you mean 'rpm'"),
@@ -52,13 +63,17 @@ def written(tmp_path: Path, motion: str) -> Path:
         ("true", "effects.part_turn: given true; allowed: a table"),
     ],
 )
-def test_what_is_wrong_is_said_in_the_words_of_the_file(tmp_path: Path, motion: str, words: str) -> None:
+def test_what_is_wrong_is_said_in_the_words_of_the_file(
+    tmp_path: Path, motion: str, words: str
+) -> None:
     with pytest.raises(InputError, match=words) as said:
         load_design(written(tmp_path, motion))
     assert len(str(said.value).splitlines()) == 1
 
 
-@pytest.mark.parametrize("motion", ["{ rpm = -3 }", "{ angle_deg = 20, frequency_hz = 1, axis = [0, 1, 0] }"])
+@pytest.mark.parametrize(
+    "motion", ["{ rpm = -3 }", "{ angle_deg = 20, frequency_hz = 1, axis = [0, 1, 0] }"]
+)
 def test_a_saved_design_loads_as_the_same(tmp_path: Path, motion: str) -> None:
     design = load_design(written(tmp_path, motion))
     save_design(design, tmp_path / "again.toml")
@@ -93,7 +108,10 @@ def test_a_part_that_cannot_turn_is_refused_before_anything_is_simulated(tmp_pat
 def test_too_short_a_simulation_of_a_slow_turn_is_remarked_on(tmp_path: Path, mesh) -> None:  # type: ignore[no-untyped-def]
     slow = load_design(written(tmp_path, "{ rpm = 1 }"))
     require_turnable(slow, mesh)
-    assert any("takes 60 s to turn once" in warning for warning in describe(slow, build_chamber(slow))["warnings"])
+    assert any(
+        "takes 60 s to turn once" in warning
+        for warning in describe(slow, build_chamber(slow))["warnings"]
+    )
 
 
 def test_the_shipped_study_is_about_the_turning_gear() -> None:
@@ -105,7 +123,9 @@ def test_the_shipped_study_is_about_the_turning_gear() -> None:
             require_turnable(changed, chamber_mesh(build_chamber(changed)))
 
 
-def test_balls_rest_beside_a_turning_part_if_asked_or_if_something_still_faces_up(design: Design, mesh) -> None:  # type: ignore[no-untyped-def]
+def test_balls_rest_beside_a_turning_part_if_asked_or_if_something_still_faces_up(
+    design: Design, mesh
+) -> None:  # type: ignore[no-untyped-def]
     """Here only the sonotrode and the gear do, and on neither of them a ball can lie still."""
     assert build_scene(design, mesh, 1).physics.rest is None
     asked = design.model_copy(update={"effects": design.effects.model_copy(update={"rest": True})})

@@ -29,7 +29,12 @@ def test_seeds_do_not_move() -> None:
     assert replica_seed(1, 0) == int.from_bytes(
         __import__("hashlib").sha256(b"chamberopt/search/1/0").digest()[:16], "big"
     )
-    every = {replica_seed(s, r, stream) for s in (1, 2) for r in range(50) for stream in ("search", "confirm")}
+    every = {
+        replica_seed(s, r, stream)
+        for s in (1, 2)
+        for r in range(50)
+        for stream in ("search", "confirm")
+    }
     assert len(every) == 200
     with pytest.raises(ValueError, match="stream"):
         replica_seed(1, 0, "other")
@@ -56,7 +61,9 @@ def test_what_the_design_says_is_in_the_scene(design, mesh) -> None:
     expected = [(m.C0, m.v0_m_s) for m in (materials.part, materials.sonotrode, materials.wall)]
     np.testing.assert_array_equal(by_tag, expected)
     assert scene.physics.gravity is not None
-    weightless = build_scene(design.model_copy(update={"effects": type(design.effects)(gravity=False)}), mesh, 1)
+    weightless = build_scene(
+        design.model_copy(update={"effects": type(design.effects)(gravity=False)}), mesh, 1
+    )
     assert weightless.physics.gravity is None
 
 
@@ -67,7 +74,10 @@ def test_friction_is_what_the_design_says_or_absent(design, mesh) -> None:
 
     assert build_scene(design, mesh, 1).physics.friction is None
     assert friction(mu=0.3, beta0=0.2) == (((0.3, 0.2),) * 3, (0.3, 0.2))
-    assert friction(mu=0.3, beta0=0.2, mu_balls=0.1, beta0_balls=-0.5) == (((0.3, 0.2),) * 3, (0.1, -0.5))
+    assert friction(mu=0.3, beta0=0.2, mu_balls=0.1, beta0_balls=-0.5) == (
+        ((0.3, 0.2),) * 3,
+        (0.1, -0.5),
+    )
 
 
 def test_contact_mode_is_on_where_a_ball_can_lie_still(design, mesh) -> None:
@@ -95,7 +105,9 @@ def test_effects_that_are_asked_for_are_in_the_scene(design, mesh) -> None:
     assert plain.physics.ball_collisions is not None
     effects = design.effects.model_copy(update={"drag": True, "ball_collisions": False})
     sonotrode = design.sonotrode.model_copy(update={"motion": "random_phase"})
-    asked = build_scene(design.model_copy(update={"effects": effects, "sonotrode": sonotrode}), mesh, 1)
+    asked = build_scene(
+        design.model_copy(update={"effects": effects, "sonotrode": sonotrode}), mesh, 1
+    )
     assert asked.physics.drag == Drag()
     assert asked.physics.ball_collisions is None
     other = build_scene(design.model_copy(update={"sonotrode": sonotrode}), mesh, 2)

@@ -21,7 +21,9 @@ def design_of(folder: Path, target: dict[str, Any], unit: str = "guess") -> Desi
     box = trimesh.creation.box((10, 20, 30))
     names = {(0, 0, 1): "Top", (0, 0, -1): "bottom", (1, 0, 0): "right", (-1, 0, 0): "left"}
     text = "".join(f"v {x} {y} {z}\n" for x, y, z in box.vertices)
-    for normal, face in zip(box.face_normals.round().astype(int).tolist(), box.faces + 1, strict=True):
+    for normal, face in zip(
+        box.face_normals.round().astype(int).tolist(), box.faces + 1, strict=True
+    ):
         text += f"g {names.get(tuple(normal), 'ends')}\nf {' '.join(map(str, face))}\n"
     (folder / "box.obj").write_text(text)
     data = load_design(GEAR).model_dump()
@@ -46,14 +48,19 @@ def target_area_mm2(chamber: Chamber) -> float:
         ({"surface": "ends", "box_mm": ((-99, 0, -99), (99, 99, 99))}, 300.0),
     ],
 )
-def test_names_choose_and_the_other_conditions_narrow(tmp_path: Path, target: dict[str, Any], area: float) -> None:
+def test_names_choose_and_the_other_conditions_narrow(
+    tmp_path: Path, target: dict[str, Any], area: float
+) -> None:
     assert target_area_mm2(build_chamber(design_of(tmp_path, target))) == pytest.approx(area)
 
 
 @pytest.mark.parametrize(
     ("surface", "said"),
     [
-        ("botom", r"part\.target\.surface: 'botom' is no name in the part's file; did you mean 'bottom'\?"),
+        (
+            "botom",
+            r"part\.target\.surface: 'botom' is no name in the part's file; did you mean 'bottom'\?",
+        ),
         (["left", "xyz"], r"'xyz' is no name .*allowed: all, .*bottom"),
     ],
 )
@@ -68,7 +75,9 @@ def test_a_file_without_names_says_so() -> None:
     data = load_design(GEAR).model_dump()
     data["part"]["target"]["surface"] = "flank"
 
-    with pytest.raises(InputError, match="'flank' is no name in the part's file; its file names none: 'all'"):
+    with pytest.raises(
+        InputError, match="'flank' is no name in the part's file; its file names none: 'all'"
+    ):
         build_chamber(Design.model_validate(data))
 
 
@@ -95,16 +104,23 @@ def test_elements_are_made_in_the_target_alone_and_cover_it_exactly(tmp_path: Pa
     normals = area_vectors(meshed.part.vertices, meshed.part.triangles)[meshed.part.target]
     assert (normals[:, 2] < 0).all()
     assert np.abs(normals[:, :2]).max() < 1e-5 * np.abs(normals[:, 2]).min()
-    assert any("target.element_mm = 1: the target's 2 triangles became" in note for note in meshed.notes)
+    assert any(
+        "target.element_mm = 1: the target's 2 triangles became" in note for note in meshed.notes
+    )
 
 
 def test_too_small_elements_are_refused_with_a_size_that_fits(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"part\.target\.element_mm: given 0\.01.*million triangles.*at least 0\.13"):
+    with pytest.raises(
+        InputError,
+        match=r"part\.target\.element_mm: given 0\.01.*million triangles.*at least 0\.13",
+    ):
         build_chamber(design_of(tmp_path, {"element_mm": 0.01}))
 
 
 def with_reachable(reachable: bool, **values: float) -> Design:
-    design = load_design(GEAR).with_values({name.replace("__", "."): value for name, value in values.items()})
+    design = load_design(GEAR).with_values(
+        {name.replace("__", "."): value for name, value in values.items()}
+    )
     target = design.part.target.model_copy(update={"reachable": reachable})
     return design.model_copy(update={"part": design.part.model_copy(update={"target": target})})
 
@@ -116,7 +132,10 @@ def test_what_the_shot_cannot_touch_can_be_left_out_of_the_target() -> None:
     assert (small.part.target <= whole.part.target).all()
     assert (large.part.target <= small.part.target).all()
     assert large.part.target.sum() < 0.8 * small.part.target.sum() < 0.8 * whole.part.target.sum()
-    roots = np.linalg.norm(whole.part.vertices[whole.part.triangles].mean(axis=1)[:, :2], axis=1) < 17.6e-3
+    roots = (
+        np.linalg.norm(whole.part.vertices[whole.part.triangles].mean(axis=1)[:, :2], axis=1)
+        < 17.6e-3
+    )
     assert not small.part.target[roots].all()
     (note,) = (note for note in small.notes if note.startswith("target.reachable: "))
     left = target_area_mm2(whole) - target_area_mm2(small)
@@ -133,12 +152,17 @@ def test_a_target_can_be_given_to_a_chamber() -> None:
     given = build_chamber(with_reachable(True)).part.target
     chamber = build_chamber(design, given)
     np.testing.assert_array_equal(chamber.part.target, given)
-    assert any("the target is what the shot reaches in the study's start" in note for note in chamber.notes)
+    assert any(
+        "the target is what the shot reaches in the study's start" in note for note in chamber.notes
+    )
 
 
 def test_a_target_that_no_ball_touches_is_refused(tmp_path: Path) -> None:
     """The box's upper side, 1 mm under the ceiling."""
     data = design_of(tmp_path, {"surface": "top", "reachable": True}).model_dump()
     data["chamber"]["height_mm"] = 46.0
-    with pytest.raises(InputError, match=r"part\.target\.reachable: a ball of 1\.5 mm touches nothing of the target"):
+    with pytest.raises(
+        InputError,
+        match=r"part\.target\.reachable: a ball of 1\.5 mm touches nothing of the target",
+    ):
         build_chamber(Design.model_validate(data))

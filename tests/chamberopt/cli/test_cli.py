@@ -35,7 +35,11 @@ WRONG = [
     Wrong("not utf-8", b'[part]\nmesh = "\xff"', ("not UTF-8", "byte 15", "save it as UTF-8")),
     Wrong("binary stl", b"solid\x00\x01\x02 = \x80", ("not UTF-8",)),
     Wrong("not toml", ("height_mm = 45", "height_mm : 45"), (":15", "not valid TOML", "column")),
-    Wrong("key given twice", ("height_mm = 45", "height_mm = 45\nheight_mm = 46"), ("not valid TOML", ":16")),
+    Wrong(
+        "key given twice",
+        ("height_mm = 45", "height_mm = 45\nheight_mm = 46"),
+        ("not valid TOML", ":16"),
+    ),
     Wrong(
         "misspelt key",
         ("height_mm = 45", "heigth_mm = 45"),
@@ -52,33 +56,71 @@ WRONG = [
         ("[shot]", "[shot]\nheight_mm = 3"),
         ("did you mean 'height_mm' in [chamber]",),
     ),
-    Wrong("missing key", ("diameter_mm = 70\n", ""), ("chamber.diameter_mm: missing", "from 2 to 2000 mm")),
+    Wrong(
+        "missing key",
+        ("diameter_mm = 70\n", ""),
+        ("chamber.diameter_mm: missing", "from 2 to 2000 mm"),
+    ),
     Wrong("no such unit", ('unit = "mm"', "unit = 1"), ("part.unit: given 1", '"mm"')),
-    Wrong("unknown unit", ('unit = "mm"', 'unit = "millimetre"'), ("given 'millimetre'", '"um", "mm"')),
+    Wrong(
+        "unknown unit", ('unit = "mm"', 'unit = "millimetre"'), ("given 'millimetre'", '"um", "mm"')
+    ),
     Wrong(
         "negative mass",
         ("mass_g = 5", "mass_g = -5"),
         (":23", "shot.mass_g: given -5", "from 0.0001 to 10000 g"),
     ),
-    Wrong("metres for mm", ("height_mm = 45", "height_mm = 0.045"), ("given 0.045", "from 2 to 2000 mm")),
-    Wrong("quoted number", ("amplitude_um = 40", 'amplitude_um = "40"'), ("given '40'", "without quotes")),
-    Wrong("true for a number", ("replicas = 8", "replicas = true"), ("replicas: given true", "a whole number")),
-    Wrong("fraction of a replica", ("replicas = 8", "replicas = 8.5"), ("given 8.5", "a whole number")),
+    Wrong(
+        "metres for mm",
+        ("height_mm = 45", "height_mm = 0.045"),
+        ("given 0.045", "from 2 to 2000 mm"),
+    ),
+    Wrong(
+        "quoted number",
+        ("amplitude_um = 40", 'amplitude_um = "40"'),
+        ("given '40'", "without quotes"),
+    ),
+    Wrong(
+        "true for a number",
+        ("replicas = 8", "replicas = true"),
+        ("replicas: given true", "a whole number"),
+    ),
+    Wrong(
+        "fraction of a replica", ("replicas = 8", "replicas = 8.5"), ("given 8.5", "a whole number")
+    ),
     Wrong("two replicas", ("replicas = 8", "replicas = 2"), ("given 2", "confidence interval")),
     Wrong("not a number", ("simulated_time_s = 1.5", "simulated_time_s = nan"), ("given nan",)),
     Wrong("unknown material", ('"steel"', '"steal"'), ("given 'steal'", "did you mean 'steel'")),
     Wrong("two densities", ('"steel"', '"steel"\ndensity_kg_m3 = 7800'), ("keep one of the two",)),
-    Wrong("restitution above 1", ("shot = { C0 = 0.91", "shot = { C0 = 1.2"), ("C0: given 1.2", "0.05 to 1")),
+    Wrong(
+        "restitution above 1",
+        ("shot = { C0 = 0.91", "shot = { C0 = 1.2"),
+        ("C0: given 1.2", "0.05 to 1"),
+    ),
     Wrong("no hardness", (", hardness_HB = 300", ""), (":33", "hardness_HB: missing", "HB")),
-    Wrong("unknown shape", ('"cylinder"', '"cylindre"'), ("given 'cylindre'", "did you mean 'cylinder'")),
+    Wrong(
+        "unknown shape",
+        ('"cylinder"', '"cylindre"'),
+        ("given 'cylindre'", "did you mean 'cylinder'"),
+    ),
     Wrong(
         "part above the lid",
         ("sonotrode_distance_mm = 15", "sonotrode_distance_mm = 50"),
         ("given 50", "lower it"),
     ),
-    Wrong("ball too big", ("diameter_mm = 1.5 ", "diameter_mm = 18 "), ("given 18", "smaller ball")),
-    Wrong("mesh not there", ("parts/gear.stl", "parts/gaer.stl"), (":4", "no such mesh file", "gear.stl")),
-    Wrong("angle without direction", ("direction = [0, 0, 1]\n", ""), ("angle_deg", "give both or neither")),
+    Wrong(
+        "ball too big", ("diameter_mm = 1.5 ", "diameter_mm = 18 "), ("given 18", "smaller ball")
+    ),
+    Wrong(
+        "mesh not there",
+        ("parts/gear.stl", "parts/gaer.stl"),
+        (":4", "no such mesh file", "gear.stl"),
+    ),
+    Wrong(
+        "angle without direction",
+        ("direction = [0, 0, 1]\n", ""),
+        ("angle_deg", "give both or neither"),
+    ),
     Wrong("two of three", ("[0, 0, 1]", "[0, 1]"), ("direction: too short", "three numbers")),
     Wrong(
         "misspelt parameter",
@@ -86,11 +128,26 @@ WRONG = [
         (":5", "did you mean 'chamber.height_mm'"),
         STUDY,
     ),
-    Wrong("bounds reversed", ("[28, 60]", "[60, 28]"), ("given [60, 28]", "low must be below high"), STUDY),
+    Wrong(
+        "bounds reversed",
+        ("[28, 60]", "[60, 28]"),
+        ("given [60, 28]", "low must be below high"),
+        STUDY,
+    ),
     Wrong("start out of bounds", ("[28, 60]", "[50, 60]"), ("starts at 45", "widen"), STUDY),
     Wrong("unknown algorithm", ('"auto"', '"BOBYQA"'), ("did you mean 'LN_BOBYQA'",), STUDY),
-    Wrong("no budget", ("evaluations = 20", "evaluations = 0"), ("evaluations: given 0", "from 2"), STUDY),
-    Wrong("design not there", ("gear.toml", "gaer.toml"), (":2", "no such design file", "gear.toml?"), STUDY),
+    Wrong(
+        "no budget",
+        ("evaluations = 20", "evaluations = 0"),
+        ("evaluations: given 0", "from 2"),
+        STUDY,
+    ),
+    Wrong(
+        "design not there",
+        ("gear.toml", "gaer.toml"),
+        (":2", "no such design file", "gear.toml?"),
+        STUDY,
+    ),
     Wrong(
         "unknown metric",
         ("[optimizer]", "[constraints]\ncoverage = { min = 1 }\n[optimizer]"),
@@ -136,7 +193,9 @@ def chamberopt(capsys: pytest.CaptureFixture[str]) -> Said:
 
 def in_a_shell(*arguments: object) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "chamberopt", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, encoding="utf-8", check=False, timeout=120)
+    return subprocess.run(
+        command, capture_output=True, text=True, encoding="utf-8", check=False, timeout=120
+    )
 
 
 @pytest.mark.parametrize("wrong", WRONG, ids=lambda wrong: wrong.name)
@@ -181,7 +240,10 @@ class TestWrongCalls:
     def test_a_folder(self, copies: Path, chamberopt: Said) -> None:
         status, _, err = chamberopt("check", copies / "designs")
         assert status == 2
-        assert "is a folder; give a design or study file (.toml); files in it: blade.toml, blade_conformal.toml" in err
+        assert (
+            "is a folder; give a design or study file (.toml); files in it: blade.toml, blade_conformal.toml"
+            in err
+        )
 
     def test_study_to_simulate_and_design_to_run(self, copies: Path, chamberopt: Said) -> None:
         status, _, err = chamberopt("simulate", copies / "studies" / "gear.toml")
@@ -203,7 +265,9 @@ class TestWrongCalls:
     def test_results_are_never_overwritten(self, copies: Path, chamberopt: Said) -> None:
         (copies / "out").mkdir()
         (copies / "out" / "result.json").write_text("{}")
-        status, _, err = chamberopt("simulate", copies / "designs" / "gear.toml", "--out", copies / "out")
+        status, _, err = chamberopt(
+            "simulate", copies / "designs" / "gear.toml", "--out", copies / "out"
+        )
         assert (status, "never overwritten" in err) == (2, True)
         assert (copies / "out" / "result.json").read_text() == "{}"
 
@@ -221,7 +285,9 @@ class TestWrongCalls:
         assert status == 2
         assert str(mesh) in err
 
-    def test_interrupt(self, copies: Path, chamberopt: Said, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_interrupt(
+        self, copies: Path, chamberopt: Said, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
         def ctrl_c(*_: object) -> None:
             raise KeyboardInterrupt
 
@@ -231,14 +297,18 @@ class TestWrongCalls:
 
 
 class TestCheck:
-    @pytest.mark.parametrize("name", ["designs/gear", "designs/plate", "designs/blade", "studies/gear"])
+    @pytest.mark.parametrize(
+        "name", ["designs/gear", "designs/plate", "designs/blade", "studies/gear"]
+    )
     def test_shipped(self, name: str, chamberopt: Said) -> None:
         status, out, err = chamberopt("check", "--no-pilot", ROOT / f"{name}.toml")
         assert (status, err) == (0, "")
         assert "shot.balls" in out
 
     def test_plate_has_the_papers_thirty_balls(self, chamberopt: Said) -> None:
-        status, out, _ = chamberopt("check", "--no-pilot", ROOT / "designs" / "plate.toml", "--json")
+        status, out, _ = chamberopt(
+            "check", "--no-pilot", ROOT / "designs" / "plate.toml", "--json"
+        )
         facts = json.loads(out)
         assert status == 0
         assert facts["shot"]["balls"] == 30
@@ -247,7 +317,9 @@ class TestCheck:
         assert facts["chamber"]["free_volume_cm3"] == pytest.approx(area * 15 / 1000, rel=1e-5)
         assert facts["part"]["exposed_area_mm2"] == pytest.approx(area, rel=1e-5)
 
-    def test_warns_of_a_crowded_and_of_a_narrow_chamber(self, copies: Path, chamberopt: Said) -> None:
+    def test_warns_of_a_crowded_and_of_a_narrow_chamber(
+        self, copies: Path, chamberopt: Said
+    ) -> None:
         path = copies / "designs" / "gear.toml"
         text = path.read_text(encoding="utf-8").replace("mass_g = 5", "mass_g = 240")
         path.write_text(text.replace("height_mm = 45", "height_mm = 26"), encoding="utf-8")
@@ -256,13 +328,16 @@ class TestCheck:
         assert status == 0
         assert any("hinder each other" in text for text in warnings)
         assert any(
-            "gap between the ceiling and the part's upper side" in text and "is 1 to 1.09 mm" in text
+            "gap between the ceiling and the part's upper side" in text
+            and "is 1 to 1.09 mm" in text
             for text in warnings
         )
 
     def test_a_guessed_unit_is_said(self, copies: Path, chamberopt: Said) -> None:
         path = copies / "designs" / "gear.toml"
-        path.write_text(path.read_text(encoding="utf-8").replace('unit = "mm"', ""), encoding="utf-8")
+        path.write_text(
+            path.read_text(encoding="utf-8").replace('unit = "mm"', ""), encoding="utf-8"
+        )
         status, out, _ = chamberopt("check", "--no-pilot", path)
         assert status == 0
         assert "unit guessed as 'mm' (by its size): the part measures 44 x 44 x 70 mm" in out
@@ -274,7 +349,9 @@ class TestCheck:
         drawn: list[tuple[str, int, int, int]] = []
         none = np.zeros(0)
 
-        def draw(corners, title: str, picture, marked=none, edges=none, missed=none, chamber=None) -> None:  # type: ignore[no-untyped-def]
+        def draw(
+            corners, title: str, picture, marked=none, edges=none, missed=none, chamber=None
+        ) -> None:  # type: ignore[no-untyped-def]
             drawn.append((title, int(marked.sum()), len(edges), int(missed.sum())))
 
         monkeypatch.setattr("chamberopt.output.viewer.part_picture", draw)
@@ -299,7 +376,9 @@ class TestCheck:
 
     def test_out(self, tmp_path: Path, chamberopt: Said) -> None:
         out = tmp_path / "out"
-        status, said, _ = chamberopt("check", "--no-pilot", ROOT / "designs" / "gear.toml", "--out", out)
+        status, said, _ = chamberopt(
+            "check", "--no-pilot", ROOT / "designs" / "gear.toml", "--out", out
+        )
         assert status == 0
         assert str(out) in said
         assert json.loads((out / "check.json").read_text(encoding="utf-8"))["shot"]["balls"] == 363
@@ -340,10 +419,14 @@ class TestWhole:
         for line in ("replicas = 8", "simulated_time_s = 4.0", "warmup_time_s = 0.2"):
             assert line in text
         text = text.replace("replicas = 8", "replicas = 3").replace("time_s = 4.0", "time_s = 0.05")
-        design.write_text(text.replace("warmup_time_s = 0.2", "warmup_time_s = 0.01"), encoding="utf-8")
+        design.write_text(
+            text.replace("warmup_time_s = 0.2", "warmup_time_s = 0.01"), encoding="utf-8"
+        )
         study = "[optimizer]\nevaluations = 3\nconfirm = 1\nconfirm_replicas = 3\n"
         study += '[vary]\n"shot.mass_g" = [2, 5]\n'
-        Path("studies/small.toml").write_text(f'design = "../designs/plate.toml"\n{study}', encoding="utf-8")
+        Path("studies/small.toml").write_text(
+            f'design = "../designs/plate.toml"\n{study}', encoding="utf-8"
+        )
         return copies
 
     def test_simulate_compare_inspect(self, small: Path, chamberopt: Said) -> None:
@@ -353,7 +436,9 @@ class TestWhole:
         assert 0.0 < first["metrics"]["mean_coverage"]["value"] <= 1.0
 
         # What was saved is the same design, gives the same bits, and goes to the next free folder.
-        status, out, _ = chamberopt("simulate", Path("results/plate/design.toml"), "--out", "again", "--json")
+        status, out, _ = chamberopt(
+            "simulate", Path("results/plate/design.toml"), "--out", "again", "--json"
+        )
         again = json.loads(out)
         assert status == 0
         assert (again["objective"], again["metrics"]) == (first["objective"], first["metrics"])
@@ -369,7 +454,10 @@ class TestWhole:
     def test_compare_simulates_designs_on_common_seeds(
         self, small: Path, chamberopt: Said, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr("chamberopt.output.viewer.subprocess_drawing.why_no_pictures", lambda: "not in this test")
+        monkeypatch.setattr(
+            "chamberopt.output.viewer.subprocess_drawing.why_no_pictures",
+            lambda: "not in this test",
+        )
         text = Path("designs/plate.toml").read_text(encoding="utf-8")
         heavier = text.replace("mass_g = 3.308", "mass_g = 9.9").replace("seed = 1", "seed = 5")
         Path("designs/heavier.toml").write_text(heavier, encoding="utf-8")
@@ -391,7 +479,9 @@ class TestWhole:
 
     def test_compare_refuses_before_it_makes_a_folder(self, small: Path, chamberopt: Said) -> None:
         text = Path("designs/plate.toml").read_text(encoding="utf-8")
-        Path("designs/longer.toml").write_text(text.replace("time_s = 5", "time_s = 7"), encoding="utf-8")
+        Path("designs/longer.toml").write_text(
+            text.replace("time_s = 5", "time_s = 7"), encoding="utf-8"
+        )
         status, out, err = chamberopt("compare", "designs/plate.toml", "designs/longer.toml")
         assert (status, out, err.count("\n")) == (2, "", 1)
         assert "--treatment-time-s" in err
@@ -402,7 +492,10 @@ class TestWhole:
     def test_simulate_analytically(self, small: Path, chamberopt: Said) -> None:
         status, out, _ = chamberopt("simulate", "designs/plate.toml", "--analytic", "--json")
         folder = Path(json.loads(out)["folder"])
-        assert (status, json.loads((folder / "result.json").read_text(encoding="utf-8"))["analytic"]) == (0, True)
+        assert (
+            status,
+            json.loads((folder / "result.json").read_text(encoding="utf-8"))["analytic"],
+        ) == (0, True)
         status, _, err = chamberopt("simulate", "designs/gear.toml", "--analytic")
         assert (status, err.count("\n")) == (2, 1)
         assert "the part reaches into the cavity" in err
@@ -417,10 +510,27 @@ class TestWhole:
         status, out, _ = chamberopt("inspect", "results/plate", "--screenshot", "look.png")
         assert (status, out.splitlines()[-1]) == (0, "picture in look.png")
         assert Path("look.png").stat().st_size > 10_000
-        options = ["--quantity", "speed", "--below", "90", "--clip", "Y=1", "--triangle", "7", "--view", "1,-1,1"]
-        status, out, _ = chamberopt("inspect", "results/plate", "results/plate", *options, "--off-screen", "--json")
+        options = [
+            "--quantity",
+            "speed",
+            "--below",
+            "90",
+            "--clip",
+            "Y=1",
+            "--triangle",
+            "7",
+            "--view",
+            "1,-1,1",
+        ]
+        status, out, _ = chamberopt(
+            "inspect", "results/plate", "results/plate", *options, "--off-screen", "--json"
+        )
         said = json.loads(out)
-        assert (status, said["screenshot"], len(said["folders"])) == (0, str(Path("results/inspect/inspect.png")), 2)
+        assert (status, said["screenshot"], len(said["folders"])) == (
+            0,
+            str(Path("results/inspect/inspect.png")),
+            2,
+        )
         assert Path("results/inspect/inspect.png").stat().st_size > 10_000
         for wrong, why in (
             (["--quantity", "sped"], "did you mean speed"),
@@ -440,7 +550,9 @@ class TestWhole:
         status, out, _ = chamberopt("check", "--no-pilot", best, "--json")
         assert status == 0
         assert 2 <= json.loads(out)["shot"]["mass_g"] <= 5.1
-        status, again, err = chamberopt("run", "studies/small.toml", "--out", "results/small", "--json")
+        status, again, err = chamberopt(
+            "run", "studies/small.toml", "--out", "results/small", "--json"
+        )
         assert (status, json.loads(again), "nothing was run" in err) == (0, result, True)
         status, _, err = chamberopt("run", "studies/gear.toml", "--out", "results/small")
         assert (status, "began otherwise" in err) == (2, True)
@@ -455,7 +567,9 @@ class TestWhole:
         text = path.read_text(encoding="utf-8")
         path.write_text(text.replace("mass_g = 3.308", "mass_g = 0.5"), encoding="utf-8")
         study = Path("studies/small.toml")
-        study.write_text(study.read_text(encoding="utf-8").replace("[2, 5]", "[0.48, 0.5]"), encoding="utf-8")
+        study.write_text(
+            study.read_text(encoding="utf-8").replace("[2, 5]", "[0.48, 0.5]"), encoding="utf-8"
+        )
         for command, file in (("simulate", path), ("run", study)):
             status, out, err = chamberopt(command, file, "--json")
             assert (status, bool(json.loads(out))) == (0, True)
@@ -464,7 +578,10 @@ class TestWhole:
     def test_shot_that_does_not_fit(self, small: Path, chamberopt: Said) -> None:
         """45 % of the cylinder passes the file's check, but the plate takes a quarter of that: no room."""
         path = Path("designs/plate.toml")
-        path.write_text(path.read_text(encoding="utf-8").replace("mass_g = 3.308", "mass_g = 140"), encoding="utf-8")
+        path.write_text(
+            path.read_text(encoding="utf-8").replace("mass_g = 3.308", "mass_g = 140"),
+            encoding="utf-8",
+        )
         status, out, err = chamberopt("simulate", path)
         assert (status, out) == (2, "")
         assert "Traceback" not in err

@@ -6,7 +6,14 @@ import pytest
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import SerialExecutor
-from chamberopt.coverage.dents import Samples, few_points_note, mark, marked_share, nearest_on_triangles, sample_points
+from chamberopt.coverage.dents import (
+    Samples,
+    few_points_note,
+    mark,
+    marked_share,
+    nearest_on_triangles,
+    sample_points,
+)
 from chamberopt.coverage.tally import dent_diameters
 from chamberopt.design.load import load_design
 from chamberopt.design.shot import ShotSize
@@ -16,7 +23,9 @@ from tests.helpers.synthetic import DESIGNS, impact_log, plate_design
 UP = np.array([0.0, 0.0, 1.0])
 
 
-def square(side: float, spacing: float, normal: np.ndarray = UP, corner: tuple[float, ...] = (0, 0, 0)) -> Samples:
+def square(
+    side: float, spacing: float, normal: np.ndarray = UP, corner: tuple[float, ...] = (0, 0, 0)
+) -> Samples:
     """Points on a square whose sides leave `corner` along y and across y and the normal, in 100 patches."""
     along = np.arange(0.5 * spacing, side, spacing)
     u, v = (grid.ravel() for grid in np.meshgrid(along, along))
@@ -27,19 +36,36 @@ def square(side: float, spacing: float, normal: np.ndarray = UP, corner: tuple[f
 
 
 def together(*parts: Samples) -> Samples:
-    return Samples(*(np.concatenate([getattr(p, f) for p in parts]) for f in ("place", "normal", "triangle", "area")))
+    return Samples(
+        *(
+            np.concatenate([getattr(p, f) for p in parts])
+            for f in ("place", "normal", "triangle", "area")
+        )
+    )
 
 
-def marked_area(samples: Samples, places: list, radius: float, normals: list | None = None) -> float:
+def marked_area(
+    samples: Samples, places: list, radius: float, normals: list | None = None
+) -> float:
     k = len(places)
     normal = np.tile(UP, (k, 1)) if normals is None else np.array(normals, dtype=float)
-    first = mark(samples, np.array(places, dtype=float), normal, np.full(k, radius), np.arange(k, dtype=float))
+    first = mark(
+        samples,
+        np.array(places, dtype=float),
+        normal,
+        np.full(k, radius),
+        np.arange(k, dtype=float),
+    )
     return float(samples.area[np.isfinite(first)].sum())
 
 
 def test_one_dent_has_its_area_across_triangles() -> None:
     plane = square(10.0, 0.02)
-    for place in ([5.5, 5.5, 0.0], [5.0, 5.0, 0.0], [4.2, 6.1, 0.0]):  # inside one triangle, or over four
+    for place in (
+        [5.5, 5.5, 0.0],
+        [5.0, 5.0, 0.0],
+        [4.2, 6.1, 0.0],
+    ):  # inside one triangle, or over four
         assert marked_area(plane, [place], 0.45) == pytest.approx(np.pi * 0.45**2, rel=0.01)
 
 
@@ -47,10 +73,14 @@ def test_overlap_counts_once() -> None:
     plane, r, apart = square(10.0, 0.02), 0.5, 0.6
     lens = 2 * r**2 * np.arccos(apart / (2 * r)) - 0.5 * apart * np.sqrt(4 * r**2 - apart**2)
     assert marked_area(plane, [[4, 4, 0], [4, 4, 0]], r) == pytest.approx(np.pi * r**2, rel=0.01)
-    assert marked_area(plane, [[4, 4, 0], [4 + apart, 4, 0]], r) == pytest.approx(2 * np.pi * r**2 - lens, rel=0.01)
+    assert marked_area(plane, [[4, 4, 0], [4 + apart, 4, 0]], r) == pytest.approx(
+        2 * np.pi * r**2 - lens, rel=0.01
+    )
 
 
-@pytest.mark.parametrize("angle", [30.0, 90.0, 150.0, -60.0], ids=["blunt", "right", "sharp", "hollow"])
+@pytest.mark.parametrize(
+    "angle", [30.0, 90.0, 150.0, -60.0], ids=["blunt", "right", "sharp", "hollow"]
+)
 @pytest.mark.parametrize("beside", [0.0, 0.2])
 def test_a_disc_bends_round_an_edge_and_keeps_its_area(angle: float, beside: float) -> None:
     """Two half-planes meeting in the line x = 0; unfolded they are one."""
@@ -64,9 +94,13 @@ def test_a_disc_bends_round_an_edge_and_keeps_its_area(angle: float, beside: flo
 
 def test_the_far_side_of_a_blade_and_the_next_wall_of_a_slot_stay_bare() -> None:
     top, below = square(4.0, 0.02), square(4.0, 0.02, -UP, (4.0, 0.0, -0.05))
-    assert marked_area(together(top, below), [[2, 2, 0]], 0.4) == pytest.approx(np.pi * 0.16, rel=0.01)
+    assert marked_area(together(top, below), [[2, 2, 0]], 0.4) == pytest.approx(
+        np.pi * 0.16, rel=0.01
+    )
     above = square(4.0, 0.02, -UP, (4.0, 0.0, 0.05))
-    assert marked_area(together(top, above), [[2, 2, 0]], 0.4) == pytest.approx(np.pi * 0.16, rel=0.01)
+    assert marked_area(together(top, above), [[2, 2, 0]], 0.4) == pytest.approx(
+        np.pi * 0.16, rel=0.01
+    )
 
 
 def test_random_dents_cover_what_avrami_says_at_any_time() -> None:
@@ -77,7 +111,9 @@ def test_random_dents_cover_what_avrami_says_at_any_time() -> None:
         place = np.column_stack(
             [rng.uniform(-r, 10 + r, (count, 2)), np.zeros(count)]
         )  # spilling over the rim both ways
-        first = mark(plane, place, np.tile(UP, (count, 1)), np.full(count, r), np.linspace(0.0, 1.0, count))
+        first = mark(
+            plane, place, np.tile(UP, (count, 1)), np.full(count, r), np.linspace(0.0, 1.0, count)
+        )
         shares.append([np.mean(first <= t) for t in (0.25, 0.5, 1.0)])
     got, error = np.mean(shares, axis=0), np.std(shares, axis=0, ddof=1) / np.sqrt(12)
     density = count * np.pi * r**2 / (10 + 2 * r) ** 2
@@ -100,7 +136,9 @@ def test_contact_is_the_nearest_point_of_the_triangle(size: float) -> None:
     corners = np.tile(np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), (4, 1, 1))
     balls = np.array([[0.2, 0.2, 0.5], [0.5, -0.3, 0.4], [-1.0, -1.0, 0.1], [0.7, 0.01, 1.0]])
     contacts = np.array([[0.2, 0.2, 0], [0.5, 0, 0], [0, 0, 0], [0.7, 0.01, 0]])
-    np.testing.assert_allclose(nearest_on_triangles(size * corners, size * balls), size * contacts, atol=1e-12 * size)
+    np.testing.assert_allclose(
+        nearest_on_triangles(size * corners, size * balls), size * contacts, atol=1e-12 * size
+    )
 
 
 def test_points_cover_the_exposed_part_evenly() -> None:
@@ -122,17 +160,24 @@ def test_each_ball_of_a_mix_leaves_dents_of_its_own_size() -> None:
     shot = plate_design().shot.model_copy(update={"diameter_mm": None, "mix": mix})
     design = plate_design().model_copy(update={"shot": shot})
     ends = np.array([0, shot.count - 1])
-    small, large = dent_diameters(impact_log([0, 0], np.full((2, 3), 3.0), [3.0, 3.0], ends), design)
+    small, large = dent_diameters(
+        impact_log([0, 0], np.full((2, 3), 3.0), [3.0, 3.0], ends), design
+    )
     assert 0.0 < small == pytest.approx(large * 2.0 / 3.0)
 
 
 def marking_design(**values: float):  # type: ignore[no-untyped-def]
     """The plate, every dent marked over half a second."""
     design = plate_design(
-        process__treatment_time_s=0.5, process__accuracy__replicas=4, process__accuracy__warmup_time_s=0.1, **values
+        process__treatment_time_s=0.5,
+        process__accuracy__replicas=4,
+        process__accuracy__warmup_time_s=0.1,
+        **values,
     )
     accuracy = design.process.accuracy.model_copy(update={"coverage_model": "dents"})
-    return design.model_copy(update={"process": design.process.model_copy(update={"accuracy": accuracy})})
+    return design.model_copy(
+        update={"process": design.process.model_copy(update={"accuracy": accuracy})}
+    )
 
 
 def test_both_models_agree_on_the_mean_and_the_marks_grow_with_time() -> None:
@@ -153,8 +198,14 @@ def test_both_models_agree_on_the_mean_and_the_marks_grow_with_time() -> None:
 
 
 def test_a_treatment_too_long_to_simulate_is_refused(tmp_path) -> None:  # type: ignore[no-untyped-def]
-    text = (DESIGNS / "plate.toml").read_text(encoding="utf-8").replace("replicas = 8", 'coverage_model = "dents"')
-    text = text.replace('"parts/', f'"{DESIGNS}/parts/').replace("treatment_time_s = 5\n", "treatment_time_s = 5000\n")
+    text = (
+        (DESIGNS / "plate.toml")
+        .read_text(encoding="utf-8")
+        .replace("replicas = 8", 'coverage_model = "dents"')
+    )
+    text = text.replace('"parts/', f'"{DESIGNS}/parts/').replace(
+        "treatment_time_s = 5\n", "treatment_time_s = 5000\n"
+    )
     (tmp_path / "long.toml").write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match=r"process\.accuracy\.coverage_model.*avrami"):
         load_design(tmp_path / "long.toml")

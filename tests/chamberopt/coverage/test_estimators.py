@@ -8,7 +8,12 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import SerialExecutor, local_executor
 from chamberopt.coverage.estimators import _at_most, few_dents_note, surface
 from chamberopt.coverage.metrics import METRICS, OBJECTIVES
-from chamberopt.coverage.statistics.interval import Estimate, estimate, independent_difference, paired_difference
+from chamberopt.coverage.statistics.interval import (
+    Estimate,
+    estimate,
+    independent_difference,
+    paired_difference,
+)
 from chamberopt.coverage.statistics.triangle_patches import patches
 from chamberopt.coverage.tally import Tally
 from chamberopt.design.design import checked
@@ -33,15 +38,17 @@ def truth() -> float:
 def uniform_coverage(replicas: list[Tally]) -> Estimate:
     """As evaluate() estimates it."""
     names = ("mean_coverage", "std_coverage")
-    metrics = dict(zip(names, jackknife(replicas, [METRICS[n] for n in names], CHAMBER, DESIGN), strict=True))
+    metrics = dict(
+        zip(names, jackknife(replicas, [METRICS[n] for n in names], CHAMBER, DESIGN), strict=True)
+    )
     return weighted(OBJECTIVES["uniform_coverage"], metrics)
 
 
 def uncorrected(replicas: list[Tally]) -> float:
     total = sum(replicas[1:], replicas[0])
-    return METRICS["mean_coverage"].function(total, CHAMBER, DESIGN) - METRICS["std_coverage"].function(
-        total, CHAMBER, DESIGN
-    )
+    return METRICS["mean_coverage"].function(total, CHAMBER, DESIGN) - METRICS[
+        "std_coverage"
+    ].function(total, CHAMBER, DESIGN)
 
 
 def poisson_replicas(rng: np.random.Generator, replicas: int, seconds: float) -> list[Tally]:
@@ -85,7 +92,13 @@ def test_95_percent_intervals_hold_the_truth_as_often() -> None:
     for _ in range(200):
         replicas = poisson_replicas(rng, 8, 6.0)
         names = ("mean_coverage", "std_coverage")
-        got = dict(zip(names, jackknife(replicas, [METRICS[n] for n in names], CHAMBER, DESIGN), strict=True))
+        got = dict(
+            zip(
+                names,
+                jackknife(replicas, [METRICS[n] for n in names], CHAMBER, DESIGN),
+                strict=True,
+            )
+        )
         got["uniform_coverage"] = weighted(OBJECTIVES["uniform_coverage"], got)
         for name, value in true.items():
             held[name] += got[name].low <= value <= got[name].high
@@ -100,10 +113,14 @@ def test_the_poorest_twentieth_is_held_by_its_interval_however_short_the_simulat
     for seconds in (2.0, 8.0, 32.0):
         held, width = 0, 0.0
         for _ in range(40):
-            [got] = jackknife(poisson_replicas(rng, 8, seconds), [METRICS["p05_coverage"]], CHAMBER, DESIGN)
+            [got] = jackknife(
+                poisson_replicas(rng, 8, seconds), [METRICS["p05_coverage"]], CHAMBER, DESIGN
+            )
             held += got.low <= true <= got.high
             width += got.half_width / 40
-        assert held >= 37, seconds  # its shape cannot be known from counts: it may be held more often than 95 %
+        assert held >= 37, (
+            seconds
+        )  # its shape cannot be known from counts: it may be held more often than 95 %
         widths.append(width)
     assert widths[0] > widths[1] > widths[2]
 
@@ -115,7 +132,9 @@ def test_an_even_part_is_not_better_than_its_mean() -> None:
     counts = rng.poisson(0.4, (8, 400))
     replicas = [equal_dents(1.0, k, 0.2e-6) for k in counts]
     names = ("mean_coverage", "std_coverage")
-    metrics = dict(zip(names, jackknife(replicas, [METRICS[n] for n in names], even, DESIGN), strict=True))
+    metrics = dict(
+        zip(names, jackknife(replicas, [METRICS[n] for n in names], even, DESIGN), strict=True)
+    )
     goal = weighted(OBJECTIVES["uniform_coverage"], metrics)
     assert metrics["std_coverage"].value >= 0.0
     assert goal.value == metrics["mean_coverage"].value - metrics["std_coverage"].value <= 1.0
@@ -132,7 +151,12 @@ def test_differences() -> None:
     assert apart.half_width > 0.5  # not so when they are taken as independent
     same = paired_difference(before, before)
     assert (same.value, same.half_width) == (0.0, 0.0)
-    assert independent_difference(Estimate(1.0, 0.0, (1.0, 1.0)), Estimate(0.0, 0.0, (0.0, 0.0))).half_width == 0
+    assert (
+        independent_difference(
+            Estimate(1.0, 0.0, (1.0, 1.0)), Estimate(0.0, 0.0, (0.0, 0.0))
+        ).half_width
+        == 0
+    )
 
 
 def test_value_stays_in_its_range_and_one_replica_has_no_interval() -> None:
@@ -142,7 +166,10 @@ def test_value_stays_in_its_range_and_one_replica_has_no_interval() -> None:
 
 def test_what_is_made_of_a_clipped_value_agrees_with_its_interval() -> None:
     """A correction that overshoots is clipped; objective and gain must not keep the overshoot in their intervals."""
-    metrics = {"mean_coverage": estimate([0.7, 0.8, 0.75]), "std_coverage": estimate([0.6, 0.7, 0.62], 0.0, 0.5)}
+    metrics = {
+        "mean_coverage": estimate([0.7, 0.8, 0.75]),
+        "std_coverage": estimate([0.6, 0.7, 0.62], 0.0, 0.5),
+    }
     goal = weighted(OBJECTIVES["uniform_coverage"], metrics)
     assert goal.value == pytest.approx(0.75 - 0.5)
     assert np.mean(goal.pseudovalues) == pytest.approx(goal.value)
@@ -184,9 +211,14 @@ def test_evaluate_gives_the_same_numbers_on_any_number_of_workers() -> None:
 
 def accurate(coverage: float, most: int) -> Design:
     """The plate in short replicas, as many as make the objective known to within this, or at most so many."""
-    design = plate_design(process__accuracy__simulated_time_s=0.05, process__accuracy__warmup_time_s=0.02)
+    design = plate_design(
+        process__accuracy__simulated_time_s=0.05, process__accuracy__warmup_time_s=0.02
+    )
     accuracy = {**design.process.accuracy.model_dump(), "coverage": coverage, "most_replicas": most}
-    return checked(Design, {**design.model_dump(), "process": {**design.process.model_dump(), "accuracy": accuracy}})
+    return checked(
+        Design,
+        {**design.model_dump(), "process": {**design.process.model_dump(), "accuracy": accuracy}},
+    )
 
 
 def test_replicas_are_added_until_the_accuracy_holds_or_the_budget_ends() -> None:
@@ -214,9 +246,13 @@ def test_an_accuracy_that_cannot_be_is_refused() -> None:
 
 def test_how_many_replicas_come_next() -> None:
     assert replicas_wanted(10, 0.01, 0.01, 200) == 10  # reached
-    assert replicas_wanted(10, 0.0101, 0.01, 200) == 13  # at least a quarter more: few looks, little luck
+    assert (
+        replicas_wanted(10, 0.0101, 0.01, 200) == 13
+    )  # at least a quarter more: few looks, little luck
     assert replicas_wanted(10, 0.013, 0.01, 200) == 17  # as foretold
-    assert replicas_wanted(10, 1.0, 0.01, 200) == 20  # but no more than twice: what foretells is rough
+    assert (
+        replicas_wanted(10, 1.0, 0.01, 200) == 20
+    )  # but no more than twice: what foretells is rough
     assert replicas_wanted(150, 1.0, 0.01, 200) == 200
     assert replicas_wanted(200, 1.0, 0.01, 200) == 200  # spent
     assert replicas_wanted(10, np.inf, 0.01, 200) == 20
@@ -255,7 +291,18 @@ def of_all_sizes(rng: np.random.Generator, seconds: float) -> list[Tally]:
         dents = rng.poisson(CLUMPED * seconds)
         triangle = np.repeat(np.arange(400), dents)
         area = DENT * (0.5 + CLUMPED[triangle] / 0.5) * rng.gamma(2.0, 0.5, len(triangle))
-        tallies.append(Tally(seconds, dents, dents, np.bincount(triangle, area, 400), dents, dents, triangle, area))
+        tallies.append(
+            Tally(
+                seconds,
+                dents,
+                dents,
+                np.bincount(triangle, area, 400),
+                dents,
+                dents,
+                triangle,
+                area,
+            )
+        )
     return tallies
 
 
@@ -265,10 +312,15 @@ def test_figures_are_the_same_however_long_was_simulated(seconds: float) -> None
     share = -np.expm1(-x)
     names, true = ("mean_coverage", "std_coverage"), (share.mean(), share.std())
     rng = np.random.default_rng(9)
-    runs = [jackknife(of_all_sizes(rng, seconds), [METRICS[n] for n in names], CHAMBER, DESIGN) for _ in range(200)]
+    runs = [
+        jackknife(of_all_sizes(rng, seconds), [METRICS[n] for n in names], CHAMBER, DESIGN)
+        for _ in range(200)
+    ]
     for k, wanted in enumerate(true):
         values = np.array([run[k].value for run in runs])
-        assert values.mean() == pytest.approx(wanted, abs=3.5 * values.std() / np.sqrt(200) + 1e-3), names[k]
+        assert values.mean() == pytest.approx(
+            wanted, abs=3.5 * values.std() / np.sqrt(200) + 1e-3
+        ), names[k]
         held = sum(run[k].low <= wanted <= run[k].high for run in runs)
         assert 184 <= held <= 199, (names[k], held)
 
@@ -281,8 +333,13 @@ def test_few_dents_are_said_and_make_the_interval_wide() -> None:
     assert "dents per target triangle" in note
     assert "patches" in note
     metrics = [METRICS["mean_coverage"], METRICS["std_coverage"]]
-    rough, sharp = jackknife(few, metrics, CHAMBER, DESIGN), jackknife(many, metrics, CHAMBER, DESIGN)
-    assert all(one.half_width > 4 * other.half_width for one, other in zip(rough, sharp, strict=True))
+    rough, sharp = (
+        jackknife(few, metrics, CHAMBER, DESIGN),
+        jackknife(many, metrics, CHAMBER, DESIGN),
+    )
+    assert all(
+        one.half_width > 4 * other.half_width for one, other in zip(rough, sharp, strict=True)
+    )
     x = CLUMPED * (0.5 + CLUMPED / 0.5) * 0.1 * TREATMENT
     true = -np.expm1(-x).mean(), np.expm1(-x).std()
     runs = [jackknife(of_all_sizes(rng, 0.5), metrics, CHAMBER, DESIGN) for _ in range(60)]
@@ -297,7 +354,9 @@ def test_patches_are_near_and_hold_enough() -> None:
     held = np.bincount(patch, content)
     assert held.min() >= 2.0
     assert held.mean() < 4.0
-    middles = np.column_stack([np.bincount(patch, places[:, k]) / np.bincount(patch) for k in range(3)])
+    middles = np.column_stack(
+        [np.bincount(patch, places[:, k]) / np.bincount(patch) for k in range(3)]
+    )
     assert np.linalg.norm(places - middles[patch], axis=1).mean() < 0.1
     np.testing.assert_array_equal(patches(places, content + 2.0, 2.0), np.arange(3000))
     assert set(patches(places, 0.0 * content, 2.0)) == {0}
@@ -306,7 +365,9 @@ def test_patches_are_near_and_hold_enough() -> None:
 @pytest.mark.long
 def test_real_simulations_hold_their_long_run_value() -> None:
     """200 short runs of the plate's chamber against one of all their replicas together."""
-    design = plate_design(process__accuracy__simulated_time_s=0.1, process__accuracy__warmup_time_s=0.05)
+    design = plate_design(
+        process__accuracy__simulated_time_s=0.1, process__accuracy__warmup_time_s=0.05
+    )
     chamber = build_chamber(design)
     with local_executor() as executor:
         everything = evaluate(design, chamber, executor, replicas=1600)
@@ -314,7 +375,12 @@ def test_real_simulations_hold_their_long_run_value() -> None:
     metrics = [METRICS[name] for name in names]
     held = dict.fromkeys((*names, "uniform_coverage"), 0)
     for run in range(200):
-        got = dict(zip(names, jackknife(everything.replicas[8 * run : 8 * run + 8], metrics, chamber, design)))  # noqa: B905
+        got = dict(
+            zip(
+                names,
+                jackknife(everything.replicas[8 * run : 8 * run + 8], metrics, chamber, design),
+            )
+        )  # noqa: B905
         got["uniform_coverage"] = weighted(OBJECTIVES["uniform_coverage"], got)
         truth_of = {**everything.metrics, "uniform_coverage": everything.objective}
         for name in held:
@@ -327,7 +393,9 @@ def test_a_ball_that_bounces_on_its_spot_does_not_empty_the_mean() -> None:
     of how coverage varies, and the figures stay where Poisson dents alone would have them, or say that they may not.
     """
     rng, chamber = np.random.default_rng(3), patchwork(np.full(700, 1e-6))
-    rate = 0.6 / (0.03 * TREATMENT)  # dents per triangle and second: 45 % covered, 0.03 of a triangle a dent
+    rate = 0.6 / (
+        0.03 * TREATMENT
+    )  # dents per triangle and second: 45 % covered, 0.03 of a triangle a dent
 
     def replica(spots: int) -> Tally:
         dents = rng.poisson(rate * 2.0, 700)
@@ -335,7 +403,9 @@ def test_a_ball_that_bounces_on_its_spot_does_not_empty_the_mean() -> None:
         return equal_dents(2.0, dents, 0.03e-6)
 
     names = ("mean_coverage", "std_coverage")
-    mean, std = jackknife([replica(1) for _ in range(4)], [METRICS[n] for n in names], chamber, DESIGN)
+    mean, std = jackknife(
+        [replica(1) for _ in range(4)], [METRICS[n] for n in names], chamber, DESIGN
+    )
     assert abs(mean.value + np.expm1(-0.6)) < mean.half_width + 0.02
     assert mean.value > 0.35
     assert mean.half_width < 0.15

@@ -21,7 +21,10 @@ def coverage(share: np.ndarray, area: np.ndarray, treatment_time: float) -> np.n
 
 def goal(*case) -> float:
     """Uniform coverage as plain numbers."""
-    return sum(weight * METRICS[name].function(*case) for name, weight in objective("uniform_coverage").terms.items())
+    return sum(
+        weight * METRICS[name].function(*case)
+        for name, weight in objective("uniform_coverage").terms.items()
+    )
 
 
 @pytest.fixture
@@ -66,7 +69,9 @@ def test_hidden_target_counts_as_not_covered(case: tuple) -> None:
     total, chamber, design = case
     whole, area = METRICS["mean_coverage"].function(total, chamber, design), chamber.part.area
     third = METRICS["mean_coverage"].function(
-        total, replace(chamber, part=replace(chamber.part, target=np.array([False, False, True]))), design
+        total,
+        replace(chamber, part=replace(chamber.part, target=np.array([False, False, True]))),
+        design,
     )
     hidden = replace(chamber, exposed_area=chamber.exposed_area * [1, 1, 0])
     assert METRICS["mean_coverage"].function(total, hidden, design) == pytest.approx(
@@ -86,14 +91,18 @@ def test_what_is_not_target_does_not_count(case: tuple) -> None:
 def test_nothing_hit() -> None:
     design, area = plate_design(), np.full(2, MM2)
     none = dented(np.zeros(2), 1.0, dents=np.zeros(2, dtype=int))
-    values = {name: metric.function(none, patchwork(area), design) for name, metric in METRICS.items()}
+    values = {
+        name: metric.function(none, patchwork(area), design) for name, metric in METRICS.items()
+    }
     assert values.pop("shot_count") > 0
     assert values.pop("time_to_98_s") == LONGEST
     assert set(values.values()) == {0.0}
 
 
 def test_the_names_a_study_may_use_are_these() -> None:
-    assert {name: (metric.lowest, metric.highest) for name, metric in METRICS.items()} == study.METRICS
+    assert {
+        name: (metric.lowest, metric.highest) for name, metric in METRICS.items()
+    } == study.METRICS
     for name in OBJECTIVES:
         assert study.Objective(name=name).name == name
     with pytest.raises(InputError, match="uniform_coverage"):
@@ -117,7 +126,9 @@ def test_time_to_98_is_when_the_poorest_twentieth_is_covered() -> None:
     truth = np.log(50.0) / per_second
     held = []
     for _ in range(10):
-        replicas = [equal_dents(10.0, rng.poisson(per_second * 10.0 * area / size), size) for _ in range(8)]
+        replicas = [
+            equal_dents(10.0, rng.poisson(per_second * 10.0 * area / size), size) for _ in range(8)
+        ]
         [got] = jackknife(replicas, [METRICS["time_to_98_s"]], chamber, design)
         assert got.value == pytest.approx(truth, rel=0.1)
         held.append(got.low <= truth <= got.high)
@@ -136,7 +147,12 @@ def test_intensity_uniformity_knows_places_from_scatter() -> None:
         made = []
         for _ in range(8):
             dents = rng.poisson(4.0, len(area))
-            speeds = np.array([rng.gamma(4.0, speed / 4.0, n).sum() for speed, n in zip(local, dents, strict=True)])
+            speeds = np.array(
+                [
+                    rng.gamma(4.0, speed / 4.0, n).sum()
+                    for speed, n in zip(local, dents, strict=True)
+                ]
+            )
             made.append(replace(equal_dents(1.0, dents, 0.1 * MM2), speed_sum=speeds))
         return made
 

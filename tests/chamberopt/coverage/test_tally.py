@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from chamberopt.coverage.tally import coverage_at, dent_diameter, impact_angle_deg, mean_normal_speed, tally
+from chamberopt.coverage.tally import (
+    coverage_at,
+    dent_diameter,
+    impact_angle_deg,
+    mean_normal_speed,
+    tally,
+)
 from chamberopt.design.shot import ShotSize
 from tests.helpers.synthetic import dented, impact_log, patchwork, plate_design
 
@@ -17,7 +23,9 @@ def test_dent_of_kirk() -> None:
     assert aluminium == pytest.approx(0.40e-3, rel=0.03)
     # By hand: 1.278 · 3 mm · (1 - 0.8²)^¼ · (7800 · 25 / (650 · 9.81e6))^¼
     steel = dent_diameter(np.array([5.0]), 3e-3, 7800.0, 650 * HB, 0.8, 5.0 - 1e-9)[0]
-    assert steel == pytest.approx(1.278 * 3e-3 * 0.36**0.25 * (7800 * 25 / (650 * HB)) ** 0.25, rel=1e-6)
+    assert steel == pytest.approx(
+        1.278 * 3e-3 * 0.36**0.25 * (7800 * 25 / (650 * HB)) ** 0.25, rel=1e-6
+    )
     assert steel == pytest.approx(0.22e-3, rel=0.05)
 
 
@@ -25,7 +33,9 @@ def test_dent_uses_the_restitution_at_its_own_speed() -> None:
     # e = C0 (v/v0)^(-1/4): at 16 v0 it is C0/2.
     c0, v0 = 0.9, 0.5
     expected = 1.278 * 2e-3 * (1 - 0.45**2) ** 0.25 * (7800 * 8.0**2 / (300 * HB)) ** 0.25
-    assert dent_diameter(np.array([8.0]), 2e-3, 7800.0, 300 * HB, c0, v0)[0] == pytest.approx(expected)
+    assert dent_diameter(np.array([8.0]), 2e-3, 7800.0, 300 * HB, c0, v0)[0] == pytest.approx(
+        expected
+    )
 
 
 def test_no_dent_up_to_the_yield_speed() -> None:
@@ -50,7 +60,9 @@ def test_known_impacts_give_known_coverage() -> None:
     log = impact_log([0, 1, 1, 2], np.outer(speeds, [0, 0, 1]), speeds)
     got = tally(log, chamber, design)
     part, shot = design.materials.part, design.shot
-    size = dent_diameter(speeds, shot.diameter, shot.density, part.hardness, part.restitution, part.yield_speed)
+    size = dent_diameter(
+        speeds, shot.diameter, shot.density, part.hardness, part.restitution, part.yield_speed
+    )
     area = np.pi / 4 * size**2
     np.testing.assert_array_equal(got.impacts, [1, 2, 1, 0])
     np.testing.assert_array_equal(got.dents, [1, 2, 0, 0])
@@ -65,7 +77,9 @@ def test_known_impacts_give_known_coverage() -> None:
 def test_a_dent_is_as_large_as_its_own_ball_makes_it() -> None:
     design, chamber = plate_design(), patchwork(np.full(2, 1e-6))
     sizes = tuple(ShotSize(diameter_mm=d, share=0.5) for d in (1.0, 2.0))
-    mixed = design.model_copy(update={"shot": design.shot.model_copy(update={"diameter_mm": None, "mix": sizes})})
+    mixed = design.model_copy(
+        update={"shot": design.shot.model_copy(update={"diameter_mm": None, "mix": sizes})}
+    )
     diameters = np.array(mixed.shot.diameters)
     small, large = int(diameters.argmin()), int(diameters.argmax())
     log = impact_log([0, 1], np.tile([0, 0, 3.0], (2, 1)), [3.0, 3.0], [small, large])
@@ -76,7 +90,9 @@ def test_a_dent_is_as_large_as_its_own_ball_makes_it() -> None:
 def test_avrami_at_one_area() -> None:
     # Dents that add up to the triangle's area cover 1 - 1/e of it, however long that took.
     chamber = patchwork(np.array([1e-6, 4e-6]))
-    assert coverage_at(dented(np.array([1e-6, 4e-6]), 10.0), chamber, 10.0) == pytest.approx(1 - np.exp(-1))
+    assert coverage_at(dented(np.array([1e-6, 4e-6]), 10.0), chamber, 10.0) == pytest.approx(
+        1 - np.exp(-1)
+    )
 
 
 def test_only_part_triangles_count_and_hidden_ones_have_no_coverage() -> None:

@@ -9,7 +9,16 @@ import pytest
 
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
-from chamberopt.design.load import METRICS, Design, Limits, Study, load, load_design, load_study, save_design
+from chamberopt.design.load import (
+    METRICS,
+    Design,
+    Limits,
+    Study,
+    load,
+    load_design,
+    load_study,
+    save_design,
+)
 from chamberopt.design.materials import SHOT_DENSITY
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -105,7 +114,9 @@ class TestUnits:
         assert load_design(design_file).shot.density == SHOT_DENSITY[material]
 
     def test_own_density(self, design_file: Path) -> None:
-        design_file.write_text(TABLES.replace('material = "steel"', "density_kg_m3 = 3850"), encoding="utf-8")
+        design_file.write_text(
+            TABLES.replace('material = "steel"', "density_kg_m3 = 3850"), encoding="utf-8"
+        )
         assert load_design(design_file).shot.density == 3850.0
 
     def test_mesh_counts_from_the_file(self, design: Design, design_file: Path) -> None:
@@ -131,11 +142,15 @@ class TestNumbers:
 
     def test_whole_numbers_stay_whole(self, design: Design) -> None:
         assert design.with_values({"process.seed": 3.0}).process.seed == 3
-        with pytest.raises(InputError, match=r"facets: given 44.5; allowed: a whole number from 8 to 1024"):
+        with pytest.raises(
+            InputError, match=r"facets: given 44.5; allowed: a whole number from 8 to 1024"
+        ):
             design.with_values({"chamber.facets": 44.5})
 
     def test_out_of_range(self, design: Design) -> None:
-        with pytest.raises(InputError, match=r"chamber.height_mm: given 1.0; allowed: a number from 2 to 2000 mm"):
+        with pytest.raises(
+            InputError, match=r"chamber.height_mm: given 1.0; allowed: a number from 2 to 2000 mm"
+        ):
             design.with_values({"chamber.height_mm": 1.0})
 
     def test_not_a_number(self, design: Design) -> None:
@@ -152,7 +167,9 @@ class TestNumbers:
 
     def test_every_number_can_be_read_and_set(self, design: Design) -> None:
         for name in design.numbers():
-            if name not in UNSET and not name.startswith(("effects.part_turn.", "effects.friction.")):
+            if name not in UNSET and not name.startswith(
+                ("effects.part_turn.", "effects.friction.")
+            ):
                 assert design.with_values({name: design.value(name)}) == design, name
 
     def test_frozen(self, design: Design) -> None:
@@ -170,7 +187,11 @@ class TestRoundTrip:
         assert load_design(tmp_path / "copy.toml") == design
 
     def test_awkward_numbers(self, design: Design, tmp_path: Path) -> None:
-        values = {"chamber.height_mm": 40.1 + 0.2, "shot.mass_g": 10 / 3, "materials.wall.v0_m_s": 1.1e-4}
+        values = {
+            "chamber.height_mm": 40.1 + 0.2,
+            "shot.mass_g": 10 / 3,
+            "materials.wall.v0_m_s": 1.1e-4,
+        }
         other = design.with_values(values)
         save_design(other, tmp_path / "awkward.toml")
         assert load_design(tmp_path / "awkward.toml") == other
@@ -182,7 +203,10 @@ class TestRoundTrip:
         assert 'mesh = "../../part.stl"' in text
         assert text.startswith("#")
         shutil.copytree(tmp_path, moved := tmp_path.parent / "moved", dirs_exist_ok=True)
-        assert load_design(moved / "deep" / "er" / "d.toml").part.mesh_path == moved.resolve() / "part.stl"
+        assert (
+            load_design(moved / "deep" / "er" / "d.toml").part.mesh_path
+            == moved.resolve() / "part.stl"
+        )
 
 
 class TestShipped:
@@ -198,7 +222,12 @@ class TestShipped:
         part = {"gear": ("steel", 300), "plate": ("aluminium", 120), "blade": ("titanium", 330)}[
             path.stem.partition("_")[0]
         ]
-        pairs = {"shot": ("steel", 650), "wall": ("steel", 300), "sonotrode": ("titanium", 330), "part": part}
+        pairs = {
+            "shot": ("steel", 650),
+            "wall": ("steel", 300),
+            "sonotrode": ("titanium", 330),
+            "part": part,
+        }
         design = load_design(path)
         for name, (metal, brinell) in pairs.items():
             bodies = (elastic["steel"], elastic[metal])
@@ -207,7 +236,9 @@ class TestShipped:
             speed = math.sqrt(26 * (strength / stiffness) ** 4 * strength / 7800)
             speed *= 0.5 if name == "shot" else 1.0
             law = getattr(design.materials, name)
-            assert law.yield_speed == pytest.approx(speed * (1.18 / law.restitution) ** 4, rel=0.03), name
+            assert law.yield_speed == pytest.approx(
+                speed * (1.18 / law.restitution) ** 4, rel=0.03
+            ), name
 
 
 class TestWrongDesigns:
@@ -232,11 +263,17 @@ class TestWrongDesigns:
 
     def test_key_in_the_wrong_table(self, design_file: Path) -> None:
         said = edited(design_file, ("amplitude_um = 25", "amplitude_um = 25\ndiameter_mm = 3"))
-        assert "sonotrode.diameter_mm: unknown key here; did you mean 'diameter_mm' in [chamber]?" in said
+        assert (
+            "sonotrode.diameter_mm: unknown key here; did you mean 'diameter_mm' in [chamber]?"
+            in said
+        )
 
     def test_key_that_stands_above_all_tables(self, design_file: Path) -> None:
         said = edited(design_file, ("amplitude_um = 25", 'amplitude_um = 25\neffects = "auto"'))
-        assert "sonotrode.effects: unknown key here; did you mean 'effects' above the first [table]?" in said
+        assert (
+            "sonotrode.effects: unknown key here; did you mean 'effects' above the first [table]?"
+            in said
+        )
 
     @pytest.mark.parametrize("given", ['"Auto"', "true", '["auto"]', "3"])
     def test_effects_that_are_no_table(self, design_file: Path, given: str) -> None:
@@ -252,7 +289,9 @@ class TestWrongDesigns:
         assert "a number from 0.0001 to 0.5 (wanted" in said
 
     def test_true_is_not_a_number(self, design_file: Path) -> None:
-        assert "height_mm: given true; allowed: a number" in edited(design_file, ("_mm = 40", "_mm = true"))
+        assert "height_mm: given true; allowed: a number" in edited(
+            design_file, ("_mm = 40", "_mm = true")
+        )
 
     def test_infinite(self, design_file: Path) -> None:
         assert "height_mm: given inf" in edited(design_file, ("_mm = 40", "_mm = inf"))
@@ -261,11 +300,15 @@ class TestWrongDesigns:
         assert "write it without quotes" in edited(design_file, ("_mm = 40", '_mm = "40"'))
 
     def test_table_given_as_a_number(self, design_file: Path) -> None:
-        said = edited(design_file, ("part = { C0 = 0.6, v0_m_s = 0.2, hardness_HB = 120 }", "part = 0.6"))
+        said = edited(
+            design_file, ("part = { C0 = 0.6, v0_m_s = 0.2, hardness_HB = 120 }", "part = 0.6")
+        )
         assert "materials.part: given 0.6; allowed: a table" in said
 
     def test_no_density_and_two_densities(self, design_file: Path) -> None:
-        said = edited(design_file, ('material = "steel"', 'material = "steel"\ndensity_kg_m3 = 7800'))
+        said = edited(
+            design_file, ('material = "steel"', 'material = "steel"\ndensity_kg_m3 = 7800')
+        )
         assert "shot.density_kg_m3: given 7800 beside material = 'steel'; keep one" in said
         said = edited(design_file, ('material = "steel"\ndensity_kg_m3 = 7800', ""))
         assert "shot.material: missing; give material (one of" in said
@@ -275,12 +318,18 @@ class TestWrongDesigns:
         design_file.write_text(TABLES.replace("diameter_mm = 3\n", mix + "\n"), encoding="utf-8")
         shot = load_design(design_file).shot
         small, large = (7800 * math.pi / 6 * d**3 for d in (0.002, 0.003))
-        assert shot.sizes == ((0.002, round(0.25 * 3.308e-3 / small)), (0.003, round(0.75 * 3.308e-3 / large)))
+        assert shot.sizes == (
+            (0.002, round(0.25 * 3.308e-3 / small)),
+            (0.003, round(0.75 * 3.308e-3 / large)),
+        )
         assert shot.count == len(shot.diameters) == 25 + 22
         assert shot.count * shot.ball_mass == pytest.approx(25 * small + 22 * large)
         assert shot.diameter == 0.003
         assert "shot.diameter_mm" in load_design(design_file).numbers()
-        assert load_design(design_file).with_values({"shot.mix.1.diameter_mm": 4.0}).shot.diameter == 0.004
+        assert (
+            load_design(design_file).with_values({"shot.mix.1.diameter_mm": 4.0}).shot.diameter
+            == 0.004
+        )
         with pytest.raises(InputError, match=r"shot\.diameter_mm: not set"):
             load_design(design_file).with_values({"shot.diameter_mm": 2.0})
         again = design_file.with_name("again.toml")
@@ -291,21 +340,41 @@ class TestWrongDesigns:
     @pytest.mark.parametrize(
         ("mix", "said"),
         [
-            ("", "shot.diameter_mm: missing; a number from 0.1 to 20 mm (of one ball), or several sizes: mix"),
+            (
+                "",
+                "shot.diameter_mm: missing; a number from 0.1 to 20 mm (of one ball), or several sizes: mix",
+            ),
             ("diameter_mm = 3\nmix = [[2, 0.5], [3, 0.5]]", "shot.mix"),
             ("diameter_mm = 3\nMIX", "shot.diameter_mm: given 3 beside mix"),
-            ("mix = [{ diameter_mm = 3, share = 1.0 }]", "shot.mix: given 1 sizes; allowed: 2 to 8"),
-            ("MIX" + "[effects]\nrest = true\n", "effects.rest: given beside shot.mix: not supported"),
-            ("mix = [{ diameter_mm = 3, share = 0.5 }, { diameter_mm = 3, share = 0.5 }]", "one diameter_mm twice"),
-            ("mix = [{ diameter_mm = 3, share = 0.5 }, { diameter_mm = 2, share = 0.4 }]", "add up to 0.9"),
-            ("mix = [{ diameter_mm = 3, share = 0.5 }, { diameter_mm = 16, share = 0.5 }]", "shot.mix: given 16"),
+            (
+                "mix = [{ diameter_mm = 3, share = 1.0 }]",
+                "shot.mix: given 1 sizes; allowed: 2 to 8",
+            ),
+            (
+                "MIX" + "[effects]\nrest = true\n",
+                "effects.rest: given beside shot.mix: not supported",
+            ),
+            (
+                "mix = [{ diameter_mm = 3, share = 0.5 }, { diameter_mm = 3, share = 0.5 }]",
+                "one diameter_mm twice",
+            ),
+            (
+                "mix = [{ diameter_mm = 3, share = 0.5 }, { diameter_mm = 2, share = 0.4 }]",
+                "add up to 0.9",
+            ),
+            (
+                "mix = [{ diameter_mm = 3, share = 0.5 }, { diameter_mm = 16, share = 0.5 }]",
+                "shot.mix: given 16",
+            ),
         ],
         ids=lambda text: text[:30],
     )
     def test_a_mix_that_is_wrong(self, design_file: Path, mix: str, said: str) -> None:
         fine = "mix = [{ diameter_mm = 2, share = 0.5 }, { diameter_mm = 3, share = 0.5 }]\n"
         shot, _, effects = mix.replace("MIX", fine).partition("[effects]")
-        tables = TABLES.replace("diameter_mm = 3\n", shot + "\n") + (f"[effects]{effects}" if effects else "")
+        tables = TABLES.replace("diameter_mm = 3\n", shot + "\n") + (
+            f"[effects]{effects}" if effects else ""
+        )
         design_file.write_text(tables, encoding="utf-8")
         assert said in edited(design_file)
 
@@ -320,19 +389,30 @@ class TestWrongDesigns:
                 "effects.rest: given true",
             ),
             (
-                ("amplitude_um = 25", "amplitude_um = 25\n[effects]\nfriction = { mu = -0.1, beta0 = 0.2 }"),
+                (
+                    "amplitude_um = 25",
+                    "amplitude_um = 25\n[effects]\nfriction = { mu = -0.1, beta0 = 0.2 }",
+                ),
                 "effects.friction.mu: given -0.1; allowed: a number from 0 to 10",
             ),
             (
                 ("amplitude_um = 25", "amplitude_um = 25\n[effects]\nfriction = { mu = 0.3 }"),
                 "effects.friction.beta0: missing",
             ),
-            (("amplitude_um = 25", "amplitude_um = 25\n[effects]\nfriction = 0.3"), "effects.friction: given 0.3"),
+            (
+                ("amplitude_um = 25", "amplitude_um = 25\n[effects]\nfriction = 0.3"),
+                "effects.friction: given 0.3",
+            ),
             (("mass_g = 3.308", "mass_g = 400"), "fill 65% of the chamber; at most 50 %"),
-            (("diameter_mm = 50", "diameter_mm = 2.5"), "does not fit a chamber with chamber.diameter_mm = 2.5"),
+            (
+                ("diameter_mm = 50", "diameter_mm = 2.5"),
+                "does not fit a chamber with chamber.diameter_mm = 2.5",
+            ),
         ],
     )
-    def test_contradictions(self, design_file: Path, change: tuple[str, str], said: str | None) -> None:
+    def test_contradictions(
+        self, design_file: Path, change: tuple[str, str], said: str | None
+    ) -> None:
         if said is None:  # ten amplitudes of 500 um are 5 mm, within 15: allowed
             design_file.write_text(TABLES.replace(*change), encoding="utf-8")
             load_design(design_file)
@@ -358,7 +438,8 @@ class TestWrongDesigns:
     def test_missing_mesh_names_its_neighbours(self, design_file: Path) -> None:
         said = edited(design_file, ("part.stl", "prat.stl"), ("height_mm = 40", "height_mm = 0"))
         assert (
-            f":3: part.mesh: given 'prat.stl': {design_file.parent.resolve() / 'prat.stl'}: no such mesh file" in said
+            f":3: part.mesh: given 'prat.stl': {design_file.parent.resolve() / 'prat.stl'}: no such mesh file"
+            in said
         )
         assert "did you mean" in said
         assert "height_mm: given 0" in said
@@ -368,7 +449,9 @@ class TestStudies:
     @pytest.fixture
     def study_file(self, design_file: Path) -> Path:
         path = design_file.with_name("study.toml")
-        path.write_text('design = "design.toml"\n[vary]\n"chamber.height_mm" = [35, 60]\n', encoding="utf-8")
+        path.write_text(
+            'design = "design.toml"\n[vary]\n"chamber.height_mm" = [35, 60]\n', encoding="utf-8"
+        )
         return path
 
     def test_defaults(self, study_file: Path) -> None:
@@ -390,11 +473,16 @@ class TestStudies:
     )
     def test_ways_to_write_a_name(self, study_file: Path, written: str) -> None:
         study_file.write_text(f'design = "design.toml"\n{written}\n', encoding="utf-8")
-        assert load_study(study_file).vary == {"chamber.height_mm": (35.0, 60.0), "shot.mass_g": (2.0, 5.0)}
+        assert load_study(study_file).vary == {
+            "chamber.height_mm": (35.0, 60.0),
+            "shot.mass_g": (2.0, 5.0),
+        }
 
     def test_constraints(self, study_file: Path) -> None:
         with study_file.open("a", encoding="utf-8") as file:
-            file.write("[constraints]\nmean_coverage = { min = 0.9 }\nshot_count = { min = 5, max = 60 }\n")
+            file.write(
+                "[constraints]\nmean_coverage = { min = 0.9 }\nshot_count = { min = 5, max = 60 }\n"
+            )
         constraints = load_study(study_file).constraints
         assert constraints["mean_coverage"] == Limits(min=0.9)
         assert (constraints["shot_count"].min, constraints["shot_count"].max) == (5.0, 60.0)
@@ -407,7 +495,10 @@ class TestStudies:
                 ":3: vary.chamber.heigth_mm: unknown; did you mean 'chamber.height_mm'?",
             ),
             (("[35, 60]", "[60, 35]"), "given [60, 35]; low must be below high"),
-            (("[35, 60]", "[42, 60]"), "the design starts at 40; widen the bounds or change the design"),
+            (
+                ("[35, 60]", "[42, 60]"),
+                "the design starts at 40; widen the bounds or change the design",
+            ),
             (("[35, 60]", "[10, 60]"), "the design cannot have chamber.height_mm = 10"),
             (("[35, 60]", "[35, 60, 70]"), "allowed: [low, high]"),
             (("[35, 60]", "35"), "allowed: [low, high]"),
@@ -418,14 +509,23 @@ class TestStudies:
                 ("[vary]", "[constraints]\nmean_covrage = { min = 1 }\n[vary]"),
                 "did you mean 'mean_coverage'?",
             ),
-            (("[vary]", "[constraints]\nmean_coverage = { minn = 1 }\n[vary]"), "did you mean 'min'?"),
+            (
+                ("[vary]", "[constraints]\nmean_coverage = { minn = 1 }\n[vary]"),
+                "did you mean 'min'?",
+            ),
             (("[vary]", "[constraints]\nmean_coverage = {}\n[vary]"), "give min, max or both"),
-            (("[vary]", "[constraints]\nmean_coverage = { min = 1, max = 0 }\n[vary]"), "above max = 0"),
+            (
+                ("[vary]", "[constraints]\nmean_coverage = { min = 1, max = 0 }\n[vary]"),
+                "above max = 0",
+            ),
             (
                 ("[vary]", "[constraints]\nmean_coverage = { min = 1.1 }\n[vary]"),
                 "mean_coverage: given min = 1.1, but it is from 0 to 1 in every candidate; change the limit",
             ),
-            (("[vary]", "[constraints]\ntime_to_98_s = { max = -1 }\n[vary]"), "given max = -1, but it is from 0 to"),
+            (
+                ("[vary]", "[constraints]\ntime_to_98_s = { max = -1 }\n[vary]"),
+                "given max = -1, but it is from 0 to",
+            ),
             (
                 ("[vary]", '[constraints]\n"chamber.height_mm" = { min = 61 }\n[vary]'),
                 "given min = 61, but it is from 35 to 60 in every candidate; change the limit or [vary]",
@@ -434,9 +534,18 @@ class TestStudies:
                 ("[vary]", '[constraints]\n"shot.density_kg_m3" = { min = 61 }\n[vary]'),
                 "constraints.shot.density_kg_m3: not set in this design",
             ),
-            (("[vary]", '[objective]\nsum = { shot_count = "a" }\n[vary]'), "given 'a'; allowed: { NAME = WEIGHT, "),
-            (("[vary]", '[optimizer]\nphases = "sobol"\n[vary]'), "allowed: a table [[optimizer.phases]] each"),
-            (("[vary]", '[optimizer]\nalgorithm = "LN_BOBYQ"\n[vary]'), "did you mean 'LN_BOBYQA'?"),
+            (
+                ("[vary]", '[objective]\nsum = { shot_count = "a" }\n[vary]'),
+                "given 'a'; allowed: { NAME = WEIGHT, ",
+            ),
+            (
+                ("[vary]", '[optimizer]\nphases = "sobol"\n[vary]'),
+                "allowed: a table [[optimizer.phases]] each",
+            ),
+            (
+                ("[vary]", '[optimizer]\nalgorithm = "LN_BOBYQ"\n[vary]'),
+                "did you mean 'LN_BOBYQA'?",
+            ),
             (("[vary]", "[optimizer]\nevaluations = 1\n[vary]"), "allowed: a whole number from 2"),
             (("[vary]", '[objective]\nname = "coverage"\n[vary]'), '"uniform_coverage"'),
             (('design = "design.toml"', ""), "design: missing; give the path"),
@@ -480,21 +589,36 @@ class TestStudies:
 
         ours = {"auto", "sobol", "surrogate"}
         assert ours < set(typing.get_args(Algorithm))
-        unknown = [name for name in typing.get_args(Algorithm) if name not in ours and not hasattr(nlopt, name)]
+        unknown = [
+            name
+            for name in typing.get_args(Algorithm)
+            if name not in ours and not hasattr(nlopt, name)
+        ]
         assert not unknown
 
     def test_phases(self, study_file: Path) -> None:
         with study_file.open("a") as file:
-            file.write("[optimizer]\nphases = [{ algorithm = 'sobol', share = 0.3 }, { algorithm = 'LN_BOBYQA' }]\n")
+            file.write(
+                "[optimizer]\nphases = [{ algorithm = 'sobol', share = 0.3 }, { algorithm = 'LN_BOBYQA' }]\n"
+            )
         phases = load_study(study_file).optimizer.phases
-        assert [(phase.algorithm, phase.share) for phase in phases] == [("sobol", 0.3), ("LN_BOBYQA", 1.0)]
+        assert [(phase.algorithm, phase.share) for phase in phases] == [
+            ("sobol", 0.3),
+            ("LN_BOBYQA", 1.0),
+        ]
 
     @pytest.mark.parametrize(
         ("table", "said"),
         [
-            ('[optimizer]\nalgorithm = "LN_BOBYQA"\nphases = [{ algorithm = "sobol" }]', "give one of the two"),
+            (
+                '[optimizer]\nalgorithm = "LN_BOBYQA"\nphases = [{ algorithm = "sobol" }]',
+                "give one of the two",
+            ),
             ('[optimizer]\nphases = [{ algorithm = "auto" }]', "which is phases itself"),
-            ('[optimizer]\nphases = [{ algorithm = "sobol" }, { algorithm = "surrogate" }]', "add up to 1 or more"),
+            (
+                '[optimizer]\nphases = [{ algorithm = "sobol" }, { algorithm = "surrogate" }]',
+                "add up to 1 or more",
+            ),
             ("[optimizer]\nfirst_replicas = 2", "3 is the least"),
             ("[optimizer]\ninitial_step = 2", "initial_step"),
             ("[objective]\nsum = { coverage = 1 }", "not an objective or a metric"),
@@ -518,7 +642,11 @@ def test_lines_of_keys() -> None:
 
 
 def test_a_wrong_number_in_a_list_is_one_problem(tmp_path: Path) -> None:
-    text = (ROOT / "designs" / "plate.toml").read_text(encoding="utf-8").replace("parts/", f"{ROOT}/designs/parts/")
+    text = (
+        (ROOT / "designs" / "plate.toml")
+        .read_text(encoding="utf-8")
+        .replace("parts/", f"{ROOT}/designs/parts/")
+    )
     chamber = 'shape = "revolve"\nprofile_mm = [[26, 0], [26, nan]]'
     for line in ('shape = "cylinder"\ndiameter_mm = 50', "height_mm = 20 "):
         text, chamber = text.replace(line, chamber), "#"

@@ -30,7 +30,9 @@ def test_the_script_writes_the_same_bytes_again(tmp_path: Path, name: str) -> No
     for script in PARTS.glob("*.py"):
         (tmp_path / script.name).write_bytes(script.read_bytes())
 
-    subprocess.run([sys.executable, str((tmp_path / name).with_suffix(".py"))], check=True, capture_output=True)
+    subprocess.run(
+        [sys.executable, str((tmp_path / name).with_suffix(".py"))], check=True, capture_output=True
+    )
 
     assert (tmp_path / name).read_bytes() == (PARTS / name).read_bytes()
 
@@ -46,7 +48,9 @@ def test_the_part_is_one_closed_outward_body_of_well_shaped_triangles(name: str)
     assert part.euler_number == 2
     assert 2000 < len(part.faces) < 12000
     edges = np.linalg.norm(part.triangles - np.roll(part.triangles, 1, axis=1), axis=2)
-    shape = 4 * np.sqrt(3) * part.area_faces / (edges**2).sum(axis=1)  # 1 for an equilateral triangle
+    shape = (
+        4 * np.sqrt(3) * part.area_faces / (edges**2).sum(axis=1)
+    )  # 1 for an equilateral triangle
     assert np.median(shape) > 0.85
     assert shape.min() > 0.2
     assert edges.max() < 3.0
@@ -67,7 +71,9 @@ def test_the_gear_has_the_asked_sizes() -> None:
     assert part.bounds.tolist() == [[-22, -22, 0], [22, 22, 70]]  # tip diameter m (z + 2) = 44
     on_border = toothed & (part.vertices[:, 2] > 0)
     assert radius[on_border].max() == pytest.approx(22, abs=1e-4)
-    assert radius[on_border].min() == pytest.approx(17.5, abs=2e-3)  # root diameter m (z - 2.5) = 35
+    assert radius[on_border].min() == pytest.approx(
+        17.5, abs=2e-3
+    )  # root diameter m (z - 2.5) = 35
     assert radius[part.vertices[:, 2] > 10.5].max() == pytest.approx(8, abs=1e-4)
 
 
@@ -102,7 +108,9 @@ def test_the_tooth_is_half_a_pitch_wide_on_the_pitch_circle(gear: ModuleType) ->
     assert 2 * 20 * np.arctan2(x, y) == pytest.approx(np.pi * 2 / 2, rel=1e-12)
 
 
-def test_the_fillet_leaves_the_involute_tangent_and_ends_on_the_root_circle(gear: ModuleType) -> None:
+def test_the_fillet_leaves_the_involute_tangent_and_ends_on_the_root_circle(
+    gear: ModuleType,
+) -> None:
     start = gear.fillet(np.array([gear.ALPHA]))[0]
     end = gear.fillet(np.array([np.pi / 2]))[0]
 

@@ -18,7 +18,9 @@ def plate_with_hole() -> trimesh.Trimesh:
         corners = np.array(piece.exterior.coords)[:3]
         row = [int(np.argmin(np.linalg.norm(points - corner, axis=1))) for corner in corners]
         a, b, c = points[row]
-        triangles.append(row if np.cross(np.append(b - a, 0), np.append(c - a, 0))[2] > 0 else row[::-1])
+        triangles.append(
+            row if np.cross(np.append(b - a, 0), np.append(c - a, 0))[2] > 0 else row[::-1]
+        )
     n, top = len(points), np.array(triangles)
     faces = [*top + n, *top[:, ::-1]]
     start = 0
@@ -57,7 +59,9 @@ def test_the_surface_stays_and_the_triangles_get_the_size(name: str) -> None:
     assert made.area == pytest.approx(mesh.area, rel=1e-12)
     sides = np.linalg.norm(made.triangles - np.roll(made.triangles, 1, axis=1), axis=2)
     assert sides.max() <= 4 / 3 * size * (1 + 1e-12)
-    assert quality(vertices, triangles).min() > min(worst, quality(mesh.vertices, mesh.faces).min() * 0.99 + worst)
+    assert quality(vertices, triangles).min() > min(
+        worst, quality(mesh.vertices, mesh.faces).min() * 0.99 + worst
+    )
     agree = np.einsum("ij,ij->i", made.face_normals, mesh.face_normals[source])
     assert agree.min() > 1 - 1e-12  # each triangle lies in the plane of the one it says it is of
 
@@ -80,15 +84,22 @@ def test_only_the_target_is_meshed_and_it_keeps_its_border() -> None:
     target = mesh.triangles_center[:, 2] > 0
     area = mesh.area_faces[target].sum()
 
-    vertices, triangles, source = remeshed(mesh.vertices, mesh.faces, target, target.astype(int), 1.5)
+    vertices, triangles, source = remeshed(
+        mesh.vertices, mesh.faces, target, target.astype(int), 1.5
+    )
 
     made = trimesh.Trimesh(vertices, triangles, process=False)
     chosen = target[source]
     assert made.area_faces[chosen].sum() == pytest.approx(area, rel=1e-12)
-    assert made.triangles_center[chosen][:, 2].min() > 0 > made.triangles_center[~chosen][:, 2].max()
+    assert (
+        made.triangles_center[chosen][:, 2].min() > 0 > made.triangles_center[~chosen][:, 2].max()
+    )
     far = mesh.triangles[(mesh.triangles[..., 2] < -6).all(axis=1)]
     there = {tuple(map(tuple, corners)) for corners in made.triangles.round(9)}
-    assert all(any(tuple(map(tuple, np.roll(t, k, axis=0))) in there for k in range(3)) for t in far.round(9))
+    assert all(
+        any(tuple(map(tuple, np.roll(t, k, axis=0))) in there for k in range(3))
+        for t in far.round(9)
+    )
 
 
 def test_the_same_mesh_comes_out_again() -> None:
@@ -105,5 +116,7 @@ def test_a_size_larger_than_the_part_changes_nothing_that_shapes_it() -> None:
 
     vertices, triangles, _ = remeshed(BOX.vertices, BOX.faces, everything, one, 1000.0)
 
-    assert trimesh.Trimesh(vertices, triangles, process=False).volume == pytest.approx(24000, rel=1e-12)
+    assert trimesh.Trimesh(vertices, triangles, process=False).volume == pytest.approx(
+        24000, rel=1e-12
+    )
     assert len(triangles) == 12

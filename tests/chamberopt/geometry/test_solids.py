@@ -6,11 +6,22 @@ import trimesh
 
 from chamberopt.common.errors import InputError
 from chamberopt.geometry.slivers import THINNEST, without_slivers
-from chamberopt.geometry.solids import GRID_MM, Solid, Surface, cavities, snapped, solid, subtract, united
+from chamberopt.geometry.solids import (
+    GRID_MM,
+    Solid,
+    Surface,
+    cavities,
+    snapped,
+    solid,
+    subtract,
+    united,
+)
 from chamberopt.geometry.triangles import heights, shells_of, tetrahedron_volumes, winding_number
 
 
-def box(size: tuple[float, float, float], at: tuple[float, float, float] = (0, 0, 0), name: str = "box") -> Solid:
+def box(
+    size: tuple[float, float, float], at: tuple[float, float, float] = (0, 0, 0), name: str = "box"
+) -> Solid:
     mesh = trimesh.creation.box(size)
     return solid(mesh.vertices + np.asarray(at), np.asarray(mesh.faces), name)
 
@@ -24,7 +35,9 @@ def test_a_box_less_a_box_knows_where_each_triangle_comes_from() -> None:
     volume = tetrahedron_volumes(surface.vertices, surface.triangles).sum()
     assert volume == pytest.approx(0.04**3 - 0.01 * 0.01 * 0.04, rel=1e-12)
     hole = surface.only(surface.solid == inner.label)
-    assert np.allclose(np.abs(hole.vertices[:, :2]).max(axis=1), 0.005, atol=1e-12)  # on the inner box's sides
+    assert np.allclose(
+        np.abs(hole.vertices[:, :2]).max(axis=1), 0.005, atol=1e-12
+    )  # on the inner box's sides
     assert len(np.unique(hole.source)) == 8
 
 
@@ -67,12 +80,16 @@ def test_overlapping_bodies_count_once() -> None:
 
 def test_a_wall_cuts_a_room_in_two_and_an_island_stays_with_its_room() -> None:
     whole = box((0.04, 0.04, 0.04))
-    wall_and_island = united([box((0.1, 0.1, 0.002), (0, 0, 0.005)), box((0.004, 0.004, 0.004), (0, 0, -0.008))], "two")
+    wall_and_island = united(
+        [box((0.1, 0.1, 0.002), (0, 0, 0.005)), box((0.004, 0.004, 0.004), (0, 0, -0.008))], "two"
+    )
 
     surface = subtract(whole, wall_and_island).surface()
     rooms = cavities(surface)
 
-    volumes = [tetrahedron_volumes(surface.vertices, surface.triangles[room]).sum() for room in rooms]
+    volumes = [
+        tetrahedron_volumes(surface.vertices, surface.triangles[room]).sum() for room in rooms
+    ]
     low, high, island = 0.04**2 * 0.024, 0.04**2 * 0.014, 0.004**3
     assert volumes == pytest.approx([low - island, high], rel=1e-9)
     assert np.sum(rooms) == len(surface.triangles)
@@ -93,7 +110,9 @@ def test_the_winding_number_tells_inside_from_outside() -> None:
     ball = trimesh.creation.icosphere(subdivisions=2, radius=1.0)
     points = np.array([[0.0, 0.0, 0.0], [0.7, 0.1, 0.0], [1.5, 0.0, 0.0], [0.0, -9.0, 3.0]])
 
-    assert winding_number(points, ball.vertices[ball.faces]) == pytest.approx([1, 1, 0, 0], abs=1e-12)
+    assert winding_number(points, ball.vertices[ball.faces]) == pytest.approx(
+        [1, 1, 0, 0], abs=1e-12
+    )
 
 
 def split_box(apex: float) -> Surface:
@@ -102,7 +121,9 @@ def split_box(apex: float) -> Surface:
     triangles = np.asarray(mesh.faces)
     a, b, c = triangles[0]
     sides = [(a, b, c), (b, c, a), (c, a, b)]
-    a, b, c = max(sides, key=lambda side: np.linalg.norm(mesh.vertices[side[1]] - mesh.vertices[side[0]]))
+    a, b, c = max(
+        sides, key=lambda side: np.linalg.norm(mesh.vertices[side[1]] - mesh.vertices[side[0]])
+    )
     corners = mesh.vertices[[a, b, c]]
     middle = 0.4 * corners[0] + 0.6 * corners[1]
     towards = corners[2] - middle
@@ -134,7 +155,9 @@ def test_a_needle_is_closed_by_merging_its_short_edge() -> None:
     vertices, triangles = np.asarray(mesh.vertices).copy(), np.asarray(mesh.faces)
     a, b = triangles[0][:2]
     vertices[b] = vertices[a] + [1e-13, 0, 0]
-    surface = Surface(vertices, triangles, np.ones(len(triangles), np.int64), np.arange(len(triangles)))
+    surface = Surface(
+        vertices, triangles, np.ones(len(triangles), np.int64), np.arange(len(triangles))
+    )
 
     cleaned, found, left = without_slivers(surface)
 
@@ -142,7 +165,9 @@ def test_a_needle_is_closed_by_merging_its_short_edge() -> None:
     assert (found, left) == (2, 0)
     assert closed.is_watertight
     assert len(closed.faces) == len(triangles) - 2
-    assert closed.volume == pytest.approx(trimesh.Trimesh(vertices, triangles, process=False).volume, rel=1e-9)
+    assert closed.volume == pytest.approx(
+        trimesh.Trimesh(vertices, triangles, process=False).volume, rel=1e-9
+    )
 
 
 def test_a_surface_without_slivers_is_left_alone() -> None:

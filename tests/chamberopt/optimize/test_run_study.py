@@ -120,7 +120,11 @@ def test_same_seed_same_search() -> None:
 
 def test_one_parameter(tmp_path: Path) -> None:
     question = Study(design=GEAR, vary={"shot.mass_g": (2.0, 10.0)}, optimizer={"evaluations": 20})
-    result = run(question, tmp_path, lambda design, s, n: judged(-abs(np.full(3, design.value("shot.mass_g") - 7))))
+    result = run(
+        question,
+        tmp_path,
+        lambda design, s, n: judged(-abs(np.full(3, design.value("shot.mass_g") - 7))),
+    )
     assert result.best.design.value("shot.mass_g") == pytest.approx(7.0, abs=0.3)
 
 
@@ -140,7 +144,9 @@ def test_a_candidate_that_cannot_be_built_is_a_penalty_with_a_reason(tmp_path: P
     result = run(study(), tmp_path, evaluator)
     failed = [trial for trial in result.trials if trial.objective is None]
     assert failed
-    assert all(t.reason == "chamber.height_mm: too high for this test" and not t.feasible for t in failed)
+    assert all(
+        t.reason == "chamber.height_mm: too high for this test" and not t.feasible for t in failed
+    )
     assert hill(shares(result.best.design)) > PEAK - 0.02
     as_csv(read_history(tmp_path))  # rows without metrics are rows
 
@@ -156,7 +162,9 @@ def test_constraints_hold_for_the_answer(tmp_path: Path) -> None:
 
 
 def test_constraints_nobody_meets_are_the_users_to_loosen(tmp_path: Path) -> None:
-    question = study(evaluations=6).model_copy(update={"constraints": {"mean_coverage": Limits(min=3.0)}})
+    question = study(evaluations=6).model_copy(
+        update={"constraints": {"mean_coverage": Limits(min=3.0)}}
+    )
     with pytest.raises(InputError, match=r"mean_coverage .* < min 3.*history\.jsonl"):
         run(question, tmp_path, analytic(0.0))
     assert len(read_history(tmp_path)) == 7  # the search and the start's confirmation
@@ -171,7 +179,9 @@ def test_an_unusable_start_is_said_at_once(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("algorithm", ["auto", "GN_DIRECT_L", "GN_CRS2_LM", "LN_COBYLA"])
-def test_other_errors_and_ctrl_c_pass_through_nlopt_unchanged(tmp_path: Path, algorithm: str) -> None:
+def test_other_errors_and_ctrl_c_pass_through_nlopt_unchanged(
+    tmp_path: Path, algorithm: str
+) -> None:
     for error in (KeyboardInterrupt(), ZeroDivisionError("a bug")):
         calls: list = []
         good = analytic(0.0, calls)
@@ -190,7 +200,9 @@ def test_other_errors_and_ctrl_c_pass_through_nlopt_unchanged(tmp_path: Path, al
 def test_the_start_is_confirmed_on_the_same_fresh_seeds(tmp_path: Path) -> None:
     calls: list = []
     progress: list = []
-    result = run(study(evaluations=20), tmp_path, analytic(0.01, calls), lambda *args: progress.append(args))
+    result = run(
+        study(evaluations=20), tmp_path, analytic(0.01, calls), lambda *args: progress.append(args)
+    )
     assert [stream for stream, _ in calls[:20]] == ["search"] * 20
     assert [stream for stream, _ in calls[20:]] == ["confirm"] * 4
     np.testing.assert_array_equal(calls[0][1], calls[20][1])
@@ -230,7 +242,9 @@ def test_history_is_whole_rows_as_they_end(tmp_path: Path) -> None:
 
 
 def test_what_was_asked_is_in_the_folder_first(tmp_path: Path) -> None:
-    question = study(evaluations=5).model_copy(update={"constraints": {"mean_coverage": Limits(min=0.1)}})
+    question = study(evaluations=5).model_copy(
+        update={"constraints": {"mean_coverage": Limits(min=0.1)}}
+    )
     run(question, tmp_path, analytic(0.0))
     again = load_study(tmp_path / "study.toml")
     assert again == question
@@ -272,7 +286,9 @@ def test_the_real_thing_end_to_end(tmp_path: Path, monkeypatch: pytest.MonkeyPat
             results.append(run_study(question, tmp_path / str(workers), executor))
         assert write_study(tmp_path / str(workers), results[-1]) == []
     one, two = results
-    assert [t.score for t in one.trials] == [t.score for t in two.trials]  # whatever the number of workers
+    assert [t.score for t in one.trials] == [
+        t.score for t in two.trials
+    ]  # whatever the number of workers
     assert one.improved
     assert one.best.design.sonotrode.amplitude_um > 20
     again = load_result(tmp_path / "1")
@@ -288,7 +304,12 @@ def test_history_rows_are_plain_json(tmp_path: Path) -> None:
 
 
 def drafted(draft: dict, design=GEAR, **vary) -> Study:
-    return Study(design=design, vary={**BOUNDS, **vary}, optimizer={"evaluations": 12, "confirm": 2}, draft=draft)
+    return Study(
+        design=design,
+        vary={**BOUNDS, **vary},
+        optimizer={"evaluations": 12, "confirm": 2},
+        draft=draft,
+    )
 
 
 def test_a_study_searches_at_draft_and_confirms_at_the_designs_own_accuracy(tmp_path: Path) -> None:
@@ -296,10 +317,16 @@ def test_a_study_searches_at_draft_and_confirms_at_the_designs_own_accuracy(tmp_
 
     def evaluator(design, stream, replicas):
         accuracy = design.process.accuracy
-        seen.add((stream, replicas, accuracy.simulated_time_s, accuracy.replicas, design.chamber.facets))
+        seen.add(
+            (stream, replicas, accuracy.simulated_time_s, accuracy.replicas, design.chamber.facets)
+        )
         return judged(hill(shares(design)) + np.linspace(-0.01, 0.01, replicas or 4))
 
-    found = run(drafted({"replicas": 3, "simulated_time_s": 0.25, "facets": 16}), tmp_path / "out", evaluator)
+    found = run(
+        drafted({"replicas": 3, "simulated_time_s": 0.25, "facets": 16}),
+        tmp_path / "out",
+        evaluator,
+    )
     fine = GEAR.process.accuracy
     assert seen == {
         ("search", None, 0.25, 3, 16),
@@ -311,7 +338,9 @@ def test_a_study_searches_at_draft_and_confirms_at_the_designs_own_accuracy(tmp_
 def test_an_accuracy_asked_for_is_what_confirms(tmp_path: Path) -> None:
     asked = GEAR.with_values({"process.accuracy.most_replicas": 60})
     accuracy = asked.process.accuracy.model_copy(update={"coverage": 0.01})
-    asked = asked.model_copy(update={"process": asked.process.model_copy(update={"accuracy": accuracy})})
+    asked = asked.model_copy(
+        update={"process": asked.process.model_copy(update={"accuracy": accuracy})}
+    )
     seen = set()
 
     def evaluator(design, stream, replicas):
@@ -344,11 +373,31 @@ def test_how_well_a_design_is_known_is_none_of_its_choices() -> None:
 @pytest.mark.parametrize(
     ("vary", "corner", "why"),
     [
-        ({"chamber.height_mm": (16, 60), "chamber.sonotrode_distance_mm": (2, 44)}, (0, 1), "part would be outside"),
-        ({"shot.diameter_mm": (1, 10), "chamber.sonotrode_distance_mm": (2, 25)}, (1, 0), "no ball fits under"),
-        ({"sonotrode.amplitude_um": (20, 400), "chamber.sonotrode_distance_mm": (2, 25)}, (1, 0), "ten amplitudes"),
-        ({"shot.mass_g": (1, 600), "chamber.height_mm": (16, 60)}, (1, 0), "at most 50 % is allowed"),
-        ({"shot.mass_g": (1, 100), "shot.diameter_mm": (0.9, 3)}, (1, 0), "more than the 20000 supported"),
+        (
+            {"chamber.height_mm": (16, 60), "chamber.sonotrode_distance_mm": (2, 44)},
+            (0, 1),
+            "part would be outside",
+        ),
+        (
+            {"shot.diameter_mm": (1, 10), "chamber.sonotrode_distance_mm": (2, 25)},
+            (1, 0),
+            "no ball fits under",
+        ),
+        (
+            {"sonotrode.amplitude_um": (20, 400), "chamber.sonotrode_distance_mm": (2, 25)},
+            (1, 0),
+            "ten amplitudes",
+        ),
+        (
+            {"shot.mass_g": (1, 600), "chamber.height_mm": (16, 60)},
+            (1, 0),
+            "at most 50 % is allowed",
+        ),
+        (
+            {"shot.mass_g": (1, 100), "shot.diameter_mm": (0.9, 3)},
+            (1, 0),
+            "more than the 20000 supported",
+        ),
     ],
 )
 def test_a_corner_of_the_bounds_that_is_no_design_is_a_penalty_with_the_reason(
@@ -367,7 +416,10 @@ def test_a_corner_of_the_bounds_that_is_no_design_is_a_penalty_with_the_reason(
     rows = read_history(tmp_path)
     failed = [row for row in rows if row["objective"] is None]
     assert any(why in row["reason"] for row in failed)
-    assert all(row["reason"] and not row["feasible"] and row["score"] == rows[0]["score"] - FAILED for row in failed)
+    assert all(
+        row["reason"] and not row["feasible"] and row["score"] == rows[0]["score"] - FAILED
+        for row in failed
+    )
     assert len([row for row in rows if row["stage"] == "search"]) == 24
     assert result.best.feasible
 
@@ -379,7 +431,9 @@ def test_every_candidate_has_the_target_that_the_start_can_reach(tmp_path: Path)
     settings = {"evaluations": 6, "confirm": 1, "confirm_replicas": 8}
     question = Study(design=design, vary={"shot.diameter_mm": (1.5, 4.0)}, optimizer=settings)
 
-    result = run(question, tmp_path, lambda design, stream, replicas: judged(0.5 + np.zeros(replicas or 8)))
+    result = run(
+        question, tmp_path, lambda design, stream, replicas: judged(0.5 + np.zeros(replicas or 8))
+    )
 
     np.testing.assert_array_equal(result.target, build_chamber(design).part.target)
     larger = design.with_values({"shot.diameter_mm": 4.0})
@@ -389,5 +443,8 @@ def test_every_candidate_has_the_target_that_the_start_can_reach(tmp_path: Path)
     meshed = target.model_copy(update={"element_mm": 2.0})
     meshed = GEAR.model_copy(update={"part": GEAR.part.model_copy(update={"target": meshed})})
     varied = Study(design=meshed, vary={"part.target.element_mm": (1.0, 3.0)})
-    with pytest.raises(InputError, match=r"vary: part\.target\.element_mm with part\.target\.reachable: not supported"):
+    with pytest.raises(
+        InputError,
+        match=r"vary: part\.target\.element_mm with part\.target\.reachable: not supported",
+    ):
         kept_target(varied)

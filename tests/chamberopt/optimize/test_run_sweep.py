@@ -30,14 +30,21 @@ def study(vary: dict = MASS, **more) -> Study:
 def small_study() -> Study:
     """A real scene that takes moments."""
     design = plate_design(
-        process__accuracy__simulated_time_s=0.05, process__accuracy__warmup_time_s=0.02, process__accuracy__replicas=3
+        process__accuracy__simulated_time_s=0.05,
+        process__accuracy__warmup_time_s=0.02,
+        process__accuracy__replicas=3,
     )
-    return Study(design=design, vary={"sonotrode.amplitude_um": (15.0, 40.0), "shot.mass_g": (2.0, 5.0)})
+    return Study(
+        design=design, vary={"sonotrode.amplitude_um": (15.0, 40.0), "shot.mass_g": (2.0, 5.0)}
+    )
 
 
 def rows(folder: Path) -> list[dict]:
     """A history without the clock."""
-    return [{name: value for name, value in row.items() if name != "seconds"} for row in read_history(folder)]
+    return [
+        {name: value for name, value in row.items() if name != "seconds"}
+        for row in read_history(folder)
+    ]
 
 
 def test_a_grid_has_the_bounds_and_every_combination() -> None:
@@ -63,7 +70,10 @@ def test_sobol_points_are_spread_and_their_seed_is_the_studys() -> None:
         ((None, 0), "--sobol: given 0; give at least 1"),
         ((3, None, 1), "--seed: given 1, but a grid draws nothing"),
         ((None, 4, -1), "--seed: given -1; give 0 or more"),
-        ((400, None), "--grid: 400 values of 2 parameters: 160,000 candidates, more than 100,000; give fewer"),
+        (
+            (400, None),
+            "--grid: 400 values of 2 parameters: 160,000 candidates, more than 100,000; give fewer",
+        ),
     ],
 )
 def test_what_cannot_be_planned_is_said(arguments: tuple, said: str) -> None:
@@ -73,10 +83,24 @@ def test_what_cannot_be_planned_is_said(arguments: tuple, said: str) -> None:
 
 def test_a_failed_candidate_is_a_row_and_the_best_is_the_best_feasible(tmp_path: Path) -> None:
     question = study(constraints={"mean_coverage": {"max": 0.55}})
-    sweep = run_sweep(question, plan_sweep(question, 9, None), tmp_path, SerialExecutor(), None, worker_jobs.hill)
-    assert [trial.parameters["shot.mass_g"] for trial in sweep.trials] == [2, 3, 4, 5, 6, 7, 8, 9, 10]
+    sweep = run_sweep(
+        question, plan_sweep(question, 9, None), tmp_path, SerialExecutor(), None, worker_jobs.hill
+    )
+    assert [trial.parameters["shot.mass_g"] for trial in sweep.trials] == [
+        2,
+        3,
+        4,
+        5,
+        6,
+        7,
+        8,
+        9,
+        10,
+    ]
     assert [trial.stage for trial in sweep.trials] == ["sweep"] * 9
-    assert [trial.feasible for trial in sweep.trials] == [True] * 4 + [False] * 5  # a constraint, at last the shot
+    assert [trial.feasible for trial in sweep.trials] == [True] * 4 + [
+        False
+    ] * 5  # a constraint, at last the shot
     assert sweep.trials[8].reason == "shot: 10 g do not fit"
     assert sweep.best is sweep.trials[3]
     assert [row["number"] for row in read_history(tmp_path)] == list(range(9))
@@ -87,14 +111,21 @@ def test_when_all_fail_the_reason_is_said(tmp_path: Path) -> None:
     plan = plan_sweep(question, 2, None)
     with pytest.raises(InputError, match=r"the first for: shot: .* do not fit; change \[vary\]"):
         run_sweep(
-            question, type(plan)("grid", 2, plan.points[1:], None), tmp_path, SerialExecutor(), None, worker_jobs.hill
+            question,
+            type(plan)("grid", 2, plan.points[1:], None),
+            tmp_path,
+            SerialExecutor(),
+            None,
+            worker_jobs.hill,
         )
 
 
 def test_a_candidate_that_takes_its_workers_down_is_a_row(tmp_path: Path) -> None:
     question = study()
     with local_executor(2, "processes") as executor:
-        sweep = run_sweep(question, plan_sweep(question, 9, None), tmp_path, executor, None, worker_jobs.deadly)
+        sweep = run_sweep(
+            question, plan_sweep(question, 9, None), tmp_path, executor, None, worker_jobs.deadly
+        )
     assert [trial.feasible for trial in sweep.trials] == [True] * 4 + [False] + [True] * 3 + [False]
     assert "its worker process died 2 times (signal 9" in sweep.trials[4].reason
     assert sweep.trials[8].reason == "shot: 10 g do not fit"
@@ -116,7 +147,9 @@ def test_what_a_sweep_leaves(vary: dict, way: tuple, tmp_path: Path) -> None:
     assert write_sweep(tmp_path, sweep) == []
     assert seen[-1][:2] == (len(sweep.trials), len(sweep.trials))
     assert (tmp_path / "map.png").stat().st_size > 10_000
-    assert load_design(tmp_path / "best.toml").shot.mass_g == pytest.approx(sweep.best.parameters["shot.mass_g"])
+    assert load_design(tmp_path / "best.toml").shot.mass_g == pytest.approx(
+        sweep.best.parameters["shot.mass_g"]
+    )
     assert len((tmp_path / "history.csv").read_text().splitlines()) == 1 + len(sweep.trials)
     assert load_study(tmp_path / "study.toml").vary == vary
     said = json.loads((tmp_path / "result.json").read_text())
@@ -147,7 +180,16 @@ def test_the_command_line_maps_a_study(tmp_path: Path, capsys) -> None:
     from chamberopt.optimize.run_study import save_inputs
 
     save_inputs(small_study(), tmp_path)
-    command = ["sweep", str(tmp_path / "study.toml"), "--sobol", "2", "--workers", "1", "--out", str(tmp_path / "out")]
+    command = [
+        "sweep",
+        str(tmp_path / "study.toml"),
+        "--sobol",
+        "2",
+        "--workers",
+        "1",
+        "--out",
+        str(tmp_path / "out"),
+    ]
     assert main(command) == 0
     said = capsys.readouterr().out
     assert "2 candidates in" in said
@@ -177,24 +219,57 @@ def test_a_sweep_that_was_stopped_goes_on(tmp_path: Path, kept: int) -> None:
     assert history.read_bytes() == (whole / "history.jsonl").read_bytes()
     assert len(calls) == 9 - kept
     with pytest.raises(InputError, match=r"sweep\.count: was 9, is 5"):
-        run_sweep(question, plan_sweep(question, 5, None), folder, SerialExecutor(), None, worker_jobs.hill)
+        run_sweep(
+            question,
+            plan_sweep(question, 5, None),
+            folder,
+            SerialExecutor(),
+            None,
+            worker_jobs.hill,
+        )
 
 
 def test_a_sweep_names_what_it_maximises(tmp_path: Path) -> None:
     """A sum or a pair has no name of its own: the first goal is what its figures are of."""
     question = study(objective={"sum": {"shot_count": 1.0}})
-    sweep = run_sweep(question, plan_sweep(question, 2, None), tmp_path, SerialExecutor(), None, worker_jobs.hill)
+    sweep = run_sweep(
+        question, plan_sweep(question, 2, None), tmp_path, SerialExecutor(), None, worker_jobs.hill
+    )
     write_sweep(tmp_path, sweep)
-    assert json.loads((tmp_path / "result.json").read_text())["sweep"]["objective"] == "1 shot_count"
+    assert (
+        json.loads((tmp_path / "result.json").read_text())["sweep"]["objective"] == "1 shot_count"
+    )
 
 
 def test_another_plan_on_a_finished_sweep_is_refused_as_another(tmp_path: Path) -> None:
     question = study()
     folder = tmp_path / "map"
     write_sweep(
-        folder, run_sweep(question, plan_sweep(question, 3, None), folder, SerialExecutor(), None, worker_jobs.hill)
+        folder,
+        run_sweep(
+            question,
+            plan_sweep(question, 3, None),
+            folder,
+            SerialExecutor(),
+            None,
+            worker_jobs.hill,
+        ),
     )
     with pytest.raises(InputError, match=r"sweep\.count: was 3, is 2"):
-        run_sweep(question, plan_sweep(question, 2, None), folder, SerialExecutor(), None, worker_jobs.hill)
+        run_sweep(
+            question,
+            plan_sweep(question, 2, None),
+            folder,
+            SerialExecutor(),
+            None,
+            worker_jobs.hill,
+        )
     with pytest.raises(InputError, match="is finished"):
-        run_sweep(question, plan_sweep(question, 3, None), folder, SerialExecutor(), None, worker_jobs.hill)
+        run_sweep(
+            question,
+            plan_sweep(question, 3, None),
+            folder,
+            SerialExecutor(),
+            None,
+            worker_jobs.hill,
+        )

@@ -35,9 +35,19 @@ def shares(design) -> np.ndarray:
 
 
 def run(folder: Path, evaluator, optimizer: dict | None = None, **tables):
-    settings = {"evaluations": 16, "confirm": 2, "confirm_replicas": 4, **NO_FRILLS, **(optimizer or {})}
+    settings = {
+        "evaluations": 16,
+        "confirm": 2,
+        "confirm_replicas": 4,
+        **NO_FRILLS,
+        **(optimizer or {}),
+    }
     return run_study(
-        Study(design=GEAR, vary=VARY, optimizer=settings, **tables), folder, SerialExecutor(), None, evaluator
+        Study(design=GEAR, vary=VARY, optimizer=settings, **tables),
+        folder,
+        SerialExecutor(),
+        None,
+        evaluator,
     )
 
 
@@ -48,7 +58,9 @@ def bowl(x: np.ndarray) -> float:
 def test_phases_have_their_shares_and_the_last_what_is_left() -> None:
     points: list[np.ndarray] = []
     phases = [("sobol", 0.4), ("LN_SBPLX", 0.3), ("surrogate", 1.0)]
-    ran = maximise(lambda x: points.append(x) or bowl(x), np.full(2, 0.5), "auto", 20, 1, phases=phases)
+    ran = maximise(
+        lambda x: points.append(x) or bowl(x), np.full(2, 0.5), "auto", 20, 1, phases=phases
+    )
     assert ran == "sobol, then LN_SBPLX, then surrogate"
     assert len(points) == 20
     spread = np.array(points[1:8])
@@ -59,7 +71,9 @@ def test_phases_have_their_shares_and_the_last_what_is_left() -> None:
 def test_first_step_and_tolerance_are_in_units_of_the_bounds() -> None:
     def walk(**settings) -> list[np.ndarray]:
         points: list[np.ndarray] = []
-        maximise(lambda x: points.append(x) or bowl(x), np.full(2, 0.5), "LN_BOBYQA", 60, 1, **settings)
+        maximise(
+            lambda x: points.append(x) or bowl(x), np.full(2, 0.5), "LN_BOBYQA", 60, 1, **settings
+        )
         return points
 
     assert abs(walk(step=0.3)[1] - 0.5).max() == pytest.approx(0.3)
@@ -85,11 +99,15 @@ def test_the_model_holds_the_truth_in_its_interval() -> None:
     truth = np.array([bowl(x) for x in at])
     assert np.mean(np.abs(mean - truth) < 1.96 * deviation) > 0.85
     assert np.sqrt(np.mean((mean - truth) ** 2)) < 0.04
-    np.testing.assert_allclose(np.diag(model.covariance(at[:5], at[:5])), deviation[:5] ** 2, rtol=1e-6)
+    np.testing.assert_allclose(
+        np.diag(model.covariance(at[:5], at[:5])), deviation[:5] ** 2, rtol=1e-6
+    )
 
 
 def test_spreads_are_pooled() -> None:
-    np.testing.assert_allclose(pooled(np.array([1.0, 3.0, np.nan]), np.array([2, 4, 1])), [1.0, 0.5, 2.0])
+    np.testing.assert_allclose(
+        pooled(np.array([1.0, 3.0, np.nan]), np.array([2, 4, 1])), [1.0, 0.5, 2.0]
+    )
     wild = pooled(np.array([1.0, 3.0, 1e9]), np.array([2, 2, 2]))  # must not drown the others
     np.testing.assert_allclose(wild, [1.0, 1.0, 5e8])
     assert not pooled(np.full(2, np.nan), np.ones(2)).any()
@@ -105,8 +123,12 @@ def test_a_constraint_is_priced_by_what_is_to_be_expected_beyond_it() -> None:
     assert shortfall(at_limit, limits) == pytest.approx(error / np.sqrt(2.0 * np.pi) / 0.5)
 
 
-@pytest.mark.parametrize(("half_width", "standing"), [(0.05, "feasible"), (0.2, "not known"), (0.0, "feasible")])
-def test_an_answer_keeps_its_limits_to_the_end_of_the_interval(half_width: float, standing: str) -> None:
+@pytest.mark.parametrize(
+    ("half_width", "standing"), [(0.05, "feasible"), (0.2, "not known"), (0.0, "feasible")]
+)
+def test_an_answer_keeps_its_limits_to_the_end_of_the_interval(
+    half_width: float, standing: str
+) -> None:
     constraints = {"mean_coverage": Limits(min=0.5, max=0.9)}
     assert standing_of(constraints, {"mean_coverage": Estimate(0.6, half_width)})[0] == standing
     said, why = standing_of(constraints, {"mean_coverage": Estimate(0.3, 0.1)})
@@ -150,7 +172,9 @@ def test_scores_suit_objectives_of_any_size(tmp_path: Path) -> None:
 
 
 def test_a_weighted_sum_is_of_objectives_and_metrics(tmp_path: Path) -> None:
-    study = Study(design=GEAR, vary=VARY, objective={"sum": {"uniform_coverage": 1.0, "time_to_98_s": -0.001}})
+    study = Study(
+        design=GEAR, vary=VARY, objective={"sum": {"uniform_coverage": 1.0, "time_to_98_s": -0.001}}
+    )
     assert study.objective.goals == ("1 uniform_coverage + -0.001 time_to_98_s",)
     for wrong, said in (
         ({"sum": {"uniform_covrage": 1.0}}, "did you mean 'uniform_coverage'"),
@@ -190,7 +214,11 @@ def test_two_objectives_give_a_front(tmp_path: Path) -> None:
     front = [one for one in compromises(result) if one.stage == "confirm" and one.on_front]
     assert len(front) >= 3
     places = np.array(
-        [[one.parameters[name] for name in VARY] for one in front if one.parameters != result.start.parameters]
+        [
+            [one.parameters[name] for name in VARY]
+            for one in front
+            if one.parameters != result.start.parameters
+        ]
     )
     places = (places - [35.0, 2.0]) / [25.0, 8.0]
     assert np.abs(places[:, 1] - 0.5).max() < 0.1
@@ -205,13 +233,21 @@ def test_two_objectives_give_a_front(tmp_path: Path) -> None:
     assert all(np.isfinite(goal.half_width) for goals in expected for goal in goals)
     front_picture(tmp_path / "pareto.png", result)
     assert (tmp_path / "pareto.png").stat().st_size > 10000
-    assert load_study(tmp_path / "out" / "study.toml").objective.pareto == ("coverage_p05", "intensity_uniformity")
+    assert load_study(tmp_path / "out" / "study.toml").objective.pareto == (
+        "coverage_p05",
+        "intensity_uniformity",
+    )
 
 
 def test_flat_directions_and_effects_are_those_of_the_function(tmp_path: Path) -> None:
     points = np.random.default_rng(1).random((40, 2))
     scores = 0.8 - 4.0 * (points[:, 0] - 0.5) ** 2
-    got = found(Surrogate(points, scores), {"a": (0.0, 10.0), "b": (-1.0, 1.0)}, {"a": 5.0, "b": 0.0}, noise=0.04)
+    got = found(
+        Surrogate(points, scores),
+        {"a": (0.0, 10.0), "b": (-1.0, 1.0)},
+        {"a": 5.0, "b": 0.0},
+        noise=0.04,
+    )
     steep, idle = got.slices
     assert steep.flat == pytest.approx((4.0, 6.0), abs=0.25)  # 4 (x - 0.5)² = 0.04 at 0.4 and 0.6
     assert idle.flat == pytest.approx((-1.0, 1.0))
@@ -223,11 +259,15 @@ def test_flat_directions_and_effects_are_those_of_the_function(tmp_path: Path) -
 
 
 def test_a_study_says_what_its_model_found(tmp_path: Path) -> None:
-    result = run(tmp_path / "out", lambda d, s, n: judged(bowl(shares(d)) + np.linspace(-0.01, 0.01, 4)))
+    result = run(
+        tmp_path / "out", lambda d, s, n: judged(bowl(shares(d)) + np.linspace(-0.01, 0.01, 4))
+    )
     assert [one.name for one in result.findings.slices] == list(VARY)
     slices_picture(tmp_path / "slices.png", result, result.findings)
     assert (tmp_path / "slices.png").stat().st_size > 10000
-    short = run(tmp_path / "short", lambda d, s, n: judged(np.full(3, bowl(shares(d)))), {"evaluations": 5})
+    short = run(
+        tmp_path / "short", lambda d, s, n: judged(np.full(3, bowl(shares(d)))), {"evaluations": 5}
+    )
     assert short.findings is None
 
 

@@ -23,7 +23,11 @@ from chamberopt.output.results.results import load_result
 from tests.helpers.results.resumable_study import calls, history, logged, run, study
 from tests.helpers.synthetic import DESIGNS, plate_design, poisson_evaluation
 
-fork = multiprocessing.get_context("fork") if "fork" in multiprocessing.get_all_start_methods() else None
+fork = (
+    multiprocessing.get_context("fork")
+    if "fork" in multiprocessing.get_all_start_methods()
+    else None
+)
 needs_fork = pytest.mark.skipif(fork is None, reason="needs fork")
 
 
@@ -48,7 +52,9 @@ def failing(folder: Path, at: int, error: Callable[[], BaseException], times: in
 
 
 class TestFullDisk:
-    def test_no_room_for_a_row(self, tmp_path: Path, expected: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_no_room_for_a_row(
+        self, tmp_path: Path, expected: bytes, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
         """Wherever in a study the disk fills up: search, confirmation's file, its row."""
         for full_after in (0, 1, 5, 21, 25, 27):
             folder, synced = tmp_path / str(full_after), [0]
@@ -102,7 +108,9 @@ def test_a_fault_of_ours_stops_the_study_not_the_candidate(
     assert history(folder).count(b"\n") == at
     if issubclass(error, Exception):
         (note,) = raised.value.__notes__
-        assert note.startswith(f"in evaluation {at + 1} ({'search' if at < 16 else 'confirm'}): chamber.height_mm = ")
+        assert note.startswith(
+            f"in evaluation {at + 1} ({'search' if at < 16 else 'confirm'}): chamber.height_mm = "
+        )
     run(study(), folder)
     assert history(folder) == expected
     assert len(calls(folder)) == len(calls(tmp_path / "whole"))
@@ -114,10 +122,17 @@ def test_no_number_is_no_score(tmp_path: Path) -> None:
 
     def evaluator(design, stream, replicas):
         evaluation = good(design, stream, replicas)
-        return replace(evaluation, objective=Estimate(math.nan, math.nan)) if len(calls(folder)) == 4 else evaluation
+        return (
+            replace(evaluation, objective=Estimate(math.nan, math.nan))
+            if len(calls(folder)) == 4
+            else evaluation
+        )
 
     result = run(study(), folder, evaluator=evaluator)
-    assert (result.trials[3].objective, result.trials[3].score) == (None, result.trials[0].score - FAILED)
+    assert (result.trials[3].objective, result.trials[3].score) == (
+        None,
+        result.trials[0].score - FAILED,
+    )
     assert "nan" in result.trials[3].reason
     assert run(study(), folder).trials == result.trials
 
@@ -185,7 +200,9 @@ class TestCommandLine:
         def evaluator(design, stream, replicas):
             done.append((stream, design.shot.mass_g))
             self.at.get(len(done), lambda: None)()
-            return poisson_evaluation(design, chamber, 4.0 * design.shot.mass_g, 3, seed=len(stream))
+            return poisson_evaluation(
+                design, chamber, 4.0 * design.shot.mass_g, 3, seed=len(stream)
+            )
 
         self.at: dict[int, Callable[[], None]] = {}
         monkeypatch.setattr("chamberopt.optimize.run_study.simulation", lambda *_: evaluator)
@@ -196,7 +213,9 @@ class TestCommandLine:
     def rows(self, folder: str = "out") -> int:
         return Path(folder, "history.jsonl").read_text().count("\n")
 
-    def test_ctrl_c_once_finishes_the_evaluation(self, evaluated: list, capfd: pytest.CaptureFixture[str]) -> None:
+    def test_ctrl_c_once_finishes_the_evaluation(
+        self, evaluated: list, capfd: pytest.CaptureFixture[str]
+    ) -> None:
         self.at[3] = lambda: os.kill(os.getpid(), signal.SIGINT)
         before = signal.getsignal(signal.SIGINT)
         assert main(["run", "small.toml", "--out", "out"]) == 130
@@ -212,7 +231,9 @@ class TestCommandLine:
         assert len(evaluated) == len(set(evaluated)) == self.rows() == ROWS
 
     @needs_fork
-    def test_ctrl_c_twice_stops_at_once(self, evaluated: list, capfd: pytest.CaptureFixture[str]) -> None:
+    def test_ctrl_c_twice_stops_at_once(
+        self, evaluated: list, capfd: pytest.CaptureFixture[str]
+    ) -> None:
         def twice() -> None:
             os.kill(os.getpid(), signal.SIGINT)
             os.kill(os.getpid(), signal.SIGINT)
@@ -224,7 +245,11 @@ class TestCommandLine:
         child.join(60)
         err = capfd.readouterr().err
         assert child.exitcode == 130
-        assert err.index(FIRST) < err.index(SECOND) < err.index("to go on: chamberopt run small.toml --out out")
+        assert (
+            err.index(FIRST)
+            < err.index(SECOND)
+            < err.index("to go on: chamberopt run small.toml --out out")
+        )
         assert self.rows() == 2
         self.at.clear()
         assert main(["run", "small.toml", "--out", "out"]) == 0
@@ -235,7 +260,9 @@ class TestCommandLine:
         self, evaluated: list, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
     ) -> None:
         """Wherever it comes: an exception would be dropped in an import, and crash in the compiler."""
-        monkeypatch.setattr("chamberopt.cli.studies.compiled", lambda *_: os.kill(os.getpid(), signal.SIGINT))
+        monkeypatch.setattr(
+            "chamberopt.cli.studies.compiled", lambda *_: os.kill(os.getpid(), signal.SIGINT)
+        )
         child = fork.Process(target=main, args=(["run", "small.toml"],))
         child.start()
         child.join(60)
@@ -253,7 +280,10 @@ class TestCommandLine:
         self.at[4] = lambda: monkeypatch.setattr("os.fsync", full)
         assert main(["run", "small.toml", "--out", "out"]) == 1
         *_, what, how = capfd.readouterr().err.splitlines()
-        assert what == f"{Path('out/history.jsonl')}: No space left on device; what had been finished stays on disk"
+        assert (
+            what
+            == f"{Path('out/history.jsonl')}: No space left on device; what had been finished stays on disk"
+        )
         assert how == "to go on: chamberopt run small.toml --out out"
         assert self.rows() == 3
 
@@ -304,13 +334,20 @@ class TestCommandLine:
         assert main(["run", "small.toml", "--out", "out"]) == 0
         before = {path: path.read_bytes() for path in Path("out").rglob("*") if path.is_file()}
         capfd.readouterr()
-        monkeypatch.setattr("chamberopt.common.versions.sources_digest", lambda: "another")  # its result stands
+        monkeypatch.setattr(
+            "chamberopt.common.versions.sources_digest", lambda: "another"
+        )  # its result stands
         assert main(["run", "small.toml", "--out", "out"]) == 0
         out, err = capfd.readouterr()
-        assert "out: this study is finished, nothing was run; to run it anew give another folder (--out)" in err
+        assert (
+            "out: this study is finished, nothing was run; to run it anew give another folder (--out)"
+            in err
+        )
         assert "uniform coverage" in out
         assert len(evaluated) == ROWS
-        assert {path: path.read_bytes() for path in Path("out").rglob("*") if path.is_file()} == before
+        assert {
+            path: path.read_bytes() for path in Path("out").rglob("*") if path.is_file()
+        } == before
         Path("small.toml").write_text(STUDY.replace("evaluations = 5", "evaluations = 6"))
         assert main(["run", "small.toml", "--out", "out"]) == 2
         assert "study.optimizer.evaluations: was 5, is 6" in capfd.readouterr().err
@@ -331,7 +368,8 @@ class TestCommandLine:
         assert f"to go on: chamberopt run small.toml --out {first}" in capfd.readouterr().err
         assert main(["run", "small.toml"]) == 0
         assert (
-            f"{first}: not finished; to go on there: chamberopt run small.toml --out {first}" in capfd.readouterr().err
+            f"{first}: not finished; to go on there: chamberopt run small.toml --out {first}"
+            in capfd.readouterr().err
         )
         assert self.rows("results/small") == 3
         assert self.rows("results/small-2") == ROWS

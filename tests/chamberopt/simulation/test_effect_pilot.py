@@ -99,8 +99,12 @@ def pretend(strength: dict[str, float], monkeypatch: pytest.MonkeyPatch) -> list
     return asked
 
 
-def test_each_effect_is_switched_alone_and_the_most_important_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked = pretend({"gravity": 0.05, "ball_collisions": -0.5, "friction": -0.3, "drag": -0.001}, monkeypatch)
+def test_each_effect_is_switched_alone_and_the_most_important_comes_first(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked = pretend(
+        {"gravity": 0.05, "ball_collisions": -0.5, "friction": -0.3, "drag": -0.001}, monkeypatch
+    )
     order = advise(PLATE, CHAMBER, SerialExecutor())
     said = {one.effect: one for one in order}
     assert [one.effect for one in order] == ["ball_collisions", "friction", "gravity", "drag"]
@@ -113,11 +117,17 @@ def test_each_effect_is_switched_alone_and_the_most_important_comes_first(monkey
     assert all(design.process.accuracy.coverage is None for design in asked)
 
 
-def test_a_target_of_two_triangles_has_figures_too(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_target_of_two_triangles_has_figures_too(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     """Both are as far from the sonotrode: there is no farther half, and no 0 / 0."""
     trimesh.creation.box((60, 60, 10)).export(tmp_path / "lid.stl")
     data = PLATE.model_dump()
-    data["part"] = {"mesh": str(tmp_path / "lid.stl"), "unit": "mm", "target": {"direction": (0.0, 0.0, -1.0)}}
+    data["part"] = {
+        "mesh": str(tmp_path / "lid.stl"),
+        "unit": "mm",
+        "target": {"direction": (0.0, 0.0, -1.0)},
+    }
     data["part"]["target"]["angle_deg"] = (0.0, 10.0)
     lid = checked(Design, data)
     pretend({"gravity": 0.05}, monkeypatch)
@@ -127,19 +137,30 @@ def test_a_target_of_two_triangles_has_figures_too(monkeypatch: pytest.MonkeyPat
 
 
 def test_auto_keeps_what_matters_and_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
-    pretend({"gravity": 0.002, "ball_collisions": -0.5, "friction": -0.3, "drag": -0.001}, monkeypatch)
+    pretend(
+        {"gravity": 0.002, "ball_collisions": -0.5, "friction": -0.3, "drag": -0.001}, monkeypatch
+    )
     design = with_effects("auto")
     assert design.effects.auto
     chosen, why = settled(design, CHAMBER, SerialExecutor())
     effects = chosen.effects
-    assert (effects.auto, effects.gravity, effects.ball_collisions, effects.drag) == (False, False, True, False)
+    assert (effects.auto, effects.gravity, effects.ball_collisions, effects.drag) == (
+        False,
+        False,
+        True,
+        False,
+    )
     assert effects.friction is not None
     assert len(why) == 4
     assert settled(PLATE, CHAMBER, SerialExecutor()) == (PLATE, [])
 
 
-def test_effects_that_are_small_alone_but_not_together_are_not_all_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    pretend({"gravity": 0.009, "drag": 0.0085, "friction": -0.3, "ball_collisions": 0.5}, monkeypatch)
+def test_effects_that_are_small_alone_but_not_together_are_not_all_left_out(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    pretend(
+        {"gravity": 0.009, "drag": 0.0085, "friction": -0.3, "ball_collisions": 0.5}, monkeypatch
+    )
     effects = settled(with_effects("auto"), CHAMBER, SerialExecutor())[0].effects
     assert (effects.gravity, effects.drag) == (True, False)
 

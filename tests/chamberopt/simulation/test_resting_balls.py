@@ -7,7 +7,13 @@ import trimesh
 from chamberopt.chamber.build import Chamber, Part, build_chamber
 from chamberopt.chamber.scene import build_scene, chamber_mesh, replica_seed
 from chamberopt.design.effects import Friction
-from chamberopt.simulation.resting_balls import Stuck, on_the_spot_notes, share_on_the_spot, still, stuck_notes
+from chamberopt.simulation.resting_balls import (
+    Stuck,
+    on_the_spot_notes,
+    share_on_the_spot,
+    still,
+    stuck_notes,
+)
 from sim_core import Resting, simulate
 from tests.helpers.scenes.cavities import box_around
 from tests.helpers.synthetic import plate_design
@@ -20,7 +26,9 @@ NOBODY = [-1, -1, -1, -1]
 def chamber() -> Chamber:
     """A room of 20 mm, and in its middle a part of 14 x 8 x 8 mm: 3 mm from the walls at x = -10 and x = 10 mm."""
     mesh = box_around(trimesh.creation.box((14e-3, 8e-3, 8e-3)), 10e-3)
-    part = Part(mesh.vertices, mesh.triangles, np.ones(len(mesh.triangles)), np.ones(1, dtype=bool), "box")
+    part = Part(
+        mesh.vertices, mesh.triangles, np.ones(len(mesh.triangles)), np.ones(1, dtype=bool), "box"
+    )
     none = np.zeros(len(mesh.triangles), dtype=np.int32)
     return Chamber(mesh.vertices, mesh.triangles, mesh.tags, none, 1.0, part, none, ())
 
@@ -28,7 +36,9 @@ def chamber() -> Chamber:
 def triangle(chamber: Chamber, tag: int, axis: int, at: float) -> int:
     """One that lies in a plane ``axis`` = ``at`` [m]."""
     corners = chamber.vertices[chamber.triangles]
-    return int(np.flatnonzero((chamber.tags == tag) & np.isclose(corners[..., axis], at).all(axis=1))[0])
+    return int(
+        np.flatnonzero((chamber.tags == tag) & np.isclose(corners[..., axis], at).all(axis=1))[0]
+    )
 
 
 def resting(*balls: tuple[list[float], float, int, int, bool]) -> Resting:
@@ -67,7 +77,9 @@ def test_groups_say_how_many_on_what_and_where(chamber: Chamber) -> None:
 def test_a_part_that_turns_is_elsewhere_by_then(chamber: Chamber) -> None:
     found = still(resting(([8.5, 0.0, 0.0], 0.2, -1, -1, True)), 20, BALL, chamber, part_turns=True)
     assert found is not None
-    assert "1 jammed between the wall and other balls or the part at (8.5, 0.0, 0.0) mm" in found.line
+    assert (
+        "1 jammed between the wall and other balls or the part at (8.5, 0.0, 0.0) mm" in found.line
+    )
 
 
 def test_far_apart_is_two_places_and_the_smallest_are_counted_only(chamber: Chamber) -> None:
@@ -82,13 +94,21 @@ def test_far_apart_is_two_places_and_the_smallest_are_counted_only(chamber: Cham
 
 
 def test_between_other_balls_only(chamber: Chamber) -> None:
-    found = still(resting(([0.0, 0.0, 8.0], 0.2, -1, -1, True)), 20, BALL, chamber, part_turns=False)
+    found = still(
+        resting(([0.0, 0.0, 8.0], 0.2, -1, -1, True)), 20, BALL, chamber, part_turns=False
+    )
     assert found is not None
     assert "1 jammed among other balls at" in found.line
 
 
 def test_nothing_lies_still(chamber: Chamber) -> None:
-    nothing = Resting(np.zeros(0, int), np.zeros((0, 3)), np.zeros(0), *(np.zeros((0, 4), int),) * 2, np.zeros(0, bool))
+    nothing = Resting(
+        np.zeros(0, int),
+        np.zeros((0, 3)),
+        np.zeros(0),
+        *(np.zeros((0, 4), int),) * 2,
+        np.zeros(0, bool),
+    )
     assert still(nothing, 20, BALL, chamber, part_turns=False) is None
 
 

@@ -10,7 +10,9 @@ DESIGN = plate_design()
 
 
 @pytest.mark.parametrize(("dents", "end"), [(40.0, None), (4.0, FARTHEST)])
-def test_the_curve_goes_through_the_figures_of_the_treatment_time(dents: float, end: float | None) -> None:
+def test_the_curve_goes_through_the_figures_of_the_treatment_time(
+    dents: float, end: float | None
+) -> None:
     """Dents fall at one rate on all triangles: mean coverage is 1 - exp(-rate t) at every time."""
     rng = np.random.default_rng(1)
     seconds, treatment, size, area = 1.0, DESIGN.process.treatment_time, 1e-8, 1e-6
@@ -34,4 +36,6 @@ def test_the_curve_goes_through_the_figures_of_the_treatment_time(dents: float, 
     times = [row["time_s"] for row in rows]
     assert times == sorted(times)
     full = evaluation.metrics["time_to_98_s"].value
-    assert times[-1] == pytest.approx(end * treatment if end else max(treatment, min(1.1 * full, FARTHEST * treatment)))
+    assert times[-1] == pytest.approx(
+        end * treatment if end else max(treatment, min(1.1 * full, FARTHEST * treatment))
+    )

@@ -8,7 +8,12 @@ import pytest
 from chamberopt.common.errors import InputError
 from chamberopt.coverage.hits import Hits, hits_on_part, load_hits, save_hits, sorted_hits
 from chamberopt.coverage.tally import dent_diameter
-from chamberopt.simulation.triangle_fields import QUANTITIES, _quantile, coverage_bounds, per_triangle
+from chamberopt.simulation.triangle_fields import (
+    QUANTITIES,
+    _quantile,
+    coverage_bounds,
+    per_triangle,
+)
 from tests.helpers.synthetic import impact_log, patchwork, plate_design, poisson_evaluation
 
 DESIGN = plate_design()
@@ -31,7 +36,12 @@ def test_hits_are_the_impacts_on_the_part_with_their_size_and_energy() -> None:
     mass = shot.density * np.pi / 6 * shot.diameter**3
     np.testing.assert_allclose(hits.energy, 0.5 * mass * np.array([9.0, 9.0, 0.01]), rtol=1e-5)
     size = dent_diameter(
-        np.array([3.0]), shot.diameter, shot.density, material.hardness, material.restitution, material.yield_speed
+        np.array([3.0]),
+        shot.diameter,
+        shot.density,
+        material.hardness,
+        material.restitution,
+        material.yield_speed,
     )
     np.testing.assert_allclose(hits.dent, [size[0], size[0], 0.0], rtol=1e-5)
 
@@ -77,8 +87,12 @@ def test_per_triangle_columns_add_up() -> None:
     found = per_triangle(DESIGN, chamber, evaluation)
     hits = sorted_hits(evaluation.hits, 50)
     times = DESIGN.process.treatment_time / evaluation.total.simulated_time
-    assert np.nansum(found["energy_per_mm2"]) == pytest.approx(1e3 * hits.hits.energy.sum(dtype=float) * times)
-    assert (found["p90_normal_speed"] >= found["mean_normal_speed"] - 1e-6)[found["impacts"] > 0].all()
+    assert np.nansum(found["energy_per_mm2"]) == pytest.approx(
+        1e3 * hits.hits.energy.sum(dtype=float) * times
+    )
+    assert (found["p90_normal_speed"] >= found["mean_normal_speed"] - 1e-6)[
+        found["impacts"] > 0
+    ].all()
     assert {quantity.column for quantity in QUANTITIES.values()} <= set(found)
 
 

@@ -6,7 +6,18 @@ import numpy as np
 
 from sim_core import Balls, Gravity, Physics, Restitution, Scene, pack_balls, simulate
 from sim_core.scene.invariants import clearance, closest_pair, momentum
-from tests.hard_cases.outcome import WEIGHTLESS, Case, Claim, Outcome, Played, named, near, play, verdict, with_rest
+from tests.hard_cases.outcome import (
+    WEIGHTLESS,
+    Case,
+    Claim,
+    Outcome,
+    Played,
+    named,
+    near,
+    play,
+    verdict,
+    with_rest,
+)
 from tests.helpers.scenes.cavities import box
 from tests.helpers.scenes.fuzzed_chambers import Chamber
 
@@ -34,7 +45,9 @@ def newtons_cradle() -> Outcome:
     """Five equal balls, 1 mm apart: each hands its whole velocity to the next."""
     gap, speed = 1e-3, 1.0
     balls = row([k * (DIAMETER + gap) for k in range(5)], [speed, 0, 0, 0, 0])
-    pieces = 11  # each of half the time between two hits, so that the k-th hit lies inside piece 2 k + 1
+    pieces = (
+        11  # each of half the time between two hits, so that the k-th hit lies inside piece 2 k + 1
+    )
     seen = play(Chamber(ROOM, balls, Physics()), pieces * 0.5 * gap / speed, pieces)
     order = [int(one.velocities[:, 0].argmax()) for one in seen.track]
     return verdict(
@@ -43,7 +56,9 @@ def newtons_cradle() -> Outcome:
         near("velocities [m/s]", seen.end.velocities[:, 0], [0, 0, 0, 0, speed], 1e-15),
         near("sideways [m/s]", seen.end.velocities[:, 1:], np.zeros((5, 2)), 1e-15),
         near("hits", seen.pairs, 4, 0),
-        Claim(order == sorted(order) and set(order) == set(range(5)), f"the moving ball was {order}"),
+        Claim(
+            order == sorted(order) and set(order) == set(range(5)), f"the moving ball was {order}"
+        ),
     )
 
 
@@ -61,7 +76,10 @@ def newtons_cradle_touching() -> Outcome:
 
 def newtons_cradle_with_two() -> Outcome:
     """Two in, two out: elastic hits in a row exchange velocities, so that their order along the row is kept."""
-    balls = row([0.0, DIAMETER + 1e-6, *(5 * DIAMETER + k * (DIAMETER + 1e-6) for k in range(3))], [2.0, 2.0, 0, 0, 0])
+    balls = row(
+        [0.0, DIAMETER + 1e-6, *(5 * DIAMETER + k * (DIAMETER + 1e-6) for k in range(3))],
+        [2.0, 2.0, 0, 0, 0],
+    )
     seen = play(Chamber(ROOM, balls, Physics()), 8e-3)
     return verdict(
         seen,
@@ -107,7 +125,9 @@ def collapse_of_a_row_between_walls() -> Outcome:
         seen,
         "keeps its order and cools",
         Claim(bool((np.diff(along) > 0.0).all()), "balls have passed through each other"),
-        Claim(seen.events / seen.duration < 1e6, f"{seen.events / seen.duration:.2g} events a second"),
+        Claim(
+            seen.events / seen.duration < 1e6, f"{seen.events / seen.duration:.2g} events a second"
+        ),
         never_warmer(seen),
     )
 
@@ -123,7 +143,9 @@ def collapse_of_a_cloud() -> Outcome:
         seen,
         "cools into clusters in a bounded number of events",
         Claim(share < 0.01, f"has kept {share:.2g} of its energy"),
-        Claim(seen.events / seen.duration < 1e6, f"{seen.events / seen.duration:.2g} events a second"),
+        Claim(
+            seen.events / seen.duration < 1e6, f"{seen.events / seen.duration:.2g} events a second"
+        ),
         never_warmer(seen),
     )
 
@@ -133,13 +155,17 @@ def pile_coming_to_rest() -> Outcome:
     rng = np.random.default_rng(7)
     room = box((0.012, 0.012, 0.06))
     balls = Balls(pack_balls(room, 50, DIAMETER, rng), rng.normal(0.0, 0.5, (50, 3)), DIAMETER)
-    seen = play(Chamber(room, balls, with_rest(Physics(Gravity(), with_losses(0.5)))), 2.0, 20, record=())
+    seen = play(
+        Chamber(room, balls, with_rest(Physics(Gravity(), with_losses(0.5)))), 2.0, 20, record=()
+    )
     speed = float(np.abs(seen.end.velocities).max())
     return verdict(
         seen,
         "lies still in the end",
         Claim(speed < 1e-2, f"still at {speed:.2g} m/s"),
-        Claim(seen.events / seen.duration < 1e5, f"{seen.events / seen.duration:.2g} events a second"),
+        Claim(
+            seen.events / seen.duration < 1e5, f"{seen.events / seen.duration:.2g} events a second"
+        ),
     )
 
 
@@ -147,7 +173,11 @@ def triple_contact() -> Outcome:
     """A ball flies between two that touch, at both at once. Which comes first is open; momentum and energy are not."""
     half = 0.5 * DIAMETER
     positions = np.array(
-        [[MIDDLE - 0.02, MIDDLE, MIDDLE], [MIDDLE, MIDDLE + half, MIDDLE], [MIDDLE, MIDDLE - half, MIDDLE]]
+        [
+            [MIDDLE - 0.02, MIDDLE, MIDDLE],
+            [MIDDLE, MIDDLE + half, MIDDLE],
+            [MIDDLE, MIDDLE - half, MIDDLE],
+        ]
     )
     velocities = np.array([[1.0, 0, 0], [0, 0, 0], [0, 0, 0]])
     balls = Balls(positions, velocities, DIAMETER)
@@ -179,7 +209,9 @@ def four_balls_close_on_one() -> Outcome:
     )
 
 
-def crystal(side: int, share: float, jitter: float, rng: np.random.Generator) -> tuple[Chamber, float]:
+def crystal(
+    side: int, share: float, jitter: float, rng: np.random.Generator
+) -> tuple[Chamber, float]:
     """A face-centred cubic crystal of 4 side³ balls that fills ``share`` of its box, each moved by up to ``jitter`` of
     the free gap; and the share. Elastic, no gravity.
     """
@@ -194,7 +226,9 @@ def crystal(side: int, share: float, jitter: float, rng: np.random.Generator) ->
     moved *= jitter * 0.5 * gap / np.linalg.norm(moved, axis=1)[:, None]
     inside = np.clip(positions + moved, 0.5 * DIAMETER, wide - 0.5 * DIAMETER)
     room = box((wide, wide, wide))
-    return Chamber(room, Balls(inside, rng.normal(0.0, 1.0, (count, 3)), DIAMETER), Physics()), share
+    return Chamber(
+        room, Balls(inside, rng.normal(0.0, 1.0, (count, 3)), DIAMETER), Physics()
+    ), share
 
 
 def packing_of_64_percent() -> Outcome:

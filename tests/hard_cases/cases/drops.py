@@ -16,7 +16,9 @@ G = 9.80665  # m/s²
 HALF = 0.03  # m: of the room about a body
 DROP = 0.01  # m: from the start down to where a ball right above would touch
 EXACT = 1e-12  # s, m/s: rounding of times below 1 s and of speeds below 10 m/s, a thousandfold
-TURN = TOUCH / RADIUS  # [-]: an edge is taken for met TOUCH early, which turns the line to the centre by this at most
+TURN = (
+    TOUCH / RADIUS
+)  # [-]: an edge is taken for met TOUCH early, which turns the line to the centre by this at most
 
 
 def one_ball(position: tuple[float, float, float], velocity: tuple[float, float, float]) -> Balls:
@@ -45,14 +47,22 @@ def _ridge() -> TriangleMesh:
     bar.apply_transform(trimesh.transformations.rotation_matrix(math.pi / 4.0, [0.0, 1.0, 0.0]))
     bar.apply_translation([0.0, 0.0, -0.005 * math.sqrt(2.0)])
     vertices = np.asarray(bar.vertices)
-    vertices[np.abs(vertices) < 1e-15] = 0.0  # the top edge is where the formula has it, without rounding
+    vertices[np.abs(vertices) < 1e-15] = (
+        0.0  # the top edge is where the formula has it, without rounding
+    )
     return box_around(trimesh.Trimesh(vertices, bar.faces, process=False), HALF)
 
 
 def _tip(slope: float) -> TriangleMesh:
     """A room with a four-sided pyramid in it, its tip on top at the origin; ``slope`` [-]: height over half width."""
     wide = 0.01 / slope
-    corners = [[0.0, 0.0, 0.0], [wide, 0, -0.01], [0, wide, -0.01], [-wide, 0, -0.01], [0, -wide, -0.01]]
+    corners = [
+        [0.0, 0.0, 0.0],
+        [wide, 0, -0.01],
+        [0, wide, -0.01],
+        [-wide, 0, -0.01],
+        [0, -wide, -0.01],
+    ]
     faces = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1], [1, 3, 2], [1, 4, 3]]
     return box_around(trimesh.Trimesh(corners, faces, process=False), HALF)
 
@@ -173,7 +183,9 @@ def ball_along_a_row_of_corners() -> Outcome:
     room = box((0.03, 0.03, 0.03))
     fine = room
     for _ in range(3):
-        vertices, triangles, index = trimesh.remesh.subdivide(fine.vertices, fine.triangles, return_index=True)
+        vertices, triangles, index = trimesh.remesh.subdivide(
+            fine.vertices, fine.triangles, return_index=True
+        )
         origin = np.empty(len(triangles), dtype=int)
         for old, new in index.items():
             origin[new] = old

@@ -6,7 +6,17 @@ from functools import partial
 import numpy as np
 import trimesh
 
-from sim_core import Balls, Gravity, Physics, Restitution, Scene, TriangleMesh, Vibration, pack_balls, simulate
+from sim_core import (
+    Balls,
+    Gravity,
+    Physics,
+    Restitution,
+    Scene,
+    TriangleMesh,
+    Vibration,
+    pack_balls,
+    simulate,
+)
 from sim_core.scene.invariants import energy
 from tests.hard_cases.cases.drops import EXACT, RADIUS, G, one_ball
 from tests.hard_cases.outcome import (
@@ -31,13 +41,17 @@ DROP = 0.01  # m
 ROOM = box((SIDE, SIDE, SIDE))
 
 
-def _to_and_fro(side: float, radius: float, speed: float, duration: float, off: float = 0.0) -> Outcome:
+def _to_and_fro(
+    side: float, radius: float, speed: float, duration: float, off: float = 0.0
+) -> Outcome:
     """Between floor and ceiling of a cube with side [m]: hits at (first way + k (side - 2 r))/v, none is lost.
 
     ``off`` [m]: how far from the origin the cube is, along every axis.
     """
     room = box((side,) * 3, centre=(off,) * 3)
-    low, high = (float(f(room.vertices[:, 2])) for f in (np.min, np.max))  # where rounding has put them
+    low, high = (
+        float(f(room.vertices[:, 2])) for f in (np.min, np.max)
+    )  # where rounding has put them
     ball = Balls(np.full((1, 3), off), np.array([[0.0, 0.0, speed]]), 2.0 * radius)
     seen = play(Chamber(room, ball, Physics()), duration)
     way = high - low - 2.0 * radius
@@ -60,7 +74,11 @@ def gas_of_small_balls() -> Outcome:
     grid = np.stack(np.meshgrid(*[np.arange(4.0)] * 3), axis=-1).reshape(-1, 3)
     balls = Balls(1e-6 * (1.0 + 3.0 * grid), rng.normal(0.0, 1.0, (64, 3)), 1e-6)
     seen = play(Chamber(box((1.0, 1.0, 1.0)), balls, Physics()), 5.0, 5, record=())
-    return verdict(seen, "fly out of their corner and keep their energy", Claim(seen.collisions > 500, "few hits"))
+    return verdict(
+        seen,
+        "fly out of their corner and keep their energy",
+        Claim(seen.collisions > 500, "few hits"),
+    )
 
 
 def large_ball_on_a_small_body() -> Outcome:
@@ -89,8 +107,16 @@ def triangles_of_two_sizes() -> Outcome:
     square = [(half - tiny, half - tiny), (half, half - tiny), (half, half), (half - tiny, half)]
     floor = [(0.0, 0.0), (SIDE, 0.0), (SIDE, SIDE), (0.0, SIDE), *square]
     vertices = np.array([(x, y, 0.0) for x, y in floor] + [(x, y, SIDE) for x, y in floor[:4]])
-    frame = [t for k in range(4) for t in ((k, 4 + k, (k + 1) % 4), ((k + 1) % 4, 4 + k, 4 + (k + 1) % 4))]
-    sides = [t for k in range(4) for t in ((k, (k + 1) % 4, 8 + (k + 1) % 4), (k, 8 + (k + 1) % 4, 8 + k))]
+    frame = [
+        t
+        for k in range(4)
+        for t in ((k, 4 + k, (k + 1) % 4), ((k + 1) % 4, 4 + k, 4 + (k + 1) % 4))
+    ]
+    sides = [
+        t
+        for k in range(4)
+        for t in ((k, (k + 1) % 4, 8 + (k + 1) % 4), (k, 8 + (k + 1) % 4, 8 + k))
+    ]
     triangles = [*frame, (4, 6, 5), (4, 7, 6), (8, 9, 10), (8, 10, 11), *sides]
     room = TriangleMesh(vertices, triangles, np.zeros(len(triangles), dtype=int))
     way = SIDE - 2.0 * RADIUS
@@ -155,7 +181,9 @@ def sonotrode_swinging_a_millimetre() -> Outcome:
     seen = play(Chamber(ROOM, start, physics), 0.01)
     place, speed, now = 0.02, -3.0, 0.0
     off, least = 0.0, math.inf
-    for time, z, triangle, said in zip(seen.time, seen.position[:, 2], seen.triangle, seen.normal_speed, strict=True):
+    for time, z, triangle, said in zip(
+        seen.time, seen.position[:, 2], seen.triangle, seen.normal_speed, strict=True
+    ):
         place, now = place + speed * (time - now), time
         off = max(off, abs(place - z))
         moving = seen.mesh.tags[triangle] == FLOOR
@@ -169,7 +197,10 @@ def sonotrode_swinging_a_millimetre() -> Outcome:
         f"is mirrored {len(seen.time)} times, where the face is and at its speed",
         near("places [m]", off, 0.0, 1e-12),
         near("velocity in the end [m/s]", seen.end.velocities[0, 2], speed, 1e-6),
-        Claim(least > 0.0 and len(seen.time) > 10, f"{len(seen.time)} hits, the slowest at {least} m/s"),
+        Claim(
+            least > 0.0 and len(seen.time) > 10,
+            f"{len(seen.time)} hits, the slowest at {least} m/s",
+        ),
     )
 
 
@@ -177,11 +208,17 @@ def shot_on_a_sonotrode_swinging_a_millimetre() -> Outcome:
     """Thirty balls, e = 0.9, between walls: nothing leaves, nothing overlaps."""
     rng = np.random.default_rng(12)
     room = cylinder(0.02, 0.03)
-    balls = Balls(pack_balls(room, 30, 2.0 * RADIUS, rng, clear=1e-3), rng.normal(0.0, 5.0, (30, 3)), 2.0 * RADIUS)
+    balls = Balls(
+        pack_balls(room, 30, 2.0 * RADIUS, rng, clear=1e-3),
+        rng.normal(0.0, 5.0, (30, 3)),
+        2.0 * RADIUS,
+    )
     law = (0.9, 1.0)
     physics = Physics(Gravity(), Restitution((law,) * 3, law), Vibration(FLOOR, 1e-3, 20e3))
     seen = play(Chamber(room, balls, physics), 0.05, 10)
-    return verdict(seen, "stays in the chamber", Claim(seen.collisions > 2_000, f"only {seen.collisions} hits"))
+    return verdict(
+        seen, "stays in the chamber", Claim(seen.collisions > 2_000, f"only {seen.collisions} hits")
+    )
 
 
 def _plastic(e: float) -> Physics:
@@ -206,7 +243,11 @@ def perfectly_plastic_walls() -> Outcome:
 
 def perfectly_plastic_pair() -> Outcome:
     """e = 0: after the hit both have their common velocity, for good."""
-    balls = Balls(np.array([[0.01, 0.015, 0.015], [0.015, 0.015, 0.015]]), np.array([[0.2, 0, 0], [0, 0, 0.0]]), 3e-3)
+    balls = Balls(
+        np.array([[0.01, 0.015, 0.015], [0.015, 0.015, 0.015]]),
+        np.array([[0.2, 0, 0], [0, 0, 0.0]]),
+        3e-3,
+    )
     seen = play(Chamber(ROOM, balls, _plastic(0.0)), 0.05)
     return verdict(
         seen,
@@ -225,7 +266,9 @@ def almost_plastic_wall() -> Outcome:
         seen,
         "creeps away from the wall",
         near("hits", len(seen.time), 1, 0),
-        near("velocity [m/s]", seen.end.velocities[0, 0], -1e-9, 2e-16),  # what is left of 1 m/s less 1 m/s
+        near(
+            "velocity [m/s]", seen.end.velocities[0, 0], -1e-9, 2e-16
+        ),  # what is left of 1 m/s less 1 m/s
         near("place [m]", seen.end.positions[0, 0], SIDE - RADIUS - 1e-9 * (10.0 - way), 1e-14),
     )
 

@@ -16,17 +16,25 @@ SIDE = 0.03  # m
 TINY = 1e-9  # m: width of slivers and of steps that are almost none
 
 
-def floor_with(points: list[tuple[float, float, float]], below: list[list[int]] | None = None) -> TriangleMesh:
+def floor_with(
+    points: list[tuple[float, float, float]], below: list[list[int]] | None = None
+) -> TriangleMesh:
     """A box on z = 0 whose floor is triangulated through its corners and further points (x, y, z) [m]: as ``below``
     says, or as it comes.
     """
     corners = [(0.0, 0.0, 0.0), (SIDE, 0.0, 0.0), (SIDE, SIDE, 0.0), (0.0, SIDE, 0.0)]
     floor = np.array([*corners, *points])
     if below is None:
-        below = Delaunay(floor[:, :2], qhull_options="QJ Pp").simplices  # joggled: loses no point that is near another
+        below = Delaunay(
+            floor[:, :2], qhull_options="QJ Pp"
+        ).simplices  # joggled: loses no point that is near another
     below = np.array(below)
-    turn = np.cross(floor[below[:, 1]] - floor[below[:, 0]], floor[below[:, 2]] - floor[below[:, 0]])[:, 2]
-    below = np.where(turn[:, None] > 0.0, below[:, ::-1], below)  # the cavity is above: normals point down
+    turn = np.cross(
+        floor[below[:, 1]] - floor[below[:, 0]], floor[below[:, 2]] - floor[below[:, 0]]
+    )[:, 2]
+    below = np.where(
+        turn[:, None] > 0.0, below[:, ::-1], below
+    )  # the cavity is above: normals point down
     top = len(floor)
     vertices = np.concatenate([floor, np.array(corners) + np.array([0.0, 0.0, SIDE])])
     lid = [(top, top + 1, top + 2), (top, top + 2, top + 3)]
@@ -38,9 +46,13 @@ def floor_with(points: list[tuple[float, float, float]], below: list[list[int]] 
     return TriangleMesh(vertices, np.concatenate([below, lid, sides]), np.array(tags))
 
 
-def _bounces_as_on_a_plane(room: TriangleMesh, at: tuple[float, float], off: float, expected: str) -> Outcome:
+def _bounces_as_on_a_plane(
+    room: TriangleMesh, at: tuple[float, float], off: float, expected: str
+) -> Outcome:
     """Dropped at (x, y) [m]: comes up again straight, as high, as if the floor were plane but for ``off`` [m]."""
-    seen = play(Chamber(room, one_ball((*at, RADIUS + DROP), (0.0, 0.0, 0.0)), Physics(Gravity())), 0.4)
+    seen = play(
+        Chamber(room, one_ball((*at, RADIUS + DROP), (0.0, 0.0, 0.0)), Physics(Gravity())), 0.4
+    )
     fall = math.sqrt(2.0 * DROP / G)
     times = fall * np.arange(1.0, 0.4 / fall, 2.0)
     number = len(times)
@@ -57,21 +69,31 @@ def floor_with_a_sliver() -> Outcome:
     left, right, top = 4, 5, 6
     triangles = [[left, right, top], [top, 2, 3], [left, top, 3], [top, right, 2]]
     triangles += [[0, 1, right], [0, right, left], [0, left, 3], [1, 2, right]]
-    room = floor_with([(0.005, 0.015, 0.0), (0.025, 0.015, 0.0), (0.015, 0.015 + TINY, 0.0)], triangles)
-    return _bounces_as_on_a_plane(room, (0.014, 0.015), 0.0, "a sliver a nanometre wide is not felt")
+    room = floor_with(
+        [(0.005, 0.015, 0.0), (0.025, 0.015, 0.0), (0.015, 0.015 + TINY, 0.0)], triangles
+    )
+    return _bounces_as_on_a_plane(
+        room, (0.014, 0.015), 0.0, "a sliver a nanometre wide is not felt"
+    )
 
 
 def floor_with_near_duplicate_corners() -> Outcome:
     """Corners a nanometre apart: triangles that are almost points, and almost duplicates of their neighbours."""
     room = floor_with([(0.015, 0.015, 0.0), (0.015 + TINY, 0.015, 0.0), (0.015, 0.015 + TINY, 0.0)])
-    return _bounces_as_on_a_plane(room, (0.015, 0.015), 0.0, "corners a nanometre apart are not felt")
+    return _bounces_as_on_a_plane(
+        room, (0.015, 0.015), 0.0, "corners a nanometre apart are not felt"
+    )
 
 
 def floor_with_a_pimple() -> Outcome:
     """A nanometre high on a base of millimetres: the ball falls on its tip and goes straight up again."""
     height = TINY
-    room = floor_with([(0.015, 0.015, height), (0.013, 0.013, 0.0), (0.017, 0.013, 0.0), (0.015, 0.018, 0.0)])
-    return _bounces_as_on_a_plane(room, (0.015, 0.015), 2.0 * height, "a nanometre's pimple is a nanometre's pimple")
+    room = floor_with(
+        [(0.015, 0.015, height), (0.013, 0.013, 0.0), (0.017, 0.013, 0.0), (0.015, 0.018, 0.0)]
+    )
+    return _bounces_as_on_a_plane(
+        room, (0.015, 0.015), 2.0 * height, "a nanometre's pimple is a nanometre's pimple"
+    )
 
 
 def plate_of_a_nanometre() -> Outcome:
@@ -95,7 +117,9 @@ def plate_of_a_nanometre() -> Outcome:
 
 def sliver_of_a_tetrahedron() -> Outcome:
     """Four corners almost in one plane, a nanometre's rise in the middle: met from above and below."""
-    corners = np.array([[-0.01, -0.01, 0.0], [0.01, -0.01, 0.0], [0.0, 0.014, 0.0], [0.0, 0.0, TINY]])
+    corners = np.array(
+        [[-0.01, -0.01, 0.0], [0.01, -0.01, 0.0], [0.0, 0.014, 0.0], [0.0, 0.0, TINY]]
+    )
     body = trimesh.Trimesh(corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]], process=False)
     room = box_around(body, HALF)
     positions = np.array([[0.0, 0.0, RADIUS + TINY + DROP], [0.001, 0.001, -RADIUS - DROP]])
@@ -132,13 +156,19 @@ def unmerged_corners() -> Outcome:
     mesh = _open_box()
     soup = mesh.corners.reshape(-1, 3)
     triangles = np.arange(len(soup)).reshape(-1, 3)
-    return refusal(lambda: TriangleMesh(soup, triangles, mesh.tags), "not closed: 36 open .* merge duplicate vertices")
+    return refusal(
+        lambda: TriangleMesh(soup, triangles, mesh.tags),
+        "not closed: 36 open .* merge duplicate vertices",
+    )
 
 
 def missing_triangle() -> Outcome:
     """A hole."""
     mesh = _open_box()
-    return refusal(lambda: TriangleMesh(mesh.vertices, mesh.triangles[1:], mesh.tags[1:]), "not closed: 3 open edge")
+    return refusal(
+        lambda: TriangleMesh(mesh.vertices, mesh.triangles[1:], mesh.tags[1:]),
+        "not closed: 3 open edge",
+    )
 
 
 def triangle_given_twice() -> Outcome:
@@ -155,13 +185,17 @@ def flipped_triangle() -> Outcome:
     """One triangle wound the wrong way round."""
     mesh = _open_box()
     triangles = np.concatenate([mesh.triangles[:1, ::-1], mesh.triangles[1:]])
-    return refusal(lambda: TriangleMesh(mesh.vertices, triangles, mesh.tags), "triangles 0 and .* the same way")
+    return refusal(
+        lambda: TriangleMesh(mesh.vertices, triangles, mesh.tags), "triangles 0 and .* the same way"
+    )
 
 
 def inside_out_chamber() -> Outcome:
     """All triangles wound the wrong way round."""
     mesh = _open_box()
-    return refusal(lambda: TriangleMesh(mesh.vertices, mesh.triangles[:, ::-1], mesh.tags), "inside out")
+    return refusal(
+        lambda: TriangleMesh(mesh.vertices, mesh.triangles[:, ::-1], mesh.tags), "inside out"
+    )
 
 
 def inside_out_island() -> Outcome:
@@ -172,7 +206,9 @@ def inside_out_island() -> Outcome:
     triangles = np.concatenate([room.faces, body.faces + len(room.vertices)])
     ball = one_ball((0.0, 0.0, 0.02), (0.0, 0.0, -1.0))
     return refusal(
-        lambda: Scene(TriangleMesh(vertices, triangles, np.zeros(24, dtype=int)), ball, Physics(), 1.0),
+        lambda: Scene(
+            TriangleMesh(vertices, triangles, np.zeros(24, dtype=int)), ball, Physics(), 1.0
+        ),
         r"triangle \d+ .*inside out|inside out.* triangle \d+",
     )
 
@@ -181,7 +217,8 @@ def flat_chamber() -> Outcome:
     """A box squeezed to no height."""
     mesh = _open_box()
     return refusal(
-        lambda: TriangleMesh(mesh.vertices * [1.0, 1.0, 0.0], mesh.triangles, mesh.tags), "inside out or flat"
+        lambda: TriangleMesh(mesh.vertices * [1.0, 1.0, 0.0], mesh.triangles, mesh.tags),
+        "inside out or flat",
     )
 
 
@@ -208,12 +245,18 @@ def triangle_without_area() -> Outcome:
     room = TriangleMesh(points, np.concatenate([kept, new]), tags)
     seen = play(Chamber(room, one_ball((0.01, 0.012, 0.02), (0.7, 0.8, -1.0)), Physics()), 2.0)
     way = SIDE - 2.0 * RADIUS
-    crossings = [math.floor((2.0 * v + s) / way) for v, s in ((0.7, 0.0085), (0.8, 0.0105), (1.0, way - 0.0185))]
+    crossings = [
+        math.floor((2.0 * v + s) / way)
+        for v, s in ((0.7, 0.0085), (0.8, 0.0105), (1.0, way - 0.0185))
+    ]
     return verdict(
         seen,
         "bounces in the box as if it were not there",
         near("hits", len(seen.time), sum(crossings), 0),
-        Claim(bool(np.allclose(np.abs(seen.end.velocities[0]), [0.7, 0.8, 1.0], rtol=1e-15)), "speeds changed"),
+        Claim(
+            bool(np.allclose(np.abs(seen.end.velocities[0]), [0.7, 0.8, 1.0], rtol=1e-15)),
+            "speeds changed",
+        ),
     )
 
 

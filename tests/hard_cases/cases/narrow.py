@@ -45,7 +45,9 @@ def slot(more: float) -> tuple[TriangleMesh, Balls]:
 def slot_wider_by(more: float) -> Outcome:
     """A ball goes to and fro once every 2 (w - 2 r)/v, without gravity and losses."""
     room, ball = slot(more)
-    width = float(np.ptp(room.vertices[:, 2])) - 2.0 * RADIUS  # the gap there is, after rounding of the corners
+    width = (
+        float(np.ptp(room.vertices[:, 2])) - 2.0 * RADIUS
+    )  # the gap there is, after rounding of the corners
     period = width / SPEED
     seen = play(Chamber(room, ball, Physics()), (BOUNCES + 0.25) * period)
     # a wall lies where rounding of its coordinates puts it; each crossing is off by that at most
@@ -57,7 +59,10 @@ def slot_wider_by(more: float) -> Outcome:
         near("bounces", len(seen.time), BOUNCES, 0),
         near("time of the last [s]", seen.time[-1], (BOUNCES - 0.5) * period, BOUNCES * off),
         near("speed [m/s]", seen.normal_speed, np.full(len(seen.time), SPEED), 0.0),
-        Claim(bool((sides[::2] == CEILING).all() and (sides[1::2] == FLOOR).all()), "one side was met twice"),
+        Claim(
+            bool((sides[::2] == CEILING).all() and (sides[1::2] == FLOOR).all()),
+            "one side was met twice",
+        ),
     )
 
 
@@ -75,14 +80,19 @@ def upright_slot_narrower_than_two_balls() -> Outcome:
     """The first of those that do not fit is named."""
     room = box((2.0 * RADIUS - 1e-11, 0.02, 0.02), centre=(0.0, 0.0, 0.0))
     balls = Balls(np.array([[0.0, 5e-3, 0.0], [0.0, -5e-3, 0.0]]), np.zeros((2, 3)), 2.0 * RADIUS)
-    return refusal(lambda: Scene(room, balls, Physics(), 1.0), r"ball 0 at .* narrower than the ball by 1e-11 m;")
+    return refusal(
+        lambda: Scene(room, balls, Physics(), 1.0),
+        r"ball 0 at .* narrower than the ball by 1e-11 m;",
+    )
 
 
 def slot_too_tight_for_a_second() -> Outcome:
     """A picometre of play means 10^12 bounces a second: that is said, instead of being worked on for ever."""
     room, ball = slot(1e-12)
     return refusal(
-        lambda: simulate(Scene(room, ball, Physics(), 1.0)), "jams at .* as wide as the ball", SimulationError
+        lambda: simulate(Scene(room, ball, Physics(), 1.0)),
+        "jams at .* as wide as the ball",
+        SimulationError,
     )
 
 
@@ -117,7 +127,8 @@ def sonotrode_nearer_than_a_ball() -> Outcome:
     """Packing refuses: no ball fits."""
     rng = np.random.default_rng(1)
     return refusal(
-        lambda: pack_balls(_low_room(-1e-4), 1, 2.0 * RADIUS, rng, AMPLITUDE), "3 mm fits .* narrower than the ball"
+        lambda: pack_balls(_low_room(-1e-4), 1, 2.0 * RADIUS, rng, AMPLITUDE),
+        "3 mm fits .* narrower than the ball",
     )
 
 
@@ -125,21 +136,26 @@ def sonotrode_nearer_than_a_ball_and_its_swing() -> Outcome:
     """At rest a ball would fit, at the crest it would not: packing refuses that too."""
     rng = np.random.default_rng(1)
     return refusal(
-        lambda: pack_balls(_low_room(0.5 * AMPLITUDE), 1, 2.0 * RADIUS, rng, AMPLITUDE), "narrower than the ball"
+        lambda: pack_balls(_low_room(0.5 * AMPLITUDE), 1, 2.0 * RADIUS, rng, AMPLITUDE),
+        "narrower than the ball",
     )
 
 
 def ball_in_a_room_too_low() -> Outcome:
     """Put there by hand, it overlaps."""
     ball = Balls(np.array([[0.01, 0.01, RADIUS - 5e-5]]), np.zeros((1, 3)), 2.0 * RADIUS)
-    return refusal(lambda: Scene(_low_room(-1e-4), ball, _swinging(), 1.0), "ball 0 at .* (overlaps|inside)")
+    return refusal(
+        lambda: Scene(_low_room(-1e-4), ball, _swinging(), 1.0), "ball 0 at .* (overlaps|inside)"
+    )
 
 
 def ball_crushed_by_the_sonotrode() -> Outcome:
     """It fits at the phase of the start, and is caught between two rigid bodies a quarter period later: no motion of
     a rigid ball is right, so that it must be said.
     """
-    ball = Balls(np.array([[0.01, 0.01, RADIUS + 0.25 * AMPLITUDE]]), np.zeros((1, 3)), 2.0 * RADIUS)
+    ball = Balls(
+        np.array([[0.01, 0.01, RADIUS + 0.25 * AMPLITUDE]]), np.zeros((1, 3)), 2.0 * RADIUS
+    )
     return refusal(
         lambda: Scene(_low_room(0.5 * AMPLITUDE), ball, _swinging(-0.5), 0.1),
         r"ball 0 .* the vibrating surface \(triangle \d+\).* narrower .* by 1.25e-05 m at the end of its swing",
@@ -154,7 +170,9 @@ def ball_with_just_the_swing_for_room() -> Outcome:
     for phase in (-0.5 * math.pi, -0.5, 0.5 * math.pi):
         lift = AMPLITUDE * max(0.0, math.sin(phase))
         here = np.array([[RADIUS, 0.01, RADIUS + lift]])
-        Scene(_low_room(AMPLITUDE), Balls(here, np.zeros((1, 3)), 2.0 * RADIUS), _swinging(phase), 0.1)
+        Scene(
+            _low_room(AMPLITUDE), Balls(here, np.zeros((1, 3)), 2.0 * RADIUS), _swinging(phase), 0.1
+        )
     return Outcome("", True, "allowed")
 
 
@@ -169,7 +187,9 @@ def ball_in_a_wedge_by_rounding() -> Outcome:
 def ball_with_room_above_the_crest() -> Outcome:
     """A hair more than the swing: the ball rattles, and never overlaps. Elastic: who is hit gains, so few periods."""
     clear = 1.2 * AMPLITUDE
-    ball = Balls(np.array([[0.01, 0.01, RADIUS + 0.9 * clear]]), np.array([[0.3, 0.2, -0.5]]), 2.0 * RADIUS)
+    ball = Balls(
+        np.array([[0.01, 0.01, RADIUS + 0.9 * clear]]), np.array([[0.3, 0.2, -0.5]]), 2.0 * RADIUS
+    )
     seen = play(Chamber(_low_room(clear), ball, _swinging()), 2e-3, 20)
     return verdict(
         seen,
@@ -213,9 +233,20 @@ def wedge() -> Outcome:
     length, depth = 0.1, 0.02
     outline = [(0.0, 0.0), (length, -length * slope), (length, length * slope)]
     front, back = ([(x, y, z) for x, z in outline] for y in (0.0, depth))
-    triangles = [(0, 1, 2), (3, 5, 4), (0, 3, 4), (0, 4, 1), (1, 4, 5), (1, 5, 2), (2, 5, 3), (2, 3, 0)]
+    triangles = [
+        (0, 1, 2),
+        (3, 5, 4),
+        (0, 3, 4),
+        (0, 4, 1),
+        (1, 4, 5),
+        (1, 5, 2),
+        (2, 5, 3),
+        (2, 3, 0),
+    ]
     far, side = 2, 1
-    mesh = TriangleMesh(np.array([*front, *back]), triangles, np.array([0, 0, side, side, far, far, side, side]))
+    mesh = TriangleMesh(
+        np.array([*front, *back]), triangles, np.array([0, 0, side, side, far, far, side, side])
+    )
     start = Balls(np.array([[0.09, 0.01, 0.0]]), np.array([[-1.0, 0.0, across]]), 2.0 * RADIUS)
     seen = play(Chamber(mesh, start, Physics()), 0.3)
     ends = np.flatnonzero(mesh.tags[seen.triangle] == far)
@@ -228,8 +259,14 @@ def wedge() -> Outcome:
 
 
 CASES = [
-    *(Case(f"slot 2r + {more:g} m", lambda more=more: slot_wider_by(more)) for more in (1e-12, 1e-9, 1e-7, 1e-5, 1e-3)),
-    *(Case(f"slot 2r - {less:g} m", lambda less=less: slot_narrower_by(less)) for less in (1e-12, 1e-9, 1e-6)),
+    *(
+        Case(f"slot 2r + {more:g} m", lambda more=more: slot_wider_by(more))
+        for more in (1e-12, 1e-9, 1e-7, 1e-5, 1e-3)
+    ),
+    *(
+        Case(f"slot 2r - {less:g} m", lambda less=less: slot_narrower_by(less))
+        for less in (1e-12, 1e-9, 1e-6)
+    ),
     named(slot_too_tight_for_a_second),
     named(slot_just_as_wide),
     named(upright_slot_narrower_than_two_balls),

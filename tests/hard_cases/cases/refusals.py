@@ -32,7 +32,9 @@ def fields(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
     if isinstance(value, tuple):
         names = getattr(value, "_fields", range(len(value)))
         for k, (name, part) in enumerate(zip(names, value, strict=True)):
-            for place, fill in fields(part, f"{path}.{name}" if isinstance(name, str) else f"{path}[{name}]"):
+            for place, fill in fields(
+                part, f"{path}.{name}" if isinstance(name, str) else f"{path}[{name}]"
+            ):
                 yield place, partial(_refilled, value, k, fill)
     elif isinstance(value, int | float) and not isinstance(value, bool):
         yield path.lstrip("."), lambda number: number
@@ -47,12 +49,18 @@ def physics_without_a_number(field: str, fill: Any) -> Outcome:
     """NaN and both infinities in one field of Physics: each refused, the effect and the field named."""
     effect, _, rest = field.partition(".")
     name = rest.partition("[")[0] if effect != "gravity" else ""
-    return _all_refused(lambda value: Scene(ROOM, still(MIDDLE), fill(value), 1.0), rf"{effect}.*{name}")
+    return _all_refused(
+        lambda value: Scene(ROOM, still(MIDDLE), fill(value), 1.0), rf"{effect}.*{name}"
+    )
 
 
 def _all_refused(attempt: Any, message: str) -> Outcome:
     outcomes = [refusal(partial(attempt, value), message) for value in NO_NUMBERS]
-    bad = [f"{value}: {one.said}" for value, one in zip(NO_NUMBERS, outcomes, strict=True) if not one.ok]
+    bad = [
+        f"{value}: {one.said}"
+        for value, one in zip(NO_NUMBERS, outcomes, strict=True)
+        if not one.ok
+    ]
     return Outcome("", not bad, "; ".join(bad) if bad else outcomes[0].said)
 
 
@@ -64,18 +72,23 @@ def position_without_a_number() -> Outcome:
 def velocity_without_a_number() -> Outcome:
     """The ball is named."""
     return _all_refused(
-        lambda value: Balls(np.array([MIDDLE]), np.array([[0.0, 0.0, value]]), DIAMETER), "balls.velocities: ball 0"
+        lambda value: Balls(np.array([MIDDLE]), np.array([[0.0, 0.0, value]]), DIAMETER),
+        "balls.velocities: ball 0",
     )
 
 
 def diameter_without_a_number() -> Outcome:
     """Not a size."""
-    return _all_refused(lambda value: Balls(np.array([MIDDLE]), np.zeros((1, 3)), value), "balls.diameter")
+    return _all_refused(
+        lambda value: Balls(np.array([MIDDLE]), np.zeros((1, 3)), value), "balls.diameter"
+    )
 
 
 def density_without_a_number() -> Outcome:
     """Not a density."""
-    return _all_refused(lambda value: Balls(np.array([MIDDLE]), np.zeros((1, 3)), DIAMETER, value), "balls.density")
+    return _all_refused(
+        lambda value: Balls(np.array([MIDDLE]), np.zeros((1, 3)), DIAMETER, value), "balls.density"
+    )
 
 
 def vertex_without_a_number() -> Outcome:
@@ -102,7 +115,10 @@ def triangle_without_a_number() -> Outcome:
 
 def fractional_index() -> Outcome:
     """Half an index is not the index below it."""
-    return refusal(lambda: TriangleMesh(ROOM.vertices, ROOM.triangles + 0.5, ROOM.tags), "mesh triangles .*whole")
+    return refusal(
+        lambda: TriangleMesh(ROOM.vertices, ROOM.triangles + 0.5, ROOM.tags),
+        "mesh triangles .*whole",
+    )
 
 
 def tag_without_a_number() -> Outcome:
@@ -118,17 +134,23 @@ def tag_without_a_number() -> Outcome:
 
 def fractional_tag() -> Outcome:
     """Half a tag is not the tag below it."""
-    return refusal(lambda: TriangleMesh(ROOM.vertices, ROOM.triangles, ROOM.tags + 0.5), "mesh tags .*whole")
+    return refusal(
+        lambda: TriangleMesh(ROOM.vertices, ROOM.triangles, ROOM.tags + 0.5), "mesh tags .*whole"
+    )
 
 
 def duration_without_a_number() -> Outcome:
     """The field is named."""
-    return _all_refused(lambda value: Scene(ROOM, still(MIDDLE), Physics(), value), "scene.duration")
+    return _all_refused(
+        lambda value: Scene(ROOM, still(MIDDLE), Physics(), value), "scene.duration"
+    )
 
 
 def warmup_without_a_number() -> Outcome:
     """The field is named."""
-    return _all_refused(lambda value: Scene(ROOM, still(MIDDLE), Physics(), 1.0, warmup=value), "scene.warmup")
+    return _all_refused(
+        lambda value: Scene(ROOM, still(MIDDLE), Physics(), 1.0, warmup=value), "scene.warmup"
+    )
 
 
 def restitution_of_too_few_numbers() -> Outcome:
@@ -140,7 +162,8 @@ def restitution_of_too_few_numbers() -> Outcome:
 def speed_beyond_numbers() -> Outcome:
     """1e200 m/s is finite, its square is not."""
     return refusal(
-        lambda: Balls(np.array([MIDDLE]), np.array([[1e200, 0.0, 0.0]]), DIAMETER), "balls.velocities: ball 0"
+        lambda: Balls(np.array([MIDDLE]), np.array([[1e200, 0.0, 0.0]]), DIAMETER),
+        "balls.velocities: ball 0",
     )
 
 
@@ -152,7 +175,10 @@ def frequency_beyond_numbers() -> Outcome:
 
 def two_balls_in_one_place() -> Outcome:
     """Both are named."""
-    return refusal(lambda: Scene(ROOM, still(MIDDLE, MIDDLE), Physics(), 1.0), "balls (0 and 1|1 and 0) overlap")
+    return refusal(
+        lambda: Scene(ROOM, still(MIDDLE, MIDDLE), Physics(), 1.0),
+        "balls (0 and 1|1 and 0) overlap",
+    )
 
 
 def balls_overlapping() -> Outcome:
@@ -165,7 +191,10 @@ def balls_overlapping() -> Outcome:
 
 def ball_outside() -> Outcome:
     """The ball is named."""
-    return refusal(lambda: Scene(ROOM, still(MIDDLE, [0.05, 0.0, 0.0]), Physics(), 1.0), "ball 1 .* outside the mesh")
+    return refusal(
+        lambda: Scene(ROOM, still(MIDDLE, [0.05, 0.0, 0.0]), Physics(), 1.0),
+        "ball 1 .* outside the mesh",
+    )
 
 
 def ball_in_a_wall() -> Outcome:
@@ -180,12 +209,16 @@ def ball_in_the_sonotrode() -> Outcome:
     """Clear of the face at rest, not where it is at the start."""
     physics = Physics(vibration=Vibration(FLOOR, 1e-3, 20e3, 0.5 * math.pi))
     return refusal(
-        lambda: Scene(ROOM, still([0.015, 0.015, 2e-3]), physics, 1.0), "ball 0 .* 0.0005 m inside the vibrating"
+        lambda: Scene(ROOM, still([0.015, 0.015, 2e-3]), physics, 1.0),
+        "ball 0 .* 0.0005 m inside the vibrating",
     )
 
 
 CASES = [
-    *(Case(f"{field} not a number", partial(physics_without_a_number, field, fill)) for field, fill in fields(PHYSICS)),
+    *(
+        Case(f"{field} not a number", partial(physics_without_a_number, field, fill))
+        for field, fill in fields(PHYSICS)
+    ),
     named(position_without_a_number),
     named(velocity_without_a_number),
     named(diameter_without_a_number),

@@ -39,7 +39,11 @@ def overlap(run: _Run) -> float:
     balls, physics, mesh = run.balls(), run.scene.physics, run.scene.mesh
     moving = [effect.tag for effect in (*physics.vibrations, physics.turn) if effect is not None]
     still = mesh.corners[~np.isin(mesh.tags, moving)]
-    deepest = balls.radius - clearance(still, balls.positions, 2.0 * balls.radius).min() if len(still) else -np.inf
+    deepest = (
+        balls.radius - clearance(still, balls.positions, 2.0 * balls.radius).min()
+        if len(still)
+        else -np.inf
+    )
     return float(max(deepest, balls.diameter - closest_pair(balls)[0]))
 
 
@@ -67,31 +71,70 @@ def judged(test: Callable[..., None], *arguments: object) -> Outcome:
 
 def tested(name: str, test: Callable[..., None], *arguments: object) -> Case:
     """A test, called with these parameters, as a case."""
-    inspect.signature(test).bind(*arguments)  # a call that cannot be is found when the table is made
+    inspect.signature(test).bind(
+        *arguments
+    )  # a call that cannot be is found when the table is made
     return Case(name, functools.partial(judged, test, *arguments))
 
 
 CASES = [
-    tested("bouncing to rest, e = 0.5", resting.test_a_dropped_ball_stops_when_the_series_of_its_bounces_ends, 0.5),
-    tested("bouncing to rest, e = 0.9", resting.test_a_dropped_ball_stops_when_the_series_of_its_bounces_ends, 0.9),
+    tested(
+        "bouncing to rest, e = 0.5",
+        resting.test_a_dropped_ball_stops_when_the_series_of_its_bounces_ends,
+        0.5,
+    ),
+    tested(
+        "bouncing to rest, e = 0.9",
+        resting.test_a_dropped_ball_stops_when_the_series_of_its_bounces_ends,
+        0.9,
+    ),
     tested("at rest", resting.test_a_ball_at_rest_costs_nothing),
-    tested("down a ramp of triangles", resting.test_down_a_ramp_of_many_triangles_it_slides_as_on_one, 6, 0.0),
-    tested("down a ramp with resistance", resting.test_down_a_ramp_of_many_triangles_it_slides_as_on_one, 6, 0.1),
-    tested("held on a gentle slope", resting.test_resistance_stops_a_sliding_ball_and_holds_it_on_a_gentle_slope),
+    tested(
+        "down a ramp of triangles",
+        resting.test_down_a_ramp_of_many_triangles_it_slides_as_on_one,
+        6,
+        0.0,
+    ),
+    tested(
+        "down a ramp with resistance",
+        resting.test_down_a_ramp_of_many_triangles_it_slides_as_on_one,
+        6,
+        0.1,
+    ),
+    tested(
+        "held on a gentle slope",
+        resting.test_resistance_stops_a_sliding_ball_and_holds_it_on_a_gentle_slope,
+    ),
     *(
-        tested(f"down a ramp, mu = {mu:g}", rolling.test_down_a_ramp_of_many_triangles_it_rolls_or_slips, mu, 0.0, 6)
+        tested(
+            f"down a ramp, mu = {mu:g}",
+            rolling.test_down_a_ramp_of_many_triangles_it_rolls_or_slips,
+            mu,
+            0.0,
+            6,
+        )
         for mu in (0.0, 0.05, 10.0)
     ),
     *(
-        tested(f"landing with mu = {mu:g}", rolling.test_landing_it_rolls_in_the_end_with_what_the_floor_leaves_it, mu)
+        tested(
+            f"landing with mu = {mu:g}",
+            rolling.test_landing_it_rolls_in_the_end_with_what_the_floor_leaves_it,
+            mu,
+        )
         for mu in (0.01, 10.0)
     ),
     *(
-        tested(f"slip turns on a slope, {speed:g} m/s", rolling.test_on_a_slope_a_slip_that_turns_is_followed, speed)
+        tested(
+            f"slip turns on a slope, {speed:g} m/s",
+            rolling.test_on_a_slope_a_slip_that_turns_is_followed,
+            speed,
+        )
         for speed in (0.4, 4.0)
     ),
     tested("rolling down a valley", rolling.test_down_a_valley_it_rolls_on_both_faces, 10.0),
-    tested("rolling over an edge", rolling.test_slowly_over_an_edge_it_rolls_until_it_leaves_it, 0.05),
+    tested(
+        "rolling over an edge", rolling.test_slowly_over_an_edge_it_rolls_until_it_leaves_it, 0.05
+    ),
     tested(
         "held on a slope by friction",
         rolling.test_on_a_slope_it_lies_still_where_neither_slip_nor_roll_moves_it,
@@ -100,8 +143,12 @@ CASES = [
         True,
     ),
     tested("lift-off at a ramp's end", resting.test_it_lifts_off_at_the_ramps_end),
-    tested("slowly over an edge", resting.test_slowly_over_an_edge_it_rolls_until_it_leaves_it, 0.05),
-    tested("change of slope", resting.test_over_a_gentle_change_of_slope_it_keeps_its_energy, 20.0, 8.0),
+    tested(
+        "slowly over an edge", resting.test_slowly_over_an_edge_it_rolls_until_it_leaves_it, 0.05
+    ),
+    tested(
+        "change of slope", resting.test_over_a_gentle_change_of_slope_it_keeps_its_energy, 20.0, 8.0
+    ),
     tested("trough of 2 degree facets", resting.test_a_trough_of_facets_is_a_pendulum, 2.0),
     tested("trough of 0.5 degree facets", resting.test_a_trough_of_facets_is_a_pendulum, 0.5),
     tested("bowl of triangles", resting.test_a_bowl_of_triangles_keeps_the_energy),
@@ -126,19 +173,47 @@ CASES = [
         )
         for rpm in (1.0, 100.0, 6000.0)
     ),
-    tested("thrown by a turning bar", turning.test_a_resting_ball_is_thrown_by_the_bar_as_by_a_heavy_moving_face, 1.0),
-    tested("rotor keeps the Jacobi integral", turning.test_hits_on_a_steady_rotor_keep_the_jacobi_integral, 60.0),
+    tested(
+        "thrown by a turning bar",
+        turning.test_a_resting_ball_is_thrown_by_the_bar_as_by_a_heavy_moving_face,
+        1.0,
+    ),
+    tested(
+        "rotor keeps the Jacobi integral",
+        turning.test_hits_on_a_steady_rotor_keep_the_jacobi_integral,
+        60.0,
+    ),
     tested(
         "shaft turns in its ceiling",
         turning.test_a_round_shaft_turns_where_it_goes_through_the_ceiling_and_balls_stay_in,
     ),
     *(
-        tested(f"woken by a paddle at {rpm:g} rpm", beside.test_a_sleeping_ball_is_woken_when_the_paddle_arrives, rpm)
+        tested(
+            f"woken by a paddle at {rpm:g} rpm",
+            beside.test_a_sleeping_ball_is_woken_when_the_paddle_arrives,
+            rpm,
+        )
         for rpm in (0.1, 10.0)
     ),
-    tested("pushed by a paddle at 0.05 rpm", beside.test_what_it_pushes_pushes_others_however_slowly, 0.05),
-    tested("pile swept at 1 rpm", beside.test_a_pile_swept_by_a_slow_paddle_gets_no_more_speed_than_that_gives, 1.0),
-    tested("at rest below a turning gear", beside.test_balls_rest_below_a_gear_that_turns_and_nothing_overlaps),
-    tested("hops on a turning slab", beside.test_on_the_turning_part_nothing_rests_and_hops_are_bounded),
-    tested("crushed by a cam", beside.test_a_ball_that_the_part_crushes_stops_the_run_and_the_part_is_named),
+    tested(
+        "pushed by a paddle at 0.05 rpm",
+        beside.test_what_it_pushes_pushes_others_however_slowly,
+        0.05,
+    ),
+    tested(
+        "pile swept at 1 rpm",
+        beside.test_a_pile_swept_by_a_slow_paddle_gets_no_more_speed_than_that_gives,
+        1.0,
+    ),
+    tested(
+        "at rest below a turning gear",
+        beside.test_balls_rest_below_a_gear_that_turns_and_nothing_overlaps,
+    ),
+    tested(
+        "hops on a turning slab", beside.test_on_the_turning_part_nothing_rests_and_hops_are_bounded
+    ),
+    tested(
+        "crushed by a cam",
+        beside.test_a_ball_that_the_part_crushes_stops_the_run_and_the_part_is_named,
+    ),
 ]

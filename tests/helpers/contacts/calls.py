@@ -19,14 +19,18 @@ from sim_core.numerics.jit import jit
 from sim_core.numerics.vec3 import Vec3
 
 
-def faces(numbers: np.ndarray, rows: np.ndarray, flights: np.ndarray, radius: float, seam: float) -> np.ndarray:
+def faces(
+    numbers: np.ndarray, rows: np.ndarray, flights: np.ndarray, radius: float, seam: float
+) -> np.ndarray:
     """Contact of each flight with the face in its row of ``numbers``."""
     found = np.empty(len(rows))
     _faces(numbers, rows, flights, radius, seam, found)
     return found
 
 
-def capsules(numbers: np.ndarray, rows: np.ndarray, flights: np.ndarray, radius: float, limit: float) -> np.ndarray:
+def capsules(
+    numbers: np.ndarray, rows: np.ndarray, flights: np.ndarray, radius: float, limit: float
+) -> np.ndarray:
     """Contact of each flight with the capsule in its row of ``numbers`` within ``limit`` [s]."""
     found = np.empty(len(rows))
     _capsules(numbers, rows, flights, radius, limit, found)
@@ -41,7 +45,12 @@ def meetings(apart: np.ndarray, closing: np.ndarray, reach: np.ndarray) -> np.nd
 
 
 def waving_planes(
-    planes: np.ndarray, waves: np.ndarray, flights: np.ndarray, times: np.ndarray, radius: float, limits: np.ndarray
+    planes: np.ndarray,
+    waves: np.ndarray,
+    flights: np.ndarray,
+    times: np.ndarray,
+    radius: float,
+    limits: np.ndarray,
 ) -> np.ndarray:
     """Contact of each flight with its vibrating plane: ``planes`` (n, 20) as obstacles hold them, ``waves`` (n, 6)
     swing, omega, phase and axis, ``times`` (n,) now, ``limits`` (n,) [s].
@@ -52,19 +61,38 @@ def waving_planes(
 
 
 def contacts(
-    ground: Ground, flights: np.ndarray, gravity: Gravity | None, wave: Wave | None, time: float, lengths: np.ndarray
+    ground: Ground,
+    flights: np.ndarray,
+    gravity: Gravity | None,
+    wave: Wave | None,
+    time: float,
+    lengths: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """First contact of each flight (n, 6; relative to the mesh's centre) with a whole mesh: delays, and mesh
     triangles (-1: none).
     """
     found, obstacles = np.empty(len(lengths)), np.empty(len(lengths), dtype=np.int64)
-    _contacts(ground.tree, new_scratch(), flights, gravity, wave, ground.seam, time, lengths, found, obstacles)
+    _contacts(
+        ground.tree,
+        new_scratch(),
+        flights,
+        gravity,
+        wave,
+        ground.seam,
+        time,
+        lengths,
+        found,
+        obstacles,
+    )
     return found, np.where(obstacles >= 0, ground.tree.triangles[obstacles, 0], -1)
 
 
 @jit
 def _ball(flights: np.ndarray, i: int) -> Point:
-    return Point(Vec3(flights[i, 0], flights[i, 1], flights[i, 2]), Vec3(flights[i, 3], flights[i, 4], flights[i, 5]))
+    return Point(
+        Vec3(flights[i, 0], flights[i, 1], flights[i, 2]),
+        Vec3(flights[i, 3], flights[i, 4], flights[i, 5]),
+    )
 
 
 @jit
@@ -74,7 +102,12 @@ def _fall(flights: np.ndarray, i: int) -> Vec3:
 
 @jit
 def _faces(
-    numbers: np.ndarray, rows: np.ndarray, flights: np.ndarray, radius: float, seam: float, found: np.ndarray
+    numbers: np.ndarray,
+    rows: np.ndarray,
+    flights: np.ndarray,
+    radius: float,
+    seam: float,
+    found: np.ndarray,
 ) -> None:
     for i in range(len(rows)):
         found[i] = face_delay(numbers, rows[i], _ball(flights, i), _fall(flights, i), radius, seam)
@@ -82,17 +115,26 @@ def _faces(
 
 @jit
 def _capsules(
-    numbers: np.ndarray, rows: np.ndarray, flights: np.ndarray, radius: float, limit: float, found: np.ndarray
+    numbers: np.ndarray,
+    rows: np.ndarray,
+    flights: np.ndarray,
+    radius: float,
+    limit: float,
+    found: np.ndarray,
 ) -> None:
     for i in range(len(rows)):
-        found[i] = capsule_delay(numbers, rows[i], _ball(flights, i), _fall(flights, i), radius, limit)
+        found[i] = capsule_delay(
+            numbers, rows[i], _ball(flights, i), _fall(flights, i), radius, limit
+        )
 
 
 @jit
 def _meetings(apart: np.ndarray, closing: np.ndarray, reach: np.ndarray, found: np.ndarray) -> None:
     for i in range(len(reach)):
         found[i] = meeting_delay(
-            Vec3(apart[i, 0], apart[i, 1], apart[i, 2]), Vec3(closing[i, 0], closing[i, 1], closing[i, 2]), reach[i]
+            Vec3(apart[i, 0], apart[i, 1], apart[i, 2]),
+            Vec3(closing[i, 0], closing[i, 1], closing[i, 2]),
+            reach[i],
         )
 
 
@@ -107,7 +149,9 @@ def _waving_planes(
     found: np.ndarray,
 ) -> None:
     for i in range(len(times)):
-        wave = Wave(waves[i, 0], waves[i, 1], waves[i, 2], Vec3(waves[i, 3], waves[i, 4], waves[i, 5]))
+        wave = Wave(
+            waves[i, 0], waves[i, 1], waves[i, 2], Vec3(waves[i, 3], waves[i, 4], waves[i, 5])
+        )
         found[i] = waving_plane_delay(
             planes, i, _ball(flights, i), _fall(flights, i), radius, wave, times[i], limits[i]
         )
@@ -127,4 +171,6 @@ def _contacts(
     obstacles: np.ndarray,
 ) -> None:
     for i in range(len(lengths)):
-        found[i], obstacles[i] = first_contact(tree, scratch, _ball(flights, i), gravity, wave, seam, time, lengths[i])
+        found[i], obstacles[i] = first_contact(
+            tree, scratch, _ball(flights, i), gravity, wave, seam, time, lengths[i]
+        )

@@ -20,7 +20,17 @@ SHAPES = {
     "far": (1.5e-3, 0.05),
 }
 BODIES = {**SHAPES, "box": (1.5e-3, 0.05), "spiky": (0.5e-3, 0.05), "cone": (1.5e-3, 0.05)}
-AIMS = ("random", "fast", "grazing", "tangent", "touching", "overlapping", "turning back", "at rest", "behind")
+AIMS = (
+    "random",
+    "fast",
+    "grazing",
+    "tangent",
+    "touching",
+    "overlapping",
+    "turning back",
+    "at rest",
+    "behind",
+)
 HARD_AIMS = AIMS[1:]
 
 
@@ -70,7 +80,9 @@ def body_of(rng: np.random.Generator, shape: str) -> tuple[np.ndarray, np.ndarra
     elif shape == "cone":
         angle = np.linspace(0.0, 2 * np.pi, 100, endpoint=False)
         rim = np.stack([np.cos(angle), np.sin(angle), np.zeros(100)], axis=1)
-        corners = 0.01 * np.concatenate([rim, [[0.0, 0.0, 10.0 ** rng.uniform(-5.0, -3.0)], [0.0, 0.0, -1.0]]])
+        corners = 0.01 * np.concatenate(
+            [rim, [[0.0, 0.0, 10.0 ** rng.uniform(-5.0, -3.0)], [0.0, 0.0, -1.0]]]
+        )
         k = np.arange(100)
         up = np.stack([k, (k + 1) % 100, np.full(100, 100)], axis=1)
         down = np.stack([(k + 1) % 100, k, np.full(100, 101)], axis=1)
@@ -103,7 +115,9 @@ def touches(
     kind = rng.integers(4, size=count)
     edge = kind == 1
     where[edge, 2] = 0.0
-    neighbour = np.array([across[int(triangles[t, 0]), int(triangles[t, 1])] for t in chosen[edge]], dtype=int)
+    neighbour = np.array(
+        [across[int(triangles[t, 0]), int(triangles[t, 1])] for t in chosen[edge]], dtype=int
+    )
     share = rng.uniform(size=(len(neighbour), 1))
     normal[edge] = share * normal[edge] + (1.0 - share) * normals[neighbour]
     corner = kind >= 2
@@ -124,15 +138,21 @@ def touches(
     return foot + radius * normal, normal
 
 
-def room_with(corners: np.ndarray, triangles: np.ndarray, half: float, centre: np.ndarray) -> TriangleMesh:
+def room_with(
+    corners: np.ndarray, triangles: np.ndarray, half: float, centre: np.ndarray
+) -> TriangleMesh:
     """A cube of half side ``half`` [m] about ``centre`` and in it solid bodies (n, vertices, 3), all of the same
     ``triangles`` (m, 3) that wind outward; the bodies are the "part". They may overlap: obstacles do not care.
     """
-    signs = np.array([[x, y, z] for x in (-half, half) for y in (-half, half) for z in (-half, half)])
+    signs = np.array(
+        [[x, y, z] for x in (-half, half) for y in (-half, half) for z in (-half, half)]
+    )
     quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
     walls = np.array([[q[0], q[j], q[j + 1]] for q in quads for j in (1, 2)])
     count, size = corners.shape[:2]
-    part = (triangles[None, :, ::-1] + size * np.arange(count)[:, None, None]).reshape(-1, 3) + len(signs)
+    part = (triangles[None, :, ::-1] + size * np.arange(count)[:, None, None]).reshape(-1, 3) + len(
+        signs
+    )
     tags = np.concatenate([np.full(len(walls), SIDES), np.full(len(part), CEILING)])
     vertices = np.concatenate([signs, corners.reshape(-1, 3)]) + centre
     return TriangleMesh(vertices, np.concatenate([walls, part]), tags)
@@ -148,7 +168,12 @@ def falls_for(rng: np.random.Generator, count: int) -> np.ndarray:
 
 
 def flights_to(
-    rng: np.random.Generator, aim: str, touch: np.ndarray, normal: np.ndarray, fall: np.ndarray, radius: float
+    rng: np.random.Generator,
+    aim: str,
+    touch: np.ndarray,
+    normal: np.ndarray,
+    fall: np.ndarray,
+    radius: float,
 ) -> np.ndarray:
     """Flights (n, 9) that bring a centre to the points ``touch`` (n, 3) [m], where it touches a surface with this
     outward ``normal`` (n, 3).
@@ -196,6 +221,10 @@ def flights_to(
             speed = np.zeros(count)
         elif aim == "behind":
             above = -radius * rng.uniform(0.6, 3.0, count)
-    velocity = speed[:, None] * direction - delay[:, None] * fall  # at the start; ``speed`` is at the touch
-    start = touch + above[:, None] * normal - delay[:, None] * (velocity + 0.5 * delay[:, None] * fall)
+    velocity = (
+        speed[:, None] * direction - delay[:, None] * fall
+    )  # at the start; ``speed`` is at the touch
+    start = (
+        touch + above[:, None] * normal - delay[:, None] * (velocity + 0.5 * delay[:, None] * fall)
+    )
     return np.concatenate([start, velocity, fall], axis=1)

@@ -32,7 +32,9 @@ def _point_triangle(p: np.ndarray, corners: np.ndarray) -> float:
 
 
 @numba.njit(cache=True)
-def _gap(t: float, p: np.ndarray, v: np.ndarray, g: np.ndarray, corners: np.ndarray, radius: float) -> float:
+def _gap(
+    t: float, p: np.ndarray, v: np.ndarray, g: np.ndarray, corners: np.ndarray, radius: float
+) -> float:
     at = p + v * t + 0.5 * g * t * t
     best = np.inf
     for k in range(len(corners)):
@@ -48,7 +50,9 @@ def bracket(p, v, g, corners, radius, length):  # type: ignore[no-untyped-def]
     lowest = here
     for k in range(1, SAMPLES + 1):
         after = _gap(k * step, p, v, g, corners, radius)
-        if here <= before and here <= after and here < 4.0 * step * 20.0:  # a dip: golden section to its bottom
+        if (
+            here <= before and here <= after and here < 4.0 * step * 20.0
+        ):  # a dip: golden section to its bottom
             low, high = (k - 2) * step if k > 1 else 0.0, k * step
             for _ in range(80):
                 one, two = low + GOLDEN * (high - low), high - GOLDEN * (high - low)
@@ -92,7 +96,12 @@ def distance_to_triangles(p: np.ndarray, corners: np.ndarray) -> np.ndarray:
 
 
 def gap_at(
-    time: np.ndarray, p: np.ndarray, v: np.ndarray, g: np.ndarray, corners: np.ndarray, radius: float
+    time: np.ndarray,
+    p: np.ndarray,
+    v: np.ndarray,
+    g: np.ndarray,
+    corners: np.ndarray,
+    radius: float,
 ) -> np.ndarray:
     """Distance from the ball's surface to the triangles at ``time`` (n,), in extended precision (80 bits on x86)."""
     time, p, v, g, corners = (np.asarray(x, dtype=np.longdouble) for x in (time, p, v, g, corners))
@@ -101,7 +110,12 @@ def gap_at(
 
 
 def first_contact_reference(
-    p: np.ndarray, v: np.ndarray, g: np.ndarray, corners: np.ndarray, radius: float, length: np.ndarray
+    p: np.ndarray,
+    v: np.ndarray,
+    g: np.ndarray,
+    corners: np.ndarray,
+    radius: float,
+    length: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """First touch of each ball (n, 3) flying at v (n, 3) under g (3,) with the triangles (k, 3 corners, 3).
 

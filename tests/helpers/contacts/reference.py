@@ -34,7 +34,9 @@ SURELY = 1e-12  # m: a gap this wide is open, whatever rounding did
 # m/s: a rate of zero, but for rounding in the code under test: that of the sonotrode's 25 m/s at an angle of 5000 rad,
 # known to 5e-13 rad. In 10 ms a ball receding so slowly gains 1e-13 m.
 STANDING = 1e-11
-AHEAD = np.concatenate([[0.0], 2.0 ** np.arange(-40, 1)])  # shares of the flight left at which to look ahead
+AHEAD = np.concatenate(
+    [[0.0], 2.0 ** np.arange(-40, 1)]
+)  # shares of the flight left at which to look ahead
 UNSEEN = 1e-17  # m: falls smaller than this are not looked for
 
 
@@ -58,7 +60,9 @@ def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Vector products of columns."""
-    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+    return np.stack(
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    )
 
 
 def value(polynomial: list[np.ndarray], t: np.ndarray) -> np.ndarray:
@@ -110,7 +114,11 @@ def depth(gaps: np.ndarray, behind: float = np.inf) -> np.ndarray:
 
 
 def verdict(
-    found: np.ndarray, limit: float | np.ndarray, gap: Callable[..., np.ndarray], rate: np.ndarray, late: np.ndarray
+    found: np.ndarray,
+    limit: float | np.ndarray,
+    gap: Callable[..., np.ndarray],
+    rate: np.ndarray,
+    late: np.ndarray,
 ) -> Verdict:
     """``gap(cases, times (..., cases))``; ``rate`` (n,) is the gap's at the reported contacts."""
     early, receding = np.full(len(found), -np.inf), np.full(len(found), -np.inf)
@@ -135,7 +143,9 @@ class Flight(NamedTuple):
     def at(self, t: np.ndarray) -> np.ndarray:
         """Positions (3, ..., n) at times (..., n)."""
         shape = (3,) + (1,) * (np.ndim(t) - 1) + (self.position.shape[1],)
-        return self.position.reshape(shape) + t * (self.velocity.reshape(shape) + t / 2 * self.fall.reshape(shape))
+        return self.position.reshape(shape) + t * (
+            self.velocity.reshape(shape) + t / 2 * self.fall.reshape(shape)
+        )
 
     def speed(self, t: np.ndarray) -> np.ndarray:
         """Velocities (3, n) at times (n,)."""
@@ -143,7 +153,11 @@ class Flight(NamedTuple):
 
     def along(self, direction: np.ndarray, origin: np.ndarray | float = 0.0) -> list[np.ndarray]:
         """Polynomial of the distance travelled along a direction (3, n) from an origin (n,)."""
-        return [dot(self.position, direction) - origin, dot(self.velocity, direction), dot(self.fall, direction) / 2]
+        return [
+            dot(self.position, direction) - origin,
+            dot(self.velocity, direction),
+            dot(self.fall, direction) / 2,
+        ]
 
     def squared(self) -> list[np.ndarray]:
         """Polynomial of the squared distance from the coordinates' origin."""
@@ -162,7 +176,12 @@ def end_of(found: np.ndarray, limit: float | np.ndarray) -> np.ndarray:
 
 
 def judge_faces(
-    corners: np.ndarray, flights: np.ndarray, radius: float, seam: float, limit: float, found: np.ndarray
+    corners: np.ndarray,
+    flights: np.ndarray,
+    radius: float,
+    seam: float,
+    limit: float,
+    found: np.ndarray,
 ) -> tuple[Verdict, np.ndarray]:
     """Contacts with the shot sides of triangles (n, 3 corners, 3) that wind clockwise as the shot sees them.
 
@@ -216,7 +235,9 @@ def judge_faces(
     return verdict(found, limit, gap, height[1] + 2 * height[2] * end, late), away
 
 
-def judge_capsules(ends: np.ndarray, flights: np.ndarray, radius: float, limit: float, found: np.ndarray) -> Verdict:
+def judge_capsules(
+    ends: np.ndarray, flights: np.ndarray, radius: float, limit: float, found: np.ndarray
+) -> Verdict:
     """Contacts with the capsules about segments (n, 2 ends, 3).
 
     The squared distance is a quartic in time, one beside the segment and one off each end: the marks are those of
@@ -233,7 +254,9 @@ def judge_capsules(ends: np.ndarray, flights: np.ndarray, radius: float, limit: 
     beside = [x - y for x, y in zip(near.squared(), product(reach, reach), strict=True)]
     end = end_of(found, limit)
     times = [marks(squared, end) for squared in (near.squared(), far.squared(), beside)]
-    times += [_zeros([reach[0] - origin, *reach[1:]], end) for origin in (np.zeros_like(length), length)]
+    times += [
+        _zeros([reach[0] - origin, *reach[1:]], end) for origin in (np.zeros_like(length), length)
+    ]
     everything = np.sort(np.concatenate(times), axis=0)
 
     def away(i: np.ndarray, t: np.ndarray) -> np.ndarray:
@@ -297,13 +320,19 @@ def judge_waves(
         return value([c[i] for c in height], t) - swing[i] * np.sin(omega[i] * t + theta[i])
 
     def rate(i: np.ndarray, t: np.ndarray) -> np.ndarray:
-        return height[1][i] + 2 * height[2][i] * t - swing[i] * omega[i] * np.cos(omega[i] * t + theta[i])
+        return (
+            height[1][i]
+            + 2 * height[2][i] * t
+            - swing[i] * omega[i] * np.cos(omega[i] * t + theta[i])
+        )
 
     everyone = np.arange(len(found))
     end = end_of(found, limits)
     start = np.minimum(gap(everyone, np.zeros_like(end)), 0.0)
     late = np.zeros(len(found), dtype=Long)
-    behind = start <= -BEHIND * radius  # counts from the top of its flight on, if that is in front of the crests
+    behind = (
+        start <= -BEHIND * radius
+    )  # counts from the top of its flight on, if that is in front of the crests
     top = np.clip(-height[1] / np.where(height[2] < 0.0, 2 * height[2], -np.inf), 0.0, end)
     out = value(height, top) > np.abs(swing) + SURELY
     start = np.where(behind, 0.0, start)
@@ -312,7 +341,11 @@ def judge_waves(
     while len(i):
         middle, half = (low + high) / 2, (high - low) / 2
         h = [c[i] for c in height]
-        above = value(h, middle) - half * (np.abs(h[1] + 2 * h[2] * middle) + half * np.abs(h[2])) - np.abs(swing[i])
+        above = (
+            value(h, middle)
+            - half * (np.abs(h[1] + 2 * h[2] * middle) + half * np.abs(h[2]))
+            - np.abs(swing[i])
+        )
         maybe = above <= 0.0  # below the crests somewhere
         i, low, high, middle, half = (x[maybe] for x in (i, low, high, middle, half))
         here, pace, most = gap(i, middle), rate(i, middle), bend[i] * half
@@ -358,7 +391,10 @@ def judge_triangles(
 
     def gap(i: np.ndarray, t: np.ndarray) -> np.ndarray:
         pairs = np.add.outer(i * count, np.arange(count)).ravel()
-        gaps = [rest(pairs, np.repeat(row, count))[0].reshape(len(i), count).min(axis=1) - radius for row in t]
+        gaps = [
+            rest(pairs, np.repeat(row, count))[0].reshape(len(i), count).min(axis=1) - radius
+            for row in t
+        ]
         return np.stack(gaps)
 
     pairs = np.arange(cases * count)
@@ -372,7 +408,9 @@ def judge_triangles(
     for k in range(3):
         away = from_segments(position, triangles[k], triangles[k - 1])
         distance = np.sqrt(dot(away, away))
-        rate = np.minimum(rate, np.where(distance - radius <= allowed, dot(away, velocity) / distance, np.inf))
+        rate = np.minimum(
+            rate, np.where(distance - radius <= allowed, dot(away, velocity) / distance, np.inf)
+        )
     rate = (rate - tilt * np.sqrt(dot(velocity, velocity))).reshape(cases, count).min(axis=1)
 
     time = np.zeros(len(pairs), dtype=Long)
@@ -383,10 +421,14 @@ def judge_triangles(
         deep = room <= allowed * 1e-3
         np.maximum.at(late, i[deep], Long(allowed))
         now = Flight(*(x[:, i] for x in ball))
-        time = time + _first_root(np.maximum(room, 0.0), dot(normal, now.speed(time)), dot(normal, now.fall) / 2)
+        time = time + _first_root(
+            np.maximum(room, 0.0), dot(normal, now.speed(time)), dot(normal, now.fall) / 2
+        )
         on = ~deep & (time < end[i])
         pairs, time = pairs[on], time[on]
-    return verdict(found, limits, lambda i, t: gap(i, np.atleast_2d(t)).reshape(t.shape), rate, late)
+    return verdict(
+        found, limits, lambda i, t: gap(i, np.atleast_2d(t)).reshape(t.shape), rate, late
+    )
 
 
 def _first_root(c: np.ndarray, b: np.ndarray, a: np.ndarray) -> np.ndarray:

@@ -23,7 +23,9 @@ def hits_of(evaluation: Evaluation) -> tuple[Hits, ...]:
     found = []
     for tally in evaluation.replicas:
         triangle = np.repeat(np.arange(len(tally.impacts), dtype=np.int32), tally.impacts)
-        same = [np.full(len(triangle), value, dtype=np.float32) for value in (3.0, 70.0, 1e-4, 1e-5)]
+        same = [
+            np.full(len(triangle), value, dtype=np.float32) for value in (3.0, 70.0, 1e-4, 1e-5)
+        ]
         found.append(Hits(triangle, *same))
     return tuple(found)
 
@@ -32,7 +34,9 @@ def simulated(folder: Path, per_mm2: float = 60.0, hits: bool = True) -> tuple[P
     """A simulation's folder; hits False: as older versions left it."""
     chamber = build_chamber(DESIGN)
     evaluation = poisson_evaluation(DESIGN, chamber, per_mm2)
-    write_simulation(folder, DESIGN, chamber, replace(evaluation, hits=hits_of(evaluation) if hits else ()))
+    write_simulation(
+        folder, DESIGN, chamber, replace(evaluation, hits=hits_of(evaluation) if hits else ())
+    )
     return folder, chamber
 
 
@@ -49,7 +53,9 @@ def studied(folder: Path, evaluations: int = 12) -> Path:
     def evaluator(design, stream, replicas):
         if design.chamber.sonotrode_distance_mm > 17:
             raise InputError("<b>not</b> this one")
-        return poisson_evaluation(design, chamber, 80.0 * design.shot.mass_g, replicas or 4, seed=len(stream))
+        return poisson_evaluation(
+            design, chamber, 80.0 * design.shot.mass_g, replicas or 4, seed=len(stream)
+        )
 
     write_study(folder, run_study(question, folder, SerialExecutor(), evaluator=evaluator))
     return folder

@@ -14,7 +14,11 @@ from chamberopt.simulation.evaluate import Evaluation
 from tests.helpers.synthetic import DESIGNS, judged
 
 GEAR = load_design(DESIGNS / "gear.toml")
-BOUNDS = {"chamber.height_mm": (35.0, 60.0), "chamber.sonotrode_distance_mm": (5.0, 25.0), "shot.mass_g": (2.0, 10.0)}
+BOUNDS = {
+    "chamber.height_mm": (35.0, 60.0),
+    "chamber.sonotrode_distance_mm": (5.0, 25.0),
+    "shot.mass_g": (2.0, 10.0),
+}
 CALLS = "calls.log"
 
 

@@ -14,7 +14,9 @@ from tests.helpers.synthetic import plate_design
 def plate_result(folder: Path) -> Result:
     """Three replicas of 0.3 s, in a new folder, without its picture."""
     design = plate_design(
-        process__accuracy__simulated_time_s=0.3, process__accuracy__warmup_time_s=0.05, process__accuracy__replicas=3
+        process__accuracy__simulated_time_s=0.3,
+        process__accuracy__warmup_time_s=0.05,
+        process__accuracy__replicas=3,
     )
     chamber = build_chamber(design)
     with patch.object(viewer, "coverage_picture", lambda *_: None):

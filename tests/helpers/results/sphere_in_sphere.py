@@ -25,12 +25,16 @@ def ball_result(folder: Path, marked: bool = False, moved: float = 0.0, lost: in
     Triangle k has k % 5 simulated impacts, of 1 ... 4 m/s. moved: by so many mm · lost: each so-manyth triangle.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    ball, room = (trimesh.creation.icosphere(subdivisions=3, radius=radius) for radius in (0.01, 0.02))
+    ball, room = (
+        trimesh.creation.icosphere(subdivisions=3, radius=radius) for radius in (0.01, 0.02)
+    )
     kept = np.arange(len(ball.faces)) % lost != 0 if lost else np.ones(len(ball.faces), dtype=bool)
     faces, middle = np.asarray(ball.faces)[kept], ball.triangles_center[kept]
     count = len(faces)
     tags = np.where(room.triangles_center[:, 2] < -0.015, 1, 2).astype(np.uint8)
-    part = SimpleNamespace(vertices=ball.vertices + np.array([moved * 1e-3, 0.0, 0.0]), triangles=faces)
+    part = SimpleNamespace(
+        vertices=ball.vertices + np.array([moved * 1e-3, 0.0, 0.0]), triangles=faces
+    )
     chamber: Any = SimpleNamespace(
         part=part,
         vertices=np.asarray(room.vertices),
@@ -41,8 +45,13 @@ def ball_result(folder: Path, marked: bool = False, moved: float = 0.0, lost: in
     )
     height = 50.0 + 4500.0 * middle[:, 2]  # % of the way up: 5 to 95
     impacts = np.arange(count) % 5
-    hits = Hits(np.repeat(np.arange(count), impacts), *(np.zeros(impacts.sum(), np.float32) for _ in range(4)))
-    hits = replace(hits, speed=np.concatenate([np.arange(1, n + 1) for n in impacts]).astype(np.float32))
+    hits = Hits(
+        np.repeat(np.arange(count), impacts),
+        *(np.zeros(impacts.sum(), np.float32) for _ in range(4)),
+    )
+    hits = replace(
+        hits, speed=np.concatenate([np.arange(1, n + 1) for n in impacts]).astype(np.float32)
+    )
     target = middle[:, 0] < 0.008
     fields = {
         "coverage": height / 100.0,
@@ -59,7 +68,9 @@ def ball_result(folder: Path, marked: bool = False, moved: float = 0.0, lost: in
     write_chamber(folder, chamber)
     save_hits(folder / "hits.npz", sorted_hits([hits], count))
     mean = float(fields["impacts_per_mm2"][target].mean())
-    return Subject(str(folder), f"{folder.name}\nnot simulated", TREATMENT, 50.0, int(target.sum()), mean)
+    return Subject(
+        str(folder), f"{folder.name}\nnot simulated", TREATMENT, 50.0, int(target.sum()), mean
+    )
 
 
 def picture(subject: Subject, look: Look) -> np.ndarray:
@@ -77,7 +88,9 @@ def picture(subject: Subject, look: Look) -> np.ndarray:
 
 LOOKS = {
     "coverage": Look(),
-    "pick": Look("speed", below=60.0, cut=((0.0, -1.0, 0.0), None), triangle=404, eye=(-1.0, -1.0, 0.5)),
+    "pick": Look(
+        "speed", below=60.0, cut=((0.0, -1.0, 0.0), None), triangle=404, eye=(-1.0, -1.0, 0.5)
+    ),
 }
 
 
@@ -103,7 +116,11 @@ def driven(folder: Path) -> list[dict[str, Any]]:
     """What a window shows after each key, click and slide: its look, and what is in its views."""
     from chamberopt.output.viewer.window import Window, opened
 
-    subjects = [ball_result(folder / "one"), ball_result(folder / "two"), ball_result(folder / "marked", marked=True)]
+    subjects = [
+        ball_result(folder / "one"),
+        ball_result(folder / "two"),
+        ball_result(folder / "marked", marked=True),
+    ]
     window = Window(opened(subjects[:2], Look()), Look(), off_screen=True)
     steps: list[dict[str, Any]] = []
 

@@ -19,17 +19,24 @@ def tagged(vertices: np.ndarray, triangles: np.ndarray) -> TriangleMesh:
     return TriangleMesh(vertices, triangles, tags)
 
 
-def box(sides: tuple[float, float, float], centre: tuple[float, float, float] | None = None) -> TriangleMesh:
+def box(
+    sides: tuple[float, float, float], centre: tuple[float, float, float] | None = None
+) -> TriangleMesh:
     """A box [m], from the origin up unless a centre is given."""
     mesh = trimesh.creation.box(sides)
     middle = 0.5 * np.array(sides) if centre is None else np.array(centre)
     return tagged(np.asarray(mesh.vertices) + middle, np.asarray(mesh.faces))
 
 
-def cylinder(radius: float, height: float, sections: int = 64, subdivisions: int = 0) -> TriangleMesh:
+def cylinder(
+    radius: float, height: float, sections: int = 64, subdivisions: int = 0
+) -> TriangleMesh:
     """A cylinder [m] standing on z = 0."""
     mesh = trimesh.creation.cylinder(radius=radius, height=height, sections=sections)
-    vertices, triangles = np.asarray(mesh.vertices) + np.array([0.0, 0.0, 0.5 * height]), np.asarray(mesh.faces)
+    vertices, triangles = (
+        np.asarray(mesh.vertices) + np.array([0.0, 0.0, 0.5 * height]),
+        np.asarray(mesh.faces),
+    )
     for _ in range(subdivisions):
         vertices, triangles = trimesh.remesh.subdivide(vertices, triangles)
     return tagged(np.round(vertices, 15), triangles)

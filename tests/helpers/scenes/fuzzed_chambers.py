@@ -13,7 +13,16 @@ from manifold3d import CrossSection, Manifold, Mesh64
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from sim_core import Balls, Gravity, Physics, Restitution, SceneError, TriangleMesh, Vibration, pack_balls
+from sim_core import (
+    Balls,
+    Gravity,
+    Physics,
+    Restitution,
+    SceneError,
+    TriangleMesh,
+    Vibration,
+    pack_balls,
+)
 from sim_core.geometry.obstacle_set import build_ground
 from tests.helpers.scenes.cavities import CEILING, FLOOR
 
@@ -41,9 +50,13 @@ def random_chamber(family: str, seed: int) -> Chamber:
     level = (vertices[triangles][:, :, 2] == vertices[:, 2].min()).all(axis=1)
     turn = Rotation.random(random_state=int(rng.integers(1 << 31)))
     away = FAR * rng.normal(size=3) if rng.random() < 0.5 else np.zeros(3)
-    mesh = TriangleMesh(turn.apply(wide * vertices) + away, triangles, np.where(level, FLOOR, CEILING))
+    mesh = TriangleMesh(
+        turn.apply(wide * vertices) + away, triangles, np.where(level, FLOOR, CEILING)
+    )
     physics = random_physics(family in WITH_FLOOR, turn, wide, wide * diameter, rng)
-    if physics.vibration is not None and has_moving_edge(mesh, 0.5 * wide * diameter, physics.vibration):
+    if physics.vibration is not None and has_moving_edge(
+        mesh, 0.5 * wide * diameter, physics.vibration
+    ):
         physics = random_physics(False, turn, wide, wide * diameter, rng)
     return Chamber(mesh, random_balls(mesh, wide * diameter, physics, rng), physics)
 
@@ -57,19 +70,29 @@ def has_moving_edge(mesh: TriangleMesh, radius: float, vibration: Vibration) -> 
     return False
 
 
-def random_physics(with_floor: bool, turn: Rotation, wide: float, diameter: float, rng: np.random.Generator) -> Physics:
+def random_physics(
+    with_floor: bool, turn: Rotation, wide: float, diameter: float, rng: np.random.Generator
+) -> Physics:
     """Elastic with or without gravity, or with losses that a vibrating floor makes up for."""
     down = SPEED**2 / wide * rng.uniform(0.05, 0.5)
     if with_floor and rng.random() < 0.5:
         law = (rng.uniform(0.5, 0.95), rng.uniform(0.1, 2.0))
         swing = diameter * 10.0 ** rng.uniform(-2.5, -1.0)
         axis = tuple(turn.apply([0.0, 0.0, 1.0]).tolist())
-        sonotrode = Vibration(FLOOR, swing, SPEED / (2.0 * np.pi * swing), rng.uniform(0.0, 6.0), axis)
-        return Physics(Gravity(*(-down * np.array(axis)).tolist()), Restitution((law, law), law), sonotrode)
-    return Physics(Gravity(*(down * turn.apply([0.0, 0.6, -0.8])).tolist()) if rng.random() < 0.5 else None)
+        sonotrode = Vibration(
+            FLOOR, swing, SPEED / (2.0 * np.pi * swing), rng.uniform(0.0, 6.0), axis
+        )
+        return Physics(
+            Gravity(*(-down * np.array(axis)).tolist()), Restitution((law, law), law), sonotrode
+        )
+    return Physics(
+        Gravity(*(down * turn.apply([0.0, 0.6, -0.8])).tolist()) if rng.random() < 0.5 else None
+    )
 
 
-def random_balls(mesh: TriangleMesh, diameter: float, physics: Physics, rng: np.random.Generator) -> Balls:
+def random_balls(
+    mesh: TriangleMesh, diameter: float, physics: Physics, rng: np.random.Generator
+) -> Balls:
     """Up to 60 balls, or as many as find a place."""
     count = int(rng.integers(5, 60))
     clear = physics.vibration.amplitude if physics.vibration else 0.0
@@ -97,14 +120,21 @@ def dented(_: float, rng: np.random.Generator) -> Surface:
     """A sphere with every corner moved in or out: convex and concave edges in a random mixture."""
     ball = trimesh.creation.icosphere(subdivisions=int(rng.integers(1, 4)), radius=0.5)
     depth = rng.uniform(0.02, 0.4)
-    return np.asarray(ball.vertices) * rng.uniform(1.0 - depth, 1.0, (len(ball.vertices), 1)), np.asarray(ball.faces)
+    return np.asarray(ball.vertices) * rng.uniform(
+        1.0 - depth, 1.0, (len(ball.vertices), 1)
+    ), np.asarray(ball.faces)
 
 
 def spiked(_: float, rng: np.random.Generator) -> Surface:
     """A box with needles of three to six sides in it, some through its walls."""
     return room_less(
         [
-            turned(Manifold.cylinder(rng.uniform(0.2, 0.8), rng.uniform(1e-3, 0.1), 0.0, int(rng.integers(3, 7))), rng)
+            turned(
+                Manifold.cylinder(
+                    rng.uniform(0.2, 0.8), rng.uniform(1e-3, 0.1), 0.0, int(rng.integers(3, 7))
+                ),
+                rng,
+            )
             for _ in range(12)
         ]
     )
@@ -114,7 +144,12 @@ def bladed(_: float, rng: np.random.Generator) -> Surface:
     """A box with plates in it, down to a millionth of its width thick."""
     return room_less(
         [
-            turned(Manifold.cube([*rng.uniform(0.1, 0.6, 2), 10.0 ** rng.uniform(-6.0, -1.5)], center=True), rng)
+            turned(
+                Manifold.cube(
+                    [*rng.uniform(0.1, 0.6, 2), 10.0 ** rng.uniform(-6.0, -1.5)], center=True
+                ),
+                rng,
+            )
             for _ in range(8)
         ]
     )
@@ -142,7 +177,9 @@ def throated(diameter: float, rng: np.random.Generator) -> Surface:
     """Two boxes joined by a tube hardly wider than a ball."""
     sides = int(rng.integers(3, 9))
     inscribed = 0.5 * diameter * (1.0 + 10.0 ** rng.uniform(-3.0, -0.5))
-    tube = Manifold.cylinder(0.6, inscribed / np.cos(np.pi / sides), -1.0, sides).rotate([0.0, 90.0, 0.0])
+    tube = Manifold.cylinder(0.6, inscribed / np.cos(np.pi / sides), -1.0, sides).rotate(
+        [0.0, 90.0, 0.0]
+    )
     one = Manifold.cube([0.4, 0.5, 0.5], center=True).translate([-0.3, 0.0, 0.0])
     two = Manifold.cube([0.4, 0.5, 0.5], center=True).translate([0.3, 0.0, 0.0])
     return surface(one + two + tube.translate([-0.3, 0.0, 0.0]))
@@ -160,13 +197,16 @@ def slotted(diameter: float, rng: np.random.Generator) -> Surface:
 
 def grooved(_: float, rng: np.random.Generator) -> Surface:
     """A box with prisms side by side in it: between them grooves that end in an edge."""
-    outline = CrossSection([[(0.0, 0.0), (0.2, 0.0), (rng.uniform(0.02, 0.18), rng.uniform(0.1, 0.6))]])
+    outline = CrossSection(
+        [[(0.0, 0.0), (0.2, 0.0), (rng.uniform(0.02, 0.18), rng.uniform(0.1, 0.6))]]
+    )
     prism = outline.extrude(0.7).rotate([90.0, 0.0, 0.0])
     return room_less([prism.translate([-0.45 + 0.2 * k, 0.35, -0.4]) for k in range(4)])
 
 
 FAMILIES: dict[str, Callable[[float, np.random.Generator], Surface]] = {
-    f.__name__: f for f in (hull, dented, spiked, bladed, wedged, geared, throated, slotted, grooved)
+    f.__name__: f
+    for f in (hull, dented, spiked, bladed, wedged, geared, throated, slotted, grooved)
 }
 WITH_FLOOR = {"spiked", "bladed", "wedged", "geared", "throated", "slotted", "grooved"}
 

@@ -54,14 +54,18 @@ def played(
     that melt the lattice.
     """
     duration = collisions / enskog_rate(carnahan_starling(gas.packing), gas.kt)
-    balls = simulate(Scene(gas.room, gas.balls, Physics(), 100.0 * duration / collisions, record=())).balls
+    balls = simulate(
+        Scene(gas.room, gas.balls, Physics(), 100.0 * duration / collisions, record=())
+    ).balls
     for _ in range(pieces):
         result = simulate(Scene(gas.room, balls, Physics(), duration, record=record))
         balls = result.balls
         yield result, duration
 
 
-def jackknife(estimate: Callable[[np.ndarray], float], rows: np.ndarray, blocks: int = 20) -> tuple[float, float]:
+def jackknife(
+    estimate: Callable[[np.ndarray], float], rows: np.ndarray, blocks: int = 20
+) -> tuple[float, float]:
     """estimate(mean row) and its standard error, from leaving out one block of rows (n, ...) after the other.
 
     Efron, The Jackknife, the Bootstrap and Other Resampling Plans (1982), chapter 3.
@@ -100,7 +104,9 @@ def in_a_box(gas: Gas) -> float:
         return packing - np.pi * ratio * packing * (tension(high) - tension(low)) / pressure
 
     middle = brentq(lambda packing: average(packing) - gas.packing, 0.5 * gas.packing, gas.packing)
-    return (middle * carnahan_starling(middle) - 2.0 / 3.0 * np.pi * ratio * tension(middle)) / gas.packing
+    return (
+        middle * carnahan_starling(middle) - 2.0 / 3.0 * np.pi * ratio * tension(middle)
+    ) / gas.packing
 
 
 def enskog_rate(compressibility: float, kt: float, diameter: float = DIAMETER) -> float:

@@ -41,7 +41,9 @@ def star(teeth: int, tip: float, root: float, height: float) -> trimesh.Trimesh:
         np.column_stack([there, here, np.full(count, 2 * count)]),
         np.column_stack([count + here, count + there, np.full(count, 2 * count + 1)]),
     ]
-    return trimesh.Trimesh(np.concatenate([low, high, middle]), np.concatenate(faces), process=False)
+    return trimesh.Trimesh(
+        np.concatenate([low, high, middle]), np.concatenate(faces), process=False
+    )
 
 
 BODIES = {
@@ -50,7 +52,14 @@ BODIES = {
     "star": star(7, 0.012, 0.006, 0.008),
     "ball": trimesh.creation.icosphere(2, 0.008),
     "wedge": trimesh.Trimesh(
-        np.array([[0.012, 0, -0.004], [-0.006, 0.003, -0.004], [-0.006, -0.008, -0.004], [0.001, 0, 0.007]]),
+        np.array(
+            [
+                [0.012, 0, -0.004],
+                [-0.006, 0.003, -0.004],
+                [-0.006, -0.008, -0.004],
+                [0.001, 0, 0.007],
+            ]
+        ),
         [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]],
     ),
 }
@@ -58,16 +67,28 @@ BODIES = {
 
 @jit
 def _search(  # type: ignore[no-untyped-def]
-    part: PartTree, turning: Turning, scratch: Scratch, position: Vec3, velocity: Vec3, gravity, seam, time, limit
+    part: PartTree,
+    turning: Turning,
+    scratch: Scratch,
+    position: Vec3,
+    velocity: Vec3,
+    gravity,
+    seam,
+    time,
+    limit,
 ):
     fall = acceleration(gravity)
-    return first_part_contact(part, turning, scratch, Point(position, velocity), fall, seam, time, limit, -1, 0)
+    return first_part_contact(
+        part, turning, scratch, Point(position, velocity), fall, seam, time, limit, -1, 0
+    )
 
 
 class Rotor:
     """A part that turns in an empty cube, ready to be asked for contacts."""
 
-    def __init__(self, body: trimesh.Trimesh, turn: Turn, diameter: float = 3e-3, half: float = 0.04) -> None:
+    def __init__(
+        self, body: trimesh.Trimesh, turn: Turn, diameter: float = 3e-3, half: float = 0.04
+    ) -> None:
         self.turn = turn
         self.radius = 0.5 * diameter
         self.mesh: TriangleMesh = box_around(body, half)
@@ -79,12 +100,19 @@ class Rotor:
         self.scratch = new_scratch()
 
     def search(
-        self, position: np.ndarray, velocity: np.ndarray, gravity: Gravity | None, time: float, limit: float
+        self,
+        position: np.ndarray,
+        velocity: np.ndarray,
+        gravity: Gravity | None,
+        time: float,
+        limit: float,
     ) -> tuple[float, int]:
         """The answer of the code under test: delay [s] and obstacle, -1 if there is none within ``limit`` [s]."""
         place, speed = Vec3(*map(float, position)), Vec3(*map(float, velocity))
         seam = self.ground.seam
-        delay, row = _search(self.ground.part, self.turning, self.scratch, place, speed, gravity, seam, time, limit)
+        delay, row = _search(
+            self.ground.part, self.turning, self.scratch, place, speed, gravity, seam, time, limit
+        )
         return float(delay), int(row)
 
     def angle(self, time: np.ndarray) -> np.ndarray:
@@ -109,14 +137,21 @@ class Rotor:
         return bool(room and clearance(self.own, frame, 0.2)[0] > self.radius + 1e-9)
 
     def gap(
-        self, position: np.ndarray, velocity: np.ndarray, gravity: Gravity | None, time: float, delay: np.ndarray
+        self,
+        position: np.ndarray,
+        velocity: np.ndarray,
+        gravity: Gravity | None,
+        time: float,
+        delay: np.ndarray,
     ) -> np.ndarray:
         """Distance (n,) [m] between ball and part after delays (n,) [s]."""
         points = flight(position, velocity, gravity, delay)
         return clearance(self.own, self.seen(points, time + delay), 0.2) - self.radius
 
 
-def flight(position: np.ndarray, velocity: np.ndarray, gravity: Gravity | None, delay: np.ndarray) -> np.ndarray:
+def flight(
+    position: np.ndarray, velocity: np.ndarray, gravity: Gravity | None, delay: np.ndarray
+) -> np.ndarray:
     """Where a ball is (n, 3) [m] after delays (n,) [s]."""
     fall = np.zeros(3) if gravity is None else np.array(gravity)
     return np.asarray(position + delay[:, None] * velocity + 0.5 * delay[:, None] ** 2 * fall)

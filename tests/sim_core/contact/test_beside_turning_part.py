@@ -37,7 +37,9 @@ TOUCH = 1e-12  # m
 
 def physics(turn: Turn, e: float = 0.8) -> Physics:
     law = (e, 1e3)
-    return Physics(Gravity(), Restitution((law,) * 3, law, ELASTIC_BELOW), rest=Rest(1e-3, 0.005), turn=turn)
+    return Physics(
+        Gravity(), Restitution((law,) * 3, law, ELASTIC_BELOW), rest=Rest(1e-3, 0.005), turn=turn
+    )
 
 
 def paddle(length: float = 0.03) -> TriangleMesh:
@@ -49,7 +51,9 @@ def paddle(length: float = 0.03) -> TriangleMesh:
 
 def on_floor(places: object) -> Balls:
     flat = np.atleast_2d(np.array(places, dtype=float))
-    return Balls(np.column_stack([flat, np.full(len(flat), R - HALF)]), np.zeros((len(flat), 3)), 2 * R)
+    return Balls(
+        np.column_stack([flat, np.full(len(flat), R - HALF)]), np.zeros((len(flat), 3)), 2 * R
+    )
 
 
 def gaps(run: _Run) -> float:
@@ -87,12 +91,16 @@ def test_a_sleeping_ball_is_woken_when_the_paddle_arrives(rpm: float) -> None:
     out = max((1.0 + e) * speed, speed + 1e-4 * G)  # what lies on it would hop for 0.2 ms
     angle = arrival(x, y)
     expected = out * np.array([-np.sin(angle), np.cos(angle), 0.0])
-    np.testing.assert_allclose(run.balls().velocities[0], expected, rtol=1e-6, atol=2e-10 * when)  # less the brake
+    np.testing.assert_allclose(
+        run.balls().velocities[0], expected, rtol=1e-6, atol=2e-10 * when
+    )  # less the brake
     run.play(2 * when, record=False)
     assert gaps(run) > -TOUCH
 
 
-def test_a_part_that_swings_wakes_a_ball_when_it_gets_there_and_not_one_that_it_does_not_reach() -> None:
+def test_a_part_that_swings_wakes_a_ball_when_it_gets_there_and_not_one_that_it_does_not_reach() -> (
+    None
+):
     swing, frequency = 0.9, 0.2
     turn = Turn(PART, swing=swing, frequency=frequency)
     near, far = (0.009, 0.007), (0.002, 0.012)
@@ -120,7 +128,11 @@ def test_what_it_pushes_pushes_others_however_slowly(rpm: float) -> None:
     """
     omega = 2 * np.pi * rpm / 60
     first, step = WIDE + R + 1e-4, 1.001 * R
-    places = [[0.012, first], [0.012 - step, first + np.sqrt(3.0) * step], [0.012 + step, first + np.sqrt(3.0) * step]]
+    places = [
+        [0.012, first],
+        [0.012 - step, first + np.sqrt(3.0) * step],
+        [0.012 + step, first + np.sqrt(3.0) * step],
+    ]
     until = 0.1 / omega
     run = _Run(Scene(paddle(), on_floor(places), physics(Turn(PART, rpm=rpm)), until))
     for stop in np.linspace(0.0, until, 21)[1:]:
@@ -148,7 +160,10 @@ def test_a_pile_swept_by_a_slow_paddle_gets_no_more_speed_than_that_gives(rpm: f
         run.play(float(stop), record=False)
         assert gaps(run) > -TOUCH
         if stop > 2.0:
-            assert np.linalg.norm(run.balls().velocities, axis=1).max() < 2.0 * tip + 5.0 * ELASTIC_BELOW
+            assert (
+                np.linalg.norm(run.balls().velocities, axis=1).max()
+                < 2.0 * tip + 5.0 * ELASTIC_BELOW
+            )
             asleep += int((modes(run) >= ASLEEP).sum())
     assert asleep > 40 * 25
     assert run.count.sum() < 100_000
@@ -202,7 +217,9 @@ def pocket_and_cam() -> TriangleMesh:
 def test_a_ball_that_the_part_crushes_stops_the_run_and_the_part_is_named() -> None:
     ball = Balls(np.array([[0.021 - 1e-6, 0.0, R - 0.00155 + 1e-6]]), np.zeros((1, 3)), 2 * R)
     scene = Scene(pocket_and_cam(), ball, physics(Turn(PART, rpm=5.0)), 7.0)
-    with pytest.raises(SimulationError, match=r"ball 0 is caught between .*the turning part \(triangle \d+\)"):
+    with pytest.raises(
+        SimulationError, match=r"ball 0 is caught between .*the turning part \(triangle \d+\)"
+    ):
         simulate(scene)
 
 
@@ -211,7 +228,11 @@ def any_scene(seed: int) -> Scene:
     rng = np.random.default_rng(seed)
     body = BODIES[sorted(BODIES)[seed % len(BODIES)]].copy()
     body.apply_translation([0.0, 0.0, rng.uniform(-0.008, 0.0)])
-    motion = {"rpm": 10.0 ** rng.uniform(-1.0, 2.5)} if seed % 3 else {"swing": rng.uniform(0.1, 2.0), "frequency": 2.0}
+    motion = (
+        {"rpm": 10.0 ** rng.uniform(-1.0, 2.5)}
+        if seed % 3
+        else {"swing": rng.uniform(0.1, 2.0), "frequency": 2.0}
+    )
     turn = Turn(PART, axis=tuple(rng.normal(0.0, 0.3, 3) + np.eye(3)[rng.integers(3)]), **motion)
     room = box_around(body, rng.uniform(0.021, 0.026))
     places = pack_balls(room, int(rng.integers(5, 60)), 2 * R, rng, turn=turn)

@@ -51,7 +51,9 @@ def physics(e: float = 0.8, resistance: float = 0.0, vibration: Vibration | None
 
 def shot(places: object, velocities: object = 0.0) -> Balls:
     places = np.atleast_2d(np.array(places, dtype=float))
-    return Balls(places, np.broadcast_to(np.array(velocities, dtype=float), places.shape).copy(), DIAMETER)
+    return Balls(
+        places, np.broadcast_to(np.array(velocities, dtype=float), places.shape).copy(), DIAMETER
+    )
 
 
 def film(
@@ -88,7 +90,9 @@ def mode(run: _Run) -> int:
 def slope(degrees: float) -> tuple[np.ndarray, np.ndarray]:
     """Unit normal and downhill direction of a plane that falls towards +x."""
     angle = math.radians(degrees)
-    return np.array([math.sin(angle), 0.0, math.cos(angle)]), np.array([math.cos(angle), 0.0, -math.sin(angle)])
+    return np.array([math.sin(angle), 0.0, math.cos(angle)]), np.array(
+        [math.cos(angle), 0.0, -math.sin(angle)]
+    )
 
 
 ROOM = box((0.02, 0.02, 0.05))
@@ -135,13 +139,17 @@ def test_down_a_ramp_of_many_triangles_it_slides_as_on_one(tags: int, resistance
     rng = np.random.default_rng(3)
     x = np.sort(np.concatenate([[0.0, 0.3], rng.uniform(0.0, 0.3, 30)]))
     y = np.sort(np.concatenate([[-0.02, 0.02], rng.uniform(-0.02, 0.02, 6)]))
-    ramp = terrain(x, y, np.tile(-math.tan(math.radians(degrees)) * x[:, None], len(y)), 0.05, rng, tags)
+    ramp = terrain(
+        x, y, np.tile(-math.tan(math.radians(degrees)) * x[:, None], len(y)), 0.05, rng, tags
+    )
     normal, down = slope(degrees)
     start = 0.02 / down[0] * down + R * normal + np.array([0.0, 0.003, 0.0])
     run, frames = film(ramp, shot(start), physics(resistance=resistance), until)
     push = G * (math.sin(math.radians(degrees)) - resistance * math.cos(math.radians(degrees)))
     gone = frames[-1].positions[0] - start
-    assert gone @ down == pytest.approx(0.5 * push * until**2, rel=1e-9 if resistance == 0.0 else 1e-7)
+    assert gone @ down == pytest.approx(
+        0.5 * push * until**2, rel=1e-9 if resistance == 0.0 else 1e-7
+    )
     assert abs(gone @ normal) < TOUCH
     assert abs(gone[1]) < TOUCH
     assert frames[-1].velocities[0] @ down == pytest.approx(push * until, rel=1e-7)
@@ -154,9 +162,16 @@ def test_resistance_stops_a_sliding_ball_and_holds_it_on_a_gentle_slope() -> Non
     """v²/(2 resistance g) on the level; on a slope of tan < resistance it never starts."""
     v, resistance = 0.3, 0.4
     result = simulate(
-        Scene(box((0.1, 0.02, 0.02)), shot([0.01, 0.01, R], [v, 0.0, 0.0]), physics(0.8, resistance), 1.0)
+        Scene(
+            box((0.1, 0.02, 0.02)),
+            shot([0.01, 0.01, R], [v, 0.0, 0.0]),
+            physics(0.8, resistance),
+            1.0,
+        )
     )
-    assert result.balls.positions[0, 0] - 0.01 == pytest.approx(v**2 / (2.0 * resistance * G), rel=1e-6)
+    assert result.balls.positions[0, 0] - 0.01 == pytest.approx(
+        v**2 / (2.0 * resistance * G), rel=1e-6
+    )
     assert result.resting.since[0] == pytest.approx(v / (resistance * G), rel=1e-6)
     normal, down = slope(20.0)
     x = np.array([0.0, 0.1])
@@ -167,7 +182,9 @@ def test_resistance_stops_a_sliding_ball_and_holds_it_on_a_gentle_slope() -> Non
         assert (len(result.resting) == 1) is still
 
 
-@pytest.mark.parametrize("speed", [0.4, 4.0])  # the faster turns by less than TURN while it is searched in one piece
+@pytest.mark.parametrize(
+    "speed", [0.4, 4.0]
+)  # the faster turns by less than TURN while it is searched in one piece
 def test_resistance_is_against_the_motion_of_a_ball_that_turns_downhill(speed: float) -> None:
     """Thrown across a slope, against small steps of v' = g sin - resistance g cos v/|v|."""
     resistance, degrees, until = 0.25, 20.0, 0.3
@@ -190,8 +207,15 @@ def test_it_lifts_off_at_the_ramps_end() -> None:
     normal, down = slope(20.0)
     edge = 0.1 / down[0]
     z = -0.1 * math.tan(math.radians(20.0))
-    cliff = profile(np.array([0.0, 0.1, 0.105, 0.3]), np.array([0.0, z, z - 0.05, z - 0.05]), 0.02, 0.05)
-    start, push, length, after = 0.02 * down + R * normal, G * math.sin(math.radians(20.0)), edge - 0.02, 0.05
+    cliff = profile(
+        np.array([0.0, 0.1, 0.105, 0.3]), np.array([0.0, z, z - 0.05, z - 0.05]), 0.02, 0.05
+    )
+    start, push, length, after = (
+        0.02 * down + R * normal,
+        G * math.sin(math.radians(20.0)),
+        edge - 0.02,
+        0.05,
+    )
     slide = math.sqrt(2.0 * length / push)
     balls = simulate(Scene(cliff, shot(start), physics(), slide + after)).balls
     flight = down * push * slide * after + 0.5 * after**2 * np.array([0.0, 0.0, -G])
@@ -206,7 +230,9 @@ def test_slowly_over_an_edge_it_rolls_until_it_leaves_it(speed: float) -> None:
     """
     x = np.array([0.0, 0.1, 0.1 + 1e-6, 0.4])
     cliff = profile(x, np.array([0.0, 0.0, -0.05, -0.05]), 0.02, 0.05)
-    _, frames = film(cliff, shot([0.0999, 0.0, R], [speed, 0.0, 0.0]), physics(), 1e-4 / speed + 0.06, 60)
+    _, frames = film(
+        cliff, shot([0.0999, 0.0, R], [speed, 0.0, 0.0]), physics(), 1e-4 / speed + 0.06, 60
+    )
     leaves = min(1.0, (2.0 + speed**2 / (G * R)) / 3.0)
     assert (np.diff(energies(frames)) < 1e-12).all()
     end = frames[-1]
@@ -217,7 +243,9 @@ def test_slowly_over_an_edge_it_rolls_until_it_leaves_it(speed: float) -> None:
 @pytest.mark.parametrize(("first", "second"), [(20.0, 8.0), (8.0, 20.0)])
 def test_over_a_gentle_change_of_slope_it_keeps_its_energy(first: float, second: float) -> None:
     a, b = math.tan(math.radians(first)), math.tan(math.radians(second))
-    ramp = profile(np.array([0.0, 0.1, 0.3]), np.array([0.0, -0.1 * a, -0.1 * a - 0.2 * b]), 0.02, 0.08)
+    ramp = profile(
+        np.array([0.0, 0.1, 0.3]), np.array([0.0, -0.1 * a, -0.1 * a - 0.2 * b]), 0.02, 0.08
+    )
     normal, down = slope(first)
     _, frames = film(ramp, shot(0.03 * down + R * normal), physics(), 0.4)
     spent = energies(frames)
@@ -236,7 +264,11 @@ def test_a_trough_of_facets_is_a_pendulum(facet: float) -> None:
     length = radius - R
     start = math.radians(20.0)
     run, frames = film(
-        trough, shot([0.999 * length * math.sin(start), 0.0, -0.999 * length * math.cos(start)]), physics(0.5), 4.0, 800
+        trough,
+        shot([0.999 * length * math.sin(start), 0.0, -0.999 * length * math.cos(start)]),
+        physics(0.5),
+        4.0,
+        800,
     )
     x, time = np.array([f.positions[0, 0] for f in frames]), np.linspace(0.0, 4.0, 801)
     up = np.flatnonzero((x[:-1] < 0.0) & (x[1:] >= 0.0))
@@ -260,7 +292,9 @@ def test_a_bowl_of_triangles_keeps_the_energy() -> None:
     spent = energies(frames)
     assert (np.diff(spent) < 1e-12).all()
     depth = spent[20] - (-G * length)
-    assert spent[20] - spent[-1] < 0.02 * depth  # what is lost where three faces meet at the bowl's bottom
+    assert (
+        spent[20] - spent[-1] < 0.02 * depth
+    )  # what is lost where three faces meet at the bowl's bottom
     assert run.count[3] < 20_000
 
 
@@ -269,7 +303,9 @@ def test_down_a_valley_it_is_led_by_both_faces(resistance: float) -> None:
     """Along the crease: g (sin - resistance load) with the load of both faces; cos(crease)/cos(40°) here."""
     lift, fall = math.tan(math.radians(40.0)), 0.1
     y, x = np.array([-0.02, 0.0, 0.02]), np.linspace(0.0, 0.3, 31)
-    valley = terrain(x, y, np.abs(y)[None, :] * lift - fall * x[:, None], 0.05, np.random.default_rng(1), tags=4)
+    valley = terrain(
+        x, y, np.abs(y)[None, :] * lift - fall * x[:, None], 0.05, np.random.default_rng(1), tags=4
+    )
     one = np.array([fall, -lift, 1.0]) / math.sqrt(fall**2 + lift**2 + 1.0)
     start = np.array([0.02, 0.0, -0.002 + R / one[2]])
     until = 0.5
@@ -288,10 +324,14 @@ def test_wedged_against_three_faces_it_sleeps() -> None:
     corner = np.radians([90.0, 210.0, 330.0])
     rim = np.column_stack([0.03 * np.cos(corner), 0.03 * np.sin(corner), np.full(3, 0.03)])
     pit = TriangleMesh(
-        np.vstack([rim, np.zeros(3)]), np.array([[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]]), np.ones(4, int)
+        np.vstack([rim, np.zeros(3)]),
+        np.array([[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]]),
+        np.ones(4, int),
     )
     run, frames = film(pit, shot([0.002, 0.001, 0.02], [0.1, 0.2, 0.0]), physics(), 2.0)
-    upright = 1.0 / math.hypot(1.0, 0.03 / (0.03 * math.cos(math.radians(60.0))))  # z of the faces' unit normals
+    upright = 1.0 / math.hypot(
+        1.0, 0.03 / (0.03 * math.cos(math.radians(60.0)))
+    )  # z of the faces' unit normals
     np.testing.assert_allclose(frames[-1].positions[0], [0.0, 0.0, R / upright], atol=1e-12)
     assert (frames[-1].velocities == 0.0).all()
     assert (np.diff(energies(frames)) < 1e-15).all()
@@ -304,7 +344,9 @@ def test_wedged_against_three_faces_it_sleeps() -> None:
 @pytest.mark.parametrize("gap", [1e-9, 1e-7, 1e-5, 1e-3])
 def test_in_a_slot_just_wider_than_itself_it_costs_a_bounded_number_of_events(gap: float) -> None:
     slot = box((DIAMETER + gap, 0.02, 0.05))
-    run, frames = film(slot, shot([R + 0.5 * gap, 0.01, 0.02], [0.05, 0.1, 0.0]), physics(0.8, 0.005), 3.0)
+    run, frames = film(
+        slot, shot([R + 0.5 * gap, 0.01, 0.02], [0.05, 0.1, 0.0]), physics(0.8, 0.005), 3.0
+    )
     assert run.count.sum() < 2000
     assert (np.diff(energies(frames)) < 1e-15).all()
     assert mode(run) == ASLEEP
@@ -368,7 +410,9 @@ def test_another_balls_hit_wakes_it() -> None:
     balls = shot([[0.05, 0.01, R], [0.1, 0.01, R]], [[v, 0.0, 0.0], [0.0, 0.0, 0.0]])
     meets = (0.05 - DIAMETER) / v
     end = simulate(Scene(room, balls, physics(e), meets + 0.1)).balls
-    np.testing.assert_allclose(end.velocities[:, 0], [0.5 * (1 - e) * v, 0.5 * (1 + e) * v], rtol=1e-9)
+    np.testing.assert_allclose(
+        end.velocities[:, 0], [0.5 * (1 - e) * v, 0.5 * (1 + e) * v], rtol=1e-9
+    )
     expected = np.array([0.1 - DIAMETER + 0.05 * (1 - e) * v, 0.1 + 0.05 * (1 + e) * v])
     np.testing.assert_allclose(end.positions[:, 0], expected, rtol=1e-9)
     np.testing.assert_allclose(end.positions[:, 2], R, atol=TOUCH)
@@ -406,7 +450,9 @@ def small_scene() -> Scene:
     x, y = np.linspace(0.0, 0.02, 3), np.array([-0.008, 0.0, 0.008])
     valley = terrain(x, y, np.tile(0.5 * np.abs(y), (3, 1)), 0.02, np.random.default_rng(1), tags=3)
     rng = np.random.default_rng(6)
-    places = np.column_stack([np.linspace(0.0017, 0.0183, 4), rng.normal(0.0, 5e-4, 4), np.full(4, 0.004)])
+    places = np.column_stack(
+        [np.linspace(0.0017, 0.0183, 4), rng.normal(0.0, 5e-4, 4), np.full(4, 0.004)]
+    )
     return Scene(valley, shot(places), physics(0.5, 0.05), 0.15)
 
 
@@ -418,7 +464,10 @@ def test_rest_is_checked() -> None:
 
 def held_beside_another(leaves: float) -> _Run:
     """Ball 0 is held in the air, 1 um beside ball 1, which goes aside at ``leaves`` [m/s]."""
-    balls = shot([[0.005, 0.01, 0.03], [0.005 + DIAMETER + 1e-6, 0.01, 0.03]], [[0.0, 0.0, 0.0], [leaves, 0.0, 0.0]])
+    balls = shot(
+        [[0.005, 0.01, 0.03], [0.005 + DIAMETER + 1e-6, 0.01, 0.03]],
+        [[0.0, 0.0, 0.0], [leaves, 0.0, 0.0]],
+    )
     run = _Run(Scene(ROOM, balls, physics(), 1.0))
     assert run.footing is not None
     hold_beside(run, 0.0)
@@ -469,4 +518,6 @@ def test_every_ball_of_a_settled_heap_is_held_by_what_it_touches() -> None:
         still = np.flatnonzero(run.footing.marks[:, MODE] >= ASLEEP)
         assert len(still) > 45
         lacking = force_lacking(room, run.balls(), still, LEANING, friction=0.3)
-        assert lacking.max() < 0.02, f"seed {seed}: ball {still[lacking.argmax()]} lacks {lacking.max():.2f}"
+        assert lacking.max() < 0.02, (
+            f"seed {seed}: ball {still[lacking.argmax()]} lacks {lacking.max():.2f}"
+        )

@@ -16,7 +16,18 @@ from tests.helpers.jit_on_and_off import with_and_without_jit
 from tests.helpers.scenes.cavities import box
 from tests.helpers.scenes.terrain import profile, terrain
 from tests.sim_core.contact import test_resting as resting
-from tests.sim_core.contact.test_resting import CAPTURE, DIAMETER, TAGS, TOUCH, R, energies, feet, film, mode, slope
+from tests.sim_core.contact.test_resting import (
+    CAPTURE,
+    DIAMETER,
+    TAGS,
+    TOUCH,
+    R,
+    energies,
+    feet,
+    film,
+    mode,
+    slope,
+)
 from tests.sim_core.loop.test_determinism import fingerprint
 
 ALLEY = box((0.6, 0.1, 0.02))
@@ -25,10 +36,14 @@ ON_A_PLANE = 2.0 / 5.0  # moment of inertia of a solid sphere over m R²
 
 def physics(mu: float, e: float = 0.8, resistance: float = 0.0, beta0: float = 0.2) -> Physics:
     """As for balls without friction, and the same friction everywhere."""
-    return resting.physics(e, resistance)._replace(friction=Friction(((mu, beta0),) * TAGS, (mu, beta0)))
+    return resting.physics(e, resistance)._replace(
+        friction=Friction(((mu, beta0),) * TAGS, (mu, beta0))
+    )
 
 
-def shot(place: object, velocity: object = (0.0, 0.0, 0.0), spin: object = (0.0, 0.0, 0.0)) -> Balls:
+def shot(
+    place: object, velocity: object = (0.0, 0.0, 0.0), spin: object = (0.0, 0.0, 0.0)
+) -> Balls:
     rows = (np.array([row], dtype=float) for row in (place, velocity, spin))
     places, velocities, spins = rows
     return Balls(places, velocities, DIAMETER, spins=spins)
@@ -45,20 +60,29 @@ def downhill(mu: float, degrees: float, inertia: float, load: float = 1.0) -> fl
 
     ``load``: on its feet, over that on a plane.
     """
-    push, press = G * math.sin(math.radians(degrees)), mu * load * G * math.cos(math.radians(degrees))
+    push, press = (
+        G * math.sin(math.radians(degrees)),
+        mu * load * G * math.cos(math.radians(degrees)),
+    )
     rolls = push / (1.0 + inertia)
     return rolls if push - rolls < press else push - press
 
 
 @pytest.mark.parametrize("tags", [1, 6])  # one: the plane is merged; six: its triangles stay apart
-@pytest.mark.parametrize(("mu", "resistance"), [(0.0, 0.0), (0.05, 0.0), (0.1, 0.0), (10.0, 0.0), (10.0, 0.05)])
-def test_down_a_ramp_of_many_triangles_it_rolls_or_slips(mu: float, resistance: float, tags: int) -> None:
+@pytest.mark.parametrize(
+    ("mu", "resistance"), [(0.0, 0.0), (0.05, 0.0), (0.1, 0.0), (10.0, 0.0), (10.0, 0.05)]
+)
+def test_down_a_ramp_of_many_triangles_it_rolls_or_slips(
+    mu: float, resistance: float, tags: int
+) -> None:
     """At 15 degrees it rolls from mu = 2/7 tan on, with 5/7 of the frictionless acceleration less the resistance."""
     degrees, until = 15.0, 0.35
     rng = np.random.default_rng(3)
     x = np.sort(np.concatenate([[0.0, 0.3], rng.uniform(0.0, 0.3, 30)]))
     y = np.sort(np.concatenate([[-0.02, 0.02], rng.uniform(-0.02, 0.02, 6)]))
-    ramp = terrain(x, y, np.tile(-math.tan(math.radians(degrees)) * x[:, None], len(y)), 0.05, rng, tags)
+    ramp = terrain(
+        x, y, np.tile(-math.tan(math.radians(degrees)) * x[:, None], len(y)), 0.05, rng, tags
+    )
     normal, down = slope(degrees)
     start = 0.02 / down[0] * down + R * normal + np.array([0.0, 0.003, 0.0])
     run, frames = film(ramp, shot(start), physics(mu, resistance=resistance), until)
@@ -70,7 +94,9 @@ def test_down_a_ramp_of_many_triangles_it_rolls_or_slips(mu: float, resistance: 
     assert abs(gone[1]) < TOUCH
     assert frames[-1].velocities[0] @ down == pytest.approx(push * until, rel=1e-7)
     turns = push if rolls else 2.5 * mu * G * math.cos(math.radians(degrees))
-    np.testing.assert_allclose(spin(frames[-1]), [0.0, turns * until / R, 0.0], rtol=1e-7, atol=1e-6)
+    np.testing.assert_allclose(
+        spin(frames[-1]), [0.0, turns * until / R, 0.0], rtol=1e-7, atol=1e-6
+    )
     assert run.count[0] == 1
     if resistance == 0.0:
         assert (np.diff(energies(frames)) < 1e-14).all()
@@ -90,7 +116,9 @@ def test_a_ball_thrown_along_the_floor_slips_until_it_rolls_with_five_sevenths(m
         gone = v * slipping - 0.5 * mu * G * slipping**2 + 5.0 / 7.0 * v * rolling
         assert end.positions[0, 0] - 0.01 == pytest.approx(gone, rel=1e-9)
         assert end.velocities[0, 0] == pytest.approx(v - mu * G * slipping, rel=1e-9)
-        np.testing.assert_allclose(spin(end), [0.0, 2.5 * mu * G * slipping / R, 0.0], rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(
+            spin(end), [0.0, 2.5 * mu * G * slipping / R, 0.0], rtol=1e-9, atol=1e-9
+        )
     assert gone - 5.0 / 7.0 * v * rolling == pytest.approx(where, rel=1e-12)
     assert spin(end)[1] * R == pytest.approx(end.velocities[0, 0], rel=1e-12)
 
@@ -113,7 +141,9 @@ def test_a_ball_that_spins_askew_goes_along_a_parabola_and_then_straight_on() ->
     assert (np.diff(energies(frames)) < 1e-15).all()
 
 
-@pytest.mark.parametrize("speed", [0.4, 4.0])  # the faster turns by less than TURN while it is searched in one piece
+@pytest.mark.parametrize(
+    "speed", [0.4, 4.0]
+)  # the faster turns by less than TURN while it is searched in one piece
 def test_on_a_slope_a_slip_that_turns_is_followed(speed: float) -> None:
     """Thrown across a slope: against small steps of the equations of motion, v' = g + f, w' = -5/(2R) n x f."""
     mu, degrees, until = 0.15, 20.0, 0.25
@@ -121,17 +151,27 @@ def test_on_a_slope_a_slip_that_turns_is_followed(speed: float) -> None:
     x = np.array([0.0, 0.5])
     ramp = profile(x, -math.tan(math.radians(degrees)) * x, 0.5 * speed, 0.05)
     pull = G * math.sin(math.radians(degrees)) * down
-    start, v, w = 0.02 / down[0] * down + R * normal, np.array([0.0, speed, 0.0]), np.array([0.0, -60.0, 0.0])
+    start, v, w = (
+        0.02 / down[0] * down + R * normal,
+        np.array([0.0, speed, 0.0]),
+        np.array([0.0, -60.0, 0.0]),
+    )
     _, frames = film(ramp, shot(start, v, w), physics(mu), until, 10)
     step, place = 1e-5, start.copy()
     for _ in range(round(until / step)):
         slip = v + np.cross(w, -R * normal)
         size = np.linalg.norm(slip)
-        rub = -mu * G * math.cos(math.radians(degrees)) * slip / size if size > 1e-3 else -2.0 / 7.0 * pull
+        rub = (
+            -mu * G * math.cos(math.radians(degrees)) * slip / size
+            if size > 1e-3
+            else -2.0 / 7.0 * pull
+        )
         place += step * v
         v = v + step * (pull + rub)
         w = w - step * 2.5 / R * np.cross(normal, rub)
-    lag = 0.5 * TURN * mu * G * math.cos(math.radians(degrees))  # the force's direction is old by TURN at most
+    lag = (
+        0.5 * TURN * mu * G * math.cos(math.radians(degrees))
+    )  # the force's direction is old by TURN at most
     np.testing.assert_allclose(frames[-1].positions[0], place, atol=0.5 * lag * until**2)
     np.testing.assert_allclose(frames[-1].velocities[0], v, atol=lag * until)
     assert (np.diff(energies(frames)) < 1e-14).all()
@@ -142,7 +182,9 @@ def test_down_a_valley_it_rolls_on_both_faces(mu: float) -> None:
     """About the line through the two touching points, h below the centre: g sin / (1 + 2/5 R²/h²) along the crease."""
     lift, fall, until = math.tan(math.radians(40.0)), 0.1, 0.5
     y, x = np.array([-0.02, 0.0, 0.02]), np.linspace(0.0, 0.3, 31)
-    valley = terrain(x, y, np.abs(y)[None, :] * lift - fall * x[:, None], 0.05, np.random.default_rng(1), tags=4)
+    valley = terrain(
+        x, y, np.abs(y)[None, :] * lift - fall * x[:, None], 0.05, np.random.default_rng(1), tags=4
+    )
     one = np.array([fall, -lift, 1.0]) / math.sqrt(fall**2 + lift**2 + 1.0)
     start = np.array([0.02, 0.0, -0.002 + R / one[2]])
     run, frames = film(valley, shot(start), physics(mu), until)
@@ -196,7 +238,9 @@ def test_a_trough_of_facets_is_a_rolling_pendulum() -> None:
     assert run.count[3] < 20_000
 
 
-@pytest.mark.parametrize(("mu", "resistance", "still"), [(0.37, 0.27, True), (0.36, 0.27, False), (0.37, 0.25, False)])
+@pytest.mark.parametrize(
+    ("mu", "resistance", "still"), [(0.37, 0.27, True), (0.36, 0.27, False), (0.37, 0.25, False)]
+)
 def test_on_a_slope_it_lies_still_where_neither_slip_nor_roll_moves_it(
     mu: float, resistance: float, still: bool
 ) -> None:
@@ -204,7 +248,11 @@ def test_on_a_slope_it_lies_still_where_neither_slip_nor_roll_moves_it(
     normal, down = slope(20.0)
     x = np.array([0.0, 0.1])
     ramp = profile(x, -math.tan(math.radians(20.0)) * x, 0.01, 0.05)
-    result = simulate(Scene(ramp, shot(0.05 * down + (R + 1e-9) * normal), physics(mu, resistance=resistance), 0.2))
+    result = simulate(
+        Scene(
+            ramp, shot(0.05 * down + (R + 1e-9) * normal), physics(mu, resistance=resistance), 0.2
+        )
+    )
     assert (len(result.resting) == 1) is still
     if still:
         assert (spin(result.balls) == 0.0).all()
@@ -215,7 +263,9 @@ def test_resistance_stops_a_rolling_ball_and_takes_its_spin() -> None:
     v, resistance = 0.2, 0.1
     start = shot([0.01, 0.05, R], [v, 0.0, 0.0], [0.0, v / R, 0.0])
     result = simulate(Scene(ALLEY, start, physics(0.5, resistance=resistance), 1.0))
-    assert result.balls.positions[0, 0] - 0.01 == pytest.approx(v**2 / (2.0 * resistance * G), rel=1e-6)
+    assert result.balls.positions[0, 0] - 0.01 == pytest.approx(
+        v**2 / (2.0 * resistance * G), rel=1e-6
+    )
     assert result.resting.since[0] == pytest.approx(v / (resistance * G), rel=1e-6)
     assert (spin(result.balls) == 0.0).all()
 
@@ -243,7 +293,8 @@ def test_without_grip_it_moves_as_without_friction_to_the_last_bit() -> None:
         friction=Friction(((0.0, 0.2),) * TAGS, (0.0, 0.2)),
     )
     one, two = (
-        simulate(Scene(scene.mesh, scene.balls, what, 0.3)) for what in (smooth, smooth._replace(friction=None))
+        simulate(Scene(scene.mesh, scene.balls, what, 0.3))
+        for what in (smooth, smooth._replace(friction=None))
     )
     assert one.collisions == two.collisions
     assert fingerprint(one) == fingerprint(two)
@@ -257,7 +308,12 @@ def test_in_a_settling_pile_of_rough_balls_nothing_overlaps_and_no_energy_comes_
     rng = np.random.default_rng(seed)
     room = box((0.012, 0.012, 0.06)) if floor == "flat" else resting.rough_floor(rng)
     places = pack_balls(room, 50, DIAMETER, rng)
-    balls = Balls(places, rng.normal(0.0, 0.5, places.shape), DIAMETER, spins=rng.normal(0.0, 300.0, places.shape))
+    balls = Balls(
+        places,
+        rng.normal(0.0, 0.5, places.shape),
+        DIAMETER,
+        spins=rng.normal(0.0, 300.0, places.shape),
+    )
     for _ in range(5):
         run, frames = film(room, balls, physics(mu, 0.7, 0.005), 0.1)
         balls = frames[-1]
@@ -285,7 +341,9 @@ def test_rolling_balls_give_the_same_bits_with_the_jit_off() -> None:
     assert answers[0] == answers[1]
 
 
-def test_a_ball_that_spins_itself_against_a_wall_uphill_stays_there_until_it_slips_no_more() -> None:
+def test_a_ball_that_spins_itself_against_a_wall_uphill_stays_there_until_it_slips_no_more() -> (
+    None
+):
     """Gravity leads it away from the wall, friction holds it there: u = R w falls at 5/2 mu g cos - all the while.
 
     Then it rolls down with 5/7 of g sin; the wall itself, which bears only what friction presses, does not rub.
@@ -300,7 +358,13 @@ def test_a_ball_that_spins_itself_against_a_wall_uphill_stays_there_until_it_sli
     assert away > 0.0
     held = R * w / (2.5 * mu * G * math.cos(math.radians(degrees)))
     until = held + 0.2
-    run, frames = film(ramp, shot(start + 1e-12 * down, [0.0, 0.0, 0.0], [0.0, -w, 0.0]), physics(mu, 0.5), until, 50)
+    run, frames = film(
+        ramp,
+        shot(start + 1e-12 * down, [0.0, 0.0, 0.0], [0.0, -w, 0.0]),
+        physics(mu, 0.5),
+        until,
+        50,
+    )
     push = 5.0 / 7.0 * G * math.sin(math.radians(degrees))
     gone = (frames[-1].positions[0] - start) @ down
     assert gone == pytest.approx(0.5 * push * 0.2**2, rel=1e-2)

@@ -14,7 +14,16 @@ from sim_core.geometry.obstacles import PAST_CORNERS, seam
 from sim_core.scene.invariants import clearance, contained
 from sim_core.scene.scene import TOUCH
 from tests.helpers.contacts import calls
-from tests.helpers.contacts.cases import AIMS, BODIES, FAR, body_of, flights_to, room_with, touches, units
+from tests.helpers.contacts.cases import (
+    AIMS,
+    BODIES,
+    FAR,
+    body_of,
+    flights_to,
+    room_with,
+    touches,
+    units,
+)
 from tests.helpers.contacts.first_contact import first_contact_reference, gap_at
 from tests.helpers.contacts.reference import judge_triangles
 from tests.helpers.scenes.cavities import CEILING, box_around
@@ -33,10 +42,14 @@ def random_body(rng: np.random.Generator, family: str) -> trimesh.Trimesh:
         corners[3] = corners[:3].mean(axis=0) + 1e-6 * rng.normal(size=3)
     if family == "needle":
         corners[1:] = corners[1] + 2e-6 * rng.normal(size=(3, 3))
-    return trimesh.Trimesh(corners, trimesh.convex.convex_hull(corners).faces, process=False).convex_hull
+    return trimesh.Trimesh(
+        corners, trimesh.convex.convex_hull(corners).faces, process=False
+    ).convex_hull
 
 
-def shots_at(body: trimesh.Trimesh, count: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+def shots_at(
+    body: trimesh.Trimesh, count: int, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
     """Balls that start clear of the body and fly at its surroundings, some aimed to graze it."""
     start = rng.normal(size=(count, 3))
     start *= rng.uniform(0.015, 0.03, size=(count, 1)) / np.linalg.norm(start, axis=1)[:, None]
@@ -58,15 +71,26 @@ def compare_with_reference(family: str, bodies: int, shots: int, seed: int) -> N
         centre = mesh.middle
         start, velocity = shots_at(body, shots, rng)
         length = 0.04 / np.linalg.norm(velocity, axis=1)
-        expected, lowest = first_contact_reference(start, velocity, fall, body.triangles, RADIUS, length)
+        expected, lowest = first_contact_reference(
+            start, velocity, fall, body.triangles, RADIUS, length
+        )
         flights = np.concatenate([start - centre, velocity], axis=1)
         found, triangles = calls.contacts(ground, flights, gravity, None, 0.0, length)
         found[mesh.tags[triangles] != CEILING] = np.inf  # the room's walls
         hit = np.flatnonzero(np.isfinite(found))
         hits += len(hit)
         everywhere = np.broadcast_to(body.triangles, (len(hit), *body.triangles.shape))
-        gaps = gap_at(found[hit], start[hit], velocity[hit], np.broadcast_to(fall, (len(hit), 3)), everywhere, RADIUS)
-        assert np.abs(gaps).max(initial=0.0) <= EARLY, "a contact was reported where the ball does not touch"
+        gaps = gap_at(
+            found[hit],
+            start[hit],
+            velocity[hit],
+            np.broadcast_to(fall, (len(hit), 3)),
+            everywhere,
+            RADIUS,
+        )
+        assert np.abs(gaps).max(initial=0.0) <= EARLY, (
+            "a contact was reported where the ball does not touch"
+        )
         # the reference saw the ball inside before the reported contact: one was missed
         missed = np.flatnonzero(np.isfinite(expected) & (found > expected + 1e-15))
         for i in missed:
@@ -75,7 +99,9 @@ def compare_with_reference(family: str, bodies: int, shots: int, seed: int) -> N
                 f"{family}: contact at {found[i]!r} s, but the reference touches at {expected[i]!r} s, "
                 f"{-lowest[i]:.3g} m deep"
             )
-        assert lowest[~np.isfinite(found)].min() > -EARLY, f"{family}: a contact was missed altogether"
+        assert lowest[~np.isfinite(found)].min() > -EARLY, (
+            f"{family}: a contact was missed altogether"
+        )
     assert hits > 0.2 * bodies * shots, "the shots do not test much: too few hit"
 
 
@@ -91,7 +117,12 @@ def test_first_contact_on_a_hundred_thousand_cases(family: str) -> None:
 
 
 GROUP = 500  # flights to one body; fewer to the cone's many triangles
-PULLS = (Gravity(), Gravity(0.0, 0.0, 0.0), Gravity(), Gravity(500.0, -600.0, 550.0))  # 1, 0 and 100 g
+PULLS = (
+    Gravity(),
+    Gravity(0.0, 0.0, 0.0),
+    Gravity(),
+    Gravity(500.0, -600.0, 550.0),
+)  # 1, 0 and 100 g
 
 
 @pytest.mark.parametrize("count", SIZES)
@@ -110,8 +141,12 @@ def test_first_contact_from_any_start(shape: str, count: int) -> None:
         mesh = room_with(corners[None], triangles, half, offset)
         ground = build_ground(mesh, radius)
         touch, normal = touches(rng, corners, triangles, radius, size)
-        flights = flights_to(rng, aim, touch, normal, np.broadcast_to(np.array(pull), (size, 3)), radius)
-        seen = mesh.corners - mesh.middle  # all digits of a far mesh's rounded corners, as the simulation has them
+        flights = flights_to(
+            rng, aim, touch, normal, np.broadcast_to(np.array(pull), (size, 3)), radius
+        )
+        seen = (
+            mesh.corners - mesh.middle
+        )  # all digits of a far mesh's rounded corners, as the simulation has them
         free = clearance(seen, flights[:, :3], radius) >= radius - TOUCH
         flights = flights[free & contained(mesh, flights[:, :3] + offset)]
         tilt = (
@@ -141,7 +176,9 @@ def test_a_scene_a_kilometre_away_plays_the_same_bits() -> None:
     logs = []
     for move in (np.zeros(3), shift):
         mesh = TriangleMesh(rounded + move, near.triangles, near.tags)
-        logs.append(simulate(Scene(mesh, Balls(positions + move, velocities, 1e-3), physics, 0.1)).impacts)
+        logs.append(
+            simulate(Scene(mesh, Balls(positions + move, velocities, 1e-3), physics, 0.1)).impacts
+        )
     assert len(logs[0]) > 100
     for column in ("time", "triangle", "normal_speed"):
         np.testing.assert_array_equal(getattr(logs[0], column), getattr(logs[1], column))

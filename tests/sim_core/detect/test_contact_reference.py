@@ -24,7 +24,9 @@ OFF = 2e-12  # m: twice what the tests allow
 HEIGHT, SPEED = 2e-3, 1.0
 CONTACT = 2 * HEIGHT / (SPEED + math.sqrt(SPEED**2 + 2 * G * HEIGHT))
 STRAIGHT = HEIGHT / SPEED  # two balls: no gravity between them
-TRIANGLE = np.array([[-0.01, -0.01, 0.0], [0.0, 0.01, 0.0], [0.01, -0.01, 0.0]])  # clockwise from above
+TRIANGLE = np.array(
+    [[-0.01, -0.01, 0.0], [0.0, 0.01, 0.0], [0.01, -0.01, 0.0]]
+)  # clockwise from above
 
 
 def judged(judge: str, found: float, upwards: bool = False) -> Verdict:
@@ -35,7 +37,9 @@ def judged(judge: str, found: float, upwards: bool = False) -> Verdict:
     if judge == "face":
         return judge_faces(TRIANGLE[None], flight, RADIUS, 1e-8, LIMIT, said)[0]
     if judge == "capsule":
-        return judge_capsules(np.array([[[-0.01, 0.0, 0.0], [0.01, 0.0, 0.0]]]), flight, RADIUS, LIMIT, said)
+        return judge_capsules(
+            np.array([[[-0.01, 0.0, 0.0], [0.01, 0.0, 0.0]]]), flight, RADIUS, LIMIT, said
+        )
     if judge == "meeting":
         return judge_meetings(flight[:, :3], flight[:, 3:6], np.array([RADIUS]), LIMIT, said)
     if judge == "wave":
@@ -43,7 +47,9 @@ def judged(judge: str, found: float, upwards: bool = False) -> Verdict:
         plane[0, 2:4] = 1.0, RADIUS
         wave = np.array([[1e-30, 1e5, 0.0, 0.0, 0.0, 1.0]])
         return judge_waves(plane, wave, flight, np.zeros(1), RADIUS, np.array([LIMIT]), said)
-    return judge_triangles(TRIANGLE[None, None], flight, RADIUS, np.array([LIMIT]), said, 1e-12, 0.0)
+    return judge_triangles(
+        TRIANGLE[None, None], flight, RADIUS, np.array([LIMIT]), said, 1e-12, 0.0
+    )
 
 
 @pytest.mark.parametrize("judge", ["face", "capsule", "meeting", "wave", "mesh"])

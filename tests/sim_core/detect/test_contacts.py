@@ -17,8 +17,23 @@ from sim_core.geometry.obstacles import CAPSULE, FACE, NUMBERS, Obstacles, build
 from sim_core.numerics.roots import WaveGap, first_wave_approach
 from tests.helpers.contacts import calls
 from tests.helpers.contacts import cases as contact_cases
-from tests.helpers.contacts.cases import AIMS, FAR, HARD_AIMS, SHAPES, falls_for, flights_to, spread, units
-from tests.helpers.contacts.reference import Verdict, judge_capsules, judge_faces, judge_meetings, judge_waves
+from tests.helpers.contacts.cases import (
+    AIMS,
+    FAR,
+    HARD_AIMS,
+    SHAPES,
+    falls_for,
+    flights_to,
+    spread,
+    units,
+)
+from tests.helpers.contacts.reference import (
+    Verdict,
+    judge_capsules,
+    judge_faces,
+    judge_meetings,
+    judge_waves,
+)
 
 TOLERANCE = 1e-12  # m
 LIMIT = 0.02  # s, length of a flight
@@ -42,14 +57,24 @@ def require(verdict: Verdict, found: np.ndarray, family: str, hits: float = 0.0)
 
 def families(count: int, hard: bool, aims: tuple[str, ...] = AIMS) -> list[tuple[str, str, int]]:
     """(shape, aim, cases): plump bodies hit at random, or every other pair, ``count`` cases in all."""
-    pairs = [(s, a) for s in SHAPES for a in (aims if hard else aims[:1]) if hard == ((s, a) != ("plump", "random"))]
+    pairs = [
+        (s, a)
+        for s in SHAPES
+        for a in (aims if hard else aims[:1])
+        if hard == ((s, a) != ("plump", "random"))
+    ]
     share = math.ceil(count / len(pairs))
     return [(*pair, min(CHUNK, share)) for pair in pairs for _ in range(math.ceil(share / CHUNK))]
 
 
 def obstacles_around(mesh: TriangleMesh, radius: float) -> Obstacles:
     """All obstacles of a mesh that stands still."""
-    flats = find_flats(mesh.corners - mesh.middle, edge_partners(mesh.triangles), mesh.tags, in_plane(mesh.vertices))
+    flats = find_flats(
+        mesh.corners - mesh.middle,
+        edge_partners(mesh.triangles),
+        mesh.tags,
+        in_plane(mesh.vertices),
+    )
     return build_obstacles(mesh, radius, np.zeros(len(mesh.triangles), dtype=bool), 0.0, flats)
 
 
@@ -74,7 +99,9 @@ def test_faces(count: int, hard: bool) -> None:
         triangle = corners[obstacles.triangles[rows, 0]]
         normal = obstacles.numbers[rows, 0:3]
         where = rng.dirichlet(np.ones(3), cases)
-        border = rng.integers(3, size=cases) == 0  # aimed at an edge or a corner, and a little past it or short of it
+        border = (
+            rng.integers(3, size=cases) == 0
+        )  # aimed at an edge or a corner, and a little past it or short of it
         where[border, rng.integers(3, size=cases)[border]] = 0.0
         where /= where.sum(axis=1)[:, None]
         past = units(rng, cases) * (spread(rng, 1e-12, 1e-6, cases) * border)[:, None]
@@ -83,8 +110,12 @@ def test_faces(count: int, hard: bool) -> None:
         found = calls.faces(obstacles.numbers, rows, flights, radius, seam(radius))
         found[found > LIMIT] = np.inf
         verdict, outside = judge_faces(triangle, flights, radius, seam(radius), LIMIT, found)
-        require(verdict, found, f"faces, {shape}, {aim}", hits=0.3 if aim in ("random", "fast") else 0.0)
-        assert outside.max() <= 3.2 * seam(radius), f"{shape}, {aim}: a contact {outside.max():.3g} m beside the face"
+        require(
+            verdict, found, f"faces, {shape}, {aim}", hits=0.3 if aim in ("random", "fast") else 0.0
+        )
+        assert outside.max() <= 3.2 * seam(radius), (
+            f"{shape}, {aim}: a contact {outside.max():.3g} m beside the face"
+        )
 
 
 @pytest.mark.parametrize("count", SIZES)
@@ -112,11 +143,18 @@ def test_capsules(count: int, hard: bool, end: bool) -> None:
         at = flights[:, :3] - start
         at -= np.clip(np.einsum("nd,nd->n", at, along), 0.0, length)[:, None] * along
         keep = np.linalg.norm(at, axis=1) > 0.5 * radius
-        rows, flights, start, along, length = (x[keep] for x in (rows, flights, start, along, length))
+        rows, flights, start, along, length = (
+            x[keep] for x in (rows, flights, start, along, length)
+        )
         found = calls.capsules(obstacles.numbers, rows, flights, radius, LIMIT)
         ends = np.stack([start, start.astype(np.longdouble) + length[:, None] * along], axis=1)
         verdict = judge_capsules(ends, flights, radius, LIMIT, found)
-        require(verdict, found, f"capsules, {shape}, {aim}", hits=0.9 if aim in ("random", "fast") else 0.0)
+        require(
+            verdict,
+            found,
+            f"capsules, {shape}, {aim}",
+            hits=0.9 if aim in ("random", "fast") else 0.0,
+        )
 
 
 @pytest.mark.parametrize("count", SIZES)
@@ -136,7 +174,17 @@ def test_meetings_of_two_balls(count: int, aim: str) -> None:
         require(judge_meetings(apart, closing, reach, LIMIT, found), found, f"meetings, {aim}")
 
 
-WAVE_AIMS = ("random", "fast", "chatter", "crest", "tangent", "receding slower", "at rest", "still", "behind")
+WAVE_AIMS = (
+    "random",
+    "fast",
+    "chatter",
+    "crest",
+    "tangent",
+    "receding slower",
+    "at rest",
+    "still",
+    "behind",
+)
 
 
 def wave_cases(rng: np.random.Generator, aim: str, count: int):  # type: ignore[no-untyped-def]
@@ -162,7 +210,10 @@ def wave_cases(rng: np.random.Generator, aim: str, count: int):  # type: ignore[
     if aim == "still":
         swing *= rng.integers(2, size=count)
         omega = 2 * np.pi * rng.uniform(5.0, 40.0, count)
-    phase, times = rng.uniform(0.0, 2 * np.pi, count), rng.uniform(0.0, 0.02, count) * rng.integers(2, size=count)
+    phase, times = (
+        rng.uniform(0.0, 2 * np.pi, count),
+        rng.uniform(0.0, 0.02, count) * rng.integers(2, size=count),
+    )
     fall = falls_for(rng, count)
     planes = np.zeros((count, NUMBERS))
     planes[:, 0:3], planes[:, 3] = normal, rng.normal(size=count) * 0.01 + radius
@@ -171,7 +222,12 @@ def wave_cases(rng: np.random.Generator, aim: str, count: int):  # type: ignore[
     delay = spread(rng, 1e-6, 1e-2, count)
     if aim == "crest":
         turn = (np.pi / 2 * np.sign(lift) - phase) / omega
-        delay = turn + 2 * np.pi / omega * rng.integers(1, 100, count) + rng.normal(size=count) * 1e-3 / omega - times
+        delay = (
+            turn
+            + 2 * np.pi / omega * rng.integers(1, 100, count)
+            + rng.normal(size=count) * 1e-3 / omega
+            - times
+        )
         delay += 2 * np.pi / omega * np.ceil(-delay * omega / (2 * np.pi) + 1)
     elif aim in ("chatter", "receding slower", "at rest", "behind"):
         delay = np.zeros(count)
@@ -203,7 +259,9 @@ def wave_cases(rng: np.random.Generator, aim: str, count: int):  # type: ignore[
     limits = delay + (30 if aim != "behind" else 3000) * 2 * np.pi / omega
     waves = np.concatenate([np.stack([swing, omega, phase], axis=1), axis], axis=1)
     flights = np.concatenate([start, velocity, fall], axis=1)
-    opening = np.einsum("nd,nd->n", normal, start) - planes[:, 3] - lift * np.sin(omega * times + phase)
+    opening = (
+        np.einsum("nd,nd->n", normal, start) - planes[:, 3] - lift * np.sin(omega * times + phase)
+    )
     keep = (opening > -0.5 * radius) | (aim == "behind")
     return (*(x[keep] for x in (planes, waves, flights, times)), radius, limits[keep])
 
@@ -244,11 +302,15 @@ def test_a_face_ends_at_its_needles_tip() -> None:
     The seams along its two long borders cross 0.1 mm past it, where once was a contact with nothing.
     """
     radius = 1.5e-3
-    sharp = np.array([[[0.0, 0.0, 0.0], [-0.01, -0.5e-6, 0.0], [-0.01, 0.5e-6, 0.0], [-0.01, 0.0, -0.01]]])
+    sharp = np.array(
+        [[[0.0, 0.0, 0.0], [-0.01, -0.5e-6, 0.0], [-0.01, 0.5e-6, 0.0], [-0.01, 0.0, -0.01]]]
+    )
     mesh = contact_cases.room_with(sharp, contact_cases.TETRAHEDRON, 0.05, np.zeros(3))
     obstacles = obstacles_around(mesh, radius)
     (row,) = np.flatnonzero(
-        (obstacles.kinds == FACE) & (obstacles.numbers[:, 2] > 0.99) & (obstacles.triangles[:, 0] > 11)
+        (obstacles.kinds == FACE)
+        & (obstacles.numbers[:, 2] > 0.99)
+        & (obstacles.triangles[:, 0] > 11)
     )
     past = np.array([-1e-3, 0.0, 1e-9, 1e-7, 1e-6, 1e-5, 5e-5])
     flights = np.zeros((len(past), 9))

@@ -13,7 +13,9 @@ from tests.helpers.contacts.reference import columns, dot, from_segments
 
 SIZE = 0.05  # m
 RADIUS = 1e-9  # m: below a float32 step of the coordinates, 4e-9 m
-SINGLE = float(np.finfo(np.float32).eps) * SIZE  # m, 6e-9: nearer to an edge embree's float32 cannot decide
+SINGLE = (
+    float(np.finfo(np.float32).eps) * SIZE
+)  # m, 6e-9: nearer to an edge embree's float32 cannot decide
 CHUNK = 100_000
 
 
@@ -25,7 +27,9 @@ def bumpy_chamber(rng: np.random.Generator) -> TriangleMesh:
     return TriangleMesh(vertices, ball.faces, np.zeros(len(ball.faces), dtype=int))
 
 
-def from_border(mesh: TriangleMesh, triangle: np.ndarray, origin: np.ndarray, direction: np.ndarray) -> np.ndarray:
+def from_border(
+    mesh: TriangleMesh, triangle: np.ndarray, origin: np.ndarray, direction: np.ndarray
+) -> np.ndarray:
     """How far [m] rays pass from the nearest border of the triangle they hit, in its plane."""
     a, b, c = np.moveaxis(mesh.corners[triangle], 1, 0)
     normal = np.cross(b - a, c - a)
@@ -52,7 +56,13 @@ def test_the_first_triangle_on_a_ray_is_the_one_embree_sees(count: int) -> None:
         other = np.flatnonzero(triangle != seen)
         different += len(other)
         ray = origin[other], direction[other]
-        known = np.minimum(from_border(mesh, triangle[other], *ray), from_border(mesh, seen[other], *ray))
+        known = np.minimum(
+            from_border(mesh, triangle[other], *ray), from_border(mesh, seen[other], *ray)
+        )
         assert (seen[other] >= 0).all()
-        assert known.max(initial=0.0) <= SINGLE, f"embree sees another triangle, {known.max():.3g} m inside its borders"
-    assert different <= 1e-4 * count, f"{different} of {count} rays pass undecidably near an edge: too many"
+        assert known.max(initial=0.0) <= SINGLE, (
+            f"embree sees another triangle, {known.max():.3g} m inside its borders"
+        )
+    assert different <= 1e-4 * count, (
+        f"{different} of {count} rays pass undecidably near an edge: too many"
+    )

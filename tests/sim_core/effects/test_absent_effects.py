@@ -58,7 +58,10 @@ BARE = Physics(ball_collisions=None)
 def bare_scene(physics: Physics = BARE) -> Scene:
     places = np.array([[0.005, 0.005, 0.005], [0.012, 0.01, 0.01]])
     return Scene(
-        box((0.02, 0.02, 0.02)), Balls(places, np.array([[1.0, 0.5, 0.2], [-1.0, 0.3, 0.4]]), 3e-3), physics, 0.05
+        box((0.02, 0.02, 0.02)),
+        Balls(places, np.array([[1.0, 0.5, 0.2], [-1.0, 0.3, 0.4]]), 3e-3),
+        physics,
+        0.05,
     )
 
 
@@ -69,7 +72,9 @@ def compiled_functions() -> dict[str, list[str]]:
         if name.startswith("sim_core."):
             for function in vars(module).values():
                 if getattr(function, "signatures", None) and function.py_func.__module__ == name:
-                    found[f"{name}.{function.py_func.__name__}"] = [str(types) for types in function.signatures]
+                    found[f"{name}.{function.py_func.__name__}"] = [
+                        str(types) for types in function.signatures
+                    ]
     return found
 
 
@@ -117,7 +122,9 @@ def test_the_machine_code_of_a_bare_scene_knows_no_effect(bare: dict[str, list[s
         "neighbours.next_meeting",
     ):
         module, _, name = f"sim_core.{function}".rpartition(".")
-        assert hasattr(sys.modules.get(module) or __import__(module, fromlist=[name]), name), f"{function} is no more"
+        assert hasattr(sys.modules.get(module) or __import__(module, fromlist=[name]), name), (
+            f"{function} is no more"
+        )
         assert f"sim_core.{function}" not in bare
 
 

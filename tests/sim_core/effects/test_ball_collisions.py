@@ -35,7 +35,9 @@ def shot(count: int) -> Balls:
     return Balls(pack_balls(ROOM, count, DIAMETER, rng), rng.normal(0.0, 3.0, (count, 3)), DIAMETER)
 
 
-@pytest.mark.parametrize("physics", [THROUGH, THROUGH._replace(rest=Rest())], ids=["flying", "contact mode"])
+@pytest.mark.parametrize(
+    "physics", [THROUGH, THROUGH._replace(rest=Rest())], ids=["flying", "contact mode"]
+)
 def test_each_ball_has_the_history_it_has_alone(physics: Physics) -> None:
     balls = shot(12)
     together = simulate(Scene(ROOM, balls, physics, 0.3))
@@ -46,14 +48,20 @@ def test_each_ball_has_the_history_it_has_alone(physics: Physics) -> None:
             alone = simulate(Scene(ROOM, one, given, 0.3))
             own = together.impacts.ball == ball
             for column in ("time", "triangle", "position", "velocity", "normal_speed"):
-                np.testing.assert_array_equal(getattr(together.impacts, column)[own], getattr(alone.impacts, column))
+                np.testing.assert_array_equal(
+                    getattr(together.impacts, column)[own], getattr(alone.impacts, column)
+                )
             assert (together.balls.positions[ball] == alone.balls.positions[0]).all()
             assert (together.balls.velocities[ball] == alone.balls.velocities[0]).all()
 
 
 def test_two_balls_fly_through_each_other() -> None:
     room = box((0.1, 0.02, 0.02))
-    start = Balls(np.array([[0.02, 0.01, 0.01], [0.08, 0.01, 0.01]]), np.array([[1.0, 0, 0], [-1.0, 0, 0]]), DIAMETER)
+    start = Balls(
+        np.array([[0.02, 0.01, 0.01], [0.08, 0.01, 0.01]]),
+        np.array([[1.0, 0, 0], [-1.0, 0, 0]]),
+        DIAMETER,
+    )
     end = simulate(Scene(room, start, Physics(ball_collisions=None), 0.05)).balls
     np.testing.assert_allclose(end.positions[:, 0], [0.07, 0.03], atol=1e-15)
     np.testing.assert_array_equal(end.velocities, start.velocities)
@@ -66,7 +74,10 @@ def test_nothing_is_kept_of_pairs_and_overlaps_are_no_error() -> None:
     assert run.calendar.pair_time is None
     assert run.calendar.marks.shape == (3, 3)
     run.play(0.1, record=False)
-    assert touching(run.scene, ROOM.corners, in_one_place.positions, 0) == ("", False)  # a jam is not of those
+    assert touching(run.scene, ROOM.corners, in_one_place.positions, 0) == (
+        "",
+        False,
+    )  # a jam is not of those
     with pytest.raises(SceneError, match="overlap"):
         Scene(ROOM, in_one_place, Physics(), 1.0)
 
@@ -74,5 +85,7 @@ def test_nothing_is_kept_of_pairs_and_overlaps_are_no_error() -> None:
 def test_a_ball_faster_than_any_shot_is_followed_and_what_is_no_effect_is_named() -> None:
     fast = Balls(np.array([[0.0, 0.0, 0.01]]), np.array([[9e5, 0.0, 0.0]]), DIAMETER)
     assert simulate(Scene(ROOM, fast, Physics(ball_collisions=None), 1e-5)).collisions.walls > 100
-    with pytest.raises(SceneError, match=r"physics\.ball_collisions is False: give a BallCollisions, or None"):
+    with pytest.raises(
+        SceneError, match=r"physics\.ball_collisions is False: give a BallCollisions, or None"
+    ):
         Scene(ROOM, fast, Physics(ball_collisions=False), 1.0)  # type: ignore[arg-type]

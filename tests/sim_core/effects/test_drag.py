@@ -32,20 +32,28 @@ from tests.sim_core.physics.test_conservation import gas
 DIAMETER, DENSITY = 3e-3, 7800.0
 RADIUS = 0.5 * DIAMETER
 AIR, VISCOSITY = 1.204, 1.82e-5
-THICK = Drag(density=1000.0 * AIR, viscosity=VISCOSITY)  # Re > 1000 down to 5 mm/s, and 400 m/s² at 5 m/s
+THICK = Drag(
+    density=1000.0 * AIR, viscosity=VISCOSITY
+)  # Re > 1000 down to 5 mm/s, and 400 m/s² at 5 m/s
 K = 0.75 * 0.44 * THICK.density / (DENSITY * DIAMETER)
 G = 9.80665
 
 
-def row(distances: np.ndarray, velocity: tuple[float, float, float], tall: float) -> tuple[TriangleMesh, Balls]:
+def row(
+    distances: np.ndarray, velocity: tuple[float, float, float], tall: float
+) -> tuple[TriangleMesh, Balls]:
     """Balls side by side, so far above the floor or, when they fly up, below the ceiling [m]; none meets another."""
-    positions = np.stack([0.01 * (1.0 + np.arange(len(distances))), np.full(len(distances), 0.01), distances], axis=1)
+    positions = np.stack(
+        [0.01 * (1.0 + np.arange(len(distances))), np.full(len(distances), 0.01), distances], axis=1
+    )
     positions[:, 2] = tall - RADIUS - distances if velocity[2] > 0.0 else RADIUS + distances
     room = box((0.01 * (len(distances) + 1), 0.02, tall))
     return room, Balls(positions, np.tile(velocity, (len(distances), 1)), DIAMETER, DENSITY)
 
 
-def first_hits(room: TriangleMesh, balls: Balls, physics: Physics, duration: float) -> tuple[np.ndarray, np.ndarray]:
+def first_hits(
+    room: TriangleMesh, balls: Balls, physics: Physics, duration: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Time and normal speed of each ball's first impact."""
     log = simulate(Scene(room, balls, physics, duration)).impacts
     first = np.array([np.flatnonzero(log.ball == ball)[0] for ball in range(len(balls))])
@@ -53,9 +61,13 @@ def first_hits(room: TriangleMesh, balls: Balls, physics: Physics, duration: flo
 
 
 @pytest.mark.parametrize(
-    ("diameter", "density", "tall"), [(3e-3, 7800.0, 1000.0), (1e-3, 500.0, 100.0)], ids=["steel", "light"]
+    ("diameter", "density", "tall"),
+    [(3e-3, 7800.0, 1000.0), (1e-3, 500.0, 100.0)],
+    ids=["steel", "light"],
 )
-def test_a_falling_ball_comes_to_its_terminal_speed(diameter: float, density: float, tall: float) -> None:
+def test_a_falling_ball_comes_to_its_terminal_speed(
+    diameter: float, density: float, tall: float
+) -> None:
     def pull(v: float) -> float:
         re = AIR * v * diameter / VISCOSITY
         cd = 0.44 if re >= 1000.0 else 24.0 / re * (1.0 + 0.15 * re**0.687)
@@ -63,7 +75,9 @@ def test_a_falling_ball_comes_to_its_terminal_speed(diameter: float, density: fl
 
     terminal = brentq(pull, 1e-3, 100.0)
     ball = Balls(np.array([[1.0, 1.0, tall - 1.0]]), np.zeros((1, 3)), diameter, density)
-    end = simulate(Scene(box((2.0, 2.0, tall)), ball, Physics(Gravity(), drag=Drag()), 0.7 * tall / terminal)).balls
+    end = simulate(
+        Scene(box((2.0, 2.0, tall)), ball, Physics(Gravity(), drag=Drag()), 0.7 * tall / terminal)
+    ).balls
     print(f"terminal {terminal:.6f}, reached {-end.velocities[0, 2]:.6f} m/s")
     assert end.velocities[0, :2].tolist() == [0.0, 0.0]
     assert -end.velocities[0, 2] == pytest.approx(terminal, rel=2e-4)
@@ -76,7 +90,10 @@ def worst(drag: Drag, gravity: bool) -> tuple[float, float]:
         room, balls = row(distances, (0.0, 0.0, 0.0), 0.1)
         time, speed = first_hits(room, balls, Physics(Gravity(), drag=drag), 1.0)
         top = math.sqrt(G / K)
-        place, exact = np.log(np.cosh(G * time / top)) / K, top * np.sqrt(-np.expm1(-2.0 * K * distances))
+        place, exact = (
+            np.log(np.cosh(G * time / top)) / K,
+            top * np.sqrt(-np.expm1(-2.0 * K * distances)),
+        )
     else:
         room, balls = row(distances, (0.0, 0.0, 5.0), 0.1)
         time, speed = first_hits(room, balls, Physics(drag=drag), 1.0)
@@ -88,10 +105,14 @@ def worst(drag: Drag, gravity: bool) -> tuple[float, float]:
 def test_the_error_of_a_piece_is_as_stated_and_falls_with_its_square(gravity: bool) -> None:
     pieces = (1e-3, 5e-4, 2.5e-4)
     errors = [worst(THICK._replace(piece=piece), gravity) for piece in pieces]
-    steepest = K * 25.0 if not gravity else G  # m/s²: the deceleration at 5 m/s, or at the terminal speed
+    steepest = (
+        K * 25.0 if not gravity else G
+    )  # m/s²: the deceleration at 5 m/s, or at the terminal speed
     for piece, (place, _) in zip(pieces, errors, strict=True):
         print(f"{piece:g} s: {place:.3g} m of {steepest * piece**2 / 8.0:.3g}")
-        assert place < 1.5 * steepest * piece**2 / 8.0  # the bound is of one piece; Strang's own error comes on top
+        assert (
+            place < 1.5 * steepest * piece**2 / 8.0
+        )  # the bound is of one piece; Strang's own error comes on top
     for coarse, fine in pairwise(errors):
         for one, two in zip(coarse, fine, strict=True):
             assert 3.2 < one / two < 5.0
@@ -105,7 +126,9 @@ def test_within_a_piece_the_path_is_off_by_at_most_an_eighth_of_the_square() -> 
     room, balls = row(distances, (0.0, 0.0, 5.0), 0.05 + DIAMETER)
     log = simulate(Scene(room, balls, Physics(drag=drag), 0.03)).impacts
     for ball in range(len(balls)):
-        one, two = np.flatnonzero(log.ball == ball)[:2]  # ceiling, then floor: 50 mm apart, in about 10 ms
+        one, two = np.flatnonzero(log.ball == ball)[
+            :2
+        ]  # ceiling, then floor: 50 mm apart, in about 10 ms
         speed = log.normal_speed[one]
         place = math.log1p(k * speed * (log.time[two] - log.time[one])) / k
         assert abs(place - 0.05) < 1.05 * k * speed**2 * piece**2 / 8.0
@@ -129,7 +152,9 @@ def test_a_small_slow_ball_is_slowed_as_its_equation_says() -> None:
         x += step * v + step * step * (a + b + c) / 6.0
         v += step * (a + 2.0 * b + 2.0 * c + slope(v + step * c)) / 6.0
     assert end.velocities[0, 2] == pytest.approx(v, rel=1e-9)
-    assert end.positions[0, 2] == pytest.approx(x, abs=3.0 * abs(slope(4.5)) * Drag().piece ** 2 / 8.0)
+    assert end.positions[0, 2] == pytest.approx(
+        x, abs=3.0 * abs(slope(4.5)) * Drag().piece ** 2 / 8.0
+    )
 
 
 def test_a_gas_only_loses_energy_and_its_balls_stay_apart_and_inside() -> None:
@@ -137,7 +162,9 @@ def test_a_gas_only_loses_energy_and_its_balls_stay_apart_and_inside() -> None:
     balls = gas(room, 40, 3.0, 2)
     last = energy(balls, Gravity())
     for _ in range(10):
-        balls = simulate(Scene(room, balls, Physics(Gravity(), drag=Drag(density=100.0)), 0.05, record=())).balls
+        balls = simulate(
+            Scene(room, balls, Physics(Gravity(), drag=Drag(density=100.0)), 0.05, record=())
+        ).balls
         assert energy(balls, Gravity()) < last * (1.0 + 1e-12)
         last = energy(balls, Gravity())
         assert contained(room, balls.positions).all()
@@ -178,7 +205,8 @@ def test_no_ball_jams_on_its_way_up_with_the_sonotrode() -> None:
 
 
 @pytest.mark.parametrize(
-    ("drag", "said"), [(Drag(density=-1.0), "density"), (Drag(piece=0.0), "piece"), (Drag(piece=1e-7), "piece")]
+    ("drag", "said"),
+    [(Drag(density=-1.0), "density"), (Drag(piece=0.0), "piece"), (Drag(piece=1e-7), "piece")],
 )
 def test_air_that_is_none_is_named(drag: Drag, said: str) -> None:
     with pytest.raises(SceneError, match=rf"drag\.{said} is "):

@@ -31,39 +31,69 @@ HUGE = 1e9  # mu: every hit sticks
 def physics(mu: float, beta0: float, e: float = 1.0) -> Physics:
     """Without weight; the same law everywhere."""
     return Physics(
-        WEIGHTLESS, Restitution(((e, 1e3),) * 3, (e, 1e3), 0.0), friction=Friction(((mu, beta0),) * 3, (mu, beta0))
+        WEIGHTLESS,
+        Restitution(((e, 1e3),) * 3, (e, 1e3), 0.0),
+        friction=Friction(((mu, beta0),) * 3, (mu, beta0)),
     )
 
 
 def shot(positions: object, velocities: object, spins: object = 0.0) -> Balls:
-    places, speeds = np.atleast_2d(np.array(positions, dtype=float)), np.atleast_2d(np.array(velocities, dtype=float))
-    return Balls(places, speeds, DIAMETER, spins=np.broadcast_to(np.array(spins, dtype=float), places.shape))
+    places, speeds = (
+        np.atleast_2d(np.array(positions, dtype=float)),
+        np.atleast_2d(np.array(velocities, dtype=float)),
+    )
+    return Balls(
+        places, speeds, DIAMETER, spins=np.broadcast_to(np.array(spins, dtype=float), places.shape)
+    )
 
 
-def walton(slip: np.ndarray, into: float, mass: float, mu: float, beta0: float, e: float) -> np.ndarray:
+def walton(
+    slip: np.ndarray, into: float, mass: float, mu: float, beta0: float, e: float
+) -> np.ndarray:
     """The tangential impulse per ball mass [m/s] against the touching points' slip."""
     stick = 2.0 / 7.0 * (1.0 + beta0) * mass * np.linalg.norm(slip)
     return -min(mu * (1.0 + e) * mass * into, stick) * slip / np.linalg.norm(slip)
 
 
-LAWS = [(0.05, 0.3, 0.9), (0.05, 1.0, 0.5), (2.0, 0.4, 0.9), (2.0, -0.6, 1.0), (HUGE, 1.0, 1.0), (HUGE, 0.0, 0.0)]
+LAWS = [
+    (0.05, 0.3, 0.9),
+    (0.05, 1.0, 0.5),
+    (2.0, 0.4, 0.9),
+    (2.0, -0.6, 1.0),
+    (HUGE, 1.0, 1.0),
+    (HUGE, 0.0, 0.0),
+]
 
 
 @pytest.mark.parametrize(("mu", "beta0", "e"), LAWS)
-def test_a_spinning_ball_bounces_off_the_floor_as_walton_says(mu: float, beta0: float, e: float) -> None:
-    v, w, n = np.array([1.0, -0.4, -2.0]), np.array([300.0, 900.0, -200.0]), np.array([0.0, 0.0, 1.0])
+def test_a_spinning_ball_bounces_off_the_floor_as_walton_says(
+    mu: float, beta0: float, e: float
+) -> None:
+    v, w, n = (
+        np.array([1.0, -0.4, -2.0]),
+        np.array([300.0, 900.0, -200.0]),
+        np.array([0.0, 0.0, 1.0]),
+    )
     slip = v + np.cross(w, -R * n)
     slip -= slip @ n * n
     kick = walton(slip, 2.0, 1.0, mu, beta0, e)
     fall = 0.01
     end = simulate(
-        Scene(ROOM, shot([0.025, 0.025, R + fall], v, w), physics(mu, beta0, e), fall / 2.0 + 1e-3, record=())
+        Scene(
+            ROOM,
+            shot([0.025, 0.025, R + fall], v, w),
+            physics(mu, beta0, e),
+            fall / 2.0 + 1e-3,
+            record=(),
+        )
     ).balls
     assert end.spins is not None
     np.testing.assert_allclose(end.velocities[0], [*(v + kick)[:2], 2.0 * e], atol=1e-14)
     np.testing.assert_allclose(end.spins[0], w + np.cross(-R * n, kick) / INERTIA, atol=1e-11)
     # about the touched point nothing turns the ball: R n x v + I w is kept, normal parts of v aside
-    about = [R * np.cross(n, u) + INERTIA * s for u, s in ((v, w), (end.velocities[0], end.spins[0]))]
+    about = [
+        R * np.cross(n, u) + INERTIA * s for u, s in ((v, w), (end.velocities[0], end.spins[0]))
+    ]
     np.testing.assert_allclose(about[1], about[0], atol=1e-16)
     if mu == HUGE:  # the touching points' velocity is turned round and multiplied by beta0
         after = end.velocities[0] + np.cross(end.spins[0], -R * n)
@@ -71,7 +101,9 @@ def test_a_spinning_ball_bounces_off_the_floor_as_walton_says(mu: float, beta0: 
 
 
 @pytest.mark.parametrize(("mu", "beta0", "e"), LAWS)
-def test_two_balls_keep_momentum_and_lose_what_the_closed_form_says(mu: float, beta0: float, e: float) -> None:
+def test_two_balls_keep_momentum_and_lose_what_the_closed_form_says(
+    mu: float, beta0: float, e: float
+) -> None:
     rng = np.random.default_rng(3)
     for _ in range(5):
         n = rng.normal(size=3)
@@ -81,7 +113,9 @@ def test_two_balls_keep_momentum_and_lose_what_the_closed_form_says(mu: float, b
         mean, gap = rng.normal(0.0, 0.3, 3), 1e-3
         w = rng.normal(0.0, 500.0, (2, 3))
         v = np.stack([mean - 0.5 * closing, mean + 0.5 * closing])
-        touch = np.array([[0.025] * 3, 0.025 + DIAMETER * n])  # where they are when they meet, after gap / speed
+        touch = np.array(
+            [[0.025] * 3, 0.025 + DIAMETER * n]
+        )  # where they are when they meet, after gap / speed
         when = gap / 2.0
         start = shot(touch - when * v, v, w)
         end = simulate(Scene(ROOM, start, physics(mu, beta0, e), 2.0 * when, record=())).balls
@@ -115,7 +149,9 @@ def test_smooth_balls_fly_as_without_friction_to_the_last_bit() -> None:
         smooth = simulate(Scene(ROOM, shot(places, v, w), physics(*law, 0.9), 0.3))
         assert bare.collisions.total == smooth.collisions.total > 500
         for name in ("time", "position", "velocity"):
-            np.testing.assert_array_equal(getattr(bare.impacts, name), getattr(smooth.impacts, name))
+            np.testing.assert_array_equal(
+                getattr(bare.impacts, name), getattr(smooth.impacts, name)
+            )
         np.testing.assert_array_equal(bare.balls.velocities, smooth.balls.velocities)
         np.testing.assert_array_equal(smooth.balls.spins, w)
     assert bare.balls.spins is None
@@ -165,7 +201,9 @@ def test_the_sonotrode_rubs_with_its_own_speed_of_approach() -> None:
     assert len(result.impacts) == 1
     kick = mu * (1.0 + e) * result.impacts.normal_speed[0]
     assert abs(result.impacts.normal_speed[0] - 1.0) > 0.1
-    np.testing.assert_allclose(result.balls.velocities[0, :2], (2.5 - kick) * np.array([0.6, 0.8]), rtol=1e-13)
+    np.testing.assert_allclose(
+        result.balls.velocities[0, :2], (2.5 - kick) * np.array([0.6, 0.8]), rtol=1e-13
+    )
 
 
 def turned(vectors: np.ndarray, angle: float) -> np.ndarray:
@@ -178,7 +216,9 @@ def test_a_part_seen_from_its_own_frame_spins_the_balls_as_it_does_in_the_rooms(
     """Standing still at an angle, against the scene turned back by that angle, where it is as the mesh has it."""
     angle, rng = 0.9, np.random.default_rng(2)
     room, rough = box_around(BODIES["star"], 0.3), physics(0.2, 0.3, 0.9)
-    places = np.array([[0.0165 * np.cos(a), 0.0165 * np.sin(a), 0.0] for a in np.linspace(0.0, 6.0, 12)])
+    places = np.array(
+        [[0.0165 * np.cos(a), 0.0165 * np.sin(a), 0.0] for a in np.linspace(0.0, 6.0, 12)]
+    )
     v, w = -0.6 * places / 0.0165 + rng.normal(0.0, 0.1, (12, 3)), rng.normal(0.0, 200.0, (12, 3))
     one = simulate(Scene(room, shot(places, v, w), rough._replace(turn=Turn(PART, rpm=0.0)), 0.03))
     posed = rough._replace(turn=Turn(PART, rpm=0.0, phase=angle))
@@ -186,7 +226,9 @@ def test_a_part_seen_from_its_own_frame_spins_the_balls_as_it_does_in_the_rooms(
     assert one.collisions.total == two.collisions.total > 10
     assert np.abs(one.balls.spins - w).max() > 10.0  # type: ignore[operator]
     np.testing.assert_allclose(two.balls.spins, turned(one.balls.spins, angle), atol=1e-7)  # type: ignore[arg-type]
-    np.testing.assert_allclose(two.balls.velocities, turned(one.balls.velocities, angle), atol=1e-10)
+    np.testing.assert_allclose(
+        two.balls.velocities, turned(one.balls.velocities, angle), atol=1e-10
+    )
 
 
 @pytest.mark.parametrize("rpm", [60.0, 2000.0])
@@ -197,7 +239,11 @@ def test_hits_on_a_rough_rotor_keep_the_jacobi_integral(rpm: float) -> None:
     omega, rng = 2 * np.pi * rpm / 60, np.random.default_rng(8)
     angle, radius = 2 * np.pi * np.arange(24) / 24, 0.0165
     positions = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.zeros(24)])
-    start = shot(positions, -0.6 * positions / radius + rng.normal(0.0, 0.1, (24, 3)), rng.normal(0.0, 99.0, (24, 3)))
+    start = shot(
+        positions,
+        -0.6 * positions / radius + rng.normal(0.0, 0.1, (24, 3)),
+        rng.normal(0.0, 99.0, (24, 3)),
+    )
     rough = physics(HUGE, 1.0)._replace(turn=Turn(PART, rpm=rpm))
     result = simulate(Scene(box_around(BODIES["star"], 0.3), start, rough, 0.06))
     assert (result.impacts.position[:, :2] ** 2).sum(axis=1).max() < 0.02**2
@@ -205,7 +251,10 @@ def test_hits_on_a_rough_rotor_keep_the_jacobi_integral(rpm: float) -> None:
 
     def jacobi(balls: Balls) -> float:
         assert balls.spins is not None
-        around = np.cross(balls.positions, balls.velocities)[:, 2].sum() + INERTIA * balls.spins[:, 2].sum()
+        around = (
+            np.cross(balls.positions, balls.velocities)[:, 2].sum()
+            + INERTIA * balls.spins[:, 2].sum()
+        )
         return energy(balls) / balls.ball_mass - omega * float(around)
 
     sizes = energy(start) / start.ball_mass, energy(result.balls) / start.ball_mass
@@ -216,7 +265,10 @@ def test_hits_on_a_rough_rotor_keep_the_jacobi_integral(rpm: float) -> None:
 @pytest.mark.parametrize(
     ("friction", "said"),
     [
-        (Friction(((-0.1, 0.0),) * 3, (0.3, 0.2)), r"friction\.surfaces\[0\] is \(-0\.1, 0\.0\): mu must be 0 or more"),
+        (
+            Friction(((-0.1, 0.0),) * 3, (0.3, 0.2)),
+            r"friction\.surfaces\[0\] is \(-0\.1, 0\.0\): mu must be 0 or more",
+        ),
         (Friction(((0.3, 0.2),) * 3, (0.3, 1.2)), r"friction\.balls is .* beta0 lie in \[-1, 1\]"),
         (Friction(((np.inf, 0.2),) * 3, (0.3, 0.2)), "finite"),
         (Friction(((0.3, 0.2),) * 2, (0.3, 0.2)), r"for tags 0 to 2, not shape \(2, 2\)"),
@@ -233,7 +285,9 @@ def test_spins_are_checked() -> None:
     with pytest.raises(SceneError, match=r"balls\.spins are given without physics\.friction"):
         Scene(ROOM, shot([0.02] * 3, [1.0, 0.0, 0.0]), Physics(Gravity()), 1.0)
     places = np.full((1, 3), 0.02)
-    with pytest.raises(SceneError, match=r"balls\.positions has 1 balls, balls\.spins 2: give one each"):
+    with pytest.raises(
+        SceneError, match=r"balls\.positions has 1 balls, balls\.spins 2: give one each"
+    ):
         Balls(places, places, DIAMETER, spins=np.zeros((2, 3)))
     with pytest.raises(SceneError, match=r"balls\.spins: ball 0 has \[0\.0, nan, 0\.0\]"):
         Balls(places, places, DIAMETER, spins=np.array([[0.0, np.nan, 0.0]]))

@@ -35,7 +35,9 @@ def flights(count: int) -> tuple[ImpactLog, np.ndarray]:
     """Impacts of one ball that flies straight up and down, losing nothing, and which are on the floor."""
     ball = Balls(np.array([[0.005, 0.005, 0.01]]), np.array([[0.0, 0.0, -20.0]]), DIAMETER)
     shaking = Vibration(FLOOR, 25e-6, 20e3)
-    scene = Scene(ONE_BALL, ball, Physics(vibration=shaking, random_phase=RandomPhase(1)), count * 1e-3)
+    scene = Scene(
+        ONE_BALL, ball, Physics(vibration=shaking, random_phase=RandomPhase(1)), count * 1e-3
+    )
     log = simulate(scene).impacts
     return log, ONE_BALL.tags[log.triangle] == FLOOR
 
@@ -43,7 +45,10 @@ def flights(count: int) -> tuple[ImpactLog, np.ndarray]:
 def test_draws_are_uniform_and_independent() -> None:
     draws = np.array([[drawn(7, ball, k) for k in range(1000)] for ball in range(50)]) / math.tau
     assert kstest(draws.ravel(), "uniform").pvalue > UNLIKELY
-    for one, two in ((draws[1:], draws[:-1]), (draws[:, 1:], draws[:, :-1])):  # of two balls, of two draws
+    for one, two in (
+        (draws[1:], draws[:-1]),
+        (draws[:, 1:], draws[:, :-1]),
+    ):  # of two balls, of two draws
         assert abs(np.corrcoef(one.ravel(), two.ravel())[0, 1]) < 4.0 / math.sqrt(one.size)
 
 
@@ -80,8 +85,12 @@ def test_rates_and_speeds_are_those_of_the_sinusoid(law: str, share: float) -> N
         physics = Physics(Gravity(), restitution, SHAKING, random_phase=random_phase)
         log = simulate(Scene(room, balls, physics, 4.0, warmup=0.2)).impacts
         high = room.tags[log.triangle] == CEILING
-        counts, low = (np.bincount(log.ball[which], minlength=len(balls)) for which in (high, ~high))
-        rows[name] = np.stack([counts, low, np.bincount(log.ball[high], log.normal_speed[high], len(balls))], axis=1)
+        counts, low = (
+            np.bincount(log.ball[which], minlength=len(balls)) for which in (high, ~high)
+        )
+        rows[name] = np.stack(
+            [counts, low, np.bincount(log.ball[high], log.normal_speed[high], len(balls))], axis=1
+        )
     for what, estimate in (
         ("ceiling rate", lambda row: row[0]),
         ("floor rate", lambda row: row[1]),
@@ -122,7 +131,10 @@ def test_the_same_seed_gives_the_same_bits_on_threads_and_another_does_not() -> 
 
     def scene(seed: int) -> Scene:
         return Scene(
-            room, balls, Physics(Gravity(), LAWS["the paper's"][0], SHAKING, random_phase=RandomPhase(seed)), 1
+            room,
+            balls,
+            Physics(Gravity(), LAWS["the paper's"][0], SHAKING, random_phase=RandomPhase(seed)),
+            1,
         )
 
     with ThreadPoolExecutor(4) as pool:

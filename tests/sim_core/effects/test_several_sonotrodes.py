@@ -88,7 +88,9 @@ def test_phases_do_not_drift(windows: int) -> None:
         turns = Fraction(frequency) / Fraction(40e3) * 800 * windows % 1
         off = (waves.numbers[k, 2] - 0.1 * k) / math.tau - float(turns)
         assert abs(off - round(off)) < 1e-14 + windows / PARTS
-    assert (waves.numbers[[3, 0, 5], 2] == [0.1 * 3, 0.0, 0.1 * 5]).all()  # whole periods to the last bit
+    assert (
+        waves.numbers[[3, 0, 5], 2] == [0.1 * 3, 0.0, 0.1 * 5]
+    ).all()  # whole periods to the last bit
 
 
 def test_one_vibration_needs_no_table() -> None:
@@ -98,7 +100,9 @@ def test_one_vibration_needs_no_table() -> None:
 
 @pytest.mark.parametrize("wall", [FLOOR, 3])
 @pytest.mark.parametrize("phase", np.linspace(0.0, 2.0 * np.pi, 4, endpoint=False))
-def test_a_vibrating_wall_beyond_does_not_hide_the_face_a_ball_comes_down_on(phase: float, wall: int) -> None:
+def test_a_vibrating_wall_beyond_does_not_hide_the_face_a_ball_comes_down_on(
+    phase: float, wall: int
+) -> None:
     """As in test_sonotrode_border, but behind the face there is a wall that vibrates, with the floor or on its own."""
     room = trough([(0.021, 1e-4), (0.022, -3e-3), (0.04, -3e-3)], left=0.012)
     behind = (room.corners[:, :, 0] == 0.012).all(axis=1)
@@ -121,7 +125,12 @@ def test_a_ball_that_lies_still_waits_for_the_slowest() -> None:
     comes = (math.asin(0.4) - wall.phase) / (math.tau * 5.0)
     for plates in ((HIGH, wall), (wall, HIGH)):
         run = _Run(
-            Scene(room, balls_at(np.array([[1.7e-3, 0.015, 1.5e-3]])), Physics(Gravity(), LAWS, plates, Rest()), 1.0)
+            Scene(
+                room,
+                balls_at(np.array([[1.7e-3, 0.015, 1.5e-3]])),
+                Physics(Gravity(), LAWS, plates, Rest()),
+                1.0,
+            )
         )
         run.play(comes - 1e-9, record=False)
         assert run.footing is not None
@@ -137,7 +146,9 @@ def test_a_ball_that_lies_still_waits_for_the_slowest() -> None:
 def two_faced(angle: float) -> TriangleMesh:
     """The trough, its floor and the slope beside it [degrees] of two tags."""
     room = trough([(0.04, 0.02 * math.tan(math.radians(angle)))])
-    slope = (room.corners[:, :, 0] >= 0.02).all(axis=1) & (room.corners[:, :, 2] < 0.019).all(axis=1)
+    slope = (room.corners[:, :, 0] >= 0.02).all(axis=1) & (room.corners[:, :, 2] < 0.019).all(
+        axis=1
+    )
     slope &= np.ptp(room.corners[:, :, 1], axis=1) > 0.0
     return TriangleMesh(room.vertices, room.triangles, np.where(slope, 3, room.tags))
 
@@ -164,7 +175,9 @@ def test_a_wrong_one_of_several_is_named(vibration: object, said: str) -> None:
 
 def test_what_several_cannot_be_beside_is_refused() -> None:
     both = Physics(vibration=(LOW, HIGH))
-    with pytest.raises(SceneError, match=r"random_phase is given, and 2 vibrating surfaces: not supported together"):
+    with pytest.raises(
+        SceneError, match=r"random_phase is given, and 2 vibrating surfaces: not supported together"
+    ):
         Scene(ROOM, balls_at(MIDDLE), both._replace(random_phase=RandomPhase()), 1.0)
     with pytest.raises(SceneError, match=r"turn.tag and vibration.tag are both 0"):
         Scene(ROOM, balls_at(MIDDLE), both._replace(turn=Turn(CEILING, rpm=1.0)), 1.0)
@@ -174,7 +187,9 @@ def test_what_several_cannot_be_beside_is_refused() -> None:
 def test_two_that_meet_in_a_blunt_edge_are_refused(blunt: float) -> None:
     plates = (LOW, LOW._replace(tag=3, phase=1.0))
     ball = balls_at(np.array([[0.01, 0.02, 0.01]]))
-    with pytest.raises(SceneError, match=r"vibrating triangles \d+ and \d+, of tags (1 and 3|3 and 1), meet"):
+    with pytest.raises(
+        SceneError, match=r"vibrating triangles \d+ and \d+, of tags (1 and 3|3 and 1), meet"
+    ):
         simulate(Scene(two_faced(blunt), ball, Physics(vibration=plates), 0.01))
     simulate(Scene(two_faced(20.0), ball, Physics(vibration=plates), 0.01))
 
@@ -182,9 +197,14 @@ def test_two_that_meet_in_a_blunt_edge_are_refused(blunt: float) -> None:
 def test_a_ball_inside_one_of_them_is_named_with_its_tag() -> None:
     lowered = (LOW._replace(phase=-0.5 * math.pi), HIGH._replace(phase=0.5 * math.pi))
     near = balls_at(np.array([[0.015, 0.015, 0.02 - 1.5e-3 - 10e-6]]))
-    with pytest.raises(SceneError, match=r"starts 1.5e-05 m inside the vibrating surface of tag 0, which is displaced"):
+    with pytest.raises(
+        SceneError,
+        match=r"starts 1.5e-05 m inside the vibrating surface of tag 0, which is displaced",
+    ):
         Scene(ROOM, near, Physics(vibration=lowered), 1.0)
-    Scene(ROOM, near, Physics(vibration=(lowered[0], lowered[1]._replace(phase=-0.5 * math.pi))), 1.0)
+    Scene(
+        ROOM, near, Physics(vibration=(lowered[0], lowered[1]._replace(phase=-0.5 * math.pi))), 1.0
+    )
 
 
 def test_both_of_two_narrow_the_gap_between_them() -> None:
@@ -216,5 +236,10 @@ def test_the_simulator_is_compiled_ahead_for_several(
     assert not compile_ahead.is_compiled(physics, 1)
     compile_ahead.compile_simulator(physics)
     assert compile_ahead.is_compiled(physics, 1)
-    assert new_waves(scenes[1].physics.vibrations, checked_waves(several[:2]), 0.02, scenes[1].mesh.tags) is not None
+    assert (
+        new_waves(
+            scenes[1].physics.vibrations, checked_waves(several[:2]), 0.02, scenes[1].mesh.tags
+        )
+        is not None
+    )
     assert {0, 3} < set(scenes[1].mesh.tags.tolist())

@@ -38,7 +38,9 @@ def speed(plate: Vibration, time: np.ndarray) -> np.ndarray:
     return plate.axis[2] * plate.peak_speed * np.cos(angle(plate, time))
 
 
-def next_hit(plates: tuple[Vibration, ...], start: float, z: float, v: float, g: float, last: int) -> tuple[float, int]:
+def next_hit(
+    plates: tuple[Vibration, ...], start: float, z: float, v: float, g: float, last: int
+) -> tuple[float, int]:
     """How long [s] until the bead, at z with speed v, meets which plate: 0 floor, 1 ceiling; it leaves the ``last``."""
 
     def gap(s: np.ndarray, k: int) -> np.ndarray:
@@ -47,11 +49,15 @@ def next_hit(plates: tuple[Vibration, ...], start: float, z: float, v: float, g:
         return at - R - plate if k == 0 else TOP + plate - R - at
 
     step = 1.0 / (STEPS * max(plate.frequency for plate in plates))
-    fastest = math.sqrt(v * v + 2.0 * g * TOP) + g * 100.0 * step  # of the bead, while it goes from plate to plate
+    fastest = (
+        math.sqrt(v * v + 2.0 * g * TOP) + g * 100.0 * step
+    )  # of the bead, while it goes from plate to plate
     begin = 0.0
     while True:
         at = z + v * begin - 0.5 * g * begin * begin
-        clear = min(at - R - plates[0].amplitude, TOP - R - plates[1].amplitude - at)  # of both swings
+        clear = min(
+            at - R - plates[0].amplitude, TOP - R - plates[1].amplitude - at
+        )  # of both swings
         if clear > fastest * step:
             begin += clear / fastest
             continue
@@ -82,7 +88,9 @@ def plates_hit(log: ImpactLog, room: TriangleMesh) -> np.ndarray:
 
 
 @pytest.mark.parametrize("g", [0.0, 9.80665])
-def test_a_bead_between_two_gentle_plates_follows_its_reference_for_hundreds_of_hits(g: float) -> None:
+def test_a_bead_between_two_gentle_plates_follows_its_reference_for_hundreds_of_hits(
+    g: float,
+) -> None:
     log = box_log(WEAK, 4.0, g)
     which = plates_hit(log, box((0.03, 0.03, TOP)))
     now, z, v, last = 0.0, 0.008, 1.0, -1
@@ -95,14 +103,20 @@ def test_a_bead_between_two_gentle_plates_follows_its_reference_for_hundreds_of_
         v = 2.0 * float(speed(WEAK[last], now)) - v
 
 
-@pytest.mark.parametrize(("g", "v", "duration"), [(0.0, 1.0, 1.5), (9.80665, 1.0, 1.5), (0.0, -0.05, 60.0)])
-def test_each_hit_gives_twice_the_plates_speed_and_the_next_comes_on_time(g: float, v: float, duration: float) -> None:
+@pytest.mark.parametrize(
+    ("g", "v", "duration"), [(0.0, 1.0, 1.5), (9.80665, 1.0, 1.5), (0.0, -0.05, 60.0)]
+)
+def test_each_hit_gives_twice_the_plates_speed_and_the_next_comes_on_time(
+    g: float, v: float, duration: float
+) -> None:
     """Such plates throw a bead about by chance, so that each flight is followed anew from where it began."""
     plates = STRONG if duration < 10.0 else tuple(p._replace(amplitude=1e-9) for p in STRONG)
     log = box_log(plates, duration, g, v)
     which = plates_hit(log, box((0.03, 0.03, TOP)))
     shift = np.where(which == 0, height(plates[0], log.time), height(plates[1], log.time))
-    np.testing.assert_allclose(log.position[:, 2], np.where(which == 0, R, TOP - R) + shift, atol=1e-12)
+    np.testing.assert_allclose(
+        log.position[:, 2], np.where(which == 0, R, TOP - R) + shift, atol=1e-12
+    )
     shaken = np.where(which == 0, speed(plates[0], log.time), speed(plates[1], log.time))
     before = log.velocity[:, 2] + shaken  # the log has it as the plate sees it
     after = shaken - log.velocity[:, 2]
@@ -122,7 +136,9 @@ def test_the_same_chamber_upside_down_gives_the_same_upside_down() -> None:
     flip = np.array([1.0, 1.0, -1.0])
     exchanged = (WEAK[1]._replace(tag=FLOOR, axis=UP), WEAK[0]._replace(tag=CEILING, axis=DOWN))
     down, up = (
-        simulate(Scene(room, Balls(turn * places, turn * speeds, 2 * R), Physics(vibration=plates), 0.3))
+        simulate(
+            Scene(room, Balls(turn * places, turn * speeds, 2 * R), Physics(vibration=plates), 0.3)
+        )
         for turn, plates in ((1.0, WEAK), (flip, exchanged))
     )
     assert down.collisions == up.collisions
@@ -163,8 +179,14 @@ def test_two_faces_in_one_plane_are_hit_at_their_own_times(first: int) -> None:
     """Whichever of the two is given first; the balls fall so slowly that their hits show the phase."""
     room = ridge(PARTED)
     plates = (Vibration(FLOOR, 25e-6, 20e3, 0.0), Vibration(PARTED, 25e-6, 20e3, 3.0))
-    ball = Balls(np.array([[0.01, 0.02, 0.0016], [0.031, 0.02, 0.0016]]), np.tile([0.0, 0.0, -0.4], (2, 1)), 2 * R)
-    log = simulate(Scene(room, ball, Physics(vibration=(plates[first], plates[1 - first])), 0.005)).impacts
+    ball = Balls(
+        np.array([[0.01, 0.02, 0.0016], [0.031, 0.02, 0.0016]]),
+        np.tile([0.0, 0.0, -0.4], (2, 1)),
+        2 * R,
+    )
+    log = simulate(
+        Scene(room, ball, Physics(vibration=(plates[first], plates[1 - first])), 0.005)
+    ).impacts
     for k, plate in enumerate(plates):
         own = log.ball == k
         expected, _ = next_hit((plate, STRONG[1]), 0.0, 0.0016, -0.4, 0.0, -1)

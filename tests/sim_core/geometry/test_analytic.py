@@ -40,10 +40,14 @@ SQUARE = np.array([[0.0, 0.0], [0.03, 0.0], [0.03, 0.04], [0.0, 0.04]])
 BOX = prism_cavity(SQUARE, 0.0, 0.02, TAGS)
 CYLINDER = cylinder_cavity(0.05, 0.0, 0.02, TAGS)
 STEEL = Restitution(((0.91, 0.5),) * 3, (0.91, 1.5))
-SHAKEN = Physics(Gravity(), STEEL, Vibration(cavities.FLOOR, 25e-6, 20e3, 0.4), ball_collisions=BallCollisions())
+SHAKEN = Physics(
+    Gravity(), STEEL, Vibration(cavities.FLOOR, 25e-6, 20e3, 0.4), ball_collisions=BallCollisions()
+)
 
 
-def shot(room: AnalyticCavity, count: int, seed: int, diameter: float | np.ndarray = DIAMETER) -> Balls:
+def shot(
+    room: AnalyticCavity, count: int, seed: int, diameter: float | np.ndarray = DIAMETER
+) -> Balls:
     rng = np.random.default_rng(seed)
     positions = pack_balls(room, count, diameter, rng, clear=5e-5)
     return Balls(positions, rng.normal(size=(count, 3)), diameter)
@@ -89,7 +93,9 @@ def test_elastic_shot_of_two_sizes_keeps_its_energy_in_a_cylinder() -> None:
     gaps = CYLINDER.gaps(end.balls.positions) - 0.5 * balls.diameters[:, None]
     assert gaps.min() > -1e-15
     touched = CYLINDER.gaps(end.impacts.position)[np.arange(len(end.impacts)), end.impacts.triangle]
-    np.testing.assert_allclose(touched, 0.5 * balls.diameters[end.impacts.ball], rtol=0.0, atol=1e-15)
+    np.testing.assert_allclose(
+        touched, 0.5 * balls.diameters[end.impacts.ball], rtol=0.0, atol=1e-15
+    )
 
 
 def test_all_effects_together_in_a_cylinder() -> None:
@@ -105,7 +111,9 @@ def test_all_effects_together_in_a_cylinder() -> None:
     sideways = one.impacts.velocity[one.impacts.triangle == 2]
     outward = one.impacts.position[one.impacts.triangle == 2, :2]
     closing = np.einsum("ij,ij->i", sideways[:, :2], outward) / np.linalg.norm(outward, axis=1)
-    np.testing.assert_allclose(closing, one.impacts.normal_speed[one.impacts.triangle == 2], rtol=1e-9)
+    np.testing.assert_allclose(
+        closing, one.impacts.normal_speed[one.impacts.triangle == 2], rtol=1e-9
+    )
 
 
 def flights(family: str, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -116,7 +124,11 @@ def flights(family: str, count: int) -> tuple[np.ndarray, np.ndarray]:
     if family in ("touching", "grazing"):
         distance = 1.0 + rng.integers(-4, 5, count) * 2.0**-53
     if family == "grazing":
-        way = angle + 0.5 * np.pi + rng.choice([-1.0, 1.0], count) * 10.0 ** rng.uniform(-17.0, -3.0, count)
+        way = (
+            angle
+            + 0.5 * np.pi
+            + rng.choice([-1.0, 1.0], count) * 10.0 ** rng.uniform(-17.0, -3.0, count)
+        )
     if family == "slow":
         speed = 10.0 ** rng.uniform(-12.0, -6.0, count)
     return (
@@ -140,7 +152,8 @@ def test_the_round_side_is_never_missed(family: str) -> None:
         delay = bore_delay(Bore(0.0, 0.0), numbers, 0, ball)
         assert 0.0 <= delay < np.inf
         x, y = (
-            Decimal(p) + Decimal(v) * Decimal(delay) for p, v in zip(place.tolist(), velocity.tolist(), strict=True)
+            Decimal(p) + Decimal(v) * Decimal(delay)
+            for p, v in zip(place.tolist(), velocity.tolist(), strict=True)
         )
         u, v = (Decimal(k) for k in velocity.tolist())
         assert abs((x * x + y * y).sqrt() - 1) < Decimal("1e-15"), (place, velocity)
@@ -161,9 +174,17 @@ def test_a_start_in_overlap_of_rounding_going_in_is_no_contact() -> None:
     [
         (BOX, {"rest": Rest()}, "rest is not supported with an analytical cavity"),
         (BOX, {"turn": Turn(0, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 10.0)}, "turn is not supported"),
-        (CYLINDER, {"gravity": Gravity(1.0, 0.0, -9.8)}, "not supported with an analytical cylinder unless along z"),
+        (
+            CYLINDER,
+            {"gravity": Gravity(1.0, 0.0, -9.8)},
+            "not supported with an analytical cylinder unless along z",
+        ),
         (BOX, {"vibration": SHAKEN.vibration._replace(axis=(0.0, 1.0, 0.0))}, "vibration.axis"),
-        (BOX, {"vibration": SHAKEN.vibration._replace(tag=cavities.SIDES)}, "that of side 2, side 3, side 4, side 5"),
+        (
+            BOX,
+            {"vibration": SHAKEN.vibration._replace(tag=cavities.SIDES)},
+            "that of side 2, side 3, side 4, side 5",
+        ),
     ],
 )
 def test_what_is_not_supported_says_so(room: AnalyticCavity, changes: dict, said: str) -> None:
@@ -175,14 +196,26 @@ def test_what_is_not_supported_says_so(room: AnalyticCavity, changes: dict, said
 @pytest.mark.parametrize(
     ("room", "place", "diameter", "said"),
     [
-        (CYLINDER, (0.03, 0.0, 0.01), 3e-3, "ball 0 at .* is outside the cavity, beyond the round side"),
+        (
+            CYLINDER,
+            (0.03, 0.0, 0.01),
+            3e-3,
+            "ball 0 at .* is outside the cavity, beyond the round side",
+        ),
         (CYLINDER, (0.0, 0.024, 0.01), 3e-3, "overlaps the round side by 0.0005 m"),
         (BOX, (0.001, 0.02, 0.01), 3e-3, "overlaps side 5 by 0.0005 m"),
-        (BOX, (0.015, 0.02, 0.0015), 3e-3, r"overlaps the floor \(displaced by its phase at the start\)"),
+        (
+            BOX,
+            (0.015, 0.02, 0.0015),
+            3e-3,
+            r"overlaps the floor \(displaced by its phase at the start\)",
+        ),
         (BOX, (0.015, 0.02, 0.0100049), 0.01999, "does not fit between the floor and the ceiling"),
     ],
 )
-def test_a_ball_without_room_is_named(room: AnalyticCavity, place: tuple, diameter: float, said: str) -> None:
+def test_a_ball_without_room_is_named(
+    room: AnalyticCavity, place: tuple, diameter: float, said: str
+) -> None:
     with pytest.raises(SceneError, match=said):
         Scene(room, Balls(np.array([place]), np.zeros((1, 3)), diameter), SHAKEN, 1.0)
 
@@ -191,7 +224,10 @@ def test_a_ball_without_room_is_named(room: AnalyticCavity, place: tuple, diamet
     ("make", "said"),
     [
         (lambda: prism_cavity(SQUARE[::-1], 0.0, 0.02, TAGS), "does not turn left"),
-        (lambda: prism_cavity(np.array([[0, 0], [1, 0], [2, 0], [1, 1]]), 0.0, 0.02, TAGS), "corner 1"),
+        (
+            lambda: prism_cavity(np.array([[0, 0], [1, 0], [2, 0], [1, 1]]), 0.0, 0.02, TAGS),
+            "corner 1",
+        ),
         (lambda: prism_cavity(SQUARE[[0, 2]], 0.0, 0.02, TAGS), "shape"),
         (lambda: prism_cavity(SQUARE, 0.02, 0.0, TAGS), "top must be above bottom"),
         (lambda: prism_cavity(SQUARE, 0.0, 0.02, (0, 1, 2, 3)), "tags"),
@@ -200,7 +236,9 @@ def test_a_ball_without_room_is_named(room: AnalyticCavity, place: tuple, diamet
         (lambda: cylinder_cavity(0.05, 0.0, 0.02, (0, 1, 300)), "tags"),
     ],
 )
-def test_numbers_that_make_no_cavity_are_refused(make: Callable[[], AnalyticCavity], said: str) -> None:
+def test_numbers_that_make_no_cavity_are_refused(
+    make: Callable[[], AnalyticCavity], said: str
+) -> None:
     with pytest.raises(SceneError, match=said):
         make()
 

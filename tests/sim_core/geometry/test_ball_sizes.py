@@ -31,7 +31,9 @@ from tests.sim_core.loop.test_determinism import fingerprint
 SIZES = np.array([1e-3, 2e-3, 3e-3])  # m
 
 
-def mixture(room: TriangleMesh, counts: tuple[int, int, int], seed: int, clear: float = 0.0) -> Balls:
+def mixture(
+    room: TriangleMesh, counts: tuple[int, int, int], seed: int, clear: float = 0.0
+) -> Balls:
     """So many of each of the SIZES, in random order; the smallest are as dense as tungsten carbide."""
     rng = np.random.default_rng(seed)
     which = rng.permutation(np.repeat(np.arange(3), counts))
@@ -44,10 +46,18 @@ def test_two_unequal_balls_collide_as_momentum_and_energy_say() -> None:
     """Head on: v1' = ((m1 - m2) v1 + 2 m2 v2) / (m1 + m2) when elastic; they meet when r1 + r2 apart."""
     room = box((0.1, 0.02, 0.02))
     start = np.array([[0.02, 0.01, 0.01], [0.08, 0.01, 0.01]])
-    balls = Balls(start, np.array([[1.0, 0, 0], [-2.0, 0, 0]]), np.array([3e-3, 1e-3]), np.array([7800.0, 15e3]))
+    balls = Balls(
+        start,
+        np.array([[1.0, 0, 0], [-2.0, 0, 0]]),
+        np.array([3e-3, 1e-3]),
+        np.array([7800.0, 15e3]),
+    )
     after = simulate(Scene(room, balls, Physics(), 0.025)).balls
     m, n = balls.masses
-    expected = [((m - n) * 1.0 + 2.0 * n * -2.0) / (m + n), ((n - m) * -2.0 + 2.0 * m * 1.0) / (m + n)]
+    expected = [
+        ((m - n) * 1.0 + 2.0 * n * -2.0) / (m + n),
+        ((n - m) * -2.0 + 2.0 * m * 1.0) / (m + n),
+    ]
     np.testing.assert_allclose(after.velocities[:, 0], expected, rtol=1e-14)
     met = (0.06 - 2e-3) / 3.0
     places = start[:, 0] + balls.velocities[:, 0] * met + np.array(expected) * (0.025 - met)
@@ -94,7 +104,9 @@ def test_energy_is_shared_out_evenly_between_the_sizes() -> None:
         samples.append([each[own].mean() for own in which])
     rows = np.array(samples) / np.mean(samples)
     means = rows.mean(axis=0)
-    errors = np.array([block.mean(axis=0) for block in np.array_split(rows, 20)]).std(axis=0) / math.sqrt(19.0)
+    errors = np.array([block.mean(axis=0) for block in np.array_split(rows, 20)]).std(
+        axis=0
+    ) / math.sqrt(19.0)
     print("m v² by size over the mean", means, "+-", errors)
     assert (np.abs(means - 1.0) < SURE * errors).all()
     assert errors.max() < 0.02
@@ -103,7 +115,9 @@ def test_energy_is_shared_out_evenly_between_the_sizes() -> None:
 @pytest.mark.parametrize("name", ["slanted walls", "a cube's edges"])
 def test_every_size_touches_at_its_own_radius(name: str) -> None:
     """At every impact the surface is a radius away from the centre, to rounding."""
-    cube = trimesh.creation.box((0.01,) * 3, transform=trimesh.transformations.rotation_matrix(0.5, (1, 2, 3)))
+    cube = trimesh.creation.box(
+        (0.01,) * 3, transform=trimesh.transformations.rotation_matrix(0.5, (1, 2, 3))
+    )
     room = cylinder(0.02, 0.02, sections=12) if name == "slanted walls" else box_around(cube, 0.015)
     start = mixture(room, (20, 20, 20), 5)
     log = simulate(Scene(room, start, Physics(Gravity()), 0.3)).impacts
@@ -118,7 +132,9 @@ def test_every_size_touches_at_its_own_radius(name: str) -> None:
 def test_each_ball_of_a_mixture_flies_as_it_does_alone() -> None:
     """Where they do not collide with one another, to the last bit: its obstacles are those of its own size."""
     room = cylinder(0.012, 0.02, sections=12)
-    physics = Physics(Gravity(), Restitution(((0.9, 0.7),) * 3, (0.9, 0.7)), Vibration(FLOOR, 25e-6, 20e3, 0.3))
+    physics = Physics(
+        Gravity(), Restitution(((0.9, 0.7),) * 3, (0.9, 0.7)), Vibration(FLOOR, 25e-6, 20e3, 0.3)
+    )
     physics = physics._replace(ball_collisions=None)
     balls = mixture(room, (4, 4, 4), 10, clear=50e-6)
     together = simulate(Scene(room, balls, physics, 0.2))
@@ -134,7 +150,9 @@ def test_each_ball_of_a_mixture_flies_as_it_does_alone() -> None:
 def test_a_mixture_in_a_chamber_that_shakes_stays_inside_and_apart() -> None:
     room = cylinder(0.015, 0.02, sections=37)
     law = Restitution(((0.9, 0.7),) * 3, (0.9, 0.7))
-    physics = Physics(Gravity(), law, Vibration(FLOOR, 25e-6, 20e3), random_phase=RandomPhase(), drag=Drag())
+    physics = Physics(
+        Gravity(), law, Vibration(FLOOR, 25e-6, 20e3), random_phase=RandomPhase(), drag=Drag()
+    )
     start = mixture(room, (30, 20, 10), 6, clear=50e-6)
     result = simulate(Scene(room, start, physics, 1.0))
     assert result.collisions.sonotrode > 1000
@@ -177,15 +195,23 @@ def test_packing_leaves_room_for_every_size() -> None:
 def test_a_mixed_ball_that_overlaps_is_named() -> None:
     room, still = box((0.03, 0.03, 0.03)), np.zeros((3, 3))
     diameter = np.array([2e-3, 2e-3, 6e-3])
-    near = np.array([[0.01, 0.01, 0.01], [0.01, 0.01, 0.0125], [0.01, 0.01, 0.016]])  # 0 and 1 are nearer, and clear
+    near = np.array(
+        [[0.01, 0.01, 0.01], [0.01, 0.01, 0.0125], [0.01, 0.01, 0.016]]
+    )  # 0 and 1 are nearer, and clear
     with pytest.raises(SceneError, match=r"balls 1 and 2 overlap by 0\.0005 m"):
         Scene(room, Balls(near, still, diameter), Physics(), 1.0)
     with pytest.raises(SceneError, match=r"ball 2 .* overlaps a surface by 0\.001 m"):
-        Scene(room, Balls([[0.01] * 3, [0.02] * 3, [0.002, 0.02, 0.02]], still, diameter), Physics(), 1.0)
+        Scene(
+            room,
+            Balls([[0.01] * 3, [0.02] * 3, [0.002, 0.02, 0.02]], still, diameter),
+            Physics(),
+            1.0,
+        )
 
 
 @pytest.mark.parametrize(
-    ("physics", "name"), [(Physics(Gravity(), rest=Rest()), "rest"), (Physics(turn=Turn(CEILING, rpm=1.0)), "turn")]
+    ("physics", "name"),
+    [(Physics(Gravity(), rest=Rest()), "rest"), (Physics(turn=Turn(CEILING, rpm=1.0)), "turn")],
 )
 def test_what_several_sizes_do_not_go_with_is_said(physics: Physics, name: str) -> None:
     room = box((0.03, 0.03, 0.03))

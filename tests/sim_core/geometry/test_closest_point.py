@@ -17,10 +17,14 @@ def test_it_is_the_nearest_of_all_triangles() -> None:
     places = rng.uniform(-12e-3, 12e-3, (2000, 3))
     for reach in (1.0, 2e-3):
         found = nearest(mesh, places, reach)
-        np.testing.assert_allclose(found.distance, clearance(mesh.corners, places, reach), rtol=0, atol=1e-15)
+        np.testing.assert_allclose(
+            found.distance, clearance(mesh.corners, places, reach), rtol=0, atol=1e-15
+        )
         hit = found.triangle >= 0
         assert hit.all() == (reach == 1.0)
-        np.testing.assert_allclose(np.linalg.norm(found.point - places, axis=1)[hit], found.distance[hit], atol=1e-15)
+        np.testing.assert_allclose(
+            np.linalg.norm(found.point - places, axis=1)[hit], found.distance[hit], atol=1e-15
+        )
         own = mesh.corners[found.triangle[hit]]
         on_it = [clearance(own[[k]], found.point[hit][[k]], 1.0)[0] for k in range(50)]
         assert max(on_it) < 1e-15
@@ -45,7 +49,16 @@ def test_each_place_has_its_own_reach_and_a_tag_can_be_asked_for() -> None:
 def test_a_needle_is_no_worse_than_a_line() -> None:
     """A triangle without area, as rounding leaves them, counts as its longest side."""
     corners = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0, 0], [0.5, 0.5, 1.0]])
-    triangles = [[1, 0, 2], [2, 0, 3], [0, 4, 5], [4, 1, 5], [0, 1, 4], [1, 2, 5], [2, 3, 5], [3, 0, 5]]
+    triangles = [
+        [1, 0, 2],
+        [2, 0, 3],
+        [0, 4, 5],
+        [4, 1, 5],
+        [0, 1, 4],
+        [1, 2, 5],
+        [2, 3, 5],
+        [3, 0, 5],
+    ]
     mesh = TriangleMesh(corners, np.array(triangles), np.zeros(8))
     found = nearest(mesh, np.array([[0.3, -2.0, 0.0]]), 10.0)
     np.testing.assert_allclose(found.distance, 2.0)

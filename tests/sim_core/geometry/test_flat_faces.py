@@ -25,7 +25,9 @@ def fine(mesh: TriangleMesh, times: int) -> TriangleMesh:
     """Every triangle split in four so many times."""
     vertices, triangles, tags = mesh.vertices, mesh.triangles, mesh.tags
     for _ in range(times):
-        vertices, triangles, parents = trimesh.remesh.subdivide(vertices, triangles, return_index=True)
+        vertices, triangles, parents = trimesh.remesh.subdivide(
+            vertices, triangles, return_index=True
+        )
         origin = np.empty(len(triangles), dtype=int)
         for old, new in parents.items():
             origin[new] = old
@@ -42,7 +44,9 @@ def slanted_block() -> TriangleMesh:
 
 def without_flats(mesh: TriangleMesh, monkeypatch: pytest.MonkeyPatch) -> Ground:
     def none(corners: np.ndarray, *_: object) -> Flats:
-        return Flats(np.full(len(corners), LONE, np.int32), np.zeros(0, np.int32), np.zeros((0, 3, 3)), [])
+        return Flats(
+            np.full(len(corners), LONE, np.int32), np.zeros(0, np.int32), np.zeros((0, 3, 3)), []
+        )
 
     with monkeypatch.context() as patch:
         patch.setattr(ground_module, "find_flats", none)
@@ -56,8 +60,12 @@ def places_for_a_ball(room: TriangleMesh, count: int, rng: np.random.Generator) 
     return places[clearance(room.corners, places, 2 * RADIUS) > 1.01 * RADIUS][:count]
 
 
-@pytest.mark.parametrize("mesh", [fine(slanted_block(), 3), cylinder(0.03, 0.03, 48, 3)], ids=["block", "cylinder"])
-def test_contacts_with_a_flat_are_those_with_its_triangles(mesh: TriangleMesh, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    "mesh", [fine(slanted_block(), 3), cylinder(0.03, 0.03, 48, 3)], ids=["block", "cylinder"]
+)
+def test_contacts_with_a_flat_are_those_with_its_triangles(
+    mesh: TriangleMesh, monkeypatch: pytest.MonkeyPatch
+) -> None:
     merged, split = build_ground(mesh, RADIUS), without_flats(mesh, monkeypatch)
     assert len(merged.tree.kinds) < 0.1 * len(split.tree.kinds)
     scratch, rng = new_scratch(), np.random.default_rng(1)
@@ -66,7 +74,9 @@ def test_contacts_with_a_flat_are_those_with_its_triangles(mesh: TriangleMesh, m
         one = first_contact(merged.tree, scratch, ball, Gravity(), None, merged.seam, 0.0, 0.1)
         two = first_contact(split.tree, scratch, ball, Gravity(), None, split.seam, 0.0, 0.1)
         speed = np.linalg.norm(ball.velocity) + 1.0
-        assert one[0] == two[0] or abs(one[0] - two[0]) * speed < 5e-12  # metres along the path, for any angle
+        assert (
+            one[0] == two[0] or abs(one[0] - two[0]) * speed < 5e-12
+        )  # metres along the path, for any angle
 
 
 def test_a_hit_on_a_flat_is_booked_on_the_triangle_under_the_ball() -> None:
@@ -78,7 +88,10 @@ def test_a_hit_on_a_flat_is_booked_on_the_triangle_under_the_ball() -> None:
         logs.append(simulate(Scene(room, ball, Physics(), duration=0.03)).impacts)
     triangle = np.concatenate([log.triangle for log in logs])
     centre = np.concatenate([log.position for log in logs])
-    gap = [clearance(room.corners[[t]], c[None], 2 * RADIUS)[0] for t, c in zip(triangle, centre, strict=True)]
+    gap = [
+        clearance(room.corners[[t]], c[None], 2 * RADIUS)[0]
+        for t, c in zip(triangle, centre, strict=True)
+    ]
     assert len(triangle) > 1000
     assert len(np.unique(triangle)) > 300
     assert (room.tags[triangle] == CEILING).any()
@@ -87,7 +100,9 @@ def test_a_hit_on_a_flat_is_booked_on_the_triangle_under_the_ball() -> None:
 
 def outline(*rings: list[tuple[float, float]]) -> np.ndarray:
     """Segments (n, 2, 2) of closed rings."""
-    return np.concatenate([np.stack([np.array(ring), np.roll(ring, -1, axis=0)], axis=1) for ring in rings])
+    return np.concatenate(
+        [np.stack([np.array(ring), np.roll(ring, -1, axis=0)], axis=1) for ring in rings]
+    )
 
 
 def test_a_cover_fills_an_outline_with_holes_once() -> None:

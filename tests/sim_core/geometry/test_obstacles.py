@@ -25,10 +25,14 @@ def test_hits_on_an_edge_are_shared_by_its_two_faces() -> None:
     top = 0.02 / np.sqrt(2)
     rng = np.random.default_rng(1)
     slopes = []
-    for offset in rng.uniform(-0.9e-3, 0.9e-3, 60):  # within the radius x sin 45° that meets the ridge, not a slope
+    for offset in rng.uniform(
+        -0.9e-3, 0.9e-3, 60
+    ):  # within the radius x sin 45° that meets the ridge, not a slope
         ball = Balls(np.array([[0.003, offset, top + 0.01]]), np.array([[0.0, 0.0, -5.0]]), 3e-3)
         log = simulate(Scene(room, ball, Physics(), duration=0.0025, record=(CEILING,))).impacts
         assert len(log) == 1
-        normal = np.cross(*(room.corners[log.triangle[0], k] - room.corners[log.triangle[0], 0] for k in (1, 2)))
+        normal = np.cross(
+            *(room.corners[log.triangle[0], k] - room.corners[log.triangle[0], 0] for k in (1, 2))
+        )
         slopes.append(np.sign(-normal[1]) == np.sign(offset))
     assert all(slopes), "a ball left of the ridge dents the left slope"

@@ -50,7 +50,9 @@ def checked_flight(rotor, position, velocity, gravity, time, limit):  # type: ig
     rows = np.concatenate([np.linspace(0.0, delay, SAMPLES), [delay - 1e-6 * delay, delay - 1e-9]])
     gap = rotor.gap(position, velocity, gravity, time, np.maximum(rows, 0.0))
     worst = gap.argmin()
-    assert gap[worst] > -EARLY, f"missed at {rows[worst]:.9g} s: overlap {-gap[worst]:.3g} m, answer {delay, row}"
+    assert gap[worst] > -EARLY, (
+        f"missed at {rows[worst]:.9g} s: overlap {-gap[worst]:.3g} m, answer {delay, row}"
+    )
     if row >= 0:
         there = rotor.gap(position, velocity, gravity, time, np.array([delay]))[0]
         assert abs(there) <= EARLY, f"gap {there:.3g} m at the contact"
@@ -80,7 +82,11 @@ def test_random_flights_meet_the_part_when_its_surface_is_there(body: str, motio
             if not rotor.clear(position, time):
                 continue
             if rng.random() < 0.7:  # aimed at the part
-                velocity = np.linalg.norm(velocity) * (BODIES[body].sample(1, seed=rng)[0] - position) / 0.02
+                velocity = (
+                    np.linalg.norm(velocity)
+                    * (BODIES[body].sample(1, seed=rng)[0] - position)
+                    / 0.02
+                )
             for _ in range(4):
                 delay, row = checked_flight(rotor, position, velocity, gravity, time, 0.01)
                 fall = np.zeros(3) if gravity is None else np.array(gravity)
@@ -94,7 +100,9 @@ def test_random_flights_meet_the_part_when_its_surface_is_there(body: str, motio
     assert hits > 0.06 * STARTS
 
 
-def bounced(rotor: Rotor, position: np.ndarray, velocity: np.ndarray, time: float, e: float) -> np.ndarray:
+def bounced(
+    rotor: Rotor, position: np.ndarray, velocity: np.ndarray, time: float, e: float
+) -> np.ndarray:
     """Velocity after the ball has hit the part, its normal taken from how the gap changes with the place."""
     step = 1e-7
     moved = position + step * np.concatenate([np.eye(3), -np.eye(3)])
@@ -117,27 +125,37 @@ def flight_point(rotor: Rotor, position: np.ndarray, time: float, later: float) 
 
 @pytest.mark.parametrize("rpm", [3.0, 3000.0])
 @pytest.mark.parametrize("miss", [1e-6, 1e-9, 1e-11])
-def test_a_grazing_corner_hits_a_resting_ball_or_not_by_which_side_it_is_on(rpm: float, miss: float) -> None:
+def test_a_grazing_corner_hits_a_resting_ball_or_not_by_which_side_it_is_on(
+    rpm: float, miss: float
+) -> None:
     tip = np.hypot(10e-3, 2e-3)
     rotor = Rotor(BODIES["bar"], Turn(PART, rpm=rpm))
     for angle in np.linspace(0.3, 1.2, 7):
         for side in (-1.0, 1.0):
-            position = (tip + rotor.radius + side * miss) * np.array([np.cos(angle), np.sin(angle), 0.0])
+            position = (tip + rotor.radius + side * miss) * np.array(
+                [np.cos(angle), np.sin(angle), 0.0]
+            )
             delay, row = checked_flight(rotor, position, np.zeros(3), None, 0.0, 30.0 / rpm)
             assert (row >= 0) == (side < 0.0)
             if row >= 0:  # a little before the corner would be straight under it
-                assert delay == pytest.approx((angle - np.arctan2(2e-3, 10e-3)) / (2 * np.pi * rpm / 60), rel=0.1)
+                assert delay == pytest.approx(
+                    (angle - np.arctan2(2e-3, 10e-3)) / (2 * np.pi * rpm / 60), rel=0.1
+                )
 
 
 BAR_HALF, REACH = 2e-3, 3.5e-3  # m: half the bar's width, and that plus a ball's radius
 
 
-def effects(turn: Turn | None, gravity: Gravity = Gravity(0.0, 0.0, 0.0), e: float = 1.0) -> Physics:  # noqa: B008
+def effects(
+    turn: Turn | None, gravity: Gravity = Gravity(0.0, 0.0, 0.0), e: float = 1.0
+) -> Physics:  # noqa: B008
     """One set of effects for most tests, as each set is compiled."""
     return Physics(gravity, Restitution(((e, 1e3),) * 3, (1.0, 1e3), elastic_below=0.0), turn=turn)
 
 
-def one_ball(position: tuple[float, ...], velocity: tuple[float, ...], physics: Physics, duration: float) -> Result:
+def one_ball(
+    position: tuple[float, ...], velocity: tuple[float, ...], physics: Physics, duration: float
+) -> Result:
     room = box_around(BODIES["bar"], 0.05)
     shot = Balls(np.array([position]), np.array([velocity]), 3e-3)
     return simulate(Scene(room, shot, physics, duration))
@@ -160,7 +178,9 @@ def test_a_falling_ball_meets_the_turning_bar_when_the_closed_form_says(rpm: flo
     x, y, v = np.copysign(6e-3, rpm), 9e-3, -0.3
     physics = effects(Turn(PART, rpm=rpm), Gravity(0.0, -g, 0.0))
 
-    def gap(t: np.longdouble) -> np.longdouble:  # n(t) x(t) - reach with n = (-sin, cos) of the angle
+    def gap(
+        t: np.longdouble,
+    ) -> np.longdouble:  # n(t) x(t) - reach with n = (-sin, cos) of the angle
         height = y + t * (v - t * g / 2)
         return abs(height * np.cos(omega * t) - x * np.sin(omega * t)) - REACH
 
@@ -173,13 +193,22 @@ def test_a_falling_ball_meets_the_turning_bar_when_the_closed_form_says(rpm: flo
 
 
 @pytest.mark.parametrize("frequency", [0.5, 7.0, 200.0])
-def test_a_bar_swinging_to_and_fro_meets_a_resting_ball_when_the_closed_form_says(frequency: float) -> None:
+def test_a_bar_swinging_to_and_fro_meets_a_resting_ball_when_the_closed_form_says(
+    frequency: float,
+) -> None:
     swing, x, y = 0.5, 6e-3, 4.5e-3
     physics = effects(Turn(PART, swing=swing, frequency=frequency))
     log = one_ball((x, y, 0.0), (0.0, 0.0, 0.0), physics, 0.3 / frequency).impacts
     angle = np.arctan2(y, x) - np.arcsin(REACH / np.hypot(x, y))
     when = np.arcsin(angle / swing) / (2 * np.pi * frequency)
-    speed = 2 * np.pi * frequency * swing * np.cos(np.arcsin(angle / swing)) * np.sqrt(x * x + y * y - REACH**2)
+    speed = (
+        2
+        * np.pi
+        * frequency
+        * swing
+        * np.cos(np.arcsin(angle / swing))
+        * np.sqrt(x * x + y * y - REACH**2)
+    )
     assert log.time[0] * speed == pytest.approx(when * speed, abs=EARLY)
     assert log.normal_speed[0] == pytest.approx(speed, rel=1e-12)
 
@@ -195,7 +224,9 @@ def test_a_resting_ball_is_thrown_by_the_bar_as_by_a_heavy_moving_face(e: float)
     expected = (1.0 + e) * speed * np.array([-np.sin(angle), np.cos(angle), 0.0])
     np.testing.assert_allclose(result.balls.velocities[0], expected, atol=1e-12)
     # the touched face runs under the ball at omega times its height over the axis
-    np.testing.assert_allclose(result.impacts.velocity[0], [omega * BAR_HALF, -speed, 0.0], atol=1e-12)
+    np.testing.assert_allclose(
+        result.impacts.velocity[0], [omega * BAR_HALF, -speed, 0.0], atol=1e-12
+    )
 
 
 def test_a_part_that_turns_at_0_rpm_is_the_still_part() -> None:
@@ -224,7 +255,9 @@ def test_hits_on_a_steady_rotor_keep_the_jacobi_integral(rpm: float) -> None:
     angle, radius = 2 * np.pi * np.arange(24) / 24, 0.0165
     positions = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.zeros(24)])
     velocities = -0.6 * positions / radius + rng.normal(0.0, 0.1, (24, 3))
-    result = simulate(Scene(room, Balls(positions, velocities, 3e-3), effects(Turn(PART, rpm=rpm)), 0.06))
+    result = simulate(
+        Scene(room, Balls(positions, velocities, 3e-3), effects(Turn(PART, rpm=rpm)), 0.06)
+    )
     assert len(result.impacts) > 15
     assert own[result.impacts.triangle].all()
 
@@ -244,10 +277,21 @@ def crowd(turn: Turn, duration: float, count: int = 40, seed: int = 4) -> Scene:
     tags = room.tags.copy()
     tags[(room.corners[:, :, 2] == room.corners[:, :, 2].min()).all(axis=1)] = 1
     room = TriangleMesh(room.vertices, room.triangles, tags)
-    physics = Physics(Gravity(), Restitution(((0.9, 1.0),) * 3, (0.9, 1.0)), Vibration(1, 40e-6, 20e3, 0.3), turn=turn)
+    physics = Physics(
+        Gravity(),
+        Restitution(((0.9, 1.0),) * 3, (0.9, 1.0)),
+        Vibration(1, 40e-6, 20e3, 0.3),
+        turn=turn,
+    )
     rng = np.random.default_rng(seed)
     positions = pack_balls(room, count, 3e-3, rng, clear=50e-6, turn=turn)
-    return Scene(room, Balls(positions, rng.normal(0.0, 2.0, (count, 3)), 3e-3), physics, duration, record=(PART,))
+    return Scene(
+        room,
+        Balls(positions, rng.normal(0.0, 2.0, (count, 3)), 3e-3),
+        physics,
+        duration,
+        record=(PART,),
+    )
 
 
 @pytest.mark.parametrize(
@@ -268,11 +312,15 @@ def test_impacts_lie_on_the_part_in_its_own_frame_and_balls_stay_outside_it(turn
     assert len(log) > 5_000
     some = np.random.default_rng(1).choice(len(log), 1000, replace=False)
     off = [
-        clearance(scene.mesh.corners[[log.triangle[k]]], log.position[[k]], 0.01)[0] - scene.balls.radius for k in some
+        clearance(scene.mesh.corners[[log.triangle[k]]], log.position[[k]], 0.01)[0]
+        - scene.balls.radius
+        for k in some
     ]
     assert np.abs(off).max() <= 1e-9
     rotor = Rotor(BODIES["star"], turn)
-    gap = clearance(rotor.own, rotor.seen(result.balls.positions, np.full(len(result.balls), 20.0)), 0.05)
+    gap = clearance(
+        rotor.own, rotor.seen(result.balls.positions, np.full(len(result.balls), 20.0)), 0.05
+    )
     assert gap.min() > scene.balls.radius - 1e-9
 
 
@@ -292,7 +340,9 @@ def shaft_through_ceiling(sections: int, across: float, tilt: float = 0.0) -> Tr
     shaft = trimesh.creation.cylinder(radius=0.008, height=0.04, sections=sections)
     shaft.apply_transform(trimesh.transformations.rotation_matrix(tilt, [1, 0, 0]))
     shaft.apply_translation([across, 0.0, 0.02])
-    room = trimesh.boolean.difference([trimesh.creation.box((0.05, 0.05, 0.04)), shaft], engine="manifold")
+    room = trimesh.boolean.difference(
+        [trimesh.creation.box((0.05, 0.05, 0.04)), shaft], engine="manifold"
+    )
     inside = np.linalg.norm(room.triangles_center[:, :2] - [across, 0.0], axis=1) < 0.0085
     ceiling = (np.abs(room.triangles[:, :, 2] - 0.02) < 1e-9).all(axis=1)
     floor = (np.abs(room.triangles[:, :, 2] + 0.02) < 1e-9).all(axis=1)
@@ -317,20 +367,62 @@ class Refused(NamedTuple):
 @pytest.mark.parametrize(
     "case",
     [
-        Refused(lambda: shaft_through_ceiling(24, 0.004), Turn(0, rpm=1.0), "not round about its axis"),
-        Refused(lambda: shaft_through_ceiling(24, 0.0), Turn(0, axis=(0.1, 0.0, 1.0), rpm=1.0), "not round about"),
-        Refused(lambda: shaft_through_ceiling(4, 0.0), Turn(0, rpm=1.0), "not round about its axis"),
-        Refused(lambda: box_around(BODIES["bar"], 0.0102), Turn(PART, (0.005, 0.0, 0.0), rpm=1.0), "cannot turn"),
-        Refused(lambda: box_around(bar(0.0198, 0.0198), 0.0102), Turn(PART, rpm=1.0), "cannot turn"),
+        Refused(
+            lambda: shaft_through_ceiling(24, 0.004), Turn(0, rpm=1.0), "not round about its axis"
+        ),
+        Refused(
+            lambda: shaft_through_ceiling(24, 0.0),
+            Turn(0, axis=(0.1, 0.0, 1.0), rpm=1.0),
+            "not round about",
+        ),
+        Refused(
+            lambda: shaft_through_ceiling(4, 0.0), Turn(0, rpm=1.0), "not round about its axis"
+        ),
+        Refused(
+            lambda: box_around(BODIES["bar"], 0.0102),
+            Turn(PART, (0.005, 0.0, 0.0), rpm=1.0),
+            "cannot turn",
+        ),
+        Refused(
+            lambda: box_around(bar(0.0198, 0.0198), 0.0102), Turn(PART, rpm=1.0), "cannot turn"
+        ),
         Refused(lambda: box_around(BODIES["bar"], 0.02), Turn(9, rpm=1.0), "turn.tag is 9"),
-        Refused(lambda: box_around(BODIES["bar"], 0.02), Turn(PART), "either rpm, or swing and frequency"),
-        Refused(lambda: box_around(BODIES["bar"], 0.02), Turn(PART, rpm=1.0, swing=1.0), "either rpm, or"),
-        Refused(lambda: box_around(BODIES["bar"], 0.02), Turn(PART, swing=1.0), "either rpm, or swing"),
-        Refused(lambda: box_around(BODIES["bar"], 0.02), Turn(PART, rpm=float("nan")), "turn.rpm is nan"),
-        Refused(lambda: box_around(BODIES["bar"], 0.02), Turn(PART, axis=(0.0, 0.0, 0.0), rpm=1.0), "a direction"),
-        Refused(lambda: box_around(BODIES["bar"], 0.02), Turn(PART, swing=-1.0, frequency=1.0), "turn.swing is -1"),
-        Refused(lambda: box_around(BODIES["bar"], 0.02), Turn(PART, swing=1.0, frequency=0.0), "turn.frequency is 0"),
-        Refused(lambda: box_around(BODIES["bar"], 0.02), Turn(PART, rpm=1.0, phase=float("inf")), "turn.phase is inf"),
+        Refused(
+            lambda: box_around(BODIES["bar"], 0.02),
+            Turn(PART),
+            "either rpm, or swing and frequency",
+        ),
+        Refused(
+            lambda: box_around(BODIES["bar"], 0.02),
+            Turn(PART, rpm=1.0, swing=1.0),
+            "either rpm, or",
+        ),
+        Refused(
+            lambda: box_around(BODIES["bar"], 0.02), Turn(PART, swing=1.0), "either rpm, or swing"
+        ),
+        Refused(
+            lambda: box_around(BODIES["bar"], 0.02), Turn(PART, rpm=float("nan")), "turn.rpm is nan"
+        ),
+        Refused(
+            lambda: box_around(BODIES["bar"], 0.02),
+            Turn(PART, axis=(0.0, 0.0, 0.0), rpm=1.0),
+            "a direction",
+        ),
+        Refused(
+            lambda: box_around(BODIES["bar"], 0.02),
+            Turn(PART, swing=-1.0, frequency=1.0),
+            "turn.swing is -1",
+        ),
+        Refused(
+            lambda: box_around(BODIES["bar"], 0.02),
+            Turn(PART, swing=1.0, frequency=0.0),
+            "turn.frequency is 0",
+        ),
+        Refused(
+            lambda: box_around(BODIES["bar"], 0.02),
+            Turn(PART, rpm=1.0, phase=float("inf")),
+            "turn.phase is inf",
+        ),
     ],
     ids=lambda case: case.words,
 )

@@ -30,7 +30,9 @@ CENTRE = np.array([0.3, -0.2])
 ROOM = cylinder_cavity(2.0 * RADIUS, 0.0, HEIGHT, (1, 0, 2), (0.3, -0.2))
 
 
-def flown(start: tuple[float, float, float], velocity: tuple[float, float, float], duration: float) -> ImpactLog:
+def flown(
+    start: tuple[float, float, float], velocity: tuple[float, float, float], duration: float
+) -> ImpactLog:
     """Of one ball that starts so far from the axis, and so high [m]."""
     place = np.array([[*CENTRE, 0.0]]) + np.array(start)
     balls = Balls(place, np.array([velocity]), DIAMETER)
@@ -52,7 +54,9 @@ def test_circling_it_hits_at_even_times(alpha: float) -> None:
     time, place, velocity = sides(log)
     np.testing.assert_allclose(time, (0.5 + np.arange(200)) * period, rtol=0.0, atol=1e-12)
     np.testing.assert_allclose(np.hypot(*place.T), REACH, rtol=0.0, atol=1e-15)
-    np.testing.assert_allclose(log.normal_speed[log.triangle == SIDE], speed * math.sin(alpha), rtol=1e-9)
+    np.testing.assert_allclose(
+        log.normal_speed[log.triangle == SIDE], speed * math.sin(alpha), rtol=1e-9
+    )
     momentum = place[:, 0] * velocity[:, 1] - place[:, 1] * velocity[:, 0]
     np.testing.assert_allclose(momentum, -start[1] * speed, rtol=1e-12)
     angle = np.unwrap(np.arctan2(*place.T))
@@ -77,7 +81,9 @@ def test_up_and_down_it_bounces_as_if_there_were_no_side() -> None:
 
 def test_along_a_diameter_through_the_axis() -> None:
     time, place, _ = sides(flown((0.0, 0.0, 0.01), (0.0, 2.0, 0.0), 0.2))
-    np.testing.assert_allclose(time, (0.5 + np.arange(len(time))) * 2.0 * REACH / 2.0, rtol=0.0, atol=1e-13)
+    np.testing.assert_allclose(
+        time, (0.5 + np.arange(len(time))) * 2.0 * REACH / 2.0, rtol=0.0, atol=1e-13
+    )
     np.testing.assert_array_equal(np.sign(place[:, 1])[:4], [1.0, -1.0, 1.0, -1.0])
 
 
@@ -87,7 +93,9 @@ def test_a_ball_that_starts_in_contact(outward: float) -> None:
     speed = 1.5
     time, _, _ = sides(flown((REACH, 0.0, 0.01), (outward * speed, 0.0, 0.0), 0.15))
     first = 0.0 if outward > 0.0 else 2.0 * REACH / speed
-    np.testing.assert_allclose(time, first + np.arange(len(time)) * 2.0 * REACH / speed, rtol=0.0, atol=1e-13)
+    np.testing.assert_allclose(
+        time, first + np.arange(len(time)) * 2.0 * REACH / speed, rtol=0.0, atol=1e-13
+    )
 
 
 @pytest.mark.parametrize("off", [0.0, 1e-9, -1e-9])
@@ -106,14 +114,22 @@ def test_restitution_lets_it_slide_and_takes_no_more_speed() -> None:
     """Inelastic collapse: normal speeds fall as e^n, each hop is shorter by e, and after a finite time it slides."""
     e, along, normal = 0.5, 1.0, 0.2
     law = Restitution(((1.0, 100.0), (1.0, 100.0), (e, 100.0)), (1.0, 1.0), elastic_below=0.0)
-    physics = Physics(Gravity(), law, Vibration(1, 0.0, 20e3), ball_collisions=BallCollisions())  # of all shaken rooms
-    balls = Balls(np.array([[CENTRE[0] + REACH, CENTRE[1], 0.01]]), np.array([[normal, along, 0.0]]), DIAMETER)
+    physics = Physics(
+        Gravity(), law, Vibration(1, 0.0, 20e3), ball_collisions=BallCollisions()
+    )  # of all shaken rooms
+    balls = Balls(
+        np.array([[CENTRE[0] + REACH, CENTRE[1], 0.01]]), np.array([[normal, along, 0.0]]), DIAMETER
+    )
     end = simulate(Scene(ROOM, balls, physics, 0.1))
     assert np.hypot(*end.balls.velocities[0, :2]) == pytest.approx(along, rel=1e-6)
     round_side = end.impacts.triangle == SIDE
-    np.testing.assert_allclose(end.impacts.normal_speed[round_side][:5], normal * e ** np.arange(5.0), rtol=1e-9)
+    np.testing.assert_allclose(
+        end.impacts.normal_speed[round_side][:5], normal * e ** np.arange(5.0), rtol=1e-9
+    )
     collapsed = 2.0 * REACH / along**2 * normal * e / (1.0 - e)  # each hop lasts 2 REACH v_n / v²
-    assert round_side.sum() == pytest.approx((0.1 - collapsed) * along / (2.0 * REACH * HOP), rel=0.01)
+    assert round_side.sum() == pytest.approx(
+        (0.1 - collapsed) * along / (2.0 * REACH * HOP), rel=0.01
+    )
 
 
 def test_along_the_axis_it_never_meets_the_side() -> None:

@@ -17,7 +17,9 @@ from sim_core.scene.invariants import clearance, closest_pair, contained
 from tests.helpers.scenes.fuzzed_chambers import FAMILIES, Chamber, random_chamber
 
 TOUCH = 2e-13  # m: how far from touching an impact may be: an edge is taken for met at 1e-13, faces at rounding
-ROUNDING = 8 * np.finfo(float).eps  # of the coordinates [m], which answers are rounded to: it matters far away
+ROUNDING = (
+    8 * np.finfo(float).eps
+)  # of the coordinates [m], which answers are rounded to: it matters far away
 REACH = 1.01  # of a radius: where clearance stops measuring
 
 
@@ -49,10 +51,14 @@ def height_at(chamber: Chamber, points: np.ndarray, time: np.ndarray) -> np.ndar
     mesh, height = chamber.mesh, np.full(len(points), np.inf)
     for vibration in chamber.physics.vibrations:
         axis = np.array(vibration.axis) / np.linalg.norm(vibration.axis)
-        shift = vibration.amplitude * np.sin(math.tau * vibration.frequency * time + vibration.phase)
+        shift = vibration.amplitude * np.sin(
+            math.tau * vibration.frequency * time + vibration.phase
+        )
         if chamber.physics.random_phase is not None:
             shift = np.full(len(points), -vibration.amplitude)
-        height = np.minimum(height, (points - mesh.corners[mesh.tags == vibration.tag][0, 0]) @ axis - shift)
+        height = np.minimum(
+            height, (points - mesh.corners[mesh.tags == vibration.tag][0, 0]) @ axis - shift
+        )
     return height
 
 
@@ -74,7 +80,9 @@ def has_sharp_rim(chamber: Chamber, points: np.ndarray, time: np.ndarray) -> np.
     mesh, balls, sharp = chamber.mesh, chamber.balls, np.ones(len(points), dtype=bool)
     normals, _ = towards_shot(mesh.corners)
     for one in chamber.physics.vibrations:
-        rim = find_rim(mesh.triangles, mesh.corners, normals, balls.radius, mesh.tags == one.tag, one.amplitude)
+        rim = find_rim(
+            mesh.triangles, mesh.corners, normals, balls.radius, mesh.tags == one.tag, one.amplitude
+        )
         near = height_at(chamber, points, time) < balls.radius + 2.0 * one.amplitude
         sharp &= ~near | (len(rim.slopes) == 0)
     return sharp
@@ -90,7 +98,9 @@ def later(physics: Physics, duration: float) -> Physics:
         physics = physics._replace(vibration=tuple(moved) if len(moved) > 1 else moved[0])
     if turn is not None:
         rate = turn.rpm / 60.0 if turn.rpm is not None else turn.frequency or 0.0  # [1/s]
-        physics = physics._replace(turn=turn._replace(phase=(turn.phase + math.tau * rate * duration) % math.tau))
+        physics = physics._replace(
+            turn=turn._replace(phase=(turn.phase + math.tau * rate * duration) % math.tau)
+        )
     return physics
 
 
@@ -98,7 +108,9 @@ def look(before: Chamber, after: Chamber, result: Result, impacts: int) -> Recor
     """Is every ball inside and clear of all else, and did the last so many impacts happen where surfaces are?"""
     mesh, balls, _ = after
     outside = np.flatnonzero(~contained(mesh, balls.positions))
-    assert len(outside) == 0, f"ball {outside[0]} has left at {balls.positions[outside[0]].tolist()} m"
+    assert len(outside) == 0, (
+        f"ball {outside[0]} has left at {balls.positions[outside[0]].tolist()} m"
+    )
     log = result.impacts
     where, when = log.position[-impacts:], log.time[-impacts:]
     judged = has_sharp_rim(before, where, when)
@@ -107,7 +119,9 @@ def look(before: Chamber, after: Chamber, result: Result, impacts: int) -> Recor
         collisions=result.collisions.total,
         checks=1,
         impacts=len(hit),
-        surface=float(balls.radius - clearance_at(after, balls.positions, np.zeros(len(balls))).min()),
+        surface=float(
+            balls.radius - clearance_at(after, balls.positions, np.zeros(len(balls))).min()
+        ),
         pair=balls.diameter - closest_pair(balls)[0],
         touch=float(np.abs(hit - balls.radius).max(initial=0.0)),
     )
@@ -133,7 +147,9 @@ def watch(chamber: Chamber, collisions: int, every: int, impacts: int) -> Record
 @pytest.mark.parametrize("family", FAMILIES)
 def test_no_ball_leaves_a_fuzzed_chamber(family: str) -> None:
     for seed in range(2):
-        print(family, watch(random_chamber(family, seed), collisions=10_000, every=500, impacts=500))
+        print(
+            family, watch(random_chamber(family, seed), collisions=10_000, every=500, impacts=500)
+        )
 
 
 @pytest.mark.parametrize(
@@ -153,13 +169,20 @@ def test_no_ball_leaves_a_chamber_that_one_once_left(family: str, seed: int) -> 
 def test_no_ball_leaves_fuzzed_chambers_in_half_a_million_collisions_each(family: str) -> None:
     seen = Record()
     for seed in range(100, 115):
-        seen.add(watch(random_chamber(family, seed), collisions=500_000, every=5_000, impacts=1_000))
+        seen.add(
+            watch(random_chamber(family, seed), collisions=500_000, every=5_000, impacts=1_000)
+        )
     print(family, seen)
 
 
 @pytest.mark.long
 def test_no_ball_leaves_the_gears_chamber_in_a_hundred_million_collisions() -> None:
     gear = scene("gear-200-10k")
-    seen = watch(Chamber(gear.mesh, gear.balls, gear.physics), collisions=100_000_000, every=50_000, impacts=200)
+    seen = watch(
+        Chamber(gear.mesh, gear.balls, gear.physics),
+        collisions=100_000_000,
+        every=50_000,
+        impacts=200,
+    )
     print("gear", seen)
     assert seen.checks > 1_000

@@ -42,7 +42,12 @@ def scene_with_everything_else(duration: float, count: int = 6) -> Scene:
     scene = small_scene(duration, count)
     physics = PHYSICS._replace(random_phase=RandomPhase(4), drag=Drag(density=50.0))
     diameter = np.where(np.arange(count) % 2 == 0, 3e-3, 2e-3)
-    return Scene(scene.mesh, Balls(scene.balls.positions, scene.balls.velocities, diameter), physics, duration)
+    return Scene(
+        scene.mesh,
+        Balls(scene.balls.positions, scene.balls.velocities, diameter),
+        physics,
+        duration,
+    )
 
 
 def fingerprint(result: Result) -> str:
@@ -89,7 +94,9 @@ def test_frames_show_the_balls_on_their_flights_and_change_nothing() -> None:
     times = np.linspace(0.0, scene.duration, 301)
     plain, watched = simulate(scene), simulate(scene, frames=times)
     for column in ("time", "ball", "triangle", "position", "velocity", "normal_speed"):
-        np.testing.assert_array_equal(getattr(plain.impacts, column), getattr(watched.impacts, column))
+        np.testing.assert_array_equal(
+            getattr(plain.impacts, column), getattr(watched.impacts, column)
+        )
     np.testing.assert_array_equal(plain.balls.positions, watched.balls.positions)
     assert plain.frames.shape == (0, len(scene.balls), 3)
     np.testing.assert_array_equal(watched.frames[-1], watched.balls.positions)

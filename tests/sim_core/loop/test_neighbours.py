@@ -19,7 +19,9 @@ def all_pairs(motion: np.ndarray, ball: int, time: float, before: float) -> tupl
     excess = (apart * apart).sum(axis=1) - REACH**2
     disc = rate**2 - speed * excess
     with np.errstate(invalid="ignore", divide="ignore"):
-        delay = np.where((rate < 0.0) & (disc > 0.0), np.maximum(excess, 0.0) / (np.sqrt(disc) - rate), np.inf)
+        delay = np.where(
+            (rate < 0.0) & (disc > 0.0), np.maximum(excess, 0.0) / (np.sqrt(disc) - rate), np.inf
+        )
     delay[ball] = np.inf
     partner = int(delay.argmin())
     return (time + delay[partner], partner) if time + delay[partner] < before else (np.inf, -1)
@@ -27,7 +29,9 @@ def all_pairs(motion: np.ndarray, ball: int, time: float, before: float) -> tupl
 
 def gas(balls: int, half: float, rng: np.random.Generator) -> np.ndarray:
     """Bases [m] and velocities [m/s] (n, 6): fast, slow and resting balls, some in step with their neighbour."""
-    motion = np.concatenate([rng.uniform(-half, half, (balls, 3)), rng.normal(0.0, 3.0, (balls, 3))], axis=1)
+    motion = np.concatenate(
+        [rng.uniform(-half, half, (balls, 3)), rng.normal(0.0, 3.0, (balls, 3))], axis=1
+    )
     motion[::7, 3:] = 0.0
     motion[1::7, 3:] *= 1e-4
     pairs = len(motion[3::7])
@@ -40,7 +44,9 @@ def crowd_of(motion: np.ndarray, half: float) -> Crowd:
     return new_crowd(motion, np.full(3, -half), np.full(3, half), REACH, fastest, WINDOW)
 
 
-@pytest.mark.parametrize(("balls", "half"), [(4, 0.005), (200, 0.03), (MANY - 1, 0.07), (MANY, 0.07), (3000, 0.2)])
+@pytest.mark.parametrize(
+    ("balls", "half"), [(4, 0.005), (200, 0.03), (MANY - 1, 0.07), (MANY, 0.07), (3000, 0.2)]
+)
 def test_every_meeting_is_found(balls: int, half: float) -> None:
     rng = np.random.default_rng(balls)
     motion = gas(balls, half, rng)
@@ -55,7 +61,9 @@ def test_every_meeting_is_found(balls: int, half: float) -> None:
         assert found == partner
         assert found < 0 or meeting == pytest.approx(expected, rel=1e-9, abs=1e-15)
         met += found >= 0
-        change = rng.integers(balls)  # a ball gets a new path: the crowd follows it, as the loop has it do
+        change = rng.integers(
+            balls
+        )  # a ball gets a new path: the crowd follows it, as the loop has it do
         motion[change, 3:] = rng.normal(0.0, 3.0, 3)
         motion[change, :3] = rng.uniform(-half, half, 3) - motion[change, 3:] * time
         follow(crowd, motion, int(change), time)
@@ -84,7 +92,9 @@ def test_sorting_into_blocks_keeps_every_ball() -> None:
     crowd = crowd_of(motion, 0.1)
     assert crowd.blocks is not None
     for _ in range(3):
-        motion[:, :3] = rng.uniform(-0.12, 0.12, (count, 3))  # some outside the room, as bases may be
+        motion[:, :3] = rng.uniform(
+            -0.12, 0.12, (count, 3)
+        )  # some outside the room, as bases may be
         set_crowd(crowd, motion)
         slots = crowd.blocks.slot
         assert sorted(slots) == list(range(count))

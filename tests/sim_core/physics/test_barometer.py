@@ -36,7 +36,10 @@ def heights_and_speeds(samples: int) -> tuple[np.ndarray, np.ndarray, float]:
     heights, squares = np.empty((samples, COUNT)), np.empty((samples, COUNT))
     for k in range(samples):
         balls = simulate(Scene(room, balls, Physics(Gravity(z=-G)), duration, record=())).balls
-        heights[k], squares[k] = balls.positions[:, 2] - balls.radius, (balls.velocities**2).sum(axis=1)
+        heights[k], squares[k] = (
+            balls.positions[:, 2] - balls.radius,
+            (balls.velocities**2).sum(axis=1),
+        )
     return heights, squares, float(total)
 
 
@@ -62,7 +65,9 @@ def compare_with_the_formula(samples: int) -> None:
     # a ball at z leaves E - g z for 5N/2 - 1 pairs of quadratic terms, itself among them
     temperature = squares * (2.5 * COUNT - 1.0) / 3.0 / (total - G * heights)
     upper = heights > total / (2.5 * COUNT * G)
-    rows = np.stack([temperature * upper, upper, temperature * ~upper, ~upper], axis=-1).mean(axis=1)
+    rows = np.stack([temperature * upper, upper, temperature * ~upper, ~upper], axis=-1).mean(
+        axis=1
+    )
     ratio, error = jackknife(lambda row: float(row[0] / row[1] / (row[2] / row[3])), rows)
     print(f"temperature above over below {ratio:.4f} +- {error:.4f}")
     assert abs(ratio - 1.0) < SURE * error

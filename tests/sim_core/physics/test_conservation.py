@@ -12,7 +12,9 @@ DIAMETER = 3e-3
 
 def gas(mesh: TriangleMesh, count: int, speed: float, seed: int) -> Balls:
     rng = np.random.default_rng(seed)
-    return Balls(pack_balls(mesh, count, DIAMETER, rng), rng.normal(0.0, speed, (count, 3)), DIAMETER)
+    return Balls(
+        pack_balls(mesh, count, DIAMETER, rng), rng.normal(0.0, speed, (count, 3)), DIAMETER
+    )
 
 
 def test_an_elastic_gas_in_a_box_keeps_its_energy_over_a_million_collisions() -> None:
@@ -39,10 +41,19 @@ def test_two_balls_meet_head_on_and_keep_their_momentum() -> None:
     room = box((0.1, 0.1, 0.1))
     e = 0.5
     physics = Physics(None, Restitution(((1.0, 1.0),) * 3, (e, 100.0)))
-    balls = Balls(np.array([[0.04, 0.05, 0.05], [0.06, 0.05, 0.05]]), np.array([[2.0, 0, 0], [-1.0, 0, 0]]), DIAMETER)
+    balls = Balls(
+        np.array([[0.04, 0.05, 0.05], [0.06, 0.05, 0.05]]),
+        np.array([[2.0, 0, 0], [-1.0, 0, 0]]),
+        DIAMETER,
+    )
     end = simulate(Scene(room, balls, physics, duration=0.01)).balls
-    mean, half = 0.5, 0.5 * e * 3.0  # centre of mass speed kept; relative speed reversed and multiplied by e
-    np.testing.assert_allclose(end.velocities, [[mean - half, 0, 0], [mean + half, 0, 0]], atol=1e-14)
+    mean, half = (
+        0.5,
+        0.5 * e * 3.0,
+    )  # centre of mass speed kept; relative speed reversed and multiplied by e
+    np.testing.assert_allclose(
+        end.velocities, [[mean - half, 0, 0], [mean + half, 0, 0]], atol=1e-14
+    )
 
 
 def test_dissipation_never_raises_the_energy() -> None:

@@ -48,7 +48,9 @@ def without_edges(ratios: list[tuple[float, float]], sizes: list[float]) -> tupl
     """Two ratios to theory (value, error) on cubes of two sizes [m], carried on to where (1 / size)² is none."""
     weight = sizes[1] ** 2 / (sizes[1] ** 2 - sizes[0] ** 2)
     (small, small_error), (large, large_error) = ratios
-    return weight * large - (weight - 1.0) * small, float(np.hypot(weight * large_error, (weight - 1.0) * small_error))
+    return weight * large - (weight - 1.0) * small, float(
+        np.hypot(weight * large_error, (weight - 1.0) * small_error)
+    )
 
 
 def compare_with_theory(packing: float, effort: int) -> None:
@@ -56,7 +58,11 @@ def compare_with_theory(packing: float, effort: int) -> None:
 
     The mean free path is <v>/ν = 1/(sqrt(2) π n d² χ): Chapman & Cowling, section 5.21.
     """
-    ratios: dict[str, list[tuple[float, float]]] = {"pressure": [], "collision rate": [], "mean free path": []}
+    ratios: dict[str, list[tuple[float, float]]] = {
+        "pressure": [],
+        "collision rate": [],
+        "mean free path": [],
+    }
     sizes = []
     for per_side in (SMALL, LARGE):
         gas, rows = measured(per_side, packing, effort)
@@ -70,9 +76,16 @@ def compare_with_theory(packing: float, effort: int) -> None:
             ratios[name].append((mean / value, error / value))
         sizes.append(gas.inner)
     dense = 1.0 - 1.0 / carnahan_starling(packing)
-    for name, allowed in (("pressure", THEORY * dense), ("collision rate", THEORY), ("mean free path", THEORY)):
+    for name, allowed in (
+        ("pressure", THEORY * dense),
+        ("collision rate", THEORY),
+        ("mean free path", THEORY),
+    ):
         ratio, error = without_edges(ratios[name], sizes)
-        print(f"packing {packing}: {name} over theory {ratio:.4f} +- {error:.4f}; N = {SMALL**3}, {LARGE**3}: ", end="")
+        print(
+            f"packing {packing}: {name} over theory {ratio:.4f} +- {error:.4f}; N = {SMALL**3}, {LARGE**3}: ",
+            end="",
+        )
         print(", ".join(f"{one:.4f} +- {its_error:.4f}" for one, its_error in ratios[name]))
         assert abs(ratio - 1.0) < allowed + SURE * error, name
 
@@ -89,7 +102,9 @@ def test_the_virial_theorem_ties_the_walls_impulses_to_the_collisions(packing: f
     The closing speeds of pairs that meet average sqrt(π kT), as kT = <v²>/3 (1 + 1/12N, which is left out).
     """
     gas, rows = measured(LARGE, packing, EFFORT)
-    virial, error = jackknife(lambda row: row[0] - 1.0 - row[1] * DIAMETER * np.sqrt(np.pi / gas.kt) / 6.0, rows)
+    virial, error = jackknife(
+        lambda row: row[0] - 1.0 - row[1] * DIAMETER * np.sqrt(np.pi / gas.kt) / 6.0, rows
+    )
     print(f"packing {packing}: virial {virial:.5f} +- {error:.5f}")
     assert abs(virial) < SURE * error + (carnahan_starling(packing) - 1.0) / (12.0 * LARGE**3)
 

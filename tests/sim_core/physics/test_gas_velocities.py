@@ -53,7 +53,9 @@ def test_eight_balls_have_the_distribution_of_few(samples: int) -> None:
     """
     velocities = sampled(2, 0.05, samples)
     count = 3 * velocities.shape[1]
-    law = beta(0.5 * (count - 1), 0.5 * (count - 1), loc=-np.sqrt(count), scale=2.0 * np.sqrt(count))
+    law = beta(
+        0.5 * (count - 1), 0.5 * (count - 1), loc=-np.sqrt(count), scale=2.0 * np.sqrt(count)
+    )
     one = velocities[:, 0]  # one ball of the eight, whose samples do not know of each other
     for axis in range(3):
         result = kstest(one[:, axis], law.cdf)

@@ -32,7 +32,9 @@ def test_between_plates_without_gravity_impacts_come_every_gap_over_speed() -> N
 def test_under_gravity_a_drop_bounces_as_v_over_g() -> None:
     e, height = 0.8, 0.05
     physics = Physics(Gravity(), Restitution(((e, 100.0),) * 3, (1.0, 1.0)))
-    log = simulate(Scene(box((0.03, 0.03, 0.2)), one_ball(height + DIAMETER / 2, 0.0), physics, 0.6)).impacts
+    log = simulate(
+        Scene(box((0.03, 0.03, 0.2)), one_ball(height + DIAMETER / 2, 0.0), physics, 0.6)
+    ).impacts
     first = math.sqrt(2 * height / G)
     speeds = G * first * e ** np.arange(len(log))
     times = first + np.concatenate([[0.0], np.cumsum(2 * speeds[1:] / G)])

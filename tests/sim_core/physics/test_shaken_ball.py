@@ -42,8 +42,14 @@ def power(c0: float, v0: float, elastic_below: float = 0.0) -> Law:
 # Each law as the simulator takes it, and as the marching does, on (ceiling, floor).
 LAWS: dict[str, tuple[Restitution | None, tuple[Law, Law]]] = {
     "elastic": (None, (constant(1.0),) * 2),
-    "constant": (Restitution(((0.6, 1e3),) * 3, (1.0, 1.0), elastic_below=0.05), (constant(0.6, 0.05),) * 2),
-    "the paper's": (Restitution(((0.9, 0.7),) * 3, (1.0, 1.0), elastic_below=0.05), (power(0.9, 0.7, 0.05),) * 2),
+    "constant": (
+        Restitution(((0.6, 1e3),) * 3, (1.0, 1.0), elastic_below=0.05),
+        (constant(0.6, 0.05),) * 2,
+    ),
+    "the paper's": (
+        Restitution(((0.9, 0.7),) * 3, (1.0, 1.0), elastic_below=0.05),
+        (power(0.9, 0.7, 0.05),) * 2,
+    ),
     "two materials": (
         Restitution(((0.5, 2.0), (0.95, 0.3), (1.0, 1.0)), (1.0, 1.0), elastic_below=0.3),
         (power(0.5, 2.0, 0.3), power(0.95, 0.3, 0.3)),
@@ -60,7 +66,9 @@ def first_contact(z: float, v: float, t: float) -> tuple[float, int]:
 
     def gaps(s: np.ndarray | float) -> np.ndarray:
         height = z + v * s - 0.5 * G * s * s
-        return np.array([TOP - 0.5 * DIAMETER - height, height - 0.5 * DIAMETER - floor_height(t + s)])
+        return np.array(
+            [TOP - 0.5 * DIAMETER - height, height - 0.5 * DIAMETER - floor_height(t + s)]
+        )
 
     step = 1.0 / SHAKING.frequency / 400.0
     # the first points lie close together: a ball that has just been hit is still at the surface it leaves
@@ -83,7 +91,11 @@ def marched(z: float, v: float, laws: tuple[Law, Law]) -> Iterator[tuple[float, 
     while True:
         delay, which = first_contact(z, v, t)
         z, v, t = z + v * delay - 0.5 * G * delay * delay, v - G * delay, t + delay
-        surface = SHAKING.amplitude * OMEGA * math.cos(OMEGA * t + SHAKING.phase) if which == FLOOR else 0.0
+        surface = (
+            SHAKING.amplitude * OMEGA * math.cos(OMEGA * t + SHAKING.phase)
+            if which == FLOOR
+            else 0.0
+        )
         speed = abs(v - surface)
         yield t, speed, which
         v = surface - laws[which](speed) * (v - surface)
@@ -110,7 +122,9 @@ def compare_impact_by_impact(law: str, per_side: int) -> None:
     log = simulate(Scene(room, balls, Physics(Gravity(), restitution, SHAKING), 0.05)).impacts
     compared = 0
     for ball, (z, v) in enumerate(zip(balls.positions[:, 2], balls.velocities[:, 2], strict=True)):
-        march, beside = (np.array(list(islice(marched(z + shift, v, laws), 10))) for shift in (0.0, 1e-12))
+        march, beside = (
+            np.array(list(islice(marched(z + shift, v, laws), 10))) for shift in (0.0, 1e-12)
+        )
         spread = np.maximum.accumulate(np.abs(march - beside), axis=0)
         together = (spread[:, 1] < 1e-3) & (march[:, 0] < 0.05)  # speeds within 1 mm/s
         march, spread = march[together], spread[together]
@@ -144,11 +158,16 @@ def compare_statistics(law: str, per_side: int, duration: float) -> None:
         march = takewhile(lambda hit: hit[0] < duration, marched(z, v, laws))
         speeds = [speed for _, speed, which in march if which == CEILING]
         rows.append((len(speeds), sum(speeds)))
-    for name, estimate in (("impacts a second", lambda row: row[0] / duration), ("speed", lambda row: row[1] / row[0])):
+    for name, estimate in (
+        ("impacts a second", lambda row: row[0] / duration),
+        ("speed", lambda row: row[1] / row[0]),
+    ):
         one, one_error = jackknife(estimate, simulated)
         two, two_error = jackknife(estimate, np.array(rows, dtype=float))
         error = float(np.hypot(one_error, two_error))
-        print(f"{law}: {name} {one:.4g} simulated, {two:.4g} marched, ratio {one / two:.4f} +- {error / two:.4f}")
+        print(
+            f"{law}: {name} {one:.4g} simulated, {two:.4g} marched, ratio {one / two:.4f} +- {error / two:.4f}"
+        )
         assert abs(one - two) < SURE * error, name
 
 

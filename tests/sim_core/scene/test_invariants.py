@@ -16,7 +16,9 @@ def test_containment_agrees_with_what_the_shape_says() -> None:
         "ij,ij->i", ball.face_normals, ball.triangles[:, 0]
     )
     inside_body = (planes < 0.0).all(axis=1)
-    np.testing.assert_array_equal(contained(box_around(ball, 0.05), points), inside_box & ~inside_body)
+    np.testing.assert_array_equal(
+        contained(box_around(ball, 0.05), points), inside_box & ~inside_body
+    )
 
 
 def test_a_point_in_line_with_edges_and_corners_is_judged_by_another_ray() -> None:
@@ -35,11 +37,14 @@ def test_clearance_agrees_with_trimesh() -> None:
     points = np.random.default_rng(2).uniform(-0.03, 0.03, (300, 3)) + np.array([0, 0, 0.02])
     expected = [
         np.linalg.norm(
-            trimesh.triangles.closest_point(room.corners, np.tile(p, (len(room.corners), 1))) - p, axis=1
+            trimesh.triangles.closest_point(room.corners, np.tile(p, (len(room.corners), 1))) - p,
+            axis=1,
         ).min()
         for p in points
     ]
-    np.testing.assert_allclose(clearance(room.corners, points, 0.01), np.minimum(expected, 0.01), atol=1e-12)
+    np.testing.assert_allclose(
+        clearance(room.corners, points, 0.01), np.minimum(expected, 0.01), atol=1e-12
+    )
 
 
 def test_the_closest_pair_is_found() -> None:

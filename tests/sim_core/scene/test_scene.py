@@ -49,7 +49,10 @@ def test_a_ball_inside_the_raised_sonotrode_is_named() -> None:
     with pytest.raises(SceneError, match=r"ball 0 .* starts 3e-05 m inside the vibrating surface"):
         Scene(ROOM, balls([0.015, 0.015, 1.5e-3 + 10e-6]), raised, 1.0)
     lowered = Physics(vibration=Vibration(FLOOR, 40e-6, 20e3, phase=-math.pi / 2))
-    for height in (10e-6, -10e-6):  # the second lies below where the mesh has the face, but the face is not there
+    for height in (
+        10e-6,
+        -10e-6,
+    ):  # the second lies below where the mesh has the face, but the face is not there
         Scene(ROOM, balls([0.015, 0.015, 1.5e-3 + height]), lowered, 1.0)
 
 
@@ -58,7 +61,10 @@ def test_a_ball_inside_the_raised_sonotrode_is_named() -> None:
     [
         (Physics(gravity=Gravity(z=math.nan)), "gravity"),
         (Physics(restitution=Restitution(((0.9, 1.0),), (0.9, 1.0))), "tags 0 to 2"),
-        (Physics(restitution=Restitution(((1.1, 1.0),) * 3, (0.9, 1.0))), r"surfaces\[0\] is \(1.1, 1.0\)"),
+        (
+            Physics(restitution=Restitution(((1.1, 1.0),) * 3, (0.9, 1.0))),
+            r"surfaces\[0\] is \(1.1, 1.0\)",
+        ),
         (Physics(vibration=Vibration(7, 1e-6, 20e3)), "tag is 7, but the mesh has tags"),
         (Physics(vibration=Vibration(1, -1e-6, 20e3)), "amplitude"),
         (Physics(vibration=Vibration(1, 1e-6, 0.0)), "frequency"),
@@ -111,7 +117,9 @@ def test_balls_in_one_place_are_two_balls() -> None:
         Scene(ROOM, balls(MIDDLE, MIDDLE), Physics(), 1.0)
 
 
-@pytest.mark.parametrize("wrong", [{"duration": "1"}, {"duration": 1e12}, {"warmup": math.nan}, {"record": (9,)}])
+@pytest.mark.parametrize(
+    "wrong", [{"duration": "1"}, {"duration": 1e12}, {"warmup": math.nan}, {"record": (9,)}]
+)
 def test_a_wrong_scene_field_is_named(wrong: dict) -> None:
     with pytest.raises(SceneError, match=rf"scene\.{next(iter(wrong))}"):
         Scene(ROOM, balls(MIDDLE), Physics(), **{"duration": 1.0, **wrong})

@@ -34,8 +34,14 @@ def _carried_down(room: ShapeSurface, setup: Setup) -> ShapeSurface:
     face, count = room.triangles[on_face], len(room.vertices)
     used, numbers = np.unique(face, return_inverse=True)
     floor = room.vertices[used] * [1.0, 1.0, 0.0]
-    below = Surface(floor, numbers.reshape(-1, 3).astype(np.int32), on_face[on_face], on_face[on_face])
-    shaft = swept(below, np.array([0.0, 0.0, room.vertices[used[0], 2]]), "the room under the sonotrode as drawn")
+    below = Surface(
+        floor, numbers.reshape(-1, 3).astype(np.int32), on_face[on_face], on_face[on_face]
+    )
+    shaft = swept(
+        below,
+        np.array([0.0, 0.0, room.vertices[used[0], 2]]),
+        "the room under the sonotrode as drawn",
+    )
     if overlap(solid(room.vertices, room.triangles, "the set-up"), shaft) > SAME * shaft.volume:
         raise _refused(setup, "farther", "another part of the room is in the way under it")
     a, b = border(face).T
@@ -47,7 +53,9 @@ def _carried_down(room: ShapeSurface, setup: Setup) -> ShapeSurface:
         np.concatenate([room.vertices, floor]),
         np.concatenate([triangles, walls]).astype(np.int32),
         np.r_[room.tags, np.full(len(walls), TAG_WALL, dtype=np.uint8)],
-        None if room.source is None else np.r_[room.source, np.full(len(walls), -1, dtype=np.int32)],
+        None
+        if room.source is None
+        else np.r_[room.source, np.full(len(walls), -1, dtype=np.int32)],
     )
 
 
@@ -57,11 +65,15 @@ def _cut_off(room: ShapeSurface, height: float, setup: Setup) -> ShapeSurface:
     face = whole.surface().only(room.tags[whole.surface().source] == TAG_SONOTRODE)
     shaft = swept(face, np.array([0.0, 0.0, height]), "the room over the sonotrode as drawn")
     low, high = room.vertices.min(axis=0) - height, room.vertices.max(axis=0) + height
-    bottom = swept(_rectangle(low, high), np.array([0.0, 0.0, -low[2]]), "what lies under the sonotrode")
+    bottom = swept(
+        _rectangle(low, high), np.array([0.0, 0.0, -low[2]]), "what lies under the sonotrode"
+    )
     rest = subtract(whole, bottom)
     straight = overlap(whole, shaft) > (1.0 - SAME) * shaft.volume
     if not straight or whole.volume - rest.volume > (1.0 + SAME) * shaft.volume:
-        raise _refused(setup, "nearer", "its walls do not rise straight from the sonotrode's outline so far")
+        raise _refused(
+            setup, "nearer", "its walls do not rise straight from the sonotrode's outline so far"
+        )
     cut = rest.surface()
     kept = cut.solid == whole.label
     rows = np.where(kept, cut.source, 0)
@@ -75,8 +87,15 @@ def _cut_off(room: ShapeSurface, height: float, setup: Setup) -> ShapeSurface:
 
 def _rectangle(low: np.ndarray, high: np.ndarray) -> Surface:
     """A box's underside."""
-    corners = np.array([[x, y, low[2]] for x, y in ((low[0], low[1]), (high[0], low[1]), high[:2], (low[0], high[1]))])
-    return Surface(corners, np.array([[0, 2, 1], [0, 3, 2]], dtype=np.int32), np.zeros(2), np.zeros(2))
+    corners = np.array(
+        [
+            [x, y, low[2]]
+            for x, y in ((low[0], low[1]), (high[0], low[1]), high[:2], (low[0], high[1]))
+        ]
+    )
+    return Surface(
+        corners, np.array([[0, 2, 1], [0, 3, 2]], dtype=np.int32), np.zeros(2), np.zeros(2)
+    )
 
 
 def _refused(setup: Setup, way: str, why: str) -> InputError:

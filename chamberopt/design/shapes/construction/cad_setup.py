@@ -13,8 +13,21 @@ from pathlib import Path
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.design.shapes.construction.surface import TAG_PART, TAG_SONOTRODE, TAG_WALL, ShapeSurface
-from chamberopt.geometry.mesh_io import OpenSurfaceError, PartMesh, Triangles, closed, named, place_text, read_triangles
+from chamberopt.design.shapes.construction.surface import (
+    TAG_PART,
+    TAG_SONOTRODE,
+    TAG_WALL,
+    ShapeSurface,
+)
+from chamberopt.geometry.mesh_io import (
+    OpenSurfaceError,
+    PartMesh,
+    Triangles,
+    closed,
+    named,
+    place_text,
+    read_triangles,
+)
 from chamberopt.geometry.solids import Solid, overlap, snapped, solid, united
 from chamberopt.geometry.triangles import area_vectors, free_rim, shells_of
 
@@ -55,14 +68,22 @@ def read_setup(path: Path, unit: str, part: tuple[str, ...], sonotrode: tuple[st
 
 @lru_cache(maxsize=4)
 def _read_once(
-    path: Path, unit: str, part: tuple[str, ...], sonotrode: tuple[str, ...], _changed: int, _size: int
+    path: Path,
+    unit: str,
+    part: tuple[str, ...],
+    sonotrode: tuple[str, ...],
+    _changed: int,
+    _size: int,
 ) -> Setup:
     read = read_triangles(path, unit)
     of_part, of_face = (
-        _chosen(read, names, f"chamber.{key}") for key, names in (("part", part), ("sonotrode", sonotrode))
+        _chosen(read, names, f"chamber.{key}")
+        for key, names in (("part", part), ("sonotrode", sonotrode))
     )
     if (of_part & of_face).any():
-        raise InputError(f"chamber.part: {(of_part & of_face).sum()} of its triangles are the sonotrode's too")
+        raise InputError(
+            f"chamber.part: {(of_part & of_face).sum()} of its triangles are the sonotrode's too"
+        )
     body, whole = _bodies(read, of_part)
     mesh, left = _room_of_sonotrode(whole, sonotrode)
     own = named(mesh.groups, part, len(mesh.triangles), "chamber.part")
@@ -116,12 +137,16 @@ def _bodies(read: Triangles, own: np.ndarray) -> tuple[PartMesh | None, PartMesh
 def _piece(mesh: PartMesh, own: np.ndarray) -> PartMesh:
     """The part as the piece of the room's surface that it bounds, in the order of the room's triangles."""
     if not own.any():
-        raise InputError("chamber.part: none of it bounds the room over the sonotrode; check the groups of the file")
+        raise InputError(
+            "chamber.part: none of it bounds the room over the sonotrode; check the groups of the file"
+        )
     used, numbers = np.unique(mesh.triangles[own][:, ::-1], return_inverse=True)
     triangles = numbers.reshape(-1, 3).astype(np.int32)
     groups = {name: mask[own] for name, mask in mesh.groups.items() if mask[own].any()}
     numbering = mesh.numbering.of(own)
-    return replace(mesh, vertices=mesh.vertices[used], triangles=triangles, numbering=numbering, groups=groups)
+    return replace(
+        mesh, vertices=mesh.vertices[used], triangles=triangles, numbering=numbering, groups=groups
+    )
 
 
 def _room_of_sonotrode(mesh: PartMesh, sonotrode: tuple[str, ...]) -> tuple[PartMesh, list[str]]:
@@ -132,7 +157,9 @@ def _room_of_sonotrode(mesh: PartMesh, sonotrode: tuple[str, ...]) -> tuple[Part
     face = named(mesh.groups, sonotrode, len(mesh.triangles), "chamber.sonotrode")
     facing = area_vectors(mesh.vertices, mesh.triangles[face])
     if np.linalg.norm(facing.sum(axis=0)) < (1.0 - SAME_WAY) * np.linalg.norm(facing, axis=1).sum():
-        raise InputError("chamber.sonotrode: its triangles are not flat, they face different ways; name one flat face")
+        raise InputError(
+            "chamber.sonotrode: its triangles are not flat, they face different ways; name one flat face"
+        )
     shells, volumes = shells_of(mesh.vertices, mesh.triangles)
     of_face = np.unique(shells[face])
     if len(of_face) != 1:
@@ -142,22 +169,35 @@ def _room_of_sonotrode(mesh: PartMesh, sonotrode: tuple[str, ...]) -> tuple[Part
         )
     outward = np.where((volumes < 0.0)[shells][:, None], mesh.triangles[:, ::-1], mesh.triangles)
     bodies = [
-        solid(mesh.vertices, outward, f"closed surface {k + 1} of the set-up", only=np.flatnonzero(shells == k))
+        solid(
+            mesh.vertices,
+            outward,
+            f"closed surface {k + 1} of the set-up",
+            only=np.flatnonzero(shells == k),
+        )
         for k in range(len(volumes))
     ]
     first = int(of_face[0])
     inside = [k for k in range(len(volumes)) if k != first and _is_inside(bodies[k], bodies[first])]
-    if inside and united([bodies[k] for k in inside], "").volume < (1.0 - SAME) * sum(bodies[k].volume for k in inside):
-        raise InputError("the set-up: closed surfaces that stand in its room overlap; unite them in the CAD program")
+    if inside and united([bodies[k] for k in inside], "").volume < (1.0 - SAME) * sum(
+        bodies[k].volume for k in inside
+    ):
+        raise InputError(
+            "the set-up: closed surfaces that stand in its room overlap; unite them in the CAD program"
+        )
     triangles = np.where(np.isin(shells, inside)[:, None], outward[:, ::-1], outward)
     rows = np.isin(shells, [first, *inside])
     used, numbers = np.unique(triangles[rows], return_inverse=True)
     groups = {name: mask[rows] for name, mask in mesh.groups.items()}
     kept = numbers.reshape(-1, 3).astype(np.int32)
     numbering = mesh.numbering.of(rows)
-    room = replace(mesh, vertices=mesh.vertices[used], triangles=kept, numbering=numbering, groups=groups)
+    room = replace(
+        mesh, vertices=mesh.vertices[used], triangles=kept, numbering=numbering, groups=groups
+    )
     left = len(volumes) - 1 - len(inside)
-    return room, [f"{left} closed surfaces that are not in the room over the sonotrode are left out"] if left else []
+    return room, [
+        f"{left} closed surfaces that are not in the room over the sonotrode are left out"
+    ] if left else []
 
 
 def _is_inside(body: Solid, room: Solid) -> bool:
@@ -184,8 +224,15 @@ def _upright(mesh: PartMesh, face: np.ndarray) -> tuple[np.ndarray, np.ndarray, 
             f"{1e3 * heights.max():.6g} mm along their mean normal; name the peening face alone"
         )
     turn = _to_z(up)
-    shift, told = np.array([0.0, 0.0, -(heights.min() + heights.max()) / 2.0]), np.round(up, 4) + 0.0
-    return turn, shift, [] if up[2] == 1.0 else [f"turned so that what is along {told.tolist()} in the file is up"]
+    shift, told = (
+        np.array([0.0, 0.0, -(heights.min() + heights.max()) / 2.0]),
+        np.round(up, 4) + 0.0,
+    )
+    return (
+        turn,
+        shift,
+        [] if up[2] == 1.0 else [f"turned so that what is along {told.tolist()} in the file is up"],
+    )
 
 
 def _to_z(up: np.ndarray) -> np.ndarray:

@@ -13,7 +13,9 @@ def refuse_beyond(key: str, given: float, most: float, why: str) -> None:
     """CrossCheckError for a key [mm or degrees] given beyond the most (of its sign) that fits."""
     if abs(given) > abs(most):
         fits = math.trunc(most * 1e3) / 1e3  # towards 0: what is said to fit does
-        raise CrossCheckError([Problem(key, f"given {given:g}, {why}; {fits:.7g} is the furthest that fits")])
+        raise CrossCheckError(
+            [Problem(key, f"given {given:g}, {why}; {fits:.7g} is the furthest that fits")]
+        )
 
 
 def refuse_inward(slope: float, slopes: Iterable[float], inclination_deg: float) -> None:
@@ -21,4 +23,6 @@ def refuse_inward(slope: float, slopes: Iterable[float], inclination_deg: float)
     least = max(slopes, default=-math.inf)
     if slope < least:
         most = math.degrees(math.atan(least))
-        refuse_beyond("inclination_deg", inclination_deg, most, "with which walls meet below the ceiling")
+        refuse_beyond(
+            "inclination_deg", inclination_deg, most, "with which walls meet below the ceiling"
+        )

@@ -23,7 +23,10 @@ def lofted(rings: Sequence[np.ndarray], peak: np.ndarray | None = None) -> Shape
     sides = []
     for ring in range(k - 1):
         low, high = ring * n, (ring + 1) * n
-        sides += [np.c_[low + here, low + beside, high + beside], np.c_[low + here, high + beside, high + here]]
+        sides += [
+            np.c_[low + here, low + beside, high + beside],
+            np.c_[low + here, high + beside, high + here],
+        ]
     top = (k - 1) * n
     ceiling = np.c_[np.full(n, k * n + 1), top + here, top + beside]
     triangles = np.concatenate([floor, *sides, ceiling]).astype(np.int32)

@@ -8,7 +8,10 @@ from chamberopt.design.shapes.construction.limits import LEAST
 def turns(outline: np.ndarray) -> np.ndarray:
     """By what angle [rad] the outline turns left at each corner, (n,)."""
     before, after = _along(outline)
-    return np.arctan2(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0], np.einsum("ij,ij->i", before, after))
+    return np.arctan2(
+        before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0],
+        np.einsum("ij,ij->i", before, after),
+    )
 
 
 def moved(outline: np.ndarray, out: float) -> np.ndarray:
@@ -29,7 +32,11 @@ def area(outline: np.ndarray, out: float = 0.0) -> float:
     """Of the outline [m²], its sides moved outwards by so much."""
     (x, y), (xn, yn) = outline.T, np.roll(outline, -1, axis=0).T
     around = np.hypot(xn - x, yn - y).sum()
-    return float(0.5 * (x * yn - y * xn).sum() + out * around + out * out * np.tan(turns(outline) / 2.0).sum())
+    return float(
+        0.5 * (x * yn - y * xn).sum()
+        + out * around
+        + out * out * np.tan(turns(outline) / 2.0).sum()
+    )
 
 
 def arcs(outline: np.ndarray, facets: int) -> tuple[np.ndarray, np.ndarray]:

@@ -38,16 +38,23 @@ def rounded(line: np.ndarray, radius: float, facets: int) -> np.ndarray:
     if radius <= LEAST:
         return line
     points = [line[:1]]
-    for corner, before, after, turn in zip(line[1:-1], line[:-2], line[2:], turns(line)[1:-1], strict=True):
+    for corner, before, after, turn in zip(
+        line[1:-1], line[:-2], line[2:], turns(line)[1:-1], strict=True
+    ):
         steps = facets * abs(turn) / (2.0 * np.pi)
         if steps < 0.5:
             points.append(corner[None])
             continue
-        into, out = ((end - start) / np.hypot(*(end - start)) for start, end in ((before, corner), (corner, after)))
+        into, out = (
+            (end - start) / np.hypot(*(end - start))
+            for start, end in ((before, corner), (corner, after))
+        )
         centre = corner + radius / np.cos(turn / 2.0) * _unit(out - into)
         begin = corner - radius * np.tan(abs(turn) / 2.0) * into - centre
         angle = turn * np.linspace(0.0, 1.0, int(np.ceil(steps - 1e-9)) + 1)[:, None]
-        points.append(centre + np.cos(angle) * begin + np.sin(angle) * np.array([-begin[1], begin[0]]))
+        points.append(
+            centre + np.cos(angle) * begin + np.sin(angle) * np.array([-begin[1], begin[0]])
+        )
     return np.concatenate([*points, line[-1:]])
 
 
@@ -58,7 +65,10 @@ def crossing(line: np.ndarray) -> np.ndarray | None:
         return line[np.argmax(sharp)]
     start, end = line[:-1], line[1:]
     i, j = np.triu_indices(len(start), 2)
-    apart = np.min([_distance(line[k], start[m], end[m]) for k, m in ((i, j), (i + 1, j), (j, i), (j + 1, i))], axis=0)
+    apart = np.min(
+        [_distance(line[k], start[m], end[m]) for k, m in ((i, j), (i + 1, j), (j, i), (j + 1, i))],
+        axis=0,
+    )
     near = (apart < LEAST) | _cut(start[i], end[i], start[j], end[j])
     return start[i[np.argmax(near)]] if near.any() else None
 

@@ -4,7 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-TAG_PART, TAG_SONOTRODE, TAG_WALL = 0, 1, 2  # and 3, 4 ...: the further sonotrodes, in the design's order
+TAG_PART, TAG_SONOTRODE, TAG_WALL = (
+    0,
+    1,
+    2,
+)  # and 3, 4 ...: the further sonotrodes, in the design's order
 
 
 def tag_of_further(k: int) -> int:

@@ -18,11 +18,23 @@ from chamberopt.common.errors import InputError
 from chamberopt.geometry.mesh_io.readers.elements import CORNERS, EDGES, Block, Elements, surface_of
 from chamberopt.geometry.mesh_io.readers.raw_mesh import RawMesh
 
-REFUSED = ("INCLUDE", "SYSTEM", "NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SUBSTRUCTURE GENERATE")
+REFUSED = (
+    "INCLUDE",
+    "SYSTEM",
+    "NGEN",
+    "NFILL",
+    "NCOPY",
+    "NMAP",
+    "ELGEN",
+    "ELCOPY",
+    "SUBSTRUCTURE GENERATE",
+)
 SHELL = re.compile(r"(?:STRI|SFM3D|M3D|R3D|CPS|CPE|DS|S)(3|4|6|8|9)\D*5?$")
 STRI65 = re.compile(r"STRI65$")  # six nodes, five degrees of freedom
 SOLID = re.compile(r"(?:AC3D|DC3D|C3D)(4|5|6|8|10|13|15|20)\D*$")
-WITHOUT_SURFACE = re.compile(r"(B\d|PIPE|T[23]D|MASS|ROTARYI|SPRING|DASHPOT|CONN|GAP|JOINT|DCOUP|RB3D|RAX)")
+WITHOUT_SURFACE = re.compile(
+    r"(B\d|PIPE|T[23]D|MASS|ROTARYI|SPRING|DASHPOT|CONN|GAP|JOINT|DCOUP|RB3D|RAX)"
+)
 SHELL_KIND = {3: "triangle", 6: "triangle", 4: "quad", 8: "quad", 9: "quad"}
 SOLID_KIND = {
     4: "tetra", 10: "tetra", 5: "pyramid", 13: "pyramid", 6: "wedge", 15: "wedge", 8: "hexahedron", 20: "hexahedron",
@@ -52,7 +64,11 @@ class _Instance:
         if self.lines:
             points = points + np.array((self.lines[0] + [0.0] * 3)[:3])
         if len(self.lines) > 1:
-            a, b, degrees = np.array(self.lines[1][:3]), np.array(self.lines[1][3:6]), self.lines[1][6]
+            a, b, degrees = (
+                np.array(self.lines[1][:3]),
+                np.array(self.lines[1][3:6]),
+                self.lines[1][6],
+            )
             axis = (b - a) / np.linalg.norm(b - a)
             angle, arm = np.radians(degrees), points - a
             along = np.outer(arm @ axis, axis)  # Rodrigues' formula
@@ -66,7 +82,9 @@ def read_abaqus(path: Path, content: bytes) -> RawMesh:
     try:
         return surface_of(_assembled(scopes, instances, notes))
     except KeyError as error:
-        raise InputError(f"{path}: names {error.args[0]}, which is not there; export the whole model") from None
+        raise InputError(
+            f"{path}: names {error.args[0]}, which is not there; export the whole model"
+        ) from None
 
 
 def _keywords(text: str) -> Iterator[tuple[str, Options, list[str], int]]:
@@ -112,7 +130,9 @@ def _scopes(path: Path, text: str) -> tuple[dict[str, _Scope], dict[str, _Instan
             elif keyword == "END PART":
                 now = ""
             elif keyword == "INSTANCE":
-                numbers = [[float(value) for value in row.split(",") if value.strip()] for row in data]
+                numbers = [
+                    [float(value) for value in row.split(",") if value.strip()] for row in data
+                ]
                 instances[options["NAME"].upper()] = _Instance(options["PART"].upper(), numbers)
             elif keyword == "NODE":
                 _add_nodes(scope, options, data)
@@ -124,19 +144,31 @@ def _scopes(path: Path, text: str) -> tuple[dict[str, _Scope], dict[str, _Instan
             elif keyword == "SURFACE" and options.get("TYPE", "ELEMENT").upper() == "ELEMENT":
                 for row in data:
                     whose, _, face = row.partition(",")
-                    scope.faces[options["NAME"]].append((_tail(whose.strip()), face.strip().upper()))
+                    scope.faces[options["NAME"]].append(
+                        (_tail(whose.strip()), face.strip().upper())
+                    )
         except (ValueError, KeyError, IndexError) as error:
             reason = f"lacks {error.args[0]}=" if isinstance(error, KeyError) else str(error)
-            raise InputError(f"{path}: line {line}: *{keyword}: {reason}; export it again") from None
-    return scopes, instances, [f"left out {count} {kind}: it has no surface" for kind, count in passed.items()]
+            raise InputError(
+                f"{path}: line {line}: *{keyword}: {reason}; export it again"
+            ) from None
+    return (
+        scopes,
+        instances,
+        [f"left out {count} {kind}: it has no surface" for kind, count in passed.items()],
+    )
 
 
 def _add_nodes(scope: _Scope, options: Options, data: list[str]) -> None:
     if options.get("SYSTEM", "R").upper() != "R":
-        raise ValueError("cylindrical and spherical coordinates are not supported; write rectangular ones")
+        raise ValueError(
+            "cylindrical and spherical coordinates are not supported; write rectangular ones"
+        )
     for row in data:
         number, *place = row.split(",")
-        scope.nodes[int(number)] = [float(value) if value.strip() else 0.0 for value in [*place, "", ""][:3]]
+        scope.nodes[int(number)] = [
+            float(value) if value.strip() else 0.0 for value in [*place, "", ""][:3]
+        ]
         if "NSET" in options:
             scope.node_sets[options["NSET"]].append(("", int(number)))
 
@@ -153,10 +185,14 @@ def _add_elements(scope: _Scope, options: Options, data: list[str], passed: Coun
         count = int((shell or solid)[1])  # type: ignore[index]
         kind = SHELL_KIND[count] if shell else SOLID_KIND[count]
     else:
-        raise ValueError(f"type={name} is not supported; use S3, S4, S8R, C3D4, C3D8, C3D10 or their like")
+        raise ValueError(
+            f"type={name} is not supported; use S3, S4, S8R, C3D4, C3D8, C3D10 or their like"
+        )
     flat = [int(value) for row in data for value in row.split(",") if value.strip()]
     if len(flat) % (count + 1):
-        raise ValueError(f"type={name} has {count} nodes, and the data are no whole number of elements")
+        raise ValueError(
+            f"type={name} has {count} nodes, and the data are no whole number of elements"
+        )
     for at in range(0, len(flat), count + 1):
         number, *nodes = flat[at : at + count + 1]
         scope.elements[number] = kind, nodes[: CORNERS[kind] + len(EDGES[kind])], count
@@ -177,7 +213,11 @@ def _members(options: Options, data: list[str], sets: dict[str, list[Member]]) -
             continue
         for word in words:
             whose, _, name = word.rpartition(".")
-            known = [(whose.upper() or instance, int(name))] if name.isdigit() else sets[by_upper[name.upper()]]
+            known = (
+                [(whose.upper() or instance, int(name))]
+                if name.isdigit()
+                else sets[by_upper[name.upper()]]
+            )
             members += known
     return members
 
@@ -187,13 +227,19 @@ def _tail(name: str) -> str:
     return name.rpartition(".")[2].strip('"')
 
 
-def _assembled(scopes: dict[str, _Scope], instances: dict[str, _Instance], notes: list[str]) -> Elements:
+def _assembled(
+    scopes: dict[str, _Scope], instances: dict[str, _Instance], notes: list[str]
+) -> Elements:
     """All instances in one mesh; without instances, whatever the file holds."""
     placed = [(scopes[instance.part], instance) for instance in instances.values()]
-    placed += [(scope, _Instance("", [])) for name, scope in scopes.items() if not (name and instances)]
+    placed += [
+        (scope, _Instance("", [])) for name, scope in scopes.items() if not (name and instances)
+    ]
     points: list[np.ndarray] = []
     groups: dict[tuple[str, int], list[list[int]]] = defaultdict(list)
-    members: dict[tuple[int, int], tuple[tuple[str, int], int]] = {}  # (scope, number) -> block and row in it
+    members: dict[
+        tuple[int, int], tuple[tuple[str, int], int]
+    ] = {}  # (scope, number) -> block and row in it
     row_of: dict[tuple[int, int], int] = {}
     for at, (scope, instance) in enumerate(placed):
         before = len(row_of)
@@ -243,7 +289,11 @@ def _name(
     home = [at] if scope.elements or scope.nodes else list(range(len(instances) + 1))
 
     def found(members: list[Member], known: dict[tuple[int, int], int]) -> np.ndarray:
-        places = ((who, n) for name, n in members for who in ([instances.index(name)] if name in instances else home))
+        places = (
+            (who, n)
+            for name, n in members
+            for who in ([instances.index(name)] if name in instances else home)
+        )
         return np.array([known[place] for place in places if place in known], dtype=np.int64)
 
     def joined(one: dict[str, np.ndarray], name: str, more: np.ndarray) -> None:
@@ -254,7 +304,9 @@ def _name(
     for name, members in scope.node_sets.items():
         joined(mesh.node_sets, name, found(members, row_of))
     for name, faces in scope.faces.items():
-        elements, sides = mesh.face_sets.get(name, (np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)))
+        elements, sides = mesh.face_sets.get(
+            name, (np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))
+        )
         for whose, face in faces:
             if whose.isdigit():
                 more = found([("", int(whose))], index)
@@ -264,6 +316,8 @@ def _name(
                 more = mesh.element_sets[whose]
             else:
                 raise KeyError(f"the element set {whose}")
-            side = int(face[1:]) - 1 if re.fullmatch(r"S\d", face) else 0  # SPOS, SNEG, "": the shell itself
+            side = (
+                int(face[1:]) - 1 if re.fullmatch(r"S\d", face) else 0
+            )  # SPOS, SNEG, "": the shell itself
             elements, sides = np.r_[elements, more], np.r_[sides, np.full(len(more), side)]
         mesh.face_sets[name] = elements, sides

@@ -26,7 +26,9 @@ class Numbering:
         """That of some of the triangles, in the order of rows: indices, -1 for one that is new, or a mask."""
         if rows.dtype == bool:
             rows = np.flatnonzero(rows)
-        elements, faces = (np.where(rows >= 0, column[rows], 0) for column in (self.elements, self.faces))
+        elements, faces = (
+            np.where(rows >= 0, column[rows], 0) for column in (self.elements, self.faces)
+        )
         return replace(self, elements=elements, faces=faces)
 
 

@@ -24,7 +24,14 @@ FACES: dict[str, tuple[Face, ...]] = {
     "tetra": ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
     "pyramid": ((0, 1, 2, 3), (0, 4, 1), (1, 4, 2), (2, 4, 3), (3, 4, 0)),
     "wedge": ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)),
-    "hexahedron": ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)),
+    "hexahedron": (
+        (0, 1, 2, 3),
+        (4, 7, 6, 5),
+        (0, 4, 5, 1),
+        (1, 5, 6, 2),
+        (2, 6, 7, 3),
+        (3, 7, 4, 0),
+    ),
 }
 # Edges in the order of their mid-edge nodes, which follow the corners (VTK's and Abaqus's order).
 EDGES: dict[str, tuple[Face, ...]] = {
@@ -92,11 +99,16 @@ def surface_of(mesh: Elements) -> RawMesh:
     soup, groups, notes = [], [], list(mesh.notes)
     order, origins = [], []
     for n in (3, 4):
-        shells, solids = _polygons(mesh, n, SHELLS), _polygons(mesh, n, tuple(set(FACES) - set(SHELLS)))
+        shells, solids = (
+            _polygons(mesh, n, SHELLS),
+            _polygons(mesh, n, tuple(set(FACES) - set(SHELLS))),
+        )
         if any(block.kind not in SHELLS for block in mesh.blocks):
             faces, inside = _coated(_skin(solids, mesh.points, mesh.blocks), shells)
             if inside:
-                notes.append(f"left out {inside} shell elements that are not on the skin of the solid elements")
+                notes.append(
+                    f"left out {inside} shell elements that are not on the skin of the solid elements"
+                )
         else:
             faces = shells
         triangles, of_face = _triangulated(faces, mesh.points)
@@ -109,7 +121,9 @@ def surface_of(mesh: Elements) -> RawMesh:
     named = {name: mask for name, mask in masks.items() if mask.any()}
     elements, sides = np.concatenate(origins)[sequence].T
     numbering = Numbering(elements, sides.astype(np.int8), mesh.own, mesh.instance)
-    return RawMesh(np.concatenate(soup)[sequence].reshape(-1, 3, 3), named, None, tuple(notes), numbering)
+    return RawMesh(
+        np.concatenate(soup)[sequence].reshape(-1, 3, 3), named, None, tuple(notes), numbering
+    )
 
 
 def _origin(mesh: Elements, faces: _Polygons) -> tuple[np.ndarray, np.ndarray]:
@@ -134,7 +148,15 @@ def _polygons(mesh: Elements, n: int, kinds: tuple[str, ...]) -> _Polygons:
         for side, face in enumerate(FACES[block.kind]):
             if len(face) == n and block.kind in kinds:
                 full = np.full_like(number, side)
-                rows.append((block.nodes[:, face], _mids(block, face), number, full, np.full_like(number, NONE)))
+                rows.append(
+                    (
+                        block.nodes[:, face],
+                        _mids(block, face),
+                        number,
+                        full,
+                        np.full_like(number, NONE),
+                    )
+                )
     if not rows:
         return _Polygons(*np.zeros((2, 0, n), dtype=np.int64), *np.zeros((3, 0), dtype=np.int64))
     return _Polygons(*(np.concatenate(column) for column in zip(*rows, strict=True)))
@@ -151,11 +173,15 @@ def _mids(block: Block, face: Face) -> np.ndarray:
 
 def _skin(faces: _Polygons, points: np.ndarray, blocks: list[Block]) -> _Polygons:
     """The faces that belong to one solid only, facing away from it."""
-    _, same, times = np.unique(np.sort(faces.corners, axis=1), axis=0, return_inverse=True, return_counts=True)
+    _, same, times = np.unique(
+        np.sort(faces.corners, axis=1), axis=0, return_inverse=True, return_counts=True
+    )
     faces = faces.only(times[same.reshape(-1)] == 1)
     if not len(faces.corners):
         return faces
-    middle = np.concatenate([points[block.nodes[:, : CORNERS[block.kind]]].mean(axis=1) for block in blocks])
+    middle = np.concatenate(
+        [points[block.nodes[:, : CORNERS[block.kind]]].mean(axis=1) for block in blocks]
+    )
     at = points[faces.corners]
     across = np.cross(at[:, 1] - at[:, 0], at[:, -1] - at[:, 0])
     inward = np.einsum("ij,ij->i", across, at.mean(axis=1) - middle[faces.owner]) < 0.0
@@ -203,9 +229,13 @@ def _triangulated(faces: _Polygons, points: np.ndarray) -> tuple[np.ndarray, np.
     pieces = [_split(faces.corners[plain], plain, points)]
     if len(bent):
         corners, mids = faces.corners[bent], faces.mids[bent].copy()
-        missing = mids == NONE  # the corner itself stands in: the edge is straight, one triangle falls flat
+        missing = (
+            mids == NONE
+        )  # the corner itself stands in: the edge is straight, one triangle falls flat
         mids[missing] = corners[missing]
-        pieces += [(np.stack([corners[:, k], mids[:, k], mids[:, k - 1]], axis=1), bent) for k in range(n)]
+        pieces += [
+            (np.stack([corners[:, k], mids[:, k], mids[:, k - 1]], axis=1), bent) for k in range(n)
+        ]
         pieces.append(_split(mids, bent, points))
     triangles = np.concatenate([piece for piece, _ in pieces])
     of_face = np.concatenate([face for _, face in pieces])
@@ -214,7 +244,9 @@ def _triangulated(faces: _Polygons, points: np.ndarray) -> tuple[np.ndarray, np.
     return triangles[whole], of_face[whole]
 
 
-def _split(polygons: np.ndarray, of_face: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _split(
+    polygons: np.ndarray, of_face: np.ndarray, points: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Triangles as they are; quadrilaterals cut along the shorter diagonal."""
     if polygons.shape[1] == 3:
         return polygons, of_face

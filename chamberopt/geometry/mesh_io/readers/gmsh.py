@@ -46,7 +46,9 @@ class _Stream:
 
     def _take(self, count: int, kind: str) -> np.ndarray:
         if self.text:
-            taken = self.tokens[self.at : self.at + count].astype(np.float64 if kind == "f8" else np.int64)
+            taken = self.tokens[self.at : self.at + count].astype(
+                np.float64 if kind == "f8" else np.int64
+            )
             self.at += count
         else:
             size = count * int(kind[1])
@@ -95,16 +97,25 @@ class _Mesh:
 
 def read_gmsh(path: Path, content: bytes) -> RawMesh:
     """The surface in a .msh. Raises InputError for other versions and for elements that are not understood."""
-    found = re.match(rb"\s*\$MeshFormat\s+([\d.]+)\s+([01])\s+(\d+)[ \t]*\r?\n?(.{0,4})", content, re.S)
+    found = re.match(
+        rb"\s*\$MeshFormat\s+([\d.]+)\s+([01])\s+(\d+)[ \t]*\r?\n?(.{0,4})", content, re.S
+    )
     if not found or found[1] not in (b"2.2", b"2", b"4.1"):
         version = found[1].decode() if found else "?"
-        raise InputError(f"{path}: version {version} of Gmsh's format is not supported; save as 4.1 or 2.2")
+        raise InputError(
+            f"{path}: version {version} of Gmsh's format is not supported; save as 4.1 or 2.2"
+        )
     text = found[2] == b"0"
     order = "<" if found[4][:1] == b"\x01" else ">"
-    streams = {name: _Stream(path, body, text, order) for name, body in _sections(path, content).items()}
+    streams = {
+        name: _Stream(path, body, text, order) for name, body in _sections(path, content).items()
+    }
     mesh = _Mesh()
     (_read_2 if found[1][:1] == b"2" else _read_4)(streams, mesh)
-    names = {(int(d), int(n)): name.decode("utf-8", "replace") for d, n, name in PHYSICAL.findall(_names(content))}
+    names = {
+        (int(d), int(n)): name.decode("utf-8", "replace")
+        for d, n, name in PHYSICAL.findall(_names(content))
+    }
     return surface_of(_elements(path, mesh, names))
 
 
@@ -120,7 +131,9 @@ def _sections(path: Path, content: bytes) -> dict[str, bytes]:
             continue
         end = content.rfind(f"$End{name}".encode())
         if end < 0:
-            raise InputError(f"{path}: truncated: ${name} has no $End{name}; export or copy it again")
+            raise InputError(
+                f"{path}: truncated: ${name} has no $End{name}; export or copy it again"
+            )
         sections[name] = content[start:end].partition(b"\n")[2]
     for name in ("Nodes", "Elements"):
         if name not in sections:
@@ -180,7 +193,9 @@ def _size(path: Path, kind: int) -> int:
     if kind in WITHOUT_SURFACE:
         return WITHOUT_SURFACE[kind]
     if kind not in TYPES:
-        raise InputError(f"{path}: elements of Gmsh's type {kind} are not supported; mesh with order 1 or 2")
+        raise InputError(
+            f"{path}: elements of Gmsh's type {kind} are not supported; mesh with order 1 or 2"
+        )
     return TYPES[kind][1]
 
 
@@ -197,7 +212,9 @@ def _elements(path: Path, mesh: _Mesh, names: dict[tuple[int, int], str]) -> Ele
             continue
         rows = numbered[:, 1:]
         own.append(numbered[:, 0])
-        at = by_number[np.minimum(np.searchsorted(numbers, rows, sorter=by_number), len(numbers) - 1)]
+        at = by_number[
+            np.minimum(np.searchsorted(numbers, rows, sorter=by_number), len(numbers) - 1)
+        ]
         if not np.array_equal(numbers[at], rows):
             raise InputError(f"{path}: an element names a node that is not there; export it again")
         name, dimension = TYPES[kind][0], 2 if TYPES[kind][0] in ("triangle", "quad") else 3

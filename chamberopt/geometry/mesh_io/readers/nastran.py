@@ -14,7 +14,14 @@ from pathlib import Path
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.geometry.mesh_io.readers.elements import CORNERS, EDGES, NONE, Block, Elements, surface_of
+from chamberopt.geometry.mesh_io.readers.elements import (
+    CORNERS,
+    EDGES,
+    NONE,
+    Block,
+    Elements,
+    surface_of,
+)
 from chamberopt.geometry.mesh_io.readers.raw_mesh import RawMesh
 
 KINDS = {
@@ -33,7 +40,9 @@ REFUSED = {
     "SPOINT": "remove it", "GRDSET": "write its values into each GRID",
     "CQUAD": "export CQUAD4 or CQUAD8", "CTRIAX6": "export a solid's surface",
 }  # fmt: skip
-WITHOUT_SURFACE = re.compile(r"C(BAR|BEAM|ROD|TUBE|BUSH|ELAS|DAMP|MASS|ONM|ONROD|GAP|WELD|FAST|VISC|BEND|SEAM|HBDY)")
+WITHOUT_SURFACE = re.compile(
+    r"C(BAR|BEAM|ROD|TUBE|BUSH|ELAS|DAMP|MASS|ONM|ONROD|GAP|WELD|FAST|VISC|BEND|SEAM|HBDY)"
+)
 SYSTEMS = ("CORD2R", "CORD2C", "CORD2S")
 KEPT = {"GRID", *KINDS, *SYSTEMS, *REFUSED}
 NUMBER = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+))(?:[ED]?([-+]?\d+))?$")
@@ -58,7 +67,9 @@ def read_nastran(path: Path, content: bytes) -> RawMesh:
         mesh = Elements(points, [])
         _add_elements(path, mesh, cards, row_of, _property_names(text), _sets(text))
     except (ValueError, IndexError) as error:
-        raise InputError(f"{path}: cannot be read as Nastran bulk data: {error}; export it again") from None
+        raise InputError(
+            f"{path}: cannot be read as Nastran bulk data: {error}; export it again"
+        ) from None
     mesh.notes += [f"left out {count} {name}: it has no surface" for name, count in passed.items()]
     return surface_of(mesh)
 
@@ -66,7 +77,9 @@ def read_nastran(path: Path, content: bytes) -> RawMesh:
 def _cards(text: str) -> Iterator[Card]:
     """Name, fields after the name, and line number of each card; continuation lines joined."""
     lines = text.splitlines()
-    start = next((k + 1 for k, line in enumerate(lines) if re.match(r"\s*BEGIN\s+BULK", line, re.I)), 0)
+    start = next(
+        (k + 1 for k, line in enumerate(lines) if re.match(r"\s*BEGIN\s+BULK", line, re.I)), 0
+    )
     name, fields, first = "", [], 0
     for number, line in enumerate(lines[start:], start=start + 1):
         line = line.split("$")[0].rstrip()
@@ -124,7 +137,9 @@ def _points(path: Path, cards: dict[str, list[Card]]) -> tuple[np.ndarray, dict[
         number = _whole(fields[0], line, "GRID's number")
         points[row] = [_number(text, line, "a GRID coordinate") for text in fields[2:5]]
         if (points[row] != points[row_of.setdefault(number, row)]).any():
-            raise ValueError(f"line {line}: GRID {number} is given twice, at two places; give each number once")
+            raise ValueError(
+                f"line {line}: GRID {number} is given twice, at two places; give each number once"
+            )
         if fields[1] not in ("", "0"):
             own[_whole(fields[1], line, "GRID's coordinate system")].append(row)
     for system, rows in own.items():
@@ -137,7 +152,10 @@ class _Systems:
 
     def __init__(self, path: Path, cards: list[Card]) -> None:
         self.path = path
-        self.cards = {_whole(fields[0], line, f"{name}'s number"): (name, fields, line) for name, fields, line in cards}
+        self.cards = {
+            _whole(fields[0], line, f"{name}'s number"): (name, fields, line)
+            for name, fields, line in cards
+        }
         self.frames: dict[int, tuple[np.ndarray, np.ndarray]] = {0: (np.zeros(3), np.eye(3))}
 
     def basic(self, number: int, points: np.ndarray) -> np.ndarray:
@@ -154,12 +172,16 @@ class _Systems:
 
     def _frame(self, number: int, above: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
         if number in above or (number != 0 and number not in self.cards):
-            raise ValueError(f"coordinate system {number} is not defined; export it along with the mesh")
+            raise ValueError(
+                f"coordinate system {number} is not defined; export it along with the mesh"
+            )
         if number not in self.frames:
             _, fields, line = self.cards[number]
             parent = _whole(fields[1], line, "the reference system")
             self._frame(parent, (*above, number))
-            given = np.array([_number(text, line, "a coordinate") for text in fields[2:11]]).reshape(3, 3)
+            given = np.array(
+                [_number(text, line, "a coordinate") for text in fields[2:11]]
+            ).reshape(3, 3)
             a, b, c = self.basic(parent, given)
             z = (b - a) / np.linalg.norm(b - a)
             y = np.cross(z, c - a)
@@ -189,10 +211,14 @@ def _add_elements(
             for column, text in enumerate(fields[2 : 2 + count]):
                 grid = _whole(text, line, f"a grid of {card}")
                 if grid and grid not in row_of:
-                    raise ValueError(f"line {line}: {card} {numbers[-1]} names grid {grid}, which is not there")
+                    raise ValueError(
+                        f"line {line}: {card} {numbers[-1]} names grid {grid}, which is not there"
+                    )
                 nodes[row, column] = row_of[grid] if grid else NONE
             if (nodes[row, : CORNERS[kind]] == NONE).any():
-                raise ValueError(f"line {line}: {card} {numbers[-1]} has fewer than {CORNERS[kind]} corners")
+                raise ValueError(
+                    f"line {line}: {card} {numbers[-1]} has fewer than {CORNERS[kind]} corners"
+                )
         if len(nodes):
             mesh.blocks.append(Block(kind, nodes[:, REORDERED.get(kind, range(size))]))
     mesh.numbers = np.array(numbers, dtype=np.int64)

@@ -46,8 +46,14 @@ def read_ply(path: Path, content: bytes) -> RawMesh:
     if colours is None:
         return RawMesh(corners)
     kinds, of_triangle = np.unique(colours, axis=0, return_inverse=True)
-    names = [] if len(kinds) > MOST_COLOURS else ["#" + "".join(f"{int(c):02x}" for c in kind) for kind in kinds]
-    groups = {name: of_triangle.reshape(-1) == k for k, name in enumerate(names) if kinds[k, 0] >= 0}
+    names = (
+        []
+        if len(kinds) > MOST_COLOURS
+        else ["#" + "".join(f"{int(c):02x}" for c in kind) for kind in kinds]
+    )
+    groups = {
+        name: of_triangle.reshape(-1) == k for k, name in enumerate(names) if kinds[k, 0] >= 0
+    }
     return RawMesh(corners, groups)
 
 
@@ -59,7 +65,9 @@ def _require_all_lines(path: Path, content: bytes) -> None:
     said = sum(int(count) for count in re.findall(rb"^element\s+\S+\s+(\d+)", header, re.MULTILINE))
     there = sum(1 for line in body.splitlines() if line.strip())
     if there < said:
-        raise InputError(f"{path}: truncated: its header counts {said} lines and {there} are there; export it again")
+        raise InputError(
+            f"{path}: truncated: its header counts {said} lines and {there} are there; export it again"
+        )
 
 
 def _colours(mesh: Any) -> np.ndarray | None:
@@ -83,7 +91,9 @@ def read_3mf(path: Path, content: bytes) -> RawMesh:
         found = re.search(rb'<model[^>]*\bunit\s*=\s*"(\w+)"', archive.read(model))
     stated = found[1].decode().lower() if found else "millimeter"  # the specification's own default
     if stated not in THREEMF_UNITS:
-        raise InputError(f"{path}: its unit, {stated!r}, is not supported; export it in millimetres")
+        raise InputError(
+            f"{path}: its unit, {stated!r}, is not supported; export it in millimetres"
+        )
     return replace(joined(pieces), unit=THREEMF_UNITS[stated])
 
 
@@ -99,7 +109,9 @@ def read_step(path: Path, content: bytes) -> RawMesh:
     with tempfile.TemporaryDirectory() as folder:
         step, glb = Path(folder) / "part.step", Path(folder) / "part.glb"
         step.write_bytes(content)
-        work = "import sys, cascadio; cascadio.step_to_glb(*sys.argv[1:3], *map(float, sys.argv[3:]))"
+        work = (
+            "import sys, cascadio; cascadio.step_to_glb(*sys.argv[1:3], *map(float, sys.argv[3:]))"
+        )
         command = [sys.executable, "-c", work, str(step), str(glb), str(STEP_MM), str(STEP_RAD)]
         subprocess.run(command, capture_output=True, timeout=STEP_SECONDS, check=False)
         pieces = _placed(trimesh.load_scene(glb, process=False)) if glb.is_file() else []
@@ -125,7 +137,9 @@ def _placed(scene: Any) -> list[tuple[str, np.ndarray]]:
         mesh = scene.geometry[name]
         if not hasattr(mesh, "faces"):
             continue  # lines and points
-        vertices = np.asarray(mesh.vertices, dtype=np.float64) @ transform[:3, :3].T + transform[:3, 3]
+        vertices = (
+            np.asarray(mesh.vertices, dtype=np.float64) @ transform[:3, :3].T + transform[:3, 3]
+        )
         told = str(mesh.metadata.get("name") or node)
         pieces.append(("" if told.startswith("geometry_") else told, vertices[mesh.faces]))
     return pieces
@@ -138,12 +152,18 @@ def _whole_stl(path: Path, content: bytes) -> bytes:
     """
     if is_text_stl(content):
         if not content.rstrip().splitlines()[-1].strip().lower().startswith(b"endsolid"):
-            raise InputError(f"{path}: truncated, the last line is not 'endsolid'; export or copy it again")
+            raise InputError(
+                f"{path}: truncated, the last line is not 'endsolid'; export or copy it again"
+            )
         return content
     declared = int.from_bytes(content[80:84], "little")
     if len(content) < 84 or len(content) < 84 + 50 * declared:
         held = max(0, (len(content) - 84) // 50)
-        told = f"it says {declared} triangles and holds {held}" if len(content) >= 84 else "shorter than its header"
+        told = (
+            f"it says {declared} triangles and holds {held}"
+            if len(content) >= 84
+            else "shorter than its header"
+        )
         raise InputError(f"{path}: truncated or not an STL: {told}; export or copy it again")
     return content[: 84 + 50 * declared]
 
@@ -166,12 +186,16 @@ def read_obj(path: Path, content: bytes) -> RawMesh:
             try:
                 points.append([float(word) for word in words[:3]])
             except ValueError:
-                raise InputError(f"{path}: line {number}: 'v' with no number; export it again") from None
+                raise InputError(
+                    f"{path}: line {number}: 'v' with no number; export it again"
+                ) from None
         elif keyword == "f":
             try:
                 ring = [int(word.split("/")[0]) for word in words]
             except ValueError:
-                raise InputError(f"{path}: line {number}: 'f' with no number; export it again") from None
+                raise InputError(
+                    f"{path}: line {number}: 'f' with no number; export it again"
+                ) from None
             ring = [k - 1 if k > 0 else len(points) + k for k in ring]
             if len(ring) < 3 or min(ring) < 0:
                 raise InputError(
@@ -181,14 +205,27 @@ def read_obj(path: Path, content: bytes) -> RawMesh:
             fans.append(len(ring) - 2)
         elif keyword in ("o", "g", "usemtl"):
             names[keyword] = tuple(words) if keyword == "g" else (" ".join(words),)
-            runs.append((len(triangles), tuple(dict.fromkeys(name for kept in names.values() for name in kept))))
+            runs.append(
+                (
+                    len(triangles),
+                    tuple(dict.fromkeys(name for kept in names.values() for name in kept)),
+                )
+            )
     if triangles and max(map(max, triangles)) >= len(points):
-        raise InputError(f"{path}: truncated: a face names a vertex that is not there; export or copy it again")
-    corners = np.array(points, dtype=np.float64)[np.array(triangles)] if triangles else np.zeros((0, 3, 3))
+        raise InputError(
+            f"{path}: truncated: a face names a vertex that is not there; export or copy it again"
+        )
+    corners = (
+        np.array(points, dtype=np.float64)[np.array(triangles)]
+        if triangles
+        else np.zeros((0, 3, 3))
+    )
     groups: dict[str, np.ndarray] = {}
     ends = [start for start, _ in runs[1:]] + [len(triangles)]
     for (start, told), end in zip(runs, ends, strict=True) if runs else ():
         for name in told if end > start else ():
             groups.setdefault(name, np.zeros(len(triangles), dtype=bool))[start:end] = True
-    faces = Numbering(np.repeat(np.arange(1, len(fans) + 1), fans), np.zeros(len(triangles), dtype=np.int8))
+    faces = Numbering(
+        np.repeat(np.arange(1, len(fans) + 1), fans), np.zeros(len(triangles), dtype=np.int8)
+    )
     return RawMesh(corners, groups, numbering=faces)

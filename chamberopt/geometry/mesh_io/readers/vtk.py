@@ -19,7 +19,9 @@ KINDS = {
     12: "hexahedron", 25: "hexahedron", 29: "hexahedron", 33: "hexahedron",
 }  # fmt: skip
 WITHOUT_SURFACE = (0, 1, 2, 3, 4, 21, 35)  # points and lines
-MOST_NAMES = 64  # an integer cell field with more values than this numbers the cells rather than naming them
+MOST_NAMES = (
+    64  # an integer cell field with more values than this numbers the cells rather than naming them
+)
 
 
 def read_vtk(path: Path, content: bytes) -> RawMesh:
@@ -37,7 +39,10 @@ def read_vtk(path: Path, content: bytes) -> RawMesh:
         before, array = data.GetNumberOfVerts() + data.GetNumberOfLines(), data.GetPolys()
     else:
         array = data.GetCells()
-    offsets, nodes = vtk_to_numpy(array.GetOffsetsArray()), vtk_to_numpy(array.GetConnectivityArray())
+    offsets, nodes = (
+        vtk_to_numpy(array.GetOffsetsArray()),
+        vtk_to_numpy(array.GetConnectivityArray()),
+    )
     sizes = np.diff(offsets)
     if isinstance(data, vtkPolyData):
         types = np.select([sizes == 3, sizes == 4], [5, 9], 7)
@@ -52,7 +57,9 @@ def read_vtk(path: Path, content: bytes) -> RawMesh:
         if kind not in KINDS:
             told = f"cell {before + rows[0] + 1} is of VTK's type {kind} with {size} corners"
             raise InputError(f"{path}: {told}, which is not supported; make triangles of it")
-        made.blocks.append(Block(KINDS[kind], nodes[offsets[rows][:, None] + np.arange(size)].astype(np.int64)))
+        made.blocks.append(
+            Block(KINDS[kind], nodes[offsets[rows][:, None] + np.arange(size)].astype(np.int64))
+        )
         cells.append(before + rows)
     if cells:
         made.numbers = np.concatenate(cells) + 1
@@ -68,11 +75,17 @@ def _vtk_data(path: Path, content: bytes) -> Any:
 
     legacy = re.search(rb"^DATASET\s+(\w+)", content[:4096], re.M | re.I)
     xml = re.search(rb'<VTKFile[^>]*\btype\s*=\s*"(\w+)"', content[:4096])
-    holds = (legacy or xml)[1].decode().upper().replace("_", "") if legacy or xml else "nothing that is known"  # type: ignore[index]
+    holds = (
+        (legacy or xml)[1].decode().upper().replace("_", "")
+        if legacy or xml
+        else "nothing that is known"
+    )  # type: ignore[index]
     if holds not in ("POLYDATA", "UNSTRUCTUREDGRID"):
         raise InputError(f"{path}: holds {holds}; save a PolyData or an UnstructuredGrid")
     if xml:
-        reader: Any = vtkXMLPolyDataReader() if holds == "POLYDATA" else vtkXMLUnstructuredGridReader()
+        reader: Any = (
+            vtkXMLPolyDataReader() if holds == "POLYDATA" else vtkXMLUnstructuredGridReader()
+        )
         reader.SetFileName(str(path))
     else:
         reader = vtkPolyDataReader() if holds == "POLYDATA" else vtkUnstructuredGridReader()
@@ -89,7 +102,9 @@ def _vtk_data(path: Path, content: bytes) -> Any:
     finally:
         vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_WARNING)
     if troubles or reader.GetErrorCode():
-        raise InputError(f"{path}: cannot be read as VTK, it is damaged or truncated; export it again")
+        raise InputError(
+            f"{path}: cannot be read as VTK, it is damaged or truncated; export it again"
+        )
     return reader.GetOutputDataObject(0)
 
 

@@ -15,12 +15,16 @@ from chamberopt.output.vtp_files import CHAMBER, COVERAGE, pyvista, read_surface
 COLUMNS = 4  # results beside each other: more go below
 
 
-def coverage_picture(folders: Sequence[str | Path], titles: Sequence[str], picture: str | Path) -> str | None:
+def coverage_picture(
+    folders: Sequence[str | Path], titles: Sequence[str], picture: str | Path
+) -> str | None:
     """Draw the coverage of one result, or of several side by side on one colour scale, into a .png.
 
     folders: each with coverage.vtp and chamber.vtp. Returns None, or one line saying why there is no picture.
     """
-    return drawn_apart({"draw": "coverage", "folders": [str(f) for f in folders], "titles": list(titles)}, picture)
+    return drawn_apart(
+        {"draw": "coverage", "folders": [str(f) for f in folders], "titles": list(titles)}, picture
+    )
 
 
 def draw(job: dict[str, Any]) -> None:
@@ -31,7 +35,9 @@ def draw(job: dict[str, Any]) -> None:
     limits = colour_range(parts)
     single = len(folders) == 1
     plotter, place = panels(len(folders))
-    for column, (part, chamber, title) in enumerate(zip(parts, chambers, job["titles"], strict=True)):
+    for column, (part, chamber, title) in enumerate(
+        zip(parts, chambers, job["titles"], strict=True)
+    ):
         plotter.subplot(*place(0, column))
         in_chamber(plotter, part, chamber, title, limits, bar=False)
         plotter.subplot(*place(1, column))
@@ -46,12 +52,14 @@ def panels(count: int) -> tuple[Any, Callable[[int, int], tuple[int, int]]]:
     One result has its views beside each other, several below, in bands of COLUMNS results.
     """
     if count == 1:
-        return pyvista().Plotter(off_screen=True, shape=(1, 2), window_size=[1800, 900], border=False), lambda v, k: (
-            0,
-            v,
-        )
+        return pyvista().Plotter(
+            off_screen=True, shape=(1, 2), window_size=[1800, 900], border=False
+        ), lambda v, k: (0, v)
     columns, bands = min(count, COLUMNS), -(-count // COLUMNS)
     plotter = pyvista().Plotter(
-        off_screen=True, shape=(2 * bands, columns), window_size=[900 * columns, 1500 * bands], border=False
+        off_screen=True,
+        shape=(2 * bands, columns),
+        window_size=[900 * columns, 1500 * bands],
+        border=False,
     )
     return plotter, lambda view, k: (2 * (k // COLUMNS) + view, k % COLUMNS)

@@ -25,7 +25,10 @@ FEWEST, MOST = 200, 1500  # pixels of a side: to read the text by, and 1.6 GB
 LOW = 0.8  # height over width of pictures that are put one above the other
 BARE, GROUND, PLAIN = 0.0, np.array([0.72, 0.745, 0.77]), 1.0
 SHADE = 0.75  # of full light on what is seen at a slant
-RIM, RIM_SHADE = 0.8, 0.72  # share of a dent's radius from where it is drawn darker, to tell it from its neighbour
+RIM, RIM_SHADE = (
+    0.8,
+    0.72,
+)  # share of a dent's radius from where it is drawn darker, to tell it from its neighbour
 SEEN_RIMS = 12  # pixels across a dent from which rims are drawn
 LIGHT = 0.35  # of viridis, from where it cannot be taken for black
 
@@ -57,7 +60,9 @@ def dent_picture(maps: Sequence[DentMap], dents: Dents, title: str, picture: Pat
     legend = "black: not peened   grey: not in the target"
     text = "\n".join(fill(one, int(LETTERS * size[0])) for one in (title, legend))
     figure.suptitle(text, x=0.01, ha="left", fontsize=10, parse_math=False)
-    bar = figure.colorbar(ScalarMappable(limits, colours), ax=list(every), shrink=0.7, extend="both", pad=0.01)
+    bar = figure.colorbar(
+        ScalarMappable(limits, colours), ax=list(every), shrink=0.7, extend="both", pad=0.01
+    )
     bar.set_label("dent diameter [µm]")
     with whole_file(picture) as temporary:
         figure.savefig(temporary)
@@ -87,7 +92,9 @@ def image(one: DentMap, dents: Dents, colours: Colormap, limits: Any) -> np.ndar
     dented = one.dent >= 0
     bright = light[dented]
     across = 2.0 * dents.radius[one.dent[dented]] / (FINER * one.view.pixel)
-    bright = bright * np.where((one.off[dented] > RIM) & (across > SEEN_RIMS), RIM_SHADE, 1.0)[:, None]
+    bright = (
+        bright * np.where((one.off[dented] > RIM) & (across > SEEN_RIMS), RIM_SHADE, 1.0)[:, None]
+    )
     picture[dented] = colours(limits(2e6 * dents.radius[one.dent[dented]]))[:, :3] * bright
     rows, columns = (FINER * (side // FINER) for side in one.view.shape)
     blocks = picture[:rows, :columns].reshape(rows // FINER, FINER, columns // FINER, FINER, 3)
@@ -102,5 +109,12 @@ def _scale(axes: Any, one: DentMap) -> None:
     length = max(step * 10.0 ** np.floor(np.log10(wanted)) for step in (0.5, 1.0, 2.0, 5.0) if
                  step * 10.0 ** np.floor(np.log10(wanted)) <= wanted)  # fmt: skip
     low = rows * 1.015
-    axes.plot([0, length / pixel_mm], [low, low], color="black", lw=2, clip_on=False, solid_capstyle="butt")
+    axes.plot(
+        [0, length / pixel_mm],
+        [low, low],
+        color="black",
+        lw=2,
+        clip_on=False,
+        solid_capstyle="butt",
+    )
     axes.text(0, low + 0.008 * rows, f"{length:g} mm", va="top", fontsize=9)

@@ -19,7 +19,9 @@ COLOURS = "PuOr"
 PALE, NO_TARGET = "#e6e9ec", "#a9b0b7"
 
 
-def write_differences(path: Path, part: Path, columns: Sequence[tuple[np.ndarray, np.ndarray]]) -> None:
+def write_differences(
+    path: Path, part: Path, columns: Sequence[tuple[np.ndarray, np.ndarray]]
+) -> None:
     """The part [mm] of a coverage.vtp, with cell data difference_K [%-points] and real_K, K = 1 the second candidate.
 
     columns: of each later one, value (m,) -1..1, NaN off the target, and real (m,) bool.
@@ -33,12 +35,16 @@ def write_differences(path: Path, part: Path, columns: Sequence[tuple[np.ndarray
         surface.save(temporary)
 
 
-def difference_picture(surface: str | Path, titles: Sequence[str], picture: str | Path) -> str | None:
+def difference_picture(
+    surface: str | Path, titles: Sequence[str], picture: str | Path
+) -> str | None:
     """Draw what write_differences wrote, from two sides, each candidate with its title and all on one scale.
 
     Returns None, or one line saying why there is no picture.
     """
-    return drawn_apart({"draw": "difference", "surface": str(surface), "titles": list(titles)}, picture)
+    return drawn_apart(
+        {"draw": "difference", "surface": str(surface), "titles": list(titles)}, picture
+    )
 
 
 def draw(job: dict[str, Any]) -> None:
@@ -56,7 +62,11 @@ def draw(job: dict[str, Any]) -> None:
             else:
                 text = "violet: more coverage   orange: less   pale: within the noise   grey: not in the target"
                 plotter.add_text(text, position="lower_left", font_size=9, color=DARK)
-            plotter.camera_position = [(-side, 1.4 * side, 0.8 * side), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
+            plotter.camera_position = [
+                (-side, 1.4 * side, 0.8 * side),
+                (0.0, 0.0, 0.0),
+                (0.0, 0.0, 1.0),
+            ]
             wanted = surface.extract_cells(np.isfinite(surface[f"difference_{k + 1}"]))
             plotter.reset_camera(bounds=wanted.bounds)
             plotter.enable_anti_aliasing("ssaa")
@@ -87,7 +97,10 @@ def _show(plotter: Any, surface: Any, k: int, reach: float, bar: bool) -> None:
 
 def _reach(surface: Any, count: int) -> float:
     """How far the scale goes to each side: a round number that holds nearly all of what is real, %-points."""
-    real = [np.abs(surface[f"difference_{k}"])[np.asarray(surface[f"real_{k}"]) > 0] for k in range(1, count + 1)]
+    real = [
+        np.abs(surface[f"difference_{k}"])[np.asarray(surface[f"real_{k}"]) > 0]
+        for k in range(1, count + 1)
+    ]
     values = np.concatenate(real)
     if not len(values):
         return 5.0

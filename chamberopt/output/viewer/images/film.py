@@ -23,7 +23,9 @@ def film_path(film: str | Path) -> Path:
     """Where a film may be written. InputError for what is no .gif or .mp4, in no folder, or cannot be written here."""
     path = file_path(film, (".gif", ".mp4"), "films are written as .gif or .mp4")
     if path.suffix.lower() == ".mp4" and find_spec("imageio_ffmpeg") is None:
-        raise InputError(f"{path}: .mp4 needs a further package: pip install 'chamberopt[mp4]', or write a .gif")
+        raise InputError(
+            f"{path}: .mp4 needs a further package: pip install 'chamberopt[mp4]', or write a .gif"
+        )
     return path
 
 
@@ -37,7 +39,9 @@ def require_playable(fps: int, size: tuple[int, int], frames: int, path: Path) -
         raise InputError(f"--size: given {size[0]} {size[1]}; for .mp4 give multiples of {BLOCK}")
     most = MOST_PIXELS // (size[0] * size[1])
     if frames > most:
-        raise InputError(f"--frames: given {frames}; at most {most} are supported at {size[0]} x {size[1]} pixels")
+        raise InputError(
+            f"--frames: given {frames}; at most {most} are supported at {size[0]} x {size[1]} pixels"
+        )
 
 
 def write_film(path: Path, frames: Sequence[np.ndarray], fps: int) -> None:
@@ -48,7 +52,9 @@ def write_film(path: Path, frames: Sequence[np.ndarray], fps: int) -> None:
         else:
             import imageio.v2 as imageio
 
-            imageio.mimwrite(temporary, list(frames), fps=fps, codec="libx264", quality=7, macro_block_size=BLOCK)
+            imageio.mimwrite(
+                temporary, list(frames), fps=fps, codec="libx264", quality=7, macro_block_size=BLOCK
+            )
 
 
 def _write_gif(path: Path, frames: Sequence[np.ndarray], fps: int) -> None:
@@ -56,9 +62,18 @@ def _write_gif(path: Path, frames: Sequence[np.ndarray], fps: int) -> None:
 
     some = [frames[k] for k in np.unique(np.linspace(0, len(frames) - 1, SAMPLED).astype(int))]
     palette = Image.fromarray(_fair_share(some)).quantize(COLOURS, method=Image.Quantize.MEDIANCUT)
-    images = [Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
+    images = [
+        Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
+        for frame in frames
+    ]
     images[0].save(
-        path, save_all=True, append_images=images[1:], duration=round(1000 / fps), loop=0, optimize=True, disposal=1
+        path,
+        save_all=True,
+        append_images=images[1:],
+        duration=round(1000 / fps),
+        loop=0,
+        optimize=True,
+        disposal=1,
     )
 
 

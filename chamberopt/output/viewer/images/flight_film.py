@@ -34,7 +34,12 @@ FEW = 2000  # balls that are drawn round; of more, with fewer sides
 
 
 def replay(
-    result: Path, seen: Flight, film: Path, fps: int, size: tuple[int, int], view: tuple[float, float, float] = EYE
+    result: Path,
+    seen: Flight,
+    film: Path,
+    fps: int,
+    size: tuple[int, int],
+    view: tuple[float, float, float] = EYE,
 ) -> str | None:
     """Draw a flight into a .gif or .mp4, fps frames a second. None, or one line saying why there is no film.
 
@@ -43,7 +48,9 @@ def replay(
     """
     slower = (len(seen.time) - 1) / (fps * (seen.time[-1] - seen.time[0]))
     face = (
-        f"± {1e6 * seen.amplitude:g} µm, to scale" if seen.sonotrodes else "drawn still: no ball meets it at one phase"
+        f"± {1e6 * seen.amplitude:g} µm, to scale"
+        if seen.sonotrodes
+        else "drawn still: no ball meets it at one phase"
     )
     title = f"{result.resolve().name}   slowed {slower:.3g} times   sonotrode {face}   magenta: has just hit the part"
     with tempfile.TemporaryDirectory() as folder:
@@ -77,7 +84,9 @@ def draw(job: dict[str, Any]) -> None:
 class _Stage:
     """The chamber with everything in it, as it is in one frame after another."""
 
-    def __init__(self, plotter: Any, folder: Path, flight: dict[str, np.ndarray], job: dict[str, Any]) -> None:
+    def __init__(
+        self, plotter: Any, folder: Path, flight: dict[str, np.ndarray], job: dict[str, Any]
+    ) -> None:
         self.plotter, self.flight = plotter, flight
         self.step = float(flight["time"][1] - flight["time"][0])
         chamber, part = read_surface(folder / CHAMBER), read_surface(folder / COVERAGE)
@@ -85,9 +94,14 @@ class _Stage:
         plotter.remove_all_lights()
         plotter.add_light(pyvista().Light(light_type="headlight"))
         self.sonotrodes, _ = room(plotter, chamber)
-        self.plain = np.where((np.asarray(part["target"]) > 0)[:, None], TARGET, REST).astype(np.uint8)
+        self.plain = np.where((np.asarray(part["target"]) > 0)[:, None], TARGET, REST).astype(
+            np.uint8
+        )
         part["colour"] = self.plain.copy()
-        self.surface, self.part = part, plotter.add_mesh(part, scalars="colour", rgb=True, ambient=0.4, diffuse=0.6)
+        self.surface, self.part = (
+            part,
+            plotter.add_mesh(part, scalars="colour", rgb=True, ambient=0.4, diffuse=0.6),
+        )
         sides = 20 if len(flight["diameter"]) < FEW else 8
         self.ball = pyvista().Sphere(radius=0.5, theta_resolution=sides, phi_resolution=sides)
         self.disc = pyvista().Disc(inner=0.0, outer=1.0, normal=(1.0, 0.0, 0.0), r_res=1, c_res=16)
@@ -118,11 +132,18 @@ class _Stage:
         self._dents("new dents", fresh, HIT, pose)
         trail = flight["trail"][max(0, number - TAIL + 1) : number + 1].reshape(-1, 3)
         trail = trail[np.isfinite(trail[:, 0])]
-        self._replace("trails", pyvista().PolyData(trail * MM) if len(trail) else None, color=TRAIL, point_size=2.0)
+        self._replace(
+            "trails",
+            pyvista().PolyData(trail * MM) if len(trail) else None,
+            color=TRAIL,
+            point_size=2.0,
+        )
         impacts = int((flight["hit_time"] <= now).sum())
         clock = f"{1e3 * now:.3f} ms after the warm-up   {impacts} impacts on the part, {int(there.sum())} dents"
         text = as_it_stands(f"{clock} since {1e3 * flight['time'][0]:g} ms\n{self.title}")
-        self.plotter.add_text(text, position="lower_left", font_size=8, color=DARK, name="clock", render=False)
+        self.plotter.add_text(
+            text, position="lower_left", font_size=8, color=DARK, name="clock", render=False
+        )
         self.plotter.render()
 
     def _balls(self, name: str, number: int, chosen: np.ndarray, colour: str) -> None:
@@ -148,7 +169,9 @@ class _Stage:
         if mesh is None:
             self.plotter.remove_actor(name, render=False)
         else:
-            self.plotter.add_mesh(mesh, name=name, reset_camera=False, show_scalar_bar=False, render=False, **style)
+            self.plotter.add_mesh(
+                mesh, name=name, reset_camera=False, show_scalar_bar=False, render=False, **style
+            )
 
 
 def turn_matrix(point: np.ndarray, axis: np.ndarray, angle: float) -> np.ndarray:

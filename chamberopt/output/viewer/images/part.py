@@ -36,10 +36,13 @@ def part_picture(
     with tempfile.TemporaryDirectory() as folder:
         part = Path(folder) / "part.npz"
         marked, missed = (
-            np.zeros(len(corners), dtype=bool) if chosen is None else chosen for chosen in (marked, missed)
+            np.zeros(len(corners), dtype=bool) if chosen is None else chosen
+            for chosen in (marked, missed)
         )
         edges = np.zeros((0, 2, 3)) if edges is None else edges
-        np.savez(part, corners=corners * MM, marked=marked & ~missed, missed=missed, edges=edges * MM)
+        np.savez(
+            part, corners=corners * MM, marked=marked & ~missed, missed=missed, edges=edges * MM
+        )
         job = {"draw": "part", "part": str(part), "title": title}
         if chamber is not None:
             write_chamber(Path(folder), chamber)
@@ -50,8 +53,15 @@ def part_picture(
 def draw(job: dict[str, Any]) -> None:
     """The part's surface from two opposite sides, edges shining through it, where there are any; and in its chamber."""
     with np.load(job["part"]) as data:
-        corners, marked, missed, edges = data["corners"], data["marked"], data["missed"], data["edges"]
-    surface = pyvista().PolyData.from_regular_faces(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
+        corners, marked, missed, edges = (
+            data["corners"],
+            data["marked"],
+            data["missed"],
+            data["edges"],
+        )
+    surface = pyvista().PolyData.from_regular_faces(
+        corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
+    )
     lines = pyvista().line_segments_from_points(edges.reshape(-1, 3)) if len(edges) else None
     cavity = read_surface(Path(job["chamber"])) if "chamber" in job else None
     views = (1.0, -1.0) if cavity is None else (1.0, -1.0, 0.0)
@@ -66,12 +76,20 @@ def draw(job: dict[str, Any]) -> None:
             side = 1.0
         for chosen, colour in ((~(marked | missed), GREY), (marked, SONOTRODE), (missed, FAULT)):
             if chosen.any():
-                plotter.add_mesh(surface.extract_cells(chosen), color=colour, opacity=1.0 if lines is None else 0.35)
+                plotter.add_mesh(
+                    surface.extract_cells(chosen),
+                    color=colour,
+                    opacity=1.0 if lines is None else 0.35,
+                )
         if lines is not None:
             plotter.add_mesh(lines, color=FAULT, line_width=6, lighting=False)
         if column == 0:
             plotter.add_text(job["title"], position="upper_left", font_size=11, color=DARK)
-        plotter.camera_position = [(side, -1.6 * side, 0.7 * side), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
+        plotter.camera_position = [
+            (side, -1.6 * side, 0.7 * side),
+            (0.0, 0.0, 0.0),
+            (0.0, 0.0, 1.0),
+        ]
         plotter.reset_camera()
         plotter.enable_anti_aliasing("ssaa")
     with whole_file(Path(job["picture"])) as temporary:

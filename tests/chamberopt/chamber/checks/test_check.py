@@ -22,7 +22,9 @@ DESIGNS = Path(__file__).resolve().parents[4] / "designs"
 
 @cache
 def made(name: str, **values: float) -> tuple[Design, Chamber]:
-    design = load_design(DESIGNS / f"{name}.toml").with_values({k.replace("__", "."): v for k, v in values.items()})
+    design = load_design(DESIGNS / f"{name}.toml").with_values(
+        {k.replace("__", "."): v for k, v in values.items()}
+    )
     return design, build_chamber(design)
 
 
@@ -47,7 +49,9 @@ def described(design: Design, chamber: Chamber) -> dict[str, Any]:
 
 
 def without_gravity(design: Design) -> Design:
-    return design.model_copy(update={"effects": design.effects.model_copy(update={"gravity": False})})
+    return design.model_copy(
+        update={"effects": design.effects.model_copy(update={"gravity": False})}
+    )
 
 
 @pytest.fixture(scope="module")
@@ -75,8 +79,16 @@ def test_slopes_are_a_note_and_no_warning() -> None:
     design, chamber = made("blade")
     assert not ledges(design, chamber)
     data = design.model_dump()
-    data["chamber"] = {"shape": "prism", "sides": 6, "across_mm": 50.0, "height_mm": 57.0, "inclination_deg": 10.0}
-    leaning = checked(Design, {**data, "chamber": {**data["chamber"], "sonotrode_distance_mm": 15.0}})
+    data["chamber"] = {
+        "shape": "prism",
+        "sides": 6,
+        "across_mm": 50.0,
+        "height_mm": 57.0,
+        "inclination_deg": 10.0,
+    }
+    leaning = checked(
+        Design, {**data, "chamber": {**data["chamber"], "sonotrode_distance_mm": 15.0}}
+    )
     assert not ledges(leaning, build_chamber(leaning))
     profile = [[24, 0], [24, 12], [28, 8], [32, 12], [32, 57]]
     data["chamber"] = {"shape": "revolve", "profile_mm": profile, "sonotrode_distance_mm": 15.0}
@@ -118,25 +130,36 @@ def test_a_part_that_turns_down_to_the_sonotrode_is_warned_of() -> None:
     eccentric = {"effects.part_turn.through_mm.1": -6.9}
     design, chamber = made("gear_turning")
     said = " ".join(warned(design.with_values(eccentric), chamber))
-    assert "the gap between turning part and sonotrode is 1.16 mm, narrower than a ball of 1.5 mm" in said
+    assert (
+        "the gap between turning part and sonotrode is 1.16 mm, narrower than a ball of 1.5 mm"
+        in said
+    )
     assert "turning part" not in " ".join(warned(design, chamber))
     # 5 degrees to each side, a point 22 mm under the gear's axis hardly gets lower than at rest
     swings = design.with_values(eccentric)
-    motion = swings.effects.part_turn.model_copy(update={"rpm": None, "angle_deg": 5.0, "frequency_hz": 1.0})  # type: ignore[union-attr]
-    swings = swings.model_copy(update={"effects": swings.effects.model_copy(update={"part_turn": motion})})
+    motion = swings.effects.part_turn.model_copy(
+        update={"rpm": None, "angle_deg": 5.0, "frequency_hz": 1.0}
+    )  # type: ignore[union-attr]
+    swings = swings.model_copy(
+        update={"effects": swings.effects.model_copy(update={"part_turn": motion})}
+    )
     assert "turning part" not in " ".join(warned(swings, chamber))
 
 
 def test_balls_that_would_meet_but_are_let_through_each_other_are_warned_of() -> None:
     design, chamber = made("gear")
-    through = design.model_copy(update={"effects": design.effects.model_copy(update={"ball_collisions": False})})
+    through = design.model_copy(
+        update={"effects": design.effects.model_copy(update={"ball_collisions": False})}
+    )
     assert any("effects.ball_collisions is false" in text for text in warned(through, chamber))
     assert not any("ball_collisions" in text for text in warned(design, chamber))
     alone = through.with_values({"shot.mass_g": 1e-3 * round(1e6 * design.shot.ball_mass)})
     assert not any("ball_collisions" in text for text in warned(alone, chamber))
 
 
-def test_what_a_ball_can_touch_is_a_fact_and_what_it_cannot_a_warning(gear: tuple[Design, Chamber]) -> None:
+def test_what_a_ball_can_touch_is_a_fact_and_what_it_cannot_a_warning(
+    gear: tuple[Design, Chamber],
+) -> None:
     design, chamber = gear
     facts = described(design, chamber)
     reach = facts["reach"]
@@ -144,7 +167,9 @@ def test_what_a_ball_can_touch_is_a_fact_and_what_it_cannot_a_warning(gear: tupl
     assert reach["target_reachable_mm2"] == pytest.approx(
         reach["target_reachable_share"] * facts["target"]["exposed_area_mm2"], rel=1e-3
     )
-    (said,) = (text for text in facts["warnings"] if "cannot be touched by a ball of 1.5 mm" in text)
+    (said,) = (
+        text for text in facts["warnings"] if "cannot be touched by a ball of 1.5 mm" in text
+    )
     share = 100.0 * (1.0 - reach["target_reachable_share"])
     assert float(said.split("%")[0]) == pytest.approx(share, abs=0.1)
     assert 5.0 < share < 25.0  # the sharp roots of the teeth
@@ -153,11 +178,18 @@ def test_what_a_ball_can_touch_is_a_fact_and_what_it_cannot_a_warning(gear: tupl
 
 
 def test_a_gap_too_low_for_a_ball_is_warned_of_with_its_place_and_width() -> None:
-    (said,) = (text for text in warned(*made("gear", chamber__height_mm=26.0)) if "the gap between" in text)
+    (said,) = (
+        text for text in warned(*made("gear", chamber__height_mm=26.0)) if "the gap between" in text
+    )
     assert "the gap between the ceiling and the part's upper side at (" in said
     assert ", 25.5) mm is 1 to 1.0" in said
-    assert "narrower than a ball of 1.5 mm: no ball gets in there; raise chamber.height_mm or close the gap" in said
-    (said,) = (text for text in warned(*made("gear", chamber__diameter_mm=46.0)) if "gaps between" in text)
+    assert (
+        "narrower than a ball of 1.5 mm: no ball gets in there; raise chamber.height_mm or close the gap"
+        in said
+    )
+    (said,) = (
+        text for text in warned(*made("gear", chamber__diameter_mm=46.0)) if "gaps between" in text
+    )
     assert said.startswith("each of 20 gaps between the part's side and the wall, one at (")
     assert "no ball gets in there; enlarge the chamber" in said
 
@@ -166,11 +198,18 @@ def test_a_chamber_that_leaks_is_refused_with_the_place(gear: tuple[Design, Cham
     design, chamber = gear
     assert described(design, chamber)["chamber"]["closed"] == "yes"
     gone = int((chamber.tags == TAG_SONOTRODE).argmax())
-    columns = {name: np.delete(getattr(chamber, name), gone, axis=0) for name in ("triangles", "tags", "source")}
+    columns = {
+        name: np.delete(getattr(chamber, name), gone, axis=0)
+        for name in ("triangles", "tags", "source")
+    }
     corners = chamber.vertices[chamber.triangles[gone]]
-    with pytest.raises(SceneError, match=r"mesh is not closed: 3 open edge\(s\), the first on triangle") as refused:
+    with pytest.raises(
+        SceneError, match=r"mesh is not closed: 3 open edge\(s\), the first on triangle"
+    ) as refused:
         describe(design, replace(chamber, **columns))
-    place = np.array([float(x) for x in str(refused.value).split("at [")[1].split("]")[0].split(",")])
+    place = np.array(
+        [float(x) for x in str(refused.value).split("at [")[1].split("]")[0].split(",")]
+    )
     middles = 0.5 * (corners + np.roll(corners, -1, axis=0))
     assert np.linalg.norm(middles - place, axis=1).min() < 2e-6
 
@@ -182,6 +221,8 @@ def test_a_sonotrode_that_comes_near_the_part_is_warned_of(gear: tuple[Design, C
     floor = np.unique(chamber.triangles[chamber.tags == TAG_SONOTRODE])
     vertices = chamber.vertices.copy()
     vertices[floor, 2] = 14.7e-3
-    (said,) = (text for text in warned(design, replace(chamber, vertices=vertices)) if "apart" in text)
+    (said,) = (
+        text for text in warned(design, replace(chamber, vertices=vertices)) if "apart" in text
+    )
     assert "part and sonotrode are only 0.3 mm apart, less than ten amplitudes of 40 µm" in said
     assert "chamber.sonotrode_distance_mm" in said

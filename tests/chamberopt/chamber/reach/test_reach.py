@@ -100,7 +100,9 @@ def test_a_groove_is_touched_down_to_where_the_ball_lies_on_both_flanks(half_ang
     groove = prism([(-half, 10.0), (half, 10.0), (0.0, 10.0 + deep)], 20.0)
     chamber = cavity(ROOM, groove)
     found = reached(chamber)
-    flanks = (found.mesh.tags[found.touches.triangle] == TAG_PART) & (np.abs(found.touches.normal[:, 1]) < 0.5)
+    flanks = (found.mesh.tags[found.touches.triangle] == TAG_PART) & (
+        np.abs(found.touches.normal[:, 1]) < 0.5
+    )
     # a reach into the other flank of FORGIVEN r lets the ball that much / sin(2a) further down
     first = 1.5 / np.tan(a) - FORGIVEN * 1.5 / np.sin(2 * a)
     wide = 20.0 - 2 * 1.5 * (1.0 - FORGIVEN)
@@ -115,7 +117,12 @@ def test_a_groove_is_touched_down_to_where_the_ball_lies_on_both_flanks(half_ang
 def pocket(neck_mm: float) -> Chamber:
     """A room of 8 x 20 x 8 mm above, through a square neck 2 mm long."""
     n = neck_mm / 2
-    return cavity(ROOM, block((-n, 10 - n, 9), (n, 10 + n, 13)), block((-4, 0, 12), (4, 20, 20)), above_mm=12.5)
+    return cavity(
+        ROOM,
+        block((-n, 10 - n, 9), (n, 10 + n, 13)),
+        block((-4, 0, 12), (4, 20, 20)),
+        above_mm=12.5,
+    )
 
 
 @pytest.mark.parametrize(("neck", "open_"), [(2.9, False), (3.05, True), (3.6, True)])
@@ -175,7 +182,9 @@ def test_smaller_balls_reach_more_of_a_gear() -> None:
     mesh = chamber_mesh(chamber)
     count = len(chamber.part.triangles)
     target = chamber.part.target
-    shares = [part_share(reach(mesh, d), chamber.source, count)[target] for d in (1e-3, 1.5e-3, 4e-3)]
+    shares = [
+        part_share(reach(mesh, d), chamber.source, count)[target] for d in (1e-3, 1.5e-3, 4e-3)
+    ]
     weights = chamber.exposed_area[target]
     means = [np.average(share, weights=weights) for share in shares]
     assert all(more > less + 0.02 for more, less in pairwise(means)), means
@@ -194,4 +203,6 @@ def test_no_impact_falls_where_no_ball_is_said_to_reach() -> None:
     normal = -area_vectors(mesh.vertices, mesh.triangles)[impacts.triangle]
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     radius = 0.5 * design.shot.diameter
-    assert (largest_balls(mesh, impacts.position, normal, 2 * radius, FORGIVEN * radius)[0] >= radius).all()
+    assert (
+        largest_balls(mesh, impacts.position, normal, 2 * radius, FORGIVEN * radius)[0] >= radius
+    ).all()

@@ -26,7 +26,9 @@ from chamberopt.simulation.evaluate import evaluate
 from tests.chamberopt.optimize.test_run_sweep import rows, small_study
 from tests.helpers import worker_jobs
 
-distributed = pytest.importorskip("distributed", reason="Dask is not installed: pip install 'chamberopt[dask]'")
+distributed = pytest.importorskip(
+    "distributed", reason="Dask is not installed: pip install 'chamberopt[dask]'"
+)
 
 ROOT = Path(__file__).parents[4]
 
@@ -44,8 +46,19 @@ class Dask:
 
     def start(self, *words: str) -> subprocess.Popen:
         log = open(self.folder / f"{words[0]}-{len(self.programs)}.log", "wb")  # noqa: SIM115
-        command = [sys.executable, "-m", "dask", *words, "--scheduler-file", str(self.scheduler_file), "--no-dashboard"]
-        setting = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])}
+        command = [
+            sys.executable,
+            "-m",
+            "dask",
+            *words,
+            "--scheduler-file",
+            str(self.scheduler_file),
+            "--no-dashboard",
+        ]
+        setting = {
+            **os.environ,
+            "PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]),
+        }
         program = subprocess.Popen(command, stdout=log, stderr=log, env=setting, cwd=self.folder)
         log.close()
         self.programs.append(program)
@@ -116,7 +129,9 @@ def test_a_killed_worker_costs_its_task_only(dask: Dask, tmp_path: Path) -> None
 
 
 def test_a_sweep_goes_on_when_a_worker_is_killed(dask: Dask, tmp_path: Path) -> None:
-    question = Study(design=load_design(ROOT / "designs" / "gear.toml"), vary={"shot.mass_g": (2.0, 10.0)})
+    question = Study(
+        design=load_design(ROOT / "designs" / "gear.toml"), vary={"shot.mass_g": (2.0, 10.0)}
+    )
     plan = plan_sweep(question, 40, None)
     run_sweep(question, plan, tmp_path / "serial", SerialExecutor(), None, worker_jobs.hill)
     done = []
@@ -140,7 +155,10 @@ def test_the_same_bits_as_on_this_machine(dask: Dask, tmp_path: Path) -> None:
     plan = plan_sweep(question, None, 4)
     chamber = build_chamber(question.design)
     evaluations = []
-    for name, executor in (("serial", SerialExecutor()), ("cluster", Cluster(str(dask.scheduler_file)))):
+    for name, executor in (
+        ("serial", SerialExecutor()),
+        ("cluster", Cluster(str(dask.scheduler_file))),
+    ):
         with executor:
             run_sweep(question, plan, tmp_path / name, executor)
             evaluations.append(evaluate(question.design, chamber, executor, replicas=5))
@@ -155,7 +173,14 @@ def test_a_scheduler_that_is_not_there_is_status_2(tmp_path: Path, capsys, monke
     with socket.socket() as closed:
         closed.bind(("127.0.0.1", 0))
         address = f"tcp://127.0.0.1:{closed.getsockname()[1]}"
-        command = ["simulate", str(ROOT / "designs" / "plate.toml"), "--cluster", address, "--out", str(tmp_path / "o")]
+        command = [
+            "simulate",
+            str(ROOT / "designs" / "plate.toml"),
+            "--cluster",
+            address,
+            "--out",
+            str(tmp_path / "o"),
+        ]
         assert main(command) == 2
     said = capsys.readouterr().err
     assert f"--cluster: no scheduler answers at {address} within 0.5 s" in said
@@ -175,10 +200,16 @@ def test_a_scheduler_without_workers_is_said(tmp_path: Path) -> None:
         alone.end()
 
 
-def test_another_version_on_a_worker_is_refused(dask: Dask, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_version_on_a_worker_is_refused(
+    dask: Dask, monkeypatch: pytest.MonkeyPatch
+) -> None:
     real = dask_cluster.fingerprint()
-    monkeypatch.setattr(dask_cluster, "version", lambda name: "0.0" if name == "numba" else real[name])
-    with pytest.raises(InputError, match=rf"numba {real['numba']} \(0\.0 here\): figures could differ"):
+    monkeypatch.setattr(
+        dask_cluster, "version", lambda name: "0.0" if name == "numba" else real[name]
+    )
+    with pytest.raises(
+        InputError, match=rf"numba {real['numba']} \(0\.0 here\): figures could differ"
+    ):
         Cluster(str(dask.scheduler_file))
 
 

@@ -11,7 +11,12 @@ import pytest
 from chamberopt.chamber.scene import replica_seed
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError, WorkerLostError
-from chamberopt.common.parallel.executor import SerialExecutor, local_executor, open_executor, shared
+from chamberopt.common.parallel.executor import (
+    SerialExecutor,
+    local_executor,
+    open_executor,
+    shared,
+)
 from chamberopt.design import load
 from chamberopt.simulation.replicas import in_order
 from tests.helpers import worker_jobs
@@ -24,9 +29,9 @@ def processes():
 
 
 def test_processes_answer_in_order_and_share_the_work(processes: Executor) -> None:
-    assert [future.result() for future in [processes.submit(worker_jobs.square, n) for n in range(20)]] == [
-        n * n for n in range(20)
-    ]
+    assert [
+        future.result() for future in [processes.submit(worker_jobs.square, n) for n in range(20)]
+    ] == [n * n for n in range(20)]
     busy = Counter(processes.map(worker_jobs.pid_of, range(8)))
     assert set(busy) == set(processes.pids)  # type: ignore[attr-defined]
     assert min(busy.values()) >= 3
@@ -55,7 +60,9 @@ def test_an_error_travels_as_what_it_is(processes: Executor) -> None:
         processes.submit(worker_jobs.refuse, "shot: too many").result()
 
 
-def test_an_error_of_the_system_is_the_tasks_own_and_no_lost_worker(processes: Executor, tmp_path: Path) -> None:
+def test_an_error_of_the_system_is_the_tasks_own_and_no_lost_worker(
+    processes: Executor, tmp_path: Path
+) -> None:
     with pytest.raises(FileNotFoundError):
         processes.submit(worker_jobs.open_nothing, tmp_path).result()
     assert worker_jobs.marks(tmp_path) == {"tried": 1}
@@ -77,9 +84,12 @@ def test_a_lost_process_costs_its_task_alone(processes: Executor, tmp_path: Path
     assert len(before & set(processes.pids)) == 1  # type: ignore[attr-defined]
 
 
-def test_a_task_that_takes_its_processes_down_is_said_so(processes: Executor, tmp_path: Path) -> None:
+def test_a_task_that_takes_its_processes_down_is_said_so(
+    processes: Executor, tmp_path: Path
+) -> None:
     with pytest.raises(
-        WorkerLostError, match=r"died 2 times \(signal 9, as when memory runs out\); give fewer --workers"
+        WorkerLostError,
+        match=r"died 2 times \(signal 9, as when memory runs out\); give fewer --workers",
     ):
         processes.submit(worker_jobs.die, tmp_path, 99).result()
     assert worker_jobs.marks(tmp_path) == {"die": 2}
@@ -97,7 +107,9 @@ def test_what_is_shared_travels_once_a_worker(processes: Executor, tmp_path: Pat
     assert not file.exists()
 
 
-@pytest.mark.parametrize("executor", [SerialExecutor(), local_executor(1)], ids=["serial", "threads"])
+@pytest.mark.parametrize(
+    "executor", [SerialExecutor(), local_executor(1)], ids=["serial", "threads"]
+)
 def test_where_memory_is_shared_nothing_travels(executor: Executor) -> None:
     value = object()
     assert shared(executor, value) is value
@@ -126,7 +138,11 @@ def test_leaving_by_an_exception_does_not_wait_for_the_tasks(tmp_path: Path) -> 
         (2, "tcp://127.0.0.1:8786", "--workers: given 2, but --cluster has workers of its own"),
         (None, "no-such-file.json", "neither an address nor a file; give tcp://HOST:PORT"),
         (None, __file__, "holds no scheduler's address"),
-        (None, "http://127.0.0.1", r"no scheduler answers at http://127.0.0.1 .*not of the form tcp://HOST:PORT"),
+        (
+            None,
+            "http://127.0.0.1",
+            r"no scheduler answers at http://127.0.0.1 .*not of the form tcp://HOST:PORT",
+        ),
     ],
 )
 def test_what_cannot_be_is_said(workers: int | None, cluster: str | None, said: str) -> None:
@@ -148,10 +164,14 @@ def test_lost_workers_are_one_message_and_status_1(monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr(load, "load_design", lose)
     assert main(["simulate", "any.toml"]) == 1
-    assert capsys.readouterr().err.startswith("replica 3: its worker process died 2 times (signal 9) (killed")
+    assert capsys.readouterr().err.startswith(
+        "replica 3: its worker process died 2 times (signal 9) (killed"
+    )
 
 
-@pytest.mark.parametrize(("workers", "kind"), [(1, "ThreadPoolExecutor"), (8, "ThreadPoolExecutor"), (9, "Processes")])
+@pytest.mark.parametrize(
+    ("workers", "kind"), [(1, "ThreadPoolExecutor"), (8, "ThreadPoolExecutor"), (9, "Processes")]
+)
 def test_too_many_cores_for_threads_are_given_processes(workers: int, kind: str) -> None:
     with open_executor(workers, None) as executor:  # processes start with their first task
         assert type(executor).__name__ == kind

@@ -44,8 +44,12 @@ def folder(tmp_path: Path) -> Path:
     """A design with a pyramid of its own round a small block."""
     text = (ROOT / "designs" / "gear.toml").read_text(encoding="utf-8")
     head, rest = text.split("[part.target]")[0], text.split("[sonotrode]")[1]
-    chamber = '[chamber]\nshape = "pyramid.py"\nside_mm = 80\nsonotrode_distance_mm = 15\n\n[sonotrode]'
-    (tmp_path / "d.toml").write_text(head.replace("parts/gear.stl", "block.stl") + chamber + rest, encoding="utf-8")
+    chamber = (
+        '[chamber]\nshape = "pyramid.py"\nside_mm = 80\nsonotrode_distance_mm = 15\n\n[sonotrode]'
+    )
+    (tmp_path / "d.toml").write_text(
+        head.replace("parts/gear.stl", "block.stl") + chamber + rest, encoding="utf-8"
+    )
     (tmp_path / "pyramid.py").write_text(PYRAMID, encoding="utf-8")
     trimesh.creation.box((10, 10, 10)).export(tmp_path / "block.stl")
     return tmp_path
@@ -79,9 +83,14 @@ def test_its_keys_are_checked_and_vary(folder: Path) -> None:
     assert design.value("chamber.top_mm") == 60.0
     other = design.with_values({"chamber.side_mm": 70})
     assert (other.chamber.side_mm, other.chamber.shape) == (70.0, str(folder / "pyramid.py"))
-    with pytest.raises(InputError, match=r"chamber\.side_mm: given 5.0; allowed: a number from 10 to 500 mm \(of the"):
+    with pytest.raises(
+        InputError,
+        match=r"chamber\.side_mm: given 5.0; allowed: a number from 10 to 500 mm \(of the",
+    ):
         design.with_values({"chamber.side_mm": 5})
-    (folder / "s.toml").write_text('design = "d.toml"\n[vary]\n"chamber.side_mm" = [60, 90]\n', encoding="utf-8")
+    (folder / "s.toml").write_text(
+        'design = "d.toml"\n[vary]\n"chamber.side_mm" = [60, 90]\n', encoding="utf-8"
+    )
     assert load_study(folder / "s.toml").vary == {"chamber.side_mm": (60.0, 90.0)}
     assert "d.toml:9: chamber.sid_mm: unknown key; did you mean 'side_mm'?" in said_of(
         folder, ("side_mm", "sid_mm"), file="d.toml"
@@ -110,11 +119,16 @@ def test_a_file_that_changes_is_another_shape(folder: Path) -> None:
     assert before.chamber.sha256 == sha256(PYRAMID.encode()).hexdigest() != after.chamber.sha256
 
 
-def test_results_name_the_file_and_can_be_read_without_it(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_results_name_the_file_and_can_be_read_without_it(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(viewer, "coverage_picture", lambda *_: None)
     design = load_design(folder / "d.toml")
     chamber = build_chamber(design)
-    for name, changed in (("first", design), ("second", design.with_values({"chamber.side_mm": 70}))):
+    for name, changed in (
+        ("first", design),
+        ("second", design.with_values({"chamber.side_mm": 70})),
+    ):
         write_simulation(folder / name, changed, chamber, poisson_evaluation(changed, chamber))
 
     written = json.loads((folder / "first" / "result.json").read_text(encoding="utf-8"))
@@ -134,7 +148,10 @@ def test_results_name_the_file_and_can_be_read_without_it(folder: Path, monkeypa
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ((RETURN, "return 7"), "surface() of Pyramid gives int; a chamberopt.design.shapes.ShapeSurface is wanted"),
+        (
+            (RETURN, "return 7"),
+            "surface() of Pyramid gives int; a chamberopt.design.shapes.ShapeSurface is wanted",
+        ),
         ((RETURN, "return 1 / 0"), "pyramid.py:14: surface() failed: ZeroDivisionError"),
         (("[3, 0, 4]]", "[3, 4, 0]]"), "is not closed: each side of a triangle"),
         ((", [3, 0, 4]]", "]"), "must tag each triangle"),
@@ -144,11 +161,23 @@ def test_results_name_the_file_and_can_be_read_without_it(folder: Path, monkeypa
         (("[1, 1, 2", "[1, 1, 1"), "has a sonotrode that is not the floor at z = 0"),
         (("[0, 0, h]", "[0, 0, np.nan]"), "no finite numbers"),
         (("def surface", "def surfaces"), "Pyramid does not define surface()"),
-        (("import numpy as np", "import nunpy as np"), "pyramid.py:4: cannot be run: ModuleNotFoundError: No module"),
-        (("class Pyramid(ChamberTable):", "class Pyramid(ChamberTable)"), "pyramid.py:6: cannot be run: SyntaxError"),
+        (
+            ("import numpy as np", "import nunpy as np"),
+            "pyramid.py:4: cannot be run: ModuleNotFoundError: No module",
+        ),
+        (
+            ("class Pyramid(ChamberTable):", "class Pyramid(ChamberTable)"),
+            "pyramid.py:6: cannot be run: SyntaxError",
+        ),
         (("class Pyramid(ChamberTable)", "class Pyramid"), "it defines none"),
-        (("import numpy as np", "import numpy as np\nclass Cone(ChamberTable): pass"), "it defines Cone and Pyramid"),
-        (("    def surface", "    def room(self): return 1 / 0\n    def surface"), "room() failed: ZeroDivisionError"),
+        (
+            ("import numpy as np", "import numpy as np\nclass Cone(ChamberTable): pass"),
+            "it defines Cone and Pyramid",
+        ),
+        (
+            ("    def surface", "    def room(self): return 1 / 0\n    def surface"),
+            "room() failed: ZeroDivisionError",
+        ),
     ],
 )
 def test_what_is_wrong_with_it_is_said(folder: Path, change: tuple[str, str], said: str) -> None:
@@ -156,15 +185,22 @@ def test_what_is_wrong_with_it_is_said(folder: Path, change: tuple[str, str], sa
 
 
 def test_a_file_that_is_not_there(folder: Path) -> None:
-    said = said_of(folder, ('"pyramid.py"', '"pyramids.py"'), ("mass_g = 5", "mass_g = -5"), file="d.toml")
+    said = said_of(
+        folder, ('"pyramid.py"', '"pyramids.py"'), ("mass_g = 5", "mass_g = -5"), file="d.toml"
+    )
 
-    assert f"d.toml:8: chamber.shape: given 'pyramids.py': {folder / 'pyramids.py'}: no such shape file" in said
+    assert (
+        f"d.toml:8: chamber.shape: given 'pyramids.py': {folder / 'pyramids.py'}: no such shape file"
+        in said
+    )
     assert f"did you mean {folder / 'pyramid.py'}?" in said
     assert "shot.mass_g: given -5" in said
 
 
 def test_the_shipped_oblong_is_a_stadium() -> None:
-    design = load_design(ROOT / "designs" / "blade_oblong.toml").with_values({"chamber.inclination_deg": 10})
+    design = load_design(ROOT / "designs" / "blade_oblong.toml").with_values(
+        {"chamber.inclination_deg": 10}
+    )
     table = design.chamber
 
     made = table.surface(np.zeros((0, 3)), np.zeros((0, 3), dtype=int))
@@ -180,7 +216,9 @@ def test_the_shipped_oblong_is_a_stadium() -> None:
 
 def test_the_one_in_the_docs_works(folder: Path) -> None:
     docs = (ROOT / "docs" / "chambers.md").read_text(encoding="utf-8")
-    (folder / "pyramid.py").write_text(docs.split("```python\n")[1].split("```")[0], encoding="utf-8")
+    (folder / "pyramid.py").write_text(
+        docs.split("```python\n")[1].split("```")[0], encoding="utf-8"
+    )
 
     assert build_chamber(load_design(folder / "d.toml")).volume == pytest.approx(1.27e-4, rel=1e-6)
 
@@ -189,8 +227,14 @@ def test_the_one_in_the_docs_works(folder: Path) -> None:
     ("line", "said"),
     [
         ("raise SystemExit(3)", r"pyramid\.py:14: surface\(\) failed: SystemExit: 3"),
-        ("vertices[:] = 0.0", r"pyramid\.py:14: surface\(\) failed: ValueError: assignment destination is read-only"),
-        ("points = 1e3 * points", r"is 80 m wide, where 10 is the most; its vertices are in metres, not mm"),
+        (
+            "vertices[:] = 0.0",
+            r"pyramid\.py:14: surface\(\) failed: ValueError: assignment destination is read-only",
+        ),
+        (
+            "points = 1e3 * points",
+            r"is 80 m wide, where 10 is the most; its vertices are in metres, not mm",
+        ),
     ],
 )
 def test_what_its_surface_may_not_do(folder: Path, line: str, said: str) -> None:
@@ -204,7 +248,10 @@ def test_a_surface_that_crosses_itself_is_refused(folder: Path) -> None:
         faces = np.array([[0, 2, 1], [0, 3, 2], [5, 0, 1], [5, 1, 4], [5, 4, 0], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
         return ShapeSurface(n, faces, np.array([1, 1, 2, 2, 2, 2, 2, 2]))"""
 
-    assert re.search(r"surface\(\) of Pyramid crosses itself, near \(", said_of(folder, (RETURN, notched.strip())))
+    assert re.search(
+        r"surface\(\) of Pyramid crosses itself, near \(",
+        said_of(folder, (RETURN, notched.strip())),
+    )
 
 
 def test_lists_will_do_and_what_it_says_of_the_part_does_not_count(folder: Path) -> None:
@@ -226,8 +273,14 @@ def test_lists_will_do_and_what_it_says_of_the_part_does_not_count(folder: Path)
             r"widths_mm\(\) of Pyramid gives 'wide'; widths \[mm\] by key are wanted",
         ),
         ("def widths_mm(self): return {'side_mm': None}", r"widths_mm\(\) of Pyramid gives .*None"),
-        ("def room(self): return 0.0", r"room\(\) of Pyramid gives 0.0; a volume \[m³\] above 0 is wanted"),
-        ("def notes(self, ball): return 'note'", r"notes\(\) of Pyramid gives 'note'; a list of texts is wanted"),
+        (
+            "def room(self): return 0.0",
+            r"room\(\) of Pyramid gives 0.0; a volume \[m³\] above 0 is wanted",
+        ),
+        (
+            "def notes(self, ball): return 'note'",
+            r"notes\(\) of Pyramid gives 'note'; a list of texts is wanted",
+        ),
     ],
 )
 def test_what_its_other_methods_must_give(folder: Path, method: str, said: str) -> None:
@@ -244,7 +297,12 @@ def test_what_its_other_methods_must_give(folder: Path, method: str, said: str) 
 def test_what_its_validators_raise_is_said(folder: Path, error: str, said: str) -> None:
     check = f"    @pydantic.model_validator(mode='after')\n    def _agree(self): raise {error}\n\n    def surface"
     assert re.search(
-        said, said_of(folder, ("import numpy as np", "import numpy as np, pydantic"), ("    def surface", check))
+        said,
+        said_of(
+            folder,
+            ("import numpy as np", "import numpy as np, pydantic"),
+            ("    def surface", check),
+        ),
     )
 
 

@@ -42,13 +42,17 @@ def sides(low: np.ndarray, high: np.ndarray) -> list[np.ndarray]:
 
 
 def box(half: float, low: float, high: float) -> np.ndarray:
-    return fan(square(half, low)[::-1], *sides(square(half, low), square(half, high)), square(half, high))
+    return fan(
+        square(half, low)[::-1], *sides(square(half, low), square(half, high)), square(half, high)
+    )
 
 
 def as_pieces(top: float = 20.0, block: float = DRAWN) -> Drawing:
     """One closed surface: of the block only what bounds the room. The ceiling reaches ``top`` mm to each side."""
     inner, outer = square(10, 20), square(top, 20)
-    ring = [np.array([outer[k], outer[(k + 1) % 4], inner[(k + 1) % 4], inner[k]]) for k in range(4)]
+    ring = [
+        np.array([outer[k], outer[(k + 1) % 4], inner[(k + 1) % 4], inner[k]]) for k in range(4)
+    ]
     hanging = [side[::-1] for side in sides(square(10, block), inner)]
     return {
         "SONOTRODE": fan(square(20, 0)[::-1]),
@@ -59,7 +63,10 @@ def as_pieces(top: float = 20.0, block: float = DRAWN) -> Drawing:
 
 def as_bodies(top: float) -> Drawing:
     """A closed box, and the block as a body of its own that ends at a height."""
-    room = {"SONOTRODE": fan(square(20, 0)[::-1]), "WALL": fan(*sides(square(20, 0), square(20, 20)), square(20, 20))}
+    room = {
+        "SONOTRODE": fan(square(20, 0)[::-1]),
+        "WALL": fan(*sides(square(20, 0), square(20, 20)), square(20, 20)),
+    }
     return {**room, "PART": box(10, DRAWN, top)}
 
 
@@ -92,7 +99,9 @@ def text_stl(path: Path, drawing: Drawing) -> Path:
         lines.append(f"solid {name}")
         for triangle in corners:
             lines += ["facet normal 0 0 0", "outer loop"]
-            lines += ["vertex " + " ".join(f"{value:.9g}" for value in corner) for corner in triangle]
+            lines += [
+                "vertex " + " ".join(f"{value:.9g}" for value in corner) for corner in triangle
+            ]
             lines += ["endloop", "endfacet"]
         lines.append(f"endsolid {name}")
     path.write_text("\n".join(lines) + "\n")
@@ -105,7 +114,9 @@ def nastran(path: Path, drawing: Drawing) -> Path:
         names.append(f'$HMNAME PROP {pid:8d}"{name}" 4')
         for triangle in corners:
             start = len(grids) + 1
-            grids += [f"GRID,{start + k},,{x:.9f},{y:.9f},{z:.9f}" for k, (x, y, z) in enumerate(triangle)]
+            grids += [
+                f"GRID,{start + k},,{x:.9f},{y:.9f},{z:.9f}" for k, (x, y, z) in enumerate(triangle)
+            ]
             cards.append(f"CTRIA3,{len(cards) + 1},{pid},{start},{start + 1},{start + 2}")
     path.write_text("\n".join(["BEGIN BULK", *names, *grids, *cards, "ENDDATA"]) + "\n")
     return path
@@ -129,7 +140,9 @@ def sound(chamber: Chamber, volume: float, distance: float) -> None:
     assert chamber.volume == pytest.approx(mesh.volume, rel=1e-12)
     floor = chamber.tags == TAG_SONOTRODE
     assert (chamber.vertices[chamber.triangles[floor]][..., 2] == 0.0).all()
-    assert 1e6 * areas(chamber.vertices, chamber.triangles)[floor].sum() == pytest.approx(FLOOR, rel=1e-6)
+    assert 1e6 * areas(chamber.vertices, chamber.triangles)[floor].sum() == pytest.approx(
+        FLOOR, rel=1e-6
+    )
     assert 1e3 * chamber.part.vertices[:, 2].min() == pytest.approx(distance, abs=1e-5)
     own = chamber.tags == TAG_PART
     assert ((chamber.source >= 0) == own).all()
@@ -160,25 +173,42 @@ def test_the_same_room_however_it_is_drawn(tmp_path: Path, name: str, write: Any
     chamber = build_chamber(design(write(tmp_path / "setup", drawing)))
 
     sound(chamber, volume, DRAWN)
-    assert 1e6 * chamber.part.area == pytest.approx(1e6 * drawn_area(drawing["PART"]), rel=1e-6)  # in the file's order
-    walls = FLOOR + 4 * 40 * 20 - (0.0 if name == "hanging body" else 400.0) + 2 * (2 * 2 + 2 * 8) * (name == "a post")
+    assert 1e6 * chamber.part.area == pytest.approx(
+        1e6 * drawn_area(drawing["PART"]), rel=1e-6
+    )  # in the file's order
+    walls = (
+        FLOOR
+        + 4 * 40 * 20
+        - (0.0 if name == "hanging body" else 400.0)
+        + 2 * (2 * 2 + 2 * 8) * (name == "a post")
+    )
     on_wall = chamber.tags == TAG_WALL
-    assert 1e6 * areas(chamber.vertices, chamber.triangles)[on_wall].sum() == pytest.approx(walls, rel=1e-6)
+    assert 1e6 * areas(chamber.vertices, chamber.triangles)[on_wall].sum() == pytest.approx(
+        walls, rel=1e-6
+    )
     assert any("left out" in note for note in chamber.notes) == (name == "thick walls")
     assert any("is up" in note for note in chamber.notes) == ("turned" in name)
 
 
 def drawn_area(corners: np.ndarray) -> np.ndarray:
     """m² of each triangle."""
-    return 0.5e-6 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    return 0.5e-6 * np.linalg.norm(
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+    )
 
 
-@pytest.mark.parametrize("name", ["pieces", "overlapping body", "hanging body", "turned pieces", "turned bodies"])
+@pytest.mark.parametrize(
+    "name", ["pieces", "overlapping body", "hanging body", "turned pieces", "turned bodies"]
+)
 @pytest.mark.parametrize("distance", [3.5, 12.0, 12.001, 30.0])
-def test_the_sonotrode_moves_and_the_walls_go_on_straight(tmp_path: Path, name: str, distance: float) -> None:
+def test_the_sonotrode_moves_and_the_walls_go_on_straight(
+    tmp_path: Path, name: str, distance: float
+) -> None:
     drawing, volume = DRAWINGS[name]
 
-    chamber = build_chamber(design(text_stl(tmp_path / "setup.stl", drawing), sonotrode_distance_mm=distance))
+    chamber = build_chamber(
+        design(text_stl(tmp_path / "setup.stl", drawing), sonotrode_distance_mm=distance)
+    )
 
     sound(chamber, volume + FLOOR * (distance - DRAWN), distance)
 
@@ -186,7 +216,10 @@ def test_the_sonotrode_moves_and_the_walls_go_on_straight(tmp_path: Path, name: 
 def test_the_distance_as_drawn_is_no_change(tmp_path: Path) -> None:
     path = text_stl(tmp_path / "setup.stl", as_pieces())
 
-    drawn, asked = build_chamber(design(path)), build_chamber(design(path, sonotrode_distance_mm=DRAWN))
+    drawn, asked = (
+        build_chamber(design(path)),
+        build_chamber(design(path, sonotrode_distance_mm=DRAWN)),
+    )
 
     assert np.array_equal(drawn.vertices, asked.vertices)
     assert np.array_equal(drawn.triangles, asked.triangles)
@@ -199,13 +232,20 @@ def test_walls_that_lean_can_go_on_but_not_be_cut(tmp_path: Path) -> None:
 
     sound(build_chamber(design(path)), frustum, DRAWN)
     sound(build_chamber(design(path, sonotrode_distance_mm=15.0)), frustum + 3 * FLOOR, 15.0)
-    with pytest.raises(InputError, match=r"chamber\.sonotrode_distance_mm: the set-up is drawn with 12, .* straight"):
+    with pytest.raises(
+        InputError,
+        match=r"chamber\.sonotrode_distance_mm: the set-up is drawn with 12, .* straight",
+    ):
         build_chamber(design(path, sonotrode_distance_mm=11.0))
 
 
 def test_the_sonotrode_does_not_move_into_another_part_of_the_room(tmp_path: Path) -> None:
     """A duct leads out of the room, down beside it, and on 5 to 10 mm under its floor."""
-    duct = [((19, -5, 10), (30, 5, 15)), ((25, -5, -10), (30, 5, 15)), ((-10, -5, -10), (30, 5, -5))]
+    duct = [
+        ((19, -5, 10), (30, 5, 15)),
+        ((25, -5, -10), (30, 5, 15)),
+        ((-10, -5, -10), (30, 5, -5)),
+    ]
     boxes = [trimesh.creation.box(bounds=pair) for pair in [((-20, -20, 0), (20, 20, 20)), *duct]]
     room = trimesh.boolean.union(boxes, engine="manifold")
     corners = np.asarray(room.triangles)
@@ -217,7 +257,9 @@ def test_the_sonotrode_does_not_move_into_another_part_of_the_room(tmp_path: Pat
     beside = build_chamber(design(path, sonotrode_distance_mm=DRAWN + 4.0))
 
     assert beside.volume == pytest.approx(volume + 4e-9 * FLOOR, rel=1e-7)
-    with pytest.raises(InputError, match=r"cannot be moved farther .* another part of the room is in the way"):
+    with pytest.raises(
+        InputError, match=r"cannot be moved farther .* another part of the room is in the way"
+    ):
         build_chamber(design(path, sonotrode_distance_mm=DRAWN + 8.0))
 
 
@@ -228,7 +270,13 @@ def test_deflectors_and_wells_fit_an_imported_room_too(tmp_path: Path) -> None:
 
     sound(build_chamber(checked(Design, data)), ROOM - BLOCK - 24.0, DRAWN)
     data["sonotrodes"] = [
-        {"at_mm": [25, 0, 10], "axis": [-1, 0, 0], "diameter_mm": 8.0, "frequency_khz": 20.0, "amplitude_um": 5.0}
+        {
+            "at_mm": [25, 0, 10],
+            "axis": [-1, 0, 0],
+            "diameter_mm": 8.0,
+            "frequency_khz": 20.0,
+            "amplitude_um": 5.0,
+        }
     ]
     well = 5 * 32 * 4**2 * np.sin(2 * np.pi / 64)
     sound(build_chamber(checked(Design, data)), ROOM - BLOCK - 24.0 + well, DRAWN)
@@ -248,7 +296,10 @@ def test_the_target_is_chosen_by_the_names_and_frame_of_the_file(tmp_path: Path)
 def crossed() -> Drawing:
     """A post of wall that goes half into the floor."""
     drawing = as_bodies(25.0)
-    return {**drawing, "WALL": np.concatenate([drawing["WALL"], box(2, -2, 2) + np.array([15.0, 15.0, 0.0])])}
+    return {
+        **drawing,
+        "WALL": np.concatenate([drawing["WALL"], box(2, -2, 2) + np.array([15.0, 15.0, 0.0])]),
+    }
 
 
 def stepped() -> Drawing:
@@ -258,7 +309,10 @@ def stepped() -> Drawing:
     ring = [np.array([outer[k], low[k], low[(k + 1) % 4], outer[(k + 1) % 4]]) for k in range(4)]
     drawing = as_pieces()
     step = [side[::-1] for side in sides(low, high)]
-    floors = {"SONOTRODE": fan(*ring, high[::-1]), "WALL": np.concatenate([drawing["WALL"], fan(*step)])}
+    floors = {
+        "SONOTRODE": fan(*ring, high[::-1]),
+        "WALL": np.concatenate([drawing["WALL"], fan(*step)]),
+    }
     return {**drawing, **floors}
 
 
@@ -270,19 +324,57 @@ def leaking(drawing: Drawing) -> Drawing:
     ("drawing", "tables", "said"),
     [
         (leaking(as_pieces()), {}, r"the surface is not closed: 3 open edges.*\(-?20, -?20, 0\)"),
-        (leaking(as_bodies(25.0)), {}, r"not closed: 3 open edges.*\(-?20, -?20, 0\).*must be closed without it"),
-        (as_pieces(), {"sonotrode": "SONO"}, r"chamber\.sonotrode: 'SONO' is no name.*did you mean 'SONOTRODE'"),
-        (as_pieces(), {"part": ["PART", "WALL", "SONOTRODE"]}, r"chamber\.part: .*all of the triangles"),
-        (as_pieces(), {"sonotrode": ["SONOTRODE", "WALL"]}, r"chamber\.sonotrode: its triangles are not flat"),
-        (stepped(), {}, r"chamber\.sonotrode: its triangles are not flat, they reach from 0 to 1 mm"),
-        (as_pieces(), {"part": ["PART", "SONOTRODE"]}, r"chamber\.part: 2 of its triangles are the sonotrode's too"),
-        (as_bodies(25.0), {"part": "WALL", "sonotrode": "PART"}, "sonotrode: .* not flat, they face different ways"),
-        (as_pieces(block=2.0), {}, r"shot\.diameter_mm: given 3, .* drawn 2 mm above the sonotrode"),
+        (
+            leaking(as_bodies(25.0)),
+            {},
+            r"not closed: 3 open edges.*\(-?20, -?20, 0\).*must be closed without it",
+        ),
+        (
+            as_pieces(),
+            {"sonotrode": "SONO"},
+            r"chamber\.sonotrode: 'SONO' is no name.*did you mean 'SONOTRODE'",
+        ),
+        (
+            as_pieces(),
+            {"part": ["PART", "WALL", "SONOTRODE"]},
+            r"chamber\.part: .*all of the triangles",
+        ),
+        (
+            as_pieces(),
+            {"sonotrode": ["SONOTRODE", "WALL"]},
+            r"chamber\.sonotrode: its triangles are not flat",
+        ),
+        (
+            stepped(),
+            {},
+            r"chamber\.sonotrode: its triangles are not flat, they reach from 0 to 1 mm",
+        ),
+        (
+            as_pieces(),
+            {"part": ["PART", "SONOTRODE"]},
+            r"chamber\.part: 2 of its triangles are the sonotrode's too",
+        ),
+        (
+            as_bodies(25.0),
+            {"part": "WALL", "sonotrode": "PART"},
+            "sonotrode: .* not flat, they face different ways",
+        ),
+        (
+            as_pieces(block=2.0),
+            {},
+            r"shot\.diameter_mm: given 3, .* drawn 2 mm above the sonotrode",
+        ),
         (crossed(), {}, r"closed surface . of the set-up, 64 mm³, crosses the wall of the room"),
-        ({**as_bodies(25.0), "PART": box(3, 30, 40)}, {}, "no part of it is inside the chamber; check the groups"),
+        (
+            {**as_bodies(25.0), "PART": box(3, 30, 40)},
+            {},
+            "no part of it is inside the chamber; check the groups",
+        ),
     ],
 )
-def test_what_is_no_set_up_is_refused(tmp_path: Path, drawing: Drawing, tables: dict[str, Any], said: str) -> None:
+def test_what_is_no_set_up_is_refused(
+    tmp_path: Path, drawing: Drawing, tables: dict[str, Any], said: str
+) -> None:
     with pytest.raises(InputError, match=said):
         build_chamber(design(text_stl(tmp_path / "setup.stl", drawing), **tables))
 
@@ -292,9 +384,16 @@ def test_a_sonotrode_with_a_free_rim_is_refused(tmp_path: Path) -> None:
     ring = [np.array([a, b, c, d])[::-1] for a, b, c, d in zip(*corners_of_a_step(), strict=True)]
     step = sides(square(10, -2), square(10, 0))
     walls = [*sides(square(20, -2), square(20, 20)), *ring, *(side[::-1] for side in step)]
-    drawing = {"SONOTRODE": fan(square(10, 0)[::-1]), "WALL": fan(*walls, square(20, 20)), "PART": box(5, 12, 16)}
+    drawing = {
+        "SONOTRODE": fan(square(10, 0)[::-1]),
+        "WALL": fan(*walls, square(20, 20)),
+        "PART": box(5, 12, 16),
+    }
 
-    with pytest.raises(InputError, match=r"chamber\.sonotrode: its face has a free rim at \(.*\) mm: walls must rise"):
+    with pytest.raises(
+        InputError,
+        match=r"chamber\.sonotrode: its face has a free rim at \(.*\) mm: walls must rise",
+    ):
         build_chamber(design(text_stl(tmp_path / "setup.stl", drawing)))
 
 
@@ -306,12 +405,17 @@ def corners_of_a_step() -> tuple[np.ndarray, ...]:
 @pytest.mark.parametrize(
     ("part", "said"),
     [
-        ({"rotate_deg": [0.0, 90.0, 0.0]}, "part.rotate_deg: given [0.0, 90.0, 0.0] beside chamber.shape"),
+        (
+            {"rotate_deg": [0.0, 90.0, 0.0]},
+            "part.rotate_deg: given [0.0, 90.0, 0.0] beside chamber.shape",
+        ),
         ({"offset_mm": [1.0, 0.0]}, "part.offset_mm: given [1.0, 0.0] beside chamber.shape"),
         ({"target": {"element_mm": 0.5}}, "part.target.element_mm: given beside chamber.shape"),
     ],
 )
-def test_what_a_drawn_set_up_leaves_no_choice_of_is_refused(tmp_path: Path, part: dict[str, Any], said: str) -> None:
+def test_what_a_drawn_set_up_leaves_no_choice_of_is_refused(
+    tmp_path: Path, part: dict[str, Any], said: str
+) -> None:
     with pytest.raises(InputError) as error:
         design(text_stl(tmp_path / "setup.stl", as_pieces()), placed=part)
     assert said in str(error.value)
@@ -334,7 +438,9 @@ def test_a_study_moves_the_sonotrode_of_a_drawn_set_up(tmp_path: Path) -> None:
     start = design(text_stl(tmp_path / "setup.stl", as_pieces()), sonotrode_distance_mm=DRAWN)
     best = DRAWN + (ROOM - BLOCK) / 3 / FLOOR
     question = Study(
-        design=start, vary={"chamber.sonotrode_distance_mm": (8.0, 25.0)}, optimizer={"evaluations": 16, "confirm": 1}
+        design=start,
+        vary={"chamber.sonotrode_distance_mm": (8.0, 25.0)},
+        optimizer={"evaluations": 16, "confirm": 1},
     )
 
     def volume_off(made: Design, *_: Any) -> Any:
@@ -348,7 +454,9 @@ def test_a_study_moves_the_sonotrode_of_a_drawn_set_up(tmp_path: Path) -> None:
 
 def test_the_shipped_set_up_is_the_plates_own_chamber() -> None:
     """Same room, and the same triangles to cover in the same places, whichever way round the file draws them."""
-    drawn, parametric = (load_design(DESIGNS / f"{name}.toml") for name in ("plate_imported", "plate"))
+    drawn, parametric = (
+        load_design(DESIGNS / f"{name}.toml") for name in ("plate_imported", "plate")
+    )
     one, two = build_chamber(drawn), build_chamber(parametric)
 
     assert one.volume == pytest.approx(two.volume, rel=1e-5)  # corners are on a grid of 0.1 µm

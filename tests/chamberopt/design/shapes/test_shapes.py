@@ -87,7 +87,9 @@ def test_a_cylinder_is_the_prism_over_a_regular_polygon(facets: int) -> None:
     assert len(made.triangles) == 4 * facets
     floor = made.tags == TAG_SONOTRODE
     assert mesh.area_faces[floor].sum() == pytest.approx(polygon, rel=1e-12)
-    assert mesh.area_faces[made.tags == TAG_WALL].sum() == pytest.approx(mesh.area - polygon, rel=1e-12)
+    assert mesh.area_faces[made.tags == TAG_WALL].sum() == pytest.approx(
+        mesh.area - polygon, rel=1e-12
+    )
 
 
 def test_the_floor_is_at_zero_and_the_axis_does_not_drift() -> None:
@@ -105,7 +107,9 @@ def test_a_leaning_cylinder_is_a_frustum(lean: float) -> None:
     low, height = 35.0, 40.0
     high = low + height * np.tan(np.radians(lean))
 
-    mesh = checked(surface("cylinder", diameter_mm=2 * low, height_mm=height, inclination_deg=lean, facets=48))
+    mesh = checked(
+        surface("cylinder", diameter_mm=2 * low, height_mm=height, inclination_deg=lean, facets=48)
+    )
 
     frustum = np.pi / 3.0 * height * (low**2 + low * high + high**2)
     assert mesh.volume == pytest.approx(frustum * in_flats(48), rel=1e-12)
@@ -124,10 +128,19 @@ def test_the_edge_below_a_cylinders_ceiling_is_rounded(lean: float, corner: floa
     tangent = middle_z - corner * np.sin(a)
 
     def plan(z: float) -> float:
-        inner = low + np.tan(a) * z if z < tangent else middle_r + np.sqrt(max(0.0, corner**2 - (z - middle_z) ** 2))
+        inner = (
+            low + np.tan(a) * z
+            if z < tangent
+            else middle_r + np.sqrt(max(0.0, corner**2 - (z - middle_z) ** 2))
+        )
         return np.pi * inner**2
 
-    keys = {"diameter_mm": 2 * low, "height_mm": height, "inclination_deg": lean, "corner_radius_mm": corner}
+    keys = {
+        "diameter_mm": 2 * low,
+        "height_mm": height,
+        "inclination_deg": lean,
+        "corner_radius_mm": corner,
+    }
     mesh = checked(surface("cylinder", facets=200, **keys))
 
     volume = quad(plan, 0.0, height, points=[tangent], epsrel=1e-9)[0]
@@ -137,10 +150,16 @@ def test_the_edge_below_a_cylinders_ceiling_is_rounded(lean: float, corner: floa
 
 def test_a_revolved_cone_and_a_step_are_what_they_are() -> None:
     cone = checked(surface("revolve", profile_mm=[[30.0, 0.0], [0.0, 50.0]], facets=40))
-    stepped = checked(surface("revolve", profile_mm=[[30.0, 0.0], [30.0, 20.0], [20.0, 20.0], [20.0, 50.0]], facets=40))
+    stepped = checked(
+        surface(
+            "revolve", profile_mm=[[30.0, 0.0], [30.0, 20.0], [20.0, 20.0], [20.0, 50.0]], facets=40
+        )
+    )
 
     assert cone.volume == pytest.approx(np.pi / 3 * 30**2 * 50 * in_flats(40), rel=1e-12)
-    assert stepped.volume == pytest.approx(np.pi * (30**2 * 20 + 20**2 * 30) * in_flats(40), rel=1e-12)
+    assert stepped.volume == pytest.approx(
+        np.pi * (30**2 * 20 + 20**2 * 30) * in_flats(40), rel=1e-12
+    )
 
 
 @pytest.mark.parametrize("corner", [0.0, 1.5])
@@ -152,7 +171,9 @@ def test_a_revolved_profile_by_pappus(corner: float) -> None:
     if corner:
         whole = whole.buffer(-corner, **fine).buffer(2 * corner, **fine).buffer(-corner, **fine)
     section = whole.intersection(shapely.box(0.0, 0.0, 100.0, 100.0))
-    apex = 0.0 if not corner else 0.01  # mm³: shapely rounds the tip on the axis too; a cone's tip stays
+    apex = (
+        0.0 if not corner else 0.01
+    )  # mm³: shapely rounds the tip on the axis too; a cone's tip stays
 
     mesh = checked(surface("revolve", profile_mm=PROFILE, corner_radius_mm=corner, facets=200))
 
@@ -169,7 +190,9 @@ def test_a_profile_may_overhang_and_a_leaning_one_is_sheared() -> None:
     slope = np.tan(np.radians(10.0))
     sheared = [[r + slope * z if r else 0.0, z] for r, z in PROFILE]
     leaning = checked(surface("revolve", profile_mm=PROFILE, inclination_deg=10.0))
-    assert leaning.volume == pytest.approx(checked(surface("revolve", profile_mm=sheared)).volume, rel=1e-12)
+    assert leaning.volume == pytest.approx(
+        checked(surface("revolve", profile_mm=sheared)).volume, rel=1e-12
+    )
 
 
 # --------------------------------------------------------------------------------------------------------- box, prism
@@ -183,7 +206,9 @@ def test_a_box_and_a_hexagon_have_their_sizes() -> None:
 
     hexagon = checked(surface("prism", sides=6, across_mm=40.0, height_mm=30.0, turn_deg=30.0))
     assert hexagon.volume == pytest.approx(np.sqrt(3) / 2 * 40**2 * 30, rel=1e-12)
-    assert hexagon.extents[:2] == pytest.approx([40 * 2 / np.sqrt(3), 40.0], rel=1e-12)  # at 0 the flats face x
+    assert hexagon.extents[:2] == pytest.approx(
+        [40 * 2 / np.sqrt(3), 40.0], rel=1e-12
+    )  # at 0 the flats face x
 
 
 @pytest.mark.parametrize("lean", [-8.0, 0.0, 20.0])
@@ -202,7 +227,9 @@ def test_boxes_lean_and_are_rounded(lean: float, corner: float) -> None:
     assert floor_area(made) == pytest.approx(plan(0.0), rel=1e-12)
     normal = checked(made).face_normals[made.tags == TAG_WALL]
     sides = normal[np.abs(normal[:, 2]) < 0.9]
-    flat = np.abs(sides[:, :2]).max(axis=1) > 0.9999 * np.hypot(*sides[:, :2].T)  # the four walls: at the inclination
+    flat = np.abs(sides[:, :2]).max(axis=1) > 0.9999 * np.hypot(
+        *sides[:, :2].T
+    )  # the four walls: at the inclination
     assert flat.sum() >= 8
     assert np.degrees(np.arcsin(-sides[flat][:, 2])) == pytest.approx(lean, abs=1e-9)
 
@@ -210,7 +237,9 @@ def test_boxes_lean_and_are_rounded(lean: float, corner: float) -> None:
 # ---------------------------------------------------------------------------------------------------------- conformal
 
 
-def block(size: tuple[float, float, float], at: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> trimesh.Trimesh:
+def block(
+    size: tuple[float, float, float], at: tuple[float, float, float] = (0.0, 0.0, 0.0)
+) -> trimesh.Trimesh:
     """Its lowest face `at` 15 mm over the sonotrode; m."""
     made = trimesh.creation.box(1e-3 * np.array(size))
     made.apply_translation(1e-3 * np.add(at, (0.0, 0.0, 15.0 + size[2] / 2)))
@@ -228,7 +257,13 @@ ELL_PLAN = shapely.union(shapely.box(-20, -5, 20, 5), shapely.box(10, -5, 20, 25
 
 @pytest.mark.parametrize("lean", [-4.0, 0.0, 15.0])
 def test_the_conformal_hull_is_the_parts_hull_grown(lean: float) -> None:
-    keys = {"outline": "hull", "gap_mm": 6.0, "height_mm": 40.0, "inclination_deg": lean, "facets": 512}
+    keys = {
+        "outline": "hull",
+        "gap_mm": 6.0,
+        "height_mm": 40.0,
+        "inclination_deg": lean,
+        "facets": 512,
+    }
     out = 40.0 * np.tan(np.radians(lean))
     hull = ELL_PLAN.convex_hull
 
@@ -241,7 +276,13 @@ def test_the_conformal_hull_is_the_parts_hull_grown(lean: float) -> None:
 
 @pytest.mark.parametrize("corner", [0.0, 5.0])
 def test_the_silhouette_follows_hollows_and_spans_narrow_ones(corner: float) -> None:
-    keys = {"outline": "silhouette", "gap_mm": 6.0, "height_mm": 40.0, "corner_radius_mm": corner, "facets": 256}
+    keys = {
+        "outline": "silhouette",
+        "gap_mm": 6.0,
+        "height_mm": 40.0,
+        "corner_radius_mm": corner,
+        "facets": 256,
+    }
     plan = ELL_PLAN.buffer(6.0 + corner, quad_segs=256).buffer(-corner, quad_segs=256)
 
     made = surface("conformal", ELL, **keys)
@@ -249,7 +290,9 @@ def test_the_silhouette_follows_hollows_and_spans_narrow_ones(corner: float) -> 
     mesh = checked(made)
     assert mesh.volume == pytest.approx(plan.area * 40.0, rel=2e-4)
     assert floor_area(made) == pytest.approx(plan.area, rel=2e-4)
-    hull = checked(surface("conformal", ELL, **{**keys, "outline": "hull", "corner_radius_mm": 0.0}))
+    hull = checked(
+        surface("conformal", ELL, **{**keys, "outline": "hull", "corner_radius_mm": 0.0})
+    )
     assert mesh.volume < 0.9 * hull.volume
     wall = shapely.Polygon(1e3 * made.vertices[_rim(made)][:, :2])
     assert wall.exterior.distance(ELL_PLAN) == pytest.approx(6.0, abs=0.01)
@@ -308,7 +351,11 @@ def mm(low: float, high: float) -> st.SearchStrategy[float]:
     return st.floats(low, high, allow_nan=False)
 
 
-LEANING = {"inclination_deg": mm(-45, 45), "facets": st.integers(8, 80), "corner_radius_mm": mm(0, 40)}
+LEANING = {
+    "inclination_deg": mm(-45, 45),
+    "facets": st.integers(8, 80),
+    "corner_radius_mm": mm(0, 40),
+}
 VALUES: dict[str, dict[str, st.SearchStrategy[Any]]] = {
     "cylinder": {"diameter_mm": mm(2, 2000), "height_mm": mm(2, 2000), **LEANING},
     "box": {"length_mm": mm(2, 2000), "width_mm": mm(2, 2000), "height_mm": mm(2, 2000), **LEANING},
@@ -339,14 +386,23 @@ VALUES: dict[str, dict[str, st.SearchStrategy[Any]]] = {
 
 def volume_between(shape: str, keys: dict[str, Any]) -> tuple[float, float]:
     """Bounds [mm³] of the cavity's volume; equal where a formula holds its facets too."""
-    facets, corner, slope = keys["facets"], keys["corner_radius_mm"], np.tan(np.radians(keys["inclination_deg"]))
+    facets, corner, slope = (
+        keys["facets"],
+        keys["corner_radius_mm"],
+        np.tan(np.radians(keys["inclination_deg"])),
+    )
     height = keys.get("height_mm", 0.0)
     if shape in ("cylinder", "revolve"):
-        points = keys.get("profile_mm") or [(keys["diameter_mm"] / 2, 0.0), (keys["diameter_mm"] / 2, height)]
+        points = keys.get("profile_mm") or [
+            (keys["diameter_mm"] / 2, 0.0),
+            (keys["diameter_mm"] / 2, height),
+        ]
         line = [(r + slope * z, z) for r, z in points]
         section = shapely.Polygon([(0.0, 0.0), *line, (0.0, line[-1][1])])
         volume = 2.0 * np.pi * section.centroid.x * section.area * in_flats(facets)
-        return (volume, volume) if corner <= 0.05 else (0.2 * volume, 1.8 * volume)  # rounded: held by tests above
+        return (
+            (volume, volume) if corner <= 0.05 else (0.2 * volume, 1.8 * volume)
+        )  # rounded: held by tests above
     if shape in ("box", "prism"):
         sides = keys.get("sides", 4)
 
@@ -362,7 +418,10 @@ def volume_between(shape: str, keys: dict[str, Any]) -> tuple[float, float]:
     narrow = ELL_PLAN.convex_hull if keys["outline"] == "hull" else ELL_PLAN
 
     def grown(plan: shapely.Polygon) -> float:
-        return simpson(lambda share: plan.buffer(keys["gap_mm"] + share * slope * height, quad_segs=64).area, height)
+        return simpson(
+            lambda share: plan.buffer(keys["gap_mm"] + share * slope * height, quad_segs=64).area,
+            height,
+        )
 
     # arcs between inscribed and, of one side alone, mitred; a corner radius spans some of a silhouette's hollow
     return in_flats(keys["facets"]) * grown(narrow), 1.01 * grown(ELL_PLAN.convex_hull)
@@ -396,16 +455,52 @@ def test_every_shape_has_its_name_and_a_table_of_its_own() -> None:
 @pytest.mark.parametrize(
     ("shape", "keys", "said"),
     [
-        ("cylinder", {"diameter_mm": 70.0, "height_mm": 45.0, "inclination_deg": -40.0}, "inclination_deg: given -40"),
-        ("cylinder", {"diameter_mm": 70.0, "height_mm": 45.0, "corner_radius_mm": 36.0}, "34.95 is the furthest"),
-        ("box", {"length_mm": 60.0, "width_mm": 40.0, "height_mm": 30.0, "corner_radius_mm": 20.0}, "19.975 is the"),
-        ("box", {"length_mm": 60.0, "width_mm": 4.0, "height_mm": 90.0, "inclination_deg": -2.0}, "walls meet below"),
-        ("prism", {"sides": 5, "across_mm": 40.0, "height_mm": 30.0, "corner_radius_mm": 25.0}, "corner_radius_mm"),
+        (
+            "cylinder",
+            {"diameter_mm": 70.0, "height_mm": 45.0, "inclination_deg": -40.0},
+            "inclination_deg: given -40",
+        ),
+        (
+            "cylinder",
+            {"diameter_mm": 70.0, "height_mm": 45.0, "corner_radius_mm": 36.0},
+            "34.95 is the furthest",
+        ),
+        (
+            "box",
+            {"length_mm": 60.0, "width_mm": 40.0, "height_mm": 30.0, "corner_radius_mm": 20.0},
+            "19.975 is the",
+        ),
+        (
+            "box",
+            {"length_mm": 60.0, "width_mm": 4.0, "height_mm": 90.0, "inclination_deg": -2.0},
+            "walls meet below",
+        ),
+        (
+            "prism",
+            {"sides": 5, "across_mm": 40.0, "height_mm": 30.0, "corner_radius_mm": 25.0},
+            "corner_radius_mm",
+        ),
         ("revolve", {"profile_mm": [[30.0, 1.0], [30.0, 20.0]]}, "begins at z = 1"),
-        ("revolve", {"profile_mm": [[30.0, 0.0], [0.0, 20.0], [30.0, 30.0]]}, r"given \[0.0, 20.0\] as point 1"),
-        ("revolve", {"profile_mm": [[30.0, 0.0], [30.0, 20.0], [20.0, 20.0], [32.0, 10.0]]}, "crosses"),
-        ("revolve", {"profile_mm": [[30.0, 0.0], [30.0, 20.0], [30.0, 10.0], [5.0, 20.0]]}, "folds back"),
-        ("revolve", {"profile_mm": [[30.0, 0.0], [30.0, 20.0], [30.0, 20.0]]}, "point 2 is on or next to point 1"),
+        (
+            "revolve",
+            {"profile_mm": [[30.0, 0.0], [0.0, 20.0], [30.0, 30.0]]},
+            r"given \[0.0, 20.0\] as point 1",
+        ),
+        (
+            "revolve",
+            {"profile_mm": [[30.0, 0.0], [30.0, 20.0], [20.0, 20.0], [32.0, 10.0]]},
+            "crosses",
+        ),
+        (
+            "revolve",
+            {"profile_mm": [[30.0, 0.0], [30.0, 20.0], [30.0, 10.0], [5.0, 20.0]]},
+            "folds back",
+        ),
+        (
+            "revolve",
+            {"profile_mm": [[30.0, 0.0], [30.0, 20.0], [30.0, 20.0]]},
+            "point 2 is on or next to point 1",
+        ),
         (
             "conformal",
             {"outline": "silhouette", "gap_mm": 5.0, "height_mm": 40.0, "inclination_deg": 2.0},
@@ -423,7 +518,9 @@ def test_every_shape_has_its_name_and_a_table_of_its_own() -> None:
         ),
     ],
 )
-def test_what_makes_no_cavity_is_refused_with_what_would(shape: str, keys: dict[str, Any], said: str) -> None:
+def test_what_makes_no_cavity_is_refused_with_what_would(
+    shape: str, keys: dict[str, Any], said: str
+) -> None:
     with pytest.raises(ValidationError, match=said):
         surface(shape, ELL, **keys)
 
@@ -433,11 +530,18 @@ def test_what_makes_no_cavity_is_refused_with_what_would(shape: str, keys: dict[
     [
         ("cylinder", {"diameter_mm": 70.0, "height_mm": 45.0}, "inclination_deg", -37.835),
         ("cylinder", {"diameter_mm": 70.0, "height_mm": 45.0}, "corner_radius_mm", 34.95),
-        ("box", {"length_mm": 60.0, "width_mm": 40.0, "height_mm": 30.0}, "corner_radius_mm", 19.975),
+        (
+            "box",
+            {"length_mm": 60.0, "width_mm": 40.0, "height_mm": 30.0},
+            "corner_radius_mm",
+            19.975,
+        ),
         ("revolve", {"profile_mm": PROFILE}, "corner_radius_mm", None),
     ],
 )
-def test_what_is_said_to_fit_does(shape: str, keys: dict[str, Any], key: str, fits: float | None) -> None:
+def test_what_is_said_to_fit_does(
+    shape: str, keys: dict[str, Any], key: str, fits: float | None
+) -> None:
     with pytest.raises(ValidationError) as refused:
         surface(shape, **keys, **{key: -44.0 if key == "inclination_deg" else 500.0})
     said = re.search(r"; (\S+) is the furthest", str(refused.value))
@@ -451,11 +555,36 @@ def test_what_is_said_to_fit_does(shape: str, keys: dict[str, Any], key: str, fi
 
 
 TABLES: dict[str, dict[str, Any]] = {
-    "cylinder": {"diameter_mm": 70.0, "height_mm": 45.0, "inclination_deg": 7.0, "corner_radius_mm": 4.0},
-    "box": {"length_mm": 60.0, "width_mm": 50.0, "height_mm": 45.0, "inclination_deg": -6.0, "corner_radius_mm": 5.0},
-    "prism": {"sides": 7, "across_mm": 60.0, "height_mm": 45.0, "turn_deg": 11.0, "inclination_deg": 4.0},
-    "revolve": {"profile_mm": [[30.0, 0.0], [30.0, 20.0], [36.0, 26.0], [0.0, 60.0]], "corner_radius_mm": 3.0},
-    "conformal": {"outline": "silhouette", "gap_mm": 12.0, "height_mm": 45.0, "corner_radius_mm": 2.0},
+    "cylinder": {
+        "diameter_mm": 70.0,
+        "height_mm": 45.0,
+        "inclination_deg": 7.0,
+        "corner_radius_mm": 4.0,
+    },
+    "box": {
+        "length_mm": 60.0,
+        "width_mm": 50.0,
+        "height_mm": 45.0,
+        "inclination_deg": -6.0,
+        "corner_radius_mm": 5.0,
+    },
+    "prism": {
+        "sides": 7,
+        "across_mm": 60.0,
+        "height_mm": 45.0,
+        "turn_deg": 11.0,
+        "inclination_deg": 4.0,
+    },
+    "revolve": {
+        "profile_mm": [[30.0, 0.0], [30.0, 20.0], [36.0, 26.0], [0.0, 60.0]],
+        "corner_radius_mm": 3.0,
+    },
+    "conformal": {
+        "outline": "silhouette",
+        "gap_mm": 12.0,
+        "height_mm": 45.0,
+        "corner_radius_mm": 2.0,
+    },
 }
 
 
@@ -482,7 +611,9 @@ def test_a_part_is_taken_out_of_every_shape(tmp_path: Path, shape: str) -> None:
     assert 1e9 * chamber.volume == pytest.approx(checked(alone).volume - ball.volume, rel=1e-7)
     assert 1e6 * chamber.exposed_area.sum() == pytest.approx(ball.area, rel=1e-6)
     area = areas(chamber.vertices, chamber.triangles)
-    assert 1e6 * area[chamber.tags == TAG_SONOTRODE].sum() == pytest.approx(floor_area(alone), rel=1e-6)
+    assert 1e6 * area[chamber.tags == TAG_SONOTRODE].sum() == pytest.approx(
+        floor_area(alone), rel=1e-6
+    )
     assert not any("rounding" in note for note in chamber.notes)
 
 
@@ -519,19 +650,24 @@ def test_the_blades_chamber_stays_by_its_gap(tmp_path: Path) -> None:
         wall = shapely.Polygon(1e3 * chamber.vertices[_rim(chamber)][:, :2])
         inside = shapely.points(1e3 * below[:, :2])
         assert shapely.contains(wall, inside).all()
-        assert shapely.distance(wall.exterior, inside).min() == pytest.approx(9.0, abs=0.02)  # 64 facets: 0.011
+        assert shapely.distance(wall.exterior, inside).min() == pytest.approx(
+            9.0, abs=0.02
+        )  # 64 facets: 0.011
 
 
 def test_points_of_a_profile_vary(tmp_path: Path) -> None:
     design = design_with(tmp_path, "revolve", trimesh.creation.box((10, 10, 10)))
 
-    assert {"chamber.profile_mm.1.0", "chamber.profile_mm.3.1", "chamber.inclination_deg"} <= set(design.numbers())
+    assert {"chamber.profile_mm.1.0", "chamber.profile_mm.3.1", "chamber.inclination_deg"} <= set(
+        design.numbers()
+    )
     wider = design.with_values({"chamber.profile_mm.1.0": 33.0})
     assert wider.chamber.profile_mm[1] == (33.0, 20.0)
     with pytest.raises(InputError, match=r"chamber\.profile_mm: begins at z = 2"):
         design.with_values({"chamber.profile_mm.0.1": 2.0})
     with pytest.raises(
-        InputError, match=r"chamber\.profile_mm: with a ceiling at 60 mm, but the part begins 70 mm above"
+        InputError,
+        match=r"chamber\.profile_mm: with a ceiling at 60 mm, but the part begins 70 mm above",
     ):
         build_chamber(design.with_values({"chamber.sonotrode_distance_mm": 70.0}))
 

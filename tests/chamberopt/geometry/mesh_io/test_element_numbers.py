@@ -56,8 +56,13 @@ def listed(nodes: tuple[int, ...]) -> str:
 
 def test_nastran(tmp_path: Path) -> None:
     cards = [f"CQUAD4,{n},1,{listed(quad)}" for n, quad in zip(NUMBERS[:4], QUADS[:4], strict=True)]
-    for number, (a, b, c, d) in zip((10, 77), QUADS[4:], strict=True):  # triangles are kept apart from quadrilaterals
-        cards += [f"CTRIA3,{number},1,{listed((a, b, c))}", f"CTRIA3,{number + 1000},1,{listed((a, c, d))}"]
+    for number, (a, b, c, d) in zip(
+        (10, 77), QUADS[4:], strict=True
+    ):  # triangles are kept apart from quadrilaterals
+        cards += [
+            f"CTRIA3,{number},1,{listed((a, b, c))}",
+            f"CTRIA3,{number + 1000},1,{listed((a, c, d))}",
+        ]
     part = read_part(written(tmp_path / "box.bdf", nastran_text(cards)), "mm")
     part.elements[part.elements > 1000] -= 1000
     assert_numbered(part, NUMBERS, own=True)
@@ -68,7 +73,10 @@ def abaqus_text(instances: int) -> str:
     mesh = "*Node\n" + nodes_text(CORNERS) + "*Element, type=S4\n" + quads
     if not instances:
         return "*Heading\n" + mesh
-    placed = "".join(f"*Instance, name=Box-{k}, part=Box\n{50 * k}, 0, 0\n*End Instance\n" for k in range(instances))
+    placed = "".join(
+        f"*Instance, name=Box-{k}, part=Box\n{50 * k}, 0, 0\n*End Instance\n"
+        for k in range(instances)
+    )
     return f"*Heading\n*Part, name=Box\n{mesh}*End Part\n*Assembly, name=A\n{placed}*End Assembly\n"
 
 
@@ -88,24 +96,36 @@ def test_abaqus(tmp_path: Path) -> None:
 @pytest.mark.parametrize("binary", [True, False])
 def test_gmsh_2(tmp_path: Path, binary: bool) -> None:
     """Its elements are read group by group: the numbers, here places from 1 with a line first, go along."""
-    elements = [(1, (0, 1), np.array([0, 1])), *((3, (7 + k % 2, 1), np.array(quad)) for k, quad in enumerate(QUADS))]
+    elements = [
+        (1, (0, 1), np.array([0, 1])),
+        *((3, (7 + k % 2, 1), np.array(quad)) for k, quad in enumerate(QUADS)),
+    ]
     (tmp_path / "box.msh").write_bytes(gmsh_2(CORNERS, elements, binary))
     assert_numbered(read_part(tmp_path / "box.msh", "mm"), (2, 3, 4, 5, 6, 7), own=True)
 
 
 def test_gmsh_4(tmp_path: Path) -> None:
     points = "".join(f"{x} {y} {z}\n" for x, y, z in CORNERS)
-    quads = "".join(f"{n} {listed(quad).replace(',', ' ')}\n" for n, quad in zip(NUMBERS[1:], QUADS[1:], strict=True))
+    quads = "".join(
+        f"{n} {listed(quad).replace(',', ' ')}\n"
+        for n, quad in zip(NUMBERS[1:], QUADS[1:], strict=True)
+    )
     text = GMSH_4.format(points=points, quads=quads)
     top = int(re.search(rf"^(\d+) {listed(TOP).replace(',', ' ')}$", text, re.M)[1])  # type: ignore[index]
-    assert_numbered(read_part(written(tmp_path / "box.msh", text), "mm"), (top, *NUMBERS[1:]), own=True)
+    assert_numbered(
+        read_part(written(tmp_path / "box.msh", text), "mm"), (top, *NUMBERS[1:]), own=True
+    )
 
 
 def test_files_without_numbers_go_by_place(tmp_path: Path) -> None:
     text = OBJ_HEAD + "".join(map(obj_face, QUADS))
-    assert_numbered(read_part(written(tmp_path / "box.obj", text), "mm"), (1, 2, 3, 4, 5, 6), own=False)
+    assert_numbered(
+        read_part(written(tmp_path / "box.obj", text), "mm"), (1, 2, 3, 4, 5, 6), own=False
+    )
 
-    surface = pyvista.PolyData(CORNERS, np.insert(np.array(QUADS), 0, 4, axis=1).ravel(), lines=[2, 0, 1])
+    surface = pyvista.PolyData(
+        CORNERS, np.insert(np.array(QUADS), 0, 4, axis=1).ravel(), lines=[2, 0, 1]
+    )
     surface.save(tmp_path / "box.vtp")
     # A cell's place counts lines too.
     assert_numbered(read_part(tmp_path / "box.vtp", "mm"), (2, 3, 4, 5, 6, 7), own=False)
@@ -118,12 +138,17 @@ def test_files_without_numbers_go_by_place(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("program", ["nastran", "abaqus"])
-def test_a_solids_faces_have_its_number_but_a_shell_on_it_comes_first(tmp_path: Path, program: str) -> None:
+def test_a_solids_faces_have_its_number_but_a_shell_on_it_comes_first(
+    tmp_path: Path, program: str
+) -> None:
     """Two bricks, 44 on top of 9; a quadrilateral 300 lies on the uppermost face."""
     points = np.concatenate([CORNERS, CORNERS[4:] + np.array([0.0, 0.0, 40.0])])
     low, high, top = range(8), (*range(4, 8), *range(8, 12)), (8, 9, 10, 11)
     if program == "nastran":
-        cards = [f"CHEXA,{n},1,{listed(k[:6])}\n+,{listed(k[6:])}" for n, k in ((9, tuple(low)), (44, high))]
+        cards = [
+            f"CHEXA,{n},1,{listed(k[:6])}\n+,{listed(k[6:])}"
+            for n, k in ((9, tuple(low)), (44, high))
+        ]
         text = nastran_text([*cards, f"CQUAD4,300,2,{listed(top)}"], points)
     else:
         bricks = "".join(f"{n}, {listed(tuple(k))}\n" for n, k in ((44, high), (9, low)))
@@ -158,9 +183,15 @@ def test_numbers_stay_with_their_triangles_through_healing(tmp_path: Path) -> No
 
     part = read_part(written(tmp_path / "ball.bdf", nastran_text(cards, ball.vertices)), "mm")
 
-    found = dict(zip(part.elements.tolist(), part.vertices[part.triangles].mean(axis=1), strict=True))
+    found = dict(
+        zip(part.elements.tolist(), part.vertices[part.triangles].mean(axis=1), strict=True)
+    )
     assert len(found) == len(part.triangles) == len(ball.faces)
-    expected = {n: 1e-3 * ball.vertices[list(nodes)].mean(axis=0) for n, nodes in given.items() if n < 99_998}
+    expected = {
+        n: 1e-3 * ball.vertices[list(nodes)].mean(axis=0)
+        for n, nodes in given.items()
+        if n < 99_998
+    }
     expected[0] = 1e-3 * ball.vertices[list(missing)].mean(axis=0)
     assert sorted(found) == sorted(expected)
     for number, place in expected.items():
@@ -182,7 +213,10 @@ def test_one_body_of_several_keeps_its_numbers(tmp_path: Path) -> None:
 def test_the_part_of_a_drawn_set_up_keeps_its_numbers() -> None:
     path = PARTS / "plate_setup.bdf"
     text = path.read_text()
-    points = {int(n): [float(v) for v in row.split(",")] for n, row in re.findall(r"^GRID,(\d+),,(.*)$", text, re.M)}
+    points = {
+        int(n): [float(v) for v in row.split(",")]
+        for n, row in re.findall(r"^GRID,(\d+),,(.*)$", text, re.M)
+    }
     own = {
         int(n): np.mean([points[int(k)] for k in row.split(",")], axis=0)
         for n, row in re.findall(r"^CTRIA3,(\d+),1,(.*)$", text, re.M)
@@ -192,4 +226,6 @@ def test_the_part_of_a_drawn_set_up_keeps_its_numbers() -> None:
 
     assert sorted(part.elements.tolist()) == sorted(own)
     for number, triangle in zip(part.elements.tolist(), part.triangles, strict=True):
-        np.testing.assert_allclose(1e3 * part.vertices[triangle].mean(axis=0), own[number], atol=1e-9)
+        np.testing.assert_allclose(
+            1e3 * part.vertices[triangle].mean(axis=0), own[number], atol=1e-9
+        )

@@ -26,11 +26,15 @@ def write_stl(path: Path, corners: np.ndarray) -> Path:
     return path
 
 
-def write_ascii_stl(path: Path, corners: np.ndarray, digits: int = 9, end: str = "endsolid box\n") -> Path:
+def write_ascii_stl(
+    path: Path, corners: np.ndarray, digits: int = 9, end: str = "endsolid box\n"
+) -> Path:
     lines = ["solid box"]
     for triangle in corners:
         lines += ["facet normal 0 0 0", " outer loop"]
-        lines += ["  vertex " + " ".join(f"{value:.{digits}g}" for value in corner) for corner in triangle]
+        lines += [
+            "  vertex " + " ".join(f"{value:.{digits}g}" for value in corner) for corner in triangle
+        ]
         lines += [" endloop", "endfacet"]
     path.write_text("\n".join(lines) + "\n" + end)
     return path
@@ -66,7 +70,9 @@ def test_a_3mf_is_read_where_lxml_is_there(tmp_path: Path) -> None:
     assert read_part(path, "mm").size == pytest.approx([0.02] * 3)
 
 
-@pytest.mark.parametrize(("unit", "metres"), [("um", 1e-6), ("mm", 1e-3), ("cm", 1e-2), ("m", 1.0), ("in", 0.0254)])
+@pytest.mark.parametrize(
+    ("unit", "metres"), [("um", 1e-6), ("mm", 1e-3), ("cm", 1e-2), ("m", 1.0), ("in", 0.0254)]
+)
 def test_units(tmp_path: Path, unit: str, metres: float) -> None:
     path = write_stl(tmp_path / "box.stl", box_corners(0.05 / metres))
 
@@ -173,7 +179,9 @@ def broken(folder: Path, how: str) -> Path:
     elif how == "short text ply":
         path = folder / "part.ply"
         trimesh.creation.box((20, 20, 20)).export(path, encoding="ascii")
-        path.write_bytes(path.read_bytes().rstrip().rpartition(b"\n")[0] + b"\n")  # the last face is gone
+        path.write_bytes(
+            path.read_bytes().rstrip().rpartition(b"\n")[0] + b"\n"
+        )  # the last face is gone
     return path
 
 
@@ -189,8 +197,14 @@ def broken(folder: Path, how: str) -> Path:
         ("truncated text", "truncated.*endsolid"),
         ("not an stl", "truncated or not an STL"),
         ("nan", "1 triangles have a corner that is not a number.*triangle 5 of 12"),
-        ("open", r"not closed: \d+ open edges in [12] holes?, the first from \(.*\) mm to \(.*\) mm"),
-        ("non-manifold", r"not manifold: 1 edges.*the first from \(10, 10, -10\) mm to \(10, 10, 10\) mm"),
+        (
+            "open",
+            r"not closed: \d+ open edges in [12] holes?, the first from \(.*\) mm to \(.*\) mm",
+        ),
+        (
+            "non-manifold",
+            r"not manifold: 1 edges.*the first from \(10, 10, -10\) mm to \(10, 10, 10\) mm",
+        ),
         ("too small", r"measures 0\.02 x 0\.02 x 0\.02 mm.*'m' or 'in'"),
         ("too big", r"measures 20000 x 20000 x 20000 mm.*'um'"),
         ("damaged ply", "cannot be read as PLY, it is damaged or truncated"),
@@ -229,7 +243,9 @@ def test_a_small_hole_is_closed_and_its_place_said(tmp_path: Path) -> None:
     assert mesh.is_watertight
     assert mesh.is_winding_consistent
     assert mesh.volume == pytest.approx(4 / 3 * np.pi * 1e-6, rel=5e-3)
-    assert len(part.triangles) == len(corners)  # as many as were missing, or the hole would not be closed
+    assert len(part.triangles) == len(
+        corners
+    )  # as many as were missing, or the hole would not be closed
     assert len(part.notes) == 1
     assert "closed 1 small hole, the widest 0." in part.notes[0]
     assert ", 9.99" in part.notes[0]
@@ -267,7 +283,9 @@ def test_a_body_that_crosses_itself_is_refused_with_its_place(tmp_path: Path) ->
 
 
 def test_bodies_that_overlap_do_not_cross_themselves(tmp_path: Path) -> None:
-    corners = np.r_[box_corners(), box_corners(at=(10, 10, 10)), ball_corners() + np.array([40, 0, 0])]
+    corners = np.r_[
+        box_corners(), box_corners(at=(10, 10, 10)), ball_corners() + np.array([40, 0, 0])
+    ]
 
     assert read_part(write_stl(tmp_path / "three.stl", corners), "mm").notes == ()
 
@@ -293,18 +311,28 @@ def test_crossing_triangles_are_found_as_by_trying_each_edge_against_each_triang
             if any(segment_meets(corners[other], ends) for ends in edges):
                 expected.add((i, j))
 
-    found = [self_intersection._crossing(corners, a, b, 0.0) for a, b in self_intersection._close_pairs(corners)]
+    found = [
+        self_intersection._crossing(corners, a, b, 0.0)
+        for a, b in self_intersection._close_pairs(corners)
+    ]
 
-    pairs = [(min(i, j), max(i, j)) for a, b in found for i, j in zip(a.tolist(), b.tolist(), strict=True)]
+    pairs = [
+        (min(i, j), max(i, j))
+        for a, b in found
+        for i, j in zip(a.tolist(), b.tolist(), strict=True)
+    ]
     assert len(pairs) == len(set(pairs))
     assert set(pairs) == expected
     assert len(expected) > 20
 
 
 @pytest.mark.parametrize(
-    ("size", "unit", "metres"), [(20.0, "mm", 1e-3), (1200.0, "mm", 1e-3), (0.02, "m", 1.0), (30000.0, "um", 1e-6)]
+    ("size", "unit", "metres"),
+    [(20.0, "mm", 1e-3), (1200.0, "mm", 1e-3), (0.02, "m", 1.0), (30000.0, "um", 1e-6)],
 )
-def test_a_unit_is_guessed_from_the_size_and_said(tmp_path: Path, size: float, unit: str, metres: float) -> None:
+def test_a_unit_is_guessed_from_the_size_and_said(
+    tmp_path: Path, size: float, unit: str, metres: float
+) -> None:
     part = read_part(write_stl(tmp_path / "box.stl", box_corners(size)))
 
     assert part.unit == unit
@@ -312,8 +340,12 @@ def test_a_unit_is_guessed_from_the_size_and_said(tmp_path: Path, size: float, u
     assert f"unit guessed as '{unit}' (by its size): the part measures" in part.notes[0]
 
 
-@pytest.mark.parametrize(("said", "unit"), [("# units = inch", "in"), ("# Unit: centimeters", "cm")])
-def test_a_comment_that_states_the_unit_is_believed_before_the_size(tmp_path: Path, said: str, unit: str) -> None:
+@pytest.mark.parametrize(
+    ("said", "unit"), [("# units = inch", "in"), ("# Unit: centimeters", "cm")]
+)
+def test_a_comment_that_states_the_unit_is_believed_before_the_size(
+    tmp_path: Path, said: str, unit: str
+) -> None:
     path = tmp_path / "box.obj"
     trimesh.creation.box((2, 2, 2)).export(path)
     path.write_text(f"{said}\n{path.read_text()}")
@@ -325,7 +357,9 @@ def test_a_comment_that_states_the_unit_is_believed_before_the_size(tmp_path: Pa
 
 
 def test_a_size_that_says_nothing_asks_for_the_unit(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"cannot be guessed from a longest side of 2.*give part\.unit"):
+    with pytest.raises(
+        InputError, match=r"cannot be guessed from a longest side of 2.*give part\.unit"
+    ):
         read_part(write_stl(tmp_path / "box.stl", box_corners(2.0)))
 
 

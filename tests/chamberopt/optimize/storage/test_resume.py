@@ -48,7 +48,11 @@ def test_every_algorithm_goes_on_from_any_row(algorithm: str, tmp_path: Path) ->
     whole, question = tmp_path / "whole", study(algorithm=algorithm)
     run(question, whole)
     ends = [0, *(at + 1 for at, byte in enumerate(history(whole)) if byte == ord("\n"))]
-    rows = (0, 1, 4, 5, 6, 9, 13, 16, 17, len(ends) - 2) if algorithm == "auto" else (1, 7, 13, len(ends) - 2)
+    rows = (
+        (0, 1, 4, 5, 6, 9, 13, 16, 17, len(ends) - 2)
+        if algorithm == "auto"
+        else (1, 7, 13, len(ends) - 2)
+    )
     for k in rows:
         folder = tmp_path / str(k)
         cut(whole, folder, ends[k])
@@ -61,7 +65,9 @@ def test_every_algorithm_goes_on_from_any_row(algorithm: str, tmp_path: Path) ->
 @pytest.mark.parametrize("objective", [{}, {"pareto": ["uniform_coverage", "coverage_p05"]}])
 def test_what_is_learnt_from_few_replicas_is_learnt_again(objective: dict, tmp_path: Path) -> None:
     """Candidates given up after a few replicas, confirmations repeated with more, two objectives: all from the rows."""
-    question = study(first_replicas=4, confirm_rounds=3).model_copy(update={"objective": Objective(**objective)})
+    question = study(first_replicas=4, confirm_rounds=3).model_copy(
+        update={"objective": Objective(**objective)}
+    )
     whole = tmp_path / "whole"
     first = run(question, whole)
     ends = [0, *(at + 1 for at, byte in enumerate(history(whole)) if byte == ord("\n"))]
@@ -97,7 +103,11 @@ def test_an_ended_study_is_read_not_run(tmp_path: Path) -> None:
     assert_same(again.start.evaluation, first.start.evaluation)
 
 
-fork = multiprocessing.get_context("fork") if "fork" in multiprocessing.get_all_start_methods() else None
+fork = (
+    multiprocessing.get_context("fork")
+    if "fork" in multiprocessing.get_all_start_methods()
+    else None
+)
 
 
 @pytest.mark.usefixtures("quick_disk")
@@ -166,7 +176,12 @@ class TestEvaluationFile:
         plain = poisson_evaluation(design, build_chamber(design))
         curve = ((0.5, plain.metrics["mean_coverage"]), (1.0, plain.objective))
         return Evaluation(
-            **{**vars(plain), "notes": ("µ ± 1", "x"), "marked": np.array([0.5, np.nan]), "against_time": curve}
+            **{
+                **vars(plain),
+                "notes": ("µ ± 1", "x"),
+                "marked": np.array([0.5, np.nan]),
+                "against_time": curve,
+            }
         )
 
     def test_reads_back_the_same(self, evaluation: Evaluation, tmp_path: Path) -> None:
@@ -207,7 +222,11 @@ class TestDamage:
                 ('"point": [0.', '"point": [0.9'),
                 r"history\.jsonl:4: recorded is the search of \[0\.9.*but what comes",
             ),
-            (2, ('"stage": "search"', '"stage": "confirm"'), r"history\.jsonl:2: recorded is the confirm"),
+            (
+                2,
+                ('"stage": "search"', '"stage": "confirm"'),
+                r"history\.jsonl:2: recorded is the confirm",
+            ),
             (1, ("{", "7 #"), r"history\.jsonl:1: damaged row"),
         ],
     )
@@ -226,7 +245,9 @@ class TestDamage:
         rows = [json.loads(row) for row in history(folder).splitlines()]
         rows[2]["score"] += 0.3
         (folder / "history.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
-        with pytest.raises(InputError, match=r"history\.jsonl:\d: recorded is .*edited, or another version"):
+        with pytest.raises(
+            InputError, match=r"history\.jsonl:\d: recorded is .*edited, or another version"
+        ):
             run(study(evaluations=6), folder)
 
     def test_of_rows_too_many(self, folder: Path) -> None:
@@ -331,7 +352,9 @@ class TestChanges:
                 mesh.write_text("another")
             return evaluation
 
-        with pytest.raises(InputError, match=r"while the study ran.*\n  part\.mesh\.(file|sha256): was"):
+        with pytest.raises(
+            InputError, match=r"while the study ran.*\n  part\.mesh\.(file|sha256): was"
+        ):
             run(question, tmp_path / "out", evaluator=evaluator)
         assert history_rows(tmp_path / "out") == 3
         shutil.copy(GEAR.part.mesh_path, mesh)
@@ -352,8 +375,18 @@ class TestChanges:
 def test_effects_left_to_us_are_chosen_once(tmp_path: Path) -> None:
     """A pilot takes its time: what it said is kept, and the study goes on with it."""
     auto = GEAR.model_copy(update={"effects": GEAR.effects.model_copy(update={"auto": True})})
-    chosen = GEAR.model_copy(update={"effects": GEAR.effects.model_copy(update={"auto": False, "gravity": False})})
-    advice = [Advice("gravity", True, "g H / V² = 0.01", {"µ": Estimate(0.1, np.inf, (0.1 + 0.2, 1 / 3))}, 0.01)]
+    chosen = GEAR.model_copy(
+        update={"effects": GEAR.effects.model_copy(update={"auto": False, "gravity": False})}
+    )
+    advice = [
+        Advice(
+            "gravity",
+            True,
+            "g H / V² = 0.01",
+            {"µ": Estimate(0.1, np.inf, (0.1 + 0.2, 1 / 3))},
+            0.01,
+        )
+    ]
     question = study().model_copy(update={"design": auto})
     asked: list[Design] = []
 
@@ -363,7 +396,10 @@ def test_effects_left_to_us_are_chosen_once(tmp_path: Path) -> None:
 
     for _ in range(2):
         with open_record(question, tmp_path / "out") as record:
-            assert record.settled(settle) == (question.model_copy(update={"design": chosen}), advice)
+            assert record.settled(settle) == (
+                question.model_copy(update={"design": chosen}),
+                advice,
+            )
     assert asked == [auto]
 
 
@@ -371,7 +407,9 @@ class TestTwoProcesses:
     def test_the_second_is_refused(self, tmp_path: Path) -> None:
         with (
             open_record(study(), tmp_path / "out") as record,
-            pytest.raises(InputError, match=r"is being written by process \d+ on .* since 2.*wait.*--out"),
+            pytest.raises(
+                InputError, match=r"is being written by process \d+ on .* since 2.*wait.*--out"
+            ),
             open_record(study(), tmp_path / "out"),
         ):
             pass
@@ -390,7 +428,10 @@ class TestTwoProcesses:
         child = fork.Process(target=hold)
         child.start()
         assert held.wait(20)
-        with pytest.raises(InputError, match=f"process {child.pid}"), open_record(study(), tmp_path / "out"):
+        with (
+            pytest.raises(InputError, match=f"process {child.pid}"),
+            open_record(study(), tmp_path / "out"),
+        ):
             pass
         child.kill()
         child.join()
@@ -401,8 +442,14 @@ class TestTwoProcesses:
 @pytest.mark.long
 def test_the_real_thing_killed_from_a_shell(tmp_path: Path) -> None:
     """`chamberopt run` with real simulations: the history is the undisturbed one's, the answer too."""
-    text = (DESIGNS / "plate.toml").read_text(encoding="utf-8").replace("parts/", f"{(DESIGNS / 'parts').as_posix()}/")
-    text = text.replace("replicas = 8", "replicas = 3").replace("simulated_time_s = 4.0", "simulated_time_s = 0.3")
+    text = (
+        (DESIGNS / "plate.toml")
+        .read_text(encoding="utf-8")
+        .replace("parts/", f"{(DESIGNS / 'parts').as_posix()}/")
+    )
+    text = text.replace("replicas = 8", "replicas = 3").replace(
+        "simulated_time_s = 4.0", "simulated_time_s = 0.3"
+    )
     (tmp_path / "plate.toml").write_text(text, encoding="utf-8")
     (tmp_path / "small.toml").write_text(
         'design = "plate.toml"\n[vary]\n"shot.mass_g" = [1.5, 8.0]\n'
@@ -411,7 +458,9 @@ def test_the_real_thing_killed_from_a_shell(tmp_path: Path) -> None:
 
     def start(out: str) -> subprocess.Popen[bytes]:
         command = [sys.executable, "-m", "chamberopt", "run", "small.toml", "--out", out]
-        return subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        return subprocess.Popen(
+            command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
 
     assert start("whole").wait() == 0
     out = tmp_path / "out"

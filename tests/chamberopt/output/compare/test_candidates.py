@@ -35,7 +35,9 @@ class Simulations:
     def evaluate(self, design: Design, chamber: Any, *_: Any, **how: Any) -> Any:
         self.done.append((design, how))
         count = how["replicas"] or design.process.accuracy.replicas
-        evaluation = poisson_evaluation(design, chamber, 4.0 * design.shot.mass_g, count, design.process.seed)
+        evaluation = poisson_evaluation(
+            design, chamber, 4.0 * design.shot.mass_g, count, design.process.seed
+        )
         return replace(evaluation, stream=how["stream"], objective_name=how["objective_name"])
 
 
@@ -70,10 +72,14 @@ def run(paths: list[Path], out: Path, seconds: float | None = None) -> tuple[Any
     return comparison_of(results, [one.label for one in found]), remarks
 
 
-def test_designs_of_one_name_on_the_draws_of_the_first(simulations: Simulations, made, tmp_path: Path) -> None:
+def test_designs_of_one_name_on_the_draws_of_the_first(
+    simulations: Simulations, made, tmp_path: Path
+) -> None:
     first = made("a/plate.toml", process__seed=7, process__accuracy__replicas=5)
     second = made("b/plate.toml", shot__mass_g=6.0)
-    second.write_text(second.read_text().replace("[process.accuracy]", "[process.accuracy]\ncoverage = 0.01"))
+    second.write_text(
+        second.read_text().replace("[process.accuracy]", "[process.accuracy]\ncoverage = 0.01")
+    )
     compared, remarks = run([first, second], tmp_path / "out")
     assert compared.labels == ("a/plate", "b/plate")
     instead = "seed = 7 in place of 1 and 5 replicas in place of as many as make ± 0.01"
@@ -89,12 +95,20 @@ def test_designs_of_one_name_on_the_draws_of_the_first(simulations: Simulations,
         assert result.data["replicas"] == 5
 
 
-def test_a_design_against_a_confirmed_result(simulations: Simulations, made, tmp_path: Path) -> None:
-    evaluation = replace(poisson_evaluation(PLATE, CHAMBER, 20, 6), stream="confirm", objective_name="coverage_p05")
+def test_a_design_against_a_confirmed_result(
+    simulations: Simulations, made, tmp_path: Path
+) -> None:
+    evaluation = replace(
+        poisson_evaluation(PLATE, CHAMBER, 20, 6), stream="confirm", objective_name="coverage_p05"
+    )
     write_simulation(tmp_path / "best", PLATE, CHAMBER, evaluation)
     compared, _ = run([tmp_path / "best", made("mine.toml", shot__mass_g=6.0)], tmp_path / "out")
     [(design, how)] = simulations.done  # the result is not simulated again
-    assert (design.process.seed, how["stream"], how["replicas"]) == (PLATE.process.seed, "confirm", 6)
+    assert (design.process.seed, how["stream"], how["replicas"]) == (
+        PLATE.process.seed,
+        "confirm",
+        6,
+    )
     assert "coverage_p05" in compared.differences
     assert compared.differences["mean_coverage"][0].paired
 
@@ -118,7 +132,9 @@ def test_another_treatment_time_is_simulated_again_on_its_own_seeds(
     assert len(simulations.done) == 3  # the design alone: the result is of that time
 
 
-def test_everything_is_refused_before_anything_is_simulated(simulations: Simulations, made, tmp_path: Path) -> None:
+def test_everything_is_refused_before_anything_is_simulated(
+    simulations: Simulations, made, tmp_path: Path
+) -> None:
     one = made("one.toml")
     for second, said in (
         (made("longer.toml", process__treatment_time_s=50), "cannot be compared"),
@@ -137,7 +153,9 @@ def test_everything_is_refused_before_anything_is_simulated(simulations: Simulat
     assert simulations.done == []
 
 
-def test_a_part_may_be_turned_and_its_unit_guessed(simulations: Simulations, made, tmp_path: Path) -> None:
+def test_a_part_may_be_turned_and_its_unit_guessed(
+    simulations: Simulations, made, tmp_path: Path
+) -> None:
     data = PLATE.model_dump()
     data["part"] |= {"unit": "guess", "offset_mm": (1.0, 0.0), "rotate_deg": (0.0, 0.0, 90.0)}
     save_design(checked(Design, data), tmp_path / "turned.toml")
@@ -145,7 +163,9 @@ def test_a_part_may_be_turned_and_its_unit_guessed(simulations: Simulations, mad
     assert set(compared.parameters) == {"part.offset_mm", "part.rotate_deg"}
 
 
-def test_designs_share_the_first_ones_reachable_target(simulations: Simulations, tmp_path: Path) -> None:
+def test_designs_share_the_first_ones_reachable_target(
+    simulations: Simulations, tmp_path: Path
+) -> None:
     data = PLATE.model_dump()
     data["part"]["target"] = {"direction": (0, 0, -1), "angle_deg": (0, 10), "reachable": True}
     save_design(checked(Design, data), tmp_path / "wide.toml")
@@ -157,7 +177,9 @@ def test_designs_share_the_first_ones_reachable_target(simulations: Simulations,
     np.testing.assert_array_equal(wide.chamber.part.target, narrow.chamber.part.target)
     alone = build_chamber(narrow.design)
     assert (alone.part.target != wide.chamber.part.target).any()
-    write_simulation(tmp_path / "result", narrow.design, alone, poisson_evaluation(narrow.design, alone))
+    write_simulation(
+        tmp_path / "result", narrow.design, alone, poisson_evaluation(narrow.design, alone)
+    )
     with pytest.raises(InputError, match=r"its target is \d+ triangles.*give its design"):
         gathered([tmp_path / "wide.toml", tmp_path / "result"])
 

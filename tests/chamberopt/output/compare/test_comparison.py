@@ -52,7 +52,10 @@ def test_the_same_twice(tmp_path: Path) -> None:
         assert gap.paired
         assert not gap.real
         assert gap.times is None
-        if name not in ("p05_coverage", "time_to_98_s"):  # their intervals hold a bias that knows nothing of pairs
+        if name not in (
+            "p05_coverage",
+            "time_to_98_s",
+        ):  # their intervals hold a bias that knows nothing of pairs
             assert gap.half_width == 0.0
     text = as_text(both)
     assert "the designs do not differ" in text
@@ -87,8 +90,12 @@ def test_pairs_by_hand() -> None:
     assert gap.real
     apart = difference(after, before, same_seeds=False)
     assert (apart.paired, apart.real) == (False, False)
-    expected = stats.ttest_ind(after.pseudovalues, before.pseudovalues, equal_var=False).confidence_interval(0.95)
-    assert (apart.value - apart.half_width, apart.value + apart.half_width) == pytest.approx(tuple(expected))
+    expected = stats.ttest_ind(
+        after.pseudovalues, before.pseudovalues, equal_var=False
+    ).confidence_interval(0.95)
+    assert (apart.value - apart.half_width, apart.value + apart.half_width) == pytest.approx(
+        tuple(expected)
+    )
     assert not difference(estimate([1.0, 2.0, 3.0, 4.0, 5.0]), before, same_seeds=True).paired
 
 
@@ -115,7 +122,9 @@ def test_simulated_so_much_longer_the_difference_shows_in_half_of_the_cases(pair
     # 1.96 standard errors in the limit: the foretold number is not far above (Student's t of more replicas is near it).
     limit = (1.96 * spread / true_gap) ** 2 * (1 if paired else 2)
     assert limit < gap.replicas < 1.2 * limit
-    drawn = rng.normal(0.0, spread, (2, 4000, gap.replicas)) + np.array([0.0, true_gap])[:, None, None]
+    drawn = (
+        rng.normal(0.0, spread, (2, 4000, gap.replicas)) + np.array([0.0, true_gap])[:, None, None]
+    )
     if paired:
         found = stats.ttest_1samp(drawn[1], 0.0, axis=1).pvalue < 0.05
     else:
@@ -137,7 +146,9 @@ def test_never_is_not_told_from_late(tmp_path: Path) -> None:
     folders = [left(tmp_path / "late", 20)]
     evaluation = poisson_evaluation(PLATE, CHAMBER, 20, 6)
     never = Estimate(NEVER, NEVER, (NEVER,) * 6)
-    folders.append(left(tmp_path / "never", 20, metrics={**evaluation.metrics, "time_to_98_s": never}))
+    folders.append(
+        left(tmp_path / "never", 20, metrics={**evaluation.metrics, "time_to_98_s": never})
+    )
     both = compare(folders)
     (gap,) = both.differences["time_to_98_s"]
     assert not gap.real
@@ -166,8 +177,12 @@ def test_three_results_and_what_is_written(tmp_path: Path) -> None:
     assert about["distributions"]["mean_normal_speed_m_s"] == pytest.approx([3.0] * 3)
     assert about["distributions"]["mean_angle_deg"] == pytest.approx([70.0] * 3)
     edges = np.array(about["distributions"]["coverage"]["edges"])
-    for shares, mean in zip(about["distributions"]["coverage"]["shares"], three.metrics["mean_coverage"], strict=True):
-        assert 0.5 * (edges[1:] + edges[:-1]) @ shares == pytest.approx(100.0 * mean.value, abs=edges[1] - edges[0])
+    for shares, mean in zip(
+        about["distributions"]["coverage"]["shares"], three.metrics["mean_coverage"], strict=True
+    ):
+        assert 0.5 * (edges[1:] + edges[:-1]) @ shares == pytest.approx(
+            100.0 * mean.value, abs=edges[1] - edges[0]
+        )
     assert (tmp_path / "out" / "distributions.png").stat().st_size > 50_000
     with pytest.raises(InputError, match="never overwritten"):
         write_comparison(tmp_path / "out", three)
@@ -196,7 +211,9 @@ def test_two_ways_of_counting_are_said(tmp_path: Path) -> None:
 def test_single_impacts_of_another_result_are_refused(tmp_path: Path) -> None:
     both = compare([left(tmp_path / "a", 20), left(tmp_path / "b", 30)])
     (tmp_path / "b" / "hits.npz").write_bytes((tmp_path / "a" / "hits.npz").read_bytes())
-    with pytest.raises(InputError, match=r"hits\.npz: its impacts are not those of the coverage\.vtp beside it"):
+    with pytest.raises(
+        InputError, match=r"hits\.npz: its impacts are not those of the coverage\.vtp beside it"
+    ):
         write_comparison(tmp_path / "out", both)
     assert not (tmp_path / "out").exists()
 
@@ -206,7 +223,9 @@ def test_targets_of_other_triangles_are_refused(tmp_path: Path) -> None:
     surface = viewer.read_surface(tmp_path / "b" / "coverage.vtp")
     surface["target"][np.flatnonzero(surface["target"])[:3]] = 0
     surface.save(tmp_path / "b" / "coverage.vtp")
-    with pytest.raises(InputError, match=r"of another result than result\.json: a target of 333 triangles"):
+    with pytest.raises(
+        InputError, match=r"of another result than result\.json: a target of 333 triangles"
+    ):
         write_comparison(tmp_path / "out", both)
     assert not (tmp_path / "out").exists()
 
@@ -236,11 +255,19 @@ def test_what_cannot_be_compared(tmp_path: Path) -> None:
 def test_curves_end_where_nobody_knows_any_more() -> None:
     widths = ((0.01, 0.02), (0.1, 0.2), (0.2, 0.1))
     rows = [
-        {"time_s": k + 1.0, "mean_coverage": 0.5, "half_width": mean, "p05_coverage": 0.4, "p05_half_width": poorest}
+        {
+            "time_s": k + 1.0,
+            "mean_coverage": 0.5,
+            "half_width": mean,
+            "p05_coverage": 0.4,
+            "p05_half_width": poorest,
+        }
         for k, (mean, poorest) in enumerate(widths)
     ]
     mean, poorest = plots._known(rows)
     np.testing.assert_array_equal(mean[0], [1.0, 2.0])
     np.testing.assert_array_equal(poorest[0], [1.0])
-    marked = plots._known([{"time_s": 1.0, "mean_coverage": 0.5, "half_width": 0.01}])[1]  # has no poorest twentieth
+    marked = plots._known([{"time_s": 1.0, "mean_coverage": 0.5, "half_width": 0.01}])[
+        1
+    ]  # has no poorest twentieth
     assert marked.shape == (3, 0)

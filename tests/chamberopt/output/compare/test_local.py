@@ -12,7 +12,12 @@ from chamberopt.output import viewer
 from chamberopt.output.compare.covered import Covered, covered
 from chamberopt.output.compare.local import local_difference
 from chamberopt.output.results.results import load_result, write_simulation
-from chamberopt.output.viewer import difference_picture, read_surface, why_no_pictures, write_differences
+from chamberopt.output.viewer import (
+    difference_picture,
+    read_surface,
+    why_no_pictures,
+    write_differences,
+)
 from tests.helpers.synthetic import equal_dents, evaluation_of, plate_design
 
 PLATE = plate_design()
@@ -26,11 +31,16 @@ def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(viewer, "coverage_picture", lambda *_: None)
 
 
-def peened(folder: Path, per_mm2: np.ndarray | float, seed: int, chamber: Chamber = CHAMBER) -> Covered:
+def peened(
+    folder: Path, per_mm2: np.ndarray | float, seed: int, chamber: Chamber = CHAMBER
+) -> Covered:
     """A result whose dents fell at random, so many in all on each mm² of a triangle."""
     rng = np.random.default_rng(seed)
     mean = per_mm2 * 1e6 * chamber.exposed_area / 4
-    tallies = [equal_dents(PLATE.process.accuracy.simulated_time, rng.poisson(mean), DENT) for _ in range(4)]
+    tallies = [
+        equal_dents(PLATE.process.accuracy.simulated_time, rng.poisson(mean), DENT)
+        for _ in range(4)
+    ]
     write_simulation(folder, PLATE, chamber, evaluation_of(PLATE, chamber, tallies))
     return covered(load_result(folder))
 
@@ -41,11 +51,16 @@ def on_the_right() -> np.ndarray:
 
 def test_more_on_one_half_is_found_there_and_not_elsewhere(tmp_path: Path) -> None:
     right = on_the_right()
-    found = local_difference(peened(tmp_path / "a", 20.0, 1), peened(tmp_path / "b", np.where(right, 40.0, 20.0), 2))
+    found = local_difference(
+        peened(tmp_path / "a", 20.0, 1), peened(tmp_path / "b", np.where(right, 40.0, 20.0), 2)
+    )
     target = CHAMBER.part.target
     assert np.isnan(found.value[~target]).all()
     assert not found.real[~target].any()
-    away = np.abs(CHAMBER.part.vertices[CHAMBER.part.triangles].mean(axis=1)[:, 0]) > 1e-3 * found.reach
+    away = (
+        np.abs(CHAMBER.part.vertices[CHAMBER.part.triangles].mean(axis=1)[:, 0])
+        > 1e-3 * found.reach
+    )
     wanted = np.exp(-20.0 * 1e6 * DENT * TIMES) - np.exp(-40.0 * 1e6 * DENT * TIMES)
     assert found.value[target & right & away].mean() == pytest.approx(wanted, abs=0.01)
     assert found.value[target & ~right & away].mean() == pytest.approx(0.0, abs=0.01)
@@ -55,11 +70,17 @@ def test_more_on_one_half_is_found_there_and_not_elsewhere(tmp_path: Path) -> No
     assert found.less < 0.05
 
 
-@pytest.mark.parametrize("per_mm2", [1.0, 100.0], ids=["averaged over discs", "triangle by triangle"])
-def test_one_in_twenty_is_real_by_chance_where_nothing_differs(tmp_path: Path, per_mm2: float) -> None:
+@pytest.mark.parametrize(
+    "per_mm2", [1.0, 100.0], ids=["averaged over discs", "triangle by triangle"]
+)
+def test_one_in_twenty_is_real_by_chance_where_nothing_differs(
+    tmp_path: Path, per_mm2: float
+) -> None:
     shares = []
     for k in range(6):
-        pair = [peened(tmp_path / f"{name}{k}", per_mm2, 2 * k + seed) for seed, name in enumerate("ab")]
+        pair = [
+            peened(tmp_path / f"{name}{k}", per_mm2, 2 * k + seed) for seed, name in enumerate("ab")
+        ]
         found = local_difference(pair[0], pair[1])
         shares.append(found.more + found.less)
         assert (found.reach > 0.0) == (per_mm2 < 10.0)
@@ -71,7 +92,9 @@ def test_one_in_twenty_is_real_by_chance_where_nothing_differs(tmp_path: Path, p
 def test_what_is_hidden_in_one_is_not_covered_there(tmp_path: Path) -> None:
     hidden = on_the_right()
     half = replace(CHAMBER, exposed_area=np.where(hidden, 0.0, CHAMBER.exposed_area))
-    found = local_difference(peened(tmp_path / "all", 100.0, 1), peened(tmp_path / "half", 100.0, 2, half))
+    found = local_difference(
+        peened(tmp_path / "all", 100.0, 1), peened(tmp_path / "half", 100.0, 2, half)
+    )
     lost = hidden & CHAMBER.part.target
     covered_in_first = 1.0 - np.exp(-100.0 * 1e6 * DENT * TIMES)
     assert found.value[lost].mean() == pytest.approx(-covered_in_first, abs=0.02)
@@ -79,7 +102,9 @@ def test_what_is_hidden_in_one_is_not_covered_there(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(why_no_pictures() is not None, reason="no OpenGL library")
-def test_the_picture_is_violet_where_more_orange_where_less_and_pale_between(tmp_path: Path) -> None:
+def test_the_picture_is_violet_where_more_orange_where_less_and_pale_between(
+    tmp_path: Path,
+) -> None:
     """Colours by their hue, shares of the picture; greys are bluish by up to 12 of 255."""
     one = peened(tmp_path / "a", 20.0, 1)
     right, target = on_the_right(), one.target

@@ -24,7 +24,12 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import SerialExecutor, local_executor
 from chamberopt.design.load import Design, Study
 from chamberopt.optimize.run_study import run_study
-from chamberopt.output.export.chamber_files import read_cavity, write_3mf, write_stl, write_stl_per_surface
+from chamberopt.output.export.chamber_files import (
+    read_cavity,
+    write_3mf,
+    write_stl,
+    write_stl_per_surface,
+)
 from chamberopt.output.export.frame import FrameName
 from chamberopt.output.export.impact_columns import PIECE
 from chamberopt.output.export.impacts_table import write_impacts
@@ -69,7 +74,9 @@ def design(place: Path) -> Design:
 @pytest.fixture(scope="module")
 def simulated(place: Path, design: Design) -> Path:
     chamber = build_chamber(design)
-    write_simulation(place / "simulated", design, chamber, evaluate(design, chamber, SerialExecutor()))
+    write_simulation(
+        place / "simulated", design, chamber, evaluate(design, chamber, SerialExecutor())
+    )
     return place / "simulated"
 
 
@@ -85,7 +92,9 @@ def study(place: Path, design: Design) -> Path:
 
 
 @pytest.fixture
-def chamberopt(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Said:
+def chamberopt(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> Said:
     """Runs a command in this process, in an empty folder: status, stdout, stderr."""
     monkeypatch.chdir(tmp_path)
 
@@ -124,7 +133,9 @@ def require_result_again(folder: Path, table: dict[str, np.ndarray]) -> None:
     np.testing.assert_array_equal(np.bincount(dented, minlength=surface.n_cells), surface["dents"])
     speeds = np.bincount(table["triangle"], table["normal_speed_m_s"], surface.n_cells)
     hit = on_each > 0
-    np.testing.assert_allclose(speeds[hit] / on_each[hit], surface["mean_normal_speed"][hit], rtol=1e-6)
+    np.testing.assert_allclose(
+        speeds[hit] / on_each[hit], surface["mean_normal_speed"][hit], rtol=1e-6
+    )
 
 
 def test_the_rows_give_the_figures_of_the_result(simulated: Path, tmp_path: Path) -> None:
@@ -138,10 +149,15 @@ def test_the_rows_give_the_figures_of_the_result(simulated: Path, tmp_path: Path
     assert set(table["ball_diameter_mm"]) == {3.0}
 
 
-def test_places_and_velocities_are_those_of_the_parts_file(simulated: Path, place: Path, tmp_path: Path) -> None:
+def test_places_and_velocities_are_those_of_the_parts_file(
+    simulated: Path, place: Path, tmp_path: Path
+) -> None:
     part = trimesh.load_mesh(place / "plate.stl", process=False)
     table = table_of(simulated, tmp_path / "i.parquet")
-    at, velocity = columns(table, "x_in", "y_in", "z_in"), columns(table, "vx_m_s", "vy_m_s", "vz_m_s")
+    at, velocity = (
+        columns(table, "x_in", "y_in", "z_in"),
+        columns(table, "vx_m_s", "vy_m_s", "vz_m_s"),
+    )
     nearest = trimesh.triangles.closest_point(part.triangles[table["triangle"]], at)
     assert np.abs(nearest - at).max() < 2e-6  # float32 in the STL file: 20 in are told to 1e-6
     across = (velocity * part.face_normals[table["triangle"]]).sum(axis=1)
@@ -157,16 +173,25 @@ def test_in_the_chambers_frame_they_lie_on_coverage_vtp(simulated: Path, tmp_pat
     at = columns(table, "x_mm", "y_mm", "z_mm")
     nearest = trimesh.triangles.closest_point(corners[table["triangle"]], at)
     assert np.abs(nearest - at).max() < 1e-9
-    np.testing.assert_allclose(table["vz_m_s"], table["normal_speed_m_s"])  # up against the plate's lower face
+    np.testing.assert_allclose(
+        table["vz_m_s"], table["normal_speed_m_s"]
+    )  # up against the plate's lower face
 
 
-def test_what_the_parquet_file_says_of_itself(simulated: Path, design: Design, tmp_path: Path) -> None:
+def test_what_the_parquet_file_says_of_itself(
+    simulated: Path, design: Design, tmp_path: Path
+) -> None:
     table_of(simulated, tmp_path / "i.parquet")
     schema = pyarrow.parquet.read_schema(tmp_path / "i.parquet")
     about = json.loads(schema.metadata[b"chamberopt"])
     assert about["length_unit"] == "in"
     assert about["frame"].startswith("part: ")
-    assert (about["seed"], about["stream"], about["replicas"], about["same_as_result"]) == (1, "search", 3, True)
+    assert (about["seed"], about["stream"], about["replicas"], about["same_as_result"]) == (
+        1,
+        "search",
+        3,
+        True,
+    )
     assert about["simulated_time_s"] == pytest.approx(0.6)
     assert about["design"]["shot"]["mass_g"] == 6.0
     assert about["versions"]["chamberopt"]
@@ -185,16 +210,22 @@ def test_csv_holds_what_parquet_holds_whatever_the_number_of_workers(
     ground = ground_of(result)
     files = [tmp_path / name for name in ("i.csv", "i.csv.gz", "i.parquet")]
     write_impacts(files, result, ground, SerialExecutor())
-    monkeypatch.setattr("chamberopt.output.resimulate.impacts.AT_ONCE", 1.0)  # nor are all replicas in memory
+    monkeypatch.setattr(
+        "chamberopt.output.resimulate.impacts.AT_ONCE", 1.0
+    )  # nor are all replicas in memory
     with local_executor(2) as executor:
         write_impacts([tmp_path / "two.csv.gz"], result, ground, executor)
     assert (tmp_path / "two.csv.gz").read_bytes() == (tmp_path / "i.csv.gz").read_bytes()
-    assert gzip.decompress((tmp_path / "i.csv.gz").read_bytes()) == (tmp_path / "i.csv").read_bytes()
+    assert (
+        gzip.decompress((tmp_path / "i.csv.gz").read_bytes()) == (tmp_path / "i.csv").read_bytes()
+    )
     read = np.genfromtxt(tmp_path / "i.csv", delimiter=",", names=True)
     table = pyarrow.parquet.read_table(tmp_path / "i.parquet")
     assert list(read.dtype.names) == table.column_names
     for name in table.column_names:
-        np.testing.assert_allclose(read[name], table[name].to_numpy(), rtol=1e-5, atol=1e-12, err_msg=name)
+        np.testing.assert_allclose(
+            read[name], table[name].to_numpy(), rtol=1e-5, atol=1e-12, err_msg=name
+        )
     about = json.loads((tmp_path / "i.csv.json").read_text(encoding="utf-8"))
     schema = pyarrow.parquet.read_schema(tmp_path / "i.parquet")
     assert about == json.loads(schema.metadata[b"chamberopt"])
@@ -208,7 +239,9 @@ def test_endings_in_capitals_mean_the_same(simulated: Path, tmp_path: Path) -> N
     assert gzip.decompress(files[1].read_bytes()).count(b"\n") == written + 1
 
 
-def test_a_study_gives_the_impacts_of_its_best_and_of_its_start(study: Path, tmp_path: Path) -> None:
+def test_a_study_gives_the_impacts_of_its_best_and_of_its_start(
+    study: Path, tmp_path: Path
+) -> None:
     for folder in (study, study / "start"):
         table = table_of(folder, tmp_path / f"{folder.name}.parquet")
         require_result_again(folder, table)
@@ -218,7 +251,9 @@ def test_a_study_gives_the_impacts_of_its_best_and_of_its_start(study: Path, tmp
 def test_an_analytical_cavity_gives_its_own_impacts(place: Path, tmp_path: Path) -> None:
     design = plate_design(process__accuracy__replicas=3, process__accuracy__simulated_time_s=0.2)
     chamber = build_chamber(design)
-    evaluation = evaluate(design, chamber, SerialExecutor(), cavity=analytic_cavity(design, chamber))
+    evaluation = evaluate(
+        design, chamber, SerialExecutor(), cavity=analytic_cavity(design, chamber)
+    )
     write_simulation(place / "analytic", design, chamber, evaluation)
     table = table_of(place / "analytic", tmp_path / "i.parquet")
     require_result_again(place / "analytic", table)
@@ -235,11 +270,15 @@ def altered(folder: Path, copy: Path, change: Callable[[dict], None]) -> Path:
     return copy
 
 
-def test_another_mesh_is_refused(simulated: Path, place: Path, chamberopt: Said, tmp_path: Path) -> None:
+def test_another_mesh_is_refused(
+    simulated: Path, place: Path, chamberopt: Said, tmp_path: Path
+) -> None:
     other = tmp_path / "other.stl"
     trimesh.load_mesh(place / "plate.stl").subdivide().export(other)
     folder = altered(
-        simulated, tmp_path / "copy", lambda data: data["design"]["part"].update(mesh=str(other), target={})
+        simulated,
+        tmp_path / "copy",
+        lambda data: data["design"]["part"].update(mesh=str(other), target={}),
     )
     status, out, err = chamberopt("export", folder, "--to", "impacts-csv")
     assert (status, out, err.count("\n")) == (2, "", 1)
@@ -250,13 +289,21 @@ def test_another_mesh_is_refused(simulated: Path, place: Path, chamberopt: Said,
 
 
 def test_a_chamber_that_comes_out_differently_is_refused(simulated: Path, tmp_path: Path) -> None:
-    folder = altered(simulated, tmp_path / "copy", lambda data: data["design"]["chamber"].update(diameter_mm=51.0))
+    folder = altered(
+        simulated,
+        tmp_path / "copy",
+        lambda data: data["design"]["chamber"].update(diameter_mm=51.0),
+    )
     with pytest.raises(InputError, match=r"its chamber comes out differently now.*manifold3d \d"):
         ground_of(load_result(folder))
 
 
-def test_impacts_that_are_not_the_results_are_not_handed_on(simulated: Path, chamberopt: Said, tmp_path: Path) -> None:
-    folder = altered(simulated, tmp_path / "copy", lambda data: data["design"]["shot"].update(mass_g=5.0))
+def test_impacts_that_are_not_the_results_are_not_handed_on(
+    simulated: Path, chamberopt: Said, tmp_path: Path
+) -> None:
+    folder = altered(
+        simulated, tmp_path / "copy", lambda data: data["design"]["shot"].update(mass_g=5.0)
+    )
     formats = ["--to", "impacts-parquet", "--to", "impacts-csv"]
     status, out, err = chamberopt("export", folder, *formats)
     err = err.splitlines()[-1]  # after what is said of compiling
@@ -264,15 +311,26 @@ def test_impacts_that_are_not_the_results_are_not_handed_on(simulated: Path, cha
     assert "does not simulate it again bit for bit: dents of" in err
     assert "simulate the design again" in err
     assert not (tmp_path / "results" / "copy-export").exists()
-    status, _, err = chamberopt("export", folder, "--to", "impacts-csv", "--replicas", "2", "--out", "two.csv")
-    assert (status, err.splitlines()[-1]) == (0, "only 2 of 3 replicas: not compared with the result")
+    status, _, err = chamberopt(
+        "export", folder, "--to", "impacts-csv", "--replicas", "2", "--out", "two.csv"
+    )
+    assert (status, err.splitlines()[-1]) == (
+        0,
+        "only 2 of 3 replicas: not compared with the result",
+    )
     assert json.loads(Path("two.csv.json").read_text(encoding="utf-8"))["same_as_result"] is False
     status, _, err = chamberopt("export", folder, "--to", "impacts-csv", "--replicas", "4")
     assert (status, "--replicas: given 4; the result has 3, give 1 to 3" in err) == (2, True)
 
 
 def test_several_formats_into_a_new_folder(simulated: Path, chamberopt: Said) -> None:
-    formats = ["impacts-parquet", "impacts-csv", "chamber-stl", "chamber-stl-per-tag", "chamber-3mf"]
+    formats = [
+        "impacts-parquet",
+        "impacts-csv",
+        "chamber-stl",
+        "chamber-stl-per-tag",
+        "chamber-3mf",
+    ]
     asked = [word for name in formats for word in ("--to", name)]
     status, out, err = chamberopt("export", simulated, *asked, "--json", "--workers", "1")
     told = json.loads(out)
@@ -281,7 +339,10 @@ def test_several_formats_into_a_new_folder(simulated: Path, chamberopt: Said) ->
     assert all(Path(file).exists() for file in told["files"].values())
     assert told["impacts"] == len(Path(told["files"]["impacts-csv"]).read_text().splitlines()) - 1
     status, out, _ = chamberopt("export", simulated, "--to", "chamber-stl")
-    assert (status, out.split()) == (0, ["chamber-stl", str(Path("results/simulated-export-2/chamber.stl"))])
+    assert (status, out.split()) == (
+        0,
+        ["chamber-stl", str(Path("results/simulated-export-2/chamber.stl"))],
+    )
 
 
 @pytest.mark.parametrize(
@@ -290,18 +351,35 @@ def test_several_formats_into_a_new_folder(simulated: Path, chamberopt: Said) ->
         (["--to", "impact-csv"], "--to: given 'impact-csv'; did you mean 'impacts-csv'?"),
         (["--to", "stl"], "--to: given 'stl'; "),
         ([], "--to"),
-        (["--to", "impacts-csv", "--out", "i.parquet"], "i.parquet: is no file of impacts-csv; give a name in .csv or"),
-        (["--to", "chamber-stl-per-tag", "--out", "i.stl"], "i.stl: is no file of chamber-stl-per-tag; give a folder"),
-        (["--to", "chamber-stl", "--to", "chamber-3mf", "--out", "c.stl"], "one file for 2 formats; give a folder"),
-        (["--to", "chamber-stl", "--out", "there.stl"], "there.stl: is there already, and nothing is ever overwritten"),
+        (
+            ["--to", "impacts-csv", "--out", "i.parquet"],
+            "i.parquet: is no file of impacts-csv; give a name in .csv or",
+        ),
+        (
+            ["--to", "chamber-stl-per-tag", "--out", "i.stl"],
+            "i.stl: is no file of chamber-stl-per-tag; give a folder",
+        ),
+        (
+            ["--to", "chamber-stl", "--to", "chamber-3mf", "--out", "c.stl"],
+            "one file for 2 formats; give a folder",
+        ),
+        (
+            ["--to", "chamber-stl", "--out", "there.stl"],
+            "there.stl: is there already, and nothing is ever overwritten",
+        ),
         (["--to", "impacts-csv", "--out", "there.csv"], "there.csv.json: is there already"),
-        (["--to", "chamber-stl", "--out", "nowhere/c.stl"], "the folder nowhere does not exist; make it first"),
+        (
+            ["--to", "chamber-stl", "--out", "nowhere/c.stl"],
+            "the folder nowhere does not exist; make it first",
+        ),
         (["--to", "chamber-stl", "--out", "full"], "full: already holds files"),
         (["--to", "study-csv"], "history.jsonl: is not there; give a study's results folder"),
         (["--to", "chamber-stl", "--frame", "room"], "--frame"),
     ],
 )
-def test_wrong_calls_are_one_message(simulated: Path, chamberopt: Said, words: list[str], said: str) -> None:
+def test_wrong_calls_are_one_message(
+    simulated: Path, chamberopt: Said, words: list[str], said: str
+) -> None:
     Path("full").mkdir()
     for file in ("there.stl", "there.csv.json", "full/file"):
         Path(file).write_text("mine")
@@ -313,16 +391,23 @@ def test_wrong_calls_are_one_message(simulated: Path, chamberopt: Said, words: l
     assert not Path("results/simulated-export").exists()
 
 
-def test_without_pyarrow(simulated: Path, chamberopt: Said, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_pyarrow(
+    simulated: Path, chamberopt: Said, monkeypatch: pytest.MonkeyPatch
+) -> None:
     for name in ("pyarrow", "pyarrow.parquet"):
         monkeypatch.setitem(sys.modules, name, None)
     status, _, err = chamberopt("export", simulated, "--to", "impacts-parquet")
-    assert (status, "pyarrow is not installed: pip install 'chamberopt[parquet]'" in err) == (2, True)
+    assert (status, "pyarrow is not installed: pip install 'chamberopt[parquet]'" in err) == (
+        2,
+        True,
+    )
     assert not Path("results/simulated-export").exists()
     assert chamberopt("export", simulated, "--to", "impacts-csv")[0] == 0
 
 
-def test_where_nothing_may_be_written(simulated: Path, chamberopt: Said, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_where_nothing_may_be_written(
+    simulated: Path, chamberopt: Said, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def denied(*_: object, **__: object) -> None:
         raise PermissionError(13, "Permission denied")
 
@@ -360,7 +445,13 @@ def test_the_whole_chamber_as_stl_and_3mf(study: Path, tmp_path: Path) -> None:
 def test_each_surface_as_stl_by_its_name(place: Path, tmp_path: Path) -> None:
     """Every triangle is in one file, and those of two sonotrodes, a hole and a deflector are what the design says."""
     data = plate_design().model_dump()
-    well = {"frequency_khz": 20, "amplitude_um": 20, "at_mm": (40, 0, 7), "axis": (-1, 0, 0), "diameter_mm": 6}
+    well = {
+        "frequency_khz": 20,
+        "amplitude_um": 20,
+        "at_mm": (40, 0, 7),
+        "axis": (-1, 0, 0),
+        "diameter_mm": 6,
+    }
     hole = {"at_mm": (0, 0, 8), "axis": (0, 1, 0), "diameter_mm": 4, "depth_mm": 12}
     floating = {"kind": "plate", "at_mm": (0, 0, 8), "size_mm": (6, 4, 2)}
     data["chamber"] |= {"holes": [hole], "deflectors": [floating]}
@@ -369,7 +460,14 @@ def test_each_surface_as_stl_by_its_name(place: Path, tmp_path: Path) -> None:
     write_simulation(place / "fitted", design, chamber, poisson_evaluation(design, chamber))
     write_stl_per_surface(place / "fitted", tmp_path / "stl")
     read = {file.stem: trimesh.load_mesh(file) for file in (tmp_path / "stl").iterdir()}
-    assert set(read) == {"part", "sonotrode", "wall", "sonotrodes.0", "chamber.holes.0", "chamber.deflectors.0"}
+    assert set(read) == {
+        "part",
+        "sonotrode",
+        "wall",
+        "sonotrodes.0",
+        "chamber.holes.0",
+        "chamber.deflectors.0",
+    }
     assert sum(len(mesh.faces) for mesh in read.values()) == len(chamber.triangles)
     polygon = 64 / 2 * np.sin(2 * np.pi / 64)  # area of 64 corners on a circle of radius 1
     assert read["sonotrode"].area == pytest.approx(polygon * 25**2, rel=1e-5)
@@ -377,7 +475,9 @@ def test_each_surface_as_stl_by_its_name(place: Path, tmp_path: Path) -> None:
     assert read["part"].area == pytest.approx(chamber.exposed_area.sum() * 1e6, rel=1e-5)
     block = read["chamber.deflectors.0"]
     assert block.is_watertight
-    assert block.volume == pytest.approx(-6 * 4 * 2, rel=1e-5)  # normals point out of the cavity, into the block
+    assert block.volume == pytest.approx(
+        -6 * 4 * 2, rel=1e-5
+    )  # normals point out of the cavity, into the block
     bore = read["chamber.holes.0"].bounds
     # The bore goes 12 mm beyond the wall, which a flat side of the chamber's polygon is nearer than its radius.
     assert bore[1] == pytest.approx([2.0, 25.0 + 12.0, 10.0], abs=0.05)
@@ -387,10 +487,17 @@ def test_each_surface_as_stl_by_its_name(place: Path, tmp_path: Path) -> None:
 def test_the_study_as_a_table(study: Path, chamberopt: Said) -> None:
     status, out, _ = chamberopt("export", study, "--to", "study-csv", "--out", "s.csv")
     assert (status, out.split()) == (0, ["study-csv", "s.csv"])
-    read = np.genfromtxt("s.csv", delimiter=",", names=True, dtype=None, encoding="utf-8", deletechars="")
-    rows = [json.loads(line) for line in (study / "history.jsonl").read_text(encoding="utf-8").splitlines()]
+    read = np.genfromtxt(
+        "s.csv", delimiter=",", names=True, dtype=None, encoding="utf-8", deletechars=""
+    )
+    rows = [
+        json.loads(line)
+        for line in (study / "history.jsonl").read_text(encoding="utf-8").splitlines()
+    ]
     assert read["stage"].tolist() == [row["stage"] for row in rows]
-    np.testing.assert_array_equal(read["shot.mass_g"], [row["parameters"]["shot.mass_g"] for row in rows])
+    np.testing.assert_array_equal(
+        read["shot.mass_g"], [row["parameters"]["shot.mass_g"] for row in rows]
+    )
     for name, metric in rows[0]["metrics"].items():
         assert read[name][0] == metric["value"]
         assert f"{name}_pm" in read.dtype.names
@@ -402,9 +509,14 @@ def test_an_unfinished_study_and_a_sweep(study: Path, chamberopt: Said, tmp_path
     shutil.copytree(study, unfinished)
     (unfinished / "result.json").unlink()
     sweep = altered(study, tmp_path / "sweep", lambda data: data.update(kind="sweep"))
-    for folder, said in ((unfinished, "a study that did not finish"), (sweep, "a sweep, a map of candidates")):
+    for folder, said in (
+        (unfinished, "a study that did not finish"),
+        (sweep, "a sweep, a map of candidates"),
+    ):
         for name in ("impacts-csv", "chamber-stl"):
             status, _, err = chamberopt("export", folder, "--to", name)
             assert (status, said in err) == (2, True)
-        assert chamberopt("export", folder, "--to", "study-csv", "--out", f"{folder.name}.csv")[0] == 0
+        assert (
+            chamberopt("export", folder, "--to", "study-csv", "--out", f"{folder.name}.csv")[0] == 0
+        )
         assert len(Path(f"{folder.name}.csv").read_text(encoding="utf-8").splitlines()) > 5

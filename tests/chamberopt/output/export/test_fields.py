@@ -31,8 +31,16 @@ def plate_quads() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     points = np.array([(x, y, z) for z in (0.0, SIDES[2]) for y in line for x in line])
     node = np.arange(len(points)).reshape(2, TOP + 1, TOP + 1)  # z, y, x
     low, high = node
-    flat = [(low[j, i], low[j + 1, i], low[j + 1, i + 1], low[j, i + 1]) for j in range(TOP) for i in range(TOP)]
-    flat += [(high[j, i], high[j, i + 1], high[j + 1, i + 1], high[j + 1, i]) for j in range(TOP) for i in range(TOP)]
+    flat = [
+        (low[j, i], low[j + 1, i], low[j + 1, i + 1], low[j, i + 1])
+        for j in range(TOP)
+        for i in range(TOP)
+    ]
+    flat += [
+        (high[j, i], high[j, i + 1], high[j + 1, i + 1], high[j + 1, i])
+        for j in range(TOP)
+        for i in range(TOP)
+    ]
     rings = [low[0, :], low[:, -1], low[-1, ::-1], low[::-1, 0]]
     above = [high[0, :], high[:, -1], high[-1, ::-1], high[::-1, 0]]
     for below, up in zip(rings, above, strict=True):
@@ -45,7 +53,10 @@ def plate_quads() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def nastran_plate(path: Path) -> np.ndarray:
     points, quads, numbers = plate_quads()
     lines = [f"GRID,{k},,{x:.6f},{y:.6f},{z:.6f}" for k, (x, y, z) in enumerate(points, start=1)]
-    lines += [f"CQUAD4,{n},1," + ",".join(str(k + 1) for k in quad) for n, quad in zip(numbers, quads, strict=True)]
+    lines += [
+        f"CQUAD4,{n},1," + ",".join(str(k + 1) for k in quad)
+        for n, quad in zip(numbers, quads, strict=True)
+    ]
     path.write_text("\n".join(["BEGIN BULK", *lines, "ENDDATA"]) + "\n")
     return numbers
 
@@ -54,9 +65,17 @@ def abaqus_plate(path: Path, instance: bool = False) -> np.ndarray:
     points, quads, numbers = plate_quads()
     mesh = ["*Node", *(f"{k}, {x}, {y}, {z}" for k, (x, y, z) in enumerate(points, start=1))]
     mesh.append("*Element, type=S4")
-    mesh += [f"{n}, " + ", ".join(str(k + 1) for k in quad) for n, quad in zip(numbers, quads, strict=True)]
+    mesh += [
+        f"{n}, " + ", ".join(str(k + 1) for k in quad)
+        for n, quad in zip(numbers, quads, strict=True)
+    ]
     if instance:
-        put = ["*Assembly, name=A", "*Instance, name=Plate-1, part=Plate", "*End Instance", "*End Assembly"]
+        put = [
+            "*Assembly, name=A",
+            "*Instance, name=Plate-1, part=Plate",
+            "*End Instance",
+            "*End Assembly",
+        ]
         mesh = ["*Part, name=Plate", *mesh, "*End Part", *put]
     path.write_text("\n".join(["*Heading", *mesh]) + "\n")
     return numbers
@@ -111,7 +130,9 @@ def distributions(text: str) -> dict[str, dict[str, float]]:
             assert f"*Distribution Table, name={options['table']}\nRATIO\n" in text
             assert [float(word or "nan") for word in rows[0].split(",")][1] == 0.0
             assert not rows[0].split(",")[0].strip()
-            found[options["name"]] = {row.split(",")[0].strip(): float(row.split(",")[1]) for row in rows[1:]}
+            found[options["name"]] = {
+                row.split(",")[0].strip(): float(row.split(",")[1]) for row in rows[1:]
+            }
     return found
 
 
@@ -143,7 +164,9 @@ def means_by_hand(folder: Path) -> dict[str, dict[int, float]]:
             exposed = [k for k in rows if surface["exposed_area_mm2"][k] > 0]
             whole = sum(surface["coverage"][k] * surface["exposed_area_mm2"][k] for k in exposed)
             found["COVERAGE"][int(number)] = whole / area
-        impacts = [surface["dents"][k] for k in rows]  # every impact of the made-up evaluation leaves a dent
+        impacts = [
+            surface["dents"][k] for k in rows
+        ]  # every impact of the made-up evaluation leaves a dent
         found["DENTS"][int(number)] = float(sum(impacts))
         for name in names[1:3] if sum(impacts) else ():
             sums = [surface[name.lower()][k] * n for k, n in zip(rows, impacts, strict=True) if n]
@@ -153,7 +176,9 @@ def means_by_hand(folder: Path) -> dict[str, dict[int, float]]:
 
 def assert_same(found: dict[int, float], expected: dict[int, float]) -> None:
     assert sorted(found) == sorted(expected)
-    assert [found[k] for k in sorted(found)] == pytest.approx([expected[k] for k in sorted(expected)], rel=1e-8)
+    assert [found[k] for k in sorted(found)] == pytest.approx(
+        [expected[k] for k in sorted(expected)], rel=1e-8
+    )
 
 
 def test_a_nastran_parts_elements_get_their_own_numbers_back(tmp_path: Path) -> None:
@@ -174,7 +199,9 @@ def test_a_nastran_parts_elements_get_their_own_numbers_back(tmp_path: Path) -> 
     for name, values in expected.items():
         assert_same(found[name], values)
     # The treated face's elements, by where the file has them: the first 25 of it.
-    assert {k for k, value in found["TARGET"].items() if value} == set(numbers[: TOP * TOP].tolist())
+    assert {k for k, value in found["TARGET"].items() if value} == set(
+        numbers[: TOP * TOP].tolist()
+    )
 
 
 def test_an_abaqus_parts_elements_get_their_own_numbers_back(tmp_path: Path) -> None:
@@ -195,12 +222,16 @@ def test_an_abaqus_parts_elements_get_their_own_numbers_back(tmp_path: Path) -> 
     bands = {name: set(part.elements[mask].tolist()) for name, mask in whole.groups.items()}
     assert len(bands) > 1
     for low, high in ((0, 50), (50, 90), (90, 98), (98, 100)):
-        inside = {number for number, value in expected["COVERAGE"].items() if low <= 100 * value < high}
+        inside = {
+            number for number, value in expected["COVERAGE"].items() if low <= 100 * value < high
+        }
         assert bands.get(f"COVERAGE_{low}_TO_{high}", set()) == inside
     assert sum(map(len, bands.values())) == len(expected["COVERAGE"])
 
 
-def test_labels_of_an_abaqus_instance_carry_its_name_and_sets_are_for_its_assembly(tmp_path: Path) -> None:
+def test_labels_of_an_abaqus_instance_carry_its_name_and_sets_are_for_its_assembly(
+    tmp_path: Path,
+) -> None:
     abaqus_plate(tmp_path / "plate.inp", instance=True)
     folder, _ = simulated(tmp_path / "plate.inp")
 
@@ -210,35 +241,55 @@ def test_labels_of_an_abaqus_instance_carry_its_name_and_sets_are_for_its_assemb
     assert any("fields_sets.inp" in remark and "*Assembly" in remark for remark in remarks)
     found, expected = distributions(text), means_by_hand(folder)
     assert_same(
-        {int(k.removeprefix("PLATE-1.")): value for k, value in found["COVERAGE"].items()}, expected["COVERAGE"]
+        {int(k.removeprefix("PLATE-1.")): value for k, value in found["COVERAGE"].items()},
+        expected["COVERAGE"],
     )
     assert all(label.startswith("PLATE-1.") for label in found["COVERAGE"])
     assert "*Elset" not in text
-    whole = (tmp_path / "plate.inp").read_text().replace("*End Assembly\n", sets + "*End Assembly\n") + text
+    whole = (tmp_path / "plate.inp").read_text().replace(
+        "*End Assembly\n", sets + "*End Assembly\n"
+    ) + text
     (tmp_path / "whole.inp").write_text(whole)
     groups = read_part(tmp_path / "whole.inp", "mm").groups
-    assert sum(mask.sum() for mask in groups.values()) == 2 * len(expected["COVERAGE"])  # two triangles a square
+    assert sum(mask.sum() for mask in groups.values()) == 2 * len(
+        expected["COVERAGE"]
+    )  # two triangles a square
 
 
 @pytest.mark.parametrize(("to", "suffix"), [("abaqus", "inp"), ("nastran", "bdf")])
-def test_a_part_without_element_numbers_is_written_along(tmp_path: Path, to: str, suffix: str) -> None:
+def test_a_part_without_element_numbers_is_written_along(
+    tmp_path: Path, to: str, suffix: str
+) -> None:
     stl_plate(tmp_path / "plate.stl")
     folder, _ = simulated(tmp_path / "plate.stl")
 
     remarks = write_fields(folder, to, tmp_path / f"fields.{suffix}")
 
     assert any("no element numbers" in remark and "in mm" in remark for remark in remarks)
-    part, back = read_part(tmp_path / "plate.stl", "mm"), read_part(tmp_path / f"fields.{suffix}", "mm")
-    np.testing.assert_allclose(back.vertices[back.triangles], part.vertices[part.triangles], rtol=1e-11, atol=1e-15)
+    part, back = (
+        read_part(tmp_path / "plate.stl", "mm"),
+        read_part(tmp_path / f"fields.{suffix}", "mm"),
+    )
+    np.testing.assert_allclose(
+        back.vertices[back.triangles], part.vertices[part.triangles], rtol=1e-11, atol=1e-15
+    )
     assert back.elements.tolist() == list(range(1, len(part.triangles) + 1))
-    text, surface = (tmp_path / f"fields.{suffix}").read_text(), pyvista.read(folder / "coverage.vtp")
-    found = {int(k): v for k, v in (distributions if to == "abaqus" else pressures)(text)["COVERAGE"].items()}
+    text, surface = (
+        (tmp_path / f"fields.{suffix}").read_text(),
+        pyvista.read(folder / "coverage.vtp"),
+    )
+    found = {
+        int(k): v
+        for k, v in (distributions if to == "abaqus" else pressures)(text)["COVERAGE"].items()
+    }
     known = np.flatnonzero(np.isfinite(surface["coverage"]))
     assert_same(found, {int(k) + 1: surface["coverage"][k] for k in known})
 
 
 @pytest.mark.parametrize("element_mm", [1.0, 9.0])
-def test_where_the_target_was_meshed_anew_elements_get_what_lies_on_them(tmp_path: Path, element_mm: float) -> None:
+def test_where_the_target_was_meshed_anew_elements_get_what_lies_on_them(
+    tmp_path: Path, element_mm: float
+) -> None:
     """Squares of 4 mm in triangles finer and coarser than they are; coverage that rises along x tells them apart."""
     numbers = nastran_plate(tmp_path / "plate.bdf")
     folder, _ = simulated(tmp_path / "plate.bdf", element_mm=element_mm)
@@ -260,7 +311,9 @@ def test_where_the_target_was_meshed_anew_elements_get_what_lies_on_them(tmp_pat
     lower = numbers[: TOP * TOP].tolist()
     assert set(lower) <= set(found["COVERAGE"])
     off = [abs(found["COVERAGE"][k] - middles[k]) * SIDES[0] for k in lower]
-    assert max(off) < (0.5 if element_mm == 1.0 else 6.0)  # mm: where a triangle's middle may lie from its element's
+    assert max(off) < (
+        0.5 if element_mm == 1.0 else 6.0
+    )  # mm: where a triangle's middle may lie from its element's
 
 
 def test_vtkhdf_and_vtp_hold_every_field(tmp_path: Path) -> None:
@@ -293,7 +346,9 @@ def test_every_column_of_a_result_is_handed_on(tmp_path: Path) -> None:
 def test_what_cannot_be_handed_on_is_said(tmp_path: Path) -> None:
     nastran_plate(tmp_path / "plate.bdf")
     folder, _ = simulated(tmp_path / "plate.bdf")
-    with pytest.raises(InputError, match="not written as 'ansys'; use one of vtp, vtkhdf, abaqus, nastran"):
+    with pytest.raises(
+        InputError, match="not written as 'ansys'; use one of vtp, vtkhdf, abaqus, nastran"
+    ):
         write_fields(folder, "ansys", tmp_path / "a.cdb")
     with pytest.raises(InputError, match=r"name it fields\.vtkhdf"):
         write_fields(folder, "vtkhdf", tmp_path / "fields.h5")
@@ -314,14 +369,18 @@ def test_what_cannot_be_handed_on_is_said(tmp_path: Path) -> None:
     surface.cell_data.remove("element")
     surface.save(folder / "coverage.vtp")
     for to in ("vtp", "vtkhdf", "abaqus", "nastran"):
-        with pytest.raises(InputError, match=r"coverage\.vtp: .* no element numbers; simulate again"):
+        with pytest.raises(
+            InputError, match=r"coverage\.vtp: .* no element numbers; simulate again"
+        ):
             write_fields(folder, to, tmp_path / f"b.{to}")
 
 
 def test_nastran_takes_no_fields_on_solids(tmp_path: Path) -> None:
     corners = [(x, y, z) for z in (0, 8) for x, y in ((0, 0), (20, 0), (20, 20), (0, 20))]
     lines = [f"GRID,{k},,{x}.,{y}.,{z}." for k, (x, y, z) in enumerate(corners, start=1)]
-    (tmp_path / "block.bdf").write_text("\n".join(["BEGIN BULK", *lines, "CHEXA,77,1,1,2,3,4,5,6", "+,7,8", "ENDDATA"]))
+    (tmp_path / "block.bdf").write_text(
+        "\n".join(["BEGIN BULK", *lines, "CHEXA,77,1,1,2,3,4,5,6", "+,7,8", "ENDDATA"])
+    )
     folder, _ = simulated(tmp_path / "block.bdf")
 
     with pytest.raises(InputError, match="solid elements are not supported as Nastran loads"):

@@ -106,20 +106,30 @@ def changed(folder: Path, copy: Path, change) -> Path:
         (math.nan, 1.0, "not known"),
     ],
 )
-def test_an_interval_has_one_or_two_digits_and_its_value_the_same_decimals(value, half_width, said) -> None:
+def test_an_interval_has_one_or_two_digits_and_its_value_the_same_decimals(
+    value, half_width, said
+) -> None:
     assert with_interval(value, half_width) == said
 
 
 @pytest.mark.parametrize(
     ("value", "said"),
-    [(33.9552, "33.96"), (5e-18, "0"), (4311860.0, "4\u202f311\u202f860"), (1e-7, "1e-07"), (120.0, "120")],
+    [
+        (33.9552, "33.96"),
+        (5e-18, "0"),
+        (4311860.0, "4\u202f311\u202f860"),
+        (1e-7, "1e-07"),
+        (120.0, "120"),
+    ],
 )
 def test_a_number_alone_has_four_digits_that_count(value: float, said: str) -> None:
     assert plain(value) == said
 
 
 def test_a_goal_that_is_a_metric_reads_as_the_metric() -> None:
-    assert goal_words("time_to_98") == Words("time until 95 % of the target's area is 98 % covered", "s", -1.0)
+    assert goal_words("time_to_98") == Words(
+        "time until 95 % of the target's area is 98 % covered", "s", -1.0
+    )
     assert goal_words("coverage_p05").unit == "%"
     assert goal_words("uniform_coverage").meaning == "mean minus standard deviation of coverage"
     assert goal_words("of a later version").label == "of a later version"
@@ -144,7 +154,10 @@ def test_a_study_is_answered_with_its_gain(study: Path) -> None:
     assert with_interval(gain["value"], gain["half_width"], sign=True) in said["answer"]
     assert "more than noise" in said["answer"]
     first = said["metrics"][0]
-    assert (first["change"]["value"], first["change"]["half_width"]) == (gain["value"], gain["half_width"])
+    assert (first["change"]["value"], first["change"]["half_width"]) == (
+        gain["value"],
+        gain["half_width"],
+    )
     assert first["real"]
     assert [one["name"] for one in said["question"]["vary"]] == list(about["vary"])
     assert said["question"]["constraints"] == ["chamber.sonotrode_distance_mm ≥ 9.5"]
@@ -202,7 +215,10 @@ def test_too_little_to_tell_is_said() -> None:
     unsure = influence(a_model([1.0, 0.9, 0.8], [0.2, 0.2, 0.2]), Words("goal"))
     assert unsure["parameters"][0]["surely"] == 0.0
     assert "20 evaluations are too few to tell the influence of x from none" in unsure["said"][0]
-    none = influence({**a_model([1.0] * 3, [0.0] * 3), "model": None, "evaluations": 3, "failed": 1}, Words("goal"))
+    none = influence(
+        {**a_model([1.0] * 3, [0.0] * 3), "model": None, "evaluations": 3, "failed": 1},
+        Words("goal"),
+    )
     assert none["parameters"] == []
     assert none["said"] == [
         "3 evaluations, 1 of them failed, are too few to tell what each parameter does: 4 or more are needed for a "
@@ -211,11 +227,20 @@ def test_too_little_to_tell_is_said() -> None:
 
 
 def test_a_time_that_shall_be_short_is_shown_as_a_time() -> None:
-    told = influence(a_model([-400.0, -900.0, -2000.0], [10.0] * 3), goal_words("time_to_98"))["parameters"][0]
+    told = influence(a_model([-400.0, -900.0, -2000.0], [10.0] * 3), goal_words("time_to_98"))[
+        "parameters"
+    ][0]
     assert told["mean"] == [400.0, 900.0, 2000.0]
     assert told["loss"] == pytest.approx(1600.0)
     rows = [
-        {"number": i + 1, "stage": "search", "value": v, "half_width": 1.0, "feasible": True, "parameters": {}}
+        {
+            "number": i + 1,
+            "stage": "search",
+            "value": v,
+            "half_width": 1.0,
+            "feasible": True,
+            "parameters": {},
+        }
         for i, v in enumerate((900.0, 400.0, 600.0))
     ]
     best = charts.convergence(rows, "time [s]", smaller=True)["data"][1]
@@ -223,7 +248,10 @@ def test_a_time_that_shall_be_short_is_shown_as_a_time() -> None:
 
 
 def test_a_front_of_two_objectives_is_listed(study: Path, tmp_path: Path) -> None:
-    goals = {"uniform_coverage": {"value": 0.5, "half_width": 0.01}, "time_to_98": {"value": -71.3, "half_width": 2.0}}
+    goals = {
+        "uniform_coverage": {"value": 0.5, "half_width": 0.01},
+        "time_to_98": {"value": -71.3, "half_width": 2.0},
+    }
     front = [{"parameters": {"shot.mass_g": 7.5}, "standing": "feasible", "objectives": goals}]
     folder = changed(study, tmp_path / "front", lambda data: data["study"].update(front=front))
     said = Page(write_report(folder)[0]).said
@@ -248,7 +276,9 @@ def test_a_histogram_holds_all_of_the_area() -> None:
 
 
 @pytest.mark.parametrize("kind", ["simulation", "study"])
-def test_the_page_needs_nothing_but_itself(kind: str, tmp_path: Path, request: pytest.FixtureRequest) -> None:
+def test_the_page_needs_nothing_but_itself(
+    kind: str, tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
     path, _ = write_report(request.getfixturevalue(kind), tmp_path / "page.html")
     page = Page(path)
     for tag, attributes in page.elements:
@@ -289,23 +319,35 @@ def test_the_page_carries_the_columns_of_the_target(simulation: Path, tmp_path: 
     target = (surface["target"] > 0) & (surface["exposed_area_mm2"] > 0)
     carried = Page(write_report(simulation, tmp_path / "page.html")[0]).parts()
     (scene,) = carried["scenes"]
-    for name, column, factor in (("coverage", "coverage", 100.0), ("p90-speed", "p90_normal_speed", 1.0)):
+    for name, column, factor in (
+        ("coverage", "coverage", 100.0),
+        ("p90-speed", "p90_normal_speed", 1.0),
+    ):
         np.testing.assert_array_equal(
             unpacked(scene["columns"][name]), (factor * surface[column][target]).astype(np.float32)
         )
     np.testing.assert_array_equal(unpacked(scene["number"], "<i4"), np.flatnonzero(target))
     part = next(trace for trace in scene["figure"] if trace["name"] == "part")
     corners = np.stack([unpacked(part[axis]["bdata"]) for axis in "xyz"], axis=1)
-    faces = np.stack([np.frombuffer(base64.b64decode(part[k]["bdata"]), part[k]["dtype"]) for k in "ijk"], axis=1)
+    faces = np.stack(
+        [np.frombuffer(base64.b64decode(part[k]["bdata"]), part[k]["dtype"]) for k in "ijk"], axis=1
+    )
     expected = np.asarray(surface.points)[surface.regular_faces[target]]
     np.testing.assert_allclose(corners[faces], expected, atol=1e-4)
     density = unpacked(scene["columns"]["density"])
-    np.testing.assert_allclose(-100.0 * np.expm1(-density), unpacked(scene["columns"]["coverage"]), rtol=1e-4)
-    assert {one["name"] for one in carried["quantities"]} == set(scene["columns"]) - {"density", "shown-density"}
+    np.testing.assert_allclose(
+        -100.0 * np.expm1(-density), unpacked(scene["columns"]["coverage"]), rtol=1e-4
+    )
+    assert {one["name"] for one in carried["quantities"]} == set(scene["columns"]) - {
+        "density",
+        "shown-density",
+    }
     assert set(carried["scales"]) == {"viridis", "cividis", "magma"}
 
 
-def test_an_older_result_without_single_hits_shows_what_it_has(tmp_path: Path, no_pictures: None) -> None:
+def test_an_older_result_without_single_hits_shows_what_it_has(
+    tmp_path: Path, no_pictures: None
+) -> None:
     folder, _ = simulated(tmp_path / "older", hits=False)
     data = json.loads((folder / "result.json").read_text())
     for later in ("coverage_against_time", "stopped_by", "analytic"):
@@ -315,10 +357,17 @@ def test_an_older_result_without_single_hits_shows_what_it_has(tmp_path: Path, n
     (folder / "result.json").write_text(json.dumps(data))
     page = Page(write_report(folder)[0])
     assert "older result does not say" in page.said
-    assert [one["name"] for one in page.parts()["quantities"]] == ["coverage", "impacts", "speed", "angle"]
+    assert [one["name"] for one in page.parts()["quantities"]] == [
+        "coverage",
+        "impacts",
+        "speed",
+        "angle",
+    ]
 
 
-def test_coverage_of_marked_dents_is_told_at_no_other_time(simulation: Path, tmp_path: Path) -> None:
+def test_coverage_of_marked_dents_is_told_at_no_other_time(
+    simulation: Path, tmp_path: Path
+) -> None:
     def marks(data: dict) -> None:
         data["design"]["process"]["accuracy"]["coverage_model"] = "dents"
 
@@ -360,7 +409,10 @@ def test_a_surface_of_another_result_is_refused(study: Path, tmp_path: Path) -> 
 def test_parts_side_by_side(simulation: Path, study: Path, tmp_path: Path) -> None:
     remarks = write_part_page([study / "start", study], tmp_path / "parts.html")
     page = Page(tmp_path / "parts.html")
-    assert [scene["title"] for scene in page.parts()["scenes"]] == ["study/start", f"{study.parent.name}/study"]
+    assert [scene["title"] for scene in page.parts()["scenes"]] == [
+        "study/start",
+        f"{study.parent.name}/study",
+    ]
     assert all(remark in page.said for remark in remarks)
 
 

@@ -15,10 +15,18 @@ from chamberopt.output.report import write_part_page, write_report
 from tests.helpers.results.report_folders import studied
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium, chromium-browser or google-chrome on PATH")
+CHROMIUM = next(
+    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
+)
+pytestmark = pytest.mark.skipif(
+    CHROMIUM is None, reason="no chromium, chromium-browser or google-chrome on PATH"
+)
 
-SOFTWARE = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]  # WebGL without a graphics card
+SOFTWARE = [
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--no-sandbox",
+]  # WebGL without a graphics card
 DRAWN = "body[data-drawn=yes]"
 WAIT = 60_000  # ms; a busy machine draws slowly
 
@@ -46,7 +54,10 @@ class Watched:
         self.requests: list[str] = []
         self.page = browser.new_page(viewport={"width": width, "height": 800})
         self.page.on("pageerror", lambda error: self.troubles.append(str(error)))
-        self.page.on("console", lambda said: self.troubles.append(said.text) if said.type == "error" else None)
+        self.page.on(
+            "console",
+            lambda said: self.troubles.append(said.text) if said.type == "error" else None,
+        )
         self.page.on("request", lambda request: self.requests.append(request.url))
         self.page.goto(path.as_uri())
         self.page.wait_for_selector(DRAWN, timeout=WAIT)
@@ -54,7 +65,9 @@ class Watched:
     def pixels(self, place: str = "#part-0") -> np.ndarray:
         """What is on the screen there, (rows, columns, 3) in 0..1."""
         self.page.wait_for_timeout(600)  # drawn in the next frame
-        return imread(io.BytesIO(self.page.locator(place).first.screenshot()), format="png")[..., :3]
+        return imread(io.BytesIO(self.page.locator(place).first.screenshot()), format="png")[
+            ..., :3
+        ]
 
 
 @pytest.fixture(scope="module")
@@ -85,12 +98,16 @@ def test_another_quantity_has_its_own_bar(shown: Watched) -> None:
     assert "coverage [%]" in bar.text_content()
     before = shown.pixels()
     shown.page.select_option("#quantity", label="impacts per area")
-    shown.page.wait_for_function("document.querySelector('#part-0 .infolayer').textContent.includes('1/mm²')")
+    shown.page.wait_for_function(
+        "document.querySelector('#part-0 .infolayer').textContent.includes('1/mm²')"
+    )
     assert "coverage [%]" not in bar.text_content()
     assert not shown.page.locator("#times").is_visible()
     assert np.abs(shown.pixels() - before).max() > 0.2
     shown.page.select_option("#quantity", label="coverage")
-    shown.page.wait_for_function("document.querySelector('#part-0 .infolayer').textContent.includes('coverage [%]')")
+    shown.page.wait_for_function(
+        "document.querySelector('#part-0 .infolayer').textContent.includes('coverage [%]')"
+    )
 
 
 def test_time_goes_by(shown: Watched) -> None:
@@ -136,7 +153,9 @@ def test_the_chamber_can_be_hidden_and_what_is_folded_opens(shown: Watched) -> N
     assert "[sonotrode]" in fold.locator("pre").inner_text()
 
 
-def test_a_narrow_window_needs_no_scrolling_sideways(browser: Any, study: Path, tmp_path: Path) -> None:
+def test_a_narrow_window_needs_no_scrolling_sideways(
+    browser: Any, study: Path, tmp_path: Path
+) -> None:
     """Two parts, side by side where there is room, turn together."""
     write_part_page([study / "start", study], tmp_path / "parts.html")
     narrow = Watched(browser, tmp_path / "parts.html", 800)

@@ -13,7 +13,14 @@ from matplotlib.image import imread
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError
-from chamberopt.coverage.dents import Dents, Samples, dents_on_part, mark, marked_share, sample_points
+from chamberopt.coverage.dents import (
+    Dents,
+    Samples,
+    dents_on_part,
+    mark,
+    marked_share,
+    sample_points,
+)
 from chamberopt.design.load import load_design
 from chamberopt.geometry.raycast import places, seen, view_of
 from chamberopt.output.resimulate.dent_map import (
@@ -76,7 +83,9 @@ def test_a_ball_is_seen_without_cracks_and_its_points_are_on_it() -> None:
     which = seen(view, corners)
     assert (which >= 0).sum() * view.pixel**2 == pytest.approx(np.pi, rel=0.01)
     filled = which >= 0
-    assert all(np.diff(np.flatnonzero(line)).max(initial=1) == 1 for line in filled)  # no crack in any row
+    assert all(
+        np.diff(np.flatnonzero(line)).max(initial=1) == 1 for line in filled
+    )  # no crack in any row
     row, column = np.nonzero(filled)
     there = places(view, corners, which[row, column], row, column)
     assert np.abs(np.linalg.norm(there, axis=1) - 1.0).max() < 3e-3  # facets
@@ -89,7 +98,9 @@ def test_the_last_dent_lies_on_top_and_bends_round_an_edge() -> None:
     n, k = 4000, 300
     side = rng.random(n) < 0.5
     run, along = rng.uniform(0, 1, n), rng.uniform(0, 3, n)
-    place = np.where(side[:, None], np.stack([-run, along, 0 * run], 1), np.stack([0 * run, along, -run], 1))
+    place = np.where(
+        side[:, None], np.stack([-run, along, 0 * run], 1), np.stack([0 * run, along, -run], 1)
+    )
     normal = np.where(side[:, None], UP, [1.0, 0, 0])
     unrolled = np.where(side, -run, run)
     at, far, own = rng.uniform(0, 1, k), rng.uniform(0, 3, k), rng.random(k) < 0.5
@@ -103,7 +114,9 @@ def test_the_last_dent_lies_on_top_and_bends_round_an_edge() -> None:
     expected = np.where(inside.any(axis=1), k - 1 - inside[:, ::-1].argmax(axis=1), -1)
     np.testing.assert_array_equal(last, expected)
     there = last >= 0
-    np.testing.assert_allclose(off[there], (distance[np.arange(n), last] / dents.radius[last])[there], atol=1e-5)
+    np.testing.assert_allclose(
+        off[there], (distance[np.arange(n), last] / dents.radius[last])[there], atol=1e-5
+    )
     samples = Samples(place, normal, np.zeros(n, dtype=int), np.ones(n))
     marked = mark(samples, dents.place, dents.normal, dents.radius, dents.time)
     np.testing.assert_array_equal(there, np.isfinite(marked))
@@ -125,7 +138,9 @@ def test_one_dent_is_a_disc_of_its_size() -> None:
     assert found.area[found.dent == 0].sum() == pytest.approx(np.pi * 0.16e-6, rel=0.02)
     slanted = dent_map(chamber, one, (1.0, -0.5, -1.0), 1000)
     assert slanted.area[slanted.dent == 0].sum() == pytest.approx(np.pi * 0.16e-6, rel=0.02)
-    assert (slanted.dent == 0).sum() * slanted.view.pixel**2 < 0.75 * np.pi * 0.16e-6  # foreshortened
+    assert (
+        slanted.dent == 0
+    ).sum() * slanted.view.pixel**2 < 0.75 * np.pi * 0.16e-6  # foreshortened
 
 
 def share_by_triangle(found: DentMap, triangles: int) -> tuple[np.ndarray, np.ndarray]:
@@ -143,7 +158,9 @@ def test_the_share_of_black_is_what_coverage_says(name: str) -> None:
     dents = thrown(chamber, 6000 if name == "plate" else 15_000, 0.3e-3)
     samples = sample_points(chamber, 1e-4 if name == "plate" else 7e-5)
     m = len(chamber.part.triangles)
-    marked = marked_share(samples, mark(samples, dents.place, dents.normal, dents.radius, dents.time), 1e9, m)
+    marked = marked_share(
+        samples, mark(samples, dents.place, dents.normal, dents.radius, dents.time), 1e9, m
+    )
     view = default_views(chamber)[0]
     found = dent_map(chamber, dents, view, 1000 if name == "plate" else 1500)
     area, share = share_by_triangle(found, m)
@@ -152,16 +169,22 @@ def test_the_share_of_black_is_what_coverage_says(name: str) -> None:
     assert whole.sum() > 300
     weight = chamber.exposed_area[whole]
     assert 0.2 < (marked[whole] @ weight) / weight.sum() < 0.8
-    assert share[whole] @ weight / weight.sum() == pytest.approx(marked[whole] @ weight / weight.sum(), abs=0.003)
+    assert share[whole] @ weight / weight.sum() == pytest.approx(
+        marked[whole] @ weight / weight.sum(), abs=0.003
+    )
     assert np.abs(share - marked)[whole].max() < 0.1
     if name == "plate":
         assert area[whole].sum() == pytest.approx(weight.sum(), rel=0.01)
         there = found.ground == TARGET
-        assert (found.dent[there] >= 0).mean() == pytest.approx(coverage(dents, chamber, 1e-4), abs=0.004)
+        assert (found.dent[there] >= 0).mean() == pytest.approx(
+            coverage(dents, chamber, 1e-4), abs=0.004
+        )
 
 
 def test_a_flat_target_is_seen_face_on_and_a_round_one_from_two_sides() -> None:
-    np.testing.assert_allclose(default_views(build_chamber(plate_design())), [(0.0, 0.0, -1.0)], atol=1e-12)
+    np.testing.assert_allclose(
+        default_views(build_chamber(plate_design())), [(0.0, 0.0, -1.0)], atol=1e-12
+    )
     one, other = default_views(build_chamber(load_design(DESIGNS / "gear.toml")))
     np.testing.assert_allclose(one, -np.array(other))
 
@@ -185,7 +208,9 @@ def test_the_picture_has_as_much_black_as_is_bare(
     result: Result, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     picture = tmp_path / "dents.png"
-    assert main(["dents", str(result.folder), str(picture), "--at-s", "0.5", "--pixels", "400"]) == 0
+    assert (
+        main(["dents", str(result.folder), str(picture), "--at-s", "0.5", "--pixels", "400"]) == 0
+    )
     said = capsys.readouterr().out
     assert "simulated on from 0.3 s" in said
     image = imread(picture)[..., :3]
@@ -203,7 +228,9 @@ def test_the_picture_has_as_much_black_as_is_bare(
     assert list(tmp_path.iterdir()) == [picture]
 
 
-def test_on_the_command_line(result: Result, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_on_the_command_line(
+    result: Result, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     folder, picture = str(result.folder), str(tmp_path / "a.png")
     for arguments, said in (
         ([folder, str(tmp_path / "a.jpg")], "pictures are written as .png"),
@@ -223,5 +250,7 @@ def test_a_target_kept_by_a_study_is_the_results_own(result: Result) -> None:
     """What coverage.vtp says is the target holds for target.reachable, not what this chamber alone would say."""
     target = result.design.part.target.model_copy(update={"reachable": True})
     part = result.design.part.model_copy(update={"target": target})
-    kept = replica_of(replace(result, design=result.design.model_copy(update={"part": part}))).chamber.part.target
+    kept = replica_of(
+        replace(result, design=result.design.model_copy(update={"part": part}))
+    ).chamber.part.target
     np.testing.assert_array_equal(kept, replica_of(result).chamber.part.target)

@@ -44,7 +44,9 @@ def test_a_ball_alone_is_where_the_closed_form_has_it(replica: Replayed) -> None
     """Dropped on a floor that gives all back, drifting sideways: z = r + h - g τ²/2, τ from the nearest apex."""
     r, h, drift = 1.5e-3, 6.5e-3, 0.05
     ball = Balls(np.array([[0.0, 0.0, r + h]]), np.array([[drift, 0.0, 0.0]]), 2 * r)
-    scene = Scene(replica.scene.mesh, ball, Physics(gravity=Gravity()), 0.3, warmup=0.02, record=(TAG_PART,))
+    scene = Scene(
+        replica.scene.mesh, ball, Physics(gravity=Gravity()), 0.3, warmup=0.02, record=(TAG_PART,)
+    )
     seen = flight(replace(replica, scene=scene), start=0.0137, span=0.2, frames=77, trail=3)
     assert seen.time[0] == 0.0137
     assert seen.time[-1] == pytest.approx(0.2137, abs=1e-15)
@@ -58,7 +60,9 @@ def test_a_ball_alone_is_where_the_closed_form_has_it(replica: Replayed) -> None
 
     np.testing.assert_allclose(seen.balls[:, 0], exact(seen.time), atol=1e-11)
     thirds = seen.time[:-1, None] + np.arange(3) * (0.2 / 76 / 3)
-    np.testing.assert_allclose(seen.trail[1:, :, 0].reshape(-1, 3), exact(thirds.ravel()), atol=1e-11)
+    np.testing.assert_allclose(
+        seen.trail[1:, :, 0].reshape(-1, 3), exact(thirds.ravel()), atol=1e-11
+    )
     assert np.isnan(seen.trail[0]).all()
     assert len(seen.impacts) == len(seen.dents) == 0
 
@@ -86,7 +90,8 @@ def test_the_sonotrode_is_where_the_shot_met_it(replica: Replayed) -> None:
     np.testing.assert_allclose(face[:, 2], lowest, atol=1e-9)
     seen = flight(replica, 0.01, 0.002, 5)
     np.testing.assert_array_equal(
-        seen.sonotrodes[TAG_SONOTRODE], displacement(scene.physics.vibrations[0], scene.warmup + seen.time)
+        seen.sonotrodes[TAG_SONOTRODE],
+        displacement(scene.physics.vibrations[0], scene.warmup + seen.time),
     )
 
 
@@ -126,7 +131,10 @@ def test_what_was_not_simulated_is_not_shown(
 def test_a_replica_or_a_part_that_is_not_there_is_said(result: Result, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="--replica: given 3; the result has 3, give 0 to 2"):
         replica_of(result, 3)
-    with pytest.raises(InputError, match=r"part\.mesh: .*plate\.stl: not what .*plate was simulated with; restore it"):
+    with pytest.raises(
+        InputError,
+        match=r"part\.mesh: .*plate\.stl: not what .*plate was simulated with; restore it",
+    ):
         replica_of(replace(result, part_sha256="0" * 64))
     other = result.design.with_values({"chamber.diameter_mm": 51})
     with pytest.raises(InputError, match="chamber comes out differently now"):
@@ -141,7 +149,10 @@ def test_films_play_back_as_they_were_written(tmp_path: Path) -> None:
         frame[10:12, 5 * k + 4 : 5 * k + 6] = (255, 46, 154)
     write_film(tmp_path / "spot.gif", frames, fps=20)
     with Image.open(tmp_path / "spot.gif") as image:
-        pages = [(np.array(page.convert("RGB")), page.info["duration"]) for page in ImageSequence.Iterator(image)]
+        pages = [
+            (np.array(page.convert("RGB")), page.info["duration"])
+            for page in ImageSequence.Iterator(image)
+        ]
         assert image.info["loop"] == 0
     assert [duration for _, duration in pages] == [50] * 7
     for (page, _), frame in zip(pages, frames, strict=True):
@@ -150,11 +161,16 @@ def test_films_play_back_as_they_were_written(tmp_path: Path) -> None:
     write_film(tmp_path / "spot.mp4", frames, fps=20)
     again = imageio.mimread(tmp_path / "spot.mp4")
     assert len(again) == 7
-    assert all(np.abs(page.astype(int) - frame).mean() < 8 for page, frame in zip(again, frames, strict=True))
+    assert all(
+        np.abs(page.astype(int) - frame).mean() < 8
+        for page, frame in zip(again, frames, strict=True)
+    )
 
 
 def test_where_no_film_can_be_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(InputError, match=r"shot\.avi: films are written as \.gif or \.mp4; give such a name"):
+    with pytest.raises(
+        InputError, match=r"shot\.avi: films are written as \.gif or \.mp4; give such a name"
+    ):
         film_path(tmp_path / "shot.avi")
     with pytest.raises(InputError, match="the folder does not exist"):
         film_path(tmp_path / "nowhere" / "shot.gif")
@@ -176,7 +192,13 @@ def test_where_no_film_can_be_is_said(tmp_path: Path, monkeypatch: pytest.Monkey
         (0, (64, 64), 9, "a.gif", "--fps"),
         (20, (10, 64), 9, "a.gif", "--size"),
         (20, (100, 64), 9, "a.mp4", "multiples of 16"),
-        (20, (2000, 1500), 101, "a.gif", "--frames: given 101; at most 100 are supported at 2000 x 1500 pixels"),
+        (
+            20,
+            (2000, 1500),
+            101,
+            "a.gif",
+            "--frames: given 101; at most 100 are supported at 2000 x 1500 pixels",
+        ),
     ):
         with pytest.raises(InputError, match=said):
             film.require_playable(fps, size, frames, Path(name))
@@ -188,17 +210,23 @@ def test_a_replay_shows_balls_that_move_and_hits(result: Result, tmp_path: Path)
     assert len(seen.impacts) > 5
     assert replay(result.folder, seen, tmp_path / "plate.gif", 20, (320, 240)) is None
     with Image.open(tmp_path / "plate.gif") as image:
-        pages = [np.array(page.convert("RGB")).astype(int) for page in ImageSequence.Iterator(image)]
+        pages = [
+            np.array(page.convert("RGB")).astype(int) for page in ImageSequence.Iterator(image)
+        ]
     assert len(pages) == 6
     assert all((np.abs(one - other).max(axis=2) > 40).sum() > 200 for one, other in pairwise(pages))
     last = pages[-1]
     assert (np.abs(last - [0xE0, 0x8A, 0x2E]).max(axis=2) < 24).mean() > 0.03  # the sonotrode
     red, green, blue = last.transpose(2, 0, 1)
-    assert ((red > 120) & (green < 0.55 * red) & (blue > 1.3 * green)).sum() > 20  # magenta: balls that have just hit
+    assert (
+        (red > 120) & (green < 0.55 * red) & (blue > 1.3 * green)
+    ).sum() > 20  # magenta: balls that have just hit
     assert list(tmp_path.iterdir()) == [tmp_path / "plate.gif"]
 
 
-def test_on_the_command_line(result: Result, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_on_the_command_line(
+    result: Result, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     folder = str(result.folder)
     for arguments, said in (
         (["replay", folder, str(tmp_path / "a.avi")], ".gif or .mp4"),
@@ -221,7 +249,9 @@ def test_a_changed_part_ends_with_one_sentence(result: Result, tmp_path: Path, c
         (folder / name).write_bytes((result.folder / name).read_bytes())
     changed = tmp_path / "plate.stl"
     mesh = result.design.part.mesh_path.read_bytes()
-    changed.write_bytes(mesh[:-1] + bytes([mesh[-1] ^ 1]))  # one bit of the last triangle's attribute
+    changed.write_bytes(
+        mesh[:-1] + bytes([mesh[-1] ^ 1])
+    )  # one bit of the last triangle's attribute
     data["design"]["part"]["mesh"] = str(changed)
     (folder / "result.json").write_text(json.dumps(data), encoding="utf-8")
     assert load_result(folder).design.part.mesh_path == changed

@@ -23,7 +23,9 @@ EVALUATION = poisson_evaluation(DESIGN, CHAMBER)
 
 @pytest.fixture
 def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(viewer, "coverage_picture", lambda *_: "coverage.png skipped: no OpenGL library found")
+    monkeypatch.setattr(
+        viewer, "coverage_picture", lambda *_: "coverage.png skipped: no OpenGL library found"
+    )
 
 
 @pytest.mark.usefixtures("no_pictures")
@@ -32,7 +34,14 @@ def test_simulation_reads_back(tmp_path: Path) -> None:
     remarks = write_simulation(folder, DESIGN, CHAMBER, EVALUATION)
     assert remarks == ["coverage.png skipped: no OpenGL library found"]
     names = {path.name for path in folder.iterdir()}
-    assert names == {"design.toml", "result.json", "coverage.vtp", "hits.npz", "chamber.stl", "chamber.vtp"}
+    assert names == {
+        "design.toml",
+        "result.json",
+        "coverage.vtp",
+        "hits.npz",
+        "chamber.stl",
+        "chamber.vtp",
+    }
     result = load_result(folder)
     assert result == load_result(folder / "result.json")
     assert result.kind == "simulation"
@@ -91,7 +100,13 @@ def test_what_is_no_result_is_said(tmp_path: Path) -> None:
     folder = tmp_path / "plate"
     write_simulation(folder, DESIGN, CHAMBER, EVALUATION)
     text = (folder / "result.json").read_text()
-    for damaged in (text[: len(text) // 2], "[]", "{}", text.replace('"metrics"', '"metric"'), *wrong_figures(text)):
+    for damaged in (
+        text[: len(text) // 2],
+        "[]",
+        "{}",
+        text.replace('"metrics"', '"metric"'),
+        *wrong_figures(text),
+    ):
         (folder / "result.json").write_text(damaged)
         with pytest.raises(InputError, match="damaged"):
             load_result(folder)
@@ -112,7 +127,9 @@ def test_a_study_leaves_everything_and_its_best_design_can_be_used(tmp_path: Pat
         if design.chamber.sonotrode_distance_mm > 17:
             raise InputError("not this one")
         # More shot, more dents: the best is at the upper bound.
-        return poisson_evaluation(design, CHAMBER, 4.0 * design.shot.mass_g, replicas or 4, seed=len(stream))
+        return poisson_evaluation(
+            design, CHAMBER, 4.0 * design.shot.mass_g, replicas or 4, seed=len(stream)
+        )
 
     folder = tmp_path / "study"
     outcome = run_study(question, folder, SerialExecutor(), evaluator=evaluator)
@@ -131,7 +148,9 @@ def test_a_study_leaves_everything_and_its_best_design_can_be_used(tmp_path: Pat
     # The start stands beside it, judged on the same seeds: comparing the two gives the gain again.
     both = compare([folder / "start", folder])
     (gain,) = both.differences["uniform_coverage"]
-    assert (gain.value, gain.half_width) == pytest.approx((outcome.gain.value, outcome.gain.half_width))
+    assert (gain.value, gain.half_width) == pytest.approx(
+        (outcome.gain.value, outcome.gain.half_width)
+    )
     about = result.data["study"]
     assert about["improved"]
     assert about["gain"]["value"] == outcome.gain.value

@@ -25,7 +25,13 @@ pytestmark = pytest.mark.skipif(why_no_pictures() is not None, reason="no OpenGL
 
 def drawn(folder: Path) -> dict[str, np.ndarray]:
     """Of tests/looked_at.py, in a process of its own."""
-    command = [sys.executable, "-m", "tests.helpers.results.sphere_in_sphere", "pictures", str(folder)]
+    command = [
+        sys.executable,
+        "-m",
+        "tests.helpers.results.sphere_in_sphere",
+        "pictures",
+        str(folder),
+    ]
     subprocess.run(command, check=True, env=without_display(), cwd=REFERENCES.parents[1])
     with np.load(folder / "pictures.npz") as pictures:
         return {name: pictures[name] for name in pictures.files}
@@ -39,7 +45,10 @@ def difference(one: np.ndarray, other: np.ndarray) -> float:
     """The largest between the means of their blocks, of 1."""
     assert one.shape == other.shape
     means = [
-        image.reshape(image.shape[0] // BLOCK, BLOCK, image.shape[1] // BLOCK, BLOCK, 3).mean(axis=(1, 3)) / 255.0
+        image.reshape(image.shape[0] // BLOCK, BLOCK, image.shape[1] // BLOCK, BLOCK, 3).mean(
+            axis=(1, 3)
+        )
+        / 255.0
         for image in (one, other)
     ]
     return float(np.abs(means[0] - means[1]).max())

@@ -11,7 +11,14 @@ import pytest
 
 from chamberopt.common.errors import InputError
 from chamberopt.coverage.hits import save_hits, sorted_hits
-from chamberopt.output.viewer import Look, Subject, cut_across, eye_at, read_surface, why_no_pictures
+from chamberopt.output.viewer import (
+    Look,
+    Subject,
+    cut_across,
+    eye_at,
+    read_surface,
+    why_no_pictures,
+)
 from chamberopt.output.viewer.opened_result import Seen, limits, same_part
 from chamberopt.output.viewer.plotter import where_the_target_is_seen
 from chamberopt.output.viewer.scene import as_it_stands, ticks
@@ -104,7 +111,9 @@ def test_time_moves_what_grows(ball: Subject) -> None:
     bare = 1.0 - seen.part.values(QUANTITIES["coverage"]) / 100.0
     for look, times in ((now, 1.0), (later, 2.0)):
         seen.show(look)
-        np.testing.assert_allclose(seen.part.target["shown"], 100.0 * (1.0 - bare**times), atol=1e-9)
+        np.testing.assert_allclose(
+            seen.part.target["shown"], 100.0 * (1.0 - bare**times), atol=1e-9
+        )
     assert limits([seen], later) == (0.0, 100.0)
     impacts = seen.part.values(QUANTITIES["impacts"])
     seen.show(Look("impacts", time_s=2.0 * TREATMENT))
@@ -178,7 +187,9 @@ def test_what_an_older_result_lacks_is_said(ball: Subject) -> None:
         seen.show(Look("energy"))
 
 
-def test_a_damaged_surface_is_one_sentence(ball: Subject, capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_damaged_surface_is_one_sentence(
+    ball: Subject, capfd: pytest.CaptureFixture[str]
+) -> None:
     file = Path(ball.folder) / "coverage.vtp"
     whole = file.read_bytes()
     for damaged in (whole[: len(whole) // 2], b"nothing of the kind" * 50):
@@ -189,14 +200,21 @@ def test_a_damaged_surface_is_one_sentence(ball: Subject, capfd: pytest.CaptureF
 
 
 def test_only_views_of_the_same_part_are_linked(tmp_path: Path, ball: Subject) -> None:
-    moved, other = ball_result(tmp_path / "moved", moved=1.0), ball_result(tmp_path / "other", lost=7)
+    moved, other = (
+        ball_result(tmp_path / "moved", moved=1.0),
+        ball_result(tmp_path / "other", lost=7),
+    )
     assert same_part([Seen(ball), Seen(moved)])
     assert not same_part([Seen(ball), Seen(other)])
 
 
 def test_a_target_that_looks_down_is_seen_from_below() -> None:
     for looks, side in ((-1.0, -1.0), (1.0, 1.0)):
-        plate = pyvista().Plane(direction=(0.0, 0.0, looks), i_resolution=2, j_resolution=2).triangulate()
+        plate = (
+            pyvista()
+            .Plane(direction=(0.0, 0.0, looks), i_resolution=2, j_resolution=2)
+            .triangulate()
+        )
         plate["exposed_area_mm2"] = np.full(plate.n_cells, 0.125)
         assert np.sign(where_the_target_is_seen(plate)[2]) == side
     ball = pyvista().Sphere()
@@ -214,9 +232,17 @@ def test_a_dollar_in_a_name_is_no_formula() -> None:
 @pytest.fixture(scope="module")
 def steps(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
     folder = tmp_path_factory.mktemp("steps")
-    command = [sys.executable, "-m", "tests.helpers.results.sphere_in_sphere", "driven", str(folder)]
+    command = [
+        sys.executable,
+        "-m",
+        "tests.helpers.results.sphere_in_sphere",
+        "driven",
+        str(folder),
+    ]
     subprocess.run(command, check=True, env=without_display(), cwd=Path(__file__).parents[4])
-    return {one["step"]: one for one in json.loads((folder / "steps.json").read_text(encoding="utf-8"))}
+    return {
+        one["step"]: one for one in json.loads((folder / "steps.json").read_text(encoding="utf-8"))
+    }
 
 
 @needs_opengl
@@ -239,7 +265,16 @@ def test_a_window_shows_what_its_keys_say(steps: dict[str, dict[str, Any]]) -> N
 def test_handles_are_there_when_they_do_something(steps: dict[str, dict[str, Any]]) -> None:
     slider = {step: steps[step]["slider"] for step in ("opened", "3", "1", "r", "marked")}
     assert slider == {"opened": True, "3": False, "1": True, "r": True, "marked": False}
-    assert [step for step in steps if steps[step]["plane"]] == ["c", "x", "g", "cut", "clicked", "h", "slid", "6"]
+    assert [step for step in steps if steps[step]["plane"]] == [
+        "c",
+        "x",
+        "g",
+        "cut",
+        "clicked",
+        "h",
+        "slid",
+        "6",
+    ]
     assert steps["cut"]["look"]["cut"] == [[1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
 
 

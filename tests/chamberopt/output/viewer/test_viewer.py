@@ -74,7 +74,9 @@ def test_chamber_files_are_closed_and_tagged(case: tuple) -> None:
     folder, chamber, _ = case
     solid = trimesh.load(folder / "chamber.stl")
     assert solid.is_watertight
-    assert solid.volume * 1e-9 == pytest.approx(chamber.volume, rel=1e-5)  # STL has single precision
+    assert solid.volume * 1e-9 == pytest.approx(
+        chamber.volume, rel=1e-5
+    )  # STL has single precision
     np.testing.assert_array_equal(read_surface(folder / "chamber.vtp")["tag"], chamber.tags)
 
 
@@ -96,7 +98,9 @@ def test_picture_shows_part_sonotrode_and_scale(case: tuple, tmp_path: Path) -> 
     assert 0.2 < (image > 0.99).all(axis=2).mean() < 0.9  # background, and not only background
     orange = np.array([0xE0, 0x8A, 0x2E]) / 255
     assert (np.abs(image[:, :900] - orange).max(axis=2) < 0.08).mean() > 0.01  # the sonotrode
-    assert len(np.unique((image * 32).astype(int).reshape(-1, 3), axis=0)) > 60  # a scale of colours
+    assert (
+        len(np.unique((image * 32).astype(int).reshape(-1, 3), axis=0)) > 60
+    )  # a scale of colours
     assert [path.name for path in tmp_path.iterdir()] == ["coverage.png"]
 
 
@@ -107,10 +111,14 @@ def test_side_by_side(case: tuple, tmp_path: Path) -> None:
     assert image.shape[:2] == (1500, 1800)
     lower = image[800:, :, :3]
     difference = np.abs(lower[:, :700] - lower[:, 900:1600]).mean()
-    assert difference < 0.1  # the same part on the same scale (the colour bar moves the second aside)
+    assert (
+        difference < 0.1
+    )  # the same part on the same scale (the colour bar moves the second aside)
 
 
-def test_screenshot_without_a_display(case: tuple, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_screenshot_without_a_display(
+    case: tuple, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     drawn: list = []
     monkeypatch.setattr(window, "drawn_apart", lambda *arguments: drawn.append(arguments))
     monkeypatch.delenv("DISPLAY", raising=False)
@@ -118,7 +126,11 @@ def test_screenshot_without_a_display(case: tuple, tmp_path: Path, monkeypatch: 
     subject, look = Subject(str(case[0]), "a plate", 5.0, 25.0, 336, 5.0), Look("speed", below=90.0)
     inspect([subject], look, tmp_path / "shot.png")
     ((job, picture),) = drawn
-    assert (job["draw"], job["subjects"], picture) == ("inspect", [asdict(subject)], tmp_path / "shot.png")
+    assert (job["draw"], job["subjects"], picture) == (
+        "inspect",
+        [asdict(subject)],
+        tmp_path / "shot.png",
+    )
     assert Look.from_json(json.loads(json.dumps(job["look"]))) == look
     if sys.platform.startswith("linux"):
         with pytest.raises(InputError, match=r"no display.*--screenshot"):
@@ -191,7 +203,9 @@ def test_a_part_is_drawn_with_its_target_or_with_its_fault_in_red(tmp_path: Path
     assert part_picture(corners, "a hole", tmp_path / "fault.png", edges=edges) is None
 
     target, fault = (imread(tmp_path / f"{name}.png")[..., :3] for name in ("target", "fault"))
-    red = [(picture[..., 0] - picture[..., 1:].max(axis=2) > 0.5).mean() for picture in (target, fault)]
+    red = [
+        (picture[..., 0] - picture[..., 1:].max(axis=2) > 0.5).mean() for picture in (target, fault)
+    ]
     orange = [(picture[..., 1] - picture[..., 2] > 0.1).mean() for picture in (target, fault)]
     assert red[1] > 5e-4 > 10 * red[0]
     assert orange[0] > 0.05 > 10 * orange[1]

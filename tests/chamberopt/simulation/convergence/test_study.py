@@ -14,7 +14,15 @@ from chamberopt.coverage.statistics.interval import Estimate, estimate, student
 from chamberopt.coverage.tally import Tally
 from chamberopt.design.load import load_design
 from chamberopt.simulation.convergence import study as climbing
-from chamberopt.simulation.convergence.error_law import Law, Level, fitted, front, law_of, rms_error, rms_interval
+from chamberopt.simulation.convergence.error_law import (
+    Law,
+    Level,
+    fitted,
+    front,
+    law_of,
+    rms_error,
+    rms_interval,
+)
 from chamberopt.simulation.convergence.parameters import (
     FACETS,
     FLOOR,
@@ -26,7 +34,13 @@ from chamberopt.simulation.convergence.parameters import (
     designs,
     knobs,
 )
-from chamberopt.simulation.convergence.recommendation import choices, cost, explained, recommend, replicas_for
+from chamberopt.simulation.convergence.recommendation import (
+    choices,
+    cost,
+    explained,
+    recommend,
+    replicas_for,
+)
 from chamberopt.simulation.convergence.runs import Rung
 from chamberopt.simulation.convergence.study import Ladder
 from tests.helpers.synthetic import DESIGNS, equal_dents, plate_design
@@ -43,14 +57,20 @@ def pools(draws: int, size: int, count: int) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("count", [4, 16, 32])
 def test_error_of_a_sub_pool_is_that_against_the_truth_not_against_its_own_pool(count: int) -> None:
     parts, whole = pools(4000, 64, count)
-    square = np.mean([rms_error(part, one, count / 64) ** 2 for part, one in zip(parts, whole, strict=True)])
+    square = np.mean(
+        [rms_error(part, one, count / 64) ** 2 for part, one in zip(parts, whole, strict=True)]
+    )
     assert square == pytest.approx(1.0 / count, rel=0.05)
-    assert np.mean((parts - whole[:, None]) ** 2) == pytest.approx((1 - count / 64) / count, rel=0.05)
+    assert np.mean((parts - whole[:, None]) ** 2) == pytest.approx(
+        (1 - count / 64) / count, rel=0.05
+    )
 
 
 def test_interval_of_an_error_holds_it_as_often_as_it_says() -> None:
     parts, whole = pools(2000, 64, 8)
-    ends = [rms_interval(rms_error(part, one, 1 / 8), 8) for part, one in zip(parts, whole, strict=True)]
+    ends = [
+        rms_interval(rms_error(part, one, 1 / 8), 8) for part, one in zip(parts, whole, strict=True)
+    ]
     held = np.mean([low <= 8**-0.5 <= high for low, high in ends])
     assert 0.93 <= held <= 0.97
 
@@ -62,7 +82,17 @@ def levels_of(pool: np.ndarray, joined: int = 0) -> list[Level]:
         parts = pool[: len(pool) // count * count].reshape(-1, count).mean(axis=1)
         rms = rms_error(parts, pool.mean(), count / len(pool))
         said = student(count - 1) / np.sqrt(count)
-        found.append(Level(count, len(parts), rms, *rms_interval(rms, len(parts)), said, float(count), count <= joined))
+        found.append(
+            Level(
+                count,
+                len(parts),
+                rms,
+                *rms_interval(rms, len(parts)),
+                said,
+                float(count),
+                count <= joined,
+            )
+        )
     return found
 
 
@@ -90,7 +120,9 @@ def test_nothing_beats_what_is_on_the_front_and_all_else_is_beaten() -> None:
     cost, error = np.random.default_rng(4).uniform(size=(2, 200))
     on = front(cost, error)
     for i in range(200):
-        beaten = ((cost <= cost[i]) & (error <= error[i]) & ((cost < cost[i]) | (error < error[i]))).any()
+        beaten = (
+            (cost <= cost[i]) & (error <= error[i]) & ((cost < cost[i]) | (error < error[i]))
+        ).any()
         assert beaten == (i not in on)
     assert list(cost[on]) == sorted(cost[on])
 
@@ -98,13 +130,27 @@ def test_nothing_beats_what_is_on_the_front_and_all_else_is_beaten() -> None:
 # Recommendations
 
 
-def rung(knob: str, setting: Any, cpu: float, bias: float = 0.0, unsure: float = 0.0, mean_bias: float = 0.0) -> Rung:
+def rung(
+    knob: str,
+    setting: Any,
+    cpu: float,
+    bias: float = 0.0,
+    unsure: float = 0.0,
+    mean_bias: float = 0.0,
+) -> Rung:
     """100 replicas of standard deviation 0.02, or of a quarter or four times the simulated time."""
     stretch = {"0.375": 4.0, "6": 0.25}.get(str(setting), 1.0) if knob == TIME else 1.0
     noise = np.random.default_rng(5).normal(size=100)
     goal = estimate(0.3 + 0.02 * np.sqrt(stretch) * (noise - noise.mean()) / noise.std(ddof=1))
     return Rung(
-        knob, str(setting), 100, Estimate(cpu, 1e-3 * cpu), goal, goal, Estimate(bias, unsure), Estimate(mean_bias, 0.0)
+        knob,
+        str(setting),
+        100,
+        Estimate(cpu, 1e-3 * cpu),
+        goal,
+        goal,
+        Estimate(bias, unsure),
+        Estimate(mean_bias, 0.0),
     )
 
 
@@ -114,10 +160,22 @@ def ladder_of(*rungs: Rung, dents: tuple[Rung, ...] = ()) -> Ladder:
     settings = {FACETS: 256, MOTION: "sinusoidal", WARM_UP: 0.8, FLOOR: 1.0, TIME: 1.5}
     times = [rung(TIME, 0.375, 0.1675), rung(TIME, 6, 0.73), rung(WARM_UP, 0.2, 0.22, 0.0, 0.03)]
     levels = tuple(
-        Level(k, 400 // k, 0.02 / k**0.5, 0.01, 0.1, student(k - 1) * 0.02 / k**0.5, 0.28 * k) for k in (4, 8, 16, 32)
+        Level(k, 400 // k, 0.02 / k**0.5, 0.01, 0.1, student(k - 1) * 0.02 / k**0.5, 0.28 * k)
+        for k in (4, 8, 16, 32)
     )
     law = Law(1.96 * 0.02 * 0.28**0.5, 0.5, 0.05)
-    return Ladder(design, settings, rung("reference", "", 0.28), (*times, *rungs), levels, law, dents, 20.0, 300.0, 150)
+    return Ladder(
+        design,
+        settings,
+        rung("reference", "", 0.28),
+        (*times, *rungs),
+        levels,
+        law,
+        dents,
+        20.0,
+        300.0,
+        150,
+    )
 
 
 def test_cost_of_a_replica_is_a_line() -> None:
@@ -127,7 +185,11 @@ def test_cost_of_a_replica_is_a_line() -> None:
 
 def test_replicas_are_those_whose_interval_is_as_narrow() -> None:
     needed = replicas_for(ladder_of(), 0.001, 1.5)
-    assert student(needed - 1) * 0.02 / needed**0.5 <= 0.001 < student(needed - 2) * 0.02 / (needed - 1) ** 0.5
+    assert (
+        student(needed - 1) * 0.02 / needed**0.5
+        <= 0.001
+        < student(needed - 2) * 0.02 / (needed - 1) ** 0.5
+    )
     assert replicas_for(ladder_of(), 0.001, 6.0) == pytest.approx(needed / 4, rel=0.02)
     assert replicas_for(ladder_of(), 0.5, 1.5) == 4  # fewer were not tried
 
@@ -140,7 +202,9 @@ def test_cheapest_setting_within_a_third_of_the_accuracy_is_taken() -> None:
     assert usual.settings[FLOOR] == 1.0  # a coarser floor saves no more than chance
     assert usual.settings[WARM_UP] == 0.8  # its bias is not known to 0.0033
     assert any(WARM_UP in text and "cannot tell" in text for text in usual.remarks)
-    assert tight.settings[TIME] == 6.0  # what warm-up and start cost is shared by more recorded time
+    assert (
+        tight.settings[TIME] == 6.0
+    )  # what warm-up and start cost is shared by more recorded time
     seconds = tight.settings[TIME] + tight.settings[WARM_UP]
     assert tight.cpu_s == pytest.approx(tight.replicas * (0.05 + 0.1 * seconds))
     assert usual.cpu_s < tight.cpu_s / 50
@@ -156,10 +220,16 @@ def test_out_of_reach_is_said() -> None:
 def test_rates_that_differ_from_dents_one_by_one_are_remarked_on() -> None:
     dents = tuple(
         rung("process.accuracy.coverage_model", name, 2.0, mean_bias=off)
-        for name, off in (("avrami", 0.011), ("dents, sample_mm 0.2", 0.0005), ("dents, sample_mm 0.1", 0.0))
+        for name, off in (
+            ("avrami", 0.011),
+            ("dents, sample_mm 0.2", 0.0005),
+            ("dents, sample_mm 0.1", 0.0),
+        )
     )
     assert not any("rates give" in text for text in recommend(ladder_of(dents=dents), 0.05).remarks)
-    [said] = [text for text in recommend(ladder_of(dents=dents), 0.01).remarks if "rates give" in text]
+    [said] = [
+        text for text in recommend(ladder_of(dents=dents), 0.01).remarks if "rates give" in text
+    ]
     assert "+0.0110" in said
     assert 'coverage_model = "dents", sample_mm = 0.2' in said
 
@@ -198,12 +268,18 @@ def played(design: Any, chamber: Any, mesh: Any, number: int) -> tuple[Tally, fl
     """Dents at random, a quarter more per second on later triangles; fewer facets give fewer."""
     seconds = design.process.recorded_time
     rng = np.random.default_rng([number, round(1e6 * seconds)])
-    slant = np.linspace(0.8, 1.2, len(chamber.exposed_area)) * (0.9 if design.chamber.facets == 16 else 1.0)
+    slant = np.linspace(0.8, 1.2, len(chamber.exposed_area)) * (
+        0.9 if design.chamber.facets == 16 else 1.0
+    )
     dents = rng.poisson(2e6 * seconds * chamber.exposed_area * slant)
-    return equal_dents(seconds, dents, 2e-7), 0.002 + 0.01 * (seconds + design.process.accuracy.warmup_time)
+    return equal_dents(seconds, dents, 2e-7), 0.002 + 0.01 * (
+        seconds + design.process.accuracy.warmup_time
+    )
 
 
-def marked(design: Any, chamber: Any, mesh: Any, samples: Any, number: int) -> tuple[Tally, list[Any], list[float]]:
+def marked(
+    design: Any, chamber: Any, mesh: Any, samples: Any, number: int
+) -> tuple[Tally, list[Any], list[float]]:
     dents, cpu = played(design, chamber, mesh, number)
     share = -np.expm1(-dents.dented_area / np.maximum(chamber.exposed_area, 1e-12))
     return dents, [share + 0.01, share, share], [cpu, 2 * cpu, 3 * cpu, 5 * cpu]
@@ -217,48 +293,119 @@ def no_simulator(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("no_simulator")
-def test_command_leaves_table_diagram_and_lines_to_paste(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_command_leaves_table_diagram_and_lines_to_paste(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     status = main(
-        ["accuracy", str(DESIGNS / "plate.toml"), "--out", str(tmp_path / "out"), "--budget-s", "2", "--json"]
+        [
+            "accuracy",
+            str(DESIGNS / "plate.toml"),
+            "--out",
+            str(tmp_path / "out"),
+            "--budget-s",
+            "2",
+            "--json",
+        ]
     )
     told = json.loads(capsys.readouterr().out)
     assert status == 0
     folder = Path(told["folder"])
-    assert {path.name for path in folder.iterdir()} == {"accuracy.json", "accuracy.csv", "accuracy.png", "design.toml"}
+    assert {path.name for path in folder.iterdir()} == {
+        "accuracy.json",
+        "accuracy.csv",
+        "accuracy.png",
+        "design.toml",
+    }
     assert (folder / "accuracy.png").stat().st_size > 20_000
     with (folder / "accuracy.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    assert json.loads((folder / "accuracy.json").read_text(encoding="utf-8"))["rows"] == told["rows"]
-    assert {row["knob"] for row in rows} >= {FACETS, MOTION, WARM_UP, FLOOR, TIME, "reference", "replicas"}
+    assert (
+        json.loads((folder / "accuracy.json").read_text(encoding="utf-8"))["rows"] == told["rows"]
+    )
+    assert {row["knob"] for row in rows} >= {
+        FACETS,
+        MOTION,
+        WARM_UP,
+        FLOOR,
+        TIME,
+        "reference",
+        "replicas",
+    }
     coarse = next(row for row in told["rows"] if (row["knob"], row["setting"]) == (FACETS, "16"))
-    assert coarse["bias_mean_coverage"] < -coarse["bias_mean_coverage_half_width"] < 0  # a tenth fewer dents are seen
+    assert (
+        coarse["bias_mean_coverage"] < -coarse["bias_mean_coverage_half_width"] < 0
+    )  # a tenth fewer dents are seen
     assert told["cpu_s"] >= 1.5
     design = load_design(folder / "design.toml")
     for advice in told["recommendations"]:
         pasted = tomllib.loads("\n".join(advice["lines"]))["process"]["accuracy"]
-        assert changed(design, {f"process.accuracy.{name}": value for name, value in pasted.items()})
+        assert changed(
+            design, {f"process.accuracy.{name}": value for name, value in pasted.items()}
+        )
 
 
 @pytest.mark.usefixtures("no_simulator")
 def test_command_prints_what_it_found(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["accuracy", str(DESIGNS / "plate.toml"), "--out", str(tmp_path / "out"), "--budget-s", "0.01"]) == 0
+    assert (
+        main(
+            [
+                "accuracy",
+                str(DESIGNS / "plate.toml"),
+                "--out",
+                str(tmp_path / "out"),
+                "--budget-s",
+                "0.01",
+            ]
+        )
+        == 0
+    )
     said = capsys.readouterr().out
-    for words in ("reference: 33 replicas", "only the finest facets", "halving the error costs", "Pareto front"):
+    for words in (
+        "reference: 33 replicas",
+        "only the finest facets",
+        "halving the error costs",
+        "Pareto front",
+    ):
         assert words in said
     assert said.count("[process.accuracy]") == 3
 
 
 @pytest.mark.usefixtures("no_simulator")
-def test_no_dents_no_errors(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: Any) -> None:
-    bare = lambda design, chamber, *_: (equal_dents(1.0, np.zeros(len(chamber.exposed_area), int), 1e-7), 0.01)  # noqa: E731
+def test_no_dents_no_errors(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: Any
+) -> None:
+    bare = lambda design, chamber, *_: (
+        equal_dents(1.0, np.zeros(len(chamber.exposed_area), int), 1e-7),
+        0.01,
+    )  # noqa: E731
     monkeypatch.setattr(climbing, "_replica", bare)
-    assert main(["accuracy", str(DESIGNS / "plate.toml"), "--out", str(tmp_path / "out"), "--budget-s", "0.01"]) == 2
+    assert (
+        main(
+            [
+                "accuracy",
+                str(DESIGNS / "plate.toml"),
+                "--out",
+                str(tmp_path / "out"),
+                "--budget-s",
+                "0.01",
+            ]
+        )
+        == 2
+    )
     assert "no dent on the target was simulated" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("budget", ["0", "-1", "nan", "inf"])
-def test_a_budget_that_is_none_is_refused(budget: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    arguments = ["accuracy", str(DESIGNS / "plate.toml"), "--out", str(tmp_path / "out"), f"--budget-s={budget}"]
+def test_a_budget_that_is_none_is_refused(
+    budget: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = [
+        "accuracy",
+        str(DESIGNS / "plate.toml"),
+        "--out",
+        str(tmp_path / "out"),
+        f"--budget-s={budget}",
+    ]
     assert main(arguments) == 2
     err = capsys.readouterr().err
     assert "--budget-s: given" in err
