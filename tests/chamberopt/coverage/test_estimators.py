@@ -379,8 +379,9 @@ def test_real_simulations_hold_their_long_run_value() -> None:
             zip(
                 names,
                 jackknife(everything.replicas[8 * run : 8 * run + 8], metrics, chamber, design),
+                strict=False,
             )
-        )  # noqa: B905
+        )
         got["uniform_coverage"] = weighted(OBJECTIVES["uniform_coverage"], got)
         truth_of = {**everything.metrics, "uniform_coverage": everything.objective}
         for name in held:

@@ -146,9 +146,10 @@ def test_a_grazing_corner_hits_a_resting_ball_or_not_by_which_side_it_is_on(
 BAR_HALF, REACH = 2e-3, 3.5e-3  # m: half the bar's width, and that plus a ball's radius
 
 
-def effects(
-    turn: Turn | None, gravity: Gravity = Gravity(0.0, 0.0, 0.0), e: float = 1.0
-) -> Physics:  # noqa: B008
+WEIGHTLESS = Gravity(0.0, 0.0, 0.0)
+
+
+def effects(turn: Turn | None, gravity: Gravity = WEIGHTLESS, e: float = 1.0) -> Physics:
     """One set of effects for most tests, as each set is compiled."""
     return Physics(gravity, Restitution(((e, 1e3),) * 3, (1.0, 1e3), elastic_below=0.0), turn=turn)
 

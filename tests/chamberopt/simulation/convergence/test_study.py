@@ -374,10 +374,9 @@ def test_command_prints_what_it_found(tmp_path: Path, capsys: pytest.CaptureFixt
 def test_no_dents_no_errors(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: Any
 ) -> None:
-    bare = lambda design, chamber, *_: (
-        equal_dents(1.0, np.zeros(len(chamber.exposed_area), int), 1e-7),
-        0.01,
-    )  # noqa: E731
+    def bare(design: Any, chamber: Any, *_: Any) -> Any:
+        return equal_dents(1.0, np.zeros(len(chamber.exposed_area), int), 1e-7), 0.01
+
     monkeypatch.setattr(climbing, "_replica", bare)
     assert (
         main(
