@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.scenes import PART, PHYSICS, scene
-from sim_core import Balls, Drag, Friction, Physics, RandomPhase, Rest, Scene, Turn
+from sim_core import Balls, Drag, Friction, PartRotation, Physics, RandomPhase, Rest, Scene
 
 NAME = "gear-200-10k"
 STEEL = (0.3, 0.2)  # mu and beta0, of every surface
@@ -35,7 +35,9 @@ EFFECTS = {
     ),
     "drag": Effect(PHYSICS, PHYSICS._replace(drag=Drag()), ("air",)),
     "rest": Effect(PHYSICS, PHYSICS._replace(rest=Rest()), ("footing",)),
-    "turn": Effect(PHYSICS, PHYSICS._replace(turn=Turn(PART, rpm=30.0)), ("turning", "part")),
+    "turn": Effect(
+        PHYSICS, PHYSICS._replace(part_rotation=PartRotation(PART, rpm=30.0)), ("turning", "part")
+    ),
     "sizes": Effect(PHYSICS, PHYSICS, ("sizes",)),
 }
 

@@ -21,21 +21,21 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from benchmarks.events import STEADY, TARGET, advance
 from benchmarks.scenes import PART, PHYSICS, scene
-from sim_core import Scene, Turn, compile_simulator
+from sim_core import PartRotation, Scene, compile_simulator
 from sim_core.loop.simulate import _Run
 
 NAME = "gear-200-10k"
-MOTIONS: dict[str, Turn | None] = {
+MOTIONS: dict[str, PartRotation | None] = {
     "still": None,
-    **{f"{rpm} rpm": Turn(PART, rpm=float(rpm)) for rpm in (0, 1, 30, 100, 1000)},
-    "20 deg at 1 Hz": Turn(PART, swing=float(np.radians(20.0)), frequency=1.0),
+    **{f"{rpm} rpm": PartRotation(PART, rpm=float(rpm)) for rpm in (0, 1, 30, 100, 1000)},
+    "20 deg at 1 Hz": PartRotation(PART, amplitude=float(np.radians(20.0)), frequency=1.0),
 }
 
 
-def steady(turn: Turn | None) -> _Run:
+def steady(turn: PartRotation | None) -> _Run:
     """The gear's chamber with this motion, played to its steady state."""
     still = scene(NAME)
-    run = _Run(Scene(still.mesh, still.balls, PHYSICS._replace(turn=turn), still.duration))
+    run = _Run(Scene(still.mesh, still.balls, PHYSICS._replace(part_rotation=turn), still.duration))
     advance(run, STEADY)
     return run
 
@@ -75,7 +75,7 @@ def main() -> None:
     )
     parser.add_argument("--json", action="store_true", help="rows as JSON on stdout")
     options = parser.parse_args()
-    for physics in (PHYSICS, PHYSICS._replace(turn=MOTIONS["1 rpm"])):
+    for physics in (PHYSICS, PHYSICS._replace(part_rotation=MOTIONS["1 rpm"])):
         compile_simulator(physics)
     rows = measure(3 if options.quick else 9)
     if options.json:

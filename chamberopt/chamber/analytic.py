@@ -61,12 +61,12 @@ def described(cavity: AnalyticCavity) -> str:
 
 def on_chamber(impacts: ImpactLog, chamber: Chamber) -> ImpactLog:
     """The impacts on the ceiling of an analytical cavity, booked on the chamber's triangles under them."""
-    from sim_core import triangles_at
+    from sim_core import find_triangles
 
     ceiling = np.flatnonzero(chamber.tags == TAG_PART)
     corners = chamber.vertices[chamber.triangles[ceiling]]
     return replace(
-        impacts, triangle=ceiling[triangles_at(corners, impacts.position)].astype(np.int32)
+        impacts, triangle=ceiling[find_triangles(corners, impacts.position)].astype(np.int32)
     )
 
 

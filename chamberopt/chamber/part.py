@@ -148,14 +148,14 @@ def _places(mesh: PartMesh, corners: np.ndarray, source: np.ndarray) -> np.ndarr
     """The triangle of the mesh (k,) that the middle of each of corners (k, 3, 3) [m] lies in: where they are not those
     of its source, that is only one in the same flat face.
     """
-    from sim_core import TriangleMesh, nearest
+    from sim_core import TriangleMesh, closest_points
 
     moved = np.flatnonzero((corners != mesh.vertices[mesh.triangles[source]]).any(axis=(1, 2)))
     surface = TriangleMesh(
         mesh.vertices, mesh.triangles, np.zeros(len(mesh.triangles), dtype=np.uint8)
     )
     places = source.copy()
-    places[moved] = nearest(
+    places[moved] = closest_points(
         surface, corners[moved].mean(axis=1), float(np.ptp(mesh.vertices))
     ).triangle
     return places

@@ -17,7 +17,7 @@ MOST_BALLS = 20_000
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.design.load import Design
-    from sim_core import AnalyticCavity, Physics, Scene, TriangleMesh, Turn, Vibration
+    from sim_core import AnalyticCavity, PartRotation, Physics, Scene, TriangleMesh, Vibration
 
 STREAMS = ("search", "confirm")
 
@@ -56,25 +56,25 @@ def require_countable(design: Design) -> None:
         )
 
 
-def part_turn(design: Design, phase: float = 0.0) -> Turn | None:
+def part_turn(design: Design, phase: float = 0.0) -> PartRotation | None:
     """How the part turns, if it does; ``phase`` [rad] at the start."""
-    from sim_core import Turn
+    from sim_core import PartRotation
 
     turn = design.effects.part_turn
     if turn is None:
         return None
     point, axis = ((float(x), float(y), float(z)) for x, y, z in turning_axis(design))
-    return Turn(TAG_PART, point, axis, turn.rpm, turn.swing, turn.frequency_hz, phase)
+    return PartRotation(TAG_PART, point, axis, turn.rpm, turn.amplitude, turn.frequency_hz, phase)
 
 
 def require_turnable(design: Design, mesh: TriangleMesh) -> None:
     """InputError if the part is to turn in its chamber and cannot."""
-    from sim_core import SceneError, require_free_turn
+    from sim_core import SceneError, require_free_rotation
 
     turn = part_turn(design)
     try:
         if turn is not None:
-            require_free_turn(mesh, turn, design.shot.diameter)
+            require_free_rotation(mesh, turn, design.shot.diameter)
     except SceneError as error:
         raise InputError(f"effects.part_turn: {error}") from None
 
@@ -149,7 +149,7 @@ def scene_physics(
         gravity=Gravity() if effects.gravity else None,
         restitution=Restitution(surfaces, of_balls, accuracy.elastic_below),
         vibration=vibrations(design, phase),
-        turn=part_turn(design, turn_phase),
+        part_rotation=part_turn(design, turn_phase),
         rest=Rest() if rests(design, mesh) else None,
         friction=Friction((rubs.surfaces,) * len(surfaces), rubs.balls)
         if rubs is not None
@@ -184,7 +184,7 @@ def build_scene(design: Design, mesh: TriangleMesh | AnalyticCavity, seed: int) 
         diameter = np.array(shot.diameters)
         turn = part_turn(design, turn_phase)
         positions = pack_balls(
-            mesh, shot.count, diameter, rng, clear=swing, turn=turn, floor=0.0
+            mesh, shot.count, diameter, rng, clear=swing, part_rotation=turn, floor=0.0
         )  # not in a sump
     except SceneError as error:
         raise InputError(

@@ -22,7 +22,7 @@ from chamberopt.simulation.resting_balls import Stuck, share_on_the_spot, still
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.design.load import Design
-    from sim_core import AnalyticCavity, Result, TriangleMesh
+    from sim_core import AnalyticCavity, SimulationResult, TriangleMesh
 
 T = TypeVar("T")
 
@@ -134,7 +134,7 @@ def simulate_replica(
 
 def simulated(
     design: Design, chamber: Chamber, mesh: TriangleMesh | AnalyticCavity, seed: int
-) -> Result:
+) -> SimulationResult:
     """What the simulator has to say of one replica; its impacts are on the chamber's triangles."""
     from sim_core import TriangleMesh, simulate
 

@@ -22,20 +22,28 @@ TURN = 2.0 * math.pi
 ROUND_AGAIN = 1.01  # turns: a little more than one
 
 
-class Turn(NamedTuple):
-    """Motion of the surface ``tag`` about the line through ``axis_point`` [m] along ``axis``: give ``rpm`` or, to and
-    fro, ``swing`` and ``frequency``.
+class PartRotation(NamedTuple):
+    """Rotation of the surface ``tag`` about an axis: steady (``rpm``) or to and fro.
 
-    ``rpm`` [1/min]: the angle is 2π rpm/60 t + phase, right-handed about the axis. ``swing`` [rad] zero-to-peak and
-    ``frequency`` [Hz]: the angle is swing sin(2π frequency t + phase). ``phase`` [rad]. At angle 0 the part is where
-    the mesh has it. Impacts on it are logged in its own frame, that is, on the part as the mesh has it.
+    At angle 0 the part is where the mesh has it. Impacts on it are logged in its own frame, that
+    is, on the part as the mesh has it.
+
+    Args:
+        tag: surface tag of the part.
+        axis_point: a point of the axis [m].
+        axis: direction of the axis; angles are right-handed about it.
+        rpm: steady rotation [1/min]: the angle is 2π rpm/60 t + phase.
+        amplitude: zero-to-peak angle [rad] of a rotation to and fro, with ``frequency``: the angle
+            is amplitude sin(2π frequency t + phase).
+        frequency: of the rotation to and fro [Hz].
+        phase: angle, or phase of the sine, at time 0 [rad].
     """
 
     tag: int
     axis_point: tuple[float, float, float] = (0.0, 0.0, 0.0)
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
     rpm: float | None = None
-    swing: float | None = None
+    amplitude: float | None = None
     frequency: float | None = None
     phase: float = 0.0
 
@@ -80,7 +88,7 @@ class Seen(NamedTuple):
     acceleration: Vec3
 
 
-def checked_turn(turn: Turn | None, middle: np.ndarray) -> Turning | None:
+def checked_turn(turn: PartRotation | None, middle: np.ndarray) -> Turning | None:
     """Raises SceneError for numbers out of range; ``middle`` (3,) [m] is the mesh's."""
     if turn is None:
         return None
@@ -91,9 +99,9 @@ def checked_turn(turn: Turn | None, middle: np.ndarray) -> Turning | None:
         rate = TURN * float(turn.rpm) / 60.0
         bounds = (abs(rate), 0.0, 0.0)
     else:
-        assert turn.swing is not None
+        assert turn.amplitude is not None
         assert turn.frequency is not None
-        swing, rate = float(turn.swing), TURN * float(turn.frequency)
+        swing, rate = float(turn.amplitude), TURN * float(turn.frequency)
         bounds = (swing * rate, swing * rate**2, swing * rate**3)
     point = np.array(axle.point) - middle
     return Turning(
@@ -107,39 +115,40 @@ def checked_turn(turn: Turn | None, middle: np.ndarray) -> Turning | None:
     )
 
 
-def checked_axle(turn: Turn | None) -> Axle | None:
+def checked_axle(turn: PartRotation | None) -> Axle | None:
     """The axis of a Turn; raises SceneError for numbers out of range."""
     if turn is None:
         return None
     fastest = TURN * FASTEST / 60.0
-    for name in ("rpm", "swing", "frequency", "phase"):
+    for name in ("rpm", "amplitude", "frequency", "phase"):
         if getattr(turn, name) is not None:
-            number(f"turn.{name}", getattr(turn, name))
-    if (turn.rpm is None) == (turn.swing is None) or (turn.swing is None) != (
+            number(f"part_rotation.{name}", getattr(turn, name))
+    if (turn.rpm is None) == (turn.amplitude is None) or (turn.amplitude is None) != (
         turn.frequency is None
     ):
-        raise SceneError("turn: give either rpm, or swing and frequency")
+        raise SceneError("part_rotation: give either rpm, or amplitude and frequency")
     if turn.rpm is not None and not abs(turn.rpm) <= FASTEST:
         raise SceneError(
-            f"turn.rpm is {turn.rpm}: it must lie between {-FASTEST:g} and {FASTEST:g}"
+            f"part_rotation.rpm is {turn.rpm}: it must lie between {-FASTEST:g} and {FASTEST:g}"
         )
-    if turn.swing is not None and turn.frequency is not None:
-        if not 0.0 <= turn.swing <= LARGEST_SWING:
+    if turn.amplitude is not None and turn.frequency is not None:
+        if not 0.0 <= turn.amplitude <= LARGEST_SWING:
             raise SceneError(
-                f"turn.swing is {turn.swing} rad: it must lie between 0 and {LARGEST_SWING:.0f}"
+                f"part_rotation.amplitude is {turn.amplitude} rad: it must lie between 0 and {LARGEST_SWING:.0f}"
             )
         if not 0.0 < turn.frequency < math.inf:
-            raise SceneError(f"turn.frequency is {turn.frequency} Hz: it must be positive")
-        if not TURN * turn.frequency * turn.swing <= fastest:
+            raise SceneError(f"part_rotation.frequency is {turn.frequency} Hz: it must be positive")
+        if not TURN * turn.frequency * turn.amplitude <= fastest:
             raise SceneError(
-                f"turn.swing of {turn.swing:g} rad at {turn.frequency:g} Hz turns faster than {fastest:.0f} rad/s"
+                f"part_rotation.amplitude of {turn.amplitude:g} rad at {turn.frequency:g} Hz "
+                f"turns faster than {fastest:.0f} rad/s: make one of them smaller"
             )
     if not math.isfinite(turn.phase):
-        raise SceneError(f"turn.phase is {turn.phase} rad: it must be finite")
+        raise SceneError(f"part_rotation.phase is {turn.phase} rad: it must be finite")
     if len(turn.axis) != 3 or not 0.0 < math.hypot(*turn.axis) < math.inf:
-        raise SceneError(f"turn.axis is {turn.axis}: it must be a direction")
+        raise SceneError(f"part_rotation.axis is {turn.axis}: it must be a direction")
     if len(turn.axis_point) != 3 or not all(math.isfinite(k) for k in turn.axis_point):
-        raise SceneError(f"turn.axis_point is {turn.axis_point}: give three numbers [m]")
+        raise SceneError(f"part_rotation.axis_point is {turn.axis_point}: give three numbers [m]")
     length = math.hypot(*turn.axis)
     x, y, z = (float(k) / length for k in turn.axis)
     px, py, pz = (float(k) for k in turn.axis_point)
@@ -147,7 +156,7 @@ def checked_axle(turn: Turn | None) -> Axle | None:
         int(turn.tag),
         (px, py, pz),
         (x, y, z),
-        math.inf if turn.swing is None else float(turn.swing),
+        math.inf if turn.amplitude is None else float(turn.amplitude),
     )
 
 

@@ -19,7 +19,7 @@ from sim_core.numerics.simd import BOXES
 from sim_core.numerics.vec3 import Vec3, along, dot, sub
 
 
-class Nearest(NamedTuple):
+class ClosestPoints(NamedTuple):
     """``distance`` (n,) [m], ``triangle`` (n,) int32, ``point`` (n, 3) [m] on it; of a place with nothing within its
     reach: the reach, -1, and the place itself.
     """
@@ -29,15 +29,15 @@ class Nearest(NamedTuple):
     point: np.ndarray
 
 
-def nearest(
+def closest_points(
     mesh: TriangleMesh, places: np.ndarray, reach: float | np.ndarray, tag: int | None = None
-) -> Nearest:
+) -> ClosestPoints:
     """The surface point nearest to each of the places (n, 3) [m], if one is nearer than ``reach`` [m], () or (n,).
 
     ``tag``: only the triangles that have it count.
     """
     middle = mesh.middle
-    found = Nearest(
+    found = ClosestPoints(
         np.array(np.broadcast_to(np.asarray(reach, dtype=np.float64), len(places))),
         np.full(len(places), -1, dtype=np.int32),
         np.ascontiguousarray(places, dtype=np.float64) - middle,
@@ -62,7 +62,7 @@ def _tree_of(mesh: TriangleMesh, tag: int | None) -> Tree:
 
 
 @jit
-def _find(tree: Tree, found: Nearest, stack: np.ndarray, entry: np.ndarray) -> None:
+def _find(tree: Tree, found: ClosestPoints, stack: np.ndarray, entry: np.ndarray) -> None:
     """``found`` comes with reaches and places; ``stack`` and ``entry`` are room for the walk: nodes, and how near."""
     for i in range(len(found.distance)):
         at = Vec3(found.point[i, 0], found.point[i, 1], found.point[i, 2])

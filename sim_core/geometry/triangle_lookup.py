@@ -106,7 +106,7 @@ def triangle_at(locator: Locator, seed: int, at: Vec3) -> int:
     return nearest
 
 
-def triangles_at(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
+def find_triangles(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Which of the triangles (m, 3, 3) [m] of one plane holds each point (n, 3) [m] of it, or is nearest to it: (n,).
 
     Triangles wound as in a TriangleMesh, normals away from the shot; a point off the plane is seen along its normal.

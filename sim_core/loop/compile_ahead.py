@@ -54,7 +54,7 @@ def compile_simulator(
     for law in (physics.restitution, physics.friction):
         if law is not None:
             tags = np.minimum(tags, len(law.surfaces) - 1)
-    if physics.turn is not None:
+    if physics.part_rotation is not None:
         physics, vertices, triangles, tags = _with_a_turning_box(physics, vertices, triangles, tags)
     side = math.ceil(MANY ** (1 / 3)) if balls >= MANY else 2
     places = np.stack(np.meshgrid(*[np.linspace(0.1, 0.9, side)] * 3), axis=-1).reshape(-1, 3)
@@ -80,7 +80,7 @@ def _with_a_turning_box(
     physics: Physics, vertices: np.ndarray, triangles: np.ndarray, tags: np.ndarray
 ) -> tuple[Physics, np.ndarray, np.ndarray, np.ndarray]:
     """The cube with a small box in a corner, which turns."""
-    turn = physics.turn
+    turn = physics.part_rotation
     assert turn is not None
     shaken = [one.tag for one in physics.vibrations]
     still = next(tag for tag in range(4) if tag not in (turn.tag, *shaken))
@@ -91,7 +91,7 @@ def _with_a_turning_box(
             physics = physics._replace(**{name: wider})
     box = len(vertices) + triangles[:, ::-1]
     return (
-        physics._replace(turn=turn._replace(axis_point=(0.03, 0.03, 0.03))),
+        physics._replace(part_rotation=turn._replace(axis_point=(0.03, 0.03, 0.03))),
         np.concatenate([vertices, 0.02 * vertices + 0.02]),
         np.concatenate([triangles, box]),
         np.concatenate([np.where(np.isin(tags, shaken), tags, still), np.full(len(box), turn.tag)]),

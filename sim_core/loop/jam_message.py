@@ -56,5 +56,5 @@ def _surfaces(
         if not any(alike) and len(found) < MOST_NAMED:
             found.append(t)
     tags = [int(scene.mesh.tags[t]) for t in found]
-    held_by_part = physics.turn is not None and physics.turn.tag in tags
+    held_by_part = physics.part_rotation is not None and physics.part_rotation.tag in tags
     return [surface_name(scene.mesh, physics, t) for t in found], held_by_part

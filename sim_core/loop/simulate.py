@@ -1,4 +1,4 @@
-"""Scene in, Result out: sets up the columns, runs the compiled event loop, checks what must never break."""
+"""Scene in, SimulationResult out: sets up the columns, runs the compiled event loop, checks what must never break."""
 
 import math
 from collections.abc import Sequence
@@ -59,7 +59,7 @@ class Collisions:
 
 
 @dataclass(frozen=True)
-class Result:
+class SimulationResult:
     """The recorded impacts, the balls at the end, counts of the collisions, and who lies still at the end.
 
     ``frames`` (f, n, 3) [m]: where the balls' centres were at the times asked for.
@@ -72,7 +72,7 @@ class Result:
     frames: np.ndarray
 
 
-def simulate(scene: Scene, frames: Sequence[float] | np.ndarray = ()) -> Result:
+def simulate(scene: Scene, frames: Sequence[float] | np.ndarray = ()) -> SimulationResult:
     """Plays the scene from its start to the end of its duration.
 
     ``frames`` (f,) [s since the end of the warm-up], ascending: when to note where the balls are, each on its flight at
@@ -86,7 +86,7 @@ def simulate(scene: Scene, frames: Sequence[float] | np.ndarray = ()) -> Result:
     )
     balls = run.balls()
     still = resting(run.footing, run.ground, balls.positions, run.centre, scene.warmup)
-    return Result(
+    return SimulationResult(
         impact_log(run.pages, run.centre),
         balls,
         Collisions(*(int(n) for n in run.count)),
@@ -133,10 +133,10 @@ class _Run:
         self.phases: Phases | None = new_phases(
             random_phase, self.wave, vibrating, 0.5 * scene.balls.diameters
         )
-        self.turning: Turning | None = checked_turn(scene.physics.turn, self.centre)
+        self.turning: Turning | None = checked_turn(scene.physics.part_rotation, self.centre)
         radii = tuple(float(r) for r in 0.5 * scene.balls.sizes)
         self.ground = _ground(
-            scene.mesh, radii, tags_waving, swings, checked_axle(scene.physics.turn)
+            scene.mesh, radii, tags_waving, swings, checked_axle(scene.physics.part_rotation)
         )
         self.waves: Waves | None = new_waves(
             vibrations, waves, self.window, self._tags_of_obstacles()
@@ -324,7 +324,7 @@ class _Run:
 
     def _corners(self) -> np.ndarray | None:
         """The triangles where they are now, if some of them turn."""
-        turn = self.scene.physics.turn
+        turn = self.scene.physics.part_rotation
         mesh = self.scene.mesh
         if turn is None or self.turning is None or isinstance(mesh, AnalyticCavity):
             return None

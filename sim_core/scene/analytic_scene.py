@@ -13,7 +13,7 @@ from sim_core.scene.physics import Physics
 def require_supported(cavity: AnalyticCavity, physics: Physics) -> None:
     """Raises SceneError for effects that are not supported in an analytical cavity."""
     remedy = "leave it out, or give the cavity as a mesh"
-    for name in ("rest", "turn"):
+    for name in ("rest", "part_rotation"):
         if getattr(physics, name) is not None:
             raise SceneError(f"physics.{name} is not supported with an analytical cavity; {remedy}")
     gravity = physics.gravity

@@ -12,7 +12,13 @@ import numpy as np
 
 from sim_core.balls import Balls
 from sim_core.effects.gravity import Gravity
-from sim_core.effects.part_rotation import Turn, angle_now, checked_axle, checked_turn, turned
+from sim_core.effects.part_rotation import (
+    PartRotation,
+    angle_now,
+    checked_axle,
+    checked_turn,
+    turned,
+)
 from sim_core.geometry.mesh import TriangleMesh
 from sim_core.numerics.jit import jit
 from sim_core.numerics.vec3 import Vec3, cross, dot, sub
@@ -132,7 +138,7 @@ def _solid_angles(corners: np.ndarray, points: np.ndarray, angle: np.ndarray) ->
             angle[i] += 2.0 * math.atan2(dot(a, cross(b, c)), below)
 
 
-def posed(mesh: TriangleMesh, turn: Turn, angle: float | None = None) -> np.ndarray:
+def posed(mesh: TriangleMesh, turn: PartRotation, angle: float | None = None) -> np.ndarray:
     """Corners (m, 3, 3) [m] of the mesh's triangles, those of the part turned by ``angle`` [rad]: at the start, if
     none is given.
     """

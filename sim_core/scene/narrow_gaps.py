@@ -55,7 +55,7 @@ def find_pinch(
 
 def surface_name(mesh: TriangleMesh, physics: Physics, triangle: int) -> str:
     """E.g. "triangle 7", or "the turning part (triangle 12)"."""
-    turn, tag = physics.turn, int(mesh.tags[triangle])
+    turn, tag = physics.part_rotation, int(mesh.tags[triangle])
     if tag in [one.tag for one in physics.vibrations]:
         return f"{vibrating_name(physics, tag)} (triangle {triangle})"
     if turn is not None and tag == turn.tag:
@@ -76,7 +76,7 @@ def _swing(physics: Physics) -> float:
 def _tightest(
     mesh: TriangleMesh, physics: Physics, here: np.ndarray, radius: float, corners: np.ndarray
 ) -> tuple[int, int, float, bool] | None:
-    turn, reach = physics.turn, radius + _swing(physics)
+    turn, reach = physics.part_rotation, radius + _swing(physics)
     box = np.abs(here - np.clip(here, corners.min(axis=1), corners.max(axis=1))).max(axis=1)
     near = np.flatnonzero(box <= reach)
     away = here - _nearest_points(corners[near], here)

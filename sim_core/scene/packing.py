@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sim_core.effects.part_rotation import Turn
+from sim_core.effects.part_rotation import PartRotation
 from sim_core.errors import SceneError
 from sim_core.geometry.analytic import AnalyticCavity
 from sim_core.geometry.mesh import TriangleMesh
@@ -25,13 +25,13 @@ def pack_balls(
     diameter: float | np.ndarray,
     rng: np.random.Generator,
     clear: float = 0.0,
-    turn: Turn | None = None,
+    part_rotation: PartRotation | None = None,
     floor: float = -np.inf,
 ) -> np.ndarray:
     """Positions [m] of ``count`` balls inside the mesh, shape (count, 3), no two overlapping.
 
     ``diameter`` [m], of all or of each, (count,): the larger are placed first; ``clear`` [m] is kept from every surface
-    (at least the largest amplitude, if any); ``turn``: a part that turns is where its phase has it. "Low" is along
+    (at least the largest amplitude, if any); ``part_rotation``: a part that turns is where its phase has it. "Low" is along
     -z, but nothing is placed lower than ``floor`` [m]. Raises SceneError when they do not fit: random placement reaches
     about 30 % of the volume a ball can use.
     """
@@ -44,7 +44,7 @@ def pack_balls(
         )
     each = np.broadcast_to(sizes, int(count))
     placed = _Placed(2.0 * (0.5 * float(each.max()) + GAP))
-    free = _free_of(mesh, turn)
+    free = _free_of(mesh, part_rotation)
     positions = np.empty((int(count), 3))
     for size in np.unique(each)[::-1]:
         before = len(placed.points)
@@ -54,16 +54,18 @@ def pack_balls(
 
 
 def _free_of(
-    mesh: TriangleMesh | AnalyticCavity, turn: Turn | None
+    mesh: TriangleMesh | AnalyticCavity, part_rotation: PartRotation | None
 ) -> Callable[[np.ndarray, float], np.ndarray]:
     """Those of points (n, 3) [m] that are inside and so far [m] from every surface, as a function of the two."""
     if isinstance(mesh, AnalyticCavity):
         return lambda points, reach: points[(mesh.gaps(points) >= reach).all(axis=1)]
-    corners = mesh.corners if turn is None else posed(mesh, turn)
+    corners = mesh.corners if part_rotation is None else posed(mesh, part_rotation)
 
     def free(points: np.ndarray, reach: float) -> np.ndarray:
         points = points[clearance(corners, points, reach) >= reach]
-        return points[contained(mesh, points) if turn is None else enclosed(corners, points)]
+        return points[
+            contained(mesh, points) if part_rotation is None else enclosed(corners, points)
+        ]
 
     return free
 

@@ -7,7 +7,7 @@ from sim_core.effects.contact_mode import Rest
 from sim_core.effects.drag import Drag
 from sim_core.effects.friction import Friction
 from sim_core.effects.gravity import Gravity
-from sim_core.effects.part_rotation import Turn
+from sim_core.effects.part_rotation import PartRotation
 from sim_core.effects.random_phase import RandomPhase
 from sim_core.effects.restitution import Restitution
 from sim_core.effects.vibration import Vibration
@@ -23,7 +23,7 @@ class Physics(NamedTuple):
     restitution: Restitution | None = None
     vibration: Vibration | tuple[Vibration, ...] | None = None
     rest: Rest | None = None
-    turn: Turn | None = None
+    part_rotation: PartRotation | None = None
     friction: Friction | None = None
     random_phase: RandomPhase | None = None
     ball_collisions: BallCollisions | None = BallCollisions()

@@ -11,7 +11,7 @@ from sim_core.effects.contact_mode import Rest, checked_rest
 from sim_core.effects.drag import Drag, checked_drag
 from sim_core.effects.friction import Friction, checked_friction
 from sim_core.effects.gravity import checked_gravity
-from sim_core.effects.part_rotation import Turn, checked_axle
+from sim_core.effects.part_rotation import PartRotation, checked_axle
 from sim_core.effects.random_phase import RandomPhase, checked_random_phase
 from sim_core.effects.restitution import Restitution, checked_restitution
 from sim_core.effects.vibration import checked_waves
@@ -33,7 +33,7 @@ TOUCH = 1e-9  # m: overlap at the start that is taken for rounding of the input;
 KINDS = {  # of the effects that are checked by name; gravity may be any three numbers
     "restitution": Restitution,
     "rest": Rest,
-    "turn": Turn,
+    "part_rotation": PartRotation,
     "random_phase": RandomPhase,
     "ball_collisions": BallCollisions,
     "drag": Drag,
@@ -81,11 +81,11 @@ class Scene:
         vibrations, restitution, turn = (
             self.physics.vibrations,
             self.physics.restitution,
-            self.physics.turn,
+            self.physics.part_rotation,
         )
         checked_gravity(self.physics.gravity)
         checked_rest(self.physics.rest)
-        for name in ("rest", "turn", "friction"):
+        for name in ("rest", "part_rotation", "friction"):
             if getattr(self.physics, name) is not None and not self.balls.alike:
                 raise SceneError(
                     f"physics.{name} is given, and balls of several sizes or densities: not supported together yet; "
@@ -105,10 +105,10 @@ class Scene:
         tags = np.unique(self.mesh.tags).tolist()
         if turn is not None and axle is not None and isinstance(self.mesh, TriangleMesh):
             if turn.tag not in tags:
-                raise SceneError(f"turn.tag is {turn.tag}, but the mesh has tags {tags}")
+                raise SceneError(f"part_rotation.tag is {turn.tag}, but the mesh has tags {tags}")
             if turn.tag in [one.tag for one in vibrations]:
                 raise SceneError(
-                    f"turn.tag and vibration.tag are both {turn.tag}: one surface cannot do both"
+                    f"part_rotation.tag and vibration.tag are both {turn.tag}: one surface cannot do both"
                 )
             require_free_axle(self.mesh, axle, self.balls.radius)
         for one in vibrations:
@@ -139,7 +139,7 @@ class Scene:
                 f"mesh triangle {wrong} belongs to a body that is inside out: the cavity is behind it; reverse every "
                 "triangle of that body so that normals point away from the shot"
             )
-        turn = self.physics.turn
+        turn = self.physics.part_rotation
         corners = None if turn is None else posed(self.mesh, turn)
         inside = (
             contained(self.mesh, balls.positions)
@@ -201,7 +201,7 @@ class Scene:
         )
 
 
-def require_free_turn(mesh: TriangleMesh, turn: Turn, diameter: float) -> None:
+def require_free_rotation(mesh: TriangleMesh, turn: PartRotation, diameter: float) -> None:
     """Raises SceneError if the part cannot turn in its chamber, with balls of this diameter [m], or its numbers are
     out of range: what a Scene asks, without the balls.
     """

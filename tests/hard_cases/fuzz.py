@@ -64,7 +64,7 @@ def plans(combinations: tuple[str, ...]) -> st.SearchStrategy[Plan]:
 def _plans(effects: frozenset[str]) -> st.SearchStrategy[Plan]:
     families = (
         set(TURNING)
-        if "turn" in effects
+        if "part_rotation" in effects
         else WITH_FLOOR
         if "vibration" in effects
         else set(FAMILIES)
@@ -102,7 +102,7 @@ def chamber_of(plan: Plan) -> Chamber:
         size = diameter * np.where(np.arange(plan.count) % 2, plan.much.spread, 1.0)
         density = rng.choice([2500.0, 7800.0], plan.count)
     clear = max((one.amplitude for one in physics.vibrations), default=0.0)
-    positions = pack_balls(mesh, plan.count, size, rng, clear, physics.turn)
+    positions = pack_balls(mesh, plan.count, size, rng, clear, physics.part_rotation)
     velocities = rng.normal(0.0, plan.speed, positions.shape)
     spins = (
         None
@@ -131,7 +131,7 @@ def duration_of(plan: Plan) -> float:
         1.0,
         math.sqrt(much.weight) if "gravity" in plan.effects else 0.0,
         much.beat if "vibration" in plan.effects and much.swing else 0.0,
-        much.tip if "turn" in plan.effects else 0.0,
+        much.tip if "part_rotation" in plan.effects else 0.0,
     )
     return TRAVERSES * plan.wide / (fastest * plan.speed)
 

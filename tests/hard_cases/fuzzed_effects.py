@@ -11,11 +11,11 @@ from sim_core import (
     Drag,
     Friction,
     Gravity,
+    PartRotation,
     Physics,
     RandomPhase,
     Rest,
     Restitution,
-    Turn,
     Vibration,
 )
 from sim_core.effects.drag import SHORTEST
@@ -29,22 +29,22 @@ LAWFUL = "gravity restitution ball_collisions"  # of a chamber that is of this w
 FEW = (
     f"{LAWFUL} vibration rest friction drag",
     f"{LAWFUL} vibration random_phase drag {SIZES}",
-    f"{LAWFUL} vibration rest friction turn",
-    "gravity restitution vibration random_phase rest friction drag turn",
+    f"{LAWFUL} vibration rest friction part_rotation",
+    "gravity restitution vibration random_phase rest friction drag part_rotation",
     f"{LAWFUL} vibration rest {SONOTRODES}",
 )
 MANY = (
     *FEW,
-    f"{LAWFUL} vibration random_phase rest friction drag turn",
+    f"{LAWFUL} vibration random_phase rest friction drag part_rotation",
     f"{LAWFUL} vibration",
     f"{LAWFUL} vibration rest",
-    f"{LAWFUL} vibration rest friction drag turn {SONOTRODES}",
+    f"{LAWFUL} vibration rest friction drag part_rotation {SONOTRODES}",
     f"{LAWFUL} vibration drag {SIZES} {SONOTRODES}",
     f"{LAWFUL} vibration friction",
     f"{LAWFUL} vibration random_phase friction",
-    f"{LAWFUL} friction drag turn",
+    f"{LAWFUL} friction drag part_rotation",
     f"{LAWFUL} rest friction",
-    f"{LAWFUL} rest turn drag",
+    f"{LAWFUL} rest part_rotation drag",
     f"ball_collisions {SIZES}",
     "ball_collisions friction",
     "ball_collisions",
@@ -115,9 +115,9 @@ def physics_of(
     law = (much.restitution, CONSTANT if much.restitution == 1.0 else speed)
     amplitude = much.swing * diameter
     rate = much.tip * speed / (0.3 * wide)  # rad/s
-    turn = Turn(PART, tuple(middle.tolist()), (0.1, -0.2, 1.0), rpm=60.0 * rate / math.tau)
+    turn = PartRotation(PART, tuple(middle.tolist()), (0.1, -0.2, 1.0), rpm=60.0 * rate / math.tau)
     if much.to_and_fro:
-        turn = turn._replace(rpm=None, swing=0.7, frequency=max(rate, 1e-6) / (0.7 * math.tau))
+        turn = turn._replace(rpm=None, amplitude=0.7, frequency=max(rate, 1e-6) / (0.7 * math.tau))
     # of steel, at speed: 3/4 C_d air / (rho D) = slowing / wide, with C_d 0.44
     air = much.slowing * 7800.0 * diameter / (0.33 * wide)
     floor = Vibration(

@@ -181,8 +181,8 @@ def overlap(chamber: Chamber) -> float:
     mesh, balls, physics = chamber
     gap = clearance_at(chamber, balls.positions, np.zeros(len(balls)))
     corners = corners_now(mesh, physics)
-    if corners is not None and physics.turn is not None:
-        part = np.ascontiguousarray(corners[mesh.tags == physics.turn.tag])
+    if corners is not None and physics.part_rotation is not None:
+        part = np.ascontiguousarray(corners[mesh.tags == physics.part_rotation.tag])
         gap = np.minimum(gap, clearance(part, balls.positions, REACH * balls.radius))
     near = gap < REACH * balls.radius  # others touch nothing: how far they are is not measured
     surface = float((0.5 * balls.diameters - gap)[near].max(initial=-math.inf))
@@ -208,19 +208,19 @@ def _in_the_room(mesh: TriangleMesh, physics: Physics) -> np.ndarray:
     """True (m,) for triangles whose impacts are logged where they happen, and not as a turning part sees them."""
     return (
         np.ones(len(mesh.tags), dtype=np.bool_)
-        if physics.turn is None
-        else mesh.tags != physics.turn.tag
+        if physics.part_rotation is None
+        else mesh.tags != physics.part_rotation.tag
     )
 
 
 def corners_now(mesh: TriangleMesh, physics: Physics) -> np.ndarray | None:
     """The triangles (m, 3, 3) [m] where a turning part is now; None if none turns."""
-    return None if physics.turn is None else posed(mesh, physics.turn)
+    return None if physics.part_rotation is None else posed(mesh, physics.part_rotation)
 
 
 def is_still(physics: Physics) -> bool:
     """True when no surface moves, so that no energy comes in."""
-    return all(one.amplitude == 0.0 for one in physics.vibrations) and physics.turn is None
+    return all(one.amplitude == 0.0 for one in physics.vibrations) and physics.part_rotation is None
 
 
 def is_elastic(physics: Physics) -> bool:

@@ -15,12 +15,12 @@ from sim_core import (
     Drag,
     Friction,
     Gravity,
+    PartRotation,
     Physics,
     RandomPhase,
     Rest,
     Scene,
     TriangleMesh,
-    Turn,
     Vibration,
 )
 from sim_core.effects.contact_mode import ASLEEP, MODE, SLIDING
@@ -40,7 +40,7 @@ EVERYTHING = Physics(
     LOSSLESS,
     Vibration(FLOOR, 0.0, 20e3),
     Rest(1e-3, 0.0),
-    Turn(PART, rpm=0.0),
+    PartRotation(PART, rpm=0.0),
     Friction((SMOOTH,) * 3, SMOOTH),
     RandomPhase(),
     None,
@@ -73,7 +73,7 @@ def test_a_ball_dropped_on_a_turntable_goes_round_with_two_sevenths_of_its_speed
     omega, drop, hops = 10.0, 2e-4, 60
     disk = trimesh.creation.cylinder(radius=0.03, height=0.004, sections=48)
     physics = EVERYTHING._replace(
-        turn=Turn(PART, rpm=60.0 * omega / math.tau), friction=rough(STICKS, 0.0)
+        part_rotation=PartRotation(PART, rpm=60.0 * omega / math.tau), friction=rough(STICKS, 0.0)
     )
     first = math.sqrt(2.0 * drop / G)
     start = shot([0.015, 0.0, 0.002 + R + drop])
@@ -92,7 +92,7 @@ def test_a_ball_that_a_rough_paddle_pushes_slips_on_the_floor_until_it_rolls(mu:
     """The paddle's face passes the ball at omega times half its width, and rubs; then the floor takes 2/7 of it all."""
     x, y, omega, beta0 = 0.002, 0.012, 10.0, 0.5
     physics = EVERYTHING._replace(
-        turn=Turn(PART, rpm=60.0 * omega / math.tau), friction=rough(mu, beta0)
+        part_rotation=PartRotation(PART, rpm=60.0 * omega / math.tau), friction=rough(mu, beta0)
     )
     angle = arrival(x, y)
     out, along = (
@@ -150,7 +150,7 @@ def test_balls_that_do_not_meet_rub_roll_and_rest_as_each_does_alone() -> None:
         restitution=LOSSLESS._replace(surfaces=law),
         friction=rough(0.3, 0.4),
         drag=Drag(),
-        turn=Turn(PART, rpm=40.0),
+        part_rotation=PartRotation(PART, rpm=40.0),
     )
     places = rng.uniform([0.004, 0.004, -0.018], [0.018, 0.018, 0.018], (6, 3))
     speeds, turns = rng.normal(0.0, 0.4, (6, 3)), rng.normal(0.0, 200.0, (6, 3))

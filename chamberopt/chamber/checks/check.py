@@ -221,7 +221,7 @@ def _sonotrode_warnings(design: Design, mesh: TriangleMesh) -> list[str]:
     if turn is None:
         return []
     own = mesh.vertices[mesh.triangles[mesh.tags == TAG_PART]].reshape(-1, 3)
-    below = _lowest_on_its_way(design, own, turn.swing) - amplitude
+    below = _lowest_on_its_way(design, own, turn.amplitude) - amplitude
     if not 0.0 < below < ball:
         return []
     return [
@@ -232,7 +232,7 @@ def _sonotrode_warnings(design: Design, mesh: TriangleMesh) -> list[str]:
 
 def sonotrode_clearance(mesh: TriangleMesh) -> float:
     """Least distance [m] from a corner of the part to the sonotrode, or the other way; inf without one of them."""
-    from sim_core import nearest
+    from sim_core import closest_points
 
     if not ((mesh.tags == TAG_PART).any() and (mesh.tags == TAG_SONOTRODE).any()):
         return float("inf")
@@ -240,7 +240,7 @@ def sonotrode_clearance(mesh: TriangleMesh) -> float:
     ways = ((TAG_PART, TAG_SONOTRODE), (TAG_SONOTRODE, TAG_PART))
     corners = (np.unique(mesh.triangles[mesh.tags == one]) for one, _ in ways)
     return min(
-        float(nearest(mesh, mesh.vertices[these], whole, other).distance.min())
+        float(closest_points(mesh, mesh.vertices[these], whole, other).distance.min())
         for these, (_, other) in zip(corners, ways, strict=True)
     )
 

@@ -62,7 +62,7 @@ def open_cells(mesh: TriangleMesh, radius: float) -> Cells:
     """
     from scipy.ndimage import label
 
-    from sim_core import nearest
+    from sim_core import closest_points
 
     low, edge = mesh.vertices.min(axis=0), cell_edge(mesh, radius)
     blocks = np.ceil(np.ptp(mesh.vertices, axis=0) / (edge * 2**HALVINGS)).astype(np.int64)
@@ -71,7 +71,7 @@ def open_cells(mesh: TriangleMesh, radius: float) -> Cells:
         side = edge * 2**halvings
         half = 0.5 * DIAGONAL * side
         index = np.argwhere(unsure)
-        found = nearest(mesh, low + side * (index + 0.5), radius + half)
+        found = closest_points(mesh, low + side * (index + 0.5), radius + half)
         away = found.distance
         free[tuple(index.T)] = found.triangle < 0
         unsure[tuple(index.T)] = (found.triangle >= 0) & (away > radius - half)
@@ -131,20 +131,20 @@ def _midways(mesh: TriangleMesh, cells: Cells, radius: float) -> np.ndarray:
     """
     from scipy.ndimage import maximum_filter, minimum_filter
 
-    from sim_core import nearest
+    from sim_core import closest_points
 
     highest = maximum_filter(cells.space, size=NEARBY)
     lowest = minimum_filter(
         np.where(cells.space > 0, cells.space, np.iinfo(np.int32).max), size=NEARBY
     )
     place = cells.middles(cells.unsure & ((highest == 0) | (highest != lowest)))
-    beside = nearest(mesh, place, radius + DIAGONAL * cells.edge)
+    beside = closest_points(mesh, place, radius + DIAGONAL * cells.edge)
     outward = area_vectors(mesh.vertices, mesh.triangles)[beside.triangle]
     place = place[np.einsum("ij,ij->i", place - beside.point, outward) < 0.0]
     best, widest = place.copy(), np.zeros(len(place))
     step = 0.5 * cells.edge
     for _ in range(PUSHES):
-        found = nearest(mesh, place, radius + DIAGONAL * cells.edge)
+        found = closest_points(mesh, place, radius + DIAGONAL * cells.edge)
         wider = found.distance > widest
         best[wider], widest[wider] = place[wider], found.distance[wider]
         away = place - found.point
@@ -201,7 +201,7 @@ def _ways_on(
 
 def _clear_way(mesh: TriangleMesh, start: np.ndarray, end: np.ndarray, radius: float) -> np.ndarray:
     """Whether a ball gets straight from each start (n, 3) [m] to its end: (n,) bool."""
-    from sim_core import nearest
+    from sim_core import closest_points
 
     clear = np.ones(len(start), dtype=bool)
     if not len(start):
@@ -209,6 +209,6 @@ def _clear_way(mesh: TriangleMesh, start: np.ndarray, end: np.ndarray, radius: f
     steps = int(np.ceil(np.linalg.norm(end - start, axis=1).max() / (STEP * radius))) + 1
     for share in np.linspace(0.0, 1.0, steps + 1)[1:-1]:
         asked = np.flatnonzero(clear)
-        found = nearest(mesh, start[asked] + share * (end - start)[asked], radius)
+        found = closest_points(mesh, start[asked] + share * (end - start)[asked], radius)
         clear[asked[found.triangle >= 0]] = False
     return clear

@@ -90,14 +90,14 @@ def largest_balls(
 
     A ball of radius R that touches at p reaches ``forgiven`` > 0 deep at q where |q - p - R n| = R - forgiven.
     """
-    from sim_core import nearest
+    from sim_core import closest_points
 
     radius = np.full(len(point), most)
     against, opposite = np.full(len(point), -1), np.zeros(len(point))
     asked = np.arange(len(point))
     for _ in range(ROUNDS):
         centre = point[asked] + radius[asked, None] * normal[asked]
-        found = nearest(mesh, centre, radius[asked] - forgiven)
+        found = closest_points(mesh, centre, radius[asked] - forgiven)
         hit = found.triangle >= 0
         asked = asked[hit]
         if not len(asked):

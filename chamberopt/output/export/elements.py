@@ -65,12 +65,12 @@ def of_other_triangles(
     small = np.flatnonzero(~np.isin(filed.elements, number[cells]) & (filed.elements > 0))
     weight = np.ones(len(cells))
     if len(small):
-        from sim_core import TriangleMesh, nearest
+        from sim_core import TriangleMesh, closest_points
 
         tags = np.zeros(len(simulated.triangles), dtype=np.uint8)
         mesh = TriangleMesh(simulated.vertices, simulated.triangles, tags)
         middles = filed.vertices[filed.triangles[small]].mean(axis=1)
-        around = nearest(mesh, middles, float(np.ptp(filed.vertices))).triangle
+        around = closest_points(mesh, middles, float(np.ptp(filed.vertices))).triangle
         share = areas(filed.vertices, filed.triangles[small]) / areas(
             simulated.vertices, simulated.triangles[around]
         )

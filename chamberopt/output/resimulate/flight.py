@@ -15,7 +15,7 @@ from chamberopt.coverage.dents import Dents, dents_on_part
 
 if TYPE_CHECKING:
     from chamberopt.output.resimulate.replica import Replayed
-    from sim_core import ImpactLog, Turn, Vibration
+    from sim_core import ImpactLog, PartRotation, Vibration
 
 SHORTEST = 1e-6  # s
 MOST_FRAMES = 2000
@@ -64,7 +64,7 @@ def flight(replayed: Replayed, start: float, span: float, frames: int, trail: in
     impacts = replayed.booked(seen.impacts)
     shown = (impacts.time >= start) & (replayed.chamber.source[impacts.triangle] >= 0)
     impacts = impacts.only(shown)
-    time, turn = every[::trail], scene.physics.turn
+    time, turn = every[::trail], scene.physics.part_rotation
     waving = () if scene.physics.random_phase else scene.physics.vibrations
     before = np.full((1, trail, *seen.frames.shape[1:]), np.nan)
     return Flight(
@@ -94,15 +94,15 @@ def displacement(vibration: Vibration, time: np.ndarray) -> np.ndarray:
     )
 
 
-def angle(turn: Turn | None, time: np.ndarray) -> np.ndarray:
+def angle(turn: PartRotation | None, time: np.ndarray) -> np.ndarray:
     """How far a part has turned (f,) [rad] at times (f,) [s] from the scene's start; 0 where it does not."""
     if turn is None:
         return np.zeros(len(time))
     if turn.rpm is not None:
         return 2.0 * math.pi * turn.rpm / 60.0 * time + turn.phase
-    assert turn.swing is not None
+    assert turn.amplitude is not None
     assert turn.frequency is not None
-    return np.asarray(turn.swing * np.sin(2.0 * math.pi * turn.frequency * time + turn.phase))
+    return np.asarray(turn.amplitude * np.sin(2.0 * math.pi * turn.frequency * time + turn.phase))
 
 
 def _require_simulated(

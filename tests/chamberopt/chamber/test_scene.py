@@ -6,7 +6,7 @@ import pytest
 from chamberopt.chamber.build import TAG_PART, TAG_SONOTRODE, build_chamber
 from chamberopt.chamber.scene import build_scene, chamber_mesh, replica_seed, start_velocities
 from chamberopt.common.errors import InputError
-from chamberopt.design.effects import Friction
+from chamberopt.design.effects import FrictionSettings
 from chamberopt.design.load import load_design
 from chamberopt.design.shot import ShotSize
 from sim_core import Drag, Rest
@@ -69,7 +69,7 @@ def test_what_the_design_says_is_in_the_scene(design, mesh) -> None:
 
 def test_friction_is_what_the_design_says_or_absent(design, mesh) -> None:
     def friction(**said):
-        effects = design.effects.model_copy(update={"friction": Friction(**said)})
+        effects = design.effects.model_copy(update={"friction": FrictionSettings(**said)})
         return build_scene(design.model_copy(update={"effects": effects}), mesh, 1).physics.friction
 
     assert build_scene(design, mesh, 1).physics.friction is None

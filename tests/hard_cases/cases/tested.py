@@ -37,7 +37,9 @@ def runs_seen() -> Iterator[list[_Run]]:
 def overlap(run: _Run) -> float:
     """How deep a ball lies in another ball, or in a surface that neither vibrates nor turns [m]."""
     balls, physics, mesh = run.balls(), run.scene.physics, run.scene.mesh
-    moving = [effect.tag for effect in (*physics.vibrations, physics.turn) if effect is not None]
+    moving = [
+        effect.tag for effect in (*physics.vibrations, physics.part_rotation) if effect is not None
+    ]
     still = mesh.corners[~np.isin(mesh.tags, moving)]
     deepest = (
         balls.radius - clearance(still, balls.positions, 2.0 * balls.radius).min()

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from sim_core import Balls, Physics, Result, Scene, TriangleMesh, simulate
+from sim_core import Balls, Physics, Scene, SimulationResult, TriangleMesh, simulate
 from tests.helpers.scenes.cavities import box
 
 DIAMETER = 1e-3  # m
@@ -49,7 +49,7 @@ def lattice_gas(per_side: int, packing: float, seed: int) -> Gas:
 
 def played(
     gas: Gas, pieces: int, collisions: float, record: tuple[int, ...] | None = None
-) -> Iterator[tuple[Result, float]]:
+) -> Iterator[tuple[SimulationResult, float]]:
     """The gas in so many pieces, each of about so many ``collisions`` a ball, and their duration [s]; after a hundred
     that melt the lattice.
     """

@@ -4,7 +4,7 @@ import numpy as np
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from sim_core import Gravity, TriangleMesh, Turn
+from sim_core import Gravity, PartRotation, TriangleMesh
 from sim_core.detect.ball_mesh import Scratch, new_scratch
 from sim_core.detect.ball_turning_part import first_part_contact
 from sim_core.effects.gravity import acceleration
@@ -87,7 +87,7 @@ class Rotor:
     """A part that turns in an empty cube, ready to be asked for contacts."""
 
     def __init__(
-        self, body: trimesh.Trimesh, turn: Turn, diameter: float = 3e-3, half: float = 0.04
+        self, body: trimesh.Trimesh, turn: PartRotation, diameter: float = 3e-3, half: float = 0.04
     ) -> None:
         self.turn = turn
         self.radius = 0.5 * diameter
@@ -116,13 +116,13 @@ class Rotor:
         return float(delay), int(row)
 
     def angle(self, time: np.ndarray) -> np.ndarray:
-        """The part's angle [rad] at times [s], from the words of Turn."""
+        """The part's angle [rad] at times [s], by the definition of PartRotation."""
         turn = self.turn
         if turn.rpm is not None:
             return np.asarray(2.0 * np.pi * turn.rpm / 60.0 * time + turn.phase)
-        assert turn.swing is not None
+        assert turn.amplitude is not None
         assert turn.frequency is not None
-        return np.asarray(turn.swing * np.sin(2.0 * np.pi * turn.frequency * time + turn.phase))
+        return np.asarray(turn.amplitude * np.sin(2.0 * np.pi * turn.frequency * time + turn.phase))
 
     def seen(self, points: np.ndarray, time: np.ndarray) -> np.ndarray:
         """Points (n, 3) of the room at times (n,), in the part's frame."""

@@ -10,6 +10,7 @@ import trimesh
 from sim_core import (
     Balls,
     Gravity,
+    PartRotation,
     Physics,
     Rest,
     Restitution,
@@ -17,7 +18,6 @@ from sim_core import (
     SceneError,
     SimulationError,
     TriangleMesh,
-    Turn,
     can_rest,
     pack_balls,
     simulate,
@@ -35,10 +35,13 @@ ELASTIC_BELOW = 0.01  # m/s
 TOUCH = 1e-12  # m
 
 
-def physics(turn: Turn, e: float = 0.8) -> Physics:
+def physics(turn: PartRotation, e: float = 0.8) -> Physics:
     law = (e, 1e3)
     return Physics(
-        Gravity(), Restitution((law,) * 3, law, ELASTIC_BELOW), rest=Rest(1e-3, 0.005), turn=turn
+        Gravity(),
+        Restitution((law,) * 3, law, ELASTIC_BELOW),
+        rest=Rest(1e-3, 0.005),
+        part_rotation=turn,
     )
 
 
@@ -78,7 +81,7 @@ def arrival(x: float, y: float) -> float:
 def test_a_sleeping_ball_is_woken_when_the_paddle_arrives(rpm: float) -> None:
     x, y, omega = 0.002, 0.012, 2 * np.pi * rpm / 60
     when = arrival(x, y) / omega
-    run = _Run(Scene(paddle(), on_floor([x, y]), physics(Turn(PART, rpm=rpm)), 2 * when))
+    run = _Run(Scene(paddle(), on_floor([x, y]), physics(PartRotation(PART, rpm=rpm)), 2 * when))
     run.play(0.5 * when, record=False)
     before = run.count.copy()
     run.play(when * (1.0 - 1e-9), record=False)
@@ -102,7 +105,7 @@ def test_a_part_that_swings_wakes_a_ball_when_it_gets_there_and_not_one_that_it_
     None
 ):
     swing, frequency = 0.9, 0.2
-    turn = Turn(PART, swing=swing, frequency=frequency)
+    turn = PartRotation(PART, amplitude=swing, frequency=frequency)
     near, far = (0.009, 0.007), (0.002, 0.012)
     assert arrival(*near) < swing < arrival(*far)
     when = np.arcsin(arrival(*near) / swing) / (2 * np.pi * frequency)
@@ -114,7 +117,9 @@ def test_a_part_that_swings_wakes_a_ball_when_it_gets_there_and_not_one_that_it_
 
 
 def test_what_the_part_never_reaches_is_never_looked_at_again() -> None:
-    run = _Run(Scene(paddle(), on_floor([0.018, 0.018]), physics(Turn(PART, rpm=30.0)), 30.0))
+    run = _Run(
+        Scene(paddle(), on_floor([0.018, 0.018]), physics(PartRotation(PART, rpm=30.0)), 30.0)
+    )
     run.play(0.1, record=False)
     before = run.count.copy()
     run.play(30.0, record=False)
@@ -134,7 +139,7 @@ def test_what_it_pushes_pushes_others_however_slowly(rpm: float) -> None:
         [0.012 + step, first + np.sqrt(3.0) * step],
     ]
     until = 0.1 / omega
-    run = _Run(Scene(paddle(), on_floor(places), physics(Turn(PART, rpm=rpm)), until))
+    run = _Run(Scene(paddle(), on_floor(places), physics(PartRotation(PART, rpm=rpm)), until))
     for stop in np.linspace(0.0, until, 21)[1:]:
         run.play(float(stop), record=False)
         assert gaps(run) > -TOUCH
@@ -149,9 +154,9 @@ def test_a_pile_swept_by_a_slow_paddle_gets_no_more_speed_than_that_gives(rpm: f
     """Twice the paddle's; but what is squeezed hops at up to the speed at which hits begin to lose and balls to give
     way, and is shot out of a wedge at a few times that. What the paddle does not touch falls still.
     """
-    room, turn = paddle(), Turn(PART, rpm=rpm)
+    room, turn = paddle(), PartRotation(PART, rpm=rpm)
     rng = np.random.default_rng(1)
-    places = pack_balls(room, 60, 2 * R, rng, turn=turn)
+    places = pack_balls(room, 60, 2 * R, rng, part_rotation=turn)
     balls = Balls(places, rng.normal(0.0, 0.1, places.shape), 2 * R)
     run = _Run(Scene(room, balls, physics(turn), 4.0))
     tip = np.hypot(0.015, WIDE) * 2 * np.pi * rpm / 60
@@ -173,9 +178,9 @@ def test_balls_rest_below_a_gear_that_turns_and_nothing_overlaps() -> None:
     """A horizontal axis: teeth come down into the pile, lift balls and let them fall."""
     gear = star(7, 0.012, 0.007, 0.008)
     gear.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [1, 0, 0]))
-    room, turn = box_around(gear, 0.0145), Turn(PART, axis=(0.0, 1.0, 0.0), rpm=10.0)
+    room, turn = box_around(gear, 0.0145), PartRotation(PART, axis=(0.0, 1.0, 0.0), rpm=10.0)
     rng = np.random.default_rng(5)
-    places = pack_balls(room, 80, 2 * R, rng, turn=turn)
+    places = pack_balls(room, 80, 2 * R, rng, part_rotation=turn)
     balls = Balls(places, rng.normal(0.0, 0.1, places.shape), 2 * R)
     run = _Run(Scene(room, balls, physics(turn), 2.0))
     for stop in np.linspace(0.0, 2.0, 41)[1:]:
@@ -187,7 +192,7 @@ def test_balls_rest_below_a_gear_that_turns_and_nothing_overlaps() -> None:
 
 def test_on_the_turning_part_nothing_rests_and_hops_are_bounded() -> None:
     slab = trimesh.creation.box((0.026, 0.026, 0.01))
-    room, turn = box_around(slab, HALF), Turn(PART, rpm=2.0)
+    room, turn = box_around(slab, HALF), PartRotation(PART, rpm=2.0)
     ball = Balls(np.array([[0.0, 0.0, 0.005 + R + 1e-3]]), np.zeros((1, 3)), 2 * R)
     run = _Run(Scene(room, ball, physics(turn, 0.5), 3.0))
     run.play(2.0, record=False)
@@ -216,7 +221,7 @@ def pocket_and_cam() -> TriangleMesh:
 
 def test_a_ball_that_the_part_crushes_stops_the_run_and_the_part_is_named() -> None:
     ball = Balls(np.array([[0.021 - 1e-6, 0.0, R - 0.00155 + 1e-6]]), np.zeros((1, 3)), 2 * R)
-    scene = Scene(pocket_and_cam(), ball, physics(Turn(PART, rpm=5.0)), 7.0)
+    scene = Scene(pocket_and_cam(), ball, physics(PartRotation(PART, rpm=5.0)), 7.0)
     with pytest.raises(
         SimulationError, match=r"ball 0 is caught between .*the turning part \(triangle \d+\)"
     ):
@@ -231,11 +236,13 @@ def any_scene(seed: int) -> Scene:
     motion = (
         {"rpm": 10.0 ** rng.uniform(-1.0, 2.5)}
         if seed % 3
-        else {"swing": rng.uniform(0.1, 2.0), "frequency": 2.0}
+        else {"amplitude": rng.uniform(0.1, 2.0), "frequency": 2.0}
     )
-    turn = Turn(PART, axis=tuple(rng.normal(0.0, 0.3, 3) + np.eye(3)[rng.integers(3)]), **motion)
+    turn = PartRotation(
+        PART, axis=tuple(rng.normal(0.0, 0.3, 3) + np.eye(3)[rng.integers(3)]), **motion
+    )
     room = box_around(body, rng.uniform(0.021, 0.026))
-    places = pack_balls(room, int(rng.integers(5, 60)), 2 * R, rng, turn=turn)
+    places = pack_balls(room, int(rng.integers(5, 60)), 2 * R, rng, part_rotation=turn)
     balls = Balls(places, rng.normal(0.0, 0.3, places.shape), 2 * R)
     return Scene(room, balls, physics(turn, rng.choice([0.0, 0.5, 0.9])), 1.0)
 
@@ -269,7 +276,7 @@ def test_many_parts_turn_among_many_balls_or_the_run_says_why_not() -> None:
 
 def small_scene() -> Scene:
     places = [[0.012, 0.005], [0.012, 0.009], [-0.006, 0.006], [0.017, 0.017]]
-    return Scene(paddle(), on_floor(places), physics(Turn(PART, rpm=40.0)), 0.3)
+    return Scene(paddle(), on_floor(places), physics(PartRotation(PART, rpm=40.0)), 0.3)
 
 
 def test_the_same_bits_with_the_jit_on_and_off() -> None:

@@ -16,12 +16,12 @@ from sim_core import (
     Drag,
     Friction,
     Gravity,
+    PartRotation,
     Physics,
     RandomPhase,
     Rest,
     Restitution,
     Scene,
-    Turn,
     Vibration,
 )
 from sim_core.loop.simulate import _Run
@@ -33,7 +33,7 @@ KEPT = {
     "restitution": ("restitution", "Restitution"),
     "vibration": ("wave", "Wave"),
     "rest": ("footing", "Footing"),
-    "turn": ("turning", "Turning"),
+    "part_rotation": ("turning", "Turning"),
     "friction": ("grip", "Grip"),
     "random_phase": ("phases", "Phases"),
     "drag": ("air", "Air"),
@@ -45,7 +45,7 @@ PRESENT = {
     "restitution": Restitution((STEEL,) * 3, STEEL),
     "vibration": Vibration(0, 25e-6, 20e3),
     "rest": Rest(),
-    "turn": Turn(0, rpm=10.0),
+    "part_rotation": PartRotation(0, rpm=10.0),
     "friction": Friction(((0.3, 0.2),) * 3, (0.3, 0.2)),
     "random_phase": RandomPhase(1),
     "drag": Drag(),
@@ -116,7 +116,7 @@ def test_the_machine_code_of_a_bare_scene_knows_no_effect(bare: dict[str, list[s
         "roots.first_wave_approach",
         "resolve.footing.touch_down",
         "resolve.leaning.meet",
-        "effects.turn.seen_from_part",
+        "effects.part_rotation.seen_from_part",
         "effects.restitution.restitution_law",
         "resolve.rubbing._rub",
         "neighbours.next_meeting",
@@ -134,7 +134,7 @@ def test_the_arrays_of_an_absent_effect_do_not_exist(effect: str) -> None:
     assert attrgetter(field)(_Run(bare_scene())) is None
 
 
-@pytest.mark.parametrize("effect", sorted(set(KEPT) - {"turn"}))
+@pytest.mark.parametrize("effect", sorted(set(KEPT) - {"part_rotation"}))
 def test_the_table_names_what_a_present_effect_keeps(effect: str) -> None:
     field, kind = KEPT[effect]
     needed = {name: PRESENT[name] for name in (effect, NEEDS.get(effect)) if name}

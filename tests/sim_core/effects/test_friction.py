@@ -7,11 +7,11 @@ from sim_core import (
     Balls,
     Friction,
     Gravity,
+    PartRotation,
     Physics,
     Restitution,
     Scene,
     SceneError,
-    Turn,
     Vibration,
     pack_balls,
     simulate,
@@ -220,8 +220,15 @@ def test_a_part_seen_from_its_own_frame_spins_the_balls_as_it_does_in_the_rooms(
         [[0.0165 * np.cos(a), 0.0165 * np.sin(a), 0.0] for a in np.linspace(0.0, 6.0, 12)]
     )
     v, w = -0.6 * places / 0.0165 + rng.normal(0.0, 0.1, (12, 3)), rng.normal(0.0, 200.0, (12, 3))
-    one = simulate(Scene(room, shot(places, v, w), rough._replace(turn=Turn(PART, rpm=0.0)), 0.03))
-    posed = rough._replace(turn=Turn(PART, rpm=0.0, phase=angle))
+    one = simulate(
+        Scene(
+            room,
+            shot(places, v, w),
+            rough._replace(part_rotation=PartRotation(PART, rpm=0.0)),
+            0.03,
+        )
+    )
+    posed = rough._replace(part_rotation=PartRotation(PART, rpm=0.0, phase=angle))
     two = simulate(Scene(room, shot(*(turned(x, angle) for x in (places, v, w))), posed, 0.03))
     assert one.collisions.total == two.collisions.total > 10
     assert np.abs(one.balls.spins - w).max() > 10.0  # type: ignore[operator]
@@ -244,7 +251,7 @@ def test_hits_on_a_rough_rotor_keep_the_jacobi_integral(rpm: float) -> None:
         -0.6 * positions / radius + rng.normal(0.0, 0.1, (24, 3)),
         rng.normal(0.0, 99.0, (24, 3)),
     )
-    rough = physics(HUGE, 1.0)._replace(turn=Turn(PART, rpm=rpm))
+    rough = physics(HUGE, 1.0)._replace(part_rotation=PartRotation(PART, rpm=rpm))
     result = simulate(Scene(box_around(BODIES["star"], 0.3), start, rough, 0.06))
     assert (result.impacts.position[:, :2] ** 2).sum(axis=1).max() < 0.02**2
     assert len(result.impacts) > 15

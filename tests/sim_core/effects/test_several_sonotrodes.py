@@ -10,15 +10,15 @@ import pytest
 from sim_core import (
     Balls,
     Gravity,
+    PartRotation,
     Physics,
     RandomPhase,
     Rest,
     Restitution,
-    Result,
     Scene,
     SceneError,
+    SimulationResult,
     TriangleMesh,
-    Turn,
     Vibration,
     pack_balls,
     simulate,
@@ -41,7 +41,7 @@ ROOM = box((0.03, 0.03, 0.02))
 MIDDLE = np.array([[0.015, 0.015, 0.01]])
 
 
-def played(vibration: object, duration: float = 0.1) -> Result:
+def played(vibration: object, duration: float = 0.1) -> SimulationResult:
     rng = np.random.default_rng(3)
     places = pack_balls(ROOM, 20, 3e-3, rng, 1e-4)
     shot = Balls(places, rng.normal(0.0, 1.0, places.shape), 3e-3)
@@ -179,8 +179,10 @@ def test_what_several_cannot_be_beside_is_refused() -> None:
         SceneError, match=r"random_phase is given, and 2 vibrating surfaces: not supported together"
     ):
         Scene(ROOM, balls_at(MIDDLE), both._replace(random_phase=RandomPhase()), 1.0)
-    with pytest.raises(SceneError, match=r"turn.tag and vibration.tag are both 0"):
-        Scene(ROOM, balls_at(MIDDLE), both._replace(turn=Turn(CEILING, rpm=1.0)), 1.0)
+    with pytest.raises(SceneError, match=r"part_rotation.tag and vibration.tag are both 0"):
+        Scene(
+            ROOM, balls_at(MIDDLE), both._replace(part_rotation=PartRotation(CEILING, rpm=1.0)), 1.0
+        )
 
 
 @pytest.mark.parametrize("blunt", [0.0, 8.0])
@@ -222,16 +224,16 @@ def test_both_of_two_narrow_the_gap_between_them() -> None:
         Scene(tight, ball, Physics(vibration=at_rest), 1.0)
 
 
-@pytest.mark.parametrize("turn", [None, Turn(1, rpm=10.0)])
+@pytest.mark.parametrize("turn", [None, PartRotation(1, rpm=10.0)])
 def test_the_simulator_is_compiled_ahead_for_several(
-    turn: Turn | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    turn: PartRotation | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The scene it is compiled with has two of them; and the code for one is not taken for that."""
     scenes: list[Scene] = []
     monkeypatch.setattr(compile_ahead, "simulate", scenes.append)
     monkeypatch.setattr(compile_ahead, "CACHE_FOLDER", tmp_path)
     several = tuple(one._replace(tag=tag) for one, tag in ((LOW, 0), (HIGH, 3), (ACROSS, 2)))
-    physics = Physics(None, LAWS, several, turn=turn)
+    physics = Physics(None, LAWS, several, part_rotation=turn)
     compile_ahead.compile_simulator(physics._replace(vibration=LOW._replace(tag=0)))
     assert not compile_ahead.is_compiled(physics, 1)
     compile_ahead.compile_simulator(physics)

@@ -13,13 +13,13 @@ from sim_core import (
     Drag,
     Friction,
     Gravity,
+    PartRotation,
     Physics,
     RandomPhase,
     Rest,
     Restitution,
     Scene,
     SceneError,
-    Turn,
     Vibration,
     can_rest,
     cylinder_cavity,
@@ -173,7 +173,11 @@ def test_a_start_in_overlap_of_rounding_going_in_is_no_contact() -> None:
     ("room", "changes", "said"),
     [
         (BOX, {"rest": Rest()}, "rest is not supported with an analytical cavity"),
-        (BOX, {"turn": Turn(0, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 10.0)}, "turn is not supported"),
+        (
+            BOX,
+            {"part_rotation": PartRotation(0, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 10.0)},
+            "part_rotation is not supported",
+        ),
         (
             CYLINDER,
             {"gravity": Gravity(1.0, 0.0, -9.8)},

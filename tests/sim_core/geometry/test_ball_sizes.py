@@ -11,6 +11,7 @@ from sim_core import (
     Balls,
     Drag,
     Gravity,
+    PartRotation,
     Physics,
     RandomPhase,
     Rest,
@@ -18,7 +19,6 @@ from sim_core import (
     Scene,
     SceneError,
     TriangleMesh,
-    Turn,
     Vibration,
     pack_balls,
     simulate,
@@ -211,7 +211,10 @@ def test_a_mixed_ball_that_overlaps_is_named() -> None:
 
 @pytest.mark.parametrize(
     ("physics", "name"),
-    [(Physics(Gravity(), rest=Rest()), "rest"), (Physics(turn=Turn(CEILING, rpm=1.0)), "turn")],
+    [
+        (Physics(Gravity(), rest=Rest()), "rest"),
+        (Physics(part_rotation=PartRotation(CEILING, rpm=1.0)), "part_rotation"),
+    ],
 )
 def test_what_several_sizes_do_not_go_with_is_said(physics: Physics, name: str) -> None:
     room = box((0.03, 0.03, 0.03))

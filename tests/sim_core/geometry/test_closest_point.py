@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from sim_core import SceneError, TriangleMesh, nearest
+from sim_core import SceneError, TriangleMesh, closest_points
 from sim_core.scene.invariants import clearance
 from tests.helpers.scenes.cavities import CEILING, FLOOR, box, box_around
 
@@ -16,7 +16,7 @@ def test_it_is_the_nearest_of_all_triangles() -> None:
     mesh = box_around(blob, 10e-3)
     places = rng.uniform(-12e-3, 12e-3, (2000, 3))
     for reach in (1.0, 2e-3):
-        found = nearest(mesh, places, reach)
+        found = closest_points(mesh, places, reach)
         np.testing.assert_allclose(
             found.distance, clearance(mesh.corners, places, reach), rtol=0, atol=1e-15
         )
@@ -35,15 +35,15 @@ def test_it_is_the_nearest_of_all_triangles() -> None:
 def test_each_place_has_its_own_reach_and_a_tag_can_be_asked_for() -> None:
     mesh = box((10e-3, 20e-3, 30e-3))
     place = np.array([[1e-3, 8e-3, 14e-3]] * 2)
-    found = nearest(mesh, place, np.array([0.9e-3, 1.1e-3]))
+    found = closest_points(mesh, place, np.array([0.9e-3, 1.1e-3]))
     assert found.triangle[0] == -1
     np.testing.assert_allclose(found.point[1], [0.0, 8e-3, 14e-3], atol=1e-18)
     for tag, away in ((FLOOR, 14e-3), (CEILING, 16e-3)):
-        asked = nearest(mesh, place, 1.0, tag)
+        asked = closest_points(mesh, place, 1.0, tag)
         np.testing.assert_allclose(asked.distance, away)
         assert (mesh.tags[asked.triangle] == tag).all()
     with pytest.raises(SceneError, match="no triangle of tag 7"):
-        nearest(mesh, place, 1.0, 7)
+        closest_points(mesh, place, 1.0, 7)
 
 
 def test_a_needle_is_no_worse_than_a_line() -> None:
@@ -60,5 +60,5 @@ def test_a_needle_is_no_worse_than_a_line() -> None:
         [3, 0, 5],
     ]
     mesh = TriangleMesh(corners, np.array(triangles), np.zeros(8))
-    found = nearest(mesh, np.array([[0.3, -2.0, 0.0]]), 10.0)
+    found = closest_points(mesh, np.array([[0.3, -2.0, 0.0]]), 10.0)
     np.testing.assert_allclose(found.distance, 2.0)

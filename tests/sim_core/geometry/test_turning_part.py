@@ -12,13 +12,13 @@ from scipy.spatial.transform import Rotation
 from sim_core import (
     Balls,
     Gravity,
+    PartRotation,
     Physics,
     Restitution,
-    Result,
     Scene,
     SceneError,
+    SimulationResult,
     TriangleMesh,
-    Turn,
     Vibration,
     pack_balls,
     simulate,
@@ -37,9 +37,9 @@ MOTIONS = {
     "100 rpm": {"rpm": 100.0},
     "backwards": {"rpm": -700.0},
     "fast": {"rpm": 9000.0},
-    "to and fro": {"swing": 0.4, "frequency": 3.0},
-    "shaken": {"swing": 0.05, "frequency": 400.0},
-    "over and over": {"swing": 9.0, "frequency": 8.0},
+    "to and fro": {"amplitude": 0.4, "frequency": 3.0},
+    "shaken": {"amplitude": 0.05, "frequency": 400.0},
+    "over and over": {"amplitude": 9.0, "frequency": 8.0},
 }
 
 
@@ -59,10 +59,10 @@ def checked_flight(rotor, position, velocity, gravity, time, limit):  # type: ig
     return delay, row
 
 
-def random_motion(rng: np.random.Generator, motion: dict[str, float]) -> Turn:
+def random_motion(rng: np.random.Generator, motion: dict[str, float]) -> PartRotation:
     axis = rng.normal(size=3) if rng.random() < 0.5 else np.array([0.0, 0.0, 1.0])
     point = rng.uniform(-3e-3, 3e-3, 3)
-    return Turn(PART, tuple(point), tuple(axis), phase=rng.uniform(0.0, 6.0), **motion)
+    return PartRotation(PART, tuple(point), tuple(axis), phase=rng.uniform(0.0, 6.0), **motion)
 
 
 @pytest.mark.parametrize("motion", MOTIONS)
@@ -129,7 +129,7 @@ def test_a_grazing_corner_hits_a_resting_ball_or_not_by_which_side_it_is_on(
     rpm: float, miss: float
 ) -> None:
     tip = np.hypot(10e-3, 2e-3)
-    rotor = Rotor(BODIES["bar"], Turn(PART, rpm=rpm))
+    rotor = Rotor(BODIES["bar"], PartRotation(PART, rpm=rpm))
     for angle in np.linspace(0.3, 1.2, 7):
         for side in (-1.0, 1.0):
             position = (tip + rotor.radius + side * miss) * np.array(
@@ -149,14 +149,16 @@ BAR_HALF, REACH = 2e-3, 3.5e-3  # m: half the bar's width, and that plus a ball'
 WEIGHTLESS = Gravity(0.0, 0.0, 0.0)
 
 
-def effects(turn: Turn | None, gravity: Gravity = WEIGHTLESS, e: float = 1.0) -> Physics:
+def effects(turn: PartRotation | None, gravity: Gravity = WEIGHTLESS, e: float = 1.0) -> Physics:
     """One set of effects for most tests, as each set is compiled."""
-    return Physics(gravity, Restitution(((e, 1e3),) * 3, (1.0, 1e3), elastic_below=0.0), turn=turn)
+    return Physics(
+        gravity, Restitution(((e, 1e3),) * 3, (1.0, 1e3), elastic_below=0.0), part_rotation=turn
+    )
 
 
 def one_ball(
     position: tuple[float, ...], velocity: tuple[float, ...], physics: Physics, duration: float
-) -> Result:
+) -> SimulationResult:
     room = box_around(BODIES["bar"], 0.05)
     shot = Balls(np.array([position]), np.array([velocity]), 3e-3)
     return simulate(Scene(room, shot, physics, duration))
@@ -177,7 +179,7 @@ def reference_time(gap: Callable[[np.longdouble], np.longdouble], before: float)
 def test_a_falling_ball_meets_the_turning_bar_when_the_closed_form_says(rpm: float) -> None:
     omega, g = 2 * np.pi * rpm / 60, 9.81
     x, y, v = np.copysign(6e-3, rpm), 9e-3, -0.3
-    physics = effects(Turn(PART, rpm=rpm), Gravity(0.0, -g, 0.0))
+    physics = effects(PartRotation(PART, rpm=rpm), Gravity(0.0, -g, 0.0))
 
     def gap(
         t: np.longdouble,
@@ -198,7 +200,7 @@ def test_a_bar_swinging_to_and_fro_meets_a_resting_ball_when_the_closed_form_say
     frequency: float,
 ) -> None:
     swing, x, y = 0.5, 6e-3, 4.5e-3
-    physics = effects(Turn(PART, swing=swing, frequency=frequency))
+    physics = effects(PartRotation(PART, amplitude=swing, frequency=frequency))
     log = one_ball((x, y, 0.0), (0.0, 0.0, 0.0), physics, 0.3 / frequency).impacts
     angle = np.arctan2(y, x) - np.arcsin(REACH / np.hypot(x, y))
     when = np.arcsin(angle / swing) / (2 * np.pi * frequency)
@@ -218,7 +220,7 @@ def test_a_bar_swinging_to_and_fro_meets_a_resting_ball_when_the_closed_form_say
 def test_a_resting_ball_is_thrown_by_the_bar_as_by_a_heavy_moving_face(e: float) -> None:
     """u' = U + e (U - u) along the normal: 2 U for the elastic one at rest; the tangential part is kept."""
     omega, x, y = 2 * np.pi * 2.0, 6e-3, 4.5e-3
-    physics = effects(Turn(PART, rpm=120.0), e=e)
+    physics = effects(PartRotation(PART, rpm=120.0), e=e)
     angle = np.arctan2(y, x) - np.arcsin(REACH / np.hypot(x, y))
     speed = omega * np.sqrt(x * x + y * y - REACH**2)
     result = one_ball((x, y, 0.0), (0.0, 0.0, 0.0), physics, angle / omega + 1e-4)
@@ -237,7 +239,7 @@ def test_a_part_that_turns_at_0_rpm_is_the_still_part() -> None:
         balls = Balls(pack_balls(room, 5, 2e-3, rng), rng.normal(0.0, 1.5, (5, 3)), 2e-3)
         still, turning = (
             simulate(Scene(room, balls, effects(turn, Gravity()), 0.012))
-            for turn in (None, Turn(PART, (1e-3, 2e-3, 0.0), rpm=0.0))
+            for turn in (None, PartRotation(PART, (1e-3, 2e-3, 0.0), rpm=0.0))
         )
         assert turning.collisions.total == still.collisions.total > 1
         np.testing.assert_array_equal(turning.impacts.triangle, still.impacts.triangle)
@@ -257,7 +259,7 @@ def test_hits_on_a_steady_rotor_keep_the_jacobi_integral(rpm: float) -> None:
     positions = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.zeros(24)])
     velocities = -0.6 * positions / radius + rng.normal(0.0, 0.1, (24, 3))
     result = simulate(
-        Scene(room, Balls(positions, velocities, 3e-3), effects(Turn(PART, rpm=rpm)), 0.06)
+        Scene(room, Balls(positions, velocities, 3e-3), effects(PartRotation(PART, rpm=rpm)), 0.06)
     )
     assert len(result.impacts) > 15
     assert own[result.impacts.triangle].all()
@@ -272,7 +274,7 @@ def test_hits_on_a_steady_rotor_keep_the_jacobi_integral(rpm: float) -> None:
     assert after == pytest.approx(before, abs=1e-11 * max(energy))
 
 
-def crowd(turn: Turn, duration: float, count: int = 40, seed: int = 4) -> Scene:
+def crowd(turn: PartRotation, duration: float, count: int = 40, seed: int = 4) -> Scene:
     """Balls about a star in a cube whose floor shakes them."""
     room = box_around(BODIES["star"], 0.025)
     tags = room.tags.copy()
@@ -282,10 +284,10 @@ def crowd(turn: Turn, duration: float, count: int = 40, seed: int = 4) -> Scene:
         Gravity(),
         Restitution(((0.9, 1.0),) * 3, (0.9, 1.0)),
         Vibration(1, 40e-6, 20e3, 0.3),
-        turn=turn,
+        part_rotation=turn,
     )
     rng = np.random.default_rng(seed)
-    positions = pack_balls(room, count, 3e-3, rng, clear=50e-6, turn=turn)
+    positions = pack_balls(room, count, 3e-3, rng, clear=50e-6, part_rotation=turn)
     return Scene(
         room,
         Balls(positions, rng.normal(0.0, 2.0, (count, 3)), 3e-3),
@@ -298,13 +300,15 @@ def crowd(turn: Turn, duration: float, count: int = 40, seed: int = 4) -> Scene:
 @pytest.mark.parametrize(
     "turn",
     [
-        Turn(PART, rpm=37.0, phase=1.0),
-        Turn(PART, rpm=-3000.0),
-        Turn(PART, swing=0.7, frequency=3.3, phase=0.5),
+        PartRotation(PART, rpm=37.0, phase=1.0),
+        PartRotation(PART, rpm=-3000.0),
+        PartRotation(PART, amplitude=0.7, frequency=3.3, phase=0.5),
     ],
     ids=["slow", "fast", "to and fro"],
 )
-def test_impacts_lie_on_the_part_in_its_own_frame_and_balls_stay_outside_it(turn: Turn) -> None:
+def test_impacts_lie_on_the_part_in_its_own_frame_and_balls_stay_outside_it(
+    turn: PartRotation,
+) -> None:
     """Over thousands of windows: the angle must not step from one to the next, nor drift."""
     scene = crowd(turn, 20.0)
     result = simulate(scene)
@@ -328,8 +332,8 @@ def test_impacts_lie_on_the_part_in_its_own_frame_and_balls_stay_outside_it(turn
 def test_the_same_scene_gives_the_same_bits_with_the_jit_on_and_off() -> None:
     code = (
         "from tests.sim_core.loop.test_determinism import fingerprint;"
-        "from tests.sim_core.geometry.test_turning_part import crowd, Turn, PART; from sim_core import simulate;"
-        "r = simulate(crowd(Turn(PART, rpm=400.0), 0.06, 8)); print(r.collisions.total, fingerprint(r))"
+        "from tests.sim_core.geometry.test_turning_part import crowd, PartRotation, PART; from sim_core import simulate;"
+        "r = simulate(crowd(PartRotation(PART, rpm=400.0), 0.06, 8)); print(r.collisions.total, fingerprint(r))"
     )
     answers = with_and_without_jit(code)
     assert int(answers[0].split()[0]) > 20
@@ -353,7 +357,7 @@ def shaft_through_ceiling(sections: int, across: float, tilt: float = 0.0) -> Tr
 def test_a_round_shaft_turns_where_it_goes_through_the_ceiling_and_balls_stay_in() -> None:
     room = shaft_through_ceiling(24, 0.0)
     rng = np.random.default_rng(2)
-    turn = Turn(0, rpm=50.0)
+    turn = PartRotation(0, rpm=50.0)
     balls = Balls(pack_balls(room, 60, 3e-3, rng), rng.normal(0.0, 2.0, (60, 3)), 3e-3)
     result = simulate(Scene(room, balls, effects(turn), 10.0))
     assert result.collisions.total > 100_000
@@ -361,7 +365,7 @@ def test_a_round_shaft_turns_where_it_goes_through_the_ceiling_and_balls_stay_in
 
 class Refused(NamedTuple):
     room: Callable[[], TriangleMesh]
-    turn: Turn
+    turn: PartRotation
     words: str
 
 
@@ -369,60 +373,74 @@ class Refused(NamedTuple):
     "case",
     [
         Refused(
-            lambda: shaft_through_ceiling(24, 0.004), Turn(0, rpm=1.0), "not round about its axis"
+            lambda: shaft_through_ceiling(24, 0.004),
+            PartRotation(0, rpm=1.0),
+            "not round about its axis",
         ),
         Refused(
             lambda: shaft_through_ceiling(24, 0.0),
-            Turn(0, axis=(0.1, 0.0, 1.0), rpm=1.0),
+            PartRotation(0, axis=(0.1, 0.0, 1.0), rpm=1.0),
             "not round about",
         ),
         Refused(
-            lambda: shaft_through_ceiling(4, 0.0), Turn(0, rpm=1.0), "not round about its axis"
+            lambda: shaft_through_ceiling(4, 0.0),
+            PartRotation(0, rpm=1.0),
+            "not round about its axis",
         ),
         Refused(
             lambda: box_around(BODIES["bar"], 0.0102),
-            Turn(PART, (0.005, 0.0, 0.0), rpm=1.0),
+            PartRotation(PART, (0.005, 0.0, 0.0), rpm=1.0),
             "cannot turn",
         ),
         Refused(
-            lambda: box_around(bar(0.0198, 0.0198), 0.0102), Turn(PART, rpm=1.0), "cannot turn"
-        ),
-        Refused(lambda: box_around(BODIES["bar"], 0.02), Turn(9, rpm=1.0), "turn.tag is 9"),
-        Refused(
-            lambda: box_around(BODIES["bar"], 0.02),
-            Turn(PART),
-            "either rpm, or swing and frequency",
+            lambda: box_around(bar(0.0198, 0.0198), 0.0102),
+            PartRotation(PART, rpm=1.0),
+            "cannot turn",
         ),
         Refused(
             lambda: box_around(BODIES["bar"], 0.02),
-            Turn(PART, rpm=1.0, swing=1.0),
+            PartRotation(9, rpm=1.0),
+            "part_rotation.tag is 9",
+        ),
+        Refused(
+            lambda: box_around(BODIES["bar"], 0.02),
+            PartRotation(PART),
+            "either rpm, or amplitude and frequency",
+        ),
+        Refused(
+            lambda: box_around(BODIES["bar"], 0.02),
+            PartRotation(PART, rpm=1.0, amplitude=1.0),
             "either rpm, or",
         ),
         Refused(
-            lambda: box_around(BODIES["bar"], 0.02), Turn(PART, swing=1.0), "either rpm, or swing"
-        ),
-        Refused(
-            lambda: box_around(BODIES["bar"], 0.02), Turn(PART, rpm=float("nan")), "turn.rpm is nan"
+            lambda: box_around(BODIES["bar"], 0.02),
+            PartRotation(PART, amplitude=1.0),
+            "either rpm, or amplitude",
         ),
         Refused(
             lambda: box_around(BODIES["bar"], 0.02),
-            Turn(PART, axis=(0.0, 0.0, 0.0), rpm=1.0),
+            PartRotation(PART, rpm=float("nan")),
+            "part_rotation.rpm is nan",
+        ),
+        Refused(
+            lambda: box_around(BODIES["bar"], 0.02),
+            PartRotation(PART, axis=(0.0, 0.0, 0.0), rpm=1.0),
             "a direction",
         ),
         Refused(
             lambda: box_around(BODIES["bar"], 0.02),
-            Turn(PART, swing=-1.0, frequency=1.0),
-            "turn.swing is -1",
+            PartRotation(PART, amplitude=-1.0, frequency=1.0),
+            "part_rotation.amplitude is -1",
         ),
         Refused(
             lambda: box_around(BODIES["bar"], 0.02),
-            Turn(PART, swing=1.0, frequency=0.0),
-            "turn.frequency is 0",
+            PartRotation(PART, amplitude=1.0, frequency=0.0),
+            "part_rotation.frequency is 0",
         ),
         Refused(
             lambda: box_around(BODIES["bar"], 0.02),
-            Turn(PART, rpm=1.0, phase=float("inf")),
-            "turn.phase is inf",
+            PartRotation(PART, rpm=1.0, phase=float("inf")),
+            "part_rotation.phase is inf",
         ),
     ],
     ids=lambda case: case.words,
@@ -431,28 +449,37 @@ def test_a_part_that_cannot_turn_is_refused_in_words(case: Refused) -> None:
     room = case.room()
     corner = room.vertices.min(axis=0) + 2e-4
     with pytest.raises(SceneError, match=case.words):
-        Scene(room, Balls(corner[None], np.zeros((1, 3)), 2e-4), Physics(turn=case.turn), 0.1)
+        Scene(
+            room, Balls(corner[None], np.zeros((1, 3)), 2e-4), Physics(part_rotation=case.turn), 0.1
+        )
 
 
 def test_a_small_swing_is_allowed_where_a_whole_turn_is_not() -> None:
     room = box_around(bar(0.0198, 0.0198), 0.0102)
     corner = room.vertices.min(axis=0)[None] + [[2e-4, 2e-4, 2e-4]]
     shot = Balls(corner, np.zeros((1, 3)), 2e-4)
-    Scene(room, shot, Physics(turn=Turn(PART, swing=0.01, frequency=1.0)), 0.1)
+    Scene(room, shot, Physics(part_rotation=PartRotation(PART, amplitude=0.01, frequency=1.0)), 0.1)
     with pytest.raises(SceneError, match="cannot turn"):
-        Scene(room, shot, Physics(turn=Turn(PART, swing=0.2, frequency=1.0)), 0.1)
+        Scene(
+            room, shot, Physics(part_rotation=PartRotation(PART, amplitude=0.2, frequency=1.0)), 0.1
+        )
 
 
 def test_one_surface_cannot_vibrate_and_turn() -> None:
-    scene = crowd(Turn(PART, rpm=1.0), 0.1, 2)
+    scene = crowd(PartRotation(PART, rpm=1.0), 0.1, 2)
     with pytest.raises(SceneError, match="both"):
-        Scene(scene.mesh, scene.balls, scene.physics._replace(turn=Turn(1, rpm=1.0)), 0.1)
+        Scene(
+            scene.mesh,
+            scene.balls,
+            scene.physics._replace(part_rotation=PartRotation(1, rpm=1.0)),
+            0.1,
+        )
 
 
 def test_a_ball_may_not_start_in_the_part_where_its_phase_has_it() -> None:
     room = box_around(BODIES["bar"], 0.02)
     shot = Balls(np.array([[0.0, 0.008, 0.0]]), np.zeros((1, 3)), 3e-3)
-    Scene(room, shot, Physics(turn=Turn(PART, rpm=1.0)), 0.1)
+    Scene(room, shot, Physics(part_rotation=PartRotation(PART, rpm=1.0)), 0.1)
     for phase, words in ((np.pi / 2, "outside the mesh"), (1.2, "overlaps a surface")):
         with pytest.raises(SceneError, match=words):
-            Scene(room, shot, Physics(turn=Turn(PART, rpm=1.0, phase=phase)), 0.1)
+            Scene(room, shot, Physics(part_rotation=PartRotation(PART, rpm=1.0, phase=phase)), 0.1)

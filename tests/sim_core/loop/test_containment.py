@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from benchmarks.scenes import scene
-from sim_core import Physics, Result, Scene, simulate
+from sim_core import Physics, Scene, SimulationResult, simulate
 from sim_core.geometry.mesh import towards_shot
 from sim_core.geometry.sonotrode_border import find_rim
 from sim_core.scene.invariants import clearance, closest_pair, contained
@@ -68,7 +68,9 @@ def clearance_at(chamber: Chamber, points: np.ndarray, time: np.ndarray) -> np.n
     """
     mesh, balls, physics = chamber
     reach = REACH * balls.radius
-    moving = [effect.tag for effect in (*physics.vibrations, physics.turn) if effect is not None]
+    moving = [
+        effect.tag for effect in (*physics.vibrations, physics.part_rotation) if effect is not None
+    ]
     still = clearance(mesh.corners[~np.isin(mesh.tags, moving)], points, reach)
     return np.minimum(still, np.minimum(height_at(chamber, points, time), reach))
 
@@ -90,7 +92,7 @@ def has_sharp_rim(chamber: Chamber, points: np.ndarray, time: np.ndarray) -> np.
 
 def later(physics: Physics, duration: float) -> Physics:
     """The same effects, the sonotrode and the turning part where they are ``duration`` [s] later."""
-    turn, moved = physics.turn, []
+    turn, moved = physics.part_rotation, []
     for one in physics.vibrations:
         phase = (one.phase + math.tau * one.frequency * duration) % math.tau
         moved.append(one._replace(phase=phase))
@@ -99,12 +101,12 @@ def later(physics: Physics, duration: float) -> Physics:
     if turn is not None:
         rate = turn.rpm / 60.0 if turn.rpm is not None else turn.frequency or 0.0  # [1/s]
         physics = physics._replace(
-            turn=turn._replace(phase=(turn.phase + math.tau * rate * duration) % math.tau)
+            part_rotation=turn._replace(phase=(turn.phase + math.tau * rate * duration) % math.tau)
         )
     return physics
 
 
-def look(before: Chamber, after: Chamber, result: Result, impacts: int) -> Record:
+def look(before: Chamber, after: Chamber, result: SimulationResult, impacts: int) -> Record:
     """Is every ball inside and clear of all else, and did the last so many impacts happen where surfaces are?"""
     mesh, balls, _ = after
     outside = np.flatnonzero(~contained(mesh, balls.positions))

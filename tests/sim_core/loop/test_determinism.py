@@ -13,9 +13,9 @@ from sim_core import (
     Physics,
     RandomPhase,
     Restitution,
-    Result,
     Scene,
     SceneError,
+    SimulationResult,
     Vibration,
     pack_balls,
     simulate,
@@ -50,7 +50,7 @@ def scene_with_everything_else(duration: float, count: int = 6) -> Scene:
     )
 
 
-def fingerprint(result: Result) -> str:
+def fingerprint(result: SimulationResult) -> str:
     digest = hashlib.sha256()
     log = result.impacts
     for column in (log.time, log.ball, log.triangle, log.position, log.velocity, log.normal_speed):

@@ -9,6 +9,7 @@ from sim_core import (
     Balls,
     Friction,
     Gravity,
+    PartRotation,
     Physics,
     Rest,
     Restitution,
@@ -16,7 +17,6 @@ from sim_core import (
     SceneError,
     SimulationError,
     TriangleMesh,
-    Turn,
     Vibration,
     simulate,
 )
@@ -131,7 +131,7 @@ def test_a_wrong_scene_field_is_named(wrong: dict) -> None:
         (Physics(vibration=Vibration(FLOOR, "tall", 20e3)), "vibration.amplitude is 'tall'"),
         (Physics(Gravity(), rest=True), "physics.rest is True: give a Rest, or None"),
         (Physics(Gravity(), rest=Rest(capture="slow")), "rest.capture is 'slow'"),
-        (Physics(turn=Turn(CEILING, rpm="fast")), "turn.rpm is 'fast'"),
+        (Physics(part_rotation=PartRotation(CEILING, rpm="fast")), "part_rotation.rpm is 'fast'"),
         (Physics(restitution=0.9), "physics.restitution is 0.9"),
         (Physics(friction=Friction(((0.3, 0.2),) * 2, {})), "friction.balls {}: give"),  # type: ignore[arg-type]
         (Physics({}), "gravity is {}: give three numbers"),  # type: ignore[arg-type]

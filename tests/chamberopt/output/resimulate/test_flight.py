@@ -21,7 +21,7 @@ from chamberopt.output.viewer import subprocess_drawing, why_no_pictures
 from chamberopt.output.viewer.images import film
 from chamberopt.output.viewer.images.film import film_path, write_film
 from chamberopt.output.viewer.images.flight_film import replay, turn_matrix
-from sim_core import Balls, Gravity, Physics, Scene, Turn, simulate
+from sim_core import Balls, Gravity, PartRotation, Physics, Scene, simulate
 from sim_core.effects.part_rotation import angle_now, checked_turn, turned
 from tests.helpers.results.short_plate import plate_result
 
@@ -95,10 +95,10 @@ def test_the_sonotrode_is_where_the_shot_met_it(replica: Replayed) -> None:
     )
 
 
-@pytest.mark.parametrize("motion", [{"rpm": 300.0}, {"swing": 0.4, "frequency": 7.0}])
+@pytest.mark.parametrize("motion", [{"rpm": 300.0}, {"amplitude": 0.4, "frequency": 7.0}])
 def test_a_turning_part_is_drawn_as_the_simulator_has_it(motion: dict[str, float]) -> None:
     point, axis = (0.01, 0.02, 0.03), (0.0, 0.6, 0.8)
-    turn = Turn(TAG_PART, point, axis, phase=0.7, **motion)
+    turn = PartRotation(TAG_PART, point, axis, phase=0.7, **motion)
     turning = checked_turn(turn, np.zeros(3))
     assert turning is not None
     times = np.array([0.0, 0.013, 0.4])
