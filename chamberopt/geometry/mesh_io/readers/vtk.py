@@ -75,11 +75,8 @@ def _vtk_data(path: Path, content: bytes) -> Any:
 
     legacy = re.search(rb"^DATASET\s+(\w+)", content[:4096], re.M | re.I)
     xml = re.search(rb'<VTKFile[^>]*\btype\s*=\s*"(\w+)"', content[:4096])
-    holds = (
-        (legacy or xml)[1].decode().upper().replace("_", "")
-        if legacy or xml
-        else "nothing that is known"
-    )  # type: ignore[index]
+    found = legacy or xml
+    holds = found[1].decode().upper().replace("_", "") if found else "nothing that is known"
     if holds not in ("POLYDATA", "UNSTRUCTUREDGRID"):
         raise InputError(f"{path}: holds {holds}; save a PolyData or an UnstructuredGrid")
     if xml:
