@@ -31,7 +31,7 @@ import numpy as np
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
-from chamberopt.common.parallel.executor import SerialExecutor, local_executor, shared  # noqa: E402
+from chamberopt.common.parallel.executor import SerialExecutor, local_executor, share  # noqa: E402
 from chamberopt.design.load import Study, load_study  # noqa: E402
 from chamberopt.optimize.run_sweep import judged, plan_sweep  # noqa: E402
 
@@ -47,13 +47,13 @@ def workers(kind: str, count: int) -> Iterator[Executor]:
         if kind == "dask":
             from distributed import LocalCluster
 
-            from chamberopt.common.parallel.dask_cluster import Cluster
+            from chamberopt.common.parallel.dask_cluster import DaskExecutor
 
             local = LocalCluster(
                 n_workers=count, threads_per_worker=1, processes=True, dashboard_address=":0"
             )
             address = stack.enter_context(local).scheduler_address
-            yield stack.enter_context(Cluster(address))
+            yield stack.enter_context(DaskExecutor(address))
         else:
             yield stack.enter_context(local_executor(count, kind))  # type: ignore[arg-type]
 
@@ -182,7 +182,7 @@ def sizes(study: Study) -> dict[str, int]:
     setting = (design, chamber, chamber_mesh(chamber), None)
     row = judged(study, *candidates(study, 1)[0])
     with local_executor(1, "processes") as executor:
-        parcel = shared(executor, setting)
+        parcel = share(executor, setting)
         replica = len(pickle.dumps((_replica, (parcel, 2**127), {})))
     return {
         "candidate": len(pickle.dumps((judged, (study, *candidates(study, 1)[0]), {}))),

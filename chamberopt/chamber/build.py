@@ -19,14 +19,22 @@ from chamberopt.chamber.part import Part, posed_part, turning_axis
 from chamberopt.chamber.reach.reach import part_share, reach
 from chamberopt.common.errors import InputError
 from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL, is_sonotrode, tag_of_further
-from chamberopt.geometry.mesh_io import box_text, place_text
-from chamberopt.geometry.slivers import THINNEST, without_slivers
-from chamberopt.geometry.solids import Solid, Surface, bodies, cavities, overlap, subtract, united
+from chamberopt.geometry.mesh_io import format_box, format_point
+from chamberopt.geometry.slivers import MIN_HEIGHT, remove_slivers
+from chamberopt.geometry.solids import (
+    Solid,
+    SolidSurface,
+    find_cavities,
+    overlap_volume,
+    split_bodies,
+    subtract,
+    unite,
+)
 from chamberopt.geometry.triangles import (
     area_vectors,
     areas,
-    free_rim,
-    shells_of,
+    find_shells,
+    find_unwalled_border,
     tetrahedron_volumes,
 )
 
@@ -98,8 +106,8 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
     if (
         shape.source is None
     ):  # else the part is drawn as what it bounds: there is nothing to cut out
-        solids, voids = bodies(part.vertices, part.triangles, part.name)
-        body = united(solids, part.name)
+        solids, voids = split_bodies(part.vertices, part.triangles, part.name)
+        body = unite(solids, part.name)
         notes += (
             [f"{part.name}: {voids} closed voids inside the part are left out"] if voids else []
         )
@@ -117,7 +125,7 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
     room, room_notes = _room_over_sonotrode(
         whole, cavity.traced(whole, own).tags, ceiling, design.chamber.ceiling_key
     )
-    room = without_slivers(room)[0]
+    room = remove_slivers(room)[0]
     traced = cavity.traced(room, own)
     on_part = traced.tags == TAG_PART
     _refuse_rims(design, room, traced.tags)
@@ -170,7 +178,7 @@ def _refuse_misplaced(part: Part, shape: np.ndarray, design: Design) -> None:
     if (low[:2] >= wall_high[:2]).any() or (high[:2] <= wall_low[:2]).any():
         raise InputError(
             f"part.offset_mm: given {[1e3 * value for value in design.part.offset]}: the part "
-            f"({box_text(high - low)}) is beside the chamber ({box_text(wall_high - wall_low)}); "
+            f"({format_box(high - low)}) is beside the chamber ({format_box(wall_high - wall_low)}); "
             "bring it nearer to the axis"
         )
 
@@ -178,34 +186,34 @@ def _refuse_misplaced(part: Part, shape: np.ndarray, design: Design) -> None:
 def _refuse_in_swing(design: Design, cavity: Cavity, body: Solid) -> None:
     """A part in the way of a further sonotrode; of the first the distance has been asked."""
     for name, swing in swept_faces(design, cavity)[1:] if design.sonotrodes else ():
-        if overlap(swing, body) > 0.0:
+        if overlap_volume(swing, body) > 0.0:
             raise InputError(
                 f"{name}.at_mm: its face would hit the part; move it back along its axis, or the part"
             )
 
 
-def _refuse_rims(design: Design, room: Surface, tags: np.ndarray) -> None:
+def _refuse_rims(design: Design, room: SolidSurface, tags: np.ndarray) -> None:
     """A sonotrode without a room, or one that walls do not rise from all round: a moving edge."""
     for k in range(len(design.sonotrodes)):
         if not (tags == tag_of_further(k)).any():
             raise InputError(
                 f"sonotrodes.{k}.at_mm: the part cuts its face off from the room; move one of them"
             )
-    rim = free_rim(room.vertices, room.triangles, is_sonotrode(tags))
+    rim = find_unwalled_border(room.vertices, room.triangles, is_sonotrode(tags))
     if rim is not None:
         raise InputError(
-            f"sonotrode: its face has a free rim at {place_text(rim)}: walls must rise from it all round, as a moving "
+            f"sonotrode: its face has a free rim at {format_point(rim)}: walls must rise from it all round, as a moving "
             "edge is not supported; let it fill the floor of the room, or of a well, from wall to wall"
         )
 
 
 def _room_over_sonotrode(
-    whole: Surface, tags: np.ndarray, ceiling: float | None, key: str
-) -> tuple[Surface, list[str]]:
+    whole: SolidSurface, tags: np.ndarray, ceiling: float | None, key: str
+) -> tuple[SolidSurface, list[str]]:
     """The room that has the sonotrode for its floor, and notes on what was cut off; ``ceiling`` [m]: if its ``key`` of
     the chamber's table can move it.
     """
-    rooms = cavities(whole)
+    rooms = find_cavities(whole)
     floor = tags == TAG_SONOTRODE
     over = [room for room in rooms if (room & floor).any()]
     if not over:
@@ -214,9 +222,9 @@ def _room_over_sonotrode(
         )
     kept = max(over, key=lambda room: areas(whole.vertices, whole.triangles[room & floor]).sum())
     notes = []
-    rest = [whole.only(room) for room in rooms if room is not kept]
+    rest = [whole.select(room) for room in rooms if room is not kept]
     volumes = [float(tetrahedron_volumes(room.vertices, room.triangles).sum()) for room in rest]
-    room = whole.only(kept)
+    room = whole.select(kept)
     if rest:
         biggest = rest[int(np.argmax(volumes))]
         low, high = 1e3 * biggest.vertices[:, 2].min(), 1e3 * biggest.vertices[:, 2].max()
@@ -226,7 +234,7 @@ def _room_over_sonotrode(
             "mm: no shot gets there, it is left out"
         )
     top = float(room.vertices[:, 2].max())
-    if ceiling is not None and top < ceiling - THINNEST:
+    if ceiling is not None and top < ceiling - MIN_HEIGHT:
         notes.append(
             f"the part closes the chamber at z = {1e3 * top:.4g} mm: "
             + (
@@ -238,7 +246,9 @@ def _room_over_sonotrode(
     return room, notes
 
 
-def _only_reachable(part: Part, room: Surface, traced: Piece, design: Design) -> tuple[Part, str]:
+def _only_reachable(
+    part: Part, room: SolidSurface, traced: Piece, design: Design
+) -> tuple[Part, str]:
     """The part with what the shot can touch of its target, and a note on the rest. InputError when that is all."""
     from sim_core import TriangleMesh
 
@@ -279,7 +289,7 @@ def _hidden_target_note(part: Part, exposed: np.ndarray) -> list[str]:
     ]
 
 
-def _crooked_note(room: Surface, wanted: np.ndarray) -> list[str]:
+def _crooked_note(room: SolidSurface, wanted: np.ndarray) -> list[str]:
     """Triangles that do not face as the surface they were cut from, (k, 3): rounding made them, not the design."""
     facing = area_vectors(room.vertices, room.triangles)
     across = np.linalg.norm(np.cross(facing, wanted), axis=1)
@@ -293,9 +303,9 @@ def _crooked_note(room: Surface, wanted: np.ndarray) -> list[str]:
     ]
 
 
-def _hold_note(room: Surface, on_part: np.ndarray, name: str) -> list[str]:
+def _hold_note(room: SolidSurface, on_part: np.ndarray, name: str) -> list[str]:
     """A piece of the part that reaches no wall is taken as held by something that takes no room."""
-    shells, volumes = shells_of(room.vertices, room.triangles)
+    shells, volumes = find_shells(room.vertices, room.triangles)
     floating = [k for k in range(len(volumes)) if on_part[shells == k].all()]
     if not floating:
         return []

@@ -26,18 +26,18 @@ from chamberopt.design.shapes import (
     tag_of_further,
 )
 from chamberopt.design.shapes.construction.loft import lofted
-from chamberopt.geometry.mesh_io import SurfaceError, place_text, read_once
+from chamberopt.geometry.mesh_io import SurfaceError, format_point, read_part_cached
 from chamberopt.geometry.solids import (
     Solid,
-    Surface,
-    bodies,
-    overlap,
-    solid,
+    SolidSurface,
+    make_solid,
+    overlap_volume,
+    split_bodies,
     subtract,
-    swept,
-    united,
+    sweep,
+    unite,
 )
-from chamberopt.geometry.triangles import area_vectors, areas, rotation
+from chamberopt.geometry.triangles import area_vectors, areas, rotation_matrix
 
 if TYPE_CHECKING:
     from chamberopt.design.design import Design
@@ -94,7 +94,7 @@ class Cavity:
     body: Solid
     pieces: tuple[Piece, ...]
 
-    def traced(self, surface: Surface, part: Piece) -> Piece:
+    def traced(self, surface: SolidSurface, part: Piece) -> Piece:
         """Tag, facing, part triangle and fitting of each triangle of a surface; of none of the pieces is the part's."""
         taken = [
             np.zeros((len(surface.solid), *column.shape[1:]), column.dtype)
@@ -123,7 +123,7 @@ def fitted(design: Design, shape: ShapeSurface) -> Cavity:
 
     Raises InputError, by the fitting's name, for one that is out of place.
     """
-    shell = solid(shape.vertices, shape.triangles, "the chamber")
+    shell = make_solid(shape.vertices, shape.triangles, "the chamber")
     own = piece(
         shell.label, shape.tags, area_vectors(shape.vertices, shape.triangles), shape.source
     )
@@ -148,7 +148,10 @@ def swept_faces(design: Design, cavity: Cavity) -> list[tuple[str, Solid]]:
         for k, s in enumerate(design.sonotrodes)
     ]
     return [
-        (name, swept(surface.only(tags == tag), np.array(axis) * amplitude, f"the swing of {name}"))
+        (
+            name,
+            sweep(surface.select(tags == tag), np.array(axis) * amplitude, f"the swing of {name}"),
+        )
         for name, tag, axis, amplitude in faces
     ]
 
@@ -158,7 +161,7 @@ def _with_hole(cavity: Cavity, hole: Hole, name: str, fitting: int) -> Cavity:
     reach, entering = _crossings(cavity.body.surface(), at[None], out, -AT_WALL)
     if entering[0] or not np.isfinite(reach[0]):
         raise InputError(
-            f"{name}.at_mm: from {place_text(at)} the axis does not lead out of the room; give a point in the room, "
+            f"{name}.at_mm: from {format_point(at)} the axis does not lead out of the room; give a point in the room, "
             "in the chamber's frame (z = 0: the sonotrode), and the way out as axis"
         )
     bottom = at + (reach[0] + hole.depth) * out
@@ -185,15 +188,15 @@ def _with_bore(
             else "move at_mm back along the axis, by its amplitude at least"
         )
         raise InputError(
-            f"{name}.at_mm: a bore of {1e3 * diameter:g} mm from {place_text(bottom)} along {_shown(axis)} does not "
+            f"{name}.at_mm: a bore of {1e3 * diameter:g} mm from {format_point(bottom)} along {_shown(axis)} does not "
             f"lead into the room all round: where its bottom is in the room, {moves}; where it passes by the room, "
             "move it or make it narrower"
         )
     made = lofted([rim, rim + (reach.max() + INSIDE) * axis])
     tags = np.repeat(np.array([tag, TAG_WALL, END], dtype=np.uint8), [ROUND, 2 * ROUND, ROUND])
-    bore = solid(made.vertices, made.triangles, name)
+    bore = make_solid(made.vertices, made.triangles, name)
     facing = area_vectors(made.vertices, made.triangles)
-    body = united([cavity.body, bore], f"the chamber with {name}")
+    body = unite([cavity.body, bore], f"the chamber with {name}")
     after = Cavity(body, (*cavity.pieces, piece(bore.label, tags, facing, None, fitting)))
     now = _area_by_tag(after)
     if now[END] > 0.0:
@@ -216,16 +219,16 @@ def _without(cavity: Cavity, design: Design) -> Cavity:
     swings, standing, pieces = swept_faces(design, cavity), [], []
     for k, deflector in enumerate(design.chamber.deflectors):
         vertices, triangles = _body_of(deflector, f"chamber.deflectors.{k}")
-        vertices = vertices @ rotation(deflector.rotate_deg).T + np.array(deflector.at)
-        own = bodies(vertices, triangles, f"chamber.deflectors.{k}")[0]
-        _refuse_out_of_place(deflector, united(own, own[0].name), cavity, swings)
+        vertices = vertices @ rotation_matrix(deflector.rotate_deg).T + np.array(deflector.at)
+        own = split_bodies(vertices, triangles, f"chamber.deflectors.{k}")[0]
+        _refuse_out_of_place(deflector, unite(own, own[0].name), cavity, swings)
         facing = -area_vectors(vertices, triangles)
         standing += own
         pieces += [
             piece(one.label, TAG_WALL, facing, None, len(design.chamber.holes) + k) for one in own
         ]
     return Cavity(
-        subtract(cavity.body, united(standing, "the deflectors")), (*cavity.pieces, *pieces)
+        subtract(cavity.body, unite(standing, "the deflectors")), (*cavity.pieces, *pieces)
     )
 
 
@@ -233,13 +236,13 @@ def _refuse_out_of_place(
     deflector: Deflector, body: Solid, cavity: Cavity, swings: Sequence[tuple[str, Solid]]
 ) -> None:
     name = body.name
-    if overlap(cavity.body, body) <= 0.0:
+    if overlap_volume(cavity.body, body) <= 0.0:
         raise InputError(
             f"{name}.at_mm: given {list(deflector.at_mm)}, where none of it is in the room; positions count from the "
             "middle of the sonotrode's face (z = 0)"
         )
     for whose, swing in swings:
-        if overlap(swing, body) > 0.0:
+        if overlap_volume(swing, body) > 0.0:
             raise InputError(
                 f"{name}.at_mm: given {list(deflector.at_mm)}, where the face of [{whose}] hits it; move it away"
             )
@@ -253,7 +256,7 @@ def notes_on_files(design: Design) -> list[str]:
         )
         for k, deflector in enumerate(design.chamber.deflectors)
         if deflector.mesh is not None
-        for note in read_once(deflector.mesh_path, deflector.unit).notes
+        for note in read_part_cached(deflector.mesh_path, deflector.unit).notes
     ]
 
 
@@ -263,7 +266,7 @@ def _body_of(deflector: Deflector, name: str) -> tuple[np.ndarray, np.ndarray]:
 
     if deflector.kind == "mesh":
         try:
-            mesh = read_once(deflector.mesh_path, deflector.unit)
+            mesh = read_part_cached(deflector.mesh_path, deflector.unit)
         except SurfaceError:
             raise
         except InputError as error:  # told of a part
@@ -285,7 +288,7 @@ def _body_of(deflector: Deflector, name: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _crossings(
-    surface: Surface, points: np.ndarray, way: np.ndarray, beyond: float
+    surface: SolidSurface, points: np.ndarray, way: np.ndarray, beyond: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """How far [m] from points (p, 3) along the unit vector ``way`` the surface is crossed first, farther than
     ``beyond``; inf where it is not; and whether from outside in, (p,) each. A line along an edge crosses it.

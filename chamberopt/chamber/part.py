@@ -11,10 +11,10 @@ import numpy as np
 
 from chamberopt.chamber.target import chosen_triangles
 from chamberopt.common.errors import InputError
-from chamberopt.geometry.mesh_io import PartMesh, read_once
-from chamberopt.geometry.remesh import quality, remeshed
-from chamberopt.geometry.solids import snapped
-from chamberopt.geometry.triangles import areas, rotation
+from chamberopt.geometry.mesh_io import PartMesh, read_part_cached
+from chamberopt.geometry.remesh import remesh, triangle_quality
+from chamberopt.geometry.solids import snap_to_grid
+from chamberopt.geometry.triangles import areas, rotation_matrix
 
 if TYPE_CHECKING:
     from chamberopt.design.design import Design, Target
@@ -56,7 +56,7 @@ def posed_part(design: Design) -> tuple[Part, list[str]]:
     """
     mesh, target = _mesh(design)
     turn, shift = _pose(mesh, design)
-    vertices = snapped(mesh.vertices @ turn.T + shift)
+    vertices = snap_to_grid(mesh.vertices @ turn.T + shift)
     area = areas(vertices, mesh.triangles)
     name, names = design.part.mesh_path.name, tuple(mesh.groups)
     part = Part(
@@ -70,7 +70,7 @@ def part_meshes(design: Design) -> tuple[PartMesh, PartMesh]:
     file's frame. They differ where target.element_mm asks for other triangles.
     """
     setup = design.chamber.setup()
-    return read_once(
+    return read_part_cached(
         design.part.mesh_path, design.part.unit
     ) if setup is None else setup.part, _mesh(design)[0]
 
@@ -92,7 +92,7 @@ def part_pose(design: Design) -> tuple[np.ndarray, np.ndarray]:
 def _mesh(design: Design) -> tuple[PartMesh, np.ndarray]:
     """The part's mesh and target, meshed once per file: a study builds a hundred chambers around the same part."""
     part, setup = design.part, design.chamber.setup()
-    mesh = read_once(part.mesh_path, part.unit) if setup is None else setup.part
+    mesh = read_part_cached(part.mesh_path, part.unit) if setup is None else setup.part
     if part.target.element is None:
         return mesh, chosen_triangles(mesh, part.target)
     return _meshed_once(part.mesh_path, part.unit, part.target, mesh.sha256)
@@ -102,7 +102,7 @@ def _mesh(design: Design) -> tuple[PartMesh, np.ndarray]:
 def _meshed_once(
     path: Path, unit: str, target: Target, _sha256: str
 ) -> tuple[PartMesh, np.ndarray]:
-    mesh = read_once(path, unit)
+    mesh = read_part_cached(path, unit)
     return _in_elements(mesh, chosen_triangles(mesh, target), target.element)  # type: ignore[arg-type]
 
 
@@ -116,13 +116,13 @@ def _in_elements(mesh: PartMesh, target: np.ndarray, size: float) -> tuple[PartM
             f"part.target.element_mm: given {1e3 * size:g}, which makes some {1e-6 * count:.3g} million triangles of "
             f"the target's {1e6 * area:.4g} mm²; give at least {fits:.2g}"
         )
-    vertices, triangles, source = remeshed(
+    vertices, triangles, source = remesh(
         mesh.vertices, mesh.triangles, target, target.astype(np.int64), size
     )
     chosen = target[source]
     sides = vertices[triangles[chosen]]
     longest = np.linalg.norm(sides - np.roll(sides, 1, axis=1), axis=2).max(axis=1)
-    shape = quality(vertices, triangles[chosen])
+    shape = triangle_quality(vertices, triangles[chosen])
     note = (
         f"target.element_mm = {1e3 * size:g}: the target's {target.sum()} triangles became {chosen.sum()}, longest "
         f"sides {1e3 * np.median(longest):.3g} mm in the middle and {1e3 * longest.max():.3g} mm at most, shape "
@@ -168,7 +168,7 @@ def _pose(mesh: PartMesh, design: Design) -> tuple[np.ndarray, np.ndarray]:
         return setup.turn, setup.shift + np.array(
             [0.0, 0.0, design.chamber.sonotrode_distance - setup.distance]
         )
-    turn = rotation(design.part.rotate_deg)
+    turn = rotation_matrix(design.part.rotate_deg)
     vertices = mesh.vertices @ turn.T
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     centre = (low + high) / 2.0

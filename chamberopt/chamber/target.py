@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.geometry.mesh_io import PartMesh, named
+from chamberopt.geometry.mesh_io import PartMesh, select_triangles
 from chamberopt.geometry.triangles import area_vectors
 
 if TYPE_CHECKING:
@@ -19,7 +19,9 @@ def chosen_triangles(mesh: PartMesh, wanted: Target) -> np.ndarray:
 
     Raises InputError for a name that the file does not have, and when nothing is chosen.
     """
-    chosen = named(mesh.groups, wanted.surface, len(mesh.triangles), "part.target.surface")
+    chosen = select_triangles(
+        mesh.groups, wanted.surface, len(mesh.triangles), "part.target.surface"
+    )
     if wanted.direction is not None and wanted.angle_deg is not None:
         normal = area_vectors(mesh.vertices, mesh.triangles)
         direction = np.asarray(wanted.direction) / np.linalg.norm(wanted.direction)

@@ -23,9 +23,9 @@ def results_folder(out: Path | None, name: str) -> Iterator[Path]:
 
     When nothing came of it the folder does not stay behind empty.
     """
-    from chamberopt.common.files import new_folder
+    from chamberopt.common.files import make_output_folder
 
-    folder = new_folder(out) if out is not None else _claimed(name)
+    folder = make_output_folder(out) if out is not None else _claimed(name)
     try:
         yield folder
     except BaseException:
@@ -37,11 +37,11 @@ def results_folder(out: Path | None, name: str) -> Iterator[Path]:
 
 def _claimed(name: str) -> Path:
     """The first free folder results/NAME, results/NAME-2 ...: whoever makes it has it, if two look at once."""
-    from chamberopt.common.files import is_free, new_folder
+    from chamberopt.common.files import is_new_or_empty, make_output_folder
 
     for number in count(1):
         folder = Path("results", name if number == 1 else f"{name}-{number}")
-        if not is_free(folder):
+        if not is_new_or_empty(folder):
             continue
         try:
             if not folder.is_dir():
@@ -52,7 +52,7 @@ def _claimed(name: str) -> Path:
                 continue
         except OSError:
             pass  # new_folder says what is wrong
-        return new_folder(folder)
+        return make_output_folder(folder)
     raise AssertionError("there is always a next number")
 
 

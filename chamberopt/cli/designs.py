@@ -49,7 +49,7 @@ def check(
     """
     from chamberopt.chamber.build import build_chamber
     from chamberopt.chamber.checks.check import describe, shot_reach
-    from chamberopt.common.files import new_folder, write_text
+    from chamberopt.common.files import make_output_folder, write_text
     from chamberopt.design.load import Study, load
     from chamberopt.geometry.mesh_io import SurfaceError
     from chamberopt.output.viewer import write_chamber
@@ -73,7 +73,7 @@ def check(
         }
         facts["evaluations"] = loaded.optimizer.evaluations
     if out is not None:
-        facts["folder"] = str(new_folder(out))
+        facts["folder"] = str(make_output_folder(out))
     kind = "study" if isinstance(loaded, Study) else "design"
     if not json:
         print("\n".join([f"{file}: a usable {kind}", *facts_said(facts)]), flush=True)

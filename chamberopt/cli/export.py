@@ -92,10 +92,10 @@ def export(
 @contextmanager
 def _files(formats: dict[str, Format], out: Path | None, name: str) -> Iterator[dict[str, Path]]:
     """Where each format goes: --out where that is a file, else a new folder."""
-    from chamberopt.common.files import new_file
+    from chamberopt.common.files import check_new_file
 
     if out is not None and is_file(out, formats):
-        yield {only: new_file(out) for only in formats}
+        yield {only: check_new_file(out) for only in formats}
         return
     with results_folder(out, name) as folder:
         yield {name: folder / one.file for name, one in formats.items()}

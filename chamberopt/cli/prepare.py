@@ -17,12 +17,12 @@ if TYPE_CHECKING:
 def compiled(design: Design, chamber: Chamber, cavity: AnalyticCavity | None = None) -> None:
     """Compiles, aloud, before the bar starts: else its first minute would look like a hang."""
     from chamberopt.chamber.scene import chamber_mesh, require_countable, scene_physics
-    from chamberopt.common.progress import announce_compilation
+    from chamberopt.common.progress import compile_with_message
 
     require_countable(design)
     shot = design.shot
     physics = scene_physics(design, cavity or chamber_mesh(chamber))
-    announce_compilation(
+    compile_with_message(
         physics, shot.count, shot.mix is None, cavity is not None and cavity.radius is not None
     )
 

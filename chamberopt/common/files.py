@@ -9,17 +9,19 @@ from pathlib import Path
 from chamberopt.common.errors import InputError
 
 # What a killed run may leave beside its files: a file half written, and the mark of who was writing (lock.py).
-TRACES = (".writing-", ".lock")
+LEFTOVER_PREFIXES = (".writing-", ".lock")
 
 
-def is_free(folder: Path) -> bool:
+def is_new_or_empty(folder: Path) -> bool:
     """Whether results can go there: it is not there, or a folder with nothing in it."""
     if not os.path.lexists(folder):
         return True
-    return folder.is_dir() and all(file.name.startswith(TRACES) for file in folder.iterdir())
+    return folder.is_dir() and all(
+        file.name.startswith(LEFTOVER_PREFIXES) for file in folder.iterdir()
+    )
 
 
-def new_folder(path: str | Path) -> Path:
+def make_output_folder(path: str | Path) -> Path:
     """The folder, made if need be; InputError when something is in it: results are never overwritten."""
     folder = Path(path)
     if os.path.lexists(folder) and not os.path.isdir(folder):
@@ -27,7 +29,7 @@ def new_folder(path: str | Path) -> Path:
             f"{folder}: is a file; results need a folder: choose another folder (out, or --out)"
         )
     try:
-        if not is_free(folder):
+        if not is_new_or_empty(folder):
             raise InputError(
                 f"{folder}: already holds files, and results are never overwritten: choose "
                 "another folder (out, or --out) or remove this one"
@@ -43,7 +45,7 @@ def new_folder(path: str | Path) -> Path:
     return folder
 
 
-def new_file(path: Path) -> Path:
+def check_new_file(path: Path) -> Path:
     """The path, where a file can be made in a folder that is there; InputError for one that is there: nothing is ever
     overwritten.
     """
@@ -64,7 +66,7 @@ def new_file(path: Path) -> Path:
 
 
 @contextmanager
-def whole_file(path: Path) -> Iterator[Path]:
+def atomic_write(path: Path) -> Iterator[Path]:
     """A temporary path beside `path`, with the same suffix, that takes its place when the block ends well.
 
     It is on the disk before it does, so that neither a crash nor a power cut leaves half a file.
@@ -81,7 +83,7 @@ def whole_file(path: Path) -> Iterator[Path]:
 
 def write_text(path: Path, text: str) -> None:
     """Write a UTF-8 text file, whole or not at all."""
-    with whole_file(path) as temporary:
+    with atomic_write(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 

@@ -57,7 +57,7 @@ def progress_bar(what: str, stream: TextIO | None = None) -> Iterator[Progress]:
         yield show
 
 
-def announce_compilation(
+def compile_with_message(
     physics: Physics,
     balls: int,
     alike: bool = True,

@@ -32,7 +32,7 @@ class CrossCheckError(ValueError):
         super().__init__("; ".join(f"{p.field}: {p.text}" for p in self.problems))
 
 
-def nearest(name: str, known: Iterable[str], count: int = 1) -> list[str]:
+def closest_names(name: str, known: Iterable[str], count: int = 1) -> list[str]:
     """The known spellings nearest to `name`, best first; empty when nothing is near. Case is ignored."""
     by_lower = {word.lower(): word for word in known}
     return [
@@ -44,14 +44,14 @@ def nearest(name: str, known: Iterable[str], count: int = 1) -> list[str]:
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """'did you mean X?' when something is near; what is allowed when nothing is, or the list is short."""
     words = list(known)
-    near = nearest(name, words)
+    near = closest_names(name, words)
     listed = f"allowed: {', '.join(words)}"
     if not near:
         return listed
     return f"did you mean {near[0]!r}?" + (f" ({listed})" if len(words) <= 8 else "")
 
 
-def message(problems: Iterable[Problem], path: Path | None = None, source: str = "") -> str:
+def format_problems(problems: Iterable[Problem], path: Path | None = None, source: str = "") -> str:
     """All problems, a line each: `file:line: field: text`; the line only where the source shows the field."""
     lines = key_lines(source)
     said = []
@@ -62,7 +62,7 @@ def message(problems: Iterable[Problem], path: Path | None = None, source: str =
     return "\n".join(said)
 
 
-def from_validation(error: ValidationError, model: type[BaseModel]) -> list[Problem]:
+def explain_validation_error(error: ValidationError, model: type[BaseModel]) -> list[Problem]:
     """Pydantic's findings in the words of the file."""
     problems: list[Problem] = []
     details = error.errors()
@@ -83,13 +83,13 @@ def from_validation(error: ValidationError, model: type[BaseModel]) -> list[Prob
     return list(dict.fromkeys(problems))  # a union says the same for each of its alternatives
 
 
-def not_found(path: Path, what: str, pattern: str) -> str:
+def explain_missing_file(path: Path, what: str, pattern: str) -> str:
     """One sentence on a file that is not there, with the near names that are."""
     folder = path.parent
     if not folder.is_dir():
         return f"{path}: no such {what}; the folder {folder} does not exist"
     there = sorted(p.name for p in folder.glob(pattern) if p.is_file())
-    near = nearest(
+    near = closest_names(
         path.stem, (Path(name).stem for name in there)
     )  # the endings are alike and would mislead
     likely = [str(folder / name) for name in there if Path(name).stem in near]
@@ -218,7 +218,7 @@ def _walk(
     return model, field
 
 
-def allowed(field: FieldInfo) -> str:
+def describe_allowed(field: FieldInfo) -> str:
     """What a field takes, from its own bounds: 'a number from 2 to 2000 mm (inner height of the chamber)'."""
     bounds = {
         name: getattr(meta, name)
@@ -269,17 +269,19 @@ def _explain(detail: ErrorDetails, model: type[BaseModel]) -> Problem:
     if kind == "extra_forbidden":
         return Problem(dotted, _unknown_key(str(loc[-1]), table, model))
     if kind == "missing" and field is not None and not isinstance(loc[-1], int):
-        return Problem(dotted, f"missing; give {allowed(field)}")
+        return Problem(dotted, f"missing; give {describe_allowed(field)}")
     if field is None:
         return Problem(dotted, f"given {_shown(detail['input'])}: {detail['msg']}")
     if kind == "missing":
-        return Problem(".".join(str(s) for s in loc[:-1]), f"too short; allowed: {allowed(field)}")
+        return Problem(
+            ".".join(str(s) for s in loc[:-1]), f"too short; allowed: {describe_allowed(field)}"
+        )
     if kind in ("value_error", "assertion_error"):  # of a user's own shape
         return Problem(dotted, detail["msg"].partition(", ")[2])
-    said = f"given {_shown(detail['input'])}; allowed: {allowed(field)}"
+    said = f"given {_shown(detail['input'])}; allowed: {describe_allowed(field)}"
     if kind == "literal_error" and isinstance(detail["input"], str):
         choices = [str(choice) for choice in get_args(_kinds(field.annotation)[0])]
-        near = nearest(detail["input"], choices)
+        near = closest_names(detail["input"], choices)
         said += f"; did you mean {near[0]!r}?" if near else ""
     if isinstance(detail["input"], str) and re.fullmatch(r"\s*[-+.\deE]+\s*", detail["input"]):
         said += "; write it without quotes"
@@ -287,7 +289,7 @@ def _explain(detail: ErrorDetails, model: type[BaseModel]) -> Problem:
 
 
 def _unknown_key(key: str, table: type[BaseModel], model: type[BaseModel]) -> str:
-    near = nearest(key, table.model_fields)
+    near = closest_names(key, table.model_fields)
     if near:
         return f"unknown key; did you mean {near[0]!r}?"
     elsewhere = [name for name in _dotted(model) if name.split(".")[-1].lower() == key.lower()]

@@ -25,7 +25,7 @@ def versions() -> dict[str, str]:
     }
 
 
-def program() -> dict[str, str]:
+def program_versions() -> dict[str, str]:
     """All of the program that a candidate's figures depend on, whatever the machine: what a study must go on with."""
     python = ".".join(platform.python_version_tuple()[:2])
     return {"python": python, **packages(), "sources": sources_digest()}

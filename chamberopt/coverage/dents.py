@@ -20,7 +20,7 @@ import numpy as np
 from chamberopt.common.errors import InputError
 from chamberopt.coverage.metrics import exposed_target
 from chamberopt.coverage.tally import dent_diameters
-from chamberopt.geometry.triangles import area_vectors
+from chamberopt.geometry.triangles import area_vectors, closest_points, unit_normals
 
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
@@ -123,18 +123,8 @@ def dents_on_part(impacts: ImpactLog, chamber: Chamber, design: Design) -> Dents
     diameter = dent_diameters(impacts, design)
     dents = np.flatnonzero((diameter > 0.0) & (chamber.source[impacts.triangle] >= 0))
     corners = chamber.vertices[chamber.triangles[impacts.triangle[dents]]]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    place = nearest_on_triangles(corners, impacts.position[dents])
-    return Dents(place, normal, 0.5 * diameter[dents], impacts.time[dents])
-
-
-def nearest_on_triangles(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """The contact of a ball at each point (n, 3) m with its triangle (n, 3, 3): the nearest one, on an edge or not."""
-    from trimesh.triangles import closest_point
-
-    # In mm: it takes fourth powers of lengths below 1e-13 for zero, which in metres is a triangle of half a millimetre.
-    return np.asarray(closest_point(corners * 1e3, points * 1e3)) * 1e-3 if len(points) else points
+    place = closest_points(corners, impacts.position[dents])
+    return Dents(place, unit_normals(corners), 0.5 * diameter[dents], impacts.time[dents])
 
 
 def mark(

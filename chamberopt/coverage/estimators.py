@@ -22,6 +22,7 @@ from chamberopt.coverage.statistics.poisson_survival import Bare, Dents
 from chamberopt.coverage.statistics.rate_mixture import MANY_STEPS, Mixture
 from chamberopt.coverage.statistics.triangle_patches import patches
 from chamberopt.coverage.tally import Tally
+from chamberopt.geometry.triangles import unit_normals
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -81,8 +82,7 @@ def surface(replicas: Sequence[Tally], chamber: Chamber, design: Design) -> Surf
 def _places(chamber: Chamber, target: np.ndarray, exposure: np.ndarray) -> np.ndarray:
     """Where triangles are, (m, 6): middle points, and normals as long as two patches: an edge parts neighbours."""
     corners = chamber.part.vertices[chamber.part.triangles[target]]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    normal = unit_normals(corners)
     wide = math.sqrt(
         chamber.exposed_area[target].sum() * LEAST_EXPOSURE / max(exposure.sum(), LEAST_EXPOSURE)
     )

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import whole_file
+from chamberopt.common.files import atomic_write
 from chamberopt.coverage.tally import ball_diameters, dent_diameters, impact_angle_deg
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ def save_hits(path: Path, found: SortedHits) -> None:
         for column in fields(Hits)
         if column.name != "triangle"
     }
-    with whole_file(path) as temporary, temporary.open("wb") as file:
+    with atomic_write(path) as temporary, temporary.open("wb") as file:
         np.savez(file, first=found.first, **columns)
 
 

@@ -25,17 +25,16 @@ from pydantic import (
 
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
-from chamberopt.common.fields import (
+from chamberopt.common.toml_errors import CrossCheckError, Problem
+from chamberopt.common.toml_fields import (
     MeshFile,
     Names,
     Pair,
     Triple,
-    Unit,
     from_file,
-    listed,
+    list_field,
     quantity,
 )
-from chamberopt.common.toml_errors import CrossCheckError, Problem
 from chamberopt.design.effects import Effects
 from chamberopt.design.materials import STRICT, Materials
 from chamberopt.design.process import Process
@@ -45,6 +44,7 @@ from chamberopt.design.shapes.custom import KeptShape, own_shape
 from chamberopt.design.shapes.imported import IMPORTED, Imported
 from chamberopt.design.shot import Shot
 from chamberopt.design.sonotrode import FurtherSonotrode, Sonotrode
+from chamberopt.geometry.mesh_io.units import Unit
 
 MOST_SONOTRODES = (
     50  # further ones: each has a tag below 255, and takes a cut through all the walls before it
@@ -56,20 +56,20 @@ class Target(BaseModel):
 
     model_config = STRICT
 
-    surface: Names = listed(
+    surface: Names = list_field(
         'a name in quotes, or a list of names, e.g. ["flank", "root"]',
         "groups, sets, properties or colours of the part's file; all: the whole surface",
         ("all",),
     )
-    direction: Triple | None = listed(
+    direction: Triple | None = list_field(
         "three numbers [x, y, z], not all 0", "reference direction in the part file's frame", None
     )
-    angle_deg: Pair | None = listed(
+    angle_deg: Pair | None = list_field(
         "two numbers [low, high], 0 <= low < high <= 180",
         "between outward normal and direction, degrees",
         None,
     )
-    box_mm: Annotated[tuple[Triple, Triple], Field(strict=False)] | None = listed(
+    box_mm: Annotated[tuple[Triple, Triple], Field(strict=False)] | None = list_field(
         "two corners [[x, y, z], [x, y, z]], low before high, mm",
         "holding the triangles' centroids, in the part file's frame",
         None,
@@ -121,10 +121,10 @@ class Part(BaseModel):
 
     mesh: MeshFile = Field(description="mesh file, path relative to the design file")
     unit: Unit = Field(default="guess", description="of the numbers in the mesh file")
-    rotate_deg: Triple = listed(
+    rotate_deg: Triple = list_field(
         "three numbers [x, y, z] in degrees", "turns about x, then y, then z", (0.0, 0.0, 0.0)
     )
-    offset_mm: Pair = listed(
+    offset_mm: Pair = list_field(
         "two numbers [x, y] in mm", "sideways from the chamber axis", (0.0, 0.0)
     )
     target: Target = Field(default_factory=Target, description="which triangles must be covered")
@@ -150,7 +150,7 @@ class Design(BaseModel):
     sonotrode: Sonotrode
     sonotrodes: Annotated[
         tuple[FurtherSonotrode, ...], Field(strict=False, max_length=MOST_SONOTRODES)
-    ] = listed(
+    ] = list_field(
         f"a list of at most {MOST_SONOTRODES} tables, [[sonotrodes]]",
         "further ones beside the floor",
         (),
@@ -373,5 +373,5 @@ def checked(
             with suppress(ValidationError):  # the shape's file has changed since
                 return cast(Table, _designs_with(KeptShape).model_validate(data, context=context))
         shown: type[BaseModel] = design_class(data, context) if model is Design else model
-        problems = toml_errors.from_validation(error, shown)
-        raise InputError(toml_errors.message(problems, path, source)) from None
+        problems = toml_errors.explain_validation_error(error, shown)
+        raise InputError(toml_errors.format_problems(problems, path, source)) from None

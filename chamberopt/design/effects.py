@@ -5,8 +5,8 @@ from typing import Self
 
 from pydantic import BaseModel, Field, model_validator
 
-from chamberopt.common.fields import Triple, listed, quantity
 from chamberopt.common.toml_errors import CrossCheckError, Problem
+from chamberopt.common.toml_fields import Triple, list_field, quantity
 from chamberopt.design.materials import STRICT
 
 
@@ -20,10 +20,10 @@ class PartTurn(BaseModel):
     )
     angle_deg: float | None = quantity(0.01, 3600, "degrees", "to and fro, to each side", None)
     frequency_hz: float | None = quantity(1e-4, 100, "Hz", "of the motion to and fro", None)
-    axis: Triple = listed(
+    axis: Triple = list_field(
         "three numbers [x, y, z], not all 0", "direction, in the part file's frame", (0.0, 0.0, 1.0)
     )
-    through_mm: Triple = listed(
+    through_mm: Triple = list_field(
         "three numbers [x, y, z] in mm", "a point on it, same frame", (0.0, 0.0, 0.0)
     )
 

@@ -103,7 +103,7 @@ def _read(path: Path, kind: str) -> tuple[str, dict[str, Any]]:
     try:
         source = path.read_bytes().decode("utf-8-sig")
     except FileNotFoundError:
-        raise InputError(toml_errors.not_found(path, f"{kind} file", "*.toml")) from None
+        raise InputError(toml_errors.explain_missing_file(path, f"{kind} file", "*.toml")) from None
     except OSError as error:
         raise InputError(
             f"{path}: cannot be read: {error.strerror}; check its permissions"
@@ -152,7 +152,7 @@ def _study(path: Path, source: str, data: dict[str, Any]) -> Study:
     if not isinstance(named, str):
         given = "missing" if named is None else f"given {named!r}"
         text = f'{given}; give the path of a design file, relative to this file: design = "../designs/gear.toml"'
-        raise InputError(toml_errors.message([Problem("design", text)], path, source))
+        raise InputError(toml_errors.format_problems([Problem("design", text)], path, source))
     values = (
         {**data, "vary": _flattened(data["vary"])}
         if isinstance(data.get("vary"), Mapping)
@@ -161,7 +161,7 @@ def _study(path: Path, source: str, data: dict[str, Any]) -> Study:
     try:
         design = load_design(Path(os.path.normpath(path.parent / named)))
     except InputError as error:
-        said = toml_errors.message(
+        said = toml_errors.format_problems(
             [Problem("design", f"given {named!r}, which cannot be used:")], path, source
         )
         raise InputError(
@@ -175,8 +175,10 @@ def _also_wrong(values: Mapping[str, Any], path: Path, source: str) -> list[str]
     try:
         Study.model_validate({**values, "design": None})
     except ValidationError as error:
-        problems = toml_errors.from_validation(error, Study)
-        text = toml_errors.message([p for p in problems if p.field != "design"], path, source)
+        problems = toml_errors.explain_validation_error(error, Study)
+        text = toml_errors.format_problems(
+            [p for p in problems if p.field != "design"], path, source
+        )
         return [text] if text else []
     return []
 

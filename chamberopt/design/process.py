@@ -4,8 +4,8 @@ from typing import Literal, Self
 
 from pydantic import BaseModel, Field, model_validator
 
-from chamberopt.common.fields import quantity
 from chamberopt.common.toml_errors import CrossCheckError, Problem
+from chamberopt.common.toml_fields import quantity
 from chamberopt.design.materials import STRICT
 
 

@@ -6,8 +6,8 @@ from typing import Annotated, Self
 
 from pydantic import BaseModel, Field, model_validator
 
-from chamberopt.common.fields import listed, quantity
 from chamberopt.common.toml_errors import CrossCheckError, Problem
+from chamberopt.common.toml_fields import list_field, quantity
 from chamberopt.design.materials import SHOT_DENSITY, STRICT, ShotMaterial
 
 
@@ -29,7 +29,7 @@ class Shot(BaseModel):
 
     mass_g: float = quantity(1e-4, 10000, "g", "of all balls together")
     diameter_mm: float | None = quantity(0.1, 20, "mm", "of one ball", None)
-    mix: Annotated[tuple[ShotSize, ...], Field(strict=False)] | None = listed(
+    mix: Annotated[tuple[ShotSize, ...], Field(strict=False)] | None = list_field(
         "a list of { diameter_mm = ..., share = ... }",
         "2 to 8 sizes and their shares of the mass",
         None,

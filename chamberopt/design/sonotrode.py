@@ -5,7 +5,14 @@ from typing import Literal
 
 from pydantic import BaseModel, Field
 
-from chamberopt.common.fields import Direction, Place, listed, metres, quantity, unit_vector
+from chamberopt.common.toml_fields import (
+    Direction,
+    Position,
+    list_field,
+    metres,
+    quantity,
+    unit_vector,
+)
 from chamberopt.design.materials import STRICT
 
 
@@ -45,10 +52,10 @@ class Sonotrode(Vibrating):
 class FurtherSonotrode(Vibrating):
     """One more: a round face at the bottom of a well that opens into the room."""
 
-    at_mm: Place = listed(
+    at_mm: Position = list_field(
         "three numbers [x, y, z] in mm", "middle of the face, in the chamber's frame"
     )
-    axis: Direction = listed(
+    axis: Direction = list_field(
         "three numbers [x, y, z], not all 0", "the way the face looks, into the room"
     )
     diameter_mm: float = quantity(0.5, 2000, "mm", "of the face")

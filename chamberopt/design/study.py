@@ -7,8 +7,8 @@ from pydantic import BaseModel, Field, model_validator
 
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
-from chamberopt.common.fields import listed, quantity
 from chamberopt.common.toml_errors import CrossCheckError, Problem
+from chamberopt.common.toml_fields import list_field, quantity
 from chamberopt.design.design import Design, checked
 from chamberopt.design.materials import STRICT
 
@@ -59,7 +59,7 @@ class Objective(BaseModel):
             "form": "{ NAME = WEIGHT, ... }, e.g. { uniform_coverage = 1.0, time_to_98_s = -0.001 }"
         },
     )
-    pareto: Annotated[tuple[ObjectiveName, ObjectiveName], Field(strict=False)] | None = listed(
+    pareto: Annotated[tuple[ObjectiveName, ObjectiveName], Field(strict=False)] | None = list_field(
         'two names, e.g. ["uniform_coverage", "time_to_98"]',
         "two objectives at once, in place of a name",
         None,
@@ -143,7 +143,7 @@ class Optimizer(BaseModel):
     algorithm: Algorithm = Field(
         default="auto", description="auto, sobol, surrogate, or an NLopt name without prefix"
     )
-    phases: Annotated[tuple[Phase, ...], Field(strict=False)] = listed(
+    phases: Annotated[tuple[Phase, ...], Field(strict=False)] = list_field(
         "a table [[optimizer.phases]] each",
         "several algorithms one after another, in place of one",
         (),

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from chamberopt.geometry.triangles import area_vectors, edge_keys
+from chamberopt.geometry.triangles import area_vectors, edge_keys, unit_vectors
 
 LONG, SHORT = (
     4.0 / 3.0,
@@ -21,7 +21,7 @@ STRAIGHT = 1e-3  # rad; turns a ball's path by less than roughness does
 ROUNDS = 5
 
 
-def remeshed(
+def remesh(
     vertices: np.ndarray, triangles: np.ndarray, target: np.ndarray, kinds: np.ndarray, size: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The closed surface with its target in triangles with sides of about size [m], and of which each one is.
@@ -39,7 +39,7 @@ def remeshed(
     return net.vertices[used], numbers.reshape(-1, 3), net.source
 
 
-def quality(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+def triangle_quality(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """4 √3 area / sum of squared sides, (m,): 1 for an equilateral triangle, 0 for one without area."""
     corners = vertices[triangles]
     squares = ((corners - np.roll(corners, 1, axis=1)) ** 2).sum(axis=(1, 2))
@@ -55,7 +55,7 @@ def _faces(vertices: np.ndarray, triangles: np.ndarray, kinds: np.ndarray) -> np
     from scipy.sparse.csgraph import connected_components
 
     reach = FLAT * float(np.linalg.norm(np.ptp(vertices, axis=0)))
-    normal = _unit(area_vectors(vertices, triangles))
+    normal = unit_vectors(area_vectors(vertices, triangles))
     a, b = (np.argsort(edge_keys(triangles), kind="stable").reshape(-1, 2) // 3).T
     level = (kinds[a] == kinds[b]) & (
         np.einsum("ij,ij->i", normal[a], normal[b]) > np.cos(STRAIGHT)
@@ -67,16 +67,11 @@ def _faces(vertices: np.ndarray, triangles: np.ndarray, kinds: np.ndarray) -> np
     first = np.zeros(count, dtype=np.int64)
     first[face[::-1]] = triangles[::-1, 0]
     off = np.einsum(
-        "mkj,mj->mk", vertices[triangles] - vertices[first[face]][:, None], _unit(area)[face]
+        "mkj,mj->mk", vertices[triangles] - vertices[first[face]][:, None], unit_vectors(area)[face]
     )
     bent = np.zeros(count, dtype=bool)
     bent[face[np.abs(off).max(axis=1) > reach]] = True  # many small steps that add up to a curve
     return np.where(bent[face], count + np.arange(len(face)), face)
-
-
-def _unit(vectors: np.ndarray) -> np.ndarray:
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0)
 
 
 class _Net:
@@ -205,7 +200,7 @@ class _Net:
         count = np.maximum(np.bincount(ends, minlength=len(self.vertices)), 1)[:, None]
         moved = np.where(free[:, None], 0.5 * (self.vertices + sums / count), self.vertices)
         before, old = (
-            quality(self.vertices, self.triangles),
+            triangle_quality(self.vertices, self.triangles),
             area_vectors(self.vertices, self.triangles),
         )
         worst = np.full(len(self.vertices), np.inf)
@@ -213,7 +208,7 @@ class _Net:
         for _ in range(20):
             turned = np.einsum("ij,ij->i", area_vectors(moved, self.triangles), old) <= 0.0
             least = worst[self.triangles].min(axis=1)
-            spoiled = turned | (quality(moved, self.triangles) < least * (1.0 - 1e-9))
+            spoiled = turned | (triangle_quality(moved, self.triangles) < least * (1.0 - 1e-9))
             back = np.unique(self.triangles[spoiled])
             if (moved[back] == self.vertices[back]).all():
                 break
@@ -269,7 +264,7 @@ class _Net:
         ends = edges[crease]
         count = np.bincount(ends.ravel(), minlength=n)
         ways = np.zeros((n, 3))
-        unit = _unit(self.vertices[ends[:, 1]] - self.vertices[ends[:, 0]])
+        unit = unit_vectors(self.vertices[ends[:, 1]] - self.vertices[ends[:, 0]])
         np.add.at(ways, ends[:, 0], unit)
         np.add.at(ways, ends[:, 1], -unit)
         straight = np.linalg.norm(ways, axis=1) < STRAIGHT * 1e-2
@@ -294,11 +289,11 @@ class _Net:
         before, after = area_vectors(self.vertices, old), area_vectors(self.vertices, new)
         corners = self.vertices[new]
         longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-        floor = np.minimum(quality(self.vertices, old), 0.3)
+        floor = np.minimum(triangle_quality(self.vertices, old), 0.3)
         wrong = stays & (
             (np.einsum("ij,ij->i", before, after) <= 0.0)
             | (longest > LONG * self.size)
-            | (quality(self.vertices, new) < floor)
+            | (triangle_quality(self.vertices, new) < floor)
         )
         bad = np.bincount(whose[wrong], minlength=len(moved)) > 0
         # Neighbours that both ends have must be the two across the edge, else the surface would touch itself.

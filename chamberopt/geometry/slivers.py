@@ -8,46 +8,46 @@ from __future__ import annotations
 
 import numpy as np
 
-from chamberopt.geometry.solids import Surface
+from chamberopt.geometry.solids import SolidSurface
 from chamberopt.geometry.triangles import heights
 
-THINNEST = 1e-9  # m: a thousand times the rounding of a boolean at 100 mm, a millionth of the smallest ball
+MIN_HEIGHT = 1e-9  # m: a thousand times the rounding of a boolean at 100 mm, a millionth of the smallest ball
 PASSES = 20  # a change can free the next one; two or three passes are usual
 
 Triangle = tuple[int, int, int]
 
 
-def without_slivers(surface: Surface) -> tuple[Surface, int, int]:
+def remove_slivers(surface: SolidSurface) -> tuple[SolidSurface, int, int]:
     """The surface with triangles lower than THINNEST taken out, how many there were and how many had to stay.
 
     A needle (one edge shorter than THINNEST) is closed by merging that edge's ends. Any other gets one edge
     turned: within one source triangle where that makes the thinner of the two triangles thicker; across
     two, only where the sliver's apex lies on the edge, and then both halves belong to the neighbour.
     """
-    found = int((heights(surface.vertices, surface.triangles) < THINNEST).sum())
+    found = int((heights(surface.vertices, surface.triangles) < MIN_HEIGHT).sum())
     if not found:
         return surface, 0, 0
     web = _Web(surface)
     for _ in range(PASSES):
-        thin = [index for index in web.alive() if web.height(web.triangles[index]) < THINNEST]
+        thin = [index for index in web.alive() if web.height(web.triangles[index]) < MIN_HEIGHT]
         changes = [web.merge(index) or web.turn(index) for index in thin if index in web.triangles]
         if not any(changes):
             break
     cleaned = web.surface()
-    return cleaned, found, int((heights(cleaned.vertices, cleaned.triangles) < THINNEST).sum())
+    return cleaned, found, int((heights(cleaned.vertices, cleaned.triangles) < MIN_HEIGHT).sum())
 
 
 class _Web:
     """A closed surface that knows who its neighbours are while triangles come and go."""
 
-    def __init__(self, surface: Surface) -> None:
+    def __init__(self, surface: SolidSurface) -> None:
         self.vertices = surface.vertices
         self.solid, self.source = surface.solid.copy(), surface.source.copy()
         self.triangles: dict[int, Triangle] = {}
         self.of_edge: dict[tuple[int, int], int] = {}
         self.of_vertex: dict[int, set[int]] = {}
         self.suspects = np.flatnonzero(
-            heights(surface.vertices, surface.triangles) < THINNEST
+            heights(surface.vertices, surface.triangles) < MIN_HEIGHT
         ).tolist()
         for index, (a, b, c) in enumerate(surface.triangles.tolist()):
             self._put(index, (a, b, c))
@@ -59,18 +59,18 @@ class _Web:
     def height(self, triangle: Triangle) -> float:
         return float(heights(self.vertices, np.array([triangle]))[0])
 
-    def surface(self) -> Surface:
+    def surface(self) -> SolidSurface:
         kept = np.array(sorted(self.triangles))
         triangles = np.array([self.triangles[index] for index in kept.tolist()], dtype=np.int32)
         everything = np.ones(len(kept), dtype=bool)
-        return Surface(self.vertices, triangles, self.solid[kept], self.source[kept]).only(
+        return SolidSurface(self.vertices, triangles, self.solid[kept], self.source[kept]).select(
             everything
         )
 
     def merge(self, index: int) -> bool:
         """Closes the triangle's shortest edge if it is shorter than THINNEST and the surface stays closed."""
         u, v = min(_edges(self.triangles[index]), key=lambda edge: self._length(*edge))
-        if self._length(u, v) >= THINNEST:
+        if self._length(u, v) >= MIN_HEIGHT:
             return False
         around_u, around_v = self.of_vertex[u], self.of_vertex[v]
         if len(self._corners(around_u) & self._corners(around_v) - {u, v}) != 2:
@@ -128,7 +128,7 @@ class _Web:
         length = float(np.linalg.norm(along))
         if length == 0.0 or not 0.0 < float(to_apex @ along) < length * length:
             return False
-        return float(np.linalg.norm(np.cross(along, to_apex))) < THINNEST * length
+        return float(np.linalg.norm(np.cross(along, to_apex))) < MIN_HEIGHT * length
 
     def _area_vector(self, triangle: Triangle) -> np.ndarray:
         a, b, c = (self.vertices[corner] for corner in triangle)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.geometry.triangles import border, shells_of, winding_number
+from chamberopt.geometry.triangles import border_edges, find_shells, winding_number
 
 if TYPE_CHECKING:
     from manifold3d import CrossSection, Manifold
@@ -29,7 +29,7 @@ SAME_VOLUME = (
 
 
 @dataclass(frozen=True)
-class Surface:
+class SolidSurface:
     """The closed surface of a solid.
 
     vertices (n, 3) float64 m · triangles (k, 3) int32, normals outward · solid (k,) int64 the label of the
@@ -41,11 +41,11 @@ class Surface:
     solid: np.ndarray
     source: np.ndarray
 
-    def only(self, keep: np.ndarray) -> Surface:
+    def select(self, keep: np.ndarray) -> SolidSurface:
         """The triangles where keep (k,) is true, with just the vertices they use."""
         used, renumbered = np.unique(self.triangles[keep], return_inverse=True)
         triangles = renumbered.reshape(-1, 3).astype(np.int32)
-        return Surface(self.vertices[used], triangles, self.solid[keep], self.source[keep])
+        return SolidSurface(self.vertices[used], triangles, self.solid[keep], self.source[keep])
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Solid:
         """Enclosed volume [m³]."""
         return float(self.body.volume()) * 1e-9
 
-    def surface(self) -> Surface:
+    def surface(self) -> SolidSurface:
         """The solid's surface, each triangle with its origin."""
         mesh = self.body.to_mesh64()
         ends = np.asarray(mesh.run_index, dtype=np.int64)
@@ -69,15 +69,15 @@ class Solid:
         solid = np.repeat(np.asarray(mesh.run_original_id, dtype=np.int64), runs)
         vertices = np.asarray(mesh.vert_properties)[:, :3] * 1e-3
         triangles = np.asarray(mesh.tri_verts).astype(np.int32)
-        return Surface(vertices, triangles, solid, np.asarray(mesh.face_id).astype(np.int32))
+        return SolidSurface(vertices, triangles, solid, np.asarray(mesh.face_id).astype(np.int32))
 
 
-def snapped(vertices: np.ndarray) -> np.ndarray:
+def snap_to_grid(vertices: np.ndarray) -> np.ndarray:
     """Positions [m], shape (n, 3), moved to the grid that solids live on (by at most 0.5 nm per axis)."""
     return _grid_mm(vertices) * 1e-3
 
 
-def solid(
+def make_solid(
     vertices: np.ndarray, triangles: np.ndarray, name: str, only: np.ndarray | None = None
 ) -> Solid:
     """A solid from a closed surface: vertices (n, 3) m, triangles (m, 3), outward.
@@ -105,30 +105,30 @@ def solid(
     return made
 
 
-def bodies(vertices: np.ndarray, triangles: np.ndarray, name: str) -> tuple[list[Solid], int]:
+def split_bodies(vertices: np.ndarray, triangles: np.ndarray, name: str) -> tuple[list[Solid], int]:
     """The solids of a surface of several bodies, (n, 3) m and (m, 3), and how many closed voids in them were filled.
 
     Sources count in the whole list of triangles. Unite them before use: bodies that overlap in one mesh would be
     subtracted wrongly, without an error.
     """
-    shells, volumes = shells_of(vertices, triangles)
+    shells, volumes = find_shells(vertices, triangles)
     if len(volumes) == 1:
-        return [solid(vertices, triangles, name)], 0
+        return [make_solid(vertices, triangles, name)], 0
     each = [np.flatnonzero(shells == k) for k in np.flatnonzero(volumes > 0.0)]
-    return [solid(vertices, triangles, name, only=body) for body in each], int(
+    return [make_solid(vertices, triangles, name, only=body) for body in each], int(
         (volumes < 0.0).sum()
     )
 
 
-def swept(face: Surface, way: np.ndarray, name: str) -> Solid:
+def sweep(face: SolidSurface, way: np.ndarray, name: str) -> Solid:
     """The room over a flat face, whose normals point away from it, up to as far as ``way`` (3,) [m]."""
-    count, (a, b) = len(face.vertices), border(face.triangles).T
+    count, (a, b) = len(face.vertices), border_edges(face.triangles).T
     walls = np.concatenate([np.c_[b, a, a + count], np.c_[b, a + count, b + count]])
     triangles = np.concatenate([face.triangles, face.triangles[:, ::-1] + count, walls])
-    return solid(np.concatenate([face.vertices, face.vertices + way]), triangles, name)
+    return make_solid(np.concatenate([face.vertices, face.vertices + way]), triangles, name)
 
 
-def united(solids: list[Solid], name: str) -> Solid:
+def unite(solids: list[Solid], name: str) -> Solid:
     """All of them as one body; where they overlap, once."""
     from manifold3d import Manifold, OpType
 
@@ -163,7 +163,7 @@ class Outline:
 
     section: CrossSection
 
-    def grown(self, by: float, facets: int) -> Outline:
+    def offset(self, by: float, facets: int) -> Outline:
         """The area within ``by`` [m] of this one, round corners in ``facets`` flat sides to a turn; below 0: shrunk."""
         from manifold3d import JoinType
 
@@ -173,7 +173,7 @@ class Outline:
         """Corners (n, 2) m of the convex hull, counter-clockwise; those within the tolerance [m] of a line left out."""
         return _corners(self.section.hull().simplify(1e3 * tolerance))[0]
 
-    def filled(self, tolerance: float) -> list[np.ndarray]:
+    def without_holes(self, tolerance: float) -> list[np.ndarray]:
         """Corners of the pieces, as those of the hull, their holes left out."""
         from manifold3d import CrossSection
 
@@ -181,13 +181,13 @@ class Outline:
         return _corners(CrossSection(outer).simplify(1e3 * tolerance))
 
 
-def shadow(vertices: np.ndarray, triangles: np.ndarray, below: float) -> Outline:
+def plan_outline(vertices: np.ndarray, triangles: np.ndarray, below: float) -> Outline:
     """What a closed surface, vertices (n, 3) m and triangles (m, 3) outward, covers in plan, below a height [m]."""
     from manifold3d import CrossSection, OpType
 
-    shells, volumes = shells_of(vertices, triangles)
+    shells, volumes = find_shells(vertices, triangles)
     bodies = [
-        solid(vertices, triangles, "the part", only=np.flatnonzero(shells == k))
+        make_solid(vertices, triangles, "the part", only=np.flatnonzero(shells == k))
         for k in np.flatnonzero(volumes > 0.0)
     ]
     sections = [
@@ -197,7 +197,7 @@ def shadow(vertices: np.ndarray, triangles: np.ndarray, below: float) -> Outline
     return Outline(CrossSection.batch_boolean(sections, OpType.Add))
 
 
-def extruded(outline: np.ndarray, height: float) -> tuple[np.ndarray, np.ndarray]:
+def extrude(outline: np.ndarray, height: float) -> tuple[np.ndarray, np.ndarray]:
     """Vertices (k, 3) m and triangles (m, 3) of the prism from z = 0 up over an outline (n, 2) m, convex or not."""
     from manifold3d import CrossSection
 
@@ -207,7 +207,7 @@ def extruded(outline: np.ndarray, height: float) -> tuple[np.ndarray, np.ndarray
     )
 
 
-def overlap(one: Solid, two: Solid) -> float:
+def overlap_volume(one: Solid, two: Solid) -> float:
     """The volume [m³] that both have in common."""
     common = one.body ^ two.body
     return (
@@ -215,9 +215,9 @@ def overlap(one: Solid, two: Solid) -> float:
     )
 
 
-def cavities(surface: Surface) -> list[np.ndarray]:
+def find_cavities(surface: SolidSurface) -> list[np.ndarray]:
     """The separate rooms of a surface, largest first: masks (k,) of an outer shell and the islands in it."""
-    shells, volumes = shells_of(surface.vertices, surface.triangles)
+    shells, volumes = find_shells(surface.vertices, surface.triangles)
     outer = sorted(np.flatnonzero(volumes > 0.0), key=lambda shell: -volumes[shell])
     rooms = {int(shell): shells == shell for shell in outer}
     for island in np.flatnonzero(volumes <= 0.0):

@@ -5,7 +5,7 @@ import numpy as np
 LEVEL = 1e-3  # rad: a surface that rises by less is level but for rounding
 
 
-def distinct_rows(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def unique_rows(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Index of the first of each different row of (n, 3), rows in rising order, and which one each row is, (n,).
 
     As np.unique(axis=0) does, six times faster on millions of rows.
@@ -26,14 +26,14 @@ def edge_keys(triangles: np.ndarray) -> np.ndarray:
     return np.minimum(a, b) * count + np.maximum(a, b)
 
 
-def border(triangles: np.ndarray) -> np.ndarray:
+def border_edges(triangles: np.ndarray) -> np.ndarray:
     """The directed sides (k, 2) of some triangles (m, 3) of a surface that are not shared among them."""
     sides = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
     count = int(sides.max()) + 1
     return sides[~np.isin(sides[:, 0] * count + sides[:, 1], sides[:, 1] * count + sides[:, 0])]
 
 
-def shells_of(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def find_shells(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Connected pieces of a closed surface: (m,) the piece of each triangle, and each piece's volume [m³]."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -70,7 +70,9 @@ def winding_number(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
     return np.arctan2(top, bottom).sum(axis=1) / (2.0 * np.pi)
 
 
-def free_rim(vertices: np.ndarray, triangles: np.ndarray, face: np.ndarray) -> np.ndarray | None:
+def find_unwalled_border(
+    vertices: np.ndarray, triangles: np.ndarray, face: np.ndarray
+) -> np.ndarray | None:
     """A point (3,) where the surface does not rise into the room beside the marked flat triangles; None if there is
     none. Normals point out of the room; face (m,) bool.
     """
@@ -95,9 +97,7 @@ def heights(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Smallest height [m] of each triangle, shape (m,): 0 for one without area."""
     corners = vertices[triangles]
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    twice = np.linalg.norm(
-        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
-    )
+    twice = 2.0 * areas(vertices, triangles)
     return np.divide(twice, longest, out=np.zeros_like(twice), where=longest > 0.0)
 
 
@@ -112,7 +112,28 @@ def area_vectors(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return 0.5 * np.cross(b - a, c - a)
 
 
-def rotation(degrees: tuple[float, float, float]) -> np.ndarray:
+def unit_normals(corners: np.ndarray) -> np.ndarray:
+    """Unit normals of triangles with corners (..., 3, 3), shape (..., 3); zero where there is no area."""
+    first = corners[..., 0, :]
+    return unit_vectors(np.cross(corners[..., 1, :] - first, corners[..., 2, :] - first))
+
+
+def unit_vectors(vectors: np.ndarray) -> np.ndarray:
+    """Vectors (..., 3) scaled to length 1; a zero vector stays zero."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0)
+
+
+def closest_points(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """The point of each triangle (n, 3, 3) that is closest to the matching point (n, 3) [m], shape (n, 3)."""
+    from trimesh.triangles import closest_point
+
+    # In mm: trimesh takes fourth powers of lengths below 1e-13 for zero. In metres that would
+    # already be a triangle of half a millimetre.
+    return np.asarray(closest_point(corners * 1e3, points * 1e3)) * 1e-3 if len(points) else points
+
+
+def rotation_matrix(degrees: tuple[float, float, float]) -> np.ndarray:
     """Matrix (3, 3) of turns about the fixed axes x, then y, then z; exact for quarter turns."""
     matrix = np.eye(3)
     for axis, angle in enumerate(degrees):

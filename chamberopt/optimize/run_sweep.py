@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.common.errors import InputError, WorkerLostError
-from chamberopt.common.parallel.executor import SerialExecutor, shared
+from chamberopt.common.parallel.executor import SerialExecutor, share
 from chamberopt.common.progress import Progress
 from chamberopt.optimize.evaluate_candidate import Evaluator, Judge
 from chamberopt.optimize.run_study import kept_target, save_inputs, simulation
@@ -158,7 +158,7 @@ def _judged(
     """The trials from the ``first`` on in the plan's order, and the seconds that each took; all tasks are there from
     the start, so that no worker waits for another.
     """
-    target = shared(executor, kept_target(study) if evaluator is None else None)
+    target = share(executor, kept_target(study) if evaluator is None else None)
     numbers = range(first, len(plan.points))
     futures = [
         executor.submit(judged, study, number, plan.points[number], target, evaluator)

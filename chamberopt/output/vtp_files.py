@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import whole_file
+from chamberopt.common.files import atomic_write
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -53,7 +53,7 @@ def _write_surface(
     surface = pyvista().PolyData.from_regular_faces(vertices * MM, triangles)
     for name, values in fields.items():
         surface.cell_data[name] = values
-    with whole_file(path) as temporary:
+    with atomic_write(path) as temporary:
         surface.save(temporary)
 
 

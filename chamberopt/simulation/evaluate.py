@@ -20,7 +20,7 @@ import numpy as np
 
 from chamberopt.chamber.analytic import described
 from chamberopt.chamber.scene import chamber_mesh
-from chamberopt.common.parallel.executor import shared
+from chamberopt.common.parallel.executor import share
 from chamberopt.common.progress import Progress
 from chamberopt.coverage.dents import Samples, few_points_note, marked_share, sample_points
 from chamberopt.coverage.estimators import coverage_figures, few_dents_note, surface, time_to_98
@@ -165,7 +165,7 @@ def evaluate(
         if accuracy.coverage_model == "dents"
         else None
     )
-    setting = shared(executor, (design, chamber, mesh, samples))
+    setting = share(executor, (design, chamber, mesh, samples))
     done = [] if done is None else done
     clock = {"simulate": 0.0, "coverage": 0.0}
     while True:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import whole_file
+from chamberopt.common.files import atomic_write
 from chamberopt.coverage.hits import Hits
 from chamberopt.coverage.statistics.interval import Estimate
 from chamberopt.coverage.tally import Tally
@@ -32,7 +32,7 @@ def save_evaluation(path: Path, evaluation: Evaluation) -> None:
     tree = json.dumps(_taken_apart(evaluation, arrays))
     packed = io.BytesIO()  # in memory first: a full disk is then one plain OSError
     np.savez_compressed(packed, tree=np.frombuffer(tree.encode(), dtype=np.uint8), **arrays)  # type: ignore[arg-type]
-    with whole_file(path) as temporary:
+    with atomic_write(path) as temporary:
         temporary.write_bytes(packed.getbuffer())
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from chamberopt.chamber.build import TAG_PART
 from chamberopt.chamber.checks.place_names import around, surface_names
-from chamberopt.coverage.dents import nearest_on_triangles
+from chamberopt.geometry.triangles import closest_points
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -136,7 +136,7 @@ def _touched(chamber: Chamber, asked: np.ndarray, position: np.ndarray, reach: f
     near = (
         np.abs(position - np.clip(position, corners.min(axis=1), corners.max(axis=1))) <= reach
     ).all(axis=1)
-    found = nearest_on_triangles(corners[near], np.broadcast_to(position, (near.sum(), 3)))
+    found = closest_points(corners[near], np.broadcast_to(position, (near.sum(), 3)))
     return np.asarray(asked[near][np.linalg.norm(found - position, axis=1) <= reach])
 
 

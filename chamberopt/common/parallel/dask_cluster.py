@@ -14,10 +14,10 @@ from urllib.parse import urlsplit
 
 from chamberopt.common.errors import ClusterLostError, InputError, WorkerLostError
 
-PATIENCE = 20.0  # s, until a scheduler has answered, and until it has a worker
+TIMEOUT_S = 20.0  # s, until a scheduler has answered, and until it has a worker
 
 
-class Cluster(Executor):
+class DaskExecutor(Executor):
     """Runs tasks on the workers of a Dask scheduler.
 
     A task whose worker dies is run again elsewhere by the scheduler; one that takes several down
@@ -31,7 +31,7 @@ class Cluster(Executor):
         except ImportError:
             text = "needs Dask, which is not installed; pip install 'chamberopt[dask]'"
             raise InputError(f"--cluster: {text}") from None
-        address, patience = _address(cluster), PATIENCE if patience is None else patience
+        address, patience = _address(cluster), TIMEOUT_S if patience is None else patience
         try:
             _knock(address, patience)
             self._client = Client(address, timeout=patience, set_as_default=False)

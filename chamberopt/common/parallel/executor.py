@@ -11,11 +11,11 @@ from typing import Any, Literal
 
 from chamberopt.common.errors import InputError
 
-Kind = Literal["threads", "processes"]
+WorkerKind = Literal["threads", "processes"]
 
 # Python's lock is held for 14 % of a replica (the gear's, 0.2 s of CPU time: packing the shot, tallies), so that seven
 # threads leave it no rest. A process first takes some 2 s of CPU time to import everything and load compiled code.
-MOST_THREADS = 8
+MAX_THREADS = 8
 
 
 def core_count() -> int:
@@ -25,7 +25,7 @@ def core_count() -> int:
     return max(1, os.cpu_count() or 1)
 
 
-def local_executor(workers: int | None = None, kind: Kind = "threads") -> Executor:
+def local_executor(workers: int | None = None, kind: WorkerKind = "threads") -> Executor:
     """Workers on this machine, one per core unless `workers` says otherwise; use it in a `with` block.
 
     Threads share the chamber and start at once, and the simulator releases Python's lock; processes run what holds it
@@ -38,12 +38,14 @@ def local_executor(workers: int | None = None, kind: Kind = "threads") -> Execut
     count = workers or core_count()
     if kind == "threads":
         return ThreadPoolExecutor(count, thread_name_prefix="replica")
-    from chamberopt.common.parallel.processes import Processes
+    from chamberopt.common.parallel.processes import ProcessExecutor
 
-    return Processes(count)
+    return ProcessExecutor(count)
 
 
-def open_executor(workers: int | None, cluster: str | None, kind: Kind | None = None) -> Executor:
+def open_executor(
+    workers: int | None, cluster: str | None, kind: WorkerKind | None = None
+) -> Executor:
     """The workers of --workers or --cluster: this machine's unless a cluster is named. InputError for both.
 
     kind: of this machine's; when None threads, or processes where there are too many cores for threads.
@@ -51,18 +53,18 @@ def open_executor(workers: int | None, cluster: str | None, kind: Kind | None = 
     if cluster is None:
         return local_executor(
             workers,
-            kind or ("threads" if (workers or core_count()) <= MOST_THREADS else "processes"),
+            kind or ("threads" if (workers or core_count()) <= MAX_THREADS else "processes"),
         )
     if workers is not None:
         raise InputError(
             f"--workers: given {workers}, but --cluster has workers of its own; leave one of the two out"
         )
-    from chamberopt.common.parallel.dask_cluster import Cluster
+    from chamberopt.common.parallel.dask_cluster import DaskExecutor
 
-    return Cluster(cluster)
+    return DaskExecutor(cluster)
 
 
-def shared(executor: Executor, value: Any) -> Any:
+def share(executor: Executor, value: Any) -> Any:
     """A value as an argument for many of this executor's tasks, which get the value itself."""
     share = getattr(executor, "share", None)
     return value if share is None else share(value)

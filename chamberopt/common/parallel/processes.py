@@ -30,7 +30,7 @@ ATTEMPTS = 2  # a process may be lost by chance, such as to the memory of anothe
 KEPT = 2  # parcels a worker keeps open: of this candidate, and of the one before it
 
 
-class Parcel:
+class SharedFile:
     """A value that travels once a worker: its pickle is the name of a file, which opens as the value itself."""
 
     def __init__(self, value: Any) -> None:
@@ -54,7 +54,7 @@ def _remove(path: str) -> None:
         os.unlink(path)
 
 
-class Processes(Executor):
+class ProcessExecutor(Executor):
     """So many processes, each started by its first task. A task whose process dies is run once more in a new one.
 
     Its second death raises WorkerLostError. Leaving the `with` block by an exception ends the processes at once.
@@ -66,8 +66,8 @@ class Processes(Executor):
         self._workers: list[_Worker] = []
         self._ended = False
 
-    def share(self, value: Any) -> Parcel:
-        return Parcel(value)
+    def share(self, value: Any) -> SharedFile:
+        return SharedFile(value)
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         return self._feeders.submit(self._run, fn, args, kwargs)

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import BaseModel, Field, ValidationInfo, field_validator
 
-from chamberopt.common.fields import from_file, listed, quantity
+from chamberopt.common.toml_fields import from_file, list_field, quantity
 from chamberopt.design.materials import STRICT
 from chamberopt.design.shapes.construction.cad_setup import Setup
 from chamberopt.design.shapes.construction.surface import ShapeSurface
@@ -29,10 +29,10 @@ class ChamberTable(BaseModel):
     sonotrode_distance_mm: float = quantity(
         0.1, 2000, "mm", "mean sonotrode face to lowest point of the part"
     )
-    deflectors: Annotated[tuple[Deflector, ...], Field(strict=False)] = listed(
+    deflectors: Annotated[tuple[Deflector, ...], Field(strict=False)] = list_field(
         "a list of tables, [[chamber.deflectors]]", "bodies that stand in the chamber", ()
     )
-    holes: Annotated[tuple[Hole, ...], Field(strict=False)] = listed(
+    holes: Annotated[tuple[Hole, ...], Field(strict=False)] = list_field(
         "a list of tables, [[chamber.holes]]", "blind bores in its wall", ()
     )
 

@@ -4,7 +4,7 @@ from typing import Literal
 
 import numpy as np
 
-from chamberopt.common.fields import quantity
+from chamberopt.common.toml_fields import quantity
 from chamberopt.design.shapes.polygon import PolygonChamber
 
 

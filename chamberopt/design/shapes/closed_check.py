@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 
 from chamberopt.design.shapes.construction.surface import TAG_SONOTRODE, TAG_WALL, ShapeSurface
-from chamberopt.geometry.mesh_io import SurfaceError, place_text
-from chamberopt.geometry.mesh_io.self_intersection import refuse_crossings
-from chamberopt.geometry.triangles import area_vectors, shells_of
+from chamberopt.geometry.mesh_io import SurfaceError, format_point
+from chamberopt.geometry.mesh_io.self_intersection import refuse_self_intersection
+from chamberopt.geometry.triangles import area_vectors, find_shells
 
 MOST_ACROSS = (
     10.0  # m: more than the shipped shapes can be, less than a chamber whose mm are taken for m
@@ -69,7 +69,7 @@ def _open_or_turned(vertices: np.ndarray, triangles: np.ndarray) -> str | None:
         return (
             f"is not closed: each side of a triangle must meet one other, run the other way{place}"
         )
-    _, volumes = shells_of(vertices, triangles)
+    _, volumes = find_shells(vertices, triangles)
     if len(volumes) > 1:
         return f"is in {len(volumes)} pieces; one closed surface is wanted"
     return "is inside out: normals must point out of the cavity" if volumes[0] <= 0.0 else None
@@ -77,9 +77,9 @@ def _open_or_turned(vertices: np.ndarray, triangles: np.ndarray) -> str | None:
 
 def _crossed(vertices: np.ndarray, triangles: np.ndarray) -> str | None:
     try:
-        refuse_crossings(Path(), vertices, triangles)
+        refuse_self_intersection(Path(), vertices, triangles)
     except SurfaceError as error:
-        places = place_text(error.edges.reshape(-1, 3).mean(axis=0))
+        places = format_point(error.edges.reshape(-1, 3).mean(axis=0))
         return f"crosses itself, near {places}"
     return None
 

@@ -14,14 +14,14 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.fields import quantity
 from chamberopt.common.toml_errors import CrossCheckError, Problem
+from chamberopt.common.toml_fields import quantity
 from chamberopt.design.shapes.base import ParametricChamber
 from chamberopt.design.shapes.construction.limits import LEAST, refuse_inward
 from chamberopt.design.shapes.construction.loft import lofted
 from chamberopt.design.shapes.construction.outline import arcs
 from chamberopt.design.shapes.construction.surface import TAG_SONOTRODE, TAG_WALL, ShapeSurface
-from chamberopt.geometry.solids import Outline, extruded, shadow
+from chamberopt.geometry.solids import Outline, extrude, plan_outline
 
 SIMPLIFIED = 5e-6  # m: the outline may be off by this much, an eighth of what 64 facets are off a wall of 70 mm
 
@@ -72,7 +72,7 @@ class Conformal(ParametricChamber):
                 f"chamber.height_mm: given {self.height_mm:g}: no part below that ceiling, whose outline could be "
                 "followed; raise height_mm or lower chamber.sonotrode_distance_mm"
             )
-        outline = shadow(vertices, triangles, self.height)
+        outline = plan_outline(vertices, triangles, self.height)
         return self._leaning(outline) if self.outline == "hull" else self._upright(outline)
 
     def _leaning(self, outline: Outline) -> ShapeSurface:
@@ -88,14 +88,14 @@ class Conformal(ParametricChamber):
 
     def _upright(self, outline: Outline) -> ShapeSurface:
         radius = 1e-3 * self.corner_radius_mm
-        grown = outline.grown(self.gap + radius, self.facets)
-        around = (grown.grown(-radius, self.facets) if radius else grown).filled(SIMPLIFIED)
+        grown = outline.offset(self.gap + radius, self.facets)
+        around = (grown.offset(-radius, self.facets) if radius else grown).without_holes(SIMPLIFIED)
         if len(around) > 1:
             raise InputError(
                 f"chamber.gap_mm: given {self.gap_mm:g}, with which the part's shadow stays in {len(around)} pieces, "
                 'each with a chamber of its own; raise it or corner_radius_mm, or use outline = "hull"'
             )
-        vertices, triangles = extruded(around[0], self.height)
+        vertices, triangles = extrude(around[0], self.height)
         low = (vertices[triangles][..., 2] == 0.0).all(axis=1)
         return ShapeSurface(
             vertices, triangles, np.where(low, TAG_SONOTRODE, TAG_WALL).astype(np.uint8)

@@ -54,7 +54,7 @@ def own_shape(path: Path) -> type[ChamberTable]:
     try:
         source = path.read_bytes()
     except FileNotFoundError:
-        raise InputError(toml_errors.not_found(path, "shape file", "*.py")) from None
+        raise InputError(toml_errors.explain_missing_file(path, "shape file", "*.py")) from None
     except OSError as error:
         raise InputError(
             f"{path}: cannot be read: {error.strerror}; check its permissions"

@@ -5,19 +5,19 @@ from typing import Literal, Self
 
 from pydantic import BaseModel, Field, model_validator
 
-from chamberopt.common.fields import (
+from chamberopt.common.toml_errors import CrossCheckError, Problem
+from chamberopt.common.toml_fields import (
     Direction,
     MeshFile,
-    Place,
+    Position,
     Triple,
-    Unit,
-    listed,
+    list_field,
     metres,
     quantity,
     unit_vector,
 )
-from chamberopt.common.toml_errors import CrossCheckError, Problem
 from chamberopt.design.materials import STRICT
+from chamberopt.geometry.mesh_io.units import Unit
 
 SIZES = {
     "plate": ("size_mm",),
@@ -35,13 +35,13 @@ class Deflector(BaseModel):
     model_config = STRICT
 
     kind: Literal["plate", "rod", "ball", "mesh"] = Field(description="what it is")
-    at_mm: Place = listed(
+    at_mm: Position = list_field(
         "three numbers [x, y, z] in mm", "its middle (of a mesh: its box's), in the chamber's frame"
     )
-    rotate_deg: Triple = listed(
+    rotate_deg: Triple = list_field(
         "three numbers [x, y, z] in degrees", "turns about x, then y, then z", (0.0, 0.0, 0.0)
     )
-    size_mm: Triple | None = listed(
+    size_mm: Triple | None = list_field(
         "three numbers [x, y, z] in mm, above 0", "sides of a plate", None
     )
     diameter_mm: float | None = quantity(0.1, 2000, "mm", "of a rod or ball", None)
@@ -102,10 +102,10 @@ class Hole(BaseModel):
 
     model_config = STRICT
 
-    at_mm: Place = listed(
+    at_mm: Position = list_field(
         "three numbers [x, y, z] in mm", "in the room, on the bore's axis; in the chamber's frame"
     )
-    axis: Direction = listed("three numbers [x, y, z], not all 0", "the way out of the room")
+    axis: Direction = list_field("three numbers [x, y, z], not all 0", "the way out of the room")
     diameter_mm: float = quantity(0.1, 2000, "mm", "of the bore")
     depth_mm: float = quantity(0.1, 2000, "mm", "beyond the wall, along the axis")
 

@@ -12,7 +12,7 @@ from typing import Self
 import numpy as np
 from pydantic import model_validator
 
-from chamberopt.common.fields import quantity
+from chamberopt.common.toml_fields import quantity
 from chamberopt.design.shapes.base import ParametricChamber
 from chamberopt.design.shapes.construction.limits import LEAST_MM, refuse_beyond, refuse_inward
 from chamberopt.design.shapes.construction.loft import lofted

@@ -5,7 +5,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from chamberopt.common.fields import quantity
+from chamberopt.common.toml_fields import quantity
 from chamberopt.design.shapes.polygon import PolygonChamber
 
 

@@ -12,8 +12,8 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, field_validator
 
-from chamberopt.common.fields import Pair, listed
 from chamberopt.common.toml_errors import CrossCheckError, Problem
+from chamberopt.common.toml_fields import Pair, list_field
 from chamberopt.design.shapes.construction.limits import LEAST, LEAST_MM
 from chamberopt.design.shapes.construction.profile import crossing
 from chamberopt.design.shapes.round import RoundChamber
@@ -26,7 +26,7 @@ class Revolve(RoundChamber):
 
     shape: Literal["revolve"]
     profile_mm: Annotated[tuple[Pair, ...], Field(strict=False, min_length=2, max_length=200)] = (
-        listed(
+        list_field(
             "2 to 200 points [[r, z], ...] in mm, the first at z = 0, none beyond 2000",
             "the wall from the sonotrode's rim up to the ceiling; r = 0 at its end: on the axis",
         )

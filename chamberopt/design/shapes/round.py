@@ -6,8 +6,8 @@ from typing import Self
 import numpy as np
 from pydantic import model_validator
 
-from chamberopt.common.fields import quantity
 from chamberopt.common.toml_errors import CrossCheckError, Problem
+from chamberopt.common.toml_fields import quantity
 from chamberopt.design.shapes.base import WalledChamber
 from chamberopt.design.shapes.construction.limits import (
     LEAST,

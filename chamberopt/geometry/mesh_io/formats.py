@@ -11,20 +11,17 @@ from chamberopt.common.errors import InputError
 from chamberopt.geometry.mesh_io.readers.abaqus import read_abaqus
 from chamberopt.geometry.mesh_io.readers.gmsh import read_gmsh
 from chamberopt.geometry.mesh_io.readers.nastran import read_nastran
+from chamberopt.geometry.mesh_io.readers.obj import read_obj
+from chamberopt.geometry.mesh_io.readers.ply import read_ply
 from chamberopt.geometry.mesh_io.readers.raw_mesh import RawMesh
-from chamberopt.geometry.mesh_io.readers.surfaces import (
-    is_text_stl,
-    read_3mf,
-    read_obj,
-    read_ply,
-    read_step,
-    read_stl,
-)
+from chamberopt.geometry.mesh_io.readers.step import read_step
+from chamberopt.geometry.mesh_io.readers.stl import is_text_stl, read_stl
+from chamberopt.geometry.mesh_io.readers.threemf import read_3mf
 from chamberopt.geometry.mesh_io.readers.vtk import read_vtk
 
 
 @dataclass(frozen=True)
-class Format:
+class MeshFormat:
     """A way to write a mesh: its usual endings, what its content begins with or holds, and its reader."""
 
     name: str
@@ -43,26 +40,26 @@ def _first(pattern: str) -> re.Pattern[bytes]:
     return re.compile(rb"\A\s*(?:" + pattern.encode() + rb")")
 
 
-FORMATS = (
-    Format("3MF", (".3mf",), _first(r"PK\x03\x04"), read_3mf),
-    Format("STEP", (".step", ".stp"), _first("ISO-10303-21"), read_step),
-    Format("PLY", (".ply",), _first(r"ply\s"), read_ply),
-    Format("Gmsh", (".msh",), _first(r"\$MeshFormat"), read_gmsh),
-    Format(
+MESH_FORMATS = (
+    MeshFormat("3MF", (".3mf",), _first(r"PK\x03\x04"), read_3mf),
+    MeshFormat("STEP", (".step", ".stp"), _first("ISO-10303-21"), read_step),
+    MeshFormat("PLY", (".ply",), _first(r"ply\s"), read_ply),
+    MeshFormat("Gmsh", (".msh",), _first(r"\$MeshFormat"), read_gmsh),
+    MeshFormat(
         "VTK",
         (".vtk", ".vtp", ".vtu"),
         _first(r"# vtk DataFile|(?:<\?xml[^>]*>\s*)?<VTKFile"),
         read_vtk,
     ),
-    Format("STL", (".stl",), _first(r"solid[^\0]*facet"), read_stl),
-    Format(
+    MeshFormat("STL", (".stl",), _first(r"solid[^\0]*facet"), read_stl),
+    MeshFormat(
         "Nastran",
         (".dat", ".data", ".bdf", ".nas"),
         _anywhere(r"GRID\*?(?:[ \t]+|,)[ \t]*\d|BEGIN[ \t]+BULK"),
         read_nastran,
     ),
-    Format("Abaqus", (".inp",), _anywhere(r"\*(?:HEADING|NODE|PART)\b"), read_abaqus),
-    Format("OBJ", (".obj",), _anywhere(r"v[ \t]+[-+.\d]+[ \t]+[-+.\d]"), read_obj),
+    MeshFormat("Abaqus", (".inp",), _anywhere(r"\*(?:HEADING|NODE|PART)\b"), read_abaqus),
+    MeshFormat("OBJ", (".obj",), _anywhere(r"v[ \t]+[-+.\d]+[ \t]+[-+.\d]"), read_obj),
 )
 HEAD = 1 << 16  # bytes in which a text file has shown what it is, comments at its head included
 
@@ -84,17 +81,17 @@ def read_raw(path: Path, content: bytes) -> RawMesh:
     return mesh
 
 
-def _format_of(path: Path, content: bytes) -> Format:
-    by_suffix = next((one for one in FORMATS if path.suffix.lower() in one.suffixes), None)
+def _format_of(path: Path, content: bytes) -> MeshFormat:
+    by_suffix = next((one for one in MESH_FORMATS if path.suffix.lower() in one.suffixes), None)
     if _is_binary_stl(content):
-        return next(one for one in FORMATS if one.name == "STL")
+        return next(one for one in MESH_FORMATS if one.name == "STL")
     head = content[:HEAD]
     binary = b"\0" in head[:1024]
-    for one in FORMATS:
+    for one in MESH_FORMATS:
         if one.content.search(head if not binary else head[:1024]):
             return one
     if by_suffix is None:
-        told = ", ".join(suffix for one in FORMATS for suffix in one.suffixes)
+        told = ", ".join(suffix for one in MESH_FORMATS for suffix in one.suffixes)
         raise InputError(
             f"{path}: not a mesh file that is known, by its content or name; use {told}"
         )

@@ -8,8 +8,8 @@ import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.geometry.mesh_io.holes import filled, hole_count
-from chamberopt.geometry.mesh_io.surface_error import OpenSurfaceError, SurfaceError, place_text
-from chamberopt.geometry.triangles import distinct_rows, edge_keys, shells_of, winding_number
+from chamberopt.geometry.mesh_io.surface_error import OpenSurfaceError, SurfaceError, format_point
+from chamberopt.geometry.triangles import edge_keys, find_shells, unique_rows, winding_number
 
 WELD = 1e-6  # of the bounding box's diagonal: what a text format with 6 digits rounds away
 
@@ -20,7 +20,7 @@ def sewn(path: Path, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nd
     Also of which given triangle each one is: (k,), -1 for one that closes a hole. Raises SurfaceError for what
     stays open or is not manifold.
     """
-    first, numbers = distinct_rows(corners.reshape(-1, 3))
+    first, numbers = unique_rows(corners.reshape(-1, 3))
     points = corners.reshape(-1, 3)[first]
     source = np.arange(len(corners))
     points, triangles, source, notes = _without_repeats(points, numbers.reshape(-1, 3), source)
@@ -44,7 +44,7 @@ def sewn(path: Path, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nd
         a, b = points[open_edges[0]]
         where = f"{len(open_edges)} open edges in {holes} hole{'s' * (holes > 1)}"
         raise OpenSurfaceError(
-            f"{path}: the surface is not closed: {where}, the first from {place_text(a)} to {place_text(b)}; "
+            f"{path}: the surface is not closed: {where}, the first from {format_point(a)} to {format_point(b)}; "
             "close it in the CAD program",
             points[triangles],
             points[open_edges],
@@ -54,7 +54,7 @@ def sewn(path: Path, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nd
         a, b = points[crowded[0]]
         raise SurfaceError(
             f"{path}: not manifold: {len(crowded)} edges belong to more than two triangles, the first from "
-            f"{place_text(a)} to {place_text(b)}; make the bodies overlap or leave a gap there",
+            f"{format_point(a)} to {format_point(b)}; make the bodies overlap or leave a gap there",
             points[triangles],
             points[crowded],
         )
@@ -76,7 +76,7 @@ def _without_repeats(
     turned = np.take_along_axis(
         triangles, (triangles.argmin(axis=1)[:, None] + np.arange(3)) % 3, axis=1
     )
-    first = np.sort(distinct_rows(turned)[0])
+    first = np.sort(unique_rows(turned)[0])
     if len(first) < len(triangles):
         notes.append(f"dropped {len(triangles) - len(first)} triangles that were there twice")
         triangles, source = triangles[first], source[first]
@@ -113,7 +113,7 @@ def outward(
     if against.any():
         notes.append(f"turned {against.sum()} triangles that faced against their neighbours")
         triangles = np.where(against[:, None], triangles[:, ::-1], triangles)
-    shells, volumes = shells_of(vertices, triangles)
+    shells, volumes = find_shells(vertices, triangles)
     for k in np.flatnonzero(volumes < 0.0):
         if _stands_in_another(vertices, triangles, shells, k):
             continue  # the wall of a void

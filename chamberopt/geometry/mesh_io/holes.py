@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from chamberopt.geometry.mesh_io.surface_error import place_text
+from chamberopt.geometry.mesh_io.surface_error import format_point
 
 SMALL = 0.03  # of the part's diagonal: widest hole that is closed unasked
 LONGEST_RIM = 64  # edges; the programme takes the cube of this
@@ -38,7 +38,7 @@ def filled(
             widest, where = width, corners.mean(axis=0)
     notes = []
     if holes:
-        told = f"the widest {1e3 * widest:.3g} mm at {place_text(where)}"
+        told = f"the widest {1e3 * widest:.3g} mm at {format_point(where)}"
         notes.append(f"closed {holes} small hole{'s' * (holes > 1)}, {told}")
     if cracks:
         notes.append(

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from chamberopt.geometry.mesh_io.surface_error import SurfaceError, place_text
-from chamberopt.geometry.triangles import heights, shells_of
+from chamberopt.geometry.mesh_io.surface_error import SurfaceError, format_point
+from chamberopt.geometry.triangles import find_shells, heights, unit_normals
 
 CHUNK = 1 << 18  # pairs looked at together: bounds memory at some 100 MB
 TOUCH = (
@@ -20,14 +20,14 @@ TOUCH = (
 )
 
 
-def refuse_crossings(path: Path, vertices: np.ndarray, triangles: np.ndarray) -> None:
+def refuse_self_intersection(path: Path, vertices: np.ndarray, triangles: np.ndarray) -> None:
     """Raises SurfaceError with the place when a body's closed surface (vertices [m], triangles (m, 3)) crosses itself.
 
     Several bodies may overlap: they are united where the chamber is made.
     """
     corners = vertices[triangles]
     touch = TOUCH * float(np.linalg.norm(np.ptp(vertices, axis=0)))
-    shells, _ = shells_of(vertices, triangles)
+    shells, _ = find_shells(vertices, triangles)
     usable = np.flatnonzero(heights(vertices, triangles) > touch)  # a thinner one has no direction
     found = []
     for a, b in _close_pairs(corners[usable]):
@@ -42,7 +42,7 @@ def refuse_crossings(path: Path, vertices: np.ndarray, triangles: np.ndarray) ->
     sides = corners[np.unique(pairs)][:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2, 3)
     raise SurfaceError(
         f"{path}: the surface crosses itself: {pairs.shape[1]} pairs of triangles, the first near "
-        f"{place_text(middle)} (triangles {first.min() + 1} and {first.max() + 1}); heal it in the CAD program, or "
+        f"{format_point(middle)} (triangles {first.min() + 1} and {first.max() + 1}); heal it in the CAD program, or "
         "make its pieces bodies of their own",
         corners,
         sides,
@@ -108,7 +108,7 @@ def _crossing(
     if not len(a):
         return a, b
     of_a, of_b = corners[a], corners[b]
-    along = np.cross(_normals(of_a), _normals(of_b))
+    along = np.cross(unit_normals(of_a), unit_normals(of_b))
     along /= np.linalg.norm(along, axis=1)[:, None]
     low_a, high_a = _interval(of_a, _distances(of_a, of_b), along)
     low_b, high_b = _interval(of_b, _distances(of_b, of_a), along)
@@ -116,14 +116,9 @@ def _crossing(
     return a[common > touch], b[common > touch]
 
 
-def _normals(corners: np.ndarray) -> np.ndarray:
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return across / np.linalg.norm(across, axis=1)[:, None]
-
-
 def _distances(corners: np.ndarray, planes: np.ndarray) -> np.ndarray:
     """Distances (k, 3) of the corners of triangles from the planes of others."""
-    return np.einsum("kij,kj->ki", corners - planes[:, :1], _normals(planes))
+    return np.einsum("kij,kj->ki", corners - planes[:, :1], unit_normals(planes))
 
 
 def _interval(

@@ -22,11 +22,11 @@ class OpenSurfaceError(SurfaceError):
     """A surface with open edges that are too many to be closed."""
 
 
-def box_text(sides: np.ndarray) -> str:
+def format_box(sides: np.ndarray) -> str:
     """A bounding box's sides (3,) [m] as text: '44 x 44 x 70 mm'."""
     return " x ".join(f"{1e3 * side:.5g}" for side in sides) + " mm"
 
 
-def place_text(point: np.ndarray) -> str:
+def format_point(point: np.ndarray) -> str:
     """A position (3,) [m] as text: '(1, 2, 3) mm'."""
     return "(" + ", ".join(f"{1e3 * value + 0.0:.5g}" for value in point) + ") mm"

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.fields import METRES_PER
-from chamberopt.geometry.mesh_io.surface_error import box_text
+from chamberopt.geometry.mesh_io.surface_error import format_box
+
+Unit = Literal["um", "mm", "cm", "m", "in", "guess"]
+METRES_PER: dict[str, float] = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
 
 SMALLEST, LARGEST = (
     5e-4,
@@ -43,7 +46,9 @@ def unit_of(
             "leave part.unit out, or export in the unit that is meant"
         )
     if stated is not None:
-        told = f"unit stated by the file: the part measures {box_text(sides * METRES_PER[stated])}"
+        told = (
+            f"unit stated by the file: the part measures {format_box(sides * METRES_PER[stated])}"
+        )
         unit, notes = stated, [] if given == stated else [told]
     elif given != "guess":
         unit, notes = given, []
@@ -68,7 +73,7 @@ def _guess(path: Path, content: bytes, sides: np.ndarray) -> tuple[str, list[str
             + ", ".join(f'"{u}"' for u in METRES_PER)
         )
     return unit, [
-        f"unit guessed as {unit!r} ({why}): the part measures {box_text(sides * METRES_PER[unit])}; "
+        f"unit guessed as {unit!r} ({why}): the part measures {format_box(sides * METRES_PER[unit])}; "
         "give part.unit if that is wrong"
     ]
 
@@ -80,6 +85,6 @@ def _refuse_implausible(path: Path, sides: np.ndarray, unit: str) -> None:
     fitting = [u for u, m in METRES_PER.items() if SMALLEST <= sides.max() * m <= LARGEST]
     hint = f"; unit = {' or '.join(repr(u) for u in fitting)} would be plausible" if fitting else ""
     raise InputError(
-        f"{path}: with part.unit = {unit!r} the part measures {box_text(sides * METRES_PER[unit])}; allowed: longest "
+        f"{path}: with part.unit = {unit!r} the part measures {format_box(sides * METRES_PER[unit])}; allowed: longest "
         f"side {1e3 * SMALLEST:g} to {1e3 * LARGEST:g} mm{hint}"
     )

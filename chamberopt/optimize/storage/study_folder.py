@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import new_folder, write_text
+from chamberopt.common.files import make_output_folder, write_text
 from chamberopt.coverage.statistics.interval import Estimate
 from chamberopt.design.design import Design, checked
 from chamberopt.optimize.storage.lock import only_writer
@@ -41,7 +41,7 @@ def open_record(
     """
     folder = Path(folder)
     if not is_study_folder(folder):
-        folder = new_folder(folder)
+        folder = make_output_folder(folder)
     with only_writer(folder):
         yield Record(study, folder, plan)
 

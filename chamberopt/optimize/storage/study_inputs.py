@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.versions import program
+from chamberopt.common.versions import program_versions
 
 if TYPE_CHECKING:
     from chamberopt.design.load import Design, Study
@@ -27,7 +27,9 @@ def asked(study: Study, plan: Mapping[str, Any] | None = None) -> dict[str, Any]
     question = study.model_dump(mode="json", exclude={"design"})
     question["design"] = _with_files(study.design.model_dump(mode="json"))
     plain = json.loads(
-        json.dumps({"format": FORMAT, "study": question, "sweep": plan, "program": program()})
+        json.dumps(
+            {"format": FORMAT, "study": question, "sweep": plan, "program": program_versions()}
+        )
     )
     assert isinstance(plain, dict)
     return plain

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chamberopt.common.files import whole_file
+from chamberopt.common.files import atomic_write
 from chamberopt.coverage.metrics import FULL
 from chamberopt.coverage.metrics import LONGEST as NEVER
 from chamberopt.output.compare.comparison import TIME, Comparison
@@ -51,7 +51,7 @@ def distributions_picture(path: Path, comparison: Comparison, found: Distributio
     _steps(panels[1, 0], found.speed, speeds, "normal speed [m/s]", "impacts")
     angles = _said(comparison, found, found.mean_angle, "°")
     _steps(panels[1, 1], found.angle, angles, "impact angle [°], 90 is head on", "impacts")
-    with whole_file(path) as temporary:
+    with atomic_write(path) as temporary:
         figure.savefig(temporary)
 
 

@@ -10,8 +10,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from chamberopt.common.fields import METRES_PER
 from chamberopt.geometry.mesh_io import PartMesh
+from chamberopt.geometry.mesh_io.units import METRES_PER
 from chamberopt.output.export.elements import ElementFields
 
 TABLE = "CHAMBEROPT_SCALAR"

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from chamberopt.chamber.fittings import fitting_names
-from chamberopt.common.files import new_folder, whole_file
+from chamberopt.common.files import atomic_write, make_output_folder
 from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL, tag_of_further
 from chamberopt.output.results.results import load_result
 from chamberopt.output.viewer import CHAMBER, read_surface
@@ -57,7 +57,7 @@ def write_stl(folder: Path, file: Path) -> None:
 
 def write_stl_per_surface(folder: Path, place: Path) -> None:
     """A binary STL of each surface of the cavity, by its name, into a new folder."""
-    cavity, place = read_cavity(folder), new_folder(place)
+    cavity, place = read_cavity(folder), make_output_folder(place)
     for name, own in cavity.surfaces.items():
         _write_stl(place / f"{name}.stl", cavity.vertices, cavity.triangles[own])
 
@@ -74,7 +74,7 @@ def write_3mf(folder: Path, file: Path) -> None:
         'Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>',
         MODEL: _model(cavity),
     }
-    with whole_file(file) as temporary, zipfile.ZipFile(temporary, "w") as package:
+    with atomic_write(file) as temporary, zipfile.ZipFile(temporary, "w") as package:
         for name, text in parts.items():
             entry = zipfile.ZipInfo(name, EPOCH)
             entry.compress_type = zipfile.ZIP_DEFLATED
@@ -115,5 +115,5 @@ def _colour(name: str) -> str:
 def _write_stl(file: Path, vertices: np.ndarray, triangles: np.ndarray) -> None:
     from trimesh import Trimesh
 
-    with whole_file(file) as temporary:
+    with atomic_write(file) as temporary:
         Trimesh(vertices, triangles, process=False).export(temporary, file_type="stl")

@@ -10,7 +10,7 @@ import numpy as np
 
 from chamberopt.chamber.part import part_meshes
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import whole_file, write_text
+from chamberopt.common.files import atomic_write, write_text
 from chamberopt.geometry.mesh_io import PartMesh
 from chamberopt.output.export.abaqus import abaqus_deck
 from chamberopt.output.export.elements import (
@@ -58,7 +58,7 @@ def write_fields(folder: str | Path, to: str, path: str | Path) -> list[str]:
         )
     try:
         if to not in DECKS:
-            with whole_file(path) as temporary:
+            with atomic_write(path) as temporary:
                 surface.save(temporary)
             return []
         return _write_deck(result, surface, to, path)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.chamber.part import part_pose
-from chamberopt.common.fields import METRES_PER
+from chamberopt.geometry.mesh_io.units import METRES_PER
 from chamberopt.output.export.formats import FrameName
 
 if TYPE_CHECKING:

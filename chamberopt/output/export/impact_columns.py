@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from chamberopt.coverage.dents import nearest_on_triangles
 from chamberopt.coverage.tally import dent_diameters, impact_angle_deg
+from chamberopt.geometry.triangles import closest_points
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -102,7 +102,7 @@ def rows(
             log.time[piece],
             triangle,
             chamber.part.elements[triangle],
-            *frame.places(nearest_on_triangles(corners, log.position[piece])).T,
+            *frame.places(closest_points(corners, log.position[piece])).T,
             *frame.directions(velocity).T,
             speed,
             impact_angle_deg(velocity, speed),

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import new_file, whole_file, write_text
+from chamberopt.common.files import atomic_write, check_new_file, write_text
 from chamberopt.common.versions import versions
 from chamberopt.output.export.formats import FrameName
 from chamberopt.output.export.frame import SAID, Frame, frame_of
@@ -64,7 +64,7 @@ def require_writable(files: Sequence[Path]) -> None:
         if _is_parquet(file):
             _pyarrow()
         else:
-            new_file(beside(file))
+            check_new_file(beside(file))
 
 
 def _pyarrow() -> Any:
@@ -133,7 +133,7 @@ def _parquet(file: Path, columns: Sequence[Column], about: dict[str, Any]) -> It
         "column_encoding": dict.fromkeys(smooth, "BYTE_STREAM_SPLIT"),
     }
     with (
-        whole_file(file) as temporary,
+        atomic_write(file) as temporary,
         pyarrow.parquet.ParquetWriter(temporary, schema, **settings) as writer,
     ):
         yield lambda values: writer.write_batch(pyarrow.record_batch(list(values), schema=schema))
@@ -142,7 +142,7 @@ def _parquet(file: Path, columns: Sequence[Column], about: dict[str, Any]) -> It
 @contextmanager
 def _csv(file: Path, columns: Sequence[Column], about: dict[str, Any]) -> Iterator[Put]:
     line = ",".join(column.text for column in columns) + "\n"
-    with whole_file(file) as temporary, open(temporary, "wb") as plain, ExitStack() as stack:
+    with atomic_write(file) as temporary, open(temporary, "wb") as plain, ExitStack() as stack:
         # Without a name and a time in it the same impacts give the same bytes.
         out = (
             stack.enter_context(gzip.GzipFile("", "wb", PACKED, plain, 0))

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.fields import METRES_PER
 from chamberopt.geometry.mesh_io import PartMesh
+from chamberopt.geometry.mesh_io.units import METRES_PER
 from chamberopt.output.export.elements import ElementFields
 
 FIRST_SID = 9001  # above what decks usually have

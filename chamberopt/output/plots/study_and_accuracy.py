@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chamberopt.common.files import whole_file
+from chamberopt.common.files import atomic_write
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,7 +44,7 @@ def convergence_picture(path: Path, result: StudyResult) -> None:
         else:
             axes.tick_params(labelleft=False)
         first = first or axes
-    with whole_file(path) as temporary:
+    with atomic_write(path) as temporary:
         figure.savefig(temporary)
 
 
@@ -141,7 +141,7 @@ def price_picture(path: Path, ladder: Ladder) -> None:
     grid = figure.add_gridspec(1, 2, width_ratios=[1.7, 1.0])
     _work_precision(figure.add_subplot(grid[0, 0]), ladder)
     _biases(figure.add_subplot(grid[0, 1]), ladder)
-    with whole_file(path) as temporary:
+    with atomic_write(path) as temporary:
         figure.savefig(temporary)
 
 

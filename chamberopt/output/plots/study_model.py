@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from chamberopt.common.files import whole_file
+from chamberopt.common.files import atomic_write
 from chamberopt.coverage.statistics.interval import Estimate
 from chamberopt.output.plots.study_and_accuracy import BLUE, GREEN, GREY, ORANGE, reach
 
@@ -108,5 +108,5 @@ def _figure(width: float, height: float) -> Any:
 
 
 def _save(figure: Any, path: Path) -> None:
-    with whole_file(path) as temporary:
+    with atomic_write(path) as temporary:
         figure.savefig(temporary)

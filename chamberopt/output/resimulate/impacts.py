@@ -15,7 +15,7 @@ import numpy as np
 
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.errors import InputError
-from chamberopt.common.parallel.executor import core_count, shared
+from chamberopt.common.parallel.executor import core_count, share
 from chamberopt.common.progress import Progress
 from chamberopt.coverage.tally import Tally, mean_normal_speed, tally
 from chamberopt.output.resimulate.rebuild import REMEDY, Ground, made_by
@@ -58,7 +58,7 @@ def impacts_of(
     design, chamber = result.design, ground.chamber
     count = asked_replicas(result, replicas)
     seed, stream = result.seeds
-    setting = shared(executor, (design, chamber, ground.cavity or chamber_mesh(chamber)))
+    setting = share(executor, (design, chamber, ground.cavity or chamber_mesh(chamber)))
     logs = in_order(_log, setting, seed, executor, stream, range(count), _ahead(result))
     tallies = []
     for number, log in enumerate(logs):

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import new_folder, write_text
+from chamberopt.common.files import make_output_folder, write_text
 from chamberopt.common.versions import versions
 from chamberopt.coverage.hits import HITS, save_hits
 from chamberopt.coverage.metrics import METRICS, exposed_target
@@ -69,7 +69,7 @@ def write_simulation(
 
     design.toml · result.json · coverage.vtp · hits.npz · chamber.stl, chamber.vtp · coverage.png.
     """
-    folder = new_folder(folder)
+    folder = make_output_folder(folder)
     save_design(design, folder / "design.toml")
     about = _write_candidate(folder, design, chamber, evaluation)
     _write_json(folder, {"kind": "simulation", **about, **_chosen(advice), **_warned(warned)})

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chamberopt.common.files import whole_file, write_text
+from chamberopt.common.files import atomic_write, write_text
 from chamberopt.design.load import save_design
 from chamberopt.optimize.storage.trial_log import Trial, as_csv, read_history
 from chamberopt.output.plots.study_and_accuracy import BLUE, GREY, ORANGE
@@ -105,7 +105,7 @@ def _picture(path: Path, sweep: Sweep) -> list[str]:
     else:
         _maps(figure, sweep, shown, (rows, columns))
     figure.suptitle(_title(sweep), fontsize=11)
-    with whole_file(path) as temporary:
+    with atomic_write(path) as temporary:
         figure.savefig(temporary)
     return remarks
 

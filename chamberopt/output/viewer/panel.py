@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from chamberopt.geometry.triangles import unit_normals
 from chamberopt.output.viewer.scene import DARK, STILL, as_it_stands, ticks
 from chamberopt.output.vtp_files import pyvista
 from chamberopt.simulation.triangle_fields import Quantity
@@ -111,9 +112,8 @@ def histogram(plotter: Any, speed: np.ndarray) -> None:
 
 def mark(plotter: Any, corners: np.ndarray, length: float) -> None:
     """A triangle (3, 3) [mm] outlined, with a pin of some length on it."""
-    normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
     foot = corners.mean(axis=0)
-    tip = foot + length * normal / max(float(np.linalg.norm(normal)), 1e-30)
+    tip = foot + length * unit_normals(corners)
     style = {"color": MARK, "lighting": False, "pickable": False, **STILL}
     plotter.add_mesh(
         pyvista().MultipleLines(np.vstack([corners, corners[:1]])), line_width=3, **style

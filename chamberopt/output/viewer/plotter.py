@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from chamberopt.common.errors import InputError
+from chamberopt.geometry.triangles import unit_normals
 from chamberopt.output.viewer import panel
 from chamberopt.output.viewer.opened_result import Seen, limits, offered, same_part
 from chamberopt.output.viewer.scene import GREY, PALE, SONOTRODE, light, room, target_and_rest
@@ -200,8 +201,7 @@ def _eye(one: Seen, look: Look) -> np.ndarray:
     if look.eye is not None or look.triangle is None or look.triangle >= one.surface.n_cells:
         return where_the_target_is_seen(one.part.target) if look.eye is None else np.array(look.eye)
     corners = one.surface.points[one.surface.regular_faces[look.triangle]]
-    normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
-    return np.asarray(normal / np.linalg.norm(normal) + [0.2, -0.3, 0.1])
+    return unit_normals(corners) + np.array([0.2, -0.3, 0.1])
 
 
 def where_the_target_is_seen(target: Surface) -> np.ndarray:

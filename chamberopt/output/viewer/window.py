@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import whole_file
+from chamberopt.common.files import atomic_write
 from chamberopt.output.viewer.opened_result import Seen, Subject
 from chamberopt.output.viewer.plotter import Stage
 from chamberopt.output.viewer.scene import DARK
@@ -51,7 +51,7 @@ def draw(job: dict[str, Any]) -> None:
     stage = Stage(opened([Subject(**one) for one in job["subjects"]], look), off_screen=True)
     stage.draw(look)
     stage.aim(look)
-    with whole_file(Path(job["picture"])) as temporary:
+    with atomic_write(Path(job["picture"])) as temporary:
         stage.plotter.screenshot(temporary)
 
 

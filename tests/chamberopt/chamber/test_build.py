@@ -10,7 +10,7 @@ import trimesh
 from chamberopt.chamber.build import TAG_PART, TAG_SONOTRODE, TAG_WALL, Chamber, Part, build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.design.load import Design, load_design
-from chamberopt.geometry.solids import solid
+from chamberopt.geometry.solids import make_solid
 from chamberopt.geometry.triangles import area_vectors, areas, heights
 
 DESIGNS = Path(__file__).resolve().parents[3] / "designs"
@@ -45,15 +45,15 @@ def box(
 def overlap(design: Design, chamber: Chamber) -> float:
     """Volume [m³] that the part and the whole shape have in common."""
     shape = design.chamber.surface(chamber.part.vertices, chamber.part.triangles)
-    part = solid(chamber.part.vertices, chamber.part.triangles, "part")
-    return (solid(shape.vertices, shape.triangles, "shape").body ^ part.body).volume() * 1e-9
+    part = make_solid(chamber.part.vertices, chamber.part.triangles, "part")
+    return (make_solid(shape.vertices, shape.triangles, "shape").body ^ part.body).volume() * 1e-9
 
 
 def shape_volume(design: Design) -> float:
     """Volume [m³] of the whole shape, its corners on the grid: within 0.5 nm of the prism over a polygon."""
     chamber = design.chamber
     shape = chamber.surface(np.zeros((0, 3)), np.zeros((0, 3), dtype=int))
-    volume = solid(shape.vertices, shape.triangles, "shape").volume
+    volume = make_solid(shape.vertices, shape.triangles, "shape").volume
     polygon = chamber.facets / 2 * (chamber.diameter / 2) ** 2 * np.sin(2 * np.pi / chamber.facets)
     assert volume == pytest.approx(
         polygon * chamber.height, rel=4e-9 / chamber.diameter + 2e-9 / chamber.height

@@ -6,14 +6,7 @@ import pytest
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import SerialExecutor
-from chamberopt.coverage.dents import (
-    Samples,
-    few_points_note,
-    mark,
-    marked_share,
-    nearest_on_triangles,
-    sample_points,
-)
+from chamberopt.coverage.dents import Samples, few_points_note, mark, marked_share, sample_points
 from chamberopt.coverage.tally import dent_diameters
 from chamberopt.design.load import load_design
 from chamberopt.design.shot import ShotSize
@@ -128,17 +121,6 @@ def test_dents_that_keep_apart_cover_more_than_avrami_says() -> None:
     share = marked_area(plane, lattice, r) / 100.0
     assert share == pytest.approx(np.pi * r**2, rel=0.01)
     assert share > 1.3 * -np.expm1(-np.pi * r**2)
-
-
-@pytest.mark.parametrize("size", [1.0, 5e-4, 5e-5])
-def test_contact_is_the_nearest_point_of_the_triangle(size: float) -> None:
-    """However small the triangle: a library's fixed tolerance once moved the contact by tenths of a millimetre."""
-    corners = np.tile(np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), (4, 1, 1))
-    balls = np.array([[0.2, 0.2, 0.5], [0.5, -0.3, 0.4], [-1.0, -1.0, 0.1], [0.7, 0.01, 1.0]])
-    contacts = np.array([[0.2, 0.2, 0], [0.5, 0, 0], [0, 0, 0], [0.7, 0.01, 0]])
-    np.testing.assert_allclose(
-        nearest_on_triangles(size * corners, size * balls), size * contacts, atol=1e-12 * size
-    )
 
 
 def test_points_cover_the_exposed_part_evenly() -> None:

@@ -5,7 +5,7 @@ import pytest
 import shapely
 import trimesh
 
-from chamberopt.geometry.remesh import quality, remeshed
+from chamberopt.geometry.remesh import remesh, triangle_quality
 
 
 def plate_with_hole() -> trimesh.Trimesh:
@@ -50,7 +50,7 @@ def test_the_surface_stays_and_the_triangles_get_the_size(name: str) -> None:
     mesh, size, worst = SHAPES[name]
     everything, one = np.ones(len(mesh.faces), dtype=bool), np.zeros(len(mesh.faces), dtype=int)
 
-    vertices, triangles, source = remeshed(mesh.vertices, mesh.faces, everything, one, size)
+    vertices, triangles, source = remesh(mesh.vertices, mesh.faces, everything, one, size)
 
     made = trimesh.Trimesh(vertices, triangles, process=False)
     assert made.is_watertight
@@ -59,8 +59,8 @@ def test_the_surface_stays_and_the_triangles_get_the_size(name: str) -> None:
     assert made.area == pytest.approx(mesh.area, rel=1e-12)
     sides = np.linalg.norm(made.triangles - np.roll(made.triangles, 1, axis=1), axis=2)
     assert sides.max() <= 4 / 3 * size * (1 + 1e-12)
-    assert quality(vertices, triangles).min() > min(
-        worst, quality(mesh.vertices, mesh.faces).min() * 0.99 + worst
+    assert triangle_quality(vertices, triangles).min() > min(
+        worst, triangle_quality(mesh.vertices, mesh.faces).min() * 0.99 + worst
     )
     agree = np.einsum("ij,ij->i", made.face_normals, mesh.face_normals[source])
     assert agree.min() > 1 - 1e-12  # each triangle lies in the plane of the one it says it is of
@@ -70,7 +70,7 @@ def test_small_triangles_become_larger_ones() -> None:
     fine = BOX.subdivide().subdivide().subdivide()
     everything, one = np.ones(len(fine.faces), dtype=bool), np.zeros(len(fine.faces), dtype=int)
 
-    vertices, triangles, _ = remeshed(fine.vertices, fine.faces, everything, one, 8.0)
+    vertices, triangles, _ = remesh(fine.vertices, fine.faces, everything, one, 8.0)
 
     made = trimesh.Trimesh(vertices, triangles, process=False)
     assert len(triangles) < len(fine.faces) / 2
@@ -84,9 +84,7 @@ def test_only_the_target_is_meshed_and_it_keeps_its_border() -> None:
     target = mesh.triangles_center[:, 2] > 0
     area = mesh.area_faces[target].sum()
 
-    vertices, triangles, source = remeshed(
-        mesh.vertices, mesh.faces, target, target.astype(int), 1.5
-    )
+    vertices, triangles, source = remesh(mesh.vertices, mesh.faces, target, target.astype(int), 1.5)
 
     made = trimesh.Trimesh(vertices, triangles, process=False)
     chosen = target[source]
@@ -106,7 +104,7 @@ def test_the_same_mesh_comes_out_again() -> None:
     mesh, size, _ = SHAPES["plate with a hole"]
     everything, one = np.ones(len(mesh.faces), dtype=bool), np.zeros(len(mesh.faces), dtype=int)
 
-    first, second = (remeshed(mesh.vertices, mesh.faces, everything, one, size) for _ in range(2))
+    first, second = (remesh(mesh.vertices, mesh.faces, everything, one, size) for _ in range(2))
 
     assert all(np.array_equal(a, b) for a, b in zip(first, second, strict=True))
 
@@ -114,7 +112,7 @@ def test_the_same_mesh_comes_out_again() -> None:
 def test_a_size_larger_than_the_part_changes_nothing_that_shapes_it() -> None:
     everything, one = np.ones(12, dtype=bool), np.zeros(12, dtype=int)
 
-    vertices, triangles, _ = remeshed(BOX.vertices, BOX.faces, everything, one, 1000.0)
+    vertices, triangles, _ = remesh(BOX.vertices, BOX.faces, everything, one, 1000.0)
 
     assert trimesh.Trimesh(vertices, triangles, process=False).volume == pytest.approx(
         24000, rel=1e-12

@@ -5,25 +5,25 @@ import pytest
 import trimesh
 
 from chamberopt.common.errors import InputError
-from chamberopt.geometry.slivers import THINNEST, without_slivers
+from chamberopt.geometry.slivers import MIN_HEIGHT, remove_slivers
 from chamberopt.geometry.solids import (
     GRID_MM,
     Solid,
-    Surface,
-    cavities,
-    snapped,
-    solid,
+    SolidSurface,
+    find_cavities,
+    make_solid,
+    snap_to_grid,
     subtract,
-    united,
+    unite,
 )
-from chamberopt.geometry.triangles import heights, shells_of, tetrahedron_volumes, winding_number
+from chamberopt.geometry.triangles import find_shells, heights, tetrahedron_volumes, winding_number
 
 
 def box(
     size: tuple[float, float, float], at: tuple[float, float, float] = (0, 0, 0), name: str = "box"
 ) -> Solid:
     mesh = trimesh.creation.box(size)
-    return solid(mesh.vertices + np.asarray(at), np.asarray(mesh.faces), name)
+    return make_solid(mesh.vertices + np.asarray(at), np.asarray(mesh.faces), name)
 
 
 def test_a_box_less_a_box_knows_where_each_triangle_comes_from() -> None:
@@ -34,7 +34,7 @@ def test_a_box_less_a_box_knows_where_each_triangle_comes_from() -> None:
     assert set(np.unique(surface.solid)) == {outer.label, inner.label}
     volume = tetrahedron_volumes(surface.vertices, surface.triangles).sum()
     assert volume == pytest.approx(0.04**3 - 0.01 * 0.01 * 0.04, rel=1e-12)
-    hole = surface.only(surface.solid == inner.label)
+    hole = surface.select(surface.solid == inner.label)
     assert np.allclose(
         np.abs(hole.vertices[:, :2]).max(axis=1), 0.005, atol=1e-12
     )  # on the inner box's sides
@@ -44,7 +44,7 @@ def test_a_box_less_a_box_knows_where_each_triangle_comes_from() -> None:
 def test_making_a_solid_keeps_every_triangle_of_the_user() -> None:
     mesh = trimesh.creation.icosphere(subdivisions=3, radius=0.01)
 
-    surface = solid(mesh.vertices, np.asarray(mesh.faces), "ball").surface()
+    surface = make_solid(mesh.vertices, np.asarray(mesh.faces), "ball").surface()
 
     assert sorted(surface.source) == list(range(len(mesh.faces)))
 
@@ -52,27 +52,27 @@ def test_making_a_solid_keeps_every_triangle_of_the_user() -> None:
 def test_the_grid_moves_nothing_by_more_than_half_a_nanometre() -> None:
     points = np.random.default_rng(1).uniform(-0.1, 0.1, (1000, 3))
 
-    assert np.abs(snapped(points) - points).max() <= 0.5001 * GRID_MM * 1e-3
-    assert (snapped(snapped(points)) == snapped(points)).all()
+    assert np.abs(snap_to_grid(points) - points).max() <= 0.5001 * GRID_MM * 1e-3
+    assert (snap_to_grid(snap_to_grid(points)) == snap_to_grid(points)).all()
 
 
 def test_an_inside_out_solid_is_refused_because_subtracting_it_would_add() -> None:
     mesh = trimesh.creation.box((0.01, 0.01, 0.01))
 
     with pytest.raises(InputError, match="inside out"):
-        solid(mesh.vertices, np.asarray(mesh.faces)[:, ::-1], "knob.stl")
+        make_solid(mesh.vertices, np.asarray(mesh.faces)[:, ::-1], "knob.stl")
 
 
 def test_an_open_surface_is_refused_and_not_taken_for_nothing() -> None:
     mesh = trimesh.creation.box((0.01, 0.01, 0.01))
 
     with pytest.raises(InputError, match=r"knob\.stl.*closed"):
-        solid(mesh.vertices, np.asarray(mesh.faces)[1:], "knob.stl")
+        make_solid(mesh.vertices, np.asarray(mesh.faces)[1:], "knob.stl")
 
 
 def test_overlapping_bodies_count_once() -> None:
     whole = box((0.1, 0.1, 0.1))
-    cross = united([box((0.02, 0.01, 0.01)), box((0.01, 0.02, 0.01))], "cross")
+    cross = unite([box((0.02, 0.01, 0.01)), box((0.01, 0.02, 0.01))], "cross")
 
     assert cross.volume == pytest.approx(3e-6, rel=1e-12)
     assert subtract(whole, cross).volume == pytest.approx(1e-3 - 3e-6, rel=1e-12)
@@ -80,12 +80,12 @@ def test_overlapping_bodies_count_once() -> None:
 
 def test_a_wall_cuts_a_room_in_two_and_an_island_stays_with_its_room() -> None:
     whole = box((0.04, 0.04, 0.04))
-    wall_and_island = united(
+    wall_and_island = unite(
         [box((0.1, 0.1, 0.002), (0, 0, 0.005)), box((0.004, 0.004, 0.004), (0, 0, -0.008))], "two"
     )
 
     surface = subtract(whole, wall_and_island).surface()
-    rooms = cavities(surface)
+    rooms = find_cavities(surface)
 
     volumes = [
         tetrahedron_volumes(surface.vertices, surface.triangles[room]).sum() for room in rooms
@@ -100,7 +100,7 @@ def test_pieces_of_a_surface_and_their_volumes() -> None:
     vertices = np.r_[a.vertices, b.vertices + 5.0]
     triangles = np.r_[a.faces, np.asarray(b.faces)[:, ::-1] + len(a.vertices)]
 
-    shells, volumes = shells_of(vertices, triangles)
+    shells, volumes = find_shells(vertices, triangles)
 
     assert (np.bincount(shells) == 12).all()
     assert sorted(volumes) == pytest.approx([-8.0, 1.0])
@@ -115,7 +115,7 @@ def test_the_winding_number_tells_inside_from_outside() -> None:
     )
 
 
-def split_box(apex: float) -> Surface:
+def split_box(apex: float) -> SolidSurface:
     """A unit box [cm] with one triangle split in three around a point `apex` [m] off its longest edge."""
     mesh = trimesh.creation.box((0.01, 0.01, 0.01))
     triangles = np.asarray(mesh.faces)
@@ -131,15 +131,15 @@ def split_box(apex: float) -> Surface:
     vertices = np.r_[mesh.vertices, [middle + apex * towards / np.linalg.norm(towards)]]
     triangles = np.r_[[(a, b, new), (b, c, new), (c, a, new)], triangles[1:]].astype(np.int32)
     source = np.r_[[0, 0, 0], np.arange(1, 12)].astype(np.int32)
-    return Surface(vertices, triangles, np.ones(14, dtype=np.int64), source)
+    return SolidSurface(vertices, triangles, np.ones(14, dtype=np.int64), source)
 
 
 @pytest.mark.parametrize("apex", [0.0, 1e-13, 5e-10])
 def test_a_cap_is_handed_to_its_neighbour_without_opening_the_surface(apex: float) -> None:
     surface = split_box(apex)
-    assert (heights(surface.vertices, surface.triangles) < THINNEST).sum() == 1
+    assert (heights(surface.vertices, surface.triangles) < MIN_HEIGHT).sum() == 1
 
-    cleaned, found, left = without_slivers(surface)
+    cleaned, found, left = remove_slivers(surface)
 
     mesh = trimesh.Trimesh(cleaned.vertices, cleaned.triangles, process=False)
     assert (found, left) == (1, 0)
@@ -155,11 +155,11 @@ def test_a_needle_is_closed_by_merging_its_short_edge() -> None:
     vertices, triangles = np.asarray(mesh.vertices).copy(), np.asarray(mesh.faces)
     a, b = triangles[0][:2]
     vertices[b] = vertices[a] + [1e-13, 0, 0]
-    surface = Surface(
+    surface = SolidSurface(
         vertices, triangles, np.ones(len(triangles), np.int64), np.arange(len(triangles))
     )
 
-    cleaned, found, left = without_slivers(surface)
+    cleaned, found, left = remove_slivers(surface)
 
     closed = trimesh.Trimesh(cleaned.vertices, cleaned.triangles, process=False)
     assert (found, left) == (2, 0)
@@ -173,4 +173,4 @@ def test_a_needle_is_closed_by_merging_its_short_edge() -> None:
 def test_a_surface_without_slivers_is_left_alone() -> None:
     surface = box((0.01, 0.01, 0.01)).surface()
 
-    assert without_slivers(surface) == (surface, 0, 0)
+    assert remove_slivers(surface) == (surface, 0, 0)

@@ -9,7 +9,7 @@ import pytest
 from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.scene import require_countable
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import new_folder
+from chamberopt.common.files import make_output_folder
 from chamberopt.common.parallel.executor import SerialExecutor, local_executor
 from chamberopt.coverage.metrics import METRICS
 from chamberopt.design.load import Limits, Study, load_design, load_study
@@ -256,7 +256,7 @@ def test_a_folder_in_use_is_refused(tmp_path: Path) -> None:
         run(study(), tmp_path, analytic(0.0))
     assert [path.name for path in tmp_path.iterdir()] == ["precious.txt"]
     with pytest.raises(InputError, match="is a file"):
-        new_folder(tmp_path / "precious.txt")
+        make_output_folder(tmp_path / "precious.txt")
 
 
 def test_the_model_of_the_scores_recommends_the_hilltop() -> None:

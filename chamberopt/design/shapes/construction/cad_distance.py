@@ -9,8 +9,15 @@ import numpy as np
 from chamberopt.common.errors import InputError
 from chamberopt.design.shapes.construction.cad_setup import Setup
 from chamberopt.design.shapes.construction.surface import TAG_SONOTRODE, TAG_WALL, ShapeSurface
-from chamberopt.geometry.solids import Surface, overlap, snapped, solid, subtract, swept
-from chamberopt.geometry.triangles import border
+from chamberopt.geometry.solids import (
+    SolidSurface,
+    make_solid,
+    overlap_volume,
+    snap_to_grid,
+    subtract,
+    sweep,
+)
+from chamberopt.geometry.triangles import border_edges
 
 SAME = 1e-6  # of a volume
 SAME_DISTANCE = 1e-9  # m
@@ -24,7 +31,7 @@ def moved(setup: Setup, distance: float) -> ShapeSurface:
     room, farther = setup.room, distance - setup.distance
     if abs(farther) < SAME_DISTANCE:
         return room
-    lifted = replace(room, vertices=snapped(room.vertices + np.array([0.0, 0.0, farther])))
+    lifted = replace(room, vertices=snap_to_grid(room.vertices + np.array([0.0, 0.0, farther])))
     return _carried_down(lifted, setup) if farther > 0.0 else _cut_off(lifted, -farther, setup)
 
 
@@ -34,17 +41,20 @@ def _carried_down(room: ShapeSurface, setup: Setup) -> ShapeSurface:
     face, count = room.triangles[on_face], len(room.vertices)
     used, numbers = np.unique(face, return_inverse=True)
     floor = room.vertices[used] * [1.0, 1.0, 0.0]
-    below = Surface(
+    below = SolidSurface(
         floor, numbers.reshape(-1, 3).astype(np.int32), on_face[on_face], on_face[on_face]
     )
-    shaft = swept(
+    shaft = sweep(
         below,
         np.array([0.0, 0.0, room.vertices[used[0], 2]]),
         "the room under the sonotrode as drawn",
     )
-    if overlap(solid(room.vertices, room.triangles, "the set-up"), shaft) > SAME * shaft.volume:
+    if (
+        overlap_volume(make_solid(room.vertices, room.triangles, "the set-up"), shaft)
+        > SAME * shaft.volume
+    ):
         raise _refused(setup, "farther", "another part of the room is in the way under it")
-    a, b = border(face).T
+    a, b = border_edges(face).T
     c, d = (count + np.searchsorted(used, side) for side in (b, a))
     walls = np.concatenate([np.c_[a, b, c], np.c_[a, c, d]])
     triangles = room.triangles.copy()
@@ -61,15 +71,15 @@ def _carried_down(room: ShapeSurface, setup: Setup) -> ShapeSurface:
 
 def _cut_off(room: ShapeSurface, height: float, setup: Setup) -> ShapeSurface:
     """Without what lies lower than z = 0: the lowest ``height`` [m], where the walls rise straight."""
-    whole = solid(room.vertices, room.triangles, "the set-up")
-    face = whole.surface().only(room.tags[whole.surface().source] == TAG_SONOTRODE)
-    shaft = swept(face, np.array([0.0, 0.0, height]), "the room over the sonotrode as drawn")
+    whole = make_solid(room.vertices, room.triangles, "the set-up")
+    face = whole.surface().select(room.tags[whole.surface().source] == TAG_SONOTRODE)
+    shaft = sweep(face, np.array([0.0, 0.0, height]), "the room over the sonotrode as drawn")
     low, high = room.vertices.min(axis=0) - height, room.vertices.max(axis=0) + height
-    bottom = swept(
+    bottom = sweep(
         _rectangle(low, high), np.array([0.0, 0.0, -low[2]]), "what lies under the sonotrode"
     )
     rest = subtract(whole, bottom)
-    straight = overlap(whole, shaft) > (1.0 - SAME) * shaft.volume
+    straight = overlap_volume(whole, shaft) > (1.0 - SAME) * shaft.volume
     if not straight or whole.volume - rest.volume > (1.0 + SAME) * shaft.volume:
         raise _refused(
             setup, "nearer", "its walls do not rise straight from the sonotrode's outline so far"
@@ -85,7 +95,7 @@ def _cut_off(room: ShapeSurface, height: float, setup: Setup) -> ShapeSurface:
     )
 
 
-def _rectangle(low: np.ndarray, high: np.ndarray) -> Surface:
+def _rectangle(low: np.ndarray, high: np.ndarray) -> SolidSurface:
     """A box's underside."""
     corners = np.array(
         [
@@ -93,7 +103,7 @@ def _rectangle(low: np.ndarray, high: np.ndarray) -> Surface:
             for x, y in ((low[0], low[1]), (high[0], low[1]), high[:2], (low[0], high[1]))
         ]
     )
-    return Surface(
+    return SolidSurface(
         corners, np.array([[0, 2, 1], [0, 3, 2]], dtype=np.int32), np.zeros(2), np.zeros(2)
     )
 

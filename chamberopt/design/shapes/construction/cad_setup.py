@@ -22,14 +22,14 @@ from chamberopt.design.shapes.construction.surface import (
 from chamberopt.geometry.mesh_io import (
     OpenSurfaceError,
     PartMesh,
-    Triangles,
-    closed,
-    named,
-    place_text,
+    TriangleSoup,
+    close_surface,
+    format_point,
     read_triangles,
+    select_triangles,
 )
-from chamberopt.geometry.solids import Solid, overlap, snapped, solid, united
-from chamberopt.geometry.triangles import area_vectors, free_rim, shells_of
+from chamberopt.geometry.solids import Solid, make_solid, overlap_volume, snap_to_grid, unite
+from chamberopt.geometry.triangles import area_vectors, find_shells, find_unwalled_border
 
 FLAT = 2e-6  # m: what rounding in a text file may lift a sonotrode's corners by
 ALONG = 1e-6  # rad: a direction so near to an axis of the file is meant to be that axis
@@ -86,15 +86,15 @@ def _read_once(
         )
     body, whole = _bodies(read, of_part)
     mesh, left = _room_of_sonotrode(whole, sonotrode)
-    own = named(mesh.groups, part, len(mesh.triangles), "chamber.part")
-    face = named(mesh.groups, sonotrode, len(mesh.triangles), "chamber.sonotrode")
+    own = select_triangles(mesh.groups, part, len(mesh.triangles), "chamber.part")
+    face = select_triangles(mesh.groups, sonotrode, len(mesh.triangles), "chamber.sonotrode")
     turn, shift, said = _upright(mesh, face)
-    vertices = snapped(mesh.vertices @ turn.T + shift)
+    vertices = snap_to_grid(mesh.vertices @ turn.T + shift)
     vertices[np.unique(mesh.triangles[face]), 2] = 0.0
-    rim = free_rim(vertices, mesh.triangles, face)
+    rim = find_unwalled_border(vertices, mesh.triangles, face)
     if rim is not None:
         raise InputError(
-            f"chamber.sonotrode: its face has a free rim at {place_text(turn.T @ (rim - shift))}: walls must rise from "
+            f"chamber.sonotrode: its face has a free rim at {format_point(turn.T @ (rim - shift))}: walls must rise from "
             "it all round, as a moving edge is not supported"
         )
     tags = np.select([face, own], [TAG_SONOTRODE, TAG_PART], TAG_WALL).astype(np.uint8)
@@ -102,33 +102,33 @@ def _read_once(
     if body is None:
         body, source = _piece(mesh, own), np.where(own, np.cumsum(own) - 1, -1).astype(np.int32)
     notes = tuple(dict.fromkeys((*body.notes, *mesh.notes, *left, *said)))
-    lowest = snapped(body.vertices @ turn.T + shift)[:, 2].min()
+    lowest = snap_to_grid(body.vertices @ turn.T + shift)[:, 2].min()
     room = ShapeSurface(vertices, mesh.triangles, tags, source)
     return Setup(room, replace(body, notes=notes), turn, shift, float(lowest))
 
 
-def _chosen(read: Triangles, names: tuple[str, ...], field: str) -> np.ndarray:
-    chosen = named(read.groups, names, len(read.corners), field)
+def _chosen(read: TriangleSoup, names: tuple[str, ...], field: str) -> np.ndarray:
+    chosen = select_triangles(read.groups, names, len(read.corners), field)
     if not chosen.any() or chosen.all():
         what = "none" if not chosen.any() else "all"
         raise InputError(f"{field}: {list(names)} are {what} of the triangles of {read.path.name}")
     return chosen
 
 
-def _bodies(read: Triangles, own: np.ndarray) -> tuple[PartMesh | None, PartMesh]:
+def _bodies(read: TriangleSoup, own: np.ndarray) -> tuple[PartMesh | None, PartMesh]:
     """The part as a closed body, and the closed surface of the rest; None and everything where only a piece of the
     part's surface is drawn.
     """
     try:
-        body = closed(read, own)
+        body = close_surface(read, own)
     except OpenSurfaceError:
-        return None, closed(read)
+        return None, close_surface(read)
     try:
-        return body, closed(read, ~own)
+        return body, close_surface(read, ~own)
     except OpenSurfaceError as error:
         said = error
     try:
-        return None, closed(read)  # only healing had made a body of a piece
+        return None, close_surface(read)  # only healing had made a body of a piece
     except OpenSurfaceError:
         why = "chamber.part is a closed body, so that what is around it must be closed without it"
         raise OpenSurfaceError(f"{said}; {why}", said.corners, said.edges) from None
@@ -154,13 +154,13 @@ def _room_of_sonotrode(mesh: PartMesh, sonotrode: tuple[str, ...]) -> tuple[Part
 
     What lies around it, as the outside of a chamber with thick walls does, is left out.
     """
-    face = named(mesh.groups, sonotrode, len(mesh.triangles), "chamber.sonotrode")
+    face = select_triangles(mesh.groups, sonotrode, len(mesh.triangles), "chamber.sonotrode")
     facing = area_vectors(mesh.vertices, mesh.triangles[face])
     if np.linalg.norm(facing.sum(axis=0)) < (1.0 - SAME_WAY) * np.linalg.norm(facing, axis=1).sum():
         raise InputError(
             "chamber.sonotrode: its triangles are not flat, they face different ways; name one flat face"
         )
-    shells, volumes = shells_of(mesh.vertices, mesh.triangles)
+    shells, volumes = find_shells(mesh.vertices, mesh.triangles)
     of_face = np.unique(shells[face])
     if len(of_face) != 1:
         raise InputError(
@@ -169,7 +169,7 @@ def _room_of_sonotrode(mesh: PartMesh, sonotrode: tuple[str, ...]) -> tuple[Part
         )
     outward = np.where((volumes < 0.0)[shells][:, None], mesh.triangles[:, ::-1], mesh.triangles)
     bodies = [
-        solid(
+        make_solid(
             mesh.vertices,
             outward,
             f"closed surface {k + 1} of the set-up",
@@ -179,7 +179,7 @@ def _room_of_sonotrode(mesh: PartMesh, sonotrode: tuple[str, ...]) -> tuple[Part
     ]
     first = int(of_face[0])
     inside = [k for k in range(len(volumes)) if k != first and _is_inside(bodies[k], bodies[first])]
-    if inside and united([bodies[k] for k in inside], "").volume < (1.0 - SAME) * sum(
+    if inside and unite([bodies[k] for k in inside], "").volume < (1.0 - SAME) * sum(
         bodies[k].volume for k in inside
     ):
         raise InputError(
@@ -202,7 +202,7 @@ def _room_of_sonotrode(mesh: PartMesh, sonotrode: tuple[str, ...]) -> tuple[Part
 
 def _is_inside(body: Solid, room: Solid) -> bool:
     """Whether a body stands in the room; false where it is beside or around it. InputError where they cross."""
-    common = overlap(body, room)
+    common = overlap_volume(body, room)
     if SAME * body.volume < common < (1.0 - SAME) * min(body.volume, room.volume):
         raise InputError(
             f"the set-up: {body.name}, {1e9 * body.volume:.4g} mm³, crosses the wall of the room over the sonotrode; "

@@ -11,8 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from chamberopt.geometry.mesh_io.readers.element_numbers import Numbering
-from chamberopt.geometry.mesh_io.readers.raw_mesh import RawMesh
+from chamberopt.geometry.mesh_io.readers.raw_mesh import ElementNumbers, RawMesh
 
 Face = tuple[int, ...]
 RING: tuple[Face, ...] = ((0, 1), (1, 2), (2, 3), (3, 0))
@@ -90,7 +89,7 @@ class _Polygons:
     side: np.ndarray
     shell: np.ndarray
 
-    def only(self, keep: np.ndarray) -> _Polygons:
+    def select(self, keep: np.ndarray) -> _Polygons:
         return _Polygons(*(column[keep] for column in vars(self).values()))
 
 
@@ -120,7 +119,7 @@ def surface_of(mesh: Elements) -> RawMesh:
     masks = {name: np.concatenate([part[name] for part in groups])[sequence] for name in groups[0]}
     named = {name: mask for name, mask in masks.items() if mask.any()}
     elements, sides = np.concatenate(origins)[sequence].T
-    numbering = Numbering(elements, sides.astype(np.int8), mesh.own, mesh.instance)
+    numbering = ElementNumbers(elements, sides.astype(np.int8), mesh.own, mesh.instance)
     return RawMesh(
         np.concatenate(soup)[sequence].reshape(-1, 3, 3), named, None, tuple(notes), numbering
     )
@@ -176,7 +175,7 @@ def _skin(faces: _Polygons, points: np.ndarray, blocks: list[Block]) -> _Polygon
     _, same, times = np.unique(
         np.sort(faces.corners, axis=1), axis=0, return_inverse=True, return_counts=True
     )
-    faces = faces.only(times[same.reshape(-1)] == 1)
+    faces = faces.select(times[same.reshape(-1)] == 1)
     if not len(faces.corners):
         return faces
     middle = np.concatenate(

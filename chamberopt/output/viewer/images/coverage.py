@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from chamberopt.common.files import whole_file
+from chamberopt.common.files import atomic_write
 from chamberopt.output.viewer.drawn_part import Part, colour_range
 from chamberopt.output.viewer.scene import in_chamber, near
 from chamberopt.output.viewer.subprocess_drawing import drawn_apart
@@ -42,7 +42,7 @@ def draw(job: dict[str, Any]) -> None:
         in_chamber(plotter, part, chamber, title, limits, bar=False)
         plotter.subplot(*place(1, column))
         near(plotter, part, limits, bar=single or column == len(folders) - 1)
-    with whole_file(Path(job["picture"])) as temporary:
+    with atomic_write(Path(job["picture"])) as temporary:
         plotter.screenshot(temporary)
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import whole_file
+from chamberopt.common.files import atomic_write
 from chamberopt.output.resimulate.dent_map import REST, TARGET, DentMap
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def dent_picture(maps: Sequence[DentMap], dents: Dents, title: str, picture: Pat
         ScalarMappable(limits, colours), ax=list(every), shrink=0.7, extend="both", pad=0.01
     )
     bar.set_label("dent diameter [µm]")
-    with whole_file(picture) as temporary:
+    with atomic_write(picture) as temporary:
         figure.savefig(temporary)
 
 

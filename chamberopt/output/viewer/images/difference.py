@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from chamberopt.common.files import whole_file
+from chamberopt.common.files import atomic_write
 from chamberopt.output.viewer.images.coverage import panels
 from chamberopt.output.viewer.scene import BACKGROUND, DARK
 from chamberopt.output.viewer.subprocess_drawing import drawn_apart
@@ -31,7 +31,7 @@ def write_differences(
     for k, (value, real) in enumerate(columns, start=1):
         surface.cell_data[f"difference_{k}"] = 100.0 * value
         surface.cell_data[f"real_{k}"] = real.astype(np.uint8)
-    with whole_file(path) as temporary:
+    with atomic_write(path) as temporary:
         surface.save(temporary)
 
 
@@ -70,7 +70,7 @@ def draw(job: dict[str, Any]) -> None:
             wanted = surface.extract_cells(np.isfinite(surface[f"difference_{k + 1}"]))
             plotter.reset_camera(bounds=wanted.bounds)
             plotter.enable_anti_aliasing("ssaa")
-    with whole_file(Path(job["picture"])) as temporary:
+    with atomic_write(Path(job["picture"])) as temporary:
         plotter.screenshot(temporary)
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import whole_file
+from chamberopt.common.files import atomic_write
 from chamberopt.output.viewer.subprocess_drawing import file_path
 
 COLOURS = 96  # of a GIF, the same in all frames: a palette of each frame's own would flicker
@@ -46,7 +46,7 @@ def require_playable(fps: int, size: tuple[int, int], frames: int, path: Path) -
 
 def write_film(path: Path, frames: Sequence[np.ndarray], fps: int) -> None:
     """Frames (rows, columns, 3) uint8 each; a GIF plays for ever."""
-    with whole_file(path) as temporary:
+    with atomic_write(path) as temporary:
         if path.suffix.lower() == ".gif":
             _write_gif(temporary, frames, fps)
         else:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chamberopt.common.files import whole_file
+from chamberopt.common.files import atomic_write
 from chamberopt.output.viewer.scene import BACKGROUND, DARK, FAULT, GREY, SONOTRODE, room
 from chamberopt.output.viewer.subprocess_drawing import drawn_apart, picture_path
 from chamberopt.output.vtp_files import CHAMBER, MM, pyvista, read_surface, write_chamber
@@ -92,5 +92,5 @@ def draw(job: dict[str, Any]) -> None:
         ]
         plotter.reset_camera()
         plotter.enable_anti_aliasing("ssaa")
-    with whole_file(Path(job["picture"])) as temporary:
+    with atomic_write(Path(job["picture"])) as temporary:
         plotter.screenshot(temporary)

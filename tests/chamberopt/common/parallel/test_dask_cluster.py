@@ -18,8 +18,8 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.cli import main
 from chamberopt.common.errors import ClusterLostError, InputError, WorkerLostError
 from chamberopt.common.parallel import dask_cluster
-from chamberopt.common.parallel.dask_cluster import Cluster
-from chamberopt.common.parallel.executor import SerialExecutor, shared
+from chamberopt.common.parallel.dask_cluster import DaskExecutor
+from chamberopt.common.parallel.executor import SerialExecutor, share
 from chamberopt.design.load import Study, load_design
 from chamberopt.optimize.run_sweep import plan_sweep, run_sweep
 from chamberopt.simulation.evaluate import evaluate
@@ -87,7 +87,7 @@ def dask(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Dask]:
         until = time.monotonic() + 60
         while not started.scheduler_file.exists() and time.monotonic() < until:
             time.sleep(0.1)
-        with Cluster(str(started.scheduler_file), 60) as executor:
+        with DaskExecutor(str(started.scheduler_file), 60) as executor:
             executor._client.wait_for_workers(2, timeout=60)
         yield started
     finally:
@@ -98,7 +98,7 @@ def test_a_scheduler_file_and_its_address_lead_to_the_same_workers(dask: Dask) -
     address = dask_cluster._address(str(dask.scheduler_file))
     assert address.startswith("tcp://")
     for where in (str(dask.scheduler_file), address):
-        with Cluster(where) as executor:
+        with DaskExecutor(where) as executor:
             assert list(executor.map(worker_jobs.square, range(8))) == [n * n for n in range(8)]
             assert len(set(executor.map(worker_jobs.pid_of, range(8)))) == 2
             with pytest.raises(InputError, match=r"^shot: too many$"):
@@ -106,8 +106,8 @@ def test_a_scheduler_file_and_its_address_lead_to_the_same_workers(dask: Dask) -
 
 
 def test_what_is_shared_travels_once_a_worker(dask: Dask, tmp_path: Path) -> None:
-    with Cluster(str(dask.scheduler_file)) as executor:
-        parcel = shared(executor, worker_jobs.Counted(tmp_path, 1000))
+    with DaskExecutor(str(dask.scheduler_file)) as executor:
+        parcel = share(executor, worker_jobs.Counted(tmp_path, 1000))
         assert set(executor.map(worker_jobs.size_of, [parcel] * 20, range(20))) == {1000}
     counts = worker_jobs.marks(tmp_path)
     assert len(counts) == 2
@@ -115,8 +115,8 @@ def test_what_is_shared_travels_once_a_worker(dask: Dask, tmp_path: Path) -> Non
 
 
 def test_a_killed_worker_costs_its_task_only(dask: Dask, tmp_path: Path) -> None:
-    with Cluster(str(dask.scheduler_file)) as executor:
-        parcel = shared(executor, worker_jobs.Counted(tmp_path, 1000))
+    with DaskExecutor(str(dask.scheduler_file)) as executor:
+        parcel = share(executor, worker_jobs.Counted(tmp_path, 1000))
         assert executor.submit(worker_jobs.size_of, parcel, -1).result() == 1000
         victim, heir = (int(name) for name in (*worker_jobs.marks(tmp_path), "0")[:2])
         futures = [executor.submit(worker_jobs.size_of, parcel, n) for n in range(40)]
@@ -141,7 +141,7 @@ def test_a_sweep_goes_on_when_a_worker_is_killed(dask: Dask, tmp_path: Path) -> 
         if count == 5:
             dask.kill_a_worker()
 
-    with Cluster(str(dask.scheduler_file)) as executor:
+    with DaskExecutor(str(dask.scheduler_file)) as executor:
         run_sweep(question, plan, tmp_path / "cluster", executor, progress, worker_jobs.hill)
         dask.start_worker()
         executor._client.wait_for_workers(2, timeout=60)
@@ -157,7 +157,7 @@ def test_the_same_bits_as_on_this_machine(dask: Dask, tmp_path: Path) -> None:
     evaluations = []
     for name, executor in (
         ("serial", SerialExecutor()),
-        ("cluster", Cluster(str(dask.scheduler_file))),
+        ("cluster", DaskExecutor(str(dask.scheduler_file))),
     ):
         with executor:
             run_sweep(question, plan, tmp_path / name, executor)
@@ -195,7 +195,7 @@ def test_a_scheduler_without_workers_is_said(tmp_path: Path) -> None:
         while not alone.scheduler_file.exists():
             time.sleep(0.1)
         with pytest.raises(InputError, match="has no workers; start some with `dask worker tcp://"):
-            Cluster(str(alone.scheduler_file), 1.0)
+            DaskExecutor(str(alone.scheduler_file), 1.0)
     finally:
         alone.end()
 
@@ -210,7 +210,7 @@ def test_another_version_on_a_worker_is_refused(
     with pytest.raises(
         InputError, match=rf"numba {real['numba']} \(0\.0 here\): figures could differ"
     ):
-        Cluster(str(dask.scheduler_file))
+        DaskExecutor(str(dask.scheduler_file))
 
 
 def test_tasks_that_the_cluster_gives_up_say_why() -> None:

@@ -11,12 +11,7 @@ import pytest
 from chamberopt.chamber.scene import replica_seed
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError, WorkerLostError
-from chamberopt.common.parallel.executor import (
-    SerialExecutor,
-    local_executor,
-    open_executor,
-    shared,
-)
+from chamberopt.common.parallel.executor import SerialExecutor, local_executor, open_executor, share
 from chamberopt.design import load
 from chamberopt.simulation.replicas import in_order
 from tests.helpers import worker_jobs
@@ -97,7 +92,7 @@ def test_a_task_that_takes_its_processes_down_is_said_so(
 
 
 def test_what_is_shared_travels_once_a_worker(processes: Executor, tmp_path: Path) -> None:
-    parcel = shared(processes, worker_jobs.Counted(tmp_path, 100_000))
+    parcel = share(processes, worker_jobs.Counted(tmp_path, 100_000))
     assert len(pickle.dumps((worker_jobs.size_of, (parcel, 1), {}))) < 300
     assert set(processes.map(worker_jobs.size_of, [parcel] * 20, range(20))) == {100_000}
     assert worker_jobs.marks(tmp_path) == {str(pid): 1 for pid in processes.pids}  # type: ignore[attr-defined]
@@ -112,7 +107,7 @@ def test_what_is_shared_travels_once_a_worker(processes: Executor, tmp_path: Pat
 )
 def test_where_memory_is_shared_nothing_travels(executor: Executor) -> None:
     value = object()
-    assert shared(executor, value) is value
+    assert share(executor, value) is value
 
 
 def test_leaving_by_an_exception_does_not_wait_for_the_tasks(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ from tests.helpers.synthetic import poisson_evaluation
 ROOT = Path(__file__).resolve().parents[4]
 
 PYRAMID = """
-from chamberopt.common.fields import quantity
+from chamberopt.common.toml_fields import quantity
 from chamberopt.design.shapes import ChamberTable, ShapeSurface
 import numpy as np
 

@@ -9,7 +9,7 @@ import pyvista
 import trimesh
 
 from chamberopt.design.shapes.construction.cad_setup import read_setup
-from chamberopt.geometry.mesh_io import PartMesh, closed, read_part, read_triangles
+from chamberopt.geometry.mesh_io import PartMesh, close_surface, read_part, read_triangles
 from tests.chamberopt.geometry.mesh_io.test_formats import (
     CORNERS,
     GMSH_4,
@@ -204,7 +204,7 @@ def test_one_body_of_several_keeps_its_numbers(tmp_path: Path) -> None:
              for shift in (0, 2000) for n, quad in zip(NUMBERS, QUADS, strict=True)]  # fmt: skip
     read = read_triangles(written(tmp_path / "two.bdf", nastran_text(cards, points)), "mm")
 
-    part = closed(read, read.groups["PID 2"])
+    part = close_surface(read, read.groups["PID 2"])
 
     part.vertices[:, 0] -= 0.1
     assert_numbered(part, tuple(n + 2000 for n in NUMBERS), own=True)

@@ -10,7 +10,7 @@ import pytest
 import trimesh
 
 from chamberopt.common.errors import InputError
-from chamberopt.geometry.mesh_io import FORMATS, PartMesh, read_part
+from chamberopt.geometry.mesh_io import MESH_FORMATS, PartMesh, read_part
 from chamberopt.geometry.triangles import areas, tetrahedron_volumes
 
 SIDES = (20.0, 30.0, 40.0)
@@ -665,6 +665,6 @@ def test_step_without_its_library_says_what_to_install(
 
 def test_the_table_in_the_docs_lists_every_format() -> None:
     table = (Path(__file__).parents[4] / "docs" / "parts.md").read_text(encoding="utf-8")
-    for one in FORMATS:
+    for one in MESH_FORMATS:
         for suffix in one.suffixes:
             assert f"`{suffix}`" in table, suffix

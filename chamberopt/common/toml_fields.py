@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
@@ -15,7 +15,7 @@ Pair = Annotated[tuple[float, float], Field(strict=False)]
 Triple = Annotated[tuple[float, float, float], Field(strict=False)]
 
 
-def _somewhere(direction: tuple[float, float, float]) -> tuple[float, float, float]:
+def _nonzero(direction: tuple[float, float, float]) -> tuple[float, float, float]:
     if not any(direction):
         raise CrossCheckError(
             [Problem("", "given [0, 0, 0], which points nowhere; e.g. [0, 0, -1] is down")]
@@ -23,23 +23,24 @@ def _somewhere(direction: tuple[float, float, float]) -> tuple[float, float, flo
     return direction
 
 
-Direction = Annotated[Triple, AfterValidator(_somewhere)]
+Direction = Annotated[Triple, AfterValidator(_nonzero)]
 
 
-def _near(place: tuple[float, float, float]) -> tuple[float, float, float]:
-    if max(map(abs, place)) > FARTHEST_MM:
+def _within_reach(place: tuple[float, float, float]) -> tuple[float, float, float]:
+    if max(map(abs, place)) > MAX_COORDINATE_MM:
         raise CrossCheckError(
             [
                 Problem(
-                    "", f"given {list(place)}; each must be from -{FARTHEST_MM} to {FARTHEST_MM} mm"
+                    "",
+                    f"given {list(place)}; each must be from -{MAX_COORDINATE_MM} to {MAX_COORDINATE_MM} mm",
                 )
             ]
         )
     return place
 
 
-FARTHEST_MM = 10000  # from the middle of the sonotrode: no chamber is larger
-Place = Annotated[Triple, AfterValidator(_near)]
+MAX_COORDINATE_MM = 10000  # from the middle of the sonotrode: no chamber is larger
+Position = Annotated[Triple, AfterValidator(_within_reach)]
 
 
 def unit_vector(direction: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -54,10 +55,6 @@ def metres(millimetres: tuple[float, float, float]) -> tuple[float, float, float
     return x, y, z
 
 
-Unit = Literal["um", "mm", "cm", "m", "in", "guess"]
-METRES_PER: dict[str, float] = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
-
-
 def _absolute(path: str, info: ValidationInfo) -> str:
     return str(from_file(path, info.context))
 
@@ -66,7 +63,12 @@ def _there(mesh: str, info: ValidationInfo) -> str:
     path = from_file(mesh, info.context)
     if (info.context or {}).get("needs_mesh") and not path.is_file():
         raise CrossCheckError(
-            [Problem("", f"given {mesh!r}: {toml_errors.not_found(path, 'mesh file', '*')}")]
+            [
+                Problem(
+                    "",
+                    f"given {mesh!r}: {toml_errors.explain_missing_file(path, 'mesh file', '*')}",
+                )
+            ]
         )
     return str(path)
 
@@ -89,7 +91,7 @@ def quantity(low: float, high: float, unit: str, what: str, default: Any = ...) 
     return Field(default, ge=low, le=high, description=what, json_schema_extra={"unit": unit})
 
 
-def listed(form: str, what: str, default: Any = ...) -> Any:
+def list_field(form: str, what: str, default: Any = ...) -> Any:
     """A list of numbers of the file, its form shown when it is wrong."""
     return Field(default, description=what, json_schema_extra={"form": form})
 
