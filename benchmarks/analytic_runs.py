@@ -9,9 +9,10 @@ import numpy as np
 from chamberopt.chamber.analytic import analytic_cavity, on_chamber
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.scene import build_scene, chamber_mesh, replica_seed
+from chamberopt.coverage.coverage_from_impacts import Tally, tally_impacts
+from chamberopt.coverage.dents import impact_angle_deg
 from chamberopt.coverage.metrics import METRICS
-from chamberopt.coverage.statistics.interval import Estimate, estimate
-from chamberopt.coverage.tally import Tally, impact_angle_deg, tally
+from chamberopt.coverage.statistics.confidence_interval import Estimate, estimate
 from chamberopt.design.load import Design
 from chamberopt.simulation.evaluate import jackknife
 from sim_core import AnalyticCavity, ImpactLog, TriangleMesh, simulate
@@ -81,7 +82,7 @@ def replica(
     log = simulate(build_scene(design, surface, seed)).impacts
     if isinstance(surface, AnalyticCavity):
         log = on_chamber(log, chamber)
-    return tally(log, chamber, design), log
+    return tally_impacts(log, chamber, design), log
 
 
 def run(

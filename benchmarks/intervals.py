@@ -19,12 +19,12 @@ import numpy as np
 
 from benchmarks.table import print_table, write_csv
 from chamberopt.chamber.build import Chamber, Part, build_chamber
+from chamberopt.coverage.coverage_from_impacts import Tally
 from chamberopt.coverage.metrics import METRICS, OBJECTIVES
-from chamberopt.coverage.statistics.interval import estimate
-from chamberopt.coverage.tally import Tally
+from chamberopt.coverage.statistics.confidence_interval import estimate
 from chamberopt.design.load import Design, load_design
-from chamberopt.simulation.evaluate import jackknife, weighted
-from chamberopt.simulation.replicas import LEAST_WATCHED, replicas_wanted
+from chamberopt.simulation.evaluate import jackknife, weighted_sum
+from chamberopt.simulation.replicas import MIN_REPLICAS_TO_STOP, next_replica_count
 
 ROOT = Path(__file__).parents[1]
 NAMES = ("mean_coverage", "std_coverage", "p05_coverage")
@@ -90,13 +90,13 @@ def figures(replicas: list[Tally], chamber: Chamber, design: Design) -> dict[str
             strict=True,
         )
     )
-    return {**got, "uniform_coverage": weighted(OBJECTIVES["uniform_coverage"], got)}
+    return {**got, "uniform_coverage": weighted_sum(OBJECTIVES["uniform_coverage"], got)}
 
 
 def exact(x: np.ndarray, weight: np.ndarray) -> dict[str, float]:
     """The figures of known x."""
     share = -np.expm1(-x)
-    true = {name: METRICS[name].over_surface(share, weight / weight.sum()) for name in NAMES}  # type: ignore[misc]
+    true = {name: METRICS[name].from_coverage(share, weight / weight.sum()) for name in NAMES}  # type: ignore[misc]
     return {**true, "uniform_coverage": true["mean_coverage"] - true["std_coverage"]}
 
 
@@ -137,7 +137,7 @@ def gear_rows(runs: int, replicas: int) -> Iterator[dict[str, Any]]:
     """Replicas of the shipped gear, simulated once; runs draw eight of them and a window of time in each."""
     from chamberopt.chamber.scene import build_scene, chamber_mesh, replica_seed
     from chamberopt.common.parallel.executor import local_executor
-    from chamberopt.coverage.tally import dent_diameter
+    from chamberopt.coverage.dents import dent_diameter
     from sim_core import simulate
 
     design = load_design(ROOT / "designs" / "gear.toml")
@@ -181,14 +181,14 @@ def gear_rows(runs: int, replicas: int) -> Iterator[dict[str, Any]]:
 
 def stopping_rows(runs: int) -> Iterator[dict[str, Any]]:
     """Normal replicas of truth 0, added by the rule of evaluate() from so many on, until ± 1.96/sqrt(wanted)."""
-    for first in (3, 5, LEAST_WATCHED):
+    for first in (3, 5, MIN_REPLICAS_TO_STOP):
         for wanted in (8, 16, 30, 60):
             rng = np.random.default_rng(3)
             half_width, held, spent = 1.96 / np.sqrt(wanted), 0, 0
             for _ in range(runs):
                 sample, count = rng.normal(size=400), first
                 while (
-                    more := replicas_wanted(
+                    more := next_replica_count(
                         count, estimate(sample[:count]).half_width, half_width, 400
                     )
                 ) > count:

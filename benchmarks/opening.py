@@ -49,10 +49,11 @@ def written(folder: Path, size: str, impacts: int) -> tuple[int, int]:
 
 def evaluation(design: Any, chamber: Any, impacts: int) -> Any:
     """So many impacts, anywhere on what is exposed, in replicas."""
-    from chamberopt.coverage.hits import Hits
+    from chamberopt.coverage.coverage_from_impacts import Tally
     from chamberopt.coverage.metrics import METRICS, OBJECTIVES
-    from chamberopt.coverage.tally import Tally
-    from chamberopt.simulation.evaluate import Evaluation, jackknife, weighted
+    from chamberopt.coverage.part_impacts import Hits
+    from chamberopt.simulation.evaluate import jackknife, weighted_sum
+    from chamberopt.simulation.evaluation import Evaluation
 
     rng = np.random.default_rng(1)
     share = chamber.exposed_area / chamber.exposed_area.sum()
@@ -77,7 +78,7 @@ def evaluation(design: Any, chamber: Any, impacts: int) -> Any:
     metrics = dict(
         zip(METRICS, jackknife(tallies, list(METRICS.values()), chamber, design), strict=True)
     )
-    goal = weighted(OBJECTIVES["uniform_coverage"], metrics)
+    goal = weighted_sum(OBJECTIVES["uniform_coverage"], metrics)
     total = sum(tallies[1:], tallies[0])
     return Evaluation(
         "uniform_coverage", goal, metrics, total, tuple(tallies), {}, {}, hits=tuple(hits)

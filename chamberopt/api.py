@@ -46,14 +46,14 @@ def simulate(
     from chamberopt.chamber.build import build_chamber
     from chamberopt.common.parallel.executor import local_executor
     from chamberopt.output.results.results import load_result, write_simulation
-    from chamberopt.simulation.effect_pilot import settled
+    from chamberopt.simulation.effect_pilot import with_effects_resolved
     from chamberopt.simulation.evaluate import evaluate
 
     _require("design", design, Design, "load_design")
     chamber = build_chamber(design)
     cavity = analytic_cavity(design, chamber) if analytic else None
     with local_executor(workers) as executor:
-        design, advice = settled(design, chamber, executor)
+        design, advice = with_effects_resolved(design, chamber, executor)
         evaluation = evaluate(design, chamber, executor, progress, cavity=cavity)
     _warn(
         [
@@ -79,13 +79,15 @@ def optimise(
     from chamberopt.optimize.run_study import go_on
     from chamberopt.optimize.storage.study_folder import open_record
     from chamberopt.output.results.results import load_result, write_study
-    from chamberopt.simulation.effect_pilot import settled
+    from chamberopt.simulation.effect_pilot import with_effects_resolved
 
     _require("study", study, Study, "load_study")
     with open_record(study, out) as record, local_executor(workers) as executor:
         if not record.finished:
             start = build_chamber(study.design)
-            study, advice = record.settled(lambda design: settled(design, start, executor))
+            study, advice = record.settled(
+                lambda design: with_effects_resolved(design, start, executor)
+            )
             found = go_on(study, record, executor, progress)
             _warn(
                 [*map(str, advice), *found.best.evaluation.notes, *write_study(out, found, advice)]

@@ -13,9 +13,10 @@ ORDER = {
     "chamberopt": "common geometry design chamber coverage simulation optimize output api cli __main__",
     "chamberopt/design": "materials shapes effects+process+shot+sonotrode design study load",
     "chamberopt/chamber": "target fittings reach part build dimensionless scene analytic checks",
-    "chamberopt/coverage": "statistics tally hits+metrics dents estimators intensity",
-    "chamberopt/simulation": "resting_balls replicas evaluate "
-    "triangle_fields time_curve effect_pilot evaluation_file convergence",
+    "chamberopt/coverage": "statistics dents coverage_from_impacts part_impacts+metrics dent_marking "
+    "coverage_estimators intensity",
+    "chamberopt/simulation": "resting_balls replicas evaluation evaluate "
+    "triangle_fields time_curve effect_pilot convergence",
     "chamberopt/optimize": "constraints pareto interrupt search storage "
     "evaluate_candidate sensitivity candidates run_study pareto_table run_sweep",
     "chamberopt/output": "vtp_files plots resimulate+viewer+results report+export+compare",

@@ -14,7 +14,7 @@ from benchmarks.analytic_runs import INSCRIBED, Run, fit, hotelling
 from benchmarks.gas import sample_gas
 from benchmarks.scenes import DIAMETER
 from benchmarks.structures.shell import build_shell
-from chamberopt.coverage.statistics.interval import Estimate
+from chamberopt.coverage.statistics.confidence_interval import Estimate
 from sim_core.loop.spatial_blocks import MANY
 from tests.helpers.scenes.cavities import box_around
 

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
-    from chamberopt.coverage.statistics.interval import Estimate
+    from chamberopt.coverage.statistics.confidence_interval import Estimate
     from chamberopt.design.load import Design
-    from chamberopt.simulation.evaluate import Evaluation
+    from chamberopt.simulation.evaluation import Evaluation
 
 
 @contextmanager
@@ -78,10 +78,10 @@ def estimates(evaluation: Evaluation) -> list[str]:
 
 
 def row(name: str, estimate: Estimate) -> str:
-    from chamberopt.coverage.statistics.interval import NOTHING
+    from chamberopt.coverage.statistics.confidence_interval import ZERO_TOLERANCE
 
     value, half_width = (
-        0.0 if abs(x) < NOTHING else x for x in (estimate.value, estimate.half_width)
+        0.0 if abs(x) < ZERO_TOLERANCE else x for x in (estimate.value, estimate.half_width)
     )
     return f"{name:34}{value:12.5g} ± {half_width:.2g}"
 

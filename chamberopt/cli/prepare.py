@@ -32,10 +32,10 @@ def settled_effects(
 ) -> tuple[Design, list[Advice]]:
     """The design with its effects chosen, and why, where it leaves them to us."""
     from chamberopt.common.progress import progress_bar
-    from chamberopt.simulation.effect_pilot import settled
+    from chamberopt.simulation.effect_pilot import with_effects_resolved
 
     with progress_bar("pilot runs") as progress:
-        return settled(
+        return with_effects_resolved(
             design, chamber, executor, progress, lambda variant: compiled(variant, chamber)
         )
 
@@ -44,7 +44,7 @@ def effects_advised(design: Design, chamber: Chamber) -> list[dict[str, Any]]:
     """Which effects a design needs, by pilot runs."""
     from chamberopt.common.parallel.executor import local_executor
     from chamberopt.common.progress import progress_bar
-    from chamberopt.simulation.effect_pilot import advise, settled
+    from chamberopt.simulation.effect_pilot import advise, with_effects_resolved
 
     def prepare(variant: Design) -> None:
         compiled(variant, chamber)
@@ -55,6 +55,6 @@ def effects_advised(design: Design, chamber: Chamber) -> list[dict[str, Any]]:
         flush=True,
     )
     with local_executor() as executor, progress_bar("pilot runs") as progress:
-        advice = settled(design, chamber, executor, progress, prepare)[1]
+        advice = with_effects_resolved(design, chamber, executor, progress, prepare)[1]
         advice = advice or advise(design, chamber, executor, progress, prepare)
     return [one.as_json() for one in advice]

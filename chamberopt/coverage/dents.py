@@ -1,14 +1,4 @@
-"""Every dent as a disc on the part's own surface: what is marked counts once, across triangles and round edges.
-
-The surface is sampled by points; a dent marks those nearer to its contact point than its radius, measured along the
-surface. Where p and q lie on two planes that meet in an edge, at angle theta between the normals n_p and n_q, that is
-
-    distance² = |p - q|² + 2 a b / (1 + cos theta),   a = (p - q).n_q,   b = (q - p).n_p,
-
-exact for the straight way over the edge: with h and y the distances of p and q from it and s along it,
-a = -h sin theta, b = -y sin theta (both + in a hollow), |p - q|² = h² + y² + 2 h y cos theta + s², and unfolded it is
-(h + y)² + s². The far side of a thin blade faces the other way, cos theta = -1, and is infinitely far.
-"""
+"""What a single impact leaves on the part: the size of its dent and the angle at which it came."""
 
 from __future__ import annotations
 
@@ -17,33 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.common.errors import InputError
-from chamberopt.coverage.metrics import exposed_target
-from chamberopt.coverage.tally import dent_diameters
-from chamberopt.geometry.triangles import area_vectors, closest_points, unit_normals
+from chamberopt.geometry.triangles import closest_points, unit_normals
 
 if TYPE_CHECKING:
-    from scipy.spatial import cKDTree
-
     from chamberopt.chamber.build import Chamber
     from chamberopt.design.load import Design
     from sim_core import ImpactLog
-
-MOST_POINTS = 5_000_000  # about a gigabyte with what is computed on the way
-AT_ONCE = 5_000  # dents looked up together
-FEW_POINTS = (
-    25  # a triangle; with 13 of them the gear's uniform_coverage is 0.03 too low (docs/accuracy.md)
-)
-
-
-@dataclass(frozen=True)
-class Samples:
-    """Points on the part's exposed surface: place, normal (p, 3) m · triangle (p,) of the part · area (p,) m² each."""
-
-    place: np.ndarray
-    normal: np.ndarray
-    triangle: np.ndarray
-    area: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -61,61 +30,57 @@ class Dents:
         return len(self.time)
 
 
-def few_points_note(samples: Samples, chamber: Chamber) -> tuple[str, ...]:
-    """What is said where a triangle of the target has too few sample points to tell a coverage by."""
-    on_target = exposed_target(chamber)[samples.triangle]
-    each = np.bincount(samples.triangle[on_target], minlength=len(chamber.part.triangles))
-    middle = float(np.median(each[each > 0])) if each.any() else 0.0
-    if middle >= FEW_POINTS:
-        return ()
-    return (
-        f"a triangle of the target has {middle:.0f} sample points in the middle, fewer than {FEW_POINTS}: std_coverage "
-        "comes out too large and uniform_coverage too low; lower process.accuracy.sample_mm",
-    )
-
-
-def sample_points(chamber: Chamber, spacing: float) -> Samples:
-    """About one point for each spacing² [m²] of the part's exposed surface, at least one a triangle of the cavity.
-
-    Spread within a triangle by the additive recurrence of the plastic number (M. Roberts, "The unreasonable
-    effectiveness of quasirandom sequences", 2018), folded from the square: even, and the same every time. Raises
-    InputError for more points than can be held.
-    """
-    index = np.flatnonzero(chamber.source >= 0)
-    vectors = area_vectors(chamber.vertices, chamber.triangles[index])
-    area = np.linalg.norm(vectors, axis=1)
-    index, vectors, area = (column[area > 0.0] for column in (index, vectors, area))
-    count = np.maximum(1, np.rint(area / spacing**2)).astype(int)
-    if count.sum() > MOST_POINTS:
-        raise InputError(
-            f"process.accuracy.sample_mm: given {spacing * 1e3:g}, which takes {count.sum():,} points for a surface of "
-            f"{area.sum() * 1e6:.4g} mm²; at most {MOST_POINTS:,} are supported: raise it"
-        )
-    owner = np.repeat(np.arange(len(index)), count)
-    number = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
-    plastic = 1.32471795724474602596
-    # Each triangle begins elsewhere in the sequence: else all single points would be at the same corner.
-    u, v = (
-        ((number + 0.5) / plastic**power + owner / plastic ** (power + 2) + 0.5) % 1.0
-        for power in (1, 2)
-    )
-    folded = u + v > 1.0
-    u, v = np.where(folded, 1.0 - u, u), np.where(folded, 1.0 - v, v)
-    a, b, c = (chamber.vertices[chamber.triangles[index[owner], k]] for k in range(3))
-    return Samples(
-        place=a + u[:, None] * (b - a) + v[:, None] * (c - a),
-        normal=(vectors / area[:, None])[owner],
-        triangle=chamber.source[index[owner]],
-        area=(area / count)[owner],
-    )
-
-
-def first_marked(
-    samples: Samples, impacts: ImpactLog, chamber: Chamber, design: Design
+def dent_diameter(
+    normal_speed: np.ndarray,
+    diameter: float | np.ndarray,
+    density: float,
+    hardness: float,
+    c0: float,
+    v0: float,
 ) -> np.ndarray:
-    """When each point is first inside a dent [s], (p,); inf for never."""
-    dents = dents_on_part(impacts, chamber, design)
-    return mark(samples, dents.place, dents.normal, dents.radius, dents.time)
+    """Diameter [m] of the dent a ball leaves; 0 where the normal speed is not above the yield speed v0.
+
+    d = 1.278 D (1 - e²)^¼ (rho v² / B)^¼, Kirk's energy balance (D. Kirk, "Prediction and control of indent
+    diameter", The Shot Peener, 2004): the energy lost at normal speed v [m/s] makes a spherical cap in a
+    material of Brinell hardness B [Pa]. D [m], rho [kg/m³] of the ball; e the restitution at that very speed.
+    """
+    from sim_core import restitution_at
+
+    speed = np.asarray(normal_speed, dtype=float)
+    # Below v0 the contact is elastic (the paper): what C0 < 1 loses there goes into waves, not into a dent.
+    dents = speed > v0
+    e = np.where(dents, restitution_at(speed, c0, v0), 1.0)
+    return (
+        1.278
+        * diameter
+        * (np.maximum(1.0 - e * e, 0.0) * density * speed * speed / hardness) ** 0.25
+    )
+
+
+def ball_diameters(impacts: ImpactLog, design: Design) -> float | np.ndarray:
+    """Diameter [m] of the ball of each impact, (n,); one number where all are alike."""
+    shot = design.shot
+    return shot.diameter if shot.mix is None else np.array(shot.diameters)[impacts.ball]
+
+
+def dent_diameters(impacts: ImpactLog, design: Design) -> np.ndarray:
+    """Diameter [m] of the dent each impact would leave on the part, (n,), each ball with its own size."""
+    material, ball = design.materials.part, ball_diameters(impacts, design)
+    return dent_diameter(
+        impacts.normal_speed,
+        ball,
+        design.shot.density,
+        material.hardness,
+        material.restitution,
+        material.yield_speed,
+    )
+
+
+def impact_angle_deg(velocity: np.ndarray, normal_speed: np.ndarray) -> np.ndarray:
+    """Angle [degrees] between the incoming ball's path and the surface: 90 is head on, 0 grazing."""
+    speed = np.linalg.norm(velocity, axis=1)
+    ratio = np.divide(normal_speed, speed, out=np.ones_like(speed), where=speed > 0)
+    return np.degrees(np.arcsin(np.clip(ratio, 0.0, 1.0)))
 
 
 def dents_on_part(impacts: ImpactLog, chamber: Chamber, design: Design) -> Dents:
@@ -125,47 +90,3 @@ def dents_on_part(impacts: ImpactLog, chamber: Chamber, design: Design) -> Dents
     corners = chamber.vertices[chamber.triangles[impacts.triangle[dents]]]
     place = closest_points(corners, impacts.position[dents])
     return Dents(place, unit_normals(corners), 0.5 * diameter[dents], impacts.time[dents])
-
-
-def mark(
-    samples: Samples, place: np.ndarray, normal: np.ndarray, radius: np.ndarray, time: np.ndarray
-) -> np.ndarray:
-    """First time (p,) at which each point is inside one of these discs: place, normal (k, 3), radius, time (k,)."""
-    from scipy.spatial import cKDTree
-
-    first = np.full(len(samples.area), np.inf)
-    tree = cKDTree(samples.place)
-    for begin in range(0, len(place), AT_ONCE):
-        some = slice(begin, begin + AT_ONCE)
-        point, dent, _ = inside(tree, samples.normal, place[some], normal[some], radius[some])
-        np.minimum.at(first, point, time[some][dent])
-    return first
-
-
-def inside(
-    tree: cKDTree, facing: np.ndarray, place: np.ndarray, normal: np.ndarray, radius: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Which points lie in which discs: rows of point, dent, and their distance as a share of the dent's radius.
-
-    tree: of the points, facing (p, 3) their normals · place, normal (k, 3), radius (k,): of the discs.
-    """
-    from scipy.spatial import cKDTree
-
-    # No way along a surface is shorter than the straight one: what is near in space holds all candidates.
-    pairs = tree.sparse_distance_matrix(cKDTree(place), radius.max(), output_type="ndarray")
-    point, dent = pairs["i"], pairs["j"]
-    cosine = (facing[point] * normal[dent]).sum(axis=1)
-    away = place[dent] - tree.data[point]
-    bend = (away * facing[point]).sum(axis=1) * -(away * normal[dent]).sum(axis=1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        detour = np.where(bend > 0.0, 2.0 * bend / (1.0 + cosine), 0.0)
-    square = pairs["v"] ** 2 + detour
-    hit = square <= radius[dent] ** 2
-    return point[hit], dent[hit], np.sqrt(square[hit]) / radius[dent[hit]]
-
-
-def marked_share(samples: Samples, first: np.ndarray, time: float, triangles: int) -> np.ndarray:
-    """Share of each part triangle's exposed area that is inside a dent by a time [s], (triangles,); NaN unexposed."""
-    area = np.bincount(samples.triangle, samples.area, triangles)
-    marked = np.bincount(samples.triangle, samples.area * (first <= time), triangles)
-    return np.divide(marked, area, out=np.full(triangles, np.nan), where=area > 0.0)

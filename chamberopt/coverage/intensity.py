@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.coverage.statistics.interval import Estimate, estimate
-from chamberopt.coverage.tally import Tally
+from chamberopt.coverage.coverage_from_impacts import Tally
+from chamberopt.coverage.statistics.confidence_interval import Estimate, estimate
 
 if TYPE_CHECKING:
-    from chamberopt.coverage.estimators import Surface
+    from chamberopt.coverage.coverage_estimators import TargetPatches
 
 
-def intensity_uniformity(replicas: Sequence[Tally], ground: Surface) -> Estimate:
+def intensity_uniformity(replicas: Sequence[Tally], ground: TargetPatches) -> Estimate:
     """1 - standard deviation over mean of the local mean normal speed, over the target's area; 1 is even, 0 unhit.
 
     A place that is not hit, or outside the cavity, has speed 0. Local means of few impacts scatter: their variance,
@@ -38,7 +38,7 @@ def intensity_uniformity(replicas: Sequence[Tally], ground: Surface) -> Estimate
     return estimate(n * whole - (n - 1) * without, highest=1.0)
 
 
-def _uniformity(speeds: np.ndarray, hits: np.ndarray, ground: Surface) -> float:
+def _uniformity(speeds: np.ndarray, hits: np.ndarray, ground: TargetPatches) -> float:
     """From sums of normal speeds and numbers of impacts, (n, p) each: a replica a row, a patch a column."""
     count, total = len(hits), hits.sum(axis=0)
     local = np.divide(speeds.sum(axis=0), total, out=np.zeros(len(total)), where=total > 0)

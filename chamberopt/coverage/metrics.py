@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.coverage.tally import Tally, coverage_at
+from chamberopt.coverage.coverage_from_impacts import Tally, coverage_at
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.design.load import Design
 
-FULL = 0.98  # SAE J2277: coverage that counts as complete
-LONGEST = 1e6  # s; eleven days of peening stand for never
+FULL_COVERAGE = 0.98  # SAE J2277: coverage that counts as complete
+NEVER = 1e6  # s; eleven days of peening stand for never
 
 Statistic = Callable[[Tally, "Chamber", "Design"], float]
 OverSurface = Callable[[np.ndarray, np.ndarray], float]
@@ -31,7 +31,7 @@ OverSurface = Callable[[np.ndarray, np.ndarray], float]
 class Metric:
     """A named number about a candidate: how it is computed, its unit and the range it can have.
 
-    over_surface: the same of any coverage (m,) of target triangles and their shares (m,) of its area, where it is one.
+    from_coverage: the same of any coverage (m,) of target triangles and their shares (m,) of its area, where it is one.
     """
 
     name: str
@@ -40,11 +40,11 @@ class Metric:
     function: Statistic
     lowest: float = -math.inf
     highest: float = math.inf
-    over_surface: OverSurface | None = None
+    from_coverage: OverSurface | None = None
 
 
 @dataclass(frozen=True)
-class Objective:
+class ObjectiveFunction:
     """What a study maximises: a weighted sum of metrics, so that it always agrees with the metrics shown beside it."""
 
     name: str
@@ -66,7 +66,7 @@ def require_target(chamber: Chamber) -> None:
         )
 
 
-def on_target(coverage: np.ndarray, chamber: Chamber) -> tuple[np.ndarray, np.ndarray]:
+def target_coverage(coverage: np.ndarray, chamber: Chamber) -> tuple[np.ndarray, np.ndarray]:
     """Coverage of every target triangle, from that of the part's exposed triangles (m,), and its share of the area.
 
     What lies outside the cavity is not covered. Left out of the count, it would teach the optimiser to hide
@@ -115,7 +115,7 @@ def time_to_98(total: Tally, chamber: Chamber, design: Design) -> float:
     """Treatment time [s] after which 95 % of the target's area is covered to 98 %; see seconds_to_98."""
     seconds = design.process.treatment_time
     return seconds_to_98(
-        p05_coverage(*on_target(coverage_at(total, chamber, seconds), chamber)), seconds
+        p05_coverage(*target_coverage(coverage_at(total, chamber, seconds), chamber)), seconds
     )
 
 
@@ -126,7 +126,7 @@ def seconds_to_98(poorest: float, seconds: float) -> float:
     never.
     """
     rate = -math.log(min(max(1.0 - poorest, 1e-12), 1.0)) / seconds
-    return min(LONGEST, -math.log(1.0 - FULL) / rate) if rate > 0.0 else LONGEST
+    return min(NEVER, -math.log(1.0 - FULL_COVERAGE) / rate) if rate > 0.0 else NEVER
 
 
 def intensity_uniformity(total: Tally, chamber: Chamber, design: Design) -> float:
@@ -143,15 +143,15 @@ def shot_count(total: Tally, chamber: Chamber, design: Design) -> float:
     return float(design.shot.count)
 
 
-def _coverage_metric(name: str, summary: str, over_surface: OverSurface, highest: float) -> Metric:
+def _coverage_metric(name: str, summary: str, from_coverage: OverSurface, highest: float) -> Metric:
     """Its plain function takes the dents of a tally for all there are: figures.py corrects for a short simulation."""
 
     def plain(total: Tally, chamber: Chamber, design: Design) -> float:
-        return over_surface(
-            *on_target(coverage_at(total, chamber, design.process.treatment_time), chamber)
+        return from_coverage(
+            *target_coverage(coverage_at(total, chamber, design.process.treatment_time), chamber)
         )
 
-    return Metric(name, "", summary, plain, 0.0, highest, over_surface)
+    return Metric(name, "", summary, plain, 0.0, highest, from_coverage)
 
 
 METRICS = {
@@ -170,7 +170,7 @@ METRICS = {
             "time until 95 % of the target's area is 98 % covered",
             time_to_98,
             0.0,
-            LONGEST,
+            NEVER,
         ),
         Metric(
             "intensity_uniformity",
@@ -196,18 +196,18 @@ OBJECTIVES = {
     one.name: one
     for one in (
         # 1 only when all is covered, and covered evenly.
-        Objective(
+        ObjectiveFunction(
             "uniform_coverage",
             "mean minus standard deviation of coverage",
             {"mean_coverage": 1.0, "std_coverage": -1.0},
         ),
-        Objective(
+        ObjectiveFunction(
             "coverage_p05", "coverage of the least covered 5 % of the area", {"p05_coverage": 1.0}
         ),
-        Objective(
+        ObjectiveFunction(
             "time_to_98", "time to full coverage, the shorter the better", {"time_to_98_s": -1.0}
         ),
-        Objective(
+        ObjectiveFunction(
             "intensity_uniformity",
             "how evenly hard the target is hit",
             {"intensity_uniformity": 1.0},
@@ -216,7 +216,7 @@ OBJECTIVES = {
 }
 
 
-def objective(name: str) -> Objective:
+def parse_objective(name: str) -> ObjectiveFunction:
     """The objective of that name, or a sum such as "1 uniform_coverage + -0.001 time_to_98_s"; else InputError."""
     if name in OBJECTIVES:
         return OBJECTIVES[name]
@@ -231,7 +231,7 @@ def objective(name: str) -> Objective:
             ) from None
         for metric, share in parts.items():
             terms[metric] = terms.get(metric, 0.0) + factor * share
-    return Objective(name, "weighted sum", terms)
+    return ObjectiveFunction(name, "weighted sum", terms)
 
 
 def _terms(name: str) -> dict[str, float]:

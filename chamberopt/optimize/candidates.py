@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.common.progress import Progress
-from chamberopt.coverage.statistics.interval import Estimate, paired_difference
+from chamberopt.coverage.statistics.confidence_interval import Estimate, paired_difference
 from chamberopt.optimize.constraints import FEASIBLE, standing_of
 from chamberopt.optimize.evaluate_candidate import Evaluator, Judge, Reference, scale
 from chamberopt.optimize.pareto import scalarised, weights
@@ -18,7 +18,7 @@ from chamberopt.optimize.search.acquisition import recommend
 from chamberopt.optimize.search.gaussian_process import Surrogate, pooled
 from chamberopt.optimize.storage.study_folder import Record
 from chamberopt.optimize.storage.trial_log import Trial
-from chamberopt.simulation.evaluate import Evaluation
+from chamberopt.simulation.evaluation import Evaluation
 
 if TYPE_CHECKING:
     from chamberopt.design.load import Design, Study

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from chamberopt.coverage.statistics.interval import Estimate, student
+from chamberopt.coverage.statistics.confidence_interval import Estimate, student_quantile
 
 if TYPE_CHECKING:
     from chamberopt.design.load import Limits
@@ -66,7 +66,7 @@ def standard_error(figure: Estimate) -> float:
     """Of an estimate, as its interval has it; 0 of what is exact or has no interval."""
     if not 0.0 < figure.half_width < math.inf:
         return 0.0
-    return figure.half_width / student(max(1, len(figure.pseudovalues) - 1))
+    return figure.half_width / student_quantile(max(1, len(figure.pseudovalues) - 1))
 
 
 def _beyond(figure: Estimate, limits: Limits) -> list[tuple[float, float]]:

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from chamberopt.common.errors import InputError, WorkerLostError
-from chamberopt.coverage.metrics import METRICS, objective
-from chamberopt.coverage.statistics.interval import Estimate
+from chamberopt.coverage.metrics import METRICS, parse_objective
+from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.optimize.constraints import shortfall, violations
 from chamberopt.optimize.storage.trial_log import Trial
-from chamberopt.simulation.evaluate import Evaluation, weighted
+from chamberopt.simulation.evaluate import weighted_sum
+from chamberopt.simulation.evaluation import Evaluation
 
 if TYPE_CHECKING:
     from chamberopt.design.load import Design, Study
@@ -64,7 +65,7 @@ class Judge:
         others = self._study.objective.goals[1:]
         return (
             evaluation.objective,
-            *(weighted(objective(name), evaluation.metrics) for name in others),
+            *(weighted_sum(parse_objective(name), evaluation.metrics) for name in others),
         )
 
     def constrained(
@@ -177,6 +178,6 @@ def scale(goal: str, metrics: Mapping[str, Estimate]) -> float:
     """How much a whole unit of an objective is: its heaviest term, of a metric within 0..1 the weight itself."""
     sizes = [
         abs(weight) * (1.0 if METRICS[name].highest <= 1.0 else abs(metrics[name].value))
-        for name, weight in objective(goal).terms.items()
+        for name, weight in parse_objective(goal).terms.items()
     ]
     return max(sizes) or 1.0

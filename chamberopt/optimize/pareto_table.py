@@ -13,7 +13,7 @@ from chamberopt.optimize.constraints import INFEASIBLE
 from chamberopt.optimize.pareto import on_front
 
 if TYPE_CHECKING:
-    from chamberopt.coverage.statistics.interval import Estimate
+    from chamberopt.coverage.statistics.confidence_interval import Estimate
     from chamberopt.optimize.run_study import StudyResult
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import write_text
 from chamberopt.common.progress import Progress
-from chamberopt.coverage.statistics.interval import Estimate, paired_difference
+from chamberopt.coverage.statistics.confidence_interval import Estimate, paired_difference
 from chamberopt.design.load import save_design
 from chamberopt.optimize.candidates import FIRST_ALONE, Candidates, Confirmed, Stop
 from chamberopt.optimize.constraints import NOT_KNOWN
@@ -23,7 +23,8 @@ from chamberopt.optimize.search.phases import PARETO_PHASES, maximise
 from chamberopt.optimize.sensitivity import Findings, found
 from chamberopt.optimize.storage.study_folder import STUDY, Record, open_record
 from chamberopt.optimize.storage.trial_log import Trial
-from chamberopt.simulation.evaluate import Evaluation, evaluate
+from chamberopt.simulation.evaluate import evaluate
+from chamberopt.simulation.evaluation import Evaluation
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber

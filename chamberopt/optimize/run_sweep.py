@@ -26,7 +26,7 @@ from chamberopt.optimize.storage.trial_log import HISTORY, Trial
 
 if TYPE_CHECKING:
     from chamberopt.design.load import Study
-    from chamberopt.simulation.evaluate import Evaluation
+    from chamberopt.simulation.evaluation import Evaluation
 
 MOST_CANDIDATES = 100_000
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from chamberopt.coverage.statistics.interval import Estimate
+from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.optimize.search.gaussian_process import Surrogate, one_thread
 
 NORMAL = 1.96  # standard deviations of a 95 % interval

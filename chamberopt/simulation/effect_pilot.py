@@ -19,14 +19,14 @@ import numpy as np
 from chamberopt.chamber import dimensionless
 from chamberopt.chamber.scene import chamber_mesh, rests
 from chamberopt.coverage.metrics import exposed_target
-from chamberopt.coverage.statistics.interval import Estimate, estimate
+from chamberopt.coverage.statistics.confidence_interval import Estimate, estimate
 from chamberopt.design.design import checked
 from chamberopt.simulation.evaluate import evaluate
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.common.progress import Progress
-    from chamberopt.coverage.tally import Tally
+    from chamberopt.coverage.coverage_from_impacts import Tally
     from chamberopt.design.load import Design
 
 Prepare = Callable[["Design"], None]
@@ -180,7 +180,7 @@ def advise(
     return sorted(said, key=lambda one: -_size(one))
 
 
-def settled(
+def with_effects_resolved(
     design: Design,
     chamber: Chamber,
     executor: Executor,

@@ -11,8 +11,7 @@ import math
 import time
 from collections.abc import Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
-from functools import cached_property, reduce
+from functools import reduce
 from operator import add
 from typing import TYPE_CHECKING
 
@@ -22,20 +21,36 @@ from chamberopt.chamber.analytic import described
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.parallel.executor import share
 from chamberopt.common.progress import Progress
-from chamberopt.coverage.dents import Samples, few_points_note, marked_share, sample_points
-from chamberopt.coverage.estimators import coverage_figures, few_dents_note, surface, time_to_98
-from chamberopt.coverage.hits import Hits, SortedHits, sorted_hits
+from chamberopt.coverage.coverage_estimators import (
+    coverage_estimates,
+    few_dents_note,
+    target_patches,
+    time_to_98_estimate,
+)
+from chamberopt.coverage.coverage_from_impacts import Tally
+from chamberopt.coverage.dent_marking import (
+    SamplePoints,
+    few_points_note,
+    marked_share,
+    sample_points,
+)
 from chamberopt.coverage.intensity import intensity_uniformity
-from chamberopt.coverage.metrics import METRICS, Metric, Objective, objective, on_target
-from chamberopt.coverage.statistics.interval import Estimate, estimate, student
-from chamberopt.coverage.tally import Tally
+from chamberopt.coverage.metrics import (
+    METRICS,
+    Metric,
+    ObjectiveFunction,
+    parse_objective,
+    target_coverage,
+)
+from chamberopt.coverage.statistics.confidence_interval import Estimate, estimate, student_quantile
+from chamberopt.simulation.evaluation import Evaluation
 from chamberopt.simulation.replicas import (
-    LEAST_WATCHED,
+    MIN_REPLICAS_TO_STOP,
     Replica,
-    replicas_wanted,
+    next_replica_count,
     simulate_replicas,
 )
-from chamberopt.simulation.resting_balls import on_the_spot_notes, stuck_notes
+from chamberopt.simulation.resting_balls import bouncing_notes, resting_notes
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -44,41 +59,6 @@ if TYPE_CHECKING:
 
 OWN_ESTIMATORS = ("time_to_98_s", "intensity_uniformity")  # beside those of coverage
 CURVE = 50  # points of coverage against time
-
-
-@dataclass(frozen=True)
-class Evaluation:
-    """One candidate, simulated: its objective and metrics with intervals, and the tallies they come from.
-
-    total: sum of the replicas' tallies · replicas: one Tally each · timings: seconds of wall clock by step ·
-    collisions: numbers of simulated collisions by kind, warm-up included · notes: what to know before
-    trusting it · stopped_by: what ended it, "replicas" (a number was asked for), "accuracy" or "most_replicas" ·
-    analytic: in an exact cavity, not the chamber's mesh ·
-    hits: of each replica, its impacts one by one ·
-    marked (m,): share of each part triangle inside dents, NaN unexposed, marked_interval (m,): width of its 95 %
-    interval, and against_time: (time s, mean coverage of the target) pairs; all only where every dent is marked.
-    """
-
-    objective_name: str
-    objective: Estimate
-    metrics: dict[str, Estimate]
-    total: Tally
-    replicas: tuple[Tally, ...]
-    timings: dict[str, float]
-    collisions: dict[str, int]
-    notes: tuple[str, ...] = ()
-    stream: str = "search"
-    stopped_by: str = "replicas"
-    analytic: bool = False
-    hits: tuple[Hits, ...] = ()
-    marked: np.ndarray | None = None
-    marked_interval: np.ndarray | None = None
-    against_time: tuple[tuple[float, Estimate], ...] = ()
-
-    @cached_property
-    def sorted_hits(self) -> SortedHits | None:
-        """The hits of all replicas by part triangle; None where there are none to tell of."""
-        return sorted_hits(self.hits, len(self.total.impacts)) if self.hits else None
 
 
 def jackknife(
@@ -93,10 +73,12 @@ def jackknife(
     total = reduce(add, replicas)
     parts = [total - replica for replica in replicas] if n > 1 else []
     figures = {}
-    if any(metric.over_surface or metric.name in OWN_ESTIMATORS for metric in statistics):
-        ground = surface(replicas, chamber, design)
-        figures = coverage_figures(replicas, chamber, ground)
-        figures["time_to_98_s"] = time_to_98(figures["p05_coverage"], design.process.treatment_time)
+    if any(metric.from_coverage or metric.name in OWN_ESTIMATORS for metric in statistics):
+        ground = target_patches(replicas, chamber, design)
+        figures = coverage_estimates(replicas, chamber, ground)
+        figures["time_to_98_s"] = time_to_98_estimate(
+            figures["p05_coverage"], design.process.treatment_time
+        )
         figures["intensity_uniformity"] = intensity_uniformity(replicas, ground)
     estimates = []
     for metric in statistics:
@@ -110,21 +92,23 @@ def jackknife(
     return estimates
 
 
-def marked_figures(shares: Sequence[np.ndarray], chamber: Chamber) -> dict[str, Estimate]:
+def marked_coverage_estimates(
+    shares: Sequence[np.ndarray], chamber: Chamber
+) -> dict[str, Estimate]:
     """The figures of parts peened to the end, dent by dent: plain means over them, (m,) coverage each.
 
     Such a part has the grain of its dents in it: std_coverage is larger, and p05_coverage lower, than of the
     coverage to expect, the more so the smaller the triangles.
     """
-    each = [on_target(share, chamber) for share in shares]
+    each = [target_coverage(share, chamber) for share in shares]
     return {
-        name: estimate([metric.over_surface(*one) for one in each], metric.lowest, metric.highest)
+        name: estimate([metric.from_coverage(*one) for one in each], metric.lowest, metric.highest)
         for name, metric in METRICS.items()
-        if metric.over_surface
+        if metric.from_coverage
     }
 
 
-def weighted(goal: Objective, metrics: dict[str, Estimate]) -> Estimate:
+def weighted_sum(goal: ObjectiveFunction, metrics: dict[str, Estimate]) -> Estimate:
     """The objective from the metrics: their corrected values, and an interval that knows how they move together."""
     value = sum(weight * metrics[name].value for name, weight in goal.terms.items())
     columns = [weight * np.array(metrics[name].pseudovalues) for name, weight in goal.terms.items()]
@@ -158,7 +142,7 @@ def evaluate(
     wanted = accuracy.coverage if replicas is None else None
     planned = replicas or accuracy.replicas
     if wanted is not None:
-        planned = min(max(planned, LEAST_WATCHED), accuracy.most_replicas)
+        planned = min(max(planned, MIN_REPLICAS_TO_STOP), accuracy.most_replicas)
     mesh = cavity or chamber_mesh(chamber)
     samples = (
         sample_points(chamber, accuracy.sample_spacing)
@@ -177,12 +161,12 @@ def evaluate(
                 progress(len(done), planned, None)
         simulated = time.perf_counter()
         metrics = _metrics(done, chamber, design, samples)
-        goal = weighted(objective(objective_name), metrics)
+        goal = weighted_sum(parse_objective(objective_name), metrics)
         clock["simulate"] += simulated - started
         clock["coverage"] += time.perf_counter() - simulated
         if wanted is None:
             break
-        planned = replicas_wanted(len(done), goal.half_width, wanted, accuracy.most_replicas)
+        planned = next_replica_count(len(done), goal.half_width, wanted, accuracy.most_replicas)
         if planned == len(done):
             break
     tallies = [replica.tally for replica in done]
@@ -198,7 +182,7 @@ def evaluate(
     if samples is not None:
         notes += few_points_note(samples, chamber)
     else:
-        notes += few_dents_note(tallies, surface(tallies, chamber, design))
+        notes += few_dents_note(tallies, target_patches(tallies, chamber, design))
     shares = None if samples is None else _shares(done, samples, chamber, design)
     return Evaluation(
         objective_name=objective_name,
@@ -225,29 +209,29 @@ def _motion_notes(done: Sequence[Replica]) -> tuple[str, ...]:
     """What became of the shot by the replicas' ends."""
     stuck = [replica.stuck for replica in done if replica.stuck]
     return (
-        *stuck_notes(stuck, len(done)),
-        *on_the_spot_notes([replica.on_the_spot for replica in done]),
+        *resting_notes(stuck, len(done)),
+        *bouncing_notes([replica.on_the_spot for replica in done]),
     )
 
 
 def _metrics(
-    done: Sequence[Replica], chamber: Chamber, design: Design, samples: Samples | None
+    done: Sequence[Replica], chamber: Chamber, design: Design, samples: SamplePoints | None
 ) -> dict[str, Estimate]:
     tallies = [replica.tally for replica in done]
     if samples is None:
         return dict(
             zip(METRICS, jackknife(tallies, list(METRICS.values()), chamber, design), strict=True)
         )
-    others = [metric for metric in METRICS.values() if metric.over_surface is None]
+    others = [metric for metric in METRICS.values() if metric.from_coverage is None]
     named = {
         m.name: e for m, e in zip(others, jackknife(tallies, others, chamber, design), strict=True)
     }
-    named |= marked_figures(_shares(done, samples, chamber, design), chamber)
+    named |= marked_coverage_estimates(_shares(done, samples, chamber, design), chamber)
     return {name: named[name] for name in METRICS}
 
 
 def _shares(
-    done: Sequence[Replica], samples: Samples, chamber: Chamber, design: Design
+    done: Sequence[Replica], samples: SamplePoints, chamber: Chamber, design: Design
 ) -> list[np.ndarray]:
     """Marked share of each part triangle at the treatment time, (m,), a replica each."""
     return _shares_at(done, samples, chamber, design.process.treatment_time)
@@ -258,25 +242,27 @@ def _width(shares: Sequence[np.ndarray]) -> np.ndarray:
     n = len(shares)
     if n < 2:
         return np.full(len(shares[0]), np.nan)
-    return np.asarray(2.0 * student(n - 1) * np.std(shares, axis=0, ddof=1) / math.sqrt(n))
+    return np.asarray(2.0 * student_quantile(n - 1) * np.std(shares, axis=0, ddof=1) / math.sqrt(n))
 
 
 def _shares_at(
-    done: Sequence[Replica], samples: Samples, chamber: Chamber, at: float
+    done: Sequence[Replica], samples: SamplePoints, chamber: Chamber, at: float
 ) -> list[np.ndarray]:
     firsts = [replica.first_marked for replica in done if replica.first_marked is not None]
     return [marked_share(samples, first, at, len(chamber.part.triangles)) for first in firsts]
 
 
 def _against_time(
-    done: Sequence[Replica], samples: Samples, chamber: Chamber, design: Design
+    done: Sequence[Replica], samples: SamplePoints, chamber: Chamber, design: Design
 ) -> tuple[tuple[float, Estimate], ...]:
     """Mean coverage of the target at even steps of time up to the treatment's end."""
     times = np.linspace(0.0, design.process.treatment_time, CURVE + 1)[1:]
     return tuple(
         (
             float(at),
-            marked_figures(_shares_at(done, samples, chamber, at), chamber)["mean_coverage"],
+            marked_coverage_estimates(_shares_at(done, samples, chamber, at), chamber)[
+                "mean_coverage"
+            ],
         )
         for at in times
     )

@@ -14,10 +14,10 @@ import numpy as np
 from chamberopt.chamber.analytic import on_chamber
 from chamberopt.chamber.scene import build_scene, replica_seed
 from chamberopt.common.errors import WorkerLostError
-from chamberopt.coverage.dents import Samples, first_marked
-from chamberopt.coverage.hits import Hits, hits_on_part
-from chamberopt.coverage.tally import Tally, tally
-from chamberopt.simulation.resting_balls import Stuck, share_on_the_spot, still
+from chamberopt.coverage.coverage_from_impacts import Tally, tally_impacts
+from chamberopt.coverage.dent_marking import SamplePoints, first_marked_times
+from chamberopt.coverage.part_impacts import Hits, hits_on_part
+from chamberopt.simulation.resting_balls import RestingBalls, bouncing_share, find_resting_balls
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -29,7 +29,7 @@ T = TypeVar("T")
 # Looking at an interval until it is narrow enough favours moments when it is too narrow by chance. From 10 replicas
 # on, with steps of a quarter or more, a 95 % interval still holds the truth 94 % of the time (normal replicas; 92 %
 # from 5 on, 90 % from 3 on: docs/accuracy.md).
-LEAST_WATCHED = 10
+MIN_REPLICAS_TO_STOP = 10
 STEP, LEAP = 1.25, 2.0
 
 
@@ -39,7 +39,7 @@ class Replica:
 
     tally: Tally
     collisions: dict[str, int]
-    stuck: Stuck | None
+    stuck: RestingBalls | None
     on_the_spot: float
     first_marked: np.ndarray | None
     hits: Hits
@@ -53,10 +53,10 @@ def simulate_replicas(
     setting: (design, chamber, mesh, samples) as executor.shared hands them over; keep it until the last replica, for
     it goes to a worker once · seed: of the design's process.
     """
-    return in_order(_replica, setting, seed, executor, stream, numbers, len(numbers))
+    return run_in_order(_replica, setting, seed, executor, stream, numbers, len(numbers))
 
 
-def in_order(
+def run_in_order(
     task: Callable[[Any, int], T],
     setting: Any,
     seed: int,
@@ -91,7 +91,7 @@ def _answer(number: int, future: Future[T]) -> T:
         raise WorkerLostError(f"replica {number}: {error}") from None
 
 
-def replicas_wanted(done: int, half_width: float, wanted: float, most: int) -> int:
+def next_replica_count(done: int, half_width: float, wanted: float, most: int) -> int:
     """How many replicas to have before the interval is looked at again: what its width foretells, within bounds."""
     if done >= most or half_width <= wanted:
         return done
@@ -100,7 +100,7 @@ def replicas_wanted(done: int, half_width: float, wanted: float, most: int) -> i
 
 
 def _replica(
-    setting: tuple[Design, Chamber, TriangleMesh | AnalyticCavity, Samples | None], seed: int
+    setting: tuple[Design, Chamber, TriangleMesh | AnalyticCavity, SamplePoints | None], seed: int
 ) -> Replica:
     return simulate_replica(*setting, seed)
 
@@ -109,30 +109,32 @@ def simulate_replica(
     design: Design,
     chamber: Chamber,
     mesh: TriangleMesh | AnalyticCavity,
-    samples: Samples | None,
+    samples: SamplePoints | None,
     seed: int,
 ) -> Replica:
     """One replica, on a worker."""
-    result = simulated(design, chamber, mesh, seed)
+    result = simulate_seed(design, chamber, mesh, seed)
     impacts = result.impacts
     shot, kinds = design.shot, ("walls", "balls", "sonotrode", "total")
     return Replica(
-        tally=tally(impacts, chamber, design),
+        tally=tally_impacts(impacts, chamber, design),
         collisions={kind: int(getattr(result.collisions, kind)) for kind in kinds},
-        on_the_spot=share_on_the_spot(result.balls.velocities),
-        stuck=still(
+        on_the_spot=bouncing_share(result.balls.velocities),
+        stuck=find_resting_balls(
             result.resting,
             len(result.balls),
             shot.diameter,
             chamber,
             design.effects.part_turn is not None,
         ),
-        first_marked=None if samples is None else first_marked(samples, impacts, chamber, design),
+        first_marked=None
+        if samples is None
+        else first_marked_times(samples, impacts, chamber, design),
         hits=hits_on_part(impacts, chamber, design),
     )
 
 
-def simulated(
+def simulate_seed(
     design: Design, chamber: Chamber, mesh: TriangleMesh | AnalyticCavity, seed: int
 ) -> SimulationResult:
     """What the simulator has to say of one replica; its impacts are on the chamber's triangles."""

@@ -28,16 +28,16 @@ MUCH = 0.1  # of the shot
 
 
 @dataclass(frozen=True)
-class Stuck:
+class RestingBalls:
     """The balls at rest at the end of a replica: their ``share`` of the shot, and one ``line`` on where they are."""
 
     share: float
     line: str
 
 
-def still(
+def find_resting_balls(
     resting: Resting, balls: int, diameter: float, chamber: Chamber, part_turns: bool
-) -> Stuck | None:
+) -> RestingBalls | None:
     """What lies still of a shot of so many ``balls`` of this ``diameter`` [m]; None if nothing does.
 
     Of a part that turns it is not known here where it is at the end, so that nothing is said to touch it.
@@ -54,13 +54,13 @@ def still(
     others = sum(len(members) for _, members in places[MOST_PLACES:])
     said += [f"{others} elsewhere"] if others else []
     verb = "lies" if len(resting) == 1 else "lie"
-    return Stuck(
+    return RestingBalls(
         len(resting) / balls,
         f"{len(resting)} of {balls} balls {verb} still at the end: {'; '.join(said)}",
     )
 
 
-def share_on_the_spot(velocities: np.ndarray) -> float:
+def bouncing_share(velocities: np.ndarray) -> float:
     """The share of balls, of velocities (n, 3), that go straight up and down: for ever, if nothing meets them."""
     sideways, speed = (
         np.hypot(velocities[:, 0], velocities[:, 1]),
@@ -69,7 +69,7 @@ def share_on_the_spot(velocities: np.ndarray) -> float:
     return float(((sideways < STRAIGHT * speed) & (speed > 0.0)).mean())
 
 
-def on_the_spot_notes(shares: Sequence[float]) -> tuple[str, ...]:
+def bouncing_notes(shares: Sequence[float]) -> tuple[str, ...]:
     """One note where much of the shot, of a ``share`` in each replica, ends so: a trap of faces that are ideal."""
     caught = [share for share in shares if share > MUCH]
     if not caught:
@@ -81,7 +81,7 @@ def on_the_spot_notes(shares: Sequence[float]) -> tuple[str, ...]:
     )
 
 
-def stuck_notes(stuck: list[Stuck], replicas: int) -> tuple[str, ...]:
+def resting_notes(stuck: list[RestingBalls], replicas: int) -> tuple[str, ...]:
     """One note on all replicas; ``stuck`` has those in which balls came to rest."""
     if not stuck:
         return ()

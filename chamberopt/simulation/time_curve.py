@@ -6,19 +6,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chamberopt.coverage.estimators import coverage_figures, surface
+from chamberopt.coverage.coverage_estimators import coverage_estimates, target_patches
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.design.load import Design
-    from chamberopt.simulation.evaluate import Evaluation
+    from chamberopt.simulation.evaluation import Evaluation
 
 POINTS = 20
 FARTHEST = 5.0  # treatment times: what is beyond is rather another treatment
 VAGUE = 0.1  # half-width of the mean's 95 % interval beyond which a curve would only mislead
 
 
-def against_time(design: Design, chamber: Chamber, evaluation: Evaluation) -> list[dict[str, Any]]:
+def coverage_against_time(
+    design: Design, chamber: Chamber, evaluation: Evaluation
+) -> list[dict[str, Any]]:
     """Rows of time_s, mean_coverage, half_width, p05_coverage, p05_half_width, from the first moments to the end.
 
     From dent rates: to where 98 % is reached, the treatment time at least, FARTHEST times it at most, and as far as the
@@ -36,8 +38,8 @@ def against_time(design: Design, chamber: Chamber, evaluation: Evaluation) -> li
     rows = []
     for at in times:
         then = design.with_values({"process.treatment_time_s": at})
-        found = coverage_figures(
-            evaluation.replicas, chamber, surface(evaluation.replicas, chamber, then)
+        found = coverage_estimates(
+            evaluation.replicas, chamber, target_patches(evaluation.replicas, chamber, then)
         )
         mean, poorest = found["mean_coverage"], found["p05_coverage"]
         if at > treatment and mean.half_width > VAGUE:

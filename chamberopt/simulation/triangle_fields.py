@@ -7,16 +7,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.coverage.hits import SortedHits
-from chamberopt.coverage.statistics.interval import CONFIDENCE
-from chamberopt.coverage.tally import coverage_at, mean_impact_angle_deg, mean_normal_speed
+from chamberopt.coverage.coverage_from_impacts import (
+    coverage_at,
+    mean_angle_per_triangle,
+    mean_speed_per_triangle,
+)
+from chamberopt.coverage.part_impacts import HitsByTriangle
+from chamberopt.coverage.statistics.confidence_interval import CONFIDENCE
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from chamberopt.chamber.build import Chamber
     from chamberopt.design.load import Design
-    from chamberopt.simulation.evaluate import Evaluation
+    from chamberopt.simulation.evaluation import Evaluation
 
 # Even steps of lightness, told apart by colour-blind readers too.
 EVEN, COUNTS, DOUBT = "viridis", "cividis", "magma"
@@ -68,7 +72,9 @@ QUANTITIES = {
 }
 
 
-def per_triangle(design: Design, chamber: Chamber, evaluation: Evaluation) -> dict[str, np.ndarray]:
+def compute_triangle_fields(
+    design: Design, chamber: Chamber, evaluation: Evaluation
+) -> dict[str, np.ndarray]:
     """The cell data of coverage.vtp, (m,) each, NaN where not exposed or never hit.
 
     coverage (0..1), impacts_per_mm2 and energy_per_mm2 [mJ/mm²] at the treatment time; dent_density (dented area per
@@ -87,8 +93,8 @@ def per_triangle(design: Design, chamber: Chamber, evaluation: Evaluation) -> di
         "dent_density": total.dented_area * 1e6 * times / exposed_mm2,
         "impacts": total.impacts,
         "dents": total.dents,
-        "mean_normal_speed": mean_normal_speed(total),
-        "mean_angle_deg": mean_impact_angle_deg(total),
+        "mean_normal_speed": mean_speed_per_triangle(total),
+        "mean_angle_deg": mean_angle_per_triangle(total),
         "exposed_area_mm2": chamber.exposed_area * 1e6,
         "target": chamber.part.target.astype(np.uint8),
         "element": chamber.part.elements,
@@ -113,11 +119,11 @@ def per_triangle(design: Design, chamber: Chamber, evaluation: Evaluation) -> di
     return found
 
 
-def _sums(hits: SortedHits, column: np.ndarray) -> np.ndarray:
+def _sums(hits: HitsByTriangle, column: np.ndarray) -> np.ndarray:
     return np.bincount(hits.hits.triangle, column.astype(float), len(hits.first) - 1)
 
 
-def _quantile(hits: SortedHits, share: float) -> np.ndarray:
+def _quantile(hits: HitsByTriangle, share: float) -> np.ndarray:
     """The speed that this share of a triangle's impacts do not exceed (its rank is rounded up), (m,)."""
     speed = hits.hits.speed[np.lexsort((hits.hits.speed, hits.hits.triangle))]
     count = np.diff(hits.first)
@@ -129,7 +135,7 @@ def _quantile(hits: SortedHits, share: float) -> np.ndarray:
 
 
 def coverage_bounds(
-    hits: SortedHits,
+    hits: HitsByTriangle,
     area: np.ndarray,
     times: float,
     over: Callable[[np.ndarray], np.ndarray] = np.asarray,

@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 
 from chamberopt.chamber.build import Chamber, Part
-from chamberopt.coverage.hits import Hits
+from chamberopt.coverage.coverage_from_impacts import Tally
 from chamberopt.coverage.metrics import METRICS, OBJECTIVES
-from chamberopt.coverage.statistics.interval import Estimate, estimate
-from chamberopt.coverage.tally import Tally
+from chamberopt.coverage.part_impacts import Hits
+from chamberopt.coverage.statistics.confidence_interval import Estimate, estimate
 from chamberopt.design.load import Design, load_design
-from chamberopt.simulation.evaluate import Evaluation, jackknife, weighted
+from chamberopt.simulation.evaluate import jackknife, weighted_sum
+from chamberopt.simulation.evaluation import Evaluation
 
 DESIGNS = Path(__file__).resolve().parents[2] / "designs"
 
@@ -110,7 +111,7 @@ def evaluation_of(design: Design, chamber: Chamber, tallies: list[Tally]) -> Eva
     )
     return Evaluation(
         "uniform_coverage",
-        weighted(OBJECTIVES["uniform_coverage"], metrics),
+        weighted_sum(OBJECTIVES["uniform_coverage"], metrics),
         metrics,
         sum(tallies[1:], tallies[0]),
         tuple(tallies),

@@ -9,7 +9,7 @@ import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.design.load import Design
-from chamberopt.simulation.evaluate import Evaluation
+from chamberopt.simulation.evaluation import Evaluation
 from tests.helpers.synthetic import judged
 
 

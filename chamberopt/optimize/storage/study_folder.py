@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import make_output_folder, write_text
-from chamberopt.coverage.statistics.interval import Estimate
+from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.design.design import Design, checked
 from chamberopt.optimize.storage.lock import only_writer
 from chamberopt.optimize.storage.study_inputs import asked, require_same, require_same_files
 from chamberopt.optimize.storage.trial_log import HISTORY, TIMINGS, Journal, Trial, read_seconds
 from chamberopt.simulation.effect_pilot import Advice
-from chamberopt.simulation.evaluate import Evaluation
-from chamberopt.simulation.evaluation_file import load_evaluation, save_evaluation
+from chamberopt.simulation.evaluation import Evaluation, load_evaluation, save_evaluation
 
 if TYPE_CHECKING:
     from chamberopt.design.load import Study

@@ -16,7 +16,7 @@ from typing import Any, Self
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import sync_folder
-from chamberopt.coverage.statistics.interval import Estimate
+from chamberopt.coverage.statistics.confidence_interval import Estimate
 
 HISTORY = "history.jsonl"
 TIMINGS = "timings.jsonl"

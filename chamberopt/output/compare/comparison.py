@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from chamberopt.coverage.metrics import LONGEST, objective
-from chamberopt.coverage.statistics.interval import Estimate
+from chamberopt.coverage.metrics import NEVER, parse_objective
+from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.output.compare.difference import Difference, confidence_of_each, difference
 from chamberopt.output.compare.inputs import require_one_time, require_same_part, require_several
 from chamberopt.output.compare.parameters import differing, labels
@@ -107,11 +107,11 @@ def _difference(name: str, first: Result, other: Result, confidence: float) -> D
     of_goal = name == first.objective_name
     after, before = (one.objective if of_goal else one.metrics[name] for one in (other, first))
     gap = difference(after, before, other.seeds == first.seeds, confidence)
-    terms = objective(name).terms if of_goal else {name: 1.0}
+    terms = parse_objective(name).terms if of_goal else {name: 1.0}
     if TIME in terms and any(
-        one.metrics[TIME].value >= LONGEST for one in (first, other) if TIME in one.metrics
+        one.metrics[TIME].value >= NEVER for one in (first, other) if TIME in one.metrics
     ):
         return replace(
-            gap, half_width=LONGEST, times=None, replicas=None
+            gap, half_width=NEVER, times=None, replicas=None
         )  # "never" has no replicas that scatter
     return gap

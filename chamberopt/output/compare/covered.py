@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chamberopt.coverage.hits import Hits, SortedHits, own_hits
+from chamberopt.coverage.part_impacts import Hits, HitsByTriangle, load_matching_hits
 from chamberopt.geometry.triangles import area_vectors
 from chamberopt.output.results.results import Result
 from chamberopt.output.results.subject import own_coverage
@@ -29,7 +29,7 @@ class Covered:
     coverage: np.ndarray
     dents: np.ndarray
     times: float
-    hits: SortedHits | None
+    hits: HitsByTriangle | None
 
     @property
     def hits_on_target(self) -> Hits | None:
@@ -57,5 +57,5 @@ def covered(result: Result) -> Covered:
         coverage=np.nan_to_num(np.asarray(surface["coverage"], dtype=float)),
         dents=np.asarray(surface["dents"], dtype=float),
         times=result.design.process.treatment_time_s / float(result.data["simulated_time_s"]),
-        hits=own_hits(result.folder, np.asarray(surface["impacts"])),
+        hits=load_matching_hits(result.folder, np.asarray(surface["impacts"])),
     )

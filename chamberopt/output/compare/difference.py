@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from chamberopt.coverage.statistics.interval import (
+from chamberopt.coverage.statistics.confidence_interval import (
     CONFIDENCE,
-    NOTHING,
+    ZERO_TOLERANCE,
     Estimate,
     independent_difference,
     paired_difference,
-    student,
+    student_quantile,
     welch_half_width,
 )
 
@@ -70,7 +70,9 @@ def difference(
     count = len(after.pseudovalues)
     paired = same_seeds and count == len(before.pseudovalues) > 0
     gap = (paired_difference if paired else independent_difference)(after, before, confidence)
-    found = Difference(0.0 if abs(gap.value) < NOTHING else gap.value, gap.half_width, paired)
+    found = Difference(
+        0.0 if abs(gap.value) < ZERO_TOLERANCE else gap.value, gap.half_width, paired
+    )
     if found.real or found.value == 0.0 or min(count, len(before.pseudovalues)) < 2:
         return found
     scatter = _of_pairs(gap, confidence) if paired else _of_two(after, before, confidence)
@@ -85,7 +87,7 @@ def _of_pairs(gap: Estimate, confidence: float) -> Callable[[float], float]:
     """Half-width from so many times as many pairs of the same scatter."""
     count, deviation = len(gap.pseudovalues), float(np.std(gap.pseudovalues, ddof=1))
     return lambda times: (
-        student(count * times - 1.0, confidence) * deviation / math.sqrt(count * times)
+        student_quantile(count * times - 1.0, confidence) * deviation / math.sqrt(count * times)
     )
 
 

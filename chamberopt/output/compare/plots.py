@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.common.files import atomic_write
-from chamberopt.coverage.metrics import FULL
-from chamberopt.coverage.metrics import LONGEST as NEVER
+from chamberopt.coverage.metrics import FULL_COVERAGE, NEVER
 from chamberopt.output.compare.comparison import TIME, Comparison
 from chamberopt.output.compare.distributions import Distributions, Histogram
 from chamberopt.output.compare.table import two_digits
@@ -92,7 +91,7 @@ def _against_time(axes: Axes, comparison: Comparison) -> None:
             if thick > 1.0 or len(curves) <= MOST_BANDS:
                 low, high = np.clip((value - half, value + half), 0.0, 1.0) * 100.0
                 axes.fill_between(times, low, high, color=colour, alpha=0.13, lw=0)
-    axes.axhline(100.0 * FULL, color=GREY, lw=0.8)
+    axes.axhline(100.0 * FULL_COVERAGE, color=GREY, lw=0.8)
     axes.axvline(seconds, color=GREY, lw=0.8)
     axes.text(seconds, 1.0, " treatment", fontsize=7.5, color="#555555")
     axes.set_xlim(0.0, 1.02 * end)
@@ -115,7 +114,7 @@ def _known(rows: list[dict[str, float]]) -> list[np.ndarray]:
 
 def _mark(axes: Axes, full: float, half_width: float, end: float, colour: str, k: int) -> None:
     """When 98 % are reached, with its interval; an arrow at the edge where that is later than the axis goes."""
-    high = 100.0 * FULL - 0.9 * k  # one below the other, where they are near
+    high = 100.0 * FULL_COVERAGE - 0.9 * k  # one below the other, where they are near
     if full > end:
         axes.plot(1.01 * end, high, ">", color=colour, ms=7, clip_on=False)
         return

@@ -6,10 +6,10 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from chamberopt.coverage.metrics import LONGEST as NEVER
-from chamberopt.coverage.statistics.interval import CONFIDENCE, Estimate
+from chamberopt.coverage.metrics import NEVER
+from chamberopt.coverage.statistics.confidence_interval import CONFIDENCE, Estimate
 from chamberopt.output.compare.comparison import TIME, Comparison
-from chamberopt.output.compare.difference import LONGEST, NOTHING, Difference
+from chamberopt.output.compare.difference import LONGEST, ZERO_TOLERANCE, Difference
 
 COUNTED = "process.accuracy.coverage_model"
 HEADER = ("difference", "real", "to know: simulate")
@@ -106,7 +106,7 @@ def _figure(name: str, estimate: Estimate) -> str:
 
 def _value(value: float, form: str, half_width: float) -> str:
     """A number, and its interval if it has one; of what rounding leaves of a zero, 0."""
-    value, half_width = (0.0 if abs(x) < NOTHING else x for x in (value, half_width))
+    value, half_width = (0.0 if abs(x) < ZERO_TOLERANCE else x for x in (value, half_width))
     return f"{value:{form}}" + (f" ± {two_digits(half_width)}" if half_width else "")
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from chamberopt.coverage.tally import dent_diameters, impact_angle_deg
+from chamberopt.coverage.dents import dent_diameters, impact_angle_deg
 from chamberopt.geometry.triangles import closest_points
 
 if TYPE_CHECKING:

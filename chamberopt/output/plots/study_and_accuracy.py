@@ -12,7 +12,7 @@ from chamberopt.common.files import atomic_write
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from chamberopt.coverage.statistics.interval import Estimate
+    from chamberopt.coverage.statistics.confidence_interval import Estimate
     from chamberopt.optimize.run_study import StudyResult
     from chamberopt.optimize.storage.trial_log import Trial
     from chamberopt.simulation.convergence.study import Ladder

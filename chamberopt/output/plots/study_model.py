@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from chamberopt.common.files import atomic_write
-from chamberopt.coverage.statistics.interval import Estimate
+from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.output.plots.study_and_accuracy import BLUE, GREEN, GREY, ORANGE, reach
 
 if TYPE_CHECKING:

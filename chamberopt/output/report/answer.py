@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from chamberopt.coverage.metrics import LONGEST
+from chamberopt.coverage.metrics import NEVER
 from chamberopt.output.report.formatting import estimated, plain
 from chamberopt.output.report.words import goal_words
 
 if TYPE_CHECKING:
-    from chamberopt.coverage.statistics.interval import Estimate
+    from chamberopt.coverage.statistics.confidence_interval import Estimate
     from chamberopt.output.results.results import Result
 
 
@@ -47,7 +47,7 @@ def full_coverage(result: Result) -> str:
     full = result.metrics.get("time_to_98_s")
     if full is None:
         return "this older result does not say when it would be covered to 98 %"
-    if full.value >= LONGEST:
+    if full.value >= NEVER:
         return "at this rate 95 % of its area would never be covered to 98 %"
     if full.half_width >= full.value:
         said = "is not known yet"

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from chamberopt.common.errors import InputError
-from chamberopt.coverage.statistics.interval import (
+from chamberopt.coverage.statistics.confidence_interval import (
     Estimate,
     independent_difference,
     paired_difference,

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from chamberopt.coverage.statistics.interval import NOTHING
+from chamberopt.coverage.statistics.confidence_interval import ZERO_TOLERANCE
 
 if TYPE_CHECKING:
-    from chamberopt.coverage.statistics.interval import Estimate
+    from chamberopt.coverage.statistics.confidence_interval import Estimate
 
 GAP = "\u202f"  # between thousands; narrow, and no line breaks there
 
@@ -17,7 +17,7 @@ def plain(value: float, digits: int = 4) -> str:
     """So many digits that count, without exponents where people would not write one."""
     if not math.isfinite(value):
         return "not known"
-    if abs(value) < NOTHING:
+    if abs(value) < ZERO_TOLERANCE:
         return "0"
     if not 1e-4 <= abs(value) < 1e9:
         return f"{value:.{digits - 1}g}"
@@ -35,13 +35,13 @@ def with_interval(value: float, half_width: float, unit: str = "", sign: bool = 
     unit = f"{GAP if unit == '°' else ' '}{unit}" if unit else ""
     if not math.isfinite(value):
         return "not known"
-    mark = "+" if sign and value > NOTHING else ""
-    if abs(half_width) < NOTHING:
+    mark = "+" if sign and value > ZERO_TOLERANCE else ""
+    if abs(half_width) < ZERO_TOLERANCE:
         return f"{mark}{plain(value)}{unit}"
     if not math.isfinite(half_width):
         return f"{mark}{plain(value)} ± not known{unit}"
     decimals = fine = _decimals(half_width)
-    shown = 0.0 if abs(value) < NOTHING else value
+    shown = 0.0 if abs(value) < ZERO_TOLERANCE else value
     if (
         decimals < 0 and 0.0 < abs(shown) < 0.5 * 10.0**-decimals
     ):  # 4000 ± 500 000 says more than 0 ± 500 000

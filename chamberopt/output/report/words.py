@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from chamberopt.common.errors import InputError
-from chamberopt.coverage.metrics import METRICS, objective
+from chamberopt.coverage.metrics import METRICS, parse_objective
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ def metric_words(name: str) -> Words:
     metric = METRICS.get(name)
     if metric is None:
         return Words(name.replace("_", " "))
-    if metric.over_surface:
+    if metric.from_coverage:
         return Words(metric.summary, "%", 100.0)
     return Words(metric.summary, "" if metric.unit == "balls" else metric.unit)  # the label says it
 
@@ -34,7 +34,7 @@ def metric_words(name: str) -> Words:
 def goal_words(name: str) -> Words:
     """Of an objective. One that is a metric, or a metric to be small, reads as that metric."""
     try:
-        goal = objective(name)
+        goal = parse_objective(name)
     except InputError:  # of another version of the program
         return Words(name.replace("_", " "))
     (first, weight), *others = goal.terms.items()

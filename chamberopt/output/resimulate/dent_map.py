@@ -12,15 +12,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.coverage.dents import (
-    Dents,
-    dents_on_part,
-    inside,
-    mark,
+from chamberopt.coverage.dent_marking import (
+    mark_points,
     marked_share,
+    points_in_dents,
     sample_points,
 )
-from chamberopt.coverage.metrics import on_target
+from chamberopt.coverage.dents import Dents, dents_on_part
+from chamberopt.coverage.metrics import target_coverage
 from chamberopt.design.process import LONGEST_MARKED
 from chamberopt.geometry.raycast import View, places, seen, view_of
 from chamberopt.geometry.triangles import area_vectors
@@ -80,8 +79,8 @@ def peened(replayed: Replayed, time: float) -> Dents:
 def coverage(dents: Dents, chamber: Chamber, spacing: float) -> float:
     """The share of the target inside dents, what lies outside the cavity counted as bare; spacing [m] of the points."""
     samples = sample_points(chamber, spacing)
-    first = mark(samples, dents.place, dents.normal, dents.radius, dents.time)
-    share, weight = on_target(
+    first = mark_points(samples, dents.place, dents.normal, dents.radius, dents.time)
+    share, weight = target_coverage(
         marked_share(samples, first, dents.time.max(initial=0.0), len(chamber.part.triangles)),
         chamber,
     )
@@ -159,7 +158,7 @@ def topmost(
     end = len(dents)
     while end and len(left):
         some = slice(max(0, end - step), end)
-        point, dent, distance = inside(
+        point, dent, distance = points_in_dents(
             tree, facing, dents.place[some], dents.normal[some], dents.radius[some]
         )
         bare = last[left[point]] < 0

@@ -17,10 +17,10 @@ from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import core_count, share
 from chamberopt.common.progress import Progress
-from chamberopt.coverage.tally import Tally, mean_normal_speed, tally
+from chamberopt.coverage.coverage_from_impacts import Tally, mean_speed_per_triangle, tally_impacts
 from chamberopt.output.resimulate.rebuild import REMEDY, Ground, made_by
 from chamberopt.output.viewer import COVERAGE, read_surface
-from chamberopt.simulation.replicas import in_order, simulated
+from chamberopt.simulation.replicas import run_in_order, simulate_seed
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -59,10 +59,10 @@ def impacts_of(
     count = asked_replicas(result, replicas)
     seed, stream = result.seeds
     setting = share(executor, (design, chamber, ground.cavity or chamber_mesh(chamber)))
-    logs = in_order(_log, setting, seed, executor, stream, range(count), _ahead(result))
+    logs = run_in_order(_log, setting, seed, executor, stream, range(count), _ahead(result))
     tallies = []
     for number, log in enumerate(logs):
-        counted = tally(log, chamber, design)
+        counted = tally_impacts(log, chamber, design)
         tallies.append(
             replace(counted, dent_triangle=np.zeros(0, dtype=np.int32), dent_area=np.zeros(0))
         )
@@ -92,7 +92,7 @@ def _ahead(result: Result) -> int:
 def _log(setting: Any, seed: int) -> ImpactLog:
     """One replica, on a worker."""
     design, chamber, mesh = setting
-    return simulated(design, chamber, mesh, seed).impacts
+    return simulate_seed(design, chamber, mesh, seed).impacts
 
 
 def _on_part(number: int, log: ImpactLog, chamber: Chamber) -> ReplicaImpacts:
@@ -108,7 +108,7 @@ def _require_same_figures(result: Result, total: Tally) -> None:
     again = {
         "dents": total.dents,
         "impacts": total.impacts,
-        "mean_normal_speed": mean_normal_speed(total),
+        "mean_normal_speed": mean_speed_per_triangle(total),
     }
     for name, values in again.items():
         if name not in kept.array_names:

@@ -11,7 +11,7 @@ from typing import Any
 
 from chamberopt.common.files import write_text
 from chamberopt.common.versions import versions
-from chamberopt.coverage.statistics.interval import Estimate
+from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.design.load import save_design
 from chamberopt.output.plots.study_and_accuracy import price_picture
 from chamberopt.simulation.convergence.recommendation import (

@@ -12,17 +12,17 @@ from typing import TYPE_CHECKING, Any
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import make_output_folder, write_text
 from chamberopt.common.versions import versions
-from chamberopt.coverage.hits import HITS, save_hits
 from chamberopt.coverage.metrics import METRICS, exposed_target
-from chamberopt.coverage.statistics.interval import Estimate
+from chamberopt.coverage.part_impacts import HITS_FILE, save_hits
+from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.design.design import checked
 from chamberopt.design.load import Design, save_design, with_paths_from
 from chamberopt.optimize import pareto_table
 from chamberopt.optimize.storage.study_folder import RESULT, is_study_folder
 from chamberopt.optimize.storage.trial_log import HISTORY, as_csv, read_history
-from chamberopt.simulation.evaluate import Evaluation
-from chamberopt.simulation.time_curve import against_time
-from chamberopt.simulation.triangle_fields import per_triangle
+from chamberopt.simulation.evaluation import Evaluation
+from chamberopt.simulation.time_curve import coverage_against_time
+from chamberopt.simulation.triangle_fields import compute_triangle_fields
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -186,9 +186,9 @@ def _write_candidate(
     """Write the surfaces of one candidate; what there is to say of it, for result.json."""
     from chamberopt.output.viewer import COVERAGE, write_chamber, write_coverage
 
-    write_coverage(folder / COVERAGE, chamber, per_triangle(design, chamber, evaluation))
+    write_coverage(folder / COVERAGE, chamber, compute_triangle_fields(design, chamber, evaluation))
     if evaluation.sorted_hits is not None:
-        save_hits(folder / HITS, evaluation.sorted_hits)
+        save_hits(folder / HITS_FILE, evaluation.sorted_hits)
     write_chamber(folder, chamber)
     return _about(folder, design, chamber, evaluation)
 
@@ -230,7 +230,7 @@ def _about(
         "metrics": {
             name: _plain(value, METRICS[name].unit) for name, value in evaluation.metrics.items()
         },
-        "coverage_against_time": against_time(design, chamber, evaluation),
+        "coverage_against_time": coverage_against_time(design, chamber, evaluation),
         "seed": design.process.seed,
         "stream": evaluation.stream,
         "replicas": len(evaluation.replicas),

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.coverage.hits import SortedHits, own_hits
+from chamberopt.coverage.part_impacts import HitsByTriangle, load_matching_hits
 from chamberopt.output.viewer.drawn_part import Part, colour_range
 from chamberopt.output.viewer.view_state import Look
 from chamberopt.output.vtp_files import CHAMBER, COVERAGE, Surface, read_surface
@@ -61,9 +61,9 @@ class Seen:
         return [name for name, one in QUANTITIES.items() if one.column in self.surface.cell_data]
 
     @cached_property
-    def hits(self) -> SortedHits | None:
+    def hits(self) -> HitsByTriangle | None:
         """Its single impacts, None where it has none. Read when first asked for: they are most of a result."""
-        return own_hits(self.folder, np.asarray(self.surface["impacts"]))
+        return load_matching_hits(self.folder, np.asarray(self.surface["impacts"]))
 
     def times(self, look: Look) -> float:
         """The time looked at in treatment times. InputError where dents are marked: their coverage has one time."""

@@ -11,15 +11,20 @@ import numpy as np
 
 from chamberopt.chamber.scene import build_scene, replica_seed
 from chamberopt.common.errors import InputError
-from chamberopt.coverage.dents import Samples, first_marked, marked_share, sample_points
-from chamberopt.coverage.metrics import objective
-from chamberopt.coverage.statistics.interval import estimate, paired_difference
-from chamberopt.coverage.tally import Tally, tally
+from chamberopt.coverage.coverage_from_impacts import Tally, tally_impacts
+from chamberopt.coverage.dent_marking import (
+    SamplePoints,
+    first_marked_times,
+    marked_share,
+    sample_points,
+)
+from chamberopt.coverage.metrics import parse_objective
+from chamberopt.coverage.statistics.confidence_interval import estimate, paired_difference
 from chamberopt.design.design import Design
 from chamberopt.design.process import LONGEST_MARKED
 from chamberopt.simulation.convergence.parameters import MODEL, changed
 from chamberopt.simulation.convergence.runs import Pool, Rung, dents_alone, figures
-from chamberopt.simulation.evaluate import marked_figures, weighted
+from chamberopt.simulation.evaluate import marked_coverage_estimates, weighted_sum
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -62,8 +67,11 @@ def dent_rungs(
     goal, mean, _ = figures(tallies, pool.chamber, treated)
     rows = [("avrami", goal, mean)]
     for i, spacing in enumerate(spacings):
-        found = marked_figures([replica[i] for replica in shares], pool.chamber)
-        goal, mean = weighted(objective("uniform_coverage"), found), found["mean_coverage"]
+        found = marked_coverage_estimates([replica[i] for replica in shares], pool.chamber)
+        goal, mean = (
+            weighted_sum(parse_objective("uniform_coverage"), found),
+            found["mean_coverage"],
+        )
         rows.append((f"dents, sample_mm {spacing:g}", goal, mean))
     _, finest, finest_mean = rows[-1]
     rungs = [
@@ -86,7 +94,11 @@ def dent_rungs(
 
 
 def _marked(
-    design: Design, chamber: Chamber, mesh: TriangleMesh, samples: Sequence[Samples], number: int
+    design: Design,
+    chamber: Chamber,
+    mesh: TriangleMesh,
+    samples: Sequence[SamplePoints],
+    number: int,
 ) -> tuple[Tally, list[np.ndarray], list[float]]:
     """One whole treatment: its dents, the marked share of each triangle by spacing, CPU seconds with each way."""
     from sim_core import simulate
@@ -94,11 +106,11 @@ def _marked(
     begin = time.thread_time()
     impacts = simulate(build_scene(design, mesh, replica_seed(design.process.seed, number))).impacts
     simulated = time.thread_time() - begin
-    left = tally(impacts, chamber, design)
+    left = tally_impacts(impacts, chamber, design)
     costs, shares = [time.thread_time() - begin], []
     for points in samples:
         begin = time.thread_time()
-        first = first_marked(points, impacts, chamber, design)
+        first = first_marked_times(points, impacts, chamber, design)
         shares.append(
             marked_share(points, first, design.process.treatment_time, len(chamber.part.triangles))
         )

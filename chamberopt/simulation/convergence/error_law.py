@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chamberopt.coverage.statistics.interval import CONFIDENCE
+from chamberopt.coverage.statistics.confidence_interval import CONFIDENCE
 
 NORMAL = 1.96  # half-width of a 95 % interval over the standard error
 DRAWS = 200  # resampled pools behind the law's interval

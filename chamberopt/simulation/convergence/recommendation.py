@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from chamberopt.coverage.statistics.interval import student
+from chamberopt.coverage.statistics.confidence_interval import student_quantile
 from chamberopt.simulation.convergence.error_law import NORMAL, front
 from chamberopt.simulation.convergence.parameters import (
     DESIGNED,
@@ -144,7 +144,7 @@ def replicas_for(ladder: Ladder, accuracy: float, seconds: float) -> int:
     low, high = 3, MOST + 1
     while low < high:
         middle = (low + high) // 2
-        enough = student(middle - 1) * sigma / math.sqrt(middle) <= accuracy
+        enough = student_quantile(middle - 1) * sigma / math.sqrt(middle) <= accuracy
         low, high = (low, middle) if enough else (middle + 1, high)
     return max(low, math.ceil(round(floor * stretch, 6)))
 

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.coverage.estimators import coverage_figures, surface
-from chamberopt.coverage.metrics import objective
-from chamberopt.coverage.statistics.interval import Estimate, estimate, paired_difference
-from chamberopt.coverage.tally import Tally
+from chamberopt.coverage.coverage_estimators import coverage_estimates, target_patches
+from chamberopt.coverage.coverage_from_impacts import Tally
+from chamberopt.coverage.metrics import parse_objective
+from chamberopt.coverage.statistics.confidence_interval import Estimate, estimate, paired_difference
 from chamberopt.design.design import Design
-from chamberopt.simulation.evaluate import weighted
+from chamberopt.simulation.evaluate import weighted_sum
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -74,9 +74,13 @@ def figures(
     tallies: Sequence[Tally], chamber: Chamber, design: Design
 ) -> tuple[Estimate, Estimate, bool]:
     """Objective and mean coverage, as evaluate() has them, and whether triangles were taken together."""
-    ground = surface(tallies, chamber, design)
-    found = coverage_figures(tallies, chamber, ground)
-    return weighted(objective("uniform_coverage"), found), found["mean_coverage"], ground.joined
+    ground = target_patches(tallies, chamber, design)
+    found = coverage_estimates(tallies, chamber, ground)
+    return (
+        weighted_sum(parse_objective("uniform_coverage"), found),
+        found["mean_coverage"],
+        ground.are_merged,
+    )
 
 
 def dents_alone(whole: Tally) -> Tally:

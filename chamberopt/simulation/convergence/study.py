@@ -20,8 +20,8 @@ import numpy as np
 from chamberopt.chamber.scene import chamber_mesh, replica_seed
 from chamberopt.common.errors import InputError
 from chamberopt.common.progress import Progress
-from chamberopt.coverage.statistics.interval import Estimate
-from chamberopt.coverage.tally import Tally
+from chamberopt.coverage.coverage_from_impacts import Tally
+from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.design.design import Design
 from chamberopt.simulation.convergence.dent_runs import dent_rungs
 from chamberopt.simulation.convergence.error_law import Law, Level, law_of, rms_error, rms_interval

@@ -15,7 +15,7 @@ from chamberopt.design.design import Design, checked
 from chamberopt.design.load import load_design, save_design
 from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL, is_sonotrode, tag_of_further
 from chamberopt.geometry.triangles import area_vectors, areas
-from chamberopt.simulation.resting_balls import still
+from chamberopt.simulation.resting_balls import find_resting_balls
 from sim_core import Resting, Vibration
 
 DESIGNS = Path(__file__).resolve().parents[3] / "designs"
@@ -218,7 +218,7 @@ def test_a_ball_on_it_is_said_to_lie_there() -> None:
         np.zeros(1, int), np.zeros((1, 3)), np.zeros(1), on, np.full((1, 4), -1), np.zeros(1, bool)
     )
 
-    found = still(ball, 10, 2e-3, chamber, part_turns=False)
+    found = find_resting_balls(ball, 10, 2e-3, chamber, part_turns=False)
 
     assert found is not None
     assert "1 on sonotrodes.0 at" in found.line

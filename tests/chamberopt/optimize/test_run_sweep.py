@@ -14,7 +14,7 @@ from chamberopt.optimize.run_sweep import plan_sweep, run_sweep
 from chamberopt.optimize.storage.trial_log import read_history
 from chamberopt.output.results.results import load_result
 from chamberopt.output.results.sweep_results import write_sweep
-from chamberopt.simulation.evaluate import Evaluation
+from chamberopt.simulation.evaluation import Evaluation
 from tests.helpers import worker_jobs
 from tests.helpers.synthetic import DESIGNS, plate_design
 

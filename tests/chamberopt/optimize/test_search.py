@@ -9,7 +9,7 @@ import pytest
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import SerialExecutor
-from chamberopt.coverage.statistics.interval import Estimate, estimate
+from chamberopt.coverage.statistics.confidence_interval import Estimate, estimate
 from chamberopt.design.load import Limits, Study, load_design, load_study
 from chamberopt.optimize.constraints import shortfall, standing_of
 from chamberopt.optimize.pareto import on_front, scalarised

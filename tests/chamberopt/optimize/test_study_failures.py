@@ -15,7 +15,7 @@ import pytest
 import chamberopt
 from chamberopt.chamber.build import build_chamber
 from chamberopt.cli import main
-from chamberopt.coverage.statistics.interval import Estimate
+from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.design.load import load_study
 from chamberopt.optimize.evaluate_candidate import FAILED
 from chamberopt.optimize.interrupt import EARLY, FIRST, SECOND

@@ -16,11 +16,11 @@ from chamberopt.chamber.scene import chamber_mesh, scene_physics
 from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import SerialExecutor, local_executor
 from chamberopt.coverage.metrics import exposed_target
-from chamberopt.coverage.statistics.interval import Estimate
+from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.design.design import checked
 from chamberopt.design.load import Design
 from chamberopt.simulation import effect_pilot
-from chamberopt.simulation.effect_pilot import FIGURES, Advice, advise, settled
+from chamberopt.simulation.effect_pilot import FIGURES, Advice, advise, with_effects_resolved
 from tests.helpers.synthetic import plate_design
 
 PLATE = plate_design()
@@ -142,7 +142,7 @@ def test_auto_keeps_what_matters_and_says_why(monkeypatch: pytest.MonkeyPatch) -
     )
     design = with_effects("auto")
     assert design.effects.auto
-    chosen, why = settled(design, CHAMBER, SerialExecutor())
+    chosen, why = with_effects_resolved(design, CHAMBER, SerialExecutor())
     effects = chosen.effects
     assert (effects.auto, effects.gravity, effects.ball_collisions, effects.drag) == (
         False,
@@ -152,7 +152,7 @@ def test_auto_keeps_what_matters_and_says_why(monkeypatch: pytest.MonkeyPatch) -
     )
     assert effects.friction is not None
     assert len(why) == 4
-    assert settled(PLATE, CHAMBER, SerialExecutor()) == (PLATE, [])
+    assert with_effects_resolved(PLATE, CHAMBER, SerialExecutor()) == (PLATE, [])
 
 
 def test_effects_that_are_small_alone_but_not_together_are_not_all_left_out(
@@ -161,14 +161,14 @@ def test_effects_that_are_small_alone_but_not_together_are_not_all_left_out(
     pretend(
         {"gravity": 0.009, "drag": 0.0085, "friction": -0.3, "ball_collisions": 0.5}, monkeypatch
     )
-    effects = settled(with_effects("auto"), CHAMBER, SerialExecutor())[0].effects
+    effects = with_effects_resolved(with_effects("auto"), CHAMBER, SerialExecutor())[0].effects
     assert (effects.gravity, effects.drag) == (True, False)
 
 
 def test_figures_given_beside_auto_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     pretend({"friction": -0.3}, monkeypatch)
     design = with_effects({"auto": True, "friction": {"mu": 0.7, "beta0": -0.1}})
-    friction = settled(design, CHAMBER, SerialExecutor())[0].effects.friction
+    friction = with_effects_resolved(design, CHAMBER, SerialExecutor())[0].effects.friction
     assert friction is not None
     assert (friction.mu, friction.beta0) == (0.7, -0.1)
 

@@ -8,11 +8,11 @@ from chamberopt.chamber.build import Chamber, Part, build_chamber
 from chamberopt.chamber.scene import build_scene, chamber_mesh, replica_seed
 from chamberopt.design.effects import FrictionSettings
 from chamberopt.simulation.resting_balls import (
-    Stuck,
-    on_the_spot_notes,
-    share_on_the_spot,
-    still,
-    stuck_notes,
+    RestingBalls,
+    bouncing_notes,
+    bouncing_share,
+    find_resting_balls,
+    resting_notes,
 )
 from sim_core import Resting, simulate
 from tests.helpers.scenes.cavities import box_around
@@ -63,7 +63,7 @@ def test_groups_say_how_many_on_what_and_where(chamber: Chamber) -> None:
         ([8.5, 0.0, 0.0], 0.2, -1, -1, True),
         ([-5.0, -5.0, -8.5], -0.1, floor, -1, False),
     )
-    found = still(balls, 200, BALL, chamber, part_turns=False)
+    found = find_resting_balls(balls, 200, BALL, chamber, part_turns=False)
     assert found is not None
     assert found.share == 0.025
     assert found.line == (
@@ -75,7 +75,9 @@ def test_groups_say_how_many_on_what_and_where(chamber: Chamber) -> None:
 
 
 def test_a_part_that_turns_is_elsewhere_by_then(chamber: Chamber) -> None:
-    found = still(resting(([8.5, 0.0, 0.0], 0.2, -1, -1, True)), 20, BALL, chamber, part_turns=True)
+    found = find_resting_balls(
+        resting(([8.5, 0.0, 0.0], 0.2, -1, -1, True)), 20, BALL, chamber, part_turns=True
+    )
     assert found is not None
     assert (
         "1 jammed between the wall and other balls or the part at (8.5, 0.0, 0.0) mm" in found.line
@@ -87,14 +89,14 @@ def test_far_apart_is_two_places_and_the_smallest_are_counted_only(chamber: Cham
     ends = [([x, y, 5.5], 0.5, top, -1, False) for x in (-6.0, 6.0) for y in (-1.5, 1.5)]
     floor = triangle(chamber, 2, 2, -10e-3)
     corners = [([x, y, -8.5], 0.5, floor, -1, False) for x in (-8.0, 8.0) for y in (-8.0, 8.0)]
-    found = still(resting(*ends, *corners), 10, BALL, chamber, part_turns=False)
+    found = find_resting_balls(resting(*ends, *corners), 10, BALL, chamber, part_turns=False)
     assert found is not None
     assert found.line.count("2 on the part's upper side around") == 2
     assert found.line.endswith("; 3 elsewhere")
 
 
 def test_between_other_balls_only(chamber: Chamber) -> None:
-    found = still(
+    found = find_resting_balls(
         resting(([0.0, 0.0, 8.0], 0.2, -1, -1, True)), 20, BALL, chamber, part_turns=False
     )
     assert found is not None
@@ -109,12 +111,14 @@ def test_nothing_lies_still(chamber: Chamber) -> None:
         *(np.zeros((0, 4), int),) * 2,
         np.zeros(0, bool),
     )
-    assert still(nothing, 20, BALL, chamber, part_turns=False) is None
+    assert find_resting_balls(nothing, 20, BALL, chamber, part_turns=False) is None
 
 
 def test_one_note_on_all_replicas() -> None:
-    assert stuck_notes([], 8) == ()
-    notes = stuck_notes([Stuck(0.1, "few"), Stuck(0.3, "many"), Stuck(0.2, "some")], 8)
+    assert resting_notes([], 8) == ()
+    notes = resting_notes(
+        [RestingBalls(0.1, "few"), RestingBalls(0.3, "many"), RestingBalls(0.2, "some")], 8
+    )
     assert notes == (
         "balls came to rest in 3 of 8 replicas and peen no more: by the end 7.5 % of the shot, on average of all; "
         "where it is most, many",
@@ -123,10 +127,10 @@ def test_one_note_on_all_replicas() -> None:
 
 def test_shot_that_bounces_on_the_spot_is_said() -> None:
     velocities = np.array([[0.0, 0.0, 5.0], [1e-9, 0.0, -4.0], [1.0, 0.0, 3.0], [0.0, 0.0, 0.0]])
-    assert share_on_the_spot(velocities) == 0.5
-    (note,) = on_the_spot_notes([0.0, 0.5, 0.2])
+    assert bouncing_share(velocities) == 0.5
+    (note,) = bouncing_notes([0.0, 0.5, 0.2])
     assert "in 2 of 3 replicas up to 50 %" in note
-    assert on_the_spot_notes([0.0, 0.05]) == ()
+    assert bouncing_notes([0.0, 0.05]) == ()
 
 
 def test_between_parallel_plates_friction_leaves_a_ball_no_sideways_speed() -> None:
@@ -137,4 +141,4 @@ def test_between_parallel_plates_friction_leaves_a_ball_no_sideways_speed() -> N
     rubs = plate.effects.model_copy(update={"friction": FrictionSettings(mu=0.3, beta0=0.2)})
     for design, caught in ((plate, 0.0), (plate.model_copy(update={"effects": rubs}), 1.0)):
         end = simulate(build_scene(design, chamber_mesh(chamber), replica_seed(1, 0))).balls
-        assert share_on_the_spot(end.velocities) == caught
+        assert bouncing_share(end.velocities) == caught

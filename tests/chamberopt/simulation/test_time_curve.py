@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from chamberopt.simulation.time_curve import FARTHEST, against_time
+from chamberopt.simulation.time_curve import FARTHEST, coverage_against_time
 from tests.helpers.synthetic import equal_dents, evaluation_of, patchwork, plate_design
 
 DESIGN = plate_design()
@@ -21,7 +21,7 @@ def test_the_curve_goes_through_the_figures_of_the_treatment_time(
     many = rate * seconds * area / size * 8
     tallies = [equal_dents(seconds, rng.poisson(many / 8, 300), size) for _ in range(8)]
     evaluation = evaluation_of(DESIGN, chamber, tallies)
-    rows = against_time(DESIGN, chamber, evaluation)
+    rows = coverage_against_time(DESIGN, chamber, evaluation)
 
     at = next(row for row in rows if row["time_s"] == treatment)
     assert at["mean_coverage"] == pytest.approx(evaluation.metrics["mean_coverage"].value)

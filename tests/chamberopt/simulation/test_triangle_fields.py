@@ -6,13 +6,19 @@ import numpy as np
 import pytest
 
 from chamberopt.common.errors import InputError
-from chamberopt.coverage.hits import Hits, hits_on_part, load_hits, save_hits, sorted_hits
-from chamberopt.coverage.tally import dent_diameter
+from chamberopt.coverage.dents import dent_diameter
+from chamberopt.coverage.part_impacts import (
+    Hits,
+    hits_on_part,
+    load_hits,
+    save_hits,
+    sort_hits_by_triangle,
+)
 from chamberopt.simulation.triangle_fields import (
     QUANTITIES,
     _quantile,
+    compute_triangle_fields,
     coverage_bounds,
-    per_triangle,
 )
 from tests.helpers.synthetic import impact_log, patchwork, plate_design, poisson_evaluation
 
@@ -49,7 +55,7 @@ def test_hits_are_the_impacts_on_the_part_with_their_size_and_energy() -> None:
 def test_hits_come_back_from_their_file_by_triangle(tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
     parts = [hits_of(rng, np.array([3, 0, 5, 1])), hits_of(rng, np.array([2, 0, 0, 4]))]
-    save_hits(tmp_path / "hits.npz", sorted_hits(parts, 4))
+    save_hits(tmp_path / "hits.npz", sort_hits_by_triangle(parts, 4))
     found = load_hits(tmp_path / "hits.npz")
     assert [len(found.of(t)) for t in range(4)] == [5, 0, 5, 5]
     assert len(found.on(np.array([True, False, False, True]))) == 10
@@ -63,7 +69,7 @@ def test_a_damaged_or_missing_hits_file_is_said(tmp_path: Path) -> None:
     path = tmp_path / "hits.npz"
     with pytest.raises(InputError, match=r"older result.*simulate again"):
         load_hits(path)
-    save_hits(path, sorted_hits([hits_of(np.random.default_rng(1), np.array([3, 4]))], 2))
+    save_hits(path, sort_hits_by_triangle([hits_of(np.random.default_rng(1), np.array([3, 4]))], 2))
     whole = path.read_bytes()
     for damaged in (b"", whole[: len(whole) // 2], b"PK" + bytes(200)):
         path.write_bytes(damaged)
@@ -74,7 +80,7 @@ def test_a_damaged_or_missing_hits_file_is_said(tmp_path: Path) -> None:
 def test_the_90th_percentile_is_the_speed_that_nine_of_ten_hits_do_not_exceed() -> None:
     rng = np.random.default_rng(2)
     hits = hits_of(rng, np.array([10, 0, 1, 37]))
-    found = _quantile(sorted_hits([hits], 4), 0.9)
+    found = _quantile(sort_hits_by_triangle([hits], 4), 0.9)
     for t in (0, 2, 3):
         speeds = np.sort(hits.speed[hits.triangle == t])
         assert found[t] == speeds[int(np.ceil(0.9 * len(speeds))) - 1]
@@ -84,8 +90,8 @@ def test_the_90th_percentile_is_the_speed_that_nine_of_ten_hits_do_not_exceed() 
 def test_per_triangle_columns_add_up() -> None:
     chamber = patchwork(np.full(50, 1e-6))
     evaluation = poisson_evaluation(DESIGN, chamber, per_mm2=8.0)
-    found = per_triangle(DESIGN, chamber, evaluation)
-    hits = sorted_hits(evaluation.hits, 50)
+    found = compute_triangle_fields(DESIGN, chamber, evaluation)
+    hits = sort_hits_by_triangle(evaluation.hits, 50)
     times = DESIGN.process.treatment_time / evaluation.total.simulated_time
     assert np.nansum(found["energy_per_mm2"]) == pytest.approx(
         1e3 * hits.hits.energy.sum(dtype=float) * times
@@ -105,7 +111,7 @@ def test_the_interval_of_a_triangles_coverage_holds_the_truth(dents: float) -> N
     triangle = np.repeat(np.arange(m, dtype=np.int32), count)
     diameter = rng.uniform(0.5e-4, 1.5e-4, len(triangle)).astype(np.float32)
     none = np.zeros(len(triangle), dtype=np.float32)
-    hits = sorted_hits([Hits(triangle, none, none, diameter, none)], m)
+    hits = sort_hits_by_triangle([Hits(triangle, none, none, diameter, none)], m)
     truth = -np.expm1(-dents * np.pi / 4 * (1e-8 + 1e-8 / 12) / area * times)
 
     low, high = coverage_bounds(hits, np.full(m, area), times)
@@ -117,6 +123,6 @@ def test_the_interval_of_a_triangles_coverage_holds_the_truth(dents: float) -> N
 
 def test_without_any_dent_nothing_is_known() -> None:
     none = np.zeros(0, dtype=np.float32)
-    hits = sorted_hits([Hits(np.zeros(0, dtype=np.int32), none, none, none, none)], 3)
+    hits = sort_hits_by_triangle([Hits(np.zeros(0, dtype=np.int32), none, none, none, none)], 3)
     low, high = coverage_bounds(hits, np.array([1e-6, np.nan, 1e-6]), 1.0)
     np.testing.assert_array_equal([low, high], [[0.0, np.nan, 0.0], [1.0, np.nan, 1.0]])

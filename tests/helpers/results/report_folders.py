@@ -8,11 +8,11 @@ import numpy as np
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import SerialExecutor
-from chamberopt.coverage.hits import Hits
+from chamberopt.coverage.part_impacts import Hits
 from chamberopt.design.load import Study
 from chamberopt.optimize.run_study import run_study
 from chamberopt.output.results.results import write_simulation, write_study
-from chamberopt.simulation.evaluate import Evaluation
+from chamberopt.simulation.evaluation import Evaluation
 from tests.helpers.synthetic import plate_design, poisson_evaluation
 
 DESIGN = plate_design()

@@ -10,7 +10,7 @@ from chamberopt.common.parallel.executor import SerialExecutor
 from chamberopt.design.load import Design, Study, load_design
 from chamberopt.optimize.run_study import StudyResult, run_study
 from chamberopt.optimize.storage.trial_log import Journal
-from chamberopt.simulation.evaluate import Evaluation
+from chamberopt.simulation.evaluation import Evaluation
 from tests.helpers.synthetic import DESIGNS, judged
 
 GEAR = load_design(DESIGNS / "gear.toml")

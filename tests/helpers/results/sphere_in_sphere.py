@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from chamberopt.coverage.hits import Hits, save_hits, sorted_hits
+from chamberopt.coverage.part_impacts import Hits, save_hits, sort_hits_by_triangle
 from chamberopt.output.viewer import Look, Subject, write_chamber, write_coverage
 from chamberopt.output.vtp_files import pyvista
 from chamberopt.simulation.triangle_fields import QUANTITIES
@@ -66,7 +66,7 @@ def ball_result(folder: Path, marked: bool = False, moved: float = 0.0, lost: in
     }
     write_coverage(folder / "coverage.vtp", chamber, fields)
     write_chamber(folder, chamber)
-    save_hits(folder / "hits.npz", sorted_hits([hits], count))
+    save_hits(folder / "hits.npz", sort_hits_by_triangle([hits], count))
     mean = float(fields["impacts_per_mm2"][target].mean())
     return Subject(
         str(folder), f"{folder.name}\nnot simulated", TREATMENT, 50.0, int(target.sum()), mean

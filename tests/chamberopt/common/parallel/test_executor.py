@@ -13,7 +13,7 @@ from chamberopt.cli import main
 from chamberopt.common.errors import InputError, WorkerLostError
 from chamberopt.common.parallel.executor import SerialExecutor, local_executor, open_executor, share
 from chamberopt.design import load
-from chamberopt.simulation.replicas import in_order
+from chamberopt.simulation.replicas import run_in_order
 from tests.helpers import worker_jobs
 
 
@@ -43,7 +43,7 @@ def test_replicas_come_in_order_and_no_more_are_begun_than_asked_for() -> None:
     for ahead in (0, 2, 6):
         begun.clear()
         came = []
-        for one in in_order(task, "this", 7, SerialExecutor(), "confirm", range(6), ahead):
+        for one in run_in_order(task, "this", 7, SerialExecutor(), "confirm", range(6), ahead):
             came.append(one)
             assert len(begun) == min(6, len(came) + ahead)
         assert came == [f"this {seed}" for seed in seeds]

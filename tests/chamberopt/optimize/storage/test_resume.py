@@ -13,14 +13,13 @@ import pytest
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
-from chamberopt.coverage.statistics.interval import Estimate
+from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.design.load import Design, Study
 from chamberopt.design.study import Objective
 from chamberopt.optimize.storage.study_folder import Record, open_record
 from chamberopt.output.results.results import load_result
 from chamberopt.simulation.effect_pilot import Advice
-from chamberopt.simulation.evaluate import Evaluation
-from chamberopt.simulation.evaluation_file import load_evaluation, save_evaluation
+from chamberopt.simulation.evaluation import Evaluation, load_evaluation, save_evaluation
 from tests.helpers.results.resumable_study import GEAR, calls, history, logged, run, study
 from tests.helpers.synthetic import DESIGNS, plate_design, poisson_evaluation
 

@@ -10,8 +10,8 @@ from scipy import stats
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
-from chamberopt.coverage.metrics import LONGEST as NEVER
-from chamberopt.coverage.statistics.interval import Estimate, estimate
+from chamberopt.coverage.metrics import NEVER
+from chamberopt.coverage.statistics.confidence_interval import Estimate, estimate
 from chamberopt.design.design import checked
 from chamberopt.design.load import Design, load_design
 from chamberopt.output import viewer

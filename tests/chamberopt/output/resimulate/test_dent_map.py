@@ -13,14 +13,8 @@ from matplotlib.image import imread
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError
-from chamberopt.coverage.dents import (
-    Dents,
-    Samples,
-    dents_on_part,
-    mark,
-    marked_share,
-    sample_points,
-)
+from chamberopt.coverage.dent_marking import SamplePoints, mark_points, marked_share, sample_points
+from chamberopt.coverage.dents import Dents, dents_on_part
 from chamberopt.design.load import load_design
 from chamberopt.geometry.raycast import places, seen, view_of
 from chamberopt.output.resimulate.dent_map import (
@@ -117,8 +111,8 @@ def test_the_last_dent_lies_on_top_and_bends_round_an_edge() -> None:
     np.testing.assert_allclose(
         off[there], (distance[np.arange(n), last] / dents.radius[last])[there], atol=1e-5
     )
-    samples = Samples(place, normal, np.zeros(n, dtype=int), np.ones(n))
-    marked = mark(samples, dents.place, dents.normal, dents.radius, dents.time)
+    samples = SamplePoints(place, normal, np.zeros(n, dtype=int), np.ones(n))
+    marked = mark_points(samples, dents.place, dents.normal, dents.radius, dents.time)
     np.testing.assert_array_equal(there, np.isfinite(marked))
 
 
@@ -159,7 +153,7 @@ def test_the_share_of_black_is_what_coverage_says(name: str) -> None:
     samples = sample_points(chamber, 1e-4 if name == "plate" else 7e-5)
     m = len(chamber.part.triangles)
     marked = marked_share(
-        samples, mark(samples, dents.place, dents.normal, dents.radius, dents.time), 1e9, m
+        samples, mark_points(samples, dents.place, dents.normal, dents.radius, dents.time), 1e9, m
     )
     view = default_views(chamber)[0]
     found = dent_map(chamber, dents, view, 1000 if name == "plate" else 1500)

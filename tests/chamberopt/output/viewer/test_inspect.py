@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from chamberopt.common.errors import InputError
-from chamberopt.coverage.hits import save_hits, sorted_hits
+from chamberopt.coverage.part_impacts import save_hits, sort_hits_by_triangle
 from chamberopt.output.viewer import (
     Look,
     Subject,
@@ -167,7 +167,7 @@ def test_files_of_another_result_are_noticed(tmp_path: Path, ball: Subject) -> N
     other = ball_result(tmp_path / "other", lost=7)
     folder = Path(ball.folder)
     (tmp_path / "hits.npz").write_bytes((folder / "hits.npz").read_bytes())
-    save_hits(folder / "hits.npz", sorted_hits([Seen(other).hits.hits], 1280))
+    save_hits(folder / "hits.npz", sort_hits_by_triangle([Seen(other).hits.hits], 1280))
     with pytest.raises(InputError, match="of another result"):
         _ = Seen(ball).hits
     (folder / "hits.npz").unlink()

@@ -14,7 +14,7 @@ from matplotlib.image import imread
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
-from chamberopt.coverage.tally import coverage_at
+from chamberopt.coverage.coverage_from_impacts import coverage_at
 from chamberopt.output.viewer import (
     Look,
     Subject,
@@ -29,7 +29,7 @@ from chamberopt.output.viewer import (
     write_coverage,
 )
 from chamberopt.output.viewer.drawn_part import averaged
-from chamberopt.simulation.triangle_fields import per_triangle
+from chamberopt.simulation.triangle_fields import compute_triangle_fields
 from tests.helpers.synthetic import plate_design, poisson_evaluation
 
 DESIGN = plate_design()
@@ -42,7 +42,9 @@ def case(tmp_path_factory: pytest.TempPathFactory) -> tuple:
     folder.mkdir()
     chamber = build_chamber(DESIGN)
     evaluation = poisson_evaluation(DESIGN, chamber)
-    write_coverage(folder / "coverage.vtp", chamber, per_triangle(DESIGN, chamber, evaluation))
+    write_coverage(
+        folder / "coverage.vtp", chamber, compute_triangle_fields(DESIGN, chamber, evaluation)
+    )
     write_chamber(folder, chamber)
     return folder, chamber, evaluation
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from chamberopt.cli import main
-from chamberopt.coverage.statistics.interval import Estimate, estimate, student
-from chamberopt.coverage.tally import Tally
+from chamberopt.coverage.coverage_from_impacts import Tally
+from chamberopt.coverage.statistics.confidence_interval import Estimate, estimate, student_quantile
 from chamberopt.design.load import load_design
 from chamberopt.simulation.convergence import study as climbing
 from chamberopt.simulation.convergence.error_law import (
@@ -81,7 +81,7 @@ def levels_of(pool: np.ndarray, joined: int = 0) -> list[Level]:
     for count in (4, 8, 16, 32, 64):
         parts = pool[: len(pool) // count * count].reshape(-1, count).mean(axis=1)
         rms = rms_error(parts, pool.mean(), count / len(pool))
-        said = student(count - 1) / np.sqrt(count)
+        said = student_quantile(count - 1) / np.sqrt(count)
         found.append(
             Level(
                 count,
@@ -160,7 +160,9 @@ def ladder_of(*rungs: Rung, dents: tuple[Rung, ...] = ()) -> Ladder:
     settings = {FACETS: 256, MOTION: "sinusoidal", WARM_UP: 0.8, FLOOR: 1.0, TIME: 1.5}
     times = [rung(TIME, 0.375, 0.1675), rung(TIME, 6, 0.73), rung(WARM_UP, 0.2, 0.22, 0.0, 0.03)]
     levels = tuple(
-        Level(k, 400 // k, 0.02 / k**0.5, 0.01, 0.1, student(k - 1) * 0.02 / k**0.5, 0.28 * k)
+        Level(
+            k, 400 // k, 0.02 / k**0.5, 0.01, 0.1, student_quantile(k - 1) * 0.02 / k**0.5, 0.28 * k
+        )
         for k in (4, 8, 16, 32)
     )
     law = Law(1.96 * 0.02 * 0.28**0.5, 0.5, 0.05)
@@ -186,9 +188,9 @@ def test_cost_of_a_replica_is_a_line() -> None:
 def test_replicas_are_those_whose_interval_is_as_narrow() -> None:
     needed = replicas_for(ladder_of(), 0.001, 1.5)
     assert (
-        student(needed - 1) * 0.02 / needed**0.5
+        student_quantile(needed - 1) * 0.02 / needed**0.5
         <= 0.001
-        < student(needed - 2) * 0.02 / (needed - 1) ** 0.5
+        < student_quantile(needed - 2) * 0.02 / (needed - 1) ** 0.5
     )
     assert replicas_for(ladder_of(), 0.001, 6.0) == pytest.approx(needed / 4, rel=0.02)
     assert replicas_for(ladder_of(), 0.5, 1.5) == 4  # fewer were not tried

@@ -6,20 +6,20 @@ import pytest
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import SerialExecutor, local_executor
-from chamberopt.coverage.estimators import _at_most, few_dents_note, surface
+from chamberopt.coverage.coverage_estimators import _at_most, few_dents_note, target_patches
+from chamberopt.coverage.coverage_from_impacts import Tally
 from chamberopt.coverage.metrics import METRICS, OBJECTIVES
-from chamberopt.coverage.statistics.interval import (
+from chamberopt.coverage.statistics.confidence_interval import (
     Estimate,
     estimate,
     independent_difference,
     paired_difference,
 )
 from chamberopt.coverage.statistics.triangle_patches import patches
-from chamberopt.coverage.tally import Tally
 from chamberopt.design.design import checked
 from chamberopt.design.load import Design
-from chamberopt.simulation.evaluate import evaluate, jackknife, weighted
-from chamberopt.simulation.replicas import LEAST_WATCHED, replicas_wanted
+from chamberopt.simulation.evaluate import evaluate, jackknife, weighted_sum
+from chamberopt.simulation.replicas import MIN_REPLICAS_TO_STOP, next_replica_count
 from tests.helpers.synthetic import equal_dents, patchwork, plate_design
 
 TREATMENT = 50.0
@@ -41,7 +41,7 @@ def uniform_coverage(replicas: list[Tally]) -> Estimate:
     metrics = dict(
         zip(names, jackknife(replicas, [METRICS[n] for n in names], CHAMBER, DESIGN), strict=True)
     )
-    return weighted(OBJECTIVES["uniform_coverage"], metrics)
+    return weighted_sum(OBJECTIVES["uniform_coverage"], metrics)
 
 
 def uncorrected(replicas: list[Tally]) -> float:
@@ -99,7 +99,7 @@ def test_95_percent_intervals_hold_the_truth_as_often() -> None:
                 strict=True,
             )
         )
-        got["uniform_coverage"] = weighted(OBJECTIVES["uniform_coverage"], got)
+        got["uniform_coverage"] = weighted_sum(OBJECTIVES["uniform_coverage"], got)
         for name, value in true.items():
             held[name] += got[name].low <= value <= got[name].high
     assert all(180 <= count <= 198 for count in held.values()), held  # 90 to 99 %
@@ -135,7 +135,7 @@ def test_an_even_part_is_not_better_than_its_mean() -> None:
     metrics = dict(
         zip(names, jackknife(replicas, [METRICS[n] for n in names], even, DESIGN), strict=True)
     )
-    goal = weighted(OBJECTIVES["uniform_coverage"], metrics)
+    goal = weighted_sum(OBJECTIVES["uniform_coverage"], metrics)
     assert metrics["std_coverage"].value >= 0.0
     assert goal.value == metrics["mean_coverage"].value - metrics["std_coverage"].value <= 1.0
 
@@ -170,7 +170,7 @@ def test_what_is_made_of_a_clipped_value_agrees_with_its_interval() -> None:
         "mean_coverage": estimate([0.7, 0.8, 0.75]),
         "std_coverage": estimate([0.6, 0.7, 0.62], 0.0, 0.5),
     }
-    goal = weighted(OBJECTIVES["uniform_coverage"], metrics)
+    goal = weighted_sum(OBJECTIVES["uniform_coverage"], metrics)
     assert goal.value == pytest.approx(0.75 - 0.5)
     assert np.mean(goal.pseudovalues) == pytest.approx(goal.value)
     gain = paired_difference(goal, estimate([0.1, 0.12, 0.11]))
@@ -226,7 +226,7 @@ def test_replicas_are_added_until_the_accuracy_holds_or_the_budget_ends() -> Non
     loose = evaluate(accurate(0.2, 100), chamber, SerialExecutor())
     assert loose.stopped_by == "accuracy"
     assert loose.objective.half_width <= 0.2
-    assert len(loose.replicas) >= LEAST_WATCHED
+    assert len(loose.replicas) >= MIN_REPLICAS_TO_STOP
     tight = evaluate(accurate(0.001, 14), chamber, SerialExecutor())
     assert (tight.stopped_by, len(tight.replicas)) == ("most_replicas", 14)
     assert tight.objective.half_width > 0.001
@@ -245,25 +245,25 @@ def test_an_accuracy_that_cannot_be_is_refused() -> None:
 
 
 def test_how_many_replicas_come_next() -> None:
-    assert replicas_wanted(10, 0.01, 0.01, 200) == 10  # reached
+    assert next_replica_count(10, 0.01, 0.01, 200) == 10  # reached
     assert (
-        replicas_wanted(10, 0.0101, 0.01, 200) == 13
+        next_replica_count(10, 0.0101, 0.01, 200) == 13
     )  # at least a quarter more: few looks, little luck
-    assert replicas_wanted(10, 0.013, 0.01, 200) == 17  # as foretold
+    assert next_replica_count(10, 0.013, 0.01, 200) == 17  # as foretold
     assert (
-        replicas_wanted(10, 1.0, 0.01, 200) == 20
+        next_replica_count(10, 1.0, 0.01, 200) == 20
     )  # but no more than twice: what foretells is rough
-    assert replicas_wanted(150, 1.0, 0.01, 200) == 200
-    assert replicas_wanted(200, 1.0, 0.01, 200) == 200  # spent
-    assert replicas_wanted(10, np.inf, 0.01, 200) == 20
+    assert next_replica_count(150, 1.0, 0.01, 200) == 200
+    assert next_replica_count(200, 1.0, 0.01, 200) == 200  # spent
+    assert next_replica_count(10, np.inf, 0.01, 200) == 20
 
 
 def test_stopping_when_it_looks_good_keeps_the_95_percent() -> None:
     rng = np.random.default_rng(8)
     held, runs = 0, 2000
     for _ in range(runs):
-        sample, n, wanted = rng.normal(size=400), LEAST_WATCHED, 0.45
-        while (more := replicas_wanted(n, estimate(sample[:n]).half_width, wanted, 400)) > n:
+        sample, n, wanted = rng.normal(size=400), MIN_REPLICAS_TO_STOP, 0.45
+        while (more := next_replica_count(n, estimate(sample[:n]).half_width, wanted, 400)) > n:
             n = more
         got = estimate(sample[:n])
         held += got.low <= 0.0 <= got.high
@@ -328,8 +328,8 @@ def test_figures_are_the_same_however_long_was_simulated(seconds: float) -> None
 def test_few_dents_are_said_and_make_the_interval_wide() -> None:
     rng = np.random.default_rng(10)
     few, many = of_all_sizes(rng, 0.2), of_all_sizes(rng, 40.0)
-    assert few_dents_note(many, surface(many, CHAMBER, DESIGN)) == ()
-    [note] = few_dents_note(few, surface(few, CHAMBER, DESIGN))
+    assert few_dents_note(many, target_patches(many, CHAMBER, DESIGN)) == ()
+    [note] = few_dents_note(few, target_patches(few, CHAMBER, DESIGN))
     assert "dents per target triangle" in note
     assert "patches" in note
     metrics = [METRICS["mean_coverage"], METRICS["std_coverage"]]
@@ -382,7 +382,7 @@ def test_real_simulations_hold_their_long_run_value() -> None:
                 strict=False,
             )
         )
-        got["uniform_coverage"] = weighted(OBJECTIVES["uniform_coverage"], got)
+        got["uniform_coverage"] = weighted_sum(OBJECTIVES["uniform_coverage"], got)
         truth_of = {**everything.metrics, "uniform_coverage": everything.objective}
         for name in held:
             held[name] += got[name].low <= truth_of[name].value <= got[name].high

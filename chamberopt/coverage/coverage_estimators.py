@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.coverage.metrics import LONGEST, exposed_target, require_target, seconds_to_98
-from chamberopt.coverage.statistics.interval import Estimate, estimate
+from chamberopt.coverage.coverage_from_impacts import Tally
+from chamberopt.coverage.metrics import NEVER, exposed_target, require_target, seconds_to_98
+from chamberopt.coverage.statistics.confidence_interval import Estimate, estimate
 from chamberopt.coverage.statistics.poisson_survival import Bare, Dents
 from chamberopt.coverage.statistics.rate_mixture import MANY_STEPS, Mixture
 from chamberopt.coverage.statistics.triangle_patches import patches
-from chamberopt.coverage.tally import Tally
 from chamberopt.geometry.triangles import unit_normals
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ NORMAL = 1.645  # standard deviations: how far below the mean of a normal distri
 
 
 @dataclass(frozen=True)
-class Surface:
+class TargetPatches:
     """The exposed target as the estimators see it.
 
     patch (m,): of each part triangle, -1 off the target · area (p,) m² of the patches · hidden: share of the target's
@@ -53,12 +53,12 @@ class Surface:
     triangles: int
 
     @property
-    def joined(self) -> bool:
+    def are_merged(self) -> bool:
         """Whether neighbours had to be taken together."""
         return len(self.area) < self.triangles
 
 
-def surface(replicas: Sequence[Tally], chamber: Chamber, design: Design) -> Surface:
+def target_patches(replicas: Sequence[Tally], chamber: Chamber, design: Design) -> TargetPatches:
     """The target of a chamber, in patches that the dents of these replicas suffice for. InputError if there is none."""
     require_target(chamber)
     exposed = exposed_target(chamber)
@@ -74,7 +74,7 @@ def surface(replicas: Sequence[Tally], chamber: Chamber, design: Design) -> Surf
     patch[target] = patches(_places(chamber, target, exposure), exposure, LEAST_EXPOSURE)
     sizes_of = np.bincount(patch[target], area)
     all_area = chamber.part.area[chamber.part.target].sum()
-    return Surface(
+    return TargetPatches(
         patch, sizes_of, max(0.0, 1.0 - float(area.sum() / all_area)), stretch, dent, len(target)
     )
 
@@ -89,8 +89,8 @@ def _places(chamber: Chamber, target: np.ndarray, exposure: np.ndarray) -> np.nd
     return np.concatenate([corners.mean(axis=1), 2.0 * wide * normal], axis=1)
 
 
-def coverage_figures(
-    replicas: Sequence[Tally], chamber: Chamber, ground: Surface
+def coverage_estimates(
+    replicas: Sequence[Tally], chamber: Chamber, ground: TargetPatches
 ) -> dict[str, Estimate]:
     """mean_coverage, std_coverage and p05_coverage at the treatment time, dents falling as Avrami has it."""
     dents, parts, totals = [], [], np.zeros(len(ground.area))
@@ -100,7 +100,7 @@ def coverage_figures(
         dents.append(Dents(patch[there], replica.dent_area[there]))
         parts.append(np.bincount(dents[-1].patch, dents[-1].area, len(ground.area)))
         totals += parts[-1]
-    lost = _variance_within(replicas, ground, chamber) if ground.joined else 0.0
+    lost = _variance_within(replicas, ground, chamber) if ground.are_merged else 0.0
     mean, std = _mean_and_std(dents, ground, lost)
     return {
         "mean_coverage": mean,
@@ -110,7 +110,7 @@ def coverage_figures(
 
 
 def _mean_and_std(
-    dents: Sequence[Dents], ground: Surface, lost: float
+    dents: Sequence[Dents], ground: TargetPatches, lost: float
 ) -> tuple[Estimate, Estimate]:
     """From the means of exp(-x) and exp(-2 x); lost: variance of x within patches."""
     bare = Bare(dents, ground.area, ground.stretch, ground.dent)
@@ -153,19 +153,19 @@ def _at_most(lost: float, bare: float) -> tuple[float, float]:
     return 1.0 - bare - hit * dented, hit * (1.0 - hit) * dented**2
 
 
-def time_to_98(poorest: Estimate, seconds: float) -> Estimate:
+def time_to_98_estimate(poorest: Estimate, seconds: float) -> Estimate:
     """Time [s] to full coverage from p05_coverage after `seconds`; never: objective.LONGEST, and an interval as wide.
 
     The chord over the interval instead of the tangent, as for the spread: the time is steep where little is covered.
     """
     value, slope = seconds_to_98(poorest.value, seconds), 0.0
     reach = min(poorest.half_width, 1.0)
-    if reach > 0.0 and value < LONGEST:
+    if reach > 0.0 and value < NEVER:
         slow, fast = (seconds_to_98(poorest.value + side * reach, seconds) for side in (-1.0, 1.0))
         slope = (fast - slow) / (2.0 * reach)
     moved = value + slope * (np.array(poorest.pseudovalues) - poorest.value)
-    made = estimate(moved, 0.0, LONGEST, abs(slope) * poorest.bias)
-    return Estimate(made.value, LONGEST, made.pseudovalues, made.bias) if value == LONGEST else made
+    made = estimate(moved, 0.0, NEVER, abs(slope) * poorest.bias)
+    return Estimate(made.value, NEVER, made.pseudovalues, made.bias) if value == NEVER else made
 
 
 def _pseudovalues(values: np.ndarray) -> np.ndarray:
@@ -180,7 +180,7 @@ def _pseudovalues(values: np.ndarray) -> np.ndarray:
 def _poorest(
     parts: Sequence[np.ndarray],
     totals: np.ndarray,
-    ground: Surface,
+    ground: TargetPatches,
     lost: float,
     mean: Estimate,
     std: Estimate,
@@ -218,7 +218,7 @@ def _poorest(
     return estimate(_pseudovalues(-np.expm1(-x)), 0.0, 1.0, bias)
 
 
-def _variance_within(replicas: Sequence[Tally], ground: Surface, chamber: Chamber) -> float:
+def _variance_within(replicas: Sequence[Tally], ground: TargetPatches, chamber: Chamber) -> float:
     """Variance of x over the triangles less that over the patches, both free of the dents' own scatter.
 
     Squares are made of pairs of dents from different replicas: within one a ball that bounces on its spot puts all of
@@ -242,10 +242,10 @@ def _variance_within(replicas: Sequence[Tally], ground: Surface, chamber: Chambe
     )
 
 
-def few_dents_note(replicas: Sequence[Tally], ground: Surface) -> tuple[str, ...]:
+def few_dents_note(replicas: Sequence[Tally], ground: TargetPatches) -> tuple[str, ...]:
     """What to know where neighbours had to be taken together."""
     hits = sum(int(replica.dents[ground.patch >= 0].sum()) for replica in replicas)
-    if not ground.joined and hits:
+    if not ground.are_merged and hits:
         return ()
     return (
         f"only {hits / ground.triangles:.1f} dents per target triangle were simulated: neighbouring triangles are "

@@ -12,7 +12,7 @@ import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import atomic_write
-from chamberopt.coverage.tally import ball_diameters, dent_diameters, impact_angle_deg
+from chamberopt.coverage.dents import ball_diameters, dent_diameters, impact_angle_deg
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from chamberopt.design.load import Design
     from sim_core import ImpactLog
 
-HITS = "hits.npz"
+HITS_FILE = "hits.npz"
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Hits:
 
 
 @dataclass(frozen=True)
-class SortedHits:
+class HitsByTriangle:
     """Hits in the order of their triangles: those of triangle t are the rows first[t] to first[t + 1].
 
     first (m + 1,) int64 · the columns of Hits.
@@ -77,16 +77,16 @@ def hits_on_part(impacts: ImpactLog, chamber: Chamber, design: Design) -> Hits:
     )
 
 
-def sorted_hits(hits: Sequence[Hits], triangles: int) -> SortedHits:
+def sort_hits_by_triangle(hits: Sequence[Hits], triangles: int) -> HitsByTriangle:
     """Hits of replicas together, by part triangle; triangles: how many the part has."""
     whole = Hits(
         *(np.concatenate([getattr(one, column.name) for one in hits]) for column in fields(Hits))
     )
     first = np.concatenate([[0], np.cumsum(np.bincount(whole.triangle, minlength=triangles))])
-    return SortedHits(first, _rows(whole, np.argsort(whole.triangle, kind="stable")))
+    return HitsByTriangle(first, _rows(whole, np.argsort(whole.triangle, kind="stable")))
 
 
-def save_hits(path: Path, found: SortedHits) -> None:
+def save_hits(path: Path, found: HitsByTriangle) -> None:
     """Write them, whole or not at all: a .npz without the triangles, which `first` says."""
     columns = {
         column.name: getattr(found.hits, column.name)
@@ -97,13 +97,13 @@ def save_hits(path: Path, found: SortedHits) -> None:
         np.savez(file, first=found.first, **columns)
 
 
-def load_hits(path: Path) -> SortedHits:
+def load_hits(path: Path) -> HitsByTriangle:
     """Read them back. InputError for a file gone, damaged, or not written by this version."""
     try:
         with np.load(path, allow_pickle=False) as file:
             columns = {name: file[name] for name in file.files}
         first = columns.pop("first")
-        found = SortedHits(
+        found = HitsByTriangle(
             first,
             Hits(np.repeat(np.arange(len(first) - 1, dtype=np.int32), np.diff(first)), **columns),
         )
@@ -126,11 +126,11 @@ def load_hits(path: Path) -> SortedHits:
     return found
 
 
-def own_hits(folder: Path, impacts: np.ndarray) -> SortedHits | None:
+def load_matching_hits(folder: Path, impacts: np.ndarray) -> HitsByTriangle | None:
     """The single impacts of a results folder, None of an older result. impacts (m,): how many each triangle had, as
     coverage.vtp says; InputError where these are others.
     """
-    path = folder / HITS
+    path = folder / HITS_FILE
     if not path.is_file():
         return None
     found = load_hits(path)

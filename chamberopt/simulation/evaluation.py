@@ -10,7 +10,8 @@ import io
 import json
 import zipfile
 import zlib
-from dataclasses import fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +19,45 @@ import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import atomic_write
-from chamberopt.coverage.hits import Hits
-from chamberopt.coverage.statistics.interval import Estimate
-from chamberopt.coverage.tally import Tally
-from chamberopt.simulation.evaluate import Evaluation
+from chamberopt.coverage.coverage_from_impacts import Tally
+from chamberopt.coverage.part_impacts import Hits, HitsByTriangle, sort_hits_by_triangle
+from chamberopt.coverage.statistics.confidence_interval import Estimate
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """One candidate, simulated: its objective and metrics with intervals, and the tallies they come from.
+
+    total: sum of the replicas' tallies · replicas: one Tally each · timings: seconds of wall clock by step ·
+    collisions: numbers of simulated collisions by kind, warm-up included · notes: what to know before
+    trusting it · stopped_by: what ended it, "replicas" (a number was asked for), "accuracy" or "most_replicas" ·
+    analytic: in an exact cavity, not the chamber's mesh ·
+    hits: of each replica, its impacts one by one ·
+    marked (m,): share of each part triangle inside dents, NaN unexposed, marked_interval (m,): width of its 95 %
+    interval, and against_time: (time s, mean coverage of the target) pairs; all only where every dent is marked.
+    """
+
+    objective_name: str
+    objective: Estimate
+    metrics: dict[str, Estimate]
+    total: Tally
+    replicas: tuple[Tally, ...]
+    timings: dict[str, float]
+    collisions: dict[str, int]
+    notes: tuple[str, ...] = ()
+    stream: str = "search"
+    stopped_by: str = "replicas"
+    analytic: bool = False
+    hits: tuple[Hits, ...] = ()
+    marked: np.ndarray | None = None
+    marked_interval: np.ndarray | None = None
+    against_time: tuple[tuple[float, Estimate], ...] = ()
+
+    @cached_property
+    def sorted_hits(self) -> HitsByTriangle | None:
+        """The hits of all replicas by part triangle; None where there are none to tell of."""
+        return sort_hits_by_triangle(self.hits, len(self.total.impacts)) if self.hits else None
+
 
 CLASSES = {kind.__name__: kind for kind in (Evaluation, Estimate, Hits, Tally)}
 

@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 
-from chamberopt.coverage.tally import (
+from chamberopt.coverage.coverage_from_impacts import (
     coverage_at,
-    dent_diameter,
-    impact_angle_deg,
-    mean_normal_speed,
-    tally,
+    mean_speed_per_triangle,
+    tally_impacts,
 )
+from chamberopt.coverage.dents import dent_diameter, impact_angle_deg
 from chamberopt.design.shot import ShotSize
 from tests.helpers.synthetic import dented, impact_log, patchwork, plate_design
 
@@ -58,7 +57,7 @@ def test_known_impacts_give_known_coverage() -> None:
     v0 = design.materials.part.yield_speed
     speeds = np.array([2.0, 2.0, 3.0, 0.5 * v0])
     log = impact_log([0, 1, 1, 2], np.outer(speeds, [0, 0, 1]), speeds)
-    got = tally(log, chamber, design)
+    got = tally_impacts(log, chamber, design)
     part, shot = design.materials.part, design.shot
     size = dent_diameter(
         speeds, shot.diameter, shot.density, part.hardness, part.restitution, part.yield_speed
@@ -67,8 +66,8 @@ def test_known_impacts_give_known_coverage() -> None:
     np.testing.assert_array_equal(got.impacts, [1, 2, 1, 0])
     np.testing.assert_array_equal(got.dents, [1, 2, 0, 0])
     np.testing.assert_allclose(got.dented_area, [area[0], area[1] + area[2], 0, 0])
-    np.testing.assert_allclose(mean_normal_speed(got)[:3], [2.0, 2.5, 0.5 * v0])
-    assert np.isnan(mean_normal_speed(got)[3])
+    np.testing.assert_allclose(mean_speed_per_triangle(got)[:3], [2.0, 2.5, 0.5 * v0])
+    assert np.isnan(mean_speed_per_triangle(got)[3])
     simulated = design.process.accuracy.simulated_time
     expected = 1 - np.exp(-got.dented_area / (1e-6 * simulated) * 7.0)
     np.testing.assert_allclose(coverage_at(got, chamber, 7.0), expected, rtol=1e-12)
@@ -83,7 +82,7 @@ def test_a_dent_is_as_large_as_its_own_ball_makes_it() -> None:
     diameters = np.array(mixed.shot.diameters)
     small, large = int(diameters.argmin()), int(diameters.argmax())
     log = impact_log([0, 1], np.tile([0, 0, 3.0], (2, 1)), [3.0, 3.0], [small, large])
-    area = tally(log, chamber, mixed).dented_area
+    area = tally_impacts(log, chamber, mixed).dented_area
     assert area[1] / area[0] == pytest.approx(4.0)
 
 
@@ -100,7 +99,7 @@ def test_only_part_triangles_count_and_hidden_ones_have_no_coverage() -> None:
     chamber = patchwork(np.full(3, 1e-6), exposed=np.array([1e-6, 0.0, 5e-7]))
     chamber.source[1] = -1  # a wall triangle
     log = impact_log([0, 1, 2], np.tile([0, 0, 3.0], (3, 1)), [3.0, 3.0, 3.0])
-    got = tally(log, chamber, design)
+    got = tally_impacts(log, chamber, design)
     np.testing.assert_array_equal(got.impacts, [1, 0, 1])
     coverage = coverage_at(got, chamber, 1.0)
     assert np.isnan(coverage[1])
@@ -110,7 +109,7 @@ def test_only_part_triangles_count_and_hidden_ones_have_no_coverage() -> None:
 
 def test_no_impacts_is_no_coverage() -> None:
     design, chamber = plate_design(), patchwork(np.full(3, 1e-6))
-    got = tally(impact_log([], np.empty((0, 3)), []), chamber, design)
+    got = tally_impacts(impact_log([], np.empty((0, 3)), []), chamber, design)
     assert (coverage_at(got, chamber, 100.0) == 0.0).all()
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 CONFIDENCE = 0.95
-NOTHING = 1e-12  # what rounding leaves of a zero
+ZERO_TOLERANCE = 1e-12  # what rounding leaves of a zero
 
 
 @dataclass(frozen=True)
@@ -51,11 +51,13 @@ def estimate(
     n = len(values)
     half_width, bias = float("inf"), float(bias)
     if n > 1:
-        half_width = student(n - 1, confidence) * float(values.std(ddof=1)) / math.sqrt(n) + bias
+        half_width = (
+            student_quantile(n - 1, confidence) * float(values.std(ddof=1)) / math.sqrt(n) + bias
+        )
     return Estimate(mean, half_width, tuple(values.tolist()), bias)
 
 
-def student(freedom: float, confidence: float = CONFIDENCE) -> float:
+def student_quantile(freedom: float, confidence: float = CONFIDENCE) -> float:
     """How many standard errors the interval reaches to each side."""
     from scipy.special import stdtrit  # scipy.stats would take a second to import
 
@@ -107,4 +109,4 @@ def welch_half_width(
     if va + vb == 0.0:
         return 0.0
     freedom = (va + vb) ** 2 / (va**2 / (a - 1.0) + vb**2 / (b - 1.0))
-    return student(freedom, confidence) * math.sqrt(va + vb)
+    return student_quantile(freedom, confidence) * math.sqrt(va + vb)

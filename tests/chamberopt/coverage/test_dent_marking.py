@@ -6,8 +6,14 @@ import pytest
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import SerialExecutor
-from chamberopt.coverage.dents import Samples, few_points_note, mark, marked_share, sample_points
-from chamberopt.coverage.tally import dent_diameters
+from chamberopt.coverage.dent_marking import (
+    SamplePoints,
+    few_points_note,
+    mark_points,
+    marked_share,
+    sample_points,
+)
+from chamberopt.coverage.dents import dent_diameters
 from chamberopt.design.load import load_design
 from chamberopt.design.shot import ShotSize
 from chamberopt.simulation.evaluate import evaluate
@@ -18,18 +24,18 @@ UP = np.array([0.0, 0.0, 1.0])
 
 def square(
     side: float, spacing: float, normal: np.ndarray = UP, corner: tuple[float, ...] = (0, 0, 0)
-) -> Samples:
+) -> SamplePoints:
     """Points on a square whose sides leave `corner` along y and across y and the normal, in 100 patches."""
     along = np.arange(0.5 * spacing, side, spacing)
     u, v = (grid.ravel() for grid in np.meshgrid(along, along))
     across = np.cross([0.0, 1.0, 0.0], normal)
     place = np.asarray(corner) + u[:, None] * across + v[:, None] * [0.0, 1.0, 0.0]
     triangle = (u // (side / 10)).astype(int) * 10 + (v // (side / 10)).astype(int)
-    return Samples(place, np.tile(normal, (len(u), 1)), triangle, np.full(len(u), spacing**2))
+    return SamplePoints(place, np.tile(normal, (len(u), 1)), triangle, np.full(len(u), spacing**2))
 
 
-def together(*parts: Samples) -> Samples:
-    return Samples(
+def together(*parts: SamplePoints) -> SamplePoints:
+    return SamplePoints(
         *(
             np.concatenate([getattr(p, f) for p in parts])
             for f in ("place", "normal", "triangle", "area")
@@ -38,11 +44,11 @@ def together(*parts: Samples) -> Samples:
 
 
 def marked_area(
-    samples: Samples, places: list, radius: float, normals: list | None = None
+    samples: SamplePoints, places: list, radius: float, normals: list | None = None
 ) -> float:
     k = len(places)
     normal = np.tile(UP, (k, 1)) if normals is None else np.array(normals, dtype=float)
-    first = mark(
+    first = mark_points(
         samples,
         np.array(places, dtype=float),
         normal,
@@ -104,7 +110,7 @@ def test_random_dents_cover_what_avrami_says_at_any_time() -> None:
         place = np.column_stack(
             [rng.uniform(-r, 10 + r, (count, 2)), np.zeros(count)]
         )  # spilling over the rim both ways
-        first = mark(
+        first = mark_points(
             plane, place, np.tile(UP, (count, 1)), np.full(count, r), np.linspace(0.0, 1.0, count)
         )
         shares.append([np.mean(first <= t) for t in (0.25, 0.5, 1.0)])
