@@ -32,8 +32,9 @@ ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
 from chamberopt.common.parallel.executor import SerialExecutor, local_executor, share  # noqa: E402
-from chamberopt.design.load import Study, load_study  # noqa: E402
-from chamberopt.optimize.run_sweep import judged, plan_sweep  # noqa: E402
+from chamberopt.optimize.load_study import load_study  # noqa: E402
+from chamberopt.optimize.run_sweep import evaluate_point, plan_sweep  # noqa: E402
+from chamberopt.optimize.study import Study  # noqa: E402
 
 CANDIDATES, NOTHINGS = 24, 1000
 ASKED = 0.9
@@ -70,7 +71,7 @@ def nothing(number: int) -> int:
 def timed(study: Study, number: int, point: np.ndarray) -> tuple[float, float]:
     """A candidate's seconds by the clock, and of CPU time."""
     clock, cpu = time.perf_counter(), time.thread_time()
-    judged(study, number, point)
+    evaluate_point(study, number, point)
     return time.perf_counter() - clock, time.thread_time() - cpu
 
 
@@ -106,7 +107,7 @@ def play(executor: Executor, study: Study, tasks: list[tuple[int, np.ndarray]]) 
 def ready(executor: Executor, count: int, study: Study, task: tuple[int, np.ndarray]) -> float:
     """Seconds until each worker has done its first candidate."""
     begin = time.perf_counter()
-    for future in [executor.submit(judged, study, *task) for _ in range(count)]:
+    for future in [executor.submit(evaluate_point, study, *task) for _ in range(count)]:
         future.result()
     return time.perf_counter() - begin
 
@@ -177,15 +178,15 @@ def sizes(study: Study) -> dict[str, int]:
     from chamberopt.chamber.scene import chamber_mesh
     from chamberopt.simulation.replicas import _replica
 
-    design = study.drafted(study.design)
+    design = study.at_search_accuracy(study.design)
     chamber = build_chamber(design)
     setting = (design, chamber, chamber_mesh(chamber), None)
-    row = judged(study, *candidates(study, 1)[0])
+    row = evaluate_point(study, *candidates(study, 1)[0])
     with local_executor(1, "processes") as executor:
         parcel = share(executor, setting)
         replica = len(pickle.dumps((_replica, (parcel, 2**127), {})))
     return {
-        "candidate": len(pickle.dumps((judged, (study, *candidates(study, 1)[0]), {}))),
+        "candidate": len(pickle.dumps((evaluate_point, (study, *candidates(study, 1)[0]), {}))),
         "row": len(pickle.dumps(row)),
         "replica": replica,
         "replica_unshared": len(pickle.dumps((_replica, (setting, 2**127), {}))),
@@ -229,7 +230,7 @@ def main() -> None:
     count, rounds = CANDIDATES, options.rounds
     if options.quick:
         study, rounds = (
-            study.model_copy(update={"draft": {"replicas": 3, "simulated_time_s": 0.2}}),
+            study.model_copy(update={"search_accuracy": {"replicas": 3, "simulated_time_s": 0.2}}),
             1,
         )
     play(SerialExecutor(), study, candidates(study, 1))  # compiles, if need be, for all

@@ -21,8 +21,8 @@ import numpy as np
 
 from benchmarks.noisy_problems import REPLICAS, Problem, chambers, functions
 from benchmarks.table import print_table, write_csv
-from chamberopt.optimize.search.acquisition import recommend
-from chamberopt.optimize.search.gaussian_process import Surrogate, pooled
+from chamberopt.optimize.search.acquisition import recommend_point
+from chamberopt.optimize.search.gaussian_process import GaussianProcess, pool_variances
 from chamberopt.optimize.search.phases import maximise
 
 EVALUATIONS, SEEDS = 40, 10
@@ -52,12 +52,12 @@ class Record:
     @property
     def fitted(self) -> np.ndarray:
         """What our surrogate recommends from these evaluations."""
-        return recommend(Surrogate(np.array(self.points), *self.seen()), self.seed)
+        return recommend_point(GaussianProcess(np.array(self.points), *self.seen()), self.seed)
 
     def seen(self) -> tuple[np.ndarray, np.ndarray]:
         """Scores and their pooled variances."""
         one = REPLICAS * np.array(self.variances)
-        return np.array(self.scores), pooled(one, np.full(len(one), REPLICAS))
+        return np.array(self.scores), pool_variances(one, np.full(len(one), REPLICAS))
 
 
 Optimizer = Callable[[Record, int], np.ndarray]

@@ -19,7 +19,9 @@ from typing import TYPE_CHECKING
 
 from chamberopt.common.errors import InputError
 from chamberopt.design.design import Design
-from chamberopt.design.load import Study, load_design, load_study
+from chamberopt.design.load import load_design
+from chamberopt.optimize.load_study import load_study
+from chamberopt.optimize.study import Study
 
 if TYPE_CHECKING:
     from chamberopt.common.progress import Progress
@@ -76,19 +78,19 @@ def optimise(
     """
     from chamberopt.chamber.build import build_chamber
     from chamberopt.common.parallel.executor import local_executor
-    from chamberopt.optimize.run_study import go_on
-    from chamberopt.optimize.storage.study_folder import open_record
+    from chamberopt.optimize.run_study import search_and_confirm
+    from chamberopt.optimize.storage.study_folder import open_study_folder
     from chamberopt.output.results.results import load_result, write_study
     from chamberopt.simulation.effect_pilot import with_effects_resolved
 
     _require("study", study, Study, "load_study")
-    with open_record(study, out) as record, local_executor(workers) as executor:
+    with open_study_folder(study, out) as record, local_executor(workers) as executor:
         if not record.finished:
             start = build_chamber(study.design)
-            study, advice = record.settled(
+            study, advice = record.with_effects_resolved(
                 lambda design: with_effects_resolved(design, start, executor)
             )
-            found = go_on(study, record, executor, progress)
+            found = search_and_confirm(study, record, executor, progress)
             _warn(
                 [*map(str, advice), *found.best.evaluation.notes, *write_study(out, found, advice)]
             )

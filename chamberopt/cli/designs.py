@@ -50,8 +50,9 @@ def check(
     from chamberopt.chamber.build import build_chamber
     from chamberopt.chamber.checks.check import describe, shot_reach
     from chamberopt.common.files import make_output_folder, write_text
-    from chamberopt.design.load import Study, load
     from chamberopt.geometry.mesh_io import SurfaceError
+    from chamberopt.optimize.load_study import load
+    from chamberopt.optimize.study import Study
     from chamberopt.output.viewer import write_chamber
 
     loaded = load(file)

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from chamberopt.chamber.build import Chamber
-    from chamberopt.design.load import Study
-    from chamberopt.optimize.interrupt import Interrupt
-    from chamberopt.optimize.storage.study_folder import Record
+    from chamberopt.cli.interrupt import Interrupt
+    from chamberopt.optimize.storage.study_folder import StudyFolder
+    from chamberopt.optimize.study import Study
 
 
 @app.command
@@ -48,20 +48,20 @@ def run(
     study
         Study file (.toml).
     """
-    from chamberopt.optimize.interrupt import Interrupt
+    from chamberopt.cli.interrupt import Interrupt
 
     with Interrupt() as interrupt:
         from chamberopt.chamber.build import build_chamber
         from chamberopt.common.parallel.executor import open_executor
-        from chamberopt.design.load import load_study
-        from chamberopt.optimize.storage.study_folder import open_record
+        from chamberopt.optimize.load_study import load_study
+        from chamberopt.optimize.storage.study_folder import open_study_folder
 
         question = load_study(study)
         start = build_chamber(question.design)
         if out is None:
             remark(_unfinished(study))
         place = results_folder(None, study.stem) if out is None else nullcontext(out)
-        with place as folder, open_record(question, folder) as record:
+        with place as folder, open_study_folder(question, folder) as record:
             if record.finished:
                 _finished(record.folder, json)
                 return
@@ -78,16 +78,18 @@ def run(
 
 
 def _run(
-    question: Study, start: Chamber, record: Record, executor: Executor, interrupt: Interrupt, how_to_go_on: str,
+    question: Study, start: Chamber, record: StudyFolder, executor: Executor, interrupt: Interrupt, how_to_go_on: str,
     json: bool,
 ) -> None:  # fmt: skip
     """A study from where its record stands to what is said of its result. start: the chamber of its design."""
     from chamberopt.chamber.build import build_chamber
     from chamberopt.common.progress import progress_bar
-    from chamberopt.optimize.run_study import go_on
+    from chamberopt.optimize.run_study import search_and_confirm
     from chamberopt.output.results.results import write_study
 
-    question, advice = record.settled(lambda design: settled_effects(design, start, executor))
+    question, advice = record.with_effects_resolved(
+        lambda design: settled_effects(design, start, executor)
+    )
     design = question.design
     compiled(design, start)
     if record.trials:
@@ -96,7 +98,9 @@ def _run(
         )
     with progress_bar("evaluations") as progress:
         interrupt.be_patient(how_to_go_on)
-        result = go_on(question, record, executor, progress, stop=lambda: interrupt.asked)
+        result = search_and_confirm(
+            question, record, executor, progress, stop=lambda: interrupt.asked
+        )
     warned = warn(
         result.best.design, build_chamber(result.best.design, result.target), " of the best design"
     )
@@ -116,8 +120,8 @@ def _run(
     ]
     verdict = "better than the start" if result.improved else "within the noise of the start"
     lines += ["", f"{row('gain', result.gain)}: {verdict}"]
-    if result.findings:
-        lines += ["", *result.findings.sentences(), ""]
+    if result.sensitivity:
+        lines += ["", *result.sensitivity.sentences(), ""]
     if question.objective.pareto:
         lines += [
             f"the front of {' and '.join(question.objective.pareto)}: pareto.csv, pareto.png",
@@ -126,11 +130,11 @@ def _run(
     fine = result.best.evaluation
     lines += [
         f"± 95 % intervals; start and best from {len(fine.replicas)} replicas of {design.process.recorded_time:g} s on "
-        f"seeds of their own, the search's figures in history.csv from {accuracy_said(question.drafted(design))}"
+        f"seeds of their own, the search's figures in history.csv from {accuracy_said(question.at_search_accuracy(design))}"
     ]
     notes = (
         *map(str, advice),
-        *result.doubts,
+        *result.warnings,
         *result.at_bounds,
         *start.notes,
         *result.best.evaluation.notes,
@@ -200,7 +204,7 @@ def sweep(
     from chamberopt.chamber.build import build_chamber
     from chamberopt.common.parallel.executor import open_executor
     from chamberopt.common.progress import progress_bar
-    from chamberopt.design.load import load_study
+    from chamberopt.optimize.load_study import load_study
     from chamberopt.optimize.run_sweep import plan_sweep, run_sweep
     from chamberopt.output.results import sweep_results
 
@@ -216,7 +220,7 @@ def sweep(
             found = run_sweep(question, plan, folder, executor, progress)
         remark(sweep_results.write_sweep(folder, found))
     lines = [
-        f"{len(found.trials)} candidates in {found.seconds:.0f} s, {accuracy_said(question.drafted(design))} each"
+        f"{len(found.trials)} candidates in {found.seconds:.0f} s, {accuracy_said(question.at_search_accuracy(design))} each"
     ]
     best = found.best
     if best is not None and best.objective is not None:

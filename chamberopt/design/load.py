@@ -1,4 +1,4 @@
-"""The door: design and study files in, frozen and checked nouns out; all that is wrong in one message."""
+"""Load and save design files; every problem of a file is reported in one error."""
 
 import os
 import re
@@ -7,55 +7,24 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import write_text
-from chamberopt.common.toml_errors import Problem
 from chamberopt.design.design import Design, checked
 from chamberopt.design.shapes.base import is_own
-from chamberopt.design.study import METRICS, Limits, Study
 
-__all__ = [
-    "METRICS",
-    "Design",
-    "Limits",
-    "Study",
-    "load",
-    "load_design",
-    "load_study",
-    "save_design",
-]
+__all__ = ["Design", "load_design", "save_design"]
 
 
 def load_design(path: str | Path) -> Design:
     """The design in a file. Raises InputError that names every problem, with file and line."""
     path = Path(path)
-    source, data = _read(path, "design")
-    if _is_study(data):
+    source, data = read_toml(path, "design")
+    if is_study(data):
         raise InputError(
             f"{path}: this is a study file; a design file is wanted: give the one it names"
         )
-    return _design(path, source, data)
-
-
-def load_study(path: str | Path) -> Study:
-    """The study in a file, its design loaded too. Raises InputError that names every problem and line."""
-    path = Path(path)
-    source, data = _read(path, "study")
-    if not _is_study(data):
-        raise InputError(
-            f"{path}: this is a design file; a study file is wanted: one with design = ... and [vary]"
-        )
-    return _study(path, source, data)
-
-
-def load(path: str | Path) -> Design | Study:
-    """Whichever of the two the file holds: a study names a design or has [vary]."""
-    path = Path(path)
-    source, data = _read(path, "design or study")
-    return _study(path, source, data) if _is_study(data) else _design(path, source, data)
+    return checked(Design, data, path, source)
 
 
 def save_design(design: Design, path: str | Path) -> None:
@@ -94,7 +63,7 @@ def _relative(path: str, folder: Path) -> str:
         return Path(path).as_posix()
 
 
-def _read(path: Path, kind: str) -> tuple[str, dict[str, Any]]:
+def read_toml(path: Path, kind: str) -> tuple[str, dict[str, Any]]:
     """Text and content of a TOML file that is there, readable, UTF-8, not empty and well formed."""
     if path.is_dir():
         inside = sorted(p.name for p in path.glob("*.toml"))
@@ -137,61 +106,10 @@ def _read(path: Path, kind: str) -> tuple[str, dict[str, Any]]:
         ) from None
 
 
-def _is_study(data: Mapping[str, Any]) -> bool:
+def is_study(data: Mapping[str, Any]) -> bool:
     return isinstance(data.get("design"), str) or any(
         name in data for name in ("vary", "optimizer")
     )
-
-
-def _design(path: Path, source: str, data: Mapping[str, Any]) -> Design:
-    return checked(Design, data, path, source)
-
-
-def _study(path: Path, source: str, data: dict[str, Any]) -> Study:
-    named = data.get("design")
-    if not isinstance(named, str):
-        given = "missing" if named is None else f"given {named!r}"
-        text = f'{given}; give the path of a design file, relative to this file: design = "../designs/gear.toml"'
-        raise InputError(toml_errors.format_problems([Problem("design", text)], path, source))
-    values = (
-        {**data, "vary": _flattened(data["vary"])}
-        if isinstance(data.get("vary"), Mapping)
-        else data
-    )
-    try:
-        design = load_design(Path(os.path.normpath(path.parent / named)))
-    except InputError as error:
-        said = toml_errors.format_problems(
-            [Problem("design", f"given {named!r}, which cannot be used:")], path, source
-        )
-        raise InputError(
-            "\n".join([said, str(error), *_also_wrong(values, path, source)])
-        ) from None
-    return checked(Study, {**values, "design": design}, path, source)
-
-
-def _also_wrong(values: Mapping[str, Any], path: Path, source: str) -> list[str]:
-    """What else a study file has wrong, beside a design that cannot be loaded."""
-    try:
-        Study.model_validate({**values, "design": None})
-    except ValidationError as error:
-        problems = toml_errors.explain_validation_error(error, Study)
-        text = toml_errors.format_problems(
-            [p for p in problems if p.field != "design"], path, source
-        )
-        return [text] if text else []
-    return []
-
-
-def _flattened(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Dotted names, whether they were written as quoted keys, dotted keys or nested tables."""
-    flat: dict[str, Any] = {}
-    for name, value in table.items():
-        if isinstance(value, Mapping):
-            flat.update(_flattened(value, f"{prefix}{name}."))
-        else:
-            flat[prefix + name] = value
-    return flat
 
 
 def _without_none(value: Any) -> Any:

@@ -11,17 +11,18 @@ import numpy as np
 
 from chamberopt.common.progress import Progress
 from chamberopt.coverage.statistics.confidence_interval import Estimate, paired_difference
-from chamberopt.optimize.constraints import FEASIBLE, standing_of
-from chamberopt.optimize.evaluate_candidate import Evaluator, Judge, Reference, scale
-from chamberopt.optimize.pareto import scalarised, weights
-from chamberopt.optimize.search.acquisition import recommend
-from chamberopt.optimize.search.gaussian_process import Surrogate, pooled
-from chamberopt.optimize.storage.study_folder import Record
+from chamberopt.optimize.constraints import FEASIBLE, feasibility_of
+from chamberopt.optimize.evaluate_candidate import CandidateEvaluator, Reference, Simulator, scale
+from chamberopt.optimize.search.acquisition import recommend_point
+from chamberopt.optimize.search.gaussian_process import GaussianProcess, pool_variances
+from chamberopt.optimize.search.scalarisation import draw_weights, scalarise
+from chamberopt.optimize.storage.study_folder import StudyFolder
 from chamberopt.optimize.storage.trial_log import Trial
 from chamberopt.simulation.evaluation import Evaluation
 
 if TYPE_CHECKING:
-    from chamberopt.design.load import Design, Study
+    from chamberopt.design.load import Design
+    from chamberopt.optimize.study import Study
 
 # Candidates nearer to each other than this share of the bounds count as one when the best are picked.
 DISTINCT = 0.02
@@ -34,7 +35,7 @@ Stop = Callable[[], bool]
 
 
 @dataclass(frozen=True)
-class Confirmed:
+class ConfirmedCandidate:
     """A candidate judged on fresh seeds; searched: its trial number, None if the surrogate proposed it.
 
     goals: every objective of the study · standing: "feasible" when all the intervals of the constraints' figures keep
@@ -45,13 +46,13 @@ class Confirmed:
     parameters: dict[str, float]
     design: Design
     evaluation: Evaluation
-    standing: str
+    feasibility: str
     reason: str
     goals: tuple[Estimate, ...]
 
     @property
     def feasible(self) -> bool:
-        return self.standing == FEASIBLE
+        return self.feasibility == FEASIBLE
 
 
 class Candidates:
@@ -63,14 +64,14 @@ class Candidates:
     def __init__(
         self,
         study: Study,
-        record: Record,
-        evaluator: Evaluator,
+        record: StudyFolder,
+        simulator: Simulator,
         progress: Progress | None = None,
         stop: Stop | None = None,
     ) -> None:
         self._study, self._record = study, record
         self._progress, self._stop = progress, stop
-        self._judge = Judge(study, evaluator)
+        self._judge = CandidateEvaluator(study, simulator)
         self.start = self._judge.start
         self.trials: list[Trial] = []
         self._points: list[np.ndarray] = []
@@ -81,7 +82,7 @@ class Candidates:
         return np.array(self._points)
 
     def score(self, point: np.ndarray) -> float:
-        """Judge one point: objective less penalties. The first, the start, raises if it fails."""
+        """Evaluate one point: objective less penalties. The first, the start, raises if it fails."""
         trial, _ = self._judged(point, "search", None)
         self._points.append(point)
         return trial.score
@@ -103,14 +104,16 @@ class Candidates:
             [trial.penalty for trial in self.trials[: len(rows)]]
         )
         if len(some) > 1 and weight is not FIRST_ALONE:
-            weight = weights(self._study.optimizer.seed, len(rows)) if weight is None else weight
-            score, variance = scalarised(values, variances, weight, ~failed)
+            weight = (
+                draw_weights(self._study.optimizer.seed, len(rows)) if weight is None else weight
+            )
+            score, variance = scalarise(values, variances, weight, ~failed)
             penalty = penalty / self._judge.reference.scale
         score = score - penalty
         score[failed] = score[~failed].min()
         return score, variance
 
-    def confirm(self) -> list[Confirmed]:
+    def confirm(self) -> list[ConfirmedCandidate]:
         """The start, then the best candidates, on fresh seeds at the design's own accuracy; failures are left out.
 
         With more replicas, unless the design asks for an accuracy, which then says how many. While the best cannot be
@@ -141,14 +144,16 @@ class Candidates:
 
     def _confirmed(
         self, searched: int | None, point: np.ndarray, replicas: int | None
-    ) -> Confirmed | None:
+    ) -> ConfirmedCandidate | None:
         trial, evaluation = self._judged(point, "confirm", replicas)
         if evaluation is None or not trial.goals:
             return None
         figures = self._judge.constrained(trial.parameters, evaluation)
-        standing, reason = standing_of(self._study.constraints, figures)
+        standing, reason = feasibility_of(self._study.constraints, figures)
         design, goals = self._judge.design(point), self._judge.goals(evaluation)
-        return Confirmed(searched, trial.parameters, design, evaluation, standing, reason, goals)
+        return ConfirmedCandidate(
+            searched, trial.parameters, design, evaluation, standing, reason, goals
+        )
 
     def _promising(self, count: int) -> list[tuple[int | None, np.ndarray]]:
         """The start and up to `count` distinct others: the best feasible, and what the surrogate recommends.
@@ -179,16 +184,16 @@ class Candidates:
                 chosen.append((None, point))
         return chosen
 
-    def model(self, weight: np.ndarray | None = None) -> Surrogate | None:
+    def model(self, weight: np.ndarray | None = None) -> GaussianProcess | None:
         """What the whole search says of every point; None when it is too little."""
         scores, variances = self.seen(weight)
         if len(scores) < POINTS_PER_PARAMETER * len(self.start) or np.ptp(scores) == 0.0:
             return None
-        return Surrogate(self.points, scores, variances)
+        return GaussianProcess(self.points, scores, variances)
 
     def _recommended(self, weight: np.ndarray | None) -> np.ndarray | None:
         model = self.model(weight)
-        return None if model is None else recommend(model, self._study.optimizer.seed)
+        return None if model is None else recommend_point(model, self._study.optimizer.seed)
 
     def _judged(
         self, point: np.ndarray, stage: str, replicas: int | None
@@ -236,12 +241,12 @@ def _variances(goals: list[Estimate]) -> np.ndarray:
     spreads = [
         float(np.var(g.pseudovalues, ddof=1)) if len(g.pseudovalues) > 1 else np.nan for g in goals
     ]
-    return pooled(np.array(spreads), replicas)
+    return pool_variances(np.array(spreads), replicas)
 
 
-def hard_to_tell_apart(confirmed: list[Confirmed]) -> list[Confirmed]:
+def hard_to_tell_apart(confirmed: list[ConfirmedCandidate]) -> list[ConfirmedCandidate]:
     """The best feasible one and those whose difference to it is within the noise; none when it stands alone."""
-    feasible = [one for one in confirmed if one.standing != "infeasible"]
+    feasible = [one for one in confirmed if one.feasibility != "infeasible"]
     if not feasible:
         return []
     best = max(feasible, key=lambda one: one.goals[0].value)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from chamberopt.coverage.statistics.confidence_interval import Estimate, student_quantile
 
 if TYPE_CHECKING:
-    from chamberopt.design.load import Limits
+    from chamberopt.optimize.study import Limits
 
 FEASIBLE, NOT_KNOWN, INFEASIBLE = "feasible", "not known", "infeasible"
 
@@ -42,7 +42,7 @@ def violations(name: str, figure: Estimate, limits: Limits) -> list[str]:
     return said
 
 
-def standing_of(
+def feasibility_of(
     constraints: Mapping[str, Limits], figures: Mapping[str, Estimate]
 ) -> tuple[str, str]:
     """Whether all limits are kept, to the end of the 95 % intervals, and why not, or why it is not known."""

@@ -18,14 +18,15 @@ from chamberopt.simulation.evaluate import weighted_sum
 from chamberopt.simulation.evaluation import Evaluation
 
 if TYPE_CHECKING:
-    from chamberopt.design.load import Design, Study
+    from chamberopt.design.load import Design
+    from chamberopt.optimize.study import Study
 
 # What the optimiser is told of a candidate that could not be simulated: so many of the objective's scale below the
 # start. Finite because NLopt's models break on inf and NaN.
 FAILED = 2.0
 
-Evaluator = Callable[["Design", str, "int | None"], Evaluation]
-"""evaluator(design, stream, replicas) judges one candidate; raises InputError or sim_core's two errors."""
+Simulator = Callable[["Design", str, "int | None"], Evaluation]
+"""simulator(design, stream, replicas) judges one candidate; raises InputError or sim_core's two errors."""
 
 
 class Reference(NamedTuple):
@@ -35,13 +36,13 @@ class Reference(NamedTuple):
     scale: float = 1.0
 
 
-class Judge:
+class CandidateEvaluator:
     """Maps points of the unit cube, shares of a study's bounds, to designs and their figures; remembers but the
     ``reference``, which a search sets when it has judged its start.
     """
 
-    def __init__(self, study: Study, evaluator: Evaluator) -> None:
-        self._study, self._evaluator = study, evaluator
+    def __init__(self, study: Study, simulator: Simulator) -> None:
+        self._study, self._evaluator = study, simulator
         self._low, self._high = np.array(list(study.vary.values()), dtype=float).T
         begin = np.array([study.design.value(name) for name in study.vary], dtype=float)
         self.start = (begin - self._low) / (self._high - self._low)
@@ -150,16 +151,16 @@ class Judge:
     ) -> Evaluation:
         """A candidate of the search that a few replicas show to be plainly worse than the best gets no more of them."""
         if stage == "confirm":
-            return self._simulated(design, "confirm", replicas)
-        design = self._study.drafted(design)
+            return self._simulate(design, "confirm", replicas)
+        design = self._study.at_search_accuracy(design)
         few, accuracy = self._study.optimizer.first_replicas, design.process.accuracy
         if bar is not None and 0 < few < accuracy.replicas and accuracy.coverage is None:
-            first = self._simulated(design, "search", few)
+            first = self._simulate(design, "search", few)
             if len(self._study.objective.goals) == 1 and first.objective.high < bar:
                 return first
-        return self._simulated(design, "search", replicas)
+        return self._simulate(design, "search", replicas)
 
-    def _simulated(self, design: Design, stream: str, replicas: int | None) -> Evaluation:
+    def _simulate(self, design: Design, stream: str, replicas: int | None) -> Evaluation:
         """Once more where a worker died: the executor may have mended itself."""
         try:
             return self._evaluator(design, stream, replicas)

@@ -1,11 +1,33 @@
-"""Two objectives at once: which candidates no other beats in both, and how a search is spread along that front."""
+"""The Pareto front of a study with two objectives: what was confirmed of it, and what the search saw."""
 
 from __future__ import annotations
 
+import csv
+import io
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
-# Weight of the plain sum beside the worse of the two: without it a point beaten in one objective could score alike.
-SUM = 0.05
+from chamberopt.optimize.constraints import INFEASIBLE
+
+if TYPE_CHECKING:
+    from chamberopt.coverage.statistics.confidence_interval import Estimate
+    from chamberopt.optimize.run_study import StudyResult
+
+
+@dataclass(frozen=True)
+class ParetoPoint:
+    """One candidate in the plane of the two objectives.
+
+    stage: "search" or "confirm" · standing: of the constraints · on_front: no other of its stage beats it in both.
+    """
+
+    stage: str
+    parameters: dict[str, float]
+    goals: tuple[Estimate, ...]
+    feasibility: str
+    on_front: bool
 
 
 def on_front(values: np.ndarray, among: np.ndarray | None = None) -> np.ndarray:
@@ -20,22 +42,56 @@ def on_front(values: np.ndarray, among: np.ndarray | None = None) -> np.ndarray:
     return counts & ~beaten
 
 
-def weights(seed: int, step: int) -> np.ndarray:
-    """How much each of two objectives counts at this step of a search: drawn anew each time."""
-    first = float(np.random.default_rng([seed, step]).random())
-    return np.array([first, 1.0 - first])
+def pareto_points(result: StudyResult) -> list[ParetoPoint]:
+    """The candidates as confirmed, then those of the search; the start is the first of each."""
+    names = result.study.objective.goals
+    searched = [trial for trial in result.trials if trial.stage == "search" and trial.goals]
+    stages = {
+        "confirm": [(one.parameters, one.goals, one.feasibility) for one in result.confirmed],
+        "search": [
+            (trial.parameters, trial.goals, "feasible" if trial.feasible else INFEASIBLE)
+            for trial in searched
+        ],
+    }
+    made = []
+    for stage, rows in stages.items():
+        values = np.array([[goal.value for goal in goals] for _, goals, _ in rows]).reshape(
+            -1, len(names)
+        )
+        front = on_front(
+            values, np.array([standing != INFEASIBLE for *_, standing in rows], dtype=bool)
+        )
+        made += [
+            ParetoPoint(stage, *row, bool(there)) for row, there in zip(rows, front, strict=True)
+        ]
+    return made
 
 
-def scalarised(
-    values: np.ndarray, variances: np.ndarray, weight: np.ndarray, among: np.ndarray | None = None
-) -> tuple[np.ndarray, np.ndarray]:
-    """One score for several objectives (n, k), to be maximised, and its variance: two arrays (n,).
+def as_csv(result: StudyResult) -> str:
+    """The points as a table: NAME and NAME_pm, value and half-width, for each of the two objectives."""
+    text, names = io.StringIO(), result.study.objective.goals
+    goals = [column for name in names for column in (name, f"{name}_pm")]
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(["stage", "on_front", "standing", *goals, *result.study.vary])
+    for one in pareto_points(result):
+        figures = [number for goal in one.goals for number in (goal.value, goal.half_width)]
+        table.writerow(
+            [one.stage, one.on_front, one.feasibility, *figures, *one.parameters.values()]
+        )
+    return text.getvalue()
 
-    The augmented Tchebycheff distance from the best of each, in units of the range of those `among` (J. Knowles,
-    "ParEGO", IEEE Trans. Evol. Comput. 10 (2006) 50): for every point of the front there are weights it is best for.
-    """
-    known = values if among is None else values[among]
-    size = np.ptp(known, axis=0)
-    size = np.where(size > 0.0, size, 1.0)
-    missing = weight * (known.max(axis=0) - values) / size
-    return -(missing.max(axis=1) + SUM * missing.sum(axis=1)), variances @ (weight / size) ** 2
+
+def as_json(result: StudyResult) -> list[dict[str, Any]]:
+    """The confirmed front, from the best by the first objective to the best by the second."""
+    front = [one for one in pareto_points(result) if one.on_front and one.stage == "confirm"]
+    return [
+        {
+            "parameters": one.parameters,
+            "standing": one.feasibility,
+            "objectives": {
+                name: {"value": goal.value, "half_width": goal.half_width}
+                for name, goal in zip(result.study.objective.goals, one.goals, strict=True)
+            },
+        }
+        for one in sorted(front, key=lambda one: -one.goals[0].value)
+    ]

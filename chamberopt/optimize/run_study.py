@@ -16,19 +16,20 @@ from chamberopt.common.files import write_text
 from chamberopt.common.progress import Progress
 from chamberopt.coverage.statistics.confidence_interval import Estimate, paired_difference
 from chamberopt.design.load import save_design
-from chamberopt.optimize.candidates import FIRST_ALONE, Candidates, Confirmed, Stop
+from chamberopt.optimize.candidates import FIRST_ALONE, Candidates, ConfirmedCandidate, Stop
 from chamberopt.optimize.constraints import NOT_KNOWN
-from chamberopt.optimize.evaluate_candidate import Evaluator
+from chamberopt.optimize.evaluate_candidate import Simulator
 from chamberopt.optimize.search.phases import PARETO_PHASES, maximise
-from chamberopt.optimize.sensitivity import Findings, found
-from chamberopt.optimize.storage.study_folder import STUDY, Record, open_record
+from chamberopt.optimize.sensitivity import Sensitivity, analyse_sensitivity
+from chamberopt.optimize.storage.study_folder import STUDY, StudyFolder, open_study_folder
 from chamberopt.optimize.storage.trial_log import Trial
 from chamberopt.simulation.evaluate import evaluate
 from chamberopt.simulation.evaluation import Evaluation
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
-    from chamberopt.design.load import Design, Study
+    from chamberopt.design.load import Design
+    from chamberopt.optimize.study import Study
     from chamberopt.simulation.replicas import Replica
 
 
@@ -37,7 +38,7 @@ class StudyResult:
     """What a study found.
 
     start, best, confirmed: judged on the same fresh seeds · gain: objective of best minus start with its 95 %
-    interval from those paired replicas · findings: what a model of the whole search says about the best; None when
+    interval from those paired replicas · sensitivity: what a model of the whole search says about the best; None when
     there is too little to fit · trials: search and confirmation, as they ran · seconds: wall clock of all evaluations,
     whenever they ran · target (m,) bool: of all candidates, where it is the start's; None where each design's own says
     it. Of two objectives, best is the best by the first.
@@ -47,13 +48,13 @@ class StudyResult:
     folder: Path
     algorithm: str
     trials: tuple[Trial, ...]
-    start: Confirmed
-    confirmed: tuple[Confirmed, ...]
-    best: Confirmed
+    start: ConfirmedCandidate
+    confirmed: tuple[ConfirmedCandidate, ...]
+    best: ConfirmedCandidate
     gain: Estimate
     seconds: float
     target: np.ndarray | None = None
-    findings: Findings | None = None
+    sensitivity: Sensitivity | None = None
 
     @property
     def at_bounds(self) -> tuple[str, ...]:
@@ -69,9 +70,9 @@ class StudyResult:
         return tuple(said)
 
     @property
-    def doubts(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[str, ...]:
         """A sentence where it is not known whether the best keeps the constraints."""
-        return (f"constraints: {self.best.reason}",) if self.best.standing == NOT_KNOWN else ()
+        return (f"constraints: {self.best.reason}",) if self.best.feasibility == NOT_KNOWN else ()
 
     @property
     def improved(self) -> bool:
@@ -84,13 +85,13 @@ def run_study(
     folder: str | Path,
     executor: Executor,
     progress: Progress | None = None,
-    evaluator: Evaluator | None = None,
+    simulator: Simulator | None = None,
     stop: Stop | None = None,
 ) -> StudyResult:
     """Search for a better design within the budget, then confirm the best and the start on fresh seeds.
 
     folder: new, empty, or where this very study was stopped: then what is on record there is not evaluated again, and
-    the end is the same as if it had never been stopped. evaluator: stands in for the simulation (tests, other models).
+    the end is the same as if it had never been stopped. simulator: stands in for the simulation (tests, other models).
     progress(done, total, best): after each evaluation. stop(): asked before each; KeyboardInterrupt when it says True.
 
     Every candidate of the search gets the same seeds. The best candidates and the start are then simulated
@@ -101,25 +102,25 @@ def run_study(
     Raises InputError when the folder is in use or its study another, when the start cannot be simulated, or nothing
     meets the constraints; OSError when an evaluation cannot be recorded.
     """
-    with open_record(study, folder) as record:
-        return go_on(study, record, executor, progress, evaluator, stop)
+    with open_study_folder(study, folder) as record:
+        return search_and_confirm(study, record, executor, progress, simulator, stop)
 
 
-def go_on(
+def search_and_confirm(
     study: Study,
-    record: Record,
+    record: StudyFolder,
     executor: Executor,
     progress: Progress | None = None,
-    evaluator: Evaluator | None = None,
+    simulator: Simulator | None = None,
     stop: Stop | None = None,
 ) -> StudyResult:
-    """The same from where a record stands. study: the record's, with its effects chosen (Record.settled)."""
+    """The same from where a record stands. study: the record's, with its effects chosen (StudyFolder.settled)."""
     folder = record.folder
     record.begin()
     save_inputs(study, folder)
-    target = kept_target(study)
-    evaluator = evaluator or simulation(study, executor, target)
-    candidates = Candidates(study, record, evaluator, progress, stop)
+    target = fixed_target(study)
+    simulator = simulator or chamber_simulator(study, executor, target)
+    candidates = Candidates(study, record, simulator, progress, stop)
     settings = study.optimizer
     phases: Sequence[tuple[str, float]] = [
         (phase.algorithm, phase.share) for phase in settings.phases
@@ -146,7 +147,7 @@ def go_on(
         )
     start = confirmed[0]
     winners = [one for one in confirmed if one.feasible] or [
-        one for one in confirmed if one.standing == NOT_KNOWN
+        one for one in confirmed if one.feasibility == NOT_KNOWN
     ]
     if not winners:
         raise InputError(
@@ -167,7 +168,7 @@ def go_on(
         else paired_difference(best.goals[0], start.goals[0]),
         seconds=record.seconds,
         target=target,
-        findings=found(
+        sensitivity=analyse_sensitivity(
             candidates.model(FIRST_ALONE),
             study.vary,
             best.parameters,
@@ -176,7 +177,7 @@ def go_on(
     )
 
 
-def kept_target(study: Study) -> np.ndarray | None:
+def fixed_target(study: Study) -> np.ndarray | None:
     """The target (m,) bool of every candidate where it is what the shot reaches: found once, in the start's chamber.
 
     A search could else shrink what it has to cover. Raises InputError where the study varies the target itself.
@@ -194,7 +195,7 @@ def kept_target(study: Study) -> np.ndarray | None:
 
 
 def save_inputs(study: Study, folder: Path) -> None:
-    """The study as files to read and to run again; asked.json has what it is compared by."""
+    """The study as files to read and to run again; inputs.json has what it is compared by."""
     import tomli_w
 
     if (folder / STUDY).is_file():
@@ -204,7 +205,7 @@ def save_inputs(study: Study, folder: Path) -> None:
     write_text(folder / STUDY, tomli_w.dumps({"design": "design.toml", **asked}))
 
 
-def simulation(study: Study, executor: Executor, target: np.ndarray | None) -> Evaluator:
+def chamber_simulator(study: Study, executor: Executor, target: np.ndarray | None) -> Simulator:
     """The real thing: chamber, replicas, coverage. Asked again for more replicas it adds to those it has."""
     from chamberopt.chamber.build import build_chamber
 

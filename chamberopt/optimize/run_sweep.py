@@ -19,20 +19,20 @@ import numpy as np
 from chamberopt.common.errors import InputError, WorkerLostError
 from chamberopt.common.parallel.executor import SerialExecutor, share
 from chamberopt.common.progress import Progress
-from chamberopt.optimize.evaluate_candidate import Evaluator, Judge
-from chamberopt.optimize.run_study import kept_target, save_inputs, simulation
-from chamberopt.optimize.storage.study_folder import Record, open_record
+from chamberopt.optimize.evaluate_candidate import CandidateEvaluator, Simulator
+from chamberopt.optimize.run_study import chamber_simulator, fixed_target, save_inputs
+from chamberopt.optimize.storage.study_folder import StudyFolder, open_study_folder
 from chamberopt.optimize.storage.trial_log import HISTORY, Trial
 
 if TYPE_CHECKING:
-    from chamberopt.design.load import Study
+    from chamberopt.optimize.study import Study
     from chamberopt.simulation.evaluation import Evaluation
 
 MOST_CANDIDATES = 100_000
 
 
 @dataclass(frozen=True)
-class Plan:
+class SweepPlan:
     """Which candidates: method "grid" or "sobol" · count: of values a parameter, or of points · points (n, d): in
     shares of the bounds · seed: of the points, None for a grid.
     """
@@ -48,11 +48,11 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class Sweep:
+class SweepResult:
     """What was found. trials: in the plan's order · seconds: wall clock."""
 
     study: Study
-    plan: Plan
+    plan: SweepPlan
     folder: Path
     trials: tuple[Trial, ...]
     seconds: float
@@ -64,7 +64,9 @@ class Sweep:
         return max(feasible, key=lambda trial: trial.score, default=None)
 
 
-def plan_sweep(study: Study, grid: int | None, sobol: int | None, seed: int | None = None) -> Plan:
+def plan_sweep(
+    study: Study, grid: int | None, sobol: int | None, seed: int | None = None
+) -> SweepPlan:
     """`grid` values of every parameter, bounds included, or `sobol` points in all; InputError unless one is given.
 
     Sobol points are scrambled (scipy.stats.qmc.Sobol, after A. B. Owen, "Scrambling Sobol' and Niederreiter-Xing
@@ -85,7 +87,7 @@ def plan_sweep(study: Study, grid: int | None, sobol: int | None, seed: int | No
             raise InputError(f"--grid: given {grid}; give at least 2 values a parameter")
         _require_few(grid**dimensions, f"--grid: {grid} values of {dimensions} parameters")
         axis = np.linspace(0.0, 1.0, grid)
-        return Plan("grid", grid, np.array(list(product(axis, repeat=dimensions))), None)
+        return SweepPlan("grid", grid, np.array(list(product(axis, repeat=dimensions))), None)
     assert sobol is not None
     if sobol < 1:
         raise InputError(f"--sobol: given {sobol}; give at least 1 point")
@@ -93,40 +95,40 @@ def plan_sweep(study: Study, grid: int | None, sobol: int | None, seed: int | No
     seed = study.optimizer.seed if seed is None else seed
     if seed < 0:
         raise InputError(f"--seed: given {seed}; give 0 or more")
-    return Plan("sobol", sobol, _sobol(dimensions, sobol, seed), seed)
+    return SweepPlan("sobol", sobol, _sobol(dimensions, sobol, seed), seed)
 
 
 def run_sweep(
     study: Study,
-    plan: Plan,
+    plan: SweepPlan,
     folder: str | Path,
     executor: Executor,
     progress: Progress | None = None,
-    evaluator: Evaluator | None = None,
-) -> Sweep:
-    """Judge every candidate of the plan, at the accuracy of a search and on its seeds.
+    simulator: Simulator | None = None,
+) -> SweepResult:
+    """CandidateEvaluator every candidate of the plan, at the accuracy of a search and on its seeds.
 
     folder: new, empty, or where this very sweep was stopped; receives design.toml, study.toml and history.jsonl, its
-    rows in the plan's order whatever the number of workers. evaluator: stands in for the simulation; must go to the
+    rows in the plan's order whatever the number of workers. simulator: stands in for the simulation; must go to the
     workers. A candidate that fails is a row with its reason. Raises InputError when all fail, or the folder is of
     another sweep.
     """
-    with open_record(study, folder, plan.asked()) as record:
+    with open_study_folder(study, folder, plan.asked()) as record:
         if record.finished:
             raise InputError(
                 f"{folder}: this sweep is finished, nothing was run; to run it anew give another folder (--out)"
             )
-        return _go_on(study, plan, record, executor, progress, evaluator)
+        return _go_on(study, plan, record, executor, progress, simulator)
 
 
 def _go_on(
     study: Study,
-    plan: Plan,
-    record: Record,
+    plan: SweepPlan,
+    record: StudyFolder,
     executor: Executor,
     progress: Progress | None,
-    evaluator: Evaluator | None,
-) -> Sweep:
+    simulator: Simulator | None,
+) -> SweepResult:
     """From where the record stands."""
     record.begin()
     save_inputs(study, record.folder)
@@ -137,7 +139,7 @@ def _go_on(
             break
         trials.append(trial)
     best = max((trial.score for trial in trials if trial.feasible), default=None)
-    for trial, seconds in _judged(study, plan, len(trials), executor, evaluator):
+    for trial, seconds in _judged(study, plan, len(trials), executor, simulator):
         record.append(trial, None, seconds)
         trials.append(trial)
         if trial.feasible:
@@ -149,19 +151,19 @@ def _go_on(
             f"no candidate of the sweep could be simulated, the first for: {trials[0].reason}; change [vary] or the "
             f"design; every candidate is in {record.folder / HISTORY}"
         )
-    return Sweep(study, plan, record.folder, tuple(trials), record.seconds)
+    return SweepResult(study, plan, record.folder, tuple(trials), record.seconds)
 
 
 def _judged(
-    study: Study, plan: Plan, first: int, executor: Executor, evaluator: Evaluator | None
+    study: Study, plan: SweepPlan, first: int, executor: Executor, simulator: Simulator | None
 ) -> Iterator[tuple[Trial, float]]:
     """The trials from the ``first`` on in the plan's order, and the seconds that each took; all tasks are there from
     the start, so that no worker waits for another.
     """
-    target = share(executor, kept_target(study) if evaluator is None else None)
+    target = share(executor, fixed_target(study) if simulator is None else None)
     numbers = range(first, len(plan.points))
     futures = [
-        executor.submit(judged, study, number, plan.points[number], target, evaluator)
+        executor.submit(evaluate_point, study, number, plan.points[number], target, simulator)
         for number in numbers
     ]
     try:
@@ -175,17 +177,17 @@ def _judged(
             future.cancel()
 
 
-def judged(
+def evaluate_point(
     study: Study,
     number: int,
     point: np.ndarray,
     target: np.ndarray | None = None,
-    evaluator: Evaluator | None = None,
+    simulator: Simulator | None = None,
 ) -> tuple[Trial, float]:
     """One candidate from chamber to figures, on one worker, and the seconds it took."""
     began = time.perf_counter()
-    evaluator = evaluator or simulation(study, SerialExecutor(), target)
-    trial = Judge(study, evaluator).trial(number, point, "sweep")[0]
+    simulator = simulator or chamber_simulator(study, SerialExecutor(), target)
+    trial = CandidateEvaluator(study, simulator).trial(number, point, "sweep")[0]
     return trial, time.perf_counter() - began
 
 
@@ -195,7 +197,7 @@ def _lost(study: Study, number: int, point: np.ndarray, error: WorkerLostError) 
     def fail(*_: object) -> Evaluation:
         raise InputError(str(error))
 
-    return Judge(study, fail).trial(number, point, "sweep")[0]
+    return CandidateEvaluator(study, fail).trial(number, point, "sweep")[0]
 
 
 def _sobol(dimensions: int, count: int, seed: int) -> np.ndarray:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from chamberopt.coverage.statistics.confidence_interval import Estimate
-from chamberopt.optimize.search.gaussian_process import Surrogate, one_thread
+from chamberopt.optimize.search.gaussian_process import GaussianProcess, one_thread
 
 NORMAL = 1.96  # standard deviations of a 95 % interval
 STEPS = 41  # of a slice
@@ -35,7 +35,7 @@ class Slice:
 
 
 @dataclass(frozen=True)
-class Findings:
+class Sensitivity:
     """One slice a parameter; noise: what counts as no loss · expected: the model's own score of the best design ·
     together: share of the designs with every parameter within its flat range that lose no more than the noise.
     """
@@ -77,12 +77,12 @@ class Findings:
         }
 
 
-def found(
-    model: Surrogate | None,
+def analyse_sensitivity(
+    model: GaussianProcess | None,
     vary: Mapping[str, tuple[float, float]],
     best: Mapping[str, float],
     noise: float,
-) -> Findings | None:
+) -> Sensitivity | None:
     """What the model says about a best design, by dotted name in the file's units; None without a model."""
     from scipy.stats.qmc import Sobol
 
@@ -116,10 +116,12 @@ def found(
         ends = np.array(ranges)
         within = ends[:, 0] + cloud * (ends[:, 1] - ends[:, 0])
         together = float((model(within)[0] >= top - noise).mean())
-    return Findings(tuple(slices), noise, Estimate(top, NORMAL * doubt), together)
+    return Sensitivity(tuple(slices), noise, Estimate(top, NORMAL * doubt), together)
 
 
-def _main_effect(model: Surrogate, cloud: np.ndarray, i: int, steps: np.ndarray) -> np.ndarray:
+def _main_effect(
+    model: GaussianProcess, cloud: np.ndarray, i: int, steps: np.ndarray
+) -> np.ndarray:
     """Mean score over the other parameters at each step of parameter i."""
     means = []
     for step in steps:
@@ -129,7 +131,7 @@ def _main_effect(model: Surrogate, cloud: np.ndarray, i: int, steps: np.ndarray)
     return np.array(means)
 
 
-def _flat(model: Surrogate, at: np.ndarray, i: int, least: float) -> tuple[float, float]:
+def _flat(model: GaussianProcess, at: np.ndarray, i: int, least: float) -> tuple[float, float]:
     """How far parameter i may move down and up, in shares of the bounds, with the model's mean at `least` or above."""
     ends = []
     for bound in (0.0, 1.0):

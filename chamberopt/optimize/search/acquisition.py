@@ -1,4 +1,4 @@
-"""Where the next evaluation teaches most, and which point to recommend, by the surrogate; NLopt climbs on both.
+"""Where the next evaluation teaches most, and which point to recommend, by the model; NLopt climbs on both.
 
 The worth of an evaluation is its knowledge gradient: by how much it raises, on average, the best mean of the model
 (P. Frazier, W. Powell and S. Dayanik, "The knowledge-gradient policy for correlated normal beliefs", INFORMS J.
@@ -12,8 +12,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from chamberopt.optimize.search.gaussian_process import Surrogate, one_thread
-from chamberopt.optimize.search.nlopt_search import LOCAL, climb
+from chamberopt.optimize.search.gaussian_process import GaussianProcess, one_thread
+from chamberopt.optimize.search.nlopt_search import LOCAL, run_nlopt
 
 # Quantiles of the evaluation's outcome that its worth is averaged over.
 OUTCOMES = 16
@@ -30,7 +30,7 @@ STEP, TOLERANCE, CALLS = 0.05, 1e-3, 40
 Function = Callable[[np.ndarray], np.ndarray]
 
 
-def propose(model: Surrogate, rng: np.random.Generator) -> np.ndarray:
+def propose_point(model: GaussianProcess, rng: np.random.Generator) -> np.ndarray:
     """The point (d,) of the unit cube whose evaluation is worth most, none seen before."""
     with one_thread():
         mean, _ = model(model.points)
@@ -55,7 +55,7 @@ def propose(model: Surrogate, rng: np.random.Generator) -> np.ndarray:
     return point
 
 
-def recommend(model: Surrogate, seed: int) -> np.ndarray:
+def recommend_point(model: GaussianProcess, seed: int) -> np.ndarray:
     """The point (d,) with the best modelled score, less some of the model's doubt."""
 
     def cautious(at: np.ndarray) -> np.ndarray:
@@ -71,7 +71,7 @@ def recommend(model: Surrogate, seed: int) -> np.ndarray:
         return np.round(_climbed(cautious, best_first[:2]), DECIMALS)
 
 
-def _worth(model: Surrogate, leaders: np.ndarray) -> Function:
+def _worth(model: GaussianProcess, leaders: np.ndarray) -> Function:
     """The knowledge gradient as a function of points (k, d); log, for NLopt sees shapes better than sizes."""
     from scipy.special import ndtri
 
@@ -120,9 +120,9 @@ def _climbed(function: Function, starts: np.ndarray) -> np.ndarray:
 
     for start in starts:
         if len(start) > 1:
-            climb(value, start, LOCAL, step=STEP, tolerance=TOLERANCE, most=CALLS)
+            run_nlopt(value, start, LOCAL, step=STEP, tolerance=TOLERANCE, most=CALLS)
         else:  # BOBYQA wants two parameters at least
-            climb(value, start, "LN_SBPLX", step=STEP, tolerance=TOLERANCE, most=CALLS)
+            run_nlopt(value, start, "LN_SBPLX", step=STEP, tolerance=TOLERANCE, most=CALLS)
     return max(seen, key=lambda one: one[0])[1]
 
 

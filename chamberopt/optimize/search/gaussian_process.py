@@ -28,10 +28,10 @@ SIGNAL, LENGTH, NOISE = (1.0, 1.5), (0.3, 0.6), (0.01, 1.5)
 SIGNAL_BOUNDS, LENGTH_BOUNDS, NOISE_BOUNDS = (0.02, 50.0), (0.05, 5.0), (1e-6, 7.0)
 
 
-class Surrogate:
+class GaussianProcess:
     """Scores as a smooth function of points of the unit cube, fitted once.
 
-    points (n, d) in [0, 1] · scores (n,) · variances (n,): squared standard errors of the scores, see pooled(); 0, or
+    points (n, d) in [0, 1] · scores (n,) · variances (n,): squared standard errors of the scores, see pool_variances(); 0, or
     absent, where not known. Of more than MOST_POINTS only the best are used. rough: the fitted length scales times
     this; below 1 for a model that trusts less what it has not seen.
     """
@@ -83,7 +83,7 @@ class Surrogate:
         return matern
 
 
-def pooled(spreads: np.ndarray, replicas: np.ndarray) -> np.ndarray:
+def pool_variances(spreads: np.ndarray, replicas: np.ndarray) -> np.ndarray:
     """Squared standard errors (n,) of means of so many replicas (n,), from the variances (n,) of one replica each.
 
     So few replicas tell a candidate's own variance badly: all are taken to scatter alike, as the mean of them. Only one

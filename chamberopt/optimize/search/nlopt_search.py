@@ -19,7 +19,7 @@ def seed_nlopt(seed: int) -> None:
     nlopt.srand(seed)
 
 
-def climb(
+def run_nlopt(
     function: Callable[[np.ndarray], float],
     start: np.ndarray,
     algorithm: str,

@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from chamberopt.optimize.search.acquisition import propose
-from chamberopt.optimize.search.gaussian_process import MOST_POINTS, Surrogate
-from chamberopt.optimize.search.nlopt_search import LOCAL, climb, seed_nlopt
+from chamberopt.optimize.search.acquisition import propose_point
+from chamberopt.optimize.search.gaussian_process import MOST_POINTS, GaussianProcess
+from chamberopt.optimize.search.nlopt_search import LOCAL, run_nlopt, seed_nlopt
 
 # Phases that are not NLopt algorithms: points evenly over the bounds, and a model on which NLopt climbs.
 SPREAD, MODEL = "sobol", "surrogate"
@@ -64,7 +64,7 @@ def maximise(
         for phase, end in plan:
             search.run(phase, max(1, round(end * budget)))
         if algorithm == "auto" and not phases:
-            search.go_on(LOCAL)
+            search.search_and_confirm(LOCAL)
     except _BudgetSpentError:
         pass
     return ", then ".join(search.ran) or "none"
@@ -120,7 +120,7 @@ class _Search:
         else:
             self._climb(phase, stop_at, self._step)
 
-    def go_on(self, algorithm: str) -> None:
+    def search_and_confirm(self, algorithm: str) -> None:
         """Rounds of local searches with ever smaller steps, until the budget or no new point comes."""
         spent = 0
         while spent < len(self.scores):
@@ -145,7 +145,9 @@ class _Search:
                 continue
             rough = ROUGH if len(self.points) % DOUBT_EVERY == 0 else 1.0
             self.judge(
-                propose(Surrogate(np.array(self.points), scores, variances, rough), self._rng)
+                propose_point(
+                    GaussianProcess(np.array(self.points), scores, variances, rough), self._rng
+                )
             )
 
     def _climb(self, algorithm: str, stop_at: int, step: float) -> None:
@@ -156,7 +158,7 @@ class _Search:
 
         try:
             # `most`: a safety net for algorithms that keep asking for points already seen.
-            climb(
+            run_nlopt(
                 within,
                 self._best,
                 algorithm,

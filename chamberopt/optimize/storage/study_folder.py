@@ -14,15 +14,15 @@ from chamberopt.common.files import make_output_folder, write_text
 from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.design.design import Design, checked
 from chamberopt.optimize.storage.lock import only_writer
-from chamberopt.optimize.storage.study_inputs import asked, require_same, require_same_files
-from chamberopt.optimize.storage.trial_log import HISTORY, TIMINGS, Journal, Trial, read_seconds
+from chamberopt.optimize.storage.study_inputs import require_same, require_same_files, study_inputs
+from chamberopt.optimize.storage.trial_log import HISTORY, TIMINGS, JsonLines, Trial, read_seconds
 from chamberopt.simulation.effect_pilot import Advice
 from chamberopt.simulation.evaluation import Evaluation, load_evaluation, save_evaluation
 
 if TYPE_CHECKING:
-    from chamberopt.design.load import Study
+    from chamberopt.optimize.study import Study
 
-ASKED = "asked.json"
+INPUTS = "inputs.json"
 EFFECTS = "effects.json"
 STUDY = "study.toml"
 CONFIRMED = "confirm"
@@ -30,9 +30,9 @@ RESULT = "result.json"  # written last of all (results.py): a study that has it 
 
 
 @contextmanager
-def open_record(
+def open_study_folder(
     study: Study, folder: str | Path, plan: Mapping[str, Any] | None = None
-) -> Iterator[Record]:
+) -> Iterator[StudyFolder]:
     """The record of a study in a folder that is new, empty or its own, held against other processes.
 
     Raises InputError when the folder holds anything else or is being written, and when study, part or program are not
@@ -42,12 +42,12 @@ def open_record(
     if not is_study_folder(folder):
         folder = make_output_folder(folder)
     with only_writer(folder):
-        yield Record(study, folder, plan)
+        yield StudyFolder(study, folder, plan)
 
 
 def is_study_folder(folder: Path) -> bool:
     """Whether a study was begun here; whether it ended is another question."""
-    return (folder / ASKED).is_file()
+    return (folder / INPUTS).is_file()
 
 
 def is_finished(folder: Path) -> bool:
@@ -55,14 +55,14 @@ def is_finished(folder: Path) -> bool:
     return (folder / RESULT).is_file()
 
 
-class Record:
-    """See open_record. trials: those on disk when it was opened."""
+class StudyFolder:
+    """See open_study_folder. trials: those on disk when it was opened."""
 
     def __init__(self, study: Study, folder: Path, plan: Mapping[str, Any] | None = None) -> None:
-        self.folder, self._study, self._asked = folder, study, asked(study, plan)
+        self.folder, self._study, self._inputs = folder, study, study_inputs(study, plan)
         self._history, self._timings = (
-            Journal(folder / HISTORY),
-            Journal(folder / TIMINGS, lasting=False),
+            JsonLines(folder / HISTORY),
+            JsonLines(folder / TIMINGS, lasting=False),
         )
         self._require_same_study()
         self.trials = self._read_trials()
@@ -85,15 +85,15 @@ class Record:
 
     def begin(self) -> None:
         """Write down what was asked, before anything that answers it; over an older question that nothing came of."""
-        path = self.folder / ASKED
-        if path.is_file() and (self.begun or _read_json(path) == self._asked):
+        path = self.folder / INPUTS
+        if path.is_file() and (self.begun or _read_json(path) == self._inputs):
             return
         for name in (EFFECTS, STUDY):
             (self.folder / name).unlink(missing_ok=True)
-        write_text(path, json.dumps(self._asked, indent=2) + "\n")
+        write_text(path, json.dumps(self._inputs, indent=2) + "\n")
 
-    def settled(
-        self, settle: Callable[[Design], tuple[Design, list[Advice]]]
+    def with_effects_resolved(
+        self, resolve: Callable[[Design], tuple[Design, list[Advice]]]
     ) -> tuple[Study, list[Advice]]:
         """The study with the effects of its design chosen, and why, where it leaves them to us: asked of `settle` once,
         for a pilot takes its time.
@@ -104,7 +104,7 @@ class Record:
         self.begin()
         path = self.folder / EFFECTS
         if not path.is_file():
-            chosen, advice = settle(design)
+            chosen, advice = resolve(design)
             told = {
                 "effects": chosen.effects.model_dump(mode="json"),
                 "advice": [asdict(one) for one in advice],
@@ -148,7 +148,7 @@ class Record:
         """Keep a trial, of a confirmation all of it; on the disk when this returns. Raises OSError if it cannot be, and
         InputError if the part's file has changed under it.
         """
-        require_same_files(self._study.design, self._asked, self.folder)
+        require_same_files(self._study.design, self._inputs, self.folder)
         if trial.stage == "confirm" and evaluation is not None:
             path = self._file(trial.number)
             path.parent.mkdir(exist_ok=True)
@@ -163,7 +163,7 @@ class Record:
         """Where evaluations are there, they answer what was asked then."""
         if not self.begun:
             return
-        before, now = _read_json(self.folder / ASKED), self._asked
+        before, now = _read_json(self.folder / INPUTS), self._inputs
         if self.finished:  # its result stands, whatever program is asked for it
             before, now = (
                 {key: one.get(key) for key in ("study", "sweep")} for one in (before, now)

@@ -12,24 +12,23 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.versions import program_versions
 
 if TYPE_CHECKING:
-    from chamberopt.design.load import Design, Study
+    from chamberopt.design.load import Design
+    from chamberopt.optimize.study import Study
 
 FORMAT = 1
 SHOWN = 12  # differences in one message
 
 
-def asked(study: Study, plan: Mapping[str, Any] | None = None) -> dict[str, Any]:
+def study_inputs(study: Study, plan: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """Everything that a study's history depends on, as plain JSON: its values, not the text they were written in.
 
     A file that the design names, such as the part's mesh, stands with its name and the sha256 of its content, wherever
     it lies. plan: of a sweep.
     """
-    question = study.model_dump(mode="json", exclude={"design"})
-    question["design"] = _with_files(study.design.model_dump(mode="json"))
+    values = study.model_dump(mode="json", exclude={"design"})
+    values["design"] = _with_files(study.design.model_dump(mode="json"))
     plain = json.loads(
-        json.dumps(
-            {"format": FORMAT, "study": question, "sweep": plan, "program": program_versions()}
-        )
+        json.dumps({"format": FORMAT, "study": values, "sweep": plan, "program": program_versions()})
     )
     assert isinstance(plain, dict)
     return plain

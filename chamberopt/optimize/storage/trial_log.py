@@ -119,7 +119,7 @@ def _estimate(row: Mapping[str, Any], name: str) -> Estimate:
     )
 
 
-class Journal:
+class JsonLines:
     """Rows of JSON, one a line, in a file that only grows: each is on the disk before `append` returns.
 
     lasting: even through a power cut, which costs milliseconds a row.
@@ -185,25 +185,25 @@ class Journal:
         return rows, len(content) - len(torn)
 
 
-def read_history(folder: Path) -> list[dict[str, Any]]:
+def read_trials(folder: Path) -> list[dict[str, Any]]:
     """Every row of a study's history, in order, with its seconds where they are known."""
     path = folder / HISTORY
     if not path.is_file():
         raise InputError(f"{path}: is not there; give a study's results folder")
     seconds = read_seconds(folder)
     return [
-        {**row, "seconds": seconds.get(number)} for number, row in enumerate(Journal(path).rows())
+        {**row, "seconds": seconds.get(number)} for number, row in enumerate(JsonLines(path).rows())
     ]
 
 
 def read_seconds(folder: Path) -> dict[int, float]:
     """Seconds of wall clock that each evaluation took, by its number."""
     return {
-        row.get("number", -1): row.get("seconds", 0.0) for row in Journal(folder / TIMINGS).rows()
+        row.get("number", -1): row.get("seconds", 0.0) for row in JsonLines(folder / TIMINGS).rows()
     }
 
 
-def as_csv(rows: list[dict[str, Any]]) -> str:
+def trials_as_csv(rows: list[dict[str, Any]]) -> str:
     """The history as a table: a column per parameter and metric, NAME_pm for the half-width of NAME."""
     flat = []
     for row in rows:

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from chamberopt.common.files import write_text
-from chamberopt.optimize.storage.trial_log import as_csv, read_history
+from chamberopt.optimize.storage.trial_log import read_trials, trials_as_csv
 
 
 def write_study_table(folder: Path, file: Path) -> None:
     """The evaluations in a study's folder so far, as .csv. InputError where there are none."""
-    write_text(file, as_csv(read_history(folder)))
+    write_text(file, trials_as_csv(read_trials(folder)))

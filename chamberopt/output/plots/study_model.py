@@ -11,23 +11,23 @@ from chamberopt.output.plots.study_and_accuracy import BLUE, GREEN, GREY, ORANGE
 
 if TYPE_CHECKING:
     from chamberopt.optimize.run_study import StudyResult
-    from chamberopt.optimize.sensitivity import Findings
+    from chamberopt.optimize.sensitivity import Sensitivity
 
 
-def slices_picture(path: Path, result: StudyResult, findings: Findings) -> None:
+def slices_picture(path: Path, result: StudyResult, sensitivity: Sensitivity) -> None:
     """The objective over each parameter as the model has it: slice with its interval, main effect, flat range; .png."""
-    count = len(findings.slices)
+    count = len(sensitivity.slices)
     columns = min(count, 4)
     rows = -(-count // columns)
     figure = _figure(3.4 * max(columns, 2), 3.3 * rows + 0.5)
     grid = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
-    for axes, one in zip(grid, findings.slices, strict=False):
+    for axes, one in zip(grid, sensitivity.slices, strict=False):
         axes.axvspan(
             *one.flat,
             color=GREEN,
             alpha=0.12,
             lw=0,
-            label=f"loses no more than {findings.noise:.2g}",
+            label=f"loses no more than {sensitivity.noise:.2g}",
         )
         axes.fill_between(
             one.values,
@@ -55,11 +55,11 @@ def slices_picture(path: Path, result: StudyResult, findings: Findings) -> None:
 
 def front_picture(path: Path, result: StudyResult) -> None:
     """Both objectives of every candidate, the confirmed front with its intervals; .png."""
-    from chamberopt.optimize.pareto_table import compromises
+    from chamberopt.optimize.pareto import pareto_points
 
     figure = _figure(8.0, 6.0)
     axes = figure.subplots()
-    every = compromises(result)
+    every = pareto_points(result)
     groups = (
         ("search", False, GREY, "o", "searched"),
         ("search", True, BLUE, "o", "searched, on the front of the search"),

@@ -16,7 +16,7 @@ from chamberopt.coverage.statistics.confidence_interval import (
     paired_difference,
 )
 from chamberopt.optimize.storage.study_folder import STUDY
-from chamberopt.optimize.storage.trial_log import HISTORY, read_history
+from chamberopt.optimize.storage.trial_log import HISTORY, read_trials
 from chamberopt.output.report.answer import answer
 from chamberopt.output.report.cost import accuracy_reached, price_paid
 from chamberopt.output.report.influence import influence
@@ -37,7 +37,7 @@ def facts(folder: str | Path) -> dict[str, Any]:
         load_result(result.folder / START) if study and (result.folder / START).is_dir() else None
     )
     gain = None if start is None else _change(result.objective, start.objective, result, start)
-    rows = read_history(result.folder) if study and (result.folder / HISTORY).is_file() else []
+    rows = read_trials(result.folder) if study and (result.folder / HISTORY).is_file() else []
     goal = goal_words(result.objective_name)
     return {
         "kind": result.kind,

@@ -17,9 +17,9 @@ from chamberopt.coverage.part_impacts import HITS_FILE, save_hits
 from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.design.design import checked
 from chamberopt.design.load import Design, save_design, with_paths_from
-from chamberopt.optimize import pareto_table
+from chamberopt.optimize import pareto
 from chamberopt.optimize.storage.study_folder import RESULT, is_study_folder
-from chamberopt.optimize.storage.trial_log import HISTORY, as_csv, read_history
+from chamberopt.optimize.storage.trial_log import HISTORY, read_trials, trials_as_csv
 from chamberopt.simulation.evaluation import Evaluation
 from chamberopt.simulation.time_curve import coverage_against_time
 from chamberopt.simulation.triangle_fields import compute_triangle_fields
@@ -97,7 +97,7 @@ def write_study(
     folder = Path(folder)
     start, best = study_result.start, study_result.best
     save_design(best.design, folder / "best.toml")
-    write_text(folder / "history.csv", as_csv(read_history(folder)))
+    write_text(folder / "history.csv", trials_as_csv(read_trials(folder)))
     target = study_result.target
     (folder / "start").mkdir(exist_ok=True)
     save_design(start.design, folder / "start" / "design.toml")
@@ -108,10 +108,10 @@ def write_study(
         folder, best.design, build_chamber(best.design, target), best.evaluation
     )
     convergence_picture(folder / "convergence.png", study_result)
-    if study_result.findings:
-        slices_picture(folder / "slices.png", study_result, study_result.findings)
+    if study_result.sensitivity:
+        slices_picture(folder / "slices.png", study_result, study_result.sensitivity)
     if study_result.study.objective.pareto:
-        write_text(folder / "pareto.csv", pareto_table.as_csv(study_result))
+        write_text(folder / "pareto.csv", pareto.as_csv(study_result))
         front_picture(folder / "pareto.png", study_result)
     remarks = _picture([folder], [best.evaluation], ["best design"], folder / "coverage.png")
     pair, names = [start.evaluation, best.evaluation], ["start", "best design"]
@@ -269,9 +269,9 @@ def _about_study(result: StudyResult) -> dict[str, Any]:
         "vary": {name: list(bounds) for name, bounds in result.study.vary.items()},
         "evaluations": len(search),
         "accuracy": {
-            "search": result.study.drafted(result.study.design).process.accuracy.model_dump(
-                exclude_none=True
-            ),
+            "search": result.study.at_search_accuracy(
+                result.study.design
+            ).process.accuracy.model_dump(exclude_none=True),
             "confirm": result.study.design.process.accuracy.model_dump(exclude_none=True)
             | {"replicas": len(result.best.evaluation.replicas)},
         },
@@ -282,8 +282,8 @@ def _about_study(result: StudyResult) -> dict[str, Any]:
         "gain": _plain(result.gain, ""),
         "improved": result.improved,
         "at_bounds": list(result.at_bounds),
-        **({"model": result.findings.as_json()} if result.findings else {}),
-        **({"front": pareto_table.as_json(result)} if result.study.objective.pareto else {}),
+        **({"model": result.sensitivity.as_json()} if result.sensitivity else {}),
+        **({"front": pareto.as_json(result)} if result.study.objective.pareto else {}),
         "best": {"searched_as": result.best.searched, "parameters": result.best.parameters},
         "start": {
             "parameters": result.start.parameters,
@@ -299,7 +299,7 @@ def _about_study(result: StudyResult) -> dict[str, Any]:
                 "parameters": candidate.parameters,
                 "objective": _plain(candidate.evaluation.objective, ""),
                 "feasible": candidate.feasible,
-                "standing": candidate.standing,
+                "standing": candidate.feasibility,
                 "reason": candidate.reason,
             }
             for candidate in result.confirmed

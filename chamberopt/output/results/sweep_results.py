@@ -12,7 +12,7 @@ import numpy as np
 
 from chamberopt.common.files import atomic_write, write_text
 from chamberopt.design.load import save_design
-from chamberopt.optimize.storage.trial_log import Trial, as_csv, read_history
+from chamberopt.optimize.storage.trial_log import Trial, read_trials, trials_as_csv
 from chamberopt.output.plots.study_and_accuracy import BLUE, GREY, ORANGE
 from chamberopt.output.results.results import FORMAT, RESULT, versions
 
@@ -20,20 +20,20 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from chamberopt.optimize.run_sweep import Sweep
+    from chamberopt.optimize.run_sweep import SweepResult
 
 COLOURS = "viridis"
 MOST_PAIRS = 15  # panels of a picture: six parameters
 
 
-def write_sweep(folder: str | Path, sweep: Sweep) -> list[str]:
+def write_sweep(folder: str | Path, sweep: SweepResult) -> list[str]:
     """Complete the folder of a sweep that has ended; returns remarks, such as a picture that leaves pairs out.
 
     Beside design.toml, study.toml and history.jsonl, which run_sweep wrote: history.csv · result.json · map.png ·
     best.toml, unless no candidate is feasible.
     """
     folder = Path(folder)
-    write_text(folder / "history.csv", as_csv(read_history(folder)))
+    write_text(folder / "history.csv", trials_as_csv(read_trials(folder)))
     if sweep.best is not None:
         save_design(sweep.study.design.with_values(sweep.best.parameters), folder / "best.toml")
     remarks = _picture(folder / "map.png", sweep)
@@ -43,7 +43,7 @@ def write_sweep(folder: str | Path, sweep: Sweep) -> list[str]:
     return remarks
 
 
-def caution(sweep: Sweep) -> str:
+def caution(sweep: SweepResult) -> str:
     """What to know of the best row of a sweep."""
     if sweep.best is None:
         return (
@@ -55,7 +55,7 @@ def caution(sweep: Sweep) -> str:
     )
 
 
-def _about(sweep: Sweep) -> dict[str, Any]:
+def _about(sweep: SweepResult) -> dict[str, Any]:
     plan, study, best = sweep.plan, sweep.study, sweep.best
     return {
         "kind": "sweep",
@@ -72,7 +72,9 @@ def _about(sweep: Sweep) -> dict[str, Any]:
             "missing_a_constraint": sum(
                 t.objective is not None and not t.feasible for t in sweep.trials
             ),
-            "accuracy": study.drafted(study.design).process.accuracy.model_dump(exclude_none=True),
+            "accuracy": study.at_search_accuracy(study.design).process.accuracy.model_dump(
+                exclude_none=True
+            ),
             "best": best.row() if best else None,
             "seconds": round(sweep.seconds, 3),
         },
@@ -81,7 +83,7 @@ def _about(sweep: Sweep) -> dict[str, Any]:
     }
 
 
-def _picture(path: Path, sweep: Sweep) -> list[str]:
+def _picture(path: Path, sweep: SweepResult) -> list[str]:
     """One parameter: objective with intervals · two: a map, in squares of the grid or as points · more: a map of
     each pair, in which the other parameters vary too.
     """
@@ -110,14 +112,14 @@ def _picture(path: Path, sweep: Sweep) -> list[str]:
     return remarks
 
 
-def _title(sweep: Sweep) -> str:
+def _title(sweep: SweepResult) -> str:
     count, best = f"{len(sweep.trials)} candidates", sweep.best
     if best is None or best.objective is None:
         return f"{count}, none of them feasible"
     return f"{count}; the best as simulated {best.objective.value:.3f} ± {best.objective.half_width:.2g}, luck included"
 
 
-def _line(axes: Axes, sweep: Sweep, name: str) -> None:
+def _line(axes: Axes, sweep: SweepResult, name: str) -> None:
     """Objective against the only parameter, 95 % intervals."""
     for feasible, colour, mark in ((True, BLUE, "o"), (False, GREY, "x")):
         goals = [
@@ -148,7 +150,7 @@ def _line(axes: Axes, sweep: Sweep, name: str) -> None:
 
 
 def _maps(
-    figure: Figure, sweep: Sweep, pairs: list[tuple[str, str]], shape: tuple[int, int]
+    figure: Figure, sweep: SweepResult, pairs: list[tuple[str, str]], shape: tuple[int, int]
 ) -> None:
     judged = [trial for trial in sweep.trials if trial.objective]
     # The good ones on top: of what lies on one spot of a pair the best is seen.
@@ -172,7 +174,7 @@ def _maps(
     )
 
 
-def _squares(axes: Axes, sweep: Sweep, across: str, up: str) -> Any:
+def _squares(axes: Axes, sweep: SweepResult, across: str, up: str) -> Any:
     """A grid of two parameters; what could not be simulated stays white."""
     goals = [trial.objective.value if trial.objective else np.nan for trial in sweep.trials]
     values = np.array(goals).reshape(
@@ -188,7 +190,7 @@ def _points(axes: Axes, judged: list[Trial], across: str, up: str) -> Any:
     return axes.scatter(x, y, c=colours, cmap=COLOURS, s=34, edgecolors="none")
 
 
-def _marks(axes: Axes, sweep: Sweep, across: str, up: str) -> None:
+def _marks(axes: Axes, sweep: SweepResult, across: str, up: str) -> None:
     """Start, best, and what is not to be had."""
     design = sweep.study.design
     for trials, label, colour in (
@@ -226,5 +228,5 @@ def _marks(axes: Axes, sweep: Sweep, across: str, up: str) -> None:
     axes.set_ylabel(up)
 
 
-def _goal(sweep: Sweep) -> str:
+def _goal(sweep: SweepResult) -> str:
     return sweep.study.objective.goals[0].replace("_", " ")

@@ -7,7 +7,7 @@ import pytest
 
 from chamberopt.common.errors import InputError
 from chamberopt.coverage.metrics import METRICS, NEVER, OBJECTIVES, parse_objective
-from chamberopt.design import study
+from chamberopt.optimize import study
 from chamberopt.simulation.evaluate import jackknife
 from tests.helpers.synthetic import dented, equal_dents, patchwork, plate_design
 

@@ -9,17 +9,10 @@ import pytest
 
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
-from chamberopt.design.load import (
-    METRICS,
-    Design,
-    Limits,
-    Study,
-    load,
-    load_design,
-    load_study,
-    save_design,
-)
+from chamberopt.design.load import Design, load_design, save_design
 from chamberopt.design.materials import SHOT_DENSITY
+from chamberopt.optimize.load_study import load, load_study
+from chamberopt.optimize.study import METRICS, Limits, Study
 
 ROOT = Path(__file__).resolve().parents[3]
 DESIGNS = sorted((ROOT / "designs").glob("*.toml"))
@@ -557,9 +550,16 @@ class TestStudies:
         assert said in edited(study_file, change)
 
     def test_one_fault_is_said_once(self, study_file: Path) -> None:
-        said = edited(study_file, ("[vary]", "[draft]\nfacets = [1]\n[vary]"))
-        assert ":3: draft.facets: given [1]; allowed: a number or a text (while searching" in said
+        said = edited(study_file, ("[vary]", "[search_accuracy]\nfacets = [1]\n[vary]"))
+        assert (
+            ":3: search_accuracy.facets: given [1]; allowed: a number or a text (while searching"
+            in said
+        )
         assert "\n" not in said
+
+    def test_the_old_table_draft_names_its_new_name(self, study_file: Path) -> None:
+        said = edited(study_file, ("[vary]", "[draft]\nfacets = 32\n[vary]"))
+        assert ":2: draft: renamed; write [search_accuracy] instead of [draft]" in said
 
     def test_study_and_its_design_at_once(self, study_file: Path) -> None:
         design_file = study_file.with_name("design.toml")
@@ -585,7 +585,7 @@ class TestStudies:
 
         import nlopt
 
-        from chamberopt.design.study import Algorithm
+        from chamberopt.optimize.study import Algorithm
 
         ours = {"auto", "sobol", "surrogate"}
         assert ours < set(typing.get_args(Algorithm))

@@ -12,13 +12,15 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.files import make_output_folder
 from chamberopt.common.parallel.executor import SerialExecutor, local_executor
 from chamberopt.coverage.metrics import METRICS
-from chamberopt.design.load import Limits, Study, load_design, load_study
+from chamberopt.design.load import load_design
 from chamberopt.optimize.evaluate_candidate import FAILED
-from chamberopt.optimize.run_study import kept_target, run_study
-from chamberopt.optimize.search.acquisition import recommend
-from chamberopt.optimize.search.gaussian_process import Surrogate
+from chamberopt.optimize.load_study import load_study
+from chamberopt.optimize.run_study import fixed_target, run_study
+from chamberopt.optimize.search.acquisition import recommend_point
+from chamberopt.optimize.search.gaussian_process import GaussianProcess
 from chamberopt.optimize.search.phases import maximise
-from chamberopt.optimize.storage.trial_log import as_csv, read_history
+from chamberopt.optimize.storage.trial_log import read_trials, trials_as_csv
+from chamberopt.optimize.study import Limits, Study
 from chamberopt.output import viewer
 from chamberopt.output.results.results import load_result, write_study
 from tests.helpers.synthetic import DESIGNS, judged, plate_design
@@ -44,9 +46,9 @@ def shares(design) -> np.ndarray:
 
 
 def analytic(noise: float, calls: list | None = None, seed: int = 0):
-    """An evaluator whose replicas scatter around the hill; the same seeds always draw the same noise."""
+    """An simulator whose replicas scatter around the hill; the same seeds always draw the same noise."""
 
-    def evaluator(design, stream, replicas):
+    def simulator(design, stream, replicas):
         x = shares(design)
         if calls is not None:
             calls.append((stream, x))
@@ -54,17 +56,17 @@ def analytic(noise: float, calls: list | None = None, seed: int = 0):
         scatter = noise * np.sqrt(8) * rng.normal(size=replicas or 8)
         return judged(hill(x) + scatter, mean_coverage=float(x[2]))
 
-    return evaluator
+    return simulator
 
 
 def study(**optimizer) -> Study:
-    plain = {"first_replicas": 0, "confirm_rounds": 1}  # one call of the evaluator a candidate
+    plain = {"first_replicas": 0, "confirm_rounds": 1}  # one call of the simulator a candidate
     settings = {"evaluations": 40, "confirm": 3, "confirm_replicas": 16, **plain, **optimizer}
     return Study(design=GEAR, vary=BOUNDS, optimizer=settings)
 
 
-def run(question: Study, folder: Path, evaluator, progress=None):
-    return run_study(question, folder, SerialExecutor(), progress, evaluator)
+def run(question: Study, folder: Path, simulator, progress=None):
+    return run_study(question, folder, SerialExecutor(), progress, simulator)
 
 
 def test_finds_a_known_optimum(tmp_path: Path) -> None:
@@ -136,19 +138,19 @@ def test_what_an_algorithm_cannot_do_is_said() -> None:
 def test_a_candidate_that_cannot_be_built_is_a_penalty_with_a_reason(tmp_path: Path) -> None:
     good = analytic(0.0)
 
-    def evaluator(design, stream, replicas):
+    def simulator(design, stream, replicas):
         if shares(design)[0] > 0.75:
             raise InputError("chamber.height_mm: too high for this test")
         return good(design, stream, replicas)
 
-    result = run(study(), tmp_path, evaluator)
+    result = run(study(), tmp_path, simulator)
     failed = [trial for trial in result.trials if trial.objective is None]
     assert failed
     assert all(
         t.reason == "chamber.height_mm: too high for this test" and not t.feasible for t in failed
     )
     assert hill(shares(result.best.design)) > PEAK - 0.02
-    as_csv(read_history(tmp_path))  # rows without metrics are rows
+    trials_as_csv(read_trials(tmp_path))  # rows without metrics are rows
 
 
 def test_constraints_hold_for_the_answer(tmp_path: Path) -> None:
@@ -167,15 +169,15 @@ def test_constraints_nobody_meets_are_the_users_to_loosen(tmp_path: Path) -> Non
     )
     with pytest.raises(InputError, match=r"mean_coverage .* < min 3.*history\.jsonl"):
         run(question, tmp_path, analytic(0.0))
-    assert len(read_history(tmp_path)) == 7  # the search and the start's confirmation
+    assert len(read_trials(tmp_path)) == 7  # the search and the start's confirmation
 
 
 def test_an_unusable_start_is_said_at_once(tmp_path: Path) -> None:
-    def evaluator(design, stream, replicas):
+    def simulator(design, stream, replicas):
         raise InputError("part.mesh: gone")
 
     with pytest.raises(InputError, match=r"part\.mesh: gone"):
-        run(study(), tmp_path, evaluator)
+        run(study(), tmp_path, simulator)
 
 
 @pytest.mark.parametrize("algorithm", ["auto", "GN_DIRECT_L", "GN_CRS2_LM", "LN_COBYLA"])
@@ -186,15 +188,15 @@ def test_other_errors_and_ctrl_c_pass_through_nlopt_unchanged(
         calls: list = []
         good = analytic(0.0, calls)
 
-        def evaluator(design, stream, replicas, good=good, calls=calls, error=error):
+        def simulator(design, stream, replicas, good=good, calls=calls, error=error):
             if len(calls) == 5:
                 raise error
             return good(design, stream, replicas)
 
         folder = tmp_path / type(error).__name__
         with pytest.raises(type(error)):
-            run(study(algorithm=algorithm), folder, evaluator)
-        assert len(read_history(folder)) == 5  # what was finished is on disk
+            run(study(algorithm=algorithm), folder, simulator)
+        assert len(read_trials(folder)) == 5  # what was finished is on disk
 
 
 def test_the_start_is_confirmed_on_the_same_fresh_seeds(tmp_path: Path) -> None:
@@ -223,22 +225,22 @@ def test_a_flat_function_gains_nothing(tmp_path: Path) -> None:
 
 def test_history_is_whole_rows_as_they_end(tmp_path: Path) -> None:
     result = run(study(evaluations=8), tmp_path, analytic(0.01))
-    rows = read_history(tmp_path)
+    rows = read_trials(tmp_path)
     assert [row["number"] for row in rows] == list(range(len(rows)))
     assert rows[0]["parameters"] == {name: GEAR.value(name) for name in BOUNDS}
     assert set(rows[0]["metrics"]) == set(METRICS)
     assert rows[3]["objective"] == result.trials[3].objective.value
-    table = as_csv(rows).splitlines()
+    table = trials_as_csv(rows).splitlines()
     assert len(table) == len(rows) + 1
     assert table[0].startswith("number,stage,chamber.height_mm,")
     # A torn last line, left by a crash, is not a row; damage before it is said.
     path = tmp_path / "history.jsonl"
     text = path.read_text()
     path.write_text(text + '{"number": 99, "par')
-    assert read_history(tmp_path) == rows
+    assert read_trials(tmp_path) == rows
     path.write_text("garbage\n" + text)
     with pytest.raises(InputError, match=r"history\.jsonl:1"):
-        read_history(tmp_path)
+        read_trials(tmp_path)
 
 
 def test_what_was_asked_is_in_the_folder_first(tmp_path: Path) -> None:
@@ -263,9 +265,11 @@ def test_the_model_of_the_scores_recommends_the_hilltop() -> None:
     rng = np.random.default_rng(0)
     points = rng.random((40, 3))
     scores = np.array([hill(x) for x in points]) + rng.normal(0, 0.03, 40)
-    model = Surrogate(points, scores)
-    assert hill(recommend(model, 1)) > PEAK - 0.03
-    np.testing.assert_array_equal(recommend(model, 1), recommend(Surrogate(points, scores), 1))
+    model = GaussianProcess(points, scores)
+    assert hill(recommend_point(model, 1)) > PEAK - 0.03
+    np.testing.assert_array_equal(
+        recommend_point(model, 1), recommend_point(GaussianProcess(points, scores), 1)
+    )
 
 
 def test_the_real_thing_end_to_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -303,19 +307,21 @@ def test_history_rows_are_plain_json(tmp_path: Path) -> None:
         json.loads(line, parse_constant=lambda name: pytest.fail(f"{name} is not JSON"))
 
 
-def drafted(draft: dict, design=GEAR, **vary) -> Study:
+def with_search_accuracy(search_accuracy: dict, design=GEAR, **vary) -> Study:
     return Study(
         design=design,
         vary={**BOUNDS, **vary},
         optimizer={"evaluations": 12, "confirm": 2},
-        draft=draft,
+        search_accuracy=search_accuracy,
     )
 
 
-def test_a_study_searches_at_draft_and_confirms_at_the_designs_own_accuracy(tmp_path: Path) -> None:
+def test_a_study_searches_at_search_accuracy_and_confirms_at_the_designs_own_accuracy(
+    tmp_path: Path,
+) -> None:
     seen = set()
 
-    def evaluator(design, stream, replicas):
+    def simulator(design, stream, replicas):
         accuracy = design.process.accuracy
         seen.add(
             (stream, replicas, accuracy.simulated_time_s, accuracy.replicas, design.chamber.facets)
@@ -323,9 +329,9 @@ def test_a_study_searches_at_draft_and_confirms_at_the_designs_own_accuracy(tmp_
         return judged(hill(shares(design)) + np.linspace(-0.01, 0.01, replicas or 4))
 
     found = run(
-        drafted({"replicas": 3, "simulated_time_s": 0.25, "facets": 16}),
+        with_search_accuracy({"replicas": 3, "simulated_time_s": 0.25, "facets": 16}),
         tmp_path / "out",
-        evaluator,
+        simulator,
     )
     fine = GEAR.process.accuracy
     assert seen == {
@@ -343,31 +349,33 @@ def test_an_accuracy_asked_for_is_what_confirms(tmp_path: Path) -> None:
     )
     seen = set()
 
-    def evaluator(design, stream, replicas):
+    def simulator(design, stream, replicas):
         seen.add((stream, replicas, design.process.accuracy.coverage))
         return judged(hill(shares(design)) + np.linspace(-0.01, 0.01, replicas or 4))
 
-    run(drafted({"coverage": 0.05}, asked), tmp_path / "out", evaluator)
+    run(with_search_accuracy({"coverage": 0.05}, asked), tmp_path / "out", simulator)
     assert seen == {("search", None, 0.05), ("confirm", None, 0.01)}
 
 
 @pytest.mark.parametrize(
-    ("draft", "said"),
+    ("search_accuracy", "said"),
     [
-        ({"replicas": 1}, r"draft.*replicas"),
-        ({"replica": 3}, r"draft.*replica"),
-        ({"coverage_model": "dint"}, r"draft.*coverage_model"),
-        ({"facets": 2}, r"draft.*facets"),
+        ({"replicas": 1}, r"search_accuracy.*replicas"),
+        ({"replica": 3}, r"search_accuracy.*replica"),
+        ({"coverage_model": "dint"}, r"search_accuracy.*coverage_model"),
+        ({"facets": 2}, r"search_accuracy.*facets"),
     ],
 )
-def test_a_draft_that_cannot_be_is_named(draft: dict, said: str) -> None:
+def test_a_wrong_search_accuracy_is_named(search_accuracy: dict, said: str) -> None:
     with pytest.raises(ValueError, match=said):
-        drafted(draft)
+        with_search_accuracy(search_accuracy)
 
 
 def test_how_well_a_design_is_known_is_none_of_its_choices() -> None:
-    with pytest.raises(ValueError, match=r"process\.accuracy\.simulated_time_s.*see \[draft\]"):
-        drafted({}, **{"process.accuracy.simulated_time_s": (0.5, 2.0)})
+    with pytest.raises(
+        ValueError, match=r"process\.accuracy\.simulated_time_s.*see \[search_accuracy\]"
+    ):
+        with_search_accuracy({}, **{"process.accuracy.simulated_time_s": (0.5, 2.0)})
 
 
 @pytest.mark.parametrize(
@@ -406,14 +414,14 @@ def test_a_corner_of_the_bounds_that_is_no_design_is_a_penalty_with_the_reason(
     """Each bound alone is a design, not so both together: there the search is drawn to."""
     low, high = np.array(list(vary.values()), dtype=float).T
 
-    def evaluator(design, stream, replicas):
+    def simulator(design, stream, replicas):
         require_countable(design)
         x = (np.array([design.value(name) for name in vary]) - low) / (high - low)
         return judged(PEAK - ((x - corner) ** 2).sum() + np.zeros(replicas or 8))
 
     settings = {"evaluations": 24, "confirm": 1, "confirm_replicas": 8}
-    result = run(Study(design=GEAR, vary=vary, optimizer=settings), tmp_path, evaluator)
-    rows = read_history(tmp_path)
+    result = run(Study(design=GEAR, vary=vary, optimizer=settings), tmp_path, simulator)
+    rows = read_trials(tmp_path)
     failed = [row for row in rows if row["objective"] is None]
     assert any(why in row["reason"] for row in failed)
     assert all(
@@ -439,7 +447,7 @@ def test_every_candidate_has_the_target_that_the_start_can_reach(tmp_path: Path)
     larger = design.with_values({"shot.diameter_mm": 4.0})
     assert build_chamber(larger).part.target.sum() < 0.8 * result.target.sum()
     np.testing.assert_array_equal(build_chamber(larger, result.target).part.target, result.target)
-    assert kept_target(study()) is None
+    assert fixed_target(study()) is None
     meshed = target.model_copy(update={"element_mm": 2.0})
     meshed = GEAR.model_copy(update={"part": GEAR.part.model_copy(update={"target": meshed})})
     varied = Study(design=meshed, vary={"part.target.element_mm": (1.0, 3.0)})
@@ -447,4 +455,4 @@ def test_every_candidate_has_the_target_that_the_start_can_reach(tmp_path: Path)
         InputError,
         match=r"vary: part\.target\.element_mm with part\.target\.reachable: not supported",
     ):
-        kept_target(varied)
+        fixed_target(varied)

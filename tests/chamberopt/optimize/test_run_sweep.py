@@ -9,9 +9,11 @@ import pytest
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import SerialExecutor, local_executor
-from chamberopt.design.load import Study, load_design, load_study
+from chamberopt.design.load import load_design
+from chamberopt.optimize.load_study import load_study
 from chamberopt.optimize.run_sweep import plan_sweep, run_sweep
-from chamberopt.optimize.storage.trial_log import read_history
+from chamberopt.optimize.storage.trial_log import read_trials
+from chamberopt.optimize.study import Study
 from chamberopt.output.results.results import load_result
 from chamberopt.output.results.sweep_results import write_sweep
 from chamberopt.simulation.evaluation import Evaluation
@@ -43,7 +45,7 @@ def rows(folder: Path) -> list[dict]:
     """A history without the clock."""
     return [
         {name: value for name, value in row.items() if name != "seconds"}
-        for row in read_history(folder)
+        for row in read_trials(folder)
     ]
 
 
@@ -103,7 +105,7 @@ def test_a_failed_candidate_is_a_row_and_the_best_is_the_best_feasible(tmp_path:
     ] * 5  # a constraint, at last the shot
     assert sweep.trials[8].reason == "shot: 10 g do not fit"
     assert sweep.best is sweep.trials[3]
-    assert [row["number"] for row in read_history(tmp_path)] == list(range(9))
+    assert [row["number"] for row in read_trials(tmp_path)] == list(range(9))
 
 
 def test_when_all_fail_the_reason_is_said(tmp_path: Path) -> None:

@@ -10,16 +10,18 @@ import pytest
 from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import SerialExecutor
 from chamberopt.coverage.statistics.confidence_interval import Estimate, estimate
-from chamberopt.design.load import Limits, Study, load_design, load_study
-from chamberopt.optimize.constraints import shortfall, standing_of
-from chamberopt.optimize.pareto import on_front, scalarised
-from chamberopt.optimize.pareto_table import as_csv, compromises
+from chamberopt.design.load import load_design
+from chamberopt.optimize.constraints import feasibility_of, shortfall
+from chamberopt.optimize.load_study import load_study
+from chamberopt.optimize.pareto import as_csv, on_front, pareto_points
 from chamberopt.optimize.run_study import run_study
-from chamberopt.optimize.search.acquisition import propose
-from chamberopt.optimize.search.gaussian_process import Surrogate, pooled
+from chamberopt.optimize.search.acquisition import propose_point
+from chamberopt.optimize.search.gaussian_process import GaussianProcess, pool_variances
 from chamberopt.optimize.search.phases import maximise
-from chamberopt.optimize.sensitivity import found
-from chamberopt.optimize.storage.trial_log import read_history
+from chamberopt.optimize.search.scalarisation import scalarise
+from chamberopt.optimize.sensitivity import analyse_sensitivity
+from chamberopt.optimize.storage.trial_log import read_trials
+from chamberopt.optimize.study import Limits, Study
 from chamberopt.output.plots.study_and_accuracy import reach
 from chamberopt.output.plots.study_model import front_picture, slices_picture
 from tests.helpers.synthetic import DESIGNS, judged
@@ -34,7 +36,7 @@ def shares(design) -> np.ndarray:
     return (np.array([design.value(name) for name in VARY]) - low) / (high - low)
 
 
-def run(folder: Path, evaluator, optimizer: dict | None = None, **tables):
+def run(folder: Path, simulator, optimizer: dict | None = None, **tables):
     settings = {
         "evaluations": 16,
         "confirm": 2,
@@ -47,7 +49,7 @@ def run(folder: Path, evaluator, optimizer: dict | None = None, **tables):
         folder,
         SerialExecutor(),
         None,
-        evaluator,
+        simulator,
     )
 
 
@@ -83,8 +85,10 @@ def test_first_step_and_tolerance_are_in_units_of_the_bounds() -> None:
 def test_proposals_are_new_and_the_same_for_the_same_seed() -> None:
     rng = np.random.default_rng(3)
     points = np.vstack([rng.random((15, 2)), [[1.0, 0.0]]])
-    model = Surrogate(points, points[:, 0] - points[:, 1])  # best in the corner, which was seen
-    one, two = (propose(model, np.random.default_rng(5)) for _ in range(2))
+    model = GaussianProcess(
+        points, points[:, 0] - points[:, 1]
+    )  # best in the corner, which was seen
+    one, two = (propose_point(model, np.random.default_rng(5)) for _ in range(2))
     np.testing.assert_array_equal(one, two)
     assert np.abs(points - one).max(axis=1).min() >= 0.005
 
@@ -93,7 +97,7 @@ def test_the_model_holds_the_truth_in_its_interval() -> None:
     rng = np.random.default_rng(4)
     points = rng.random((60, 2))
     scores = np.array([bowl(x) for x in points]) + rng.normal(0.0, 0.05, 60)
-    model = Surrogate(points, scores, np.full(60, 0.05**2))
+    model = GaussianProcess(points, scores, np.full(60, 0.05**2))
     at = rng.random((300, 2))
     mean, deviation = model(at)
     truth = np.array([bowl(x) for x in at])
@@ -106,11 +110,13 @@ def test_the_model_holds_the_truth_in_its_interval() -> None:
 
 def test_spreads_are_pooled() -> None:
     np.testing.assert_allclose(
-        pooled(np.array([1.0, 3.0, np.nan]), np.array([2, 4, 1])), [1.0, 0.5, 2.0]
+        pool_variances(np.array([1.0, 3.0, np.nan]), np.array([2, 4, 1])), [1.0, 0.5, 2.0]
     )
-    wild = pooled(np.array([1.0, 3.0, 1e9]), np.array([2, 2, 2]))  # must not drown the others
+    wild = pool_variances(
+        np.array([1.0, 3.0, 1e9]), np.array([2, 2, 2])
+    )  # must not drown the others
     np.testing.assert_allclose(wild, [1.0, 1.0, 5e8])
-    assert not pooled(np.full(2, np.nan), np.ones(2)).any()
+    assert not pool_variances(np.full(2, np.nan), np.ones(2)).any()
 
 
 def test_a_constraint_is_priced_by_what_is_to_be_expected_beyond_it() -> None:
@@ -130,8 +136,8 @@ def test_an_answer_keeps_its_limits_to_the_end_of_the_interval(
     half_width: float, standing: str
 ) -> None:
     constraints = {"mean_coverage": Limits(min=0.5, max=0.9)}
-    assert standing_of(constraints, {"mean_coverage": Estimate(0.6, half_width)})[0] == standing
-    said, why = standing_of(constraints, {"mean_coverage": Estimate(0.3, 0.1)})
+    assert feasibility_of(constraints, {"mean_coverage": Estimate(0.6, half_width)})[0] == standing
+    said, why = feasibility_of(constraints, {"mean_coverage": Estimate(0.3, 0.1)})
     assert (said, why) == ("infeasible", "mean_coverage 0.3 ± 0.1 < min 0.5")
 
 
@@ -139,24 +145,24 @@ def test_a_number_of_the_design_can_be_a_constraint(tmp_path: Path) -> None:
     limits = {"shot.mass_g": Limits(max=4.0)}  # the best is at 4.4
     result = run(tmp_path, lambda d, s, n: judged(np.full(3, bowl(shares(d)))), constraints=limits)
     assert 3.5 < result.best.design.shot.mass_g <= 4.0
-    assert result.best.standing == "feasible"
+    assert result.best.feasibility == "feasible"
 
 
 def test_where_no_constraint_is_surely_kept_the_answer_says_so(tmp_path: Path) -> None:
-    def evaluator(design, stream, replicas):
+    def simulator(design, stream, replicas):
         made = judged(np.full(4, bowl(shares(design))))
         made.metrics["mean_coverage"] = estimate([0.4, 0.6, 0.5, 0.52])
         return made
 
-    result = run(tmp_path, evaluator, constraints={"mean_coverage": Limits(min=0.5)})
-    assert result.best.standing == "not known"
-    assert "mean_coverage 0.505 ± 0.13 may be < min 0.5" in result.doubts[0]
+    result = run(tmp_path, simulator, constraints={"mean_coverage": Limits(min=0.5)})
+    assert result.best.feasibility == "not known"
+    assert "mean_coverage 0.505 ± 0.13 may be < min 0.5" in result.warnings[0]
 
 
 def test_scores_suit_objectives_of_any_size(tmp_path: Path) -> None:
     """Seconds instead of shares: what fails must still look worse than what does not."""
 
-    def evaluator(design, stream, replicas):
+    def simulator(design, stream, replicas):
         x = shares(design)
         if x[0] > 0.9:
             raise InputError("too high")
@@ -164,7 +170,7 @@ def test_scores_suit_objectives_of_any_size(tmp_path: Path) -> None:
         made = judged(np.full(3, -seconds), time_to_98_s=seconds)
         return made
 
-    result = run(tmp_path, evaluator, objective={"name": "time_to_98"})
+    result = run(tmp_path, simulator, objective={"name": "time_to_98"})
     failed = [trial.score for trial in result.trials if trial.objective is None]
     assert failed
     assert max(failed) < min(trial.score for trial in result.trials if trial.objective)
@@ -195,7 +201,7 @@ def test_the_front_is_who_nobody_beats() -> None:
     assert on_front(values, among).tolist() == [True, True, False, True, False, True]
     assert on_front(values).tolist() == [False, False, False, False, True, False]
     for weight, best in (([0.999, 0.001], 3), ([0.001, 0.999], 0), ([0.5, 0.5], 1)):
-        scores, _ = scalarised(values[:4], np.zeros((4, 2)), np.array(weight))
+        scores, _ = scalarise(values[:4], np.zeros((4, 2)), np.array(weight))
         assert scores.argmax() == best
 
 
@@ -203,15 +209,15 @@ def test_two_objectives_give_a_front(tmp_path: Path) -> None:
     """Bowls about two places: what nobody beats lies on the line between them."""
     low, high = np.array([0.2, 0.5]), np.array([0.8, 0.5])
 
-    def evaluator(design, stream, replicas):
+    def simulator(design, stream, replicas):
         x = shares(design)
         one, two = (1.0 - float(((x - at) ** 2).sum()) for at in (low, high))
         return judged(one + np.linspace(-0.01, 0.01, 4), p05_coverage=one, intensity_uniformity=two)
 
     question = {"pareto": ["coverage_p05", "intensity_uniformity"]}
-    result = run(tmp_path / "out", evaluator, {"evaluations": 24, "confirm": 4}, objective=question)
-    assert all(np.isfinite(goal.value) for one in compromises(result) for goal in one.goals)
-    front = [one for one in compromises(result) if one.stage == "confirm" and one.on_front]
+    result = run(tmp_path / "out", simulator, {"evaluations": 24, "confirm": 4}, objective=question)
+    assert all(np.isfinite(goal.value) for one in pareto_points(result) for goal in one.goals)
+    front = [one for one in pareto_points(result) if one.stage == "confirm" and one.on_front]
     assert len(front) >= 3
     places = np.array(
         [
@@ -242,8 +248,8 @@ def test_two_objectives_give_a_front(tmp_path: Path) -> None:
 def test_flat_directions_and_effects_are_those_of_the_function(tmp_path: Path) -> None:
     points = np.random.default_rng(1).random((40, 2))
     scores = 0.8 - 4.0 * (points[:, 0] - 0.5) ** 2
-    got = found(
-        Surrogate(points, scores),
+    got = analyse_sensitivity(
+        GaussianProcess(points, scores),
         {"a": (0.0, 10.0), "b": (-1.0, 1.0)},
         {"a": 5.0, "b": 0.0},
         noise=0.04,
@@ -262,26 +268,26 @@ def test_a_study_says_what_its_model_found(tmp_path: Path) -> None:
     result = run(
         tmp_path / "out", lambda d, s, n: judged(bowl(shares(d)) + np.linspace(-0.01, 0.01, 4))
     )
-    assert [one.name for one in result.findings.slices] == list(VARY)
-    slices_picture(tmp_path / "slices.png", result, result.findings)
+    assert [one.name for one in result.sensitivity.slices] == list(VARY)
+    slices_picture(tmp_path / "slices.png", result, result.sensitivity)
     assert (tmp_path / "slices.png").stat().st_size > 10000
     short = run(
         tmp_path / "short", lambda d, s, n: judged(np.full(3, bowl(shares(d)))), {"evaluations": 5}
     )
-    assert short.findings is None
+    assert short.sensitivity is None
 
 
 def test_the_plainly_bad_get_few_replicas_and_close_calls_more(tmp_path: Path) -> None:
     asked: list[tuple[str, int | None]] = []
 
-    def evaluator(design, stream, replicas):
+    def simulator(design, stream, replicas):
         asked.append((stream, replicas))
         count = replicas or design.process.accuracy.replicas
         rng = np.random.default_rng(np.frombuffer(shares(design).tobytes(), dtype=np.uint32))
         return judged(bowl(shares(design)) + rng.normal(0.0, 0.02, count))
 
-    result = run(tmp_path, evaluator, {"first_replicas": 4, "confirm_rounds": 3, "evaluations": 12})
-    rows = read_history(tmp_path)
+    result = run(tmp_path, simulator, {"first_replicas": 4, "confirm_rounds": 3, "evaluations": 12})
+    rows = read_trials(tmp_path)
     assert {row["replicas"] for row in rows if row["stage"] == "search"} == {4, 8}
     bar = max(t.objective.low for t in result.trials if t.stage == "search")
     few = [row for row in rows if row["stage"] == "search" and row["replicas"] == 4]

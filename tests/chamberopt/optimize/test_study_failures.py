@@ -15,10 +15,10 @@ import pytest
 import chamberopt
 from chamberopt.chamber.build import build_chamber
 from chamberopt.cli import main
+from chamberopt.cli.interrupt import EARLY, FIRST, SECOND
 from chamberopt.coverage.statistics.confidence_interval import Estimate
-from chamberopt.design.load import load_study
 from chamberopt.optimize.evaluate_candidate import FAILED
-from chamberopt.optimize.interrupt import EARLY, FIRST, SECOND
+from chamberopt.optimize.load_study import load_study
 from chamberopt.output.results.results import load_result
 from tests.helpers.results.resumable_study import calls, history, logged, run, study
 from tests.helpers.synthetic import DESIGNS, plate_design, poisson_evaluation
@@ -39,16 +39,16 @@ def expected(tmp_path: Path) -> bytes:
 
 
 def failing(folder: Path, at: int, error: Callable[[], BaseException], times: int = 1):
-    """The evaluator of a folder; its call number `at` and the next raise."""
+    """The simulator of a folder; its call number `at` and the next raise."""
     good, left = logged(folder.with_name(f"{folder.name}-calls.log")), [times]
 
-    def evaluator(design, stream, replicas):
+    def simulator(design, stream, replicas):
         if len(calls(folder)) >= at and left[0]:
             left[0] -= 1
             raise error()
         return good(design, stream, replicas)
 
-    return evaluator
+    return simulator
 
 
 class TestFullDisk:
@@ -104,7 +104,7 @@ def test_a_fault_of_ours_stops_the_study_not_the_candidate(
 ) -> None:
     folder = tmp_path / "out"
     with pytest.raises(error) as raised:
-        run(study(), folder, evaluator=failing(folder, at, error))
+        run(study(), folder, simulator=failing(folder, at, error))
     assert history(folder).count(b"\n") == at
     if issubclass(error, Exception):
         (note,) = raised.value.__notes__
@@ -120,7 +120,7 @@ def test_no_number_is_no_score(tmp_path: Path) -> None:
     folder = tmp_path / "out"
     good = logged(folder.with_name("out-calls.log"))
 
-    def evaluator(design, stream, replicas):
+    def simulator(design, stream, replicas):
         evaluation = good(design, stream, replicas)
         return (
             replace(evaluation, objective=Estimate(math.nan, math.nan))
@@ -128,7 +128,7 @@ def test_no_number_is_no_score(tmp_path: Path) -> None:
             else evaluation
         )
 
-    result = run(study(), folder, evaluator=evaluator)
+    result = run(study(), folder, simulator=simulator)
     assert (result.trials[3].objective, result.trials[3].score) == (
         None,
         result.trials[0].score - FAILED,
@@ -144,28 +144,28 @@ def _die() -> None:
 class TestWorkerThatDies:
     """A worker process killed from outside: a real one, in a pool that is made anew as a pool must be."""
 
-    def evaluator(self, folder: Path, deaths: list[int]):
+    def simulator(self, folder: Path, deaths: list[int]):
         good = logged(folder.with_name(f"{folder.name}-calls.log"))
 
-        def evaluator(design, stream, replicas):
+        def simulator(design, stream, replicas):
             if len(calls(folder)) == 5 and deaths[0]:
                 deaths[0] -= 1
                 with ProcessPoolExecutor(1, fork) as pool:
                     pool.submit(_die).result()
             return good(design, stream, replicas)
 
-        return evaluator
+        return simulator
 
     @needs_fork
     def test_once_is_made_good(self, tmp_path: Path, expected: bytes) -> None:
-        run(study(), tmp_path / "out", evaluator=self.evaluator(tmp_path / "out", [1]))
+        run(study(), tmp_path / "out", simulator=self.simulator(tmp_path / "out", [1]))
         assert history(tmp_path / "out") == expected
 
     @needs_fork
     def test_twice_is_said(self, tmp_path: Path, expected: bytes) -> None:
         folder = tmp_path / "out"
         with pytest.raises(BrokenExecutor) as raised:
-            run(study(), folder, evaluator=self.evaluator(folder, [2]))
+            run(study(), folder, simulator=self.simulator(folder, [2]))
         assert "in evaluation 6 (search): chamber.height_mm" in raised.value.__notes__[0]
         assert history(folder).count(b"\n") == 5
         run(study(), folder)
@@ -187,7 +187,7 @@ ROWS = 7  # five searched, then the start and the best confirmed
 
 
 class TestCommandLine:
-    """`chamberopt run` with an evaluator of milliseconds; all around it is real."""
+    """`chamberopt run` with an simulator of milliseconds; all around it is real."""
 
     @pytest.fixture
     def evaluated(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list:
@@ -197,7 +197,7 @@ class TestCommandLine:
         chamber = build_chamber(plate_design())
         done: list = []
 
-        def evaluator(design, stream, replicas):
+        def simulator(design, stream, replicas):
             done.append((stream, design.shot.mass_g))
             self.at.get(len(done), lambda: None)()
             return poisson_evaluation(
@@ -205,7 +205,7 @@ class TestCommandLine:
             )
 
         self.at: dict[int, Callable[[], None]] = {}
-        monkeypatch.setattr("chamberopt.optimize.run_study.simulation", lambda *_: evaluator)
+        monkeypatch.setattr("chamberopt.optimize.run_study.chamber_simulator", lambda *_: simulator)
         monkeypatch.setattr("chamberopt.cli.studies.compiled", lambda *_: None)
         monkeypatch.setattr("chamberopt.output.viewer.coverage_picture", lambda *_: None)
         return done

@@ -9,8 +9,8 @@ from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import SerialExecutor
 from chamberopt.coverage.part_impacts import Hits
-from chamberopt.design.load import Study
 from chamberopt.optimize.run_study import run_study
+from chamberopt.optimize.study import Study
 from chamberopt.output.results.results import write_simulation, write_study
 from chamberopt.simulation.evaluation import Evaluation
 from tests.helpers.synthetic import plate_design, poisson_evaluation
@@ -50,12 +50,12 @@ def studied(folder: Path, evaluations: int = 12) -> Path:
         constraints={"chamber.sonotrode_distance_mm": {"min": 9.5}},
     )
 
-    def evaluator(design, stream, replicas):
+    def simulator(design, stream, replicas):
         if design.chamber.sonotrode_distance_mm > 17:
             raise InputError("<b>not</b> this one")
         return poisson_evaluation(
             design, chamber, 80.0 * design.shot.mass_g, replicas or 4, seed=len(stream)
         )
 
-    write_study(folder, run_study(question, folder, SerialExecutor(), evaluator=evaluator))
+    write_study(folder, run_study(question, folder, SerialExecutor(), simulator=simulator))
     return folder

@@ -1,4 +1,4 @@
-"""A study of milliseconds that can be stopped anywhere: its evaluator logs every call, and its answer is known."""
+"""A study of milliseconds that can be stopped anywhere: its simulator logs every call, and its answer is known."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -7,9 +7,10 @@ import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import SerialExecutor
-from chamberopt.design.load import Design, Study, load_design
+from chamberopt.design.load import Design, load_design
 from chamberopt.optimize.run_study import StudyResult, run_study
-from chamberopt.optimize.storage.trial_log import Journal
+from chamberopt.optimize.storage.trial_log import JsonLines
+from chamberopt.optimize.study import Study
 from chamberopt.simulation.evaluation import Evaluation
 from tests.helpers.synthetic import DESIGNS, judged
 
@@ -23,7 +24,7 @@ CALLS = "calls.log"
 
 
 def study(**optimizer: object) -> Study:
-    """One call of the evaluator a row, unless asked otherwise."""
+    """One call of the simulator a row, unless asked otherwise."""
     once = {"first_replicas": 0, "confirm_rounds": 1}
     settings = {"evaluations": 16, "confirm": 3, "confirm_replicas": 4, **once, **optimizer}
     return Study(design=GEAR, vary=BOUNDS, optimizer=settings)
@@ -46,25 +47,25 @@ def noisy_hill(at: dict[str, float], stream: str, replicas: int | None) -> Evalu
 
 def logged(log: Path) -> Callable:
     """The same, each call first a row of `log`."""
-    calls = Journal(log, lasting=False)
+    calls = JsonLines(log, lasting=False)
 
-    def evaluator(design: Design, stream: str, replicas: int | None) -> Evaluation:
+    def simulator(design: Design, stream: str, replicas: int | None) -> Evaluation:
         at = values(design)
         calls.append({"stage": stream, "parameters": at})
         return noisy_hill(at, stream, replicas)
 
-    return evaluator
+    return simulator
 
 
 def run(question: Study, folder: Path, **more: object) -> StudyResult:
-    """In `folder`, with the log of the evaluator's calls beside it."""
-    more.setdefault("evaluator", logged(folder.with_name(f"{folder.name}-{CALLS}")))
+    """In `folder`, with the log of the simulator's calls beside it."""
+    more.setdefault("simulator", logged(folder.with_name(f"{folder.name}-{CALLS}")))
     return run_study(question, folder, SerialExecutor(), **more)
 
 
 def calls(folder: Path) -> list[dict]:
     """What was evaluated for a folder, in order, whether or not it came on record."""
-    return Journal(folder.with_name(f"{folder.name}-{CALLS}")).rows()
+    return JsonLines(folder.with_name(f"{folder.name}-{CALLS}")).rows()
 
 
 def history(folder: Path) -> bytes:

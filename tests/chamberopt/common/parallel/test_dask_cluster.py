@@ -20,8 +20,9 @@ from chamberopt.common.errors import ClusterLostError, InputError, WorkerLostErr
 from chamberopt.common.parallel import dask_cluster
 from chamberopt.common.parallel.dask_cluster import DaskExecutor
 from chamberopt.common.parallel.executor import SerialExecutor, share
-from chamberopt.design.load import Study, load_design
+from chamberopt.design.load import load_design
 from chamberopt.optimize.run_sweep import plan_sweep, run_sweep
+from chamberopt.optimize.study import Study
 from chamberopt.simulation.evaluate import evaluate
 from tests.chamberopt.optimize.test_run_sweep import rows, small_study
 from tests.helpers import worker_jobs

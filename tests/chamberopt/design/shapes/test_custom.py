@@ -13,7 +13,8 @@ import trimesh
 from chamberopt.chamber.build import build_chamber
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError
-from chamberopt.design.load import load_design, load_study, save_design
+from chamberopt.design.load import load_design, save_design
+from chamberopt.optimize.load_study import load_study
 from chamberopt.output import viewer
 from chamberopt.output.compare.comparison import compare
 from chamberopt.output.results.results import load_result, write_simulation

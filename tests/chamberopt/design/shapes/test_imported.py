@@ -15,10 +15,11 @@ from chamberopt.chamber.checks.check import describe
 from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import SerialExecutor
 from chamberopt.design.design import Design, checked
-from chamberopt.design.load import Study, load_design, save_design
+from chamberopt.design.load import load_design, save_design
 from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL
 from chamberopt.geometry.triangles import area_vectors, areas
 from chamberopt.optimize.run_study import run_study
+from chamberopt.optimize.study import Study
 from tests.helpers.synthetic import judged
 
 DESIGNS = Path(__file__).resolve().parents[4] / "designs"

@@ -14,9 +14,9 @@ import pytest
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.coverage.statistics.confidence_interval import Estimate
-from chamberopt.design.load import Design, Study
-from chamberopt.design.study import Objective
-from chamberopt.optimize.storage.study_folder import Record, open_record
+from chamberopt.design.load import Design
+from chamberopt.optimize.storage.study_folder import StudyFolder, open_study_folder
+from chamberopt.optimize.study import Objective, Study
 from chamberopt.output.results.results import load_result
 from chamberopt.simulation.effect_pilot import Advice
 from chamberopt.simulation.evaluation import Evaluation, load_evaluation, save_evaluation
@@ -269,8 +269,8 @@ class TestDamage:
             run(study(evaluations=6), folder)
 
     def test_of_what_was_asked(self, folder: Path) -> None:
-        (folder / "asked.json").write_text("{")
-        with pytest.raises(InputError, match=r"asked\.json: damaged"):
+        (folder / "inputs.json").write_text("{")
+        with pytest.raises(InputError, match=r"inputs\.json: damaged"):
             run(study(evaluations=6), folder)
 
     def test_of_the_timings_costs_no_evaluation(self, folder: Path) -> None:
@@ -342,7 +342,7 @@ class TestChanges:
         question = study().model_copy(update={"design": GEAR.model_copy(update={"part": part})})
         good = logged(tmp_path / "log")
 
-        def evaluator(design: Design, stream: str, replicas: int | None) -> Evaluation:
+        def simulator(design: Design, stream: str, replicas: int | None) -> Evaluation:
             evaluation = good(design, stream, replicas)
             if len((tmp_path / "log").read_text().splitlines()) == 4:
                 mesh.unlink()
@@ -354,7 +354,7 @@ class TestChanges:
         with pytest.raises(
             InputError, match=r"while the study ran.*\n  part\.mesh\.(file|sha256): was"
         ):
-            run(question, tmp_path / "out", evaluator=evaluator)
+            run(question, tmp_path / "out", simulator=simulator)
         assert history_rows(tmp_path / "out") == 3
         shutil.copy(GEAR.part.mesh_path, mesh)
         run(question, tmp_path / "out")
@@ -366,7 +366,7 @@ class TestChanges:
             raise InputError("shot.mass_g: too much")
 
         with pytest.raises(InputError, match="too much"):
-            run(study(), tmp_path / "out", evaluator=fails)
+            run(study(), tmp_path / "out", simulator=fails)
         run(study(evaluations=5), tmp_path / "out")
         assert "evaluations = 5" in (tmp_path / "out" / "study.toml").read_text()
 
@@ -394,8 +394,8 @@ def test_effects_left_to_us_are_chosen_once(tmp_path: Path) -> None:
         return chosen, advice
 
     for _ in range(2):
-        with open_record(question, tmp_path / "out") as record:
-            assert record.settled(settle) == (
+        with open_study_folder(question, tmp_path / "out") as record:
+            assert record.with_effects_resolved(settle) == (
                 question.model_copy(update={"design": chosen}),
                 advice,
             )
@@ -405,22 +405,22 @@ def test_effects_left_to_us_are_chosen_once(tmp_path: Path) -> None:
 class TestTwoProcesses:
     def test_the_second_is_refused(self, tmp_path: Path) -> None:
         with (
-            open_record(study(), tmp_path / "out") as record,
+            open_study_folder(study(), tmp_path / "out") as record,
             pytest.raises(
                 InputError, match=r"is being written by process \d+ on .* since 2.*wait.*--out"
             ),
-            open_record(study(), tmp_path / "out"),
+            open_study_folder(study(), tmp_path / "out"),
         ):
             pass
-        with open_record(study(), tmp_path / "out") as record:
-            assert isinstance(record, Record)
+        with open_study_folder(study(), tmp_path / "out") as record:
+            assert isinstance(record, StudyFolder)
 
     @pytest.mark.skipif(fork is None, reason="needs fork")
     def test_a_killed_one_holds_nothing(self, tmp_path: Path) -> None:
         held = fork.Event()
 
         def hold() -> None:
-            with open_record(study(), tmp_path / "out"):
+            with open_study_folder(study(), tmp_path / "out"):
                 held.set()
                 time.sleep(60)
 
@@ -429,12 +429,12 @@ class TestTwoProcesses:
         assert held.wait(20)
         with (
             pytest.raises(InputError, match=f"process {child.pid}"),
-            open_record(study(), tmp_path / "out"),
+            open_study_folder(study(), tmp_path / "out"),
         ):
             pass
         child.kill()
         child.join()
-        with open_record(study(), tmp_path / "out"):
+        with open_study_folder(study(), tmp_path / "out"):
             pass
 
 

@@ -22,8 +22,9 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import SerialExecutor, local_executor
-from chamberopt.design.load import Design, Study
+from chamberopt.design.load import Design
 from chamberopt.optimize.run_study import run_study
+from chamberopt.optimize.study import Study
 from chamberopt.output.export.chamber_files import (
     read_cavity,
     write_3mf,

@@ -9,8 +9,9 @@ import pytest
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import SerialExecutor
-from chamberopt.design.load import Study, load_design
+from chamberopt.design.load import load_design
 from chamberopt.optimize.run_study import run_study
+from chamberopt.optimize.study import Study
 from chamberopt.output import viewer
 from chamberopt.output.compare.comparison import compare
 from chamberopt.output.results.results import load_result, summary, write_simulation, write_study
@@ -123,7 +124,7 @@ def test_a_study_leaves_everything_and_its_best_design_can_be_used(tmp_path: Pat
         optimizer={"evaluations": 12, "confirm": 2, "confirm_replicas": 4},
     )
 
-    def evaluator(design, stream, replicas):
+    def simulator(design, stream, replicas):
         if design.chamber.sonotrode_distance_mm > 17:
             raise InputError("not this one")
         # More shot, more dents: the best is at the upper bound.
@@ -132,12 +133,12 @@ def test_a_study_leaves_everything_and_its_best_design_can_be_used(tmp_path: Pat
         )
 
     folder = tmp_path / "study"
-    outcome = run_study(question, folder, SerialExecutor(), evaluator=evaluator)
+    outcome = run_study(question, folder, SerialExecutor(), simulator=simulator)
     write_study(folder, outcome)
     names = {path.name for path in folder.iterdir()}
     assert names == {
         "design.toml", "study.toml", "history.jsonl", "history.csv", "best.toml", "result.json", "coverage.vtp",
-        "chamber.stl", "chamber.vtp", "convergence.png", "slices.png", "start", "asked.json", "timings.jsonl",
+        "chamber.stl", "chamber.vtp", "convergence.png", "slices.png", "start", "inputs.json", "timings.jsonl",
         "confirm", ".lock", "hits.npz",
     }  # fmt: skip
     result = load_result(folder)

@@ -222,16 +222,16 @@ class Study(BaseModel):
         description="METRIC = { min =, max = }, or a number of the design in quotes",
     )
     optimizer: Optimizer = Field(default_factory=Optimizer)
-    draft: dict[str, int | float | str] = Field(
+    search_accuracy: dict[str, int | float | str] = Field(
         default_factory=dict,
         description="while searching, in place of the design's own: keys of [process.accuracy], and facets",
         json_schema_extra={"form": "a number or a text"},
     )
 
-    def drafted(self, design: Design) -> Design:
+    def at_search_accuracy(self, design: Design) -> Design:
         """A candidate at the accuracy of the search. Raises InputError for a draft that cannot be."""
         data = design.model_dump()
-        for name, value in self.draft.items():
+        for name, value in self.search_accuracy.items():
             table = data["chamber"] if name == "facets" else data["process"]["accuracy"]
             table[name] = value
         return checked(Design, data)
@@ -252,7 +252,7 @@ class Study(BaseModel):
         if self.objective.pareto and not {"auto", "sobol", "surrogate"}.issuperset(phases):
             text = "given two objectives, which only auto, sobol and surrogate can search"
             problems.append(Problem("objective.pareto", text))
-        problems += self._draft_problems()
+        problems += self._search_accuracy_problems()
         if problems:
             raise CrossCheckError(problems)
         return self
@@ -282,13 +282,14 @@ class Study(BaseModel):
             said.append(f"given max = {limits.max:g}, {remedy}")
         return said
 
-    def _draft_problems(self) -> list[Problem]:
+    def _search_accuracy_problems(self) -> list[Problem]:
         try:
-            self.drafted(self.design)
+            self.at_search_accuracy(self.design)
         except InputError as error:
             return [
                 Problem(
-                    "draft", str(error).replace("process.accuracy.", "").replace("chamber.", "")
+                    "search_accuracy",
+                    str(error).replace("process.accuracy.", "").replace("chamber.", ""),
                 )
             ]
         return []
@@ -308,7 +309,11 @@ def _vary_problems(design: Design, name: str, bounds: tuple[float, float]) -> li
             )
         ]
     if name.startswith("process.accuracy."):
-        return [Problem(field, "not a choice of design, but of how well it is known; see [draft]")]
+        return [
+            Problem(
+                field, "not a choice of design, but of how well it is known; see [search_accuracy]"
+            )
+        ]
     if name not in numbers:
         return [Problem(field, "a whole number cannot vary; leave it out")]
     if low >= high:
