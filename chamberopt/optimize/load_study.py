@@ -65,7 +65,9 @@ def _also_wrong(values: Mapping[str, Any], path: Path, source: str) -> list[str]
         Study.model_validate({**values, "design": None})
     except ValidationError as error:
         problems = toml_errors.explain_validation_error(error, Study)
-        text = toml_errors.format_problems([p for p in problems if p.field != "design"], path, source)
+        text = toml_errors.format_problems(
+            [p for p in problems if p.field != "design"], path, source
+        )
         return [text] if text else []
     return []
 

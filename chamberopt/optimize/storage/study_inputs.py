@@ -28,7 +28,9 @@ def study_inputs(study: Study, plan: Mapping[str, Any] | None = None) -> dict[st
     values = study.model_dump(mode="json", exclude={"design"})
     values["design"] = _with_files(study.design.model_dump(mode="json"))
     plain = json.loads(
-        json.dumps({"format": FORMAT, "study": values, "sweep": plan, "program": program_versions()})
+        json.dumps(
+            {"format": FORMAT, "study": values, "sweep": plan, "program": program_versions()}
+        )
     )
     assert isinstance(plain, dict)
     return plain
