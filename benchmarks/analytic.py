@@ -40,15 +40,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
         parser.error("--quick is too rough for the documentation: give --out")
     effort = QUICK if asked.quick else FULL
     time = {"process.treatment_time_s": PEENED, "process.accuracy.simulated_time_s": effort.seconds}
-    plate = load_design(ROOT / "designs" / "plate.toml").with_values(time)
+    plate = load_design(ROOT / "designs" / "plate.toml").changed(time)
     with local_executor() as executor:
         design = calibrated(plate, effort, executor)
         edges = bin_edges(design)
         exact = run(design, effort, edges, executor, "confirm", True)
         meshed = {
-            n: run(
-                design.with_values({"chamber.facets": n}), effort, edges, executor, "search", False
-            )
+            n: run(design.changed({"chamber.facets": n}), effort, edges, executor, "search", False)
             for n in effort.facets
         }
     facets = design.chamber.facets

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from chamberopt.chamber.analytic import analytic_cavity, on_chamber
+from chamberopt.chamber.analytic import analytic_cavity, impacts_on_chamber
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.scene import build_scene, chamber_mesh, replica_seed
 from chamberopt.coverage.coverage_from_impacts import Tally, tally_impacts
@@ -81,7 +81,7 @@ def replica(
     """What the plate got in one replica, and its impacts."""
     log = simulate(build_scene(design, surface, seed)).impacts
     if isinstance(surface, AnalyticCavity):
-        log = on_chamber(log, chamber)
+        log = impacts_on_chamber(log, chamber)
     return tally_impacts(log, chamber, design), log
 
 
@@ -121,13 +121,13 @@ def calibrated(design: Design, effort: Effort, executor: Executor) -> Design:
     wanted, slope, amplitude = np.log(-np.log1p(-MEASURED)), SLOPE, GUESS
     before: tuple[float, float] | None = None
     for _ in range(STEPS):
-        design = design.with_values({"sonotrode.amplitude_um": round(amplitude, 2)})
+        design = design.changed({"sonotrode.amplitude_um": round(amplitude, 2)})
         covered = run(design, effort, {}, executor, "search", True).figures["mean_coverage"].value
         here = np.log(1e6 * design.sonotrode.amplitude), np.log(-np.log1p(-covered))
         if before is not None and abs(here[0] - before[0]) > FAR:
             slope = (here[1] - before[1]) / (here[0] - before[0])
         before, amplitude = here, float(np.exp(here[0] + (wanted - here[1]) / slope))
-    return design.with_values({"sonotrode.amplitude_um": round(amplitude, 2)})
+    return design.changed({"sonotrode.amplitude_um": round(amplitude, 2)})
 
 
 def bin_edges(design: Design) -> dict[str, np.ndarray]:

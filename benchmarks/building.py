@@ -48,7 +48,7 @@ def row(path: Path, runs: int) -> dict[str, Any]:
     """One mesh."""
     from chamberopt.chamber.build import build_chamber
     from chamberopt.chamber.scene import chamber_mesh
-    from chamberopt.design.design import checked
+    from chamberopt.design.design import validate
     from chamberopt.design.load import load_design
     from chamberopt.geometry.mesh_io import read_part
     from sim_core import compile_simulator  # noqa: F401  its import is not timed
@@ -56,12 +56,12 @@ def row(path: Path, runs: int) -> dict[str, Any]:
 
     data = load_design(ROOT / "designs" / "gear.toml").model_dump()
     data["part"]["mesh"] = str(path)
-    design = checked(type(load_design(ROOT / "designs" / "gear.toml")), data)
+    design = validate(type(load_design(ROOT / "designs" / "gear.toml")), data)
     read, part = timed(lambda: read_part(path, "mm"))
     build_chamber(design)  # reads the file for good
     seconds: dict[str, list[float]] = {"chamber": [], "mesh": [], "tree": []}
     for run in range(runs):
-        candidate = design.with_values({"chamber.height_mm": 45.0 + 0.1 * run})
+        candidate = design.changed({"chamber.height_mm": 45.0 + 0.1 * run})
         spent, chamber = timed(lambda: build_chamber(candidate))  # noqa: B023
         seconds["chamber"].append(spent)
         spent, mesh = timed(lambda: chamber_mesh(chamber))  # noqa: B023

@@ -56,7 +56,7 @@ def row(
         name: low + x * (high - low)
         for (name, (low, high)), x in zip(vary.items(), (u, v), strict=True)
     }
-    candidate = design.with_values(values)
+    candidate = design.changed(values)
     found = evaluate(
         candidate, build_chamber(candidate), SerialExecutor(), stream="confirm", replicas=replicas
     ).objective
@@ -93,7 +93,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=0.4, help="simulated, of each replica")
     asked = parser.parse_args()
     design = load_design(ROOT / "designs" / f"{asked.name}.toml")
-    design = design.with_values(
+    design = design.changed(
         {
             "process.accuracy.simulated_time_s": asked.seconds,
             "process.treatment_time_s": TREATMENT[asked.name],

@@ -42,8 +42,8 @@ def evaluation(accuracy: float) -> dict[str, Any]:
 
     asked = {
         "shot.mass_g": MASS_G,
-        "process.accuracy.coverage": accuracy,
-        "process.accuracy.most_replicas": 1000,
+        "process.accuracy.objective_half_width": accuracy,
+        "process.accuracy.max_replicas": 1000,
     }
     clock = [("import", time.process_time())]
     design = changed(load_design(ROOT / "designs" / "gear.toml"), asked)

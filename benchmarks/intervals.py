@@ -121,7 +121,7 @@ def rows_of(
 
 def model_rows(runs: int) -> Iterator[dict[str, Any]]:
     chamber = model_chamber()
-    design = load_design(ROOT / "designs" / "plate.toml").with_values(
+    design = load_design(ROOT / "designs" / "plate.toml").changed(
         {"process.treatment_time_s": TREATMENT}
     )
     for case, x in models().items():

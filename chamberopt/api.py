@@ -3,7 +3,7 @@
     import chamberopt
 
     design = chamberopt.load_design("designs/gear.toml")
-    result = chamberopt.simulate(design.with_values({"shot.mass_g": 8}), "results/more-shot")
+    result = chamberopt.simulate(design.changed({"shot.mass_g": 8}), "results/more-shot")
     result.metrics["mean_coverage"]            # Estimate(value=..., half_width=...), 95 % interval
     chamberopt.show(result, "more-shot.png")
 

@@ -53,13 +53,13 @@ def analytic_cavity(design: Design, chamber: Chamber) -> AnalyticCavity:
     return cylinder_cavity(design.chamber.diameter, bottom, top, tags)
 
 
-def described(cavity: AnalyticCavity) -> str:
+def cavity_note(cavity: AnalyticCavity) -> str:
     """A note for the result: what was simulated in place of the chamber's triangles."""
     what = "cylinder" if cavity.radius is not None else f"prism of {len(cavity.outline)} sides"
     return f"simulated in an analytical cavity, an exact {what} of {1e6 * cavity.volume:.5g} cm³, not the mesh"
 
 
-def on_chamber(impacts: ImpactLog, chamber: Chamber) -> ImpactLog:
+def impacts_on_chamber(impacts: ImpactLog, chamber: Chamber) -> ImpactLog:
     """The impacts on the ceiling of an analytical cavity, booked on the chamber's triangles under them."""
     from sim_core import find_triangles
 

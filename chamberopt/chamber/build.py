@@ -14,11 +14,24 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.chamber.fittings import Cavity, Piece, fitted, notes_on_files, piece, swept_faces
+from chamberopt.chamber.bores_and_deflectors import (
+    Cavity,
+    Piece,
+    fitted,
+    notes_on_files,
+    piece,
+    swept_faces,
+)
 from chamberopt.chamber.part import Part, posed_part, turning_axis
 from chamberopt.chamber.reach.reach import part_share, reach
 from chamberopt.common.errors import InputError
-from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL, is_sonotrode, tag_of_further
+from chamberopt.design.shapes import (
+    TAG_PART,
+    TAG_SONOTRODE,
+    TAG_WALL,
+    further_sonotrode_tag,
+    is_sonotrode,
+)
 from chamberopt.geometry.mesh_io import format_box, format_point
 from chamberopt.geometry.slivers import MIN_HEIGHT, remove_slivers
 from chamberopt.geometry.solids import (
@@ -195,7 +208,7 @@ def _refuse_in_swing(design: Design, cavity: Cavity, body: Solid) -> None:
 def _refuse_rims(design: Design, room: SolidSurface, tags: np.ndarray) -> None:
     """A sonotrode without a room, or one that walls do not rise from all round: a moving edge."""
     for k in range(len(design.sonotrodes)):
-        if not (tags == tag_of_further(k)).any():
+        if not (tags == further_sonotrode_tag(k)).any():
             raise InputError(
                 f"sonotrodes.{k}.at_mm: the part cuts its face off from the room; move one of them"
             )

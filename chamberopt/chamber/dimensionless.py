@@ -13,12 +13,12 @@ if TYPE_CHECKING:
     from chamberopt.design.load import Design
 
 STANDARD_GRAVITY = 9.80665  # m/s², CGPM 1901
-MOST_INTO_SPIN = (
+MAX_SPIN_SHARE = (
     2.0 / 7.0
 )  # of a solid sphere's tangential velocity, by an impact that sticks (Walton's formula)
 
 
-def fall(design: Design, chamber: Chamber) -> float:
+def gravity_speed_change(design: Design, chamber: Chamber) -> float:
     """g H / V²: by what share speed changes over the chamber's height, half the change of kinetic energy."""
     return STANDARD_GRAVITY * chamber.height / design.sonotrode.peak_speed**2
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from chamberopt.chamber.build import TAG_PART, TAG_SONOTRODE, turning_axis
 from chamberopt.common.errors import InputError
-from chamberopt.design.shapes import tag_of_further
+from chamberopt.design.shapes import further_sonotrode_tag
 
 # Every ball is compared with every other: 20,000 take about 40 µs a prediction, a thousand times a second each.
 MOST_BALLS = 20_000
@@ -47,7 +47,7 @@ def chamber_mesh(chamber: Chamber) -> TriangleMesh:
     return TriangleMesh(chamber.vertices, chamber.triangles, chamber.tags)
 
 
-def require_countable(design: Design) -> None:
+def require_ball_count(design: Design) -> None:
     """InputError for more balls than the simulator is made for."""
     if design.shot.count > MOST_BALLS:
         raise InputError(
@@ -79,14 +79,14 @@ def require_turnable(design: Design, mesh: TriangleMesh) -> None:
         raise InputError(f"effects.part_turn: {error}") from None
 
 
-def rests(design: Design, mesh: TriangleMesh | AnalyticCavity) -> bool:
+def balls_can_rest(design: Design, mesh: TriangleMesh | AnalyticCavity) -> bool:
     """Whether balls can lie still: as the design says, or wherever its chamber has a still surface that faces up."""
     from sim_core import Gravity, can_rest
 
     asked = design.effects.rest
     if asked is not None:
         return asked
-    moving = [TAG_SONOTRODE, *(tag_of_further(k) for k in range(len(design.sonotrodes)))]
+    moving = [TAG_SONOTRODE, *(further_sonotrode_tag(k) for k in range(len(design.sonotrodes)))]
     if design.effects.part_turn is not None:
         moving.append(TAG_PART)
     gravity = Gravity() if design.effects.gravity else None
@@ -101,7 +101,9 @@ def vibrations(design: Design, phase: float) -> Vibration | tuple[Vibration, ...
 
     first = Vibration(TAG_SONOTRODE, design.sonotrode.amplitude, design.sonotrode.frequency, phase)
     further = tuple(
-        Vibration(tag_of_further(k), one.amplitude, one.frequency, phase + one.phase, one.direction)
+        Vibration(
+            further_sonotrode_tag(k), one.amplitude, one.frequency, phase + one.phase, one.direction
+        )
         for k, one in enumerate(design.sonotrodes)
     )
     return (first, *further) if further else first
@@ -150,11 +152,11 @@ def scene_physics(
         restitution=Restitution(surfaces, of_balls, accuracy.elastic_below),
         vibration=vibrations(design, phase),
         part_rotation=part_turn(design, turn_phase),
-        rest=Rest() if rests(design, mesh) else None,
+        rest=Rest() if balls_can_rest(design, mesh) else None,
         friction=Friction((rubs.surfaces,) * len(surfaces), rubs.balls)
         if rubs is not None
         else None,
-        drag=Drag(piece=accuracy.drag_piece) if effects.drag else None,
+        drag=Drag(piece=accuracy.drag_step) if effects.drag else None,
         ball_collisions=BallCollisions() if effects.ball_collisions else None,
         random_phase=RandomPhase(draws) if sonotrode.motion == "random_phase" else None,
     )
@@ -172,7 +174,7 @@ def build_scene(design: Design, mesh: TriangleMesh | AnalyticCavity, seed: int) 
     """
     from sim_core import AnalyticCavity, Balls, Scene, SceneError, pack_balls
 
-    require_countable(design)
+    require_ball_count(design)
     if not isinstance(mesh, AnalyticCavity):
         require_turnable(design, mesh)
     rng = np.random.default_rng(seed)

@@ -89,8 +89,8 @@ def row(name: str, estimate: Estimate) -> str:
 def accuracy_said(design: Design) -> str:
     """How accurate a search is, in words."""
     accuracy = design.process.accuracy
-    if accuracy.coverage is not None:
-        return f"as many as make ± {accuracy.coverage:g}"
+    if accuracy.objective_half_width is not None:
+        return f"as many as make ± {accuracy.objective_half_width:g}"
     return f"{accuracy.replicas} replicas of {design.process.recorded_time:g} s"
 
 

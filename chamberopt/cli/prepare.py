@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 
 def compiled(design: Design, chamber: Chamber, cavity: AnalyticCavity | None = None) -> None:
     """Compiles, aloud, before the bar starts: else its first minute would look like a hang."""
-    from chamberopt.chamber.scene import chamber_mesh, require_countable, scene_physics
+    from chamberopt.chamber.scene import chamber_mesh, require_ball_count, scene_physics
     from chamberopt.common.progress import compile_with_message
 
-    require_countable(design)
+    require_ball_count(design)
     shot = design.shot
     physics = scene_physics(design, cavity or chamber_mesh(chamber))
     compile_with_message(

@@ -289,6 +289,9 @@ def _explain(detail: ErrorDetails, model: type[BaseModel]) -> Problem:
 
 
 def _unknown_key(key: str, table: type[BaseModel], model: type[BaseModel]) -> str:
+    renamed = getattr(table, "RENAMED", {})
+    if key in renamed:
+        return f"is now called {renamed[key]!r}; rename it"
     near = closest_names(key, table.model_fields)
     if near:
         return f"unknown key; did you mean {near[0]!r}?"

@@ -5,9 +5,10 @@ Every table is frozen, refuses unknown keys, and holds bounds wide enough for an
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cache
+from numbers import Integral, Real
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeVar, cast
 
@@ -39,10 +40,10 @@ from chamberopt.design.effects import Effects
 from chamberopt.design.materials import STRICT, Materials
 from chamberopt.design.process import Process
 from chamberopt.design.shapes import SHAPES, ChamberTable
-from chamberopt.design.shapes.base import is_own
-from chamberopt.design.shapes.custom import KeptShape, own_shape
+from chamberopt.design.shapes.base import is_custom
+from chamberopt.design.shapes.custom import KeptShape, custom_shape
 from chamberopt.design.shapes.imported import IMPORTED, Imported
-from chamberopt.design.shot import Shot
+from chamberopt.design.shot import ShotTable
 from chamberopt.design.sonotrode import FurtherSonotrode, Sonotrode
 from chamberopt.geometry.mesh_io.units import Unit
 
@@ -114,7 +115,7 @@ class Target(BaseModel):
         return self
 
 
-class Part(BaseModel):
+class PartTable(BaseModel):
     """The part's mesh and how it is placed in the chamber."""
 
     model_config = STRICT
@@ -145,7 +146,7 @@ class Design(BaseModel):
 
     model_config = STRICT
 
-    part: Part
+    part: PartTable
     chamber: ChamberTable
     sonotrode: Sonotrode
     sonotrodes: Annotated[
@@ -155,7 +156,7 @@ class Design(BaseModel):
         "further ones beside the floor",
         (),
     )
-    shot: Shot
+    shot: ShotTable
     materials: Materials
     effects: Effects = Field(default_factory=Effects)
     process: Process
@@ -172,7 +173,7 @@ class Design(BaseModel):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Workers get the values: the class of a shape's designs is made anew there."""
-        return checked, (Design, self.model_dump())
+        return validate, (Design, self.model_dump())
 
     @model_validator(mode="before")
     @classmethod
@@ -283,29 +284,49 @@ class Design(BaseModel):
                 raise InputError(f"{name}: not set in this design; give it a value there first")
         return at
 
-    def with_values(self, values: Mapping[str, float]) -> "Design":
-        """A copy with other numbers, by dotted name and in the file's units, checked again as a whole.
+    def changed(self, values: Mapping[str, Any]) -> "Design":
+        """A copy with other values, checked again as a whole.
 
-        Raises InputError when a name is no number of a design, or the new values are out of range or
-        contradict each other.
+        Args:
+            values: new values in the file's units by dotted name, e.g. {"chamber.height_mm": 45}.
+                An entry of a list goes by its position: part.offset_mm.0.
+        Raises:
+            InputError: a name is not a key of a design, or the new values are out of range or
+                contradict each other.
         """
         data = self.model_dump()
-        for name, number in values.items():
-            was = self.value(name)
-            whole = (
-                isinstance(was, int) and name not in self.numbers() and float(number).is_integer()
-            )
-            *tables, last = name.split(".")
-            at: Any = data
-            for step in tables:
-                place: Any = int(step) if isinstance(at, list) else step
-                if isinstance(at[place], tuple):
-                    at[place] = list(at[place])
-                at = at[place]
-            at[int(last) if isinstance(at, list) else last] = (
-                int(number) if whole else float(number)
-            )
-        return checked(Design, data)
+        for name, value in values.items():
+            data = _replaced(data, name, name.split("."), value)
+        return validate(Design, data)
+
+
+def _replaced(old: Any, name: str, steps: Sequence[str], value: Any) -> Any:
+    """A table or list with another value at the end of a path of keys and positions."""
+    if not steps:
+        return _of_the_same_kind(old, value)
+    step, rest = steps[0], steps[1:]
+    if isinstance(old, dict) and (step in old or not rest):  # an unknown last key is reported later
+        return {**old, step: _replaced(old.get(step), name, rest, value)}
+    if isinstance(old, tuple) and step.isdecimal() and int(step) < len(old):
+        k = int(step)
+        return (*old[:k], _replaced(old[k], name, rest, value), *old[k + 1 :])
+    why = (
+        "not set in this design; give it a value there first"
+        if old is None
+        else "not a key of a design"
+    )
+    raise InputError(f"{name}: {why}")
+
+
+def _of_the_same_kind(old: Any, value: Any) -> Any:
+    """A number as whole or not as the one in its place, so that numpy's numbers can be given too."""
+    is_number = isinstance(value, Real) and not isinstance(value, bool)
+    if not is_number:
+        return value
+    if isinstance(old, int):
+        return int(value) if float(value).is_integer() else float(value)
+    whole = isinstance(value, Integral) and not isinstance(old, float)
+    return int(value) if whole else float(value)
 
 
 class AnyShape(ChamberTable):
@@ -320,29 +341,29 @@ class AnyShape(ChamberTable):
     @field_validator("shape", mode="before")
     @classmethod
     def _own(cls, shape: Any, info: ValidationInfo) -> Any:
-        if is_own(shape):
+        if is_custom(shape):
             try:
-                own_shape(from_file(shape, info.context))
+                custom_shape(from_file(shape, info.context))
             except InputError as error:
                 raise CrossCheckError([Problem("", f"given {shape!r}: {error}")]) from None
         return shape
 
 
 def design_class(data: Mapping[str, Any], context: Mapping[str, Any] | None = None) -> type[Design]:
-    """The class of designs whose chamber has the shape that the data name; context as in ``checked``."""
+    """The class of designs whose chamber has the shape that the data name; context as in ``validate``."""
     chamber = data.get("chamber")
     name = chamber.get("shape") if isinstance(chamber, Mapping) else getattr(chamber, "shape", None)
-    if not is_own(name):
+    if not is_custom(name):
         return _designs_with(SHAPES.get(name, AnyShape) if isinstance(name, str) else AnyShape)
     try:
-        return _designs_with(own_shape(from_file(str(name), context)))
+        return _designs_with(custom_shape(from_file(str(name), context)))
     except InputError:
         return _designs_with(AnyShape if (context or {}).get("needs_mesh") else KeptShape)
 
 
 def _is_of_own_shape(data: Mapping[str, Any]) -> bool:
     chamber = data.get("chamber")
-    return isinstance(chamber, Mapping) and is_own(chamber.get("shape"))
+    return isinstance(chamber, Mapping) and is_custom(chamber.get("shape"))
 
 
 @cache
@@ -354,7 +375,7 @@ def _designs_with(table: type[ChamberTable]) -> type[Design]:
 Table = TypeVar("Table", bound=BaseModel)
 
 
-def checked(
+def validate(
     model: type[Table],
     data: Mapping[str, Any],
     path: Path | None = None,

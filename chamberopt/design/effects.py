@@ -77,7 +77,7 @@ class PartTurn(BaseModel):
         return 60.0 / abs(self.rpm) if self.rpm else math.inf
 
 
-class FrictionSettings(BaseModel):
+class FrictionTable(BaseModel):
     """Balls rub and spin: Walton's mu and beta0, of balls on all surfaces and, unless given apart, of ball on ball."""
 
     model_config = STRICT
@@ -124,7 +124,7 @@ class Effects(BaseModel):
     part_turn: PartTurn | None = Field(
         default=None, description="{ rpm = ... } or { angle_deg = ..., frequency_hz = ... }"
     )
-    friction: FrictionSettings | None = Field(
+    friction: FrictionTable | None = Field(
         default=None,
         description="balls rub and spin: { mu = 0.3, beta0 = 0.2 }; left out: smooth, no rotation",
     )

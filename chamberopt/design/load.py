@@ -10,8 +10,8 @@ from typing import Any
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import write_text
-from chamberopt.design.design import Design, checked
-from chamberopt.design.shapes.base import is_own
+from chamberopt.design.design import Design, validate
+from chamberopt.design.shapes.base import is_custom
 
 __all__ = ["Design", "load_design", "save_design"]
 
@@ -24,7 +24,7 @@ def load_design(path: str | Path) -> Design:
         raise InputError(
             f"{path}: this is a study file; a design file is wanted: give the one it names"
         )
-    return checked(Design, data, path, source)
+    return validate(Design, data, path, source)
 
 
 def save_design(design: Design, path: str | Path) -> None:
@@ -45,7 +45,7 @@ def with_paths_from(folder: Path, value: Any) -> Any:
     if isinstance(value, Mapping):
         return {
             name: _relative(inner, folder)
-            if isinstance(inner, str) and (name == "mesh" or (name == "shape" and is_own(inner)))
+            if isinstance(inner, str) and (name == "mesh" or (name == "shape" and is_custom(inner)))
             else with_paths_from(folder, inner)
             for name, inner in value.items()
         }

@@ -1,6 +1,6 @@
 """How long a design is peened, and how well the answer is to be known."""
 
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import BaseModel, Field, model_validator
 
@@ -13,16 +13,21 @@ class Accuracy(BaseModel):
     """How much is simulated: independent replicas, each after its own start and warm-up."""
 
     model_config = STRICT
+    RENAMED: ClassVar[dict[str, str]] = {  # former names of keys
+        "coverage": "objective_half_width",
+        "max_replicas": "max_replicas",
+        "drag_step_ms": "drag_step_ms",
+    }
 
     replicas: int = Field(
         default=8, ge=3, le=100000, description="3 is the least that gives a confidence interval"
     )
     simulated_time_s: float = quantity(1e-4, 10000, "s", "of each replica, after warm-up", 1.0)
     warmup_time_s: float = quantity(0, 10000, "s", "simulated first and not counted", 0.2)
-    coverage: float | None = quantity(
+    objective_half_width: float | None = quantity(
         1e-4, 0.5, "", "wanted half-width of the objective's 95 % interval", None
     )
-    most_replicas: int = Field(
+    max_replicas: int = Field(
         default=200, ge=3, le=100000, description="where the wish for accuracy ends"
     )
     coverage_model: Literal["avrami", "dents"] = Field(
@@ -34,15 +39,15 @@ class Accuracy(BaseModel):
     elastic_below_mm_s: float = quantity(
         0.1, 1000, "mm/s", "slower hits lose nothing: ends endless bouncing", 10.0
     )
-    drag_piece_ms: float = quantity(
+    drag_step_ms: float = quantity(
         0.1, 1000, "ms", "longest flight between two kicks of the air, effects.drag", 10.0
     )
 
     @model_validator(mode="after")
     def _agree(self) -> Self:
-        if self.coverage is not None and self.most_replicas < self.replicas:
-            text = f"given {self.most_replicas}, below replicas = {self.replicas}; raise it"
-            raise CrossCheckError([Problem("most_replicas", text)])
+        if self.objective_half_width is not None and self.max_replicas < self.replicas:
+            text = f"given {self.max_replicas}, below replicas = {self.replicas}; raise it"
+            raise CrossCheckError([Problem("max_replicas", text)])
         return self
 
     @property
@@ -66,13 +71,13 @@ class Accuracy(BaseModel):
         return self.elastic_below_mm_s * 1e-3
 
     @property
-    def drag_piece(self) -> float:
+    def drag_step(self) -> float:
         """Longest time [s] between two kicks of the air."""
-        return self.drag_piece_ms * 1e-3
+        return self.drag_step_ms * 1e-3
 
 
 # The longest treatment [s] that is simulated from beginning to end: minutes of computing a replica.
-LONGEST_MARKED = 600.0
+MAX_SIMULATED_TREATMENT = 600.0
 
 
 class Process(BaseModel):
@@ -86,11 +91,12 @@ class Process(BaseModel):
 
     @model_validator(mode="after")
     def _agree(self) -> Self:
-        if self.accuracy.coverage_model == "dents" and self.treatment_time_s > LONGEST_MARKED:
+        if (
+            self.accuracy.coverage_model == "dents"
+            and self.treatment_time_s > MAX_SIMULATED_TREATMENT
+        ):
             text = f'given "dents", which simulates all of treatment_time_s = {self.treatment_time_s:g} in each replica'
-            wants = (
-                f'at most {LONGEST_MARKED:g} s are supported; shorten the treatment or use "avrami"'
-            )
+            wants = f'at most {MAX_SIMULATED_TREATMENT:g} s are supported; shorten the treatment or use "avrami"'
             raise CrossCheckError([Problem("accuracy.coverage_model", f"{text}; {wants}")])
         return self
 

@@ -20,7 +20,7 @@ class ShotSize(BaseModel):
     share: float = quantity(1e-6, 1, "of the charge's mass", "the shares of all sizes add up to 1")
 
 
-class Shot(BaseModel):
+class ShotTable(BaseModel):
     """The charge: balls of one size, or a mix. Give exactly one of diameter_mm and mix, and of material and
     density_kg_m3.
     """

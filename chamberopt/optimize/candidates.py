@@ -122,7 +122,7 @@ class Candidates:
         settings = self._study.optimizer
         replicas = (
             settings.confirm_replicas
-            if self._study.design.process.accuracy.coverage is None
+            if self._study.design.process.accuracy.objective_half_width is None
             else None
         )
         promising = self._promising(settings.confirm)

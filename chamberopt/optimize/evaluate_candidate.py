@@ -59,7 +59,7 @@ class CandidateEvaluator:
         return dict(zip(self._study.vary, values.tolist(), strict=True))
 
     def design(self, point: np.ndarray) -> Design:
-        return self._study.design.with_values(self.parameters(point))
+        return self._study.design.changed(self.parameters(point))
 
     def goals(self, evaluation: Evaluation) -> tuple[Estimate, ...]:
         """Every objective of the study."""
@@ -154,7 +154,11 @@ class CandidateEvaluator:
             return self._simulate(design, "confirm", replicas)
         design = self._study.at_search_accuracy(design)
         few, accuracy = self._study.optimizer.first_replicas, design.process.accuracy
-        if bar is not None and 0 < few < accuracy.replicas and accuracy.coverage is None:
+        if (
+            bar is not None
+            and 0 < few < accuracy.replicas
+            and accuracy.objective_half_width is None
+        ):
             first = self._simulate(design, "search", few)
             if len(self._study.objective.goals) == 1 and first.objective.high < bar:
                 return first

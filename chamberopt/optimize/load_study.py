@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
 from chamberopt.common.toml_errors import Problem
-from chamberopt.design.design import Design, checked
+from chamberopt.design.design import Design, validate
 from chamberopt.design.load import is_study, load_design, read_toml
 from chamberopt.optimize.study import Study
 
@@ -30,7 +30,7 @@ def load(path: str | Path) -> Design | Study:
     """Whichever of the two the file holds: a study names a design or has [vary]."""
     path = Path(path)
     source, data = read_toml(path, "design or study")
-    return _study(path, source, data) if is_study(data) else checked(Design, data, path, source)
+    return _study(path, source, data) if is_study(data) else validate(Design, data, path, source)
 
 
 def _study(path: Path, source: str, data: dict[str, Any]) -> Study:
@@ -56,7 +56,7 @@ def _study(path: Path, source: str, data: dict[str, Any]) -> Study:
         raise InputError(
             "\n".join([said, str(error), *_also_wrong(values, path, source)])
         ) from None
-    return checked(Study, {**values, "design": design}, path, source)
+    return validate(Study, {**values, "design": design}, path, source)
 
 
 def _also_wrong(values: Mapping[str, Any], path: Path, source: str) -> list[str]:

@@ -9,7 +9,7 @@ from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
 from chamberopt.common.toml_errors import CrossCheckError, Problem
 from chamberopt.common.toml_fields import list_field, quantity
-from chamberopt.design.design import Design, checked
+from chamberopt.design.design import Design, validate
 from chamberopt.design.materials import STRICT
 
 # What a study may ask for, and the range it can have. objective.py computes them, a test holds the two together.
@@ -234,7 +234,7 @@ class Study(BaseModel):
         for name, value in self.search_accuracy.items():
             table = data["chamber"] if name == "facets" else data["process"]["accuracy"]
             table[name] = value
-        return checked(Design, data)
+        return validate(Design, data)
 
     @model_validator(mode="after")
     def _agree(self) -> Self:
@@ -324,7 +324,7 @@ def _vary_problems(design: Design, name: str, bounds: tuple[float, float]) -> li
     problems = []
     for bound in bounds:
         try:
-            design.with_values({name: bound})
+            design.changed({name: bound})
         except InputError as error:
             problems.append(Problem(field, f"the design cannot have {name} = {bound:g}: {error}"))
     return problems

@@ -17,10 +17,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.chamber import dimensionless
-from chamberopt.chamber.scene import chamber_mesh, rests
+from chamberopt.chamber.scene import balls_can_rest, chamber_mesh
 from chamberopt.coverage.metrics import exposed_target
 from chamberopt.coverage.statistics.confidence_interval import Estimate, estimate
-from chamberopt.design.design import checked
 from chamberopt.simulation.evaluate import evaluate
 
 if TYPE_CHECKING:
@@ -51,7 +50,7 @@ class Switch:
 
     effect: str
     on: Callable[[Design, Chamber], bool]
-    switched: Callable[[dict[str, Any], bool], None]
+    values: tuple[Any, Any]  # on and off
     reason: Callable[[Design, Chamber], str]
 
 
@@ -107,24 +106,19 @@ class Advice:
         return f"{self.effect} is {'on' if self.on else 'off'}: {advice} ({self.reason}; pilot: {seen})"
 
 
-def _set(name: str, on: Any, off: Any) -> Callable[[dict[str, Any], bool], None]:
-    def switched(data: dict[str, Any], wanted: bool) -> None:
-        data["effects"][name] = (data["effects"][name] or on) if wanted else off
-
-    return switched
-
-
 SWITCHES = (
     Switch(
         "gravity",
         lambda design, chamber: design.effects.gravity,
-        _set("gravity", True, False),
-        lambda design, chamber: f"g H / V² = {dimensionless.fall(design, chamber):.2g}",
+        (True, False),
+        lambda design, chamber: (
+            f"g H / V² = {dimensionless.gravity_speed_change(design, chamber):.2g}"
+        ),
     ),
     Switch(
         "ball_collisions",
         lambda design, chamber: design.effects.ball_collisions,
-        _set("ball_collisions", True, False),
+        (True, False),
         lambda design, chamber: (
             f"mean free path {dimensionless.free_path(design, chamber):.2g} chamber heights"
         ),
@@ -132,23 +126,23 @@ SWITCHES = (
     Switch(
         "friction",
         lambda design, chamber: design.effects.friction is not None,
-        _set("friction", FRICTION, None),
+        (FRICTION, None),
         lambda design, chamber: (
-            f"a hit that sticks takes {dimensionless.MOST_INTO_SPIN:.0%} of the sideways speed into spin"
+            f"a hit that sticks takes {dimensionless.MAX_SPIN_SHARE:.0%} of the sideways speed into spin"
         ),
     ),
     Switch(
         "drag",
         lambda design, chamber: design.effects.drag,
-        _set("drag", True, False),
+        (True, False),
         lambda design, chamber: (
             f"{dimensionless.drag_loss(design, chamber):.2g} of the speed is lost on the way up"
         ),
     ),
     Switch(
         "rest",
-        lambda design, chamber: rests(design, chamber_mesh(chamber)),
-        _set("rest", True, False),
+        lambda design, chamber: balls_can_rest(design, chamber_mesh(chamber)),
+        (True, False),
         lambda design, chamber: "something still faces up, where balls can lie",
     ),
 )
@@ -232,14 +226,14 @@ class _Pilot:
         return _figures(self._switched(wanted, self._seconds), self._chamber, self._executor)
 
     def _switched(self, wanted: dict[Switch, bool], seconds: float) -> Design:
-        data = _with(self._design, wanted).model_dump()
-        data["process"]["accuracy"] |= {
-            "replicas": REPLICAS,
-            "simulated_time_s": seconds,
-            "coverage": None,
-            "coverage_model": "avrami",
-        }
-        variant = checked(type(self._design), data)
+        variant = _with(self._design, wanted).changed(
+            {
+                "process.accuracy.replicas": REPLICAS,
+                "process.accuracy.simulated_time_s": seconds,
+                "process.accuracy.objective_half_width": None,
+                "process.accuracy.coverage_model": "avrami",
+            }
+        )
         if self._prepare is not None:
             self._prepare(variant)
         return variant
@@ -248,23 +242,20 @@ class _Pilot:
 def _applies(switch: Switch, design: Design, chamber: Chamber) -> bool:
     """Whether an effect can be switched in this design at all."""
     if switch.effect == "rest":
-        loose = design.model_copy(
-            update={"effects": design.effects.model_copy(update={"rest": None})}
-        )
-        return rests(loose, chamber_mesh(chamber))
+        return balls_can_rest(design.changed({"effects.rest": None}), chamber_mesh(chamber))
     if design.shot.mix is not None and switch.effect == "friction":
         return False  # not supported together
     return switch.effect != "ball_collisions" or design.shot.count > 1
 
 
 def _with(design: Design, wanted: dict[Switch, bool]) -> Design:
-    data = design.model_dump()
-    data["effects"]["auto"] = False
+    values: dict[str, Any] = {"effects.auto": False}
     for switch, on in wanted.items():
-        switch.switched(data, on)
-    if not data["effects"]["gravity"]:
-        data["effects"]["rest"] = None  # nothing lies still without gravity
-    return checked(type(design), data)
+        present, (value_on, value_off) = getattr(design.effects, switch.effect), switch.values
+        values[f"effects.{switch.effect}"] = (present or value_on) if on else value_off
+    if not values.get("effects.gravity", design.effects.gravity):
+        values["effects.rest"] = None  # nothing lies still without gravity
+    return design.changed(values)
 
 
 def _size(one: Advice) -> float:

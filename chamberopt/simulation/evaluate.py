@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.chamber.analytic import described
+from chamberopt.chamber.analytic import cavity_note
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.parallel.executor import share
 from chamberopt.common.progress import Progress
@@ -139,10 +139,10 @@ def evaluate(
     Raises InputError (the shot does not fit) and sim_core.SimulationError.
     """
     accuracy = design.process.accuracy
-    wanted = accuracy.coverage if replicas is None else None
+    wanted = accuracy.objective_half_width if replicas is None else None
     planned = replicas or accuracy.replicas
     if wanted is not None:
-        planned = min(max(planned, MIN_REPLICAS_TO_STOP), accuracy.most_replicas)
+        planned = min(max(planned, MIN_REPLICAS_TO_STOP), accuracy.max_replicas)
     mesh = cavity or chamber_mesh(chamber)
     samples = (
         sample_points(chamber, accuracy.sample_spacing)
@@ -166,7 +166,7 @@ def evaluate(
         clock["coverage"] += time.perf_counter() - simulated
         if wanted is None:
             break
-        planned = next_replica_count(len(done), goal.half_width, wanted, accuracy.most_replicas)
+        planned = next_replica_count(len(done), goal.half_width, wanted, accuracy.max_replicas)
         if planned == len(done):
             break
     tallies = [replica.tally for replica in done]
@@ -175,9 +175,9 @@ def evaluate(
         if wanted is None
         else "accuracy"
         if goal.half_width <= wanted
-        else "most_replicas"
+        else "max_replicas"
     )
-    notes: tuple[str, ...] = (described(cavity),) if cavity else ()
+    notes: tuple[str, ...] = (cavity_note(cavity),) if cavity else ()
     notes += _accuracy_note(stopped_by, len(done), goal, wanted)
     if samples is not None:
         notes += few_points_note(samples, chamber)
@@ -281,8 +281,8 @@ def _accuracy_note(
         if math.isfinite(goal.half_width)
         else "many more"
     )
-    remedy = "raise process.accuracy.most_replicas or simulated_time_s"
+    remedy = "raise process.accuracy.max_replicas or simulated_time_s"
     return (
-        f"the accuracy asked for, ± {wanted:g}, was not reached: process.accuracy.most_replicas = {replicas} ended it "
+        f"the accuracy asked for, ± {wanted:g}, was not reached: process.accuracy.max_replicas = {replicas} ended it "
         f"at ± {goal.half_width:.2g}, some {more} would be needed; {remedy}",
     )

@@ -30,7 +30,7 @@ class Evaluation:
 
     total: sum of the replicas' tallies · replicas: one Tally each · timings: seconds of wall clock by step ·
     collisions: numbers of simulated collisions by kind, warm-up included · notes: what to know before
-    trusting it · stopped_by: what ended it, "replicas" (a number was asked for), "accuracy" or "most_replicas" ·
+    trusting it · stopped_by: what ended it, "replicas" (a number was asked for), "accuracy" or "max_replicas" ·
     analytic: in an exact cavity, not the chamber's mesh ·
     hits: of each replica, its impacts one by one ·
     marked (m,): share of each part triangle inside dents, NaN unexposed, marked_interval (m,): width of its 95 %

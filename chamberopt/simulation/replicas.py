@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from chamberopt.chamber.analytic import on_chamber
+from chamberopt.chamber.analytic import impacts_on_chamber
 from chamberopt.chamber.scene import build_scene, replica_seed
 from chamberopt.common.errors import WorkerLostError
 from chamberopt.coverage.coverage_from_impacts import Tally, tally_impacts
@@ -143,4 +143,4 @@ def simulate_seed(
     result = simulate(build_scene(design, mesh, seed))
     if isinstance(mesh, TriangleMesh):
         return result
-    return replace(result, impacts=on_chamber(result.impacts, chamber))
+    return replace(result, impacts=impacts_on_chamber(result.impacts, chamber))

@@ -37,7 +37,7 @@ def coverage_against_time(
     times = sorted({treatment, *(end * np.arange(1, POINTS + 1) / POINTS).tolist()})
     rows = []
     for at in times:
-        then = design.with_values({"process.treatment_time_s": at})
+        then = design.changed({"process.treatment_time_s": at})
         found = coverage_estimates(
             evaluation.replicas, chamber, target_patches(evaluation.replicas, chamber, then)
         )

@@ -6,9 +6,7 @@ errors like those of the shipped shapes; so are those it has from ParametricCham
 
 import numpy as np
 
-from chamberopt.common.errors import InputError
-from chamberopt.common.toml_fields import quantity
-from chamberopt.design.shapes import ParametricChamber, ShapeSurface, lofted
+from chamberopt.design.shapes import InputError, ParametricChamber, ShapeSurface, lofted, quantity
 
 
 class Oblong(ParametricChamber):

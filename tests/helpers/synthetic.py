@@ -21,7 +21,7 @@ DESIGNS = Path(__file__).resolve().parents[2] / "designs"
 def plate_design(**values: float) -> Design:
     """The shipped plate, with other numbers: plate_design(shot__mass_g=3) sets shot.mass_g."""
     changes = {name.replace("__", "."): value for name, value in values.items()}
-    return load_design(DESIGNS / "plate.toml").with_values(changes)
+    return load_design(DESIGNS / "plate.toml").changed(changes)
 
 
 def patchwork(

@@ -12,7 +12,7 @@ from chamberopt.chamber.checks.ledges import ledges
 from chamberopt.chamber.checks.place_names import CEILING, SIDE_WALL, on_target, surface_names
 from chamberopt.chamber.dimensionless import free_path
 from chamberopt.chamber.reach.reach import Reach, reach
-from chamberopt.chamber.scene import chamber_mesh, require_countable, require_turnable
+from chamberopt.chamber.scene import chamber_mesh, require_ball_count, require_turnable
 from chamberopt.design.shapes import is_sonotrode
 from chamberopt.design.shapes.construction.surface import ShapeSurface
 from chamberopt.geometry.triangles import areas, tetrahedron_volumes
@@ -38,7 +38,7 @@ def describe(design: Design, chamber: Chamber, found: Reach | None = None) -> di
     ``found``: its `shot_reach`, if it is known. Raises InputError when the shot has more balls than can be simulated,
     or the part cannot turn as asked; sim_core.SceneError, with the place, for a cavity that leaks.
     """
-    require_countable(design)
+    require_ball_count(design)
     found = shot_reach(design, chamber) if found is None else found
     if design.effects.part_turn is not None:
         require_turnable(design, found.mesh)

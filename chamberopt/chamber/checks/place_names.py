@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.chamber.build import TAG_PART, TAG_SONOTRODE, TAG_WALL
-from chamberopt.design.shapes import tag_of_further
+from chamberopt.design.shapes import further_sonotrode_tag
 from chamberopt.geometry.triangles import area_vectors
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def surface_names(chamber: Chamber) -> np.ndarray:
     words = np.where(chamber.tags == TAG_PART, on_part, on_wall).astype(object)
     words[chamber.tags == TAG_SONOTRODE] = SONOTRODE
     for tag in np.unique(chamber.tags[chamber.tags > TAG_WALL]):
-        words[chamber.tags == tag] = f"sonotrodes.{tag - tag_of_further(0)}"
+        words[chamber.tags == tag] = f"sonotrodes.{tag - further_sonotrode_tag(0)}"
     return words
 
 

@@ -3,6 +3,8 @@
 A new shape: a file with a subclass of ChamberTable, and its name here.
 """
 
+from chamberopt.common.errors import InputError
+from chamberopt.common.toml_fields import quantity
 from chamberopt.design.shapes.base import ChamberTable, ParametricChamber, WalledChamber
 from chamberopt.design.shapes.box import Box
 from chamberopt.design.shapes.conformal import Conformal
@@ -12,8 +14,8 @@ from chamberopt.design.shapes.construction.surface import (
     TAG_SONOTRODE,
     TAG_WALL,
     ShapeSurface,
+    further_sonotrode_tag,
     is_sonotrode,
-    tag_of_further,
 )
 from chamberopt.design.shapes.cylinder import Cylinder
 from chamberopt.design.shapes.imported import Imported
@@ -26,12 +28,14 @@ __all__ = [
     "TAG_SONOTRODE",
     "TAG_WALL",
     "ChamberTable",
+    "InputError",
     "ParametricChamber",
     "ShapeSurface",
     "WalledChamber",
+    "further_sonotrode_tag",
     "is_sonotrode",
     "lofted",
-    "tag_of_further",
+    "quantity",
 ]
 
 SHAPES: dict[str, type[ChamberTable]] = {

@@ -11,7 +11,7 @@ from chamberopt.common.toml_fields import from_file, list_field, quantity
 from chamberopt.design.materials import STRICT
 from chamberopt.design.shapes.construction.cad_setup import Setup
 from chamberopt.design.shapes.construction.surface import ShapeSurface
-from chamberopt.design.shapes.fitting_tables import Deflector, Hole
+from chamberopt.design.shapes.hole_and_deflector_tables import Deflector, Hole
 
 
 class ChamberTable(BaseModel):
@@ -40,7 +40,7 @@ class ChamberTable(BaseModel):
     @classmethod
     def _absolute(cls, shape: str, info: ValidationInfo) -> str:
         """A user's own file is held absolute from here on, like the part's mesh."""
-        return str(from_file(shape, info.context)) if is_own(shape) else shape
+        return str(from_file(shape, info.context)) if is_custom(shape) else shape
 
     @property
     def sonotrode_distance(self) -> float:
@@ -112,6 +112,6 @@ class ParametricChamber(WalledChamber):
         return self.height * self.slope
 
 
-def is_own(shape: object) -> bool:
+def is_custom(shape: object) -> bool:
     """Whether a design's shape names a Python file of the user's."""
     return isinstance(shape, str) and shape.endswith(".py")

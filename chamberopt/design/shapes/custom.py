@@ -29,7 +29,7 @@ class KeptShape(ChamberTable):
     def surface(self, vertices: np.ndarray, triangles: np.ndarray) -> ShapeSurface:
         """By the file, should it be back; else InputError that says what is wrong with it."""
         return (
-            own_shape(Path(self.shape))
+            custom_shape(Path(self.shape))
             .model_validate(self.model_dump())
             .surface(vertices, triangles)
         )
@@ -49,7 +49,7 @@ GIVES: dict[str, tuple[str, Callable[[Any], bool]]] = {
 }
 
 
-def own_shape(path: Path) -> type[ChamberTable]:
+def custom_shape(path: Path) -> type[ChamberTable]:
     """The shape in a file; the same class as long as the file's content is the same. InputError if it holds none."""
     try:
         source = path.read_bytes()

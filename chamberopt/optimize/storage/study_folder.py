@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import make_output_folder, write_text
 from chamberopt.coverage.statistics.confidence_interval import Estimate
-from chamberopt.design.design import Design, checked
+from chamberopt.design.design import Design
 from chamberopt.optimize.storage.lock import only_writer
 from chamberopt.optimize.storage.study_inputs import require_same, require_same_files, study_inputs
 from chamberopt.optimize.storage.trial_log import HISTORY, TIMINGS, JsonLines, Trial, read_seconds
@@ -112,7 +112,7 @@ class StudyFolder:
             write_text(path, json.dumps(told, indent=2) + "\n")
         kept = _read_json(path)
         try:
-            chosen = checked(Design, {**design.model_dump(), "effects": kept["effects"]})
+            chosen = design.changed({"effects": kept["effects"]})
             advice = [_advice(**one) for one in kept["advice"]]
         except (KeyError, TypeError, AttributeError) as error:
             raise _damaged(path, error) from None

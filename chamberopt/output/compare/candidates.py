@@ -6,14 +6,14 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from chamberopt.chamber.analytic import analytic_cavity
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.progress import progress_bar
-from chamberopt.design.design import Design, checked
+from chamberopt.design.design import Design
 from chamberopt.design.load import load_design
 from chamberopt.output.compare.comparison import part_unit
 from chamberopt.output.compare.inputs import (
@@ -145,11 +145,11 @@ def _simulate(
 
 def _drawn(design: Design, draws: Draws) -> Design:
     """The design with these draws in place of its own: its file then says what was done."""
-    data = design.model_dump()
-    data["process"]["seed"] = draws.seed
+    values: dict[str, Any] = {"process.seed": draws.seed}
     if draws.replicas is not None:
-        data["process"]["accuracy"] |= {"replicas": draws.replicas, "coverage": None}
-    return checked(Design, data)
+        values["process.accuracy.replicas"] = draws.replicas
+        values["process.accuracy.objective_half_width"] = None
+    return design.changed(values)
 
 
 def _overridden(one: Candidate, draws: Draws) -> list[str]:
@@ -158,9 +158,9 @@ def _overridden(one: Candidate, draws: Draws) -> list[str]:
     said = []
     if process.seed != draws.seed:
         said.append(f"seed = {draws.seed} in place of {process.seed}")
-    if draws.replicas is not None and process.accuracy.coverage is not None:
+    if draws.replicas is not None and process.accuracy.objective_half_width is not None:
         said.append(
-            f"{draws.replicas} replicas in place of as many as make ± {process.accuracy.coverage:g}"
+            f"{draws.replicas} replicas in place of as many as make ± {process.accuracy.objective_half_width:g}"
         )
     elif draws.replicas not in (None, process.accuracy.replicas):
         said.append(f"{draws.replicas} replicas in place of {process.accuracy.replicas}")
@@ -178,7 +178,7 @@ def _peened_for(one: Candidate, seconds: float) -> Candidate:
     if one.design.process.treatment_time_s == seconds:
         return one
     return replace(
-        one, design=one.design.with_values({"process.treatment_time_s": seconds}), missing=True
+        one, design=one.design.changed({"process.treatment_time_s": seconds}), missing=True
     )
 
 

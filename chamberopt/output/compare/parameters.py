@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from chamberopt.design.shapes.base import is_own
+from chamberopt.design.shapes.base import is_custom
 
 if TYPE_CHECKING:
     from chamberopt.output.results.results import Result
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 # How many replicas there were says more than what was to decide it.
 REPLICAS, DECIDED_BY = (
     "process.accuracy.replicas",
-    ("process.accuracy.coverage", "process.accuracy.most_replicas"),
+    ("process.accuracy.objective_half_width", "process.accuracy.max_replicas"),
 )
 
 
@@ -41,7 +41,7 @@ def _values(result: Result) -> dict[str, Any]:
     values = _flat(result.design.model_dump(mode="json", exclude={"part": {"mesh", "unit"}}))
     for name in DECIDED_BY:
         values.pop(name, None)
-    if is_own(values["chamber.shape"]):
+    if is_custom(values["chamber.shape"]):
         values["chamber.shape"] = Path(values["chamber.shape"]).name  # its content is shape_sha256
     return {
         **values,

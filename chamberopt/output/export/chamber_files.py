@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from chamberopt.chamber.fittings import fitting_names
+from chamberopt.chamber.bores_and_deflectors import fitting_names
 from chamberopt.common.files import atomic_write, make_output_folder
-from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL, tag_of_further
+from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL, further_sonotrode_tag
 from chamberopt.output.results.results import load_result
 from chamberopt.output.viewer import CHAMBER, read_surface
 
@@ -105,7 +105,7 @@ def _model(cavity: Cavity) -> str:
 
 
 def _name(tag: int) -> str:
-    return NAMES.get(tag) or f"sonotrodes.{tag - tag_of_further(0)}"
+    return NAMES.get(tag) or f"sonotrodes.{tag - further_sonotrode_tag(0)}"
 
 
 def _colour(name: str) -> str:

@@ -19,7 +19,7 @@ DOING = {
 STOPPED = {
     "replicas": "the number of replicas asked for",
     "accuracy": "the accuracy asked for was reached",
-    "most_replicas": "the most replicas allowed: the accuracy asked for was not reached",
+    "max_replicas": "the most replicas allowed: the accuracy asked for was not reached",
 }
 
 

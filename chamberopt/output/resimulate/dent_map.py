@@ -20,7 +20,7 @@ from chamberopt.coverage.dent_marking import (
 )
 from chamberopt.coverage.dents import Dents, dents_on_part
 from chamberopt.coverage.metrics import target_coverage
-from chamberopt.design.process import LONGEST_MARKED
+from chamberopt.design.process import MAX_SIMULATED_TREATMENT
 from chamberopt.geometry.raycast import View, places, seen, view_of
 from chamberopt.geometry.triangles import area_vectors
 
@@ -67,9 +67,9 @@ def peened(replayed: Replayed, time: float) -> Dents:
     """
     from sim_core import simulate
 
-    if not 0.0 < time <= LONGEST_MARKED:
+    if not 0.0 < time <= MAX_SIMULATED_TREATMENT:
         raise InputError(
-            f"--at-s: given {time:g}; a dent map simulates all of it: more than 0, at most {LONGEST_MARKED:g} s are "
+            f"--at-s: given {time:g}; a dent map simulates all of it: more than 0, at most {MAX_SIMULATED_TREATMENT:g} s are "
             "supported"
         )
     impacts = simulate(replace(replayed.scene, duration=time)).impacts

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from chamberopt.chamber.analytic import on_chamber
+from chamberopt.chamber.analytic import impacts_on_chamber
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -24,4 +24,4 @@ class Replayed:
 
     def booked(self, impacts: ImpactLog) -> ImpactLog:
         """The impacts, with the chamber's triangles, also where the cavity has others."""
-        return on_chamber(impacts, self.chamber) if self.cavity else impacts
+        return impacts_on_chamber(impacts, self.chamber) if self.cavity else impacts

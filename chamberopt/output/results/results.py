@@ -15,7 +15,7 @@ from chamberopt.common.versions import versions
 from chamberopt.coverage.metrics import METRICS, exposed_target
 from chamberopt.coverage.part_impacts import HITS_FILE, save_hits
 from chamberopt.coverage.statistics.confidence_interval import Estimate
-from chamberopt.design.design import checked
+from chamberopt.design.design import validate
 from chamberopt.design.load import Design, save_design, with_paths_from
 from chamberopt.optimize import pareto
 from chamberopt.optimize.storage.study_folder import RESULT, is_study_folder
@@ -157,7 +157,7 @@ def load_result(path: str | Path) -> Result:
         return Result(
             folder=folder,
             kind=data["kind"],
-            design=checked(Design, data["design"], file, mesh_must_exist=False),
+            design=validate(Design, data["design"], file, mesh_must_exist=False),
             objective_name=data["objective"]["name"],
             objective=_estimate(data["objective"]),
             metrics={

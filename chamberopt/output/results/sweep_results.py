@@ -35,7 +35,7 @@ def write_sweep(folder: str | Path, sweep: SweepResult) -> list[str]:
     folder = Path(folder)
     write_text(folder / "history.csv", trials_as_csv(read_trials(folder)))
     if sweep.best is not None:
-        save_design(sweep.study.design.with_values(sweep.best.parameters), folder / "best.toml")
+        save_design(sweep.study.design.changed(sweep.best.parameters), folder / "best.toml")
     remarks = _picture(folder / "map.png", sweep)
     write_text(
         folder / RESULT, json.dumps(_about(sweep), indent=2, allow_nan=False) + "\n"

@@ -21,8 +21,8 @@ from chamberopt.coverage.dent_marking import (
 from chamberopt.coverage.metrics import parse_objective
 from chamberopt.coverage.statistics.confidence_interval import estimate, paired_difference
 from chamberopt.design.design import Design
-from chamberopt.design.process import LONGEST_MARKED
-from chamberopt.simulation.convergence.parameters import MODEL, changed
+from chamberopt.design.process import MAX_SIMULATED_TREATMENT
+from chamberopt.simulation.convergence.parameters import MODEL
 from chamberopt.simulation.convergence.runs import Pool, Rung, dents_alone, figures
 from chamberopt.simulation.evaluate import marked_coverage_estimates, weighted_sum
 
@@ -48,8 +48,8 @@ def dent_rungs(
     affordable = max(
         budget_s / DENT_REPLICAS / pace / DENT_LOAD - accuracy.warmup_time, accuracy.simulated_time
     )
-    seconds = float(min(pool.design.process.treatment_time, LONGEST_MARKED, affordable))
-    treated = changed(pool.design, {"process.treatment_time_s": seconds, MODEL: "dents"})
+    seconds = float(min(pool.design.process.treatment_time, MAX_SIMULATED_TREATMENT, affordable))
+    treated = pool.design.changed({"process.treatment_time_s": seconds, MODEL: "dents"})
     spacings = [2 * accuracy.sample_mm, accuracy.sample_mm, accuracy.sample_mm / 2]
     try:
         samples = [sample_points(pool.chamber, 1e-3 * spacing) for spacing in spacings]

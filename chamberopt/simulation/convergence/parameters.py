@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
-from chamberopt.design.design import Design, checked
+from chamberopt.design.design import Design
 
 FACETS, MOTION = "chamber.facets", "sonotrode.motion"
 TIME, WARM_UP = "process.accuracy.simulated_time_s", "process.accuracy.warmup_time_s"
-FLOOR, PIECE = "process.accuracy.elastic_below_mm_s", "process.accuracy.drag_piece_ms"
+FLOOR, PIECE = "process.accuracy.elastic_below_mm_s", "process.accuracy.drag_step_ms"
 MODEL = "process.accuracy.coverage_model"
 REFERENCE, DESIGNED = "reference", "as designed"
 
@@ -17,7 +16,7 @@ REFERENCE, DESIGNED = "reference", "as designed"
 def knobs(design: Design) -> dict[str, tuple[Any, ...]]:
     """Settings of every knob, by dotted name; the last is the reference's."""
     accuracy = design.process.accuracy
-    warm, floor, piece = accuracy.warmup_time_s, accuracy.elastic_below_mm_s, accuracy.drag_piece_ms
+    warm, floor, piece = accuracy.warmup_time_s, accuracy.elastic_below_mm_s, accuracy.drag_step_ms
     ladder: dict[str, tuple[Any, ...]] = {}
     if design.chamber.is_round:
         facets = design.value(FACETS)
@@ -36,26 +35,14 @@ def knobs(design: Design) -> dict[str, tuple[Any, ...]]:
     return ladder | {TIME: (max(1e-4, time_s / 4), min(1e4, 4 * time_s), time_s)}
 
 
-def changed(design: Design, values: Mapping[str, Any]) -> Design:
-    """A copy with other settings, numbers or not, by dotted name; checked again as a whole."""
-    data = design.model_dump()
-    for name, value in values.items():
-        *tables, last = name.split(".")
-        at = data
-        for step in tables:
-            at = at[step]
-        at[last] = value
-    return checked(Design, data)
-
-
 def designs(design: Design) -> tuple[dict[str, Any], dict[tuple[str, str], Design]]:
     """The reference's settings, and every design of the ladder by knob and setting, the reference first."""
-    own = changed(design, {MODEL: "avrami"})
+    own = design.changed({MODEL: "avrami"})
     settings = {knob: values[-1] for knob, values in knobs(own).items()}
-    reference = changed(own, settings)
+    reference = own.changed(settings)
     ladder = {(REFERENCE, ""): reference}
     for knob, values in knobs(own).items():
-        ladder |= {(knob, shown(value)): changed(reference, {knob: value}) for value in values[:-1]}
+        ladder |= {(knob, shown(value)): reference.changed({knob: value}) for value in values[:-1]}
     return settings, ladder | {(DESIGNED, ""): own}
 
 

@@ -5,11 +5,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from chamberopt.chamber.analytic import analytic_cavity, on_chamber
+from chamberopt.chamber.analytic import analytic_cavity, impacts_on_chamber
 from chamberopt.chamber.build import Chamber, Part, build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import local_executor
-from chamberopt.design.design import checked
+from chamberopt.design.design import validate
 from chamberopt.design.load import Design, load_design
 from chamberopt.simulation.evaluate import evaluate
 from sim_core import ImpactLog, TriangleMesh, prism_cavity
@@ -24,7 +24,7 @@ BOX = {
     "height_mm": 20.0,
     "sonotrode_distance_mm": 15.0,
 }
-EDGED = checked(Design, {**PLATE.model_dump(), "chamber": BOX})
+EDGED = validate(Design, {**PLATE.model_dump(), "chamber": BOX})
 
 
 @cache
@@ -103,7 +103,7 @@ def test_what_is_in_the_way_is_named() -> None:
     with pytest.raises(InputError, match=r"the part reaches into the cavity at z = \d+"):
         analytic_cavity(gear, build_chamber(gear))
     with pytest.raises(InputError, match=r"not a circle of chamber\.diameter_mm, by 5 mm"):
-        analytic_cavity(PLATE.with_values({"chamber.diameter_mm": 60.0}), plate())
+        analytic_cavity(PLATE.changed({"chamber.diameter_mm": 60.0}), plate())
 
 
 @pytest.mark.parametrize(("name", "value"), [("rest", True), ("part_turn", {"rpm": 10.0})])
@@ -123,7 +123,7 @@ def test_impacts_are_booked_on_the_triangle_under_them() -> None:
     )
     ball, speed = np.zeros(500, dtype=np.int32), np.ones(500)
     log = ImpactLog(speed, ball, np.ones(500, dtype=np.int32), place, np.zeros((500, 3)), speed)
-    booked = on_chamber(log, plate()).triangle
+    booked = impacts_on_chamber(log, plate()).triangle
     assert (plate().tags[booked] == 0).all()
     corners = plate().vertices[plate().triangles[booked]][:, :, :2]
     side = np.roll(corners, -1, axis=1) - corners
@@ -151,7 +151,7 @@ def both(design: Design) -> list[float]:
 
 def test_the_plate_is_peened_as_in_its_mesh() -> None:
     """95 % half-widths: the two differ by less than twice their common one, but for one time in ten thousand."""
-    design = PLATE.with_values(
+    design = PLATE.changed(
         {"process.accuracy.replicas": 6, "process.accuracy.simulated_time_s": 1.0}
     )
     assert np.abs(both(design)).max() < 2.0

@@ -86,12 +86,12 @@ def test_the_axis_goes_with_the_part_wherever_it_is_posed(design: Design) -> Non
     # the gear's axis is its file's z axis: turned about x by 90 degrees it lies along -y, at half the gear's height
     np.testing.assert_allclose(axis, [0.0, -1.0, 0.0], atol=1e-15)
     np.testing.assert_allclose(point[[0, 2]], [0.0, 0.015 + 0.022], atol=1e-4)
-    lower = design.with_values({"chamber.sonotrode_distance_mm": 10.0, "part.offset_mm.0": 3.0})
+    lower = design.changed({"chamber.sonotrode_distance_mm": 10.0, "part.offset_mm.0": 3.0})
     np.testing.assert_allclose(turning_axis(lower)[0] - point, [3e-3, 0.0, -5e-3], atol=1e-12)
 
 
 def test_replicas_start_at_angles_of_their_own(design: Design, mesh) -> None:  # type: ignore[no-untyped-def]
-    few = design.with_values({"shot.mass_g": 0.2})
+    few = design.changed({"shot.mass_g": 0.2})
     one, two, again = (build_scene(few, mesh, seed).physics.turn for seed in (1, 2, 1))
     assert one == again
     assert one is not None
@@ -120,7 +120,7 @@ def test_the_shipped_study_is_about_the_turning_gear() -> None:
     assert study.design.effects.part_turn is not None
     for name, bounds in study.vary.items():
         for bound in bounds:
-            changed = study.design.with_values({name: bound})
+            changed = study.design.changed({name: bound})
             require_turnable(changed, chamber_mesh(build_chamber(changed)))
 
 

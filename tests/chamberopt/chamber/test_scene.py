@@ -6,7 +6,7 @@ import pytest
 from chamberopt.chamber.build import TAG_PART, TAG_SONOTRODE, build_chamber
 from chamberopt.chamber.scene import build_scene, chamber_mesh, replica_seed, start_velocities
 from chamberopt.common.errors import InputError
-from chamberopt.design.effects import FrictionSettings
+from chamberopt.design.effects import FrictionTable
 from chamberopt.design.load import load_design
 from chamberopt.design.shot import ShotSize
 from sim_core import Drag, Rest
@@ -69,7 +69,7 @@ def test_what_the_design_says_is_in_the_scene(design, mesh) -> None:
 
 def test_friction_is_what_the_design_says_or_absent(design, mesh) -> None:
     def friction(**said):
-        effects = design.effects.model_copy(update={"friction": FrictionSettings(**said)})
+        effects = design.effects.model_copy(update={"friction": FrictionTable(**said)})
         return build_scene(design.model_copy(update={"effects": effects}), mesh, 1).physics.friction
 
     assert build_scene(design, mesh, 1).physics.friction is None
@@ -122,8 +122,8 @@ def test_numerical_tolerances_are_what_the_design_says(design, mesh) -> None:
     plain = build_scene(drag, mesh, 1).physics
     assert plain.restitution.elastic_below == ELASTIC_BELOW
     assert plain.drag == Drag()
-    finer = {"process.accuracy.elastic_below_mm_s": 2.0, "process.accuracy.drag_piece_ms": 5.0}
-    asked = build_scene(drag.with_values(finer), mesh, 1).physics
+    finer = {"process.accuracy.elastic_below_mm_s": 2.0, "process.accuracy.drag_step_ms": 5.0}
+    asked = build_scene(drag.changed(finer), mesh, 1).physics
     assert asked.restitution.elastic_below == pytest.approx(2e-3)
     assert asked.drag == Drag(piece=5e-3)
 

@@ -118,7 +118,7 @@ def test_too_small_elements_are_refused_with_a_size_that_fits(tmp_path: Path) ->
 
 
 def with_reachable(reachable: bool, **values: float) -> Design:
-    design = load_design(GEAR).with_values(
+    design = load_design(GEAR).changed(
         {name.replace("__", "."): value for name, value in values.items()}
     )
     target = design.part.target.model_copy(update={"reachable": reachable})

@@ -16,7 +16,7 @@ from chamberopt.coverage.statistics.confidence_interval import (
     paired_difference,
 )
 from chamberopt.coverage.statistics.triangle_patches import patches
-from chamberopt.design.design import checked
+from chamberopt.design.design import validate
 from chamberopt.design.load import Design
 from chamberopt.simulation.evaluate import evaluate, jackknife, weighted_sum
 from chamberopt.simulation.replicas import MIN_REPLICAS_TO_STOP, next_replica_count
@@ -214,8 +214,12 @@ def accurate(coverage: float, most: int) -> Design:
     design = plate_design(
         process__accuracy__simulated_time_s=0.05, process__accuracy__warmup_time_s=0.02
     )
-    accuracy = {**design.process.accuracy.model_dump(), "coverage": coverage, "most_replicas": most}
-    return checked(
+    accuracy = {
+        **design.process.accuracy.model_dump(),
+        "objective_half_width": coverage,
+        "max_replicas": most,
+    }
+    return validate(
         Design,
         {**design.model_dump(), "process": {**design.process.model_dump(), "accuracy": accuracy}},
     )
@@ -228,9 +232,9 @@ def test_replicas_are_added_until_the_accuracy_holds_or_the_budget_ends() -> Non
     assert loose.objective.half_width <= 0.2
     assert len(loose.replicas) >= MIN_REPLICAS_TO_STOP
     tight = evaluate(accurate(0.001, 14), chamber, SerialExecutor())
-    assert (tight.stopped_by, len(tight.replicas)) == ("most_replicas", 14)
+    assert (tight.stopped_by, len(tight.replicas)) == ("max_replicas", 14)
     assert tight.objective.half_width > 0.001
-    assert any("most_replicas = 14" in note and "not reached" in note for note in tight.notes)
+    assert any("max_replicas = 14" in note and "not reached" in note for note in tight.notes)
     # The same replicas at once say the same: how they were added leaves no trace.
     again = evaluate(accurate(0.001, 14), chamber, SerialExecutor(), replicas=14)
     assert again.metrics == tight.metrics
@@ -238,7 +242,7 @@ def test_replicas_are_added_until_the_accuracy_holds_or_the_budget_ends() -> Non
 
 
 def test_an_accuracy_that_cannot_be_is_refused() -> None:
-    with pytest.raises(InputError, match=r"process\.accuracy\.most_replicas.*below replicas"):
+    with pytest.raises(InputError, match=r"process\.accuracy\.max_replicas.*below replicas"):
         accurate(0.01, 5)
     with pytest.raises(InputError, match=r"process\.accuracy\.coverage"):
         accurate(-0.01, 50)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from chamberopt.chamber.build import build_chamber
-from chamberopt.chamber.scene import require_countable
+from chamberopt.chamber.scene import require_ball_count
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import make_output_folder
 from chamberopt.common.parallel.executor import SerialExecutor, local_executor
@@ -342,15 +342,15 @@ def test_a_study_searches_at_search_accuracy_and_confirms_at_the_designs_own_acc
 
 
 def test_an_accuracy_asked_for_is_what_confirms(tmp_path: Path) -> None:
-    asked = GEAR.with_values({"process.accuracy.most_replicas": 60})
-    accuracy = asked.process.accuracy.model_copy(update={"coverage": 0.01})
+    asked = GEAR.changed({"process.accuracy.max_replicas": 60})
+    accuracy = asked.process.accuracy.model_copy(update={"objective_half_width": 0.01})
     asked = asked.model_copy(
         update={"process": asked.process.model_copy(update={"accuracy": accuracy})}
     )
     seen = set()
 
     def simulator(design, stream, replicas):
-        seen.add((stream, replicas, design.process.accuracy.coverage))
+        seen.add((stream, replicas, design.process.accuracy.objective_half_width))
         return judged(hill(shares(design)) + np.linspace(-0.01, 0.01, replicas or 4))
 
     run(with_search_accuracy({"coverage": 0.05}, asked), tmp_path / "out", simulator)
@@ -415,7 +415,7 @@ def test_a_corner_of_the_bounds_that_is_no_design_is_a_penalty_with_the_reason(
     low, high = np.array(list(vary.values()), dtype=float).T
 
     def simulator(design, stream, replicas):
-        require_countable(design)
+        require_ball_count(design)
         x = (np.array([design.value(name) for name in vary]) - low) / (high - low)
         return judged(PEAK - ((x - corner) ** 2).sum() + np.zeros(replicas or 8))
 
@@ -444,7 +444,7 @@ def test_every_candidate_has_the_target_that_the_start_can_reach(tmp_path: Path)
     )
 
     np.testing.assert_array_equal(result.target, build_chamber(design).part.target)
-    larger = design.with_values({"shot.diameter_mm": 4.0})
+    larger = design.changed({"shot.diameter_mm": 4.0})
     assert build_chamber(larger).part.target.sum() < 0.8 * result.target.sum()
     np.testing.assert_array_equal(build_chamber(larger, result.target).part.target, result.target)
     assert fixed_target(study()) is None

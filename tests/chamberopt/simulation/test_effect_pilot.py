@@ -17,7 +17,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import SerialExecutor, local_executor
 from chamberopt.coverage.metrics import exposed_target
 from chamberopt.coverage.statistics.confidence_interval import Estimate
-from chamberopt.design.design import checked
+from chamberopt.design.design import validate
 from chamberopt.design.load import Design
 from chamberopt.simulation import effect_pilot
 from chamberopt.simulation.effect_pilot import FIGURES, Advice, advise, with_effects_resolved
@@ -28,12 +28,14 @@ CHAMBER = build_chamber(PLATE)
 
 
 def with_effects(effects: Any) -> Design:
-    return checked(Design, {**PLATE.model_dump(), "effects": effects})
+    return validate(Design, {**PLATE.model_dump(), "effects": effects})
 
 
 def test_groups_are_what_their_formulas_say() -> None:
     speed = PLATE.sonotrode.peak_speed
-    assert dimensionless.fall(PLATE, CHAMBER) == pytest.approx(9.80665 * CHAMBER.height / speed**2)
+    assert dimensionless.gravity_speed_change(PLATE, CHAMBER) == pytest.approx(
+        9.80665 * CHAMBER.height / speed**2
+    )
     # A dilute gas: the packing does not matter, and twice the balls halve the path.
     each = 1e3 * PLATE.shot.ball_mass  # g
     thin, thinner = (plate_design(shot__mass_g=balls * each) for balls in (8, 4))
@@ -114,7 +116,7 @@ def test_each_effect_is_switched_alone_and_the_most_important_comes_first(
     assert said["gravity"].changes["mean impact speed"].value == pytest.approx(0.05)
     changed = [design.effects for design in asked if design.effects != PLATE.effects]
     assert len(changed) == 4
-    assert all(design.process.accuracy.coverage is None for design in asked)
+    assert all(design.process.accuracy.objective_half_width is None for design in asked)
 
 
 def test_a_target_of_two_triangles_has_figures_too(
@@ -129,7 +131,7 @@ def test_a_target_of_two_triangles_has_figures_too(
         "target": {"direction": (0.0, 0.0, -1.0)},
     }
     data["part"]["target"]["angle_deg"] = (0.0, 10.0)
-    lid = checked(Design, data)
+    lid = validate(Design, data)
     pretend({"gravity": 0.05}, monkeypatch)
 
     for one in advise(lid, build_chamber(lid), SerialExecutor()):

@@ -6,7 +6,7 @@ import trimesh
 
 from chamberopt.chamber.build import Chamber, Part, build_chamber
 from chamberopt.chamber.scene import build_scene, chamber_mesh, replica_seed
-from chamberopt.design.effects import FrictionSettings
+from chamberopt.design.effects import FrictionTable
 from chamberopt.simulation.resting_balls import (
     RestingBalls,
     bouncing_notes,
@@ -136,9 +136,9 @@ def test_shot_that_bounces_on_the_spot_is_said() -> None:
 def test_between_parallel_plates_friction_leaves_a_ball_no_sideways_speed() -> None:
     """What the note is about; without friction its sideways speed lasts."""
     plate = plate_design(process__accuracy__simulated_time_s=5.0)
-    plate = plate.with_values({"shot.mass_g": 1e3 * plate.shot.ball_mass})
+    plate = plate.changed({"shot.mass_g": 1e3 * plate.shot.ball_mass})
     chamber = build_chamber(plate)
-    rubs = plate.effects.model_copy(update={"friction": FrictionSettings(mu=0.3, beta0=0.2)})
+    rubs = plate.effects.model_copy(update={"friction": FrictionTable(mu=0.3, beta0=0.2)})
     for design, caught in ((plate, 0.0), (plate.model_copy(update={"effects": rubs}), 1.0)):
         end = simulate(build_scene(design, chamber_mesh(chamber), replica_seed(1, 0))).balls
         assert bouncing_share(end.velocities) == caught

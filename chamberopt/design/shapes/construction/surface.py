@@ -11,7 +11,7 @@ TAG_PART, TAG_SONOTRODE, TAG_WALL = (
 )  # and 3, 4 ...: the further sonotrodes, in the design's order
 
 
-def tag_of_further(k: int) -> int:
+def further_sonotrode_tag(k: int) -> int:
     """The tag of sonotrodes.k of a design."""
     return TAG_WALL + 1 + k
 

@@ -13,7 +13,7 @@ from chamberopt.chamber.build import TAG_SONOTRODE, Chamber, build_chamber
 from chamberopt.chamber.checks.check import describe, shot_reach, warnings
 from chamberopt.chamber.checks.ledges import ledges
 from chamberopt.chamber.reach.reach import Reach
-from chamberopt.design.design import Design, checked
+from chamberopt.design.design import Design, validate
 from chamberopt.design.load import load_design
 from sim_core import SceneError
 
@@ -22,7 +22,7 @@ DESIGNS = Path(__file__).resolve().parents[4] / "designs"
 
 @cache
 def made(name: str, **values: float) -> tuple[Design, Chamber]:
-    design = load_design(DESIGNS / f"{name}.toml").with_values(
+    design = load_design(DESIGNS / f"{name}.toml").changed(
         {k.replace("__", "."): v for k, v in values.items()}
     )
     return design, build_chamber(design)
@@ -86,13 +86,13 @@ def test_slopes_are_a_note_and_no_warning() -> None:
         "height_mm": 57.0,
         "inclination_deg": 10.0,
     }
-    leaning = checked(
+    leaning = validate(
         Design, {**data, "chamber": {**data["chamber"], "sonotrode_distance_mm": 15.0}}
     )
     assert not ledges(leaning, build_chamber(leaning))
     profile = [[24, 0], [24, 12], [28, 8], [32, 12], [32, 57]]
     data["chamber"] = {"shape": "revolve", "profile_mm": profile, "sonotrode_distance_mm": 15.0}
-    gutter = checked(Design, data)
+    gutter = validate(Design, data)
     (found,) = ledges(gutter, build_chamber(gutter))
     assert not found.level
     assert "in hollows of the wall" in found.said
@@ -129,14 +129,14 @@ def test_a_part_that_turns_down_to_the_sonotrode_is_warned_of() -> None:
     """The gear of 22 mm, 15 mm over the sonotrode, turned about a line 6.9 mm under its own axis: down to 1.2 mm."""
     eccentric = {"effects.part_turn.through_mm.1": -6.9}
     design, chamber = made("gear_turning")
-    said = " ".join(warned(design.with_values(eccentric), chamber))
+    said = " ".join(warned(design.changed(eccentric), chamber))
     assert (
         "the gap between turning part and sonotrode is 1.16 mm, narrower than a ball of 1.5 mm"
         in said
     )
     assert "turning part" not in " ".join(warned(design, chamber))
     # 5 degrees to each side, a point 22 mm under the gear's axis hardly gets lower than at rest
-    swings = design.with_values(eccentric)
+    swings = design.changed(eccentric)
     motion = swings.effects.part_turn.model_copy(
         update={"rpm": None, "angle_deg": 5.0, "frequency_hz": 1.0}
     )  # type: ignore[union-attr]
@@ -153,7 +153,7 @@ def test_balls_that_would_meet_but_are_let_through_each_other_are_warned_of() ->
     )
     assert any("effects.ball_collisions is false" in text for text in warned(through, chamber))
     assert not any("ball_collisions" in text for text in warned(design, chamber))
-    alone = through.with_values({"shot.mass_g": 1e-3 * round(1e6 * design.shot.ball_mass)})
+    alone = through.changed({"shot.mass_g": 1e-3 * round(1e6 * design.shot.ball_mass)})
     assert not any("ball_collisions" in text for text in warned(alone, chamber))
 
 

@@ -194,7 +194,7 @@ def test_smaller_balls_reach_more_of_a_gear() -> None:
 
 def test_no_impact_falls_where_no_ball_is_said_to_reach() -> None:
     values = {"process.accuracy.simulated_time_s": 0.1, "process.accuracy.warmup_time_s": 0.02}
-    design = load_design(DESIGNS / "gear.toml").with_values(values)
+    design = load_design(DESIGNS / "gear.toml").changed(values)
     mesh = chamber_mesh(build_chamber(design))
     found = reach(mesh, design.shot.diameter)
     impacts = simulate(build_scene(design, mesh, 1)).impacts

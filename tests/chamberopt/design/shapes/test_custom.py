@@ -82,13 +82,13 @@ def test_its_keys_are_checked_and_vary(folder: Path) -> None:
 
     assert {"chamber.side_mm", "chamber.top_mm"} <= set(design.numbers())
     assert design.value("chamber.top_mm") == 60.0
-    other = design.with_values({"chamber.side_mm": 70})
+    other = design.changed({"chamber.side_mm": 70})
     assert (other.chamber.side_mm, other.chamber.shape) == (70.0, str(folder / "pyramid.py"))
     with pytest.raises(
         InputError,
         match=r"chamber\.side_mm: given 5.0; allowed: a number from 10 to 500 mm \(of the",
     ):
-        design.with_values({"chamber.side_mm": 5})
+        design.changed({"chamber.side_mm": 5})
     (folder / "s.toml").write_text(
         'design = "d.toml"\n[vary]\n"chamber.side_mm" = [60, 90]\n', encoding="utf-8"
     )
@@ -126,10 +126,7 @@ def test_results_name_the_file_and_can_be_read_without_it(
     monkeypatch.setattr(viewer, "coverage_picture", lambda *_: None)
     design = load_design(folder / "d.toml")
     chamber = build_chamber(design)
-    for name, changed in (
-        ("first", design),
-        ("second", design.with_values({"chamber.side_mm": 70})),
-    ):
+    for name, changed in (("first", design), ("second", design.changed({"chamber.side_mm": 70}))):
         write_simulation(folder / name, changed, chamber, poisson_evaluation(changed, chamber))
 
     written = json.loads((folder / "first" / "result.json").read_text(encoding="utf-8"))
@@ -199,7 +196,7 @@ def test_a_file_that_is_not_there(folder: Path) -> None:
 
 
 def test_the_shipped_oblong_is_a_stadium() -> None:
-    design = load_design(ROOT / "designs" / "blade_oblong.toml").with_values(
+    design = load_design(ROOT / "designs" / "blade_oblong.toml").changed(
         {"chamber.inclination_deg": 10}
     )
     table = design.chamber
@@ -212,7 +209,7 @@ def test_the_shipped_oblong_is_a_stadium() -> None:
     round_ends = np.pi / 3 * up * (low**2 + low * high + high**2) * np.sin(np.pi / 32) * 32 / np.pi
     assert mesh.volume == pytest.approx(round_ends + straight * up * (low + high), rel=1e-9)
     with pytest.raises(InputError, match=r"chamber\.length_mm: given 44"):
-        build_chamber(design.with_values({"chamber.length_mm": 44}))
+        build_chamber(design.changed({"chamber.length_mm": 44}))
 
 
 def test_the_one_in_the_docs_works(folder: Path) -> None:

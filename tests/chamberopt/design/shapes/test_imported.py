@@ -14,7 +14,7 @@ from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.check import describe
 from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import SerialExecutor
-from chamberopt.design.design import Design, checked
+from chamberopt.design.design import Design, validate
 from chamberopt.design.load import load_design, save_design
 from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL
 from chamberopt.geometry.triangles import area_vectors, areas
@@ -129,7 +129,7 @@ def design(path: Path, placed: dict[str, Any] | None = None, **chamber: Any) -> 
     data["part"] = {"mesh": str(path), "unit": "mm", **(placed or {})}
     data["chamber"] = {"shape": "imported", "part": "PART", "sonotrode": "SONOTRODE", **chamber}
     data["shot"]["mass_g"] = 1.0
-    return checked(Design, data)
+    return validate(Design, data)
 
 
 def sound(chamber: Chamber, volume: float, distance: float) -> None:
@@ -269,7 +269,7 @@ def test_deflectors_and_wells_fit_an_imported_room_too(tmp_path: Path) -> None:
     rod = {"kind": "plate", "at_mm": [15.0, 0.0, 10.0], "size_mm": [2.0, 3.0, 4.0]}
     data = design(path, deflectors=[rod]).model_dump()
 
-    sound(build_chamber(checked(Design, data)), ROOM - BLOCK - 24.0, DRAWN)
+    sound(build_chamber(validate(Design, data)), ROOM - BLOCK - 24.0, DRAWN)
     data["sonotrodes"] = [
         {
             "at_mm": [25, 0, 10],
@@ -280,7 +280,7 @@ def test_deflectors_and_wells_fit_an_imported_room_too(tmp_path: Path) -> None:
         }
     ]
     well = 5 * 32 * 4**2 * np.sin(2 * np.pi / 64)
-    sound(build_chamber(checked(Design, data)), ROOM - BLOCK - 24.0 + well, DRAWN)
+    sound(build_chamber(validate(Design, data)), ROOM - BLOCK - 24.0 + well, DRAWN)
 
 
 def test_the_target_is_chosen_by_the_names_and_frame_of_the_file(tmp_path: Path) -> None:

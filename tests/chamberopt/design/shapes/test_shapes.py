@@ -661,15 +661,15 @@ def test_points_of_a_profile_vary(tmp_path: Path) -> None:
     assert {"chamber.profile_mm.1.0", "chamber.profile_mm.3.1", "chamber.inclination_deg"} <= set(
         design.numbers()
     )
-    wider = design.with_values({"chamber.profile_mm.1.0": 33.0})
+    wider = design.changed({"chamber.profile_mm.1.0": 33.0})
     assert wider.chamber.profile_mm[1] == (33.0, 20.0)
     with pytest.raises(InputError, match=r"chamber\.profile_mm: begins at z = 2"):
-        design.with_values({"chamber.profile_mm.0.1": 2.0})
+        design.changed({"chamber.profile_mm.0.1": 2.0})
     with pytest.raises(
         InputError,
         match=r"chamber\.profile_mm: with a ceiling at 60 mm, but the part begins 70 mm above",
     ):
-        build_chamber(design.with_values({"chamber.sonotrode_distance_mm": 70.0}))
+        build_chamber(design.changed({"chamber.sonotrode_distance_mm": 70.0}))
 
 
 def test_facets_are_a_knob_only_where_something_is_round(tmp_path: Path) -> None:

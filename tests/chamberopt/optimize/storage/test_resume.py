@@ -305,7 +305,7 @@ class TestChanges:
         assert "--out" in said
 
     def test_of_the_design(self, folder: Path) -> None:
-        heavier = study().model_copy(update={"design": GEAR.with_values({"shot.mass_g": 6.0})})
+        heavier = study().model_copy(update={"design": GEAR.changed({"shot.mass_g": 6.0})})
         assert "study.design.shot.mass_g: was 5.0, is 6.0" in self.refused(heavier, folder)
 
     def test_of_the_bounds(self, folder: Path) -> None:

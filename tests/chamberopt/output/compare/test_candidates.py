@@ -13,7 +13,7 @@ import pytest
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import SerialExecutor
-from chamberopt.design.design import Design, checked
+from chamberopt.design.design import Design, validate
 from chamberopt.design.load import load_design, save_design
 from chamberopt.output import viewer
 from chamberopt.output.compare import candidates
@@ -78,7 +78,9 @@ def test_designs_of_one_name_on_the_draws_of_the_first(
     first = made("a/plate.toml", process__seed=7, process__accuracy__replicas=5)
     second = made("b/plate.toml", shot__mass_g=6.0)
     second.write_text(
-        second.read_text().replace("[process.accuracy]", "[process.accuracy]\ncoverage = 0.01")
+        second.read_text().replace(
+            "[process.accuracy]", "[process.accuracy]\nobjective_half_width = 0.01"
+        )
     )
     compared, remarks = run([first, second], tmp_path / "out")
     assert compared.labels == ("a/plate", "b/plate")
@@ -91,7 +93,11 @@ def test_designs_of_one_name_on_the_draws_of_the_first(
         result = load_result(tmp_path / "out" / name)
         assert load_design(tmp_path / "out" / name / "design.toml") == result.design
         process = result.design.process
-        assert (process.seed, process.accuracy.replicas, process.accuracy.coverage) == (7, 5, None)
+        assert (process.seed, process.accuracy.replicas, process.accuracy.objective_half_width) == (
+            7,
+            5,
+            None,
+        )
         assert result.data["replicas"] == 5
 
 
@@ -158,7 +164,7 @@ def test_a_part_may_be_turned_and_its_unit_guessed(
 ) -> None:
     data = PLATE.model_dump()
     data["part"] |= {"unit": "guess", "offset_mm": (1.0, 0.0), "rotate_deg": (0.0, 0.0, 90.0)}
-    save_design(checked(Design, data), tmp_path / "turned.toml")
+    save_design(validate(Design, data), tmp_path / "turned.toml")
     compared, _ = run([made("straight.toml"), tmp_path / "turned.toml"], tmp_path / "out")
     assert set(compared.parameters) == {"part.offset_mm", "part.rotate_deg"}
 
@@ -168,9 +174,9 @@ def test_designs_share_the_first_ones_reachable_target(
 ) -> None:
     data = PLATE.model_dump()
     data["part"]["target"] = {"direction": (0, 0, -1), "angle_deg": (0, 10), "reachable": True}
-    save_design(checked(Design, data), tmp_path / "wide.toml")
+    save_design(validate(Design, data), tmp_path / "wide.toml")
     data["chamber"]["diameter_mm"] = 40.0
-    save_design(checked(Design, data), tmp_path / "narrow.toml")
+    save_design(validate(Design, data), tmp_path / "narrow.toml")
     wide, narrow = gathered([tmp_path / "wide.toml", tmp_path / "narrow.toml"])
     assert wide.chamber is not None
     assert narrow.chamber is not None
@@ -192,7 +198,7 @@ def test_a_result_whose_parts_file_is_gone_is_compared_but_not_simulated_again(
     shutil.copy(PLATE.part.mesh_path, parts / "plate.stl")
     data = PLATE.model_dump()
     data["part"]["mesh"] = str(parts / "plate.stl")
-    moved = checked(Design, data)
+    moved = validate(Design, data)
     write_simulation(tmp_path / "old", moved, CHAMBER, poisson_evaluation(moved, CHAMBER))
     shutil.rmtree(parts)
     assert [one.missing for one in gathered([tmp_path / "old", made("new.toml")])] == [False, True]

@@ -12,7 +12,7 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.coverage.metrics import NEVER
 from chamberopt.coverage.statistics.confidence_interval import Estimate, estimate
-from chamberopt.design.design import checked
+from chamberopt.design.design import validate
 from chamberopt.design.load import Design, load_design
 from chamberopt.output import viewer
 from chamberopt.output.compare import files, plots
@@ -202,7 +202,7 @@ def test_results_without_single_impacts_are_compared_all_the_same(tmp_path: Path
 def test_two_ways_of_counting_are_said(tmp_path: Path) -> None:
     data = PLATE.model_dump()
     data["process"]["accuracy"] |= {"coverage_model": "dents"}
-    dents = checked(Design, data)
+    dents = validate(Design, data)
     text = as_text(compare([left(tmp_path / "a", 20), left(tmp_path / "b", 20, 0, dents)]))
     assert "counted in two ways (process.accuracy.coverage_model)" in text
     assert "two ways" not in as_text(compare([tmp_path / "a", left(tmp_path / "c", 20)]))

@@ -136,7 +136,7 @@ def test_a_replica_or_a_part_that_is_not_there_is_said(result: Result, tmp_path:
         match=r"part\.mesh: .*plate\.stl: not what .*plate was simulated with; restore it",
     ):
         replica_of(replace(result, part_sha256="0" * 64))
-    other = result.design.with_values({"chamber.diameter_mm": 51})
+    other = result.design.changed({"chamber.diameter_mm": 51})
     with pytest.raises(InputError, match="chamber comes out differently now"):
         replica_of(replace(result, design=other))
 

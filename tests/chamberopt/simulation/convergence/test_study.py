@@ -30,7 +30,6 @@ from chamberopt.simulation.convergence.parameters import (
     PIECE,
     TIME,
     WARM_UP,
-    changed,
     designs,
     knobs,
 )
@@ -253,7 +252,7 @@ def test_every_rung_is_one_knob_off_the_reference() -> None:
     (_, reference), *others = ladder.items()
     assert others[-1][1] == own
     for (knob, setting), design in others[:-1]:
-        restored = changed(design, {knob: settings[knob]})
+        restored = design.changed({knob: settings[knob]})
         assert restored == reference != design
         assert setting
     assert settings[MOTION] == "sinusoidal"
@@ -341,9 +340,7 @@ def test_command_leaves_table_diagram_and_lines_to_paste(
     design = load_design(folder / "design.toml")
     for advice in told["recommendations"]:
         pasted = tomllib.loads("\n".join(advice["lines"]))["process"]["accuracy"]
-        assert changed(
-            design, {f"process.accuracy.{name}": value for name, value in pasted.items()}
-        )
+        assert design.changed({f"process.accuracy.{name}": value for name, value in pasted.items()})
 
 
 @pytest.mark.usefixtures("no_simulator")

@@ -9,11 +9,17 @@ import pytest
 import trimesh
 
 from chamberopt.chamber.build import Chamber, build_chamber
-from chamberopt.chamber.scene import build_scene, chamber_mesh, rests, scene_physics
+from chamberopt.chamber.scene import balls_can_rest, build_scene, chamber_mesh, scene_physics
 from chamberopt.common.errors import InputError
-from chamberopt.design.design import Design, checked
+from chamberopt.design.design import Design, validate
 from chamberopt.design.load import load_design, save_design
-from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL, is_sonotrode, tag_of_further
+from chamberopt.design.shapes import (
+    TAG_PART,
+    TAG_SONOTRODE,
+    TAG_WALL,
+    further_sonotrode_tag,
+    is_sonotrode,
+)
 from chamberopt.geometry.triangles import area_vectors, areas
 from chamberopt.simulation.resting_balls import find_resting_balls
 from sim_core import Resting, Vibration
@@ -34,7 +40,7 @@ def design(deflectors: Any = (), holes: Any = (), sonotrodes: Any = (), **chambe
     sizes = {"diameter_mm": DIAMETER, "height_mm": HEIGHT, "facets": FACETS, **chamber}
     data["chamber"] = {**data["chamber"], **sizes, "deflectors": deflectors, "holes": holes}
     data["sonotrodes"] = sonotrodes
-    return checked(Design, data)
+    return validate(Design, data)
 
 
 def sonotrode(**values: Any) -> dict[str, Any]:
@@ -193,7 +199,7 @@ def test_a_further_sonotrode_is_the_bottom_of_a_well(plain: Chamber, at: Any, ax
     chamber = build_chamber(made)
 
     sound(chamber)
-    tag = tag_of_further(0)
+    tag = further_sonotrode_tag(0)
     face = chamber.tags == tag
     assert area_of(chamber, tag) == pytest.approx(polygon(12.0), rel=1e-6)
     normals = -area_vectors(chamber.vertices, chamber.triangles)[face]
@@ -213,7 +219,7 @@ def test_a_further_sonotrode_is_the_bottom_of_a_well(plain: Chamber, at: Any, ax
 def test_a_ball_on_it_is_said_to_lie_there() -> None:
     chamber = build_chamber(design(sonotrodes=[sonotrode(at_mm=(0, -40, 9), axis=(0, 3, 0))]))
     on = np.full((1, 4), -1)
-    on[0, 0] = np.flatnonzero(chamber.tags == tag_of_further(0))[0]
+    on[0, 0] = np.flatnonzero(chamber.tags == further_sonotrode_tag(0))[0]
     ball = Resting(
         np.zeros(1, int), np.zeros((1, 3)), np.zeros(1), on, np.full((1, 4), -1), np.zeros(1, bool)
     )
@@ -257,13 +263,13 @@ def test_balls_do_not_rest_on_a_sonotrode_that_looks_up(tmp_path: Path) -> None:
     rod.export(tmp_path / "part.stl")
     data["part"] = {"mesh": str(tmp_path / "part.stl"), "unit": "mm"}
     up = sonotrode(at_mm=[45.0, 0.0, 10.0], axis=[-1.0, 0.0, 0.5])
-    one, two = checked(Design, data), checked(Design, {**data, "sonotrodes": [up]})
+    one, two = validate(Design, data), validate(Design, {**data, "sonotrodes": [up]})
 
-    assert not rests(one, chamber_mesh(build_chamber(one)))
+    assert not balls_can_rest(one, chamber_mesh(build_chamber(one)))
     mesh = chamber_mesh(build_chamber(two))
     facing = np.unique(mesh.tags[-area_vectors(mesh.vertices, mesh.triangles)[:, 2] > 1e-9])
     assert set(facing) == {TAG_SONOTRODE, TAG_WALL, 3}  # the wall: the well's lower side
-    assert rests(two, mesh)
+    assert balls_can_rest(two, mesh)
 
 
 OUTSIDE, WELL, AXIS = {**PLATE, "at_mm": [200.0, 0.0, 12.0]}, sonotrode(), [0.0, 0.0, 1.0]
@@ -405,7 +411,7 @@ def test_random_phases_of_several_sonotrodes_are_refused() -> None:
     with pytest.raises(
         InputError, match=r"sonotrode\.motion: given .random_phase. beside sonotrodes"
     ):
-        checked(Design, data)
+        validate(Design, data)
 
 
 def test_their_numbers_vary_and_are_saved(tmp_path: Path) -> None:
@@ -419,7 +425,7 @@ def test_their_numbers_vary_and_are_saved(tmp_path: Path) -> None:
         "sonotrodes.0.at_mm.2",
     )
 
-    other = made.with_values(dict(zip(names, (12.5, 6.0, 51.0), strict=True)))
+    other = made.changed(dict(zip(names, (12.5, 6.0, 51.0), strict=True)))
 
     assert set(names) <= set(made.numbers())
     assert [other.value(name) for name in names] == [12.5, 6.0, 51.0]
@@ -557,7 +563,7 @@ def test_too_far_and_too_many_are_refused(fittings: dict[str, Any], said: str) -
 
 def test_the_sides_of_a_plate_vary() -> None:
     asked = design([PLATE])
-    thicker = asked.with_values({"chamber.deflectors.0.size_mm.2": 5.0})
+    thicker = asked.changed({"chamber.deflectors.0.size_mm.2": 5.0})
 
     assert "chamber.deflectors.0.size_mm.2" in asked.numbers()
     assert thicker.chamber.deflectors[0].size_mm == (10.0, 8.0, 5.0)
@@ -565,4 +571,4 @@ def test_the_sides_of_a_plate_vary() -> None:
         InputError,
         match=r"size_mm: given \[10.0, 8.0, 0.0\]; each side must be from 0.1 to 2000 mm",
     ):
-        asked.with_values({"chamber.deflectors.0.size_mm.2": 0.0})
+        asked.changed({"chamber.deflectors.0.size_mm.2": 0.0})

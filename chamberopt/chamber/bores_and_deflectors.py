@@ -22,8 +22,8 @@ from chamberopt.design.shapes import (
     TAG_SONOTRODE,
     TAG_WALL,
     ShapeSurface,
+    further_sonotrode_tag,
     is_sonotrode,
-    tag_of_further,
 )
 from chamberopt.design.shapes.construction.loft import lofted
 from chamberopt.geometry.mesh_io import SurfaceError, format_point, read_part_cached
@@ -41,7 +41,7 @@ from chamberopt.geometry.triangles import area_vectors, areas, rotation_matrix
 
 if TYPE_CHECKING:
     from chamberopt.design.design import Design
-    from chamberopt.design.shapes.fitting_tables import Deflector, Hole
+    from chamberopt.design.shapes.hole_and_deflector_tables import Deflector, Hole
 
 ROUND = 64  # flat sides of a round bore or rod, their corners on the circle
 INSIDE = 1e-4  # m: how far a bore goes on in the room
@@ -133,7 +133,13 @@ def fitted(design: Design, shape: ShapeSurface) -> Cavity:
     for k, one in enumerate(design.sonotrodes):
         at, axis = np.array(one.at), np.array(one.direction)
         cavity = _with_bore(
-            cavity, at, axis, one.diameter, tag_of_further(k), f"sonotrodes.{k}", one.amplitude
+            cavity,
+            at,
+            axis,
+            one.diameter,
+            further_sonotrode_tag(k),
+            f"sonotrodes.{k}",
+            one.amplitude,
         )
     return _without(cavity, design) if design.chamber.deflectors else cavity
 
@@ -144,7 +150,7 @@ def swept_faces(design: Design, cavity: Cavity) -> list[tuple[str, Solid]]:
     tags = cavity.traced(surface, NOTHING).tags
     faces = [("sonotrode", TAG_SONOTRODE, (0.0, 0.0, 1.0), design.sonotrode.amplitude)]
     faces += [
-        (f"sonotrodes.{k}", tag_of_further(k), s.direction, s.amplitude)
+        (f"sonotrodes.{k}", further_sonotrode_tag(k), s.direction, s.amplitude)
         for k, s in enumerate(design.sonotrodes)
     ]
     return [
