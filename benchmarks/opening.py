@@ -36,14 +36,14 @@ def written(folder: Path, size: str, impacts: int) -> tuple[int, int]:
     from chamberopt.chamber.build import build_chamber
     from chamberopt.design.design import validate
     from chamberopt.design.load import load_design
-    from chamberopt.output.results.results import write_simulation
+    from chamberopt.output.save_run import save_simulation
 
     gear = load_design(ROOT / "designs" / "gear.toml")
     data = gear.model_dump()
     data["part"]["mesh"] = str(gear_file(folder, size))
     design = validate(type(gear), data)
     chamber = build_chamber(design)
-    write_simulation(folder / "result", design, chamber, evaluation(design, chamber, impacts))
+    save_simulation(folder / "result", design, chamber, evaluation(design, chamber, impacts))
     return len(chamber.part.triangles), int(np.argmax(chamber.exposed_area * chamber.part.target))
 
 

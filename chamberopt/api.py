@@ -25,7 +25,7 @@ from chamberopt.optimize.study import Study
 
 if TYPE_CHECKING:
     from chamberopt.common.progress import Progress
-    from chamberopt.output.results.results import Result
+    from chamberopt.output.results.load import Result
 
 __all__ = ["Design", "Study", "load_design", "load_study", "optimise", "show", "simulate"]
 
@@ -47,7 +47,8 @@ def simulate(
     from chamberopt.chamber.analytic import analytic_cavity
     from chamberopt.chamber.build import build_chamber
     from chamberopt.common.parallel.executor import local_executor
-    from chamberopt.output.results.results import load_result, write_simulation
+    from chamberopt.output.results.load import load_result
+    from chamberopt.output.save_run import save_simulation
     from chamberopt.simulation.effect_pilot import with_effects_resolved
     from chamberopt.simulation.evaluate import evaluate
 
@@ -61,7 +62,7 @@ def simulate(
         [
             *map(str, advice),
             *evaluation.notes,
-            *write_simulation(out, design, chamber, evaluation, advice),
+            *save_simulation(out, design, chamber, evaluation, advice),
         ]
     )
     return load_result(out)
@@ -80,7 +81,8 @@ def optimise(
     from chamberopt.common.parallel.executor import local_executor
     from chamberopt.optimize.run_study import search_and_confirm
     from chamberopt.optimize.storage.study_folder import open_study_folder
-    from chamberopt.output.results.results import load_result, write_study
+    from chamberopt.output.results.load import load_result
+    from chamberopt.output.save_run import save_study
     from chamberopt.simulation.effect_pilot import with_effects_resolved
 
     _require("study", study, Study, "load_study")
@@ -92,19 +94,18 @@ def optimise(
             )
             found = search_and_confirm(study, record, executor, progress)
             _warn(
-                [*map(str, advice), *found.best.evaluation.notes, *write_study(out, found, advice)]
+                [*map(str, advice), *found.best.evaluation.notes, *save_study(out, found, advice)]
             )
     return load_result(out)
 
 
 def show(result: Result, screenshot: str | Path | None = None) -> None:
     """The part coloured by coverage in its chamber: in a window, or as a picture in the file ``screenshot``."""
-    from chamberopt.output.results.results import Result
-    from chamberopt.output.results.subject import subject
-    from chamberopt.output.viewer import Look, inspect
+    from chamberopt.output.results.load import Result
+    from chamberopt.output.viewer import ViewState, inspect, result_info
 
     _require("result", result, Result, "simulate")
-    inspect([subject(result)], Look(), screenshot)
+    inspect([result_info(result)], ViewState(), screenshot)
 
 
 def _require(name: str, given: object, kind: type, maker: str) -> None:

@@ -19,7 +19,8 @@ ORDER = {
     "triangle_fields time_curve effect_pilot convergence",
     "chamberopt/optimize": "study load_study+constraints+search+storage "
     "sensitivity+evaluate_candidate candidates run_study pareto+run_sweep",
-    "chamberopt/output": "vtp_files plots resimulate+viewer+results report+export+compare",
+    "chamberopt/output": "vtp_files+disc_averages plots results resimulate viewer "
+    "save_run report+export+compare",
     "sim_core": "errors numerics balls effects geometry motion impulses scene contact detect loop",
 }
 # Only this file or package imports the library.
@@ -27,8 +28,8 @@ ONE_IMPORTER = {
     "sklearn": "optimize/search/gaussian_process.py",
     "manifold3d": "geometry/solids.py",
     "nlopt": "optimize/search/nlopt_search.py",
-    "pyvista": "output/",
-    "vtk": "output/",
+    "pyvista": "output/vtp_files.py",
+    "vtk": "output/viewer/",
     "distributed": "common/parallel/dask_cluster.py",
     "dask": "common/parallel/dask_cluster.py",
     "plotly": "output/report/",

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from chamberopt.output.viewer import why_no_pictures
+from chamberopt.output.viewer import missing_opengl
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -18,7 +18,7 @@ SNIPPETS = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
 def test_the_readmes_python_runs_as_printed(snippet: str, tmp_path: Path) -> None:
     for folder in ("designs", "studies"):
         (tmp_path / folder).symlink_to(ROOT / folder)
-    if why_no_pictures():  # the only line that needs OpenGL
+    if missing_opengl():  # the only line that needs OpenGL
         snippet = re.sub(r"chamberopt\.show\(.*", "", snippet)
     answer = subprocess.run(
         [sys.executable, "-c", snippet], cwd=tmp_path, capture_output=True, text=True, check=False

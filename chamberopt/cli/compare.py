@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.design.load import Design
     from chamberopt.output.compare.candidates import Candidate
-    from chamberopt.output.results.results import Result
+    from chamberopt.output.results.load import Result
     from chamberopt.simulation.effect_pilot import Advice
     from sim_core import AnalyticCavity
 

@@ -51,7 +51,7 @@ def _claimed(name: str) -> Path:
             if folder.exists():  # another command was faster
                 continue
         except OSError:
-            pass  # new_folder says what is wrong
+            pass  # make_output_folder says what is wrong
         return make_output_folder(folder)
     raise AssertionError("there is always a next number")
 

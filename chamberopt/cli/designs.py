@@ -53,7 +53,7 @@ def check(
     from chamberopt.geometry.mesh_io import SurfaceError
     from chamberopt.optimize.load_study import load
     from chamberopt.optimize.study import Study
-    from chamberopt.output.viewer import write_chamber
+    from chamberopt.output.vtp_files import write_chamber
 
     loaded = load(file)
     design = loaded.design if isinstance(loaded, Study) else loaded
@@ -108,7 +108,7 @@ def simulate(
     from chamberopt.common.parallel.executor import open_executor
     from chamberopt.common.progress import progress_bar
     from chamberopt.design.load import load_design
-    from chamberopt.output.results.results import write_simulation
+    from chamberopt.output.save_run import save_simulation
     from chamberopt.simulation.evaluate import evaluate
 
     asked = load_design(design)
@@ -120,7 +120,7 @@ def simulate(
         compiled(candidate, chamber, cavity)
         with progress_bar("replicas") as progress:
             evaluation = evaluate(candidate, chamber, executor, progress, cavity=cavity)
-        remark(write_simulation(folder, candidate, chamber, evaluation, advice, warned))
+        remark(save_simulation(folder, candidate, chamber, evaluation, advice, warned))
     notes = (*map(str, advice), *chamber.notes, *evaluation.notes)
     say([*estimates(evaluation), *notes_said(notes)], folder, json)
 
@@ -158,12 +158,12 @@ def accuracy(
 
 def _picture_of_fault(fault: SurfaceError, screenshot: Path) -> None:
     """What is wrong with a part's surface, in red; the message itself follows on stderr."""
-    from chamberopt.output.viewer import part_picture
+    from chamberopt.output.viewer import draw_part
 
     text = fill(str(fault), 110)
     remark(
         [
-            part_picture(fault.corners, text, screenshot, edges=fault.edges)
+            draw_part(fault.corners, text, screenshot, edges=fault.edges)
             or f"picture in {screenshot}"
         ]
     )
@@ -172,7 +172,7 @@ def _picture_of_fault(fault: SurfaceError, screenshot: Path) -> None:
 def _picture_of_target(chamber: Chamber, found: Reach, screenshot: Path) -> None:
     """The part with its target, and what of it the shot does not reach."""
     from chamberopt.chamber.reach.reach import part_share
-    from chamberopt.output.viewer import part_picture
+    from chamberopt.output.viewer import draw_part
 
     part = chamber.part
     missed = part.target & (part_share(found, chamber.source, len(part.triangles)) <= 0.5)
@@ -180,5 +180,5 @@ def _picture_of_target(chamber: Chamber, found: Reach, screenshot: Path) -> None
         ", in red where hardly a ball can touch it" if missed.any() else ""
     )
     corners = part.vertices[part.triangles]
-    drawn = part_picture(corners, title, screenshot, part.target, missed=missed, chamber=chamber)
+    drawn = draw_part(corners, title, screenshot, part.target, missed=missed, chamber=chamber)
     remark([drawn or f"picture in {screenshot}"])

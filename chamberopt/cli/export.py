@@ -24,7 +24,7 @@ from chamberopt.output.export.formats import (
 )
 
 if TYPE_CHECKING:
-    from chamberopt.output.results.results import Result
+    from chamberopt.output.results.load import Result
 
 To = Annotated[
     list[str],
@@ -55,7 +55,7 @@ def export(
     out
         Folder for the files, new or empty; or, of a single format, a file that is not there yet.
     """
-    from chamberopt.output.results.results import load_result
+    from chamberopt.output.results.load import load_result
 
     formats = asked_formats(to)
     again = [name for name, one in formats.items() if one.write is None]
@@ -108,12 +108,12 @@ def _impacts(
     from chamberopt.common.parallel.executor import open_executor
     from chamberopt.common.progress import progress_bar
     from chamberopt.output.export.impacts_table import require_writable, write_impacts
-    from chamberopt.output.resimulate.impacts import asked_replicas
-    from chamberopt.output.resimulate.rebuild import ground_of
+    from chamberopt.output.resimulate.impacts import replica_count
+    from chamberopt.output.resimulate.rebuild import rebuild_chamber
 
     require_writable(files)
-    fewer = asked_replicas(result, replicas) < result.data["replicas"]
-    ground = ground_of(result)
+    fewer = replica_count(result, replicas) < result.data["replicas"]
+    ground = rebuild_chamber(result)
     compiled(result.design, ground.chamber, ground.cavity)
     with open_executor(workers, None) as executor, progress_bar("replicas") as progress:
         impacts = write_impacts(

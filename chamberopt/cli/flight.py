@@ -11,8 +11,8 @@ from chamberopt.cli.options import app
 from chamberopt.common.errors import InputError
 
 if TYPE_CHECKING:
-    from chamberopt.output.resimulate.replica import Replayed
-    from chamberopt.output.results.results import Result
+    from chamberopt.output.resimulate.rebuild import Replica
+    from chamberopt.output.results.load import Result
 
 Size = Annotated[tuple[int, int], Parameter(negative="", help="Width and height in pixels.")]
 View = Annotated[
@@ -48,14 +48,14 @@ def replay(
         Pictures a second: how slowly it is played.
     """
     from chamberopt.output.resimulate.flight import flight
-    from chamberopt.output.viewer import eye_at
+    from chamberopt.output.viewer import parse_view
     from chamberopt.output.viewer.images.film import film_path, require_playable
-    from chamberopt.output.viewer.images.flight_film import EYE
-    from chamberopt.output.viewer.images.flight_film import replay as draw_replay
+    from chamberopt.output.viewer.images.replay_film import EYE
+    from chamberopt.output.viewer.images.replay_film import replay as draw_replay
 
     path = film_path(film)
     require_playable(fps, size, frames, path)
-    eye = eye_at(view) if view else None
+    eye = parse_view(view) if view else None
     loaded, replayed = _again(result, replica)
     seen = flight(replayed, from_s, 1e-3 * span_ms, frames)
     trouble = draw_replay(loaded.folder, seen, path, fps, size, eye or EYE)
@@ -85,12 +85,12 @@ def dents(
         Longer side of what is drawn from one side.
     """
     from chamberopt.output.resimulate.dent_map import coverage, default_views, dent_map, peened
-    from chamberopt.output.viewer import eye_at
+    from chamberopt.output.viewer import parse_view
     from chamberopt.output.viewer.images.dent_map import FINER, dent_picture, require_pixels
     from chamberopt.output.viewer.subprocess_drawing import picture_path
 
     path = picture_path(picture, "")
-    eye = eye_at(view) if view else None
+    eye = parse_view(view) if view else None
     require_pixels(pixels)
     loaded, replayed = _again(result, replica)
     design, chamber = replayed.design, replayed.chamber
@@ -111,13 +111,13 @@ def dents(
     print(f"{said}\npicture in {path}")
 
 
-def _again(folder: Path, replica: int) -> tuple[Result, Replayed]:
+def _again(folder: Path, replica: int) -> tuple[Result, Replica]:
     """A result and one of its replicas, ready to be simulated again."""
     from chamberopt.cli.prepare import compiled
-    from chamberopt.output.resimulate.rebuild import replica_of
-    from chamberopt.output.results.results import load_result
+    from chamberopt.output.resimulate.rebuild import rebuild_replica
+    from chamberopt.output.results.load import load_result
 
     loaded = load_result(folder)
-    replayed = replica_of(loaded, replica)
+    replayed = rebuild_replica(loaded, replica)
     compiled(replayed.design, replayed.chamber, replayed.cavity)
     return loaded, replayed

@@ -27,7 +27,7 @@ def inspect(
     json: Json = False,
     out: Out = None,
 ) -> None:
-    """Look at results in 3D: each part coloured triangle by triangle in its chamber. Key h lists what the window can.
+    """ViewState at results in 3D: each part coloured triangle by triangle in its chamber. Key h lists what the window can.
 
     Every option says what the window, or a picture, begins with. --out: a picture goes there.
 
@@ -59,12 +59,11 @@ def inspect(
         Write a page that shows the parts in a browser, with switches of its own.
     """
     from chamberopt.output import viewer
-    from chamberopt.output.results.results import load_result, summary
-    from chamberopt.output.results.subject import subject
+    from chamberopt.output.results.load import load_result, summary
 
-    look = viewer.Look(
-        quantity=quantity, time_s=time_s, below=below, cut=viewer.cut_across(clip) if clip else None, cut_part=cut_part,
-        chamber=chamber, triangle=triangle, eye=viewer.eye_at(view) if view else None,
+    look = viewer.ViewState(
+        quantity=quantity, time_s=time_s, below=below, cut=viewer.parse_clip(clip) if clip else None, cut_part=cut_part,
+        chamber=chamber, triangle=triangle, eye=viewer.parse_view(view) if view else None,
     )  # fmt: skip
     if not results:
         raise InputError("inspect: requires an argument: one or more results folders")
@@ -79,7 +78,7 @@ def inspect(
     if html is not None:
         from chamberopt.output.report import write_part_page
 
-        if look != viewer.Look():
+        if look != viewer.ViewState():
             raise InputError(
                 "inspect: the page of --html has switches of its own; leave out what says how to look"
             )
@@ -87,9 +86,9 @@ def inspect(
     if screenshot is None and (off_screen or out is not None):
         with results_folder(out, "inspect") as folder:
             screenshot = folder / "inspect.png"
-            viewer.inspect([subject(one) for one in loaded], look, screenshot)
+            viewer.inspect([viewer.result_info(one) for one in loaded], look, screenshot)
     elif html is None or screenshot is not None:
-        viewer.inspect([subject(one) for one in loaded], look, screenshot)
+        viewer.inspect([viewer.result_info(one) for one in loaded], look, screenshot)
     if json:
         first = {**loaded[0].data, "folder": str(loaded[0].folder)} if len(loaded) == 1 else {}
         written = {"screenshot": _text(screenshot), "page": _text(html)}

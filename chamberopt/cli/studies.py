@@ -85,7 +85,7 @@ def _run(
     from chamberopt.chamber.build import build_chamber
     from chamberopt.common.progress import progress_bar
     from chamberopt.optimize.run_study import search_and_confirm
-    from chamberopt.output.results.results import write_study
+    from chamberopt.output.save_run import save_study
 
     question, advice = record.with_effects_resolved(
         lambda design: settled_effects(design, start, executor)
@@ -104,7 +104,7 @@ def _run(
     warned = warn(
         result.best.design, build_chamber(result.best.design, result.target), " of the best design"
     )
-    remark(write_study(record.folder, result, advice, warned))
+    remark(save_study(record.folder, result, advice, warned))
     lines = [f"{'parameter':34}{'start':>12}{'best':>12}"]
     lines += [
         f"{name:34}{question.design.value(name):12.5g}{result.best.design.value(name):12.5g}"
@@ -148,7 +148,7 @@ def _run(
 
 def _finished(folder: Path, json: bool) -> None:
     """What `run` says of a study that needs nothing more."""
-    from chamberopt.output.results.results import load_result, summary
+    from chamberopt.output.results.load import load_result, summary
 
     remark(
         [

@@ -23,8 +23,9 @@ from chamberopt.output.compare.inputs import (
     require_several,
 )
 from chamberopt.output.compare.parameters import labels
-from chamberopt.output.results.results import Result, load_result, write_simulation
-from chamberopt.output.viewer import COVERAGE, read_surface
+from chamberopt.output.results.load import Result, load_result
+from chamberopt.output.save_run import save_simulation
+from chamberopt.output.vtp_files import COVERAGE, read_surface
 from chamberopt.simulation.evaluate import evaluate
 
 if TYPE_CHECKING:
@@ -139,7 +140,7 @@ def _simulate(
             design, one.chamber, executor, progress, objective_name=draws.objective_name, stream=draws.stream,
             replicas=draws.replicas, cavity=cavity,
         )  # fmt: skip
-    remarks = write_simulation(folder, design, one.chamber, evaluation, advice)
+    remarks = save_simulation(folder, design, one.chamber, evaluation, advice)
     return load_result(folder), [f"{one.label}: {text}" for text in (*map(str, advice), *remarks)]
 
 

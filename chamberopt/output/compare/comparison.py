@@ -12,7 +12,7 @@ from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.output.compare.difference import Difference, confidence_of_each, difference
 from chamberopt.output.compare.inputs import require_one_time, require_same_part, require_several
 from chamberopt.output.compare.parameters import differing, labels
-from chamberopt.output.results.results import Result, load_result
+from chamberopt.output.results.load import Result, load_result
 
 TIME = "time_to_98_s"
 

@@ -8,8 +8,7 @@ import numpy as np
 
 from chamberopt.coverage.part_impacts import Hits, HitsByTriangle, load_matching_hits
 from chamberopt.geometry.triangles import area_vectors
-from chamberopt.output.results.results import Result
-from chamberopt.output.results.subject import own_coverage
+from chamberopt.output.results.load import Result, load_coverage
 
 
 @dataclass(frozen=True)
@@ -44,7 +43,7 @@ class Covered:
 
 def covered(result: Result) -> Covered:
     """Read a results folder. Raises InputError for files gone or damaged."""
-    surface = own_coverage(result)
+    surface = load_coverage(result)
     points, triangles = np.asarray(surface.points, dtype=float), np.asarray(surface.regular_faces)
     vectors = area_vectors(points, triangles)
     area = np.linalg.norm(vectors, axis=1)

@@ -15,13 +15,9 @@ from chamberopt.output.compare.inputs import require_same_triangles
 from chamberopt.output.compare.local import LocalDifference, local_difference
 from chamberopt.output.compare.plots import distributions_picture
 from chamberopt.output.compare.table import as_text
-from chamberopt.output.results.results import summary
-from chamberopt.output.viewer import (
-    COVERAGE,
-    coverage_picture,
-    difference_picture,
-    write_differences,
-)
+from chamberopt.output.results.load import summary
+from chamberopt.output.viewer import draw_coverage, draw_difference, write_differences
+from chamberopt.output.vtp_files import COVERAGE
 
 COMPARE, DIFFERENCE = "compare.json", "difference.vtp"
 
@@ -72,7 +68,7 @@ def comparison_picture(picture: str | Path, comparison: Comparison) -> str | Non
         f"{label}\n{summary(result)}"
         for label, result in zip(comparison.labels, comparison.results, strict=True)
     ]
-    return coverage_picture([result.folder for result in comparison.results], titles, picture)
+    return draw_coverage([result.folder for result in comparison.results], titles, picture)
 
 
 def _draw_differences(
@@ -87,4 +83,4 @@ def _draw_differences(
         over = f"; averaged over {one.reach:.1f} mm" if one.reach else ""
         shares = f"more on {100.0 * one.more:.0f} %, less on {100.0 * one.less:.0f} % of the target{over}"
         titles.append(f"{label} less {first}\n{shares}")
-    return difference_picture(folder / DIFFERENCE, titles, folder / "difference.png")
+    return draw_difference(folder / DIFFERENCE, titles, folder / "difference.png")

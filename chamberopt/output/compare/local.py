@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from chamberopt.output.compare.covered import Covered
-from chamberopt.output.viewer.drawn_part import DENTS_SHOWN, over_discs, reach_wanted
+from chamberopt.output.disc_averages import DENTS_PER_DISC, averaging_radius, disc_sums
 from chamberopt.simulation.triangle_fields import coverage_bounds
 
 DENT = np.pi / 4.0  # area of a dent of diameter 1
 DENTS = (
-    4.0 * DENTS_SHOWN
+    4.0 * DENTS_PER_DISC
 )  # on a disc: a difference of two has more noise than either, and is smaller
 
 
@@ -48,10 +48,10 @@ def local_difference(first: Covered, other: Covered) -> LocalDifference:
     target = first.target
     centre, normal = first.centre[target], first.normal[target]
     reach = max(
-        reach_wanted(centre, one.exposed[target], one.dents[target], DENTS)
+        averaging_radius(centre, one.exposed[target], one.dents[target], DENTS)
         for one in (first, other)
     )
-    over = over_discs(centre, normal, reach)
+    over = disc_sums(centre, normal, reach)
     a, a_low, a_high = _with_interval(first, target, over)
     b, b_low, b_high = _with_interval(other, target, over)
     value = b - a

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from chamberopt.design.shapes.base import is_custom
 
 if TYPE_CHECKING:
-    from chamberopt.output.results.results import Result
+    from chamberopt.output.results.load import Result
 
 # How many replicas there were says more than what was to decide it.
 REPLICAS, DECIDED_BY = (

@@ -13,6 +13,7 @@ from chamberopt.coverage.metrics import FULL_COVERAGE, NEVER
 from chamberopt.output.compare.comparison import TIME, Comparison
 from chamberopt.output.compare.distributions import Distributions, Histogram
 from chamberopt.output.compare.table import two_digits
+from chamberopt.output.disc_averages import DENTS_PER_DISC
 from chamberopt.output.plots.study_and_accuracy import (
     BLUE,
     GREEN,
@@ -22,7 +23,6 @@ from chamberopt.output.plots.study_and_accuracy import (
     SKY,
     YELLOW,
 )
-from chamberopt.output.viewer.drawn_part import DENTS_SHOWN
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -61,7 +61,7 @@ def _coverage(axes: Axes, comparison: Comparison, found: Distributions) -> None:
         for label, mean, dents in zip(comparison.labels, means, found.dents, strict=True)
     ]
     _steps(axes, found.coverage, said, "coverage of a triangle [%]", "target area")
-    if min(found.dents) < DENTS_SHOWN:
+    if min(found.dents) < DENTS_PER_DISC:
         axes.set_title(
             "few dents were simulated: their own scatter widens this", loc="left", fontsize=9
         )

@@ -15,8 +15,8 @@ import numpy as np
 from chamberopt.chamber.bores_and_deflectors import fitting_names
 from chamberopt.common.files import atomic_write, make_output_folder
 from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL, further_sonotrode_tag
-from chamberopt.output.results.results import load_result
-from chamberopt.output.viewer import CHAMBER, read_surface
+from chamberopt.output.results.load import load_result
+from chamberopt.output.vtp_files import CHAMBER, read_surface
 
 NAMES = {TAG_PART: "part", TAG_SONOTRODE: "sonotrode", TAG_WALL: "wall"}
 GREY, GLASS, ORANGE = "#B9BEC4", "#9DB7CC", "#E08A2E"

@@ -20,9 +20,8 @@ from chamberopt.output.export.elements import (
     of_other_triangles,
 )
 from chamberopt.output.export.nastran import nastran_deck
-from chamberopt.output.results.results import Result, load_result
-from chamberopt.output.results.subject import own_coverage
-from chamberopt.output.viewer import COVERAGE
+from chamberopt.output.results.load import Result, load_coverage, load_result
+from chamberopt.output.vtp_files import COVERAGE
 
 DECKS: dict[str, Callable[[list[str], PartMesh, ElementFields], dict[str, str]]] = {
     "abaqus": abaqus_deck,
@@ -51,7 +50,7 @@ def write_fields(folder: str | Path, to: str, path: str | Path) -> list[str]:
             f"{path}: is no file in a folder that is there; make the folder, or give a file's name"
         )
     result = load_result(folder)
-    surface = own_coverage(result)
+    surface = load_coverage(result)
     if "element" not in surface.cell_data:
         raise InputError(
             f"{result.folder / COVERAGE}: from a version that kept no element numbers; simulate again"

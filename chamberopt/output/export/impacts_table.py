@@ -18,11 +18,11 @@ from chamberopt.common.versions import versions
 from chamberopt.output.export.formats import FrameName
 from chamberopt.output.export.frame import SAID, Frame, frame_of
 from chamberopt.output.export.impact_columns import Column, columns_of, rows
-from chamberopt.output.resimulate.impacts import Ground, asked_replicas, impacts_of
+from chamberopt.output.resimulate.impacts import RebuiltChamber, replica_count, simulate_impacts
 
 if TYPE_CHECKING:
     from chamberopt.common.progress import Progress
-    from chamberopt.output.results.results import Result
+    from chamberopt.output.results.load import Result
 
 PARQUET = ".parquet"
 ABOUT = "chamberopt"  # key of a Parquet file's metadata
@@ -35,7 +35,7 @@ Put = Callable[[Sequence[np.ndarray]], None]
 
 
 def write_impacts(
-    files: Sequence[Path], result: Result, ground: Ground, executor: Executor, *, frame: FrameName = "part",
+    files: Sequence[Path], result: Result, ground: RebuiltChamber, executor: Executor, *, frame: FrameName = "part",
     replicas: int | None = None, progress: Progress | None = None,
 ) -> int:  # fmt: skip
     """Simulate the result again, write all its impacts into each file, by its ending; how many there are.
@@ -46,11 +46,11 @@ def write_impacts(
     design, chamber = result.design, ground.chamber
     seen = frame_of(frame, design, chamber)
     columns = columns_of(seen)
-    about = _about(result, ground, seen, columns, asked_replicas(result, replicas))
+    about = _about(result, ground, seen, columns, replica_count(result, replicas))
     written = 0
     with ExitStack() as stack:
         puts = [stack.enter_context(_sink(file)(file, columns, about)) for file in files]
-        for impacts in impacts_of(result, ground, executor, replicas, progress):
+        for impacts in simulate_impacts(result, ground, executor, replicas, progress):
             for values in rows(impacts, chamber, design, seen, columns):
                 for put in puts:
                     put(values)
@@ -78,7 +78,7 @@ def _pyarrow() -> Any:
 
 
 def _about(
-    result: Result, ground: Ground, frame: Frame, columns: Sequence[Column], replicas: int
+    result: Result, ground: RebuiltChamber, frame: Frame, columns: Sequence[Column], replicas: int
 ) -> dict[str, Any]:
     """What to know of the rows: where they come from, and in what they are written."""
     design = result.design

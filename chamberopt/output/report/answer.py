@@ -10,7 +10,7 @@ from chamberopt.output.report.words import goal_words
 
 if TYPE_CHECKING:
     from chamberopt.coverage.statistics.confidence_interval import Estimate
-    from chamberopt.output.results.results import Result
+    from chamberopt.output.results.load import Result
 
 
 def answer(result: Result, start: Result | None, gain: Estimate | None) -> str:

@@ -9,7 +9,7 @@ from chamberopt.output.report.formatting import estimated, plain
 from chamberopt.output.report.words import goal_words, metric_words
 
 if TYPE_CHECKING:
-    from chamberopt.output.results.results import Result
+    from chamberopt.output.results.load import Result
 
 DOING = {
     "chamber": "to build the chamber",

@@ -21,10 +21,10 @@ from chamberopt.output.report.answer import answer
 from chamberopt.output.report.cost import accuracy_reached, price_paid
 from chamberopt.output.report.influence import influence
 from chamberopt.output.report.words import goal_words, metric_words
-from chamberopt.output.results.results import load_result
+from chamberopt.output.results.load import load_result
 
 if TYPE_CHECKING:
-    from chamberopt.output.results.results import Result
+    from chamberopt.output.results.load import Result
 
 START = "start"
 

@@ -17,7 +17,7 @@ from chamberopt.output.report import html
 from chamberopt.output.report.facts import START, design_file, facts
 from chamberopt.output.report.part3d import Scene, part_scene, quantities
 from chamberopt.output.report.sections import sections
-from chamberopt.output.results.results import load_result, summary
+from chamberopt.output.results.load import load_result, summary
 
 REPORT = "report.html"
 GENERATOR = '<meta name="generator" content="chamberopt'

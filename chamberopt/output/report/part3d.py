@@ -16,10 +16,9 @@ import numpy as np
 
 from chamberopt.design.shapes import TAG_PART, TAG_WALL, is_sonotrode
 from chamberopt.geometry.triangles import area_vectors
-from chamberopt.output.results.results import Result
-from chamberopt.output.results.subject import own_coverage
-from chamberopt.output.viewer import CHAMBER, read_surface
-from chamberopt.output.viewer.drawn_part import averaged
+from chamberopt.output.disc_averages import average_over_discs
+from chamberopt.output.results.load import Result, load_coverage
+from chamberopt.output.vtp_files import CHAMBER, read_surface
 from chamberopt.simulation.triangle_fields import QUANTITIES
 
 # A triangle costs about 80 bytes of the page: with this many it stays below 60 MB and opens.
@@ -48,7 +47,7 @@ def part_scene(result: Result, title: str, most: int = MOST_TRIANGLES) -> Scene:
 
     most: triangles that may be drawn; of a larger part the target alone is, and nothing where that is still too large.
     """
-    surface = own_coverage(result)
+    surface = load_coverage(result)
     points, triangles = np.asarray(surface.points, dtype=float), np.asarray(surface.regular_faces)
     fields = {name: np.asarray(surface.cell_data[name]) for name in surface.cell_data}
     corners = points[triangles]
@@ -57,7 +56,7 @@ def part_scene(result: Result, title: str, most: int = MOST_TRIANGLES) -> Scene:
     target = fields["target"] > 0
     seen = target & (fields["exposed_area_mm2"] > 0.0)
     unit = vectors[seen] / np.maximum(area[seen], 1e-300)[:, None]
-    density, reach = averaged(
+    density, reach = average_over_discs(
         corners[seen].mean(axis=1),
         unit,
         *(fields[name][seen] for name in ("dent_density", "exposed_area_mm2", "dents")),

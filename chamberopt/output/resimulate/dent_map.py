@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from chamberopt.chamber.build import Chamber
-    from chamberopt.output.resimulate.replica import Replayed
+    from chamberopt.output.resimulate.rebuild import Replica
 
 PAIRS = 1_000_000  # of pixel and dent looked at together: 200 MB
 MOST_DENTS = 20_000  # looked at together
@@ -60,7 +60,7 @@ class DentMap:
     triangle: np.ndarray
 
 
-def peened(replayed: Replayed, time: float) -> Dents:
+def peened(replayed: Replica, time: float) -> Dents:
     """The dents of one peening of ``time`` [s], a replica simulated as far as that, beyond where the result ended, too.
 
     Raises InputError for a time too long to simulate, and sim_core.SimulationError.

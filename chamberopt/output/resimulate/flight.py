@@ -14,7 +14,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.coverage.dents import Dents, dents_on_part
 
 if TYPE_CHECKING:
-    from chamberopt.output.resimulate.replica import Replayed
+    from chamberopt.output.resimulate.rebuild import Replica
     from sim_core import ImpactLog, PartRotation, Vibration
 
 SHORTEST = 1e-6  # s
@@ -46,7 +46,7 @@ class Flight:
     part_triangle: np.ndarray
 
 
-def flight(replayed: Replayed, start: float, span: float, frames: int, trail: int = 4) -> Flight:
+def flight(replayed: Replica, start: float, span: float, frames: int, trail: int = 4) -> Flight:
     """Frames of ``span`` [s] from ``start`` [s after the warm-up], the first and last at its ends, evenly spaced.
 
     trail: exact places of each ball noted from frame to frame, the frame's own among them. Raises InputError for what

@@ -18,13 +18,13 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import core_count, share
 from chamberopt.common.progress import Progress
 from chamberopt.coverage.coverage_from_impacts import Tally, mean_speed_per_triangle, tally_impacts
-from chamberopt.output.resimulate.rebuild import REMEDY, Ground, made_by
-from chamberopt.output.viewer import COVERAGE, read_surface
+from chamberopt.output.resimulate.rebuild import REMEDY, RebuiltChamber, made_by
+from chamberopt.output.vtp_files import COVERAGE, read_surface
 from chamberopt.simulation.replicas import run_in_order, simulate_seed
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
-    from chamberopt.output.results.results import Result
+    from chamberopt.output.results.load import Result
     from sim_core import ImpactLog
 
 AT_ONCE = 4e6  # impacts in memory, some 200 bytes each while they are simulated
@@ -43,20 +43,20 @@ class ReplicaImpacts:
     part_triangle: np.ndarray
 
 
-def impacts_of(
+def simulate_impacts(
     result: Result,
-    ground: Ground,
+    ground: RebuiltChamber,
     executor: Executor,
     replicas: int | None = None,
     progress: Progress | None = None,
 ) -> Iterator[ReplicaImpacts]:
     """Every impact on the part, one replica after another; only a few replicas are in memory at a time.
 
-    ground: `ground_of` the result. replicas: only so many, the first ones. After the last of all replicas InputError
+    ground: `rebuild_chamber` the result. replicas: only so many, the first ones. After the last of all replicas InputError
     unless they gave the result's own figures, triangle by triangle, to the last bit; of fewer that cannot be said.
     """
     design, chamber = result.design, ground.chamber
-    count = asked_replicas(result, replicas)
+    count = replica_count(result, replicas)
     seed, stream = result.seeds
     setting = share(executor, (design, chamber, ground.cavity or chamber_mesh(chamber)))
     logs = run_in_order(_log, setting, seed, executor, stream, range(count), _ahead(result))
@@ -73,7 +73,7 @@ def impacts_of(
         _require_same_figures(result, reduce(add, tallies))
 
 
-def asked_replicas(result: Result, replicas: int | None) -> int:
+def replica_count(result: Result, replicas: int | None) -> int:
     """How many replicas: all of the result's unless fewer are asked for. InputError for more, or for none."""
     there = int(result.data["replicas"])
     if replicas is not None and not 1 <= replicas <= there:

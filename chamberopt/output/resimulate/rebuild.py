@@ -9,31 +9,45 @@ from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 
-from chamberopt.chamber.analytic import analytic_cavity
+from chamberopt.chamber.analytic import analytic_cavity, impacts_on_chamber
 from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.part import posed_part
 from chamberopt.chamber.scene import build_scene, chamber_mesh, replica_seed
 from chamberopt.common.errors import InputError
-from chamberopt.output.resimulate.replica import Replayed
 from chamberopt.output.vtp_files import CHAMBER, COVERAGE, MM, read_surface
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
-    from chamberopt.output.results.results import Result
-    from sim_core import AnalyticCavity
+    from chamberopt.design.load import Design
+    from chamberopt.output.results.load import Result
+    from sim_core import AnalyticCavity, ImpactLog, Scene
 
 REMEDY = "simulate the design again, and use that result"
 
 
 @dataclass(frozen=True)
-class Ground:
+class RebuiltChamber:
     """Where a result was simulated: its chamber, built again, and the analytical cavity if it was simulated in one."""
 
     chamber: Chamber
     cavity: AnalyticCavity | None
 
 
-def ground_of(result: Result) -> Ground:
+@dataclass(frozen=True)
+class Replica:
+    """One replica of a result: what it was simulated from. cavity: in place of the chamber's mesh, where it was."""
+
+    design: Design
+    chamber: Chamber
+    cavity: AnalyticCavity | None
+    scene: Scene
+
+    def booked(self, impacts: ImpactLog) -> ImpactLog:
+        """The impacts, with the chamber's triangles, also where the cavity has others."""
+        return impacts_on_chamber(impacts, self.chamber) if self.cavity else impacts
+
+
+def rebuild_chamber(result: Result) -> RebuiltChamber:
     """The chamber of a simulation, or of a study's best or start, as it was simulated; its target is the result's.
 
     Raises InputError when a file that the design names has changed since, or this version builds another chamber.
@@ -55,12 +69,12 @@ def ground_of(result: Result) -> Ground:
             f"{result.folder}: its chamber comes out differently now: a file that the design names has changed, or "
             f"another version made it ({made_by(result)}); {REMEDY}"
         )
-    return Ground(
+    return RebuiltChamber(
         chamber, analytic_cavity(result.design, chamber) if result.data.get("analytic") else None
     )
 
 
-def replica_of(result: Result, number: int = 0) -> Replayed:
+def rebuild_replica(result: Result, number: int = 0) -> Replica:
     """A replica of a simulation, or of a study's best or start. InputError for one that is not there, or cannot be
     simulated again.
     """
@@ -69,10 +83,10 @@ def replica_of(result: Result, number: int = 0) -> Replayed:
         raise InputError(
             f"--replica: given {number}; the result has {there}, give 0 to {there - 1}"
         )
-    ground, (seed, stream) = ground_of(result), result.seeds
+    ground, (seed, stream) = rebuild_chamber(result), result.seeds
     mesh = ground.cavity or chamber_mesh(ground.chamber)
     scene = build_scene(result.design, mesh, replica_seed(seed, number, stream))
-    return Replayed(result.design, ground.chamber, ground.cavity, scene)
+    return Replica(result.design, ground.chamber, ground.cavity, scene)
 
 
 def _refuse_file(result: Result, field: str, path: object) -> NoReturn:

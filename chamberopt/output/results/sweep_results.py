@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.common.files import atomic_write, write_text
+from chamberopt.common.versions import versions
 from chamberopt.design.load import save_design
+from chamberopt.optimize.storage.study_folder import RESULT
 from chamberopt.optimize.storage.trial_log import Trial, read_trials, trials_as_csv
 from chamberopt.output.plots.study_and_accuracy import BLUE, GREY, ORANGE
-from chamberopt.output.results.results import FORMAT, RESULT, versions
+from chamberopt.output.results.load import FORMAT
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -5,14 +5,14 @@ import sys
 
 from chamberopt.common.errors import InputError
 from chamberopt.output.viewer import window
-from chamberopt.output.viewer.images import coverage, difference, flight_film, part
+from chamberopt.output.viewer.images import coverage, difference, part, replay_film
 
 DRAWERS = {
     "coverage": coverage.draw,
     "difference": difference.draw,
     "inspect": window.draw,
     "part": part.draw,
-    "replay": flight_film.draw,
+    "replay": replay_film.draw,
 }
 
 if __name__ == "__main__":

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
 
 from chamberopt.common.errors import InputError
+from chamberopt.output.disc_averages import average_over_discs
 from chamberopt.output.vtp_files import Surface
 from chamberopt.simulation.triangle_fields import QUANTITIES, Quantity
 
-# Pictures average coverage over so many dents or more where triangles got fewer: single dents would be confetti.
-DENTS_SHOWN = 15
-# ... but over no more than this share of the target's size, so that a picture never hides a pattern.
-WIDEST = 0.06
 
-
-class Part:
+class DrawnPart:
     """A part ready to be drawn: `target` with one quantity as cell data "shown", in the unit shown, and the `rest`.
 
     Both have cell data "row", the triangle's row in coverage.vtp. reach [mm]: how far around a triangle coverage is
@@ -63,7 +59,7 @@ class Part:
     @cached_property
     def _averages(self) -> tuple[np.ndarray, float]:
         """What coverage is computed from, averaged: its dent density, or itself where dents are marked; and reach."""
-        return averaged(
+        return average_over_discs(
             np.asarray(self.target.cell_centers().points),
             np.asarray(self.target.cell_normals),
             np.asarray(self.target["coverage" if self.marked else "dent_density"]),
@@ -72,49 +68,7 @@ class Part:
         )
 
 
-def averaged(
-    centre: np.ndarray, normal: np.ndarray, density: np.ndarray, area: np.ndarray, dents: np.ndarray
-) -> tuple[np.ndarray, float]:
-    """Dent density averaged over discs of one radius [mm], just wide enough to hold DENTS_SHOWN dents; and that radius.
-
-    Only over neighbours that face the same way, so that a flank is not mixed with the next one. 0.0: as it is.
-    """
-    reach = reach_wanted(centre, area, dents)
-    if reach == 0.0:
-        return density, 0.0
-    over = over_discs(centre, normal, reach)
-    return over(density * area) / over(area), reach
-
-
-def reach_wanted(
-    centre: np.ndarray, area: np.ndarray, dents: np.ndarray, wanted: float = DENTS_SHOWN
-) -> float:
-    """Radius [mm] of discs that hold so many dents in the mean; 0.0 where triangles do."""
-    if not len(centre) or np.mean(dents) >= wanted:
-        return 0.0
-    per_mm2 = max(float(dents.sum() / area.sum()), 1e-12)
-    size = float(np.linalg.norm(np.ptp(centre, axis=0)))
-    return float(min(np.sqrt(wanted / (np.pi * per_mm2)), WIDEST * size))
-
-
-def over_discs(
-    centre: np.ndarray, normal: np.ndarray, reach: float
-) -> Callable[[np.ndarray], np.ndarray]:
-    """A function that sums what triangles have, (m,), over the disc round each: neighbours that face the same way."""
-    if reach == 0.0:
-        return np.asarray
-    from scipy.spatial import cKDTree
-
-    pairs = cKDTree(centre).query_pairs(reach, output_type="ndarray")
-    i, j = pairs[np.einsum("ij,ij->i", normal[pairs[:, 0]], normal[pairs[:, 1]]) > 0.7].T
-
-    def over(own: np.ndarray) -> np.ndarray:
-        return np.asarray(own + np.bincount(i, own[j], len(own)) + np.bincount(j, own[i], len(own)))
-
-    return over
-
-
-def colour_range(parts: Sequence[Part]) -> tuple[float, float]:
+def colour_range(parts: Sequence[DrawnPart]) -> tuple[float, float]:
     """Round limits that hold nearly all of what is shown on every part."""
     values = np.concatenate([part.target["shown"] for part in parts])
     values = values[np.isfinite(values)]

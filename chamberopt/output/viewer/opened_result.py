@@ -11,8 +11,9 @@ import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.coverage.part_impacts import HitsByTriangle, load_matching_hits
-from chamberopt.output.viewer.drawn_part import Part, colour_range
-from chamberopt.output.viewer.view_state import Look
+from chamberopt.output.results.load import Result, require_matching_coverage, summary
+from chamberopt.output.viewer.drawn_part import DrawnPart, colour_range
+from chamberopt.output.viewer.view_state import ViewState
 from chamberopt.output.vtp_files import CHAMBER, COVERAGE, Surface, read_surface
 from chamberopt.simulation.triangle_fields import QUANTITIES
 
@@ -29,7 +30,7 @@ NEEDED = (
 
 
 @dataclass(frozen=True)
-class Subject:
+class ResultInfo:
     """A result as the window wants it, plain enough for a drawing job.
 
     treatment_s: its peening time · longest_s: the last time worth looking at · triangles: how many of the target are
@@ -44,16 +45,33 @@ class Subject:
     impacts_per_mm2: float
 
 
-class Seen:
+def result_info(result: Result) -> ResultInfo:
+    """Collect what the viewer needs of a result."""
+    treatment = result.design.process.treatment_time
+    return ResultInfo(
+        folder=str(result.folder),
+        title=f"{result.folder.resolve().name}\n{summary(result)}",
+        treatment_s=treatment,
+        longest_s=max(
+            [treatment, *(row["time_s"] for row in result.data.get("coverage_against_time", []))]
+        ),
+        triangles=result.data["chamber"]["target_triangles"],
+        impacts_per_mm2=result.metrics["impacts_per_mm2_s"].value * treatment,
+    )
+
+
+class OpenedResult:
     """A result opened. Raises InputError where files are missing or damaged, or are another result's."""
 
-    def __init__(self, subject: Subject) -> None:
+    def __init__(self, subject: ResultInfo) -> None:
         self.subject = subject
         self.folder = Path(subject.folder)
         self.surface = _with_columns(self.folder / COVERAGE, NEEDED)
         self.chamber = _with_columns(self.folder / CHAMBER, ("tag",))
-        self.part = Part(self.surface)
-        require_own(subject, self.surface)
+        self.part = DrawnPart(self.surface)
+        require_matching_coverage(
+            self.folder, self.surface, subject.triangles, subject.impacts_per_mm2
+        )
 
     @property
     def offered(self) -> list[str]:
@@ -65,7 +83,7 @@ class Seen:
         """Its single impacts, None where it has none. Read when first asked for: they are most of a result."""
         return load_matching_hits(self.folder, np.asarray(self.surface["impacts"]))
 
-    def times(self, look: Look) -> float:
+    def times(self, look: ViewState) -> float:
         """The time looked at in treatment times. InputError where dents are marked: their coverage has one time."""
         if look.time_s is None:
             return 1.0
@@ -76,7 +94,7 @@ class Seen:
             )
         return look.time_s / self.subject.treatment_s
 
-    def show(self, look: Look) -> None:
+    def show(self, look: ViewState) -> None:
         """The quantity looked at becomes the part's "shown". InputError where the result does not have it."""
         if look.quantity not in self.offered:
             raise InputError(
@@ -85,14 +103,14 @@ class Seen:
             )
         self.part.show(QUANTITIES[look.quantity], self.times(look))
 
-    def passed(self, look: Look) -> np.ndarray:
+    def passed(self, look: ViewState) -> np.ndarray:
         """Triangles of the target that are covered as far as the threshold or farther, bool."""
         if look.below is None:
             return np.zeros(self.part.target.n_cells, dtype=bool)
         times = 1.0 if self.part.marked else self.times(look)
         return np.asarray(self.part.values(QUANTITIES["coverage"], times) >= look.below)
 
-    def numbers(self, triangle: int, look: Look) -> list[str]:
+    def numbers(self, triangle: int, look: ViewState) -> list[str]:
         """All there is to say of a triangle, a line each. InputError where there is no such triangle."""
         if not 0 <= triangle < self.surface.n_cells:
             raise InputError(
@@ -120,7 +138,7 @@ class Seen:
         )
         return lines
 
-    def _value(self, name: str, triangle: int, look: Look) -> float:
+    def _value(self, name: str, triangle: int, look: ViewState) -> float:
         """The triangle's own, nothing averaged."""
         one = QUANTITIES[name]
         if name == "coverage" and not self.part.marked:
@@ -134,21 +152,6 @@ class Seen:
         )
 
 
-def require_own(subject: Subject, surface: Surface) -> None:
-    """InputError where the target of coverage.vtp is not the one that result.json tells of."""
-    wanted = (np.asarray(surface["target"]) > 0) & (np.asarray(surface["exposed_area_mm2"]) > 0.0)
-    area, impacts = (
-        np.asarray(surface[name])[wanted] for name in ("exposed_area_mm2", "impacts_per_mm2")
-    )
-    mean = float((area * impacts).sum() / area.sum()) if len(area) else 0.0
-    if len(area) != subject.triangles or not np.isclose(mean, subject.impacts_per_mm2, rtol=1e-6):
-        raise InputError(
-            f"{Path(subject.folder) / COVERAGE}: of another result than result.json: a target of {len(area)} triangles "
-            f"with {mean:.6g} impacts per mm², not {subject.triangles} with "
-            f"{subject.impacts_per_mm2:.6g}; simulate again"
-        )
-
-
 def _with_columns(path: Path, names: Sequence[str]) -> Surface:
     surface = read_surface(path)
     missing = [name for name in names if name not in surface.cell_data]
@@ -159,12 +162,12 @@ def _with_columns(path: Path, names: Sequence[str]) -> Surface:
     return surface
 
 
-def offered(seen: Sequence[Seen]) -> list[str]:
+def offered(seen: Sequence[OpenedResult]) -> list[str]:
     """The quantities that all of them have."""
     return [name for name in QUANTITIES if all(name in one.offered for one in seen)]
 
 
-def limits(seen: Sequence[Seen], look: Look) -> tuple[float, float]:
+def limits(seen: Sequence[OpenedResult], look: ViewState) -> tuple[float, float]:
     """The colour scale of what they all show."""
     for one in seen:
         one.show(look)
@@ -175,7 +178,7 @@ def limits(seen: Sequence[Seen], look: Look) -> tuple[float, float]:
     )
 
 
-def same_part(seen: Sequence[Seen]) -> bool:
+def same_part(seen: Sequence[OpenedResult]) -> bool:
     """Whether their triangles are the same ones, each in its place on the part: not if only a chamber differs."""
     first = seen[0].surface
     return all(

@@ -1,4 +1,4 @@
-"""The views of inspect, one a result: all that is in a plotter follows from one Look."""
+"""The views of inspect, one a result: all that is in a plotter follows from one ViewState."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.geometry.triangles import unit_normals
-from chamberopt.output.viewer import panel
-from chamberopt.output.viewer.opened_result import Seen, limits, offered, same_part
-from chamberopt.output.viewer.scene import GREY, PALE, SONOTRODE, light, room, target_and_rest
-from chamberopt.output.viewer.view_state import FROM, KEYS, Look, Vector
+from chamberopt.output.viewer import overlay
+from chamberopt.output.viewer.actors import GREY, PALE, SONOTRODE, light, room, target_and_rest
+from chamberopt.output.viewer.opened_result import OpenedResult, limits, offered, same_part
+from chamberopt.output.viewer.view_state import FROM, KEYS, Vector, ViewState
 from chamberopt.output.vtp_files import Surface, pyvista
 from chamberopt.simulation.triangle_fields import QUANTITIES
 
@@ -29,12 +29,12 @@ BELOW = 2.0  # times as steep as from above: past the sonotrode
 SCREEN = 1500, 850  # pixels: a window no larger fits on most
 
 
-class Stage:
+class ResultPlotter:
     """A plotter with a view for each result. size: pixels of each · menu: whether the keys of quantities are listed."""
 
     def __init__(
         self,
-        seen: Sequence[Seen],
+        seen: Sequence[OpenedResult],
         off_screen: bool,
         size: tuple[int, int] | None = None,
         menu: bool = False,
@@ -59,7 +59,7 @@ class Stage:
         self.drawn: list[set[str]] = [set() for _ in seen]
         self.offered = offered(seen)
 
-    def draw(self, look: Look) -> None:
+    def draw(self, look: ViewState) -> None:
         """Everything anew; only the cameras stay as they are. InputError where a result does not have what is asked."""
         scale = limits(self.seen, look)
         for number, one in enumerate(self.seen):
@@ -68,10 +68,10 @@ class Stage:
             self._draw_one(number, one, look, scale)
         if look.keys:
             self._at(0)
-            panel.keys(self.plotter, KEYS, self.size())
+            overlay.keys(self.plotter, KEYS, self.size())
             self.drawn[0].add("keys")
 
-    def aim(self, look: Look) -> None:
+    def aim(self, look: ViewState) -> None:
         """Point the cameras, all the same way, at all there is to see."""
         boxes = [_box(one, look) for one in self.seen]
         for number, one in enumerate(self.seen):
@@ -109,14 +109,16 @@ class Stage:
 
     def _clear(self, number: int) -> None:
         plotter, renderer = self.plotter, self.plotter.renderer
-        if panel.bar_name(number) in plotter.scalar_bars:
-            plotter.remove_scalar_bar(panel.bar_name(number), render=False)
+        if overlay.bar_name(number) in plotter.scalar_bars:
+            plotter.remove_scalar_bar(overlay.bar_name(number), render=False)
         for name in self.drawn[number]:  # not handles, and not what holds the charts
             renderer.remove_actor(name, reset_camera=False, render=False)
         if renderer.has_charts:
             plotter.remove_chart(0)
 
-    def _draw_one(self, number: int, one: Seen, look: Look, scale: tuple[float, float]) -> None:
+    def _draw_one(
+        self, number: int, one: OpenedResult, look: ViewState, scale: tuple[float, float]
+    ) -> None:
         plotter, size, quantity = self.plotter, self.size(), QUANTITIES[look.quantity]
         shown = look.triangle if look.view in (None, number) else None
         before = set(plotter.renderer.actors)
@@ -134,21 +136,21 @@ class Stage:
         if shown is not None:
             lines, speed = _told(one, shown, look)
             corners = one.surface.points[one.surface.regular_faces[shown]]
-            panel.mark(plotter, corners, 0.06 * one.part.target.length)
+            overlay.mark(plotter, corners, 0.06 * one.part.target.length)
         words = one.subject.title
         if self.menu and number == 0:
-            words += "\n" + panel.wrapped(
-                _menu(self.offered, look), 0.6 * size[0], panel.fonts(size)[1]
+            words += "\n" + overlay.wrapped(
+                _menu(self.offered, look), 0.6 * size[0], overlay.fonts(size)[1]
             )
-        panel.title(plotter, words, lines, size)
-        panel.bar(plotter, quantity, scale, actors[0], number, size)
-        panel.legend(plotter, _colours(one, look), _remarks(one, look, passed), size)
+        overlay.title(plotter, words, lines, size)
+        overlay.bar(plotter, quantity, scale, actors[0], number, size)
+        overlay.legend(plotter, _colours(one, look), _remarks(one, look, passed), size)
         self.drawn[number] = set(plotter.renderer.actors) - before
         if len(speed):
-            panel.histogram(plotter, speed)
+            overlay.histogram(plotter, speed)
 
 
-def _menu(names: Sequence[str], look: Look) -> str:
+def _menu(names: Sequence[str], look: ViewState) -> str:
     """The keys of the quantities, the one that is shown in brackets."""
     keys = [f"{key} {name}" for key, name in enumerate(QUANTITIES, 1) if name in names]
     return (
@@ -157,7 +159,7 @@ def _menu(names: Sequence[str], look: Look) -> str:
     )
 
 
-def _told(one: Seen, triangle: int, look: Look) -> tuple[list[str], np.ndarray]:
+def _told(one: OpenedResult, triangle: int, look: ViewState) -> tuple[list[str], np.ndarray]:
     """What is said of a triangle, and its impact speeds (k,) [m/s]."""
     lines = one.numbers(triangle, look)
     if one.hits is None:
@@ -165,7 +167,7 @@ def _told(one: Seen, triangle: int, look: Look) -> tuple[list[str], np.ndarray]:
     return lines, one.hits.of(triangle).speed
 
 
-def _remarks(one: Seen, look: Look, passed: np.ndarray) -> list[str]:
+def _remarks(one: OpenedResult, look: ViewState, passed: np.ndarray) -> list[str]:
     """What the colours do not say."""
     quantity, remarks = QUANTITIES[look.quantity], []
     if quantity.name == "coverage" or quantity.grows:
@@ -185,7 +187,7 @@ def _remarks(one: Seen, look: Look, passed: np.ndarray) -> list[str]:
     return remarks
 
 
-def _colours(one: Seen, look: Look) -> list[tuple[str, str]]:
+def _colours(one: OpenedResult, look: ViewState) -> list[tuple[str, str]]:
     """(colour, meaning) of what is no quantity."""
     grey = "not in the target" + (
         ", or no such impact" if np.isnan(one.part.target["shown"]).any() else ""
@@ -196,7 +198,7 @@ def _colours(one: Seen, look: Look) -> list[tuple[str, str]]:
     return [(SONOTRODE, "sonotrode"), *entries] if look.chamber else entries
 
 
-def _eye(one: Seen, look: Look) -> np.ndarray:
+def _eye(one: OpenedResult, look: ViewState) -> np.ndarray:
     """Where it is seen from: in front of the triangle that is asked about, if any."""
     if look.eye is not None or look.triangle is None or look.triangle >= one.surface.n_cells:
         return where_the_target_is_seen(one.part.target) if look.eye is None else np.array(look.eye)
@@ -215,7 +217,7 @@ def where_the_target_is_seen(target: Surface) -> np.ndarray:
     return below if seen[1] > 2.0 * seen[0] else above
 
 
-def _cut(actors: Sequence[Any], cut: tuple[Vector, Vector | None], one: Seen) -> None:
+def _cut(actors: Sequence[Any], cut: tuple[Vector, Vector | None], one: OpenedResult) -> None:
     """Take away what lies on the normal's side."""
     normal, origin = cut
     point = one.chamber.center if origin is None else origin
@@ -224,7 +226,7 @@ def _cut(actors: Sequence[Any], cut: tuple[Vector, Vector | None], one: Seen) ->
         actor.mapper.AddClippingPlane(plane)
 
 
-def _box(one: Seen, look: Look) -> np.ndarray:
+def _box(one: OpenedResult, look: ViewState) -> np.ndarray:
     """Bounds (3, 2) [mm] of all there is to see: of the target alone where no chamber is drawn."""
     if not look.chamber:
         return np.reshape(one.part.target.bounds, (3, 2))

@@ -20,7 +20,7 @@ INSTALL = (
 )
 
 
-def why_no_pictures() -> str | None:
+def missing_opengl() -> str | None:
     """None when pictures can be tried on this machine, else one line that says what is missing."""
     if not sys.platform.startswith("linux") or offscreen_window():
         return None
@@ -75,12 +75,14 @@ def file_path(file: str | Path, suffixes: tuple[str, ...], written: str, option:
     return path
 
 
-def drawn_apart(job: dict[str, Any], picture: str | Path, patience: float = 600.0) -> str | None:
+def draw_in_subprocess(
+    job: dict[str, Any], picture: str | Path, patience: float = 600.0
+) -> str | None:
     """Does a drawing job in a process of its own. None, or one line saying why there is no picture.
 
     patience [s]: subprocess.TimeoutExpired after so long.
     """
-    missing = why_no_pictures()
+    missing = missing_opengl()
     if missing:
         return f"{Path(picture).name} skipped: {missing}"
     job = {**job, "picture": str(picture)}

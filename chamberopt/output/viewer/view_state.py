@@ -1,4 +1,4 @@
-"""What inspect shows of its results: every option and every key is a change of one Look."""
+"""What inspect shows of its results: every option and every key is a change of one ViewState."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ q        quit"""
 
 
 @dataclass(frozen=True)
-class Look:
+class ViewState:
     """What is shown, and how.
 
     quantity: its name · time_s: of the coverage, None: each treatment's · below [%]: triangles covered so far or
@@ -68,14 +68,14 @@ class Look:
             raise InputError("--cut-part: say where with --clip X, Y or Z")
 
     @staticmethod
-    def from_json(values: dict[str, Any]) -> Look:
+    def from_json(values: dict[str, Any]) -> ViewState:
         """From a drawing job: its lists are vectors."""
-        return Look(
-            **{name: _tuples(values[name]) for name in (field.name for field in fields(Look))}
+        return ViewState(
+            **{name: _tuples(values[name]) for name in (field.name for field in fields(ViewState))}
         )
 
 
-def cut_across(text: str) -> tuple[Vector, Vector | None]:
+def parse_clip(text: str) -> tuple[Vector, Vector | None]:
     """What --clip says: X, Y or Z, and where [mm] on that axis: Z=12.5."""
     found = re.fullmatch(r"([xyzXYZ])(?:=([-+]?\d*\.?\d+))?", text.strip())
     if not found:
@@ -89,7 +89,7 @@ def cut_across(text: str) -> tuple[Vector, Vector | None]:
     return normal, tuple(float(at) * abs(one) for one in normal)  # type: ignore[return-value]
 
 
-def eye_at(text: str) -> Vector:
+def parse_view(text: str) -> Vector:
     """What --view says: three numbers, the direction from the part to the eye."""
     try:
         x, y, z = (float(number) for number in text.split(","))
@@ -102,7 +102,7 @@ def eye_at(text: str) -> Vector:
     return x, y, z
 
 
-def pressed(look: Look, key: str, first: Look, offered: Sequence[str]) -> Look:
+def pressed(look: ViewState, key: str, first: ViewState, offered: Sequence[str]) -> ViewState:
     """The look after a key; `first`: the look it began with; offered: quantities that all results have."""
     names = list(QUANTITIES)
     if key.isdigit() and 0 < int(key) <= len(names) and names[int(key) - 1] in offered:

@@ -1,4 +1,4 @@
-"""Results in a window of their own, whose keys and handles change one Look; or as a picture of it."""
+"""Results in a window of their own, whose keys and handles change one ViewState; or as a picture of it."""
 
 from __future__ import annotations
 
@@ -11,18 +11,20 @@ from typing import Any
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import atomic_write
-from chamberopt.output.viewer.opened_result import Seen, Subject
-from chamberopt.output.viewer.plotter import Stage
-from chamberopt.output.viewer.scene import DARK
-from chamberopt.output.viewer.subprocess_drawing import drawn_apart, picture_path
-from chamberopt.output.viewer.view_state import Look, pressed
+from chamberopt.output.viewer.actors import DARK
+from chamberopt.output.viewer.opened_result import OpenedResult, ResultInfo
+from chamberopt.output.viewer.plotter import ResultPlotter
+from chamberopt.output.viewer.subprocess_drawing import draw_in_subprocess, picture_path
+from chamberopt.output.viewer.view_state import ViewState, pressed
 from chamberopt.simulation.triangle_fields import QUANTITIES
 
 HANDLED = "12345678bcxgurh"
 STILL = 4  # pixels that the mouse may move in a click
 
 
-def inspect(subjects: Sequence[Subject], look: Look, screenshot: str | Path | None = None) -> None:
+def inspect(
+    subjects: Sequence[ResultInfo], look: ViewState, screenshot: str | Path | None = None
+) -> None:
     """Turn the parts in their chambers with the mouse; or, with `screenshot`, write a picture without a window.
 
     Raises InputError when a folder has no coverage or another's, lacks what is asked, or there is no display.
@@ -33,7 +35,7 @@ def inspect(subjects: Sequence[Subject], look: Look, screenshot: str | Path | No
             "subjects": [asdict(one) for one in subjects],
             "look": asdict(look),
         }
-        trouble = drawn_apart(job, picture_path(screenshot))
+        trouble = draw_in_subprocess(job, picture_path(screenshot))
         if trouble:
             raise InputError(trouble)
         return
@@ -47,17 +49,19 @@ def inspect(subjects: Sequence[Subject], look: Look, screenshot: str | Path | No
 
 def draw(job: dict[str, Any]) -> None:
     """What a drawing process does of it: the picture that the window would show."""
-    look = Look.from_json(job["look"])
-    stage = Stage(opened([Subject(**one) for one in job["subjects"]], look), off_screen=True)
+    look = ViewState.from_json(job["look"])
+    stage = ResultPlotter(
+        opened([ResultInfo(**one) for one in job["subjects"]], look), off_screen=True
+    )
     stage.draw(look)
     stage.aim(look)
     with atomic_write(Path(job["picture"])) as temporary:
         stage.plotter.screenshot(temporary)
 
 
-def opened(subjects: Sequence[Subject], look: Look) -> list[Seen]:
+def opened(subjects: Sequence[ResultInfo], look: ViewState) -> list[OpenedResult]:
     """The results, each of which has what is looked at. InputError where one does not."""
-    seen = [Seen(one) for one in subjects]
+    seen = [OpenedResult(one) for one in subjects]
     for one in seen:
         one.show(look)
         if look.triangle is not None:
@@ -68,8 +72,10 @@ def opened(subjects: Sequence[Subject], look: Look) -> list[Seen]:
 class Window:
     """A stage on the screen, and the look that its keys, slider, plane and clicks change."""
 
-    def __init__(self, seen: Sequence[Seen], look: Look, off_screen: bool = False) -> None:
-        self.stage = Stage(seen, off_screen, menu=True)
+    def __init__(
+        self, seen: Sequence[OpenedResult], look: ViewState, off_screen: bool = False
+    ) -> None:
+        self.stage = ResultPlotter(seen, off_screen, menu=True)
         self.first = self.look = look
         self.slider: Any = None
         self.plane: Any = None
@@ -93,7 +99,7 @@ class Window:
         iren.add_observer("LeftButtonReleaseEvent", lambda *_: self._release())
         plotter.show(title="chamberopt inspect")
 
-    def change(self, look: Look) -> None:
+    def change(self, look: ViewState) -> None:
         """Another look; one that a result cannot give leaves the present one."""
         before, self.look = self.look, look
         try:

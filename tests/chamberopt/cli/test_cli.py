@@ -354,7 +354,7 @@ class TestCheck:
         ) -> None:  # type: ignore[no-untyped-def]
             drawn.append((title, int(marked.sum()), len(edges), int(missed.sum())))
 
-        monkeypatch.setattr("chamberopt.output.viewer.part_picture", draw)
+        monkeypatch.setattr("chamberopt.output.viewer.draw_part", draw)
         if open_part:
             mesh = copies / "designs" / "parts" / "gear.stl"
             content = mesh.read_bytes()  # without its last 100 triangles
@@ -455,8 +455,7 @@ class TestWhole:
         self, small: Path, chamberopt: Said, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(
-            "chamberopt.output.viewer.subprocess_drawing.why_no_pictures",
-            lambda: "not in this test",
+            "chamberopt.output.viewer.subprocess_drawing.missing_opengl", lambda: "not in this test"
         )
         text = Path("designs/plate.toml").read_text(encoding="utf-8")
         heavier = text.replace("mass_g = 3.308", "mass_g = 9.9").replace("seed = 1", "seed = 5")
@@ -502,10 +501,10 @@ class TestWhole:
         assert not Path("results/gear").exists()
 
     def test_inspect(self, small: Path, chamberopt: Said) -> None:
-        from chamberopt.output.viewer import why_no_pictures
+        from chamberopt.output.viewer import missing_opengl
 
-        if why_no_pictures():
-            pytest.skip(why_no_pictures() or "")
+        if missing_opengl():
+            pytest.skip(missing_opengl() or "")
         assert chamberopt("simulate", "designs/plate.toml")[0] == 0
         status, out, _ = chamberopt("inspect", "results/plate", "--screenshot", "look.png")
         assert (status, out.splitlines()[-1]) == (0, "picture in look.png")

@@ -22,7 +22,8 @@ from chamberopt.optimize.search.phases import maximise
 from chamberopt.optimize.storage.trial_log import read_trials, trials_as_csv
 from chamberopt.optimize.study import Limits, Study
 from chamberopt.output import viewer
-from chamberopt.output.results.results import load_result, write_study
+from chamberopt.output.results.load import load_result
+from chamberopt.output.save_run import save_study
 from tests.helpers.synthetic import DESIGNS, judged, plate_design
 
 GEAR = load_design(DESIGNS / "gear.toml")
@@ -274,7 +275,7 @@ def test_the_model_of_the_scores_recommends_the_hilltop() -> None:
 
 def test_the_real_thing_end_to_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # Twice the amplitude hits harder and more often: even a study of seconds must see that.
-    monkeypatch.setattr(viewer, "coverage_picture", lambda *_: None)
+    monkeypatch.setattr(viewer, "draw_coverage", lambda *_: None)
     design = plate_design(
         sonotrode__amplitude_um=15, process__accuracy__simulated_time_s=0.1, process__accuracy__warmup_time_s=0.05,
         process__accuracy__replicas=3, process__treatment_time_s=20,
@@ -288,7 +289,7 @@ def test_the_real_thing_end_to_end(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     for workers in (1, 2):
         with local_executor(workers) as executor:
             results.append(run_study(question, tmp_path / str(workers), executor))
-        assert write_study(tmp_path / str(workers), results[-1]) == []
+        assert save_study(tmp_path / str(workers), results[-1]) == []
     one, two = results
     assert [t.score for t in one.trials] == [
         t.score for t in two.trials

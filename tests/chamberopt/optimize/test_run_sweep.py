@@ -14,7 +14,7 @@ from chamberopt.optimize.load_study import load_study
 from chamberopt.optimize.run_sweep import plan_sweep, run_sweep
 from chamberopt.optimize.storage.trial_log import read_trials
 from chamberopt.optimize.study import Study
-from chamberopt.output.results.results import load_result
+from chamberopt.output.results.load import load_result
 from chamberopt.output.results.sweep_results import write_sweep
 from chamberopt.simulation.evaluation import Evaluation
 from tests.helpers import worker_jobs

@@ -19,7 +19,7 @@ from chamberopt.cli.interrupt import EARLY, FIRST, SECOND
 from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.optimize.evaluate_candidate import FAILED
 from chamberopt.optimize.load_study import load_study
-from chamberopt.output.results.results import load_result
+from chamberopt.output.results.load import load_result
 from tests.helpers.results.resumable_study import calls, history, logged, run, study
 from tests.helpers.synthetic import DESIGNS, plate_design, poisson_evaluation
 
@@ -207,7 +207,7 @@ class TestCommandLine:
         self.at: dict[int, Callable[[], None]] = {}
         monkeypatch.setattr("chamberopt.optimize.run_study.chamber_simulator", lambda *_: simulator)
         monkeypatch.setattr("chamberopt.cli.studies.compiled", lambda *_: None)
-        monkeypatch.setattr("chamberopt.output.viewer.coverage_picture", lambda *_: None)
+        monkeypatch.setattr("chamberopt.output.viewer.draw_coverage", lambda *_: None)
         return done
 
     def rows(self, folder: str = "out") -> int:
@@ -312,7 +312,10 @@ class TestCommandLine:
             main(["run", "small.toml", "--out", "out"])
         assert raised.value.__notes__[1] == "to go on: chamberopt run small.toml --out out"
 
-    @pytest.mark.parametrize("step", ["write_coverage", "write_chamber", "coverage_picture"])
+    @pytest.mark.parametrize(
+        "step",
+        ["results.write.write_coverage", "results.write.write_chamber", "viewer.draw_coverage"],
+    )
     def test_stopped_while_it_writes_its_results(
         self, step: str, evaluated: list, monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -320,7 +323,7 @@ class TestCommandLine:
             raise OSError(errno.ENOSPC, "No space left on device")
 
         with monkeypatch.context() as patch:
-            patch.setattr(f"chamberopt.output.viewer.{step}", full)
+            patch.setattr(f"chamberopt.output.{step}", full)
             assert main(["run", "small.toml", "--out", "out"]) == 1
         assert len(evaluated) == ROWS
         assert not Path("out/result.json").exists()

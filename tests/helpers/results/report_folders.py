@@ -11,7 +11,7 @@ from chamberopt.common.parallel.executor import SerialExecutor
 from chamberopt.coverage.part_impacts import Hits
 from chamberopt.optimize.run_study import run_study
 from chamberopt.optimize.study import Study
-from chamberopt.output.results.results import write_simulation, write_study
+from chamberopt.output.save_run import save_simulation, save_study
 from chamberopt.simulation.evaluation import Evaluation
 from tests.helpers.synthetic import plate_design, poisson_evaluation
 
@@ -34,7 +34,7 @@ def simulated(folder: Path, per_mm2: float = 60.0, hits: bool = True) -> tuple[P
     """A simulation's folder; hits False: as older versions left it."""
     chamber = build_chamber(DESIGN)
     evaluation = poisson_evaluation(DESIGN, chamber, per_mm2)
-    write_simulation(
+    save_simulation(
         folder, DESIGN, chamber, replace(evaluation, hits=hits_of(evaluation) if hits else ())
     )
     return folder, chamber
@@ -57,5 +57,5 @@ def studied(folder: Path, evaluations: int = 12) -> Path:
             design, chamber, 80.0 * design.shot.mass_g, replicas or 4, seed=len(stream)
         )
 
-    write_study(folder, run_study(question, folder, SerialExecutor(), simulator=simulator))
+    save_study(folder, run_study(question, folder, SerialExecutor(), simulator=simulator))
     return folder

@@ -6,7 +6,8 @@ from unittest.mock import patch
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.parallel.executor import SerialExecutor
 from chamberopt.output import viewer
-from chamberopt.output.results.results import Result, load_result, write_simulation
+from chamberopt.output.results.load import Result, load_result
+from chamberopt.output.save_run import save_simulation
 from chamberopt.simulation.evaluate import evaluate
 from tests.helpers.synthetic import plate_design
 
@@ -19,6 +20,6 @@ def plate_result(folder: Path) -> Result:
         process__accuracy__replicas=3,
     )
     chamber = build_chamber(design)
-    with patch.object(viewer, "coverage_picture", lambda *_: None):
-        write_simulation(folder, design, chamber, evaluate(design, chamber, SerialExecutor()))
+    with patch.object(viewer, "draw_coverage", lambda *_: None):
+        save_simulation(folder, design, chamber, evaluate(design, chamber, SerialExecutor()))
     return load_result(folder)

@@ -11,15 +11,17 @@ import numpy as np
 import trimesh
 
 from chamberopt.coverage.part_impacts import Hits, save_hits, sort_hits_by_triangle
-from chamberopt.output.viewer import Look, Subject, write_chamber, write_coverage
-from chamberopt.output.vtp_files import pyvista
+from chamberopt.output.viewer import ResultInfo, ViewState
+from chamberopt.output.vtp_files import pyvista, write_chamber, write_coverage
 from chamberopt.simulation.triangle_fields import QUANTITIES
 
 TREATMENT = 10.0  # s
 SIZE = 480, 340  # pixels
 
 
-def ball_result(folder: Path, marked: bool = False, moved: float = 0.0, lost: int = 0) -> Subject:
+def ball_result(
+    folder: Path, marked: bool = False, moved: float = 0.0, lost: int = 0
+) -> ResultInfo:
     """A results folder: coverage rises from pole to pole, the target is all but a cap.
 
     Triangle k has k % 5 simulated impacts, of 1 ... 4 m/s. moved: by so many mm · lost: each so-manyth triangle.
@@ -68,17 +70,17 @@ def ball_result(folder: Path, marked: bool = False, moved: float = 0.0, lost: in
     write_chamber(folder, chamber)
     save_hits(folder / "hits.npz", sort_hits_by_triangle([hits], count))
     mean = float(fields["impacts_per_mm2"][target].mean())
-    return Subject(
+    return ResultInfo(
         str(folder), f"{folder.name}\nnot simulated", TREATMENT, 50.0, int(target.sum()), mean
     )
 
 
-def picture(subject: Subject, look: Look) -> np.ndarray:
+def picture(subject: ResultInfo, look: ViewState) -> np.ndarray:
     """What the window would show of it, (height, width, 3) uint8."""
-    from chamberopt.output.viewer.plotter import Stage
+    from chamberopt.output.viewer.plotter import ResultPlotter
     from chamberopt.output.viewer.window import opened
 
-    stage = Stage(opened([subject], look), off_screen=True, size=SIZE)
+    stage = ResultPlotter(opened([subject], look), off_screen=True, size=SIZE)
     stage.draw(look)
     stage.aim(look)
     image = np.asarray(stage.plotter.screenshot(None))[..., :3]
@@ -87,8 +89,8 @@ def picture(subject: Subject, look: Look) -> np.ndarray:
 
 
 LOOKS = {
-    "coverage": Look(),
-    "pick": Look(
+    "coverage": ViewState(),
+    "pick": ViewState(
         "speed", below=60.0, cut=((0.0, -1.0, 0.0), None), triangle=404, eye=(-1.0, -1.0, 0.5)
     ),
 }
@@ -121,7 +123,7 @@ def driven(folder: Path) -> list[dict[str, Any]]:
         ball_result(folder / "two"),
         ball_result(folder / "marked", marked=True),
     ]
-    window = Window(opened(subjects[:2], Look()), Look(), off_screen=True)
+    window = Window(opened(subjects[:2], ViewState()), ViewState(), off_screen=True)
     steps: list[dict[str, Any]] = []
 
     def step(name: str) -> None:
@@ -162,7 +164,7 @@ def driven(folder: Path) -> list[dict[str, Any]]:
     window.stage.plotter.subplot(0, 1)
     steps[-1]["picked"] = window.stage.row_picked(int(0.75 * width), 450)
     steps[-1]["beside"] = window.stage.row_picked(int(0.55 * width), 450)
-    window = Window(opened(subjects[2:], Look()), Look(), off_screen=True)
+    window = Window(opened(subjects[2:], ViewState()), ViewState(), off_screen=True)
     step("marked")
     return steps
 

@@ -7,22 +7,22 @@ from pathlib import Path
 from typing import Any
 
 from chamberopt.common.files import atomic_write
-from chamberopt.output.viewer.drawn_part import Part, colour_range
-from chamberopt.output.viewer.scene import in_chamber, near
-from chamberopt.output.viewer.subprocess_drawing import drawn_apart
+from chamberopt.output.viewer.actors import in_chamber, near
+from chamberopt.output.viewer.drawn_part import DrawnPart, colour_range
+from chamberopt.output.viewer.subprocess_drawing import draw_in_subprocess
 from chamberopt.output.vtp_files import CHAMBER, COVERAGE, pyvista, read_surface
 
 COLUMNS = 4  # results beside each other: more go below
 
 
-def coverage_picture(
+def draw_coverage(
     folders: Sequence[str | Path], titles: Sequence[str], picture: str | Path
 ) -> str | None:
     """Draw the coverage of one result, or of several side by side on one colour scale, into a .png.
 
     folders: each with coverage.vtp and chamber.vtp. Returns None, or one line saying why there is no picture.
     """
-    return drawn_apart(
+    return draw_in_subprocess(
         {"draw": "coverage", "folders": [str(f) for f in folders], "titles": list(titles)}, picture
     )
 
@@ -30,7 +30,7 @@ def coverage_picture(
 def draw(job: dict[str, Any]) -> None:
     """Each result twice: in its chamber, and the target from near; several results side by side."""
     folders = [Path(folder) for folder in job["folders"]]
-    parts = [Part(read_surface(folder / COVERAGE)) for folder in folders]
+    parts = [DrawnPart(read_surface(folder / COVERAGE)) for folder in folders]
     chambers = [read_surface(folder / CHAMBER) for folder in folders]
     limits = colour_range(parts)
     single = len(folders) == 1

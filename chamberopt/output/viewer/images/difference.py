@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from chamberopt.common.files import atomic_write
+from chamberopt.output.viewer.actors import BACKGROUND, DARK
 from chamberopt.output.viewer.images.coverage import panels
-from chamberopt.output.viewer.scene import BACKGROUND, DARK
-from chamberopt.output.viewer.subprocess_drawing import drawn_apart
+from chamberopt.output.viewer.subprocess_drawing import draw_in_subprocess
 from chamberopt.output.vtp_files import pyvista, read_surface
 
 # From brown (less) over white to violet (more): told apart by colour-blind readers, and from either grey.
@@ -35,14 +35,12 @@ def write_differences(
         surface.save(temporary)
 
 
-def difference_picture(
-    surface: str | Path, titles: Sequence[str], picture: str | Path
-) -> str | None:
+def draw_difference(surface: str | Path, titles: Sequence[str], picture: str | Path) -> str | None:
     """Draw what write_differences wrote, from two sides, each candidate with its title and all on one scale.
 
     Returns None, or one line saying why there is no picture.
     """
-    return drawn_apart(
+    return draw_in_subprocess(
         {"draw": "difference", "surface": str(surface), "titles": list(titles)}, picture
     )
 

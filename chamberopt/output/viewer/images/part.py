@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.common.files import atomic_write
-from chamberopt.output.viewer.scene import BACKGROUND, DARK, FAULT, GREY, SONOTRODE, room
-from chamberopt.output.viewer.subprocess_drawing import drawn_apart, picture_path
+from chamberopt.output.viewer.actors import BACKGROUND, DARK, FAULT, GREY, SONOTRODE, room
+from chamberopt.output.viewer.subprocess_drawing import draw_in_subprocess, picture_path
 from chamberopt.output.vtp_files import CHAMBER, MM, pyvista, read_surface, write_chamber
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
 
 
-def part_picture(
+def draw_part(
     corners: np.ndarray,
     title: str,
     picture: str | Path,
@@ -47,7 +47,7 @@ def part_picture(
         if chamber is not None:
             write_chamber(Path(folder), chamber)
             job["chamber"] = str(Path(folder) / CHAMBER)
-        return drawn_apart(job, path)
+        return draw_in_subprocess(job, path)
 
 
 def draw(job: dict[str, Any]) -> None:

@@ -17,7 +17,8 @@ from chamberopt.design.load import load_design, save_design
 from chamberopt.optimize.load_study import load_study
 from chamberopt.output import viewer
 from chamberopt.output.compare.comparison import compare
-from chamberopt.output.results.results import load_result, write_simulation
+from chamberopt.output.results.load import load_result
+from chamberopt.output.save_run import save_simulation
 from tests.helpers.synthetic import poisson_evaluation
 
 ROOT = Path(__file__).resolve().parents[4]
@@ -123,11 +124,11 @@ def test_a_file_that_changes_is_another_shape(folder: Path) -> None:
 def test_results_name_the_file_and_can_be_read_without_it(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(viewer, "coverage_picture", lambda *_: None)
+    monkeypatch.setattr(viewer, "draw_coverage", lambda *_: None)
     design = load_design(folder / "d.toml")
     chamber = build_chamber(design)
     for name, changed in (("first", design), ("second", design.changed({"chamber.side_mm": 70}))):
-        write_simulation(folder / name, changed, chamber, poisson_evaluation(changed, chamber))
+        save_simulation(folder / name, changed, chamber, poisson_evaluation(changed, chamber))
 
     written = json.loads((folder / "first" / "result.json").read_text(encoding="utf-8"))
     assert written["shape_sha256"] == sha256(PYRAMID.encode()).hexdigest()
@@ -316,12 +317,12 @@ def test_without_a_height_no_key_is_blamed_for_the_ceiling(folder: Path) -> None
 def test_results_of_a_file_that_was_edited_are_told_apart_and_still_read(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(viewer, "coverage_picture", lambda *_: None)
+    monkeypatch.setattr(viewer, "draw_coverage", lambda *_: None)
     for name, text in (("first", PYRAMID), ("second", PYRAMID.replace("0.5e-3 *", "0.4e-3 *"))):
         (folder / "pyramid.py").write_text(text, encoding="utf-8")
         design = load_design(folder / "d.toml")
         chamber = build_chamber(design)
-        write_simulation(folder / name, design, chamber, poisson_evaluation(design, chamber))
+        save_simulation(folder / name, design, chamber, poisson_evaluation(design, chamber))
 
     assert set(compare([folder / "first", folder / "second"]).parameters) == {"shape_sha256"}
     (folder / "pyramid.py").write_text(PYRAMID.replace("side_mm", "edge_mm"), encoding="utf-8")

@@ -17,7 +17,7 @@ from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.design.load import Design
 from chamberopt.optimize.storage.study_folder import StudyFolder, open_study_folder
 from chamberopt.optimize.study import Objective, Study
-from chamberopt.output.results.results import load_result
+from chamberopt.output.results.load import load_result
 from chamberopt.simulation.effect_pilot import Advice
 from chamberopt.simulation.evaluation import Evaluation, load_evaluation, save_evaluation
 from tests.helpers.results.resumable_study import GEAR, calls, history, logged, run, study

@@ -19,7 +19,8 @@ from chamberopt.output import viewer
 from chamberopt.output.compare import candidates
 from chamberopt.output.compare.candidates import gathered, simulated
 from chamberopt.output.compare.comparison import comparison_of
-from chamberopt.output.results.results import load_result, write_simulation
+from chamberopt.output.results.load import load_result
+from chamberopt.output.save_run import save_simulation
 from tests.helpers.synthetic import DESIGNS, plate_design, poisson_evaluation
 
 PLATE = plate_design()
@@ -45,7 +46,7 @@ class Simulations:
 def simulations(monkeypatch: pytest.MonkeyPatch) -> Simulations:
     found = Simulations()
     monkeypatch.setattr(candidates, "evaluate", found.evaluate)
-    monkeypatch.setattr(viewer, "coverage_picture", lambda *_: None)
+    monkeypatch.setattr(viewer, "draw_coverage", lambda *_: None)
     return found
 
 
@@ -107,7 +108,7 @@ def test_a_design_against_a_confirmed_result(
     evaluation = replace(
         poisson_evaluation(PLATE, CHAMBER, 20, 6), stream="confirm", objective_name="coverage_p05"
     )
-    write_simulation(tmp_path / "best", PLATE, CHAMBER, evaluation)
+    save_simulation(tmp_path / "best", PLATE, CHAMBER, evaluation)
     compared, _ = run([tmp_path / "best", made("mine.toml", shot__mass_g=6.0)], tmp_path / "out")
     [(design, how)] = simulations.done  # the result is not simulated again
     assert (design.process.seed, how["stream"], how["replicas"]) == (
@@ -123,7 +124,7 @@ def test_another_treatment_time_is_simulated_again_on_its_own_seeds(
     simulations: Simulations, made, tmp_path: Path
 ) -> None:
     short = plate_design(process__treatment_time_s=2.0, process__seed=9)
-    write_simulation(tmp_path / "short", short, CHAMBER, poisson_evaluation(short, CHAMBER, 20, 6))
+    save_simulation(tmp_path / "short", short, CHAMBER, poisson_evaluation(short, CHAMBER, 20, 6))
     paths = [made("long.toml"), tmp_path / "short"]
     with pytest.raises(InputError, match=r"peened for 2 s.*for 5 s.*--treatment-time-s"):
         gathered(paths)
@@ -183,7 +184,7 @@ def test_designs_share_the_first_ones_reachable_target(
     np.testing.assert_array_equal(wide.chamber.part.target, narrow.chamber.part.target)
     alone = build_chamber(narrow.design)
     assert (alone.part.target != wide.chamber.part.target).any()
-    write_simulation(
+    save_simulation(
         tmp_path / "result", narrow.design, alone, poisson_evaluation(narrow.design, alone)
     )
     with pytest.raises(InputError, match=r"its target is \d+ triangles.*give its design"):
@@ -199,7 +200,7 @@ def test_a_result_whose_parts_file_is_gone_is_compared_but_not_simulated_again(
     data = PLATE.model_dump()
     data["part"]["mesh"] = str(parts / "plate.stl")
     moved = validate(Design, data)
-    write_simulation(tmp_path / "old", moved, CHAMBER, poisson_evaluation(moved, CHAMBER))
+    save_simulation(tmp_path / "old", moved, CHAMBER, poisson_evaluation(moved, CHAMBER))
     shutil.rmtree(parts)
     assert [one.missing for one in gathered([tmp_path / "old", made("new.toml")])] == [False, True]
     with pytest.raises(InputError, match=r"plate\.stl"):

@@ -20,7 +20,8 @@ from chamberopt.output.compare.comparison import compare
 from chamberopt.output.compare.difference import LONGEST, confidence_of_each, difference
 from chamberopt.output.compare.files import write_comparison
 from chamberopt.output.compare.table import as_text
-from chamberopt.output.results.results import write_simulation
+from chamberopt.output.save_run import save_simulation
+from chamberopt.output.vtp_files import read_surface
 from tests.helpers.synthetic import DESIGNS, plate_design, poisson_evaluation
 
 PLATE = plate_design()
@@ -29,14 +30,14 @@ CHAMBER = build_chamber(PLATE)
 
 @pytest.fixture(autouse=True)
 def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(viewer, "coverage_picture", lambda *_: "skipped")
-    for name in ("coverage_picture", "difference_picture"):
+    monkeypatch.setattr(viewer, "draw_coverage", lambda *_: "skipped")
+    for name in ("draw_coverage", "draw_difference"):
         monkeypatch.setattr(files, name, lambda *_: "skipped")
 
 
 def left(folder: Path, per_mm2: float, seed: int = 0, design=PLATE, **changes: object) -> Path:
     evaluation = poisson_evaluation(design, CHAMBER, per_mm2, 6, seed)
-    write_simulation(folder, design, CHAMBER, replace(evaluation, **changes))
+    save_simulation(folder, design, CHAMBER, replace(evaluation, **changes))
     return folder
 
 
@@ -220,7 +221,7 @@ def test_single_impacts_of_another_result_are_refused(tmp_path: Path) -> None:
 
 def test_targets_of_other_triangles_are_refused(tmp_path: Path) -> None:
     both = compare([left(tmp_path / "a", 20), left(tmp_path / "b", 30)])
-    surface = viewer.read_surface(tmp_path / "b" / "coverage.vtp")
+    surface = read_surface(tmp_path / "b" / "coverage.vtp")
     surface["target"][np.flatnonzero(surface["target"])[:3]] = 0
     surface.save(tmp_path / "b" / "coverage.vtp")
     with pytest.raises(
@@ -240,7 +241,7 @@ def test_what_cannot_be_compared(tmp_path: Path) -> None:
         compare([one, tmp_path])
     blade = load_design(DESIGNS / "blade.toml")
     other = build_chamber(blade)
-    write_simulation(tmp_path / "blade", blade, other, poisson_evaluation(blade, other))
+    save_simulation(tmp_path / "blade", blade, other, poisson_evaluation(blade, other))
     with pytest.raises(InputError, match=r"another part \(blade.stl\).*plate.stl"):
         compare([one, tmp_path / "blade"])
     part = PLATE.part.model_copy(update={"target": type(PLATE.part.target)()})

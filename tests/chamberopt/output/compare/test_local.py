@@ -11,13 +11,10 @@ from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.output import viewer
 from chamberopt.output.compare.covered import Covered, covered
 from chamberopt.output.compare.local import local_difference
-from chamberopt.output.results.results import load_result, write_simulation
-from chamberopt.output.viewer import (
-    difference_picture,
-    read_surface,
-    why_no_pictures,
-    write_differences,
-)
+from chamberopt.output.results.load import load_result
+from chamberopt.output.save_run import save_simulation
+from chamberopt.output.viewer import draw_difference, missing_opengl, write_differences
+from chamberopt.output.vtp_files import read_surface
 from tests.helpers.synthetic import equal_dents, evaluation_of, plate_design
 
 PLATE = plate_design()
@@ -28,7 +25,7 @@ DENT = 1e-8  # m²
 
 @pytest.fixture(autouse=True)
 def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(viewer, "coverage_picture", lambda *_: None)
+    monkeypatch.setattr(viewer, "draw_coverage", lambda *_: None)
 
 
 def peened(
@@ -41,7 +38,7 @@ def peened(
         equal_dents(PLATE.process.accuracy.simulated_time, rng.poisson(mean), DENT)
         for _ in range(4)
     ]
-    write_simulation(folder, PLATE, chamber, evaluation_of(PLATE, chamber, tallies))
+    save_simulation(folder, PLATE, chamber, evaluation_of(PLATE, chamber, tallies))
     return covered(load_result(folder))
 
 
@@ -101,7 +98,7 @@ def test_what_is_hidden_in_one_is_not_covered_there(tmp_path: Path) -> None:
     assert found.real[lost].all()
 
 
-@pytest.mark.skipif(why_no_pictures() is not None, reason="no OpenGL library")
+@pytest.mark.skipif(missing_opengl() is not None, reason="no OpenGL library")
 def test_the_picture_is_violet_where_more_orange_where_less_and_pale_between(
     tmp_path: Path,
 ) -> None:
@@ -114,7 +111,7 @@ def test_the_picture_is_violet_where_more_orange_where_less_and_pale_between(
         vtp = tmp_path / f"{name}.vtp"
         write_differences(vtp, tmp_path / "a" / "coverage.vtp", [(value, real)])
         assert read_surface(vtp)["difference_1"][target] == pytest.approx(100.0 * value[target])
-        assert difference_picture(vtp, ["b less a"], tmp_path / f"{name}.png") is None
+        assert draw_difference(vtp, ["b less a"], tmp_path / f"{name}.png") is None
         image = imread(tmp_path / f"{name}.png")[..., :3]
         assert image.shape == (900, 1800, 3)
         below = image[:, :900]  # the other view has the colour bar, which has all colours

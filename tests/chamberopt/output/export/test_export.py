@@ -34,9 +34,10 @@ from chamberopt.output.export.chamber_files import (
 from chamberopt.output.export.frame import FrameName
 from chamberopt.output.export.impact_columns import PIECE
 from chamberopt.output.export.impacts_table import write_impacts
-from chamberopt.output.resimulate.rebuild import ground_of
-from chamberopt.output.results.results import load_result, write_simulation, write_study
-from chamberopt.output.viewer import read_surface
+from chamberopt.output.resimulate.rebuild import rebuild_chamber
+from chamberopt.output.results.load import load_result
+from chamberopt.output.save_run import save_simulation, save_study
+from chamberopt.output.vtp_files import read_surface
 from chamberopt.simulation.evaluate import evaluate
 from tests.helpers.synthetic import DESIGNS, plate_design, poisson_evaluation
 
@@ -54,7 +55,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     plate.apply_scale(1.0 / INCH)
     plate.export(folder / "plate.stl")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("chamberopt.output.results.results._picture", lambda *_: [])
+        patch.setattr("chamberopt.output.save_run._draw_coverage", lambda *_: [])
         yield folder
 
 
@@ -75,7 +76,7 @@ def design(place: Path) -> Design:
 @pytest.fixture(scope="module")
 def simulated(place: Path, design: Design) -> Path:
     chamber = build_chamber(design)
-    write_simulation(
+    save_simulation(
         place / "simulated", design, chamber, evaluate(design, chamber, SerialExecutor())
     )
     return place / "simulated"
@@ -88,7 +89,7 @@ def study(place: Path, design: Design) -> Path:
         vary={"shot.mass_g": (3.0, 6.5), "chamber.diameter_mm": (40.0, 55.0)},
         optimizer={"evaluations": 4, "confirm": 1, "confirm_replicas": 4},
     )
-    write_study(place / "study", run_study(question, place / "study", SerialExecutor()))
+    save_study(place / "study", run_study(question, place / "study", SerialExecutor()))
     return place / "study"
 
 
@@ -109,7 +110,7 @@ def chamberopt(
 def table_of(folder: Path, file: Path, frame: FrameName = "part") -> dict[str, np.ndarray]:
     """The impacts of a results folder, by way of a Parquet file."""
     result = load_result(folder)
-    count = write_impacts([file], result, ground_of(result), SerialExecutor(), frame=frame)
+    count = write_impacts([file], result, rebuild_chamber(result), SerialExecutor(), frame=frame)
     table = pyarrow.parquet.read_table(file)
     assert table.num_rows == count > 100
     return {name: table[name].to_numpy() for name in table.column_names}
@@ -208,7 +209,7 @@ def test_csv_holds_what_parquet_holds_whatever_the_number_of_workers(
 ) -> None:
     monkeypatch.setattr("chamberopt.output.export.impact_columns.PIECE", 100)  # many pieces
     result = load_result(simulated)
-    ground = ground_of(result)
+    ground = rebuild_chamber(result)
     files = [tmp_path / name for name in ("i.csv", "i.csv.gz", "i.parquet")]
     write_impacts(files, result, ground, SerialExecutor())
     monkeypatch.setattr(
@@ -235,7 +236,7 @@ def test_csv_holds_what_parquet_holds_whatever_the_number_of_workers(
 def test_endings_in_capitals_mean_the_same(simulated: Path, tmp_path: Path) -> None:
     result = load_result(simulated)
     files = [tmp_path / name for name in ("I.PARQUET", "I.CSV.GZ")]
-    written = write_impacts(files, result, ground_of(result), SerialExecutor(), replicas=1)
+    written = write_impacts(files, result, rebuild_chamber(result), SerialExecutor(), replicas=1)
     assert pyarrow.parquet.read_table(files[0]).num_rows == written
     assert gzip.decompress(files[1].read_bytes()).count(b"\n") == written + 1
 
@@ -255,7 +256,7 @@ def test_an_analytical_cavity_gives_its_own_impacts(place: Path, tmp_path: Path)
     evaluation = evaluate(
         design, chamber, SerialExecutor(), cavity=analytic_cavity(design, chamber)
     )
-    write_simulation(place / "analytic", design, chamber, evaluation)
+    save_simulation(place / "analytic", design, chamber, evaluation)
     table = table_of(place / "analytic", tmp_path / "i.parquet")
     require_result_again(place / "analytic", table)
     assert np.abs(table["z_mm"]).max() < 1e-9  # the plate's lower face, in its file
@@ -296,7 +297,7 @@ def test_a_chamber_that_comes_out_differently_is_refused(simulated: Path, tmp_pa
         lambda data: data["design"]["chamber"].update(diameter_mm=51.0),
     )
     with pytest.raises(InputError, match=r"its chamber comes out differently now.*manifold3d \d"):
-        ground_of(load_result(folder))
+        rebuild_chamber(load_result(folder))
 
 
 def test_impacts_that_are_not_the_results_are_not_handed_on(
@@ -458,7 +459,7 @@ def test_each_surface_as_stl_by_its_name(place: Path, tmp_path: Path) -> None:
     data["chamber"] |= {"holes": [hole], "deflectors": [floating]}
     design = Design.model_validate({**data, "sonotrodes": [well]})
     chamber = build_chamber(design)
-    write_simulation(place / "fitted", design, chamber, poisson_evaluation(design, chamber))
+    save_simulation(place / "fitted", design, chamber, poisson_evaluation(design, chamber))
     write_stl_per_surface(place / "fitted", tmp_path / "stl")
     read = {file.stem: trimesh.load_mesh(file) for file in (tmp_path / "stl").iterdir()}
     assert set(read) == {

@@ -16,7 +16,7 @@ from chamberopt.geometry.mesh_io import read_part
 from chamberopt.output import viewer
 from chamberopt.output.export.elements import COLUMNS
 from chamberopt.output.export.fields import write_fields
-from chamberopt.output.results.results import write_simulation
+from chamberopt.output.save_run import save_simulation
 from tests.helpers.synthetic import plate_design, poisson_evaluation
 
 SIDES = (20.0, 20.0, 8.0)
@@ -105,7 +105,7 @@ def simulated(mesh: Path, **target: float) -> tuple[Path, Chamber]:
     design = design_with(mesh, **target)
     chamber = build_chamber(design)
     folder = mesh.parent / "result"
-    write_simulation(folder, design, chamber, poisson_evaluation(design, chamber, per_mm2=1.0))
+    save_simulation(folder, design, chamber, poisson_evaluation(design, chamber, per_mm2=1.0))
     surface = pyvista.read(folder / "coverage.vtp")
     hit, lots = surface["dents"] > 0, np.random.default_rng(3)
     for name in ("mean_normal_speed", "p90_normal_speed", "mean_angle_deg", "mean_dent_um"):
@@ -116,7 +116,7 @@ def simulated(mesh: Path, **target: float) -> tuple[Path, Chamber]:
 
 @pytest.fixture(autouse=True)
 def _no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(viewer, "coverage_picture", lambda *_: None)
+    monkeypatch.setattr(viewer, "draw_coverage", lambda *_: None)
 
 
 def distributions(text: str) -> dict[str, dict[str, float]]:

@@ -19,7 +19,8 @@ from chamberopt.output.report.formatting import plain, with_interval
 from chamberopt.output.report.influence import influence
 from chamberopt.output.report.part3d import part_scene
 from chamberopt.output.report.words import Words, goal_words
-from chamberopt.output.results.results import load_result
+from chamberopt.output.results.load import load_result
+from chamberopt.output.vtp_files import read_surface
 from tests.helpers.results.report_folders import simulated, studied
 
 NASTY = "a <img src=x onerror=alert(1)> & b"
@@ -28,7 +29,7 @@ NASTY = "a <img src=x onerror=alert(1)> & b"
 @pytest.fixture(scope="module")
 def no_pictures():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(viewer, "coverage_picture", lambda *_: None)
+        patch.setattr(viewer, "draw_coverage", lambda *_: None)
         yield
 
 
@@ -315,7 +316,7 @@ def test_what_others_wrote_stays_text(simulation: Path, tmp_path: Path) -> None:
 
 
 def test_the_page_carries_the_columns_of_the_target(simulation: Path, tmp_path: Path) -> None:
-    surface = viewer.read_surface(simulation / "coverage.vtp")
+    surface = read_surface(simulation / "coverage.vtp")
     target = (surface["target"] > 0) & (surface["exposed_area_mm2"] > 0)
     carried = Page(write_report(simulation, tmp_path / "page.html")[0]).parts()
     (scene,) = carried["scenes"]
@@ -388,7 +389,7 @@ def test_what_a_pilot_estimated_of_each_effect_is_told(simulation: Path, tmp_pat
 
 
 def test_a_part_too_large_for_a_page_is_drawn_less_and_says_so(simulation: Path) -> None:
-    result, surface = load_result(simulation), viewer.read_surface(simulation / "coverage.vtp")
+    result, surface = load_result(simulation), read_surface(simulation / "coverage.vtp")
     target = int(((surface["target"] > 0) & (surface["exposed_area_mm2"] > 0)).sum())
     less = part_scene(result, "", most=target)
     assert any("the target alone is drawn" in remark for remark in less.remarks)

@@ -34,7 +34,7 @@ WAIT = 60_000  # ms; a busy machine draws slowly
 @pytest.fixture(scope="module")
 def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(viewer, "coverage_picture", lambda *_: None)
+        patch.setattr(viewer, "draw_coverage", lambda *_: None)
         return studied(tmp_path_factory.mktemp("report") / "study")
 
 

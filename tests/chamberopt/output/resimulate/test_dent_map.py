@@ -27,8 +27,8 @@ from chamberopt.output.resimulate.dent_map import (
     peened,
     topmost,
 )
-from chamberopt.output.resimulate.rebuild import replica_of
-from chamberopt.output.results.results import Result
+from chamberopt.output.resimulate.rebuild import rebuild_replica
+from chamberopt.output.results.load import Result
 from chamberopt.output.viewer.images.dent_map import light_colours
 from sim_core import simulate
 from tests.helpers.results.short_plate import plate_result
@@ -184,7 +184,7 @@ def test_a_flat_target_is_seen_face_on_and_a_round_one_from_two_sides() -> None:
 
 
 def test_a_peening_goes_on_from_the_replica_that_the_result_knows(result: Result) -> None:
-    replica = replica_of(result)
+    replica = rebuild_replica(result)
     own = dents_on_part(simulate(replica.scene).impacts, replica.chamber, replica.design)
     longer = peened(replica, 0.5)
     assert len(longer) > 1.3 * len(own) > 300
@@ -208,7 +208,7 @@ def test_the_picture_has_as_much_black_as_is_bare(
     said = capsys.readouterr().out
     assert "simulated on from 0.3 s" in said
     image = imread(picture)[..., :3]
-    replica = replica_of(result)
+    replica = rebuild_replica(result)
     dents = peened(replica, 0.5)
     found = dent_map(replica.chamber, dents, (0, 0, -1), 800)
     assert (found.ground == REST).any()
@@ -244,7 +244,7 @@ def test_a_target_kept_by_a_study_is_the_results_own(result: Result) -> None:
     """What coverage.vtp says is the target holds for target.reachable, not what this chamber alone would say."""
     target = result.design.part.target.model_copy(update={"reachable": True})
     part = result.design.part.model_copy(update={"target": target})
-    kept = replica_of(
+    kept = rebuild_replica(
         replace(result, design=result.design.model_copy(update={"part": part}))
     ).chamber.part.target
-    np.testing.assert_array_equal(kept, replica_of(result).chamber.part.target)
+    np.testing.assert_array_equal(kept, rebuild_replica(result).chamber.part.target)

@@ -14,20 +14,19 @@ from chamberopt.chamber.build import TAG_PART, TAG_SONOTRODE
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError
 from chamberopt.output.resimulate.flight import angle, displacement, flight
-from chamberopt.output.resimulate.rebuild import replica_of
-from chamberopt.output.resimulate.replica import Replayed
-from chamberopt.output.results.results import Result, load_result
-from chamberopt.output.viewer import subprocess_drawing, why_no_pictures
+from chamberopt.output.resimulate.rebuild import Replica, rebuild_replica
+from chamberopt.output.results.load import Result, load_result
+from chamberopt.output.viewer import missing_opengl, subprocess_drawing
 from chamberopt.output.viewer.images import film
 from chamberopt.output.viewer.images.film import film_path, write_film
-from chamberopt.output.viewer.images.flight_film import replay, turn_matrix
+from chamberopt.output.viewer.images.replay_film import replay, turn_matrix
 from sim_core import Balls, Gravity, PartRotation, Physics, Scene, simulate
 from sim_core.effects.part_rotation import angle_now, checked_turn, turned
 from tests.helpers.results.short_plate import plate_result
 
 G = 9.80665
 COLUMNS = ("time", "ball", "triangle", "position", "velocity", "normal_speed")
-needs_opengl = pytest.mark.skipif(why_no_pictures() is not None, reason="no OpenGL library")
+needs_opengl = pytest.mark.skipif(missing_opengl() is not None, reason="no OpenGL library")
 
 
 @pytest.fixture(scope="module")
@@ -36,11 +35,11 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> Result:
 
 
 @pytest.fixture(scope="module")
-def replica(result: Result) -> Replayed:
-    return replica_of(result, 1)
+def replica(result: Result) -> Replica:
+    return rebuild_replica(result, 1)
 
 
-def test_a_ball_alone_is_where_the_closed_form_has_it(replica: Replayed) -> None:
+def test_a_ball_alone_is_where_the_closed_form_has_it(replica: Replica) -> None:
     """Dropped on a floor that gives all back, drifting sideways: z = r + h - g τ²/2, τ from the nearest apex."""
     r, h, drift = 1.5e-3, 6.5e-3, 0.05
     ball = Balls(np.array([[0.0, 0.0, r + h]]), np.array([[drift, 0.0, 0.0]]), 2 * r)
@@ -67,7 +66,7 @@ def test_a_ball_alone_is_where_the_closed_form_has_it(replica: Replayed) -> None
     assert len(seen.impacts) == len(seen.dents) == 0
 
 
-def test_what_is_shown_is_the_run_itself(replica: Replayed) -> None:
+def test_what_is_shown_is_the_run_itself(replica: Replica) -> None:
     """The scene cut short where the film ends gives the same bits as the whole; at an impact the ball is on the part"""
     whole = simulate(replica.scene).impacts
     seen = flight(replica, 0.05, 0.1, 11)
@@ -81,7 +80,7 @@ def test_what_is_shown_is_the_run_itself(replica: Replayed) -> None:
         np.testing.assert_allclose(at.balls[0, whole.ball[row]], whole.position[row], atol=1e-12)
 
 
-def test_the_sonotrode_is_where_the_shot_met_it(replica: Replayed) -> None:
+def test_the_sonotrode_is_where_the_shot_met_it(replica: Replica) -> None:
     scene = replace(replica.scene, record=(TAG_SONOTRODE,), duration=0.1)
     met = simulate(scene).impacts
     face = displacement(scene.physics.vibrations[0], scene.warmup + met.time)
@@ -122,7 +121,7 @@ def test_a_turning_part_is_drawn_as_the_simulator_has_it(motion: dict[str, float
     ],
 )
 def test_what_was_not_simulated_is_not_shown(
-    replica: Replayed, start: float, span: float, frames: int, said: str
+    replica: Replica, start: float, span: float, frames: int, said: str
 ) -> None:
     with pytest.raises(InputError, match=said):
         flight(replica, start, span, frames)
@@ -130,15 +129,15 @@ def test_what_was_not_simulated_is_not_shown(
 
 def test_a_replica_or_a_part_that_is_not_there_is_said(result: Result, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="--replica: given 3; the result has 3, give 0 to 2"):
-        replica_of(result, 3)
+        rebuild_replica(result, 3)
     with pytest.raises(
         InputError,
         match=r"part\.mesh: .*plate\.stl: not what .*plate was simulated with; restore it",
     ):
-        replica_of(replace(result, part_sha256="0" * 64))
+        rebuild_replica(replace(result, part_sha256="0" * 64))
     other = result.design.changed({"chamber.diameter_mm": 51})
     with pytest.raises(InputError, match="chamber comes out differently now"):
-        replica_of(replace(result, design=other))
+        rebuild_replica(replace(result, design=other))
 
 
 def test_films_play_back_as_they_were_written(tmp_path: Path) -> None:
@@ -206,7 +205,7 @@ def test_where_no_film_can_be_is_said(tmp_path: Path, monkeypatch: pytest.Monkey
 
 @needs_opengl
 def test_a_replay_shows_balls_that_move_and_hits(result: Result, tmp_path: Path) -> None:
-    seen = flight(replica_of(result), 0.02, 0.008, 6)
+    seen = flight(rebuild_replica(result), 0.02, 0.008, 6)
     assert len(seen.impacts) > 5
     assert replay(result.folder, seen, tmp_path / "plate.gif", 20, (320, 240)) is None
     with Image.open(tmp_path / "plate.gif") as image:

@@ -14,7 +14,8 @@ from chamberopt.optimize.run_study import run_study
 from chamberopt.optimize.study import Study
 from chamberopt.output import viewer
 from chamberopt.output.compare.comparison import compare
-from chamberopt.output.results.results import load_result, summary, write_simulation, write_study
+from chamberopt.output.results.load import load_result, summary
+from chamberopt.output.save_run import save_simulation, save_study
 from tests.helpers.synthetic import plate_design, poisson_evaluation
 
 DESIGN = plate_design()
@@ -25,14 +26,14 @@ EVALUATION = poisson_evaluation(DESIGN, CHAMBER)
 @pytest.fixture
 def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        viewer, "coverage_picture", lambda *_: "coverage.png skipped: no OpenGL library found"
+        viewer, "draw_coverage", lambda *_: "coverage.png skipped: no OpenGL library found"
     )
 
 
 @pytest.mark.usefixtures("no_pictures")
 def test_simulation_reads_back(tmp_path: Path) -> None:
     folder = tmp_path / "plate"
-    remarks = write_simulation(folder, DESIGN, CHAMBER, EVALUATION)
+    remarks = save_simulation(folder, DESIGN, CHAMBER, EVALUATION)
     assert remarks == ["coverage.png skipped: no OpenGL library found"]
     names = {path.name for path in folder.iterdir()}
     assert names == {
@@ -61,10 +62,10 @@ def test_simulation_reads_back(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("no_pictures")
 def test_results_are_never_overwritten(tmp_path: Path) -> None:
-    write_simulation(tmp_path / "plate", DESIGN, CHAMBER, EVALUATION)
+    save_simulation(tmp_path / "plate", DESIGN, CHAMBER, EVALUATION)
     before = {path.name: path.read_bytes() for path in (tmp_path / "plate").iterdir()}
     with pytest.raises(InputError, match="never overwritten"):
-        write_simulation(tmp_path / "plate", DESIGN, CHAMBER, EVALUATION)
+        save_simulation(tmp_path / "plate", DESIGN, CHAMBER, EVALUATION)
     assert {path.name: path.read_bytes() for path in (tmp_path / "plate").iterdir()} == before
 
 
@@ -83,7 +84,7 @@ def wrong_figures(text: str) -> list[str]:
 @pytest.mark.usefixtures("no_pictures")
 def test_a_result_can_be_looked_at_without_the_parts_file(tmp_path: Path) -> None:
     folder = tmp_path / "plate"
-    write_simulation(folder, DESIGN, CHAMBER, EVALUATION)
+    save_simulation(folder, DESIGN, CHAMBER, EVALUATION)
     data = json.loads((folder / "result.json").read_text())
     data["design"]["part"]["mesh"] = "gone.stl"
     (folder / "result.json").write_text(json.dumps(data))
@@ -99,7 +100,7 @@ def test_what_is_no_result_is_said(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="did not finish"):
         load_result(tmp_path)
     folder = tmp_path / "plate"
-    write_simulation(folder, DESIGN, CHAMBER, EVALUATION)
+    save_simulation(folder, DESIGN, CHAMBER, EVALUATION)
     text = (folder / "result.json").read_text()
     for damaged in (
         text[: len(text) // 2],
@@ -134,7 +135,7 @@ def test_a_study_leaves_everything_and_its_best_design_can_be_used(tmp_path: Pat
 
     folder = tmp_path / "study"
     outcome = run_study(question, folder, SerialExecutor(), simulator=simulator)
-    write_study(folder, outcome)
+    save_study(folder, outcome)
     names = {path.name for path in folder.iterdir()}
     assert names == {
         "design.toml", "study.toml", "history.jsonl", "history.csv", "best.toml", "result.json", "coverage.vtp",

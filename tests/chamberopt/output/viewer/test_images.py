@@ -14,13 +14,13 @@ import pytest
 from PIL import Image
 from scipy.ndimage import uniform_filter
 
-from chamberopt.output.viewer import why_no_pictures
+from chamberopt.output.viewer import missing_opengl
 from chamberopt.output.viewer.subprocess_drawing import without_display
 
 REFERENCES = Path(__file__).parents[4] / "pictures"
 BLOCK, TOLERANCE = 20, 0.02
 
-pytestmark = pytest.mark.skipif(why_no_pictures() is not None, reason="no OpenGL library")
+pytestmark = pytest.mark.skipif(missing_opengl() is not None, reason="no OpenGL library")
 
 
 def drawn(folder: Path) -> dict[str, np.ndarray]:

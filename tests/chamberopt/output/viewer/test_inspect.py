@@ -1,4 +1,4 @@
-"""What inspect shows: every key and option is a change of one Look, and a window is what follows from it."""
+"""What inspect shows: every key and option is a change of one ViewState, and a window is what follows from it."""
 
 import json
 import subprocess
@@ -11,29 +11,22 @@ import pytest
 
 from chamberopt.common.errors import InputError
 from chamberopt.coverage.part_impacts import save_hits, sort_hits_by_triangle
-from chamberopt.output.viewer import (
-    Look,
-    Subject,
-    cut_across,
-    eye_at,
-    read_surface,
-    why_no_pictures,
-)
-from chamberopt.output.viewer.opened_result import Seen, limits, same_part
+from chamberopt.output.viewer import ResultInfo, ViewState, missing_opengl, parse_clip, parse_view
+from chamberopt.output.viewer.actors import as_it_stands, ticks
+from chamberopt.output.viewer.opened_result import OpenedResult, limits, same_part
 from chamberopt.output.viewer.plotter import where_the_target_is_seen
-from chamberopt.output.viewer.scene import as_it_stands, ticks
 from chamberopt.output.viewer.subprocess_drawing import without_display
 from chamberopt.output.viewer.view_state import pressed
-from chamberopt.output.vtp_files import pyvista
+from chamberopt.output.vtp_files import pyvista, read_surface
 from chamberopt.simulation.triangle_fields import QUANTITIES
 from tests.helpers.results.sphere_in_sphere import TREATMENT, ball_result
 
 ALL = list(QUANTITIES)
-needs_opengl = pytest.mark.skipif(why_no_pictures() is not None, reason="no OpenGL library")
+needs_opengl = pytest.mark.skipif(missing_opengl() is not None, reason="no OpenGL library")
 
 
 @pytest.fixture
-def ball(tmp_path: Path) -> Subject:
+def ball(tmp_path: Path) -> ResultInfo:
     return ball_result(tmp_path / "ball")
 
 
@@ -55,27 +48,27 @@ def ball(tmp_path: Path) -> Subject:
 )
 def test_what_cannot_be_looked_at_is_said(options: dict[str, Any], said: str) -> None:
     with pytest.raises(InputError, match=said):
-        Look(**options)
+        ViewState(**options)
 
 
 def test_a_plane_is_said_by_its_axis() -> None:
-    assert cut_across("Z") == ((0.0, 0.0, 1.0), None)
-    assert cut_across("x=-3.5") == ((1.0, 0.0, 0.0), (-3.5, 0.0, 0.0))
-    assert cut_across("Y=2") == ((0.0, -1.0, 0.0), (0.0, 2.0, 0.0))
+    assert parse_clip("Z") == ((0.0, 0.0, 1.0), None)
+    assert parse_clip("x=-3.5") == ((1.0, 0.0, 0.0), (-3.5, 0.0, 0.0))
+    assert parse_clip("Y=2") == ((0.0, -1.0, 0.0), (0.0, 2.0, 0.0))
     for text in ("W", "X=", "X=a", "XY", ""):
         with pytest.raises(InputError, match=r"Z=12\.5"):
-            cut_across(text)
+            parse_clip(text)
 
 
 def test_an_eye_is_said_by_a_direction() -> None:
-    assert eye_at("1,-1.4,-0.8") == (1.0, -1.4, -0.8)
+    assert parse_view("1,-1.4,-0.8") == (1.0, -1.4, -0.8)
     for text in ("0,0,0", "1,2", "x", "1,2,inf", "0,0,1e300", "1e-300,0,0"):
         with pytest.raises(InputError, match="direction"):
-            eye_at(text)
+            parse_view(text)
 
 
 def test_keys() -> None:
-    first = Look("speed", below=80.0)
+    first = ViewState("speed", below=80.0)
     assert [pressed(first, str(n + 1), first, ALL).quantity for n in range(len(ALL))] == ALL
     assert pressed(first, "4", first, ["coverage"]) == first  # not there
     look, thresholds = first, []
@@ -89,9 +82,9 @@ def test_keys() -> None:
     assert (look.cut, look.cut_part) == (None, False)
     assert not pressed(first, "g", first, ALL).chamber
     assert pressed(pressed(first, "h", first, ALL), "h", first, ALL) == first
-    assert pressed(Look(triangle=3, view=0), "u", first, ALL) == Look()
-    assert pressed(Look("angle", time_s=3.0), "r", first, ALL) == first
-    assert pressed(Look(time_s=3.0), str(1 + ALL.index("interval")), first, ALL).time_s is None
+    assert pressed(ViewState(triangle=3, view=0), "u", first, ALL) == ViewState()
+    assert pressed(ViewState("angle", time_s=3.0), "r", first, ALL) == first
+    assert pressed(ViewState(time_s=3.0), str(1 + ALL.index("interval")), first, ALL).time_s is None
 
 
 @pytest.mark.parametrize("high", [0.35, 1.5, 2.0, 8.5, 90.0, 100.0, 500.0])
@@ -105,9 +98,9 @@ def test_bars_have_round_labels(high: float) -> None:
 # A result
 
 
-def test_time_moves_what_grows(ball: Subject) -> None:
-    seen = Seen(ball)
-    now, later = Look(), Look(time_s=2.0 * TREATMENT)
+def test_time_moves_what_grows(ball: ResultInfo) -> None:
+    seen = OpenedResult(ball)
+    now, later = ViewState(), ViewState(time_s=2.0 * TREATMENT)
     bare = 1.0 - seen.part.values(QUANTITIES["coverage"]) / 100.0
     for look, times in ((now, 1.0), (later, 2.0)):
         seen.show(look)
@@ -116,36 +109,36 @@ def test_time_moves_what_grows(ball: Subject) -> None:
         )
     assert limits([seen], later) == (0.0, 100.0)
     impacts = seen.part.values(QUANTITIES["impacts"])
-    seen.show(Look("impacts", time_s=2.0 * TREATMENT))
+    seen.show(ViewState("impacts", time_s=2.0 * TREATMENT))
     np.testing.assert_allclose(seen.part.target["shown"], 2.0 * impacts)
     speed = seen.part.values(QUANTITIES["speed"])
-    seen.show(Look("speed", time_s=2.0 * TREATMENT))
+    seen.show(ViewState("speed", time_s=2.0 * TREATMENT))
     np.testing.assert_array_equal(seen.part.target["shown"], speed)
 
 
 def test_marked_dents_have_one_time(tmp_path: Path) -> None:
     subject = ball_result(tmp_path / "ball", marked=True)
-    seen = Seen(subject)
-    seen.show(Look())
+    seen = OpenedResult(subject)
+    seen.show(ViewState())
     np.testing.assert_allclose(seen.part.target["shown"], 100.0 * seen.part.target["coverage"])
     with pytest.raises(InputError, match="marked one by one, at the treatment time of 10 s"):
-        seen.show(Look(time_s=3.0))
-    seen.show(Look("impacts", time_s=3.0))
+        seen.show(ViewState(time_s=3.0))
+    seen.show(ViewState("impacts", time_s=3.0))
 
 
-def test_below_is_of_coverage_whatever_is_shown(ball: Subject) -> None:
-    seen = Seen(ball)
-    passed = seen.passed(Look("speed", below=60.0))
+def test_below_is_of_coverage_whatever_is_shown(ball: ResultInfo) -> None:
+    seen = OpenedResult(ball)
+    passed = seen.passed(ViewState("speed", below=60.0))
     np.testing.assert_array_equal(passed, seen.part.target["coverage"] >= 0.6)
     assert passed.any()
-    later = seen.passed(Look("speed", below=60.0, time_s=4.0 * TREATMENT))
+    later = seen.passed(ViewState("speed", below=60.0, time_s=4.0 * TREATMENT))
     assert (later & ~passed).any()
-    assert not seen.passed(Look()).any()
+    assert not seen.passed(ViewState()).any()
 
 
-def test_a_triangles_numbers(ball: Subject) -> None:
-    seen = Seen(ball)
-    lines = seen.numbers(404, Look())
+def test_a_triangles_numbers(ball: ResultInfo) -> None:
+    seen = OpenedResult(ball)
+    lines = seen.numbers(404, ViewState())
     text = "\n".join(lines)
     surface = seen.surface
     assert lines[0] == "triangle 404"
@@ -154,41 +147,41 @@ def test_a_triangles_numbers(ball: Subject) -> None:
     assert "mean normal speed: 2.5 m/s" in lines
     assert "simulated: 4 impacts, 20 dents" in lines
     assert "energy" not in text  # not in this result
-    assert "mean normal speed: none" in seen.numbers(405, Look())
-    assert "not in the target" in seen.numbers(int(np.argmin(surface["target"])), Look())
+    assert "mean normal speed: none" in seen.numbers(405, ViewState())
+    assert "not in the target" in seen.numbers(int(np.argmin(surface["target"])), ViewState())
     np.testing.assert_array_equal(seen.hits.of(404).speed, [1.0, 2.0, 3.0, 4.0])
     surface["element"] = np.arange(surface.n_cells) + 1000
-    assert seen.numbers(404, Look())[0] == "triangle 404, element 1404"
+    assert seen.numbers(404, ViewState())[0] == "triangle 404, element 1404"
     with pytest.raises(InputError, match="triangles 0 to 1279"):
-        seen.numbers(1280, Look())
+        seen.numbers(1280, ViewState())
 
 
-def test_files_of_another_result_are_noticed(tmp_path: Path, ball: Subject) -> None:
+def test_files_of_another_result_are_noticed(tmp_path: Path, ball: ResultInfo) -> None:
     other = ball_result(tmp_path / "other", lost=7)
     folder = Path(ball.folder)
     (tmp_path / "hits.npz").write_bytes((folder / "hits.npz").read_bytes())
-    save_hits(folder / "hits.npz", sort_hits_by_triangle([Seen(other).hits.hits], 1280))
+    save_hits(folder / "hits.npz", sort_hits_by_triangle([OpenedResult(other).hits.hits], 1280))
     with pytest.raises(InputError, match="of another result"):
-        _ = Seen(ball).hits
+        _ = OpenedResult(ball).hits
     (folder / "hits.npz").unlink()
-    assert Seen(ball).hits is None
+    assert OpenedResult(ball).hits is None
     (folder / "coverage.vtp").write_bytes(Path(other.folder, "coverage.vtp").read_bytes())
     with pytest.raises(InputError, match=r"of another result than result\.json"):
-        Seen(ball)
+        OpenedResult(ball)
     (folder / "coverage.vtp").write_bytes((folder / "chamber.vtp").read_bytes())
     with pytest.raises(InputError, match="has no coverage"):
-        Seen(ball)
+        OpenedResult(ball)
 
 
-def test_what_an_older_result_lacks_is_said(ball: Subject) -> None:
-    seen = Seen(ball)
+def test_what_an_older_result_lacks_is_said(ball: ResultInfo) -> None:
+    seen = OpenedResult(ball)
     assert seen.offered == ["coverage", "impacts", "speed", "p90-speed"]
     with pytest.raises(InputError, match=r"--quantity energy.*simulate again"):
-        seen.show(Look("energy"))
+        seen.show(ViewState("energy"))
 
 
 def test_a_damaged_surface_is_one_sentence(
-    ball: Subject, capfd: pytest.CaptureFixture[str]
+    ball: ResultInfo, capfd: pytest.CaptureFixture[str]
 ) -> None:
     file = Path(ball.folder) / "coverage.vtp"
     whole = file.read_bytes()
@@ -199,13 +192,13 @@ def test_a_damaged_surface_is_one_sentence(
     assert capfd.readouterr() == ("", "")
 
 
-def test_only_views_of_the_same_part_are_linked(tmp_path: Path, ball: Subject) -> None:
+def test_only_views_of_the_same_part_are_linked(tmp_path: Path, ball: ResultInfo) -> None:
     moved, other = (
         ball_result(tmp_path / "moved", moved=1.0),
         ball_result(tmp_path / "other", lost=7),
     )
-    assert same_part([Seen(ball), Seen(moved)])
-    assert not same_part([Seen(ball), Seen(other)])
+    assert same_part([OpenedResult(ball), OpenedResult(moved)])
+    assert not same_part([OpenedResult(ball), OpenedResult(other)])
 
 
 def test_a_target_that_looks_down_is_seen_from_below() -> None:

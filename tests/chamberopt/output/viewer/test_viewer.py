@@ -15,25 +15,23 @@ from matplotlib.image import imread
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.coverage.coverage_from_impacts import coverage_at
+from chamberopt.output.disc_averages import average_over_discs
 from chamberopt.output.viewer import (
-    Look,
-    Subject,
-    coverage_picture,
+    ResultInfo,
+    ViewState,
+    draw_coverage,
+    draw_part,
     inspect,
-    part_picture,
-    read_surface,
+    missing_opengl,
     subprocess_drawing,
-    why_no_pictures,
     window,
-    write_chamber,
-    write_coverage,
 )
-from chamberopt.output.viewer.drawn_part import averaged
+from chamberopt.output.vtp_files import read_surface, write_chamber, write_coverage
 from chamberopt.simulation.triangle_fields import compute_triangle_fields
 from tests.helpers.synthetic import plate_design, poisson_evaluation
 
 DESIGN = plate_design()
-needs_opengl = pytest.mark.skipif(why_no_pictures() is not None, reason="no OpenGL library")
+needs_opengl = pytest.mark.skipif(missing_opengl() is not None, reason="no OpenGL library")
 
 
 @pytest.fixture(scope="module")
@@ -94,7 +92,7 @@ def test_a_damaged_or_missing_file_is_said(tmp_path: Path, case: tuple) -> None:
 @needs_opengl
 def test_picture_shows_part_sonotrode_and_scale(case: tuple, tmp_path: Path) -> None:
     picture = tmp_path / "coverage.png"
-    assert coverage_picture([case[0]], ["plate"], picture) is None
+    assert draw_coverage([case[0]], ["plate"], picture) is None
     image = imread(picture)[..., :3]
     assert image.shape == (900, 1800, 3)
     assert 0.2 < (image > 0.99).all(axis=2).mean() < 0.9  # background, and not only background
@@ -108,7 +106,7 @@ def test_picture_shows_part_sonotrode_and_scale(case: tuple, tmp_path: Path) -> 
 
 @needs_opengl
 def test_side_by_side(case: tuple, tmp_path: Path) -> None:
-    assert coverage_picture([case[0]] * 2, ["one", "two"], tmp_path / "both.png") is None
+    assert draw_coverage([case[0]] * 2, ["one", "two"], tmp_path / "both.png") is None
     image = imread(tmp_path / "both.png")
     assert image.shape[:2] == (1500, 1800)
     lower = image[800:, :, :3]
@@ -122,10 +120,13 @@ def test_screenshot_without_a_display(
     case: tuple, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drawn: list = []
-    monkeypatch.setattr(window, "drawn_apart", lambda *arguments: drawn.append(arguments))
+    monkeypatch.setattr(window, "draw_in_subprocess", lambda *arguments: drawn.append(arguments))
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    subject, look = Subject(str(case[0]), "a plate", 5.0, 25.0, 336, 5.0), Look("speed", below=90.0)
+    subject, look = (
+        ResultInfo(str(case[0]), "a plate", 5.0, 25.0, 336, 5.0),
+        ViewState("speed", below=90.0),
+    )
     inspect([subject], look, tmp_path / "shot.png")
     ((job, picture),) = drawn
     assert (job["draw"], job["subjects"], picture) == (
@@ -133,7 +134,7 @@ def test_screenshot_without_a_display(
         [asdict(subject)],
         tmp_path / "shot.png",
     )
-    assert Look.from_json(json.loads(json.dumps(job["look"]))) == look
+    assert ViewState.from_json(json.loads(json.dumps(job["look"]))) == look
     if sys.platform.startswith("linux"):
         with pytest.raises(InputError, match=r"no display.*--screenshot"):
             inspect([subject], look)
@@ -141,7 +142,7 @@ def test_screenshot_without_a_display(
         inspect([subject], look, tmp_path / "shot.bmp")
     with pytest.raises(InputError, match="does not exist"):
         inspect([subject], look, tmp_path / "nowhere" / "shot.png")
-    monkeypatch.setattr(window, "drawn_apart", lambda *_: "shot.png skipped: install this")
+    monkeypatch.setattr(window, "draw_in_subprocess", lambda *_: "shot.png skipped: install this")
     with pytest.raises(InputError, match="install this"):
         inspect([subject], look, tmp_path / "shot.png")
 
@@ -151,7 +152,7 @@ def test_without_an_opengl_library_one_line_says_what_to_install(
 ) -> None:
     monkeypatch.setattr(subprocess_drawing.sys, "platform", "linux")
     monkeypatch.setattr(subprocess_drawing, "offscreen_window", lambda: None)
-    remark = coverage_picture([case[0]], ["plate"], tmp_path / "coverage.png")
+    remark = draw_coverage([case[0]], ["plate"], tmp_path / "coverage.png")
     assert remark is not None
     assert "coverage.png skipped" in remark
     assert "libegl1" in remark
@@ -165,7 +166,7 @@ def test_an_opengl_library_without_a_driver_costs_the_picture_only(
 ) -> None:
     # VTK does not raise here, it dies of a segmentation fault: seen with libEGL but no vendor.
     monkeypatch.setenv("__EGL_VENDOR_LIBRARY_DIRS", "/nonexistent")
-    remark = coverage_picture([case[0]], ["plate"], tmp_path / "coverage.png")
+    remark = draw_coverage([case[0]], ["plate"], tmp_path / "coverage.png")
     assert remark is not None
     assert "libegl1" in remark
     assert "\n" not in remark
@@ -180,17 +181,19 @@ def test_averaging_keeps_the_mean_and_does_not_cross_edges() -> None:
     normal = np.repeat([[0, 0, 1.0], [0, 0, -1.0]], 900, axis=0)
     truth = np.repeat([1.0, 3.0], 900)
     dents = rng.poisson(truth)
-    shown, reach = averaged(centre, normal, dents.astype(float), np.ones(1800), dents)
+    shown, reach = average_over_discs(centre, normal, dents.astype(float), np.ones(1800), dents)
     assert 1.0 < reach < 3.0
     for side in (slice(0, 900), slice(900, 1800)):
         assert shown[side].std() < 0.5 * dents[side].std()
         assert shown[side].mean() == pytest.approx(truth[side].mean(), rel=0.1)
     plenty = np.full(1800, 100)
-    np.testing.assert_array_equal(averaged(centre, normal, truth, np.ones(1800), plenty)[0], truth)
+    np.testing.assert_array_equal(
+        average_over_discs(centre, normal, truth, np.ones(1800), plenty)[0], truth
+    )
 
 
 def test_importing_chamberopt_does_not_import_pyvista() -> None:
-    modules = "chamberopt.output.results.results, chamberopt.output.compare.files"
+    modules = "chamberopt.output.results.load, chamberopt.output.compare.files"
     code = f"import sys, {modules}; assert 'pyvista' not in sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True, env=dict(os.environ))
 
@@ -201,8 +204,8 @@ def test_a_part_is_drawn_with_its_target_or_with_its_fault_in_red(tmp_path: Path
     corners, upper = ball.triangles, ball.triangles_center[:, 2] > 0.0
     edges = corners[:80, [0, 1, 1, 2]].reshape(-1, 2, 3)
 
-    assert part_picture(corners, "a ball", tmp_path / "target.png", marked=upper) is None
-    assert part_picture(corners, "a hole", tmp_path / "fault.png", edges=edges) is None
+    assert draw_part(corners, "a ball", tmp_path / "target.png", marked=upper) is None
+    assert draw_part(corners, "a hole", tmp_path / "fault.png", edges=edges) is None
 
     target, fault = (imread(tmp_path / f"{name}.png")[..., :3] for name in ("target", "fault"))
     red = [
@@ -216,4 +219,4 @@ def test_a_part_is_drawn_with_its_target_or_with_its_fault_in_red(tmp_path: Path
 def test_a_part_is_drawn_only_where_there_can_be_such_a_file(tmp_path: Path) -> None:
     for name, said in (("part.jpg", r"\.png"), ("nowhere/part.png", "does not exist")):
         with pytest.raises(InputError, match=said):
-            part_picture(np.zeros((1, 3, 3)), "a part", tmp_path / name)
+            draw_part(np.zeros((1, 3, 3)), "a part", tmp_path / name)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from chamberopt.design.shapes import TAG_WALL, is_sonotrode
-from chamberopt.output.viewer.drawn_part import Part
+from chamberopt.output.viewer.drawn_part import DrawnPart
 from chamberopt.output.vtp_files import Surface, pyvista
 
 GREY, DARK, GLASS, SONOTRODE, BACKGROUND = "#b9bec4", "#2b3440", "#9db7cc", "#e08a2e", "white"
@@ -16,7 +16,7 @@ ROUND = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)  # steps of a colour bar, 
 STILL = {"render": False, "reset_camera": False}  # nothing is seen before all is there
 
 
-def show(plotter: Any, part: Part, limits: tuple[float, float], bar: bool) -> None:
+def show(plotter: Any, part: DrawnPart, limits: tuple[float, float], bar: bool) -> None:
     """The target coloured by its quantity, the rest of the part grey, lit from the camera."""
     light(plotter)
     target = target_and_rest(plotter, part, limits)[0]
@@ -37,7 +37,7 @@ def light(plotter: Any) -> None:
 
 
 def target_and_rest(
-    plotter: Any, part: Part, limits: tuple[float, float], passed: np.ndarray | None = None
+    plotter: Any, part: DrawnPart, limits: tuple[float, float], passed: np.ndarray | None = None
 ) -> list[Any]:
     """The actors: the target coloured by its quantity, and, if there is more of the part, that in grey.
 
@@ -57,7 +57,12 @@ def target_and_rest(
 
 
 def in_chamber(
-    plotter: Any, part: Part, chamber: Surface, title: str, limits: tuple[float, float], bar: bool
+    plotter: Any,
+    part: DrawnPart,
+    chamber: Surface,
+    title: str,
+    limits: tuple[float, float],
+    bar: bool,
 ) -> None:
     """The part inside the glass chamber, over the sonotrode."""
     show(plotter, part, limits, bar)
@@ -89,7 +94,7 @@ def room(plotter: Any, chamber: Surface) -> tuple[dict[int, Any], list[Any]]:
     ]
 
 
-def near(plotter: Any, part: Part, limits: tuple[float, float], bar: bool) -> None:
+def near(plotter: Any, part: DrawnPart, limits: tuple[float, float], bar: bool) -> None:
     """The target from near and a little below, where the shot comes from."""
     show(plotter, part, limits, bar)
     if part.reach:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from chamberopt.geometry.triangles import unit_normals
-from chamberopt.output.viewer.scene import DARK, STILL, as_it_stands, ticks
+from chamberopt.output.viewer.actors import DARK, STILL, as_it_stands, ticks
 from chamberopt.output.vtp_files import pyvista
 from chamberopt.simulation.triangle_fields import Quantity
 

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from chamberopt.output.viewer.actors import BACKGROUND, DARK, as_it_stands, room
 from chamberopt.output.viewer.images.film import write_film
-from chamberopt.output.viewer.scene import BACKGROUND, DARK, as_it_stands, room
-from chamberopt.output.viewer.subprocess_drawing import drawn_apart
+from chamberopt.output.viewer.subprocess_drawing import draw_in_subprocess
 from chamberopt.output.vtp_files import CHAMBER, COVERAGE, MM, pyvista, read_surface
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def replay(
         )  # fmt: skip
         job = {"draw": "replay", "folder": str(result), "flight": str(data), "title": title,
                "fps": fps, "size": list(size), "view": list(view)}  # fmt: skip
-        return drawn_apart(job, film, 600.0 + SLOWEST * len(seen.time))
+        return draw_in_subprocess(job, film, 600.0 + SLOWEST * len(seen.time))
 
 
 def draw(job: dict[str, Any]) -> None:

@@ -1,0 +1,156 @@
+"""Read a results folder back."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chamberopt.common.errors import InputError
+from chamberopt.coverage.metrics import METRICS
+from chamberopt.coverage.statistics.confidence_interval import Estimate
+from chamberopt.design.design import validate
+from chamberopt.design.load import Design
+from chamberopt.optimize.storage.study_folder import RESULT, is_study_folder
+from chamberopt.optimize.storage.trial_log import HISTORY
+from chamberopt.output.vtp_files import COVERAGE, Surface, read_surface
+
+if TYPE_CHECKING:
+    from chamberopt.simulation.evaluation import Evaluation
+
+FORMAT = 1
+LATER = ("time_to_98_s", "intensity_uniformity")  # metrics that results of 0.1.0 may lack
+
+
+@dataclass(frozen=True)
+class Result:
+    """A results folder read back.
+
+    kind: "simulation" or "study"; a study stands for its best design as confirmed. design: the candidate the
+    figures belong to · data: all of result.json.
+    """
+
+    folder: Path
+    kind: str
+    design: Design
+    objective_name: str
+    objective: Estimate
+    metrics: dict[str, Estimate]
+    part_sha256: str
+    seeds: tuple[int, str]
+    notes: tuple[str, ...]
+    data: dict[str, Any]
+
+
+def load_result(path: str | Path) -> Result:
+    """Read a results folder (or its result.json). InputError when it is none, unfinished or damaged."""
+    path = Path(path)
+    file = path if path.name == RESULT else path / RESULT
+    folder = file.parent
+    if not file.is_file():
+        if is_study_folder(folder) or (folder / HISTORY).is_file():
+            raise InputError(
+                f"{folder}: a study that did not finish: it has no {RESULT} yet; go on with: chamberopt run STUDY.toml "
+                f"--out {shlex.quote(str(folder))}"
+            )
+        raise InputError(
+            f"{folder}: not a results folder: {RESULT} is not there; give one made by simulate or run"
+        )
+    try:
+        data = json.loads(file.read_text(encoding="utf-8"), parse_constant=_refuse_constant)
+        if data["format"] != FORMAT:
+            raise InputError(
+                f"{file}: written in format {data['format']}, this version reads {FORMAT}; simulate again"
+            )
+        if data["kind"] == "sweep":
+            what = "a sweep, a map of candidates that stands for no single one"
+            raise InputError(
+                f"{folder}: {what}; simulate the design you want of it, such as its best.toml"
+            )
+        return Result(
+            folder=folder,
+            kind=data["kind"],
+            design=validate(Design, data["design"], file, mesh_must_exist=False),
+            objective_name=data["objective"]["name"],
+            objective=_estimate(data["objective"]),
+            metrics={
+                name: _estimate(data["metrics"][name])
+                for name in METRICS
+                if name in data["metrics"] or name not in LATER
+            },
+            part_sha256=data["part_sha256"],
+            seeds=(data["seed"], data["stream"]),
+            notes=tuple(data["notes"]),
+            data=data,
+        )
+    except OSError as error:
+        raise InputError(
+            f"{file}: cannot be read: {error.strerror}; check its permissions"
+        ) from None
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise InputError(
+            f"{file}: damaged ({type(error).__name__}: {error}); simulate again"
+        ) from None
+
+
+def load_coverage(result: Result) -> Surface:
+    """Read the coverage.vtp of a result. InputError if it is missing, damaged or another result's."""
+    surface = read_surface(result.folder / COVERAGE)
+    require_matching_coverage(
+        result.folder,
+        surface,
+        result.data["chamber"]["target_triangles"],
+        result.metrics["impacts_per_mm2_s"].value * result.design.process.treatment_time,
+    )
+    return surface
+
+
+def require_matching_coverage(
+    folder: Path, surface: Surface, target_triangles: int, impacts_per_mm2: float
+) -> None:
+    """Raise InputError unless coverage.vtp has the target and impacts that result.json records.
+
+    Args:
+        folder: of the result.
+        surface: read from its coverage.vtp.
+        target_triangles: exposed triangles of the target, by result.json.
+        impacts_per_mm2: mean over the target at the treatment time, by result.json.
+    """
+    target = (np.asarray(surface["target"]) > 0) & (np.asarray(surface["exposed_area_mm2"]) > 0.0)
+    area = np.asarray(surface["exposed_area_mm2"])[target]
+    impacts = np.asarray(surface["impacts_per_mm2"])[target]
+    mean = float((area * impacts).sum() / area.sum()) if len(area) else 0.0
+    if len(area) != target_triangles or not np.isclose(mean, impacts_per_mm2, rtol=1e-6):
+        raise InputError(
+            f"{folder / COVERAGE}: of another result than result.json: a target of {len(area)} "
+            f"triangles with {mean:.6g} impacts per mm², not {target_triangles} with "
+            f"{impacts_per_mm2:.6g}; simulate again"
+        )
+
+
+def summary(evaluation: Evaluation | Result) -> str:
+    """One line: the objective with its interval, mean and spread of coverage."""
+    goal = evaluation.objective
+    mean, spread = (evaluation.metrics[name] for name in ("mean_coverage", "std_coverage"))
+    name = evaluation.objective_name.replace("_", " ")
+    figures = f"mean {_share(mean)}   std {_share(spread)}"
+    return f"{name} {goal.value:.3f} ± {goal.half_width:.3f}   {figures}"
+
+
+def _share(estimate: Estimate) -> str:
+    return f"{100.0 * estimate.value:.1f} ± {100.0 * estimate.half_width:.1f} %"
+
+
+def _estimate(data: dict[str, Any]) -> Estimate:
+    pseudovalues = tuple(float(x) for x in data["pseudovalues"])
+    return Estimate(
+        float(data["value"]), float(data["half_width"]), pseudovalues, float(data.get("bias", 0.0))
+    )
+
+
+def _refuse_constant(name: str) -> float:
+    raise ValueError(f"{name} is no figure")

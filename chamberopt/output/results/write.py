@@ -1,0 +1,197 @@
+"""Write the data files of a result. Every file appears whole or not at all."""
+
+from __future__ import annotations
+
+import json
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from chamberopt.chamber.build import build_chamber
+from chamberopt.common.files import write_text
+from chamberopt.common.versions import versions
+from chamberopt.coverage.metrics import METRICS, exposed_target
+from chamberopt.coverage.part_impacts import HITS_FILE, save_hits
+from chamberopt.coverage.statistics.confidence_interval import Estimate
+from chamberopt.design.load import Design, save_design, with_paths_from
+from chamberopt.optimize import pareto
+from chamberopt.optimize.storage.study_folder import RESULT
+from chamberopt.optimize.storage.trial_log import read_trials, trials_as_csv
+from chamberopt.output.results.load import FORMAT
+from chamberopt.output.vtp_files import COVERAGE, write_chamber, write_coverage
+from chamberopt.simulation.evaluation import Evaluation
+from chamberopt.simulation.time_curve import coverage_against_time
+from chamberopt.simulation.triangle_fields import compute_triangle_fields
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from chamberopt.chamber.build import Chamber
+    from chamberopt.optimize.run_study import StudyResult
+    from chamberopt.simulation.effect_pilot import Advice
+
+
+def write_simulation(
+    folder: Path, design: Design, chamber: Chamber, evaluation: Evaluation
+) -> dict[str, Any]:
+    """Write the data files of a simulation into its empty folder; return its result.json."""
+    save_design(design, folder / "design.toml")
+    return {"kind": "simulation", **_write_candidate(folder, design, chamber, evaluation)}
+
+
+def write_study(folder: Path, study_result: StudyResult) -> dict[str, Any]:
+    """Add the data files of a study that has ended to its folder.
+
+    run_study has written design.toml, study.toml and history.jsonl. This adds best.toml,
+    history.csv, pareto.csv (of two objectives), the best design's coverage.vtp, hits.npz,
+    chamber.stl and chamber.vtp, and start/, a results folder of the start as confirmed on the same
+    seeds.
+
+    Returns:
+        The study's result.json, which `write_result` writes.
+    """
+    start, best, target = study_result.start, study_result.best, study_result.target
+    save_design(best.design, folder / "best.toml")
+    write_text(folder / "history.csv", trials_as_csv(read_trials(folder)))
+    (folder / "start").mkdir(exist_ok=True)
+    start_chamber = build_chamber(start.design, target)
+    write_result(
+        folder / "start",
+        write_simulation(folder / "start", start.design, start_chamber, start.evaluation),
+    )
+    if study_result.study.objective.pareto:
+        write_text(folder / "pareto.csv", pareto.as_csv(study_result))
+    best_chamber = build_chamber(best.design, target)
+    candidate = _write_candidate(folder, best.design, best_chamber, best.evaluation)
+    return {"kind": "study", **candidate, "study": _about_study(study_result)}
+
+
+def write_result(
+    folder: Path,
+    data: dict[str, Any],
+    advice: Sequence[Advice] = (),
+    warned: Sequence[str] | None = None,
+) -> None:
+    """Write result.json, the file that makes a folder a finished result.
+
+    Args:
+        folder: of the result.
+        data: what write_simulation or write_study returned.
+        advice: why effects were chosen, if the design left the choice to the program.
+        warned: warnings of `chamberopt check`; None if it was not run.
+    """
+    if advice:
+        data = {**data, "effects": [one.as_json() for one in advice]}
+    if warned is not None:
+        data = {**data, "warnings": list(warned)}
+    write_text(folder / RESULT, json.dumps(data, indent=2, allow_nan=False) + "\n")
+
+
+def _write_candidate(
+    folder: Path, design: Design, chamber: Chamber, evaluation: Evaluation
+) -> dict[str, Any]:
+    """Write the surfaces of one candidate; what there is to say of it, for result.json."""
+    write_coverage(folder / COVERAGE, chamber, compute_triangle_fields(design, chamber, evaluation))
+    if evaluation.sorted_hits is not None:
+        save_hits(folder / HITS_FILE, evaluation.sorted_hits)
+    write_chamber(folder, chamber)
+    return _about(folder, design, chamber, evaluation)
+
+
+def _about(
+    folder: Path, design: Design, chamber: Chamber, evaluation: Evaluation
+) -> dict[str, Any]:
+    target = exposed_target(chamber)
+    return {
+        "format": FORMAT,
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "objective": {"name": evaluation.objective_name, **_plain(evaluation.objective, "")},
+        "metrics": {
+            name: _plain(value, METRICS[name].unit) for name, value in evaluation.metrics.items()
+        },
+        "coverage_against_time": coverage_against_time(design, chamber, evaluation),
+        "seed": design.process.seed,
+        "stream": evaluation.stream,
+        "replicas": len(evaluation.replicas),
+        "stopped_by": evaluation.stopped_by,
+        "analytic": evaluation.analytic,
+        "simulated_time_s": evaluation.total.simulated_time,
+        "collisions": evaluation.collisions,
+        "timings_s": {step: round(seconds, 3) for step, seconds in evaluation.timings.items()},
+        "chamber": {
+            "volume_mm3": chamber.volume * 1e9,
+            "target_exposed_area_mm2": float(chamber.exposed_area[target].sum() * 1e6),
+            "target_triangles": int(target.sum()),
+        },
+        "notes": [*chamber.notes, *evaluation.notes],
+        "design": _design_values(design, folder),
+        "part_sha256": chamber.part.sha256,
+        **({"shape_sha256": design.chamber.sha256} if design.chamber.sha256 else {}),
+        "part_unit": chamber.part.unit,
+        "versions": versions(),
+    }
+
+
+def _about_study(result: StudyResult) -> dict[str, Any]:
+    search = [trial for trial in result.trials if trial.stage == "search"]
+    return {
+        "algorithm": result.algorithm,
+        "vary": {name: list(bounds) for name, bounds in result.study.vary.items()},
+        "evaluations": len(search),
+        "accuracy": {
+            "search": result.study.at_search_accuracy(
+                result.study.design
+            ).process.accuracy.model_dump(exclude_none=True),
+            "confirm": result.study.design.process.accuracy.model_dump(exclude_none=True)
+            | {"replicas": len(result.best.evaluation.replicas)},
+        },
+        "failed": sum(trial.objective is None for trial in search),
+        "missing_a_constraint": sum(
+            trial.objective is not None and not trial.feasible for trial in search
+        ),
+        "gain": _plain(result.gain, ""),
+        "improved": result.improved,
+        "at_bounds": list(result.at_bounds),
+        **({"model": result.sensitivity.as_json()} if result.sensitivity else {}),
+        **({"front": pareto.as_json(result)} if result.study.objective.pareto else {}),
+        "best": {"searched_as": result.best.searched, "parameters": result.best.parameters},
+        "start": {
+            "parameters": result.start.parameters,
+            "objective": _plain(result.start.evaluation.objective, ""),
+            "metrics": {
+                name: _plain(value, METRICS[name].unit)
+                for name, value in result.start.evaluation.metrics.items()
+            },
+        },
+        "confirmed": [
+            {
+                "searched_as": candidate.searched,
+                "parameters": candidate.parameters,
+                "objective": _plain(candidate.evaluation.objective, ""),
+                "feasible": candidate.feasible,
+                "standing": candidate.feasibility,
+                "reason": candidate.reason,
+            }
+            for candidate in result.confirmed
+        ],
+        "seconds": round(result.seconds, 3),
+    }
+
+
+def _plain(estimate: Estimate, unit: str) -> dict[str, Any]:
+    """An estimate as JSON; the pseudo-values let two results be compared with an interval later."""
+    return {
+        "value": estimate.value,
+        "half_width": estimate.half_width,
+        "unit": unit,
+        "pseudovalues": list(estimate.pseudovalues),
+        "bias": estimate.bias,
+    }
+
+
+def _design_values(design: Design, folder: Path) -> dict[str, Any]:
+    """The design as its file would say it, its files relative to the folder."""
+    values: dict[str, Any] = with_paths_from(
+        folder.resolve(), design.model_dump(mode="json", exclude_none=True)
+    )
+    return values

@@ -1,0 +1,101 @@
+"""Save a finished simulation or study: its data, its pictures and, last of all, result.json."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from chamberopt.common.files import make_output_folder
+from chamberopt.output import viewer
+from chamberopt.output.plots.study_and_accuracy import convergence_picture
+from chamberopt.output.plots.study_model import front_picture, slices_picture
+from chamberopt.output.results.load import summary
+from chamberopt.output.results.write import write_result, write_simulation, write_study
+
+if TYPE_CHECKING:
+    from chamberopt.chamber.build import Chamber
+    from chamberopt.design.load import Design
+    from chamberopt.optimize.run_study import StudyResult
+    from chamberopt.simulation.effect_pilot import Advice
+    from chamberopt.simulation.evaluation import Evaluation
+
+
+def save_simulation(
+    folder: str | Path,
+    design: Design,
+    chamber: Chamber,
+    evaluation: Evaluation,
+    advice: Sequence[Advice] = (),
+    warned: Sequence[str] | None = None,
+) -> list[str]:
+    """Save a simulation in a new or empty folder.
+
+    Writes design.toml, coverage.vtp, hits.npz, chamber.stl, chamber.vtp, result.json, coverage.png.
+
+    Args:
+        folder: must be new or empty.
+        design: as simulated, its effects chosen.
+        chamber: of the design.
+        evaluation: of the design.
+        advice: why effects were chosen, if the design left the choice to the program.
+        warned: warnings of `chamberopt check`; None if it was not run.
+
+    Returns:
+        Remarks for the user, such as why a picture was skipped.
+    """
+    folder = make_output_folder(folder)
+    data = write_simulation(folder, design, chamber, evaluation)
+    write_result(folder, data, advice, warned)
+    return _draw_coverage([folder], [evaluation], [folder.resolve().name], folder / "coverage.png")
+
+
+def save_study(
+    folder: str | Path,
+    study_result: StudyResult,
+    advice: Sequence[Advice] = (),
+    warned: Sequence[str] | None = None,
+) -> list[str]:
+    """Complete the folder of a study that has ended.
+
+    Adds the files of results.write.write_study and the pictures coverage.png (the best design),
+    before_after.png, convergence.png, slices.png (if a model could be fitted) and pareto.png (of
+    two objectives). result.json is written last, so a study that is stopped while it is being saved
+    counts as unfinished and is saved again when it is resumed.
+
+    Args:
+        folder: the study's folder.
+        study_result: of the study.
+        advice: why effects were chosen, if the design left the choice to the program.
+        warned: warnings of `chamberopt check` on the best design; None if it was not run.
+
+    Returns:
+        Remarks for the user, such as why a picture was skipped.
+    """
+    folder = Path(folder)
+    data = write_study(folder, study_result)
+    remarks = _draw_study(folder, study_result)
+    write_result(folder, data, advice, warned)
+    return remarks
+
+
+def _draw_study(folder: Path, study_result: StudyResult) -> list[str]:
+    """Draw the pictures of a study whose data is written; return remarks on skipped pictures."""
+    convergence_picture(folder / "convergence.png", study_result)
+    if study_result.sensitivity:
+        slices_picture(folder / "slices.png", study_result, study_result.sensitivity)
+    if study_result.study.objective.pareto:
+        front_picture(folder / "pareto.png", study_result)
+    start, best = study_result.start.evaluation, study_result.best.evaluation
+    remarks = _draw_coverage([folder], [best], ["best design"], folder / "coverage.png")
+    folders, names = [folder / "start", folder], ["start", "best design"]
+    remarks += _draw_coverage(folders, [start, best], names, folder / "before_after.png")
+    return list(dict.fromkeys(remarks))
+
+
+def _draw_coverage(
+    folders: Sequence[Path], evaluations: Sequence[Evaluation], names: Sequence[str], picture: Path
+) -> list[str]:
+    titles = [f"{name}\n{summary(one)}" for name, one in zip(names, evaluations, strict=True)]
+    skipped = viewer.draw_coverage(folders, titles, picture)
+    return [skipped] if skipped else []
