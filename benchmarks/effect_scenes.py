@@ -28,13 +28,13 @@ EFFECTS = {
     "vibration": Effect(LOSSLESS._replace(vibration=None), LOSSLESS, ("wave",)),
     "random_phase": Effect(PHYSICS, PHYSICS._replace(random_phase=RandomPhase(1)), ("phases",)),
     "ball_collisions": Effect(
-        PHYSICS._replace(ball_collisions=None), PHYSICS, ("crowd", "pair_time")
+        PHYSICS._replace(ball_collisions=None), PHYSICS, ("neighbours", "pair_time")
     ),
     "friction": Effect(
-        PHYSICS, PHYSICS._replace(friction=Friction((STEEL,) * 3, STEEL)), ("grip",)
+        PHYSICS, PHYSICS._replace(friction=Friction((STEEL,) * 3, STEEL)), ("friction_state",)
     ),
     "drag": Effect(PHYSICS, PHYSICS._replace(drag=Drag()), ("air",)),
-    "rest": Effect(PHYSICS, PHYSICS._replace(rest=Rest()), ("footing",)),
+    "rest": Effect(PHYSICS, PHYSICS._replace(rest=Rest()), ("contact",)),
     "turn": Effect(
         PHYSICS, PHYSICS._replace(part_rotation=PartRotation(PART, rpm=30.0)), ("turning", "part")
     ),

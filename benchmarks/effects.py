@@ -89,10 +89,10 @@ def play(effect: str, on: bool) -> None:
     piece = 0.02 * TARGET / max(spent, 1e-6)
     kept = (
         run.motion,
-        run.calendar,
-        run.shot.crowd,
-        run.footing,
-        run.grip,
+        run.queue,
+        run.neighbours,
+        run.contact,
+        run.friction_state,
         run.phases,
         run.air,
         run.sizes,

@@ -31,7 +31,7 @@ from benchmarks.table import print_table, write_csv
 from sim_core import compile_simulator
 from sim_core.detect.ball_mesh import first_contact
 from sim_core.geometry.mesh import MAX_TAGS
-from sim_core.loop.impact_log import new_page
+from sim_core.loop.impact_log import new_impact_buffer
 from sim_core.loop.simulate import Clock, _Run
 from sim_core.motion import point_at
 from sim_core.numerics.jit import jit
@@ -52,7 +52,7 @@ def steady(name: str, seed: int = 1) -> _Run:
 
 def advance(run: _Run, seconds: float) -> tuple[int, float]:
     """Collisions and CPU seconds of so many simulated seconds, nothing recorded."""
-    page = new_page(np.zeros(MAX_TAGS, dtype=np.bool_))
+    page = new_impact_buffer(np.zeros(MAX_TAGS, dtype=np.bool_))
     now = float(run.now[0] + run.now[1] * run.window)
     before, start = int(run.count[:3].sum()), time.process_time()
     run._advance(Clock(run.now, run.window, now + seconds, 0.0), page)
@@ -163,8 +163,8 @@ class Contestant:
         walls = [*run.ground.tree[:-1], *run.ground.locator]
         columns = [
             run.motion,
-            *run.calendar,
-            *(a for a in run.shot.crowd if isinstance(a, np.ndarray)),
+            *run.queue,
+            *(a for a in run.neighbours if isinstance(a, np.ndarray)),
         ]
         return {
             "scene": self.name,

@@ -2,7 +2,7 @@
 
     python benchmarks/loop_profile.py [scene ...]
 
-The loop is compiled once more with a stopwatch in it (sim_core/stopwatch.py); the last column says how much slower it
+The loop is compiled once more with a profiler in it (sim_core/numerics/profiler.py); the last column says how much slower it
 is for that. What limits it is said in docs/core.md.
 """
 
@@ -15,24 +15,24 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from benchmarks.events import advance, steady
 from benchmarks.scenes import MESHES
-from sim_core.numerics.profiler import PARTS, new_stopwatch
+from sim_core.numerics.profiler import PARTS, new_profiler
 
 WINDOW = 0.4  # CPU s a measurement
 
 
 def profile(name: str, repeats: int = 5) -> tuple[list[float], dict[str, float], float]:
-    """ns a collision in each part (medians), events and searches a collision, and how much the stopwatch slows."""
+    """ns a collision in each part (medians), events and searches a collision, and how much the profiler slows."""
     bare, watched = steady(name), steady(name)
-    watched.watch = new_stopwatch()
+    watched.profiler = new_profiler()
     advance(watched, 0.01)
     piece = 0.01 * WINDOW / max(advance(bare, 0.01)[1], 1e-6)
     parts, ratios = [], []
     watched.count[:] = 0
     for _ in range(repeats):
         collisions, spent = advance(bare, piece)
-        watched.watch.spent[:] = 0
+        watched.profiler.spent[:] = 0
         seen, longer = advance(watched, piece)
-        ticks = watched.watch.spent
+        ticks = watched.profiler.spent
         parts.append(ticks / ticks.sum() * longer / seen * 1e9)
         ratios.append((longer / seen) / (spent / collisions))
     count = watched.count / watched.count[:3].sum()
@@ -62,7 +62,7 @@ def main() -> None:
     print(
         "ns a collision | "
         + " | ".join(PARTS)
-        + " | all | wall searches a collision | with / without stopwatch"
+        + " | all | wall searches a collision | with / without profiler"
     )
     for name in names:
         parts, calls, ratio = profile(name)

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim_core.effects.contact_mode import Footing, own_pull
-from sim_core.effects.gravity import Gravity, acceleration
+from sim_core.effects.contact_mode import ContactState, ball_acceleration
+from sim_core.effects.gravity import Gravity, gravity_acceleration
 from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.vec3 import Vec3, along
 
@@ -37,14 +37,14 @@ def drift(motion: np.ndarray, ball: int, time: float) -> Vec3:
 @inlined
 def point_at(motion: np.ndarray, ball: int, time: float, gravity: Gravity | None) -> Point:
     """Where a ball is, and how fast, at a time of the window."""
-    return point_under(motion, ball, time, acceleration(gravity))
+    return point_under(motion, ball, time, gravity_acceleration(gravity))
 
 
 @inlined
-def point_under(motion: np.ndarray, ball: int, time: float, fall: Vec3) -> Point:
+def point_under(motion: np.ndarray, ball: int, time: float, acceleration: Vec3) -> Point:
     """The same under the ball's own acceleration [m/s²]."""
-    position = along(drift(motion, ball, time), 0.5 * time * time, fall)
-    velocity = along(Vec3(motion[ball, 3], motion[ball, 4], motion[ball, 5]), time, fall)
+    position = along(drift(motion, ball, time), 0.5 * time * time, acceleration)
+    velocity = along(Vec3(motion[ball, 3], motion[ball, 4], motion[ball, 5]), time, acceleration)
     return Point(position, velocity)
 
 
@@ -59,21 +59,23 @@ def kick(motion: np.ndarray, ball: int, time: float, change: Vec3) -> None:
 
 
 @inlined
-def set_off(motion: np.ndarray, ball: int, time: float, here: Point, fall: Vec3) -> None:
+def set_off(motion: np.ndarray, ball: int, time: float, here: Point, acceleration: Vec3) -> None:
     """Give a ball the path that leads through ``here`` at ``time`` under its own acceleration [m/s²]."""
     for axis in range(3):
-        velocity = here.velocity[axis] - fall[axis] * time
-        motion[ball, axis] = here.position[axis] - (velocity + 0.5 * fall[axis] * time) * time
+        velocity = here.velocity[axis] - acceleration[axis] * time
+        motion[ball, axis] = (
+            here.position[axis] - (velocity + 0.5 * acceleration[axis] * time) * time
+        )
         motion[ball, 3 + axis] = velocity
 
 
 @jit
-def set_back(
-    motion: np.ndarray, window: float, gravity: Gravity | None, footing: Footing | None = None
+def shift_motion(
+    motion: np.ndarray, window: float, gravity: Gravity | None, contact: ContactState | None = None
 ) -> None:
     """Move the clock's zero forward by ``window`` [s]."""
     for ball in range(len(motion)):
-        fall = own_pull(footing, ball, gravity)
-        for axis, a in enumerate((fall.x, fall.y, fall.z)):
+        acceleration = ball_acceleration(contact, ball, gravity)
+        for axis, a in enumerate((acceleration.x, acceleration.y, acceleration.z)):
             motion[ball, axis] += window * (motion[ball, 3 + axis] + 0.5 * a * window)
             motion[ball, 3 + axis] += a * window

@@ -12,7 +12,7 @@ import numpy as np
 from benchmarks.gas import HEIGHT, PER_BALL, Gas
 from benchmarks.structures.compiled import jit, searches
 from benchmarks.structures.pairs import sooner
-from sim_core.loop.event_queue import Calendar, new_calendar, reschedule
+from sim_core.loop.event_queue import EventQueue, new_event_queue, reschedule
 from sim_core.numerics.roots import NEVER
 
 HELD = 0.3  # balls a cell on average; 0.7 and 1.5 measured 15 and 30 % slower
@@ -20,7 +20,7 @@ HELD = 0.3  # balls a cell on average; 0.7 and 1.5 measured 15 and 30 % slower
 
 class LinkedCells(NamedTuple):
     """``edge`` [m]; ``shape`` (3,) cells until they repeat; ``where`` (n, 3) int32, counted on without repeating;
-    ``calendar``: when each ball crosses a border next; ``first`` (cells,) and ``after``, ``before`` (n,) int32: the
+    ``queue``: when each ball crosses a border next; ``first`` (cells,) and ``after``, ``before`` (n,) int32: the
     chains, -1 at their ends.
     """
 
@@ -29,7 +29,7 @@ class LinkedCells(NamedTuple):
     edge: float
     shape: np.ndarray
     where: np.ndarray
-    calendar: Calendar
+    queue: EventQueue
     first: np.ndarray
     after: np.ndarray
     before: np.ndarray
@@ -43,7 +43,7 @@ def build(gas: Gas) -> LinkedCells:
     first = np.full(int(shape.prod()), -1, dtype=np.int32)
     after, before = np.full((2, len(where)), -1, dtype=np.int32)
     cells = LinkedCells(
-        gas.motion, gas.reach, edge, shape, where, new_calendar(len(where)), first, after, before
+        gas.motion, gas.reach, edge, shape, where, new_event_queue(len(where)), first, after, before
     )
     _join_all(cells)
     return cells
@@ -88,8 +88,8 @@ def _join(cells, ball):  # type: ignore[no-untyped-def]
     cells.first[cell], cells.after[ball], cells.before[ball] = ball, head, -1
     if head >= 0:
         cells.before[head] = ball
-    cells.calendar.wall_time[ball] = _next_border(cells, ball)[0]
-    reschedule(cells.calendar, ball)
+    cells.queue.wall_time[ball] = _next_border(cells, ball)[0]
+    reschedule(cells.queue, ball)
 
 
 @jit
@@ -132,8 +132,8 @@ def upkeep(cells, ends, before, times, partners):  # type: ignore[no-untyped-def
     """Plays all crossings."""
     crossings, in_flight = 0, 0
     while True:
-        ball = np.int64(cells.calendar.winners[1])
-        time = cells.calendar.next_time[ball]
+        ball = np.int64(cells.queue.winners[1])
+        time = cells.queue.next_time[ball]
         if (
             time >= before
         ):  # what was played past the ends of flights counts as that many flights more

@@ -9,18 +9,24 @@ import numpy as np
 
 from benchmarks.gas import HEIGHT, Gas
 from benchmarks.structures.compiled import jit, searches
-from sim_core.loop.neighbours import Crowd, follow, new_crowd, next_meeting, set_crowd
+from sim_core.loop.neighbours import (
+    NeighbourFilter,
+    follow,
+    new_neighbour_filter,
+    next_meeting,
+    refresh_neighbours,
+)
 from sim_core.motion import WINDOW
 from sim_core.numerics.roots import NEVER
 
 
 class ProductPairs(NamedTuple):
-    """``motion`` (n, 6) in the free-fall frame, time 0 being the window's start; ``crowd``: what is made of it;
+    """``motion`` (n, 6) in the free-fall frame, time 0 being the window's start; ``neighbours``: what is made of it;
     ``now`` [s] on the window's clock.
     """
 
     motion: np.ndarray
-    crowd: Crowd
+    neighbours: NeighbourFilter
     now: float
 
 
@@ -33,7 +39,9 @@ def build(gas: Gas) -> ProductPairs:
     start = np.clip(place - now * np.roll(velocity, 1, axis=0), low, high)
     motion = np.concatenate([start, (place - start) / now], axis=1)
     fastest = 2.0 * float(np.abs(velocity).max())
-    pairs = ProductPairs(motion, new_crowd(motion, low, high, gas.reach, fastest, WINDOW), now)
+    pairs = ProductPairs(
+        motion, new_neighbour_filter(motion, low, high, gas.reach, fastest, WINDOW), now
+    )
     motion[:] = np.concatenate([place - now * velocity, velocity], axis=1)
     _follow_all(pairs)
     return pairs
@@ -42,14 +50,14 @@ def build(gas: Gas) -> ProductPairs:
 @jit
 def _follow_all(pairs):  # type: ignore[no-untyped-def]
     for ball in range(len(pairs.motion)):
-        follow(pairs.crowd, pairs.motion, ball, pairs.now)
+        follow(pairs.neighbours, pairs.motion, ball, pairs.now)
 
 
 @searches(ProductPairs)
 def search(pairs, ball, time, before):  # type: ignore[no-untyped-def]
     """Time [s] and partner of the ball's first meeting before ``before`` and the window's end."""
     time, partner = next_meeting(
-        pairs.crowd, pairs.motion, ball, pairs.now + time, pairs.now + before
+        pairs.neighbours, pairs.motion, ball, pairs.now + time, pairs.now + before
     )
     return (time - pairs.now, partner) if partner >= 0 else (NEVER, -1)
 
@@ -62,13 +70,13 @@ def upkeep(pairs, ends, before, times, partners):  # type: ignore[no-untyped-def
     balls = len(ends)
     if balls == 0:
         return 0
-    set_crowd(pairs.crowd, pairs.motion)
-    for ball in range(balls if pairs.crowd.blocks is not None else 0):
+    refresh_neighbours(pairs.neighbours, pairs.motion)
+    for ball in range(balls if pairs.neighbours.blocks is not None else 0):
         times[ball], partners[ball] = search(pairs, ball, 0.0, before)
     flown = 0.0
     for ball in range(balls):
         flown += ends[ball]
     flights = int(balls * balls * WINDOW / flown)
     for k in range(flights):
-        follow(pairs.crowd, pairs.motion, k % balls, pairs.now)
+        follow(pairs.neighbours, pairs.motion, k % balls, pairs.now)
     return flights

@@ -15,16 +15,16 @@ import numpy as np
 from sim_core.contact.constrained_impulse import (
     BLOCKED,
     SHORTEST_HOP,
+    acceleration_of,
     impart,
     place,
-    pull,
     response,
 )
 from sim_core.contact.jamming import watch
 from sim_core.contact.pushed_by_part import is_pressed, let_go, touch
 from sim_core.contact.support_changes import BOUNCES, touch_down
-from sim_core.effects.contact_mode import ASLEEP, MODE, ON_BALL, Footing
-from sim_core.effects.friction import OF_BALLS, Grip
+from sim_core.effects.contact_mode import ASLEEP, MODE, ON_BALL, ContactState
+from sim_core.effects.friction import OF_BALLS, FrictionState
 from sim_core.effects.restitution import Restitution, restitution_law
 from sim_core.impulses.ball_ball import pair_kick
 from sim_core.impulses.friction import rub_pair, rub_surface
@@ -39,38 +39,52 @@ PARTING = 1e-9
 
 @jit
 def meet(
-    footing: Footing,
+    contact: ContactState,
     motion: np.ndarray,
     one: int,
     two: int,
     time: float,
-    moment: float,
+    time_since_start: float,
     restitution: Restitution | None,
     radius: float,
 ) -> bool:
     """Two balls meet now; True when one that lay still is moved, so that what leans on it must be woken."""
-    first, second = place(footing, motion, one, time), place(footing, motion, two, time)
+    first, second = place(contact, motion, one, time), place(contact, motion, two, time)
     apart, closing = sub(second.position, first.position), sub(second.velocity, first.velocity)
     distance = math.sqrt(dot(apart, apart))
     into = -dot(apart, closing) / distance
     if into < -PARTING:
         return False
     into = max(into, 0.0)  # pressed together without any speed
-    still_one, still_two = footing.marks[one, MODE] >= ASLEEP, footing.marks[two, MODE] >= ASLEEP
-    slow = into < footing.slow
-    pressed = is_pressed(footing, one, moment) or is_pressed(footing, two, moment)
+    still_one, still_two = contact.marks[one, MODE] >= ASLEEP, contact.marks[two, MODE] >= ASLEEP
+    slow = into < contact.slow
+    pressed = is_pressed(contact, one, time_since_start) or is_pressed(
+        contact, two, time_since_start
+    )
     scale = 1.0 / distance
     normal = Vec3(scale * apart.x, scale * apart.y, scale * apart.z)
     if slow and still_one and not pressed:
-        _land_on(footing, motion, two, one, time, moment, second, normal, into, restitution, radius)
+        _land_on(
+            contact,
+            motion,
+            two,
+            one,
+            time,
+            time_since_start,
+            second,
+            normal,
+            into,
+            restitution,
+            radius,
+        )
     elif slow and still_two and not pressed:
         _land_on(
-            footing,
+            contact,
             motion,
             one,
             two,
             time,
-            moment,
+            time_since_start,
             first,
             times(-1.0, normal),
             into,
@@ -79,38 +93,38 @@ def meet(
         )
     elif not slow:
         change = pair_kick(apart, closing, restitution)
-        change = rub_pair(footing.grip, one, two, time, apart, closing, change)
-        impart(footing, motion, one, time, moment, first, change)
-        impart(footing, motion, two, time, moment, second, times(-1.0, change))
+        change = rub_pair(contact.friction_state, one, two, time, apart, closing, change)
+        impart(contact, motion, one, time, time_since_start, first, change)
+        impart(contact, motion, two, time, time_since_start, second, times(-1.0, change))
     else:
         if pressed:
-            let_go(footing, one, times(-1.0, normal))
-            let_go(footing, two, normal)
+            let_go(contact, one, times(-1.0, normal))
+            let_go(contact, two, normal)
         give_one, give_two = (
-            response(footing, one, times(-1.0, normal)),
-            response(footing, two, normal),
+            response(contact, one, times(-1.0, normal)),
+            response(contact, two, normal),
         )
         total = max(dot(give_two, normal) - dot(give_one, normal), BLOCKED)
-        press = _press(footing.grip, footing, one, two, normal)
+        press = _press(contact.friction_state, contact, one, two, normal)
         push = (into + max(into, SHORTEST_HOP * press, 2.0 * PARTING)) / total
-        impart(footing, motion, one, time, moment, first, times(push, give_one))
-        impart(footing, motion, two, time, moment, second, times(push, give_two))
+        impart(contact, motion, one, time, time_since_start, first, times(push, give_one))
+        impart(contact, motion, two, time, time_since_start, second, times(push, give_two))
     if pressed:
-        touch(footing, one, moment)
-        touch(footing, two, moment)
-    watch(footing, motion, one, time, moment, first.position, slow, radius)
-    watch(footing, motion, two, time, moment, second.position, slow, radius)
+        touch(contact, one, time_since_start)
+        touch(contact, two, time_since_start)
+    watch(contact, motion, one, time, time_since_start, first.position, slow, radius)
+    watch(contact, motion, two, time, time_since_start, second.position, slow, radius)
     return (still_one or still_two) and (pressed or not slow)
 
 
 @jit
 def _land_on(
-    footing: Footing,
+    contact: ContactState,
     motion: np.ndarray,
     ball: int,
     other: int,
     time: float,
-    moment: float,
+    time_since_start: float,
     here: Point,
     normal: Vec3,
     into: float,
@@ -118,16 +132,18 @@ def _land_on(
     radius: float,
 ) -> None:
     """A ball meets one that lies still: a surface like others."""
-    if footing.marks[ball, MODE] >= ASLEEP:
+    if contact.marks[ball, MODE] >= ASLEEP:
         return
     landed = touch_down(
-        footing, motion, ball, ON_BALL - other, 2.0 * radius, time, moment, here, normal
+        contact, motion, ball, ON_BALL - other, 2.0 * radius, time, time_since_start, here, normal
     )
     if landed == BOUNCES:
         e = 1.0 if restitution is None else _law(restitution, into)
         change = times((1.0 + e) * into, normal)
-        change = rub_surface(footing.grip, ball, time, normal, here.velocity, change, OF_BALLS)
-        impart(footing, motion, ball, time, moment, here, change)
+        change = rub_surface(
+            contact.friction_state, ball, time, normal, here.velocity, change, OF_BALLS
+        )
+        impart(contact, motion, ball, time, time_since_start, here, change)
 
 
 @jit
@@ -136,9 +152,11 @@ def _law(restitution: Restitution, speed: float) -> float:
 
 
 @jit
-def _press(grip: Grip | None, footing: Footing, one: int, two: int, normal: Vec3) -> float:
+def _press(
+    friction_state: FrictionState | None, contact: ContactState, one: int, two: int, normal: Vec3
+) -> float:
     """How hard two balls are pressed together [m/s²]; by a slip that ends soon no harder than by two weights."""
-    press = -dot(sub(pull(footing, two), pull(footing, one)), normal)
-    if grip is None:
+    press = -dot(sub(acceleration_of(contact, two), acceleration_of(contact, one)), normal)
+    if friction_state is None:
         return press
-    return min(press, 2.0 * math.sqrt(dot(footing.gravity, footing.gravity)))
+    return min(press, 2.0 * math.sqrt(dot(contact.gravity, contact.gravity)))

@@ -3,7 +3,7 @@
 import numpy as np
 
 from sim_core.contact.support_changes import settle
-from sim_core.effects.contact_mode import FLYING, MODE, Footing, onto_cone
+from sim_core.effects.contact_mode import FLYING, MODE, ContactState, onto_cone
 from sim_core.motion import Point, kick, point_under
 from sim_core.numerics.jit import jit
 from sim_core.numerics.vec3 import Vec3, along
@@ -14,39 +14,46 @@ SHORTEST_HOP = 1e-4
 
 
 @jit
-def pull(footing: Footing, ball: int) -> Vec3:
+def acceleration_of(contact: ContactState, ball: int) -> Vec3:
     """A ball's acceleration [m/s²]."""
-    return Vec3(footing.pull[ball, 0], footing.pull[ball, 1], footing.pull[ball, 2])
+    return Vec3(
+        contact.acceleration[ball, 0], contact.acceleration[ball, 1], contact.acceleration[ball, 2]
+    )
 
 
 @jit
-def place(footing: Footing, motion: np.ndarray, ball: int, time: float) -> Point:
+def place(contact: ContactState, motion: np.ndarray, ball: int, time: float) -> Point:
     """Where a ball is [m], and its velocity [m/s], at a time of the window's clock."""
-    return point_under(motion, ball, time, pull(footing, ball))
+    return point_under(motion, ball, time, acceleration_of(contact, ball))
 
 
 @jit
-def response(footing: Footing, ball: int, push: Vec3) -> Vec3:
+def response(contact: ContactState, ball: int, push: Vec3) -> Vec3:
     """Velocity change of a ball for a unit push per mass."""
-    if footing.marks[ball, MODE] == FLYING:
+    if contact.marks[ball, MODE] == FLYING:
         return push
-    return onto_cone(footing, ball, push)
+    return onto_cone(contact, ball, push)
 
 
 @jit
 def impart(
-    footing: Footing,
+    contact: ContactState,
     motion: np.ndarray,
     ball: int,
     time: float,
-    moment: float,
+    time_since_start: float,
     at: Point,
     change: Vec3,
 ) -> None:
     """Change a ball's velocity by ``change`` [m/s]; one in contact mode keeps of it what its feet leave."""
-    if footing.marks[ball, MODE] == FLYING:
+    if contact.marks[ball, MODE] == FLYING:
         kick(motion, ball, time, change)
     else:
         settle(
-            footing, motion, ball, time, moment, Point(at.position, along(at.velocity, 1.0, change))
+            contact,
+            motion,
+            ball,
+            time,
+            time_since_start,
+            Point(at.position, along(at.velocity, 1.0, change)),
         )

@@ -18,7 +18,7 @@ from sim_core.effects.contact_mode import (
     SLOW_HITS,
     STAYS_UNTIL,
     TOUCHED,
-    Footing,
+    ContactState,
 )
 from sim_core.motion import Point
 from sim_core.numerics.jit import jit
@@ -35,74 +35,78 @@ MOST_HOLDS = 40  # after which that is for ever
 
 @jit
 def hold(
-    footing: Footing,
+    contact: ContactState,
     motion: np.ndarray,
     ball: int,
     time: float,
-    moment: float,
+    time_since_start: float,
     position: Vec3,
     radius: float,
 ) -> None:
     """Hold a ball still where it is; one that was held there before is left alone for longer."""
     nothing = Vec3(0.0, 0.0, 0.0)
-    if _has_gone(footing, ball, HELD_AT, position, radius):
-        _mark(footing, ball, HELD_AT, position)
-        footing.marks[ball, HOLDS] = 0
+    if _has_gone(contact, ball, HELD_AT, position, radius):
+        _mark(contact, ball, HELD_AT, position)
+        contact.marks[ball, HOLDS] = 0
     else:
-        footing.marks[ball, HOLDS] = min(footing.marks[ball, HOLDS] + 1, MOST_HOLDS)
-    move_on(footing, motion, ball, time, moment, Point(position, nothing), nothing, JAMMED)
-    holds = footing.marks[ball, HOLDS]
-    footing.memory[ball, STAYS_UNTIL] = moment + WAIT * (2.0**holds - 1.0)
+        contact.marks[ball, HOLDS] = min(contact.marks[ball, HOLDS] + 1, MOST_HOLDS)
+    move_on(
+        contact, motion, ball, time, time_since_start, Point(position, nothing), nothing, JAMMED
+    )
+    holds = contact.marks[ball, HOLDS]
+    contact.memory[ball, STAYS_UNTIL] = time_since_start + WAIT * (2.0**holds - 1.0)
 
 
 @jit
 def watch(
-    footing: Footing,
+    contact: ContactState,
     motion: np.ndarray,
     ball: int,
     time: float,
-    moment: float,
+    time_since_start: float,
     position: Vec3,
     slow: bool,
     radius: float,
 ) -> None:
     """Count a ball's small hops, and hold it still when they lead nowhere."""
-    marks = footing.marks
+    marks = contact.marks
     marks[ball, ROLLING] = 0
-    if _has_gone(footing, ball, HOPS, position, radius) or (not slow and marks[ball, DRIVEN] == 0):
-        _mark(footing, ball, HOPS, position)
+    if _has_gone(contact, ball, HOPS, position, radius) or (not slow and marks[ball, DRIVEN] == 0):
+        _mark(contact, ball, HOPS, position)
         marks[ball, SLOW_HITS] = 0
         marks[ball, DRIVEN] = 0
-        footing.memory[ball, COUNTS_SINCE] = moment
+        contact.memory[ball, COUNTS_SINCE] = time_since_start
         return
     marks[ball, SLOW_HITS] += 1
     if marks[ball, SLOW_HITS] < JAM_HITS:
         return
     if marks[ball, DRIVEN] != 0:
-        if moment - footing.memory[ball, COUNTS_SINCE] < PRESS:
+        if time_since_start - contact.memory[ball, COUNTS_SINCE] < PRESS:
             marks[ball, DRIVEN] = PRESSED
         else:
-            marks[ball, DRIVEN] = 1 if moment - footing.memory[ball, TOUCHED] < TOUCHING else 0
+            marks[ball, DRIVEN] = (
+                1 if time_since_start - contact.memory[ball, TOUCHED] < TOUCHING else 0
+            )
         marks[ball, SLOW_HITS] = 0
-        footing.memory[ball, COUNTS_SINCE] = moment
+        contact.memory[ball, COUNTS_SINCE] = time_since_start
         return
     if marks[ball, MODE] >= ASLEEP:
         return
-    velocity = place(footing, motion, ball, time).velocity
-    if dot(velocity, velocity) < footing.slow * footing.slow:
+    velocity = place(contact, motion, ball, time).velocity
+    if dot(velocity, velocity) < contact.slow * contact.slow:
         marks[ball, SLOW_HITS] = 0
-        hold(footing, motion, ball, time, moment, position, radius)
+        hold(contact, motion, ball, time, time_since_start, position, radius)
 
 
 @jit
-def _has_gone(footing: Footing, ball: int, mark: int, position: Vec3, radius: float) -> bool:
+def _has_gone(contact: ContactState, ball: int, mark: int, position: Vec3, radius: float) -> bool:
     """True when a ball is further than HELD from the place in those columns of its memory."""
-    memory = footing.memory
+    memory = contact.memory
     gone = sub(position, Vec3(memory[ball, mark], memory[ball, mark + 1], memory[ball, mark + 2]))
     return dot(gone, gone) > (HELD * radius) ** 2
 
 
 @jit
-def _mark(footing: Footing, ball: int, mark: int, position: Vec3) -> None:
+def _mark(contact: ContactState, ball: int, mark: int, position: Vec3) -> None:
     for axis in range(3):
-        footing.memory[ball, mark + axis] = position[axis]
+        contact.memory[ball, mark + axis] = position[axis]

@@ -6,22 +6,22 @@ import numpy as np
 
 from sim_core.effects.contact_mode import (
     ASLEEP,
-    CALLED,
-    FEET,
     FLYING,
     GOES_ON,
     LEAVES,
-    LOOKS,
     MODE,
-    PROPS,
+    NEIGHBOURS_HOLDING_JAM,
+    RECHECK,
     STAYS_UNTIL,
     STILL,
     STOPS,
+    SUPPORTS,
+    WAKE_PENDING,
     WAKES,
-    Footing,
-    foot_normal,
+    ContactState,
+    support_normal,
 )
-from sim_core.effects.friction import Grip
+from sim_core.effects.friction import FrictionState
 from sim_core.effects.vibration import Wave
 from sim_core.geometry.bvh import Tree
 from sim_core.geometry.obstacles import FACE, WAVING_FACE
@@ -35,17 +35,19 @@ ONE_PLANE = 1e-5  # rad: faces that meet at less are told apart at their border 
 BEHIND = 2e-13  # m: an edge this little in front of a foot's plane is behind it but for rounding
 TURN = 0.1  # rad: what resistance or friction slows while it curves has its direction read anew after so much
 SHORTEST = 1e-3  # s: but not more often
-LOOK = 2e-3  # s: in which a ball that nothing holds any more would have fallen 20 um, see grounded.LEANING
+RECHECK_PERIOD = 2e-3  # s: in which a ball that nothing holds any more would have fallen 20 um, see grounded.LEANING
 
 
 @inlined
-def out_of_reach(footing: Footing | None, tree: Tree, ball: int, position: Vec3, row: int) -> bool:
+def out_of_reach(
+    contact: ContactState | None, tree: Tree, ball: int, position: Vec3, row: int
+) -> bool:
     """True for what a ball that moves along its feet's planes cannot meet: its own ground, or edges behind it."""
-    if footing is None:
+    if contact is None:
         return False
-    for foot in range(footing.marks[ball, FEET]):
-        if footing.rows[ball, foot] == row or _lies_behind(
-            tree, row, foot_normal(footing, ball, foot), position
+    for support in range(contact.marks[ball, SUPPORTS]):
+        if contact.rows[ball, support] == row or _lies_behind(
+            tree, row, support_normal(contact, ball, support), position
         ):
             return True
     return False
@@ -67,48 +69,58 @@ def _lies_behind(tree: Tree, row: int, normal: Vec3, position: Vec3) -> bool:
 
 @inlined
 def end_of_path(
-    footing: Footing | None,
+    contact: ContactState | None,
     tree: Tree,
     seam: float,
     wave: Wave | None,
     here: Point,
-    pull: Vec3,
+    acceleration: Vec3,
     ball: int,
     time: float,
-    moment: float,
+    time_since_start: float,
     length: float,
 ) -> tuple[float, int]:
     """For how long, at most ``length`` [s], the ball's path is good, and what ends it (see GOES_ON).
 
-    ``moment`` [s]: now, since the start. A ball that lies still is looked at for one swing of the slowest sonotrode:
+    ``time_since_start`` [s]: now, since the start. A ball that lies still is looked at for one swing of the slowest sonotrode:
     what does not touch it then never will.
     """
-    if footing is None:
+    if contact is None:
         return length, GOES_ON
-    mode = footing.marks[ball, MODE]
+    mode = contact.marks[ball, MODE]
     if mode == FLYING:
         return length, GOES_ON
-    if footing.marks[ball, CALLED] != 0:
-        wait = max(0.0, footing.memory[ball, STAYS_UNTIL] - moment)
+    if contact.marks[ball, WAKE_PENDING] != 0:
+        wait = max(0.0, contact.memory[ball, STAYS_UNTIL] - time_since_start)
         return (wait, WAKES) if wait <= length else (length, GOES_ON)
-    if footing.marks[ball, PROPS] > 0:
-        return LOOK, LOOKS
+    if contact.marks[ball, NEIGHBOURS_HOLDING_JAM] > 0:
+        return RECHECK_PERIOD, RECHECK
     if mode >= ASLEEP:
         return _swing(wave), STILL
     best, end = length, GOES_ON
-    for foot in range(footing.marks[ball, FEET]):
-        row = footing.rows[ball, foot]
+    for support in range(contact.marks[ball, SUPPORTS]):
+        row = contact.rows[ball, support]
         if row < 0:
             delay = _leaves_round(
-                footing, ball, foot, here.position, here.velocity, pull, Vec3(0.0, 0.0, 0.0)
+                contact,
+                ball,
+                support,
+                here.position,
+                here.velocity,
+                acceleration,
+                Vec3(0.0, 0.0, 0.0),
             )
         elif tree.kinds[row] == FACE:
-            delay = _leaves_face(tree.numbers, row, here, pull, OVER * seam)
+            delay = _leaves_face(tree.numbers, row, here, acceleration, OVER * seam)
         else:
-            delay = _leaves_edge(footing, tree.numbers, ball, foot, here, pull, OVER * seam)
+            delay = _leaves_edge(
+                contact, tree.numbers, ball, support, here, acceleration, OVER * seam
+            )
         if delay < best:
-            best, end = delay, LEAVES - foot
-    delay, turns = _brake_ends(footing.grip, footing, ball, time, here.velocity, pull)
+            best, end = delay, LEAVES - support
+    delay, turns = _brake_ends(
+        contact.friction_state, contact, ball, time, here.velocity, acceleration
+    )
     if delay < best:
         best, end = delay, STOPS
     elif turns and end == GOES_ON:  # or it would turn in every piece by less than TURN, unnoticed
@@ -124,90 +136,109 @@ def _swing(wave: Wave | None) -> float:
 
 
 @jit
-def _leaves_face(numbers: np.ndarray, row: int, here: Point, pull: Vec3, over: float) -> float:
+def _leaves_face(
+    numbers: np.ndarray, row: int, here: Point, acceleration: Vec3, over: float
+) -> float:
     soonest = NEVER
     for k in range(4, 20, 4):
         inward = Vec3(numbers[row, k], numbers[row, k + 1], numbers[row, k + 2])
         inside = dot(inward, here.position) - numbers[row, k + 3] + over
         soonest = min(
             soonest,
-            first_approach(inside, dot(inward, here.velocity), 0.5 * dot(inward, pull), math.inf),
+            first_approach(
+                inside, dot(inward, here.velocity), 0.5 * dot(inward, acceleration), math.inf
+            ),
         )
     return soonest
 
 
 @jit
 def _leaves_edge(
-    footing: Footing,
+    contact: ContactState,
     numbers: np.ndarray,
     ball: int,
-    foot: int,
+    support: int,
     here: Point,
-    pull: Vec3,
+    acceleration: Vec3,
     over: float,
 ) -> float:
     """On an edge the foot is a plane that touches the capsule: good for a short way across it, and to its ends."""
-    row = footing.rows[ball, foot]
+    row = contact.rows[ball, support]
     start = Vec3(numbers[row, 0], numbers[row, 1], numbers[row, 2])
     line = Vec3(numbers[row, 3], numbers[row, 4], numbers[row, 5])
     length = numbers[row, 6]
     place = dot(sub(here.position, start), line)
     if not 0.0 <= place <= length:
         return _leaves_round(
-            footing, ball, foot, here.position, here.velocity, pull, Vec3(0.0, 0.0, 0.0)
+            contact, ball, support, here.position, here.velocity, acceleration, Vec3(0.0, 0.0, 0.0)
         )
-    speed, change = dot(here.velocity, line), 0.5 * dot(pull, line)
+    speed, change = dot(here.velocity, line), 0.5 * dot(acceleration, line)
     return min(
         first_approach(place + over, speed, change, math.inf),
         first_approach(length - place + over, -speed, -change, math.inf),
-        _leaves_round(footing, ball, foot, here.position, here.velocity, pull, line),
+        _leaves_round(contact, ball, support, here.position, here.velocity, acceleration, line),
     )
 
 
 @jit
 def _leaves_round(
-    footing: Footing, ball: int, foot: int, position: Vec3, velocity: Vec3, pull: Vec3, line: Vec3
+    contact: ContactState,
+    ball: int,
+    support: int,
+    position: Vec3,
+    velocity: Vec3,
+    acceleration: Vec3,
+    line: Vec3,
 ) -> float:
     """How long the plane stands for what is round under it; motion along ``line`` (unit, or zero) does not count."""
-    spots = footing.spots
-    gone = sub(position, Vec3(spots[ball, foot, 0], spots[ball, foot, 1], spots[ball, foot, 2]))
+    spots = contact.spots
+    gone = sub(
+        position, Vec3(spots[ball, support, 0], spots[ball, support, 1], spots[ball, support, 2])
+    )
     gone = along(gone, -dot(gone, line), line)
     velocity = along(velocity, -dot(velocity, line), line)
-    pull = along(pull, -dot(pull, line), line)
-    left = spots[ball, foot, 3] - math.sqrt(dot(gone, gone))
+    acceleration = along(acceleration, -dot(acceleration, line), line)
+    left = spots[ball, support, 3] - math.sqrt(dot(gone, gone))
     if left <= 0.0:
         return 0.0
     speed = math.sqrt(dot(velocity, velocity))
-    root = speed + math.sqrt(speed * speed + 2.0 * left * math.sqrt(dot(pull, pull)))
+    root = speed + math.sqrt(
+        speed * speed + 2.0 * left * math.sqrt(dot(acceleration, acceleration))
+    )
     return 2.0 * left / root if root > 1e-12 else NEVER
 
 
 @jit
 def _brake_ends(
-    grip: Grip | None, footing: Footing, ball: int, time: float, velocity: Vec3, pull: Vec3
+    friction_state: FrictionState | None,
+    contact: ContactState,
+    ball: int,
+    time: float,
+    velocity: Vec3,
+    acceleration: Vec3,
 ) -> tuple[float, bool]:
     """How long the force against a ball's slip, or against its motion, keeps its direction, and whether that turns."""
-    if grip is not None:
-        slips = grip.slips
+    if friction_state is not None:
+        slips = friction_state.slips
         change = Vec3(slips[ball, 3], slips[ball, 4], slips[ball, 5])
         slip = along(Vec3(slips[ball, 0], slips[ball, 1], slips[ball, 2]), time, change)
         if dot(slip, slip) + dot(change, change) > 0.0:
             return _stops(slip, change)
-    if footing.resistance > 0.0:
-        return _stops(velocity, pull)
+    if contact.resistance > 0.0:
+        return _stops(velocity, acceleration)
     return NEVER, False
 
 
 @jit
-def _stops(velocity: Vec3, pull: Vec3) -> tuple[float, bool]:
+def _stops(velocity: Vec3, acceleration: Vec3) -> tuple[float, bool]:
     square = dot(velocity, velocity)
     if square == 0.0:
         return NEVER, False
-    rate = dot(pull, velocity)
+    rate = dot(acceleration, velocity)
     speed = math.sqrt(square)
-    across = dot(pull, pull) - rate * rate / square
+    across = dot(acceleration, acceleration) - rate * rate / square
     soonest = -square / rate if rate < 0.0 else NEVER
-    turns = across > 1e-12 * dot(pull, pull)
+    turns = across > 1e-12 * dot(acceleration, acceleration)
     if turns:
         soonest = min(soonest, max(SHORTEST, TURN * speed / math.sqrt(across)))
     return soonest, turns

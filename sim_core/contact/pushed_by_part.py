@@ -10,13 +10,13 @@ import numpy as np
 from sim_core.contact.constrained_impulse import BLOCKED, SHORTEST_HOP, impart, response
 from sim_core.effects.contact_mode import (
     DRIVEN,
-    FEET,
     ON_BALL,
     ROLLING,
+    SUPPORTS,
     TOUCHED,
-    Footing,
-    drop_foot,
-    foot_normal,
+    ContactState,
+    drop_support,
+    support_normal,
 )
 from sim_core.effects.part_rotation import Turning, from_part
 from sim_core.motion import Point, kick
@@ -31,7 +31,7 @@ PRESSED = 2  # of DRIVEN
 
 @inlined
 def taken_from_part(
-    footing: Footing | None,
+    contact: ContactState | None,
     turning: Turning,
     ball: int,
     time: float,
@@ -43,68 +43,69 @@ def taken_from_part(
 
     ``change`` [m/s]: what a free ball would take; ``away`` points to it from where it is touched, in the part's frame.
     """
-    if footing is None:
+    if contact is None:
         return change
-    if into >= footing.slow:
+    if into >= contact.slow:
         return change
     return _constrained(
-        footing, ball, from_part(turning, times(1.0 / math.sqrt(dot(away, away)), away), time), into
+        contact, ball, from_part(turning, times(1.0 / math.sqrt(dot(away, away)), away), time), into
     )
 
 
 @jit
-def _constrained(footing: Footing, ball: int, normal: Vec3, into: float) -> Vec3:
-    let_go(footing, ball, normal)
-    give = response(footing, ball, normal)
+def _constrained(contact: ContactState, ball: int, normal: Vec3, into: float) -> Vec3:
+    let_go(contact, ball, normal)
+    give = response(contact, ball, normal)
     lift = SHORTEST_HOP * math.sqrt(
-        dot(footing.gravity, footing.gravity)
+        dot(contact.gravity, contact.gravity)
     )  # what lies on it hops, not too often
     return times((into + max(into, lift)) / max(dot(give, normal), BLOCKED), give)
 
 
 @inlined
 def drive(
-    footing: Footing | None,
+    contact: ContactState | None,
     motion: np.ndarray,
     ball: int,
     time: float,
-    moment: float,
+    time_since_start: float,
     here: Point,
     change: Vec3,
 ) -> None:
     """The turning part changes a ball's velocity by ``change`` [m/s]."""
-    if footing is None:
+    if contact is None:
         kick(motion, ball, time, change)
         return
-    footing.marks[ball, ROLLING] = 0
-    impart(footing, motion, ball, time, moment, here, change)
-    touch(footing, ball, moment)
+    contact.marks[ball, ROLLING] = 0
+    impart(contact, motion, ball, time, time_since_start, here, change)
+    touch(contact, ball, time_since_start)
 
 
 @jit
-def touch(footing: Footing, ball: int, moment: float) -> None:
+def touch(contact: ContactState, ball: int, time_since_start: float) -> None:
     """Note that the turning part, or what it presses, has touched a ball."""
-    footing.marks[ball, DRIVEN] = max(footing.marks[ball, DRIVEN], 1)
-    footing.memory[ball, TOUCHED] = moment
+    contact.marks[ball, DRIVEN] = max(contact.marks[ball, DRIVEN], 1)
+    contact.memory[ball, TOUCHED] = time_since_start
 
 
 @jit
-def is_pressed(footing: Footing, ball: int, moment: float) -> bool:
+def is_pressed(contact: ContactState, ball: int, time_since_start: float) -> bool:
     """True when the turning part pushes a ball that gets nowhere: what lies still in its way must give way."""
     return (
-        footing.marks[ball, DRIVEN] == PRESSED and moment - footing.memory[ball, TOUCHED] < TOUCHING
+        contact.marks[ball, DRIVEN] == PRESSED
+        and time_since_start - contact.memory[ball, TOUCHED] < TOUCHING
     )
 
 
 @jit
-def let_go(footing: Footing, ball: int, push: Vec3) -> None:
+def let_go(contact: ContactState, ball: int, push: Vec3) -> None:
     """Take away the feet on balls that a push presses: those must give way or press back."""
-    foot = 0
-    while foot < footing.marks[ball, FEET]:
+    support = 0
+    while support < contact.marks[ball, SUPPORTS]:
         if (
-            footing.rows[ball, foot] <= ON_BALL
-            and dot(foot_normal(footing, ball, foot), push) < 0.0
+            contact.rows[ball, support] <= ON_BALL
+            and dot(support_normal(contact, ball, support), push) < 0.0
         ):
-            drop_foot(footing, ball, foot)
+            drop_support(contact, ball, support)
         else:
-            foot += 1
+            support += 1

@@ -6,13 +6,13 @@ import numpy as np
 
 from sim_core.effects.contact_mode import (
     ASLEEP,
-    FEET,
     JAMMED,
     LIES_SINCE,
+    MAX_SUPPORTS,
     MODE,
-    MOST_FEET,
     ON_BALL,
-    Footing,
+    SUPPORTS,
+    ContactState,
 )
 from sim_core.effects.gravity import Gravity
 from sim_core.geometry.analytic import AnalyticCavity
@@ -47,35 +47,35 @@ class Resting:
 
 
 def resting(
-    footing: Footing | None,
+    contact: ContactState | None,
     ground: Ground,
     positions: np.ndarray,
     middle: np.ndarray,
     origin: float,
 ) -> Resting:
     """Who lies still now; ``positions`` (n, 3) [m], ``middle`` (3,) of the mesh, ``origin`` [s] of their clock."""
-    if footing is None:
+    if contact is None:
         return Resting(*(np.zeros(shape, kind) for shape, kind in _EMPTY))
-    still = np.flatnonzero(footing.marks[:, MODE] >= ASLEEP)
-    triangles = np.full((len(still), MOST_FEET), NONE)
+    still = np.flatnonzero(contact.marks[:, MODE] >= ASLEEP)
+    triangles = np.full((len(still), MAX_SUPPORTS), NONE)
     balls = triangles.copy()
     for i, ball in enumerate(still):
-        for foot in range(footing.marks[ball, FEET]):
-            row = int(footing.rows[ball, foot])
+        for support in range(contact.marks[ball, SUPPORTS]):
+            row = int(contact.rows[ball, support])
             if row <= ON_BALL:
-                balls[i, foot] = ON_BALL - row
+                balls[i, support] = ON_BALL - row
             else:
                 seed = int(ground.tree.triangles[row, 0])
                 at = Vec3(*(float(x) for x in positions[ball] - middle))
                 lone = ground.tree.kinds[row] == CAPSULE
-                triangles[i, foot] = seed if lone else triangle_at(ground.locator, seed, at)
+                triangles[i, support] = seed if lone else triangle_at(ground.locator, seed, at)
     return Resting(
         still,
         positions[still],
-        footing.memory[still, LIES_SINCE] - origin,
+        contact.memory[still, LIES_SINCE] - origin,
         triangles,
         balls,
-        footing.marks[still, MODE] == JAMMED,
+        contact.marks[still, MODE] == JAMMED,
     )
 
 
@@ -83,8 +83,8 @@ _EMPTY = (
     ((0,), np.int64),
     ((0, 3), np.float64),
     ((0,), np.float64),
-    ((0, MOST_FEET), np.int64),
-    ((0, MOST_FEET), np.int64),
+    ((0, MAX_SUPPORTS), np.int64),
+    ((0, MAX_SUPPORTS), np.int64),
     ((0,), np.bool_),
 )
 
@@ -96,7 +96,7 @@ def can_rest(mesh: TriangleMesh | AnalyticCavity, gravity: Gravity | None, *movi
     """
     if gravity is None:
         return False
-    pull = np.array(gravity, dtype=np.float64)
+    acceleration = np.array(gravity, dtype=np.float64)
     normals, doubled = towards_shot(mesh.corners)
     still = (doubled > 0.0) & ~np.isin(mesh.tags, moving)
-    return bool((normals[still] @ pull < -UPWARD * np.linalg.norm(pull)).any())
+    return bool((normals[still] @ acceleration < -UPWARD * np.linalg.norm(acceleration)).any())

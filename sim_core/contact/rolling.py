@@ -19,19 +19,19 @@ import math
 
 from sim_core.effects.contact_mode import (
     ASLEEP,
-    FEET,
+    DETACH_TOLERANCE,
     FLYING,
-    KISS,
     ON_BALL,
     ROUNDING,
     SLIDING,
     STILL_BELOW,
-    Footing,
-    drop_foot,
-    foot_normal,
+    SUPPORTS,
+    ContactState,
+    drop_support,
     onto_cone,
+    support_normal,
 )
-from sim_core.effects.friction import Grip, set_slip, set_spin, spin_at
+from sim_core.effects.friction import FrictionState, set_slip, set_spin, spin_at
 from sim_core.numerics.jit import jit
 from sim_core.numerics.vec3 import Vec3, along, cross, dot, sub, times
 
@@ -42,64 +42,80 @@ NOTHING = Vec3(0.0, 0.0, 0.0)
 
 @jit
 def braked(
-    grip: Grip | None, footing: Footing, ball: int, time: float, velocity: Vec3, pull: Vec3
+    friction_state: FrictionState | None,
+    contact: ContactState,
+    ball: int,
+    time: float,
+    velocity: Vec3,
+    acceleration: Vec3,
 ) -> tuple[Vec3, Vec3, int]:
-    """Velocity [m/s], acceleration [m/s²] and mode of a ball on its feet, which leave it ``velocity`` and ``pull`` of
+    """Velocity [m/s], acceleration [m/s²] and mode of a ball on its feet, which leave it ``velocity`` and ``acceleration`` of
     what it had. ``time`` [s]: on the window's clock.
     """
-    if grip is None:
-        return _resisted(footing, ball, velocity, pull)
-    return _rubbed(grip, footing, ball, time, velocity, pull)
+    if friction_state is None:
+        return _resisted(contact, ball, velocity, acceleration)
+    return _rubbed(friction_state, contact, ball, time, velocity, acceleration)
 
 
 @jit
-def _resisted(footing: Footing, ball: int, velocity: Vec3, pull: Vec3) -> tuple[Vec3, Vec3, int]:
-    _lift_feet(footing, ball, pull)
-    if footing.marks[ball, FEET] == 0:
-        return velocity, pull, FLYING
-    weight, size = _size(footing.gravity), _size(pull)
+def _resisted(
+    contact: ContactState, ball: int, velocity: Vec3, acceleration: Vec3
+) -> tuple[Vec3, Vec3, int]:
+    _drop_left_supports(contact, ball, acceleration)
+    if contact.marks[ball, SUPPORTS] == 0:
+        return velocity, acceleration, FLYING
+    weight, size = _size(contact.gravity), _size(acceleration)
     speed = _size(velocity)
-    brake = footing.resistance * _load(weight, size)
+    brake = contact.resistance * _load(weight, size)
     if speed > ROUNDING:
-        return velocity, along(pull, -brake / speed, velocity), SLIDING
+        return velocity, along(acceleration, -brake / speed, velocity), SLIDING
     if size <= brake or size <= STILL_BELOW * weight:
         return NOTHING, NOTHING, ASLEEP
-    return velocity, along(pull, -brake / size, pull), SLIDING
+    return velocity, along(acceleration, -brake / size, acceleration), SLIDING
 
 
 @jit
 def _rubbed(
-    grip: Grip, footing: Footing, ball: int, time: float, velocity: Vec3, pull: Vec3
+    friction_state: FrictionState,
+    contact: ContactState,
+    ball: int,
+    time: float,
+    velocity: Vec3,
+    acceleration: Vec3,
 ) -> tuple[Vec3, Vec3, int]:
-    weight, size = _size(footing.gravity), _size(pull)
+    weight, size = _size(contact.gravity), _size(acceleration)
     load = _load(weight, size)
-    up, arm, hold, axis = _stand(grip, footing, ball, sub(pull, footing.gravity))
-    spin = spin_at(grip, ball, time)
-    if arm < grip.radius:
+    up, arm, hold, axis = _stand(friction_state, contact, ball, sub(acceleration, contact.gravity))
+    spin = spin_at(friction_state, ball, time)
+    if arm < friction_state.radius:
         spin = times(dot(spin, axis), axis)
     slip = along(velocity, -arm, cross(spin, up))
     slip = along(slip, -dot(slip, up), up)
     slipping = _size(slip)
-    inertia = 2.5 * (arm / grip.radius) ** 2  # k
+    inertia = 2.5 * (arm / friction_state.radius) ** 2  # k
     need = size / (1.0 + inertia)
-    if slipping < footing.capture and need < hold:  # it rolls, or friction holds it
-        velocity = onto_cone(footing, ball, along(velocity, -1.0 / (1.0 + inertia), slip))
-        drift = times(inertia / (1.0 + inertia), pull)
-        brake = min(footing.resistance * load, hold - need)
+    if slipping < contact.capture and need < hold:  # it rolls, or friction holds it
+        velocity = onto_cone(contact, ball, along(velocity, -1.0 / (1.0 + inertia), slip))
+        drift = times(inertia / (1.0 + inertia), acceleration)
+        brake = min(contact.resistance * load, hold - need)
         speed = _size(velocity)
         if speed > ROUNDING:
             drift = along(drift, -brake / speed, velocity)
         elif inertia * need <= brake or size <= STILL_BELOW * weight:
-            _lift_feet(footing, ball, pull)
+            _drop_left_supports(contact, ball, acceleration)
             return NOTHING, NOTHING, ASLEEP
         else:
-            drift = along(drift, -brake / size, pull)
+            drift = along(drift, -brake / size, acceleration)
         drilling = times(dot(spin, up), up)
         rolling = times(1.0 / arm, cross(up, velocity))
         set_spin(
-            grip, ball, time, along(rolling, 1.0, drilling), times(1.0 / arm, cross(up, drift))
+            friction_state,
+            ball,
+            time,
+            along(rolling, 1.0, drilling),
+            times(1.0 / arm, cross(up, drift)),
         )
-        return _kept_to(footing, ball, velocity, drift)
+        return _kept_to(contact, ball, velocity, drift)
     if _size(velocity) <= ROUNDING and hold == 0.0 and size <= STILL_BELOW * weight:
         return NOTHING, NOTHING, ASLEEP
     rub = NOTHING
@@ -107,34 +123,36 @@ def _rubbed(
         rub = times(-hold / slipping, slip)
     elif size > 0.0:
         slip = NOTHING
-        rub = times(-hold / size, pull)
-    drift = onto_cone(footing, ball, along(footing.gravity, 1.0, rub))
+        rub = times(-hold / size, acceleration)
+    drift = onto_cone(contact, ball, along(contact.gravity, 1.0, rub))
     if dot(up, drift) > STILL_BELOW * weight:
-        rub, drift = NOTHING, pull
+        rub, drift = NOTHING, acceleration
     twist = times(-inertia / arm, cross(up, rub))
-    set_spin(grip, ball, time, spin, twist)
+    set_spin(friction_state, ball, time, spin, twist)
     if hold > 0.0:
-        set_slip(grip, ball, time, slip, along(drift, -arm, cross(twist, up)))
-    return _kept_to(footing, ball, velocity, drift)
+        set_slip(friction_state, ball, time, slip, along(drift, -arm, cross(twist, up)))
+    return _kept_to(contact, ball, velocity, drift)
 
 
 @jit
-def _stand(grip: Grip, footing: Footing, ball: int, push: Vec3) -> tuple[Vec3, float, float, Vec3]:
+def _stand(
+    friction_state: FrictionState, contact: ContactState, ball: int, push: Vec3
+) -> tuple[Vec3, float, float, Vec3]:
     """What bears the load: the normal b, h [m], the largest friction force per mass [m/s²], and in a groove the
     direction of the line through the two touching points.
 
     ``push`` [m/s²]: the force per mass of all feet together. Three feet leave nothing to move: then no friction.
     """
-    feet = footing.marks[ball, FEET]
+    supports = contact.marks[ball, SUPPORTS]
     load = _size(push)
-    for one in range(feet):
-        n = foot_normal(footing, ball, one)
+    for one in range(supports):
+        n = support_normal(contact, ball, one)
         if _size(along(push, -dot(push, n), n)) <= BEARS * load:
-            return n, grip.radius, load * _mu(grip, footing, ball, one), NOTHING
-    for one in range(feet):
-        n = foot_normal(footing, ball, one)
-        for two in range(one + 1, feet):
-            m = foot_normal(footing, ball, two)
+            return n, friction_state.radius, load * _mu(friction_state, contact, ball, one), NOTHING
+    for one in range(supports):
+        n = support_normal(contact, ball, one)
+        for two in range(one + 1, supports):
+            m = support_normal(contact, ball, two)
             c = dot(n, m)
             square = 1.0 - c * c
             if square < BEARS:
@@ -147,67 +165,81 @@ def _stand(grip: Grip, footing: Footing, ball: int, push: Vec3) -> tuple[Vec3, f
                 continue
             middle, across = along(n, 1.0, m), sub(n, m)
             twice = _size(middle)
-            hold = a * _mu(grip, footing, ball, one) + b * _mu(grip, footing, ball, two)
+            hold = a * _mu(friction_state, contact, ball, one) + b * _mu(
+                friction_state, contact, ball, two
+            )
             up, axis = times(1.0 / twice, middle), times(1.0 / _size(across), across)
-            return up, 0.5 * twice * grip.radius, hold, axis
-    return foot_normal(footing, ball, 0), grip.radius, 0.0, NOTHING
+            return up, 0.5 * twice * friction_state.radius, hold, axis
+    return support_normal(contact, ball, 0), friction_state.radius, 0.0, NOTHING
 
 
 @jit
-def _mu(grip: Grip, footing: Footing, ball: int, foot: int) -> float:
-    row = footing.rows[ball, foot]
-    return grip.mu if row <= ON_BALL else grip.mu_of_rows[row]
+def _mu(friction_state: FrictionState, contact: ContactState, ball: int, support: int) -> float:
+    row = contact.rows[ball, support]
+    return friction_state.mu if row <= ON_BALL else friction_state.mu_of_rows[row]
 
 
 @jit
-def crept(grip: Grip | None, footing: Footing, ball: int, velocity: Vec3) -> Vec3:
+def crept(
+    friction_state: FrictionState | None, contact: ContactState, ball: int, velocity: Vec3
+) -> Vec3:
     """The velocity [m/s] of a ball on its feet, none if it only creeps: friction holds it, where between two surfaces
     it would go on in ever smaller hops that its slip keeps up.
     """
-    if grip is None:
+    if friction_state is None:
         return velocity
     mu = 0.0
-    for foot in range(footing.marks[ball, FEET]):
-        mu = max(mu, _mu(grip, footing, ball, foot))
-    return NOTHING if mu > 0.0 and _size(velocity) < KISS * footing.capture else velocity
+    for support in range(contact.marks[ball, SUPPORTS]):
+        mu = max(mu, _mu(friction_state, contact, ball, support))
+    return (
+        NOTHING if mu > 0.0 and _size(velocity) < DETACH_TOLERANCE * contact.capture else velocity
+    )
 
 
 @jit
-def off_its_feet(grip: Grip | None, ball: int, time: float, mode: int) -> None:
+def reset_spin(friction_state: FrictionState | None, ball: int, time: float, mode: int) -> None:
     """A ball that comes into flight keeps its spin; one that comes to lie still has none."""
-    if grip is None:
+    if friction_state is None:
         return
     if mode != SLIDING:
         set_spin(
-            grip, ball, time, spin_at(grip, ball, time) if mode == FLYING else NOTHING, NOTHING
+            friction_state,
+            ball,
+            time,
+            spin_at(friction_state, ball, time) if mode == FLYING else NOTHING,
+            NOTHING,
         )
 
 
 @jit
-def _kept_to(footing: Footing, ball: int, velocity: Vec3, pull: Vec3) -> tuple[Vec3, Vec3, int]:
+def _kept_to(
+    contact: ContactState, ball: int, velocity: Vec3, acceleration: Vec3
+) -> tuple[Vec3, Vec3, int]:
     """Take away the feet that friction leads the ball away from: it may come back to them as to walls."""
-    foot = 0
-    while foot < footing.marks[ball, FEET]:
-        if dot(foot_normal(footing, ball, foot), velocity) > ROUNDING * (1.0 + _size(velocity)):
-            drop_foot(footing, ball, foot)
+    support = 0
+    while support < contact.marks[ball, SUPPORTS]:
+        if dot(support_normal(contact, ball, support), velocity) > ROUNDING * (
+            1.0 + _size(velocity)
+        ):
+            drop_support(contact, ball, support)
         else:
-            foot += 1
-    _lift_feet(footing, ball, pull)
-    if footing.marks[ball, FEET] == 0:
-        return velocity, footing.gravity, FLYING
-    return velocity, pull, SLIDING
+            support += 1
+    _drop_left_supports(contact, ball, acceleration)
+    if contact.marks[ball, SUPPORTS] == 0:
+        return velocity, contact.gravity, FLYING
+    return velocity, acceleration, SLIDING
 
 
 @jit
-def _lift_feet(footing: Footing, ball: int, pull: Vec3) -> None:
+def _drop_left_supports(contact: ContactState, ball: int, acceleration: Vec3) -> None:
     """Take away the feet that the acceleration leads the ball away from."""
-    weight = _size(footing.gravity)
-    foot = 0
-    while foot < footing.marks[ball, FEET]:
-        if dot(foot_normal(footing, ball, foot), pull) > STILL_BELOW * weight:
-            drop_foot(footing, ball, foot)
+    weight = _size(contact.gravity)
+    support = 0
+    while support < contact.marks[ball, SUPPORTS]:
+        if dot(support_normal(contact, ball, support), acceleration) > STILL_BELOW * weight:
+            drop_support(contact, ball, support)
         else:
-            foot += 1
+            support += 1
 
 
 @jit

@@ -29,14 +29,14 @@ def meeting_delay(apart: Vec3, closing: Vec3, reach: float) -> float:
 
 
 @jit
-def pulled_meeting_delay(
-    apart: Vec3, closing: Vec3, pull: Vec3, reach: float, limit: float
+def accelerated_meeting_delay(
+    apart: Vec3, closing: Vec3, acceleration: Vec3, reach: float, limit: float
 ) -> float:
-    """The same under a relative acceleration ``pull`` [m/s²], within ``limit`` [s]; by the steps of capsule_delay."""
+    """The same under a relative acceleration ``acceleration`` [m/s²], within ``limit`` [s]; by the steps of capsule_delay."""
     delay = 0.0
     for _ in range(STEPS):
-        at = along(along(apart, delay, closing), 0.5 * delay * delay, pull)
-        velocity = along(closing, delay, pull)
+        at = along(along(apart, delay, closing), 0.5 * delay * delay, acceleration)
+        velocity = along(closing, delay, acceleration)
         distance = np.sqrt(dot(at, at))
         gap = distance - reach
         rate = dot(at, velocity) / distance
@@ -46,7 +46,7 @@ def pulled_meeting_delay(
             gap <= CONTACT
         ):  # not approaching: on until it could be as near as now, at once if pressed together
             gap, rate = 0.0, max(rate, 0.0)
-        step = first_approach(gap, rate, 0.5 * dot(at, pull) / distance, HALF * reach)
+        step = first_approach(gap, rate, 0.5 * dot(at, acceleration) / distance, HALF * reach)
         if not delay + step < limit:
             return NEVER
         if delay + step == delay:

@@ -13,8 +13,8 @@ from sim_core.detect.ball_sonotrode import (
     within_waving_borders,
 )
 from sim_core.detect.ball_triangle import capsule_delay, face_delay
-from sim_core.effects.contact_mode import Footing
-from sim_core.effects.gravity import Gravity, acceleration
+from sim_core.effects.contact_mode import ContactState
+from sim_core.effects.gravity import Gravity, gravity_acceleration
 from sim_core.effects.sonotrodes import Waves, face_wave, move_alike
 from sim_core.effects.vibration import Wave
 from sim_core.geometry.ball_sizes import Sizes, own_radius, own_root
@@ -52,7 +52,7 @@ def new_scratch() -> Scratch:
 
 
 @jit
-def _aim(ray: np.ndarray, ball: Point, fall: Vec3, length: float) -> None:
+def _aim(ray: np.ndarray, ball: Point, acceleration: Vec3, length: float) -> None:
     """Chord of the arc of ``length`` [s]: lower and upper origins (0:3, 3:6), inverse velocity (6:9).
 
     The arc lies between its chord and the chord shifted by -a T²/8; the two origins are those of the two.
@@ -60,8 +60,8 @@ def _aim(ray: np.ndarray, ball: Point, fall: Vec3, length: float) -> None:
     bulge = -0.125 * length * length
     for axis in range(3):
         origin = ball.position[axis]
-        shift = bulge * fall[axis]
-        speed = ball.velocity[axis] + 0.5 * length * fall[axis]
+        shift = bulge * acceleration[axis]
+        speed = ball.velocity[axis] + 0.5 * length * acceleration[axis]
         if abs(speed) < TINY:
             speed = TINY
         ray[axis] = np.float32(origin + max(shift, 0.0))
@@ -107,35 +107,35 @@ def first_contact(
     ``time`` [s]: now, on the window's clock (the sonotrode's phase depends on it). Ties go to the obstacle stored
     first.
     """
-    fall = acceleration(gravity)
+    acceleration = gravity_acceleration(gravity)
     return first_contact_from(
-        None, None, None, -1, tree, scratch, ball, fall, wave, None, seam, time, length
+        None, None, None, -1, tree, scratch, ball, acceleration, wave, None, seam, time, length
     )
 
 
 @inlined
 def first_contact_from(
-    footing: Footing | None,
+    contact: ContactState | None,
     sizes: Sizes | None,
     bore: Bore | None,
     number: int,
     tree: Tree,
     scratch: Scratch,
     ball: Point,
-    fall: Vec3,
+    acceleration: Vec3,
     wave: Wave | None,
     waves: Waves | None,
     seam: float,
     time: float,
     length: float,
 ) -> tuple[float, int]:
-    """The same for ball ``number``, under its own acceleration ``fall`` [m/s²], with what it stands on left out;
+    """The same for ball ``number``, under its own acceleration ``acceleration`` [m/s²], with what it stands on left out;
 
     of several ``sizes`` it has obstacles of its own, in a ``bore`` one that is round; of several ``waves`` each
     sonotrode has its own.
     """
     radius = own_radius(sizes, tree.radius, number)
-    _aim(scratch.ray, ball, fall, length)
+    _aim(scratch.ray, ball, acceleration, length)
     best = length
     found = -1
     plane_row = -1  # a sonotrode's faces share a plane: its equation is solved once a query
@@ -153,9 +153,9 @@ def first_contact_from(
             row = -1 - code
             kind = tree.kinds[row]
             if kind == FACE:
-                delay = face_delay(tree.numbers, row, ball, fall, radius, seam)
+                delay = face_delay(tree.numbers, row, ball, acceleration, radius, seam)
             elif kind == CAPSULE:
-                delay = capsule_delay(tree.numbers, row, ball, fall, radius, best)
+                delay = capsule_delay(tree.numbers, row, ball, acceleration, radius, best)
             elif is_round(bore, kind):
                 delay = bore_delay(bore, tree.numbers, row, ball)
             else:
@@ -171,7 +171,7 @@ def first_contact_from(
                             radius,
                             plane_row,
                             ball,
-                            fall,
+                            acceleration,
                             seam,
                             last,
                             time,
@@ -182,14 +182,14 @@ def first_contact_from(
                             best, found = later, face
                     plane_row = row
                     plane_delay = waving_plane_delay(
-                        tree.numbers, row, ball, fall, radius, own, time, best
+                        tree.numbers, row, ball, acceleration, radius, own, time, best
                     )
                 delay = plane_delay
                 if delay <= best and not within_waving_borders(
-                    tree.numbers, row, ball, fall, seam, own, time, delay
+                    tree.numbers, row, ball, acceleration, seam, own, time, delay
                 ):
                     delay = NEVER
-            if out_of_reach(footing, tree, number, ball.position, row):
+            if out_of_reach(contact, tree, number, ball.position, row):
                 delay = NEVER
             if delay < best or (delay == best and (found < 0 or row < found)):
                 best = delay
@@ -199,7 +199,7 @@ def first_contact_from(
     if plane_row >= 0 and plane_delay < best:  # and no face was there
         last = face_wave(waves, wave, plane_row)
         later, face = meets_later(
-            tree, waves, radius, plane_row, ball, fall, seam, last, time, plane_delay, best
+            tree, waves, radius, plane_row, ball, acceleration, seam, last, time, plane_delay, best
         )
         if face >= 0:
             return later, face

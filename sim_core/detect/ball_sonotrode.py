@@ -31,7 +31,7 @@ def waving_plane_delay(
     numbers: np.ndarray,
     row: int,
     ball: Point,
-    fall: Vec3,
+    acceleration: Vec3,
     radius: float,
     wave: Wave | None,
     time: float,
@@ -43,12 +43,14 @@ def waving_plane_delay(
     """
     if wave is None:
         return NEVER
-    return first_wave_approach(_gap(numbers, row, ball, fall, wave, time), limit, HALF * radius)
+    return first_wave_approach(
+        _gap(numbers, row, ball, acceleration, wave, time), limit, HALF * radius
+    )
 
 
 @jit
 def _gap(
-    numbers: np.ndarray, row: int, ball: Point, fall: Vec3, wave: Wave, time: float
+    numbers: np.ndarray, row: int, ball: Point, acceleration: Vec3, wave: Wave, time: float
 ) -> WaveGap:
     """The gap between the centre and the face's moving plane."""
     normal = face_normal(numbers, row)
@@ -59,7 +61,7 @@ def _gap(
     return WaveGap(
         dot(normal, ball.position) - numbers[row, 3],
         dot(normal, ball.velocity),
-        0.5 * dot(normal, fall),
+        0.5 * dot(normal, acceleration),
         abs(lift) * wave.swing,
         wave.omega,
         theta,
@@ -71,7 +73,7 @@ def within_waving_borders(
     numbers: np.ndarray,
     row: int,
     ball: Point,
-    fall: Vec3,
+    acceleration: Vec3,
     seam: float,
     wave: Wave | None,
     time: float,
@@ -80,7 +82,7 @@ def within_waving_borders(
     """True when the centre meets the face's plane, ``delay`` [s] from now, inside its borders as they are then."""
     if wave is None:
         return False
-    at = along(along(ball.position, delay, ball.velocity), 0.5 * delay * delay, fall)
+    at = along(along(ball.position, delay, ball.velocity), 0.5 * delay * delay, acceleration)
     shift = wave.swing * math.sin(wave.omega * (time + delay) + wave.phase)
     return within_borders(numbers, row, along(at, -shift, wave.axis), seam)
 
@@ -92,7 +94,7 @@ def meets_later(
     radius: float,
     row: int,
     ball: Point,
-    fall: Vec3,
+    acceleration: Vec3,
     seam: float,
     wave: Wave | None,
     time: float,
@@ -106,7 +108,7 @@ def meets_later(
     """
     if wave is None:
         return NEVER, -1
-    gap = _gap(tree.numbers, row, ball, fall, wave, time)
+    gap = _gap(tree.numbers, row, ball, acceleration, wave, time)
     while True:
         delay = next_wave_approach(gap, delay, limit, HALF * radius)
         if delay >= limit:
@@ -116,6 +118,8 @@ def meets_later(
                 tree.kinds[face] == WAVING_FACE
                 and same_plane(tree.numbers, row, face)
                 and move_alike(waves, row, face)
-                and within_waving_borders(tree.numbers, face, ball, fall, seam, wave, time, delay)
+                and within_waving_borders(
+                    tree.numbers, face, ball, acceleration, seam, wave, time, delay
+                )
             ):
                 return delay, face

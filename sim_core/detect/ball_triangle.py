@@ -68,15 +68,17 @@ def face_normal(numbers: np.ndarray, row: int) -> Vec3:
 
 @jit
 def face_delay(
-    numbers: np.ndarray, row: int, ball: Point, fall: Vec3, radius: float, seam: float
+    numbers: np.ndarray, row: int, ball: Point, acceleration: Vec3, radius: float, seam: float
 ) -> float:
     """Time [s] until the centre meets the moved face from its shot side; NEVER if it does not."""
     normal = face_normal(numbers, row)
     gap = dot(normal, ball.position) - numbers[row, 3]
-    delay = first_approach(gap, dot(normal, ball.velocity), 0.5 * dot(normal, fall), HALF * radius)
+    delay = first_approach(
+        gap, dot(normal, ball.velocity), 0.5 * dot(normal, acceleration), HALF * radius
+    )
     if delay == NEVER:
         return NEVER
-    at = along(along(ball.position, delay, ball.velocity), 0.5 * delay * delay, fall)
+    at = along(along(ball.position, delay, ball.velocity), 0.5 * delay * delay, acceleration)
     return delay if within_borders(numbers, row, at, seam) else NEVER
 
 
@@ -99,7 +101,7 @@ def nearer_neighbour(numbers: np.ndarray, row: int, away: Vec3) -> int:
 
 @jit
 def capsule_delay(
-    numbers: np.ndarray, row: int, ball: Point, fall: Vec3, radius: float, limit: float
+    numbers: np.ndarray, row: int, ball: Point, acceleration: Vec3, radius: float, limit: float
 ) -> float:
     """Time [s] until the centre meets the capsule; NEVER if it does not within ``limit`` [s].
 
@@ -109,8 +111,8 @@ def capsule_delay(
     """
     delay = 0.0
     for _ in range(STEPS):
-        at = along(along(ball.position, delay, ball.velocity), 0.5 * delay * delay, fall)
-        velocity = along(ball.velocity, delay, fall)
+        at = along(along(ball.position, delay, ball.velocity), 0.5 * delay * delay, acceleration)
+        velocity = along(ball.velocity, delay, acceleration)
         away = away_from_capsule(numbers, row, at)
         distance = np.sqrt(dot(away, away))
         if distance == 0.0:
@@ -119,7 +121,7 @@ def capsule_delay(
         rate = dot(away, velocity) / distance
         if gap <= CONTACT and rate < 0.0 and gap > -HALF * radius:
             return delay
-        bend = 0.5 * dot(away, fall) / distance
+        bend = 0.5 * dot(away, acceleration) / distance
         if -HALF * radius < gap <= CONTACT and rate * rate <= 4.0 * bend * min(gap, -CONTACT):
             gap = CONTACT  # touching, and not getting free: on until it could be deeper than now
         step = first_approach(gap, rate, bend, HALF * radius)

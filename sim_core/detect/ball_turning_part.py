@@ -40,7 +40,7 @@ def first_part_contact(
     turning: Turning | None,
     scratch: Scratch,
     ball: Point,
-    fall: Vec3,
+    acceleration: Vec3,
     seam: float,
     time: float,
     limit: float,
@@ -49,20 +49,22 @@ def first_part_contact(
 ) -> tuple[float, int]:
     """Delay [s] and obstacle of the first contact with the part before ``limit`` [s]; (limit, known) if there is none.
 
-    ``fall`` [m/s²]: the ball's acceleration; ``time`` [s]: now, on the window's clock. The part's obstacles are
+    ``acceleration`` [m/s²]: the ball's acceleration; ``time`` [s]: now, on the window's clock. The part's obstacles are
     numbered from ``first`` on. A search that runs out of steps answers (how far it got, -1).
     """
     if part is None or turning is None:
         return limit, known
-    jerk = _jerk(part, turning, ball, fall, limit)
+    jerk = _jerk(part, turning, ball, acceleration, limit)
     if jerk < 0.0:
         return limit, known
     best = limit
     found = known
     begin = 0.0
     while begin < best:
-        at = along(along(ball.position, begin, ball.velocity), 0.5 * begin * begin, fall)
-        seen = seen_from_part(turning, at, along(ball.velocity, begin, fall), fall, time + begin)
+        at = along(along(ball.position, begin, ball.velocity), 0.5 * begin * begin, acceleration)
+        seen = seen_from_part(
+            turning, at, along(ball.velocity, begin, acceleration), acceleration, time + begin
+        )
         length = _piece(seen, jerk, best - begin, part.tree.radius)
         last = begin + length >= best
         end = best if last else begin + length
@@ -79,7 +81,7 @@ def first_part_contact(
             if code < 0:
                 row = -1 - code
                 delay, sure = _delay(
-                    part.tree, row, turning, ball, fall, seen, seam, time, begin, end, jerk
+                    part.tree, row, turning, ball, acceleration, seen, seam, time, begin, end, jerk
                 )
                 if delay < end:
                     end = delay
@@ -94,23 +96,23 @@ def first_part_contact(
 
 
 @jit
-def _jerk(part: PartTree, turning: Turning, ball: Point, fall: Vec3, limit: float) -> float:
+def _jerk(part: PartTree, turning: Turning, ball: Point, acceleration: Vec3, limit: float) -> float:
     """Bound on the third derivative of the path in the part's frame [m/s³]; -1 if the path stays clear of all that
     the part sweeps.
     """
     bulge = 0.125 * limit * limit
     start = sub(ball.position, turning.point)
-    way = along(Vec3(0.0, 0.0, 0.0), limit, along(ball.velocity, 0.5 * limit, fall))
+    way = along(Vec3(0.0, 0.0, 0.0), limit, along(ball.velocity, 0.5 * limit, acceleration))
     low = dot(turning.axis, start)
     rise = dot(turning.axis, way)
-    drop = dot(turning.axis, fall)
+    drop = dot(turning.axis, acceleration)
     sag = bulge * abs(drop)
     if min(low, low + rise) - sag > part.high or max(low, low + rise) + sag < part.low:
         return -1.0
     start = along(start, -low, turning.axis)
     way = along(way, -rise, turning.axis)
-    pull = along(fall, -drop, turning.axis)
-    force = np.sqrt(dot(pull, pull))
+    across = along(acceleration, -drop, turning.axis)
+    force = np.sqrt(dot(across, across))
     square = dot(way, way)
     share = min(max(-dot(start, way) / square, 0.0), 1.0) if square > 0.0 else 0.0
     nearest = along(start, share, way)
@@ -154,7 +156,7 @@ def _delay(
     row: int,
     turning: Turning,
     ball: Point,
-    fall: Vec3,
+    acceleration: Vec3,
     seen: Seen,
     seam: float,
     time: float,
@@ -214,6 +216,8 @@ def _delay(
             if delay + step > end:
                 return NEVER, True
         delay += max(step, 1e-16)
-        at = along(along(ball.position, delay, ball.velocity), 0.5 * delay * delay, fall)
-        seen = seen_from_part(turning, at, along(ball.velocity, delay, fall), fall, time + delay)
+        at = along(along(ball.position, delay, ball.velocity), 0.5 * delay * delay, acceleration)
+        seen = seen_from_part(
+            turning, at, along(ball.velocity, delay, acceleration), acceleration, time + delay
+        )
     return delay, False

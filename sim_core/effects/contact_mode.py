@@ -20,8 +20,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim_core.effects.friction import Grip
-from sim_core.effects.gravity import Gravity, acceleration
+from sim_core.effects.friction import FrictionState
+from sim_core.effects.gravity import Gravity, gravity_acceleration
 from sim_core.effects.restitution import ELASTIC_BELOW, Restitution
 from sim_core.errors import SceneError, number
 from sim_core.numerics.jit import inlined, jit
@@ -30,16 +30,16 @@ from sim_core.numerics.vec3 import Vec3, along, cross, dot
 CAPTURE = 1e-3  # m/s: drops from 50 nm; a ten-thousandth of the shot's speed. Lower costs bounces: 22 a decade at e 0.9
 RESISTANCE = 0.005  # [-]: of steel balls on steel, the order of magnitude (assumed); slower than that they lie still
 
-MOST_FEET = 4  # three hold a ball; a fourth while it is decided which
+MAX_SUPPORTS = 4  # three hold a ball; a fourth while it is decided which
 
 # how a ball moves
 FLYING, SLIDING, ASLEEP, JAMMED = 0, 1, 2, 3
 
 # columns of Footing.marks
-MODE, FEET, ROLLING, SLOW_HITS = 0, 1, 2, 3
-CALLED = 4  # what it leans on has begun to move, and it has not seen to that yet
+MODE, SUPPORTS, ROLLING, SLOW_HITS = 0, 1, 2, 3
+WAKE_PENDING = 4  # what it leans on has begun to move, and it has not seen to that yet
 DRIVEN = 5  # 1: the turning part has touched it, or a pressed one; 2: pressed, it is pushed and gets nowhere
-PROPS = 6  # balls about a jammed one, while some of them move
+NEIGHBOURS_HOLDING_JAM = 6  # balls about a jammed one, while some of them move
 HOLDS = 7  # how often it was held where it is
 
 # columns of Footing.memory; times [s] since the start
@@ -48,7 +48,7 @@ HOPS = 3  # where its small hops began [m]
 LIES_SINCE = 6
 HELD_AT = 7  # where it was held last [m]
 STAYS_UNTIL = 10  # a call does not wake it before
-PROPPED_BY = 11  # sum of the numbers of its PROPS
+NEIGHBOUR_SUM = 11  # sum of the numbers of its PROPS
 COUNTS_SINCE = 12  # when its SLOW_HITS were 0
 TOUCHED = 13  # when it was last driven
 
@@ -57,12 +57,12 @@ GOES_ON = -1
 STOPS = -3  # or turns: the resistance is set anew
 WAKES = -4
 STILL = -5
-LOOKS = -6  # a jammed ball looks whether those about it are still there
+RECHECK = -6  # a jammed ball looks whether those about it are still there
 LEAVES = -10  # minus the foot's place
 
 ON_BALL = -2  # minus the ball's number: the row of a foot on a ball that lies still
 
-KISS = 0.01  # of capture: a foot left so slowly, against gravity, is not left
+DETACH_TOLERANCE = 0.01  # of capture: a foot left so slowly, against gravity, is not left
 ROUNDING = 1e-12  # [-]: of a projection
 STILL_BELOW = 1e-9  # of gravity: an acceleration this small is rounding
 
@@ -76,30 +76,30 @@ class Rest(NamedTuple):
     resistance: float = RESISTANCE
 
 
-class Footing(NamedTuple):
+class ContactState(NamedTuple):
     """What contact mode keeps of n balls.
 
-    ``pull`` (n, 3): each ball's own acceleration [m/s²]; ``normals`` (n, 4, 3) of its feet; ``spots`` (n, 4, 4): where
+    ``acceleration`` (n, 3): each ball's own acceleration [m/s²]; ``normals`` (n, 4, 3) of its feet; ``spots`` (n, 4, 4): where
     [m] a foot was set and how far the ball may go from there on what is round; ``rows`` (n, 4) int32: the obstacles it
-    stands on, or see ON_BALL; ``marks`` (n, 8) int32, see MODE; ``memory`` (n, 14), see LEFT; ``roster``, ``seat``
-    (n,) int32 and ``held`` (1,): the balls not in flight, each one's place among them, and how many. ``capture``,
-    ``resistance`` as in Rest; ``slow`` [m/s]: pair hits below lose nothing; ``grip``: friction, if there is any.
+    stands on, or see ON_BALL; ``marks`` (n, 8) int32, see MODE; ``memory`` (n, 14), see LEFT; ``contact_list``, ``contact_index``
+    (n,) int32 and ``contact_count`` (1,): the balls not in flight, each one's place among them, and how many. ``capture``,
+    ``resistance`` as in Rest; ``slow`` [m/s]: pair hits below lose nothing; ``friction_state``: friction, if there is any.
     """
 
-    pull: np.ndarray
+    acceleration: np.ndarray
     normals: np.ndarray
     spots: np.ndarray
     rows: np.ndarray
     marks: np.ndarray
     memory: np.ndarray
-    roster: np.ndarray
-    seat: np.ndarray
-    held: np.ndarray
+    contact_list: np.ndarray
+    contact_index: np.ndarray
+    contact_count: np.ndarray
     capture: float
     resistance: float
     slow: float
     gravity: Vec3
-    grip: Grip | None
+    friction_state: FrictionState | None
 
 
 def checked_rest(rest: Rest | None) -> Rest | None:
@@ -114,22 +114,22 @@ def checked_rest(rest: Rest | None) -> Rest | None:
     return plain
 
 
-def new_footing(
+def new_contact_state(
     rest: Rest | None,
     balls: int,
     gravity: Gravity | None,
     restitution: Restitution | None,
-    grip: Grip | None,
-) -> Footing | None:
+    friction_state: FrictionState | None,
+) -> ContactState | None:
     """All balls in flight; None without the effect."""
     if rest is None:
         return None
-    pull = acceleration(gravity)
-    return Footing(
-        np.tile(np.array(pull), (balls, 1)),
-        np.zeros((balls, MOST_FEET, 3)),
-        np.zeros((balls, MOST_FEET, 4)),
-        np.full((balls, MOST_FEET), -1, dtype=np.int32),
+    acceleration = gravity_acceleration(gravity)
+    return ContactState(
+        np.tile(np.array(acceleration), (balls, 1)),
+        np.zeros((balls, MAX_SUPPORTS, 3)),
+        np.zeros((balls, MAX_SUPPORTS, 4)),
+        np.full((balls, MAX_SUPPORTS), -1, dtype=np.int32),
         np.zeros((balls, 8), dtype=np.int32),
         np.zeros((balls, 14)),
         np.zeros(balls, dtype=np.int32),
@@ -138,23 +138,25 @@ def new_footing(
         rest.capture,
         rest.resistance,
         ELASTIC_BELOW if restitution is None else restitution.elastic_below,
-        Vec3(*(float(x) for x in pull)),
-        grip,
+        Vec3(*(float(x) for x in acceleration)),
+        friction_state,
     )
 
 
 @inlined
-def own_pull(footing: Footing | None, ball: int, gravity: Gravity | None) -> Vec3:
+def ball_acceleration(contact: ContactState | None, ball: int, gravity: Gravity | None) -> Vec3:
     """A ball's acceleration [m/s²]: gravity, or what its feet leave of it."""
-    if footing is None:
-        return acceleration(gravity)
-    return Vec3(footing.pull[ball, 0], footing.pull[ball, 1], footing.pull[ball, 2])
+    if contact is None:
+        return gravity_acceleration(gravity)
+    return Vec3(
+        contact.acceleration[ball, 0], contact.acceleration[ball, 1], contact.acceleration[ball, 2]
+    )
 
 
 @inlined
-def static_law(footing: Footing | None, restitution: Restitution | None) -> Restitution | None:
+def static_law(contact: ContactState | None, restitution: Restitution | None) -> Restitution | None:
     """The law of hits on still surfaces: with contact mode, hits lose energy at all speeds."""
-    if footing is None:
+    if contact is None:
         return restitution
     if restitution is None:
         return restitution
@@ -162,53 +164,53 @@ def static_law(footing: Footing | None, restitution: Restitution | None) -> Rest
 
 
 @jit
-def foot_normal(footing: Footing, ball: int, foot: int) -> Vec3:
+def support_normal(contact: ContactState, ball: int, support: int) -> Vec3:
     """Unit normal of a foot, towards the ball."""
     return Vec3(
-        footing.normals[ball, foot, 0],
-        footing.normals[ball, foot, 1],
-        footing.normals[ball, foot, 2],
+        contact.normals[ball, support, 0],
+        contact.normals[ball, support, 1],
+        contact.normals[ball, support, 2],
     )
 
 
 @jit
-def stands_on_ball(footing: Footing, ball: int, other: int) -> bool:
+def stands_on_ball(contact: ContactState, ball: int, other: int) -> bool:
     """True when a ball has a foot on another."""
     stands = False
-    for foot in range(footing.marks[ball, FEET]):
-        stands |= footing.rows[ball, foot] == ON_BALL - other
+    for support in range(contact.marks[ball, SUPPORTS]):
+        stands |= contact.rows[ball, support] == ON_BALL - other
     return stands
 
 
 @jit
-def _fits(footing: Footing, ball: int, x: Vec3, slack: float) -> bool:
+def _fits(contact: ContactState, ball: int, x: Vec3, slack: float) -> bool:
     fits = True
-    for foot in range(footing.marks[ball, FEET]):
-        fits &= dot(foot_normal(footing, ball, foot), x) >= -slack
+    for support in range(contact.marks[ball, SUPPORTS]):
+        fits &= dot(support_normal(contact, ball, support), x) >= -slack
     return fits
 
 
 @jit
-def onto_cone(footing: Footing, ball: int, x: Vec3) -> Vec3:
+def onto_cone(contact: ContactState, ball: int, x: Vec3) -> Vec3:
     """The vector nearest to x in the cone that the ball's feet leave: x itself, or on one foot's plane, or on two.
 
     The nearest one is unique; it is told by its multipliers, all of which push (Kuhn-Tucker).
     """
-    feet = footing.marks[ball, FEET]
+    supports = contact.marks[ball, SUPPORTS]
     size = np.sqrt(dot(x, x))
     slack = ROUNDING * size
-    if _fits(footing, ball, x, slack):
+    if _fits(contact, ball, x, slack):
         return x
-    for one in range(feet):
-        n = foot_normal(footing, ball, one)
+    for one in range(supports):
+        n = support_normal(contact, ball, one)
         push = -dot(n, x)
         y = along(x, push, n)
-        if push >= -slack and _fits(footing, ball, y, slack):
+        if push >= -slack and _fits(contact, ball, y, slack):
             return y
-    for one in range(feet):
-        n = foot_normal(footing, ball, one)
-        for two in range(one + 1, feet):
-            m = foot_normal(footing, ball, two)
+    for one in range(supports):
+        n = support_normal(contact, ball, one)
+        for two in range(one + 1, supports):
+            m = support_normal(contact, ball, two)
             line = cross(n, m)
             square = dot(line, line)
             if square < 1e-20:
@@ -220,53 +222,53 @@ def onto_cone(footing: Footing, ball: int, x: Vec3) -> Vec3:
                 continue
             share = dot(line, x) / square
             y = Vec3(share * line.x, share * line.y, share * line.z)
-            if _fits(footing, ball, y, slack):
+            if _fits(contact, ball, y, slack):
                 return y
     return Vec3(0.0, 0.0, 0.0)
 
 
 @jit
-def drop_foot(footing: Footing, ball: int, foot: int) -> None:
+def drop_support(contact: ContactState, ball: int, support: int) -> None:
     """Take a foot away; those after it move up."""
-    last = footing.marks[ball, FEET] - 1
-    for k in range(foot, last):
-        footing.rows[ball, k] = footing.rows[ball, k + 1]
+    last = contact.marks[ball, SUPPORTS] - 1
+    for k in range(support, last):
+        contact.rows[ball, k] = contact.rows[ball, k + 1]
         for axis in range(3):
-            footing.normals[ball, k, axis] = footing.normals[ball, k + 1, axis]
+            contact.normals[ball, k, axis] = contact.normals[ball, k + 1, axis]
         for axis in range(4):
-            footing.spots[ball, k, axis] = footing.spots[ball, k + 1, axis]
-    footing.rows[ball, last] = -1
-    footing.marks[ball, FEET] = last
+            contact.spots[ball, k, axis] = contact.spots[ball, k + 1, axis]
+    contact.rows[ball, last] = -1
+    contact.marks[ball, SUPPORTS] = last
 
 
 @jit
-def add_foot(
-    footing: Footing, ball: int, row: int, normal: Vec3, position: Vec3, scope: float
+def add_support(
+    contact: ContactState, ball: int, row: int, normal: Vec3, position: Vec3, scope: float
 ) -> None:
     """Stand on an obstacle too, good up to ``scope`` [m] from here; the oldest foot gives way to a fifth."""
-    if footing.marks[ball, FEET] == MOST_FEET:
-        drop_foot(footing, ball, 0)
-    foot = footing.marks[ball, FEET]
-    footing.rows[ball, foot] = row
+    if contact.marks[ball, SUPPORTS] == MAX_SUPPORTS:
+        drop_support(contact, ball, 0)
+    support = contact.marks[ball, SUPPORTS]
+    contact.rows[ball, support] = row
     for axis in range(3):
-        footing.normals[ball, foot, axis] = normal[axis]
-        footing.spots[ball, foot, axis] = position[axis]
-    footing.spots[ball, foot, 3] = scope
-    footing.marks[ball, FEET] = foot + 1
+        contact.normals[ball, support, axis] = normal[axis]
+        contact.spots[ball, support, axis] = position[axis]
+    contact.spots[ball, support, 3] = scope
+    contact.marks[ball, SUPPORTS] = support + 1
 
 
 @jit
-def enrol(footing: Footing, ball: int, mode: int) -> None:
+def set_mode(contact: ContactState, ball: int, mode: int) -> None:
     """Write down how a ball moves, and keep the roster of those not in flight."""
-    footing.marks[ball, MODE] = mode
-    seat = footing.seat[ball]
-    if mode == FLYING and seat >= 0:
-        footing.held[0] -= 1
-        last = footing.roster[footing.held[0]]
-        footing.roster[seat] = last
-        footing.seat[last] = seat
-        footing.seat[ball] = -1
-    elif mode != FLYING and seat < 0:
-        footing.roster[footing.held[0]] = ball
-        footing.seat[ball] = footing.held[0]
-        footing.held[0] += 1
+    contact.marks[ball, MODE] = mode
+    contact_index = contact.contact_index[ball]
+    if mode == FLYING and contact_index >= 0:
+        contact.contact_count[0] -= 1
+        last = contact.contact_list[contact.contact_count[0]]
+        contact.contact_list[contact_index] = last
+        contact.contact_index[last] = contact_index
+        contact.contact_index[ball] = -1
+    elif mode != FLYING and contact_index < 0:
+        contact.contact_list[contact.contact_count[0]] = ball
+        contact.contact_index[ball] = contact.contact_count[0]
+        contact.contact_count[0] += 1

@@ -96,7 +96,7 @@ def slowing(air: Air, ball: int, speed: float, span: float) -> float:
 
 
 @jit
-def set_air_back(air: Air | None, window: float) -> None:
+def shift_drag(air: Air | None, window: float) -> None:
     """Move the clock's zero forward by ``window`` [s]."""
     if air is None:
         return

@@ -33,7 +33,7 @@ class Friction(NamedTuple):
     balls: tuple[float, float]
 
 
-class Grip(NamedTuple):
+class FrictionState(NamedTuple):
     """Friction as compiled code wants it, with what it keeps of n balls; times are on the window's clock.
 
     ``surfaces`` (tags, 2), ``mu`` and ``beta0`` of the balls; ``radius`` [m]; ``mu_of_rows`` (m,): mu of each obstacle
@@ -64,15 +64,15 @@ def checked_friction(friction: Friction, tags: int) -> Friction:
     return Friction(surfaces, of_balls)
 
 
-def new_grip(
+def new_friction_state(
     friction: Friction, spins: np.ndarray, radius: float, tags_of_rows: np.ndarray
-) -> Grip:
+) -> FrictionState:
     """All balls in flight, with their spins (n, 3) [rad/s], for a checked Friction.
 
     ``radius`` [m]; ``tags_of_rows`` (m,): the tag of each obstacle a ball can stand on.
     """
     surfaces = np.asarray(friction.surfaces)
-    return Grip(
+    return FrictionState(
         surfaces,
         *friction.balls,
         radius,
@@ -84,17 +84,17 @@ def new_grip(
 
 
 @jit
-def law_of(grip: Grip, tag: int) -> tuple[float, float]:
+def law_of(friction_state: FrictionState, tag: int) -> tuple[float, float]:
     """mu and beta0 of a surface, or of the balls (OF_BALLS)."""
     if tag == OF_BALLS:
-        return grip.mu, grip.beta0
-    return grip.surfaces[tag, 0], grip.surfaces[tag, 1]
+        return friction_state.mu, friction_state.beta0
+    return friction_state.surfaces[tag, 0], friction_state.surfaces[tag, 1]
 
 
 @jit
-def spin_at(grip: Grip, ball: int, time: float) -> Vec3:
+def spin_at(friction_state: FrictionState, ball: int, time: float) -> Vec3:
     """A ball's spin [rad/s] at a time of the window."""
-    spins, twists = grip.spins, grip.twists
+    spins, twists = friction_state.spins, friction_state.twists
     return Vec3(
         spins[ball, 0] + time * twists[ball, 0],
         spins[ball, 1] + time * twists[ball, 1],
@@ -103,29 +103,33 @@ def spin_at(grip: Grip, ball: int, time: float) -> Vec3:
 
 
 @jit
-def set_spin(grip: Grip, ball: int, time: float, spin: Vec3, twist: Vec3) -> None:
+def set_spin(
+    friction_state: FrictionState, ball: int, time: float, spin: Vec3, twist: Vec3
+) -> None:
     """Let a ball spin on from ``spin`` [rad/s] at ``time``, changing by ``twist`` [rad/s²]; it does not slip."""
     for axis in range(3):
-        grip.spins[ball, axis] = spin[axis] - time * twist[axis]
-        grip.twists[ball, axis] = twist[axis]
-        grip.slips[ball, axis] = 0.0
-        grip.slips[ball, 3 + axis] = 0.0
+        friction_state.spins[ball, axis] = spin[axis] - time * twist[axis]
+        friction_state.twists[ball, axis] = twist[axis]
+        friction_state.slips[ball, axis] = 0.0
+        friction_state.slips[ball, 3 + axis] = 0.0
 
 
 @jit
-def set_slip(grip: Grip, ball: int, time: float, slip: Vec3, change: Vec3) -> None:
+def set_slip(
+    friction_state: FrictionState, ball: int, time: float, slip: Vec3, change: Vec3
+) -> None:
     """Its touching points pass the surface with ``slip`` [m/s] at ``time``, changing by ``change`` [m/s²]."""
     for axis in range(3):
-        grip.slips[ball, axis] = slip[axis] - time * change[axis]
-        grip.slips[ball, 3 + axis] = change[axis]
+        friction_state.slips[ball, axis] = slip[axis] - time * change[axis]
+        friction_state.slips[ball, 3 + axis] = change[axis]
 
 
 @inlined
-def carry_spins(grip: Grip | None, window: float) -> None:
+def shift_spins(friction_state: FrictionState | None, window: float) -> None:
     """Move the clock's zero forward by ``window`` [s]."""
-    if grip is None:
+    if friction_state is None:
         return
-    for ball in range(len(grip.spins)):
+    for ball in range(len(friction_state.spins)):
         for axis in range(3):
-            grip.spins[ball, axis] += window * grip.twists[ball, axis]
-            grip.slips[ball, axis] += window * grip.slips[ball, 3 + axis]
+            friction_state.spins[ball, axis] += window * friction_state.twists[ball, axis]
+            friction_state.slips[ball, axis] += window * friction_state.slips[ball, 3 + axis]

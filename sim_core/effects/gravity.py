@@ -35,7 +35,7 @@ def checked_gravity(gravity: Gravity | None) -> Gravity | None:
 
 
 @jit
-def acceleration(gravity: Gravity | None) -> Vec3:
+def gravity_acceleration(gravity: Gravity | None) -> Vec3:
     """Acceleration in flight [m/s²]; zero without gravity."""
     if gravity is None:
         return Vec3(0.0, 0.0, 0.0)

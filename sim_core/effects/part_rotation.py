@@ -177,7 +177,7 @@ def turned(points: np.ndarray, point: np.ndarray, axis: np.ndarray, angle: float
 
 
 @jit
-def carry(turning: Turning | None, window: float) -> None:
+def shift_rotation(turning: Turning | None, window: float) -> None:
     """Move the clock's zero forward by ``window`` [s]: the angle at the new zero is that at the old window's end."""
     if turning is None:
         return
@@ -210,7 +210,7 @@ def _turn_back(turning: Turning, vector: Vec3, c: float, s: float) -> Vec3:
 
 @jit
 def seen_from_part(
-    turning: Turning, position: Vec3, velocity: Vec3, fall: Vec3, time: float
+    turning: Turning, position: Vec3, velocity: Vec3, acceleration: Vec3, time: float
 ) -> Seen:
     """A ball as the part sees it; all arguments in the room's frame, ``time`` [s] of the current window."""
     argument = turning.argument[0] + turning.rate * time
@@ -224,7 +224,9 @@ def seen_from_part(
     offset = _turn_back(turning, sub(position, turning.point), c, s)
     side = cross(turning.axis, offset)
     relative = along(_turn_back(turning, velocity, c, s), -speed, side)
-    bend = along(_turn_back(turning, fall, c, s), -2.0 * speed, cross(turning.axis, relative))
+    bend = along(
+        _turn_back(turning, acceleration, c, s), -2.0 * speed, cross(turning.axis, relative)
+    )
     bend = along(along(bend, -speed * speed, cross(turning.axis, side)), -change, side)
     return Seen(along(offset, 1.0, turning.point), relative, bend)
 
@@ -251,12 +253,12 @@ def slip(turning: Turning, seen: Seen, away: Vec3, time: float) -> Vec3:
 
 
 @jit
-def jerk_bound(turning: Turning, reach: float, speed: float, fall: float) -> float:
+def jerk_bound(turning: Turning, reach: float, speed: float, acceleration: float) -> float:
     """J [m/s³] of a flight that stays within ``reach`` [m] of the axis, slower than ``speed`` [m/s] across it.
 
-    ``fall`` [m/s²]: acceleration across the axis, in the room.
+    ``acceleration`` [m/s²]: acceleration across the axis, in the room.
     """
     first = turning.speed
     second = turning.acceleration + first * first
     third = turning.jerk + 3.0 * first * turning.acceleration + first * first * first
-    return third * reach + 3.0 * second * speed + 3.0 * first * fall
+    return third * reach + 3.0 * second * speed + 3.0 * first * acceleration

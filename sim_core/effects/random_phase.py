@@ -103,7 +103,12 @@ def drawn(seed: int, ball: int, draw: int) -> float:
 
 @inlined
 def arrival(
-    phases: Phases | None, position: Vec3, velocity: Vec3, pull: Vec3, ball: int, length: float
+    phases: Phases | None,
+    position: Vec3,
+    velocity: Vec3,
+    acceleration: Vec3,
+    ball: int,
+    length: float,
 ) -> float:
     """Draw the phase anew for a ball that is out of the swing; one within it keeps it, and is to be looked at again
     when it gets out, if that is within ``length`` [s]: returns for how long [s] the phase is good.
@@ -117,7 +122,9 @@ def arrival(
         return length
     return min(
         length,
-        first_approach(CLEAR - height, -dot(phases.up, velocity), -0.5 * dot(phases.up, pull), 0.0),
+        first_approach(
+            CLEAR - height, -dot(phases.up, velocity), -0.5 * dot(phases.up, acceleration), 0.0
+        ),
     )
 
 

@@ -93,7 +93,7 @@ def move_alike(waves: Waves | None, face: int, other: int) -> bool:
 
 
 @jit
-def carry_phases(waves: Waves | None) -> None:
+def shift_phases(waves: Waves | None) -> None:
     """A window has gone by."""
     if waves is None:
         return

@@ -11,11 +11,13 @@ from sim_core.geometry.obstacles import ROUND, Bore
 from sim_core.numerics.jit import jit
 from sim_core.numerics.vec3 import Vec3, along
 
-HOP = 1e-4  # rad: hops R HOP²/2 = 0.2 nm high; a ball of 5 m/s makes a million a second, a tenth of what is a jam
+RECONTACT_ANGLE = 1e-4  # rad: hops R HOP²/2 = 0.2 nm high; a ball of 5 m/s makes a million a second, a tenth of what is a jam
 
 
 @jit
-def hop(bore: Bore | None, kind: int, away: Vec3, relative: Vec3, change: Vec3) -> Vec3:
+def leave_cylinder_wall(
+    bore: Bore | None, kind: int, away: Vec3, relative: Vec3, change: Vec3
+) -> Vec3:
     """The velocity change [m/s] that makes a ball leave the round side at no less than HOP; ``away``: its unit normal,
     ``relative`` [m/s]: the ball's velocity before, ``change``: as restitution and friction have it.
     """
@@ -26,7 +28,7 @@ def hop(bore: Bore | None, kind: int, away: Vec3, relative: Vec3, change: Vec3) 
     x, y = relative.x + change.x, relative.y + change.y
     out = away.x * x + away.y * y
     round_it = away.x * y - away.y * x
-    least = HOP * abs(round_it)
+    least = RECONTACT_ANGLE * abs(round_it)
     if out >= least:
         return change
     rate = away.x * relative.x + away.y * relative.y

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from sim_core.effects.contact_mode import FLYING, MODE, Footing, own_pull
+from sim_core.effects.contact_mode import FLYING, MODE, ContactState, ball_acceleration
 from sim_core.effects.drag import UNTIL, Air, slowing
 from sim_core.effects.gravity import Gravity
 from sim_core.motion import kick, point_under
@@ -22,17 +22,17 @@ EARLY = 1.999  # half pieces: a kick that rounding makes early is on time
 
 
 @inlined
-def flies(footing: Footing | None, ball: int) -> bool:
+def flies(contact: ContactState | None, ball: int) -> bool:
     """True for a ball that is not in contact mode."""
-    if footing is None:
+    if contact is None:
         return True
-    return footing.marks[ball, MODE] == FLYING
+    return contact.marks[ball, MODE] == FLYING
 
 
 @inlined
-def piece_left(air: Air | None, footing: Footing | None, ball: int, time: float) -> float:
+def piece_left(air: Air | None, contact: ContactState | None, ball: int, time: float) -> float:
     """For how long [s] the ball's path is good as far as the air goes."""
-    if air is None or not flies(footing, ball):
+    if air is None or not flies(contact, ball):
         return NEVER
     return max(air.balls[ball, UNTIL] + air.half - time, 0.0)
 
@@ -40,7 +40,7 @@ def piece_left(air: Air | None, footing: Footing | None, ball: int, time: float)
 @inlined
 def _change(
     air: Air,
-    footing: Footing | None,
+    contact: ContactState | None,
     motion: np.ndarray,
     ball: int,
     time: float,
@@ -48,7 +48,7 @@ def _change(
     span: float,
 ) -> Vec3:
     """Of the velocity [m/s], by so many seconds of air."""
-    velocity = point_under(motion, ball, time, own_pull(footing, ball, gravity)).velocity
+    velocity = point_under(motion, ball, time, ball_acceleration(contact, ball, gravity)).velocity
     lost = slowing(air, ball, math.sqrt(dot(velocity, velocity)), span) - 1.0
     return Vec3(lost * velocity.x, lost * velocity.y, lost * velocity.z)
 
@@ -56,7 +56,7 @@ def _change(
 @inlined
 def catch_up(
     air: Air | None,
-    footing: Footing | None,
+    contact: ContactState | None,
     motion: np.ndarray,
     ball: int,
     time: float,
@@ -65,16 +65,16 @@ def catch_up(
     """Make the ball's velocity what the air has made of it by now."""
     if air is None:
         return
-    if flies(footing, ball):
+    if flies(contact, ball):
         span = time - air.balls[ball, UNTIL]
-        kick(motion, ball, time, _change(air, footing, motion, ball, time, gravity, span))
+        kick(motion, ball, time, _change(air, contact, motion, ball, time, gravity, span))
     air.balls[ball, UNTIL] = time
 
 
 @inlined
 def goes_on(
     air: Air | None,
-    footing: Footing | None,
+    contact: ContactState | None,
     motion: np.ndarray,
     ball: int,
     time: float,
@@ -84,22 +84,22 @@ def goes_on(
     if air is None:
         return False
     span = time + air.half - air.balls[ball, UNTIL]
-    if span < EARLY * air.half or not flies(footing, ball):
+    if span < EARLY * air.half or not flies(contact, ball):
         return False
-    kick(motion, ball, time, _change(air, footing, motion, ball, time, gravity, span))
+    kick(motion, ball, time, _change(air, contact, motion, ball, time, gravity, span))
     air.balls[ball, UNTIL] = time + air.half
     return True
 
 
 @jit
 def catch_all_up(
-    air: Air | None, footing: Footing | None, velocities: np.ndarray, time: float
+    air: Air | None, contact: ContactState | None, velocities: np.ndarray, time: float
 ) -> None:
     """Make velocities (n, 3) [m/s] in flight what the air has made of them by ``time``, no half piece ahead."""
     if air is None:
         return
     for ball in range(len(velocities)):
-        if not flies(footing, ball):
+        if not flies(contact, ball):
             continue
         x, y, z = velocities[ball, 0], velocities[ball, 1], velocities[ball, 2]
         share = slowing(air, ball, math.sqrt(x * x + y * y + z * z), time - air.balls[ball, UNTIL])

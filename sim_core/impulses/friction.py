@@ -6,7 +6,7 @@ solid sphere of radius R, at -R n from its centre, changes its spin by -5/(2R) n
 
 import math
 
-from sim_core.effects.friction import OF_BALLS, Grip, law_of, spin_at
+from sim_core.effects.friction import OF_BALLS, FrictionState, law_of, spin_at
 from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.vec3 import Vec3, along, cross, dot, sub
 
@@ -18,38 +18,52 @@ ALONE, PAIR = 1.0, 0.5  # m_eff over m
 
 @inlined
 def rub_surface(
-    grip: Grip | None, ball: int, time: float, away: Vec3, relative: Vec3, change: Vec3, tag: int
+    friction_state: FrictionState | None,
+    ball: int,
+    time: float,
+    away: Vec3,
+    relative: Vec3,
+    change: Vec3,
+    tag: int,
 ) -> Vec3:
     """The velocity change [m/s] of a ball at a surface, with friction; the ball's spin is changed.
 
     ``change`` [m/s]: that without; ``away``: any vector along the normal, from the surface to the ball; ``relative``
     [m/s]: the ball's velocity minus that of the touched point. All in the room's frame.
     """
-    if grip is None:
+    if friction_state is None:
         return change
     normal = _unit(away)
-    slip = along(relative, -grip.radius, cross(spin_at(grip, ball, time), normal))
-    rub = _rub(slip, normal, change, law_of(grip, tag), ALONE)
-    _turn(grip, ball, normal, rub)
+    slip = along(
+        relative, -friction_state.radius, cross(spin_at(friction_state, ball, time), normal)
+    )
+    rub = _rub(slip, normal, change, law_of(friction_state, tag), ALONE)
+    _turn(friction_state, ball, normal, rub)
     return along(change, 1.0, rub)
 
 
 @inlined
 def rub_pair(
-    grip: Grip | None, one: int, two: int, time: float, apart: Vec3, closing: Vec3, change: Vec3
+    friction_state: FrictionState | None,
+    one: int,
+    two: int,
+    time: float,
+    apart: Vec3,
+    closing: Vec3,
+    change: Vec3,
 ) -> Vec3:
     """The same for two balls that meet: the velocity change of the first, and minus that of the second.
 
     ``apart`` [m], ``closing`` [m/s]: second minus first.
     """
-    if grip is None:
+    if friction_state is None:
         return change
     normal = _unit(apart)
-    spin = along(spin_at(grip, one, time), 1.0, spin_at(grip, two, time))
-    slip = along(closing, -grip.radius, cross(spin, normal))
-    rub = _rub(slip, normal, change, law_of(grip, OF_BALLS), PAIR)  # on the second
-    _turn(grip, one, normal, rub)
-    _turn(grip, two, normal, rub)  # the opposite kick on the opposite side: the same spin
+    spin = along(spin_at(friction_state, one, time), 1.0, spin_at(friction_state, two, time))
+    slip = along(closing, -friction_state.radius, cross(spin, normal))
+    rub = _rub(slip, normal, change, law_of(friction_state, OF_BALLS), PAIR)  # on the second
+    _turn(friction_state, one, normal, rub)
+    _turn(friction_state, two, normal, rub)  # the opposite kick on the opposite side: the same spin
     return sub(change, rub)
 
 
@@ -72,8 +86,8 @@ def _rub(slip: Vec3, normal: Vec3, push: Vec3, law: tuple[float, float], mass: f
 
 
 @jit
-def _turn(grip: Grip, ball: int, normal: Vec3, rub: Vec3) -> None:
+def _turn(friction_state: FrictionState, ball: int, normal: Vec3, rub: Vec3) -> None:
     """Change the spin of a ball that is kicked by ``rub`` [m/s] at -R ``normal`` from its centre."""
     torque = cross(normal, rub)
     for axis in range(3):
-        grip.spins[ball, axis] -= 2.5 / grip.radius * torque[axis]
+        friction_state.spins[ball, axis] -= 2.5 / friction_state.radius * torque[axis]

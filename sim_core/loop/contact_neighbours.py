@@ -5,26 +5,26 @@ The filter of neighbours.py does not see them; they are looked at one by one, ex
 
 import numpy as np
 
-from sim_core.contact.constrained_impulse import place, pull
-from sim_core.detect.ball_ball import pulled_meeting_delay
+from sim_core.contact.constrained_impulse import acceleration_of, place
+from sim_core.detect.ball_ball import accelerated_meeting_delay
 from sim_core.effects.contact_mode import (
     ASLEEP,
-    CALLED,
-    FEET,
     FLYING,
     JAMMED,
     MODE,
+    NEIGHBOUR_SUM,
+    NEIGHBOURS_HOLDING_JAM,
     ON_BALL,
-    PROPPED_BY,
-    PROPS,
     STAYS_UNTIL,
+    SUPPORTS,
+    WAKE_PENDING,
     WAKES,
-    Footing,
-    drop_foot,
+    ContactState,
+    drop_support,
     stands_on_ball,
 )
-from sim_core.loop.event_queue import Calendar, call_up, look_again
-from sim_core.loop.neighbours import Crowd, next_meeting
+from sim_core.loop.event_queue import EventQueue, call_up, look_again
+from sim_core.loop.neighbours import NeighbourFilter, next_meeting
 from sim_core.loop.spatial_blocks import slot_of
 from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.roots import NEVER
@@ -34,41 +34,46 @@ LEANING = 2e-5  # m: a ball held still is this near to what holds it, or nearer:
 
 
 @inlined
-def hide(footing: Footing | None, crowd: Crowd | None, ball: int) -> None:
+def hide(contact: ContactState | None, neighbours: NeighbourFilter | None, ball: int) -> None:
     """Take a ball in contact mode out of the filter's sight."""
-    if footing is None or crowd is None:
+    if contact is None or neighbours is None:
         return
-    if footing.marks[ball, MODE] != FLYING:
-        crowd.lanes[0, slot_of(crowd.blocks, ball)] = np.float32(np.nan)
+    if contact.marks[ball, MODE] != FLYING:
+        neighbours.lanes[0, slot_of(neighbours.blocks, ball)] = np.float32(np.nan)
 
 
 @jit
-def hide_all(footing: Footing | None, crowd: Crowd | None) -> None:
+def hide_all(contact: ContactState | None, neighbours: NeighbourFilter | None) -> None:
     """The same for all of them, at a window's start."""
-    if footing is None or crowd is None:
+    if contact is None or neighbours is None:
         return
-    for k in range(footing.held[0]):
-        hide(footing, crowd, footing.roster[k])
+    for k in range(contact.contact_count[0]):
+        hide(contact, neighbours, contact.contact_list[k])
 
 
 @inlined
 def first_meeting(
-    footing: Footing | None, crowd: Crowd, motion: np.ndarray, ball: int, time: float, before: float
+    contact: ContactState | None,
+    neighbours: NeighbourFilter,
+    motion: np.ndarray,
+    ball: int,
+    time: float,
+    before: float,
 ) -> tuple[float, int]:
     """next_meeting among all balls, whether in flight or in contact."""
-    if footing is None:
-        return next_meeting(crowd, motion, ball, time, before)
+    if contact is None:
+        return next_meeting(neighbours, motion, ball, time, before)
     meeting, partner = NEVER, -1
-    if footing.marks[ball, MODE] == FLYING:
-        meeting, partner = next_meeting(crowd, motion, ball, time, before)
-        if footing.held[0] == 0:
+    if contact.marks[ball, MODE] == FLYING:
+        meeting, partner = next_meeting(neighbours, motion, ball, time, before)
+        if contact.contact_count[0] == 0:
             return meeting, partner
-    return _with_grounded(footing, motion, ball, time, before, meeting, partner, crowd.reach)
+    return _with_grounded(contact, motion, ball, time, before, meeting, partner, neighbours.reach)
 
 
 @jit
 def _with_grounded(
-    footing: Footing,
+    contact: ContactState,
     motion: np.ndarray,
     ball: int,
     time: float,
@@ -81,19 +86,21 @@ def _with_grounded(
     itself those with all balls.
     """
     best = min(meeting, before) - time
-    here = place(footing, motion, ball, time)
-    flying = footing.marks[ball, MODE] == FLYING
-    still = footing.marks[ball, MODE] >= ASLEEP
-    own = pull(footing, ball)
-    for k in range(footing.held[0] if flying else len(motion)):
-        other = footing.roster[k] if flying else k
-        if other == ball or (still and footing.marks[other, MODE] >= ASLEEP):
+    here = place(contact, motion, ball, time)
+    flying = contact.marks[ball, MODE] == FLYING
+    still = contact.marks[ball, MODE] >= ASLEEP
+    own = acceleration_of(contact, ball)
+    for k in range(contact.contact_count[0] if flying else len(motion)):
+        other = contact.contact_list[k] if flying else k
+        if other == ball or (still and contact.marks[other, MODE] >= ASLEEP):
             continue
-        if stands_on_ball(footing, ball, other) or stands_on_ball(footing, other, ball):
+        if stands_on_ball(contact, ball, other) or stands_on_ball(contact, other, ball):
             continue
-        there = place(footing, motion, other, time)
+        there = place(contact, motion, other, time)
         apart, closing = sub(there.position, here.position), sub(there.velocity, here.velocity)
-        delay = pulled_meeting_delay(apart, closing, sub(pull(footing, other), own), reach, best)
+        delay = accelerated_meeting_delay(
+            apart, closing, sub(acceleration_of(contact, other), own), reach, best
+        )
         if delay < best or (delay == best and partner >= 0 and other < partner):
             best = delay
             partner = other
@@ -103,38 +110,38 @@ def _with_grounded(
 
 
 @inlined
-def lies_still(footing: Footing | None, ball: int) -> bool:
+def lies_still(contact: ContactState | None, ball: int) -> bool:
     """True for a ball that sleeps or is jammed."""
-    if footing is None:
+    if contact is None:
         return False
-    return footing.marks[ball, MODE] >= ASLEEP
+    return contact.marks[ball, MODE] >= ASLEEP
 
 
 @inlined
 def wake_if_it_moves(
-    footing: Footing | None,
-    calendar: Calendar,
+    contact: ContactState | None,
+    queue: EventQueue,
     motion: np.ndarray,
     ball: int,
     time: float,
-    moment: float,
+    time_since_start: float,
     reach: float,
 ) -> None:
     """What leans on a ball that lay still is woken when it no longer does."""
-    if footing is None:
+    if contact is None:
         return
-    if footing.marks[ball, MODE] < ASLEEP:
-        wake_neighbours(footing, calendar, motion, ball, time, moment, reach)
+    if contact.marks[ball, MODE] < ASLEEP:
+        wake_neighbours(contact, queue, motion, ball, time, time_since_start, reach)
 
 
 @jit
 def wake_neighbours(
-    footing: Footing,
-    calendar: Calendar,
+    contact: ContactState,
+    queue: EventQueue,
     motion: np.ndarray,
     ball: int,
     time: float,
-    moment: float,
+    time_since_start: float,
     reach: float,
 ) -> None:
     """Call up the balls that stand on one that has begun to move, and those held still beside it.
@@ -142,47 +149,52 @@ def wake_neighbours(
     Marked besides: what meets one of them at this very time has its events predicted anew, and the call must not be
     lost with the old ones.
     """
-    here = place(footing, motion, ball, time).position
-    for k in range(footing.held[0]):
-        other = footing.roster[k]
-        leans = stands_on_ball(footing, other, ball)
-        if not leans and other != ball and footing.marks[other, MODE] == JAMMED:
-            apart = sub(place(footing, motion, other, time).position, here)
+    here = place(contact, motion, ball, time).position
+    for k in range(contact.contact_count[0]):
+        other = contact.contact_list[k]
+        leans = stands_on_ball(contact, other, ball)
+        if not leans and other != ball and contact.marks[other, MODE] == JAMMED:
+            apart = sub(place(contact, motion, other, time).position, here)
             leans = dot(apart, apart) < (reach + LEANING) ** 2
         if leans:
-            footing.marks[other, CALLED] = 1
-            if footing.memory[other, STAYS_UNTIL] > moment:
-                _step_off(footing, other, ball)  # until then they are a pair like others
-                look_again(calendar, other, time)
+            contact.marks[other, WAKE_PENDING] = 1
+            if contact.memory[other, STAYS_UNTIL] > time_since_start:
+                _step_off(contact, other, ball)  # until then they are a pair like others
+                look_again(queue, other, time)
             else:
-                call_up(calendar, other, time, WAKES)
+                call_up(queue, other, time, WAKES)
 
 
 @jit
-def _step_off(footing: Footing, ball: int, other: int) -> None:
-    foot = 0
-    while foot < footing.marks[ball, FEET]:
-        if footing.rows[ball, foot] == ON_BALL - other:
-            drop_foot(footing, ball, foot)
+def _step_off(contact: ContactState, ball: int, other: int) -> None:
+    support = 0
+    while support < contact.marks[ball, SUPPORTS]:
+        if contact.rows[ball, support] == ON_BALL - other:
+            drop_support(contact, ball, support)
         else:
-            foot += 1
+            support += 1
 
 
 @jit
-def count_props(footing: Footing, motion: np.ndarray, ball: int, time: float, reach: float) -> bool:
+def count_neighbours(
+    contact: ContactState, motion: np.ndarray, ball: int, time: float, reach: float
+) -> bool:
     """Note which balls are about a jammed one, if any of them moves: it may not be held any more once one has gone.
 
     True when they are not those noted before.
     """
-    here = place(footing, motion, ball, time).position
+    here = place(contact, motion, ball, time).position
     count, numbers, moves = 0, 0, False
     for other in range(len(motion)):
-        apart = sub(place(footing, motion, other, time).position, here)
+        apart = sub(place(contact, motion, other, time).position, here)
         if other != ball and dot(apart, apart) < (reach + LEANING) ** 2:
             count += 1
             numbers += other
-            moves |= footing.marks[other, MODE] < ASLEEP
-    others = count != footing.marks[ball, PROPS] or numbers != footing.memory[ball, PROPPED_BY]
-    footing.marks[ball, PROPS] = count if moves else 0
-    footing.memory[ball, PROPPED_BY] = numbers
+            moves |= contact.marks[other, MODE] < ASLEEP
+    others = (
+        count != contact.marks[ball, NEIGHBOURS_HOLDING_JAM]
+        or numbers != contact.memory[ball, NEIGHBOUR_SUM]
+    )
+    contact.marks[ball, NEIGHBOURS_HOLDING_JAM] = count if moves else 0
+    contact.memory[ball, NEIGHBOUR_SUM] = numbers
     return others

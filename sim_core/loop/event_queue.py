@@ -17,7 +17,7 @@ PARTNER = 3  # ball it meets next, -1 none; this column and the next only where 
 PARTNER_HITS = 4  # the partner's HITS when that was found
 
 
-class Calendar(NamedTuple):
+class EventQueue(NamedTuple):
     """``pair_time``, ``wall_time`` (n,) [s on the window's clock]; ``marks`` (n, 5) int32;
 
     ``next_time`` (m,) [s], the earlier of the two, m the next power of two, padded with NEVER; ``winners`` (2 m,)
@@ -32,7 +32,7 @@ class Calendar(NamedTuple):
     winners: np.ndarray
 
 
-def new_calendar(balls: int, pairs: bool = True) -> Calendar:
+def new_event_queue(balls: int, pairs: bool = True) -> EventQueue:
     """A calendar in which every ball is due at once to look for its next event."""
     seats = 1
     while seats < balls:
@@ -47,7 +47,7 @@ def new_calendar(balls: int, pairs: bool = True) -> Calendar:
     for match in range(seats - 1, 0, -1):
         one, two = winners[2 * match], winners[2 * match + 1]
         winners[match] = one if next_time[one] <= next_time[two] else two
-    return Calendar(
+    return EventQueue(
         np.full(balls, NEVER) if pairs else None, np.zeros(balls), marks, next_time, winners
     )
 
@@ -77,45 +77,45 @@ def _set_meetings_back(pair_time: np.ndarray | None, window: float) -> None:
 
 
 @inlined
-def reschedule(calendar: Calendar, ball: int) -> None:
+def reschedule(queue: EventQueue, ball: int) -> None:
     """Put the ball's earlier event on the calendar and replay its matches; ties go to the lower ball."""
-    calendar.next_time[ball] = min(meeting_time(calendar.pair_time, ball), calendar.wall_time[ball])
-    match = (len(calendar.next_time) + ball) // 2
+    queue.next_time[ball] = min(meeting_time(queue.pair_time, ball), queue.wall_time[ball])
+    match = (len(queue.next_time) + ball) // 2
     while match >= 1:
-        one = calendar.winners[2 * match]
-        two = calendar.winners[2 * match + 1]
-        calendar.winners[match] = one if calendar.next_time[one] <= calendar.next_time[two] else two
+        one = queue.winners[2 * match]
+        two = queue.winners[2 * match + 1]
+        queue.winners[match] = one if queue.next_time[one] <= queue.next_time[two] else two
         match //= 2
 
 
 @jit
-def forget(calendar: Calendar, ball: int, time: float) -> None:
+def forget(queue: EventQueue, ball: int, time: float) -> None:
     """Drop what was predicted for the ball: it is due now to look again."""
-    call_up(calendar, ball, time, UNKNOWN)
+    call_up(queue, ball, time, UNKNOWN)
 
 
 @jit
-def call_up(calendar: Calendar, ball: int, time: float, what: int) -> None:
+def call_up(queue: EventQueue, ball: int, time: float, what: int) -> None:
     """Make an event of kind ``what`` (see OBSTACLE) the ball's next, now."""
-    _forget_meeting(calendar.pair_time, calendar.marks, ball)
-    calendar.wall_time[ball] = time
-    calendar.marks[ball, OBSTACLE] = what
-    reschedule(calendar, ball)
+    _forget_meeting(queue.pair_time, queue.marks, ball)
+    queue.wall_time[ball] = time
+    queue.marks[ball, OBSTACLE] = what
+    reschedule(queue, ball)
 
 
 @jit
-def look_again(calendar: Calendar, ball: int, time: float) -> None:
+def look_again(queue: EventQueue, ball: int, time: float) -> None:
     """Have the ball look again, now, for how its own path ends; its meeting stands."""
-    calendar.wall_time[ball] = time
-    calendar.marks[ball, OBSTACLE] = SEARCH_ON
-    reschedule(calendar, ball)
+    queue.wall_time[ball] = time
+    queue.marks[ball, OBSTACLE] = SEARCH_ON
+    reschedule(queue, ball)
 
 
 @jit
-def set_calendar_back(calendar: Calendar, window: float) -> None:
+def shift_queue(queue: EventQueue, window: float) -> None:
     """Move the clock's zero forward by ``window`` [s]; the order of events stays."""
-    _set_meetings_back(calendar.pair_time, window)
-    for ball in range(len(calendar.wall_time)):
-        calendar.wall_time[ball] -= window
-        calendar.next_time[ball] -= window
-        calendar.marks[ball, EVENTS] = 0
+    _set_meetings_back(queue.pair_time, window)
+    for ball in range(len(queue.wall_time)):
+        queue.wall_time[ball] -= window
+        queue.next_time[ball] -= window
+        queue.marks[ball, EVENTS] = 0

@@ -11,7 +11,7 @@ from sim_core.numerics.vec3 import Vec3
 CHUNK = 65_536  # impacts the compiled loop writes before handing them over
 
 
-class ImpactPage(NamedTuple):
+class ImpactBuffer(NamedTuple):
     """What the compiled loop writes.
 
     ``numbers`` (CHUNK, 8): time, position, velocity, normal speed; ``names`` (CHUNK, 2) int32: ball, triangle;
@@ -24,9 +24,9 @@ class ImpactPage(NamedTuple):
     record: np.ndarray
 
 
-def new_page(record: np.ndarray) -> ImpactPage:
+def new_impact_buffer(record: np.ndarray) -> ImpactBuffer:
     """An empty page recording the tags marked in ``record`` (256,) bool."""
-    return ImpactPage(
+    return ImpactBuffer(
         np.zeros((CHUNK, 8)),
         np.zeros((CHUNK, 2), dtype=np.int32),
         np.zeros(1, dtype=np.int64),
@@ -36,7 +36,7 @@ def new_page(record: np.ndarray) -> ImpactPage:
 
 @inlined
 def note_impact(
-    page: ImpactPage,
+    buffer: ImpactBuffer,
     time: float,
     ball: int,
     triangle: int,
@@ -45,15 +45,15 @@ def note_impact(
     speed: float,
 ) -> None:
     """Write one impact down."""
-    row = page.filled[0]
-    page.numbers[row, 0] = time
+    row = buffer.filled[0]
+    buffer.numbers[row, 0] = time
     for axis in range(3):
-        page.numbers[row, 1 + axis] = position[axis]
-        page.numbers[row, 4 + axis] = velocity[axis]
-    page.numbers[row, 7] = speed
-    page.names[row, 0] = ball
-    page.names[row, 1] = triangle
-    page.filled[0] = row + 1
+        buffer.numbers[row, 1 + axis] = position[axis]
+        buffer.numbers[row, 4 + axis] = velocity[axis]
+    buffer.numbers[row, 7] = speed
+    buffer.names[row, 0] = ball
+    buffer.names[row, 1] = triangle
+    buffer.filled[0] = row + 1
 
 
 @dataclass(frozen=True)
@@ -82,16 +82,16 @@ class ImpactLog:
         return ImpactLog(**{name: column[rows] for name, column in vars(self).items()})
 
 
-def impact_log(pages: list[tuple[np.ndarray, np.ndarray]], centre: np.ndarray) -> ImpactLog:
+def impact_log(chunks: list[tuple[np.ndarray, np.ndarray]], centre: np.ndarray) -> ImpactLog:
     """Joins pages of (numbers, names) into one log, positions in the user's coordinates again."""
-    numbers, names = [page[0] for page in pages], [page[1] for page in pages]
+    numbers, names = [buffer[0] for buffer in chunks], [buffer[1] for buffer in chunks]
     numbers = numbers or [np.zeros((0, 8))]
     names = names or [np.zeros((0, 2), dtype=np.int32)]
 
     def column(
         of: list[np.ndarray], part: int | slice
     ) -> np.ndarray:  # one by one: ten million impacts are a gigabyte
-        return np.concatenate([page[:, part] for page in of])
+        return np.concatenate([buffer[:, part] for buffer in of])
 
     position = column(numbers, slice(1, 4))
     position += centre

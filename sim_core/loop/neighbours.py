@@ -37,7 +37,7 @@ FINITE = 1e150  # m/s: its square is finite
 TINY = 1e-30  # stands for a velocity component of zero, whose inverse would be infinite
 
 
-class Crowd(NamedTuple):
+class NeighbourFilter(NamedTuple):
     """The balls as the filter sees them.
 
     ``lanes`` (6, m) float32: base and velocity, a column a ball, padded with NaN, which meets no one; ``probe`` (10,)
@@ -55,7 +55,7 @@ class Crowd(NamedTuple):
     radii: np.ndarray | None = None
 
 
-def new_crowd(
+def new_neighbour_filter(
     motion: np.ndarray,
     low: np.ndarray,
     high: np.ndarray,
@@ -63,7 +63,7 @@ def new_crowd(
     fastest: float,
     window: float,
     radii: np.ndarray | None = None,
-) -> Crowd:
+) -> NeighbourFilter:
     """The crowd of balls with this motion (n, 6) in a room from ``low`` to ``high`` (3,) [m]."""
     furthest = (
         float(np.max(high - low)) + fastest * window
@@ -79,36 +79,36 @@ def new_crowd(
     blocks = (
         new_blocks(len(motion), low, high, reach + 2.0 * margin) if len(motion) >= MANY else None
     )
-    crowd = Crowd(lanes, probe, reach, fastest, window, blocks, radii)
-    set_crowd(crowd, motion)
-    return crowd
+    neighbours = NeighbourFilter(lanes, probe, reach, fastest, window, blocks, radii)
+    refresh_neighbours(neighbours, motion)
+    return neighbours
 
 
 @jit
-def set_crowd(crowd: Crowd | None, motion: np.ndarray) -> None:
+def refresh_neighbours(neighbours: NeighbourFilter | None, motion: np.ndarray) -> None:
     """See all balls anew, at a window's start."""
-    if crowd is None:
+    if neighbours is None:
         return
-    sort_blocks(crowd.blocks, motion, crowd.window)
+    sort_blocks(neighbours.blocks, motion, neighbours.window)
     for ball in range(len(motion)):
-        _see(crowd, motion, ball)
+        _see(neighbours, motion, ball)
 
 
 @inlined
-def follow(crowd: Crowd | None, motion: np.ndarray, ball: int, time: float) -> None:
+def follow(neighbours: NeighbourFilter | None, motion: np.ndarray, ball: int, time: float) -> None:
     """See the new path of a ball hit at ``time`` [s]."""
-    if crowd is None:
+    if neighbours is None:
         return
-    _see(crowd, motion, ball)
-    widen(crowd.blocks, motion, ball, time, crowd.window)
+    _see(neighbours, motion, ball)
+    widen(neighbours.blocks, motion, ball, time, neighbours.window)
 
 
 @inlined
-def speed_limit(crowd: Crowd | None) -> float:
+def speed_limit(neighbours: NeighbourFilter | None) -> float:
     """Speed [m/s] up to which the filter's margins are good; every finite one without it."""
-    if crowd is None:
+    if neighbours is None:
         return FINITE
-    return crowd.fastest
+    return neighbours.fastest
 
 
 @inlined
@@ -120,17 +120,17 @@ def _pair_reach(radii: np.ndarray | None, reach: float, one: int, two: int) -> f
 
 
 @inlined
-def reach_of(crowd: Crowd | None) -> float:
+def reach_of(neighbours: NeighbourFilter | None) -> float:
     """Distance [m] at which two balls touch; 0 where they never do."""
-    if crowd is None:
+    if neighbours is None:
         return 0.0
-    return crowd.reach
+    return neighbours.reach
 
 
 @inlined
-def _see(crowd: Crowd, motion: np.ndarray, ball: int) -> None:
-    slot = slot_of(crowd.blocks, ball)
-    lanes = crowd.lanes
+def _see(neighbours: NeighbourFilter, motion: np.ndarray, ball: int) -> None:
+    slot = slot_of(neighbours.blocks, ball)
+    lanes = neighbours.lanes
     lanes[0, slot] = np.float32(motion[ball, 0])
     lanes[1, slot] = np.float32(motion[ball, 1])
     lanes[2, slot] = np.float32(motion[ball, 2])
@@ -141,23 +141,28 @@ def _see(crowd: Crowd, motion: np.ndarray, ball: int) -> None:
 
 @inlined
 def next_meeting(
-    crowd: Crowd, motion: np.ndarray, ball: int, time: float, before: float
+    neighbours: NeighbourFilter, motion: np.ndarray, ball: int, time: float, before: float
 ) -> tuple[float, int]:
     """Time [s] and partner of the ball's first meeting after ``time`` and before ``before``.
 
     If there is none: -1, and the time up to which that is known, NEVER for few balls and the window's end for many.
     """
-    probe = crowd.probe
-    slot = slot_of(crowd.blocks, ball)
+    probe = neighbours.probe
+    slot = slot_of(neighbours.blocks, ball)
     for k in range(6):
-        probe[k] = crowd.lanes[k, slot]
+        probe[k] = neighbours.lanes[k, slot]
     probe[6] = np.float32(time)
-    return _search(crowd.blocks, crowd, motion, ball, time, before)
+    return _search(neighbours.blocks, neighbours, motion, ball, time, before)
 
 
 @inlined
 def _search(
-    blocks: Blocks | None, crowd: Crowd, motion: np.ndarray, ball: int, time: float, before: float
+    blocks: Blocks | None,
+    neighbours: NeighbourFilter,
+    motion: np.ndarray,
+    ball: int,
+    time: float,
+    before: float,
 ) -> tuple[float, int]:
     """What next_meeting returns, from all lanes, or from the blocks that the ball's path enters."""
     if blocks is None:
@@ -166,12 +171,12 @@ def _search(
         best = before - time
         partner = -1
         for first in range(0, len(motion), LANES):
-            near = _without(balls_near(crowd.lanes, first, crowd.probe), ball - first)
+            near = _without(balls_near(neighbours.lanes, first, neighbours.probe), ball - first)
             while near != 0:
                 other = first + lowest_bit(near)
                 near &= near - 1
                 closing = sub(Vec3(motion[other, 3], motion[other, 4], motion[other, 5]), velocity)
-                reach = _pair_reach(crowd.radii, crowd.reach, ball, other)
+                reach = _pair_reach(neighbours.radii, neighbours.reach, ball, other)
                 delay = meeting_delay(sub(drift(motion, other, time), here), closing, reach)
                 if delay < best:
                     best = delay
@@ -179,7 +184,7 @@ def _search(
         if partner < 0:
             return NEVER, -1
         return time + best, partner
-    best, partner = min(before, crowd.window) - time, -1
+    best, partner = min(before, neighbours.window) - time, -1
     _aim(blocks.ray, motion, ball, time)
     slot = slot_of(blocks, ball)
     for node in range(len(blocks.boxes)):
@@ -188,13 +193,13 @@ def _search(
             block = BOXES * node + lowest_bit(entered)
             entered &= entered - 1
             near = _without(
-                balls_near(crowd.lanes, LANES * block, crowd.probe), slot - LANES * block
+                balls_near(neighbours.lanes, LANES * block, neighbours.probe), slot - LANES * block
             )
             if near != 0:
                 best, partner = _nearest(
-                    crowd, motion, ball, time, LANES * block, near, best, partner
+                    neighbours, motion, ball, time, LANES * block, near, best, partner
                 )
-    return (time + best, partner) if partner >= 0 else (crowd.window, -1)
+    return (time + best, partner) if partner >= 0 else (neighbours.window, -1)
 
 
 @inlined
@@ -215,7 +220,7 @@ def _aim(ray: np.ndarray, motion: np.ndarray, ball: int, time: float) -> None:
 
 @inlined
 def _nearest(
-    crowd: Crowd,
+    neighbours: NeighbourFilter,
     motion: np.ndarray,
     ball: int,
     time: float,
@@ -231,10 +236,10 @@ def _nearest(
     here = drift(motion, ball, time)
     velocity = Vec3(motion[ball, 3], motion[ball, 4], motion[ball, 5])
     while near != 0:
-        other = ball_in(crowd.blocks, first + lowest_bit(near))
+        other = ball_in(neighbours.blocks, first + lowest_bit(near))
         near &= near - 1
         closing = sub(Vec3(motion[other, 3], motion[other, 4], motion[other, 5]), velocity)
-        reach = _pair_reach(crowd.radii, crowd.reach, ball, other)
+        reach = _pair_reach(neighbours.radii, neighbours.reach, ball, other)
         delay = meeting_delay(sub(drift(motion, other, time), here), closing, reach)
         if delay < best or (delay == best and other < partner):
             best = delay

@@ -10,10 +10,10 @@ import numpy as np
 from sim_core.balls import Balls
 from sim_core.contact.resting_balls import Resting, resting
 from sim_core.detect.ball_mesh import Scratch, new_scratch
-from sim_core.effects.contact_mode import Footing, checked_rest, new_footing
+from sim_core.effects.contact_mode import ContactState, checked_rest, new_contact_state
 from sim_core.effects.drag import Air, checked_drag, new_air
-from sim_core.effects.friction import Grip, checked_friction, new_grip
-from sim_core.effects.gravity import acceleration, checked_gravity
+from sim_core.effects.friction import FrictionState, checked_friction, new_friction_state
+from sim_core.effects.gravity import checked_gravity, gravity_acceleration
 from sim_core.effects.part_rotation import Turning, angle_now, checked_axle, checked_turn
 from sim_core.effects.random_phase import Phases, checked_random_phase, new_phases
 from sim_core.effects.restitution import Restitution, checked_restitution
@@ -26,14 +26,14 @@ from sim_core.geometry.mesh import MAX_TAGS
 from sim_core.geometry.obstacle_set import build_ground
 from sim_core.impulses.drag import catch_all_up
 from sim_core.loop.contact_neighbours import hide_all
-from sim_core.loop.event_queue import Calendar, new_calendar
-from sim_core.loop.events import DONE, PAGE_FULL, STORM, TOO_FAST, advance
-from sim_core.loop.impact_log import ImpactLog, ImpactPage, impact_log, new_page
+from sim_core.loop.event_queue import EventQueue, new_event_queue
+from sim_core.loop.events import BUFFER_FULL, DONE, TOO_FAST, TOO_MANY_EVENTS, advance
+from sim_core.loop.impact_log import ImpactBuffer, ImpactLog, impact_log, new_impact_buffer
 from sim_core.loop.jam_message import touching
-from sim_core.loop.neighbours import new_crowd
-from sim_core.loop.state import Clock, Loop, Shot
+from sim_core.loop.neighbours import NeighbourFilter, new_neighbour_filter
+from sim_core.loop.state import Clock, SimulationState
 from sim_core.motion import WINDOW
-from sim_core.numerics.profiler import Stopwatch
+from sim_core.numerics.profiler import Profiler
 from sim_core.scene.invariants import contained, narrowest_gap, posed
 from sim_core.scene.scene import TOUCH, Scene
 
@@ -85,9 +85,9 @@ def simulate(scene: Scene, frames: Sequence[float] | np.ndarray = ()) -> Simulat
         scene.warmup + scene.duration, record=True, frames=_checked_frames(frames, scene)
     )
     balls = run.balls()
-    still = resting(run.footing, run.ground, balls.positions, run.centre, scene.warmup)
+    still = resting(run.contact, run.ground, balls.positions, run.centre, scene.warmup)
     return SimulationResult(
-        impact_log(run.pages, run.centre),
+        impact_log(run.chunks, run.centre),
         balls,
         Collisions(*(int(n) for n in run.count)),
         still,
@@ -146,62 +146,68 @@ class _Run:
         self.motion = np.concatenate(
             [scene.balls.positions - self.centre, scene.balls.velocities], axis=1
         )
-        self.calendar: Calendar = new_calendar(len(self.motion), self.collide)
+        self.queue: EventQueue = new_event_queue(len(self.motion), self.collide)
         self.scratch: Scratch = new_scratch()
-        self.grip = self._grip(tags)
-        self.footing: Footing | None = new_footing(
+        self.friction_state = self._friction_state(tags)
+        self.contact: ContactState | None = new_contact_state(
             checked_rest(scene.physics.rest),
             len(self.motion),
             self.gravity,
             self.restitution,
-            self.grip,
+            self.friction_state,
         )
         drag = checked_drag(scene.physics.drag)
         self.air: Air | None = new_air(drag, scene.balls.diameters, scene.balls.densities)
-        self.shot = self._shot(2.0 * max(1.0, float(np.abs(scene.balls.velocities).max())))
-        self.watch: Stopwatch | None = None
+        self.neighbours = self._new_filter(
+            2.0 * max(1.0, float(np.abs(scene.balls.velocities).max()))
+        )
+        self.profiler: Profiler | None = None
         self.now = np.zeros(2)
         self.count = np.zeros(5, dtype=np.int64)
-        self.pages: list[tuple[np.ndarray, np.ndarray]] = []
+        self.chunks: list[tuple[np.ndarray, np.ndarray]] = []
 
-    def _grip(self, tags: int) -> Grip | None:
+    def _friction_state(self, tags: int) -> FrictionState | None:
         friction, balls = self.scene.physics.friction, self.scene.balls
         if friction is None:
             return None
         spins = np.zeros_like(balls.positions) if balls.spins is None else balls.spins
-        return new_grip(
+        return new_friction_state(
             checked_friction(friction, tags), spins, balls.radius, self._tags_of_obstacles()
         )
 
     def _tags_of_obstacles(self) -> np.ndarray:
         return np.asarray(self.ground.tags[self.ground.tree.triangles[:, 0]])
 
-    def _shot(self, fastest: float) -> Shot:
+    def _new_filter(self, fastest: float) -> NeighbourFilter | None:
         if not self.collide:
-            return Shot(self.motion, None)
+            return None
         low, high = self.scene.mesh.bounds - self.centre
         balls = self.scene.balls
         radii = None if balls.alike else 0.5 * balls.diameters
-        crowd = new_crowd(self.motion, low, high, 2.0 * balls.radius, fastest, self.window, radii)
-        hide_all(self.footing, crowd)
-        return Shot(self.motion, crowd)
+        neighbours = new_neighbour_filter(
+            self.motion, low, high, 2.0 * balls.radius, fastest, self.window, radii
+        )
+        hide_all(self.contact, neighbours)
+        return neighbours
 
     def play(
         self, until: float, record: bool, frames: Sequence[float] | np.ndarray = ()
     ) -> np.ndarray:
         """Advance to ``until`` [s], checking containment on the way; positions (f, n, 3) [m] at ``frames`` [s]."""
-        page = new_page(self._recorded_tags() if record else np.zeros(MAX_TAGS, dtype=np.bool_))
+        buffer = new_impact_buffer(
+            self._recorded_tags() if record else np.zeros(MAX_TAGS, dtype=np.bool_)
+        )
         origin = self.scene.warmup
         start = self.now[0] + self.now[1] * self.window
         checks = np.linspace(start, until, 1 + max(1, math.ceil((until - start) / CHECK_EVERY)))[1:]
         due, noted, seen = set(checks), set(frames), []
         for stop in sorted({*checks, *frames}):
-            self._advance(Clock(self.now, self.window, float(stop), origin), page)
+            self._advance(Clock(self.now, self.window, float(stop), origin), buffer)
             if stop in noted:
                 seen.append(self._states()[0])
             if stop in due:
                 self._require_sound()
-        self._turn(page)
+        self._turn(buffer)
         return np.array(seen).reshape(-1, len(self.motion), 3)
 
     def _recorded_tags(self) -> np.ndarray:
@@ -209,24 +215,25 @@ class _Run:
         record[np.arange(MAX_TAGS) if self.scene.record is None else list(self.scene.record)] = True
         return record
 
-    def _advance(self, clock: Clock, page: ImpactPage) -> None:
+    def _advance(self, clock: Clock, buffer: ImpactBuffer) -> None:
         while True:
             status, ball = advance(
-                Loop(
-                    self.shot,
+                SimulationState(
+                    self.motion,
+                    self.neighbours,
                     self.ground,
-                    self.calendar,
+                    self.queue,
                     self.scratch,
                     self.gravity,
                     self.restitution,
                     self.wave,
                     self.turning,
                     clock,
-                    page,
+                    buffer,
                     self.count,
-                    self.watch,
-                    self.footing,
-                    self.grip,
+                    self.profiler,
+                    self.contact,
+                    self.friction_state,
                     self.phases,
                     self.air,
                     self.sizes,
@@ -235,23 +242,23 @@ class _Run:
             )
             if status == DONE:
                 return
-            if status == PAGE_FULL:
-                self._turn(page)
+            if status == BUFFER_FULL:
+                self._turn(buffer)
             elif status == TOO_FAST:
                 speed = float(np.abs(self.motion[ball, 3:]).max())
                 if not math.isfinite(speed):
                     raise SimulationError(
                         f"ball {ball}: its velocity is not a number any more; {self._when()}"
                     )
-                self.shot = self._shot(4.0 * speed)
-            elif status == STORM:
+                self.neighbours = self._new_filter(4.0 * speed)
+            elif status == TOO_MANY_EVENTS:
                 raise SimulationError(self._jam(ball))
 
     def _jam(self, ball: int) -> str:
         positions = self._states()[0]
         where = np.round(positions[ball], 6).tolist()
         between, by_part = touching(self.scene, self._corners(), positions, ball)
-        if self.turning is not None and (by_part or self.footing is not None):
+        if self.turning is not None and (by_part or self.contact is not None):
             through = "" if by_part else ", and the turning part presses on it through other balls"
             return (
                 f"ball {ball} is caught between {between}{through}, at {where} m, {self._when()}; make room there for "
@@ -262,17 +269,17 @@ class _Run:
             f"a second; {self._when()}. Look for a gap just as wide as the ball there"
             + (
                 ""
-                if self.footing is not None
+                if self.contact is not None
                 else "; if balls can lie still there, switch contact mode on"
             )
         )
 
-    def _turn(self, page: ImpactPage) -> None:
+    def _turn(self, buffer: ImpactBuffer) -> None:
         """Put away what the loop has written, and give it the empty page."""
-        rows = int(page.filled[0])
+        rows = int(buffer.filled[0])
         if rows:
-            self.pages.append((page.numbers[:rows].copy(), page.names[:rows].copy()))
-            page.filled[0] = 0
+            self.chunks.append((buffer.numbers[:rows].copy(), buffer.names[:rows].copy()))
+            buffer.filled[0] = 0
 
     def _when(self) -> str:
         return f"{self.now[0] + self.now[1] * self.window:.6f} s after the start"
@@ -280,11 +287,18 @@ class _Run:
     def _states(self) -> tuple[np.ndarray, np.ndarray]:
         """Positions [m] and velocities [m/s] now, (n, 3) each: point_at for all balls at once."""
         now = self.now[0]
-        fall = np.array(acceleration(self.gravity)) if self.footing is None else self.footing.pull
+        acceleration = (
+            np.array(gravity_acceleration(self.gravity))
+            if self.contact is None
+            else self.contact.acceleration
+        )
         base, velocities = self.motion[:, :3], self.motion[:, 3:]
-        velocities_now = velocities + now * fall
-        catch_all_up(self.air, self.footing, velocities_now, now)
-        return base + velocities * now + 0.5 * now * now * fall + self.centre, velocities_now
+        velocities_now = velocities + now * acceleration
+        catch_all_up(self.air, self.contact, velocities_now, now)
+        return (
+            base + velocities * now + 0.5 * now * now * acceleration + self.centre,
+            velocities_now,
+        )
 
     def _require_sound(self) -> None:
         points, _ = self._states()
@@ -332,5 +346,9 @@ class _Run:
 
     def balls(self) -> Balls:
         """The balls as they are now."""
-        spins = None if self.grip is None else self.grip.spins + self.now[0] * self.grip.twists
+        spins = (
+            None
+            if self.friction_state is None
+            else self.friction_state.spins + self.now[0] * self.friction_state.twists
+        )
         return Balls(*self._states(), self.scene.balls.diameter, self.scene.balls.density, spins)

@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from sim_core.detect.ball_mesh import Scratch
-from sim_core.effects.contact_mode import Footing
+from sim_core.effects.contact_mode import ContactState
 from sim_core.effects.drag import Air
-from sim_core.effects.friction import Grip
+from sim_core.effects.friction import FrictionState
 from sim_core.effects.gravity import Gravity
 from sim_core.effects.part_rotation import Turning
 from sim_core.effects.random_phase import Phases
@@ -16,22 +16,13 @@ from sim_core.effects.sonotrodes import Waves
 from sim_core.effects.vibration import Wave
 from sim_core.geometry.ball_sizes import Sizes
 from sim_core.geometry.obstacle_set import Ground
-from sim_core.loop.event_queue import Calendar
-from sim_core.loop.impact_log import ImpactPage
-from sim_core.loop.neighbours import Crowd
-from sim_core.numerics.profiler import Stopwatch
+from sim_core.loop.event_queue import EventQueue
+from sim_core.loop.impact_log import ImpactBuffer
+from sim_core.loop.neighbours import NeighbourFilter
+from sim_core.numerics.profiler import Profiler
 
-# columns of Loop.tally
+# columns of SimulationState.tally
 WALLS, BALLS, SONOTRODE, SEARCHES, STALE = 0, 1, 2, 3, 4
-
-
-class Shot(NamedTuple):
-    """The balls for the loop: ``motion`` (n, 6) float64 in the free-fall frame, and the ``crowd`` made of it,
-    if they collide with one another.
-    """
-
-    motion: np.ndarray
-    crowd: Crowd | None
 
 
 class Clock(NamedTuple):
@@ -47,23 +38,29 @@ class Clock(NamedTuple):
     origin: float
 
 
-class Loop(NamedTuple):
-    """Everything the event loop works on; ``tally`` (5,) int64, see WALLS and below; ``watch`` only to measure."""
+class SimulationState(NamedTuple):
+    """Everything that the event loop works on.
 
-    shot: Shot
+    ``motion`` (n, 6): base position [m] and velocity [m/s] of each ball in the free-fall frame. ``neighbours``: the
+    filter made of it, if balls collide with one another. ``tally`` (5,) int64: counts of events, see WALLS. ``profiler``:
+    only where the loop is measured. An effect that is absent is None.
+    """
+
+    motion: np.ndarray
+    neighbours: NeighbourFilter | None
     ground: Ground
-    calendar: Calendar
+    queue: EventQueue
     scratch: Scratch
     gravity: Gravity | None
     restitution: Restitution | None
     wave: Wave | None
     turning: Turning | None
     clock: Clock
-    page: ImpactPage
+    buffer: ImpactBuffer
     tally: np.ndarray
-    watch: Stopwatch | None
-    footing: Footing | None
-    grip: Grip | None
+    profiler: Profiler | None
+    contact: ContactState | None
+    friction_state: FrictionState | None
     phases: Phases | None
     air: Air | None
     sizes: Sizes | None

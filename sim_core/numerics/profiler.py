@@ -12,24 +12,24 @@ NEXT, RESOLVE, PAIRS, WALLS, SCHEDULE = 0, 1, 2, 3, 4
 PARTS = ("next event", "resolve", "pairs", "walls", "calendar")
 
 
-class Stopwatch(NamedTuple):
+class Profiler(NamedTuple):
     """``spent`` (parts,) int64: ticks of the processor's clock in each part; ``last`` (1,): when the last one ended."""
 
     spent: np.ndarray
     last: np.ndarray
 
 
-def new_stopwatch() -> Stopwatch:
-    """A stopwatch at zero."""
-    return Stopwatch(np.zeros(len(PARTS), dtype=np.int64), np.zeros(1, dtype=np.int64))
+def new_profiler() -> Profiler:
+    """A profiler that has measured nothing."""
+    return Profiler(np.zeros(len(PARTS), dtype=np.int64), np.zeros(1, dtype=np.int64))
 
 
 @inlined
-def lap(watch: Stopwatch | None, part: int) -> None:
+def add_time(profiler: Profiler | None, part: int) -> None:
     """What has passed since the last lap was spent in this part; a negative part only starts the clock."""
-    if watch is None:
+    if profiler is None:
         return
     now = ticks()
     if part >= 0:
-        watch.spent[part] += now - watch.last[0]
-    watch.last[0] = now
+        profiler.spent[part] += now - profiler.last[0]
+    profiler.last[0] = now

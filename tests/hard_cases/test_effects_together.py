@@ -107,8 +107,8 @@ def test_a_ball_that_a_rough_paddle_pushes_slips_on_the_floor_until_it_rolls(mu:
     rolls = 2.0 / 7.0 * np.linalg.norm(kicked) / (mu * G)
     run = _Run(Scene(room(paddle()), shot([x, y, R - HALF]), physics, 1.0))
     run.play(angle / omega * (1.0 - 1e-9), record=False)
-    assert run.footing is not None
-    assert run.footing.marks[0, MODE] == ASLEEP
+    assert run.contact is not None
+    assert run.contact.marks[0, MODE] == ASLEEP
     run.play(angle / omega * (1.0 + 1e-9), record=False)
     np.testing.assert_allclose(run.balls().velocities[0], kicked, atol=1e-6)
     np.testing.assert_allclose(
@@ -132,8 +132,8 @@ def test_air_does_not_wake_nor_slow_what_lies_or_rolls_on_the_floor() -> None:
     run.play(0.01, record=False)
     before, events = run.balls(), run.count.copy()
     run.play(0.5, record=False)
-    assert run.footing is not None
-    assert run.footing.marks[:, MODE].tolist() == [SLIDING, ASLEEP]
+    assert run.contact is not None
+    assert run.contact.marks[:, MODE].tolist() == [SLIDING, ASLEEP]
     assert (run.count[:3] == events[:3]).all()
     np.testing.assert_allclose(run.balls().velocities[0], [speed, 0.0, 0.0], atol=1e-9)
     np.testing.assert_allclose(

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from sim_core import Gravity, PartRotation, TriangleMesh
 from sim_core.detect.ball_mesh import Scratch, new_scratch
 from sim_core.detect.ball_turning_part import first_part_contact
-from sim_core.effects.gravity import acceleration
+from sim_core.effects.gravity import gravity_acceleration
 from sim_core.effects.part_rotation import Turning, checked_axle, checked_turn
 from sim_core.geometry.obstacle_set import Ground, build_ground
 from sim_core.geometry.turning_part import PartTree
@@ -77,7 +77,7 @@ def _search(  # type: ignore[no-untyped-def]
     time,
     limit,
 ):
-    fall = acceleration(gravity)
+    fall = gravity_acceleration(gravity)
     return first_part_contact(
         part, turning, scratch, Point(position, velocity), fall, seam, time, limit, -1, 0
     )

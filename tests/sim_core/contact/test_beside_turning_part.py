@@ -68,8 +68,8 @@ def gaps(run: _Run) -> float:
 
 
 def modes(run: _Run) -> np.ndarray:
-    assert run.footing is not None
-    return run.footing.marks[:, MODE]
+    assert run.contact is not None
+    return run.contact.marks[:, MODE]
 
 
 def arrival(x: float, y: float) -> float:

@@ -25,9 +25,9 @@ from sim_core import (
 )
 from sim_core.contact.jamming import hold
 from sim_core.contact.path_end import TURN
-from sim_core.effects.contact_mode import ASLEEP, FEET, JAMMED, MODE, ON_BALL, STAYS_UNTIL
+from sim_core.effects.contact_mode import ASLEEP, JAMMED, MODE, ON_BALL, STAYS_UNTIL, SUPPORTS
 from sim_core.effects.gravity import STANDARD as G
-from sim_core.loop.contact_neighbours import LEANING, count_props
+from sim_core.loop.contact_neighbours import LEANING, count_neighbours
 from sim_core.loop.simulate import _Run
 from sim_core.numerics.vec3 import Vec3
 from sim_core.scene.invariants import clearance, closest_pair, energy
@@ -77,14 +77,14 @@ def energies(frames: list[Balls]) -> np.ndarray:
 
 def feet(run: _Run) -> int:
     """On how many the first ball stands."""
-    assert run.footing is not None
-    return int(run.footing.marks[0, FEET])
+    assert run.contact is not None
+    return int(run.contact.marks[0, SUPPORTS])
 
 
 def mode(run: _Run) -> int:
     """How the first ball moves."""
-    assert run.footing is not None
-    return int(run.footing.marks[0, MODE])
+    assert run.contact is not None
+    return int(run.contact.marks[0, MODE])
 
 
 def slope(degrees: float) -> tuple[np.ndarray, np.ndarray]:
@@ -383,8 +383,8 @@ def test_in_a_settling_pile_nothing_overlaps(floor: str, seed: int, e: float) ->
         run, frames = film(room, balls, physics(e, 0.005), 0.1)
         balls = frames[-1]
         assert run.count[:3].sum() < 200_000
-        assert run.footing is not None
-        marks, rows = run.footing.marks, run.footing.rows
+        assert run.contact is not None
+        marks, rows = run.contact.marks, run.contact.rows
         stood_on = ON_BALL - rows[rows <= ON_BALL]
         assert (marks[stood_on, MODE] >= ASLEEP).all()
         assert (np.diff(energies(frames)) < 50 * CAPTURE**2).all()
@@ -399,8 +399,8 @@ def test_balls_that_go_on_as_one_in_flight_do_not_jam() -> None:
     balls = Balls(places, rng.normal(0.0, 0.5, places.shape), DIAMETER)
     run, _ = film(room, balls, physics(0.0, 0.005), 0.01, 10)
     assert 100 < run.count[1] < 3000
-    assert run.footing is not None
-    assert (run.footing.marks[:, MODE] != JAMMED).all()
+    assert run.contact is not None
+    assert (run.contact.marks[:, MODE] != JAMMED).all()
 
 
 def test_another_balls_hit_wakes_it() -> None:
@@ -469,17 +469,17 @@ def held_beside_another(leaves: float) -> _Run:
         [[0.0, 0.0, 0.0], [leaves, 0.0, 0.0]],
     )
     run = _Run(Scene(ROOM, balls, physics(), 1.0))
-    assert run.footing is not None
+    assert run.contact is not None
     hold_beside(run, 0.0)
     return run
 
 
 def hold_beside(run: _Run, moment: float) -> None:
     """Hold ball 0 where it is, as if it had jammed."""
-    assert run.footing is not None
+    assert run.contact is not None
     here = Vec3(*(float(x) for x in run.motion[0, :3]))
-    hold(run.footing, run.motion, 0, 0.0, moment, here, R)
-    count_props(run.footing, run.motion, 0, 0.0, DIAMETER)
+    hold(run.contact, run.motion, 0, 0.0, moment, here, R)
+    count_neighbours(run.contact, run.motion, 0, 0.0, DIAMETER)
 
 
 def test_a_held_ball_falls_when_one_of_those_around_it_has_gone() -> None:
@@ -496,8 +496,8 @@ def test_a_ball_held_at_one_place_again_and_again_is_left_there_for_longer_each_
     run = held_beside_another(0.1)
     for times in range(1, 6):
         hold_beside(run, 0.0)
-        assert run.footing is not None
-        assert run.footing.memory[0, STAYS_UNTIL] == pytest.approx(1e-3 * (2**times - 1))
+        assert run.contact is not None
+        assert run.contact.memory[0, STAYS_UNTIL] == pytest.approx(1e-3 * (2**times - 1))
     run.play(0.03, record=False)
     assert mode(run) == JAMMED
     run.play(0.031 + 0.03, record=False)
@@ -514,8 +514,8 @@ def test_every_ball_of_a_settled_heap_is_held_by_what_it_touches() -> None:
         balls = Balls(places, rng.normal(0.0, 0.3, places.shape), DIAMETER)
         run = _Run(Scene(room, balls, physics([0.5, 0.9][seed // 3], 0.005), 2.0))
         run.play(2.0, record=False)
-        assert run.footing is not None
-        still = np.flatnonzero(run.footing.marks[:, MODE] >= ASLEEP)
+        assert run.contact is not None
+        still = np.flatnonzero(run.contact.marks[:, MODE] >= ASLEEP)
         assert len(still) > 45
         lacking = force_lacking(room, run.balls(), still, LEANING, friction=0.3)
         assert lacking.max() < 0.02, (

@@ -32,12 +32,12 @@ KEPT = {
     "gravity": ("gravity", "Gravity"),
     "restitution": ("restitution", "Restitution"),
     "vibration": ("wave", "Wave"),
-    "rest": ("footing", "Footing"),
+    "rest": ("contact", "ContactState"),
     "part_rotation": ("turning", "Turning"),
-    "friction": ("grip", "Grip"),
+    "friction": ("friction_state", "FrictionState"),
     "random_phase": ("phases", "Phases"),
     "drag": ("air", "Air"),
-    "ball_collisions": ("shot.crowd", "Crowd"),
+    "ball_collisions": ("neighbours", "NeighbourFilter"),
 }
 STEEL = (0.9, 1.0)
 PRESENT = {

@@ -24,7 +24,7 @@ from sim_core import (
     simulate,
 )
 from sim_core.effects.contact_mode import ASLEEP, MODE
-from sim_core.effects.sonotrodes import PARTS, carry_phases, new_waves, whole_periods
+from sim_core.effects.sonotrodes import PARTS, new_waves, shift_phases, whole_periods
 from sim_core.effects.vibration import checked_waves
 from sim_core.loop import compile_ahead
 from sim_core.loop.simulate import _Run
@@ -83,7 +83,7 @@ def test_phases_do_not_drift(windows: int) -> None:
     assert waves is not None
     assert waves.faces.tolist() == [0, 3, 2]
     for _ in range(windows):
-        carry_phases(waves)
+        shift_phases(waves)
     for k, frequency in enumerate(FREQUENCIES):
         turns = Fraction(frequency) / Fraction(40e3) * 800 * windows % 1
         off = (waves.numbers[k, 2] - 0.1 * k) / math.tau - float(turns)
@@ -133,10 +133,10 @@ def test_a_ball_that_lies_still_waits_for_the_slowest() -> None:
             )
         )
         run.play(comes - 1e-9, record=False)
-        assert run.footing is not None
-        assert run.footing.marks[0, MODE] == ASLEEP
+        assert run.contact is not None
+        assert run.contact.marks[0, MODE] == ASLEEP
         run.play(comes + 1e-6, record=True)
-        (page,) = run.pages
+        (page,) = run.chunks
         assert page[0][0, 0] == pytest.approx(comes, abs=1e-12)
         assert run.balls().velocities[0, 0] == pytest.approx(
             (1.0 + 0.9) * wall.peak_speed * math.cos(math.asin(0.4)), rel=1e-3

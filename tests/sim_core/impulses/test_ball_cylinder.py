@@ -22,7 +22,7 @@ from sim_core import (
     simulate,
 )
 from sim_core.geometry.analytic import CEILING, FLOOR, SIDE
-from sim_core.impulses.ball_cylinder import HOP
+from sim_core.impulses.ball_cylinder import RECONTACT_ANGLE
 
 RADIUS, HEIGHT, DIAMETER, G = 0.035, 0.02, 3e-3, 9.80665
 REACH = RADIUS - 0.5 * DIAMETER
@@ -106,8 +106,8 @@ def test_sliding_along_the_side_it_circles_at_its_own_speed(off: float) -> None:
     np.testing.assert_allclose(np.hypot(*place.T), REACH, rtol=0.0, atol=1e-15)
     np.testing.assert_allclose(np.hypot(*velocity.T), speed, rtol=1e-12)
     angle = np.unwrap(np.arctan2(place[:, 1], place[:, 0]))
-    np.testing.assert_allclose(angle, speed * time / REACH, rtol=1e-6, atol=3.0 * HOP)
-    assert len(time) == pytest.approx(0.1 * speed / (2.0 * REACH * HOP), rel=0.01)
+    np.testing.assert_allclose(angle, speed * time / REACH, rtol=1e-6, atol=3.0 * RECONTACT_ANGLE)
+    assert len(time) == pytest.approx(0.1 * speed / (2.0 * REACH * RECONTACT_ANGLE), rel=0.01)
 
 
 def test_restitution_lets_it_slide_and_takes_no_more_speed() -> None:
@@ -128,7 +128,7 @@ def test_restitution_lets_it_slide_and_takes_no_more_speed() -> None:
     )
     collapsed = 2.0 * REACH / along**2 * normal * e / (1.0 - e)  # each hop lasts 2 REACH v_n / v²
     assert round_side.sum() == pytest.approx(
-        (0.1 - collapsed) * along / (2.0 * REACH * HOP), rel=0.01
+        (0.1 - collapsed) * along / (2.0 * REACH * RECONTACT_ANGLE), rel=0.01
     )
 
 

@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from sim_core.loop.neighbours import Crowd, follow, new_crowd, next_meeting, set_crowd
+from sim_core.loop.neighbours import (
+    NeighbourFilter,
+    follow,
+    new_neighbour_filter,
+    next_meeting,
+    refresh_neighbours,
+)
 from sim_core.loop.spatial_blocks import MANY
 
 REACH = 3e-3  # m
@@ -39,9 +45,9 @@ def gas(balls: int, half: float, rng: np.random.Generator) -> np.ndarray:
     return motion
 
 
-def crowd_of(motion: np.ndarray, half: float) -> Crowd:
+def filter_of(motion: np.ndarray, half: float) -> NeighbourFilter:
     fastest = 2.0 * float(np.abs(motion[:, 3:]).max())
-    return new_crowd(motion, np.full(3, -half), np.full(3, half), REACH, fastest, WINDOW)
+    return new_neighbour_filter(motion, np.full(3, -half), np.full(3, half), REACH, fastest, WINDOW)
 
 
 @pytest.mark.parametrize(
@@ -50,14 +56,14 @@ def crowd_of(motion: np.ndarray, half: float) -> Crowd:
 def test_every_meeting_is_found(balls: int, half: float) -> None:
     rng = np.random.default_rng(balls)
     motion = gas(balls, half, rng)
-    crowd = crowd_of(motion, half)
+    neighbours = filter_of(motion, half)
     met = 0
     for _ in range(400):
         ball, time = int(rng.integers(balls)), float(rng.uniform(0.0, WINDOW))
         before = float(time + rng.uniform(0.0, 0.03))
-        known = min(before, WINDOW) if crowd.blocks is not None else before
+        known = min(before, WINDOW) if neighbours.blocks is not None else before
         expected, partner = all_pairs(motion, ball, time, known)
-        meeting, found = next_meeting(crowd, motion, ball, time, before)
+        meeting, found = next_meeting(neighbours, motion, ball, time, before)
         assert found == partner
         assert found < 0 or meeting == pytest.approx(expected, rel=1e-9, abs=1e-15)
         met += found >= 0
@@ -66,7 +72,7 @@ def test_every_meeting_is_found(balls: int, half: float) -> None:
         )  # a ball gets a new path: the crowd follows it, as the loop has it do
         motion[change, 3:] = rng.normal(0.0, 3.0, 3)
         motion[change, :3] = rng.uniform(-half, half, 3) - motion[change, 3:] * time
-        follow(crowd, motion, int(change), time)
+        follow(neighbours, motion, int(change), time)
     assert met > 5
 
 
@@ -80,23 +86,23 @@ def test_a_graze_within_the_filters_rounding_is_not_lost(balls: int) -> None:
         motion[0, 3:] = 5.0 * direction
         motion[1, :3] = motion[0, :3] + 0.05 * direction + (REACH + margin) * side
         motion[1, 3:] = 0.0
-        crowd = crowd_of(motion, 0.4)
+        neighbours = filter_of(motion, 0.4)
         expected = all_pairs(motion, 0, 0.0, WINDOW)
-        assert next_meeting(crowd, motion, 0, 0.0, WINDOW)[1] == expected[1]
+        assert next_meeting(neighbours, motion, 0, 0.0, WINDOW)[1] == expected[1]
 
 
 def test_sorting_into_blocks_keeps_every_ball() -> None:
     rng = np.random.default_rng(6)
     count = MANY + 9
     motion = gas(count, 0.1, rng)
-    crowd = crowd_of(motion, 0.1)
-    assert crowd.blocks is not None
+    neighbours = filter_of(motion, 0.1)
+    assert neighbours.blocks is not None
     for _ in range(3):
         motion[:, :3] = rng.uniform(
             -0.12, 0.12, (count, 3)
         )  # some outside the room, as bases may be
-        set_crowd(crowd, motion)
-        slots = crowd.blocks.slot
+        refresh_neighbours(neighbours, motion)
+        slots = neighbours.blocks.slot
         assert sorted(slots) == list(range(count))
-        assert (crowd.blocks.ball[slots] == np.arange(count)).all()
-        assert (crowd.lanes[:, slots] == motion.T.astype(np.float32)).all()
+        assert (neighbours.blocks.ball[slots] == np.arange(count)).all()
+        assert (neighbours.lanes[:, slots] == motion.T.astype(np.float32)).all()
