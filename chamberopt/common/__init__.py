@@ -1,1 +1,1 @@
-"""What every package uses: errors, messages about TOML files, file writing, progress, workers."""
+"""What every package uses: errors, TOML fields and messages, file writing, progress, workers."""

@@ -1,18 +1,19 @@
-"""What a user can put right: one sentence that names the field, file or triangle, and the remedy; and lost workers."""
+"""Errors that a user can put right, and errors of lost workers."""
 
 from concurrent.futures import BrokenExecutor
 
 
 class InputError(Exception):
-    """A design, study, mesh or results folder that cannot be used as it is.
+    """A design, study, mesh or result folder cannot be used as it is.
 
-    The command line prints the message alone and exits with status 2.
+    The message is one sentence with the field, file or triangle and the remedy. The command line
+    prints the message alone and exits with status 2.
     """
 
 
 class WorkerLostError(BrokenExecutor):
-    """A worker died of its task, and so did the next; other tasks are not touched."""
+    """A worker died while it ran a task, and so did the worker that tried again."""
 
 
 class ClusterLostError(BrokenExecutor):
-    """The cluster is gone, and with it all that was to be done; the command line exits with status 1."""
+    """The cluster ended with tasks unfinished; the command line exits with status 1."""

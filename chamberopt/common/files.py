@@ -1,4 +1,4 @@
-"""Writing without regret: a folder that was not in use, and files that appear whole or not at all."""
+"""Output folders that must be new or empty, and files that are written whole or not at all."""
 
 import os
 import tempfile
@@ -8,12 +8,12 @@ from pathlib import Path
 
 from chamberopt.common.errors import InputError
 
-# What a killed run may leave beside its files: a file half written, and the mark of who was writing (lock.py).
+# A run that was killed may leave these in its folder: a file half written, and its lock (lock.py).
 LEFTOVER_PREFIXES = (".writing-", ".lock")
 
 
 def is_new_or_empty(folder: Path) -> bool:
-    """Whether results can go there: it is not there, or a folder with nothing in it."""
+    """Whether results can be written to a folder: it does not exist, or holds nothing."""
     if not os.path.lexists(folder):
         return True
     return folder.is_dir() and all(
@@ -22,54 +22,54 @@ def is_new_or_empty(folder: Path) -> bool:
 
 
 def make_output_folder(path: str | Path) -> Path:
-    """The folder, made if need be; InputError when something is in it: results are never overwritten."""
-    folder = Path(path)
+    """Make a folder for results.
+
+    Raises:
+        InputError: the folder holds files, which are never overwritten, or cannot be written.
+    """
+    folder, remedy = Path(path), "choose another folder (out, or --out)"
     if os.path.lexists(folder) and not os.path.isdir(folder):
-        raise InputError(
-            f"{folder}: is a file; results need a folder: choose another folder (out, or --out)"
-        )
+        raise InputError(f"{folder}: is a file; results need a folder: {remedy}")
     try:
         if not is_new_or_empty(folder):
             raise InputError(
-                f"{folder}: already holds files, and results are never overwritten: choose "
-                "another folder (out, or --out) or remove this one"
+                f"{folder}: already holds files, and results are never overwritten: {remedy} or "
+                "remove this one"
             )
         folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):  # better now than after an hour's work
-            pass
+        _require_writable(folder)
     except OSError as error:
-        why = (
-            f"{folder}: cannot be written: {error.strerror}; choose another folder (out, or --out)"
-        )
-        raise InputError(why) from None
+        raise InputError(f"{folder}: cannot be written: {error.strerror}; {remedy}") from None
     return folder
 
 
 def check_new_file(path: Path) -> Path:
-    """The path, where a file can be made in a folder that is there; InputError for one that is there: nothing is ever
-    overwritten.
+    """Return the path, where a new file can be written.
+
+    Raises:
+        InputError: the file exists and would be overwritten, or cannot be written.
     """
     if os.path.lexists(path):
         raise InputError(
-            f"{path}: is there already, and nothing is ever overwritten: choose another name or remove it"
+            f"{path}: already exists, and nothing is ever overwritten: choose another name or "
+            "remove it"
         )
     if not path.parent.is_dir():
         raise InputError(f"{path}: the folder {path.parent} does not exist; make it first")
     try:
-        with tempfile.TemporaryFile(dir=path.parent):  # better now than after an hour's work
-            pass
+        _require_writable(path.parent)
     except OSError as error:
-        raise InputError(
-            f"{path}: cannot be written: {error.strerror}; choose another place"
-        ) from None
+        text = f"cannot be written: {error.strerror}; choose another place"
+        raise InputError(f"{path}: {text}") from None
     return path
 
 
 @contextmanager
 def atomic_write(path: Path) -> Iterator[Path]:
-    """A temporary path beside `path`, with the same suffix, that takes its place when the block ends well.
+    """Give a temporary path beside `path`, which replaces it when the block ends without an error.
 
-    It is on the disk before it does, so that neither a crash nor a power cut leaves half a file.
+    The file is on the disk before it gets its name, so that neither a crash nor a power cut leaves
+    half a file. The temporary path has the same suffix.
     """
     temporary = path.with_name(f".writing-{path.name}")
     try:
@@ -88,9 +88,15 @@ def write_text(path: Path, text: str) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Make the names in a folder outlast a power cut, where the system can."""
-    with suppress(OSError):  # Windows opens no folders
+    """Write a folder's names to the disk, so that they survive a power cut."""
+    with suppress(OSError):  # Windows cannot open folders
         _sync(folder)
+
+
+def _require_writable(folder: Path) -> None:
+    """Raise OSError now rather than after an hour's work."""
+    with tempfile.TemporaryFile(dir=folder):
+        pass
 
 
 def _sync(path: Path) -> None:

@@ -1,4 +1,4 @@
-"""What a person sees while something long runs: a bar with best-so-far and time left, never in a pipe."""
+"""Progress on the terminal: a bar with the best value so far and the time left."""
 
 from __future__ import annotations
 
@@ -10,15 +10,16 @@ from typing import TYPE_CHECKING, TextIO
 if TYPE_CHECKING:
     from sim_core import Physics
 
+# Called as progress(done, total, best value so far or None).
 Progress = Callable[[int, int, "float | None"], None]
-"""Called as progress(done, total, best so far or None)."""
 
 
 @contextmanager
 def progress_bar(what: str, stream: TextIO | None = None) -> Iterator[Progress]:
-    """A bar for the time of a `with` block, as a function (done, total, best so far or None).
+    """Show a progress bar during a `with` block, and give the function that updates it.
 
-    Goes to stderr (or `stream`), and is silent where that is not a terminal: logs and pipes stay clean.
+    The bar goes to stderr (or `stream`). Nothing is shown where that is not a terminal, so that
+    logs and pipes stay clean.
     """
     stream = stream or sys.stderr
     if not stream.isatty():
@@ -41,18 +42,17 @@ def progress_bar(what: str, stream: TextIO | None = None) -> Iterator[Progress]:
         TextColumn("{task.fields[best]}", style="bold"),
         TimeElapsedColumn(),
         TextColumn("left", style="dim"),
-        # An evaluation can take seconds: the estimate looks back over all of them (speed_estimate_period).
         TimeRemainingColumn(),
     )
+    # An evaluation can take seconds. The time left is estimated from all of the last hour's.
     with Bar(
         *columns, console=Console(file=stream), speed_estimate_period=3600, transient=True
     ) as bar:
         task = bar.add_task(what, total=None, best="")
 
         def show(done: int, total: int, best: float | None) -> None:
-            bar.update(
-                task, completed=done, total=total, best="" if best is None else f"best {best:.4f}"
-            )
+            text = "" if best is None else f"best {best:.4f}"
+            bar.update(task, completed=done, total=total, best=text)
 
         yield show
 
@@ -64,7 +64,11 @@ def compile_with_message(
     bore: bool = False,
     stream: TextIO | None = None,
 ) -> float:
-    """Compiles the simulator for these effects if it never was, here, and says so; seconds it took, else 0."""
+    """Compile the simulator for these effects, with a message, unless that was done before here.
+
+    Returns:
+        Seconds that it took; 0 if the compiled simulator was there.
+    """
     import sim_core
 
     stream = stream or sys.stderr

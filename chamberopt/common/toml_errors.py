@@ -1,4 +1,8 @@
-"""What is wrong with a TOML file, said at once: file, line, field, given, allowed, remedy."""
+"""Error messages for TOML files: file, line, field, the value given, what is allowed, a remedy.
+
+All problems of a file are reported at once. Messages are made from the pydantic models of the
+files: a field's bounds, unit and description are stated once, in its model.
+"""
 
 import difflib
 import re
@@ -12,20 +16,35 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-# Pydantic ends the place of a fault with the alternative of a union that it tried; no field has such a name.
+# For a union, pydantic ends the location of an error with the alternative that it tried. No field
+# has such a name.
 ALTERNATIVES = ("int", "float", "str")
+TYPE_NAMES = {
+    float: "a number",
+    int: "a whole number",
+    str: "a text in quotes",
+    bool: "true or false",
+}
+SIMILARITY = 0.6  # of two spellings, from 0 to 1 (difflib's ratio): below it a hint would mislead
+MAX_CHOICES = 8  # listed in a message
+MAX_VALUE_TEXT = 60  # characters of a given value that a message repeats
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing to put right: dotted field ("" for the whole file) and a sentence with value and remedy."""
+    """One thing to put right.
+
+    Args:
+        field: dotted name; "" for the whole file.
+        text: sentence with the value and the remedy.
+    """
 
     field: str
     text: str
 
 
 class CrossCheckError(ValueError):
-    """Fields that are each in range but contradict each other; raised inside a pydantic validator."""
+    """Fields that are each in range but contradict each other; raised by pydantic validators."""
 
     def __init__(self, problems: Iterable[Problem]) -> None:
         self.problems = tuple(problems)
@@ -33,182 +52,207 @@ class CrossCheckError(ValueError):
 
 
 def closest_names(name: str, known: Iterable[str], count: int = 1) -> list[str]:
-    """The known spellings nearest to `name`, best first; empty when nothing is near. Case is ignored."""
+    """The known names most similar to `name`, best first; case is ignored. Empty if none is."""
     by_lower = {word.lower(): word for word in known}
-    return [
-        by_lower[word]
-        for word in difflib.get_close_matches(name.lower(), by_lower, n=count, cutoff=0.6)
-    ]
+    close = difflib.get_close_matches(name.lower(), by_lower, n=count, cutoff=SIMILARITY)
+    return [by_lower[word] for word in close]
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """'did you mean X?' when something is near; what is allowed when nothing is, or the list is short."""
+    """A hint: "did you mean 'x'?", the allowed names, or both if there are few."""
     words = list(known)
-    near = closest_names(name, words)
-    listed = f"allowed: {', '.join(words)}"
-    if not near:
-        return listed
-    return f"did you mean {near[0]!r}?" + (f" ({listed})" if len(words) <= 8 else "")
+    close = closest_names(name, words)
+    allowed = f"allowed: {', '.join(words)}"
+    if not close:
+        return allowed
+    return f"did you mean {close[0]!r}?" + (f" ({allowed})" if len(words) <= MAX_CHOICES else "")
 
 
 def format_problems(problems: Iterable[Problem], path: Path | None = None, source: str = "") -> str:
-    """All problems, a line each: `file:line: field: text`; the line only where the source shows the field."""
-    lines = key_lines(source)
-    said = []
+    """One line per problem, `file:line: field: text`; without the line if it is unknown.
+
+    Args:
+        source: text of the file, in which the fields' lines are looked up.
+    """
+    line_of = key_lines(source)
+    texts = []
     for problem in problems:
-        line = _line_of(problem.field, lines)
+        line = _find_line(problem.field, line_of)
         place = "" if path is None else f"{path}:{line}: " if line else f"{path}: "
-        said.append(place + (f"{problem.field}: " if problem.field else "") + problem.text)
-    return "\n".join(said)
+        texts.append(place + (f"{problem.field}: " if problem.field else "") + problem.text)
+    return "\n".join(texts)
 
 
 def explain_validation_error(error: ValidationError, model: type[BaseModel]) -> list[Problem]:
-    """Pydantic's findings in the words of the file."""
+    """Pydantic's errors as problems in the words of the file."""
     problems: list[Problem] = []
     details = error.errors()
     for detail in details:
         loc = detail["loc"]
-        if detail["type"] == "too_short" and any(
-            other["loc"][: len(loc)] == loc != other["loc"] for other in details
-        ):
-            continue  # only without its wrong items, which are told
+        inner_errors = (other for other in details if other["loc"][: len(loc)] == loc)
+        if detail["type"] == "too_short" and any(other["loc"] != loc for other in inner_errors):
+            continue  # the list is only too short because its wrong items do not count
         cause = detail.get("ctx", {}).get("error")
         if isinstance(cause, CrossCheckError):
-            prefix = ".".join(str(step) for step in detail["loc"])
             problems += [
-                Problem(".".join(filter(None, (prefix, p.field))), p.text) for p in cause.problems
+                Problem(".".join(filter(None, (_dotted(loc), p.field))), p.text)
+                for p in cause.problems
             ]
         else:
             problems.append(_explain(detail, model))
-    return list(dict.fromkeys(problems))  # a union says the same for each of its alternatives
+    return list(dict.fromkeys(problems))  # a union reports the same error for each alternative
 
 
 def explain_missing_file(path: Path, what: str, pattern: str) -> str:
-    """One sentence on a file that is not there, with the near names that are."""
+    """One sentence about a file that does not exist, with similar names from its folder."""
     folder = path.parent
     if not folder.is_dir():
         return f"{path}: no such {what}; the folder {folder} does not exist"
-    there = sorted(p.name for p in folder.glob(pattern) if p.is_file())
-    near = closest_names(
-        path.stem, (Path(name).stem for name in there)
-    )  # the endings are alike and would mislead
-    likely = [str(folder / name) for name in there if Path(name).stem in near]
+    names = sorted(p.name for p in folder.glob(pattern) if p.is_file())
+    # Without the suffixes, which are alike and would make every name similar.
+    close = closest_names(path.stem, (Path(name).stem for name in names))
+    likely = [str(folder / name) for name in names if Path(name).stem in close]
     if likely:
         return f"{path}: no such {what}; did you mean {' or '.join(likely)}?"
-    return f"{path}: no such {what}; in {folder} there is {', '.join(there[:8]) or 'none'}"
+    found = ", ".join(names[:MAX_CHOICES]) or "none"
+    return f"{path}: no such {what}; in {folder} there is {found}"
 
 
 def numeric_fields(
     table: BaseModel | type[BaseModel], prefix: str = ""
 ) -> Iterator[tuple[str, FieldInfo]]:
-    """Dotted name and field of every number in a table; those of lists by index: part.offset_mm.0.
+    """Dotted name and field of every number in a table; numbers in lists as part.offset_mm.0.
 
-    Of a class, what its tables can hold; of an instance, the tables of its lists too.
+    For a model class these are the numbers that its tables can hold. For an instance they include
+    the tables of its lists.
     """
-    model = table if isinstance(table, type) else type(table)
-    for name, field in model.model_fields.items():
-        kinds = _kinds(field.annotation)
-        value = None if isinstance(table, type) else getattr(table, name)
-        inner = value if isinstance(value, BaseModel) else _table(field)
-        if isinstance(value, tuple) and value and isinstance(value[0], BaseModel):
+    is_class = isinstance(table, type)
+    for name, field in (table if isinstance(table, type) else type(table)).model_fields.items():
+        name = prefix + name
+        types = _alternatives(field.annotation)
+        value = None if is_class else getattr(table, name.removeprefix(prefix))
+        inner = value if isinstance(value, BaseModel) else _table_of(field)
+        first = value[0] if isinstance(value, tuple) and value else None
+        if isinstance(first, BaseModel):
             for i, item in enumerate(value):
-                yield from numeric_fields(item, f"{prefix}{name}.{i}.")
-        elif isinstance(value, tuple) and value and isinstance(value[0], tuple):
-            yield from (
-                (f"{prefix}{name}.{i}.{j}", field)
-                for i, row in enumerate(value)
-                for j in range(len(row))
-            )
+                yield from numeric_fields(item, f"{name}.{i}.")
+        elif isinstance(first, tuple):
+            for i, row in enumerate(value):
+                yield from ((f"{name}.{i}.{j}", field) for j in range(len(row)))
         elif inner is not None:
-            yield from numeric_fields(inner, f"{prefix}{name}.")
-        elif float in kinds or int in kinds:
-            yield f"{prefix}{name}", field
-        elif isinstance(table, type) or value is not None:
-            for kind in kinds:
-                if get_args(kind) and all(item is float for item in get_args(kind)):
-                    yield from ((f"{prefix}{name}.{i}", field) for i in range(len(get_args(kind))))
+            yield from numeric_fields(inner, f"{name}.")
+        elif float in types or int in types:
+            yield name, field
+        elif is_class or value is not None:
+            for items in map(get_args, types):
+                if items and all(item is float for item in items):
+                    yield from ((f"{name}.{i}", field) for i in range(len(items)))
 
 
 def key_lines(source: str) -> dict[str, int]:
     """Line number of every table header and key in a TOML text, by dotted name.
 
-    A plain scan, enough to point a person at the place: inline tables count as their key's line.
+    A simple scan is enough to point a person at the place: the keys of inline tables are not found.
     """
     lines: dict[str, int] = {}
     rows: Counter[str] = Counter()
     table = ""
     in_string = ""
+    word = r"""(?:[\w-]+|"[^"]*"|'[^']*')"""
     for number, line in enumerate(source.splitlines(), start=1):
         if in_string:
             in_string = "" if in_string in line else in_string
             continue
         header = re.match(r"\s*(\[+)\s*([^\]]+?)\s*\]+\s*(#.*)?$", line)
-        key = re.match(
-            r"""\s*((?:[\w-]+|"[^"]*"|'[^']*')(?:\s*\.\s*(?:[\w-]+|"[^"]*"|'[^']*'))*)\s*=""", line
-        )
+        key = re.match(rf"\s*({word}(?:\s*\.\s*{word})*)\s*=", line)
         if header:
-            table = _plain(header[2])
+            table = _without_quotes(header[2])
             lines.setdefault(table, number)
             if header[1] == "[[":  # one of a list of tables
                 rows[table] += 1
                 table = f"{table}.{rows[table] - 1}"
                 lines[table] = number
         elif key:
-            lines.setdefault(".".join(filter(None, (table, _plain(key[1])))), number)
+            name = _without_quotes(key[1])
+            lines.setdefault(f"{table}.{name}" if table else name, number)
         for quote in ('"""', "'''"):
             if line.count(quote) % 2:
                 in_string = quote
     return lines
 
 
-def _plain(key: str) -> str:
+def describe_allowed(field: FieldInfo) -> str:
+    """What a field accepts: 'a number from 2 to 2000 mm (inner height of the chamber)'."""
+    bounds = {
+        name: getattr(constraint, name)
+        for constraint in field.metadata
+        for name in ("ge", "le")
+        if hasattr(constraint, name)
+    }
+    extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
+    kind = _alternatives(field.annotation)[0]
+    if "form" in extra:
+        text = str(extra["form"])
+    elif _table_of(field):
+        text = "a table"
+    else:
+        text = TYPE_NAMES.get(kind) or ", ".join(f'"{choice}"' for choice in get_args(kind))
+    if "ge" in bounds and "le" in bounds:
+        text += f" from {_format_bound(bounds['ge'])} to {_format_bound(bounds['le'])}"
+    elif "ge" in bounds:
+        text += f" of at least {_format_bound(bounds['ge'])}"
+    text += f" {extra['unit']}" if extra.get("unit") else ""
+    return text + (f" ({field.description})" if field.description else "")
+
+
+def _dotted(loc: tuple[int | str, ...]) -> str:
+    return ".".join(str(step) for step in loc)
+
+
+def _without_quotes(key: str) -> str:
     return ".".join(step.strip().strip("\"'") for step in key.split("."))
 
 
-def _line_of(field: str, lines: Mapping[str, int]) -> int | None:
+def _find_line(field: str, line_of: Mapping[str, int]) -> int | None:
+    """Line of a field, or of the innermost table around it that the file has."""
     steps = field.split(".")
-    return next(
-        (lines[name] for n in range(len(steps), 0, -1) if (name := ".".join(steps[:n])) in lines),
-        None,
-    )
+    names = (".".join(steps[:n]) for n in range(len(steps), 0, -1))
+    return next((line_of[name] for name in names if name in line_of), None)
 
 
-def _kinds(annotation: Any) -> tuple[Any, ...]:
-    """The alternatives of a union, None and what is said of them left out; a plain type alone."""
-    is_union = type(None) in get_args(annotation)
-    kinds = (
-        tuple(k for k in get_args(annotation) if k is not type(None)) if is_union else (annotation,)
-    )
-    return tuple(get_args(k)[0] if get_origin(k) is Annotated else k for k in kinds)
+def _alternatives(annotation: Any) -> tuple[Any, ...]:
+    """The types of an optional field, without None and annotations; otherwise the type itself."""
+    types = get_args(annotation)
+    types = tuple(t for t in types if t is not type(None)) if type(None) in types else (annotation,)
+    return tuple(get_args(t)[0] if get_origin(t) is Annotated else t for t in types)
 
 
-def _table(field: FieldInfo) -> type[BaseModel] | None:
-    for kind in (*_kinds(field.annotation), *get_args(field.annotation)[1:]):
-        if isinstance(kind, type) and issubclass(kind, BaseModel):
-            return kind
-    return None
+def _first_model(types: Iterable[Any]) -> type[BaseModel] | None:
+    return next((t for t in types if isinstance(t, type) and issubclass(t, BaseModel)), None)
 
 
-def _row(field: FieldInfo) -> type[BaseModel] | None:
-    """The table of each item, where the field is a list of tables."""
-    for kind in _kinds(field.annotation):
-        items = get_args(kind) if get_origin(kind) is tuple else ()
-        if items and isinstance(items[0], type) and issubclass(items[0], BaseModel):
-            return items[0]
-    return None
+def _table_of(field: FieldInfo) -> type[BaseModel] | None:
+    """Model of a field that is a table."""
+    return _first_model((*_alternatives(field.annotation), *get_args(field.annotation)[1:]))
 
 
-def _walk(
+def _row_of(field: FieldInfo) -> type[BaseModel] | None:
+    """Model of each item of a field that is a list of tables."""
+    lists = (t for t in _alternatives(field.annotation) if get_origin(t) is tuple)
+    return _first_model(item for one in lists for item in get_args(one)[:1])
+
+
+def _find_field(
     model: type[BaseModel], loc: tuple[int | str, ...]
 ) -> tuple[type[BaseModel], FieldInfo | None]:
-    """The innermost table on the way to `loc`, and the field there when the table knows it."""
+    """The innermost table on the way to `loc`, and the field there if the table has it."""
     field: FieldInfo | None = None
-    free_name = False
+    free_name = False  # the next step is a key that the user chooses
     for step in loc:
         if isinstance(step, int) or free_name:
             free_name = False
             continue
-        table = model if field is None else _table(field) or _row(field)
+        table = model if field is None else _table_of(field) or _row_of(field)
         if table is None:
             break
         model, field = table, table.model_fields.get(step)
@@ -218,92 +262,64 @@ def _walk(
     return model, field
 
 
-def describe_allowed(field: FieldInfo) -> str:
-    """What a field takes, from its own bounds: 'a number from 2 to 2000 mm (inner height of the chamber)'."""
-    bounds = {
-        name: getattr(meta, name)
-        for meta in field.metadata
-        for name in ("ge", "le")
-        if hasattr(meta, name)
-    }
-    extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
-    unit = f" {extra['unit']}" if extra.get("unit") else ""
-    kinds = _kinds(field.annotation)
-    what = f"{extra['form']}" if "form" in extra else ""
-    if not what and _table(field):
-        what = "a table"
-    if not what:
-        names = {
-            float: "a number",
-            int: "a whole number",
-            str: "a text in quotes",
-            bool: "true or false",
-        }
-        what = names.get(kinds[0], "")
-        if not what and get_args(kinds[0]):
-            what = ", ".join(f'"{choice}"' for choice in get_args(kinds[0]))
-    if "ge" in bounds and "le" in bounds:
-        what += f" from {_bound(bounds['ge'])} to {_bound(bounds['le'])}"
-    elif "ge" in bounds:
-        what += f" of at least {_bound(bounds['ge'])}"
-    about = f" ({field.description})" if field.description else ""
-    return what + unit + about
-
-
-def _bound(number: float) -> str:
+def _format_bound(number: float) -> str:
     return str(number) if isinstance(number, int) else f"{number:g}"
 
 
-def _shown(value: Any) -> str:
-    text = ("true" if value else "false") if isinstance(value, bool) else repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+def _format_value(value: Any) -> str:
+    text = str(value).lower() if isinstance(value, bool) else repr(value)
+    return text if len(text) <= MAX_VALUE_TEXT else text[: MAX_VALUE_TEXT - 3] + "..."
 
 
 def _explain(detail: ErrorDetails, model: type[BaseModel]) -> Problem:
-    loc = detail["loc"]
+    """One of pydantic's errors in the words of the file."""
+    loc, kind, value = detail["loc"], detail["type"], detail["input"]
     if loc[-1] in ALTERNATIVES:
         loc = loc[:-1]
-    dotted = ".".join(str(step) for step in loc)
-    table, field = _walk(model, loc)
-    kind = detail["type"]
+    name = _dotted(loc)
+    table, field = _find_field(model, loc)
     if kind == "extra_forbidden":
-        return Problem(dotted, _unknown_key(str(loc[-1]), table, model))
+        return Problem(name, _explain_unknown_key(str(loc[-1]), table, model))
     if kind == "missing" and field is not None and not isinstance(loc[-1], int):
-        return Problem(dotted, f"missing; give {describe_allowed(field)}")
+        return Problem(name, f"missing; give {describe_allowed(field)}")
     if field is None:
-        return Problem(dotted, f"given {_shown(detail['input'])}: {detail['msg']}")
+        return Problem(name, f"given {_format_value(value)}: {detail['msg']}")
     if kind == "missing":
-        return Problem(
-            ".".join(str(s) for s in loc[:-1]), f"too short; allowed: {describe_allowed(field)}"
-        )
-    if kind in ("value_error", "assertion_error"):  # of a user's own shape
-        return Problem(dotted, detail["msg"].partition(", ")[2])
-    said = f"given {_shown(detail['input'])}; allowed: {describe_allowed(field)}"
-    if kind == "literal_error" and isinstance(detail["input"], str):
-        choices = [str(choice) for choice in get_args(_kinds(field.annotation)[0])]
-        near = closest_names(detail["input"], choices)
-        said += f"; did you mean {near[0]!r}?" if near else ""
-    if isinstance(detail["input"], str) and re.fullmatch(r"\s*[-+.\deE]+\s*", detail["input"]):
-        said += "; write it without quotes"
-    return Problem(dotted, said)
+        return Problem(_dotted(loc[:-1]), f"too short; allowed: {describe_allowed(field)}")
+    if kind in ("value_error", "assertion_error"):  # raised by a user's own shape
+        return Problem(name, detail["msg"].partition(", ")[2])
+    text = f"given {_format_value(value)}; allowed: {describe_allowed(field)}"
+    if kind == "literal_error" and isinstance(value, str):
+        choices = map(str, get_args(_alternatives(field.annotation)[0]))
+        close = closest_names(value, choices)
+        text += f"; did you mean {close[0]!r}?" if close else ""
+    if isinstance(value, str) and re.fullmatch(r"\s*[-+.\deE]+\s*", value):
+        text += "; write it without quotes"
+    return Problem(name, text)
 
 
-def _unknown_key(key: str, table: type[BaseModel], model: type[BaseModel]) -> str:
+def _explain_unknown_key(key: str, table: type[BaseModel], model: type[BaseModel]) -> str:
+    """Hint for an unknown key: its new name, a similar key, its place, or the allowed keys.
+
+    A model lists former names of its keys in RENAMED.
+    """
     renamed = getattr(table, "RENAMED", {})
     if key in renamed:
         return f"is now called {renamed[key]!r}; rename it"
-    near = closest_names(key, table.model_fields)
-    if near:
-        return f"unknown key; did you mean {near[0]!r}?"
-    elsewhere = [name for name in _dotted(model) if name.split(".")[-1].lower() == key.lower()]
-    if elsewhere:
-        home, _, last = elsewhere[0].rpartition(".")
-        return f"unknown key here; did you mean {last!r} {f'in [{home}]' if home else 'above the first [table]'}?"
+    close = closest_names(key, table.model_fields)
+    if close:
+        return f"unknown key; did you mean {close[0]!r}?"
+    for name in _all_names(model):
+        home, _, last = name.rpartition(".")
+        if last.lower() == key.lower():
+            place = f"in [{home}]" if home else "above the first [table]"
+            return f"unknown key here; did you mean {last!r} {place}?"
     return f"unknown key; allowed here: {', '.join(table.model_fields)}"
 
 
-def _dotted(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
+def _all_names(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
+    """Dotted names of all keys of a model and its tables."""
     for name, field in model.model_fields.items():
         yield prefix + name
-        if (table := _table(field)) is not None:
-            yield from _dotted(table, f"{prefix}{name}.")
+        if (table := _table_of(field)) is not None:
+            yield from _all_names(table, f"{prefix}{name}.")

@@ -1,9 +1,10 @@
-"""Which program made a figure: versions of Python and packages, and a digest of the project's own sources."""
+"""Versions of Python, packages and this program's own sources: what figures were made with."""
 
 from __future__ import annotations
 
 import hashlib
 import platform
+from collections.abc import Iterable
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
@@ -11,30 +12,34 @@ from pathlib import Path
 
 from chamberopt.common.parallel.executor import core_count
 
-# What takes part in a figure; what only draws or prints does not.
-PACKAGES = ("chamberopt", "numpy", "scipy", "numba", "manifold3d", "nlopt", "scikit-learn")
+SIMULATION_PACKAGES = ("chamberopt", "numpy", "scipy", "numba", "manifold3d")
+# The search depends on two more. Packages that only draw or print are left out.
+PACKAGES = (*SIMULATION_PACKAGES, "nlopt", "scikit-learn")
 
 
 def versions() -> dict[str, str]:
-    """Python, system and packages that figures were made with."""
+    """Python, system, number of cores and packages: what a result states it was made with."""
     return {
         "python": platform.python_version(),
         "system": platform.platform(),
         "cores": str(core_count()),
-        **packages(),
+        **package_versions(),
     }
 
 
 def program_versions() -> dict[str, str]:
-    """All of the program that a candidate's figures depend on, whatever the machine: what a study must go on with."""
+    """Everything but the machine that a candidate's figures depend on.
+
+    A study can only be resumed where all of this is the same.
+    """
     python = ".".join(platform.python_version_tuple()[:2])
-    return {"python": python, **packages(), "sources": sources_digest()}
+    return {"python": python, **package_versions(), "sources": sources_digest()}
 
 
-def packages() -> dict[str, str]:
-    """The version of each package of PACKAGES."""
+def package_versions(packages: Iterable[str] = PACKAGES) -> dict[str, str]:
+    """Version of each package."""
     found = {}
-    for package in PACKAGES:
+    for package in packages:
         try:
             found[package] = version(package)
         except PackageNotFoundError:
@@ -44,10 +49,10 @@ def packages() -> dict[str, str]:
 
 @cache
 def sources_digest() -> str:
-    """Of every source file of the two packages: tells versions apart that were changed in place."""
+    """Digest of all source files: tells programs apart whose sources were edited in place."""
     digest = hashlib.sha256()
     for package in ("chamberopt", "sim_core"):
-        spec = find_spec(package)  # imports nothing
+        spec = find_spec(package)  # finds the package without importing it
         folder = Path(spec.origin).parent if spec and spec.origin else Path()
         for source in sorted(folder.rglob("*.py")):
             digest.update(f"{package}/{source.relative_to(folder).as_posix()}\0".encode())

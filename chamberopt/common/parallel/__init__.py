@@ -1,1 +1,1 @@
-"""Where replicas and candidates run."""
+"""Executors that run replicas and candidates: threads, processes, a Dask cluster."""

@@ -1,4 +1,7 @@
-"""Replicas and candidates on a Dask cluster. The only file that imports distributed, the extra `dask`."""
+"""Run replicas and candidates on a Dask cluster.
+
+This is the only file that imports distributed, which the extra `dask` installs.
+"""
 
 from __future__ import annotations
 
@@ -7,145 +10,149 @@ import pickle
 import socket
 from collections.abc import Callable
 from concurrent.futures import CancelledError, Executor, Future
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
 from chamberopt.common.errors import ClusterLostError, InputError, WorkerLostError
+from chamberopt.common.versions import SIMULATION_PACKAGES, package_versions
 
-TIMEOUT_S = 20.0  # s, until a scheduler has answered, and until it has a worker
+TIMEOUT_S = 20.0  # for the scheduler to answer, and again for its first worker
+SCHEDULER_FILE = "what `dask scheduler --scheduler-file FILE` wrote"
 
 
 class DaskExecutor(Executor):
     """Runs tasks on the workers of a Dask scheduler.
 
-    A task whose worker dies is run again elsewhere by the scheduler; one that takes several down
-    (distributed.scheduler.allowed-failures) raises WorkerLostError.
+    If a worker dies, the scheduler runs its task again on another. A task that takes several
+    workers down (distributed.scheduler.allowed-failures) raises WorkerLostError.
     """
 
-    def __init__(self, cluster: str, patience: float | None = None) -> None:
-        """cluster: tcp://HOST:PORT or a scheduler file (.json). InputError when there is none, or it has no workers."""
+    def __init__(self, cluster: str, timeout: float | None = None) -> None:
+        """Connect to a scheduler.
+
+        Args:
+            cluster: tcp://HOST:PORT, or a scheduler file (.json).
+            timeout: seconds to wait for the scheduler and for a worker.
+
+        Raises:
+            InputError: Dask is not installed, no scheduler answers, it has no workers, or these
+                have other versions of what figures depend on.
+        """
         try:
             from distributed import Client
         except ImportError:
             text = "needs Dask, which is not installed; pip install 'chamberopt[dask]'"
             raise InputError(f"--cluster: {text}") from None
-        address, patience = _address(cluster), TIMEOUT_S if patience is None else patience
+        address, timeout = _scheduler_address(cluster), TIMEOUT_S if timeout is None else timeout
         try:
-            _knock(address, patience)
-            self._client = Client(address, timeout=patience, set_as_default=False)
+            _require_listener(address, timeout)
+            self._client = Client(address, timeout=timeout, set_as_default=False)
         except (OSError, ValueError) as error:
             raise InputError(
-                f"--cluster: no scheduler answers at {address} within {patience:g} s ({error}); start one with "
-                "`dask scheduler`, or correct the address"
+                f"--cluster: no scheduler answers at {address} within {timeout:g} s ({error}); "
+                "start one with `dask scheduler`, or correct the address"
             ) from None
         try:
-            self._require_workers(address, patience)
+            self._require_workers(address, timeout)
         except BaseException:
             self._client.close()
             raise
         self._executor = self._client.get_executor(pure=False)
 
     def share(self, value: Any) -> Any:
-        """A task's result rather than scattered data: should its workers be lost, the scheduler makes it again."""
+        """See `chamberopt.common.parallel.executor.share`.
+
+        The value is sent as a task's result rather than as scattered data: the scheduler can
+        compute a result again if the workers that hold it die.
+        """
         return self._client.submit(
             pickle.loads, pickle.dumps(value, pickle.HIGHEST_PROTOCOL), pure=False
         )
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        theirs = self._executor.submit(fn, *args, **kwargs)
-        ours: Future[Any] = Future()
+        """Queue a task; its future raises this package's errors instead of Dask's."""
+        dask_future = self._executor.submit(fn, *args, **kwargs)
+        future: Future[Any] = Future()
 
-        def pass_on(_: Future[Any]) -> None:
-            if not ours.cancelled():
-                _copy_outcome(theirs, ours)
+        def copy_outcome(_: Future[Any]) -> None:
+            if not future.cancelled():
+                _copy_outcome(dask_future, future)
 
-        theirs.add_done_callback(pass_on)
-        ours.add_done_callback(lambda _: theirs.cancel() if ours.cancelled() else None)
-        return ours
+        dask_future.add_done_callback(copy_outcome)
+        future.add_done_callback(lambda _: dask_future.cancel() if future.cancelled() else None)
+        return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Leaves the cluster, which goes on."""
+        """Disconnect; the cluster keeps running."""
         self._executor.shutdown(wait and not cancel_futures)
         self._client.close()
 
-    def _require_workers(self, address: str, patience: float) -> None:
+    def _require_workers(self, address: str, timeout: float) -> None:
         try:
-            self._client.wait_for_workers(1, timeout=patience)
+            self._client.wait_for_workers(1, timeout=timeout)
         except TimeoutError:
-            text = f"the scheduler at {address} has no workers; start some with `dask worker {address}`"
-            raise InputError(f"--cluster: {text}") from None
-        mine = fingerprint()
+            raise InputError(
+                f"--cluster: the scheduler at {address} has no workers; "
+                f"start some with `dask worker {address}`"
+            ) from None
+        here = package_versions(SIMULATION_PACKAGES)
         try:
-            theirs = self._client.run(fingerprint)
+            of_workers = self._client.run(package_versions, SIMULATION_PACKAGES)
         except Exception as error:
-            text = f"a worker of {address} cannot import chamberopt ({error}); install the same version there"
-            raise InputError(f"--cluster: {text}") from None
-        for worker, found in theirs.items():
-            if found != mine:
-                differ = ", ".join(
-                    f"{name} {found[name]} ({mine[name]} here)"
-                    for name in mine
-                    if found[name] != mine[name]
-                )
+            raise InputError(
+                f"--cluster: a worker of {address} cannot import chamberopt ({error}); "
+                "install the same version there"
+            ) from None
+        for worker, there in of_workers.items():
+            names = [name for name in here if there[name] != here[name]]
+            if names:
+                different = ", ".join(f"{name} {there[name]} ({here[name]} here)" for name in names)
                 raise InputError(
-                    f"--cluster: worker {worker} has {differ}: figures could differ; install the same there"
+                    f"--cluster: worker {worker} has {different}: figures could differ; "
+                    "install the same there"
                 )
 
 
-def fingerprint() -> dict[str, str]:
-    """What figures depend on, of this process: versions of packages."""
-    found = {}
-    for package in ("chamberopt", "numpy", "scipy", "numba", "manifold3d"):
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = "not installed as a package"
-    return found
-
-
-def _address(cluster: str) -> str:
-    """Of the scheduler, as given or as its file says."""
+def _scheduler_address(cluster: str) -> str:
+    """The scheduler's address, as given or from its file."""
     if "://" in cluster:
         return cluster
     path = Path(cluster)
     if not path.is_file():
-        text = "neither an address nor a file; give tcp://HOST:PORT, or what `dask scheduler --scheduler-file FILE` wrote"
-        raise InputError(f"--cluster: given {cluster!r}, {text}")
+        raise InputError(
+            f"--cluster: given {cluster!r}, neither an address nor a file; "
+            f"give tcp://HOST:PORT, or {SCHEDULER_FILE}"
+        )
     try:
         return str(json.loads(path.read_text(encoding="utf-8"))["address"])
     except (OSError, ValueError, KeyError, TypeError):
-        text = (
-            "holds no scheduler's address; give what `dask scheduler --scheduler-file FILE` wrote"
-        )
+        text = f"holds no scheduler's address; give {SCHEDULER_FILE}"
         raise InputError(f"--cluster: {cluster} {text}") from None
 
 
-def _knock(address: str, patience: float) -> None:
-    """OSError or ValueError where nobody is: a Client that finds nobody takes longer, and leaves with a traceback."""
+def _require_listener(address: str, timeout: float) -> None:
+    """Raise OSError or ValueError unless something listens at the address.
+
+    A Dask client that finds nobody takes longer, and prints a traceback.
+    """
     place = urlsplit(address)
     if place.scheme not in ("tcp", "tls") or not place.hostname or not place.port:
         raise ValueError("not of the form tcp://HOST:PORT")
-    socket.create_connection((place.hostname, place.port), timeout=patience).close()
+    socket.create_connection((place.hostname, place.port), timeout=timeout).close()
 
 
-def _copy_outcome(theirs: Future[Any], ours: Future[Any]) -> None:
+def _copy_outcome(dask_future: Future[Any], future: Future[Any]) -> None:
     from distributed import KilledWorker
 
     try:
-        ours.set_result(theirs.result())
+        future.set_result(dask_future.result())
     except CancelledError:
-        ours.set_exception(
-            ClusterLostError("the cluster gave its tasks up: its scheduler has ended")
-        )
+        text = "the cluster cancelled its tasks: its scheduler has ended"
+        future.set_exception(ClusterLostError(text))
     except KilledWorker as error:
-        count = error.allowed_failures + 1
+        text = f"{error.allowed_failures + 1} workers died of its task, the last at"
         where = error.last_worker.address
-        ours.set_exception(
-            WorkerLostError(
-                f"{count} workers died of its task, the last at {where}; see their logs"
-            )
-        )
+        future.set_exception(WorkerLostError(f"{text} {where}; see their logs"))
     except Exception as error:
-        ours.set_exception(error)
+        future.set_exception(error)

@@ -1,7 +1,7 @@
-"""Where replicas and candidates run: threads or processes on this machine, a Dask cluster, or one after another.
+"""Choose where replicas and candidates run: threads or processes here, a Dask cluster, or serially.
 
-Everything that takes an executor takes a `concurrent.futures.Executor`. Those made here also `share`: a task's argument
-that is the same for many, such as a chamber, travels once a worker and not with every task.
+Everything that takes an executor takes a `concurrent.futures.Executor`. `share` sends an argument
+that many tasks have in common, such as a chamber, once to each worker and not with every task.
 """
 
 import os
@@ -13,23 +13,33 @@ from chamberopt.common.errors import InputError
 
 WorkerKind = Literal["threads", "processes"]
 
-# Python's lock is held for 14 % of a replica (the gear's, 0.2 s of CPU time: packing the shot, tallies), so that seven
-# threads leave it no rest. A process first takes some 2 s of CPU time to import everything and load compiled code.
+# A replica holds Python's lock for 14 % of its time (gear: 0.2 s of CPU time for packing the shot
+# and tallies), so that seven threads already keep the lock busy. Processes do not share a lock, but
+# each takes some 2 s of CPU time to import everything and load compiled code.
 MAX_THREADS = 8
 
 
 def core_count() -> int:
-    """Cores this process may use: an affinity mask or a batch system can leave fewer than there are."""
+    """Number of cores that this process may use.
+
+    An affinity mask or a batch system can leave fewer than the machine has.
+    """
     if hasattr(os, "sched_getaffinity"):
         return max(1, len(os.sched_getaffinity(0)))
     return max(1, os.cpu_count() or 1)
 
 
 def local_executor(workers: int | None = None, kind: WorkerKind = "threads") -> Executor:
-    """Workers on this machine, one per core unless `workers` says otherwise; use it in a `with` block.
+    """Make workers on this machine, for use in a `with` block.
 
-    Threads share the chamber and start at once, and the simulator releases Python's lock; processes run what holds it
-    in parallel too. InputError for no workers.
+    Threads share the chamber and start at once, and the simulator releases Python's lock. Processes
+    also run in parallel what needs the lock.
+
+    Args:
+        workers: their number; one per core if None.
+
+    Raises:
+        InputError: fewer than one worker.
     """
     if workers is not None and workers < 1:
         raise InputError(
@@ -46,18 +56,21 @@ def local_executor(workers: int | None = None, kind: WorkerKind = "threads") -> 
 def open_executor(
     workers: int | None, cluster: str | None, kind: WorkerKind | None = None
 ) -> Executor:
-    """The workers of --workers or --cluster: this machine's unless a cluster is named. InputError for both.
+    """Make the workers of --workers, or connect to those of --cluster.
 
-    kind: of this machine's; when None threads, or processes where there are too many cores for threads.
+    Args:
+        kind: of workers on this machine; if None, processes where there are too many for threads.
+
+    Raises:
+        InputError: both options are given, or one cannot be used.
     """
     if cluster is None:
-        return local_executor(
-            workers,
-            kind or ("threads" if (workers or core_count()) <= MAX_THREADS else "processes"),
-        )
+        few = (workers or core_count()) <= MAX_THREADS
+        return local_executor(workers, kind or ("threads" if few else "processes"))
     if workers is not None:
         raise InputError(
-            f"--workers: given {workers}, but --cluster has workers of its own; leave one of the two out"
+            f"--workers: given {workers}, but --cluster has workers of its own; "
+            "leave one of the two out"
         )
     from chamberopt.common.parallel.dask_cluster import DaskExecutor
 
@@ -65,15 +78,16 @@ def open_executor(
 
 
 def share(executor: Executor, value: Any) -> Any:
-    """A value as an argument for many of this executor's tasks, which get the value itself."""
-    share = getattr(executor, "share", None)
-    return value if share is None else share(value)
+    """Prepare an argument for many tasks of an executor; the tasks receive the value itself."""
+    share_with_workers = getattr(executor, "share", None)
+    return value if share_with_workers is None else share_with_workers(value)
 
 
 class SerialExecutor(Executor):
-    """Runs each job at once in the calling thread: for candidates on a worker, tests, debuggers and profilers."""
+    """Runs each task in the calling thread: on cluster workers, in tests, debuggers, profilers."""
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Run the task before returning."""
         future: Future[Any] = Future()
         try:
             future.set_result(fn(*args, **kwargs))

@@ -1,8 +1,9 @@
-"""Worker processes on this machine: what the simulator leaves to Python runs in parallel too, and a task that takes its
-process down costs itself alone.
+"""Worker processes on this machine.
 
-Each worker is fed by a thread of its own, one task at a time: concurrent.futures' process pool breaks as a whole when
-one of its processes dies, and says not which task did it.
+What the simulator leaves to Python runs in parallel too, and a task that crashes its process fails
+alone. The process pool of concurrent.futures cannot do that: it breaks as a whole when one of its
+processes dies, and does not tell which task caused it. Here each worker process is fed by a thread
+of its own, one task at a time.
 """
 
 from __future__ import annotations
@@ -26,25 +27,27 @@ from chamberopt.common.errors import WorkerLostError
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
 
-ATTEMPTS = 2  # a process may be lost by chance, such as to the memory of another program; twice is the task's doing
-KEPT = 2  # parcels a worker keeps open: of this candidate, and of the one before it
+# A process may die by chance, for example when another program takes all memory. If two die of the
+# same task, the task is the cause.
+MAX_ATTEMPTS = 2
+MAX_SHARED = 2  # shared values that a worker keeps: of this candidate, and of the one before it
 
 
 class SharedFile:
-    """A value that travels once a worker: its pickle is the name of a file, which opens as the value itself."""
+    """A value that each worker reads once from a file; its pickle holds the file's name alone."""
 
     def __init__(self, value: Any) -> None:
-        handle, self.path = tempfile.mkstemp(prefix="chamberopt-", suffix=".parcel")
+        handle, self.path = tempfile.mkstemp(prefix="chamberopt-", suffix=".pickle")
         weakref.finalize(self, _remove, self.path)
         with os.fdopen(handle, "wb") as file:
             pickle.dump(value, file, pickle.HIGHEST_PROTOCOL)
 
     def __reduce__(self) -> tuple[Callable[[str], Any], tuple[str]]:
-        return _opened, (self.path,)
+        return _load, (self.path,)
 
 
-@lru_cache(maxsize=KEPT)
-def _opened(path: str) -> Any:
+@lru_cache(maxsize=MAX_SHARED)
+def _load(path: str) -> Any:
     with open(path, "rb") as file:
         return pickle.load(file)
 
@@ -55,26 +58,30 @@ def _remove(path: str) -> None:
 
 
 class ProcessExecutor(Executor):
-    """So many processes, each started by its first task. A task whose process dies is run once more in a new one.
+    """Worker processes, each started by its first task.
 
-    Its second death raises WorkerLostError. Leaving the `with` block by an exception ends the processes at once.
+    A task whose process dies runs once more, in a new process. If that dies too, the task raises
+    WorkerLostError. An exception that leaves the `with` block ends the processes at once.
     """
 
     def __init__(self, workers: int) -> None:
         self._feeders = ThreadPoolExecutor(workers, thread_name_prefix="worker")
-        self._own = threading.local()
+        self._of_thread = threading.local()
         self._workers: list[_Worker] = []
         self._ended = False
 
     def share(self, value: Any) -> SharedFile:
+        """See `chamberopt.common.parallel.executor.share`."""
         return SharedFile(value)
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Queue a task."""
         return self._feeders.submit(self._run, fn, args, kwargs)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """End the processes after their tasks, or, without waiting, together with this program."""
         self._feeders.shutdown(wait, cancel_futures=cancel_futures)
-        if wait:  # else they end with this program
+        if wait:
             self._end()
 
     def __exit__(
@@ -90,35 +97,33 @@ class ProcessExecutor(Executor):
 
     @property
     def pids(self) -> list[int]:
-        """Of the processes that are there."""
-        return [
-            worker.process.pid
-            for worker in self._workers
-            if worker.process.pid and worker.process.is_alive()
-        ]
+        """Process ids of the living workers."""
+        processes = (worker.process for worker in self._workers)
+        return [process.pid for process in processes if process.pid and process.is_alive()]
 
     def _run(self, fn: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
+        """Run a task in this thread's process, starting one if need be."""
         task = pickle.dumps((fn, args, kwargs), pickle.HIGHEST_PROTOCOL)
-        for _ in range(ATTEMPTS):
+        for _ in range(MAX_ATTEMPTS):
             if self._ended:
                 break
-            worker = getattr(self._own, "worker", None)
+            worker = getattr(self._of_thread, "worker", None)
             if worker is None:
-                worker = self._own.worker = _Worker()
+                worker = self._of_thread.worker = _Worker()
                 self._workers.append(worker)
             try:
-                answer = worker.answer(task)
+                answer = worker.run(task)
             except (EOFError, OSError):
-                self._own.worker = None
+                self._of_thread.worker = None
                 code = worker.end()
                 continue
-            done, value = pickle.loads(answer)
-            if done:
+            succeeded, value = pickle.loads(answer)
+            if succeeded:
                 return value
             raise value
         if self._ended:
             raise WorkerLostError("the worker processes were ended")
-        text = f"its worker process died {ATTEMPTS} times ({_cause(code)})"
+        text = f"its worker process died {MAX_ATTEMPTS} times ({_cause_of_death(code)})"
         raise WorkerLostError(f"{text}; give fewer --workers, or look at the machine's log")
 
     def _end(self) -> None:
@@ -128,55 +133,55 @@ class ProcessExecutor(Executor):
 
 
 class _Worker:
-    """One process and the pipe to it."""
+    """A process and the pipe to it."""
 
     def __init__(self) -> None:
         context = get_context("spawn")
-        self._pipe, theirs = context.Pipe()
-        # A daemon: should this program end without a farewell, its workers end with it.
-        self.process = context.Process(target=_serve, args=(theirs,), daemon=True)
+        self._pipe, worker_end = context.Pipe()
+        # Daemon processes end with this program, even if it is killed.
+        self.process = context.Process(target=_serve, args=(worker_end,), daemon=True)
         self.process.start()
-        theirs.close()
+        worker_end.close()
 
-    def answer(self, task: bytes) -> bytes:
-        """See _answered. EOFError or OSError when the process is gone."""
+    def run(self, task: bytes) -> bytes:
+        """Run a pickled task; see `_answer`. Raises EOFError or OSError if the process died."""
         self._pipe.send_bytes(task)
         return self._pipe.recv_bytes()
 
     def end(self) -> int | None:
-        """Ends the process, if it has not ended; its exit code."""
+        """End the process if it still runs, and return its exit code."""
         self.process.terminate()
         self.process.join()
         return self.process.exitcode
 
 
 def _serve(pipe: Connection) -> None:
-    """A worker's life: task after task until the other end closes."""
-    # Ctrl-C goes to all processes of a terminal; what becomes of it is the program's to say, not a worker's.
+    """Run tasks in a worker process until the other end of the pipe closes."""
+    # A terminal sends Ctrl-C to all of its processes. Only the main program reacts to it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with suppress(EOFError, OSError):
         while True:
-            pipe.send_bytes(_answered(pipe.recv_bytes()))
+            pipe.send_bytes(_answer(pipe.recv_bytes()))
 
 
-def _answered(task: bytes) -> bytes:
-    """(True, what the task returns) or (False, what it raises)."""
+def _answer(task: bytes) -> bytes:
+    """Pickle of (True, the task's result) or (False, its exception)."""
     try:
         fn, args, kwargs = pickle.loads(task)
         return pickle.dumps((True, fn(*args, **kwargs)), pickle.HIGHEST_PROTOCOL)
     except Exception as error:
-        return pickle.dumps((False, _portable(error)), pickle.HIGHEST_PROTOCOL)
+        return pickle.dumps((False, _picklable(error)), pickle.HIGHEST_PROTOCOL)
 
 
-def _portable(error: Exception) -> Exception:
-    """The error as it can travel: one whose class takes other arguments than it keeps cannot be unpickled."""
+def _picklable(error: Exception) -> Exception:
+    """The error, or its text if its class takes other arguments than it stores."""
     try:
         return pickle.loads(pickle.dumps(error))
     except Exception:
         return RuntimeError(f"{type(error).__name__}: {error}")
 
 
-def _cause(code: int | None) -> str:
+def _cause_of_death(code: int | None) -> str:
     if code is None or code >= 0:
         return f"exit status {code}"
     killed = ", as when memory runs out" if -code == getattr(signal, "SIGKILL", None) else ""

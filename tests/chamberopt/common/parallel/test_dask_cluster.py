@@ -16,6 +16,7 @@ import pytest
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.cli import main
+from chamberopt.common import versions
 from chamberopt.common.errors import ClusterLostError, InputError, WorkerLostError
 from chamberopt.common.parallel import dask_cluster
 from chamberopt.common.parallel.dask_cluster import DaskExecutor
@@ -96,7 +97,7 @@ def dask(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Dask]:
 
 
 def test_a_scheduler_file_and_its_address_lead_to_the_same_workers(dask: Dask) -> None:
-    address = dask_cluster._address(str(dask.scheduler_file))
+    address = dask_cluster._scheduler_address(str(dask.scheduler_file))
     assert address.startswith("tcp://")
     for where in (str(dask.scheduler_file), address):
         with DaskExecutor(where) as executor:
@@ -170,7 +171,7 @@ def test_the_same_bits_as_on_this_machine(dask: Dask, tmp_path: Path) -> None:
 
 
 def test_a_scheduler_that_is_not_there_is_status_2(tmp_path: Path, capsys, monkeypatch) -> None:
-    monkeypatch.setattr(dask_cluster, "PATIENCE", 0.5)
+    monkeypatch.setattr(dask_cluster, "TIMEOUT_S", 0.5)
     with socket.socket() as closed:
         closed.bind(("127.0.0.1", 0))
         address = f"tcp://127.0.0.1:{closed.getsockname()[1]}"
@@ -204,10 +205,8 @@ def test_a_scheduler_without_workers_is_said(tmp_path: Path) -> None:
 def test_another_version_on_a_worker_is_refused(
     dask: Dask, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    real = dask_cluster.fingerprint()
-    monkeypatch.setattr(
-        dask_cluster, "version", lambda name: "0.0" if name == "numba" else real[name]
-    )
+    real = versions.package_versions()
+    monkeypatch.setattr(versions, "version", lambda name: "0.0" if name == "numba" else real[name])
     with pytest.raises(
         InputError, match=rf"numba {real['numba']} \(0\.0 here\): figures could differ"
     ):

@@ -165,7 +165,8 @@ def test_lost_workers_are_one_message_and_status_1(monkeypatch: pytest.MonkeyPat
 
 
 @pytest.mark.parametrize(
-    ("workers", "kind"), [(1, "ThreadPoolExecutor"), (8, "ThreadPoolExecutor"), (9, "Processes")]
+    ("workers", "kind"),
+    [(1, "ThreadPoolExecutor"), (8, "ThreadPoolExecutor"), (9, "ProcessExecutor")],
 )
 def test_too_many_cores_for_threads_are_given_processes(workers: int, kind: str) -> None:
     with open_executor(workers, None) as executor:  # processes start with their first task

@@ -367,9 +367,9 @@ def test_several_formats_into_a_new_folder(simulated: Path, chamberopt: Said) ->
         ),
         (
             ["--to", "chamber-stl", "--out", "there.stl"],
-            "there.stl: is there already, and nothing is ever overwritten",
+            "there.stl: already exists, and nothing is ever overwritten",
         ),
-        (["--to", "impacts-csv", "--out", "there.csv"], "there.csv.json: is there already"),
+        (["--to", "impacts-csv", "--out", "there.csv"], "there.csv.json: already exists"),
         (
             ["--to", "chamber-stl", "--out", "nowhere/c.stl"],
             "the folder nowhere does not exist; make it first",
