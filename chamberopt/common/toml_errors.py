@@ -132,21 +132,21 @@ def numeric_fields(
         types = _alternatives(field.annotation)
         value = None if is_class else getattr(table, name.removeprefix(prefix))
         inner = value if isinstance(value, BaseModel) else _table_of(field)
-        first = value[0] if isinstance(value, tuple) and value else None
-        if isinstance(first, BaseModel):
-            for i, item in enumerate(value):
+        items = value if isinstance(value, tuple) and value else (None,)
+        if isinstance(items[0], BaseModel):
+            for i, item in enumerate(items):
                 yield from numeric_fields(item, f"{name}.{i}.")
-        elif isinstance(first, tuple):
-            for i, row in enumerate(value):
+        elif isinstance(items[0], tuple):
+            for i, row in enumerate(items):
                 yield from ((f"{name}.{i}.{j}", field) for j in range(len(row)))
         elif inner is not None:
             yield from numeric_fields(inner, f"{name}.")
         elif float in types or int in types:
             yield name, field
         elif is_class or value is not None:
-            for items in map(get_args, types):
-                if items and all(item is float for item in items):
-                    yield from ((f"{name}.{i}", field) for i in range(len(items)))
+            for parts in map(get_args, types):
+                if parts and all(part is float for part in parts):
+                    yield from ((f"{name}.{i}", field) for i in range(len(parts)))
 
 
 def key_lines(source: str) -> dict[str, int]:
