@@ -141,15 +141,15 @@ def accuracy(
     from chamberopt.common.parallel.executor import local_executor
     from chamberopt.common.progress import progress_bar
     from chamberopt.design.load import load_design
-    from chamberopt.output.results.accuracy_results import as_json, as_text, write_price_list
-    from chamberopt.simulation.convergence.study import climb, require_budget
+    from chamberopt.output.results.accuracy_results import as_json, as_text, write_accuracy_results
+    from chamberopt.simulation.convergence.study import require_budget, run_convergence_study
 
     require_budget(budget_s)
     candidate = load_design(design)
     with results_folder(out, f"{design.stem}-accuracy") as folder:
         with local_executor() as executor, progress_bar("CPU seconds") as progress:
-            ladder = climb(candidate, budget_s, executor, progress, compiled)
-        write_price_list(folder, ladder)
+            ladder = run_convergence_study(candidate, budget_s, executor, progress, compiled)
+        write_accuracy_results(folder, ladder)
     if json:
         print(json_format.dumps({**as_json(ladder), "folder": str(folder)}, indent=2))
     else:

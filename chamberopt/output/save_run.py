@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 from chamberopt.common.files import make_output_folder
 from chamberopt.output import viewer
-from chamberopt.output.plots.study_and_accuracy import convergence_picture
-from chamberopt.output.plots.study_model import front_picture, slices_picture
+from chamberopt.output.plots.study import convergence_picture, pareto_picture, slices_picture
 from chamberopt.output.results.load import summary
 from chamberopt.output.results.write import write_result, write_simulation, write_study
 
@@ -85,7 +84,7 @@ def _draw_study(folder: Path, study_result: StudyResult) -> list[str]:
     if study_result.sensitivity:
         slices_picture(folder / "slices.png", study_result, study_result.sensitivity)
     if study_result.study.objective.pareto:
-        front_picture(folder / "pareto.png", study_result)
+        pareto_picture(folder / "pareto.png", study_result)
     start, best = study_result.start.evaluation, study_result.best.evaluation
     remarks = _draw_coverage([folder], [best], ["best design"], folder / "coverage.png")
     folders, names = [folder / "start", folder], ["start", "best design"]

@@ -13,7 +13,7 @@ from chamberopt.output.compare.covered import covered
 from chamberopt.output.compare.distributions import distributions
 from chamberopt.output.compare.inputs import require_same_triangles
 from chamberopt.output.compare.local import LocalDifference, local_difference
-from chamberopt.output.compare.plots import distributions_picture
+from chamberopt.output.compare.pictures import draw_distributions
 from chamberopt.output.compare.table import as_text
 from chamberopt.output.results.load import summary
 from chamberopt.output.viewer import draw_coverage, draw_difference, write_differences
@@ -41,7 +41,7 @@ def write_comparison(folder: str | Path, comparison: Comparison) -> list[str]:
     folder.mkdir(parents=True, exist_ok=True)
     write_text(folder / "compare.txt", as_text(comparison) + "\n")
     spread = distributions(seen)
-    distributions_picture(folder / "distributions.png", comparison, spread)
+    draw_distributions(folder / "distributions.png", comparison, spread)
     remarks = [comparison_picture(folder / "compare.png", comparison)]
     local: list[LocalDifference] | None = None
     if older := [

@@ -1,1 +1,1 @@
-"""Diagrams drawn with matplotlib."""
+"""Pictures drawn with matplotlib: studies, sweeps, accuracy, coverage of one or more results."""

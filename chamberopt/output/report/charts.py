@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from chamberopt.output.plots.study_and_accuracy import BLUE, GREEN, GREY, ORANGE
+from chamberopt.output.plots.colours import BLUE, GREEN, GREY, ORANGE
 
 Chart = dict[str, Any]
 CLASSES = np.linspace(0.0, 1.0, 41)  # of a coverage histogram: 2.5 % each

@@ -13,7 +13,7 @@ from chamberopt.common.files import write_text
 from chamberopt.common.versions import versions
 from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.design.load import save_design
-from chamberopt.output.plots.study_and_accuracy import price_picture
+from chamberopt.output.plots.accuracy import accuracy_picture
 from chamberopt.simulation.convergence.recommendation import (
     ASKED,
     choices,
@@ -23,13 +23,13 @@ from chamberopt.simulation.convergence.recommendation import (
     short,
     unrecorded,
 )
-from chamberopt.simulation.convergence.runs import Rung
-from chamberopt.simulation.convergence.study import Ladder
+from chamberopt.simulation.convergence.runs import Run
+from chamberopt.simulation.convergence.study import ConvergenceStudy
 
 FORMAT = 1
 
 
-def rows(ladder: Ladder) -> list[dict[str, Any]]:
+def rows(ladder: ConvergenceStudy) -> list[dict[str, Any]]:
     """Every rung and every level of replicas, one kind of row for all; None where a column says nothing."""
     found = [
         _rung_row(rung, ladder.reference)
@@ -53,7 +53,7 @@ def rows(ladder: Ladder) -> list[dict[str, Any]]:
     return found
 
 
-def _rung_row(rung: Rung, reference: Rung) -> dict[str, Any]:
+def _rung_row(rung: Run, reference: Run) -> dict[str, Any]:
     return {
         "knob": rung.knob,
         "setting": rung.setting,
@@ -77,7 +77,7 @@ def _rung_row(rung: Rung, reference: Rung) -> dict[str, Any]:
     }
 
 
-def as_text(ladder: Ladder) -> list[str]:
+def as_text(ladder: ConvergenceStudy) -> list[str]:
     """What the command prints."""
     lines = [described(ladder), ""]
     lines += [f"{'replicas':>10}{'CPU s':>9}{'RMS error':>12}{'95 % interval':>20}{'± said':>10}"]
@@ -114,7 +114,7 @@ def _signed(bias: Estimate) -> str:
     )
 
 
-def as_json(ladder: Ladder) -> dict[str, Any]:
+def as_json(ladder: ConvergenceStudy) -> dict[str, Any]:
     """Everything, for accuracy.json."""
     power, halving = ladder.law, ladder.law.halving
     front = [asdict(one) for one in choices(ladder)]
@@ -149,7 +149,7 @@ def as_json(ladder: Ladder) -> dict[str, Any]:
     }
 
 
-def write_price_list(folder: Path, ladder: Ladder) -> None:
+def write_accuracy_results(folder: Path, ladder: ConvergenceStudy) -> None:
     """Leave accuracy.json, accuracy.csv, accuracy.png and the design in an empty folder."""
     save_design(ladder.design, folder / "design.toml")
     table = io.StringIO()
@@ -160,4 +160,4 @@ def write_price_list(folder: Path, ladder: Ladder) -> None:
     write_text(
         folder / "accuracy.json", json.dumps(as_json(ladder), indent=2, allow_nan=False) + "\n"
     )
-    price_picture(folder / "accuracy.png", ladder)
+    accuracy_picture(folder / "accuracy.png", ladder)

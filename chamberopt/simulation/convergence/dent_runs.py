@@ -1,4 +1,4 @@
-"""Rungs of the coverage model: dents one by one take a whole treatment; rates are made of the same impacts."""
+"""Runs of the coverage model: dents one by one take a whole treatment; rates are made of the same impacts."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from chamberopt.coverage.statistics.confidence_interval import estimate, paired_
 from chamberopt.design.design import Design
 from chamberopt.design.process import MAX_SIMULATED_TREATMENT
 from chamberopt.simulation.convergence.parameters import MODEL
-from chamberopt.simulation.convergence.runs import Pool, Rung, dents_alone, figures
+from chamberopt.simulation.convergence.runs import Pool, Run, dents_alone, figures
 from chamberopt.simulation.evaluate import marked_coverage_estimates, weighted_sum
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ DENT_LOAD = 8.0  # CPU seconds of simulating and marking over those of simulatin
 
 def dent_rungs(
     pool: Pool, budget_s: float, executor: Executor
-) -> tuple[tuple[Rung, ...], float, float]:
+) -> tuple[tuple[Run, ...], float, float]:
     """Rates, then dents one by one at finer and finer points; seconds of treatment; CPU seconds.
 
     The treatment is cut to what the budget buys. A bias is against the finest points, from the same impacts.
@@ -75,7 +75,7 @@ def dent_rungs(
         rows.append((f"dents, sample_mm {spacing:g}", goal, mean))
     _, finest, finest_mean = rows[-1]
     rungs = [
-        Rung(
+        Run(
             knob=MODEL,
             setting=name,
             replicas=DENT_REPLICAS,

@@ -19,8 +19,8 @@ from chamberopt.simulation.convergence.parameters import (
     WARM_UP,
     shown,
 )
-from chamberopt.simulation.convergence.runs import Rung
-from chamberopt.simulation.convergence.study import Ladder
+from chamberopt.simulation.convergence.runs import Run
+from chamberopt.simulation.convergence.study import ConvergenceStudy
 
 ASKED = (0.05, 0.01, 0.001)  # half-width of the objective, absolute
 SHARE = 1.0 / 3.0  # of it, that the bias of one knob may be
@@ -100,7 +100,7 @@ class Cost:
         return self.fixed + self.pace * seconds
 
 
-def cost(ladder: Ladder) -> Cost:
+def cost(ladder: ConvergenceStudy) -> Cost:
     """A line through the rungs of warm-up and simulated time, each weighted with its own interval."""
     rungs = [
         rung
@@ -126,7 +126,7 @@ def cost(ladder: Ladder) -> Cost:
     return Cost(max(0.0, float(fixed)), float(pace), float(wide[0]), float(wide[1]))
 
 
-def replicas_for(ladder: Ladder, accuracy: float, seconds: float) -> int:
+def replicas_for(ladder: ConvergenceStudy, accuracy: float, seconds: float) -> int:
     """Replicas of so many simulated seconds until the interval said is within this accuracy.
 
     Their variance goes with 1/seconds; where the ladder has sub-pools as inaccurate as that, what these said of
@@ -149,12 +149,12 @@ def replicas_for(ladder: Ladder, accuracy: float, seconds: float) -> int:
     return max(low, math.ceil(round(floor * stretch, 6)))
 
 
-def _variance(rung: Rung) -> float:
+def _variance(rung: Run) -> float:
     """Of the objective from replica to replica."""
     return float(np.var(rung.objective.pseudovalues, ddof=1))
 
 
-def recommend(ladder: Ladder, accuracy: float) -> Recommendation:
+def recommend(ladder: ConvergenceStudy, accuracy: float) -> Recommendation:
     """For each knob the cheapest setting whose bias is, at the end of its interval, within a third of the accuracy.
 
     A coarser setting is taken only where it saves CPU seconds by more than chance. Savings of several knobs multiply,
@@ -193,12 +193,12 @@ def recommend(ladder: Ladder, accuracy: float) -> Recommendation:
     return Recommendation(accuracy, settings, replicas, price, price * unsure, tuple(remarks))
 
 
-def _saves(ladder: Ladder, rung: Rung) -> bool:
+def _saves(ladder: ConvergenceStudy, rung: Run) -> bool:
     """Whether a rung is cheaper than the reference by more than chance."""
     return rung.cpu.high < ladder.reference.cpu.low
 
 
-def _model_remarks(ladder: Ladder, accuracy: float) -> Iterator[str]:
+def _model_remarks(ladder: ConvergenceStudy, accuracy: float) -> Iterator[str]:
     """Whether rates are good enough for coverage itself. Its mean alone: the spread of single dents is another one."""
     if not ladder.dents:
         yield "dents one by one were not tried: process.accuracy.sample_mm takes too many points; raise it"
@@ -219,7 +219,7 @@ def _model_remarks(ladder: Ladder, accuracy: float) -> Iterator[str]:
         )
 
 
-def choices(ladder: Ladder) -> list[Choice]:
+def choices(ladder: ConvergenceStudy) -> list[Choice]:
     """The Pareto front: sub-pools of every level, with at most one knob off the reference, where that saves time."""
     others = [
         rung
@@ -254,7 +254,7 @@ def short(knob: str) -> str:
     return key.replace("_", " ")
 
 
-def explained(ladder: Ladder) -> str:
+def explained(ladder: ConvergenceStudy) -> str:
     """The cost of halving the error, and why it is not 4 where it is not."""
     law, levels = ladder.law, ladder.levels
     middle, low, high = law.halving
@@ -275,7 +275,7 @@ def explained(ladder: Ladder) -> str:
     return f"{said}; {why} (error ~ cost^-{law.power:.2f} ± {law.half_width:.2f})"
 
 
-def unrecorded(ladder: Ladder) -> str:
+def unrecorded(ladder: ConvergenceStudy) -> str:
     """What a replica costs, and how much of that is not recorded time."""
     line, accuracy = cost(ladder), ladder.design.process.accuracy
     whole = line.of(accuracy.warmup_time + accuracy.simulated_time)
@@ -286,7 +286,7 @@ def unrecorded(ladder: Ladder) -> str:
     )
 
 
-def described(ladder: Ladder) -> str:
+def described(ladder: ConvergenceStudy) -> str:
     """What the reference is."""
     pool = ladder.reference
     finest = ", ".join(f"{short(knob)} {shown(value)}" for knob, value in ladder.settings.items())

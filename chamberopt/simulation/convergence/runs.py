@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Rung:
+class Run:
     """One setting, simulated. cpu: CPU seconds a replica · bias, mean_bias: objective and mean coverage, less those of
     the knob's finest setting; exactly 0 for that one.
     """
@@ -63,11 +63,11 @@ class Pool:
         """Objective, mean coverage, and whether triangles were taken together."""
         return figures(self.tallies[part], self.chamber, self.design)
 
-    def rung(self, knob: str, setting: str, reference: Pool) -> Rung:
+    def rung(self, knob: str, setting: str, reference: Pool) -> Run:
         goal, mean, _ = self.figures()
         base, base_mean, _ = reference.figures()
         bias, mean_bias = paired_difference(goal, base), paired_difference(mean, base_mean)
-        return Rung(knob, setting, len(self.tallies), self.cost, goal, mean, bias, mean_bias)
+        return Run(knob, setting, len(self.tallies), self.cost, goal, mean, bias, mean_bias)
 
 
 def figures(

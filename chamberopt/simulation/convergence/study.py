@@ -26,7 +26,7 @@ from chamberopt.design.design import Design
 from chamberopt.simulation.convergence.dent_runs import dent_rungs
 from chamberopt.simulation.convergence.error_law import Law, Level, law_of, rms_error, rms_interval
 from chamberopt.simulation.convergence.parameters import REFERENCE, designs
-from chamberopt.simulation.convergence.runs import Pool, Rung, dents_alone
+from chamberopt.simulation.convergence.runs import Pool, Run, dents_alone
 from chamberopt.simulation.replicas import simulate_replica
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ NO_ERROR = 1e-12  # of a share of area: rounding
 
 
 @dataclass(frozen=True)
-class Ladder:
+class ConvergenceStudy:
     """All that was simulated.
 
     settings: of the reference, by knob · rungs: one knob coarser each, and the design as it is · levels, law: error
@@ -53,11 +53,11 @@ class Ladder:
 
     design: Design
     settings: dict[str, Any]
-    reference: Rung
-    rungs: tuple[Rung, ...]
+    reference: Run
+    rungs: tuple[Run, ...]
     levels: tuple[Level, ...]
     law: Law
-    dents: tuple[Rung, ...]
+    dents: tuple[Run, ...]
     dent_time: float
     spent_s: float
     wall_s: float
@@ -71,13 +71,13 @@ def require_budget(budget_s: float) -> None:
         )
 
 
-def climb(
+def run_convergence_study(
     design: Design,
     budget_s: float,
     executor: Executor,
     progress: Progress | None = None,
     ready: Callable[[Design, Chamber], None] = lambda design, chamber: None,
-) -> Ladder:
+) -> ConvergenceStudy:
     """Simulate the whole ladder for about so many CPU seconds; at least three replicas of every rung.
 
     Each round has one replica of every rung, and of the reference as many as there are rungs.
@@ -113,7 +113,7 @@ def climb(
     levels = _levels(reference)
     own = reference.rung(REFERENCE, "", reference)
     nothing = Estimate(0.0, 0.0)
-    return Ladder(
+    return ConvergenceStudy(
         design=design,
         settings=settings,
         reference=replace(own, bias=nothing, mean_bias=nothing),

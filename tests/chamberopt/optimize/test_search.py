@@ -22,8 +22,8 @@ from chamberopt.optimize.search.scalarisation import scalarise
 from chamberopt.optimize.sensitivity import analyse_sensitivity
 from chamberopt.optimize.storage.trial_log import read_trials
 from chamberopt.optimize.study import Limits, Study
-from chamberopt.output.plots.study_and_accuracy import reach
-from chamberopt.output.plots.study_model import front_picture, slices_picture
+from chamberopt.output.plots.figures import value_range
+from chamberopt.output.plots.study import pareto_picture, slices_picture
 from tests.helpers.synthetic import DESIGNS, judged
 
 GEAR = load_design(DESIGNS / "gear.toml")
@@ -237,7 +237,7 @@ def test_two_objectives_give_a_front(tmp_path: Path) -> None:
         [number for goal in goals for number in (goal.value, goal.half_width)] for goals in expected
     ]
     assert all(np.isfinite(goal.half_width) for goals in expected for goal in goals)
-    front_picture(tmp_path / "pareto.png", result)
+    pareto_picture(tmp_path / "pareto.png", result)
     assert (tmp_path / "pareto.png").stat().st_size > 10000
     assert load_study(tmp_path / "out" / "study.toml").objective.pareto == (
         "coverage_p05",
@@ -300,10 +300,10 @@ def test_the_plainly_bad_get_few_replicas_and_close_calls_more(tmp_path: Path) -
 
 
 def test_an_interval_that_says_nothing_does_not_spoil_the_axis() -> None:
-    low, high = reach([Estimate(-43.0, 5e5), Estimate(-6.0, 4.0), Estimate(-12.0, np.inf)])
+    low, high = value_range([Estimate(-43.0, 5e5), Estimate(-6.0, 4.0), Estimate(-12.0, np.inf)])
     assert -150 < low < -43 - 37
     assert 25 <= high < 60
-    assert reach([Estimate(1.0, np.inf)]) == (0.5, 1.5)
-    low, high = reach([Estimate(0.4, 0.1), Estimate(0.8, 0.1)])  # all of what says something
+    assert value_range([Estimate(1.0, np.inf)]) == (0.5, 1.5)
+    low, high = value_range([Estimate(0.4, 0.1), Estimate(0.8, 0.1)])  # all of what says something
     assert low < 0.3
     assert high > 0.9

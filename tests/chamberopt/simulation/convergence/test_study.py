@@ -40,8 +40,8 @@ from chamberopt.simulation.convergence.recommendation import (
     recommend,
     replicas_for,
 )
-from chamberopt.simulation.convergence.runs import Rung
-from chamberopt.simulation.convergence.study import Ladder
+from chamberopt.simulation.convergence.runs import Run
+from chamberopt.simulation.convergence.study import ConvergenceStudy
 from tests.helpers.synthetic import DESIGNS, equal_dents, plate_design
 
 # Errors and laws
@@ -136,12 +136,12 @@ def rung(
     bias: float = 0.0,
     unsure: float = 0.0,
     mean_bias: float = 0.0,
-) -> Rung:
+) -> Run:
     """100 replicas of standard deviation 0.02, or of a quarter or four times the simulated time."""
     stretch = {"0.375": 4.0, "6": 0.25}.get(str(setting), 1.0) if knob == TIME else 1.0
     noise = np.random.default_rng(5).normal(size=100)
     goal = estimate(0.3 + 0.02 * np.sqrt(stretch) * (noise - noise.mean()) / noise.std(ddof=1))
-    return Rung(
+    return Run(
         knob,
         str(setting),
         100,
@@ -153,7 +153,7 @@ def rung(
     )
 
 
-def ladder_of(*rungs: Rung, dents: tuple[Rung, ...] = ()) -> Ladder:
+def ladder_of(*rungs: Run, dents: tuple[Run, ...] = ()) -> ConvergenceStudy:
     """A replica costs 0.05 s + 0.1 s for each of 1.5 s recorded and 0.8 s of warm-up."""
     design = load_design(DESIGNS / "gear.toml")
     settings = {FACETS: 256, MOTION: "sinusoidal", WARM_UP: 0.8, FLOOR: 1.0, TIME: 1.5}
@@ -165,7 +165,7 @@ def ladder_of(*rungs: Rung, dents: tuple[Rung, ...] = ()) -> Ladder:
         for k in (4, 8, 16, 32)
     )
     law = Law(1.96 * 0.02 * 0.28**0.5, 0.5, 0.05)
-    return Ladder(
+    return ConvergenceStudy(
         design,
         settings,
         rung("reference", "", 0.28),

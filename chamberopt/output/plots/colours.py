@@ -1,0 +1,32 @@
+"""Colours of all pictures and of the report: lines, candidates and colour maps."""
+
+from __future__ import annotations
+
+from typing import Any
+
+# The palette of Okabe and Ito, which colour-blind readers can tell apart.
+BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#9aa3ab"
+PURPLE, SKY, YELLOW, BLACK = "#CC79A7", "#56B4E9", "#E69F00", "#000000"
+DARK_GREY = "#555555"  # text and reference lines
+
+COLOUR_MAP = (
+    "viridis"  # of an objective in a map; the part's maps are in triangle_fields.QUANTITIES
+)
+
+# Each compared result has a colour and a line style of its own.
+_COLOURS = (BLUE, ORANGE, GREEN, PURPLE, BLACK, YELLOW, SKY, GREY)
+_DASHES = (6, 1, 1, 1, 1, 1), (8, 2), (2, 1), (4, 1, 1, 1)
+_LINES = ("-", "--", "-.", ":", *((0, dashes) for dashes in _DASHES))
+
+
+def line_style(index: int) -> dict[str, Any]:
+    """Colour and line style of the compared result with this index."""
+    return {"color": _COLOURS[index % len(_COLOURS)], "ls": _LINES[index % len(_LINES)]}
+
+
+def hex_colours(colour_map: str, count: int = 10) -> list[str]:
+    """Evenly spaced colours of a matplotlib colour map, as #rrggbb."""
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    return [to_hex(colormaps[colour_map](i / (count - 1))) for i in range(count)]

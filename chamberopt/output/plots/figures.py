@@ -1,0 +1,67 @@
+"""What all pictures share: making a figure, saving it, plain axes and their range."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from chamberopt.common.files import atomic_write
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from chamberopt.coverage.statistics.confidence_interval import Estimate
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure [inch] that needs no display."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), dpi=130, layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def save_picture(figure: Figure, path: Path) -> None:
+    """Write the figure as .png, atomically."""
+    with atomic_write(path) as temporary:
+        figure.savefig(temporary)
+
+
+def style_axes(axes: Axes, x_label: str = "", y_label: str = "") -> None:
+    """Axes with a light grid, without a frame at the top and right."""
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(alpha=0.25, lw=0.6)
+    axes.set_axisbelow(True)
+    if x_label:
+        axes.set_xlabel(x_label)
+    if y_label:
+        axes.set_ylabel(y_label)
+
+
+def value_range(estimates: Sequence[Estimate]) -> tuple[float, float]:
+    """Axis limits that show every value, and its interval as far as it is no longer than the span of the values.
+
+    A wider interval, such as that of a time which may be infinite, would press all else into one line.
+    """
+    values = np.array([one.value for one in estimates])
+    half_widths = np.array([one.half_width for one in estimates])
+    span = float(np.ptp(values))
+    if span > 0.0:
+        shown = np.minimum(half_widths, span)
+    else:
+        shown = np.where(np.isfinite(half_widths), half_widths, 0.0)
+    low, high = float((values - shown).min()), float((values + shown).max())
+    margin = 0.05 * (high - low) or 0.5
+    return low - margin, high + margin
+
+
+def readable(name: str) -> str:
+    """The name of an objective as text of an axis."""
+    return name.replace("_", " ")

@@ -1,0 +1,253 @@
+"""Charts of a study: its search, slices through its best design, and two objectives' Pareto front."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chamberopt.coverage.statistics.confidence_interval import Estimate
+from chamberopt.output.plots.colours import BLUE, GREEN, GREY, ORANGE
+from chamberopt.output.plots.figures import (
+    new_figure,
+    readable,
+    save_picture,
+    style_axes,
+    value_range,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from chamberopt.optimize.run_study import StudyResult
+    from chamberopt.optimize.sensitivity import Sensitivity, Slice
+
+MAX_COLUMNS = 4  # panels side by side
+
+
+@dataclass(frozen=True)
+class EvaluatedCandidate:
+    """One evaluation of a study as its chart shows it.
+
+    Args:
+        number: place in the order of evaluations, from 1.
+        stage: "search" or "confirm".
+        objective: None when the candidate could not be simulated.
+        feasible: whether it meets the constraints.
+        parameters: values by dotted name.
+    """
+
+    number: int
+    stage: str
+    objective: Estimate | None
+    feasible: bool
+    parameters: Mapping[str, float] = field(default_factory=dict)
+
+
+def convergence_picture(path: Path, result: StudyResult) -> None:
+    """Write the objective against evaluation and against each parameter, as .png."""
+    candidates = [
+        EvaluatedCandidate(t.number + 1, t.stage, t.objective, t.feasible, t.parameters)
+        for t in result.trials
+    ]
+    y_label = readable(result.study.objective.goals[0])
+    names = list(result.study.vary)
+    columns = min(len(names), MAX_COLUMNS)
+    rows = -(-len(names) // columns)
+    figure = new_figure(11.0, 4.2 + 3.0 * rows)
+    grid = figure.add_gridspec(rows + 1, columns, height_ratios=[1.35, *[1.0] * rows])
+    axes = figure.add_subplot(grid[0, :])
+    draw_convergence(axes, candidates, y_label)
+    start, gain = result.start.evaluation.objective.value, result.gain
+    axes.axhline(start, color=ORANGE, lw=1.2, ls="--", label="start, confirmed")
+    axes.set_title(
+        f"best {result.best.evaluation.objective.value:.3f}, start {start:.3f}: "
+        f"gain {gain.value:+.3f} ± {gain.half_width:.3f}   ({result.algorithm})",
+        loc="left",
+        fontsize=11,
+    )
+    axes.legend(fontsize=8, ncols=3, frameon=False, loc="lower right")
+    first: Axes | None = None
+    for i, name in enumerate(names):
+        axes = figure.add_subplot(grid[1 + i // columns, i % columns], sharey=first)
+        _draw_parameter(axes, result, candidates, name)
+        if i % columns == 0:
+            axes.set_ylabel(y_label)
+        else:
+            axes.tick_params(labelleft=False)
+        first = first or axes
+    save_picture(figure, path)
+
+
+def draw_convergence(
+    axes: Axes,
+    candidates: Sequence[EvaluatedCandidate],
+    y_label: str,
+    smaller_is_better: bool = False,
+) -> None:
+    """Draw every evaluation in its order with 95 % intervals, the best so far, and confirmations."""
+    from matplotlib.ticker import MaxNLocator
+
+    search = [one for one in candidates if one.stage == "search"]
+    evaluated = [one for one in search if one.objective]
+    confirmed = [one for one in candidates if one.stage == "confirm" and one.objective]
+    feasible = [one for one in evaluated if one.feasible]
+    infeasible = [one for one in evaluated if not one.feasible]
+    failed = [one.number for one in search if not one.objective]
+    _draw_intervals(axes, feasible, BLUE, "evaluation, 95 % interval")
+    _draw_intervals(axes, infeasible, GREY, "misses a constraint", marker="x")
+    if failed:
+        axes.plot(failed, np.full(len(failed), 0.02), "|", color=GREY, clip_on=False,
+                  label="could not be simulated", transform=axes.get_xaxis_transform())  # fmt: skip
+    if feasible:
+        best = np.minimum if smaller_is_better else np.maximum
+        values = best.accumulate([one.objective.value for one in feasible if one.objective])
+        numbers = [one.number for one in feasible]
+        axes.step([*numbers, search[-1].number], [*values, values[-1]], where="post", color=BLUE,
+                  alpha=0.5, label="best so far (as searched)")  # fmt: skip
+    last = max((one.number for one in candidates), default=1) + 0.5
+    if confirmed:
+        axes.axvspan(len(search) + 0.5, last, color=GREEN, alpha=0.08, lw=0)
+        _draw_intervals(axes, confirmed, GREEN, "confirmed on fresh seeds")
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set_xlim(0.5, last)
+    if shown := [one.objective for one in (*evaluated, *confirmed) if one.objective]:
+        axes.set_ylim(*value_range(shown))
+    style_axes(axes, "evaluation", y_label)
+
+
+def _draw_intervals(
+    axes: Axes, candidates: Sequence[EvaluatedCandidate], colour: str, label: str, marker: str = "o"
+) -> None:
+    rows = [
+        (c.number, c.objective.value, c.objective.half_width) for c in candidates if c.objective
+    ]
+    if rows:
+        x, y, half_width = zip(*rows, strict=True)
+        axes.errorbar(
+            x, y, yerr=half_width, fmt=marker, ms=5, lw=1, color=colour, label=label, gid=label
+        )
+
+
+def _draw_parameter(
+    axes: Axes, result: StudyResult, candidates: Sequence[EvaluatedCandidate], name: str
+) -> None:
+    """Draw the search over one parameter, later ones darker, and start and best as confirmed."""
+    search = [one for one in candidates if one.stage == "search"]
+    shown = [one for one in search if one.objective]
+    axes.scatter(
+        [one.parameters[name] for one in shown],
+        [one.objective.value for one in shown if one.objective],
+        c=[one.number for one in shown],
+        cmap="Blues",
+        vmin=-0.6 * max(1, len(search)),
+        s=26,
+        edgecolors="none",
+    )
+    for confirmed, colour, marker, size, label in (
+        (result.start, ORANGE, "o", 8, "start"),
+        (result.best, GREEN, "*", 13, "best"),
+    ):
+        value = confirmed.evaluation.objective.value
+        axes.plot(confirmed.parameters[name], value, marker, color=colour, label=label, ms=size,
+                  mec="white")  # fmt: skip
+    low, high = result.study.vary[name]
+    margin = 0.03 * (high - low)
+    axes.set_xlim(low - margin, high + margin)
+    style_axes(axes, name)
+    axes.legend(fontsize=8, frameon=False)
+
+
+def slices_picture(path: Path, result: StudyResult, sensitivity: Sensitivity) -> None:
+    """Write the model's objective over each parameter, as .png."""
+    figure = slices_figure(
+        sensitivity.slices,
+        result.start.parameters,
+        result.best.parameters,
+        f"loses no more than {sensitivity.noise:.2g}",
+        readable(result.study.objective.goals[0]),
+    )
+    save_picture(figure, path)
+
+
+def slices_figure(
+    slices: Sequence[Slice],
+    start: Mapping[str, float],
+    best: Mapping[str, float],
+    flat_label: str,
+    y_label: str,
+) -> Figure:
+    """The model's objective over each parameter: slice with its interval, main effect, flat range.
+
+    Args:
+        start, best: parameter values of these two designs.
+        flat_label: what the shaded range of a parameter means.
+    """
+    columns = min(len(slices), MAX_COLUMNS)
+    rows = -(-len(slices) // columns)
+    figure = new_figure(3.4 * max(columns, 2), 3.3 * rows + 0.5)
+    panels = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
+    for axes, one in zip(panels, slices, strict=False):
+        low, high = one.mean - one.half_width, one.mean + one.half_width
+        axes.axvspan(*one.flat, color=GREEN, alpha=0.12, lw=0, label=flat_label)
+        axes.fill_between(one.values, low, high, color=BLUE, alpha=0.15, lw=0)
+        axes.plot(
+            one.values, one.mean, color=BLUE, label="the others as in the best, 95 % interval"
+        )
+        axes.plot(one.values, one.effect, color=GREY, ls="--", label="mean over the others")
+        axes.axvline(best[one.name], color=GREEN, lw=1.2, label="best")
+        axes.axvline(start[one.name], color=ORANGE, lw=1.0, ls=":", label="start")
+        axes.set_title(f"{one.share:.0%} of the variance", loc="left", fontsize=9)
+        style_axes(axes, one.name)
+    for axes in panels[len(slices) :]:
+        axes.set_visible(False)
+    panels[0].set_ylabel(y_label)
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=3, fontsize=8, frameon=False)
+    return figure
+
+
+def pareto_picture(path: Path, result: StudyResult) -> None:
+    """Write both objectives of every candidate, with the confirmed Pareto front, as .png."""
+    from chamberopt.optimize.pareto import pareto_points
+
+    figure = new_figure(8.0, 6.0)
+    axes = figure.subplots()
+    candidates = pareto_points(result)
+    groups = (
+        ("search", False, GREY, "o", "searched"),
+        ("search", True, BLUE, "o", "searched, on the front of the search"),
+        ("confirm", False, ORANGE, "s", "confirmed on fresh seeds, beaten in both"),
+        ("confirm", True, GREEN, "s", "confirmed on fresh seeds, on the front"),
+    )
+    for stage, on_front, colour, marker, label in groups:
+        shown = sorted(
+            (one.goals for one in candidates if (one.stage, one.on_front) == (stage, on_front)),
+            key=lambda goals: goals[0].value,
+        )
+        x, y = ([goals[k].value for goals in shown] for k in (0, 1))
+        bars: dict[str, Any] = {}
+        if stage == "confirm":
+            x_error, y_error = ([goals[k].half_width for goals in shown] for k in (0, 1))
+            bars = {"xerr": x_error, "yerr": y_error}
+        axes.errorbar(x, y, **bars, fmt=marker, ls="--" if bars and on_front else "", lw=1,
+                      ms=5 if bars else 3, color=colour, label=label)  # fmt: skip
+    # Intervals are drawn for confirmed candidates only.
+    x_goals, y_goals = (
+        [
+            one.goals[k] if one.stage == "confirm" else Estimate(one.goals[k].value, 0.0)
+            for one in candidates
+        ]
+        for k in (0, 1)
+    )
+    axes.set_xlim(*value_range(x_goals))
+    axes.set_ylim(*value_range(y_goals))
+    x_name, y_name = map(readable, result.study.objective.goals)
+    style_axes(axes, f"{x_name}, better to the right", f"{y_name}, better upwards")
+    axes.legend(fontsize=8, frameon=False)
+    save_picture(figure, path)
