@@ -22,7 +22,6 @@ from chamberopt.optimize.search.scalarisation import scalarise
 from chamberopt.optimize.sensitivity import analyse_sensitivity
 from chamberopt.optimize.storage.trial_log import read_trials
 from chamberopt.optimize.study import Limits, Study
-from chamberopt.output.plots.figures import value_range
 from chamberopt.output.plots.study import pareto_picture, slices_picture
 from tests.helpers.synthetic import DESIGNS, judged
 
@@ -297,13 +296,3 @@ def test_the_plainly_bad_get_few_replicas_and_close_calls_more(tmp_path: Path) -
     assert 8 in confirmed
     best, start = (one.evaluation.objective.pseudovalues for one in (result.best, result.start))
     assert len(best) == len(start) == max(confirmed)  # pair by pair, as the gain needs
-
-
-def test_an_interval_that_says_nothing_does_not_spoil_the_axis() -> None:
-    low, high = value_range([Estimate(-43.0, 5e5), Estimate(-6.0, 4.0), Estimate(-12.0, np.inf)])
-    assert -150 < low < -43 - 37
-    assert 25 <= high < 60
-    assert value_range([Estimate(1.0, np.inf)]) == (0.5, 1.5)
-    low, high = value_range([Estimate(0.4, 0.1), Estimate(0.8, 0.1)])  # all of what says something
-    assert low < 0.3
-    assert high > 0.9

@@ -15,7 +15,7 @@ from chamberopt.coverage.statistics.confidence_interval import Estimate, estimat
 from chamberopt.design.design import validate
 from chamberopt.design.load import Design, load_design
 from chamberopt.output import viewer
-from chamberopt.output.compare import files, plots
+from chamberopt.output.compare import files
 from chamberopt.output.compare.comparison import compare
 from chamberopt.output.compare.difference import LONGEST, confidence_of_each, difference
 from chamberopt.output.compare.files import write_comparison
@@ -251,24 +251,3 @@ def test_what_cannot_be_compared(tmp_path: Path) -> None:
     longer = left(tmp_path / "longer", 20, 0, plate_design(process__treatment_time_s=10))
     with pytest.raises(InputError, match=r"peened for 10 s.*for 5 s.*--treatment-time-s"):
         compare([one, longer])
-
-
-def test_curves_end_where_nobody_knows_any_more() -> None:
-    widths = ((0.01, 0.02), (0.1, 0.2), (0.2, 0.1))
-    rows = [
-        {
-            "time_s": k + 1.0,
-            "mean_coverage": 0.5,
-            "half_width": mean,
-            "p05_coverage": 0.4,
-            "p05_half_width": poorest,
-        }
-        for k, (mean, poorest) in enumerate(widths)
-    ]
-    mean, poorest = plots._known(rows)
-    np.testing.assert_array_equal(mean[0], [1.0, 2.0])
-    np.testing.assert_array_equal(poorest[0], [1.0])
-    marked = plots._known([{"time_s": 1.0, "mean_coverage": 0.5, "half_width": 0.01}])[
-        1
-    ]  # has no poorest twentieth
-    assert marked.shape == (3, 0)
