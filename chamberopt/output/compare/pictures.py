@@ -11,9 +11,9 @@ from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.output.compare.comparison import TIME, Comparison
 from chamberopt.output.compare.distributions import Distributions, Histogram
 from chamberopt.output.compare.table import two_digits
+from chamberopt.output.disc_averages import DENTS_PER_DISC
 from chamberopt.output.plots.colours import line_style
 from chamberopt.output.plots.coverage import CoverageCurve, HistogramData, distributions_picture
-from chamberopt.output.disc_averages import DENTS_PER_DISC
 
 
 def draw_distributions(path: Path, comparison: Comparison, found: Distributions) -> None:
