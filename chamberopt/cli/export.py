@@ -17,9 +17,9 @@ from chamberopt.common.errors import InputError
 from chamberopt.output.export.formats import (
     FORMATS,
     STUDY,
-    Format,
+    ExportFormat,
     FrameName,
-    asked_formats,
+    formats_by_name,
     is_file,
 )
 
@@ -32,7 +32,7 @@ To = Annotated[
         name="--to",
         negative="",
         help="What to write; may be given several times:\n\n"
-        + "\n".join(f"- `{name}`: {one.said}" for name, one in FORMATS.items()),
+        + "\n".join(f"- `{name}`: {one.summary}" for name, one in FORMATS.items()),
     ),
 ]
 
@@ -57,8 +57,8 @@ def export(
     """
     from chamberopt.output.results.load import load_result
 
-    formats = asked_formats(to)
-    again = [name for name, one in formats.items() if one.write is None]
+    formats = formats_by_name(to)
+    again = [name for name, one in formats.items() if one.writer is None]
     for name, given in (("frame", frame), ("replicas", replicas)):
         if given is not None and not again:
             raise InputError(
@@ -75,8 +75,8 @@ def export(
                 loaded, [files[name] for name in again], frame or "part", replicas, workers
             )
         for name, one in formats.items():
-            if one.write is not None:
-                remark(one.write(folder, files[name]) or [])
+            if one.writer is not None:
+                remark(one.write(folder, files[name]))
     if json:
         told = {name: str(file) for name, file in files.items()}
         print(
@@ -90,7 +90,9 @@ def export(
 
 
 @contextmanager
-def _files(formats: dict[str, Format], out: Path | None, name: str) -> Iterator[dict[str, Path]]:
+def _files(
+    formats: dict[str, ExportFormat], out: Path | None, name: str
+) -> Iterator[dict[str, Path]]:
     """Where each format goes: --out where that is a file, else a new folder."""
     from chamberopt.common.files import check_new_file
 

@@ -1,7 +1,9 @@
-"""The chamber for the workshop, in mm: the cavity as one closed body, and the surfaces it is made of by name.
+"""The chamber for the workshop, in mm: the cavity as one closed body, or its surfaces by name.
 
-Normals point out of the cavity. The 3MF file holds one closed object whose triangles carry named base materials, one a
-surface (3MF Core Specification 1.3, chapters 3.3, 4.1 and 5.1): programs that know no materials see the cavity whole.
+Normals point out of the cavity. The 3MF file holds one closed object. Its triangles have named base
+materials, one for each surface; programs without materials see one body.
+
+Source: 3MF Core Specification 1.3, chapters 3.3, 4.1 and 5.1.
 """
 
 from __future__ import annotations
@@ -19,53 +21,61 @@ from chamberopt.output.results.load import load_result
 from chamberopt.output.vtp_files import CHAMBER, read_surface
 
 NAMES = {TAG_PART: "part", TAG_SONOTRODE: "sonotrode", TAG_WALL: "wall"}
-GREY, GLASS, ORANGE = "#B9BEC4", "#9DB7CC", "#E08A2E"
-EPOCH = (1980, 1, 1, 0, 0, 0)  # the first date a .zip knows: the same chamber gives the same bytes
+PART_COLOUR, WALL_COLOUR, SONOTRODE_COLOUR = "#B9BEC4", "#9DB7CC", "#E08A2E"
+ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # a fixed date: the same chamber gives the same bytes
 CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
 MODEL = "3D/3dmodel.model"
 
 
-class Cavity(NamedTuple):
-    """vertices (n, 3) mm · triangles (k, 3), closed, normals out · surfaces: name -> which triangles (k,) bool."""
+class NamedSurfaces(NamedTuple):
+    """A cavity and the surfaces that it consists of.
+
+    Args:
+        vertices: [mm], shape (n, 3).
+        triangles: closed, normals out of the cavity, shape (k, 3).
+        surfaces: by name, which triangles belong to it, shape (k,) bool.
+    """
 
     vertices: np.ndarray
     triangles: np.ndarray
     surfaces: dict[str, np.ndarray]
 
 
-def read_cavity(folder: Path) -> Cavity:
-    """The chamber of a results folder: part, sonotrode, wall, and as the design names them sonotrodes.0 ...,
-    chamber.holes.0 ..., chamber.deflectors.0 ...; older results do not tell the last two from the wall.
+def read_cavity(folder: Path) -> NamedSurfaces:
+    """Read the chamber of a results folder.
+
+    Surfaces are named part, sonotrode and wall, and as in the design sonotrodes.0, chamber.holes.0,
+    chamber.deflectors.0 and so on. In older results holes and deflectors belong to the wall.
     """
-    drawn = read_surface(folder / CHAMBER)
-    tags = np.asarray(drawn["tag"])
-    fitting = (
-        np.asarray(drawn["fitting"]) if "fitting" in drawn.array_names else np.full(len(tags), -1)
-    )
+    chamber = read_surface(folder / CHAMBER)
+    tags = np.asarray(chamber["tag"])
+    stored = "fitting" in chamber.array_names
+    fitting = np.asarray(chamber["fitting"]) if stored else np.full(len(tags), -1)
     surfaces = {_name(int(tag)): (tags == tag) & (fitting < 0) for tag in np.unique(tags)}
     for number, name in enumerate(fitting_names(load_result(folder).design)):
         surfaces[name] = fitting == number
     surfaces = {name: own for name, own in surfaces.items() if own.any()}
-    return Cavity(np.asarray(drawn.points), np.asarray(drawn.regular_faces), surfaces)
+    points, triangles = np.asarray(chamber.points), np.asarray(chamber.regular_faces)
+    return NamedSurfaces(points, triangles, surfaces)
 
 
 def write_stl(folder: Path, file: Path) -> None:
-    """The whole cavity as binary STL."""
+    """Write the whole cavity as binary STL."""
     cavity = read_cavity(folder)
     _write_stl(file, cavity.vertices, cavity.triangles)
 
 
-def write_stl_per_surface(folder: Path, place: Path) -> None:
-    """A binary STL of each surface of the cavity, by its name, into a new folder."""
-    cavity, place = read_cavity(folder), make_output_folder(place)
+def write_stl_per_surface(folder: Path, out: Path) -> None:
+    """Write a binary STL of each surface of the cavity into a new folder."""
+    cavity, out = read_cavity(folder), make_output_folder(out)
     for name, own in cavity.surfaces.items():
-        _write_stl(place / f"{name}.stl", cavity.vertices, cavity.triangles[own])
+        _write_stl(out / f"{name}.stl", cavity.vertices, cavity.triangles[own])
 
 
 def write_3mf(folder: Path, file: Path) -> None:
-    """The cavity as 3MF."""
+    """Write the cavity as 3MF."""
     cavity = read_cavity(folder)
-    parts = {
+    entries = {
         "[Content_Types].xml": '<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">'
         '<Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>'
         '<Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/></Types>',
@@ -75,13 +85,13 @@ def write_3mf(folder: Path, file: Path) -> None:
         MODEL: _model(cavity),
     }
     with atomic_write(file) as temporary, zipfile.ZipFile(temporary, "w") as package:
-        for name, text in parts.items():
-            entry = zipfile.ZipInfo(name, EPOCH)
+        for name, text in entries.items():
+            entry = zipfile.ZipInfo(name, ZIP_DATE)
             entry.compress_type = zipfile.ZIP_DEFLATED
             package.writestr(entry, f'<?xml version="1.0" encoding="UTF-8"?>\n{text}')
 
 
-def _model(cavity: Cavity) -> str:
+def _model(cavity: NamedSurfaces) -> str:
     surface = np.zeros(len(cavity.triangles), dtype=int)
     for number, own in enumerate(cavity.surfaces.values()):
         surface[own] = number
@@ -109,7 +119,9 @@ def _name(tag: int) -> str:
 
 
 def _colour(name: str) -> str:
-    return ORANGE if name.startswith("sonotrode") else GREY if name == "part" else GLASS
+    if name.startswith("sonotrode"):
+        return SONOTRODE_COLOUR
+    return PART_COLOUR if name == "part" else WALL_COLOUR
 
 
 def _write_stl(file: Path, vertices: np.ndarray, triangles: np.ndarray) -> None:

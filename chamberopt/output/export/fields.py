@@ -1,4 +1,4 @@
-"""A result's fields for other programs: ParaView's formats, or decks in the element numbers of the part's file."""
+"""The fields of a result for other programs: ParaView files, Abaqus and Nastran decks."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from chamberopt.chamber.part import part_meshes
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import atomic_write, write_text
 from chamberopt.geometry.mesh_io import PartMesh
-from chamberopt.output.export.abaqus import abaqus_deck
-from chamberopt.output.export.elements import (
+from chamberopt.output.export.abaqus_deck import abaqus_deck
+from chamberopt.output.export.element_fields import (
     COLUMNS,
     ElementFields,
-    of_elements,
-    of_other_triangles,
+    fields_of_elements,
+    fields_of_remeshed_elements,
 )
-from chamberopt.output.export.nastran import nastran_deck
+from chamberopt.output.export.nastran_deck import nastran_deck
 from chamberopt.output.results.load import Result, load_coverage, load_result
 from chamberopt.output.vtp_files import COVERAGE
 
@@ -31,29 +31,36 @@ FIELD_FORMATS = ("vtp", "vtkhdf", *DECKS)
 
 
 def write_fields(folder: str | Path, to: str, path: str | Path) -> list[str]:
-    """Write the per-triangle fields of a results folder to a file; returns remarks for the user.
+    """Write the fields of a results folder to a file and return remarks for the user.
 
-    to: "vtp" or "vtkhdf": coverage.vtp's surface, posed in the chamber [mm], with its cell data · "abaqus" or
-    "nastran": per element of the part's file, in its numbers, to be included in its deck; where the file numbers no
-    elements, the triangles are written along in the file's frame and unit, numbered from 1. Raises InputError for what
-    is no result, was made before element numbers were kept, or whose part's file has changed since.
+    Args:
+        folder: the results folder.
+        to: "vtp" or "vtkhdf" writes the surface of coverage.vtp, posed in the chamber [mm], with
+            its cell data. "abaqus" or "nastran" writes values by the element numbers of the
+            part's file, to be included in its deck. Where that file numbers no elements, the
+            triangles are written too, in the file's frame and unit, numbered from 1.
+        path: the file to write; it is replaced.
+
+    Raises:
+        InputError: the folder is not a result, stores no element numbers, or the part's file has
+            changed since.
     """
     path = Path(path)
     if to not in FIELD_FORMATS:
         raise InputError(f"fields are not written as {to!r}; use one of {', '.join(FIELD_FORMATS)}")
     if to not in DECKS and path.suffix.lower() != f".{to}":
         raise InputError(
-            f"{path}: {to} files are known by their ending; name it {path.with_suffix('.' + to).name}"
+            f"{path}: {to} files need their ending; name it {path.with_suffix('.' + to).name}"
         )
     if not path.resolve().parent.is_dir() or path.is_dir():
         raise InputError(
-            f"{path}: is no file in a folder that is there; make the folder, or give a file's name"
+            f"{path}: is not a file in an existing folder; make the folder, or give a file name"
         )
     result = load_result(folder)
     surface = load_coverage(result)
     if "element" not in surface.cell_data:
         raise InputError(
-            f"{result.folder / COVERAGE}: from a version that kept no element numbers; simulate again"
+            f"{result.folder / COVERAGE}: written by a version without element numbers; simulate again"
         )
     try:
         if to not in DECKS:
@@ -68,69 +75,71 @@ def write_fields(folder: str | Path, to: str, path: str | Path) -> list[str]:
 
 
 def _write_deck(result: Result, surface: Any, to: str, path: Path) -> list[str]:
-    filed, simulated = _meshes(result, surface, path)
-    own = filed.numbering.own
+    original, simulated = _meshes(result, surface, path)
+    own = original.numbering.own
     number = np.asarray(surface["element"]) if own else np.arange(1, surface.n_cells + 1)
-    fields = of_elements(surface, number)
+    fields = fields_of_elements(surface, number)
     remarks = []
-    if own and simulated is not filed:
-        fields = of_other_triangles(surface, number, filed, simulated)
-        said = "the target was simulated in triangles of target.element_mm"
+    if own and simulated is not original:
+        fields = fields_of_remeshed_elements(surface, number, original, simulated)
         remarks.append(
-            f"{said}: elements get means over those whose middles they hold, and no sums"
+            "the target was simulated in triangles of target.element_mm: each element gets the "
+            "mean over the triangles whose centres it contains, and no sums"
         )
     if not own:
         remarks.append(
-            f"{result.design.part.mesh_path.name} has no element numbers that stand for one element each: its "
-            f"triangles are written along, in {simulated.unit}, numbered from 1"
+            f"{result.design.part.mesh_path.name} has no unique element numbers: its triangles "
+            f"are written too, in {simulated.unit}, numbered from 1"
         )
-    new = int((number == 0).sum())
-    if new:
+    added = int((number == 0).sum())
+    if added:
         remarks.append(
-            f"left out {new} triangles that are in no element of the file: they close its holes"
+            f"left out {added} triangles that belong to no element of the file: they close its holes"
         )
-    remarks += _left_out(fields)
-    about = [*_about(result), *(f"{name.upper()}: {COLUMNS[name][0]}" for name in fields.columns)]
-    for suffix, text in DECKS[to](about, simulated, fields).items():
+    remarks += _elements_left_out(fields)
+    meanings = [f"{name.upper()}: {COLUMNS[name][0]}" for name in fields.columns]
+    for suffix, text in DECKS[to]([*_origin(result), *meanings], simulated, fields).items():
         file = path.with_stem(path.stem + suffix) if suffix else path
         write_text(file, text)
         if suffix:
             remarks.append(
-                f"{file.name}: sets of elements by coverage, to be included inside the deck's *Assembly"
+                f"{file.name}: element sets by coverage, to be included in the deck's *Assembly"
             )
     return remarks
 
 
-def _left_out(fields: ElementFields) -> list[str]:
+def _elements_left_out(fields: ElementFields) -> list[str]:
+    """Remarks on elements without a value; one for each number of such elements."""
     names: dict[int, list[str]] = {}
     for name, values in fields.columns.items():
         names.setdefault(int(np.isnan(values).sum()), []).append(name)
     return [
-        f"left out {without} of {len(fields.numbers)} elements, not exposed or never hit: {', '.join(columns)}"
+        f"left out {without} of {len(fields.numbers)} elements, not exposed or never hit: "
+        f"{', '.join(columns)}"
         for without, columns in names.items()
         if without
     ]
 
 
 def _meshes(result: Result, surface: Any, path: Path) -> tuple[PartMesh, PartMesh]:
-    """The part as its file has it, and as it was simulated. InputError where the file is another one by now."""
+    """Return the part as in its file, and as it was simulated; InputError if the file changed."""
     file = result.design.part.mesh_path
     if path.resolve() == file.resolve():
         raise InputError(f"{path}: is the part's own file; choose another name")
-    filed, simulated = part_meshes(result.design)
-    if filed.sha256 != result.part_sha256 or len(simulated.triangles) != surface.n_cells:
+    original, simulated = part_meshes(result.design)
+    if original.sha256 != result.part_sha256 or len(simulated.triangles) != surface.n_cells:
         raise InputError(
-            f"{file}: is not the file any more that {result.folder} was made with, its elements may be others; put "
-            "that file back, or simulate again"
+            f"{file}: has changed since {result.folder} was simulated, and its elements may be "
+            "others; restore that file, or simulate again"
         )
-    return filed, simulated
+    return original, simulated
 
 
-def _about(result: Result) -> list[str]:
-    """Where the numbers come from, for a deck's first lines."""
+def _origin(result: Result) -> list[str]:
+    """Where the numbers come from, for the first lines of a deck."""
     design, version = result.design, result.data["versions"]["chamberopt"]
     return [
-        f"chamberopt {version}: what a simulated ultrasonic shot peening gave each element",
+        f"chamberopt {version}: simulated ultrasonic shot peening, values of each element",
         f"part file {design.part.mesh_path.name}, sha256 {result.part_sha256}",
         f"treatment time {design.process.treatment_time:g} s, seed {result.seeds[0]}",
     ]

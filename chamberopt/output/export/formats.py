@@ -1,113 +1,112 @@
-"""What `chamberopt export` can write: one line a format. What a format needs is imported when it is written."""
+"""The formats that `chamberopt export` can write, one entry a format."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Literal
 
 from chamberopt.common.errors import InputError
 
 FrameName = Literal["part", "chamber"]
-Write = Callable[[Path, Path], "list[str] | None"]
 
 
 @dataclass(frozen=True)
-class Format:
-    """file: its name in a folder of exports; one without an ending is a folder · said: a line of help · write(folder
-    of the result, file) -> remarks; None for impacts, which are simulated again, once for all of their formats ·
-    endings that its file may have.
+class ExportFormat:
+    """A format and how it is written.
+
+    Args:
+        file: name of the file in a folder of exports; a name without an ending is a folder.
+        summary: a line for --help.
+        endings: endings that the user's own file name may have.
+        writer: "module.function" in this package, called with (results folder, file, *arguments);
+            it returns remarks or None. Its module is imported when it is needed. None for impacts,
+            which are simulated again, once for all formats of impacts.
+        arguments: further arguments of the writer.
     """
 
     file: str
-    said: str
-    write: Write | None = None
+    summary: str
     endings: tuple[str, ...] = ()
+    writer: str | None = None
+    arguments: tuple[str, ...] = ()
+
+    def write(self, folder: Path, file: Path) -> list[str]:
+        """Write the file from a results folder and return remarks for the user."""
+        module, function = str(self.writer).split(".")
+        write = getattr(import_module(f"chamberopt.output.export.{module}"), function)
+        return write(folder, file, *self.arguments) or []
 
 
-def _fields(to: str) -> Write:
-    def write(folder: Path, file: Path) -> list[str]:
-        from chamberopt.output.export.fields import write_fields
-
-        return write_fields(folder, to, file)
-
-    return write
-
-
-def _chamber_stl(folder: Path, file: Path) -> None:
-    from chamberopt.output.export.chamber_files import write_stl
-
-    write_stl(folder, file)
-
-
-def _chamber_stl_per_surface(folder: Path, file: Path) -> None:
-    from chamberopt.output.export.chamber_files import write_stl_per_surface
-
-    write_stl_per_surface(folder, file)
-
-
-def _chamber_3mf(folder: Path, file: Path) -> None:
-    from chamberopt.output.export.chamber_files import write_3mf
-
-    write_3mf(folder, file)
-
-
-def _study_csv(folder: Path, file: Path) -> None:
-    from chamberopt.output.export.study_table import write_study_table
-
-    write_study_table(folder, file)
-
-
-STUDY = "study-csv"  # the only one that a study without a result, or a sweep, can give
+STUDY = "study-csv"  # the only one for a study without a result, and for a sweep
 FORMATS = {
-    "impacts-parquet": Format(
+    "impacts-parquet": ExportFormat(
         "impacts.parquet",
-        "every impact: time, triangle, place, velocity, ball, dent",
-        None,
+        "every impact: time, triangle, position, velocity, ball, dent",
         (".parquet",),
     ),
-    "impacts-csv": Format(
-        "impacts.csv", "the same as text; with --out FILE.csv.gz packed", None, (".csv", ".csv.gz")
+    "impacts-csv": ExportFormat(
+        "impacts.csv", "the same as text; compressed with --out FILE.csv.gz", (".csv", ".csv.gz")
     ),
-    "fields-vtp": Format(
-        "fields.vtp", "what each triangle of the part got, for ParaView", _fields("vtp"), (".vtp",)
+    "fields-vtp": ExportFormat(
+        "fields.vtp",
+        "the values of each triangle of the part, for ParaView",
+        (".vtp",),
+        "fields.write_fields",
+        ("vtp",),
     ),
-    "fields-vtkhdf": Format("fields.vtkhdf", "the same as VTKHDF", _fields("vtkhdf"), (".vtkhdf",)),
-    "fields-abaqus": Format(
+    "fields-vtkhdf": ExportFormat(
+        "fields.vtkhdf", "the same as VTKHDF", (".vtkhdf",), "fields.write_fields", ("vtkhdf",)
+    ),
+    "fields-abaqus": ExportFormat(
         "fields.inp",
         "distributions on the elements of the part's file",
-        _fields("abaqus"),
         (".inp", ".inc"),
+        "fields.write_fields",
+        ("abaqus",),
     ),
-    "fields-nastran": Format(
+    "fields-nastran": ExportFormat(
         "fields.bdf",
         "PLOAD4 on the elements of the part's file",
-        _fields("nastran"),
         (".bdf", ".nas"),
+        "fields.write_fields",
+        ("nastran",),
     ),
-    "chamber-stl": Format(
-        "chamber.stl", "the cavity as one closed body, in mm", _chamber_stl, (".stl",)
+    "chamber-stl": ExportFormat(
+        "chamber.stl", "the cavity as one closed body, in mm", (".stl",), "chamber_files.write_stl"
     ),
-    "chamber-stl-per-tag": Format(
+    "chamber-stl-per-tag": ExportFormat(
         "chamber-stl",
-        "an STL of each of its surfaces: part, sonotrode, wall ...",
-        _chamber_stl_per_surface,
+        "one STL for each surface of the cavity: part, sonotrode, wall ...",
+        (),
+        "chamber_files.write_stl_per_surface",
     ),
-    "chamber-3mf": Format(
-        "chamber.3mf", "the closed cavity, its surfaces named, in mm", _chamber_3mf, (".3mf",)
+    "chamber-3mf": ExportFormat(
+        "chamber.3mf",
+        "the closed cavity with named surfaces, in mm",
+        (".3mf",),
+        "chamber_files.write_3mf",
     ),
-    STUDY: Format(
-        "study.csv", "a study's or sweep's evaluations, finished or not", _study_csv, (".csv",)
+    STUDY: ExportFormat(
+        "study.csv",
+        "the evaluations of a study or sweep, finished or not",
+        (".csv",),
+        "study_table.write_study_table",
     ),
 }
 
 
-def asked_formats(names: Sequence[str]) -> dict[str, Format]:
-    """The formats of these names, each once. InputError for a name that is not known."""
+def formats_by_name(names: Sequence[str]) -> dict[str, ExportFormat]:
+    """Return the formats with these names, each once.
+
+    Raises:
+        InputError: a name is unknown.
+    """
     for name in names:
         if name not in FORMATS:
-            from chamberopt.common.toml_errors import did_you_mean  # brings pydantic
+            from chamberopt.common.toml_errors import did_you_mean  # imports pydantic
 
             raise InputError(
                 f"--to: given {name!r}; {did_you_mean(name, FORMATS)} (chamberopt export --help)"
@@ -115,23 +114,22 @@ def asked_formats(names: Sequence[str]) -> dict[str, Format]:
     return {name: FORMATS[name] for name in dict.fromkeys(names)}
 
 
-def is_file(out: Path, formats: dict[str, Format]) -> bool:
-    """Whether --out names a file, which must be that of a single format; else it is a folder."""
-    ending = _ending(out, [ending for one in FORMATS.values() for ending in one.endings])
-    if ending is None:
+def is_file(out: Path, formats: dict[str, ExportFormat]) -> bool:
+    """Return whether --out names a file rather than a folder.
+
+    Raises:
+        InputError: it names a file, but there are several formats, or the file is of another one.
+    """
+    if not _has_ending(out, [ending for one in FORMATS.values() for ending in one.endings]):
         return False
     name, single = next(iter(formats.items()))
     if len(formats) > 1:
         raise InputError(f"--out {out}: one file for {len(formats)} formats; give a folder")
-    if _ending(out, single.endings) is None:
-        which = (
-            f"a name in {' or '.join(single.endings)}, or a folder"
-            if single.endings
-            else "a folder"
-        )
-        raise InputError(f"--out {out}: is no file of {name}; give {which}")
+    if not _has_ending(out, single.endings):
+        names = f"a name in {' or '.join(single.endings)}, or " if single.endings else ""
+        raise InputError(f"--out {out}: is not a file of {name}; give {names}a folder")
     return True
 
 
-def _ending(path: Path, endings: Sequence[str]) -> str | None:
-    return next((ending for ending in endings if path.name.lower().endswith(ending)), None)
+def _has_ending(path: Path, endings: Sequence[str]) -> bool:
+    return path.name.lower().endswith(tuple(endings)) if endings else False

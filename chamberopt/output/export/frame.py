@@ -1,4 +1,4 @@
-"""In whose coordinates positions and directions are handed on: those of the part's file, or the chamber's."""
+"""Coordinate frames of exported positions and directions: of the part's file, or of the chamber."""
 
 from __future__ import annotations
 
@@ -15,34 +15,42 @@ if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.design.design import Design
 
-SAID = {
+MEANING = {
     "part": "of the part's file: its axes, its origin, its unit",
-    "chamber": "of the chamber: z up, the sonotrode's mean face at z = 0, the chamber's axis at x = y = 0",
+    "chamber": "of the chamber: z up, the sonotrode's mean face at z = 0, "
+    "the chamber's axis at x = y = 0",
 }
 
 
 @dataclass(frozen=True)
 class Frame:
-    """name · unit of its lengths · turn (3, 3), then shift (3,) [m]: from it to the chamber's frame."""
+    """A frame, and how it lies in the chamber's frame.
+
+    Args:
+        name: "part" or "chamber".
+        unit: unit of its lengths.
+        rotation: applied first on the way to the chamber's frame, shape (3, 3).
+        shift: applied second [m], shape (3,).
+    """
 
     name: FrameName
     unit: str
-    turn: np.ndarray
+    rotation: np.ndarray
     shift: np.ndarray
 
-    def places(self, metres: np.ndarray) -> np.ndarray:
-        """Positions (n, 3) of the chamber's frame [m] in this one and its unit."""
-        moved: np.ndarray = (metres - self.shift) @ self.turn / METRES_PER[self.unit]
+    def positions(self, metres: np.ndarray) -> np.ndarray:
+        """Convert positions in the chamber's frame [m], shape (n, 3), to this frame and unit."""
+        moved: np.ndarray = (metres - self.shift) @ self.rotation / METRES_PER[self.unit]
         return moved
 
     def directions(self, vectors: np.ndarray) -> np.ndarray:
-        """Vectors (n, 3) of the chamber's frame turned into this one."""
-        turned: np.ndarray = vectors @ self.turn
+        """Rotate vectors of the chamber's frame, shape (n, 3), to this frame."""
+        turned: np.ndarray = vectors @ self.rotation
         return turned
 
 
 def frame_of(name: FrameName, design: Design, chamber: Chamber) -> Frame:
-    """The frame of that name; the chamber's lengths are in mm, as everywhere in a results folder."""
+    """Return the frame of that name; lengths in the chamber's frame are in mm."""
     if name == "chamber":
         return Frame(name, "mm", np.eye(3), np.zeros(3))
     return Frame(name, chamber.part.unit, *part_pose(design))

@@ -1,4 +1,4 @@
-"""Every impact of a result as a table, for solvers of residual stress: .parquet, .csv, .csv.gz."""
+"""Write every impact of a result as a table, for residual stress solvers: .parquet, .csv, .csv.gz."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import gzip
 import json
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,8 +16,8 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.files import atomic_write, check_new_file, write_text
 from chamberopt.common.versions import versions
 from chamberopt.output.export.formats import FrameName
-from chamberopt.output.export.frame import SAID, Frame, frame_of
-from chamberopt.output.export.impact_columns import Column, columns_of, rows
+from chamberopt.output.export.frame import MEANING, Frame, frame_of
+from chamberopt.output.export.impact_columns import Column, columns_of, impact_rows
 from chamberopt.output.resimulate.impacts import RebuiltChamber, replica_count, simulate_impacts
 
 if TYPE_CHECKING:
@@ -25,41 +25,46 @@ if TYPE_CHECKING:
     from chamberopt.output.results.load import Result
 
 PARQUET = ".parquet"
-ABOUT = "chamberopt"  # key of a Parquet file's metadata
-PACKED = 3  # level of gzip: 6 takes three times as long for 6 % less
-BESIDE = (
-    ".json"  # a .csv has its header alone; what else there is to know of it stands in FILE.json
-)
+METADATA_KEY = "chamberopt"  # of a Parquet file
+GZIP_LEVEL = 3  # level 6 takes three times as long and saves 6 %
+METADATA_ENDING = ".json"  # the description of FILE.csv is in FILE.csv.json
 
-Put = Callable[[Sequence[np.ndarray]], None]
+WriteRows = Callable[[Sequence[np.ndarray]], None]
 
 
 def write_impacts(
-    files: Sequence[Path], result: Result, ground: RebuiltChamber, executor: Executor, *, frame: FrameName = "part",
+    files: Sequence[Path], result: Result, rebuilt: RebuiltChamber, executor: Executor, *, frame: FrameName = "part",
     replicas: int | None = None, progress: Progress | None = None,
 ) -> int:  # fmt: skip
-    """Simulate the result again, write all its impacts into each file, by its ending; how many there are.
+    """Simulate a result again and write all its impacts into each file, in the format of its ending.
 
-    A row an impact, replica after replica, in order of time; columns: impact_columns.py. Files appear whole, or not at
-    all where the replicas do not give the result's own figures: InputError then, and where pyarrow is missing.
+    The table has one row for each impact, replica after replica, in order of time. Its columns are
+    in impact_columns.py. Files appear complete or not at all.
+
+    Returns:
+        The number of impacts.
+
+    Raises:
+        InputError: the replicas do not give the result's own figures, or pyarrow is missing.
     """
-    design, chamber = result.design, ground.chamber
-    seen = frame_of(frame, design, chamber)
-    columns = columns_of(seen)
-    about = _about(result, ground, seen, columns, replica_count(result, replicas))
+    design, chamber = result.design, rebuilt.chamber
+    axes = frame_of(frame, design, chamber)
+    columns = columns_of(axes)
+    metadata = _metadata(result, rebuilt, axes, columns, replica_count(result, replicas))
     written = 0
     with ExitStack() as stack:
-        puts = [stack.enter_context(_sink(file)(file, columns, about)) for file in files]
-        for impacts in simulate_impacts(result, ground, executor, replicas, progress):
-            for values in rows(impacts, chamber, design, seen, columns):
-                for put in puts:
-                    put(values)
+        writers = [stack.enter_context(_open_table(file, columns, metadata)) for file in files]
+        for impacts in simulate_impacts(result, rebuilt, executor, replicas, progress):
+            for rows in impact_rows(impacts, chamber, design, axes):
+                values = [column.values(rows).astype(column.dtype) for column in columns]
+                for write_rows in writers:
+                    write_rows(values)
             written += len(impacts.log)
     return written
 
 
 def require_writable(files: Sequence[Path]) -> None:
-    """InputError where a file asked for needs pyarrow and it is not installed, or one is there already."""
+    """Raise InputError where a file needs pyarrow and it is missing, or where a file exists."""
     for file in files:
         if _is_parquet(file):
             _pyarrow()
@@ -77,14 +82,14 @@ def _pyarrow() -> Any:
     return pyarrow
 
 
-def _about(
-    result: Result, ground: RebuiltChamber, frame: Frame, columns: Sequence[Column], replicas: int
+def _metadata(
+    result: Result, rebuilt: RebuiltChamber, frame: Frame, columns: Sequence[Column], replicas: int
 ) -> dict[str, Any]:
-    """What to know of the rows: where they come from, and in what they are written."""
+    """Describe the rows: their origin, their frame and unit, their columns."""
     design = result.design
     return {
         "result": result.folder.resolve().name,
-        "frame": f"{frame.name}: {SAID[frame.name]}",
+        "frame": f"{frame.name}: {MEANING[frame.name]}",
         "length_unit": frame.unit,
         "columns": {column.name: column.meaning for column in columns},
         "replicas": replicas,
@@ -93,9 +98,9 @@ def _about(
         "same_as_result": replicas == result.data["replicas"],
         "seed": result.seeds[0],
         "stream": result.seeds[1],
-        "analytic": ground.cavity is not None,
+        "analytic": rebuilt.cavity is not None,
         "part_sha256": result.part_sha256,
-        "part_triangles": len(ground.chamber.part.triangles),
+        "part_triangles": len(rebuilt.chamber.part.triangles),
         "design": result.data["design"],
         "versions": versions(),
     }
@@ -105,12 +110,16 @@ def _is_parquet(file: Path) -> bool:
     return file.suffix.lower() == PARQUET
 
 
-def _sink(file: Path) -> Callable[..., Any]:
-    return _parquet if _is_parquet(file) else _csv
+def _open_table(
+    file: Path, columns: Sequence[Column], metadata: dict[str, Any]
+) -> AbstractContextManager[WriteRows]:
+    return (_parquet if _is_parquet(file) else _csv)(file, columns, metadata)
 
 
 @contextmanager
-def _parquet(file: Path, columns: Sequence[Column], about: dict[str, Any]) -> Iterator[Put]:
+def _parquet(
+    file: Path, columns: Sequence[Column], metadata: dict[str, Any]
+) -> Iterator[WriteRows]:
     pyarrow = _pyarrow()
     fields = [
         pyarrow.field(
@@ -121,7 +130,7 @@ def _parquet(file: Path, columns: Sequence[Column], about: dict[str, Any]) -> It
         )
         for column in columns
     ]
-    schema = pyarrow.schema(fields, {ABOUT: json.dumps(about)})
+    schema = pyarrow.schema(fields, {METADATA_KEY: json.dumps(metadata)})
     smooth = [
         column.name
         for column in columns
@@ -140,25 +149,23 @@ def _parquet(file: Path, columns: Sequence[Column], about: dict[str, Any]) -> It
 
 
 @contextmanager
-def _csv(file: Path, columns: Sequence[Column], about: dict[str, Any]) -> Iterator[Put]:
+def _csv(file: Path, columns: Sequence[Column], metadata: dict[str, Any]) -> Iterator[WriteRows]:
     line = ",".join(column.text for column in columns) + "\n"
     with atomic_write(file) as temporary, open(temporary, "wb") as plain, ExitStack() as stack:
-        # Without a name and a time in it the same impacts give the same bytes.
-        out = (
-            stack.enter_context(gzip.GzipFile("", "wb", PACKED, plain, 0))
-            if file.suffix.lower() == ".gz"
-            else plain
-        )
+        out: Any = plain
+        if file.suffix.lower() == ".gz":
+            # Without a name and a time inside, the same impacts give the same bytes.
+            out = stack.enter_context(gzip.GzipFile("", "wb", GZIP_LEVEL, plain, 0))
         out.write((",".join(column.name for column in columns) + "\n").encode())
 
-        def put(values: Sequence[np.ndarray]) -> None:
+        def write_rows(values: Sequence[np.ndarray]) -> None:
             lists = [value.tolist() for value in values]
             out.write("".join([line % row for row in zip(*lists, strict=True)]).encode())
 
-        yield put
-    write_text(beside(file), json.dumps(about, indent=2) + "\n")
+        yield write_rows
+    write_text(beside(file), json.dumps(metadata, indent=2) + "\n")
 
 
 def beside(file: Path) -> Path:
-    """Where there is said what a .csv holds."""
-    return file.with_name(file.name + BESIDE)
+    """Return the path of the JSON file that describes a .csv file."""
+    return file.with_name(file.name + METADATA_ENDING)

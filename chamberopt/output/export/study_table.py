@@ -1,4 +1,4 @@
-"""A study or sweep as a table, finished or not: a row an evaluation, NAME_pm the 95 % half-width of NAME."""
+"""The evaluations of a study or sweep as a table; NAME_pm is the 95 % half-width of NAME."""
 
 from pathlib import Path
 
@@ -7,5 +7,5 @@ from chamberopt.optimize.storage.trial_log import read_trials, trials_as_csv
 
 
 def write_study_table(folder: Path, file: Path) -> None:
-    """The evaluations in a study's folder so far, as .csv. InputError where there are none."""
+    """Write the evaluations recorded so far as .csv; InputError where there are none."""
     write_text(file, trials_as_csv(read_trials(folder)))

@@ -32,7 +32,7 @@ from chamberopt.output.export.chamber_files import (
     write_stl_per_surface,
 )
 from chamberopt.output.export.frame import FrameName
-from chamberopt.output.export.impact_columns import PIECE
+from chamberopt.output.export.impact_columns import ROWS_AT_ONCE
 from chamberopt.output.export.impacts_table import write_impacts
 from chamberopt.output.resimulate.rebuild import rebuild_chamber
 from chamberopt.output.results.load import load_result
@@ -201,13 +201,13 @@ def test_what_the_parquet_file_says_of_itself(
     assert b"meaning" in schema.field("x_in").metadata
     parts = pyarrow.parquet.ParquetFile(tmp_path / "i.parquet").metadata
     assert parts.row_group(0).column(0).compression == "ZSTD"
-    assert max(parts.row_group(k).num_rows for k in range(parts.num_row_groups)) <= PIECE
+    assert max(parts.row_group(k).num_rows for k in range(parts.num_row_groups)) <= ROWS_AT_ONCE
 
 
 def test_csv_holds_what_parquet_holds_whatever_the_number_of_workers(
     simulated: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("chamberopt.output.export.impact_columns.PIECE", 100)  # many pieces
+    monkeypatch.setattr("chamberopt.output.export.impact_columns.ROWS_AT_ONCE", 100)  # many pieces
     result = load_result(simulated)
     ground = rebuild_chamber(result)
     files = [tmp_path / name for name in ("i.csv", "i.csv.gz", "i.parquet")]
@@ -355,11 +355,11 @@ def test_several_formats_into_a_new_folder(simulated: Path, chamberopt: Said) ->
         ([], "--to"),
         (
             ["--to", "impacts-csv", "--out", "i.parquet"],
-            "i.parquet: is no file of impacts-csv; give a name in .csv or",
+            "i.parquet: is not a file of impacts-csv; give a name in .csv or",
         ),
         (
             ["--to", "chamber-stl-per-tag", "--out", "i.stl"],
-            "i.stl: is no file of chamber-stl-per-tag; give a folder",
+            "i.stl: is not a file of chamber-stl-per-tag; give a folder",
         ),
         (
             ["--to", "chamber-stl", "--to", "chamber-3mf", "--out", "c.stl"],

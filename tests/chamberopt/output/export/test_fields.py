@@ -14,7 +14,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.design.load import Design, load_design
 from chamberopt.geometry.mesh_io import read_part
 from chamberopt.output import viewer
-from chamberopt.output.export.elements import COLUMNS
+from chamberopt.output.export.element_fields import COLUMNS
 from chamberopt.output.export.fields import write_fields
 from chamberopt.output.save_run import save_simulation
 from tests.helpers.synthetic import plate_design, poisson_evaluation
@@ -265,7 +265,7 @@ def test_a_part_without_element_numbers_is_written_along(
 
     remarks = write_fields(folder, to, tmp_path / f"fields.{suffix}")
 
-    assert any("no element numbers" in remark and "in mm" in remark for remark in remarks)
+    assert any("no unique element numbers" in remark and "in mm" in remark for remark in remarks)
     part, back = (
         read_part(tmp_path / "plate.stl", "mm"),
         read_part(tmp_path / f"fields.{suffix}", "mm"),
@@ -361,7 +361,7 @@ def test_what_cannot_be_handed_on_is_said(tmp_path: Path) -> None:
 
     text = (tmp_path / "plate.bdf").read_text()
     (tmp_path / "plate.bdf").write_text("$ changed\n" + text)
-    with pytest.raises(InputError, match=r"plate\.bdf: is not the file any more .* simulate again"):
+    with pytest.raises(InputError, match=r"plate\.bdf: has changed since .* simulate again"):
         write_fields(folder, "nastran", tmp_path / "a.bdf")
     assert write_fields(folder, "vtp", tmp_path / "a.vtp") == []
 
@@ -370,7 +370,7 @@ def test_what_cannot_be_handed_on_is_said(tmp_path: Path) -> None:
     surface.save(folder / "coverage.vtp")
     for to in ("vtp", "vtkhdf", "abaqus", "nastran"):
         with pytest.raises(
-            InputError, match=r"coverage\.vtp: .* no element numbers; simulate again"
+            InputError, match=r"coverage\.vtp: .* without element numbers; simulate again"
         ):
             write_fields(folder, to, tmp_path / f"b.{to}")
 

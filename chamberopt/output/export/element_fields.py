@@ -1,0 +1,117 @@
+"""From the values of the part's triangles to the values of the elements of the part's file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chamberopt.geometry.triangles import areas
+
+if TYPE_CHECKING:
+    from chamberopt.geometry.mesh_io import PartMesh
+
+# Meaning of each column of coverage.vtp, and how the triangles of an element are combined: their
+# sum, their largest, or a mean weighted with exposed area, impacts or dents.
+COLUMNS = {
+    "coverage": ("share of the surface that is dented after the treatment, 0 to 1", "area"),
+    "coverage_interval": (
+        "width of the 95 % interval of coverage; mean over the element's triangles",
+        "area",
+    ),
+    "dent_density": ("dented area per area after the treatment", "area"),
+    "impacts_per_mm2": ("impacts per mm2 in the treatment", "area"),
+    "energy_per_mm2": ("energy of impacts in the treatment, mJ/mm2", "area"),
+    "mean_normal_speed": ("mean normal speed of impacts, m/s", "impacts"),
+    "p90_normal_speed": (
+        "90th percentile of the normal speed, m/s; mean over the element's triangles",
+        "impacts",
+    ),
+    "mean_angle_deg": ("mean angle of impacts to the surface, degrees, 90 is head on", "impacts"),
+    "mean_dent_um": ("mean diameter of dents, micrometres", "dents"),
+    "impacts": ("number of simulated impacts", "sum"),
+    "dents": ("number of simulated dents", "sum"),
+    "exposed_area_mm2": ("area inside the chamber, mm2", "sum"),
+    "target": ("1: must be covered", "any"),
+}
+WEIGHTS = {"area": "exposed_area_mm2", "impacts": "impacts", "dents": "dents"}
+
+
+@dataclass(frozen=True)
+class ElementFields:
+    """Values of the elements of the part's file.
+
+    Args:
+        numbers: element numbers in rising order, shape (e,) int64.
+        columns: values by name of the column, shape (e,) float64; NaN where there is no value.
+    """
+
+    numbers: np.ndarray
+    columns: dict[str, np.ndarray]
+
+
+def fields_of_elements(surface: Any, number: np.ndarray) -> ElementFields:
+    """Combine the columns of coverage.vtp for each element.
+
+    Args:
+        surface: coverage.vtp as PyVista reads it.
+        number: element number of each triangle, shape (m,); 0 for triangles in no element.
+    """
+    cells = np.flatnonzero(number > 0)
+    return _combined(surface, cells, number[cells], np.ones(len(cells)), tuple(COLUMNS))
+
+
+def fields_of_remeshed_elements(
+    surface: Any, number: np.ndarray, original: PartMesh, simulated: PartMesh
+) -> ElementFields:
+    """Combine the columns where the part was simulated in other triangles than its file has.
+
+    A triangle counts for the element that contains its centre. An element that contains no centre
+    gets the values of the triangles around the centres of its own triangles. Sums are left out,
+    because triangles reach across elements.
+    """
+    cells = np.flatnonzero(number > 0)
+    small = np.flatnonzero(~np.isin(original.elements, number[cells]) & (original.elements > 0))
+    share = np.ones(len(cells))
+    if len(small):
+        from sim_core import TriangleMesh, closest_points
+
+        tags = np.zeros(len(simulated.triangles), dtype=np.uint8)
+        mesh = TriangleMesh(simulated.vertices, simulated.triangles, tags)
+        centres = original.vertices[original.triangles[small]].mean(axis=1)
+        around = closest_points(mesh, centres, float(np.ptp(original.vertices))).triangle
+        own_area = areas(original.vertices, original.triangles[small])
+        share_around = own_area / areas(simulated.vertices, simulated.triangles[around])
+        cells, share = np.r_[cells, around], np.r_[share, share_around]
+    numbers = np.r_[number[number > 0], original.elements[small]]
+    names = tuple(name for name, (_, combination) in COLUMNS.items() if combination != "sum")
+    return _combined(surface, cells, numbers, share, names)
+
+
+def _combined(
+    surface: Any, cells: np.ndarray, number: np.ndarray, share: np.ndarray, names: tuple[str, ...]
+) -> ElementFields:
+    """Combine triangles (cells) by element number; share (k,) is how much of a triangle counts."""
+    numbers, element = np.unique(number, return_inverse=True)
+
+    def total(values: np.ndarray) -> np.ndarray:
+        return np.bincount(element, values, len(numbers))
+
+    columns = {}
+    for name in names:
+        if name not in surface.cell_data:
+            continue
+        values, combination = np.asarray(surface[name], dtype=np.float64)[cells], COLUMNS[name][1]
+        if combination == "sum":
+            columns[name] = total(values)
+        elif combination == "any":
+            columns[name] = (total(values) > 0.0).astype(np.float64)
+        else:
+            weight = np.asarray(surface[WEIGHTS[combination]])[cells] * share
+            weight = np.where(np.isfinite(values), weight, 0.0)
+            sums, weights = total(weight * np.nan_to_num(values)), total(weight)
+            columns[name] = np.divide(
+                sums, weights, out=np.full(len(numbers), np.nan), where=weights > 0.0
+            )
+    return ElementFields(numbers, columns)
