@@ -17,7 +17,7 @@ from scipy.ndimage import uniform_filter
 from chamberopt.output.viewer import missing_opengl
 from chamberopt.output.viewer.subprocess_drawing import without_display
 
-REFERENCES = Path(__file__).parents[4] / "pictures"
+REFERENCES = Path(__file__).parents[3] / "pictures"
 BLOCK, TOLERANCE = 20, 0.02
 
 pytestmark = pytest.mark.skipif(missing_opengl() is not None, reason="no OpenGL library")
