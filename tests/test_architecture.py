@@ -19,6 +19,7 @@ ORDER = {
     "triangle_fields time_curve effect_pilot convergence",
     "chamberopt/optimize": "study load_study+constraints+search+storage "
     "sensitivity+evaluate_candidate candidates run_study pareto+run_sweep",
+    "chamberopt/cli": "interrupt+options console prepare commands",
     "chamberopt/output": "vtp_files+disc_averages plots results resimulate viewer "
     "save_run report+export+compare",
     "sim_core": "errors numerics balls effects geometry motion impulses scene contact detect loop",

@@ -1,8 +1,8 @@
-"""What the commands say, and where they leave it: results to stdout, remarks to stderr."""
+"""What commands print, and the folder they write to: results to stdout, remarks to stderr."""
 
 from __future__ import annotations
 
-import json as json_format
+import json
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 
 @contextmanager
 def results_folder(out: Path | None, name: str) -> Iterator[Path]:
-    """Where results go: --out (new or empty), else the first free of results/NAME, results/NAME-2 ...
+    """Yield --out, which must be new or empty, or the first free of results/NAME, results/NAME-2 ...
 
-    When nothing came of it the folder does not stay behind empty.
+    If the block raises and the folder is still empty, the folder is removed.
     """
     from chamberopt.common.files import make_output_folder
 
-    folder = make_output_folder(out) if out is not None else _claimed(name)
+    folder = make_output_folder(out) if out is not None else _first_free_folder(name)
     try:
         yield folder
     except BaseException:
@@ -35,8 +35,8 @@ def results_folder(out: Path | None, name: str) -> Iterator[Path]:
         raise
 
 
-def _claimed(name: str) -> Path:
-    """The first free folder results/NAME, results/NAME-2 ...: whoever makes it has it, if two look at once."""
+def _first_free_folder(name: str) -> Path:
+    """Make the first free folder results/NAME, results/NAME-2 ..."""
     from chamberopt.common.files import is_new_or_empty, make_output_folder
 
     for number in count(1):
@@ -48,36 +48,49 @@ def _claimed(name: str) -> Path:
                 folder.parent.mkdir(parents=True, exist_ok=True)
                 folder.mkdir()
         except FileExistsError:
-            if folder.exists():  # another command was faster
+            if folder.exists():  # another command made it first
                 continue
         except OSError:
-            pass  # make_output_folder says what is wrong
+            pass  # make_output_folder names the cause
         return make_output_folder(folder)
     raise AssertionError("there is always a next number")
 
 
-def remark(remarks: Sequence[str]) -> None:
-    """What went less than well, such as a picture skipped: to stderr, so that --json stays clean."""
+def print_remarks(remarks: Sequence[str]) -> None:
+    """Print remarks, such as a skipped picture, to stderr, so that --json stays clean."""
     for remark in remarks:
         print(remark, file=sys.stderr)
 
 
-def warn(design: Design, chamber: Chamber, which: str = "") -> list[str]:
-    """What `check` would warn of, to stderr, and for result.json; which: the design, where it is one of several."""
+def print_warnings(design: Design, chamber: Chamber, which: str = "") -> list[str]:
+    """Print the warnings of `check` to stderr, and return them for result.json.
+
+    Args:
+        which: names the design where there are several, e.g. " of the best design".
+    """
     from chamberopt.chamber.checks.check import warnings
 
     found = warnings(design, chamber)
-    remark([f"warning{which}: {text}" for text in found])
+    print_remarks([f"warning{which}: {text}" for text in found])
     return found
 
 
-def estimates(evaluation: Evaluation) -> list[str]:
-    """Objective and metrics, a line each, with their 95 % intervals."""
-    rows = {evaluation.objective_name: evaluation.objective, **evaluation.metrics}
-    return [row(name, estimate) for name, estimate in rows.items()]
+def print_json(values: Mapping[str, Any]) -> None:
+    print(json.dumps(values, indent=2))
 
 
-def row(name: str, estimate: Estimate) -> str:
+def print_result(
+    lines: Sequence[str], folder: Path, as_json: bool, file: str = "result.json"
+) -> None:
+    """Print the result and its folder on stdout: the lines, or the content of a JSON file."""
+    if as_json:
+        values = json.loads((folder / file).read_text(encoding="utf-8"))
+        print_json({**values, "folder": str(folder)})
+    else:
+        print("\n".join([*lines, f"results in {folder}"]))
+
+
+def estimate_line(name: str, estimate: Estimate) -> str:
     from chamberopt.coverage.statistics.confidence_interval import ZERO_TOLERANCE
 
     value, half_width = (
@@ -86,49 +99,43 @@ def row(name: str, estimate: Estimate) -> str:
     return f"{name:34}{value:12.5g} ± {half_width:.2g}"
 
 
-def accuracy_said(design: Design) -> str:
-    """How accurate a search is, in words."""
-    accuracy = design.process.accuracy
-    if accuracy.objective_half_width is not None:
-        return f"as many as make ± {accuracy.objective_half_width:g}"
-    return f"{accuracy.replicas} replicas of {design.process.recorded_time:g} s"
+def evaluation_lines(evaluation: Evaluation) -> list[str]:
+    """Objective and metrics, one line each, with their 95 % intervals."""
+    rows = {evaluation.objective_name: evaluation.objective, **evaluation.metrics}
+    return [estimate_line(name, estimate) for name, estimate in rows.items()]
 
 
-def notes_said(notes: Sequence[str]) -> list[str]:
+def note_lines(notes: Sequence[str]) -> list[str]:
     return [f"note: {note}" for note in notes]
 
 
-def facts_said(table: Mapping[str, Any], prefix: str = "") -> list[str]:
-    """A nested table as aligned lines; lists of sentences as notes and warnings."""
+def replicas_text(design: Design) -> str:
+    """How many replicas a design asks for, in words."""
+    accuracy = design.process.accuracy
+    if accuracy.objective_half_width is not None:
+        return f"as many replicas as give ± {accuracy.objective_half_width:g}"
+    return f"{accuracy.replicas} replicas of {design.process.recorded_time:g} s"
+
+
+def table_lines(table: Mapping[str, Any], prefix: str = "") -> list[str]:
+    """A nested table as aligned lines; its lists "notes" and "warnings" as one line for each item."""
     lines: list[str] = []
     for name, value in table.items():
+        label = f"{prefix + name:33} "
         if isinstance(value, Mapping) and set(value) == {"low", "start", "high"}:
-            lines.append(
-                f"{prefix + name:33} {value['start']:g} in {value['low']:g} .. {value['high']:g}"
-            )
+            lines.append(f"{label}{value['start']:g} in {value['low']:g} .. {value['high']:g}")
         elif isinstance(value, Mapping):
-            lines += facts_said(value, f"{prefix}{name}.")
+            lines += table_lines(value, f"{prefix}{name}.")
         elif name in ("notes", "warnings"):
             lines += [f"{name.removesuffix('s')}: {text}" for text in value]
         else:
-            text = _listed(value, name) if isinstance(value, list) else str(value)
-            lines.append(f"{prefix + name:34}{text}")
+            lines.append(label + (_list_text(value, name) if isinstance(value, list) else f"{value}"))
     return lines
 
 
-def _listed(values: list[Any], name: str) -> str:
-    """Sizes as 1 x 2 x 3, other numbers and names with commas."""
+def _list_text(values: list[Any], name: str) -> str:
+    """Sizes as 1 x 2 x 3, other numbers and names separated by commas."""
     if values and isinstance(values[0], float):
-        return (" x " if name.startswith("bounding_box") else ", ").join(
-            f"{value:g}" for value in values
-        )
+        separator = " x " if name.startswith("bounding_box") else ", "
+        return separator.join(f"{value:g}" for value in values)
     return ", ".join(values) or "none"
-
-
-def say(lines: Sequence[str], folder: Path, json: bool) -> None:
-    """The outcome on stdout: text, or what result.json holds; either way with the folder."""
-    if json:
-        result = json_format.loads((folder / "result.json").read_text(encoding="utf-8"))
-        print(json_format.dumps({**result, "folder": str(folder)}, indent=2))
-    else:
-        print("\n".join([*lines, f"results in {folder}"]))

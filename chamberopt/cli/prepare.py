@@ -1,4 +1,4 @@
-"""What comes before a simulation: compiling, aloud, and pilot runs that choose effects."""
+"""What precedes a simulation: compilation with a message, pilot runs, and the replica to repeat."""
 
 from __future__ import annotations
 
@@ -7,50 +7,57 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
+    from pathlib import Path
 
     from chamberopt.chamber.build import Chamber
     from chamberopt.design.load import Design
+    from chamberopt.output.resimulate.rebuild import Replica
+    from chamberopt.output.results.load import Result
     from chamberopt.simulation.effect_pilot import Advice
     from sim_core import AnalyticCavity
 
 
-def compiled(design: Design, chamber: Chamber, cavity: AnalyticCavity | None = None) -> None:
-    """Compiles, aloud, before the bar starts: else its first minute would look like a hang."""
+def compile_simulator(
+    design: Design, chamber: Chamber, cavity: AnalyticCavity | None = None
+) -> None:
+    """Compile with a message before the progress bar starts.
+
+    Otherwise the first minute would look like a hang.
+    """
     from chamberopt.chamber.scene import chamber_mesh, require_ball_count, scene_physics
     from chamberopt.common.progress import compile_with_message
 
     require_ball_count(design)
     shot = design.shot
     physics = scene_physics(design, cavity or chamber_mesh(chamber))
-    compile_with_message(
-        physics, shot.count, shot.mix is None, cavity is not None and cavity.radius is not None
-    )
+    is_cylinder = cavity is not None and cavity.radius is not None
+    compile_with_message(physics, shot.count, shot.mix is None, is_cylinder)
 
 
-def settled_effects(
+def resolve_effects(
     design: Design, chamber: Chamber, executor: Executor
 ) -> tuple[Design, list[Advice]]:
-    """The design with its effects chosen, and why, where it leaves them to us."""
+    """Replace each effect that is "auto" by what pilot runs advise, with the advice."""
     from chamberopt.common.progress import progress_bar
     from chamberopt.simulation.effect_pilot import with_effects_resolved
 
     with progress_bar("pilot runs") as progress:
         return with_effects_resolved(
-            design, chamber, executor, progress, lambda variant: compiled(variant, chamber)
+            design, chamber, executor, progress, lambda variant: compile_simulator(variant, chamber)
         )
 
 
-def effects_advised(design: Design, chamber: Chamber) -> list[dict[str, Any]]:
-    """Which effects a design needs, by pilot runs."""
+def advise_effects(design: Design, chamber: Chamber) -> list[dict[str, Any]]:
+    """Find by pilot runs which effects a design needs; the advice as plain JSON values."""
     from chamberopt.common.parallel.executor import local_executor
     from chamberopt.common.progress import progress_bar
     from chamberopt.simulation.effect_pilot import advise, with_effects_resolved
 
     def prepare(variant: Design) -> None:
-        compiled(variant, chamber)
+        compile_simulator(variant, chamber)
 
     print(
-        "pilot runs, with each effect switched (--no-pilot skips them) ...",
+        "pilot runs with each effect switched on and off (--no-pilot skips them) ...",
         file=sys.stderr,
         flush=True,
     )
@@ -58,3 +65,14 @@ def effects_advised(design: Design, chamber: Chamber) -> list[dict[str, Any]]:
         advice = with_effects_resolved(design, chamber, executor, progress, prepare)[1]
         advice = advice or advise(design, chamber, executor, progress, prepare)
     return [one.as_json() for one in advice]
+
+
+def load_replica(folder: Path, number: int) -> tuple[Result, Replica]:
+    """A result and one of its replicas, compiled to be simulated again."""
+    from chamberopt.output.resimulate.rebuild import rebuild_replica
+    from chamberopt.output.results.load import load_result
+
+    loaded = load_result(folder)
+    replica = rebuild_replica(loaded, number)
+    compile_simulator(replica.design, replica.chamber, replica.cavity)
+    return loaded, replica

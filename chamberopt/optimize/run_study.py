@@ -115,7 +115,7 @@ def search_and_confirm(
     stop: Stop | None = None,
 ) -> StudyResult:
     """The same from where a record stands. study: the record's, with its effects chosen (StudyFolder.settled)."""
-    folder = record.folder
+    folder = record.path
     record.begin()
     save_inputs(study, folder)
     target = fixed_target(study)

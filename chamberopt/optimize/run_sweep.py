@@ -131,7 +131,7 @@ def _go_on(
 ) -> SweepResult:
     """From where the record stands."""
     record.begin()
-    save_inputs(study, record.folder)
+    save_inputs(study, record.path)
     trials: list[Trial] = []
     for number, point in enumerate(plan.points):
         trial = record.replayed(number, "sweep", point.tolist())
@@ -149,9 +149,9 @@ def _go_on(
     if all(trial.objective is None for trial in trials):
         raise InputError(
             f"no candidate of the sweep could be simulated, the first for: {trials[0].reason}; change [vary] or the "
-            f"design; every candidate is in {record.folder / HISTORY}"
+            f"design; every candidate is in {record.path / HISTORY}"
         )
-    return SweepResult(study, plan, record.folder, tuple(trials), record.seconds)
+    return SweepResult(study, plan, record.path, tuple(trials), record.seconds)
 
 
 def _judged(

@@ -59,7 +59,7 @@ class StudyFolder:
     """See open_study_folder. trials: those on disk when it was opened."""
 
     def __init__(self, study: Study, folder: Path, plan: Mapping[str, Any] | None = None) -> None:
-        self.folder, self._study, self._inputs = folder, study, study_inputs(study, plan)
+        self.path, self._study, self._inputs = folder, study, study_inputs(study, plan)
         self._history, self._timings = (
             JsonLines(folder / HISTORY),
             JsonLines(folder / TIMINGS, lasting=False),
@@ -71,7 +71,7 @@ class StudyFolder:
     @property
     def finished(self) -> bool:
         """Whether its result is written."""
-        return is_finished(self.folder)
+        return is_finished(self.path)
 
     @property
     def begun(self) -> bool:
@@ -81,15 +81,15 @@ class StudyFolder:
     @property
     def seconds(self) -> float:
         """Wall clock of all its evaluations, whenever they ran."""
-        return sum(read_seconds(self.folder).values())
+        return sum(read_seconds(self.path).values())
 
     def begin(self) -> None:
         """Write down what was asked, before anything that answers it; over an older question that nothing came of."""
-        path = self.folder / INPUTS
+        path = self.path / INPUTS
         if path.is_file() and (self.begun or _read_json(path) == self._inputs):
             return
         for name in (EFFECTS, STUDY):
-            (self.folder / name).unlink(missing_ok=True)
+            (self.path / name).unlink(missing_ok=True)
         write_text(path, json.dumps(self._inputs, indent=2) + "\n")
 
     def with_effects_resolved(
@@ -102,7 +102,7 @@ class StudyFolder:
         if not design.effects.auto:
             return self._study, []
         self.begin()
-        path = self.folder / EFFECTS
+        path = self.path / EFFECTS
         if not path.is_file():
             chosen, advice = resolve(design)
             told = {
@@ -148,7 +148,7 @@ class StudyFolder:
         """Keep a trial, of a confirmation all of it; on the disk when this returns. Raises OSError if it cannot be, and
         InputError if the part's file has changed under it.
         """
-        require_same_files(self._study.design, self._inputs, self.folder)
+        require_same_files(self._study.design, self._inputs, self.path)
         if trial.stage == "confirm" and evaluation is not None:
             path = self._file(trial.number)
             path.parent.mkdir(exist_ok=True)
@@ -157,18 +157,18 @@ class StudyFolder:
         self._timings.append({"number": trial.number, "seconds": round(seconds, 3)})
 
     def _file(self, number: int) -> Path:
-        return self.folder / CONFIRMED / f"{number:03d}.npz"
+        return self.path / CONFIRMED / f"{number:03d}.npz"
 
     def _require_same_study(self) -> None:
         """Where evaluations are there, they answer what was asked then."""
         if not self.begun:
             return
-        before, now = _read_json(self.folder / INPUTS), self._inputs
+        before, now = _read_json(self.path / INPUTS), self._inputs
         if self.finished:  # its result stands, whatever program is asked for it
             before, now = (
                 {key: one.get(key) for key in ("study", "sweep")} for one in (before, now)
             )
-        require_same(self.folder, before, now)
+        require_same(self.path, before, now)
 
     def _read_trials(self) -> list[Trial]:
         trials = []

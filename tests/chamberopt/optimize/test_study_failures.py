@@ -206,7 +206,7 @@ class TestCommandLine:
 
         self.at: dict[int, Callable[[], None]] = {}
         monkeypatch.setattr("chamberopt.optimize.run_study.chamber_simulator", lambda *_: simulator)
-        monkeypatch.setattr("chamberopt.cli.studies.compiled", lambda *_: None)
+        monkeypatch.setattr("chamberopt.cli.commands.run.compile_simulator", lambda *_: None)
         monkeypatch.setattr("chamberopt.output.viewer.draw_coverage", lambda *_: None)
         return done
 
@@ -221,12 +221,12 @@ class TestCommandLine:
         assert main(["run", "small.toml", "--out", "out"]) == 130
         err = capfd.readouterr().err
         assert FIRST in err
-        assert err.splitlines()[-1] == "to go on: chamberopt run small.toml --out out"
+        assert err.splitlines()[-1] == "to resume: chamberopt run small.toml --out out"
         assert (self.rows(), len(evaluated)) == (3, 3)
         assert signal.getsignal(signal.SIGINT) is before
         assert main(["run", "small.toml", "--out", "out"]) == 0
         out, err = capfd.readouterr()
-        assert "out: 3 evaluations are there; going on from the next" in err
+        assert "out: resuming after 3 evaluations" in err
         assert "gain" in out
         assert len(evaluated) == len(set(evaluated)) == self.rows() == ROWS
 
@@ -248,7 +248,7 @@ class TestCommandLine:
         assert (
             err.index(FIRST)
             < err.index(SECOND)
-            < err.index("to go on: chamberopt run small.toml --out out")
+            < err.index("to resume: chamberopt run small.toml --out out")
         )
         assert self.rows() == 2
         self.at.clear()
@@ -261,13 +261,13 @@ class TestCommandLine:
     ) -> None:
         """Wherever it comes: an exception would be dropped in an import, and crash in the compiler."""
         monkeypatch.setattr(
-            "chamberopt.cli.studies.compiled", lambda *_: os.kill(os.getpid(), signal.SIGINT)
+            "chamberopt.cli.commands.run.compile_simulator", lambda *_: os.kill(os.getpid(), signal.SIGINT)
         )
         child = fork.Process(target=main, args=(["run", "small.toml"],))
         child.start()
         child.join(60)
         assert (child.exitcode, EARLY in capfd.readouterr().err) == (130, True)
-        monkeypatch.setattr("chamberopt.cli.studies.compiled", lambda *_: None)
+        monkeypatch.setattr("chamberopt.cli.commands.run.compile_simulator", lambda *_: None)
         assert main(["run", "small.toml"]) == 0
         assert [path.name for path in Path("results").iterdir()] == ["small"]
 
@@ -284,7 +284,7 @@ class TestCommandLine:
             what
             == f"{Path('out/history.jsonl')}: No space left on device; what had been finished stays on disk"
         )
-        assert how == "to go on: chamberopt run small.toml --out out"
+        assert how == "to resume: chamberopt run small.toml --out out"
         assert self.rows() == 3
 
     @pytest.mark.parametrize(
@@ -301,7 +301,7 @@ class TestCommandLine:
         what, which, how = capfd.readouterr().err.splitlines()[-3:]
         assert said in what
         assert which.startswith("in evaluation 4 (search): shot.mass_g = ")
-        assert how == "to go on: chamberopt run small.toml --out out"
+        assert how == "to resume: chamberopt run small.toml --out out"
 
     def test_a_bug_shows_where_it_was_and_how_to_go_on(self, evaluated: list) -> None:
         def fail() -> None:
@@ -310,7 +310,7 @@ class TestCommandLine:
         self.at[2] = fail
         with pytest.raises(ZeroDivisionError) as raised:
             main(["run", "small.toml", "--out", "out"])
-        assert raised.value.__notes__[1] == "to go on: chamberopt run small.toml --out out"
+        assert raised.value.__notes__[1] == "to resume: chamberopt run small.toml --out out"
 
     @pytest.mark.parametrize(
         "step",
@@ -343,7 +343,7 @@ class TestCommandLine:
         assert main(["run", "small.toml", "--out", "out"]) == 0
         out, err = capfd.readouterr()
         assert (
-            "out: this study is finished, nothing was run; to run it anew give another folder (--out)"
+            "out: this study is finished, nothing was run; to run it again, give another folder (--out)"
             in err
         )
         assert "uniform coverage" in out
@@ -368,10 +368,10 @@ class TestCommandLine:
         self.at[3] = lambda: os.kill(os.getpid(), signal.SIGINT)
         assert main(["run", "small.toml"]) == 130
         first = Path("results", "small")
-        assert f"to go on: chamberopt run small.toml --out {first}" in capfd.readouterr().err
+        assert f"to resume: chamberopt run small.toml --out {first}" in capfd.readouterr().err
         assert main(["run", "small.toml"]) == 0
         assert (
-            f"{first}: not finished; to go on there: chamberopt run small.toml --out {first}"
+            f"{first}: not finished; to resume it: chamberopt run small.toml --out {first}"
             in capfd.readouterr().err
         )
         assert self.rows("results/small") == 3

@@ -290,7 +290,7 @@ def marked(
 def no_simulator(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(climbing, "_replica", played)
     monkeypatch.setattr("chamberopt.simulation.convergence.dent_runs._marked", marked)
-    monkeypatch.setattr("chamberopt.cli.designs.compiled", lambda *_: None)
+    monkeypatch.setattr("chamberopt.cli.commands.accuracy.compile_simulator", lambda *_: None)
 
 
 @pytest.mark.usefixtures("no_simulator")

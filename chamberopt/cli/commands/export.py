@@ -1,8 +1,7 @@
-"""export: what other programs read."""
+"""The command `export`: results in the formats of other programs."""
 
 from __future__ import annotations
 
-import json as json_format
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from chamberopt.cli.console import remark, results_folder
+from chamberopt.cli.console import print_json, print_remarks, results_folder
 from chamberopt.cli.options import Json, Workers, app
-from chamberopt.cli.prepare import compiled
+from chamberopt.cli.prepare import compile_simulator
 from chamberopt.common.errors import InputError
 from chamberopt.output.export.formats import (
     FORMATS,
@@ -39,61 +38,63 @@ To = Annotated[
 
 @app.command
 def export(
-    result: Path, /, *, to: To, frame: FrameName | None = None, replicas: int | None = None,
-    workers: Workers = None, json: Json = False, out: Path | None = None,
-) -> None:  # fmt: skip
-    """Hand a result on to other programs. Impacts are simulated again, as no result keeps them, and compared with it.
+    result: Path,
+    /,
+    *,
+    to: To,
+    frame: FrameName | None = None,
+    replicas: int | None = None,
+    workers: Workers = None,
+    json: Json = False,
+    out: Path | None = None,
+) -> None:
+    """Write a result in the formats of other programs.
+
+    No result stores its impacts: for them it is simulated again and compared with the original.
 
     Parameters
     ----------
     result
         Results folder.
     frame
-        Of impacts: that of the part's own file, in its unit, which is the default, or the chamber's, in mm.
+        Coordinates of impacts: "part" (default), as in the part's file and in its unit; or
+        "chamber", in mm.
     replicas
-        Of impacts: only so many replicas, the first ones; they cannot be compared with the result.
+        Export the impacts of this many replicas only; they are then not compared with the result.
     out
-        Folder for the files, new or empty; or, of a single format, a file that is not there yet.
+        Folder for the files, new or empty; for a single format it may be a file that does not exist.
     """
     from chamberopt.output.results.load import load_result
 
     formats = formats_by_name(to)
-    again = [name for name, one in formats.items() if one.writer is None]
+    from_impacts = [name for name, one in formats.items() if one.writer is None]
     for name, given in (("frame", frame), ("replicas", replicas)):
-        if given is not None and not again:
+        if given is not None and not from_impacts:
             raise InputError(
-                f"--{name}: counts for impacts alone; leave it out, or add --to impacts-parquet"
+                f"--{name}: applies only to impact exports; remove it or add --to impacts-parquet"
             )
     loaded = None if set(formats) == {STUDY} else load_result(result)
     folder = loaded.folder if loaded else result
-    impacts = 0
+    counts: dict[str, int] = {}
     with _files(formats, out, f"{folder.resolve().name}-export") as files:
-        if (
-            loaded and again
-        ):  # first: they are refused where they do not give the result's figures again
-            impacts = _impacts(
-                loaded, [files[name] for name in again], frame or "part", replicas, workers
-            )
+        # Impacts come first: they are refused where they differ from the result.
+        if loaded and from_impacts:
+            tables = [files[name] for name in from_impacts]
+            counts["impacts"] = _write_impacts(loaded, tables, frame or "part", replicas, workers)
         for name, one in formats.items():
             if one.writer is not None:
-                remark(one.write(folder, files[name]))
+                print_remarks(one.write(folder, files[name]))
     if json:
-        told = {name: str(file) for name, file in files.items()}
-        print(
-            json_format.dumps(
-                {"result": str(folder), "files": told, **({"impacts": impacts} if again else {})}
-            )
-        )
+        paths = {name: str(file) for name, file in files.items()}
+        print_json({"result": str(folder), "files": paths, **counts})
         return
-    lines = [f"{impacts:,} impacts"] if again else []
+    lines = [f"{count:,} {what}" for what, count in counts.items()]
     print("\n".join([*lines, *(f"{name:24}{file}" for name, file in files.items())]))
 
 
 @contextmanager
-def _files(
-    formats: dict[str, ExportFormat], out: Path | None, name: str
-) -> Iterator[dict[str, Path]]:
-    """Where each format goes: --out where that is a file, else a new folder."""
+def _files(formats: dict[str, ExportFormat], out: Path | None, name: str) -> Iterator[dict[str, Path]]:
+    """The file of each format: --out itself if it is a file, else one in a new folder."""
     from chamberopt.common.files import check_new_file
 
     if out is not None and is_file(out, formats):
@@ -103,10 +104,10 @@ def _files(
         yield {name: folder / one.file for name, one in formats.items()}
 
 
-def _impacts(
+def _write_impacts(
     result: Result, files: list[Path], frame: FrameName, replicas: int | None, workers: int | None
 ) -> int:
-    """Simulates the result again into these files; how many impacts there are."""
+    """Simulate the result again, write its impacts to the files, and return their number."""
     from chamberopt.common.parallel.executor import open_executor
     from chamberopt.common.progress import progress_bar
     from chamberopt.output.export.impacts_table import require_writable, write_impacts
@@ -114,15 +115,14 @@ def _impacts(
     from chamberopt.output.resimulate.rebuild import rebuild_chamber
 
     require_writable(files)
-    fewer = replica_count(result, replicas) < result.data["replicas"]
+    recorded = result.data["replicas"]
+    fewer = replica_count(result, replicas) < recorded
     ground = rebuild_chamber(result)
-    compiled(result.design, ground.chamber, ground.cavity)
+    compile_simulator(result.design, ground.chamber, ground.cavity)
     with open_executor(workers, None) as executor, progress_bar("replicas") as progress:
         impacts = write_impacts(
             files, result, ground, executor, frame=frame, replicas=replicas, progress=progress
         )
     if fewer:
-        remark(
-            [f"only {replicas} of {result.data['replicas']} replicas: not compared with the result"]
-        )
+        print_remarks([f"only {replicas} of {recorded} replicas: not compared with the result"])
     return impacts

@@ -1,14 +1,13 @@
-"""compare: designs and results, against the first of them."""
+"""The command `compare`: designs and results against the first of them."""
 
 from __future__ import annotations
 
-import json as json_format
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from chamberopt.cli.console import remark, results_folder, warn
+from chamberopt.cli.console import print_remarks, print_result, print_warnings, results_folder
 from chamberopt.cli.options import Cluster, Json, Out, Workers, app
-from chamberopt.cli.prepare import compiled, settled_effects
+from chamberopt.cli.prepare import compile_simulator, resolve_effects
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -21,41 +20,41 @@ if TYPE_CHECKING:
 
 @app.command
 def compare(
-    *candidates: Path, treatment_time_s: float | None = None, workers: Workers = None, cluster: Cluster = None,
-    json: Json = False, out: Out = None,
-) -> None:  # fmt: skip
-    """Compare candidates for the same part: what differs, what that did to the coverage, and whether it is real.
+    *candidates: Path,
+    treatment_time_s: float | None = None,
+    workers: Workers = None,
+    cluster: Cluster = None,
+    json: Json = False,
+    out: Out = None,
+) -> None:
+    """Compare candidates for the same part: what differs, its effect on coverage, and whether that
+    effect is larger than the noise.
 
     Parameters
     ----------
     candidates
-        Two or more design files (.toml) or results folders; the first is what the others are measured against. Designs
-        are simulated, on the seeds of the first.
+        Two or more design files (.toml) or results folders; the others are compared with the first.
+        Designs are simulated with the seeds of the first.
     treatment_time_s
-        Compare after so long; results of another treatment time are simulated again.
+        Compare after this time; results of another treatment time are simulated again.
     """
     from chamberopt.output.compare.candidates import gathered
     from chamberopt.output.compare.comparison import comparison_of
     from chamberopt.output.compare.files import COMPARE, write_comparison
     from chamberopt.output.compare.table import as_text
 
-    found = gathered(candidates, treatment_time_s)
+    gathered_candidates = gathered(candidates, treatment_time_s)
     with results_folder(out, "compare") as folder:
-        comparison = comparison_of(
-            _results(found, folder, workers, cluster), [one.label for one in found]
-        )
-        remark(write_comparison(folder, comparison))
-    if json:
-        about = json_format.loads((folder / COMPARE).read_text(encoding="utf-8"))
-        print(json_format.dumps({**about, "folder": str(folder)}, indent=2))
-    else:
-        print(f"{as_text(comparison)}\nresults in {folder}")
+        results = _results(gathered_candidates, folder, workers, cluster)
+        comparison = comparison_of(results, [one.label for one in gathered_candidates])
+        print_remarks(write_comparison(folder, comparison))
+    print_result([as_text(comparison)], folder, json, COMPARE)
 
 
 def _results(
     candidates: list[Candidate], folder: Path, workers: int | None, cluster: str | None
 ) -> list[Result]:
-    """The results of all; those that are missing are simulated."""
+    """The results of all candidates; missing ones are simulated."""
     from chamberopt.common.parallel.executor import open_executor
     from chamberopt.output.compare.candidates import simulated
 
@@ -66,11 +65,11 @@ def _results(
         def prepare(
             design: Design, chamber: Chamber, cavity: AnalyticCavity | None
         ) -> tuple[Design, list[Advice]]:
-            warn(design, chamber)
-            settled, advice = settled_effects(design, chamber, executor)
-            compiled(settled, chamber, cavity)
-            return settled, advice
+            print_warnings(design, chamber)
+            design, advice = resolve_effects(design, chamber, executor)
+            compile_simulator(design, chamber, cavity)
+            return design, advice
 
         results, remarks = simulated(candidates, folder, executor, prepare)
-    remark(remarks)
+    print_remarks(remarks)
     return results

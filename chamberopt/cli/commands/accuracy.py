@@ -1,0 +1,39 @@
+"""The command `accuracy`: a convergence study of the numerical parameters of one design."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from chamberopt.cli.console import print_result, results_folder
+from chamberopt.cli.options import Json, Out, app
+from chamberopt.cli.prepare import compile_simulator
+
+
+@app.command
+def accuracy(
+    design: Path, /, *, budget_s: float = 300.0, json: Json = False, out: Out = None
+) -> None:
+    """Measure error against computing time, and recommend settings for 5, 1 and 0.1 % error.
+
+    Each numerical parameter is compared with a reference simulation.
+
+    Parameters
+    ----------
+    design
+        Design file (.toml).
+    budget_s
+        CPU seconds to spend on simulations; with more, smaller errors become visible.
+    """
+    from chamberopt.common.parallel.executor import local_executor
+    from chamberopt.common.progress import progress_bar
+    from chamberopt.design.load import load_design
+    from chamberopt.output.results.accuracy_results import as_text, write_accuracy_results
+    from chamberopt.simulation.convergence.study import require_budget, run_convergence_study
+
+    require_budget(budget_s)
+    candidate = load_design(design)
+    with results_folder(out, f"{design.stem}-accuracy") as folder:
+        with local_executor() as executor, progress_bar("CPU seconds") as progress:
+            convergence = run_convergence_study(candidate, budget_s, executor, progress, compile_simulator)
+        write_accuracy_results(folder, convergence)
+    print_result(as_text(convergence), folder, json, "accuracy.json")

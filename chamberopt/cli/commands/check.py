@@ -1,0 +1,105 @@
+"""The command `check`: what a design or study file describes, and which effects it needs."""
+
+from __future__ import annotations
+
+import json as json_format
+from pathlib import Path
+from textwrap import fill
+from typing import TYPE_CHECKING
+
+from chamberopt.cli.console import print_json, print_remarks, table_lines
+from chamberopt.cli.options import Json, Out, app
+from chamberopt.cli.prepare import advise_effects
+
+if TYPE_CHECKING:
+    from chamberopt.chamber.build import Chamber
+    from chamberopt.chamber.reach.reach import Reach
+    from chamberopt.geometry.mesh_io import SurfaceError
+
+
+@app.command
+def check(
+    file: Path,
+    /,
+    *,
+    pilot: bool = True,
+    screenshot: Path | None = None,
+    json: Json = False,
+    out: Out = None,
+) -> None:
+    """Check a design or study file: geometry, volumes, shot, warnings, and the effects it needs.
+
+    Short pilot runs with each effect switched on and off show which effects matter.
+
+    Parameters
+    ----------
+    file
+        Design or study file (.toml).
+    pilot
+        With --no-pilot nothing is simulated.
+    screenshot
+        Write an image (.png) of the part with its target and chamber, or of the surface's faults.
+    """
+    from chamberopt.chamber.build import build_chamber
+    from chamberopt.chamber.checks.check import describe, shot_reach
+    from chamberopt.common.files import make_output_folder, write_text
+    from chamberopt.geometry.mesh_io import SurfaceError
+    from chamberopt.optimize.load_study import load
+    from chamberopt.optimize.study import Study
+    from chamberopt.output.vtp_files import write_chamber
+
+    loaded = load(file)
+    kind, design = ("study", loaded.design) if isinstance(loaded, Study) else ("design", loaded)
+    try:
+        chamber = build_chamber(design)
+    except SurfaceError as error:
+        if screenshot is not None:
+            _draw_fault(error, screenshot)
+        raise
+    reach = shot_reach(design, chamber)
+    facts = describe(design, chamber, reach)
+    if screenshot is not None:
+        _draw_target(chamber, reach, screenshot)
+    if isinstance(loaded, Study):
+        facts["vary"] = {
+            name: {"low": low, "start": design.value(name), "high": high}
+            for name, (low, high) in loaded.vary.items()
+        }
+        facts["evaluations"] = loaded.optimizer.evaluations
+    if out is not None:
+        facts["folder"] = str(make_output_folder(out))
+    if not json:
+        print("\n".join([f"{file}: a usable {kind}", *table_lines(facts)]), flush=True)
+    if pilot:
+        facts["effects"] = advise_effects(design, chamber)
+        if not json:
+            print("\n".join(f"effect: {one['said']}" for one in facts["effects"]))
+    if out is not None:
+        write_text(out / "check.json", json_format.dumps(facts, indent=2) + "\n")
+        write_chamber(out, chamber)
+    if json:
+        print_json(facts)
+
+
+def _draw_fault(error: SurfaceError, screenshot: Path) -> None:
+    """Draw the faults of a part's surface in red; the message itself follows on stderr."""
+    from chamberopt.output.viewer import draw_part
+
+    text = fill(str(error), 110)
+    remark = draw_part(error.corners, text, screenshot, edges=error.edges)
+    print_remarks([remark or f"picture in {screenshot}"])
+
+
+def _draw_target(chamber: Chamber, reach: Reach, screenshot: Path) -> None:
+    """Draw the part with its target, and in red the target's triangles that no ball can touch."""
+    from chamberopt.chamber.reach.reach import part_share
+    from chamberopt.output.viewer import draw_part
+
+    part = chamber.part
+    missed = part.target & (part_share(reach, chamber.source, len(part.triangles)) <= 0.5)
+    title = f"{part.name}: the target in orange"
+    if missed.any():
+        title += ", in red where hardly a ball can touch it"
+    corners = part.vertices[part.triangles]
+    remark = draw_part(corners, title, screenshot, part.target, missed=missed, chamber=chamber)
+    print_remarks([remark or f"picture in {screenshot}"])

@@ -1,0 +1,57 @@
+"""The command `dents`: an image of every dent that one replica of a result leaves on the part."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from chamberopt.cli.options import View, app
+from chamberopt.cli.prepare import load_replica
+
+
+@app.command
+def dents(
+    result: Path,
+    picture: Path,
+    /,
+    *,
+    replica: int = 0,
+    at_s: float | None = None,
+    view: View = None,
+    pixels: int = 1000,
+) -> None:
+    """Draw each dent of one replica at its place and size; the surface without dents is black.
+
+    Parameters
+    ----------
+    result
+        Results folder.
+    picture
+        File to write (.png).
+    replica
+        Number of the replica, from 0; it is simulated beyond its recorded time if necessary.
+    at_s
+        Peening time in seconds, by default the treatment time.
+    pixels
+        Longer side of one view in pixels.
+    """
+    from chamberopt.output.resimulate.dent_map import coverage, default_views, dent_map, peened
+    from chamberopt.output.viewer import parse_view
+    from chamberopt.output.viewer.images.dent_map import FINER, dent_picture, require_pixels
+    from chamberopt.output.viewer.subprocess_drawing import picture_path
+
+    path = picture_path(picture, "")
+    eye = parse_view(view) if view else None
+    require_pixels(pixels)
+    loaded, resimulated = load_replica(result, replica)
+    design, chamber = resimulated.design, resimulated.chamber
+    time = design.process.treatment_time if at_s is None else at_s
+    left = peened(resimulated, time)
+    share = coverage(left, chamber, design.process.accuracy.sample_spacing)
+    sides = [eye] if eye else default_views(chamber)
+    maps = [dent_map(chamber, left, side, FINER * pixels) for side in sides]
+    recorded = resimulated.scene.duration
+    beyond = f", simulated on from {recorded:g} s" if time > recorded else ""
+    title = f"{len(left):,} dents after {time:g} s in replica {replica}{beyond}"
+    title += f": {share:.1%} of the target"
+    dent_picture(maps, left, f"{loaded.folder.resolve().name}: {title}", path)
+    print(f"{title}\npicture in {path}")

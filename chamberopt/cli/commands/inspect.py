@@ -1,0 +1,109 @@
+"""The command `inspect`: results in 3D, triangle by triangle."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from chamberopt.cli.console import print_json, print_remarks, results_folder
+from chamberopt.cli.options import Json, Out, View, app
+from chamberopt.common.errors import InputError
+
+
+@app.command
+def inspect(
+    *results: Path,
+    quantity: str = "coverage",
+    time_s: float | None = None,
+    below: float | None = None,
+    clip: str | None = None,
+    cut_part: bool = False,
+    chamber: bool = True,
+    triangle: int | None = None,
+    view: View = None,
+    screenshot: Path | None = None,
+    off_screen: bool = False,
+    html: Path | None = None,
+    json: Json = False,
+    out: Out = None,
+) -> None:
+    """Show results in 3D: each part in its chamber, coloured triangle by triangle.
+
+    Options set the initial view; key h in the window lists its keys. With --out, an image is
+    written to that folder.
+
+    Parameters
+    ----------
+    results
+        One or more results folders; several are shown in linked views on one colour scale.
+    quantity
+        coverage, impacts, speed, p90-speed, angle, dent, energy or interval.
+    time_s
+        Show coverage, impacts and energy after this time instead of the treatment time.
+    below
+        Show only triangles covered less than this percentage; the others are pale.
+    clip
+        Cut the chamber open across an axis: X, Y or Z, and where in mm: Z=12.
+    cut_part
+        Cut the part too.
+    chamber
+        Draw the chamber.
+    triangle
+        Show the numbers and impact speeds of this triangle (its row in coverage.vtp, from 0).
+    screenshot
+        Write an image to this file instead of opening a window.
+    off_screen
+        Open no window; write inspect.png to --out, by default to results/inspect.
+    html
+        Write an HTML page that shows the parts in a browser.
+    """
+    from chamberopt.output import viewer
+    from chamberopt.output.results.load import load_result, summary
+
+    look = viewer.ViewState(
+        quantity=quantity,
+        time_s=time_s,
+        below=below,
+        cut=viewer.parse_clip(clip) if clip else None,
+        cut_part=cut_part,
+        chamber=chamber,
+        triangle=triangle,
+        eye=viewer.parse_view(view) if view else None,
+    )
+    if not results:
+        raise InputError("inspect: requires an argument: one or more results folders")
+    if screenshot is not None and out is not None:
+        raise InputError(
+            "inspect: --screenshot and --out both name the place of the image; give one of them"
+        )
+    loaded = [load_result(path) for path in results]
+    if not json:
+        print("\n".join(summary(one) for one in loaded))
+    if html is not None:
+        from chamberopt.output.report import write_part_page
+
+        if look != viewer.ViewState():
+            raise InputError(
+                "inspect: the page of --html sets the view in the browser; "
+                "remove the options that set the initial view"
+            )
+        print_remarks(write_part_page([one.folder for one in loaded], html))
+    if screenshot is None and (off_screen or out is not None):
+        with results_folder(out, "inspect") as folder:
+            screenshot = folder / "inspect.png"
+            viewer.inspect([viewer.result_info(one) for one in loaded], look, screenshot)
+    elif html is None or screenshot is not None:
+        viewer.inspect([viewer.result_info(one) for one in loaded], look, screenshot)
+    if json:
+        first = {**loaded[0].data, "folder": str(loaded[0].folder)} if len(loaded) == 1 else {}
+        print_json(
+            {
+                **first,
+                "folders": [str(one.folder) for one in loaded],
+                "screenshot": screenshot and str(screenshot),
+                "page": html and str(html),
+            }
+        )
+        return
+    for kind, path in (("page", html), ("picture", screenshot)):
+        if path is not None:
+            print(f"{kind} in {path}")

@@ -1,0 +1,166 @@
+"""The command `run`: the search for a better design."""
+
+from __future__ import annotations
+
+import shlex
+from contextlib import nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from chamberopt.cli.console import (
+    estimate_line,
+    evaluation_lines,
+    note_lines,
+    print_remarks,
+    print_result,
+    print_warnings,
+    replicas_text,
+    results_folder,
+)
+from chamberopt.cli.interrupt import Interrupt
+from chamberopt.cli.options import Cluster, Json, Resumable, Workers, app
+from chamberopt.cli.prepare import compile_simulator, resolve_effects
+from chamberopt.common.errors import InputError
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from chamberopt.chamber.build import Chamber
+    from chamberopt.optimize.run_study import StudyResult
+    from chamberopt.optimize.storage.study_folder import StudyFolder
+
+
+@app.command
+def run(
+    study: Path,
+    /,
+    *,
+    workers: Workers = None,
+    cluster: Cluster = None,
+    json: Json = False,
+    out: Resumable = None,
+) -> None:
+    """Search for a better design, confirm it with new seeds, and write it as best.toml.
+
+    With --out of an interrupted run, the run is resumed. Ctrl-C stops after the current
+    evaluation; a second Ctrl-C stops at once.
+
+    Parameters
+    ----------
+    study
+        Study file (.toml).
+    """
+    with Interrupt() as interrupt:
+        from chamberopt.chamber.build import build_chamber
+        from chamberopt.common.parallel.executor import open_executor
+        from chamberopt.optimize.load_study import load_study
+        from chamberopt.optimize.storage.study_folder import open_study_folder
+
+        loaded = load_study(study)
+        chamber = build_chamber(loaded.design)
+        if out is None:
+            print_remarks(_unfinished_runs(study))
+        place = results_folder(None, study.stem) if out is None else nullcontext(out)
+        with place as path, open_study_folder(loaded, path) as folder:
+            if folder.finished:
+                _print_finished(folder.path, json)
+                return
+            how_to_resume = f"to resume: {_command('run', study, '--out', folder.path)}"
+            try:
+                with open_executor(workers, cluster) as executor:
+                    result, notes = _search(folder, chamber, executor, interrupt, how_to_resume)
+            except InputError:
+                raise
+            except BaseException as error:
+                if folder.begun:
+                    error.add_note(how_to_resume)
+                raise
+            print_result([*_result_lines(result), *note_lines(notes)], folder.path, json)
+            if not json:
+                show, best = _command("report", folder.path), folder.path / "best.toml"
+                print(f"to see it: {show}; the design: {best}")
+
+
+def _search(
+    folder: StudyFolder,
+    chamber: Chamber,
+    executor: Executor,
+    interrupt: Interrupt,
+    how_to_resume: str,
+) -> tuple[StudyResult, list[str]]:
+    """Run or resume the study of a folder and save its result; returns notes for the user too.
+
+    Args:
+        chamber: chamber of the study's design.
+    """
+    from chamberopt.chamber.build import build_chamber
+    from chamberopt.common.progress import progress_bar
+    from chamberopt.optimize.run_study import search_and_confirm
+    from chamberopt.output.save_run import save_study
+
+    study, advice = folder.with_effects_resolved(
+        lambda design: resolve_effects(design, chamber, executor)
+    )
+    compile_simulator(study.design, chamber)
+    if folder.trials:
+        print_remarks([f"{folder.path}: resuming after {len(folder.trials)} evaluations"])
+    with progress_bar("evaluations") as progress:
+        interrupt.wait_for_evaluation(how_to_resume)
+        result = search_and_confirm(
+            study, folder, executor, progress, stop=lambda: interrupt.requested
+        )
+    best = result.best.design
+    warnings = print_warnings(best, build_chamber(best, result.target), " of the best design")
+    print_remarks(save_study(folder.path, result, advice, warnings))
+    notes = [*map(str, advice), *result.warnings, *result.at_bounds, *chamber.notes]
+    return result, [*notes, *result.best.evaluation.notes]
+
+
+def _result_lines(result: StudyResult) -> list[str]:
+    study, start, best = result.study, result.start, result.best
+    lines = [f"{'parameter':34}{'start':>12}{'best':>12}"]
+    for name in study.vary:
+        lines.append(f"{name:34}{study.design.value(name):12.5g}{best.design.value(name):12.5g}")
+    lines += ["", "start", *evaluation_lines(start.evaluation)]
+    lines += ["", "best", *evaluation_lines(best.evaluation)]
+    verdict = "better than the start" if result.improved else "within the noise of the start"
+    lines += ["", f"{estimate_line('gain', result.gain)}: {verdict}"]
+    if result.sensitivity:
+        lines += ["", *result.sensitivity.sentences(), ""]
+    if study.objective.pareto:
+        names = " and ".join(study.objective.pareto)
+        lines += [f"the Pareto front of {names}: pareto.csv, pareto.png", ""]
+    replicas, seconds = len(best.evaluation.replicas), study.design.process.recorded_time
+    effort = replicas_text(study.at_search_accuracy(study.design))
+    return [
+        *lines,
+        f"± 95 % intervals; start and best: {replicas} replicas of {seconds:g} s with seeds of "
+        f"their own; candidates of the search in history.csv: {effort}",
+    ]
+
+
+def _print_finished(folder: Path, as_json: bool) -> None:
+    """Print the result of a study that is finished already."""
+    from chamberopt.output.results.load import load_result, summary
+
+    again = "to run it again, give another folder (--out)"
+    print_remarks([f"{folder}: this study is finished, nothing was run; {again}"])
+    print_result([f"best design: {summary(load_result(folder))}"], folder, as_json)
+
+
+def _unfinished_runs(study: Path) -> list[str]:
+    """Remarks on earlier runs of the study that were interrupted, because a new one begins now."""
+    from chamberopt.optimize.storage.study_folder import is_finished, is_study_folder
+
+    results = Path("results")
+    numbered = sorted(results.glob(f"{study.stem}-[0-9]*"))
+    return [
+        f"{folder}: not finished; to resume it: {_command('run', study, '--out', folder)}"
+        for folder in (results / study.stem, *numbered)
+        if is_study_folder(folder) and not is_finished(folder)
+    ]
+
+
+def _command(*words: object) -> str:
+    """A chamberopt command, quoted for a shell."""
+    return shlex.join(["chamberopt", *map(str, words)])

@@ -1,0 +1,58 @@
+"""The command `simulate`: the coverage of one design."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from chamberopt.cli.console import (
+    evaluation_lines,
+    note_lines,
+    print_remarks,
+    print_result,
+    print_warnings,
+    results_folder,
+)
+from chamberopt.cli.options import Cluster, Json, Out, Workers, app
+from chamberopt.cli.prepare import compile_simulator, resolve_effects
+
+
+@app.command
+def simulate(
+    design: Path,
+    /,
+    *,
+    analytic: bool = False,
+    workers: Workers = None,
+    cluster: Cluster = None,
+    json: Json = False,
+    out: Out = None,
+) -> None:
+    """Simulate one design and predict its coverage, with confidence intervals and pictures.
+
+    Parameters
+    ----------
+    design
+        Design file (.toml).
+    analytic
+        Use the exact cylinder, box or prism instead of its triangles, if the chamber is one.
+    """
+    from chamberopt.chamber.analytic import analytic_cavity
+    from chamberopt.chamber.build import build_chamber
+    from chamberopt.common.parallel.executor import open_executor
+    from chamberopt.common.progress import progress_bar
+    from chamberopt.design.load import load_design
+    from chamberopt.output.save_run import save_simulation
+    from chamberopt.simulation.evaluate import evaluate
+
+    candidate = load_design(design)
+    chamber = build_chamber(candidate)
+    cavity = analytic_cavity(candidate, chamber) if analytic else None
+    warnings = print_warnings(candidate, chamber)
+    with results_folder(out, design.stem) as folder, open_executor(workers, cluster) as executor:
+        candidate, advice = resolve_effects(candidate, chamber, executor)
+        compile_simulator(candidate, chamber, cavity)
+        with progress_bar("replicas") as progress:
+            evaluation = evaluate(candidate, chamber, executor, progress, cavity=cavity)
+        print_remarks(save_simulation(folder, candidate, chamber, evaluation, advice, warnings))
+    notes = note_lines([*map(str, advice), *chamber.notes, *evaluation.notes])
+    print_result([*evaluation_lines(evaluation), *notes], folder, json)

@@ -1,0 +1,79 @@
+"""The command `sweep`: a map of a study's parameters."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+from pathlib import Path
+
+from chamberopt.cli.console import (
+    estimate_line,
+    note_lines,
+    print_remarks,
+    print_result,
+    replicas_text,
+    results_folder,
+)
+from chamberopt.cli.options import Cluster, Json, Resumable, Workers, app
+from chamberopt.cli.prepare import compile_simulator, resolve_effects
+
+
+@app.command
+def sweep(
+    study: Path,
+    /,
+    *,
+    grid: int | None = None,
+    sobol: int | None = None,
+    seed: int | None = None,
+    workers: Workers = None,
+    cluster: Cluster = None,
+    json: Json = False,
+    out: Resumable = None,
+) -> None:
+    """Simulate candidates on a grid or spread evenly over [vary], instead of searching.
+
+    With --out of an interrupted sweep, the sweep is resumed.
+
+    Parameters
+    ----------
+    study
+        Study file (.toml).
+    grid
+        Values of each parameter, bounds included: N parameters give GRID^N candidates.
+    sobol
+        Number of candidates, at Sobol points; powers of 2 are spread most evenly.
+    seed
+        Seed of the Sobol points, by default the study's optimizer.seed.
+    """
+    from chamberopt.chamber.build import build_chamber
+    from chamberopt.common.parallel.executor import open_executor
+    from chamberopt.common.progress import progress_bar
+    from chamberopt.optimize.load_study import load_study
+    from chamberopt.optimize.run_sweep import plan_sweep, run_sweep
+    from chamberopt.output.results.sweep_results import caution, write_sweep
+
+    loaded = load_study(study)
+    plan = plan_sweep(loaded, grid, sobol, seed)
+    chamber = build_chamber(loaded.design)
+    place = results_folder(None, f"{study.stem}-sweep") if out is None else nullcontext(out)
+    with place as folder, open_executor(workers, cluster, "processes") as executor:
+        design, advice = resolve_effects(loaded.design, chamber, executor)
+        loaded = loaded.model_copy(update={"design": design})
+        compile_simulator(design, chamber)
+        with progress_bar("candidates") as progress:
+            result = run_sweep(loaded, plan, folder, executor, progress)
+        print_remarks(write_sweep(folder, result))
+    effort = replicas_text(loaded.at_search_accuracy(design))
+    lines = [f"{len(result.trials)} candidates in {result.seconds:.0f} s, {effort} each"]
+    best = result.best
+    if best is not None and best.objective is not None:
+        lines += ["", f"best, number {best.number}"]
+        lines += [f"{name:34}{value:12.5g}" for name, value in best.parameters.items()]
+        estimates = {loaded.objective.goals[0]: best.objective, **best.metrics}
+        lines += [estimate_line(name, estimate) for name, estimate in estimates.items()]
+    notes = [*map(str, advice)]
+    failed = [trial for trial in result.trials if trial.objective is None]
+    if failed:
+        notes.append(f"{len(failed)} candidates failed, the first because: {failed[0].reason}")
+    notes.append(caution(result))
+    print_result([*lines, *note_lines(notes)], folder, json)
