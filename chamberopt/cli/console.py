@@ -129,7 +129,9 @@ def table_lines(table: Mapping[str, Any], prefix: str = "") -> list[str]:
         elif name in ("notes", "warnings"):
             lines += [f"{name.removesuffix('s')}: {text}" for text in value]
         else:
-            lines.append(label + (_list_text(value, name) if isinstance(value, list) else f"{value}"))
+            lines.append(
+                label + (_list_text(value, name) if isinstance(value, list) else f"{value}")
+            )
     return lines
 
 

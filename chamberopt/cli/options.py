@@ -37,8 +37,7 @@ Out = Annotated[
 Resumable = Annotated[
     Path | None,
     Parameter(
-        name="--out",
-        help="Folder for the results: new, empty, or that of this study to resume it.",
+        name="--out", help="Folder for the results: new, empty, or that of this study to resume it."
     ),
 ]
 View = Annotated[

@@ -119,8 +119,10 @@ def _search(
 def _result_lines(result: StudyResult) -> list[str]:
     study, start, best = result.study, result.start, result.best
     lines = [f"{'parameter':34}{'start':>12}{'best':>12}"]
-    for name in study.vary:
-        lines.append(f"{name:34}{study.design.value(name):12.5g}{best.design.value(name):12.5g}")
+    lines += [
+        f"{name:34}{study.design.value(name):12.5g}{best.design.value(name):12.5g}"
+        for name in study.vary
+    ]
     lines += ["", "start", *evaluation_lines(start.evaluation)]
     lines += ["", "best", *evaluation_lines(best.evaluation)]
     verdict = "better than the start" if result.improved else "within the noise of the start"

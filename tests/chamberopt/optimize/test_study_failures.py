@@ -261,7 +261,8 @@ class TestCommandLine:
     ) -> None:
         """Wherever it comes: an exception would be dropped in an import, and crash in the compiler."""
         monkeypatch.setattr(
-            "chamberopt.cli.commands.run.compile_simulator", lambda *_: os.kill(os.getpid(), signal.SIGINT)
+            "chamberopt.cli.commands.run.compile_simulator",
+            lambda *_: os.kill(os.getpid(), signal.SIGINT),
         )
         child = fork.Process(target=main, args=(["run", "small.toml"],))
         child.start()
