@@ -34,6 +34,8 @@ def accuracy(
     candidate = load_design(design)
     with results_folder(out, f"{design.stem}-accuracy") as folder:
         with local_executor() as executor, progress_bar("CPU seconds") as progress:
-            convergence = run_convergence_study(candidate, budget_s, executor, progress, compile_simulator)
+            convergence = run_convergence_study(
+                candidate, budget_s, executor, progress, compile_simulator
+            )
         write_accuracy_results(folder, convergence)
     print_result(as_text(convergence), folder, json, "accuracy.json")

@@ -93,7 +93,9 @@ def export(
 
 
 @contextmanager
-def _files(formats: dict[str, ExportFormat], out: Path | None, name: str) -> Iterator[dict[str, Path]]:
+def _files(
+    formats: dict[str, ExportFormat], out: Path | None, name: str
+) -> Iterator[dict[str, Path]]:
     """The file of each format: --out itself if it is a file, else one in a new folder."""
     from chamberopt.common.files import check_new_file
 
