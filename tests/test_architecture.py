@@ -11,7 +11,7 @@ ROOT = Path(__file__).resolve().parents[1]
 # Who may import whom: each package from those before it in its row, and from itself.
 ORDER = {
     "chamberopt": "common geometry design chamber coverage simulation optimize output api cli __main__",
-    "chamberopt/design": "materials shapes effects+process+shot+sonotrode design load",
+    "chamberopt/design": "table materials shapes effects+part+process+shot+sonotrode design load",
     "chamberopt/chamber": "target bores_and_deflectors reach part build dimensionless scene analytic checks",
     "chamberopt/coverage": "statistics dents coverage_from_impacts part_impacts+metrics dent_marking "
     "coverage_estimators intensity",

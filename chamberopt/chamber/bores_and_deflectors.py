@@ -25,7 +25,7 @@ from chamberopt.design.shapes import (
     further_sonotrode_tag,
     is_sonotrode,
 )
-from chamberopt.design.shapes.construction.loft import lofted
+from chamberopt.design.shapes.construction.surface import lofted
 from chamberopt.geometry.mesh_io import SurfaceError, format_point, read_part_cached
 from chamberopt.geometry.solids import (
     Solid,

@@ -17,7 +17,8 @@ from chamberopt.geometry.solids import snap_to_grid
 from chamberopt.geometry.triangles import areas, rotation_matrix
 
 if TYPE_CHECKING:
-    from chamberopt.design.design import Design, Target
+    from chamberopt.design.design import Design
+    from chamberopt.design.part import Target
 
 MOST_ELEMENTS = 3e5  # a few minutes of meshing; what follows is slow too
 

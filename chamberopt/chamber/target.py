@@ -11,7 +11,7 @@ from chamberopt.geometry.mesh_io import PartMesh, select_triangles
 from chamberopt.geometry.triangles import area_vectors
 
 if TYPE_CHECKING:
-    from chamberopt.design.design import Target
+    from chamberopt.design.part import Target
 
 
 def chosen_triangles(mesh: PartMesh, wanted: Target) -> np.ndarray:

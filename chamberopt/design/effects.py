@@ -1,19 +1,17 @@
-"""Which effects a design asks for: one optional key of [effects] each; what is absent is not simulated."""
+"""Physical effects of a design: one optional key of [effects] each; an absent one is not simulated."""
 
 import math
-from typing import Self
+from collections.abc import Iterator
 
-from pydantic import BaseModel, Field, model_validator
+from pydantic import Field
 
-from chamberopt.common.toml_errors import CrossCheckError, Problem
-from chamberopt.common.toml_fields import Triple, list_field, quantity
-from chamberopt.design.materials import STRICT
+from chamberopt.common.toml_errors import Problem
+from chamberopt.common.toml_fields import Triple, list_field, metres, quantity
+from chamberopt.design.table import DesignTable
 
 
-class PartTurn(BaseModel):
-    """The part turns about an axis during peening: steadily (rpm), or to and fro (angle_deg and frequency_hz)."""
-
-    model_config = STRICT
+class PartTurn(DesignTable):
+    """The part turns about an axis: steadily (rpm), or to and fro (angle_deg and frequency_hz)."""
 
     rpm: float | None = quantity(
         -10000, 10000, "1/min", "right-handed about the axis; real set-ups: 1 to 100", None
@@ -27,47 +25,32 @@ class PartTurn(BaseModel):
         "three numbers [x, y, z] in mm", "a point on it, same frame", (0.0, 0.0, 0.0)
     )
 
-    @model_validator(mode="after")
-    def _agree(self) -> Self:
-        problems = []
+    def _problems(self) -> Iterator[Problem]:
         if not any(self.axis):
-            problems.append(
-                Problem("axis", "given [0, 0, 0], which points nowhere; e.g. [0, 0, 1]")
-            )
-        if (self.angle_deg is None) != (self.frequency_hz is None):
-            given, lacking = (
-                ("angle_deg", "frequency_hz")
-                if self.frequency_hz is None
-                else ("frequency_hz", "angle_deg")
-            )
-            remedy = (
-                "rpm is given: remove it" if self.rpm is not None else "give both, or rpm instead"
-            )
-            problems.append(Problem(given, f"given without {lacking}; {remedy}"))
-        elif self.rpm is not None and self.angle_deg is not None:
-            problems.append(
-                Problem("rpm", "given beside angle_deg and frequency_hz; keep rpm or the other two")
-            )
-        elif self.rpm is None and self.angle_deg is None:
-            problems.append(
-                Problem(
-                    "", "says no motion; e.g. { rpm = 30 } or { angle_deg = 20, frequency_hz = 1 }"
-                )
-            )
-        if problems:
-            raise CrossCheckError(problems)
-        return self
+            yield Problem("axis", "given [0, 0, 0], which points nowhere; e.g. [0, 0, 1]")
+        oscillation = {"angle_deg": self.angle_deg, "frequency_hz": self.frequency_hz}
+        given = [name for name, value in oscillation.items() if value is not None]
+        if len(given) == 1:
+            lacking = (oscillation.keys() - given).pop()
+            steady = self.rpm is not None
+            remedy = "rpm is given: remove it" if steady else "give both, or rpm instead"
+            yield Problem(given[0], f"given without {lacking}; {remedy}")
+        elif given and self.rpm is not None:
+            text = "given beside angle_deg and frequency_hz; keep rpm or the other two"
+            yield Problem("rpm", text)
+        elif not given and self.rpm is None:
+            example = "{ rpm = 30 } or { angle_deg = 20, frequency_hz = 1 }"
+            yield Problem("", f"gives no motion; e.g. {example}")
 
     @property
     def amplitude(self) -> float | None:
-        """Largest angle to each side [rad], of a part that turns to and fro."""
+        """Largest angle to each side [rad] of a part that turns to and fro."""
         return None if self.angle_deg is None else math.radians(self.angle_deg)
 
     @property
     def through(self) -> tuple[float, float, float]:
         """A point on the axis [m], in the part file's frame."""
-        x, y, z = self.through_mm
-        return x * 1e-3, y * 1e-3, z * 1e-3
+        return metres(self.through_mm)
 
     @property
     def period(self) -> float:
@@ -77,10 +60,8 @@ class PartTurn(BaseModel):
         return 60.0 / abs(self.rpm) if self.rpm else math.inf
 
 
-class FrictionTable(BaseModel):
-    """Balls rub and spin: Walton's mu and beta0, of balls on all surfaces and, unless given apart, of ball on ball."""
-
-    model_config = STRICT
+class FrictionTable(DesignTable):
+    """Walton's mu and beta0 of balls on surfaces and, unless given separately, of ball on ball."""
 
     mu: float = Field(
         ge=0.0, le=10.0, description="coefficient of friction; 0 is smooth, metals: tenths"
@@ -88,13 +69,14 @@ class FrictionTable(BaseModel):
     beta0: float = Field(
         ge=-1.0,
         le=1.0,
-        description="of a hit that sticks, slip after over slip before, turned round",
+        description="tangential restitution of a sticking impact: minus the slip after over the "
+        "slip before",
     )
     mu_balls: float | None = Field(
         default=None, ge=0.0, le=10.0, description="mu of ball on ball, if not the same"
     )
     beta0_balls: float | None = Field(
-        default=None, ge=-1.0, le=1.0, description="beta0 of ball on ball, likewise"
+        default=None, ge=-1.0, le=1.0, description="beta0 of ball on ball, if not the same"
     )
 
     @property
@@ -111,14 +93,13 @@ class FrictionTable(BaseModel):
         )
 
 
-class Effects(BaseModel):
-    """Which effects act on the shot in flight. What is not listed here is not simulated."""
-
-    model_config = STRICT
+class Effects(DesignTable):
+    """Which effects act on the shot. An effect that is not listed here is not simulated."""
 
     auto: bool = Field(
         default=False,
-        description='the others are switched for you, by a pilot run; short for { auto = true }: effects = "auto"',
+        description="a pilot run decides which of the others are needed; short for "
+        '{ auto = true }: effects = "auto"',
     )
     gravity: bool = Field(default=True, description="9.80665 m/s² downwards")
     part_turn: PartTurn | None = Field(
@@ -126,14 +107,13 @@ class Effects(BaseModel):
     )
     friction: FrictionTable | None = Field(
         default=None,
-        description="balls rub and spin: { mu = 0.3, beta0 = 0.2 }; left out: smooth, no rotation",
+        description="balls slip and spin: { mu = 0.3, beta0 = 0.2 }; absent: smooth, no rotation",
     )
     rest: bool | None = Field(
         default=None,
-        description="balls slide and lie still on surfaces that neither vibrate nor turn; left out: where the chamber "
-        "has some that face up",
+        description="balls slide and lie still on surfaces that neither vibrate nor turn; absent: "
+        "where the chamber has some that face up",
     )
-
     drag: bool = Field(
         default=False, description="of still air at 20 °C: 0.4 m/s² for 3 mm of steel at 5 m/s"
     )
@@ -141,10 +121,6 @@ class Effects(BaseModel):
         default=True, description="false: balls fly through each other; for very little shot"
     )
 
-    @model_validator(mode="after")
-    def _agree(self) -> Self:
+    def _problems(self) -> Iterator[Problem]:
         if self.rest and not self.gravity:
-            raise CrossCheckError(
-                [Problem("rest", "given true with gravity = false; nothing lies still without")]
-            )
-        return self
+            yield Problem("rest", "given true with gravity = false; nothing lies still without")

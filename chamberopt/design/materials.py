@@ -1,18 +1,18 @@
-"""What balls and surfaces are made of: densities, the rebound law's two numbers, hardness.
+"""Materials of balls and surfaces: densities, restitution laws, hardness.
 
-Rebound follows the paper's law e(v) = C0 for v < v0 and C0 (v/v0)^(-1/4) above, v the relative normal speed
-at contact (McNamara & Falcon 2005). The paper gives no values: they are the user's choice, and mandatory.
+Restitution follows e(v) = C0 for v < v0 and C0 (v/v0)^(-1/4) above, where v is the relative normal
+speed at contact (McNamara & Falcon 2005). The paper gives no values, so a design must give them.
 """
 
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
-STRICT = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+from chamberopt.design.table import DesignTable
 
 ShotMaterial = Literal["steel", "tungsten_carbide", "zirconia", "glass"]
 
-# Handbook values, recalled and not verified [R]: a design that knows better gives density_kg_m3 instead.
+# Handbook values from memory, not verified [R]. A design can give density_kg_m3 instead.
 SHOT_DENSITY: dict[str, float] = {
     "steel": 7800.0,  # bearing steel 100Cr6
     "tungsten_carbide": 14900.0,  # WC with 6 % cobalt binder
@@ -23,10 +23,8 @@ SHOT_DENSITY: dict[str, float] = {
 BRINELL_TO_PASCAL = 9.81e6  # HB is kgf/mm²
 
 
-class RestitutionLaw(BaseModel):
-    """C0 and v0 of the paper's rebound law for one surface (or for ball on ball)."""
-
-    model_config = STRICT
+class RestitutionTable(DesignTable):
+    """C0 and v0 of the restitution law of one surface, or of two balls."""
 
     C0: float = Field(ge=0.05, le=1.0, description="restitution below v0")
     v0_m_s: float = Field(
@@ -47,8 +45,8 @@ class RestitutionLaw(BaseModel):
         return self.v0_m_s
 
 
-class PartMaterial(RestitutionLaw):
-    """The part's rebound law and its hardness, which sets how big a dent is."""
+class PartMaterial(RestitutionTable):
+    """The part's restitution law, and its hardness, which sets the size of a dent."""
 
     hardness_HB: float = Field(  # noqa: N815 -- HB is how hardness is written
         ge=5.0,
@@ -63,12 +61,10 @@ class PartMaterial(RestitutionLaw):
         return self.hardness_HB * BRINELL_TO_PASCAL
 
 
-class Materials(BaseModel):
-    """One rebound law for each thing a ball can hit: another ball, a wall, the sonotrode, the part."""
+class Materials(DesignTable):
+    """One restitution law for each thing that a ball can hit."""
 
-    model_config = STRICT
-
-    shot: RestitutionLaw = Field(description="ball against ball")
-    wall: RestitutionLaw = Field(description="ball against chamber wall and lid")
-    sonotrode: RestitutionLaw = Field(description="ball against sonotrode")
+    shot: RestitutionTable = Field(description="ball against ball")
+    wall: RestitutionTable = Field(description="ball against chamber wall and lid")
+    sonotrode: RestitutionTable = Field(description="ball against sonotrode")
     part: PartMaterial = Field(description="ball against part")

@@ -1,31 +1,26 @@
-"""The charge of a design: balls of one size or a mix, by mass."""
+"""The charge of a design: balls of one size, or a mix of sizes by mass."""
 
 import math
 from collections.abc import Iterator
-from typing import Annotated, Self
+from typing import Annotated
 
-from pydantic import BaseModel, Field, model_validator
+from pydantic import Field
 
-from chamberopt.common.toml_errors import CrossCheckError, Problem
+from chamberopt.common.toml_errors import Problem
 from chamberopt.common.toml_fields import list_field, quantity
-from chamberopt.design.materials import SHOT_DENSITY, STRICT, ShotMaterial
+from chamberopt.design.materials import SHOT_DENSITY, ShotMaterial
+from chamberopt.design.table import DesignTable
 
 
-class ShotSize(BaseModel):
+class ShotSize(DesignTable):
     """One of several sizes of balls."""
-
-    model_config = STRICT
 
     diameter_mm: float = quantity(0.1, 20, "mm", "of one ball of this size")
     share: float = quantity(1e-6, 1, "of the charge's mass", "the shares of all sizes add up to 1")
 
 
-class ShotTable(BaseModel):
-    """The charge: balls of one size, or a mix. Give exactly one of diameter_mm and mix, and of material and
-    density_kg_m3.
-    """
-
-    model_config = STRICT
+class ShotTable(DesignTable):
+    """The charge: exactly one of diameter_mm and mix, and one of material and density_kg_m3."""
 
     mass_g: float = quantity(1e-4, 10000, "g", "of all balls together")
     diameter_mm: float | None = quantity(0.1, 20, "mm", "of one ball", None)
@@ -37,69 +32,55 @@ class ShotTable(BaseModel):
     material: ShotMaterial | None = Field(default=None, description="sets the density")
     density_kg_m3: float | None = quantity(500, 25000, "kg/m³", "instead of material", None)
 
-    @model_validator(mode="after")
-    def _agree(self) -> Self:
-        problems = [*self._density_problems(), *self._size_problems()]
-        if problems:
-            raise CrossCheckError(problems)
-        return self
+    def _problems(self) -> Iterator[Problem]:
+        if self.material is None and self.density_kg_m3 is None:
+            materials = ", ".join(f'"{name}"' for name in SHOT_DENSITY)
+            text = f"missing; give material (one of {materials}) or density_kg_m3"
+            yield Problem("material", text)
+        if self.material is not None and self.density_kg_m3 is not None:
+            text = f"given {self.density_kg_m3:g} beside material = {self.material!r}"
+            yield Problem("density_kg_m3", f"{text}; keep one of the two")
+        if self.mix is not None:
+            yield from self._mix_problems(self.mix)
+        elif self.diameter_mm is None:
+            text = "missing; a number from 0.1 to 20 mm (of one ball), or several sizes: mix"
+            yield Problem("diameter_mm", text)
 
-    def _size_problems(self) -> Iterator[Problem]:
-        if self.mix is None:
-            if self.diameter_mm is None:
-                yield Problem(
-                    "diameter_mm",
-                    "missing; a number from 0.1 to 20 mm (of one ball), or several sizes: mix",
-                )
-            return
+    def _mix_problems(self, mix: tuple[ShotSize, ...]) -> Iterator[Problem]:
         if self.diameter_mm is not None:
-            yield Problem(
-                "diameter_mm", f"given {self.diameter_mm:g} beside mix; keep one of the two"
-            )
-        if not 2 <= len(self.mix) <= 8:
-            yield Problem(
-                "mix", f"given {len(self.mix)} sizes; allowed: 2 to 8, or one as diameter_mm"
-            )
-        if len({size.diameter_mm for size in self.mix}) < len(self.mix):
+            text = f"given {self.diameter_mm:g} beside mix; keep one of the two"
+            yield Problem("diameter_mm", text)
+        if not 2 <= len(mix) <= 8:
+            yield Problem("mix", f"given {len(mix)} sizes; allowed: 2 to 8, or one as diameter_mm")
+        if len({size.diameter_mm for size in mix}) < len(mix):
             yield Problem("mix", "given one diameter_mm twice; add up its shares")
-        whole = sum(size.share for size in self.mix)
+        whole = sum(size.share for size in mix)
         if abs(whole - 1.0) > 1e-6:
             yield Problem("mix", f"given shares that add up to {whole:g}; they must add up to 1")
 
-    def _density_problems(self) -> Iterator[Problem]:
-        if self.material is None and self.density_kg_m3 is None:
-            materials = ", ".join(f'"{name}"' for name in SHOT_DENSITY)
-            yield Problem(
-                "material", f"missing; give material (one of {materials}) or density_kg_m3"
-            )
-        if self.material is not None and self.density_kg_m3 is not None:
-            text = f"given {self.density_kg_m3:g} beside material = {self.material!r}; keep one of the two"
-            yield Problem("density_kg_m3", text)
-
     @property
     def sizes(self) -> tuple[tuple[float, int], ...]:
-        """Diameter [m] and number of the balls of each size: the mass asked for, rounded to whole balls, at least
-        one.
+        """Diameter [m] and number of the balls of each size.
+
+        The mass of a size is rounded to whole balls, at least one.
         """
-        alone = () if self.diameter_mm is None else ((self.diameter_mm * 1e-3, 1.0),)
-        asked = (
-            alone
-            if self.mix is None
-            else tuple((size.diameter_mm * 1e-3, size.share) for size in self.mix)
-        )
+        if self.mix is not None:
+            shares = tuple((size.diameter_mm * 1e-3, size.share) for size in self.mix)
+        else:
+            shares = () if self.diameter_mm is None else ((self.diameter_mm * 1e-3, 1.0),)
         whole = self.mass / (self.density * math.pi / 6.0)
         return tuple(
-            (diameter, max(1, round(share * whole / diameter**3))) for diameter, share in asked
+            (diameter, max(1, round(share * whole / diameter**3))) for diameter, share in shares
         )
 
     @property
     def diameter(self) -> float:
-        """Ball diameter [m]; of the largest, if there are several sizes."""
+        """Ball diameter [m]; of the largest ball if there are several sizes."""
         return max(diameter for diameter, _ in self.sizes)
 
     @property
     def diameters(self) -> tuple[float, ...]:
-        """Diameter of each ball [m], in the order of the balls of a scene: size by size."""
+        """Diameter of each ball [m], size by size, in the order of the balls of a scene."""
         return tuple(diameter for diameter, count in self.sizes for _ in range(count))
 
     @property
@@ -109,7 +90,7 @@ class ShotTable(BaseModel):
 
     @property
     def mass(self) -> float:
-        """Mass of the whole charge [kg], as asked for."""
+        """Wanted mass of the whole charge [kg], not rounded to whole balls."""
         return self.mass_g * 1e-3
 
     @property
@@ -119,7 +100,7 @@ class ShotTable(BaseModel):
 
     @property
     def ball_mass(self) -> float:
-        """Mass of one ball [kg]; the mean, if there are several sizes."""
+        """Mass of one ball [kg]; the mean mass if there are several sizes."""
         if self.mix is None:
             return self.density * math.pi / 6.0 * self.diameter**3
         return self.density * self.volume / self.count

@@ -1,25 +1,17 @@
-"""The sonotrodes of a design: the one that is the chamber's floor, and further ones that look into it."""
+"""Sonotrodes of a design: the one that is the chamber's floor, and further ones in its walls."""
 
 import math
 from typing import Literal
 
-from pydantic import BaseModel, Field
+from pydantic import Field
 
-from chamberopt.common.toml_fields import (
-    Direction,
-    Position,
-    list_field,
-    metres,
-    quantity,
-    unit_vector,
-)
-from chamberopt.design.materials import STRICT
+from chamberopt.common.toml_fields import Direction, Position, list_field, quantity
+from chamberopt.design.shapes.hole_and_deflector_tables import PlacedBore
+from chamberopt.design.table import DesignTable
 
 
-class Vibrating(BaseModel):
+class VibratingFace(DesignTable):
     """A face that vibrates. Amplitude is ZERO-TO-PEAK: half of a peak-to-valley figure."""
-
-    model_config = STRICT
 
     frequency_khz: float = quantity(0.01, 200, "kHz", "usually 20")
     amplitude_um: float = quantity(0.1, 500, "µm", "zero-to-peak: half of peak-to-valley")
@@ -40,17 +32,17 @@ class Vibrating(BaseModel):
         return 2.0 * math.pi * self.frequency * self.amplitude
 
 
-class Sonotrode(Vibrating):
+class Sonotrode(VibratingFace):
     """The vibrating floor."""
 
     motion: Literal["sinusoidal", "random_phase"] = Field(
         default="sinusoidal",
-        description="how the face moves: as it does, or met by each ball at a phase drawn anew",
+        description="how the face moves: in time, or each ball meets it at a random phase",
     )
 
 
-class FurtherSonotrode(Vibrating):
-    """One more: a round face at the bottom of a well that opens into the room."""
+class FurtherSonotrode(PlacedBore, VibratingFace):
+    """A further sonotrode: a round face at the bottom of a well that opens into the room."""
 
     at_mm: Position = list_field(
         "three numbers [x, y, z] in mm", "middle of the face, in the chamber's frame"
@@ -64,21 +56,6 @@ class FurtherSonotrode(Vibrating):
     )
 
     @property
-    def at(self) -> tuple[float, float, float]:
-        """Middle of the face (x, y, z) [m]."""
-        return metres(self.at_mm)
-
-    @property
-    def direction(self) -> tuple[float, float, float]:
-        """The way the face looks, a unit vector."""
-        return unit_vector(self.axis)
-
-    @property
-    def diameter(self) -> float:
-        """Of the face [m]."""
-        return self.diameter_mm * 1e-3
-
-    @property
     def phase(self) -> float:
-        """Ahead of the first sonotrode [rad]."""
+        """Phase ahead of the first sonotrode [rad]."""
         return math.radians(self.phase_deg)

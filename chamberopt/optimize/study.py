@@ -10,7 +10,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.toml_errors import CrossCheckError, Problem
 from chamberopt.common.toml_fields import list_field, quantity
 from chamberopt.design.design import Design, validate
-from chamberopt.design.materials import STRICT
+from chamberopt.design.table import STRICT
 
 # What a study may ask for, and the range it can have. objective.py computes them, a test holds the two together.
 ObjectiveName = Literal["uniform_coverage", "coverage_p05", "time_to_98", "intensity_uniformity"]

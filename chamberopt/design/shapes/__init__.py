@@ -1,6 +1,6 @@
-"""Cavities, one per file, by the name a design gives them.
+"""Shapes of chambers: one file each, and the name by which a design chooses it.
 
-A new shape: a file with a subclass of ChamberTable, and its name here.
+To add a shape, write a file with a subclass of ChamberTable and enter it in SHAPES below.
 """
 
 from chamberopt.common.errors import InputError
@@ -8,7 +8,6 @@ from chamberopt.common.toml_fields import quantity
 from chamberopt.design.shapes.base import ChamberTable, ParametricChamber, WalledChamber
 from chamberopt.design.shapes.box import Box
 from chamberopt.design.shapes.conformal import Conformal
-from chamberopt.design.shapes.construction.loft import lofted
 from chamberopt.design.shapes.construction.surface import (
     TAG_PART,
     TAG_SONOTRODE,
@@ -16,6 +15,7 @@ from chamberopt.design.shapes.construction.surface import (
     ShapeSurface,
     further_sonotrode_tag,
     is_sonotrode,
+    lofted,
 )
 from chamberopt.design.shapes.cylinder import Cylinder
 from chamberopt.design.shapes.imported import Imported

@@ -1,28 +1,41 @@
-"""What the chamber table of a design holds, whatever the shape: one class a shape, each in a file of its own."""
+"""What chambers of several shapes have in common; each shape is a file of its own beside this one.
+
+ChamberTable          keys of every chamber: shape, sonotrode distance, holes, deflectors
+  WalledChamber       + side walls all round, which may lean
+    RoundChamber      a profile turned about the axis
+    ParametricChamber + a height
+      PolygonChamber  flat sides over a convex polygon
+"""
 
 import math
 from abc import abstractmethod
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
-from pydantic import BaseModel, Field, ValidationInfo, field_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from chamberopt.common.toml_errors import CrossCheckError, Problem
 from chamberopt.common.toml_fields import from_file, list_field, quantity
-from chamberopt.design.materials import STRICT
+from chamberopt.design.shapes.construction import outline, profile
 from chamberopt.design.shapes.construction.cad_setup import Setup
-from chamberopt.design.shapes.construction.surface import ShapeSurface
+from chamberopt.design.shapes.construction.limits import (
+    MIN_LENGTH,
+    MIN_LENGTH_MM,
+    refuse_above,
+    refuse_meeting_walls,
+)
+from chamberopt.design.shapes.construction.surface import ShapeSurface, lofted
 from chamberopt.design.shapes.hole_and_deflector_tables import Deflector, Hole
+from chamberopt.design.table import DesignTable
 
 
-class ChamberTable(BaseModel):
+class ChamberTable(DesignTable):
     """A cavity before the part is taken out of it; its floor is the sonotrode, at z = 0.
 
     A shape is a subclass with keys of its own, in the file's units, and ``surface``.
     """
 
-    model_config = STRICT
-
-    sha256: ClassVar[str] = ""  # of the file, where the shape is a user's own
+    sha256: ClassVar[str] = ""  # of the file of a user's own shape
     ceiling_key: ClassVar[str] = "shape"  # what to change when the ceiling is too low
 
     shape: str = Field(description="form of the cavity")
@@ -39,7 +52,7 @@ class ChamberTable(BaseModel):
     @field_validator("shape")
     @classmethod
     def _absolute(cls, shape: str, info: ValidationInfo) -> str:
-        """A user's own file is held absolute from here on, like the part's mesh."""
+        """Make the path of a user's own shape absolute, like that of the part's mesh."""
         return str(from_file(shape, info.context)) if is_custom(shape) else shape
 
     @property
@@ -49,20 +62,25 @@ class ChamberTable(BaseModel):
 
     @abstractmethod
     def surface(self, vertices: np.ndarray, triangles: np.ndarray) -> ShapeSurface:
-        """The closed surface of the cavity, without the part; vertices (n, 3) m and triangles (m, 3) are the part as
-        it stands in it, for shapes that follow it. Raises InputError for values that make no cavity.
+        """The closed surface of the cavity, without the part.
+
+        Args:
+            vertices: the part in the chamber's frame [m], shape (n, 3), for shapes that follow it.
+            triangles: of the part, shape (m, 3).
+        Raises:
+            InputError: the values do not make a cavity.
         """
 
     def setup(self) -> Setup | None:
-        """What a file has drawn, where chamber and part come from one file; None for a parametric cavity."""
+        """The set-up as drawn, where chamber and part come from one file; otherwise None."""
         return None
 
     def widths_mm(self) -> dict[str, float]:
-        """Inner widths [mm] by the key that sets them: no ball wider than the least of them fits."""
+        """Inner widths [mm] by the key that sets them: every ball must be narrower than all."""
         return {}
 
     def room(self) -> float:
-        """A volume [m³] that the cavity does not exceed, as far as the table alone says."""
+        """An upper bound [m³] of the cavity's volume, from the table alone."""
         return math.inf
 
     @property
@@ -71,12 +89,12 @@ class ChamberTable(BaseModel):
         return False
 
     def notes(self, ball: float) -> list[str]:
-        """What to know of these values with shot whose largest balls have this diameter [m]."""
+        """Remarks on these values with shot whose largest balls have this diameter [m]."""
         return []
 
 
 class WalledChamber(ChamberTable):
-    """A cavity with side walls all round, that may lean."""
+    """A cavity with side walls all round, which may lean."""
 
     inclination_deg: float = quantity(
         -45, 45, "degrees", "of the side walls: above 0 wider at the ceiling", 0.0
@@ -90,7 +108,7 @@ class WalledChamber(ChamberTable):
 
     @property
     def slope(self) -> float:
-        """How far the side walls go outward for each metre up."""
+        """Outward shift of the side walls for each metre up."""
         return math.tan(math.radians(self.inclination_deg))
 
 
@@ -108,8 +126,127 @@ class ParametricChamber(WalledChamber):
 
     @property
     def lean(self) -> float:
-        """How far the side walls go outward over the height [m]."""
+        """Outward shift of the side walls over the height [m]."""
         return self.height * self.slope
+
+    def lofted_over(self, floor: np.ndarray, ceiling: np.ndarray) -> ShapeSurface:
+        """The surface between outlines (n, 2) [m] at the floor and at the ceiling."""
+        return lofted(
+            [np.c_[floor, np.zeros(len(floor))], np.c_[ceiling, np.full(len(ceiling), self.height)]]
+        )
+
+
+class PolygonChamber(ParametricChamber):
+    """Flat sides over a convex polygon, which may lean; upright edges sharp or rounded.
+
+      ____________            in plan: the sides at the sonotrode; higher up they are moved out by
+     /            \\           the lean, and with them the arcs of the edges, of constant radius
+    |              |
+     \\____________/
+    """
+
+    corner_radius_mm: float = quantity(
+        0,
+        1000,
+        "mm",
+        "of the upright edges between side walls, seen from above; up to 0.05: sharp",
+        0.0,
+    )
+
+    @abstractmethod
+    def floor(self) -> np.ndarray:
+        """The corners of the polygon at the sonotrode, (n, 2) [m], convex, counter-clockwise."""
+
+    @property
+    def radius(self) -> float:
+        """Radius of the upright edges [m]; 0 for sharp ones."""
+        return 1e-3 * self.corner_radius_mm if self.corner_radius_mm > MIN_LENGTH_MM else 0.0
+
+    @property
+    def is_round(self) -> bool:
+        """Whether `facets` makes a difference."""
+        return self.radius > 0.0
+
+    @model_validator(mode="after")
+    def _makes_a_cavity(self) -> Self:
+        room = outline.largest_inward_move(self.floor())
+        refuse_meeting_walls(self.slope, [-room / self.height], self.inclination_deg)
+        limit = max(MIN_LENGTH_MM, 1e3 * (room + min(0.0, self.lean)))
+        why = "too large for the sides between the edges"
+        refuse_above("corner_radius_mm", self.corner_radius_mm, limit, why)
+        return self
+
+    def surface(self, vertices: np.ndarray, triangles: np.ndarray) -> ShapeSurface:
+        """4 triangles for each corner of the rounded polygon."""
+        floor = self.floor()
+        if self.radius:
+            corner, direction = outline.corner_arcs(floor, self.facets)
+        else:
+            corner, direction = np.arange(len(floor)), np.zeros((len(floor), 2))
+        low, high = (
+            outline.move_sides(floor, lean - self.radius)[corner] + self.radius * direction
+            for lean in (0.0, self.lean)
+        )
+        return self.lofted_over(low, high)
+
+    def room(self) -> float:
+        """Volume [m³] of the cavity with sharp edges, by Simpson's rule, which is exact here."""
+        low, middle, high = (
+            outline.area_inside(self.floor(), share * self.lean) for share in (0.0, 0.5, 1.0)
+        )
+        return self.height / 6.0 * (1.0 * low + 4.0 * middle + 1.0 * high)
+
+
+class RoundChamber(WalledChamber):
+    """A profile that may lean, its corners rounded, turned about the axis.
+
+    Corners of the wall's flat sides lie on the round wall, so the sides lie inside, by at most
+    radius * (1 - cos(pi/facets)): 0.04 mm for 70 mm across and 64 facets.
+    """
+
+    corner_radius_mm: float = quantity(
+        0, 1000, "mm", "of the rounded edge between side wall and ceiling; up to 0.05: sharp", 0.0
+    )
+
+    @abstractmethod
+    def upright(self) -> np.ndarray:
+        """The profile before it leans: (n, 2) [m], from the sonotrode's edge to the axis."""
+
+    @property
+    def is_round(self) -> bool:
+        """Whether `facets` makes a difference."""
+        return True
+
+    def profile(self) -> np.ndarray:
+        """The profile (n, 2) [m] as it leans, with sharp corners."""
+        line = self.upright()
+        off_axis = line[:, 0] > 0.0
+        return np.c_[line[:, 0] + np.where(off_axis, self.slope * line[:, 1], 0.0), line[:, 1]]
+
+    @model_validator(mode="after")
+    def _makes_a_cavity(self) -> Self:
+        line = self.upright()
+        wall = line[(line[:, 0] > 0.0) & (line[:, 1] > 0.0)]
+        least_slopes = (MIN_LENGTH - wall[:, 0]) / wall[:, 1]
+        refuse_meeting_walls(self.slope, least_slopes, self.inclination_deg)
+        limit = max(MIN_LENGTH_MM, 1e3 * profile.largest_corner_radius(self.profile()))
+        why = "too large for the sides beside an edge"
+        refuse_above("corner_radius_mm", self.corner_radius_mm, limit, why)
+        if profile.crosses_itself(self._rounded()):
+            text = f"given {self.corner_radius_mm:g}, with which the profile crosses itself"
+            raise CrossCheckError([Problem("corner_radius_mm", f"{text}; lower it")])
+        return self
+
+    def surface(self, vertices: np.ndarray, triangles: np.ndarray) -> ShapeSurface:
+        """2 * facets triangles for each point of the rounded profile."""
+        return profile.revolve(self._rounded(), self.facets)
+
+    def room(self) -> float:
+        """Volume [m³] of the round cavity."""
+        return profile.enclosed_volume(self._rounded())
+
+    def _rounded(self) -> np.ndarray:
+        return profile.round_corners(self.profile(), 1e-3 * self.corner_radius_mm, self.facets)
 
 
 def is_custom(shape: object) -> bool:

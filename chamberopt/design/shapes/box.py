@@ -5,7 +5,7 @@ from typing import Literal
 import numpy as np
 
 from chamberopt.common.toml_fields import quantity
-from chamberopt.design.shapes.polygon import PolygonChamber
+from chamberopt.design.shapes.base import PolygonChamber
 
 
 class Box(PolygonChamber):
@@ -16,13 +16,10 @@ class Box(PolygonChamber):
     width_mm: float = quantity(2, 2000, "mm", "inner size along y, at the sonotrode")
 
     def floor(self) -> np.ndarray:
-        """From the corner at +x, -y on."""
-        return (
-            0.5e-3
-            * np.array([self.length_mm, self.width_mm])
-            * np.array([[1, -1], [1, 1], [-1, 1], [-1, -1]])
-        )
+        """The corners, beginning at +x, -y."""
+        half_sides = 0.5e-3 * np.array([self.length_mm, self.width_mm])
+        return half_sides * np.array([[1, -1], [1, 1], [-1, 1], [-1, -1]])
 
     def widths_mm(self) -> dict[str, float]:
-        """Along, across and up."""
+        """Length, width and height."""
         return {"length_mm": self.length_mm, "width_mm": self.width_mm, "height_mm": self.height_mm}

@@ -1,4 +1,4 @@
-"""A round chamber on the sonotrode: the floor shakes, the side and the ceiling stand still.
+"""A round chamber, a cylinder or a cone: the floor vibrates, side and ceiling stand still.
 
  ___________  z = height      ceiling: wall
 /           \\  corner radius
@@ -13,12 +13,11 @@ from typing import Literal
 import numpy as np
 
 from chamberopt.common.toml_fields import quantity
-from chamberopt.design.shapes.base import ParametricChamber
-from chamberopt.design.shapes.round import RoundChamber
+from chamberopt.design.shapes.base import ParametricChamber, RoundChamber
 
 
 class Cylinder(RoundChamber, ParametricChamber):
-    """Round, the side wall straight."""
+    """A round chamber with a straight side wall."""
 
     shape: Literal["cylinder"]
     diameter_mm: float = quantity(2, 2000, "mm", "inner diameter, at the sonotrode")
@@ -34,5 +33,5 @@ class Cylinder(RoundChamber, ParametricChamber):
         return np.array([[radius, 0.0], [radius, self.height], [0.0, self.height]])
 
     def widths_mm(self) -> dict[str, float]:
-        """Across and up."""
+        """Diameter and height."""
         return {"diameter_mm": self.diameter_mm, "height_mm": self.height_mm}

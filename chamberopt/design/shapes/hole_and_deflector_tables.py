@@ -1,11 +1,12 @@
-"""What stands in a chamber or is bored into its wall, whatever its shape: deflectors and fixture holes."""
+"""Fixture holes and deflectors of a chamber, whatever its shape."""
 
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Literal, Self
+from typing import Literal
 
-from pydantic import BaseModel, Field, model_validator
+from pydantic import Field
 
-from chamberopt.common.toml_errors import CrossCheckError, Problem
+from chamberopt.common.toml_errors import Problem
 from chamberopt.common.toml_fields import (
     Direction,
     MeshFile,
@@ -16,10 +17,10 @@ from chamberopt.common.toml_fields import (
     quantity,
     unit_vector,
 )
-from chamberopt.design.materials import STRICT
+from chamberopt.design.table import DesignTable
 from chamberopt.geometry.mesh_io.units import Unit
 
-SIZES = {
+SIZE_KEYS = {
     "plate": ("size_mm",),
     "rod": ("diameter_mm", "length_mm"),
     "ball": ("diameter_mm",),
@@ -27,12 +28,11 @@ SIZES = {
 }
 
 
-class Deflector(BaseModel):
-    """A body that stands still in the chamber, wall to the shot: a plate (a box), a rod along its z, a ball, or any
-    closed mesh.
-    """
+class Deflector(DesignTable):
+    """A body that stands still in the chamber and is wall to the shot.
 
-    model_config = STRICT
+    It is a plate (a box), a rod along its z, a ball, or any closed mesh.
+    """
 
     kind: Literal["plate", "rod", "ball", "mesh"] = Field(description="what it is")
     at_mm: Position = list_field(
@@ -49,27 +49,18 @@ class Deflector(BaseModel):
     mesh: MeshFile | None = Field(default=None, description="mesh file of a closed body")
     unit: Unit = Field(default="guess", description="of the numbers in the mesh file")
 
-    @model_validator(mode="after")
-    def _agree(self) -> Self:
-        problems = []
+    def _problems(self) -> Iterator[Problem]:
+        needed = SIZE_KEYS[self.kind]
         for name in ("size_mm", "diameter_mm", "length_mm", "mesh"):
-            wanted, given = name in SIZES[self.kind], getattr(self, name)
-            if wanted and given is None:
-                problems.append(
-                    Problem(name, f"missing; a {self.kind} has {' and '.join(SIZES[self.kind])}")
-                )
-            if given is not None and not wanted:
-                text = f"not of a {self.kind}, which has {' and '.join(SIZES[self.kind])}; leave it out"
-                problems.append(Problem(name, text))
+            given = getattr(self, name) is not None
+            if name in needed and not given:
+                yield Problem(name, f"missing; a {self.kind} has {' and '.join(needed)}")
+            if given and name not in needed:
+                text = f"not of a {self.kind}, which has {' and '.join(needed)}; leave it out"
+                yield Problem(name, text)
         if self.size_mm is not None and not all(0.1 <= side <= 2000 for side in self.size_mm):
-            problems.append(
-                Problem(
-                    "size_mm", f"given {list(self.size_mm)}; each side must be from 0.1 to 2000 mm"
-                )
-            )
-        if problems:
-            raise CrossCheckError(problems)
-        return self
+            text = f"given {list(self.size_mm)}; each side must be from 0.1 to 2000 mm"
+            yield Problem("size_mm", text)
 
     @property
     def at(self) -> tuple[float, float, float]:
@@ -83,12 +74,12 @@ class Deflector(BaseModel):
 
     @property
     def diameter(self) -> float:
-        """Of a rod or ball [m]."""
+        """Diameter of a rod or ball [m]."""
         return self.diameter_mm * 1e-3  # type: ignore[operator]
 
     @property
     def length(self) -> float:
-        """Of a rod [m]."""
+        """Length of a rod [m]."""
         return self.length_mm * 1e-3  # type: ignore[operator]
 
     @property
@@ -97,10 +88,31 @@ class Deflector(BaseModel):
         return Path(self.mesh)  # type: ignore[arg-type]
 
 
-class Hole(BaseModel):
-    """A round blind bore from the room into its wall, e.g. for the shaft that the part is held by."""
+class PlacedBore(DesignTable):
+    """A round bore in the chamber's frame: of a hole, or of a further sonotrode's well."""
 
-    model_config = STRICT
+    at_mm: Position
+    axis: Direction
+    diameter_mm: float
+
+    @property
+    def at(self) -> tuple[float, float, float]:
+        """The point (x, y, z) [m] of its axis that at_mm gives."""
+        return metres(self.at_mm)
+
+    @property
+    def direction(self) -> tuple[float, float, float]:
+        """Its axis, a unit vector."""
+        return unit_vector(self.axis)
+
+    @property
+    def diameter(self) -> float:
+        """Its diameter [m]."""
+        return self.diameter_mm * 1e-3
+
+
+class Hole(PlacedBore):
+    """A round blind bore from the room into its wall, e.g. for the shaft that holds the part."""
 
     at_mm: Position = list_field(
         "three numbers [x, y, z] in mm", "in the room, on the bore's axis; in the chamber's frame"
@@ -110,21 +122,6 @@ class Hole(BaseModel):
     depth_mm: float = quantity(0.1, 2000, "mm", "beyond the wall, along the axis")
 
     @property
-    def at(self) -> tuple[float, float, float]:
-        """A point of its axis in the room (x, y, z) [m]."""
-        return metres(self.at_mm)
-
-    @property
-    def direction(self) -> tuple[float, float, float]:
-        """The way out, a unit vector."""
-        return unit_vector(self.axis)
-
-    @property
-    def diameter(self) -> float:
-        """Of the bore [m]."""
-        return self.diameter_mm * 1e-3
-
-    @property
     def depth(self) -> float:
-        """Beyond the wall [m]."""
+        """Depth beyond the wall [m]."""
         return self.depth_mm * 1e-3

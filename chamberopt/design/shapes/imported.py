@@ -16,7 +16,7 @@ from pydantic import Field
 
 from chamberopt.common.toml_fields import File, Names, list_field, quantity
 from chamberopt.design.shapes.base import ChamberTable
-from chamberopt.design.shapes.construction.cad_distance import moved
+from chamberopt.design.shapes.construction.cad_distance import move_sonotrode
 from chamberopt.design.shapes.construction.cad_setup import Setup, read_setup
 from chamberopt.design.shapes.construction.surface import ShapeSurface
 from chamberopt.geometry.mesh_io.units import Unit
@@ -25,7 +25,7 @@ IMPORTED = "imported"
 
 
 class Imported(ChamberTable):
-    """The file is the part's. What is neither part nor sonotrode in it is wall."""
+    """A chamber drawn with its part in one file; what is neither part nor sonotrode is wall."""
 
     shape: Literal["imported"]
     sonotrode_distance_mm: float | None = quantity(  # type: ignore[assignment]
@@ -47,9 +47,13 @@ class Imported(ChamberTable):
         return self.setup().distance if given is None else given * 1e-3
 
     def setup(self) -> Setup:
-        """As drawn. Raises InputError for a file that is no closed room with a flat sonotrode."""
+        """The set-up as drawn; its file is read only once.
+
+        Raises:
+            InputError: the file does not hold a closed room with a flat sonotrode.
+        """
         return read_setup(Path(self.mesh), self.unit, self.part, self.sonotrode)
 
     def surface(self, vertices: np.ndarray, triangles: np.ndarray) -> ShapeSurface:
-        """As drawn, the floor moved to the distance that is asked for."""
-        return moved(self.setup(), self.sonotrode_distance)
+        """The room as drawn, its floor moved to the wanted distance."""
+        return move_sonotrode(self.setup(), self.sonotrode_distance)

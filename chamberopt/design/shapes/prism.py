@@ -6,11 +6,11 @@ import numpy as np
 from pydantic import Field
 
 from chamberopt.common.toml_fields import quantity
-from chamberopt.design.shapes.polygon import PolygonChamber
+from chamberopt.design.shapes.base import PolygonChamber
 
 
 class Prism(PolygonChamber):
-    """Measured across flats: by the widest round bar that fits in, whatever the number of sides."""
+    """A prism measured across flats: by the widest round bar that fits in."""
 
     shape: Literal["prism"]
     sides: int = Field(ge=3, le=64, description="flat walls")
@@ -20,15 +20,11 @@ class Prism(PolygonChamber):
     turn_deg: float = quantity(-360, 360, "degrees", "about z; at 0 the first side faces +x", 0.0)
 
     def floor(self) -> np.ndarray:
-        """From the corner after the first side on."""
-        angle = np.radians(self.turn_deg) + np.pi / self.sides * (2.0 * np.arange(self.sides) + 1.0)
-        return (
-            0.5e-3
-            * self.across_mm
-            / np.cos(np.pi / self.sides)
-            * np.c_[np.cos(angle), np.sin(angle)]
-        )
+        """The corners, beginning at the one after the first side."""
+        half_angle = np.pi / self.sides
+        angle = np.radians(self.turn_deg) + half_angle * (2.0 * np.arange(self.sides) + 1.0)
+        return 0.5e-3 * self.across_mm / np.cos(half_angle) * np.c_[np.cos(angle), np.sin(angle)]
 
     def widths_mm(self) -> dict[str, float]:
-        """Across flats and up."""
+        """Width across flats, and height."""
         return {"across_mm": self.across_mm, "height_mm": self.height_mm}

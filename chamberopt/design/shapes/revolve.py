@@ -14,13 +14,13 @@ from pydantic import Field, field_validator
 
 from chamberopt.common.toml_errors import CrossCheckError, Problem
 from chamberopt.common.toml_fields import Pair, list_field
-from chamberopt.design.shapes.construction.limits import LEAST, LEAST_MM
-from chamberopt.design.shapes.construction.profile import crossing
-from chamberopt.design.shapes.round import RoundChamber
+from chamberopt.design.shapes.base import RoundChamber
+from chamberopt.design.shapes.construction.limits import MIN_LENGTH, MIN_LENGTH_MM
+from chamberopt.design.shapes.construction.profile import find_contact
 
 
 class Revolve(RoundChamber):
-    """Round, the side wall a line of points turned about the axis."""
+    """A round chamber whose side wall is a line of points turned about the axis."""
 
     ceiling_key: ClassVar[str] = "profile_mm"
 
@@ -34,42 +34,49 @@ class Revolve(RoundChamber):
 
     @field_validator("profile_mm")
     @classmethod
-    def _goes_up_from_the_sonotrode(cls, profile: tuple[Pair, ...]) -> tuple[Pair, ...]:
-        wrong = _fault(profile)
-        if wrong:
-            raise CrossCheckError([Problem("", wrong)])
-        return profile
+    def _goes_up_from_the_sonotrode(cls, points: tuple[Pair, ...]) -> tuple[Pair, ...]:
+        fault = _find_fault(points)
+        if fault:
+            raise CrossCheckError([Problem("", fault)])
+        return points
 
     def upright(self) -> np.ndarray:
-        """The points, to the axis."""
-        return _line(self.profile_mm)
+        """The points, continued to the axis."""
+        return _to_the_axis(self.profile_mm)
 
     def widths_mm(self) -> dict[str, float]:
-        """Across or up, whichever is less."""
+        """The largest diameter or the height, whichever is less."""
         r, z = np.array(self.profile_mm).T
         return {"profile_mm": float(min(2.0 * r.max(), z.max()))}
 
 
-def _line(profile: tuple[Pair, ...]) -> np.ndarray:
-    """Points (r, z) m with the middle of the ceiling, if it is flat."""
-    line = 1e-3 * np.array(profile)
+def _to_the_axis(points: tuple[Pair, ...]) -> np.ndarray:
+    """Points (r, z) [m], with the middle of the ceiling if it is flat."""
+    line = 1e-3 * np.array(points)
     return line if line[-1, 0] == 0.0 else np.r_[line, [[0.0, line[-1, 1]]]]
 
 
-def _fault(profile: tuple[Pair, ...]) -> str | None:
-    """Why the points are no profile."""
-    if profile[0][1] != 0.0:
-        return f"begins at z = {profile[0][1]:g}; the rim is on the sonotrode, at z = 0"
-    for number, (r, z) in enumerate(profile):
-        first, last = number == 0, number == len(profile) - 1
-        if not (LEAST_MM <= r <= 2000 or (last and r == 0)) or not (LEAST_MM <= z <= 2000 or first):
-            allowed = f"[r, z] from {LEAST_MM:g} to 2000 mm, z = 0 for the first alone, r = 0 for the last alone"
+def _find_fault(points: tuple[Pair, ...]) -> str | None:
+    """Why the points cannot be a profile; None if they can."""
+    if points[0][1] != 0.0:
+        return f"begins at z = {points[0][1]:g}; the rim is on the sonotrode, at z = 0"
+    for number, (r, z) in enumerate(points):
+        is_first, is_last = number == 0, number == len(points) - 1
+        r_allowed = MIN_LENGTH_MM <= r <= 2000 or (is_last and r == 0)
+        if not (r_allowed and (MIN_LENGTH_MM <= z <= 2000 or is_first)):
+            allowed = (
+                f"[r, z] from {MIN_LENGTH_MM:g} to 2000 mm, z = 0 for the first alone, "
+                "r = 0 for the last alone"
+            )
             return f"given {[r, z]} as point {number}; allowed: {allowed}"
-    line = _line(profile)
-    short = np.flatnonzero(np.hypot(*np.diff(line, axis=0).T) < LEAST)
+    line = _to_the_axis(points)
+    short = np.flatnonzero(np.hypot(*np.diff(line, axis=0).T) < MIN_LENGTH)
     if short.size:
-        return f"point {short[0] + 1} is on or next to point {short[0]}, the first being point 0; leave it out"
-    where = crossing(line)
-    if where is not None:
-        return f"crosses, touches or folds back on itself by the point {np.round(1e3 * where, 6).tolist()}"
+        k = short[0]
+        count = "the first being point 0"
+        return f"point {k + 1} is on or next to point {k}, {count}; leave it out"
+    contact = find_contact(line)
+    if contact is not None:
+        place = np.round(1e3 * contact, 6).tolist()
+        return f"crosses, touches or folds back on itself by the point {place}"
     return None

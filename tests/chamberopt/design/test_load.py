@@ -318,8 +318,8 @@ class TestWrongDesigns:
         ("former", "name"),
         [
             ("coverage = 0.01", "objective_half_width"),
-            ("max_replicas = 100", "max_replicas"),
-            ("drag_step_ms = 5", "drag_step_ms"),
+            ("most_replicas = 100", "max_replicas"),
+            ("drag_piece_ms = 5", "drag_step_ms"),
         ],
     )
     def test_a_former_name(self, design_file: Path, former: str, name: str) -> None:

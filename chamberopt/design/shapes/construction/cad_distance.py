@@ -1,4 +1,4 @@
-"""The sonotrode of a set-up from CAD at another distance from the part than it is drawn at."""
+"""Move the sonotrode of a set-up from CAD nearer to the part, or farther from it."""
 
 from __future__ import annotations
 
@@ -19,24 +19,26 @@ from chamberopt.geometry.solids import (
 )
 from chamberopt.geometry.triangles import border_edges
 
-SAME = 1e-6  # of a volume
+VOLUME_TOLERANCE = 1e-6  # relative
 SAME_DISTANCE = 1e-9  # m
 
 
-def moved(setup: Setup, distance: float) -> ShapeSurface:
+def move_sonotrode(setup: Setup, distance: float) -> ShapeSurface:
     """The room with its sonotrode at another distance [m] from the lowest point of the part.
 
-    Raises InputError where the walls do not rise straight from the sonotrode as far as it is to come nearer.
+    Raises:
+        InputError: the sonotrode is to come nearer than the walls rise straight from it, or farther
+            where another part of the room is in the way.
     """
     room, farther = setup.room, distance - setup.distance
     if abs(farther) < SAME_DISTANCE:
         return room
     lifted = replace(room, vertices=snap_to_grid(room.vertices + np.array([0.0, 0.0, farther])))
-    return _carried_down(lifted, setup) if farther > 0.0 else _cut_off(lifted, -farther, setup)
+    return _extend_down(lifted, setup) if farther > 0.0 else _cut_off(lifted, -farther, setup)
 
 
-def _carried_down(room: ShapeSurface, setup: Setup) -> ShapeSurface:
-    """The walls go on straight down from the sonotrode's outline to z = 0."""
+def _extend_down(room: ShapeSurface, setup: Setup) -> ShapeSurface:
+    """The room whose walls continue straight down from the sonotrode's outline to z = 0."""
     on_face = room.tags == TAG_SONOTRODE
     face, count = room.triangles[on_face], len(room.vertices)
     used, numbers = np.unique(face, return_inverse=True)
@@ -51,7 +53,7 @@ def _carried_down(room: ShapeSurface, setup: Setup) -> ShapeSurface:
     )
     if (
         overlap_volume(make_solid(room.vertices, room.triangles, "the set-up"), shaft)
-        > SAME * shaft.volume
+        > VOLUME_TOLERANCE * shaft.volume
     ):
         raise _refused(setup, "farther", "another part of the room is in the way under it")
     a, b = border_edges(face).T
@@ -70,7 +72,7 @@ def _carried_down(room: ShapeSurface, setup: Setup) -> ShapeSurface:
 
 
 def _cut_off(room: ShapeSurface, height: float, setup: Setup) -> ShapeSurface:
-    """Without what lies lower than z = 0: the lowest ``height`` [m], where the walls rise straight."""
+    """The room without its lowest ``height`` [m], below z = 0, where the walls rise straight."""
     whole = make_solid(room.vertices, room.triangles, "the set-up")
     face = whole.surface().select(room.tags[whole.surface().source] == TAG_SONOTRODE)
     shaft = sweep(face, np.array([0.0, 0.0, height]), "the room over the sonotrode as drawn")
@@ -79,8 +81,8 @@ def _cut_off(room: ShapeSurface, height: float, setup: Setup) -> ShapeSurface:
         _rectangle(low, high), np.array([0.0, 0.0, -low[2]]), "what lies under the sonotrode"
     )
     rest = subtract(whole, bottom)
-    straight = overlap_volume(whole, shaft) > (1.0 - SAME) * shaft.volume
-    if not straight or whole.volume - rest.volume > (1.0 + SAME) * shaft.volume:
+    straight = overlap_volume(whole, shaft) > (1.0 - VOLUME_TOLERANCE) * shaft.volume
+    if not straight or whole.volume - rest.volume > (1.0 + VOLUME_TOLERANCE) * shaft.volume:
         raise _refused(
             setup, "nearer", "its walls do not rise straight from the sonotrode's outline so far"
         )
@@ -96,7 +98,7 @@ def _cut_off(room: ShapeSurface, height: float, setup: Setup) -> ShapeSurface:
 
 
 def _rectangle(low: np.ndarray, high: np.ndarray) -> SolidSurface:
-    """A box's underside."""
+    """The underside of a box with these corners (3,) [m]."""
     corners = np.array(
         [
             [x, y, low[2]]
@@ -110,6 +112,7 @@ def _rectangle(low: np.ndarray, high: np.ndarray) -> SolidSurface:
 
 def _refused(setup: Setup, way: str, why: str) -> InputError:
     return InputError(
-        f"chamber.sonotrode_distance_mm: the set-up is drawn with {1e3 * setup.distance:.4g}, and the sonotrode cannot "
-        f"be moved {way} as asked: {why}; give a distance nearer to that, or draw it anew"
+        f"chamber.sonotrode_distance_mm: the set-up is drawn with {1e3 * setup.distance:.4g}, and "
+        f"the sonotrode cannot be moved {way} by this much: {why}; give a distance closer to the "
+        "drawn one, or draw the set-up again"
     )

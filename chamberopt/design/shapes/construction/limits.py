@@ -1,28 +1,34 @@
-"""How a value that makes no cavity is refused: the key, and the value furthest along that does."""
+"""Smallest lengths of a cavity, and errors that name the largest value that still makes one."""
 
 import math
 from collections.abc import Iterable
 
 from chamberopt.common.toml_errors import CrossCheckError, Problem
 
-LEAST = 5e-5  # m: shorter sides and smaller radii are none; a fiftieth of usual shot, far above the grid of solids
-LEAST_MM = 1e3 * LEAST
+# Shorter sides and smaller radii count as 0 [m]: a fiftieth of usual shot, far above the grid that
+# solids are rounded to.
+MIN_LENGTH = 5e-5
+MIN_LENGTH_MM = 1e3 * MIN_LENGTH
 
 
-def refuse_beyond(key: str, given: float, most: float, why: str) -> None:
-    """CrossCheckError for a key [mm or degrees] given beyond the most (of its sign) that fits."""
-    if abs(given) > abs(most):
-        fits = math.trunc(most * 1e3) / 1e3  # towards 0: what is said to fit does
-        raise CrossCheckError(
-            [Problem(key, f"given {given:g}, {why}; {fits:.7g} is the furthest that fits")]
-        )
+def refuse_above(key: str, given: float, limit: float, why: str) -> None:
+    """Raise CrossCheckError if the value of a key [mm or degrees] exceeds a limit of its sign."""
+    if abs(given) > abs(limit):
+        fits = math.trunc(limit * 1e3) / 1e3  # rounded towards 0, so that this value does fit
+        text = f"given {given:g}, {why}; {fits:.7g} is the furthest that fits"
+        raise CrossCheckError([Problem(key, text)])
 
 
-def refuse_inward(slope: float, slopes: Iterable[float], inclination_deg: float) -> None:
-    """CrossCheckError for walls that lean in more than the steepest (least) slope allowed by any of ``slopes``."""
-    least = max(slopes, default=-math.inf)
+def refuse_meeting_walls(slope: float, limits: Iterable[float], inclination_deg: float) -> None:
+    """Raise CrossCheckError if walls lean in so far that they meet below the ceiling.
+
+    Args:
+        slope: tangent of the inclination, outward.
+        limits: least slope that each wall allows.
+        inclination_deg: the inclination, for the message.
+    """
+    least = max(limits, default=-math.inf)
     if slope < least:
-        most = math.degrees(math.atan(least))
-        refuse_beyond(
-            "inclination_deg", inclination_deg, most, "with which walls meet below the ceiling"
-        )
+        limit_deg = math.degrees(math.atan(least))
+        why = "with which walls meet below the ceiling"
+        refuse_above("inclination_deg", inclination_deg, limit_deg, why)

@@ -1,4 +1,6 @@
-"""Profiles of round cavities: a line of points (r, z) m from the sonotrode's rim to the axis; rounded, turned about z.
+"""Profiles of round cavities: rounded at their corners and turned about the axis.
+
+A profile is a line of points (r, z) [m], shape (n, 2), from the sonotrode's edge to the axis.
 
     axis
      :______ (0, z)
@@ -9,48 +11,50 @@
 
 import numpy as np
 
-from chamberopt.design.shapes.construction.limits import LEAST
-from chamberopt.design.shapes.construction.loft import lofted
-from chamberopt.design.shapes.construction.surface import ShapeSurface
+from chamberopt.design.shapes.construction.limits import MIN_LENGTH
+from chamberopt.design.shapes.construction.surface import ShapeSurface, lofted
 
 
-def turns(line: np.ndarray) -> np.ndarray:
-    """By what angle [rad] the line turns left at each of its points, (n,); 0 at both ends."""
+def corner_angles(line: np.ndarray) -> np.ndarray:
+    """Angle [rad] by which the line turns left at each of its points, (n,); 0 at both ends."""
     along = np.diff(line, axis=0)
     before, after = along[:-1], along[1:]
     cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
     return np.r_[0.0, np.arctan2(cross, np.einsum("ij,ij->i", before, after)), 0.0]
 
 
-def largest_radius(line: np.ndarray) -> float:
-    """The radius [m] up to which all corners of the line can be rounded: arcs begin r tan(turn / 2) from a corner."""
-    tangent = np.tan(np.abs(turns(line)) / 2.0)
+def largest_corner_radius(line: np.ndarray) -> float:
+    """Largest radius [m] to which all corners can be rounded.
+
+    The arc of radius r begins r tan(angle / 2) from its corner, so arcs of neighbours must not meet.
+    """
+    tangent = np.tan(np.abs(corner_angles(line)) / 2.0)
     length = np.hypot(*np.diff(line, axis=0).T)
     with np.errstate(divide="ignore"):
-        return max(0.0, float(((length - LEAST) / (tangent[:-1] + tangent[1:])).min()))
+        return max(0.0, float(((length - MIN_LENGTH) / (tangent[:-1] + tangent[1:])).min()))
 
 
-def rounded(line: np.ndarray, radius: float, facets: int) -> np.ndarray:
-    """The line with arcs in place of its corners, in steps of a full turn / facets at most, their ends on the line.
+def round_corners(line: np.ndarray, radius: float, facets: int) -> np.ndarray:
+    """The line with arcs in place of its corners, in steps of at most a full turn / facets.
 
-    A corner of less than half a step stays as it is.
+    The ends of arcs lie on the line. A corner of less than half a step stays as it is.
     """
-    if radius <= LEAST:
+    if radius <= MIN_LENGTH:
         return line
     points = [line[:1]]
     for corner, before, after, turn in zip(
-        line[1:-1], line[:-2], line[2:], turns(line)[1:-1], strict=True
+        line[1:-1], line[:-2], line[2:], corner_angles(line)[1:-1], strict=True
     ):
         steps = facets * abs(turn) / (2.0 * np.pi)
         if steps < 0.5:
             points.append(corner[None])
             continue
-        into, out = (
+        arriving, leaving = (
             (end - start) / np.hypot(*(end - start))
             for start, end in ((before, corner), (corner, after))
         )
-        centre = corner + radius / np.cos(turn / 2.0) * _unit(out - into)
-        begin = corner - radius * np.tan(abs(turn) / 2.0) * into - centre
+        centre = corner + radius / np.cos(turn / 2.0) * _unit(leaving - arriving)
+        begin = corner - radius * np.tan(abs(turn) / 2.0) * arriving - centre
         angle = turn * np.linspace(0.0, 1.0, int(np.ceil(steps - 1e-9)) + 1)[:, None]
         points.append(
             centre + np.cos(angle) * begin + np.sin(angle) * np.array([-begin[1], begin[0]])
@@ -58,9 +62,9 @@ def rounded(line: np.ndarray, radius: float, facets: int) -> np.ndarray:
     return np.concatenate([*points, line[-1:]])
 
 
-def crossing(line: np.ndarray) -> np.ndarray | None:
-    """A point (2,) m where the line comes nearer to itself than LEAST, or folds back; None where it does not."""
-    sharp = np.abs(turns(line)) > np.pi - 1e-3
+def find_contact(line: np.ndarray) -> np.ndarray | None:
+    """A point (2,) [m] where the line folds back or comes nearer to itself than MIN_LENGTH."""
+    sharp = np.abs(corner_angles(line)) > np.pi - 1e-3
     if sharp.any():
         return line[np.argmax(sharp)]
     start, end = line[:-1], line[1:]
@@ -69,25 +73,25 @@ def crossing(line: np.ndarray) -> np.ndarray | None:
         [_distance(line[k], start[m], end[m]) for k, m in ((i, j), (i + 1, j), (j, i), (j + 1, i))],
         axis=0,
     )
-    near = (apart < LEAST) | _cut(start[i], end[i], start[j], end[j])
+    near = (apart < MIN_LENGTH) | _cross(start[i], end[i], start[j], end[j])
     return start[i[np.argmax(near)]] if near.any() else None
 
 
-def crosses(line: np.ndarray) -> bool:
-    """Whether two sides of the line that are no neighbours cross."""
+def crosses_itself(line: np.ndarray) -> bool:
+    """Whether two sides of the line that are not neighbours cross."""
     start, end = line[:-1], line[1:]
     i, j = np.triu_indices(len(start), 2)
-    return bool(_cut(start[i], end[i], start[j], end[j]).any())
+    return bool(_cross(start[i], end[i], start[j], end[j]).any())
 
 
-def volume(line: np.ndarray) -> float:
-    """What the line encloses on its way round the axis [m³]: cones upon each other."""
+def enclosed_volume(line: np.ndarray) -> float:
+    """Volume [m³] inside the line turned about the axis: a sum of truncated cones."""
     (r0, r1), rise = (line[:-1, 0], line[1:, 0]), np.diff(line[:, 1])
     return float(np.pi / 3.0 * (rise * (r0 * r0 + r0 * r1 + r1 * r1)).sum())
 
 
-def revolved(line: np.ndarray, facets: int) -> ShapeSurface:
-    """The cavity under the line, which ends on the axis; `facets` flat sides to a turn, their corners on the line."""
+def revolve(line: np.ndarray, facets: int) -> ShapeSurface:
+    """The cavity under the line: `facets` flat sides for a full turn, their corners on the line."""
     angle = 2.0 * np.pi * np.arange(facets) / facets
     circle = np.c_[np.cos(angle), np.sin(angle)]
     rings = [np.c_[r * circle, np.full(facets, z)] for r, z in line[:-1]]
@@ -100,13 +104,13 @@ def _unit(vector: np.ndarray) -> np.ndarray:
 
 
 def _distance(point: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Of points (k, 2) from as many straight pieces."""
+    """Distance [m] of points (k, 2) from straight pieces, one each."""
     along = end - start
     share = np.einsum("ij,ij->i", point - start, along) / np.einsum("ij,ij->i", along, along)
     return np.hypot(*(point - start - np.clip(share, 0.0, 1.0)[:, None] * along).T)
 
 
-def _cut(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.ndarray:
+def _cross(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.ndarray:
     """Whether pieces ab and cd cross, (k,) bool."""
 
     def side(p: np.ndarray, q: np.ndarray, x: np.ndarray) -> np.ndarray:

@@ -1,23 +1,21 @@
-"""What a shape hands on: a closed surface whose triangles know what they belong to."""
+"""The closed surface that a shape makes, with a tag on each triangle."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-TAG_PART, TAG_SONOTRODE, TAG_WALL = (
-    0,
-    1,
-    2,
-)  # and 3, 4 ...: the further sonotrodes, in the design's order
+# Further sonotrodes have the tags from 3 on, in the design's order.
+TAG_PART, TAG_SONOTRODE, TAG_WALL = 0, 1, 2
 
 
 def further_sonotrode_tag(k: int) -> int:
-    """The tag of sonotrodes.k of a design."""
+    """Tag of sonotrodes.k of a design."""
     return TAG_WALL + 1 + k
 
 
 def is_sonotrode(tags: np.ndarray) -> np.ndarray:
-    """Which tags (k,) are a sonotrode's, the first's or a further one's."""
+    """Which tags (k,) belong to a sonotrode, the first or a further one."""
     return (tags == TAG_SONOTRODE) | (tags > TAG_WALL)
 
 
@@ -25,12 +23,48 @@ def is_sonotrode(tags: np.ndarray) -> np.ndarray:
 class ShapeSurface:
     """The cavity before the part is taken out of it.
 
-    vertices (n, 3) float64 m · triangles (k, 3) int32, closed, normals pointing out of the cavity · tags
-    (k,) uint8 · source (k,) int32: where the part is drawn as a piece of this surface, the part triangle that each
-    TAG_PART triangle lies on, else -1; None where the part is a body of its own, still to be cut out.
+    Attributes:
+        vertices: [m], shape (n, 3), float64.
+        triangles: shape (k, 3), int32; closed, normals pointing out of the cavity.
+        tags: shape (k,), uint8.
+        source: shape (k,), int32: the part triangle that each TAG_PART triangle lies on, else -1.
+            None where the part is a separate body that still has to be cut out.
     """
 
     vertices: np.ndarray
     triangles: np.ndarray
     tags: np.ndarray
     source: np.ndarray | None = None
+
+
+def lofted(rings: Sequence[np.ndarray], peak: np.ndarray | None = None) -> ShapeSurface:
+    """Closed surface through rings of points, lowest first; its floor is the sonotrode.
+
+            ____ ring 1      ceiling: a fan about its middle, or about a peak
+           /____\\
+           |    | ring 0     floor: a fan about its middle
+
+    Args:
+        rings: points [m], each (n, 3) with the same n, round a convex outline, counter-clockwise
+            seen from above.
+        peak: [m], shape (3,).
+    Returns:
+        2 n triangles a ring.
+    """
+    n, k = len(rings[0]), len(rings)
+    middle = rings[-1].mean(axis=0) if peak is None else peak
+    vertices = np.concatenate([*rings, [rings[0].mean(axis=0), middle]])
+    here, beside = np.arange(n), (np.arange(n) + 1) % n
+    floor = np.c_[np.full(n, k * n), beside, here]
+    sides = []
+    for ring in range(k - 1):
+        low, high = ring * n, (ring + 1) * n
+        sides += [
+            np.c_[low + here, low + beside, high + beside],
+            np.c_[low + here, high + beside, high + here],
+        ]
+    top = (k - 1) * n
+    ceiling = np.c_[np.full(n, k * n + 1), top + here, top + beside]
+    triangles = np.concatenate([floor, *sides, ceiling]).astype(np.int32)
+    tags = np.repeat(np.array([TAG_SONOTRODE, TAG_WALL], dtype=np.uint8), [n, len(triangles) - n])
+    return ShapeSurface(vertices, triangles, tags)

@@ -149,7 +149,7 @@ def test_results_name_the_file_and_can_be_read_without_it(
     [
         (
             (RETURN, "return 7"),
-            "surface() of Pyramid gives int; a chamberopt.design.shapes.ShapeSurface is wanted",
+            "surface() of Pyramid gives int; it must give a chamberopt.design.shapes.ShapeSurface",
         ),
         ((RETURN, "return 1 / 0"), "pyramid.py:14: surface() failed: ZeroDivisionError"),
         (("[3, 0, 4]]", "[3, 4, 0]]"), "is not closed: each side of a triangle"),
@@ -158,7 +158,7 @@ def test_results_name_the_file_and_can_be_read_without_it(
         (("faces = np.array([", "faces = np.fliplr(["), "is inside out"),
         (("[1, 1, 2", "[2, 2, 2"), "has no triangle tagged TAG_SONOTRODE"),
         (("[1, 1, 2", "[1, 1, 1"), "has a sonotrode that is not the floor at z = 0"),
-        (("[0, 0, h]", "[0, 0, np.nan]"), "no finite numbers"),
+        (("[0, 0, h]", "[0, 0, np.nan]"), "not finite numbers"),
         (("def surface", "def surfaces"), "Pyramid does not define surface()"),
         (
             ("import numpy as np", "import nunpy as np"),
@@ -232,7 +232,7 @@ def test_the_one_in_the_docs_works(folder: Path) -> None:
         ),
         (
             "points = 1e3 * points",
-            r"is 80 m wide, where 10 is the most; its vertices are in metres, not mm",
+            r"is 80 m wide; at most 10 m is allowed; its vertices are in metres, not mm",
         ),
     ],
 )
@@ -269,16 +269,16 @@ def test_lists_will_do_and_what_it_says_of_the_part_does_not_count(folder: Path)
     [
         (
             "def widths_mm(self): return 'wide'",
-            r"widths_mm\(\) of Pyramid gives 'wide'; widths \[mm\] by key are wanted",
+            r"widths_mm\(\) of Pyramid gives 'wide'; it must give widths \[mm\] by key",
         ),
         ("def widths_mm(self): return {'side_mm': None}", r"widths_mm\(\) of Pyramid gives .*None"),
         (
             "def room(self): return 0.0",
-            r"room\(\) of Pyramid gives 0.0; a volume \[m³\] above 0 is wanted",
+            r"room\(\) of Pyramid gives 0.0; it must give a volume \[m³\] above 0",
         ),
         (
             "def notes(self, ball): return 'note'",
-            r"notes\(\) of Pyramid gives 'note'; a list of texts is wanted",
+            r"notes\(\) of Pyramid gives 'note'; it must give a list of texts",
         ),
     ],
 )

@@ -380,7 +380,7 @@ def test_what_is_no_set_up_is_refused(
         build_chamber(design(text_stl(tmp_path / "setup.stl", drawing), **tables))
 
 
-def test_a_sonotrode_with_a_free_rim_is_refused(tmp_path: Path) -> None:
+def test_a_sonotrode_with_a_free_edge_is_refused(tmp_path: Path) -> None:
     """A step up to the sonotrode: the wall around it is lower."""
     ring = [np.array([a, b, c, d])[::-1] for a, b, c, d in zip(*corners_of_a_step(), strict=True)]
     step = sides(square(10, -2), square(10, 0))
@@ -393,7 +393,7 @@ def test_a_sonotrode_with_a_free_rim_is_refused(tmp_path: Path) -> None:
 
     with pytest.raises(
         InputError,
-        match=r"chamber\.sonotrode: its face has a free rim at \(.*\) mm: walls must rise",
+        match=r"chamber\.sonotrode: its face has a free edge at \(.*\) mm: walls must rise",
     ):
         build_chamber(design(text_stl(tmp_path / "setup.stl", drawing)))
 

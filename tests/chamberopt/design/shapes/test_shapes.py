@@ -18,8 +18,8 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.design.load import Design, load_design
 from chamberopt.design.shapes import SHAPES, TAG_SONOTRODE, TAG_WALL
-from chamberopt.design.shapes.closed_check import fault
 from chamberopt.design.shapes.construction.surface import ShapeSurface
+from chamberopt.design.shapes.construction.surface_check import find_fault
 from chamberopt.geometry.triangles import areas
 from chamberopt.simulation.convergence.parameters import FACETS, knobs
 
@@ -38,7 +38,7 @@ def checked(made: ShapeSurface) -> trimesh.Trimesh:
     assert mesh.is_watertight
     assert mesh.is_winding_consistent
     assert mesh.volume > 0.0
-    assert fault(made) is None
+    assert find_fault(made) is None
     assert np.isin(made.tags, (TAG_SONOTRODE, TAG_WALL)).all()
     low = (made.vertices[made.triangles][..., 2] == 0.0).all(axis=1)
     assert np.array_equal(low, made.tags == TAG_SONOTRODE)

@@ -1,0 +1,86 @@
+"""The part of a design: its mesh file, its place in the chamber, and the target to be covered."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field
+
+from chamberopt.common.toml_errors import Problem
+from chamberopt.common.toml_fields import MeshFile, Names, Pair, Triple, list_field, quantity
+from chamberopt.design.table import DesignTable
+from chamberopt.geometry.mesh_io.units import Unit
+
+
+class Target(DesignTable):
+    """Which triangles of the part must be covered; they meet all given conditions."""
+
+    surface: Names = list_field(
+        'a name in quotes, or a list of names, e.g. ["flank", "root"]',
+        "groups, sets, properties or colours of the part's file; all: the whole surface",
+        ("all",),
+    )
+    direction: Triple | None = list_field(
+        "three numbers [x, y, z], not all 0", "reference direction in the part file's frame", None
+    )
+    angle_deg: Pair | None = list_field(
+        "two numbers [low, high], 0 <= low < high <= 180",
+        "between outward normal and direction, degrees",
+        None,
+    )
+    box_mm: Annotated[tuple[Triple, Triple], Field(strict=False)] | None = list_field(
+        "two corners [[x, y, z], [x, y, z]], low before high, mm",
+        "holding the triangles' centroids, in the part file's frame",
+        None,
+    )
+    element_mm: float | None = quantity(
+        0.01, 1000, "mm", "wanted side of the target's triangles; absent: the file's", None
+    )
+    reachable: bool = Field(
+        default=False, description="only what a ball can touch, in the design's own chamber"
+    )
+
+    @property
+    def element(self) -> float | None:
+        """Wanted side of the target's triangles [m]."""
+        return None if self.element_mm is None else self.element_mm * 1e-3
+
+    def _problems(self) -> Iterator[Problem]:
+        if (self.direction is None) != (self.angle_deg is None):
+            names = ("direction", "angle_deg")
+            given, lacking = names if self.angle_deg is None else names[::-1]
+            yield Problem(given, f"given without {lacking}; give both or neither")
+        if self.direction is not None and not any(self.direction):
+            text = "given [0, 0, 0], which points nowhere; e.g. [0, 0, -1] is down"
+            yield Problem("direction", text)
+        if self.angle_deg is not None and not 0 <= self.angle_deg[0] < self.angle_deg[1] <= 180:
+            allowed = "[low, high] with 0 <= low < high <= 180 degrees"
+            yield Problem("angle_deg", f"given {list(self.angle_deg)}; allowed: {allowed}")
+        if self.box_mm is not None and not all(a < b for a, b in zip(*self.box_mm, strict=True)):
+            corners = [list(corner) for corner in self.box_mm]
+            text = f"given {corners}; each low corner must be below its high corner"
+            yield Problem("box_mm", text)
+
+
+class PartTable(DesignTable):
+    """The part's mesh and its place in the chamber."""
+
+    mesh: MeshFile = Field(description="mesh file, path relative to the design file")
+    unit: Unit = Field(default="guess", description="of the numbers in the mesh file")
+    rotate_deg: Triple = list_field(
+        "three numbers [x, y, z] in degrees", "turns about x, then y, then z", (0.0, 0.0, 0.0)
+    )
+    offset_mm: Pair = list_field(
+        "two numbers [x, y] in mm", "sideways from the chamber axis", (0.0, 0.0)
+    )
+    target: Target = Field(default_factory=Target, description="which triangles must be covered")
+
+    @property
+    def mesh_path(self) -> Path:
+        """Absolute path of the mesh file."""
+        return Path(self.mesh)
+
+    @property
+    def offset(self) -> tuple[float, float]:
+        """Sideways shift (x, y) from the chamber axis [m]."""
+        return self.offset_mm[0] * 1e-3, self.offset_mm[1] * 1e-3
