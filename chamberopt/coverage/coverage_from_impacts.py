@@ -1,4 +1,10 @@
-"""ImpactLog -> what each triangle of the user's own mesh got: impacts, dents and coverage."""
+"""From impacts to the coverage of each part triangle by Avrami's equation.
+
+Notation
+    C  coverage: share of an area that lies inside dents, 0..1
+    x  dent density: area of all dents over the area they lie on      (dent_density)
+    C = 1 - exp(-x) for dents that fall independently of one another (Avrami's equation)
+"""
 
 from __future__ import annotations
 
@@ -17,12 +23,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Tally:
-    """What each part triangle got, summed over the simulated time of one or more replicas.
+    """Sums of the impacts on each part triangle, over one or more replicas.
 
-    simulated_time s · impacts (m,), dents (m,): numbers · dented_area (m,) m² · speed_sum (m,) m/s, of normal
-    speeds · angle_sum (m,) degrees, of impact angles. Every column is a plain sum, so tallies add: `a + b`.
+    Every column is a plain sum, so tallies add: `a + b`. The tally of one replica also has its single dents, which sums
+    of tallies do not keep.
 
-    One replica's also has its dents one by one: dent_triangle (k,) int, dent_area (k,) m²; sums are without.
+    Args:
+        simulated_time: recorded time of all replicas together [s].
+        impacts, dents: number of impacts, and of those that leave a dent, (m,).
+        dented_area: area of the dents [m²], (m,).
+        speed_sum: sum of normal speeds [m/s], (m,).
+        angle_sum: sum of impact angles [degrees], (m,).
+        dent_triangle: part triangle of each dent, (k,) int.
+        dent_area: area of each dent [m²], (k,).
     """
 
     simulated_time: float
@@ -35,23 +48,22 @@ class Tally:
     dent_area: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def __add__(self, other: Tally) -> Tally:
-        return Tally(*(getattr(self, name) + getattr(other, name) for name in SUMS))
+        return Tally(*(getattr(self, name) + getattr(other, name) for name in _SUMS))
 
     def __sub__(self, other: Tally) -> Tally:
-        """This tally without one of its parts; what rounding leaves below zero is zero."""
-        return Tally(*(np.maximum(getattr(self, name) - getattr(other, name), 0) for name in SUMS))
+        """This tally without one of its replicas. Rounding errors below zero become zero."""
+        return Tally(*(np.maximum(getattr(self, name) - getattr(other, name), 0) for name in _SUMS))
 
 
-SUMS = tuple(column.name for column in fields(Tally) if not column.name.startswith("dent_"))
+_SUMS = tuple(column.name for column in fields(Tally) if not column.name.startswith("dent_"))
 
 
 def tally_impacts(impacts: ImpactLog, chamber: Chamber, design: Design) -> Tally:
-    """Book every impact on the part triangle it hit.
+    """Sum the impacts of one replica on each part triangle.
 
-    A dent is booked whole on the triangle under the contact, even where it spills over the edge: neighbours
-    trade what they lose, so sums over an area are unbiased, while a triangle much smaller than a dent is
-    noisy. Speeds and angles are relative to the surface; impacts below the yield speed count as impacts
-    without dents.
+    A dent counts whole for the triangle under its contact point, even if it reaches over the edge. Neighbours trade
+    what they lose, so sums over an area are unbiased, while a triangle much smaller than a dent is noisy. Impacts below
+    the yield speed count as impacts without dents.
     """
     source = chamber.source[impacts.triangle]
     on_part = source >= 0
@@ -73,27 +85,35 @@ def tally_impacts(impacts: ImpactLog, chamber: Chamber, design: Design) -> Tally
     )
 
 
-def coverage_at(total: Tally, chamber: Chamber, time: float) -> np.ndarray:
-    """Share of each part triangle that is dented after `time` [s], shape (m,), 0..1; NaN where not exposed.
+def coverage_from_dent_density(dent_density: np.ndarray) -> np.ndarray:
+    """Coverage 1 - exp(-x) of areas with dent density x, by Avrami's equation."""
+    return np.asarray(-np.expm1(-dent_density))
 
-    C = 1 - exp(-dented area per exposed area and second · time): Avrami's equation for dents that fall
-    independently of one another, at the rate seen in the simulated time.
+
+def coverage_at(total: Tally, chamber: Chamber, time: float) -> np.ndarray:
+    """Coverage of each part triangle after a peening time, dents falling at the simulated rate.
+
+    Args:
+        time: peening time [s].
+
+    Returns:
+        Coverage of the exposed area, (m,); NaN for triangles that are not exposed.
     """
     exposed = chamber.exposed_area > 0.0
     rate = np.full(len(exposed), np.nan)
     np.divide(
         total.dented_area, chamber.exposed_area * total.simulated_time, out=rate, where=exposed
     )
-    return -np.expm1(-rate * time)
+    return coverage_from_dent_density(rate * time)
 
 
 def mean_speed_per_triangle(total: Tally) -> np.ndarray:
-    """Mean normal speed of the impacts on each part triangle [m/s], shape (m,); NaN where nothing hit."""
+    """Mean normal speed of the impacts on each part triangle [m/s], (m,); NaN if nothing hit it."""
     return _per_impact(total.speed_sum, total.impacts)
 
 
 def mean_angle_per_triangle(total: Tally) -> np.ndarray:
-    """Mean impact angle on each part triangle [degrees from the surface], (m,); NaN where nothing hit."""
+    """Mean angle [degrees from the surface] of the impacts on each triangle, (m,); NaN if nothing hit it."""
     return _per_impact(total.angle_sum, total.impacts)
 
 

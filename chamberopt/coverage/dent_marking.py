@@ -1,13 +1,23 @@
-"""Every dent as a disc on the part's own surface: what is marked counts once, across triangles and round edges.
+"""Coverage model "dents": the share of the surface inside discs, each dent one disc on the surface.
 
-The surface is sampled by points; a dent marks those nearer to its contact point than its radius, measured along the
-surface. Where p and q lie on two planes that meet in an edge, at angle theta between the normals n_p and n_q, that is
+The surface is sampled by points. A dent marks the points that are nearer to its contact point than its
+radius, measured along the surface, so it bends across triangles and round edges. What several dents
+share counts once.
 
-    distance² = |p - q|² + 2 a b / (1 + cos theta),   a = (p - q).n_q,   b = (q - p).n_p,
+Notation
+    p, q      sample point and contact point [m]            (samples.place, place)
+    n_p, n_q  unit normals of the surface there             (samples.normal, normal)
+    theta     angle between the normals
+    a, b      (p - q).n_q and (q - p).n_p [m]
 
-exact for the straight way over the edge: with h and y the distances of p and q from it and s along it,
-a = -h sin theta, b = -y sin theta (both + in a hollow), |p - q|² = h² + y² + 2 h y cos theta + s², and unfolded it is
-(h + y)² + s². The far side of a thin blade faces the other way, cos theta = -1, and is infinitely far.
+On two planes that meet in an edge the distance along the surface is
+
+    distance² = |p - q|² + 2 a b / (1 + cos theta),
+
+exact for the straight way over the edge. With h and y the distances of p and q from the edge and s
+along it, a = -h sin theta and b = -y sin theta (both + in a hollow),
+|p - q|² = h² + y² + 2 h y cos theta + s², and unfolded the distance² is (h + y)² + s². The far side of a
+thin blade faces the other way, cos theta = -1, and is infinitely far.
 """
 
 from __future__ import annotations
@@ -29,16 +39,23 @@ if TYPE_CHECKING:
     from chamberopt.design.load import Design
     from sim_core import ImpactLog
 
-MOST_POINTS = 5_000_000  # about a gigabyte with what is computed on the way
-AT_ONCE = 5_000  # dents looked up together
-FEW_POINTS = (
-    25  # a triangle; with 13 of them the gear's uniform_coverage is 0.03 too low (docs/accuracy.md)
-)
+MAX_POINTS = 5_000_000  # about a gigabyte with all intermediate results
+DENTS_AT_ONCE = 5_000  # searched for together, to bound memory
+# Per target triangle. With 13 the gear's uniform_coverage is 0.03 too low (docs/accuracy.md).
+MIN_POINTS_PER_TRIANGLE = 25
+PLASTIC_NUMBER = 1.32471795724474602596  # real root of x³ = x + 1
 
 
 @dataclass(frozen=True)
 class SamplePoints:
-    """Points on the part's exposed surface: place, normal (p, 3) m · triangle (p,) of the part · area (p,) m² each."""
+    """Points on the part's exposed surface.
+
+    Args:
+        place: positions [m], (p, 3).
+        normal: unit normals of the surface, (p, 3).
+        triangle: part triangle of each point, (p,).
+        area: area that each point stands for [m²], (p,).
+    """
 
     place: np.ndarray
     normal: np.ndarray
@@ -46,42 +63,34 @@ class SamplePoints:
     area: np.ndarray
 
 
-def few_points_note(samples: SamplePoints, chamber: Chamber) -> tuple[str, ...]:
-    """What is said where a triangle of the target has too few sample points to tell a coverage by."""
-    on_target = exposed_target(chamber)[samples.triangle]
-    each = np.bincount(samples.triangle[on_target], minlength=len(chamber.part.triangles))
-    middle = float(np.median(each[each > 0])) if each.any() else 0.0
-    if middle >= FEW_POINTS:
-        return ()
-    return (
-        f"a triangle of the target has {middle:.0f} sample points in the middle, fewer than {FEW_POINTS}: std_coverage "
-        "comes out too large and uniform_coverage too low; lower process.accuracy.sample_mm",
-    )
-
-
 def sample_points(chamber: Chamber, spacing: float) -> SamplePoints:
-    """About one point for each spacing² [m²] of the part's exposed surface, at least one a triangle of the cavity.
+    """Spread points evenly over the part's exposed surface, the same ones every time.
 
-    Spread within a triangle by the additive recurrence of the plastic number (M. Roberts, "The unreasonable
-    effectiveness of quasirandom sequences", 2018), folded from the square: even, and the same every time. Raises
-    InputError for more points than can be held.
+    Within a triangle they follow the additive recurrence of the plastic number, folded from the square.
+
+    Args:
+        spacing: about one point for each spacing² [m], at least one a triangle of the cavity.
+
+    Raises:
+        InputError: the points would not fit into memory.
+
+    Source: M. Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018.
     """
     index = np.flatnonzero(chamber.source >= 0)
     vectors = area_vectors(chamber.vertices, chamber.triangles[index])
     area = np.linalg.norm(vectors, axis=1)
     index, vectors, area = (column[area > 0.0] for column in (index, vectors, area))
     count = np.maximum(1, np.rint(area / spacing**2)).astype(int)
-    if count.sum() > MOST_POINTS:
+    if count.sum() > MAX_POINTS:
         raise InputError(
-            f"process.accuracy.sample_mm: given {spacing * 1e3:g}, which takes {count.sum():,} points for a surface of "
-            f"{area.sum() * 1e6:.4g} mm²; at most {MOST_POINTS:,} are supported: raise it"
+            f"process.accuracy.sample_mm: given {spacing * 1e3:g}, which takes {count.sum():,} points "
+            f"for a surface of {area.sum() * 1e6:.4g} mm²; at most {MAX_POINTS:,} are supported: raise it"
         )
     owner = np.repeat(np.arange(len(index)), count)
     number = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
-    plastic = 1.32471795724474602596
-    # Each triangle begins elsewhere in the sequence: else all single points would be at the same corner.
+    # Each triangle starts elsewhere in the sequence, or all single points would lie in the same corner.
     u, v = (
-        ((number + 0.5) / plastic**power + owner / plastic ** (power + 2) + 0.5) % 1.0
+        ((number + 0.5) / PLASTIC_NUMBER**power + owner / PLASTIC_NUMBER ** (power + 2) + 0.5) % 1.0
         for power in (1, 2)
     )
     folded = u + v > 1.0
@@ -95,10 +104,24 @@ def sample_points(chamber: Chamber, spacing: float) -> SamplePoints:
     )
 
 
+def few_points_note(samples: SamplePoints, chamber: Chamber) -> tuple[str, ...]:
+    """A note if the median target triangle has too few sample points to measure its coverage."""
+    on_target = exposed_target(chamber)[samples.triangle]
+    count = np.bincount(samples.triangle[on_target], minlength=len(chamber.part.triangles))
+    median = float(np.median(count[count > 0])) if count.any() else 0.0
+    if median >= MIN_POINTS_PER_TRIANGLE:
+        return ()
+    return (
+        f"the median target triangle has {median:.0f} sample points, fewer than "
+        f"{MIN_POINTS_PER_TRIANGLE}: std_coverage comes out too large and uniform_coverage too low; "
+        "lower process.accuracy.sample_mm",
+    )
+
+
 def first_marked_times(
     samples: SamplePoints, impacts: ImpactLog, chamber: Chamber, design: Design
 ) -> np.ndarray:
-    """When each point is first inside a dent [s], (p,); inf for never."""
+    """First time at which each point is inside a dent [s], (p,); inf if it never is."""
     dents = dents_on_part(impacts, chamber, design)
     return mark_points(samples, dents.place, dents.normal, dents.radius, dents.time)
 
@@ -110,13 +133,18 @@ def mark_points(
     radius: np.ndarray,
     time: np.ndarray,
 ) -> np.ndarray:
-    """First time (p,) at which each point is inside one of these discs: place, normal (k, 3), radius, time (k,)."""
+    """First time [s] at which each point is inside one of these discs, (p,); inf if it never is.
+
+    Args:
+        place, normal: contact points [m] and unit normals of the discs, (k, 3).
+        radius, time: their radii [m] and times [s], (k,).
+    """
     from scipy.spatial import cKDTree
 
     first = np.full(len(samples.area), np.inf)
     tree = cKDTree(samples.place)
-    for begin in range(0, len(place), AT_ONCE):
-        some = slice(begin, begin + AT_ONCE)
+    for begin in range(0, len(place), DENTS_AT_ONCE):
+        some = slice(begin, begin + DENTS_AT_ONCE)
         point, dent, _ = points_in_dents(
             tree, samples.normal, place[some], normal[some], radius[some]
         )
@@ -127,13 +155,20 @@ def mark_points(
 def points_in_dents(
     tree: cKDTree, facing: np.ndarray, place: np.ndarray, normal: np.ndarray, radius: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Which points lie in which discs: rows of point, dent, and their distance as a share of the dent's radius.
+    """All pairs of a point and a disc that holds it.
 
-    tree: of the points, facing (p, 3) their normals · place, normal (k, 3), radius (k,): of the discs.
+    Args:
+        tree: search tree of the points.
+        facing: unit normals of the surface at the points, (p, 3).
+        place, normal, radius: the discs, as in `mark_points`.
+
+    Returns:
+        Index of the point, index of the disc, and distance as a share of the disc's radius, a row a pair.
     """
     from scipy.spatial import cKDTree
 
-    # No way along a surface is shorter than the straight one: what is near in space holds all candidates.
+    # No way along the surface is shorter than the straight line, so the pairs that are near in space
+    # include all pairs that are near along the surface.
     pairs = tree.sparse_distance_matrix(cKDTree(place), radius.max(), output_type="ndarray")
     point, dent = pairs["i"], pairs["j"]
     cosine = (facing[point] * normal[dent]).sum(axis=1)
@@ -142,14 +177,23 @@ def points_in_dents(
     with np.errstate(divide="ignore", invalid="ignore"):
         detour = np.where(bend > 0.0, 2.0 * bend / (1.0 + cosine), 0.0)
     square = pairs["v"] ** 2 + detour
-    hit = square <= radius[dent] ** 2
-    return point[hit], dent[hit], np.sqrt(square[hit]) / radius[dent[hit]]
+    inside = square <= radius[dent] ** 2
+    return point[inside], dent[inside], np.sqrt(square[inside]) / radius[dent[inside]]
 
 
 def marked_share(
     samples: SamplePoints, first: np.ndarray, time: float, triangles: int
 ) -> np.ndarray:
-    """Share of each part triangle's exposed area that is inside a dent by a time [s], (triangles,); NaN unexposed."""
+    """Share of each part triangle's exposed area that is inside a dent after a peening time.
+
+    Args:
+        first: first time at which each point is inside a dent [s], (p,).
+        time: peening time [s].
+        triangles: number of triangles of the part.
+
+    Returns:
+        Share, (triangles,); NaN for triangles that are not exposed.
+    """
     area = np.bincount(samples.triangle, samples.area, triangles)
     marked = np.bincount(samples.triangle, samples.area * (first <= time), triangles)
     return np.divide(marked, area, out=np.full(triangles, np.nan), where=area > 0.0)

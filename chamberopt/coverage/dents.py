@@ -1,4 +1,13 @@
-"""What a single impact leaves on the part: the size of its dent and the angle at which it came."""
+"""What a single impact does to the part: the size of the dent it leaves, and the angle at which the ball comes.
+
+Notation
+    d   dent diameter [m]                               (dent_diameter)
+    D   ball diameter [m]                               (diameter)
+    rho density of the ball [kg/m³]                     (density)
+    v   normal speed of the impact [m/s]                (normal_speed)
+    B   Brinell hardness of the part [Pa]               (hardness)
+    e   coefficient of restitution at this speed, which falls from c0 at the yield speed v0 [m/s]
+"""
 
 from __future__ import annotations
 
@@ -17,8 +26,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Dents:
-    """Dents in order of time: place of the contact, normal of the triangle that was hit (k, 3) m · radius (k,) m ·
-    time (k,) s. Places are in the part's own frame.
+    """Dents in order of time, in the part's own frame.
+
+    Args:
+        place: contact points [m], (k, 3).
+        normal: unit normals of the triangles that were hit, (k, 3).
+        radius: radii of the dents [m], (k,).
+        time: times of the impacts [s], (k,).
     """
 
     place: np.ndarray
@@ -30,6 +44,15 @@ class Dents:
         return len(self.time)
 
 
+def dents_on_part(impacts: ImpactLog, chamber: Chamber, design: Design) -> Dents:
+    """The dents that impacts leave on the part. Impacts below its yield speed leave none."""
+    diameter = dent_diameters(impacts, design)
+    dents = np.flatnonzero((diameter > 0.0) & (chamber.source[impacts.triangle] >= 0))
+    corners = chamber.vertices[chamber.triangles[impacts.triangle[dents]]]
+    place = closest_points(corners, impacts.position[dents])
+    return Dents(place, unit_normals(corners), 0.5 * diameter[dents], impacts.time[dents])
+
+
 def dent_diameter(
     normal_speed: np.ndarray,
     diameter: float | np.ndarray,
@@ -38,16 +61,23 @@ def dent_diameter(
     c0: float,
     v0: float,
 ) -> np.ndarray:
-    """Diameter [m] of the dent a ball leaves; 0 where the normal speed is not above the yield speed v0.
+    """Diameter of the dent that a ball leaves: d = 1.278 D (1 - e²)^¼ (rho v² / B)^¼.
 
-    d = 1.278 D (1 - e²)^¼ (rho v² / B)^¼, Kirk's energy balance (D. Kirk, "Prediction and control of indent
-    diameter", The Shot Peener, 2004): the energy lost at normal speed v [m/s] makes a spherical cap in a
-    material of Brinell hardness B [Pa]. D [m], rho [kg/m³] of the ball; e the restitution at that very speed.
+    The energy that the impact loses makes a spherical cap in the material.
+
+    Args:
+        normal_speed: v [m/s], (n,).
+        c0, v0: parameters of sim_core's restitution law.
+
+    Returns:
+        Diameter [m], (n,); 0 where the normal speed is not above the yield speed v0.
+
+    Source: D. Kirk, "Prediction and control of indent diameter", The Shot Peener, 2004.
     """
     from sim_core import restitution_at
 
     speed = np.asarray(normal_speed, dtype=float)
-    # Below v0 the contact is elastic (the paper): what C0 < 1 loses there goes into waves, not into a dent.
+    # Below v0 the contact is elastic (Kirk): the energy that c0 < 1 loses there goes into waves, not into a dent.
     dents = speed > v0
     e = np.where(dents, restitution_at(speed, c0, v0), 1.0)
     return (
@@ -58,17 +88,17 @@ def dent_diameter(
 
 
 def ball_diameters(impacts: ImpactLog, design: Design) -> float | np.ndarray:
-    """Diameter [m] of the ball of each impact, (n,); one number where all are alike."""
+    """Diameter [m] of the ball of each impact, (n,), or one number if all balls are alike."""
     shot = design.shot
     return shot.diameter if shot.mix is None else np.array(shot.diameters)[impacts.ball]
 
 
 def dent_diameters(impacts: ImpactLog, design: Design) -> np.ndarray:
-    """Diameter [m] of the dent each impact would leave on the part, (n,), each ball with its own size."""
-    material, ball = design.materials.part, ball_diameters(impacts, design)
+    """Diameter [m] of the dent that each impact would leave on the part, (n,)."""
+    material = design.materials.part
     return dent_diameter(
         impacts.normal_speed,
-        ball,
+        ball_diameters(impacts, design),
         design.shot.density,
         material.hardness,
         material.restitution,
@@ -77,16 +107,15 @@ def dent_diameters(impacts: ImpactLog, design: Design) -> np.ndarray:
 
 
 def impact_angle_deg(velocity: np.ndarray, normal_speed: np.ndarray) -> np.ndarray:
-    """Angle [degrees] between the incoming ball's path and the surface: 90 is head on, 0 grazing."""
+    """Angle between the path of the incoming ball and the surface: 90 is head on, 0 grazing.
+
+    Args:
+        velocity: velocity of the ball relative to the surface [m/s], (n, 3).
+        normal_speed: its component along the normal [m/s], (n,).
+
+    Returns:
+        Angle [degrees], (n,).
+    """
     speed = np.linalg.norm(velocity, axis=1)
     ratio = np.divide(normal_speed, speed, out=np.ones_like(speed), where=speed > 0)
     return np.degrees(np.arcsin(np.clip(ratio, 0.0, 1.0)))
-
-
-def dents_on_part(impacts: ImpactLog, chamber: Chamber, design: Design) -> Dents:
-    """The dents that impacts leave on the part; impacts below its yield speed leave none."""
-    diameter = dent_diameters(impacts, design)
-    dents = np.flatnonzero((diameter > 0.0) & (chamber.source[impacts.triangle] >= 0))
-    corners = chamber.vertices[chamber.triangles[impacts.triangle[dents]]]
-    place = closest_points(corners, impacts.position[dents])
-    return Dents(place, unit_normals(corners), 0.5 * diameter[dents], impacts.time[dents])

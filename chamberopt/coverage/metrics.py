@@ -1,7 +1,7 @@
-"""Coverage -> numbers: the metrics of a candidate, and the objectives a study can maximise.
+"""The registry of metrics and objectives: what is computed of a candidate and what a study can maximise.
 
-Each is a function of a summed Tally, so that accuracy.py can take replicas out of the sum and see how far the
-number moves. All are over the exposed target; averages over it are weighted with exposed area.
+A new metric is one entry of `METRICS`, a new objective one entry of `OBJECTIVES`. Study files, tables, reports and
+result folders take names, units and ranges from here. All metrics are over the exposed target, weighted with its area.
 """
 
 from __future__ import annotations
@@ -21,31 +21,39 @@ if TYPE_CHECKING:
     from chamberopt.design.load import Design
 
 FULL_COVERAGE = 0.98  # SAE J2277: coverage that counts as complete
-NEVER = 1e6  # s; eleven days of peening stand for never
-
-Statistic = Callable[[Tally, "Chamber", "Design"], float]
-OverSurface = Callable[[np.ndarray, np.ndarray], float]
+NEVER = 1e6  # s: eleven days of peening stand for never
+P05 = 0.05  # share of the target's area that may be covered less than p05_coverage
 
 
 @dataclass(frozen=True)
 class Metric:
-    """A named number about a candidate: how it is computed, its unit and the range it can have.
+    """A named number of a candidate.
 
-    from_coverage: the same of any coverage (m,) of target triangles and their shares (m,) of its area, where it is one.
+    Args:
+        function: the metric of the impacts of all replicas together, without correction for a short simulation.
+        lowest, highest: range that the metric can have.
+        from_coverage: the metric of the coverage of target triangles and their shares of its area, (m,) each; None for
+            a metric that does not depend on coverage alone.
+        in_version_0_1: whether result folders of version 0.1.0 have it.
     """
 
     name: str
     unit: str
     summary: str
-    function: Statistic
+    function: Callable[[Tally, Chamber, Design], float]
     lowest: float = -math.inf
     highest: float = math.inf
-    from_coverage: OverSurface | None = None
+    from_coverage: Callable[[np.ndarray, np.ndarray], float] | None = None
+    in_version_0_1: bool = True
 
 
 @dataclass(frozen=True)
 class ObjectiveFunction:
-    """What a study maximises: a weighted sum of metrics, so that it always agrees with the metrics shown beside it."""
+    """What a study maximises: a weighted sum of metrics.
+
+    Args:
+        terms: weight of each metric, by its name.
+    """
 
     name: str
     summary: str
@@ -53,12 +61,12 @@ class ObjectiveFunction:
 
 
 def exposed_target(chamber: Chamber) -> np.ndarray:
-    """Part triangles that are wanted covered and that the shot can reach, shape (m,) bool."""
+    """Which part triangles belong to the target and can be reached by the shot, (m,) bool."""
     return chamber.part.target & (chamber.exposed_area > 0.0)
 
 
 def require_target(chamber: Chamber) -> None:
-    """InputError when nothing of the target bounds the cavity."""
+    """Raise InputError if no triangle of the target bounds the cavity."""
     if not exposed_target(chamber).any():
         raise InputError(
             "part.target: no triangle of the target bounds the cavity, so its coverage is not defined; "
@@ -67,10 +75,13 @@ def require_target(chamber: Chamber) -> None:
 
 
 def target_coverage(coverage: np.ndarray, chamber: Chamber) -> tuple[np.ndarray, np.ndarray]:
-    """Coverage of every target triangle, from that of the part's exposed triangles (m,), and its share of the area.
+    """Coverage of every target triangle and its share of the target's area.
 
-    What lies outside the cavity is not covered. Left out of the count, it would teach the optimiser to hide
-    whatever is hard to reach behind a lower ceiling.
+    Area outside the cavity counts as not covered. If it were left out, an optimiser would hide places that are hard to
+    reach behind a lower ceiling.
+
+    Args:
+        coverage: coverage of the exposed area of each part triangle, (m,).
     """
     target = chamber.part.target
     require_target(chamber)
@@ -80,57 +91,60 @@ def target_coverage(coverage: np.ndarray, chamber: Chamber) -> tuple[np.ndarray,
 
 
 def mean_coverage(coverage: np.ndarray, weight: np.ndarray) -> float:
-    """Area-weighted mean of the coverage at the treatment time, 0..1."""
+    """Area-weighted mean of the coverage, 0..1."""
     return float(weight @ coverage)
 
 
 def std_coverage(coverage: np.ndarray, weight: np.ndarray) -> float:
-    """Area-weighted standard deviation of the coverage from triangle to triangle, 0..0.5."""
+    """Area-weighted standard deviation of the coverage over the triangles, 0..0.5."""
     return float(np.sqrt(weight @ (coverage - weight @ coverage) ** 2))
 
 
 def p05_coverage(coverage: np.ndarray, weight: np.ndarray) -> float:
-    """The coverage that 95 % of the target's area exceeds, 0..1."""
+    """5th percentile of the coverage: 95 % of the target's area has more, 0..1."""
     order = np.argsort(coverage, kind="stable")
     # Mid-point rule: each triangle stands at the middle of its share of the area.
     share = np.cumsum(weight[order]) - 0.5 * weight[order]
-    return float(np.interp(0.05, share, coverage[order]))
+    return float(np.interp(P05, share, coverage[order]))
 
 
-def mean_normal_speed(total: Tally, chamber: Chamber, design: Design) -> float:
-    """Mean normal speed of all impacts on the target [m/s]; 0 when nothing hit it."""
-    target = exposed_target(chamber)
-    impacts = total.impacts[target].sum()
-    return float(total.speed_sum[target].sum() / impacts) if impacts else 0.0
+def seconds_to_98(p05: float, seconds: float) -> float:
+    """Peening time [s] until the 5th percentile of the coverage is 98 %, which counts as full (SAE J2277).
 
+    By Avrami's equation, 1 - exp(-rate · time).
 
-def impacts_per_mm2_s(total: Tally, chamber: Chamber, design: Design) -> float:
-    """Impacts on the target per mm² of its exposed area and second."""
-    target = exposed_target(chamber)
-    area_mm2 = chamber.exposed_area[target].sum() * 1e6
-    return float(total.impacts[target].sum() / (area_mm2 * total.simulated_time))
+    Args:
+        p05: 5th percentile of the coverage after `seconds` of peening.
 
-
-def time_to_98(total: Tally, chamber: Chamber, design: Design) -> float:
-    """Treatment time [s] after which 95 % of the target's area is covered to 98 %; see seconds_to_98."""
-    seconds = design.process.treatment_time
-    return seconds_to_98(
-        p05_coverage(*target_coverage(coverage_at(total, chamber, seconds), chamber)), seconds
-    )
-
-
-def seconds_to_98(poorest: float, seconds: float) -> float:
-    """The same from what the poorest twentieth has after `seconds`: dents fall as Avrami has it, 1 - exp(-rate · time).
-
-    98 % counts as full coverage (SAE J2277), and all but the twentieth as everywhere. At most LONGEST, which stands for
-    never.
+    Returns:
+        Time [s], at most NEVER.
     """
-    rate = -math.log(min(max(1.0 - poorest, 1e-12), 1.0)) / seconds
+    rate = -math.log(min(max(1.0 - p05, 1e-12), 1.0)) / seconds
     return min(NEVER, -math.log(1.0 - FULL_COVERAGE) / rate) if rate > 0.0 else NEVER
 
 
-def intensity_uniformity(total: Tally, chamber: Chamber, design: Design) -> float:
-    """1 - standard deviation over mean of the local mean normal speed; 0 when nothing hit. See intensity.py."""
+def _coverage_metric(
+    name: str, summary: str, from_coverage: Callable[[np.ndarray, np.ndarray], float], highest: float
+) -> Metric:
+    def of_tally(total: Tally, chamber: Chamber, design: Design) -> float:
+        return from_coverage(*_coverage_at_treatment_end(total, chamber, design))
+
+    return Metric(name, "", summary, of_tally, 0.0, highest, from_coverage)
+
+
+def _coverage_at_treatment_end(
+    total: Tally, chamber: Chamber, design: Design
+) -> tuple[np.ndarray, np.ndarray]:
+    return target_coverage(coverage_at(total, chamber, design.process.treatment_time), chamber)
+
+
+def _time_to_98(total: Tally, chamber: Chamber, design: Design) -> float:
+    p05 = p05_coverage(*_coverage_at_treatment_end(total, chamber, design))
+    return seconds_to_98(p05, design.process.treatment_time)
+
+
+def _intensity_uniformity(total: Tally, chamber: Chamber, design: Design) -> float:
+    """1 - standard deviation / mean of the local mean normal speed; 0 if nothing hit. See intensity.py."""
     target = chamber.part.target
     hits, area = total.impacts[target], chamber.part.area[target]
     local = np.divide(total.speed_sum[target], hits, out=np.zeros(len(hits)), where=hits > 0)
@@ -138,20 +152,20 @@ def intensity_uniformity(total: Tally, chamber: Chamber, design: Design) -> floa
     return 1.0 - std_coverage(local, area / area.sum()) / mean if mean > 0.0 else 0.0
 
 
-def shot_count(total: Tally, chamber: Chamber, design: Design) -> float:
-    """Number of balls."""
+def _mean_normal_speed(total: Tally, chamber: Chamber, design: Design) -> float:
+    target = exposed_target(chamber)
+    impacts = total.impacts[target].sum()
+    return float(total.speed_sum[target].sum() / impacts) if impacts else 0.0
+
+
+def _impacts_per_mm2_s(total: Tally, chamber: Chamber, design: Design) -> float:
+    target = exposed_target(chamber)
+    area_mm2 = chamber.exposed_area[target].sum() * 1e6
+    return float(total.impacts[target].sum() / (area_mm2 * total.simulated_time))
+
+
+def _shot_count(total: Tally, chamber: Chamber, design: Design) -> float:
     return float(design.shot.count)
-
-
-def _coverage_metric(name: str, summary: str, from_coverage: OverSurface, highest: float) -> Metric:
-    """Its plain function takes the dents of a tally for all there are: figures.py corrects for a short simulation."""
-
-    def plain(total: Tally, chamber: Chamber, design: Design) -> float:
-        return from_coverage(
-            *target_coverage(coverage_at(total, chamber, design.process.treatment_time), chamber)
-        )
-
-    return Metric(name, "", summary, plain, 0.0, highest, from_coverage)
 
 
 METRICS = {
@@ -168,44 +182,44 @@ METRICS = {
             "time_to_98_s",
             "s",
             "time until 95 % of the target's area is 98 % covered",
-            time_to_98,
+            _time_to_98,
             0.0,
             NEVER,
+            in_version_0_1=False,
         ),
         Metric(
             "intensity_uniformity",
             "",
             "1 - relative spread of the local impact speed",
-            intensity_uniformity,
+            _intensity_uniformity,
+            in_version_0_1=False,
         ),
         Metric(
-            "mean_normal_speed_m_s",
-            "m/s",
-            "mean normal speed of the impacts",
-            mean_normal_speed,
-            0.0,
+            "mean_normal_speed_m_s", "m/s", "mean normal speed of the impacts", _mean_normal_speed, 0.0
         ),
         Metric(
-            "impacts_per_mm2_s", "1/(mm² s)", "impacts per area and second", impacts_per_mm2_s, 0.0
+            "impacts_per_mm2_s", "1/(mm² s)", "impacts per area and second", _impacts_per_mm2_s, 0.0
         ),
-        Metric("shot_count", "balls", "number of balls", shot_count, 0.0),
+        Metric("shot_count", "balls", "number of balls", _shot_count, 0.0),
     )
 }
 
 OBJECTIVES = {
     one.name: one
     for one in (
-        # 1 only when all is covered, and covered evenly.
+        # 1 only if everything is covered, and covered evenly.
         ObjectiveFunction(
             "uniform_coverage",
             "mean minus standard deviation of coverage",
             {"mean_coverage": 1.0, "std_coverage": -1.0},
         ),
         ObjectiveFunction(
-            "coverage_p05", "coverage of the least covered 5 % of the area", {"p05_coverage": 1.0}
+            "p05_coverage", "coverage of the least covered 5 % of the area", {"p05_coverage": 1.0}
         ),
         ObjectiveFunction(
-            "time_to_98", "time to full coverage, the shorter the better", {"time_to_98_s": -1.0}
+            "minus_time_to_98_s",
+            "time to full coverage, the shorter the better",
+            {"time_to_98_s": -1.0},
         ),
         ObjectiveFunction(
             "intensity_uniformity",
@@ -214,30 +228,29 @@ OBJECTIVES = {
         ),
     )
 }
+RENAMED_OBJECTIVES = {"coverage_p05": "p05_coverage", "time_to_98": "minus_time_to_98_s"}
 
 
 def parse_objective(name: str) -> ObjectiveFunction:
-    """The objective of that name, or a sum such as "1 uniform_coverage + -0.001 time_to_98_s"; else InputError."""
+    """The objective of that name, or a sum such as "1 uniform_coverage + -0.001 time_to_98_s".
+
+    Raises:
+        InputError: it is neither.
+    """
     if name in OBJECTIVES:
         return OBJECTIVES[name]
+    if name in RENAMED_OBJECTIVES:
+        raise InputError(f"objective.name: {name!r} is now called {RENAMED_OBJECTIVES[name]!r}")
     terms: dict[str, float] = {}
     for term in name.split(" + "):
         weight, _, part = term.partition(" ")
         try:
-            factor, parts = float(weight), _terms(part)
+            factor = float(weight)
+            of_part = {part: 1.0} if part in METRICS else OBJECTIVES[part].terms
         except (ValueError, KeyError):
             raise InputError(
                 f"objective.name: {name!r} is not an objective; allowed: {', '.join(OBJECTIVES)}"
             ) from None
-        for metric, share in parts.items():
+        for metric, share in of_part.items():
             terms[metric] = terms.get(metric, 0.0) + factor * share
     return ObjectiveFunction(name, "weighted sum", terms)
-
-
-def _terms(name: str) -> dict[str, float]:
-    """Metrics and weights of an objective or a metric. KeyError when it is neither."""
-    return (
-        {METRICS[name].name: 1.0}
-        if name in METRICS and name not in OBJECTIVES
-        else OBJECTIVES[name].terms
-    )

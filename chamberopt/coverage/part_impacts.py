@@ -1,4 +1,7 @@
-"""Impacts on the part one by one, as few columns as their distributions need: 20 bytes each, a hundred in a log."""
+"""Single impacts on the part and their file hits.npz, for distributions and percentiles.
+
+An impact takes 20 bytes here, against a hundred in the simulator's log.
+"""
 
 from __future__ import annotations
 
@@ -26,10 +29,14 @@ HITS_FILE = "hits.npz"
 
 @dataclass(frozen=True)
 class Hits:
-    """Impacts of one or more replicas, (k,) each.
+    """Impacts of one or more replicas on the part, one row each.
 
-    triangle int32, of the part · float32: speed [m/s] along the normal · angle [degrees], 90 is head on · dent [m],
-    its diameter, 0 where there is none · energy [J] of the motion along the normal, m v² / 2.
+    Args:
+        triangle: part triangle, (k,) int32.
+        speed: normal speed [m/s], (k,) float32 as all that follow.
+        angle: angle between path and surface [degrees]; 90 is head on.
+        dent: diameter of the dent [m]; 0 if the impact leaves none.
+        energy: kinetic energy of the motion along the normal, m v² / 2 [J].
     """
 
     triangle: np.ndarray
@@ -44,72 +51,78 @@ class Hits:
 
 @dataclass(frozen=True)
 class HitsByTriangle:
-    """Hits in the order of their triangles: those of triangle t are the rows first[t] to first[t + 1].
+    """Impacts in the order of their triangles.
 
-    first (m + 1,) int64 · the columns of Hits.
+    Args:
+        first: rows first[t] to first[t + 1] belong to triangle t, (m + 1,) int64.
     """
 
     first: np.ndarray
     hits: Hits
 
     def of(self, triangle: int) -> Hits:
-        """The hits of one part triangle."""
+        """The impacts on one part triangle."""
         return _rows(self.hits, slice(self.first[triangle], self.first[triangle + 1]))
 
     def on(self, triangles: np.ndarray) -> Hits:
-        """The hits of all triangles that are marked, (m,) bool."""
+        """The impacts on all triangles that are marked in (m,) bool."""
         return _rows(self.hits, np.repeat(triangles, np.diff(self.first)))
 
 
 def hits_on_part(impacts: ImpactLog, chamber: Chamber, design: Design) -> Hits:
-    """The impacts of a log that are on the part."""
+    """The impacts of a simulator log that are on the part."""
     source = chamber.source[impacts.triangle]
     on_part = source >= 0
     speed = np.asarray(impacts.normal_speed)
     mass = design.shot.density * np.pi / 6.0 * ball_diameters(impacts, design) ** 3
     columns = (
+        speed,
         impact_angle_deg(np.asarray(impacts.velocity), speed),
         dent_diameters(impacts, design),
         0.5 * mass * speed * speed,
     )
-    return Hits(
-        source[on_part], *(column[on_part].astype(np.float32) for column in (speed, *columns))
-    )
+    return Hits(source[on_part], *(column[on_part].astype(np.float32) for column in columns))
 
 
 def sort_hits_by_triangle(hits: Sequence[Hits], triangles: int) -> HitsByTriangle:
-    """Hits of replicas together, by part triangle; triangles: how many the part has."""
-    whole = Hits(
+    """Put the impacts of several replicas together.
+
+    Args:
+        triangles: number of triangles of the part.
+    """
+    together = Hits(
         *(np.concatenate([getattr(one, column.name) for one in hits]) for column in fields(Hits))
     )
-    first = np.concatenate([[0], np.cumsum(np.bincount(whole.triangle, minlength=triangles))])
-    return HitsByTriangle(first, _rows(whole, np.argsort(whole.triangle, kind="stable")))
+    first = np.concatenate([[0], np.cumsum(np.bincount(together.triangle, minlength=triangles))])
+    return HitsByTriangle(first, _rows(together, np.argsort(together.triangle, kind="stable")))
 
 
-def save_hits(path: Path, found: HitsByTriangle) -> None:
-    """Write them, whole or not at all: a .npz without the triangles, which `first` says."""
+def save_hits(path: Path, hits: HitsByTriangle) -> None:
+    """Write impacts to an .npz file. The triangles are not stored because `first` implies them."""
     columns = {
-        column.name: getattr(found.hits, column.name)
+        column.name: getattr(hits.hits, column.name)
         for column in fields(Hits)
         if column.name != "triangle"
     }
     with atomic_write(path) as temporary, temporary.open("wb") as file:
-        np.savez(file, first=found.first, **columns)
+        np.savez(file, first=hits.first, **columns)
 
 
 def load_hits(path: Path) -> HitsByTriangle:
-    """Read them back. InputError for a file gone, damaged, or not written by this version."""
+    """Read impacts that `save_hits` wrote.
+
+    Raises:
+        InputError: the file is missing, damaged, or not written by this version.
+    """
     try:
         with np.load(path, allow_pickle=False) as file:
             columns = {name: file[name] for name in file.files}
         first = columns.pop("first")
-        found = HitsByTriangle(
-            first,
-            Hits(np.repeat(np.arange(len(first) - 1, dtype=np.int32), np.diff(first)), **columns),
-        )
+        triangle = np.repeat(np.arange(len(first) - 1, dtype=np.int32), np.diff(first))
+        found = HitsByTriangle(first, Hits(triangle, **columns))
     except FileNotFoundError:
         raise InputError(
-            f"{path}: not there: an older result, without single impacts; simulate again"
+            f"{path}: not there; an older version did not keep single impacts: simulate again"
         ) from None
     except (
         OSError,
@@ -127,8 +140,16 @@ def load_hits(path: Path) -> HitsByTriangle:
 
 
 def load_matching_hits(folder: Path, impacts: np.ndarray) -> HitsByTriangle | None:
-    """The single impacts of a results folder, None of an older result. impacts (m,): how many each triangle had, as
-    coverage.vtp says; InputError where these are others.
+    """The single impacts of a results folder, checked to belong to its coverage.vtp.
+
+    Args:
+        impacts: number of impacts of each triangle by coverage.vtp, (m,).
+
+    Returns:
+        The impacts; None for an older result, which has no such file.
+
+    Raises:
+        InputError: the file is damaged or belongs to another result.
     """
     path = folder / HITS_FILE
     if not path.is_file():
@@ -136,7 +157,7 @@ def load_matching_hits(folder: Path, impacts: np.ndarray) -> HitsByTriangle | No
     found = load_hits(path)
     if not np.array_equal(np.diff(found.first), impacts):
         raise InputError(
-            f"{path}: its impacts are not those of the coverage.vtp beside it, but of another result; simulate again"
+            f"{path}: its impacts are not those of the coverage.vtp beside it; simulate again"
         )
     return found
 

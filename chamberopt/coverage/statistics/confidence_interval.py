@@ -1,22 +1,34 @@
-"""A number and how sure it is: mean of pseudo-values, Student's interval, and what is left of bias."""
+"""Estimates with 95 % confidence intervals from independent replicas.
+
+Notation
+    n       number of replicas
+    y_j     pseudo-value of replica j; their mean is the estimate     (pseudovalues, (n,))
+    s       standard deviation of the pseudo-values
+    t       quantile of Student's distribution                        (student_quantile)
+    half-width = t s / sqrt(n) + bias
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 CONFIDENCE = 0.95
-ZERO_TOLERANCE = 1e-12  # what rounding leaves of a zero
+ZERO_TOLERANCE = 1e-12  # a value below is a rounding error of zero
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A value with the half-width of its 95 % interval, and the pseudo-values (n,), one a replica, behind both.
+    """A value with its 95 % interval.
 
-    bias: how far the value may lie off however many such replicas there were; half_width has it in it.
+    Args:
+        half_width: half of the interval's width; infinite if there is only one replica.
+        pseudovalues: one value a replica, from which value and interval come, (n,).
+        bias: bound on the error that more replicas would not remove; included in half_width.
     """
 
     value: float
@@ -32,6 +44,30 @@ class Estimate:
     def high(self) -> float:
         return self.value + self.half_width
 
+    def to_json(self, unit: str | None = None) -> dict[str, Any]:
+        """As JSON values. Two results can be compared later because the pseudo-values are in it."""
+        return {
+            "value": self.value,
+            "half_width": self.half_width,
+            **({} if unit is None else {"unit": unit}),
+            "pseudovalues": list(self.pseudovalues),
+            "bias": self.bias,
+        }
+
+    @classmethod
+    def from_json(cls, data: dict[str, Any]) -> Estimate:
+        """The estimate that `to_json` or `short_json` wrote.
+
+        Raises:
+            KeyError, TypeError, ValueError: the data are not an estimate.
+        """
+        return cls(
+            float(data["value"]),
+            float(data["half_width"]),
+            tuple(float(x) for x in data.get("pseudovalues", ())),
+            float(data.get("bias", 0.0)),
+        )
+
 
 def estimate(
     pseudovalues: Sequence[float] | np.ndarray,
@@ -40,25 +76,27 @@ def estimate(
     bias: float = 0.0,
     confidence: float = CONFIDENCE,
 ) -> Estimate:
-    """Mean of the pseudo-values, clipped to the range the quantity can have, with its Student-t interval.
+    """Mean of the pseudo-values with its Student-t interval.
 
-    Where the clip bites, the pseudo-values are moved with it: what is made of them later (an objective, a gain)
-    then has the same value as what is made of the clipped estimates.
+    Args:
+        lowest, highest: range of the quantity; the mean is clipped to it.
+        bias: bound on the error that more replicas would not remove.
     """
     values = np.asarray(pseudovalues, dtype=float)
     mean = float(np.clip(values.mean(), lowest, highest))
+    # The pseudo-values move with a clipped mean, so that sums and differences of estimates agree with
+    # sums and differences of their pseudo-values.
     values = values + (mean - values.mean())
     n = len(values)
     half_width, bias = float("inf"), float(bias)
     if n > 1:
-        half_width = (
-            student_quantile(n - 1, confidence) * float(values.std(ddof=1)) / math.sqrt(n) + bias
-        )
+        spread = float(values.std(ddof=1))
+        half_width = student_quantile(n - 1, confidence) * spread / math.sqrt(n) + bias
     return Estimate(mean, half_width, tuple(values.tolist()), bias)
 
 
 def student_quantile(freedom: float, confidence: float = CONFIDENCE) -> float:
-    """How many standard errors the interval reaches to each side."""
+    """Half-width of a two-sided interval in standard errors, by Student's distribution."""
     from scipy.special import stdtrit  # scipy.stats would take a second to import
 
     return float(stdtrit(freedom, 0.5 + confidence / 2.0))
@@ -67,11 +105,10 @@ def student_quantile(freedom: float, confidence: float = CONFIDENCE) -> float:
 def paired_difference(
     after: Estimate, before: Estimate, confidence: float = CONFIDENCE
 ) -> Estimate:
-    """after - before with its 95 % interval, from replicas run on the same seeds, pair by pair.
+    """Difference after - before of replicas that ran on the same seeds, pair by pair.
 
-    The jackknife of the difference: its pseudo-values are the differences of the two. A peening chamber is
-    chaotic, so equal seeds hardly correlate, but where they do the interval is right too. Different numbers of
-    replicas make no pairs: they are taken as independent.
+    A peening chamber is chaotic, so equal seeds hardly correlate. Where they do, the interval is right
+    too. With different numbers of replicas the two are taken as independent.
     """
     if not after.pseudovalues or len(after.pseudovalues) != len(before.pseudovalues):
         return independent_difference(after, before, confidence)
@@ -83,11 +120,10 @@ def paired_difference(
 def independent_difference(
     after: Estimate, before: Estimate, confidence: float = CONFIDENCE
 ) -> Estimate:
-    """after - before with its 95 % interval when the two were simulated independently (Welch's t)."""
+    """Difference after - before of two that were simulated independently (Welch's t)."""
     value, bias = after.value - before.value, after.bias + before.bias
-    if (
-        min(len(after.pseudovalues), len(before.pseudovalues)) < 2
-    ):  # nothing to count with: intervals in quadrature
+    if min(len(after.pseudovalues), len(before.pseudovalues)) < 2:
+        # Without replicas to count, the intervals are added in quadrature.
         return Estimate(value, math.hypot(after.half_width, before.half_width), (), bias)
     scatter = welch_half_width(after.pseudovalues, before.pseudovalues, confidence)
     return Estimate(value, scatter + bias, (), bias)
@@ -99,10 +135,13 @@ def welch_half_width(
     confidence: float = CONFIDENCE,
     times: float = 1.0,
 ) -> float:
-    """Half-width of the interval of a difference of means, had each so many times as many values of this scatter.
+    """Half-width of the interval of a difference of two means.
 
-    B. L. Welch, "The generalization of 'Student's' problem when several different population variances are
-    involved", Biometrika 34 (1947) 28.
+    Args:
+        times: as if each sample had this many times as many values of the same scatter.
+
+    Source: B. L. Welch, "The generalization of 'Student's' problem when several different population
+    variances are involved", Biometrika 34 (1947) 28.
     """
     a, b = times * len(after), times * len(before)
     va, vb = float(np.var(after, ddof=1)) / a, float(np.var(before, ddof=1)) / b

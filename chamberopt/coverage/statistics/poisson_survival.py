@@ -1,18 +1,29 @@
-"""The share of a surface that no dent has reached at a time longer than simulated, without bias.
+"""The fraction of a surface that stays uncovered for longer than was simulated, without bias.
 
-Dents fall on a patch independently of one another, by Avrami's equation exp(-x) of it is bare at the time T, x the
-dented area to expect by then over the patch's. Putting the dented area simulated in the place of x is too dark:
-exp is not linear, and the fewer dents, the worse. But over the dents s_1, s_2 ... [m²] of a simulated time t
+Notation
+    T      treatment time [s]
+    t      simulated time of all replicas together [s]
+    s_j    areas of the dents on a patch within t [m²]           (dents.area)
+    A      area of the patch [m²]                                (area, (p,))
+    k      T / (t A) [1/m²]                                      (per_area, (p,))
+    x      expected area of the dents on the patch within T, over A
+    exp(-x)  uncovered fraction of the patch at T, by Avrami's equation
 
-    product of (1 - k s_j),   k = T / (t · area of the patch),
+The dented area k sum(s_j) in the place of x makes the uncovered fraction too large, because exp is not
+linear, and the fewer dents, the worse. But the product over the dents
 
-has exactly exp(-x) for its mean, whatever the sizes of the dents and however short t: the generating functional of a
-Poisson process (J. F. C. Kingman, "Poisson Processes", Oxford 1993, chapter 3.2); for dents of one size it is the
-estimator of I. J. Good and G. H. Toulmin, Biometrika 43 (1956) 45. With 2 k it is exp(-2 x), and both together give
-variances over a surface free of counting noise. What is paid is scatter, mean square exp(x (k s - 2)) a patch: of
-its orders the replicas show the first, more dents or fewer, with whatever else moves a whole replica; how much larger
-all orders are is a mean of such products again. (The delete-one jackknife would count order m of it m times over:
-B. Efron and C. Stein, Ann. Stat. 9 (1981) 586.)
+    product of (1 - k s_j)
+
+has exactly exp(-x) for its mean, for dents of any sizes and however short t is: it is the generating
+functional of a Poisson process (J. F. C. Kingman, "Poisson Processes", Oxford 1993, chapter 3.2). For
+dents of one size it is the estimator of I. J. Good and G. H. Toulmin, Biometrika 43 (1956) 45. With 2 k
+its mean is exp(-2 x), and both together give the variance of coverage over a surface free of counting
+noise.
+
+The price is scatter: the mean square of a patch is exp(x (k s - 2)). Its expansion has orders in k s. The
+replicas show the first order (more dents or fewer, with everything else that shifts a whole replica).
+How much larger the sum of all orders is, is a mean of such products again. The delete-one jackknife
+would count order m of it m times over (B. Efron and C. Stein, Ann. Stat. 9 (1981) 586).
 """
 
 from __future__ import annotations
@@ -23,96 +34,117 @@ from typing import NamedTuple
 import numpy as np
 
 
-class Dents(NamedTuple):
-    """Single dents of one replica: patch (k,) int, area (k,) m²."""
+class PatchDents(NamedTuple):
+    """Single dents of one replica: patch (k,) int and area [m²] (k,)."""
 
     patch: np.ndarray
     area: np.ndarray
 
 
-class Bare:
-    """Means over a surface of exp(-x) and exp(-2 x), and how they move from replica to replica.
+class UncoveredFraction:
+    """Means over a surface of exp(-x) and exp(-2 x), and their deviations from replica to replica.
 
-    area (p,) m² of the patches, also their weights; stretch: wanted time over the simulated time of one replica;
-    dent: area [m²] of dents that, all alike, would scatter as these do.
+    Args:
+        area: areas of the patches [m²], which are also their weights, (p,).
+        time_ratio: treatment time over the simulated time of one replica.
+        dent_area: area of dents that, all alike, would scatter as these do [m²].
     """
 
     def __init__(
-        self, replicas: Sequence[Dents], area: np.ndarray, stretch: float, dent: float
+        self,
+        replicas: Sequence[PatchDents],
+        area: np.ndarray,
+        time_ratio: float,
+        dent_area: float,
     ) -> None:
         n = len(replicas)
-        per_area, weight = stretch / n / area, area / area.sum()
-        every = Dents(
-            np.concatenate([d.patch for d in replicas]), np.concatenate([d.area for d in replicas])
+        per_area, weight = time_ratio / n / area, area / area.sum()
+        dents = PatchDents(
+            np.concatenate([one.patch for one in replicas]),
+            np.concatenate([one.area for one in replicas]),
         )
-        products = [_products(every, power * per_area) for power in (1, 2, 3, 4)]
-        self.once, self.twice = float(weight @ products[0]), float(weight @ products[1])
+        products = [_survival_product(dents, power * per_area) for power in (1, 2, 3, 4)]
+        self.mean = float(weight @ products[0])
+        self.mean_square = float(weight @ products[1])
 
-        dented = np.array([np.bincount(d.patch, d.area, len(area)) for d in replicas])
-        x = _likely(per_area * dented.sum(axis=0), per_area * dent, weight)
+        dented = np.array([np.bincount(one.patch, one.area, len(area)) for one in replicas])
+        x = _shrunken_x(per_area * dented.sum(axis=0), per_area * dent_area, weight)
         slopes = [-power * weight * np.exp(-power * x) for power in (1, 2)]
         share = np.array([n * (dented @ (slope * per_area)) for slope in slopes])
-        first = _products_of(
-            slopes, per_area**2 * np.bincount(every.patch, every.area**2, len(area))
+        first_order = _weighted_products(
+            slopes, per_area**2 * np.bincount(dents.patch, dents.area**2, len(area))
         )
         weighted = [weight * product for product in products[:2]]
-        # Without bias, as the products are: the mean of the square less the square of the mean.
-        whole = _products_of(weighted, np.ones(len(area)))
-        whole -= [[weight**2 @ products[a + b + 1] for a in (0, 1)] for b in (0, 1)]
-        self._moves = _stretched(share - share.mean(axis=1, keepdims=True), first, whole)
+        # Mean of the square less the square of the mean, each without bias as the products are.
+        all_orders = _weighted_products(weighted, np.ones(len(area)))
+        all_orders -= [[weight**2 @ products[a + b + 1] for a in (0, 1)] for b in (0, 1)]
+        self._deviations = _rescaled(
+            share - share.mean(axis=1, keepdims=True), first_order, all_orders
+        )
 
-    def swing(self, once: float, twice: float) -> np.ndarray:
-        """That of `once` times the first mean plus `twice` the second, (n,), mean 0: s/√n is the standard error."""
-        return np.array([once, twice]) @ self._moves
+    def replica_deviations(self, of_mean: float, of_mean_square: float) -> np.ndarray:
+        """Deviations from 0 of a weighted sum of `mean` and `mean_square`, one a replica, (n,).
+
+        Their standard deviation over sqrt(n) is the standard error of the sum.
+        """
+        return np.array([of_mean, of_mean_square]) @ self._deviations
 
 
-def _likely(seen: np.ndarray, noise: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """x of each patch (p,), drawn to their mean until they scatter as the true ones do, or half as much.
+def _shrunken_x(observed: np.ndarray, noise: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """x of each patch, drawn to the mean until it scatters as the true one, or half as much.
 
-    noise (p,): variance of what is seen over x. Only for the intervals, where an error of it cancels.
+    This is used for the intervals alone, where an error of it cancels.
+
+    Args:
+        observed: dented area over area of each patch, (p,).
+        noise: variance of the observed value over x, (p,).
     """
-    mean = float(weight @ seen)
-    variance = max(0.0, float(weight @ (seen - mean) ** 2 - weight @ (noise * seen)))
+    mean = float(weight @ observed)
+    variance = max(0.0, float(weight @ (observed - mean) ** 2 - weight @ (noise * observed)))
     trust = np.divide(
-        variance, variance + noise * mean, out=np.zeros_like(seen), where=noise * mean > 0.0
+        variance, variance + noise * mean, out=np.zeros_like(observed), where=noise * mean > 0.0
     )
-    return np.maximum(0.0, mean + np.sqrt(np.maximum(trust, 0.25)) * (seen - mean))
+    return np.maximum(0.0, mean + np.sqrt(np.maximum(trust, 0.25)) * (observed - mean))
 
 
-def _products_of(two: Sequence[np.ndarray], weight: np.ndarray) -> np.ndarray:
-    """All weighted sums of products of two columns, (2, 2)."""
+def _weighted_products(two: Sequence[np.ndarray], weight: np.ndarray) -> np.ndarray:
+    """Weighted sums of all products of two columns, (2, 2)."""
     columns = np.array(two)
     return np.asarray(columns * weight @ columns.T)
 
 
-def _stretched(moves: np.ndarray, first: np.ndarray, whole: np.ndarray) -> np.ndarray:
-    """Moves (2, n) of the first order, stretched to what all orders together make: L K^-1 moves.
+def _rescaled(
+    deviations: np.ndarray, first_order: np.ndarray, all_orders: np.ndarray
+) -> np.ndarray:
+    """First-order deviations, enlarged to what all orders together make: L K^-1 deviations.
 
-    K and L are the Cholesky factors of the two (2, 2) covariances from the Poisson process; `whole` is never less.
+    K and L are the Cholesky factors of the covariances `first_order` and `all_orders` of the Poisson
+    process, (2, 2). The second is kept from being smaller than the first.
+
+    Args:
+        deviations: (2, n).
     """
-    if first[0, 0] <= 0.0:
-        return moves
-    whole_top = max(whole[0, 0], first[0, 0])
-    rest = max(
-        0.0, first[1, 1] - first[0, 1] ** 2 / first[0, 0]
-    )  # rounding leaves less than 0 where dents lie on one patch
-    whole_rest = max(whole[1, 1] - whole[0, 1] ** 2 / whole_top, rest)
-    along = moves[0] / np.sqrt(first[0, 0])
-    across = (
-        (moves[1] - first[0, 1] / first[0, 0] * moves[0]) / np.sqrt(rest)
-        if rest > 0.0
-        else 0.0 * along
-    )
+    if first_order[0, 0] <= 0.0:
+        return deviations
+    top = max(all_orders[0, 0], first_order[0, 0])
+    # Rounding makes this negative if all dents lie on one patch.
+    rest = max(0.0, first_order[1, 1] - first_order[0, 1] ** 2 / first_order[0, 0])
+    top_rest = max(all_orders[1, 1] - all_orders[0, 1] ** 2 / top, rest)
+    along = deviations[0] / np.sqrt(first_order[0, 0])
+    across = 0.0 * along
+    if rest > 0.0:
+        slope = first_order[0, 1] / first_order[0, 0]
+        across = (deviations[1] - slope * deviations[0]) / np.sqrt(rest)
     return np.array(
         [
-            np.sqrt(whole_top) * along,
-            whole[0, 1] / np.sqrt(whole_top) * along + np.sqrt(whole_rest) * across,
+            np.sqrt(top) * along,
+            all_orders[0, 1] / np.sqrt(top) * along + np.sqrt(top_rest) * across,
         ]
     )
 
 
-def _products(dents: Dents, per_area: np.ndarray) -> np.ndarray:
-    """Product of 1 - k s over the dents of each patch; beyond exp(50) it is noise, and is cut off."""
+def _survival_product(dents: PatchDents, per_area: np.ndarray) -> np.ndarray:
+    """Product of 1 - k s over the dents of each patch, (p,). Beyond exp(50) it is noise and cut off."""
     factor = 1.0 - per_area[dents.patch] * dents.area
     logs = np.log(np.maximum(np.abs(factor), 1e-12))  # exactly 0 has no logarithm
     negative = np.bincount(dents.patch, factor < 0.0, len(per_area)).astype(int) % 2 == 1

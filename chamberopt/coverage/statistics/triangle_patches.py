@@ -1,20 +1,26 @@
-"""Neighbouring triangles taken together, until each patch has enough dents to say something."""
+"""Neighbouring triangles merged into patches that have enough dents for statistics."""
 
 from __future__ import annotations
 
 import numpy as np
 
 
-def patches(places: np.ndarray, content: np.ndarray, least: float) -> np.ndarray:
-    """The patch of each triangle, (m,) from 0: none holds less than `least` of the content unless all of it is one.
+def patches(places: np.ndarray, content: np.ndarray, minimum: float) -> np.ndarray:
+    """Merge triangles into patches of at least `minimum` content each, if all together have that much.
 
-    places (m, d): what is near in it may be joined (middle points, say, and normals) · content (m,), not negative.
-    Halves the whole across its longest side, and the halves again, as long as both sides keep enough; a
-    triangle that holds enough by itself can stand alone. All cells of a level are cut at once, ties by index:
-    the same input gives the same patches.
+    The whole is halved across its longest side, and the halves again, as long as both sides keep enough.
+    A triangle that has enough by itself can be a patch of its own. All cells of a level are cut at once
+    and ties go by index, so the same input gives the same patches.
+
+    Args:
+        places: triangles that are near each other in this space may be merged, (m, d).
+        content: not negative, (m,).
+
+    Returns:
+        Patch of each triangle, from 0, (m,).
     """
     m = len(content)
-    if m == 0 or content.min() >= least:
+    if m == 0 or content.min() >= minimum:
         return np.arange(m)
     cell, open_cells, cells = np.zeros(m, dtype=int), np.ones(m, dtype=bool), 1
     while open_cells.any():
@@ -31,7 +37,7 @@ def patches(places: np.ndarray, content: np.ndarray, least: float) -> np.ndarray
         before = np.concatenate([[0.0], np.cumsum(whole)[:-1]])[local]
         upper = np.cumsum(content[index]) - 0.5 * content[index] - before > 0.5 * whole[local]
         above = np.bincount(local, content[index] * upper)
-        cut = (above >= least) & (whole - above >= least)
+        cut = (above >= minimum) & (whole - above >= minimum)
         moves = cut[local] & upper
         cell[index[moves]] = (cells - 1 + np.cumsum(cut))[local[moves]]
         cells += int(cut.sum())
