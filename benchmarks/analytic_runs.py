@@ -11,10 +11,9 @@ from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.scene import build_scene, chamber_mesh, replica_seed
 from chamberopt.coverage.coverage_from_impacts import Tally, tally_impacts
 from chamberopt.coverage.dents import impact_angle_deg
-from chamberopt.coverage.metrics import METRICS
 from chamberopt.coverage.statistics.confidence_interval import Estimate, estimate
 from chamberopt.design.load import Design
-from chamberopt.simulation.evaluate import jackknife
+from chamberopt.simulation.evaluate import estimate_metrics
 from sim_core import AnalyticCavity, ImpactLog, TriangleMesh, simulate
 
 MEASURED, PEENED = 0.39, 50.0  # the paper's experiment: coverage, and after how long [s]
@@ -108,9 +107,9 @@ def run(
         ]
 
     tallies, counts = zip(*executor.map(one, range(effort.replicas)), strict=True)
-    found = jackknife(tallies, [METRICS[name] for name in FIGURES], chamber, design)
+    found = estimate_metrics(tallies, chamber, design)
     shares = {name: np.array([one[k] for one in counts]) for k, name in enumerate(edges)}
-    return Run(surface.volume, dict(zip(FIGURES, found, strict=True)), shares)
+    return Run(surface.volume, {name: found[name] for name in FIGURES}, shares)
 
 
 def calibrated(design: Design, effort: Effort, executor: Executor) -> Design:

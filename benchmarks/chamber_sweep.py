@@ -22,7 +22,7 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.common.parallel.executor import SerialExecutor
 from chamberopt.design.load import Design, load_design
 from chamberopt.optimize.constraints import standard_error
-from chamberopt.simulation.evaluate import evaluate
+from chamberopt.simulation.evaluate import ReplicaPlan, evaluate
 
 ROOT = RESULTS.parents[1]
 VARY = {
@@ -58,7 +58,7 @@ def row(
     }
     candidate = design.changed(values)
     found = evaluate(
-        candidate, build_chamber(candidate), SerialExecutor(), stream="confirm", replicas=replicas
+        candidate, build_chamber(candidate), SerialExecutor(), plan=ReplicaPlan(replicas, "confirm")
     ).objective
     error = standard_error(found)
     usual = usual_seconds(design)

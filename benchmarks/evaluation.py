@@ -80,7 +80,7 @@ def replica_shares(design: Any, chamber: Any) -> dict[str, float]:
     """Of a replica's CPU seconds: fixed, warm-up, recorded; from replicas with neither, with the first, with both."""
     from chamberopt.chamber.scene import chamber_mesh, replica_seed
     from chamberopt.simulation.convergence.parameters import TIME, WARM_UP, changed
-    from chamberopt.simulation.replicas import simulate_replica
+    from chamberopt.simulation.replicas import ReplicaSetting, simulate_replica
 
     mesh = chamber_mesh(chamber)
     lengths = [
@@ -88,14 +88,15 @@ def replica_shares(design: Any, chamber: Any) -> dict[str, float]:
         changed(design, {TIME: NO_TIME}),
         design,
     ]
-    simulate_replica(
-        lengths[0], chamber, mesh, None, 0
-    )  # builds the search tree, once for all replicas
+    # Builds the search tree, once for all replicas.
+    simulate_replica(ReplicaSetting(lengths[0], chamber, mesh, None), 0)
     spent = [0.0] * len(lengths)
     for number in range(TIMED):
         for i, cut in enumerate(lengths):
             begin = time.process_time()
-            simulate_replica(cut, chamber, mesh, None, replica_seed(cut.process.seed, number))
+            simulate_replica(
+                ReplicaSetting(cut, chamber, mesh, None), replica_seed(cut.process.seed, number)
+            )
             spent[i] += time.process_time() - begin
     fixed, warm, whole = spent
     return {

@@ -176,22 +176,22 @@ def sizes(study: Study) -> dict[str, int]:
     """Bytes of a task and its answer: a candidate of a sweep; a replica, whose chamber is shared."""
     from chamberopt.chamber.build import build_chamber
     from chamberopt.chamber.scene import chamber_mesh
-    from chamberopt.simulation.replicas import _replica
+    from chamberopt.simulation.replicas import ReplicaSetting, simulate_replica
 
     design = study.at_search_accuracy(study.design)
     chamber = build_chamber(design)
-    setting = (design, chamber, chamber_mesh(chamber), None)
+    setting = ReplicaSetting(design, chamber, chamber_mesh(chamber), None)
     row = evaluate_point(study, *candidates(study, 1)[0])
     with local_executor(1, "processes") as executor:
         parcel = share(executor, setting)
-        replica = len(pickle.dumps((_replica, (parcel, 2**127), {})))
+        replica = len(pickle.dumps((simulate_replica, (parcel, 2**127), {})))
     return {
         "candidate": len(pickle.dumps((evaluate_point, (study, *candidates(study, 1)[0]), {}))),
         "row": len(pickle.dumps(row)),
         "replica": replica,
-        "replica_unshared": len(pickle.dumps((_replica, (setting, 2**127), {}))),
+        "replica_unshared": len(pickle.dumps((simulate_replica, (setting, 2**127), {}))),
         "shared_once": len(pickle.dumps(setting)),
-        "replica_left": len(pickle.dumps(_replica(setting, 1))),
+        "replica_left": len(pickle.dumps(simulate_replica(setting, 1))),
     }
 
 

@@ -23,7 +23,7 @@ from chamberopt.coverage.coverage_from_impacts import Tally
 from chamberopt.coverage.metrics import METRICS, OBJECTIVES
 from chamberopt.coverage.statistics.confidence_interval import estimate
 from chamberopt.design.load import Design, load_design
-from chamberopt.simulation.evaluate import jackknife, weighted_sum
+from chamberopt.simulation.evaluate import estimate_metrics, weighted_sum
 from chamberopt.simulation.replicas import MIN_REPLICAS_TO_STOP, next_replica_count
 
 ROOT = Path(__file__).parents[1]
@@ -83,13 +83,8 @@ def tally_of(seconds: float, triangle: np.ndarray, area: np.ndarray, triangles: 
 
 def figures(replicas: list[Tally], chamber: Chamber, design: Design) -> dict[str, Any]:
     """The three figures of coverage and the objective, as evaluate() makes them."""
-    got = dict(
-        zip(
-            NAMES,
-            jackknife(replicas, [METRICS[name] for name in NAMES], chamber, design),
-            strict=True,
-        )
-    )
+    found = estimate_metrics(replicas, chamber, design)
+    got = {name: found[name] for name in NAMES}
     return {**got, "uniform_coverage": weighted_sum(OBJECTIVES["uniform_coverage"], got)}
 
 

@@ -50,9 +50,9 @@ def written(folder: Path, size: str, impacts: int) -> tuple[int, int]:
 def evaluation(design: Any, chamber: Any, impacts: int) -> Any:
     """So many impacts, anywhere on what is exposed, in replicas."""
     from chamberopt.coverage.coverage_from_impacts import Tally
-    from chamberopt.coverage.metrics import METRICS, OBJECTIVES
+    from chamberopt.coverage.metrics import OBJECTIVES
     from chamberopt.coverage.part_impacts import Hits
-    from chamberopt.simulation.evaluate import jackknife, weighted_sum
+    from chamberopt.simulation.evaluate import estimate_metrics, weighted_sum
     from chamberopt.simulation.evaluation import Evaluation
 
     rng = np.random.default_rng(1)
@@ -75,9 +75,7 @@ def evaluation(design: Any, chamber: Any, impacts: int) -> Any:
                 design.process.recorded_time, count, count, *sums, triangle, np.pi / 4.0 * dent**2
             )
         )
-    metrics = dict(
-        zip(METRICS, jackknife(tallies, list(METRICS.values()), chamber, design), strict=True)
-    )
+    metrics = estimate_metrics(tallies, chamber, design)
     goal = weighted_sum(OBJECTIVES["uniform_coverage"], metrics)
     total = sum(tallies[1:], tallies[0])
     return Evaluation(

@@ -16,7 +16,7 @@ ORDER = {
     "chamberopt/coverage": "statistics dents coverage_from_impacts part_impacts+metrics dent_marking "
     "coverage_estimators intensity",
     "chamberopt/simulation": "resting_balls replicas evaluation evaluate "
-    "triangle_fields time_curve effect_pilot convergence",
+    "triangle_fields+time_curve candidate_result effect_pilot convergence",
     "chamberopt/optimize": "study load_study+constraints+search+storage "
     "sensitivity+evaluate_candidate candidates run_study pareto+run_sweep",
     "chamberopt/cli": "interrupt+options console prepare commands",

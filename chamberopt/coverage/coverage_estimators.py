@@ -97,9 +97,7 @@ def target_patches(
         else np.full(len(area), MIN_EXPOSURE)
     )
     patch = np.full(len(chamber.part.triangles), -1)
-    patch[target] = patches(
-        _merging_coordinates(chamber, target, exposure), exposure, MIN_EXPOSURE
-    )
+    patch[target] = patches(_merging_coordinates(chamber, target, exposure), exposure, MIN_EXPOSURE)
     all_area = chamber.part.area[chamber.part.target].sum()
     return TargetPatches(
         patch=patch,
@@ -111,9 +109,7 @@ def target_patches(
     )
 
 
-def _merging_coordinates(
-    chamber: Chamber, target: np.ndarray, exposure: np.ndarray
-) -> np.ndarray:
+def _merging_coordinates(chamber: Chamber, target: np.ndarray, exposure: np.ndarray) -> np.ndarray:
     """Coordinates in which triangles that may be merged are near each other, (m, 6).
 
     They are the centres and the normals, these as long as two patches, so that a sharp edge separates
@@ -123,9 +119,7 @@ def _merging_coordinates(
     patch_size = math.sqrt(
         chamber.exposed_area[target].sum() * MIN_EXPOSURE / max(exposure.sum(), MIN_EXPOSURE)
     )
-    return np.concatenate(
-        [corners.mean(axis=1), 2.0 * patch_size * unit_normals(corners)], axis=1
-    )
+    return np.concatenate([corners.mean(axis=1), 2.0 * patch_size * unit_normals(corners)], axis=1)
 
 
 def coverage_estimates(
@@ -286,9 +280,7 @@ def _p05(
     return estimate(_jackknife_pseudovalues(-np.expm1(-x)), 0.0, 1.0, bias)
 
 
-def _variance_within(
-    replicas: Sequence[Tally], target: TargetPatches, chamber: Chamber
-) -> float:
+def _variance_within(replicas: Sequence[Tally], target: TargetPatches, chamber: Chamber) -> float:
     """Variance of x over the triangles less that over the patches, both free of the dents' own scatter.
 
     Squares are made of pairs of dents from different replicas. Within one replica a ball that bounces on

@@ -124,7 +124,10 @@ def seconds_to_98(p05: float, seconds: float) -> float:
 
 
 def _coverage_metric(
-    name: str, summary: str, from_coverage: Callable[[np.ndarray, np.ndarray], float], highest: float
+    name: str,
+    summary: str,
+    from_coverage: Callable[[np.ndarray, np.ndarray], float],
+    highest: float,
 ) -> Metric:
     def of_tally(total: Tally, chamber: Chamber, design: Design) -> float:
         return from_coverage(*_coverage_at_treatment_end(total, chamber, design))
@@ -195,7 +198,11 @@ METRICS = {
             in_version_0_1=False,
         ),
         Metric(
-            "mean_normal_speed_m_s", "m/s", "mean normal speed of the impacts", _mean_normal_speed, 0.0
+            "mean_normal_speed_m_s",
+            "m/s",
+            "mean normal speed of the impacts",
+            _mean_normal_speed,
+            0.0,
         ),
         Metric(
             "impacts_per_mm2_s", "1/(mm² s)", "impacts per area and second", _impacts_per_mm2_s, 0.0
@@ -231,6 +238,11 @@ OBJECTIVES = {
 RENAMED_OBJECTIVES = {"coverage_p05": "p05_coverage", "time_to_98": "minus_time_to_98_s"}
 
 
+def renamed_objective(old: str) -> str:
+    """Message for a name that objectives had in version 0.1.0."""
+    return f"{old!r} is now called {RENAMED_OBJECTIVES[old]!r}; change the name"
+
+
 def parse_objective(name: str) -> ObjectiveFunction:
     """The objective of that name, or a sum such as "1 uniform_coverage + -0.001 time_to_98_s".
 
@@ -240,7 +252,7 @@ def parse_objective(name: str) -> ObjectiveFunction:
     if name in OBJECTIVES:
         return OBJECTIVES[name]
     if name in RENAMED_OBJECTIVES:
-        raise InputError(f"objective.name: {name!r} is now called {RENAMED_OBJECTIVES[name]!r}")
+        raise InputError(f"objective.name: {renamed_objective(name)}")
     terms: dict[str, float] = {}
     for term in name.split(" + "):
         weight, _, part = term.partition(" ")

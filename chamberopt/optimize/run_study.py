@@ -23,7 +23,7 @@ from chamberopt.optimize.search.phases import PARETO_PHASES, maximise
 from chamberopt.optimize.sensitivity import Sensitivity, analyse_sensitivity
 from chamberopt.optimize.storage.study_folder import STUDY, StudyFolder, open_study_folder
 from chamberopt.optimize.storage.trial_log import Trial
-from chamberopt.simulation.evaluate import evaluate
+from chamberopt.simulation.evaluate import ReplicaPlan, evaluate
 from chamberopt.simulation.evaluation import Evaluation
 
 if TYPE_CHECKING:
@@ -222,16 +222,8 @@ def chamber_simulator(study: Study, executor: Executor, target: np.ndarray | Non
             known[key] = build_chamber(design, target), []
         chamber, done = known[key]
         built = time.perf_counter() - began
-        name = study.objective.goals[0]
-        result = evaluate(
-            design,
-            chamber,
-            executor,
-            objective_name=name,
-            stream=stream,
-            replicas=replicas,
-            done=done,
-        )
+        plan = ReplicaPlan(replicas, stream, study.objective.goals[0])
+        result = evaluate(design, chamber, executor, plan=plan, done=done)
         return replace(result, timings={"chamber": built, **result.timings})
 
     return simulate_candidate

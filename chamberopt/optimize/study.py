@@ -1,29 +1,28 @@
 """A study's own tables: what may vary, what is sought, what must hold, and the budget."""
 
-import math
-from typing import Annotated, Literal, Self, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, Field, model_validator
+from pydantic import BaseModel, BeforeValidator, Field, model_validator
 
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
 from chamberopt.common.toml_errors import CrossCheckError, Problem
 from chamberopt.common.toml_fields import list_field, quantity
+from chamberopt.coverage.metrics import METRICS, OBJECTIVES, RENAMED_OBJECTIVES, renamed_objective
 from chamberopt.design.design import Design, validate
 from chamberopt.design.table import STRICT
 
-# What a study may ask for, and the range it can have. objective.py computes them, a test holds the two together.
-ObjectiveName = Literal["uniform_coverage", "coverage_p05", "time_to_98", "intensity_uniformity"]
-METRICS = {
-    "mean_coverage": (0.0, 1.0),
-    "std_coverage": (0.0, 0.5),
-    "p05_coverage": (0.0, 1.0),
-    "time_to_98_s": (0.0, 1e6),
-    "intensity_uniformity": (-math.inf, math.inf),
-    "mean_normal_speed_m_s": (0.0, math.inf),
-    "impacts_per_mm2_s": (0.0, math.inf),
-    "shot_count": (0.0, math.inf),
-}
+
+def _refuse_old_name(name: Any) -> Any:
+    if isinstance(name, str) and name in RENAMED_OBJECTIVES:
+        raise CrossCheckError([Problem("", renamed_objective(name))])
+    return name
+
+
+if TYPE_CHECKING:
+    ObjectiveName = str
+else:
+    ObjectiveName = Annotated[Literal[tuple(OBJECTIVES)], BeforeValidator(_refuse_old_name)]
 # NLopt's own names without the "NLOPT_" prefix, and two phases that are none of them: points spread evenly, and a model
 # of the scores on which NLopt looks for the next; "auto" is these two, one after the other.
 Algorithm = Literal[
@@ -60,18 +59,20 @@ class Objective(BaseModel):
         },
     )
     pareto: Annotated[tuple[ObjectiveName, ObjectiveName], Field(strict=False)] | None = list_field(
-        'two names, e.g. ["uniform_coverage", "time_to_98"]',
+        'two names, e.g. ["uniform_coverage", "minus_time_to_98_s"]',
         "two objectives at once, in place of a name",
         None,
     )
 
     @model_validator(mode="after")
     def _agree(self) -> Self:
-        names = (*get_args(ObjectiveName), *METRICS)
+        names = (*OBJECTIVES, *METRICS)
         problems = [
             Problem(
                 f"sum.{name}",
-                f"not an objective or a metric; {toml_errors.did_you_mean(name, names)}",
+                renamed_objective(name)
+                if name in RENAMED_OBJECTIVES
+                else f"not an objective or a metric; {toml_errors.did_you_mean(name, names)}",
             )
             for name in self.sum
             if name not in names
@@ -261,7 +262,7 @@ class Study(BaseModel):
         """No figure of a candidate, or one that no candidate can have: better said before the search than after it."""
         numbers = self.design.numbers()
         if name in METRICS:
-            low, high = METRICS[name]
+            low, high = METRICS[name].lowest, METRICS[name].highest
         elif name in self.vary:
             low, high = self.vary[name]
         elif name in numbers:

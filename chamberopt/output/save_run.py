@@ -6,11 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from chamberopt.chamber.build import build_chamber
 from chamberopt.common.files import make_output_folder
 from chamberopt.output import viewer
 from chamberopt.output.plots.study import convergence_picture, pareto_picture, slices_picture
 from chamberopt.output.results.load import summary
 from chamberopt.output.results.write import write_result, write_simulation, write_study
+from chamberopt.simulation.candidate_result import complete_result
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -44,7 +46,7 @@ def save_simulation(
         Remarks for the user, such as why a picture was skipped.
     """
     folder = make_output_folder(folder)
-    data = write_simulation(folder, design, chamber, evaluation)
+    data = write_simulation(folder, complete_result(design, chamber, evaluation))
     write_result(folder, data, advice, warned)
     return _draw_coverage([folder], [evaluation], [folder.resolve().name], folder / "coverage.png")
 
@@ -72,7 +74,11 @@ def save_study(
         Remarks for the user, such as why a picture was skipped.
     """
     folder = Path(folder)
-    data = write_study(folder, study_result)
+    start, best = (
+        complete_result(one.design, build_chamber(one.design, study_result.target), one.evaluation)
+        for one in (study_result.start, study_result.best)
+    )
+    data = write_study(folder, study_result, start, best)
     remarks = _draw_study(folder, study_result)
     write_result(folder, data, advice, warned)
     return remarks

@@ -13,11 +13,13 @@ import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import atomic_write
+from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
 
 COVERAGE, CHAMBER = "coverage.vtp", "chamber.vtp"
+COVERAGE_MODEL = "coverage_model"  # field data of coverage.vtp
 MM = 1e3
 
 Surface = Any
@@ -31,9 +33,27 @@ def pyvista() -> Any:
     return pyvista
 
 
-def write_coverage(path: Path, chamber: Chamber, fields: dict[str, np.ndarray]) -> None:
-    """The user's part, posed in the chamber [mm], with cell data (m,) each: quantities.per_triangle's."""
-    _write_surface(path, chamber.part.vertices, chamber.part.triangles, fields)
+def write_coverage(
+    path: Path, chamber: Chamber, fields: dict[str, np.ndarray], coverage_model: str
+) -> None:
+    """Write the part, posed in the chamber [mm].
+
+    Args:
+        fields: cell data by name, (m,) each, from simulation.triangle_fields.
+        coverage_model: how its coverage was computed, "avrami" or "dents".
+    """
+    part = chamber.part
+    _write_surface(path, part.vertices, part.triangles, fields, {COVERAGE_MODEL: [coverage_model]})
+
+
+def read_coverage_model(surface: Surface) -> str:
+    """How the coverage of a coverage.vtp was computed, "avrami" or "dents"."""
+    if COVERAGE_MODEL in surface.field_data:
+        return str(surface.field_data[COVERAGE_MODEL][0])
+    # Files of version 0.1.0 do not record the model, but only Avrami's follows from the density.
+    expected = coverage_from_dent_density(np.asarray(surface["dent_density"]))
+    same = np.allclose(surface["coverage"], expected, atol=1e-9, equal_nan=True)
+    return "avrami" if same else "dents"
 
 
 def write_chamber(folder: Path, chamber: Chamber) -> None:
@@ -48,11 +68,17 @@ def write_chamber(folder: Path, chamber: Chamber) -> None:
 
 
 def _write_surface(
-    path: Path, vertices: np.ndarray, triangles: np.ndarray, fields: dict[str, np.ndarray]
+    path: Path,
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    fields: dict[str, np.ndarray],
+    properties: dict[str, list[str]] | None = None,
 ) -> None:
     surface = pyvista().PolyData.from_regular_faces(vertices * MM, triangles)
     for name, values in fields.items():
         surface.cell_data[name] = values
+    for name, texts in (properties or {}).items():
+        surface.field_data[name] = texts
     with atomic_write(path) as temporary:
         surface.save(temporary)
 

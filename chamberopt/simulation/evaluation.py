@@ -1,7 +1,9 @@
-"""An evaluation as one file, whole and exact: what a study needs of a confirmed candidate to go on without it.
+"""The evaluation of a candidate, and its file.
 
-A .npz of its arrays, with one more entry, `tree`: JSON of all the rest, in which {"array": name} stands for an array
-and {"is": class, ...} for a dataclass. Sequences come back as tuples.
+The file is an .npz of all arrays, with one more entry, `tree`: JSON of everything else. In it
+{"array": name} stands for an array and {"is": class, "of": fields} for a dataclass. Sequences come back
+as tuples. A study keeps its confirmed candidates in such files, exactly, so that it can be resumed
+without simulating them again.
 """
 
 from __future__ import annotations
@@ -25,16 +27,37 @@ from chamberopt.coverage.statistics.confidence_interval import Estimate
 
 
 @dataclass(frozen=True)
-class Evaluation:
-    """One candidate, simulated: its objective and metrics with intervals, and the tallies they come from.
+class MarkedCoverage:
+    """Coverage by the model "dents", which marks every single dent on the surface.
 
-    total: sum of the replicas' tallies · replicas: one Tally each · timings: seconds of wall clock by step ·
-    collisions: numbers of simulated collisions by kind, warm-up included · notes: what to know before
-    trusting it · stopped_by: what ended it, "replicas" (a number was asked for), "accuracy" or "max_replicas" ·
-    analytic: in an exact cavity, not the chamber's mesh ·
-    hits: of each replica, its impacts one by one ·
-    marked (m,): share of each part triangle inside dents, NaN unexposed, marked_interval (m,): width of its 95 %
-    interval, and against_time: (time s, mean coverage of the target) pairs; all only where every dent is marked.
+    Args:
+        share: share of each part triangle inside dents, (m,); NaN where not exposed.
+        interval_width: width of its 95 % interval, (m,); NaN with a single replica.
+        curve: peening time [s] and mean coverage of the target then, a pair a time.
+    """
+
+    share: np.ndarray
+    interval_width: np.ndarray
+    curve: tuple[tuple[float, Estimate], ...]
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """One candidate, simulated in independent replicas.
+
+    Args:
+        objective: the weighted sum of metrics that a study maximises.
+        metrics: estimate of each metric, by its name.
+        total: sum of the replicas' tallies.
+        replicas: tally of each replica.
+        timings: wall-clock time of each step [s].
+        collisions: number of simulated collisions of each kind, warm-up included.
+        notes: what to know before trusting the result.
+        stream: stream of seeds, "search" or "confirm".
+        stopped_by: what ended it: "replicas" (their number was given), "accuracy" or "max_replicas".
+        analytic: whether it ran in an exact cavity instead of the chamber's mesh.
+        hits: single impacts of each replica on the part; empty if they were not kept.
+        marked: coverage by the model "dents"; None for the model "avrami".
     """
 
     objective_name: str
@@ -49,35 +72,37 @@ class Evaluation:
     stopped_by: str = "replicas"
     analytic: bool = False
     hits: tuple[Hits, ...] = ()
-    marked: np.ndarray | None = None
-    marked_interval: np.ndarray | None = None
-    against_time: tuple[tuple[float, Estimate], ...] = ()
+    marked: MarkedCoverage | None = None
 
     @cached_property
-    def sorted_hits(self) -> HitsByTriangle | None:
-        """The hits of all replicas by part triangle; None where there are none to tell of."""
+    def hits_by_triangle(self) -> HitsByTriangle | None:
+        """The single impacts of all replicas; None if they were not kept."""
         return sort_hits_by_triangle(self.hits, len(self.total.impacts)) if self.hits else None
 
 
-CLASSES = {kind.__name__: kind for kind in (Evaluation, Estimate, Hits, Tally)}
+CLASSES = {kind.__name__: kind for kind in (Evaluation, Estimate, Hits, MarkedCoverage, Tally)}
 
 
 def save_evaluation(path: Path, evaluation: Evaluation) -> None:
-    """Write it, whole or not at all. Raises OSError where it cannot be written."""
+    """Write an evaluation to its file. Raises OSError if it cannot be written."""
     arrays: dict[str, np.ndarray] = {}
-    tree = json.dumps(_taken_apart(evaluation, arrays))
-    packed = io.BytesIO()  # in memory first: a full disk is then one plain OSError
-    np.savez_compressed(packed, tree=np.frombuffer(tree.encode(), dtype=np.uint8), **arrays)  # type: ignore[arg-type]
+    tree = json.dumps(_to_tree(evaluation, arrays)).encode()
+    packed = io.BytesIO()  # in memory first, so that a full disk is one plain OSError
+    np.savez_compressed(packed, tree=np.frombuffer(tree, dtype=np.uint8), **arrays)  # type: ignore[arg-type]
     with atomic_write(path) as temporary:
         temporary.write_bytes(packed.getbuffer())
 
 
 def load_evaluation(path: Path) -> Evaluation:
-    """The evaluation in a file, equal to the one saved. Raises InputError for a file gone or damaged."""
+    """Read an evaluation, equal to the one that was saved.
+
+    Raises:
+        InputError: the file is missing or damaged.
+    """
     try:
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
-        evaluation = _put_together(json.loads(arrays.pop("tree").tobytes()), arrays)
+        evaluation = _from_tree(json.loads(arrays.pop("tree").tobytes()), arrays)
         if not isinstance(evaluation, Evaluation):
             raise TypeError("another kind of file")
     except (
@@ -96,34 +121,28 @@ def load_evaluation(path: Path) -> Evaluation:
     return evaluation
 
 
-def _taken_apart(value: Any, arrays: dict[str, np.ndarray]) -> Any:
-    """Plain JSON values; arrays go into `arrays` under a name of their own."""
+def _to_tree(value: Any, arrays: dict[str, np.ndarray]) -> Any:
+    """Plain JSON values; arrays go into `arrays` under new names."""
     if isinstance(value, np.ndarray):
         name = f"a{len(arrays)}"
         arrays[name] = value
         return {"array": name}
     if is_dataclass(value):
-        parts = {
-            column.name: _taken_apart(getattr(value, column.name), arrays)
-            for column in fields(value)
-        }
+        parts = {one.name: _to_tree(getattr(value, one.name), arrays) for one in fields(value)}
         return {"is": type(value).__name__, "of": parts}
     if isinstance(value, dict):
-        return {
-            "is": "dict",
-            "of": {name: _taken_apart(item, arrays) for name, item in value.items()},
-        }
+        return {"is": "dict", "of": {name: _to_tree(one, arrays) for name, one in value.items()}}
     if isinstance(value, (tuple, list)):
-        return [_taken_apart(item, arrays) for item in value]
+        return [_to_tree(one, arrays) for one in value]
     return value.item() if isinstance(value, np.generic) else value
 
 
-def _put_together(tree: Any, arrays: dict[str, np.ndarray]) -> Any:
+def _from_tree(tree: Any, arrays: dict[str, np.ndarray]) -> Any:
     if isinstance(tree, list):
-        return tuple(_put_together(item, arrays) for item in tree)
+        return tuple(_from_tree(one, arrays) for one in tree)
     if not isinstance(tree, dict):
         return tree
     if "array" in tree:
         return arrays[tree["array"]]
-    parts = {name: _put_together(item, arrays) for name, item in tree["of"].items()}
+    parts = {name: _from_tree(one, arrays) for name, one in tree["of"].items()}
     return parts if tree["is"] == "dict" else CLASSES[tree["is"]](**parts)

@@ -1,4 +1,4 @@
-"""Replicas of one candidate: simulated on any number of workers, as many as the accuracy asked for takes."""
+"""Simulate independent replicas of a candidate on any number of workers."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -26,21 +26,42 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-# Looking at an interval until it is narrow enough favours moments when it is too narrow by chance. From 10 replicas
-# on, with steps of a quarter or more, a 95 % interval still holds the truth 94 % of the time (normal replicas; 92 %
-# from 5 on, 90 % from 3 on: docs/accuracy.md).
+# An interval that is looked at until it is narrow enough tends to be too narrow by chance. From 10
+# replicas on, in steps of a quarter or more, a 95 % interval still holds the truth in 94 % (normal
+# replicas; 92 % from 5 on, 90 % from 3 on: docs/accuracy.md).
 MIN_REPLICAS_TO_STOP = 10
-STEP, LEAP = 1.25, 2.0
+MIN_GROWTH, MAX_GROWTH = 1.25, 2.0
+
+
+class ReplicaSetting(NamedTuple):
+    """What all replicas of a candidate have in common.
+
+    Args:
+        samples: points for the coverage model "dents"; None for the model "avrami".
+    """
+
+    design: Design
+    chamber: Chamber
+    mesh: TriangleMesh | AnalyticCavity
+    samples: SamplePoints | None
 
 
 @dataclass(frozen=True)
 class Replica:
-    """What one replica leaves: never its impact log. first_marked (p,) s: see dents.py, None with rates alone."""
+    """What is kept of one replica; its impact log is not.
+
+    Args:
+        collisions: number of collisions of each kind.
+        resting: the balls at rest at its end; None if there are none.
+        bouncing_share: share of the balls that bounce on one spot at its end.
+        first_marked: first time at which each sample point is inside a dent [s], (p,); None without
+            sample points.
+    """
 
     tally: Tally
     collisions: dict[str, int]
-    stuck: RestingBalls | None
-    on_the_spot: float
+    resting: RestingBalls | None
+    bouncing_share: float
     first_marked: np.ndarray | None
     hits: Hits
 
@@ -48,12 +69,15 @@ class Replica:
 def simulate_replicas(
     setting: Any, seed: int, executor: Executor, stream: str, numbers: Sequence[int]
 ) -> Iterator[Replica]:
-    """The replicas of these numbers, in order: the same come out whatever the number of workers.
+    """Simulate the replicas of these numbers; the results do not depend on the number of workers.
 
-    setting: (design, chamber, mesh, samples) as executor.shared hands them over; keep it until the last replica, for
-    it goes to a worker once · seed: of the design's process.
+    Args:
+        setting: a ReplicaSetting as executor.share returns it. Keep it until the last replica, because it
+            goes to each worker once.
+        seed: of the design's process.
+        stream: stream of seeds.
     """
-    return run_in_order(_replica, setting, seed, executor, stream, numbers, len(numbers))
+    return run_in_order(simulate_replica, setting, seed, executor, stream, numbers, len(numbers))
 
 
 def run_in_order(
@@ -65,8 +89,11 @@ def run_in_order(
     numbers: Sequence[int],
     ahead: int,
 ) -> Iterator[T]:
-    """task(setting, seed of the replica) of these numbers, in order, on the workers; begun are those that are asked for
-    and ``ahead`` of them, so that no more wait in memory.
+    """Yield task(setting, seed of the replica) for each number, in order, run on the workers.
+
+    Args:
+        ahead: tasks that are started before their results are wanted, which bounds the memory that
+            waiting results take.
     """
     waiting: deque[tuple[int, Future[T]]] = deque()
     try:
@@ -75,58 +102,54 @@ def run_in_order(
                 (number, executor.submit(task, setting, replica_seed(seed, number, stream)))
             )
             if len(waiting) > ahead:
-                yield _answer(*waiting.popleft())
+                yield _result(*waiting.popleft())
         while waiting:
-            yield _answer(*waiting.popleft())
+            yield _result(*waiting.popleft())
     finally:
-        # One replica failed, or the user pressed Ctrl-C: the rest need not be simulated.
+        # If one replica fails or the user presses Ctrl-C, the rest need not be simulated.
         for _, future in waiting:
             future.cancel()
 
 
-def _answer(number: int, future: Future[T]) -> T:
+def _result(number: int, future: Future[T]) -> T:
     try:
         return future.result()
     except WorkerLostError as error:
         raise WorkerLostError(f"replica {number}: {error}") from None
 
 
-def next_replica_count(done: int, half_width: float, wanted: float, most: int) -> int:
-    """How many replicas to have before the interval is looked at again: what its width foretells, within bounds."""
-    if done >= most or half_width <= wanted:
+def next_replica_count(done: int, half_width: float, wanted: float, maximum: int) -> int:
+    """Number of replicas at which the interval is looked at again, predicted from its width.
+
+    Args:
+        done: number of replicas so far.
+        half_width: half-width of the interval that they give.
+        wanted: half-width to reach.
+
+    Returns:
+        `done` if no more replicas are needed or allowed.
+    """
+    if done >= maximum or half_width <= wanted:
         return done
-    foretold = done * (half_width / wanted) ** 2 if math.isfinite(half_width) else math.inf
-    return min(most, math.ceil(min(max(foretold, STEP * done), LEAP * done)))
+    predicted = done * (half_width / wanted) ** 2 if math.isfinite(half_width) else math.inf
+    return min(maximum, math.ceil(min(max(predicted, MIN_GROWTH * done), MAX_GROWTH * done)))
 
 
-def _replica(
-    setting: tuple[Design, Chamber, TriangleMesh | AnalyticCavity, SamplePoints | None], seed: int
-) -> Replica:
-    return simulate_replica(*setting, seed)
-
-
-def simulate_replica(
-    design: Design,
-    chamber: Chamber,
-    mesh: TriangleMesh | AnalyticCavity,
-    samples: SamplePoints | None,
-    seed: int,
-) -> Replica:
-    """One replica, on a worker."""
+def simulate_replica(setting: ReplicaSetting, seed: int) -> Replica:
+    """Simulate one replica; this runs on a worker."""
+    design, chamber, mesh, samples = setting
     result = simulate_seed(design, chamber, mesh, seed)
-    impacts = result.impacts
-    shot, kinds = design.shot, ("walls", "balls", "sonotrode", "total")
+    impacts, part_turns = result.impacts, design.effects.part_turn is not None
     return Replica(
         tally=tally_impacts(impacts, chamber, design),
-        collisions={kind: int(getattr(result.collisions, kind)) for kind in kinds},
-        on_the_spot=bouncing_share(result.balls.velocities),
-        stuck=find_resting_balls(
-            result.resting,
-            len(result.balls),
-            shot.diameter,
-            chamber,
-            design.effects.part_turn is not None,
+        collisions={
+            kind: int(getattr(result.collisions, kind))
+            for kind in ("walls", "balls", "sonotrode", "total")
+        },
+        resting=find_resting_balls(
+            result.resting, len(result.balls), design.shot.diameter, chamber, part_turns
         ),
+        bouncing_share=bouncing_share(result.balls.velocities),
         first_marked=None
         if samples is None
         else first_marked_times(samples, impacts, chamber, design),
@@ -137,7 +160,7 @@ def simulate_replica(
 def simulate_seed(
     design: Design, chamber: Chamber, mesh: TriangleMesh | AnalyticCavity, seed: int
 ) -> SimulationResult:
-    """What the simulator has to say of one replica; its impacts are on the chamber's triangles."""
+    """Run the simulator once; the impacts of its result are on the chamber's triangles."""
     from sim_core import TriangleMesh, simulate
 
     result = simulate(build_scene(design, mesh, seed))

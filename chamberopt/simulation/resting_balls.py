@@ -1,4 +1,7 @@
-"""Balls that lie still when a replica ends, in the words of a chamber's designer: how many, on what, and where."""
+"""Notes on balls that no longer peen at the end of a replica: at rest, or bouncing on one spot.
+
+They name surfaces and places as the designer of a chamber would, so that room can be made there.
+"""
 
 from __future__ import annotations
 
@@ -17,19 +20,23 @@ if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from sim_core import Resting
 
-TOUCHES = 2e-5  # m: a ball held still is this near to what holds it, or nearer
-ONE_PLACE = 3.0  # diameters: balls nearer to each other than that lie in one place
-MOST_PLACES = 3  # named, those with most balls first
-ON_BALLS = ""
-STRAIGHT = (
-    1e-6  # of its speed: what goes sideways by less will be on its spot for thousands of hits
-)
-MUCH = 0.1  # of the shot
+CONTACT_GAP = 2e-5  # m: a ball at rest is not farther than this from what holds it
+PLACE_DISTANCE = 3.0  # ball diameters: balls nearer to each other lie in one place
+MAX_PLACES = 3  # named in a note, the ones with most balls first
+ON_BALLS = ""  # kind of a ball that only other balls carry
+# A ball with less of its speed sideways stays on its spot for thousands of impacts.
+MAX_SIDEWAYS = 1e-6
+MIN_BOUNCING_SHARE = 0.1  # of the shot, to be worth a note
 
 
 @dataclass(frozen=True)
 class RestingBalls:
-    """The balls at rest at the end of a replica: their ``share`` of the shot, and one ``line`` on where they are."""
+    """The balls at rest at the end of a replica.
+
+    Args:
+        share: their share of the shot.
+        line: how many there are, on what and where.
+    """
 
     share: float
     line: str
@@ -38,58 +45,72 @@ class RestingBalls:
 def find_resting_balls(
     resting: Resting, balls: int, diameter: float, chamber: Chamber, part_turns: bool
 ) -> RestingBalls | None:
-    """What lies still of a shot of so many ``balls`` of this ``diameter`` [m]; None if nothing does.
+    """Describe the balls at rest; None if there are none.
 
-    Of a part that turns it is not known here where it is at the end, so that nothing is said to touch it.
+    Args:
+        balls: number of all balls.
+        diameter: of the balls [m].
+        part_turns: the part rotates. Its position at the end is then unknown, so no ball is said to touch
+            it.
     """
     if len(resting) == 0:
         return None
+    reach = 0.5 * diameter + CONTACT_GAP
     surfaces = surface_names(chamber)
-    kinds = [
-        _kind(resting, i, surfaces, chamber, 0.5 * diameter, part_turns)
-        for i in range(len(resting))
-    ]
-    places = _places(resting, _inherited(resting, kinds), diameter)
-    said = [_said(resting, members, kind) for kind, members in places[:MOST_PLACES]]
-    others = sum(len(members) for _, members in places[MOST_PLACES:])
-    said += [f"{others} elsewhere"] if others else []
+    kinds = [_kind(resting, i, surfaces, chamber, reach, part_turns) for i in range(len(resting))]
+    places = _places(resting, _with_carriers(resting, kinds), diameter)
+    descriptions = [_describe(resting, members, kind) for kind, members in places[:MAX_PLACES]]
+    others = sum(len(members) for _, members in places[MAX_PLACES:])
+    descriptions += [f"{others} elsewhere"] if others else []
     verb = "lies" if len(resting) == 1 else "lie"
     return RestingBalls(
         len(resting) / balls,
-        f"{len(resting)} of {balls} balls {verb} still at the end: {'; '.join(said)}",
+        f"{len(resting)} of {balls} balls {verb} still at the end: {'; '.join(descriptions)}",
     )
 
 
 def bouncing_share(velocities: np.ndarray) -> float:
-    """The share of balls, of velocities (n, 3), that go straight up and down: for ever, if nothing meets them."""
-    sideways, speed = (
-        np.hypot(velocities[:, 0], velocities[:, 1]),
-        np.linalg.norm(velocities, axis=1),
-    )
-    return float(((sideways < STRAIGHT * speed) & (speed > 0.0)).mean())
+    """Share of balls that move straight up and down, and will go on until they meet something.
+
+    Args:
+        velocities: of the balls [m/s], (n, 3).
+    """
+    sideways = np.hypot(velocities[:, 0], velocities[:, 1])
+    speed = np.linalg.norm(velocities, axis=1)
+    return float(((sideways < MAX_SIDEWAYS * speed) & (speed > 0.0)).mean())
 
 
 def bouncing_notes(shares: Sequence[float]) -> tuple[str, ...]:
-    """One note where much of the shot, of a ``share`` in each replica, ends so: a trap of faces that are ideal."""
-    caught = [share for share in shares if share > MUCH]
-    if not caught:
+    """A note if much of the shot ends bouncing on the spot, which ideal faces can make it do.
+
+    Args:
+        shares: share of bouncing balls in each replica.
+    """
+    large = [share for share in shares if share > MIN_BOUNCING_SHARE]
+    if not large:
         return ()
     return (
-        f"in {len(caught)} of {len(shares)} replicas up to {_percent(max(caught))} of the shot ends bouncing straight "
-        "up and down, each ball on its spot: between parallel faces friction takes all sideways speed, which rough "
-        "faces would give back; shorten process.accuracy.simulated_time_s, or do not trust where the dents are",
+        f"in {len(large)} of {len(shares)} replicas up to {_percent(max(large))} of the shot ends "
+        "bouncing straight up and down, each ball on its spot: between parallel faces friction takes all "
+        "sideways speed, which rough faces would give back; shorten process.accuracy.simulated_time_s, or "
+        "do not trust where the dents are",
     )
 
 
-def resting_notes(stuck: list[RestingBalls], replicas: int) -> tuple[str, ...]:
-    """One note on all replicas; ``stuck`` has those in which balls came to rest."""
-    if not stuck:
+def resting_notes(resting: Sequence[RestingBalls], replicas: int) -> tuple[str, ...]:
+    """A note on all replicas in which balls came to rest.
+
+    Args:
+        resting: of these replicas alone.
+        replicas: number of all replicas.
+    """
+    if not resting:
         return ()
-    share = sum(one.share for one in stuck) / replicas
-    worst = max(stuck, key=lambda one: one.share)
+    mean = sum(one.share for one in resting) / replicas
+    worst = max(resting, key=lambda one: one.share)
     return (
-        f"balls came to rest in {len(stuck)} of {replicas} replicas and peen no more: by the end {_percent(share)} of "
-        f"the shot, on average of all; where it is most, {worst.line}",
+        f"balls came to rest in {len(resting)} of {replicas} replicas and no longer peen: at the end "
+        f"{_percent(mean)} of the shot, on average over all replicas; in the worst one, {worst.line}",
     )
 
 
@@ -98,66 +119,62 @@ def _percent(share: float) -> str:
 
 
 def _kind(
-    resting: Resting,
-    i: int,
-    surfaces: np.ndarray,
-    chamber: Chamber,
-    radius: float,
-    part_turns: bool,
+    resting: Resting, i: int, surfaces: np.ndarray, chamber: Chamber, reach: float, part_turns: bool
 ) -> str:
-    """E.g. "on the part's upper side", "jammed between the part's side and the wall"; ON_BALLS if it has only those."""
+    """What holds a ball, such as "on the part's upper side"; ON_BALLS if other balls alone do."""
     under = resting.triangles[i][resting.triangles[i] >= 0]
     if resting.jammed[i]:
         known = chamber.tags != TAG_PART if part_turns else np.ones(len(chamber.tags), dtype=bool)
-        under = np.union1d(
-            under, _touched(chamber, np.flatnonzero(known), resting.position[i], radius + TOUCHES)
-        )
+        near = _triangles_near(chamber, np.flatnonzero(known), resting.position[i], reach)
+        under = np.union1d(under, near)
     names = sorted(set(surfaces[under]))
     if not resting.jammed[i]:
-        return ON_BALLS if not names else _between("on", names)
+        return ON_BALLS if not names else _join("on", names)
     if not names and not part_turns:
         return "jammed among other balls"
-    if len(names) < 2:  # so something else holds it too
+    if len(names) < 2:  # one surface alone cannot jam a ball
         names.append("other balls or the part" if part_turns else "other balls")
-    return f"jammed {_between('among', names)}"
+    return f"jammed {_join('among', names)}"
 
 
-def _between(at: str, names: list[str]) -> str:
+def _join(preposition: str, names: list[str]) -> str:
     return (
-        f"{at} {names[0]}"
+        f"{preposition} {names[0]}"
         if len(names) == 1
         else f"between {', '.join(names[:-1])} and {names[-1]}"
     )
 
 
-def _touched(chamber: Chamber, asked: np.ndarray, position: np.ndarray, reach: float) -> np.ndarray:
-    """Which of the triangles ``asked`` are within ``reach`` [m] of a position (3,)."""
-    corners = chamber.vertices[chamber.triangles[asked]]
-    near = (
-        np.abs(position - np.clip(position, corners.min(axis=1), corners.max(axis=1))) <= reach
-    ).all(axis=1)
-    found = closest_points(corners[near], np.broadcast_to(position, (near.sum(), 3)))
-    return np.asarray(asked[near][np.linalg.norm(found - position, axis=1) <= reach])
+def _triangles_near(
+    chamber: Chamber, triangles: np.ndarray, position: np.ndarray, reach: float
+) -> np.ndarray:
+    """Which of these triangles are within `reach` [m] of a position (3,)."""
+    corners = chamber.vertices[chamber.triangles[triangles]]
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    near = (np.abs(position - np.clip(position, low, high)) <= reach).all(axis=1)
+    closest = closest_points(corners[near], np.broadcast_to(position, (near.sum(), 3)))
+    return np.asarray(triangles[near][np.linalg.norm(closest - position, axis=1) <= reach])
 
 
-def _inherited(resting: Resting, kinds: list[str]) -> list[str]:
-    """The same, a heap counted to what its lowest balls lie on."""
-    seat = {int(ball): i for i, ball in enumerate(resting.ball)}
+def _with_carriers(resting: Resting, kinds: list[str]) -> list[str]:
+    """The kinds, with a ball on other balls counted to what the lowest of them lies on."""
+    row = {int(ball): i for i, ball in enumerate(resting.ball)}
     kinds = list(kinds)
-    for i in np.argsort(resting.position[:, 2], kind="stable"):  # what carries a ball is below it
-        carriers = [seat[int(ball)] for ball in resting.balls[i] if int(ball) in seat]
+    # Upwards, because the balls that carry a ball are below it.
+    for i in np.argsort(resting.position[:, 2], kind="stable"):
+        carriers = [row[int(ball)] for ball in resting.balls[i] if int(ball) in row]
         if kinds[i] == ON_BALLS:
             kinds[i] = next((kinds[k] for k in carriers if kinds[k]), "on other balls")
     return kinds
 
 
 def _places(resting: Resting, kinds: list[str], diameter: float) -> list[tuple[str, np.ndarray]]:
-    """Kind and members of each place, that with most balls first."""
+    """Kind and balls of each place, the one with most balls first."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import KDTree
 
-    pairs = KDTree(resting.position).query_pairs(ONE_PLACE * diameter, output_type="ndarray")
+    pairs = KDTree(resting.position).query_pairs(PLACE_DISTANCE * diameter, output_type="ndarray")
     alike = [kinds[one] == kinds[two] for one, two in pairs]
     one, two = pairs[np.array(alike, dtype=bool)].T
     links = coo_array((np.ones(len(one), dtype=bool), (one, two)), shape=(len(kinds),) * 2)
@@ -167,8 +184,8 @@ def _places(resting: Resting, kinds: list[str], diameter: float) -> list[tuple[s
     return [(kinds[members[0]], members) for members in places]
 
 
-def _said(resting: Resting, members: np.ndarray, kind: str) -> str:
-    where = around(resting.position[members])
+def _describe(resting: Resting, members: np.ndarray, kind: str) -> str:
+    where, since = around(resting.position[members]), resting.since[members].min()
     if len(members) == 1:
-        return f"1 {kind} at {where}, since {resting.since[members[0]]:.2f} s"
-    return f"{len(members)} {kind} around {where}, the longest since {resting.since[members].min():.2f} s"
+        return f"1 {kind} at {where}, since {since:.2f} s"
+    return f"{len(members)} {kind} around {where}, the longest since {since:.2f} s"

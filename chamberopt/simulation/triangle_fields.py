@@ -1,7 +1,16 @@
-"""What can be shown of each triangle of the part: its name, unit and colours, and how it is computed."""
+"""What is known of each triangle of the part: the fields of coverage.vtp and the quantities to show.
+
+Notation
+    x   dent density of a triangle at the treatment time: area of its dents over its area
+    s_i areas of the simulated dents on a triangle [m²]
+    y   sum of s_i [m²]
+    v   sum of s_i² [m⁴]
+    C   coverage, 1 - exp(-x)
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -9,6 +18,7 @@ import numpy as np
 
 from chamberopt.coverage.coverage_from_impacts import (
     coverage_at,
+    coverage_from_dent_density,
     mean_angle_per_triangle,
     mean_speed_per_triangle,
 )
@@ -16,21 +26,22 @@ from chamberopt.coverage.part_impacts import HitsByTriangle
 from chamberopt.coverage.statistics.confidence_interval import CONFIDENCE
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from chamberopt.chamber.build import Chamber
     from chamberopt.design.load import Design
     from chamberopt.simulation.evaluation import Evaluation
 
-# Even steps of lightness, told apart by colour-blind readers too.
-EVEN, COUNTS, DOUBT = "viridis", "cividis", "magma"
+# Colour maps with even steps of lightness, which colour-blind readers can tell apart too.
+DEFAULT_COLOURS, COUNT_COLOURS, UNCERTAINTY_COLOURS = "viridis", "cividis", "magma"
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """One number a triangle.
+    """A number that can be shown on each triangle.
 
-    column: its cell data in coverage.vtp · factor: from there to the unit that is shown · grows: in proportion to time.
+    Args:
+        column: its field in coverage.vtp.
+        factor: from that field to the unit that is shown.
+        grows: whether it is proportional to the peening time.
     """
 
     name: str
@@ -38,7 +49,7 @@ class Quantity:
     unit: str
     column: str
     factor: float = 1.0
-    colours: str = EVEN
+    colours: str = DEFAULT_COLOURS
     grows: bool = False
 
     @property
@@ -51,7 +62,12 @@ QUANTITIES = {
     for one in (
         Quantity("coverage", "coverage", "%", "coverage", 100.0),
         Quantity(
-            "impacts", "impacts per area", "1/mm²", "impacts_per_mm2", colours=COUNTS, grows=True
+            "impacts",
+            "impacts per area",
+            "1/mm²",
+            "impacts_per_mm2",
+            colours=COUNT_COLOURS,
+            grows=True,
         ),
         Quantity("speed", "mean normal speed", "m/s", "mean_normal_speed"),
         Quantity("p90-speed", "normal speed, 90th percentile", "m/s", "p90_normal_speed"),
@@ -62,11 +78,16 @@ QUANTITIES = {
             "energy of impacts per area",
             "mJ/mm²",
             "energy_per_mm2",
-            colours=COUNTS,
+            colours=COUNT_COLOURS,
             grows=True,
         ),
         Quantity(
-            "interval", "width of coverage's 95 % interval", "%", "coverage_interval", 100.0, DOUBT
+            "interval",
+            "width of coverage's 95 % interval",
+            "%",
+            "coverage_interval",
+            100.0,
+            UNCERTAINTY_COLOURS,
         ),
     )
 }
@@ -75,22 +96,32 @@ QUANTITIES = {
 def compute_triangle_fields(
     design: Design, chamber: Chamber, evaluation: Evaluation
 ) -> dict[str, np.ndarray]:
-    """The cell data of coverage.vtp, (m,) each, NaN where not exposed or never hit.
+    """Compute the cell data of coverage.vtp; NaN for triangles not exposed or never hit.
 
-    coverage (0..1), impacts_per_mm2 and energy_per_mm2 [mJ/mm²] at the treatment time; dent_density (dented area per
-    area then: coverage is 1 - exp(-it), or the share of the triangle inside dents where every dent is marked);
-    impacts, dents (simulated numbers), mean_normal_speed [m/s], mean_angle_deg (90 is head on), exposed_area_mm2,
-    target, element (its number in the part's file). From single hits, where the evaluation has them: p90_normal_speed
-    [m/s], mean_dent_um (of the impacts that leave one), coverage_interval (width of the 95 % interval).
+    Returns:
+        Arrays (m,) by name:
+
+        coverage: at the treatment time, 0..1.
+        impacts_per_mm2, energy_per_mm2: impacts and their energy [mJ] per area at the treatment time.
+        dent_density: area of dents over area at the treatment time.
+        impacts, dents: simulated numbers.
+        mean_normal_speed [m/s], mean_angle_deg: means over the impacts; 90 is head on.
+        exposed_area_mm2, target, element: of the triangle; its number in the part's file.
+
+        If single impacts were kept also:
+
+        p90_normal_speed: 90th percentile of the normal speed [m/s].
+        mean_dent_um: mean diameter of the dents [µm].
+        coverage_interval: width of the 95 % interval of the coverage.
     """
     total, marked = evaluation.total, evaluation.marked
     exposed_mm2 = np.where(chamber.exposed_area > 0.0, chamber.exposed_area * 1e6, np.nan)
-    seconds = design.process.treatment_time
-    times = seconds / total.simulated_time
-    found = {
-        "coverage": coverage_at(total, chamber, seconds) if marked is None else marked,
-        "impacts_per_mm2": total.impacts * times / exposed_mm2,
-        "dent_density": total.dented_area * 1e6 * times / exposed_mm2,
+    treatment_time = design.process.treatment_time
+    time_ratio = treatment_time / total.simulated_time
+    computed = {
+        "coverage": coverage_at(total, chamber, treatment_time) if marked is None else marked.share,
+        "impacts_per_mm2": total.impacts * time_ratio / exposed_mm2,
+        "dent_density": total.dented_area * 1e6 * time_ratio / exposed_mm2,
         "impacts": total.impacts,
         "dents": total.dents,
         "mean_normal_speed": mean_speed_per_triangle(total),
@@ -99,54 +130,61 @@ def compute_triangle_fields(
         "target": chamber.part.target.astype(np.uint8),
         "element": chamber.part.elements,
     }
-    hits = evaluation.sorted_hits
+    hits = evaluation.hits_by_triangle
     if hits is None:
-        return found
-    energy = _sums(hits, hits.hits.energy)
-    found |= {
-        "energy_per_mm2": energy * 1e3 * times / exposed_mm2,
-        "p90_normal_speed": _quantile(hits, 0.9),
+        return computed
+    if marked is None:
+        low, high = coverage_bounds(hits, exposed_mm2 * 1e-6, time_ratio)
+    return computed | {
+        "energy_per_mm2": _sums(hits, hits.hits.energy) * 1e3 * time_ratio / exposed_mm2,
+        "p90_normal_speed": _speed_quantile(hits, 0.9),
         "mean_dent_um": np.divide(
             1e6 * _sums(hits, hits.hits.dent),
             total.dents,
-            out=np.full(len(energy), np.nan),
+            out=np.full(len(exposed_mm2), np.nan),
             where=total.dents > 0,
         ),
-        "coverage_interval": evaluation.marked_interval
-        if evaluation.marked_interval is not None
-        else np.subtract(*reversed(coverage_bounds(hits, exposed_mm2 * 1e-6, times))),
+        "coverage_interval": high - low if marked is None else marked.interval_width,
     }
-    return found
 
 
 def _sums(hits: HitsByTriangle, column: np.ndarray) -> np.ndarray:
     return np.bincount(hits.hits.triangle, column.astype(float), len(hits.first) - 1)
 
 
-def _quantile(hits: HitsByTriangle, share: float) -> np.ndarray:
-    """The speed that this share of a triangle's impacts do not exceed (its rank is rounded up), (m,)."""
+def _speed_quantile(hits: HitsByTriangle, share: float) -> np.ndarray:
+    """Normal speed that this share of a triangle's impacts do not exceed, (m,); ranks round up."""
     speed = hits.hits.speed[np.lexsort((hits.hits.speed, hits.hits.triangle))]
     count = np.diff(hits.first)
     rank = np.maximum(np.ceil(share * count).astype(int) - 1, 0)
-    there = count > 0
-    found = np.full(len(count), np.nan)
-    found[there] = speed[hits.first[:-1][there] + rank[there]]
-    return found
+    hit = count > 0
+    quantile = np.full(len(count), np.nan)
+    quantile[hit] = speed[hits.first[:-1][hit] + rank[hit]]
+    return quantile
 
 
 def coverage_bounds(
     hits: HitsByTriangle,
     area: np.ndarray,
-    times: float,
+    time_ratio: float,
     over: Callable[[np.ndarray], np.ndarray] = np.asarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Ends (m,) of the 95 % interval of the coverage 1 - exp(-x), area (m,) m², times: treatment over simulated time.
+    """Ends of the 95 % interval of the coverage of each triangle by Avrami's equation.
 
-    over: sums what the triangles have, (m,), over the neighbours of each; area then is such a sum too.
+    x is a sum of dents that fall as a Poisson process, each with a weight of its own. The gamma interval
+    for such sums holds for few dents and for none. It does not know dents that come in series from a ball
+    that bounces on its spot.
 
-    x is a sum of dents that fall as Poisson has it, each with its own weight: the gamma interval of M. P. Fay and
-    E. J. Feuer, "Confidence intervals for directly standardized rates", Statistics in Medicine 16 (1997) 791. It
-    holds for few dents, and for none. Dents that come in series, of a ball that bounces on its spot, it does not know.
+    Args:
+        area: exposed area [m²], (m,).
+        time_ratio: treatment time over simulated time.
+        over: sums values (m,) of triangles over the neighbours of each; `area` must be such a sum too.
+
+    Returns:
+        Lower and upper ends, (m,) each.
+
+    Source: M. P. Fay and E. J. Feuer, "Confidence intervals for directly standardized rates", Statistics
+    in Medicine 16 (1997) 791.
     """
     from scipy.special import gammaincinv
 
@@ -154,12 +192,16 @@ def coverage_bounds(
     y, v = over(_sums(hits, dent)), over(_sums(hits, dent**2))
     largest = float(dent.max()) if len(dent) else 0.0
     if largest == 0.0:
-        nothing = np.where(np.isnan(area), np.nan, 0.0)
-        return nothing, nothing + 1.0
+        zero = np.where(np.isnan(area), np.nan, 0.0)
+        return zero, zero + 1.0
     tail = 0.5 * (1.0 - CONFIDENCE)
-    some = v > 0.0
+    dented = v > 0.0
     low = np.zeros(len(y))
-    low[some] = v[some] / y[some] * gammaincinv(y[some] ** 2 / v[some], tail)
-    more, wider = y + largest, v + largest**2
-    high = wider / more * gammaincinv(more**2 / wider, 1.0 - tail)
-    return -np.expm1(-low / area * times), -np.expm1(-high / area * times)
+    low[dented] = v[dented] / y[dented] * gammaincinv(y[dented] ** 2 / v[dented], tail)
+    # The upper end belongs to one more dent of the largest size.
+    y_more, v_more = y + largest, v + largest**2
+    high = v_more / y_more * gammaincinv(y_more**2 / v_more, 1.0 - tail)
+    return (
+        coverage_from_dent_density(low / area * time_ratio),
+        coverage_from_dent_density(high / area * time_ratio),
+    )

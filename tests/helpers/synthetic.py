@@ -12,7 +12,7 @@ from chamberopt.coverage.metrics import METRICS, OBJECTIVES
 from chamberopt.coverage.part_impacts import Hits
 from chamberopt.coverage.statistics.confidence_interval import Estimate, estimate
 from chamberopt.design.load import Design, load_design
-from chamberopt.simulation.evaluate import jackknife, weighted_sum
+from chamberopt.simulation.evaluate import estimate_metrics, weighted_sum
 from chamberopt.simulation.evaluation import Evaluation
 
 DESIGNS = Path(__file__).resolve().parents[2] / "designs"
@@ -106,9 +106,7 @@ def poisson_evaluation(
 
 def evaluation_of(design: Design, chamber: Chamber, tallies: list[Tally]) -> Evaluation:
     """The evaluation of replicas whose dents are known, with hits that leave these dents."""
-    metrics = dict(
-        zip(METRICS, jackknife(tallies, list(METRICS.values()), chamber, design), strict=True)
-    )
+    metrics = estimate_metrics(tallies, chamber, design)
     return Evaluation(
         "uniform_coverage",
         weighted_sum(OBJECTIVES["uniform_coverage"], metrics),

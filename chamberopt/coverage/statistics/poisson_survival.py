@@ -51,11 +51,7 @@ class UncoveredFraction:
     """
 
     def __init__(
-        self,
-        replicas: Sequence[PatchDents],
-        area: np.ndarray,
-        time_ratio: float,
-        dent_area: float,
+        self, replicas: Sequence[PatchDents], area: np.ndarray, time_ratio: float, dent_area: float
     ) -> None:
         n = len(replicas)
         per_area, weight = time_ratio / n / area, area / area.sum()
@@ -136,10 +132,7 @@ def _rescaled(
         slope = first_order[0, 1] / first_order[0, 0]
         across = (deviations[1] - slope * deviations[0]) / np.sqrt(rest)
     return np.array(
-        [
-            np.sqrt(top) * along,
-            all_orders[0, 1] / np.sqrt(top) * along + np.sqrt(top_rest) * across,
-        ]
+        [np.sqrt(top) * along, all_orders[0, 1] / np.sqrt(top) * along + np.sqrt(top_rest) * across]
     )
 
 

@@ -26,7 +26,7 @@ from chamberopt.output.compare.parameters import labels
 from chamberopt.output.results.load import Result, load_result
 from chamberopt.output.save_run import save_simulation
 from chamberopt.output.vtp_files import COVERAGE, read_surface
-from chamberopt.simulation.evaluate import evaluate
+from chamberopt.simulation.evaluate import ReplicaPlan, evaluate
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -136,10 +136,8 @@ def _simulate(
     )
     design, advice = prepare(asked, one.chamber, cavity)
     with progress_bar(f"{one.label}: replicas") as progress:
-        evaluation = evaluate(
-            design, one.chamber, executor, progress, objective_name=draws.objective_name, stream=draws.stream,
-            replicas=draws.replicas, cavity=cavity,
-        )  # fmt: skip
+        plan = ReplicaPlan(draws.replicas, draws.stream, draws.objective_name)
+        evaluation = evaluate(design, one.chamber, executor, progress, plan, cavity)
     remarks = save_simulation(folder, design, one.chamber, evaluation, advice)
     return load_result(folder), [f"{one.label}: {text}" for text in (*map(str, advice), *remarks)]
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
 from chamberopt.output.compare.covered import Covered
 from chamberopt.output.disc_averages import DENTS_PER_DISC, averaging_radius, disc_sums
 from chamberopt.simulation.triangle_fields import coverage_bounds
@@ -77,6 +78,6 @@ def _with_interval(
             one.hits.hits.triangle, DENT * one.hits.hits.dent.astype(float) ** 2, len(target)
         )[target]
     )
-    found = (-np.expm1(-dented * one.times / area), low, high)
+    found = (coverage_from_dent_density(dented * one.times / area), low, high)
     value, low, high = (np.where(there, column, 0.0) for column in found)
     return value, low, high

@@ -14,11 +14,12 @@ from typing import Any
 
 import numpy as np
 
+from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
 from chamberopt.design.shapes import TAG_PART, TAG_WALL, is_sonotrode
 from chamberopt.geometry.triangles import area_vectors
 from chamberopt.output.disc_averages import average_over_discs
 from chamberopt.output.results.load import Result, load_coverage
-from chamberopt.output.vtp_files import CHAMBER, read_surface
+from chamberopt.output.vtp_files import CHAMBER, read_coverage_model, read_surface
 from chamberopt.simulation.triangle_fields import QUANTITIES
 
 # A triangle costs about 80 bytes of the page: with this many it stays below 60 MB and opens.
@@ -61,8 +62,8 @@ def part_scene(result: Result, title: str, most: int = MOST_TRIANGLES) -> Scene:
         unit,
         *(fields[name][seen] for name in ("dent_density", "exposed_area_mm2", "dents")),
     )
-    marked = result.design.process.accuracy.coverage_model == "dents"
-    shown = fields["coverage"][seen] if marked else -np.expm1(-density)
+    marked = read_coverage_model(surface) == "dents"
+    shown = fields["coverage"][seen] if marked else coverage_from_dent_density(density)
     covered = np.zeros(len(area))
     covered[seen] = shown * np.minimum(fields["exposed_area_mm2"][seen] / area[seen], 1.0)
     remarks = _remarks(len(triangles), int(seen.sum()), most, reach if not marked else 0.0, marked)

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from chamberopt.simulation.evaluation import Evaluation
 
 FORMAT = 1
-LATER = ("time_to_98_s", "intensity_uniformity")  # metrics that results of 0.1.0 may lack
 
 
 @dataclass(frozen=True)
@@ -76,11 +75,11 @@ def load_result(path: str | Path) -> Result:
             kind=data["kind"],
             design=validate(Design, data["design"], file, mesh_must_exist=False),
             objective_name=data["objective"]["name"],
-            objective=_estimate(data["objective"]),
+            objective=Estimate.from_json(data["objective"]),
             metrics={
-                name: _estimate(data["metrics"][name])
-                for name in METRICS
-                if name in data["metrics"] or name not in LATER
+                name: Estimate.from_json(data["metrics"][name])
+                for name, metric in METRICS.items()
+                if name in data["metrics"] or metric.in_version_0_1
             },
             part_sha256=data["part_sha256"],
             seeds=(data["seed"], data["stream"]),
@@ -143,13 +142,6 @@ def summary(evaluation: Evaluation | Result) -> str:
 
 def _share(estimate: Estimate) -> str:
     return f"{100.0 * estimate.value:.1f} ± {100.0 * estimate.half_width:.1f} %"
-
-
-def _estimate(data: dict[str, Any]) -> Estimate:
-    pseudovalues = tuple(float(x) for x in data["pseudovalues"])
-    return Estimate(
-        float(data["value"]), float(data["half_width"]), pseudovalues, float(data.get("bias", 0.0))
-    )
 
 
 def _refuse_constant(name: str) -> float:

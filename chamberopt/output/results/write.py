@@ -7,39 +7,34 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from chamberopt.chamber.build import build_chamber
 from chamberopt.common.files import write_text
 from chamberopt.common.versions import versions
 from chamberopt.coverage.metrics import METRICS, exposed_target
 from chamberopt.coverage.part_impacts import HITS_FILE, save_hits
-from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.design.load import Design, save_design, with_paths_from
 from chamberopt.optimize import pareto
 from chamberopt.optimize.storage.study_folder import RESULT
 from chamberopt.optimize.storage.trial_log import read_trials, trials_as_csv
 from chamberopt.output.results.load import FORMAT
 from chamberopt.output.vtp_files import COVERAGE, write_chamber, write_coverage
-from chamberopt.simulation.evaluation import Evaluation
-from chamberopt.simulation.time_curve import coverage_against_time
-from chamberopt.simulation.triangle_fields import compute_triangle_fields
+from chamberopt.simulation.candidate_result import CandidateResult
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from chamberopt.chamber.build import Chamber
     from chamberopt.optimize.run_study import StudyResult
     from chamberopt.simulation.effect_pilot import Advice
 
 
-def write_simulation(
-    folder: Path, design: Design, chamber: Chamber, evaluation: Evaluation
-) -> dict[str, Any]:
+def write_simulation(folder: Path, candidate: CandidateResult) -> dict[str, Any]:
     """Write the data files of a simulation into its empty folder; return its result.json."""
-    save_design(design, folder / "design.toml")
-    return {"kind": "simulation", **_write_candidate(folder, design, chamber, evaluation)}
+    save_design(candidate.design, folder / "design.toml")
+    return {"kind": "simulation", **_write_candidate(folder, candidate)}
 
 
-def write_study(folder: Path, study_result: StudyResult) -> dict[str, Any]:
+def write_study(
+    folder: Path, study_result: StudyResult, start: CandidateResult, best: CandidateResult
+) -> dict[str, Any]:
     """Add the data files of a study that has ended to its folder.
 
     run_study has written design.toml, study.toml and history.jsonl. This adds best.toml,
@@ -50,19 +45,13 @@ def write_study(folder: Path, study_result: StudyResult) -> dict[str, Any]:
     Returns:
         The study's result.json, which `write_result` writes.
     """
-    start, best, target = study_result.start, study_result.best, study_result.target
     save_design(best.design, folder / "best.toml")
     write_text(folder / "history.csv", trials_as_csv(read_trials(folder)))
     (folder / "start").mkdir(exist_ok=True)
-    start_chamber = build_chamber(start.design, target)
-    write_result(
-        folder / "start",
-        write_simulation(folder / "start", start.design, start_chamber, start.evaluation),
-    )
+    write_result(folder / "start", write_simulation(folder / "start", start))
     if study_result.study.objective.pareto:
         write_text(folder / "pareto.csv", pareto.as_csv(study_result))
-    best_chamber = build_chamber(best.design, target)
-    candidate = _write_candidate(folder, best.design, best_chamber, best.evaluation)
+    candidate = _write_candidate(folder, best)
     return {"kind": "study", **candidate, "study": _about_study(study_result)}
 
 
@@ -87,29 +76,27 @@ def write_result(
     write_text(folder / RESULT, json.dumps(data, indent=2, allow_nan=False) + "\n")
 
 
-def _write_candidate(
-    folder: Path, design: Design, chamber: Chamber, evaluation: Evaluation
-) -> dict[str, Any]:
-    """Write the surfaces of one candidate; what there is to say of it, for result.json."""
-    write_coverage(folder / COVERAGE, chamber, compute_triangle_fields(design, chamber, evaluation))
-    if evaluation.sorted_hits is not None:
-        save_hits(folder / HITS_FILE, evaluation.sorted_hits)
+def _write_candidate(folder: Path, candidate: CandidateResult) -> dict[str, Any]:
+    """Write the surfaces and impacts of one candidate; return its part of result.json."""
+    design, chamber, evaluation = candidate.design, candidate.chamber, candidate.evaluation
+    write_coverage(
+        folder / COVERAGE,
+        chamber,
+        candidate.triangle_fields,
+        design.process.accuracy.coverage_model,
+    )
+    if evaluation.hits_by_triangle is not None:
+        save_hits(folder / HITS_FILE, evaluation.hits_by_triangle)
     write_chamber(folder, chamber)
-    return _about(folder, design, chamber, evaluation)
-
-
-def _about(
-    folder: Path, design: Design, chamber: Chamber, evaluation: Evaluation
-) -> dict[str, Any]:
     target = exposed_target(chamber)
     return {
         "format": FORMAT,
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
-        "objective": {"name": evaluation.objective_name, **_plain(evaluation.objective, "")},
+        "objective": {"name": evaluation.objective_name, **evaluation.objective.to_json("")},
         "metrics": {
-            name: _plain(value, METRICS[name].unit) for name, value in evaluation.metrics.items()
+            name: value.to_json(METRICS[name].unit) for name, value in evaluation.metrics.items()
         },
-        "coverage_against_time": coverage_against_time(design, chamber, evaluation),
+        "coverage_against_time": candidate.time_curve,
         "seed": design.process.seed,
         "stream": evaluation.stream,
         "replicas": len(evaluation.replicas),
@@ -149,7 +136,7 @@ def _about_study(result: StudyResult) -> dict[str, Any]:
         "missing_a_constraint": sum(
             trial.objective is not None and not trial.feasible for trial in search
         ),
-        "gain": _plain(result.gain, ""),
+        "gain": result.gain.to_json(""),
         "improved": result.improved,
         "at_bounds": list(result.at_bounds),
         **({"model": result.sensitivity.as_json()} if result.sensitivity else {}),
@@ -157,9 +144,9 @@ def _about_study(result: StudyResult) -> dict[str, Any]:
         "best": {"searched_as": result.best.searched, "parameters": result.best.parameters},
         "start": {
             "parameters": result.start.parameters,
-            "objective": _plain(result.start.evaluation.objective, ""),
+            "objective": result.start.evaluation.objective.to_json(""),
             "metrics": {
-                name: _plain(value, METRICS[name].unit)
+                name: value.to_json(METRICS[name].unit)
                 for name, value in result.start.evaluation.metrics.items()
             },
         },
@@ -167,7 +154,7 @@ def _about_study(result: StudyResult) -> dict[str, Any]:
             {
                 "searched_as": candidate.searched,
                 "parameters": candidate.parameters,
-                "objective": _plain(candidate.evaluation.objective, ""),
+                "objective": candidate.evaluation.objective.to_json(""),
                 "feasible": candidate.feasible,
                 "standing": candidate.feasibility,
                 "reason": candidate.reason,
@@ -175,17 +162,6 @@ def _about_study(result: StudyResult) -> dict[str, Any]:
             for candidate in result.confirmed
         ],
         "seconds": round(result.seconds, 3),
-    }
-
-
-def _plain(estimate: Estimate, unit: str) -> dict[str, Any]:
-    """An estimate as JSON; the pseudo-values let two results be compared with an interval later."""
-    return {
-        "value": estimate.value,
-        "half_width": estimate.half_width,
-        "unit": unit,
-        "pseudovalues": list(estimate.pseudovalues),
-        "bias": estimate.bias,
     }
 
 

@@ -8,8 +8,9 @@ from functools import cached_property
 import numpy as np
 
 from chamberopt.common.errors import InputError
+from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
 from chamberopt.output.disc_averages import average_over_discs
-from chamberopt.output.vtp_files import Surface
+from chamberopt.output.vtp_files import Surface, read_coverage_model
 from chamberopt.simulation.triangle_fields import QUANTITIES, Quantity
 
 
@@ -25,9 +26,7 @@ class DrawnPart:
         surface["row"] = np.arange(surface.n_cells)
         self.target = surface.extract_cells(wanted).extract_surface(algorithm="dataset_surface")
         self.rest = surface.extract_cells(~wanted)
-        self.marked = not np.allclose(
-            self.target["coverage"], -np.expm1(-self.target["dent_density"]), atol=1e-9
-        )
+        self.marked = read_coverage_model(surface) == "dents"
         self.show(quantity)
 
     def show(self, quantity: Quantity, times: float = 1.0) -> None:
@@ -49,7 +48,7 @@ class DrawnPart:
                 * (times if quantity.grows else 1.0)
             )
         value = self._averages[0]
-        return 100.0 * value if self.marked else -100.0 * np.expm1(-value * times)
+        return 100.0 * (value if self.marked else coverage_from_dent_density(value * times))
 
     @property
     def coverage_reach(self) -> float:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from chamberopt.common.errors import InputError
+from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
 from chamberopt.coverage.part_impacts import HitsByTriangle, load_matching_hits
 from chamberopt.output.results.load import Result, require_matching_coverage, summary
 from chamberopt.output.viewer.drawn_part import DrawnPart, colour_range
@@ -142,9 +143,8 @@ class OpenedResult:
         """The triangle's own, nothing averaged."""
         one = QUANTITIES[name]
         if name == "coverage" and not self.part.marked:
-            return -100.0 * float(
-                np.expm1(-self.surface["dent_density"][triangle] * self.times(look))
-            )
+            density = self.surface["dent_density"][triangle] * self.times(look)
+            return 100.0 * float(coverage_from_dent_density(density))
         return (
             one.factor
             * float(self.surface[one.column][triangle])

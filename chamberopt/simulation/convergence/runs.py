@@ -74,7 +74,7 @@ def figures(
     tallies: Sequence[Tally], chamber: Chamber, design: Design
 ) -> tuple[Estimate, Estimate, bool]:
     """Objective and mean coverage, as evaluate() has them, and whether triangles were taken together."""
-    ground = target_patches(tallies, chamber, design)
+    ground = target_patches(tallies, chamber, design.process.treatment_time)
     found = coverage_estimates(tallies, chamber, ground)
     return (
         weighted_sum(parse_objective("uniform_coverage"), found),

@@ -27,7 +27,7 @@ from chamberopt.simulation.convergence.dent_runs import dent_rungs
 from chamberopt.simulation.convergence.error_law import Law, Level, law_of, rms_error, rms_interval
 from chamberopt.simulation.convergence.parameters import REFERENCE, designs
 from chamberopt.simulation.convergence.runs import Pool, Run, dents_alone
-from chamberopt.simulation.replicas import simulate_replica
+from chamberopt.simulation.replicas import ReplicaSetting, simulate_replica
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -156,7 +156,7 @@ def _replica(
     """The dents of one replica, and its CPU seconds on this thread."""
     begin = time.thread_time()
     seed = replica_seed(design.process.seed, number)
-    left = simulate_replica(design, chamber, mesh, None, seed).tally
+    left = simulate_replica(ReplicaSetting(design, chamber, mesh, None), seed).tally
     return dents_alone(left), time.thread_time() - begin
 
 

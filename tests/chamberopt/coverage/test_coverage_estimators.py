@@ -6,7 +6,11 @@ import pytest
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import SerialExecutor, local_executor
-from chamberopt.coverage.coverage_estimators import _at_most, few_dents_note, target_patches
+from chamberopt.coverage.coverage_estimators import (
+    _max_effect_of_variance,
+    few_dents_note,
+    target_patches,
+)
 from chamberopt.coverage.coverage_from_impacts import Tally
 from chamberopt.coverage.metrics import METRICS, OBJECTIVES
 from chamberopt.coverage.statistics.confidence_interval import (
@@ -18,7 +22,7 @@ from chamberopt.coverage.statistics.confidence_interval import (
 from chamberopt.coverage.statistics.triangle_patches import patches
 from chamberopt.design.design import validate
 from chamberopt.design.load import Design
-from chamberopt.simulation.evaluate import evaluate, jackknife, weighted_sum
+from chamberopt.simulation.evaluate import ReplicaPlan, estimate_metrics, evaluate, weighted_sum
 from chamberopt.simulation.replicas import MIN_REPLICAS_TO_STOP, next_replica_count
 from tests.helpers.synthetic import equal_dents, patchwork, plate_design
 
@@ -37,10 +41,7 @@ def truth() -> float:
 
 def uniform_coverage(replicas: list[Tally]) -> Estimate:
     """As evaluate() estimates it."""
-    names = ("mean_coverage", "std_coverage")
-    metrics = dict(
-        zip(names, jackknife(replicas, [METRICS[n] for n in names], CHAMBER, DESIGN), strict=True)
-    )
+    metrics = estimate_metrics(replicas, CHAMBER, DESIGN)
     return weighted_sum(OBJECTIVES["uniform_coverage"], metrics)
 
 
@@ -62,7 +63,7 @@ def test_pseudovalues_of_a_mean_are_the_sample() -> None:
     rng = np.random.default_rng(5)
     replicas = poisson_replicas(rng, 6, 10.0)
     rate = METRICS["impacts_per_mm2_s"]
-    [got] = jackknife(replicas, [rate], CHAMBER, DESIGN)
+    got = estimate_metrics(replicas, CHAMBER, DESIGN)["impacts_per_mm2_s"]
     each = np.array([rate.function(replica, CHAMBER, DESIGN) for replica in replicas])
     np.testing.assert_allclose(got.pseudovalues, each, rtol=1e-9)
     assert got.value == pytest.approx(each.mean())
@@ -91,14 +92,7 @@ def test_95_percent_intervals_hold_the_truth_as_often() -> None:
     held = dict.fromkeys(true, 0)
     for _ in range(200):
         replicas = poisson_replicas(rng, 8, 6.0)
-        names = ("mean_coverage", "std_coverage")
-        got = dict(
-            zip(
-                names,
-                jackknife(replicas, [METRICS[n] for n in names], CHAMBER, DESIGN),
-                strict=True,
-            )
-        )
+        got = estimate_metrics(replicas, CHAMBER, DESIGN)
         got["uniform_coverage"] = weighted_sum(OBJECTIVES["uniform_coverage"], got)
         for name, value in true.items():
             held[name] += got[name].low <= value <= got[name].high
@@ -113,9 +107,8 @@ def test_the_poorest_twentieth_is_held_by_its_interval_however_short_the_simulat
     for seconds in (2.0, 8.0, 32.0):
         held, width = 0, 0.0
         for _ in range(40):
-            [got] = jackknife(
-                poisson_replicas(rng, 8, seconds), [METRICS["p05_coverage"]], CHAMBER, DESIGN
-            )
+            replicas = poisson_replicas(rng, 8, seconds)
+            got = estimate_metrics(replicas, CHAMBER, DESIGN)["p05_coverage"]
             held += got.low <= true <= got.high
             width += got.half_width / 40
         assert held >= 37, (
@@ -131,10 +124,7 @@ def test_an_even_part_is_not_better_than_its_mean() -> None:
     rng = np.random.default_rng(4)
     counts = rng.poisson(0.4, (8, 400))
     replicas = [equal_dents(1.0, k, 0.2e-6) for k in counts]
-    names = ("mean_coverage", "std_coverage")
-    metrics = dict(
-        zip(names, jackknife(replicas, [METRICS[n] for n in names], even, DESIGN), strict=True)
-    )
+    metrics = estimate_metrics(replicas, even, DESIGN)
     goal = weighted_sum(OBJECTIVES["uniform_coverage"], metrics)
     assert metrics["std_coverage"].value >= 0.0
     assert goal.value == metrics["mean_coverage"].value - metrics["std_coverage"].value <= 1.0
@@ -197,11 +187,11 @@ def test_evaluate_gives_the_same_numbers_on_any_number_of_workers() -> None:
     assert any("dents per target triangle" in note for note in serial.notes)
     # Replicas there are, are added to: the same as all at once.
     done: list = []
-    few = evaluate(design, chamber, SerialExecutor(), replicas=3, done=done)
+    few = evaluate(design, chamber, SerialExecutor(), plan=ReplicaPlan(3), done=done)
     assert (len(few.replicas), len(done)) == (3, 3)
     assert evaluate(design, chamber, SerialExecutor(), done=done).metrics == serial.metrics
     # Fresh draws for a confirmation.
-    other = evaluate(design, chamber, SerialExecutor(), stream="confirm", replicas=3)
+    other = evaluate(design, chamber, SerialExecutor(), plan=ReplicaPlan(3, "confirm"))
     assert other.objective.value != serial.objective.value
     assert (other.stream, len(other.replicas)) == ("confirm", 3)
 
@@ -236,7 +226,7 @@ def test_replicas_are_added_until_the_accuracy_holds_or_the_budget_ends() -> Non
     assert tight.objective.half_width > 0.001
     assert any("max_replicas = 14" in note and "not reached" in note for note in tight.notes)
     # The same replicas at once say the same: how they were added leaves no trace.
-    again = evaluate(accurate(0.001, 14), chamber, SerialExecutor(), replicas=14)
+    again = evaluate(accurate(0.001, 14), chamber, SerialExecutor(), plan=ReplicaPlan(14))
     assert again.metrics == tight.metrics
     assert again.stopped_by == "replicas"
 
@@ -244,7 +234,7 @@ def test_replicas_are_added_until_the_accuracy_holds_or_the_budget_ends() -> Non
 def test_an_accuracy_that_cannot_be_is_refused() -> None:
     with pytest.raises(InputError, match=r"process\.accuracy\.max_replicas.*below replicas"):
         accurate(0.01, 5)
-    with pytest.raises(InputError, match=r"process\.accuracy\.coverage"):
+    with pytest.raises(InputError, match=r"process\.accuracy\.objective_half_width"):
         accurate(-0.01, 50)
 
 
@@ -316,39 +306,31 @@ def test_figures_are_the_same_however_long_was_simulated(seconds: float) -> None
     share = -np.expm1(-x)
     names, true = ("mean_coverage", "std_coverage"), (share.mean(), share.std())
     rng = np.random.default_rng(9)
-    runs = [
-        jackknife(of_all_sizes(rng, seconds), [METRICS[n] for n in names], CHAMBER, DESIGN)
-        for _ in range(200)
-    ]
-    for k, wanted in enumerate(true):
-        values = np.array([run[k].value for run in runs])
+    runs = [estimate_metrics(of_all_sizes(rng, seconds), CHAMBER, DESIGN) for _ in range(200)]
+    for name, wanted in zip(names, true, strict=True):
+        values = np.array([run[name].value for run in runs])
         assert values.mean() == pytest.approx(
             wanted, abs=3.5 * values.std() / np.sqrt(200) + 1e-3
-        ), names[k]
-        held = sum(run[k].low <= wanted <= run[k].high for run in runs)
-        assert 184 <= held <= 199, (names[k], held)
+        ), name
+        held = sum(run[name].low <= wanted <= run[name].high for run in runs)
+        assert 184 <= held <= 199, (name, held)
 
 
 def test_few_dents_are_said_and_make_the_interval_wide() -> None:
     rng = np.random.default_rng(10)
     few, many = of_all_sizes(rng, 0.2), of_all_sizes(rng, 40.0)
-    assert few_dents_note(many, target_patches(many, CHAMBER, DESIGN)) == ()
-    [note] = few_dents_note(few, target_patches(few, CHAMBER, DESIGN))
+    assert few_dents_note(many, target_patches(many, CHAMBER, TREATMENT)) == ()
+    [note] = few_dents_note(few, target_patches(few, CHAMBER, TREATMENT))
     assert "dents per target triangle" in note
     assert "patches" in note
-    metrics = [METRICS["mean_coverage"], METRICS["std_coverage"]]
-    rough, sharp = (
-        jackknife(few, metrics, CHAMBER, DESIGN),
-        jackknife(many, metrics, CHAMBER, DESIGN),
-    )
-    assert all(
-        one.half_width > 4 * other.half_width for one, other in zip(rough, sharp, strict=True)
-    )
+    rough, sharp = (estimate_metrics(replicas, CHAMBER, DESIGN) for replicas in (few, many))
+    names = ("mean_coverage", "std_coverage")
+    assert all(rough[name].half_width > 4 * sharp[name].half_width for name in names)
     x = CLUMPED * (0.5 + CLUMPED / 0.5) * 0.1 * TREATMENT
     true = -np.expm1(-x).mean(), np.expm1(-x).std()
-    runs = [jackknife(of_all_sizes(rng, 0.5), metrics, CHAMBER, DESIGN) for _ in range(60)]
-    for k, wanted in enumerate(true):
-        assert sum(run[k].low <= wanted <= run[k].high for run in runs) >= 54
+    runs = [estimate_metrics(of_all_sizes(rng, 0.5), CHAMBER, DESIGN) for _ in range(60)]
+    for name, wanted in zip(names, true, strict=True):
+        assert sum(run[name].low <= wanted <= run[name].high for run in runs) >= 54
 
 
 def test_patches_are_near_and_hold_enough() -> None:
@@ -374,18 +356,11 @@ def test_real_simulations_hold_their_long_run_value() -> None:
     )
     chamber = build_chamber(design)
     with local_executor() as executor:
-        everything = evaluate(design, chamber, executor, replicas=1600)
+        everything = evaluate(design, chamber, executor, plan=ReplicaPlan(1600))
     names = ("mean_coverage", "std_coverage")
-    metrics = [METRICS[name] for name in names]
     held = dict.fromkeys((*names, "uniform_coverage"), 0)
     for run in range(200):
-        got = dict(
-            zip(
-                names,
-                jackknife(everything.replicas[8 * run : 8 * run + 8], metrics, chamber, design),
-                strict=False,
-            )
-        )
+        got = estimate_metrics(everything.replicas[8 * run : 8 * run + 8], chamber, design)
         got["uniform_coverage"] = weighted_sum(OBJECTIVES["uniform_coverage"], got)
         truth_of = {**everything.metrics, "uniform_coverage": everything.objective}
         for name in held:
@@ -407,10 +382,8 @@ def test_a_ball_that_bounces_on_its_spot_does_not_empty_the_mean() -> None:
         dents[rng.choice(700, spots, replace=False)] += 40
         return equal_dents(2.0, dents, 0.03e-6)
 
-    names = ("mean_coverage", "std_coverage")
-    mean, std = jackknife(
-        [replica(1) for _ in range(4)], [METRICS[n] for n in names], chamber, DESIGN
-    )
+    found = estimate_metrics([replica(1) for _ in range(4)], chamber, DESIGN)
+    mean, std = found["mean_coverage"], found["std_coverage"]
     assert abs(mean.value + np.expm1(-0.6)) < mean.half_width + 0.02
     assert mean.value > 0.35
     assert mean.half_width < 0.15
@@ -422,13 +395,13 @@ def test_what_variance_can_take_off_the_mean_is_bounded() -> None:
     rng = np.random.default_rng(5)
     for _ in range(200):
         x = rng.gamma(rng.uniform(0.05, 5.0), rng.uniform(0.1, 2.0), 20)
-        off, _ = _at_most(float(x.var()), float(np.exp(-x.mean())))
+        off, _ = _max_effect_of_variance(float(x.var()), float(np.exp(-x.mean())))
         assert np.exp(-x).mean() - np.exp(-x.mean()) <= off + 1e-12
     two = np.array([0.0, 0.0, 0.0, 1.7])
-    off, more = _at_most(float(two.var()), float(np.exp(-two.mean())))
+    off, more = _max_effect_of_variance(float(two.var()), float(np.exp(-two.mean())))
     assert off == pytest.approx(np.exp(-two).mean() - np.exp(-two.mean()))
     assert more == pytest.approx(np.exp(-two).var())
-    assert _at_most(0.0, 0.5) == _at_most(1.0, 1.0) == (0.0, 0.0)
+    assert _max_effect_of_variance(0.0, 0.5) == _max_effect_of_variance(1.0, 1.0) == (0.0, 0.0)
 
 
 @pytest.mark.filterwarnings("error")
@@ -439,6 +412,6 @@ def test_a_handful_of_dents_gives_figures(dents: int) -> None:
     counts = np.zeros((3, 50), dtype=int)
     counts[:dents, 7] = 1
     tallies = [equal_dents(1e-3, count, 1e-8) for count in counts]
-    for found in jackknife(tallies, list(METRICS.values()), chamber, plate_design()):
+    for found in estimate_metrics(tallies, chamber, plate_design()).values():
         assert np.isfinite(found.value)
         assert not np.isnan(found.half_width)

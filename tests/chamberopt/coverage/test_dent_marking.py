@@ -178,7 +178,7 @@ def test_both_models_agree_on_the_mean_and_the_marks_grow_with_time() -> None:
     one, other = marked.metrics["mean_coverage"], rates.metrics["mean_coverage"]
     assert one.value > 0.0
     assert abs(one.value - other.value) < 2 * np.hypot(one.half_width, other.half_width)
-    curve = [mean.value for _, mean in marked.against_time]
+    curve = [mean.value for _, mean in marked.marked.curve]
     assert (np.diff(curve) >= 0.0).all()
     assert curve[-1] == one.value
     # A part as it comes out has the grain of its dents; the coverage to expect has not.

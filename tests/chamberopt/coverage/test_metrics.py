@@ -7,8 +7,9 @@ import pytest
 
 from chamberopt.common.errors import InputError
 from chamberopt.coverage.metrics import METRICS, NEVER, OBJECTIVES, parse_objective
+from chamberopt.design.design import validate
 from chamberopt.optimize import study
-from chamberopt.simulation.evaluate import jackknife
+from chamberopt.simulation.evaluate import estimate_metrics
 from tests.helpers.synthetic import dented, equal_dents, patchwork, plate_design
 
 MM2 = 1e-6
@@ -99,14 +100,24 @@ def test_nothing_hit() -> None:
     assert set(values.values()) == {0.0}
 
 
-def test_the_names_a_study_may_use_are_these() -> None:
-    assert {
-        name: (metric.lowest, metric.highest) for name, metric in METRICS.items()
-    } == study.METRICS
-    for name in OBJECTIVES:
+def test_a_study_may_use_all_objectives_of_the_registry() -> None:
+    for name, objective in OBJECTIVES.items():
         assert study.Objective(name=name).name == name
+        assert set(objective.terms) <= set(METRICS)
     with pytest.raises(InputError, match="uniform_coverage"):
         parse_objective("shiny")
+
+
+@pytest.mark.parametrize(
+    ("old", "new"), [("coverage_p05", "p05_coverage"), ("time_to_98", "minus_time_to_98_s")]
+)
+def test_an_old_name_of_an_objective_is_refused_with_the_new_one(old: str, new: str) -> None:
+    message = f"'{old}' is now called '{new}'"
+    with pytest.raises(InputError, match=message):
+        parse_objective(old)
+    for table in ({"name": old}, {"pareto": ["uniform_coverage", old]}, {"sum": {old: 1.0}}):
+        with pytest.raises(InputError, match=message):
+            validate(study.Objective, table)
 
 
 def test_a_sum_weighs_objectives_and_metrics() -> None:
@@ -129,12 +140,12 @@ def test_time_to_98_is_when_the_poorest_twentieth_is_covered() -> None:
         replicas = [
             equal_dents(10.0, rng.poisson(per_second * 10.0 * area / size), size) for _ in range(8)
         ]
-        [got] = jackknife(replicas, [METRICS["time_to_98_s"]], chamber, design)
+        got = estimate_metrics(replicas, chamber, design)["time_to_98_s"]
         assert got.value == pytest.approx(truth, rel=0.1)
         held.append(got.low <= truth <= got.high)
     assert sum(held) >= 8
     unhit = [equal_dents(10.0, np.zeros(400, dtype=int), size) for _ in range(3)]
-    [never] = jackknife(unhit, [METRICS["time_to_98_s"]], chamber, design)
+    never = estimate_metrics(unhit, chamber, design)["time_to_98_s"]
     assert never.value == NEVER
 
 
@@ -157,6 +168,6 @@ def test_intensity_uniformity_knows_places_from_scatter() -> None:
         return made
 
     for local, truth in ((np.repeat([1.0, 3.0], 100), 0.5), (np.full(200, 2.0), 1.0)):
-        [got] = jackknife(replicas(local), [METRICS["intensity_uniformity"]], chamber, design)
+        got = estimate_metrics(replicas(local), chamber, design)["intensity_uniformity"]
         assert abs(got.value - truth) < max(got.half_width, 0.06)
         assert got.value == pytest.approx(truth, abs=0.08)

@@ -169,7 +169,7 @@ def test_scores_suit_objectives_of_any_size(tmp_path: Path) -> None:
         made = judged(np.full(3, -seconds), time_to_98_s=seconds)
         return made
 
-    result = run(tmp_path, simulator, objective={"name": "time_to_98"})
+    result = run(tmp_path, simulator, objective={"name": "minus_time_to_98_s"})
     failed = [trial.score for trial in result.trials if trial.objective is None]
     assert failed
     assert max(failed) < min(trial.score for trial in result.trials if trial.objective)
@@ -184,13 +184,13 @@ def test_a_weighted_sum_is_of_objectives_and_metrics(tmp_path: Path) -> None:
     for wrong, said in (
         ({"sum": {"uniform_covrage": 1.0}}, "did you mean 'uniform_coverage'"),
         ({"sum": {"shot_count": 0.0}}, "all weights are 0"),
-        ({"sum": {"shot_count": 1.0}, "name": "coverage_p05"}, "give one"),
-        ({"pareto": ["time_to_98", "time_to_98"]}, "twice"),
+        ({"sum": {"shot_count": 1.0}, "name": "p05_coverage"}, "give one"),
+        ({"pareto": ["minus_time_to_98_s", "minus_time_to_98_s"]}, "twice"),
     ):
         with pytest.raises(ValueError, match=said):
             Study(design=GEAR, vary=VARY, objective=wrong)
     with pytest.raises(ValueError, match="only auto, sobol and surrogate"):
-        Study(design=GEAR, vary=VARY, objective={"pareto": ["time_to_98", "coverage_p05"]},
+        Study(design=GEAR, vary=VARY, objective={"pareto": ["minus_time_to_98_s", "p05_coverage"]},
               optimizer={"algorithm": "LN_BOBYQA"})  # fmt: skip
 
 
@@ -213,7 +213,7 @@ def test_two_objectives_give_a_front(tmp_path: Path) -> None:
         one, two = (1.0 - float(((x - at) ** 2).sum()) for at in (low, high))
         return judged(one + np.linspace(-0.01, 0.01, 4), p05_coverage=one, intensity_uniformity=two)
 
-    question = {"pareto": ["coverage_p05", "intensity_uniformity"]}
+    question = {"pareto": ["p05_coverage", "intensity_uniformity"]}
     result = run(tmp_path / "out", simulator, {"evaluations": 24, "confirm": 4}, objective=question)
     assert all(np.isfinite(goal.value) for one in pareto_points(result) for goal in one.goals)
     front = [one for one in pareto_points(result) if one.stage == "confirm" and one.on_front]
@@ -229,7 +229,7 @@ def test_two_objectives_give_a_front(tmp_path: Path) -> None:
     assert np.abs(places[:, 1] - 0.5).max() < 0.1
     assert np.ptp(places[:, 0]) > 0.3
     header, *table = as_csv(result).splitlines()
-    assert header.startswith("stage,on_front,standing,coverage_p05,coverage_p05_pm,intensity_")
+    assert header.startswith("stage,on_front,standing,p05_coverage,p05_coverage_pm,intensity_")
     searched = [row.split(",") for row in table if row.startswith("search,")]
     expected = [trial.goals for trial in result.trials if trial.stage == "search"]
     assert [[float(x) for x in row[3:7]] for row in searched] == [
@@ -239,7 +239,7 @@ def test_two_objectives_give_a_front(tmp_path: Path) -> None:
     pareto_picture(tmp_path / "pareto.png", result)
     assert (tmp_path / "pareto.png").stat().st_size > 10000
     assert load_study(tmp_path / "out" / "study.toml").objective.pareto == (
-        "coverage_p05",
+        "p05_coverage",
         "intensity_uniformity",
     )
 

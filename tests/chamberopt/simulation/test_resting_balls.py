@@ -120,8 +120,8 @@ def test_one_note_on_all_replicas() -> None:
         [RestingBalls(0.1, "few"), RestingBalls(0.3, "many"), RestingBalls(0.2, "some")], 8
     )
     assert notes == (
-        "balls came to rest in 3 of 8 replicas and peen no more: by the end 7.5 % of the shot, on average of all; "
-        "where it is most, many",
+        "balls came to rest in 3 of 8 replicas and no longer peen: at the end 7.5 % of the shot, on "
+        "average over all replicas; in the worst one, many",
     )
 
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from chamberopt.simulation.time_curve import FARTHEST, coverage_against_time
+from chamberopt.simulation.time_curve import MAX_TREATMENT_TIMES, coverage_against_time
 from tests.helpers.synthetic import equal_dents, evaluation_of, patchwork, plate_design
 
 DESIGN = plate_design()
 
 
-@pytest.mark.parametrize(("dents", "end"), [(40.0, None), (4.0, FARTHEST)])
+@pytest.mark.parametrize(("dents", "end"), [(40.0, None), (4.0, MAX_TREATMENT_TIMES)])
 def test_the_curve_goes_through_the_figures_of_the_treatment_time(
     dents: float, end: float | None
 ) -> None:
@@ -37,5 +37,5 @@ def test_the_curve_goes_through_the_figures_of_the_treatment_time(
     assert times == sorted(times)
     full = evaluation.metrics["time_to_98_s"].value
     assert times[-1] == pytest.approx(
-        end * treatment if end else max(treatment, min(1.1 * full, FARTHEST * treatment))
+        end * treatment if end else max(treatment, min(1.1 * full, MAX_TREATMENT_TIMES * treatment))
     )

@@ -16,7 +16,7 @@ from chamberopt.coverage.part_impacts import (
 )
 from chamberopt.simulation.triangle_fields import (
     QUANTITIES,
-    _quantile,
+    _speed_quantile,
     compute_triangle_fields,
     coverage_bounds,
 )
@@ -67,7 +67,7 @@ def test_hits_come_back_from_their_file_by_triangle(tmp_path: Path) -> None:
 
 def test_a_damaged_or_missing_hits_file_is_said(tmp_path: Path) -> None:
     path = tmp_path / "hits.npz"
-    with pytest.raises(InputError, match=r"older result.*simulate again"):
+    with pytest.raises(InputError, match=r"older version.*simulate again"):
         load_hits(path)
     save_hits(path, sort_hits_by_triangle([hits_of(np.random.default_rng(1), np.array([3, 4]))], 2))
     whole = path.read_bytes()
@@ -80,7 +80,7 @@ def test_a_damaged_or_missing_hits_file_is_said(tmp_path: Path) -> None:
 def test_the_90th_percentile_is_the_speed_that_nine_of_ten_hits_do_not_exceed() -> None:
     rng = np.random.default_rng(2)
     hits = hits_of(rng, np.array([10, 0, 1, 37]))
-    found = _quantile(sort_hits_by_triangle([hits], 4), 0.9)
+    found = _speed_quantile(sort_hits_by_triangle([hits], 4), 0.9)
     for t in (0, 2, 3):
         speeds = np.sort(hits.speed[hits.triangle == t])
         assert found[t] == speeds[int(np.ceil(0.9 * len(speeds))) - 1]

@@ -66,7 +66,7 @@ def ball_result(
         "mean_normal_speed": np.where(impacts > 0, (1.0 + impacts) / 2.0, np.nan),
         "p90_normal_speed": np.where(impacts > 0, impacts, np.nan).astype(float),
     }
-    write_coverage(folder / "coverage.vtp", chamber, fields)
+    write_coverage(folder / "coverage.vtp", chamber, fields, "dents" if marked else "avrami")
     write_chamber(folder, chamber)
     save_hits(folder / "hits.npz", sort_hits_by_triangle([hits], count))
     mean = float(fields["impacts_per_mm2"][target].mean())

@@ -24,7 +24,7 @@ from chamberopt.common.parallel.executor import SerialExecutor, share
 from chamberopt.design.load import load_design
 from chamberopt.optimize.run_sweep import plan_sweep, run_sweep
 from chamberopt.optimize.study import Study
-from chamberopt.simulation.evaluate import evaluate
+from chamberopt.simulation.evaluate import ReplicaPlan, evaluate
 from tests.chamberopt.optimize.test_run_sweep import rows, small_study
 from tests.helpers import worker_jobs
 
@@ -163,7 +163,7 @@ def test_the_same_bits_as_on_this_machine(dask: Dask, tmp_path: Path) -> None:
     ):
         with executor:
             run_sweep(question, plan, tmp_path / name, executor)
-            evaluations.append(evaluate(question.design, chamber, executor, replicas=5))
+            evaluations.append(evaluate(question.design, chamber, executor, plan=ReplicaPlan(5)))
     assert rows(tmp_path / "cluster") == rows(tmp_path / "serial")
     one, other = evaluations
     assert one.metrics == other.metrics

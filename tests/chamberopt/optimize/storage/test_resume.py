@@ -19,7 +19,12 @@ from chamberopt.optimize.storage.study_folder import StudyFolder, open_study_fol
 from chamberopt.optimize.study import Objective, Study
 from chamberopt.output.results.load import load_result
 from chamberopt.simulation.effect_pilot import Advice
-from chamberopt.simulation.evaluation import Evaluation, load_evaluation, save_evaluation
+from chamberopt.simulation.evaluation import (
+    Evaluation,
+    MarkedCoverage,
+    load_evaluation,
+    save_evaluation,
+)
 from tests.helpers.results.resumable_study import GEAR, calls, history, logged, run, study
 from tests.helpers.synthetic import DESIGNS, plate_design, poisson_evaluation
 
@@ -61,7 +66,7 @@ def test_every_algorithm_goes_on_from_any_row(algorithm: str, tmp_path: Path) ->
 
 
 @pytest.mark.usefixtures("quick_disk")
-@pytest.mark.parametrize("objective", [{}, {"pareto": ["uniform_coverage", "coverage_p05"]}])
+@pytest.mark.parametrize("objective", [{}, {"pareto": ["uniform_coverage", "p05_coverage"]}])
 def test_what_is_learnt_from_few_replicas_is_learnt_again(objective: dict, tmp_path: Path) -> None:
     """Candidates given up after a few replicas, confirmations repeated with more, two objectives: all from the rows."""
     question = study(first_replicas=4, confirm_rounds=3).model_copy(
@@ -178,8 +183,7 @@ class TestEvaluationFile:
             **{
                 **vars(plain),
                 "notes": ("µ ± 1", "x"),
-                "marked": np.array([0.5, np.nan]),
-                "against_time": curve,
+                "marked": MarkedCoverage(np.array([0.5, np.nan]), np.array([0.1, np.nan]), curve),
             }
         )
 

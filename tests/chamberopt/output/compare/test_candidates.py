@@ -33,7 +33,10 @@ class Simulations:
 
     done: list[tuple[Design, dict[str, Any]]] = field(default_factory=list)
 
-    def evaluate(self, design: Design, chamber: Any, *_: Any, **how: Any) -> Any:
+    def evaluate(
+        self, design: Design, chamber: Any, executor: Any, progress: Any, plan: Any, cavity: Any
+    ) -> Any:
+        how = {**vars(plan), "replicas": plan.count, "cavity": cavity}
         self.done.append((design, how))
         count = how["replicas"] or design.process.accuracy.replicas
         evaluation = poisson_evaluation(
@@ -106,7 +109,7 @@ def test_a_design_against_a_confirmed_result(
     simulations: Simulations, made, tmp_path: Path
 ) -> None:
     evaluation = replace(
-        poisson_evaluation(PLATE, CHAMBER, 20, 6), stream="confirm", objective_name="coverage_p05"
+        poisson_evaluation(PLATE, CHAMBER, 20, 6), stream="confirm", objective_name="p05_coverage"
     )
     save_simulation(tmp_path / "best", PLATE, CHAMBER, evaluation)
     compared, _ = run([tmp_path / "best", made("mine.toml", shot__mass_g=6.0)], tmp_path / "out")
@@ -116,7 +119,7 @@ def test_a_design_against_a_confirmed_result(
         "confirm",
         6,
     )
-    assert "coverage_p05" in compared.differences
+    assert "p05_coverage" in compared.differences
     assert compared.differences["mean_coverage"][0].paired
 
 

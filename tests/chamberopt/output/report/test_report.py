@@ -128,10 +128,10 @@ def test_a_number_alone_has_four_digits_that_count(value: float, said: str) -> N
 
 
 def test_a_goal_that_is_a_metric_reads_as_the_metric() -> None:
-    assert goal_words("time_to_98") == Words(
+    assert goal_words("minus_time_to_98_s") == Words(
         "time until 95 % of the target's area is 98 % covered", "s", -1.0
     )
-    assert goal_words("coverage_p05").unit == "%"
+    assert goal_words("p05_coverage").unit == "%"
     assert goal_words("uniform_coverage").meaning == "mean minus standard deviation of coverage"
     assert goal_words("of a later version").label == "of a later version"
 
@@ -228,9 +228,9 @@ def test_too_little_to_tell_is_said() -> None:
 
 
 def test_a_time_that_shall_be_short_is_shown_as_a_time() -> None:
-    told = influence(a_model([-400.0, -900.0, -2000.0], [10.0] * 3), goal_words("time_to_98"))[
-        "parameters"
-    ][0]
+    told = influence(
+        a_model([-400.0, -900.0, -2000.0], [10.0] * 3), goal_words("minus_time_to_98_s")
+    )["parameters"][0]
     assert told["mean"] == [400.0, 900.0, 2000.0]
     assert told["loss"] == pytest.approx(1600.0)
     rows = [
@@ -251,7 +251,7 @@ def test_a_time_that_shall_be_short_is_shown_as_a_time() -> None:
 def test_a_front_of_two_objectives_is_listed(study: Path, tmp_path: Path) -> None:
     goals = {
         "uniform_coverage": {"value": 0.5, "half_width": 0.01},
-        "time_to_98": {"value": -71.3, "half_width": 2.0},
+        "minus_time_to_98_s": {"value": -71.3, "half_width": 2.0},
     }
     front = [{"parameters": {"shot.mass_g": 7.5}, "standing": "feasible", "objectives": goals}]
     folder = changed(study, tmp_path / "front", lambda data: data["study"].update(front=front))

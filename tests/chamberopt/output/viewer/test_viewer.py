@@ -41,7 +41,10 @@ def case(tmp_path_factory: pytest.TempPathFactory) -> tuple:
     chamber = build_chamber(DESIGN)
     evaluation = poisson_evaluation(DESIGN, chamber)
     write_coverage(
-        folder / "coverage.vtp", chamber, compute_triangle_fields(DESIGN, chamber, evaluation)
+        folder / "coverage.vtp",
+        chamber,
+        compute_triangle_fields(DESIGN, chamber, evaluation),
+        "avrami",
     )
     write_chamber(folder, chamber)
     return folder, chamber, evaluation

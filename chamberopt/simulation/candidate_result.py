@@ -1,0 +1,43 @@
+"""All that is computed of a candidate before its result is written, from its evaluation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from chamberopt.simulation.time_curve import coverage_against_time
+from chamberopt.simulation.triangle_fields import compute_triangle_fields
+
+if TYPE_CHECKING:
+    from chamberopt.chamber.build import Chamber
+    from chamberopt.design.load import Design
+    from chamberopt.simulation.evaluation import Evaluation
+
+
+@dataclass(frozen=True)
+class CandidateResult:
+    """A simulated candidate with the fields and curves of its result folder.
+
+    Args:
+        triangle_fields: cell data of coverage.vtp, by name, (m,) each.
+        time_curve: coverage against peening time, a row a time.
+    """
+
+    design: Design
+    chamber: Chamber
+    evaluation: Evaluation
+    triangle_fields: dict[str, np.ndarray]
+    time_curve: list[dict[str, float]]
+
+
+def complete_result(design: Design, chamber: Chamber, evaluation: Evaluation) -> CandidateResult:
+    """Compute what only a final result needs; a search does without it."""
+    return CandidateResult(
+        design=design,
+        chamber=chamber,
+        evaluation=evaluation,
+        triangle_fields=compute_triangle_fields(design, chamber, evaluation),
+        time_curve=coverage_against_time(design, chamber, evaluation),
+    )
