@@ -132,7 +132,7 @@ def _in_elements(mesh: PartMesh, target: np.ndarray, size: float) -> tuple[PartM
     triangles = triangles.astype(np.int32)
     places = _places(mesh, vertices[triangles], source)
     groups = {name: mask[places] for name, mask in mesh.groups.items()}
-    numbering = mesh.numbering.of(places)
+    numbering = mesh.numbering.select(places)
     notes = (*mesh.notes, note)
     meshed = replace(
         mesh,

@@ -1,1 +1,1 @@
-"""Triangles, solids and mesh files; nothing here knows of shot or of designs."""
+"""Triangles, solids and mesh files; nothing in this package knows about shot or designs."""

@@ -1,10 +1,11 @@
-"""Solids and what can be done with them. The only file that imports manifold3d.
+"""Solids and the operations on them: unite, subtract, sweep, project.
 
-Every triangle of a result remembers which solid it comes from and which triangle of that solid it lies on: an
-unlabelled Mesh64 would lose both (manifold3d reports original_id() == -1), so ids are reserved and passed.
+This is the only file that imports manifold3d. Each triangle of a result remembers which solid it
+comes from and on which triangle of that solid it lies. manifold3d keeps this only for meshes with
+reserved ids; an unlabelled Mesh64 would lose it (its original_id() is -1).
 
-Inside, lengths are millimetres on a grid of 2^-20 mm (1 nm): faces that coincide in the design then coincide
-exactly, instead of leaving needles 1e-10 mm high between them.
+Inside, lengths are millimetres on a grid of 2^-20 mm (1 nm). Faces that coincide in the design then
+coincide exactly, instead of leaving needles 1e-10 mm high between them.
 """
 
 from __future__ import annotations
@@ -15,25 +16,26 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.geometry.triangles import border_edges, find_shells, winding_number
+from chamberopt.geometry.triangles import border_edges, find_shells, shell_winding
 
 if TYPE_CHECKING:
     from manifold3d import CrossSection, Manifold
 
-GRID_MM = (
-    2.0**-20
-)  # 1 nm: a thousandth of the finest surface roughness, yet 1e7 steps of a double at 100 mm
-SAME_VOLUME = (
-    1e-9  # relative; a boolean that went wrong is off by whole triangles, rounding by 1e-13
-)
+# 1 nm: a thousandth of the finest surface roughness, yet 1e7 steps of a double at 100 mm.
+GRID_MM = 2.0**-20
+# Relative. A boolean that went wrong is off by whole triangles, rounding by 1e-13.
+SAME_VOLUME = 1e-9
 
 
 @dataclass(frozen=True)
 class SolidSurface:
     """The closed surface of a solid.
 
-    vertices (n, 3) float64 m · triangles (k, 3) int32, normals outward · solid (k,) int64 the label of the
-    solid each triangle comes from · source (k,) int32 its triangle's index there.
+    Args:
+        vertices: (n, 3) float64 [m].
+        triangles: (k, 3) int32, rows of the vertices; normals point outward.
+        solid: label of the solid that each triangle comes from, (k,) int64.
+        source: index there of the triangle on which it lies, (k,) int32.
     """
 
     vertices: np.ndarray
@@ -42,7 +44,7 @@ class SolidSurface:
     source: np.ndarray
 
     def select(self, keep: np.ndarray) -> SolidSurface:
-        """The triangles where keep (k,) is true, with just the vertices they use."""
+        """The triangles marked by `keep` (k,), with only the vertices that they use."""
         used, renumbered = np.unique(self.triangles[keep], return_inverse=True)
         triangles = renumbered.reshape(-1, 3).astype(np.int32)
         return SolidSurface(self.vertices[used], triangles, self.solid[keep], self.source[keep])
@@ -50,7 +52,12 @@ class SolidSurface:
 
 @dataclass(frozen=True)
 class Solid:
-    """A closed body. label: the id its own triangles carry; -1 for the result of an operation."""
+    """A closed body.
+
+    Args:
+        label: id that its own triangles carry; -1 for the result of an operation.
+        name: for messages.
+    """
 
     body: Manifold
     label: int
@@ -62,7 +69,7 @@ class Solid:
         return float(self.body.volume()) * 1e-9
 
     def surface(self) -> SolidSurface:
-        """The solid's surface, each triangle with its origin."""
+        """The surface, each triangle with its origin."""
         mesh = self.body.to_mesh64()
         ends = np.asarray(mesh.run_index, dtype=np.int64)
         runs: np.ndarray = (ends[1:] - ends[:-1]) // 3
@@ -73,17 +80,23 @@ class Solid:
 
 
 def snap_to_grid(vertices: np.ndarray) -> np.ndarray:
-    """Positions [m], shape (n, 3), moved to the grid that solids live on (by at most 0.5 nm per axis)."""
+    """Move positions (n, 3) [m] to the grid of the solids, by at most 0.5 nm per axis."""
     return _grid_mm(vertices) * 1e-3
 
 
 def make_solid(
     vertices: np.ndarray, triangles: np.ndarray, name: str, only: np.ndarray | None = None
 ) -> Solid:
-    """A solid from a closed surface: vertices (n, 3) m, triangles (m, 3), outward.
+    """Make a solid of a closed surface.
 
-    only: indices of the triangles to use (one body of several); sources still count in the whole list.
-    Raises InputError when the surface does not enclose a body.
+    Args:
+        vertices: (n, 3) [m].
+        triangles: (m, 3), normals outward.
+        only: indices of the triangles to use, such as one body of several. The sources of the
+            solid's triangles still count in the whole list.
+
+    Raises:
+        InputError: the surface does not enclose a body.
     """
     from manifold3d import Manifold, Mesh64
 
@@ -97,31 +110,39 @@ def make_solid(
         run_original_id=np.array([label], dtype=np.uint32),
         face_id=chosen.astype(np.uint64),
     )
-    made = Solid(_checked(Manifold(mesh), f"{name}: cannot be made a solid"), label, name)
-    if made.volume <= 0.0:  # subtracting it would ADD material, without an error
+    solid = Solid(_checked(Manifold(mesh), f"{name}: cannot be made a solid"), label, name)
+    if solid.volume <= 0.0:  # subtracting it would ADD material, without an error
         raise InputError(
             f"{name}: the surface is inside out or encloses nothing; make its normals point outward"
         )
-    return made
+    return solid
 
 
 def split_bodies(vertices: np.ndarray, triangles: np.ndarray, name: str) -> tuple[list[Solid], int]:
-    """The solids of a surface of several bodies, (n, 3) m and (m, 3), and how many closed voids in them were filled.
+    """Make solids of a surface (n, 3) [m], (m, 3) of one or several bodies.
 
-    Sources count in the whole list of triangles. Unite them before use: bodies that overlap in one mesh would be
-    subtracted wrongly, without an error.
+    Unite them before use: a mesh of bodies that overlap would be subtracted wrongly, without an
+    error. Sources count in the whole list of triangles.
+
+    Returns:
+        The solids, and the number of closed voids in them that were filled.
     """
     shells, volumes = find_shells(vertices, triangles)
     if len(volumes) == 1:
         return [make_solid(vertices, triangles, name)], 0
-    each = [np.flatnonzero(shells == k) for k in np.flatnonzero(volumes > 0.0)]
-    return [make_solid(vertices, triangles, name, only=body) for body in each], int(
-        (volumes < 0.0).sum()
-    )
+    solids = [
+        make_solid(vertices, triangles, name, only=np.flatnonzero(shells == k))
+        for k in np.flatnonzero(volumes > 0.0)
+    ]
+    return solids, int((volumes < 0.0).sum())
 
 
 def sweep(face: SolidSurface, way: np.ndarray, name: str) -> Solid:
-    """The room over a flat face, whose normals point away from it, up to as far as ``way`` (3,) [m]."""
+    """The prism over a flat face, whose normals point away from it, up to the face moved by `way`.
+
+    Args:
+        way: displacement (3,) [m].
+    """
     count, (a, b) = len(face.vertices), border_edges(face.triangles).T
     walls = np.concatenate([np.c_[b, a, a + count], np.c_[b, a + count, b + count]])
     triangles = np.concatenate([face.triangles, face.triangles[:, ::-1] + count, walls])
@@ -129,7 +150,7 @@ def sweep(face: SolidSurface, way: np.ndarray, name: str) -> Solid:
 
 
 def unite(solids: list[Solid], name: str) -> Solid:
-    """All of them as one body; where they overlap, once."""
+    """Unite solids, which may overlap, into one body."""
     from manifold3d import Manifold, OpType
 
     if len(solids) == 1:
@@ -139,9 +160,11 @@ def unite(solids: list[Solid], name: str) -> Solid:
 
 
 def subtract(whole: Solid, taken: Solid) -> Solid:
-    """whole without taken; the volumes are checked against those of their intersection.
+    """Cut `taken` out of `whole`.
 
-    Raises InputError when they disagree: the surfaces cross themselves.
+    Raises:
+        InputError: the volumes of the result, of `whole` and of their intersection do not add up,
+            because a surface crosses itself.
     """
     rest = _checked(whole.body - taken.body, f"{taken.name}: cannot be cut out of {whole.name}")
     common = _checked(
@@ -159,22 +182,29 @@ def subtract(whole: Solid, taken: Solid) -> Solid:
 
 @dataclass(frozen=True)
 class Outline:
-    """An area in plan, perhaps in several pieces and with holes."""
+    """An area in plan, which may have several pieces and holes."""
 
     section: CrossSection
 
     def offset(self, by: float, facets: int) -> Outline:
-        """The area within ``by`` [m] of this one, round corners in ``facets`` flat sides to a turn; below 0: shrunk."""
+        """The area within a distance `by` [m] of this one; smaller than it if `by` is negative.
+
+        Args:
+            facets: straight sides of a full circle, of which the round corners are parts.
+        """
         from manifold3d import JoinType
 
         return Outline(self.section.offset(1e3 * by, JoinType.Round, circular_segments=facets))
 
     def hull(self, tolerance: float) -> np.ndarray:
-        """Corners (n, 2) m of the convex hull, counter-clockwise; those within the tolerance [m] of a line left out."""
+        """Corners (n, 2) [m] of the convex hull, counter-clockwise.
+
+        Corners within the tolerance [m] of a straight line are left out.
+        """
         return _corners(self.section.hull().simplify(1e3 * tolerance))[0]
 
     def without_holes(self, tolerance: float) -> list[np.ndarray]:
-        """Corners of the pieces, as those of the hull, their holes left out."""
+        """Corners of each piece, as those of the hull; holes are left out."""
         from manifold3d import CrossSection
 
         outer = [piece for piece in self.section.to_polygons() if _signed_area(piece) > 0.0]
@@ -182,53 +212,56 @@ class Outline:
 
 
 def plan_outline(vertices: np.ndarray, triangles: np.ndarray, below: float) -> Outline:
-    """What a closed surface, vertices (n, 3) m and triangles (m, 3) outward, covers in plan, below a height [m]."""
+    """The area in plan of what a closed surface has below a height [m].
+
+    Args:
+        vertices: (n, 3) [m].
+        triangles: (m, 3), normals outward.
+    """
     from manifold3d import CrossSection, OpType
 
-    shells, volumes = find_shells(vertices, triangles)
-    bodies = [
-        make_solid(vertices, triangles, "the part", only=np.flatnonzero(shells == k))
-        for k in np.flatnonzero(volumes > 0.0)
-    ]
     sections = [
         CrossSection(one.body.trim_by_plane((0.0, 0.0, -1.0), -1e3 * below).project().to_polygons())
-        for one in bodies
+        for one in split_bodies(vertices, triangles, "the part")[0]
     ]
     return Outline(CrossSection.batch_boolean(sections, OpType.Add))
 
 
 def extrude(outline: np.ndarray, height: float) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (k, 3) m and triangles (m, 3) of the prism from z = 0 up over an outline (n, 2) m, convex or not."""
+    """Make the prism from z = 0 to a height [m] over an outline (n, 2) [m], convex or not.
+
+    Returns:
+        Vertices (k, 3) [m] and triangles (m, 3).
+    """
     from manifold3d import CrossSection
 
     mesh = CrossSection([1e3 * outline]).extrude(1e3 * height).to_mesh64()
-    return 1e-3 * np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts).astype(
-        np.int32
-    )
+    vertices = 1e-3 * np.asarray(mesh.vert_properties)[:, :3]
+    return vertices, np.asarray(mesh.tri_verts).astype(np.int32)
 
 
 def overlap_volume(one: Solid, two: Solid) -> float:
-    """The volume [m³] that both have in common."""
+    """Volume [m³] that two solids have in common."""
     common = one.body ^ two.body
-    return (
-        float(_checked(common, f"{one.name} and {two.name} cannot be intersected").volume()) * 1e-9
-    )
+    text = f"{one.name} and {two.name} cannot be intersected"
+    return float(_checked(common, text).volume()) * 1e-9
 
 
 def find_cavities(surface: SolidSurface) -> list[np.ndarray]:
-    """The separate rooms of a surface, largest first: masks (k,) of an outer shell and the islands in it."""
+    """The separate cavities of a surface, the largest first.
+
+    Returns:
+        For each a mask (k,) of its outer shell and of the islands that stand in it.
+    """
     shells, volumes = find_shells(surface.vertices, surface.triangles)
     outer = sorted(np.flatnonzero(volumes > 0.0), key=lambda shell: -volumes[shell])
-    rooms = {int(shell): shells == shell for shell in outer}
+    cavities = {int(shell): shells == shell for shell in outer}
     for island in np.flatnonzero(volumes <= 0.0):
-        points = surface.vertices[surface.triangles[shells == island]].mean(axis=1)
-        points = points[:: max(1, len(points) // 8)]
-        for shell in reversed(outer):  # the smallest room around it is the one it stands in
-            outline = surface.vertices[surface.triangles[shells == shell]]
-            if np.median(winding_number(points, outline)) > 0.5:
-                rooms[int(shell)] |= shells == island
+        for shell in reversed(outer):  # an island stands in the smallest shell around it
+            if shell_winding(surface.vertices, surface.triangles, shells, shell, island) > 0.5:
+                cavities[int(shell)] |= shells == island
                 break
-    return list(rooms.values())
+    return list(cavities.values())
 
 
 def _corners(section: CrossSection) -> list[np.ndarray]:
@@ -245,11 +278,12 @@ def _grid_mm(vertices: np.ndarray) -> np.ndarray:
 
 
 def _checked(body: Manifold, what: str) -> Manifold:
-    """The body, unless manifold3d says that it failed: every later result would be empty without a word."""
+    """The body, if manifold3d reports no error: all later results would silently be empty."""
     from manifold3d import Error
 
     if body.status() != Error.NoError:
         raise InputError(
-            f"{what}: manifold3d says {body.status().name}; the mesh must be closed, each edge shared by two triangles"
+            f"{what}: manifold3d says {body.status().name}; "
+            "the mesh must be closed, each edge shared by two triangles"
         )
     return body

@@ -1,11 +1,11 @@
-"""Which formats are read, and how a file is known: by its content, whatever its name ends with."""
+"""The mesh formats that are read; a file is recognised by its content, then by its name."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from chamberopt.common.errors import InputError
 from chamberopt.geometry.mesh_io.readers.abaqus import read_abaqus
@@ -15,14 +15,19 @@ from chamberopt.geometry.mesh_io.readers.obj import read_obj
 from chamberopt.geometry.mesh_io.readers.ply import read_ply
 from chamberopt.geometry.mesh_io.readers.raw_mesh import RawMesh
 from chamberopt.geometry.mesh_io.readers.step import read_step
-from chamberopt.geometry.mesh_io.readers.stl import is_text_stl, read_stl
+from chamberopt.geometry.mesh_io.readers.stl import is_binary_stl, read_stl
 from chamberopt.geometry.mesh_io.readers.threemf import read_3mf
 from chamberopt.geometry.mesh_io.readers.vtk import read_vtk
 
 
-@dataclass(frozen=True)
-class MeshFormat:
-    """A way to write a mesh: its usual endings, what its content begins with or holds, and its reader."""
+class MeshFormat(NamedTuple):
+    """A mesh format.
+
+    Args:
+        suffixes: usual endings of file names.
+        content: what the file begins with, or a line that it holds.
+        read: its reader.
+    """
 
     name: str
     suffixes: tuple[str, ...]
@@ -30,75 +35,63 @@ class MeshFormat:
     read: Callable[[Path, bytes], RawMesh]
 
 
-def _anywhere(pattern: str) -> re.Pattern[bytes]:
-    """A line that begins so, anywhere in the file."""
-    return re.compile(rb"^[ \t]*(?:" + pattern.encode() + rb")", re.M | re.I)
-
-
-def _first(pattern: str) -> re.Pattern[bytes]:
-    """The file begins so."""
+def _begins_with(pattern: str) -> re.Pattern[bytes]:
     return re.compile(rb"\A\s*(?:" + pattern.encode() + rb")")
 
 
+def _has_line(pattern: str) -> re.Pattern[bytes]:
+    """Matches a line anywhere in the file that begins with the pattern."""
+    return re.compile(rb"^[ \t]*(?:" + pattern.encode() + rb")", re.M | re.I)
+
+
+VTK = r"# vtk DataFile|(?:<\?xml[^>]*>\s*)?<VTKFile"
+NASTRAN = r"GRID\*?(?:[ \t]+|,)[ \t]*\d|BEGIN[ \t]+BULK"
 MESH_FORMATS = (
-    MeshFormat("3MF", (".3mf",), _first(r"PK\x03\x04"), read_3mf),
-    MeshFormat("STEP", (".step", ".stp"), _first("ISO-10303-21"), read_step),
-    MeshFormat("PLY", (".ply",), _first(r"ply\s"), read_ply),
-    MeshFormat("Gmsh", (".msh",), _first(r"\$MeshFormat"), read_gmsh),
-    MeshFormat(
-        "VTK",
-        (".vtk", ".vtp", ".vtu"),
-        _first(r"# vtk DataFile|(?:<\?xml[^>]*>\s*)?<VTKFile"),
-        read_vtk,
-    ),
-    MeshFormat("STL", (".stl",), _first(r"solid[^\0]*facet"), read_stl),
-    MeshFormat(
-        "Nastran",
-        (".dat", ".data", ".bdf", ".nas"),
-        _anywhere(r"GRID\*?(?:[ \t]+|,)[ \t]*\d|BEGIN[ \t]+BULK"),
-        read_nastran,
-    ),
-    MeshFormat("Abaqus", (".inp",), _anywhere(r"\*(?:HEADING|NODE|PART)\b"), read_abaqus),
-    MeshFormat("OBJ", (".obj",), _anywhere(r"v[ \t]+[-+.\d]+[ \t]+[-+.\d]"), read_obj),
+    MeshFormat("3MF", (".3mf",), _begins_with(r"PK\x03\x04"), read_3mf),
+    MeshFormat("STEP", (".step", ".stp"), _begins_with("ISO-10303-21"), read_step),
+    MeshFormat("PLY", (".ply",), _begins_with(r"ply\s"), read_ply),
+    MeshFormat("Gmsh", (".msh",), _begins_with(r"\$MeshFormat"), read_gmsh),
+    MeshFormat("VTK", (".vtk", ".vtp", ".vtu"), _begins_with(VTK), read_vtk),
+    MeshFormat("STL", (".stl",), _begins_with(r"solid[^\0]*facet"), read_stl),
+    MeshFormat("Nastran", (".dat", ".data", ".bdf", ".nas"), _has_line(NASTRAN), read_nastran),
+    MeshFormat("Abaqus", (".inp",), _has_line(r"\*(?:HEADING|NODE|PART)\b"), read_abaqus),
+    MeshFormat("OBJ", (".obj",), _has_line(r"v[ \t]+[-+.\d]+[ \t]+[-+.\d]"), read_obj),
 )
-HEAD = 1 << 16  # bytes in which a text file has shown what it is, comments at its head included
+HEAD = 1 << 16  # bytes in which a text file shows its format, even after comments
+BINARY_HEAD = 1 << 10
 
 
-def read_raw(path: Path, content: bytes) -> RawMesh:
-    """What the file holds. Raises InputError when it is of no known format, damaged or truncated."""
-    found = _format_of(path, content)
+def read_raw_mesh(path: Path, content: bytes) -> RawMesh:
+    """Read the triangles of a file.
+
+    Raises:
+        InputError: its format is not known, or it is damaged or truncated.
+    """
+    found = _find_format(path, content)
     try:
-        mesh = found.read(path, content)
+        return found.read(path, content)
     except (InputError, MemoryError):
         raise
     except Exception as error:  # each library fails in its own way on a damaged file
-        reason = (
-            str(error).strip().splitlines()[0][:120] if str(error).strip() else type(error).__name__
-        )
+        text = str(error).strip() or type(error).__name__
         raise InputError(
-            f"{path}: cannot be read as {found.name}, it is damaged or truncated ({reason}); export it again"
+            f"{path}: cannot be read as {found.name}, it is damaged or truncated "
+            f"({text.splitlines()[0][:120]}); export it again"
         ) from None
-    return mesh
 
 
-def _format_of(path: Path, content: bytes) -> MeshFormat:
-    by_suffix = next((one for one in MESH_FORMATS if path.suffix.lower() in one.suffixes), None)
-    if _is_binary_stl(content):
+def _find_format(path: Path, content: bytes) -> MeshFormat:
+    if is_binary_stl(content):
         return next(one for one in MESH_FORMATS if one.name == "STL")
-    head = content[:HEAD]
-    binary = b"\0" in head[:1024]
+    is_binary = b"\0" in content[:BINARY_HEAD]
+    head = content[: BINARY_HEAD if is_binary else HEAD]
     for one in MESH_FORMATS:
-        if one.content.search(head if not binary else head[:1024]):
+        if one.content.search(head):
             return one
-    if by_suffix is None:
-        told = ", ".join(suffix for one in MESH_FORMATS for suffix in one.suffixes)
-        raise InputError(
-            f"{path}: not a mesh file that is known, by its content or name; use {told}"
-        )
-    return by_suffix
-
-
-def _is_binary_stl(content: bytes) -> bool:
-    """The one format without a mark of its own: its length follows from its number of triangles."""
-    declared = int.from_bytes(content[80:84], "little")
-    return len(content) >= 84 and len(content) == 84 + 50 * declared and not is_text_stl(content)
+    for one in MESH_FORMATS:
+        if path.suffix.lower() in one.suffixes:
+            return one
+    suffixes = ", ".join(suffix for one in MESH_FORMATS for suffix in one.suffixes)
+    raise InputError(
+        f"{path}: its mesh format is not known, by its content or name; use {suffixes}"
+    )

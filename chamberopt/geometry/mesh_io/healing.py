@@ -1,122 +1,160 @@
-"""A soup of triangles -> one closed surface that faces outward; every change is told, the rest refused."""
+"""Make one closed surface that faces outward of loose triangles.
+
+Every change is noted for the user; what cannot be put right without guessing is refused.
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.geometry.mesh_io.holes import filled, hole_count
+from chamberopt.geometry.mesh_io.holes import close_holes, count_holes
 from chamberopt.geometry.mesh_io.surface_error import OpenSurfaceError, SurfaceError, format_point
-from chamberopt.geometry.triangles import edge_keys, find_shells, unique_rows, winding_number
+from chamberopt.geometry.triangles import (
+    connected_pieces,
+    edge_keys,
+    find_shells,
+    shell_winding,
+    side_pairs,
+    sides_of,
+    unique_rows,
+)
 
 WELD = 1e-6  # of the bounding box's diagonal: what a text format with 6 digits rounds away
 
 
-def sewn(path: Path, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[str]]:
-    """Corners (m, 3, 3) [m] as vertices (n, 3), triangles (k, 3) with two triangles at each edge, and notes.
+class SewnSurface(NamedTuple):
+    """Triangles with common vertices.
 
-    Also of which given triangle each one is: (k,), -1 for one that closes a hole. Raises SurfaceError for what
-    stays open or is not manifold.
+    Args:
+        points: (n, 3) [m].
+        triangles: (k, 3), rows of the points.
+        source: the given triangle that each one is, (k,); -1 if it closes a hole.
+        notes: what was changed.
+    """
+
+    points: np.ndarray
+    triangles: np.ndarray
+    source: np.ndarray
+    notes: list[str]
+
+
+def sew(path: Path, corners: np.ndarray) -> SewnSurface:
+    """Join triangles with corners (m, 3, 3) [m] into a surface with two triangles at each edge.
+
+    Raises:
+        SurfaceError: the surface stays open or is not manifold.
     """
     first, numbers = unique_rows(corners.reshape(-1, 3))
-    points = corners.reshape(-1, 3)[first]
-    source = np.arange(len(corners))
-    points, triangles, source, notes = _without_repeats(points, numbers.reshape(-1, 3), source)
-    reach = WELD * float(np.linalg.norm(np.ptp(points, axis=0)))
-    if len(_edges(triangles, count=1)):  # perhaps only the file's rounding keeps the edges apart
-        closer, renumbered = _welded(points, reach)
-        points2, triangles2, source2, notes2 = _without_repeats(
-            closer, renumbered[triangles], source
+    surface = _drop_useless(
+        corners.reshape(-1, 3)[first], numbers.reshape(-1, 3), np.arange(len(corners))
+    )
+    tolerance = WELD * float(np.linalg.norm(np.ptp(surface.points, axis=0)))
+    open_edges = _edges(surface.triangles, count=1)
+    if len(open_edges):  # perhaps only the file's rounding keeps the edges apart
+        points, renumbered = _weld(surface.points, tolerance)
+        welded = _drop_useless(points, renumbered[surface.triangles], surface.source)
+        if len(_edges(welded.triangles, count=1)) < len(open_edges):
+            merged = len(surface.points) - len(welded.points)
+            note = f"merged {merged} vertices less than {1e3 * tolerance:.2g} mm apart"
+            surface = welded._replace(notes=[*surface.notes, note, *welded.notes])
+            open_edges = _edges(surface.triangles, count=1)
+    if len(open_edges):
+        more, notes = close_holes(surface.points, surface.triangles, open_edges, tolerance)
+        surface = surface._replace(
+            triangles=np.concatenate([surface.triangles, more]),
+            source=np.r_[surface.source, np.full(len(more), -1)],
+            notes=[*surface.notes, *notes],
         )
-        if len(_edges(triangles2, count=1)) < len(_edges(triangles, count=1)):
-            merged = len(points) - len(points2)
-            notes += [f"merged {merged} vertices less than {1e3 * reach:.2g} mm apart", *notes2]
-            points, triangles, source = points2, triangles2, source2
-    if len(_edges(triangles, count=1)):
-        more, told = filled(points, triangles, _edges(triangles, count=1), reach)
-        triangles, source = np.concatenate([triangles, more]), np.r_[source, np.full(len(more), -1)]
-        notes += told
+    _require_closed(path, surface.points, surface.triangles)
+    return surface
+
+
+def _require_closed(path: Path, points: np.ndarray, triangles: np.ndarray) -> None:
+    """Raise SurfaceError unless each edge belongs to exactly two triangles."""
     open_edges = _edges(triangles, count=1)
     if len(open_edges):
-        holes = hole_count(open_edges)
-        a, b = points[open_edges[0]]
+        holes = count_holes(open_edges)
+        a, b = map(format_point, points[open_edges[0]])
         where = f"{len(open_edges)} open edges in {holes} hole{'s' * (holes > 1)}"
         raise OpenSurfaceError(
-            f"{path}: the surface is not closed: {where}, the first from {format_point(a)} to {format_point(b)}; "
+            f"{path}: the surface is not closed: {where}, the first from {a} to {b}; "
             "close it in the CAD program",
             points[triangles],
             points[open_edges],
         )
     crowded = _edges(triangles, count=3)
     if len(crowded):
-        a, b = points[crowded[0]]
+        a, b = map(format_point, points[crowded[0]])
         raise SurfaceError(
-            f"{path}: not manifold: {len(crowded)} edges belong to more than two triangles, the first from "
-            f"{format_point(a)} to {format_point(b)}; make the bodies overlap or leave a gap there",
+            f"{path}: not manifold: {len(crowded)} edges belong to more than two triangles, "
+            f"the first from {a} to {b}; make the bodies overlap or leave a gap there",
             points[triangles],
             points[crowded],
         )
-    return points, triangles, source, notes
 
 
-def _without_repeats(
-    points: np.ndarray, triangles: np.ndarray, source: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[str]]:
-    """Drops triangles with two corners in one place, and second copies of a triangle; keeps the order."""
+def _drop_useless(points: np.ndarray, triangles: np.ndarray, source: np.ndarray) -> SewnSurface:
+    """Drop triangles with two corners in one place, and second copies; the order stays."""
     notes = []
     a, b, c = triangles.T
     flat = (a == b) | (b == c) | (c == a)
     if flat.any():
-        notes.append(
-            f"dropped {flat.sum()} triangles without area, the first is triangle {source[flat][0] + 1}"
-        )
+        first = source[flat][0] + 1
+        notes.append(f"dropped {flat.sum()} triangles without area, the first is triangle {first}")
         triangles, source = triangles[~flat], source[~flat]
-    turned = np.take_along_axis(
-        triangles, (triangles.argmin(axis=1)[:, None] + np.arange(3)) % 3, axis=1
-    )
-    first = np.sort(unique_rows(turned)[0])
-    if len(first) < len(triangles):
-        notes.append(f"dropped {len(triangles) - len(first)} triangles that were there twice")
-        triangles, source = triangles[first], source[first]
+    lowest_first = (triangles.argmin(axis=1)[:, None] + np.arange(3)) % 3
+    rotated = np.take_along_axis(triangles, lowest_first, axis=1)
+    kept = np.sort(unique_rows(rotated)[0])
+    if len(kept) < len(triangles):
+        notes.append(f"dropped {len(triangles) - len(kept)} triangles that were there twice")
+        triangles, source = triangles[kept], source[kept]
     used, renumbered = np.unique(triangles, return_inverse=True)
-    return points[used], renumbered.reshape(-1, 3), source, notes
+    return SewnSurface(points[used], renumbered.reshape(-1, 3), source, notes)
 
 
-def _welded(points: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
-    """Points with those within reach [m] of each other made one, and the new number of each old point."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
+def _weld(points: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+    """Merge points within a tolerance [m].
+
+    Returns:
+        The remaining points, and the new number of each old point.
+    """
     from scipy.spatial import cKDTree
 
-    pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
-    graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(points), len(points)))
-    _, group = connected_components(graph, directed=False)
+    a, b = cKDTree(points).query_pairs(tolerance, output_type="ndarray").T
+    _, group = connected_pieces(a, b, len(points))
     _, first, renumbered = np.unique(group, return_index=True, return_inverse=True)
     return points[first], renumbered.reshape(-1)
 
 
 def _edges(triangles: np.ndarray, count: int) -> np.ndarray:
-    """Edges (k, 2) that belong to one triangle (count=1), or to three and more (count=3)."""
+    """Edges (k, 2) that belong to one triangle (count=1), or to at least three (count=3)."""
     keys, times = np.unique(edge_keys(triangles), return_counts=True)
     chosen = keys[times == 1] if count == 1 else keys[times >= count]
     return np.stack(np.divmod(chosen, int(triangles.max()) + 1), axis=1)
 
 
-def outward(
+def turn_outward(
     path: Path, vertices: np.ndarray, triangles: np.ndarray
 ) -> tuple[np.ndarray, list[str]]:
-    """Closed triangles (m, 3) turned so that neighbours agree and every body encloses a positive volume."""
+    """Turn closed triangles (m, 3) so that neighbours agree and each body has a positive volume.
+
+    Returns:
+        The triangles, and notes on what was turned.
+    """
     notes = []
-    against = _against_neighbours(path, triangles)
-    if against.any():
-        notes.append(f"turned {against.sum()} triangles that faced against their neighbours")
-        triangles = np.where(against[:, None], triangles[:, ::-1], triangles)
+    wrong = _against_neighbours(path, triangles)
+    if wrong.any():
+        notes.append(f"turned {wrong.sum()} triangles that faced against their neighbours")
+        triangles = np.where(wrong[:, None], triangles[:, ::-1], triangles)
     shells, volumes = find_shells(vertices, triangles)
     for k in np.flatnonzero(volumes < 0.0):
-        if _stands_in_another(vertices, triangles, shells, k):
-            continue  # the wall of a void
+        others = (other for other in range(len(volumes)) if other != k)
+        if any(abs(shell_winding(vertices, triangles, shells, one, k)) > 0.5 for one in others):
+            continue  # the wall of a void in another piece, whichever way that one faces
         triangles = np.where((shells == k)[:, None], triangles[:, ::-1], triangles)
         which = "it was" if len(volumes) == 1 else f"body {k + 1} of {len(volumes)} was"
         notes.append(f"{which} inside out: turned its normals outward")
@@ -126,45 +164,24 @@ def outward(
 
 
 def _against_neighbours(path: Path, triangles: np.ndarray) -> np.ndarray:
-    """Which triangles (m,) to turn so that neighbours agree, the fewest of each piece.
+    """Triangles (m,) to turn so that neighbours agree, the fewest of each piece of the surface.
 
-    Each triangle is there twice, as it is and turned; what agrees across an edge is linked. A piece of the
-    surface falls into two halves, one the other's mirror; a one-sided surface does not.
+    In a graph each triangle has two nodes, as it is and turned. Nodes that agree across an edge are
+    linked. A piece of the surface then falls into two halves, each the other's mirror image; only a
+    one-sided surface does not.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    m = len(triangles)
-    order = np.argsort(edge_keys(triangles), kind="stable").reshape(
-        -1, 2
-    )  # the two sides of each edge
-    sides = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    agree = sides[order[:, 0], 0] != sides[order[:, 1], 0]
+    m, pairs, sides = len(triangles), side_pairs(triangles), sides_of(triangles)
+    agree = sides[pairs[:, 0], 0] != sides[pairs[:, 1], 0]
     if agree.all():
         return np.zeros(m, dtype=bool)
-    a, b = (order // 3).T
-    b_plain, b_turned = np.where(agree, b, b + m), np.where(agree, b + m, b)
-    links = np.r_[a, a + m], np.r_[b_plain, b_turned]
-    graph = coo_array((np.ones(len(links[0]), dtype=np.int8), links), shape=(2 * m, 2 * m))
-    count, half = connected_components(graph, directed=False)
-    plain, turned = half[:m], half[m:]
-    if (plain == turned).any():
+    a, b = (pairs // 3).T
+    b_as_is, b_turned = np.where(agree, b, b + m), np.where(agree, b + m, b)
+    count, half = connected_pieces(np.r_[a, a + m], np.r_[b_as_is, b_turned], 2 * m)
+    as_is, turned = half[:m], half[m:]
+    if (as_is == turned).any():
         raise InputError(
             f"{path}: the surface has no inside (one-sided, like a Moebius band); redraw it"
         )
-    as_they_are = np.bincount(plain, minlength=count)
-    fewer = as_they_are[plain] < as_they_are[turned]
-    return fewer | ((as_they_are[plain] == as_they_are[turned]) & (plain > turned))
-
-
-def _stands_in_another(
-    vertices: np.ndarray, triangles: np.ndarray, shells: np.ndarray, k: np.integer
-) -> bool:
-    """Is closed piece k inside another closed piece (whichever way that one faces)?"""
-    points = vertices[triangles[shells == k]].mean(axis=1)
-    points = points[:: max(1, len(points) // 8)]
-    others = (other for other in range(int(shells.max()) + 1) if other != k)
-    return any(
-        abs(np.median(winding_number(points, vertices[triangles[shells == other]]))) > 0.5
-        for other in others
-    )
+    size = np.bincount(as_is, minlength=count)
+    fewer = size[as_is] < size[turned]
+    return fewer | ((size[as_is] == size[turned]) & (as_is > turned))

@@ -1,8 +1,14 @@
-"""Reads a part's mesh, puts right what needs no guessing, says what it did, refuses the rest by name and place.
+"""Read the mesh of a part: one closed surface in metres, its normals outward.
 
-The user's triangles stay the user's: same order, same corners, so that coverage can be read on the mesh that
-was given. A file goes through `formats` (which reader), `units`, `healing` (one closed surface, outward),
-`holes` and `crossings`.
+A file passes through these steps:
+    formats: recognise the format and read its triangles;
+    units: convert to metres;
+    healing, holes: make one closed surface of the triangles;
+    self_intersection: refuse a surface that crosses itself.
+
+What needs no guessing is put right, with a note for the user. Everything else is refused, with the
+reason and the place. The triangles keep their order and their corners, so that coverage can be
+given on the mesh of the user.
 """
 
 from __future__ import annotations
@@ -17,20 +23,25 @@ import numpy as np
 
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
-from chamberopt.geometry.mesh_io.formats import read_raw
-from chamberopt.geometry.mesh_io.healing import outward, sewn
+from chamberopt.geometry.mesh_io.formats import read_raw_mesh
+from chamberopt.geometry.mesh_io.healing import sew, turn_outward
 from chamberopt.geometry.mesh_io.readers.raw_mesh import ElementNumbers, number_by_position
 from chamberopt.geometry.mesh_io.self_intersection import refuse_self_intersection
-from chamberopt.geometry.mesh_io.units import METRES_PER, unit_of
+from chamberopt.geometry.mesh_io.units import METRES_PER, find_unit
 
 
 @dataclass(frozen=True)
 class PartMesh:
-    """A closed part in its file's own frame.
+    """A closed part in the coordinates of its file.
 
-    vertices (n, 3) float64 m · triangles (m, 3) int32, normals outward, in the file's order · numbering: which of its
-    elements each one is of · notes: what was changed · sha256 of the file as read · groups: name -> (m,) bool, what
-    the file calls some of its triangles · unit that the file's numbers were taken in.
+    Args:
+        vertices: (n, 3) float64 [m].
+        triangles: (m, 3) int32, in the file's order; normals point outward.
+        numbering: the file's element that each triangle belongs to.
+        notes: what was changed.
+        sha256: of the file as read.
+        groups: name in the file -> its triangles, (m,) bool.
+        unit: of the file's numbers.
     """
 
     vertices: np.ndarray
@@ -43,7 +54,7 @@ class PartMesh:
 
     @property
     def elements(self) -> np.ndarray:
-        """The number (m,) int64 of the element that each triangle is of; 0: of none in the file."""
+        """Number of each triangle's element in the file, (m,) int64; 0 if it has none there."""
         return self.numbering.elements
 
     @property
@@ -54,10 +65,11 @@ class PartMesh:
 
 @dataclass(frozen=True)
 class TriangleSoup:
-    """What a file holds, in metres and its own frame, before it is made one closed surface.
+    """The triangles of a file in metres, before a closed surface is made of them.
 
-    path · corners (m, 3, 3) · numbering of its elements · groups: name -> (m,) bool · notes · sha256 of the file ·
-    unit of its numbers.
+    Args:
+        corners: (m, 3, 3) [m], in the coordinates of the file.
+        The others: as in PartMesh.
     """
 
     path: Path
@@ -70,93 +82,101 @@ class TriangleSoup:
 
 
 def read_part(path: Path, unit: str = "guess") -> PartMesh:
-    """The part in a mesh file whose numbers are in `unit` (um, mm, cm, m, in; or guess): closed, outward, in metres.
+    """Read a part.
 
-    Raises InputError, with reason and place, for what is missing, empty, truncated, not finite, open, non-
-    manifold, crossing itself, or of a size that no part has.
+    Args:
+        unit: of the file's numbers: um, mm, cm, m, in or guess.
+
+    Raises:
+        InputError: the file is missing, empty, truncated or not finite; its surface is open, not
+            manifold or crosses itself; or it has a size that no part has.
     """
     return close_surface(read_triangles(path, unit))
 
 
+def read_part_cached(path: Path, unit: str = "guess") -> PartMesh:
+    """As read_part, but reads a file again only if it has changed: a study builds many chambers."""
+    try:
+        stamp = path.stat()
+    except OSError:
+        return read_part(path, unit)  # raises an error that explains why
+    return _read_part_cached(path, unit, stamp.st_mtime_ns, stamp.st_size)
+
+
+@lru_cache(maxsize=8)
+def _read_part_cached(path: Path, unit: str, _changed: int, _size: int) -> PartMesh:
+    return read_part(path, unit)
+
+
 def read_triangles(path: Path, unit: str = "guess") -> TriangleSoup:
-    """The triangles in a mesh file. Raises InputError as read_part does, but not for what they make together."""
-    content = _content(path)
-    raw = read_raw(path, content)
+    """Read the triangles of a mesh file without making a surface of them.
+
+    Raises:
+        InputError: as read_part, except for what is wrong with the surface.
+    """
+    content = _read_content(path)
+    raw = read_raw_mesh(path, content)
     corners = raw.corners
     if not len(corners):
         raise InputError(f"{path}: holds no triangles; export a surface mesh")
     bad = np.flatnonzero(~np.isfinite(corners).all(axis=(1, 2)))
     if len(bad):
         raise InputError(
-            f"{path}: {len(bad)} triangles have a corner that is not a number, the first is triangle "
-            f"{bad[0] + 1} of {len(corners)}; export the mesh again"
+            f"{path}: {len(bad)} triangles have a corner that is not a number, "
+            f"the first is triangle {bad[0] + 1} of {len(corners)}; export the mesh again"
         )
-    unit, told = unit_of(path, content, corners, unit, raw.unit)
-    corners = corners * METRES_PER[unit] + 0.0  # + 0.0: -0 and 0 are one place
-    digest = hashlib.sha256(content).hexdigest()
-    numbering = raw.numbering or number_by_position(len(corners))
-    return TriangleSoup(path, corners, numbering, raw.groups, (*raw.notes, *told), digest, unit)
-
-
-def close_surface(read: TriangleSoup, only: np.ndarray | None = None) -> PartMesh:
-    """One closed surface of all the triangles, or of those marked ``only`` (m,); its healing goes into the notes.
-
-    Raises SurfaceError, with the place, where it is open, non-manifold or crosses itself.
-    """
-    path, chosen = read.path, np.arange(len(read.corners)) if only is None else np.flatnonzero(only)
-    vertices, triangles, source, healed = sewn(path, read.corners[chosen])
-    triangles, turned = outward(path, vertices, triangles)
-    refuse_self_intersection(path, vertices, triangles)
-    groups = {
-        name: np.where(source >= 0, mask[chosen][source], False)
-        for name, mask in read.groups.items()
-    }
-    notes = tuple(f"{path.name}: {note}" for note in (*read.notes, *healed, *turned))
-    numbering = read.numbering.of(np.where(source >= 0, chosen[source], -1))
-    return PartMesh(
-        vertices, triangles.astype(np.int32), numbering, notes, read.sha256, groups, read.unit
+    unit, unit_notes = find_unit(path, content, corners, unit, raw.unit)
+    corners = corners * METRES_PER[unit] + 0.0  # + 0.0 turns -0 into 0, to be one place
+    return TriangleSoup(
+        path,
+        corners,
+        raw.numbering or number_by_position(len(corners)),
+        raw.groups,
+        (*raw.notes, *unit_notes),
+        hashlib.sha256(content).hexdigest(),
+        unit,
     )
 
 
-def read_part_cached(path: Path, unit: str = "guess") -> PartMesh:
-    """As read_part, each file once as long as it does not change: a study builds a hundred chambers from it."""
-    try:
-        stamp = path.stat()
-    except OSError:
-        return read_part(path, unit)  # says what is wrong
-    return _read_once(path, unit, stamp.st_mtime_ns, stamp.st_size)
+def close_surface(soup: TriangleSoup, only: np.ndarray | None = None) -> PartMesh:
+    """Make one closed surface of all triangles, or of those marked by `only` (m,).
 
-
-@lru_cache(maxsize=8)
-def _read_once(path: Path, unit: str, _changed: int, _size: int) -> PartMesh:
-    return read_part(path, unit)
-
-
-def _content(path: Path) -> bytes:
-    """The file's bytes, where there is a file that can be read and is not empty."""
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder; give a mesh file")
-    if not path.is_file():
-        raise InputError(
-            f"{path}: no such mesh file; check part.mesh, which counts from the design file's folder"
-        )
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise InputError(
-            f"{path}: cannot be read: {error.strerror}; check its permissions"
-        ) from None
-    if not content.strip():
-        raise InputError(f"{path}: the file is empty; export the mesh again")
-    return content
+    Raises:
+        SurfaceError: with the place where the surface is open, not manifold or crosses itself.
+    """
+    path = soup.path
+    chosen = np.arange(len(soup.corners)) if only is None else np.flatnonzero(only)
+    vertices, triangles, source, healed = sew(path, soup.corners[chosen])
+    triangles, turned = turn_outward(path, vertices, triangles)
+    refuse_self_intersection(path, vertices, triangles)
+    given = np.where(source >= 0, chosen[source], -1)  # -1: closes a hole
+    return PartMesh(
+        vertices,
+        triangles.astype(np.int32),
+        soup.numbering.select(given),
+        tuple(f"{path.name}: {note}" for note in (*soup.notes, *healed, *turned)),
+        soup.sha256,
+        {name: (given >= 0) & mask[given] for name, mask in soup.groups.items()},
+        soup.unit,
+    )
 
 
 def select_triangles(
     groups: Mapping[str, np.ndarray], names: Iterable[str], count: int, field: str
 ) -> np.ndarray:
-    """Which of ``count`` triangles have one of the names, (count,) bool; case counts only where the file needs it to.
+    """Mark the triangles of the named groups; "all" means every triangle.
 
-    "all" are all. Raises InputError, naming the design's field, for a name that the file does not have.
+    Case matters only if the file has names that differ in nothing else.
+
+    Args:
+        count: number of triangles.
+        field: the design's field that holds the names, for messages.
+
+    Returns:
+        Mask (count,).
+
+    Raises:
+        InputError: the file has no group of that name.
     """
     by_lower = {name.lower(): name for name in groups}
     chosen = np.zeros(count, dtype=bool)
@@ -165,12 +185,31 @@ def select_triangles(
         if name == "all" and known is None:
             chosen[:] = True
         elif known is None:
-            told = (
+            hint = (
                 toml_errors.did_you_mean(name, ["all", *groups])
                 if groups
                 else "its file names none: 'all'"
             )
-            raise InputError(f"{field}: {name!r} is no name in the part's file; {told}")
+            raise InputError(f"{field}: {name!r} is not a name in the part's file; {hint}")
         else:
             chosen |= groups[known]
     return chosen
+
+
+def _read_content(path: Path) -> bytes:
+    """The bytes of a file that exists, can be read and is not empty."""
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder; give a mesh file")
+    if not path.is_file():
+        raise InputError(
+            f"{path}: no such mesh file; "
+            "check part.mesh, which is relative to the design file's folder"
+        )
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        text = f"cannot be read: {error.strerror}; check its permissions"
+        raise InputError(f"{path}: {text}") from None
+    if not content.strip():
+        raise InputError(f"{path}: the file is empty; export the mesh again")
+    return content

@@ -1,7 +1,9 @@
-"""Does a surface cross itself? Cutting such a part out of a chamber goes wrong without an error, so it is refused.
+"""Refuse surfaces that cross themselves: cutting such a part out of a chamber fails silently.
 
-Candidates come from a tree of boxes over the triangles in Morton order, met with itself level by level; each pair
-is then judged by T. Möller, "A fast triangle-triangle intersection test", J. Graphics Tools 2 (1997) 25.
+Candidate pairs come from a tree of boxes over the triangles in Morton order, which is compared with
+itself level by level. Each pair is then tested exactly.
+
+Source: T. Möller, "A fast triangle-triangle intersection test", J. Graphics Tools 2 (1997) 25.
 """
 
 from __future__ import annotations
@@ -14,21 +16,25 @@ import numpy as np
 from chamberopt.geometry.mesh_io.surface_error import SurfaceError, format_point
 from chamberopt.geometry.triangles import find_shells, heights, unit_normals
 
-CHUNK = 1 << 18  # pairs looked at together: bounds memory at some 100 MB
-TOUCH = (
-    1e-6  # of the bounding box's diagonal: surfaces that pass through each other by less only touch
-)
+CHUNK = 1 << 18  # pairs tested at once: bounds memory at some 100 MB
+# Of the bounding box's diagonal. Surfaces that pass through each other by less only touch.
+TOUCH = 1e-6
 
 
 def refuse_self_intersection(path: Path, vertices: np.ndarray, triangles: np.ndarray) -> None:
-    """Raises SurfaceError with the place when a body's closed surface (vertices [m], triangles (m, 3)) crosses itself.
+    """Raise SurfaceError with the place if a body's closed surface crosses itself.
 
     Several bodies may overlap: they are united where the chamber is made.
+
+    Args:
+        path: the surface's file, for the message.
+        vertices: (n, 3) [m].
+        triangles: (m, 3).
     """
     corners = vertices[triangles]
     touch = TOUCH * float(np.linalg.norm(np.ptp(vertices, axis=0)))
     shells, _ = find_shells(vertices, triangles)
-    usable = np.flatnonzero(heights(vertices, triangles) > touch)  # a thinner one has no direction
+    usable = np.flatnonzero(heights(vertices, triangles) > touch)  # thinner ones have no direction
     found = []
     for a, b in _close_pairs(corners[usable]):
         a, b = usable[a], usable[b]
@@ -41,9 +47,9 @@ def refuse_self_intersection(path: Path, vertices: np.ndarray, triangles: np.nda
     middle = corners[first].reshape(-1, 3).mean(axis=0)
     sides = corners[np.unique(pairs)][:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2, 3)
     raise SurfaceError(
-        f"{path}: the surface crosses itself: {pairs.shape[1]} pairs of triangles, the first near "
-        f"{format_point(middle)} (triangles {first.min() + 1} and {first.max() + 1}); heal it in the CAD program, or "
-        "make its pieces bodies of their own",
+        f"{path}: the surface crosses itself: {pairs.shape[1]} pairs of triangles, "
+        f"the first near {format_point(middle)} (triangles {first.min() + 1} and "
+        f"{first.max() + 1}); heal it in the CAD program, or make its pieces separate bodies",
         corners,
         sides,
     )
@@ -52,9 +58,8 @@ def refuse_self_intersection(path: Path, vertices: np.ndarray, triangles: np.nda
 def _close_pairs(corners: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Pairs of triangles (m, 3, 3) whose boxes overlap, each pair once, in chunks."""
     order = _morton_order(corners.mean(axis=1))
-    levels = [
-        (corners.min(axis=1)[order].T.copy(), corners.max(axis=1)[order].T.copy())
-    ]  # (3, m): by axis
+    low, high = corners.min(axis=1)[order].T.copy(), corners.max(axis=1)[order].T.copy()
+    levels = [(low, high)]  # of boxes, each (3, count); the next level joins boxes in pairs
     while levels[-1][0].shape[1] > 1:
         low, high = levels[-1]
         if low.shape[1] % 2:
@@ -66,27 +71,31 @@ def _close_pairs(corners: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]
     while waiting:
         level, i, j = waiting.pop()
         for low, high in zip(*levels[level], strict=True):
-            near = (low[i] <= high[j]) & (low[j] <= high[i])
-            i, j = i[near], j[near]
+            overlap = (low[i] <= high[j]) & (low[j] <= high[i])
+            i, j = i[overlap], j[overlap]
         if level == 0:
-            apart = i != j
-            yield order[i[apart]], order[j[apart]]
+            different = i != j
+            yield order[i[different]], order[j[different]]
             continue
-        below = levels[level - 1][0].shape[1]
-        alone = i == j
+        # The four pairs of halves; of a box with itself, the two halves only once.
+        two = i != j
         i, j = (
-            np.r_[2 * i, 2 * i + 1, 2 * i, 2 * i[~alone] + 1],
-            np.r_[2 * j, 2 * j + 1, 2 * j + 1, 2 * j[~alone]],
+            np.r_[2 * i, 2 * i + 1, 2 * i, 2 * i[two] + 1],
+            np.r_[2 * j, 2 * j + 1, 2 * j + 1, 2 * j[two]],
         )
-        there = (i < below) & (j < below)
-        i, j = i[there], j[there]
+        count = levels[level - 1][0].shape[1]
+        exist = (i < count) & (j < count)
+        i, j = i[exist], j[exist]
         waiting += [
             (level - 1, i[at : at + CHUNK], j[at : at + CHUNK]) for at in range(0, len(i), CHUNK)
         ]
 
 
 def _morton_order(points: np.ndarray) -> np.ndarray:
-    """Order (m,) along a curve that keeps neighbours together: bits of x, y, z interleaved."""
+    """Order (m,) of points along a curve that keeps neighbours together.
+
+    The bits of x, y and z are interleaved.
+    """
     low, size = points.min(axis=0), np.ptp(points, axis=0).max()
     cells = ((points - low) / (size or 1.0) * (2**20 - 1)).astype(np.uint64)
     code = np.zeros(len(points), dtype=np.uint64)
@@ -99,8 +108,8 @@ def _morton_order(points: np.ndarray) -> np.ndarray:
 def _crossing(
     corners: np.ndarray, a: np.ndarray, b: np.ndarray, touch: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Those pairs of triangles a, b (k,) that pass through each other by more than touch [m]."""
-    for one, other in ((0, 1), (1, 0)):  # each must reach to both sides of the other's plane
+    """The pairs of triangles a, b (k,) that pass through each other by more than `touch` [m]."""
+    for one, other in ((0, 1), (1, 0)):  # each must have corners on both sides of the other's plane
         pair = (a, b)
         distance = _distances(corners[pair[one]], corners[pair[other]])
         through = (distance.min(axis=1) < -touch) & (distance.max(axis=1) > touch)
@@ -117,20 +126,20 @@ def _crossing(
 
 
 def _distances(corners: np.ndarray, planes: np.ndarray) -> np.ndarray:
-    """Distances (k, 3) of the corners of triangles from the planes of others."""
+    """Distances (k, 3) of triangles' corners from the planes of others, both (k, 3, 3)."""
     return np.einsum("kij,kj->ki", corners - planes[:, :1], unit_normals(planes))
 
 
 def _interval(
     corners: np.ndarray, distance: np.ndarray, along: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Where triangles meet the other's plane: first and last position (k,) along the line of both planes."""
-    places = []
+    """Where triangles cross the other's plane: first and last position (k,) along both planes' line."""
+    positions = []
     for i, j in ((0, 1), (1, 2), (2, 0)):
         through = distance[:, i] * distance[:, j] < 0.0
         share = np.divide(
             distance[:, i], distance[:, i] - distance[:, j], out=np.zeros(len(along)), where=through
         )
         point = corners[:, i] + share[:, None] * (corners[:, j] - corners[:, i])
-        places.append(np.where(through, np.einsum("kj,kj->k", point, along), np.nan))
-    return np.nanmin(places, axis=0), np.nanmax(places, axis=0)
+        positions.append(np.where(through, np.einsum("kj,kj->k", point, along), np.nan))
+    return np.nanmin(positions, axis=0), np.nanmax(positions, axis=0)

@@ -1,4 +1,4 @@
-"""What is wrong with a surface, and where: one sentence for a person, and the place for a picture."""
+"""Errors that show what is wrong with a surface, and where; lengths as text for messages."""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ from chamberopt.common.errors import InputError
 
 
 class SurfaceError(InputError):
-    """A surface that cannot be used.
+    """A surface cannot be used.
 
-    corners (m, 3, 3) m: the surface as read · edges (k, 2, 3) m: what is wrong with it, as lines.
+    Args:
+        corners: of the surface's triangles as read, (m, 3, 3) [m].
+        edges: lines that show what is wrong in a picture, (k, 2, 3) [m].
     """
 
     def __init__(self, message: str, corners: np.ndarray, edges: np.ndarray) -> None:
@@ -19,11 +21,11 @@ class SurfaceError(InputError):
 
 
 class OpenSurfaceError(SurfaceError):
-    """A surface with open edges that are too many to be closed."""
+    """A surface has open edges that are not closed automatically."""
 
 
 def format_box(sides: np.ndarray) -> str:
-    """A bounding box's sides (3,) [m] as text: '44 x 44 x 70 mm'."""
+    """Sides (3,) [m] of a bounding box as text: '44 x 44 x 70 mm'."""
     return " x ".join(f"{1e3 * side:.5g}" for side in sides) + " mm"
 
 

@@ -1,4 +1,4 @@
-"""In which unit a file's numbers are: stated by the design or by the file, else guessed from the size, aloud."""
+"""The unit of a file's numbers: given by the design, stated by the file, or guessed by size."""
 
 from __future__ import annotations
 
@@ -13,78 +13,88 @@ from chamberopt.geometry.mesh_io.surface_error import format_box
 
 Unit = Literal["um", "mm", "cm", "m", "in", "guess"]
 METRES_PER: dict[str, float] = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
-
-SMALLEST, LARGEST = (
-    5e-4,
-    3.0,
-)  # m, longest side of the bounding box: a part that can be peened in a chamber
-# What an exporter would write, likeliest first; inch and cm cannot be told from mm by size, so are not guessed.
-GUESSED = (("mm", 3e-3, 1.5), ("m", 3e-3, 1.5), ("um", 3e-3, 1.5))
-SAID = re.compile(rb"\bunits?\b[\"' ]*[=:][\"' ]*(\w+)", re.I)
-SPELLED = {
+UNIT_NAMES = {
     "mm": "mm", "millimeter": "mm", "millimeters": "mm", "millimetre": "mm", "millimetres": "mm",
     "cm": "cm", "centimeter": "cm", "centimeters": "cm", "centimetre": "cm",
     "m": "m", "meter": "m", "meters": "m", "metre": "m", "metres": "m",
     "um": "um", "micron": "um", "microns": "um", "micrometer": "um", "micrometre": "um",
     "in": "in", "inch": "in", "inches": "in",
 }  # fmt: skip
+UNIT_COMMENT = re.compile(rb"\bunits?\b[\"' ]*[=:][\"' ]*(\w+)", re.I)
+
+# m, longest side of the bounding box of a part that can be peened in a chamber.
+MIN_SIZE, MAX_SIZE = 5e-4, 3.0
+# Units that exporters write, the most likely first, and the sizes [m] for which they are guessed.
+# Inches and centimetres cannot be told from millimetres by size, so they are never guessed.
+GUESSED_UNITS = ("mm", "m", "um")
+MIN_GUESSED_SIZE, MAX_GUESSED_SIZE = 3e-3, 1.5
 
 
-def unit_of(
+def find_unit(
     path: Path, content: bytes, corners: np.ndarray, given: str, stated: str | None
 ) -> tuple[str, list[str]]:
-    """The unit of corners (m, 3, 3), and a note where a person should look at it.
+    """Find the unit of the corners (m, 3, 3) of a file.
 
-    given: the design's part.unit, or "guess" · stated: what the format itself says. Raises InputError when the
-    two contradict each other, nothing can be guessed, or the part is of a size that no part has.
+    Args:
+        given: the design's part.unit, or "guess".
+        stated: the unit that the file's format states, if any.
+
+    Returns:
+        The unit, and a note if a person should check it.
+
+    Raises:
+        InputError: the two contradict each other, the unit cannot be guessed, or no part can be
+            so large or so small.
     """
     sides = np.ptp(corners.reshape(-1, 3), axis=0)
-    step = content[:64].lstrip().startswith(b"ISO-10303-21")
-    if stated is not None and given not in ("guess", stated) and not step:
+    is_step = content[:64].lstrip().startswith(b"ISO-10303-21")  # converted to metres by its reader
+    if stated is not None and given not in ("guess", stated) and not is_step:
         raise InputError(
-            f"{path}: part.unit is {given!r}, but the file says that its numbers are in {stated!r}; "
-            "leave part.unit out, or export in the unit that is meant"
+            f"{path}: part.unit is {given!r}, but the file says that its numbers are in "
+            f"{stated!r}; leave part.unit out, or export in the unit that is meant"
         )
+    notes = []
     if stated is not None:
-        told = (
-            f"unit stated by the file: the part measures {format_box(sides * METRES_PER[stated])}"
-        )
-        unit, notes = stated, [] if given == stated else [told]
+        unit = stated
+        if given != stated:
+            box = format_box(sides * METRES_PER[stated])
+            notes = [f"unit stated by the file: the part measures {box}"]
     elif given != "guess":
-        unit, notes = given, []
+        unit = given
     else:
-        unit, notes = _guess(path, content, sides)
-    _refuse_implausible(path, sides, unit)
+        unit, reason = _guess(path, content, sides)
+        notes = [
+            f"unit guessed as {unit!r} ({reason}): "
+            f"the part measures {format_box(sides * METRES_PER[unit])}; "
+            "give part.unit if that is wrong"
+        ]
+    _require_plausible_size(path, sides, unit)
     return unit, notes
 
 
-def _guess(path: Path, content: bytes, sides: np.ndarray) -> tuple[str, list[str]]:
-    said = SAID.search(content[:4096])
-    unit = SPELLED.get(said[1].decode().lower()) if said else None
-    if unit is not None:
-        why = f"a comment in the file says {said[0].decode().strip()!r}"  # type: ignore[index]
-    else:
-        longest = float(sides.max())
-        unit = next((u for u, low, high in GUESSED if low <= longest * METRES_PER[u] < high), None)
-        why = "by its size"
-    if unit is None:
-        raise InputError(
-            f"{path}: the unit cannot be guessed from a longest side of {sides.max():.5g}; give part.unit, one of "
-            + ", ".join(f'"{u}"' for u in METRES_PER)
-        )
-    return unit, [
-        f"unit guessed as {unit!r} ({why}): the part measures {format_box(sides * METRES_PER[unit])}; "
-        "give part.unit if that is wrong"
-    ]
+def _guess(path: Path, content: bytes, sides: np.ndarray) -> tuple[str, str]:
+    """Unit, and the reason for it: a comment in the file, or the size."""
+    comment = UNIT_COMMENT.search(content[:4096])
+    name = comment[1].decode().lower() if comment else ""
+    if comment and name in UNIT_NAMES:
+        return UNIT_NAMES[name], f"a comment in the file says {comment[0].decode().strip()!r}"
+    for unit in GUESSED_UNITS:
+        if MIN_GUESSED_SIZE <= sides.max() * METRES_PER[unit] < MAX_GUESSED_SIZE:
+            return unit, "by its size"
+    raise InputError(
+        f"{path}: the unit cannot be guessed from a longest side of {sides.max():.5g}; "
+        "give part.unit, one of " + ", ".join(f'"{unit}"' for unit in METRES_PER)
+    )
 
 
-def _refuse_implausible(path: Path, sides: np.ndarray, unit: str) -> None:
-    longest = float(sides.max()) * METRES_PER[unit]
-    if SMALLEST <= longest <= LARGEST:
+def _require_plausible_size(path: Path, sides: np.ndarray, unit: str) -> None:
+    """Raise InputError unless a part can be so large."""
+    if MIN_SIZE <= sides.max() * METRES_PER[unit] <= MAX_SIZE:
         return
-    fitting = [u for u, m in METRES_PER.items() if SMALLEST <= sides.max() * m <= LARGEST]
+    fitting = [u for u, m in METRES_PER.items() if MIN_SIZE <= sides.max() * m <= MAX_SIZE]
     hint = f"; unit = {' or '.join(repr(u) for u in fitting)} would be plausible" if fitting else ""
     raise InputError(
-        f"{path}: with part.unit = {unit!r} the part measures {format_box(sides * METRES_PER[unit])}; allowed: longest "
-        f"side {1e3 * SMALLEST:g} to {1e3 * LARGEST:g} mm{hint}"
+        f"{path}: with part.unit = {unit!r} the part measures "
+        f"{format_box(sides * METRES_PER[unit])}; allowed: longest side {1e3 * MIN_SIZE:g} to "
+        f"{1e3 * MAX_SIZE:g} mm{hint}"
     )

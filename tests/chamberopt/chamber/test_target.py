@@ -59,9 +59,9 @@ def test_names_choose_and_the_other_conditions_narrow(
     [
         (
             "botom",
-            r"part\.target\.surface: 'botom' is no name in the part's file; did you mean 'bottom'\?",
+            r"part\.target\.surface: 'botom' is not a name in the part's file; did you mean 'bottom'\?",
         ),
-        (["left", "xyz"], r"'xyz' is no name .*allowed: all, .*bottom"),
+        (["left", "xyz"], r"'xyz' is not a name .*allowed: all, .*bottom"),
     ],
 )
 def test_a_name_that_the_file_does_not_have_is_refused_with_those_it_has(
@@ -76,7 +76,7 @@ def test_a_file_without_names_says_so() -> None:
     data["part"]["target"]["surface"] = "flank"
 
     with pytest.raises(
-        InputError, match="'flank' is no name in the part's file; its file names none: 'all'"
+        InputError, match="'flank' is not a name in the part's file; its file names none: 'all'"
     ):
         build_chamber(Design.model_validate(data))
 

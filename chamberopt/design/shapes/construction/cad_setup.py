@@ -152,7 +152,7 @@ def _pick(mesh: PartMesh, triangles: np.ndarray, rows: np.ndarray) -> PartMesh:
         mesh,
         vertices=mesh.vertices[used],
         triangles=numbers.reshape(-1, 3).astype(np.int32),
-        numbering=mesh.numbering.of(rows),
+        numbering=mesh.numbering.select(rows),
         groups={name: mask[rows] for name, mask in mesh.groups.items()},
     )
 

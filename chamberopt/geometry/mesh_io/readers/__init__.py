@@ -1,1 +1,1 @@
-"""One reader for each family of part file formats."""
+"""One reader for each mesh format; elements.py makes triangles of finite elements."""

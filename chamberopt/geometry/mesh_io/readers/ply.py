@@ -1,4 +1,4 @@
-"""PLY files, text and binary, read by trimesh."""
+"""Read PLY files, text and binary, with trimesh; colours give names."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ import numpy as np
 from chamberopt.common.errors import InputError
 from chamberopt.geometry.mesh_io.readers.raw_mesh import RawMesh
 
-MAX_COLOURS = 64  # a photograph on the part is no set of names
+MAX_COLOURS = 64  # more are a photograph on the part, not names of groups
 
 
 def read_ply(path: Path, content: bytes) -> RawMesh:
-    """Text or binary; a triangle painted in one colour, by face or by its three corners, is named "#rrggbb"."""
+    """Read a PLY; triangles of one colour, by face or by all three corners, are named "#rrggbb"."""
     import trimesh
 
     _require_all_lines(path, content)
@@ -24,36 +24,38 @@ def read_ply(path: Path, content: bytes) -> RawMesh:
     if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
         return RawMesh(np.zeros((0, 3, 3)))
     corners = np.asarray(mesh.vertices, dtype=np.float64)[mesh.faces]
-    colours = _colours(mesh)
+    colours = _triangle_colours(mesh)
     if colours is None:
         return RawMesh(corners)
-    kinds, of_triangle = np.unique(colours, axis=0, return_inverse=True)
-    names = (
-        []
-        if len(kinds) > MAX_COLOURS
-        else ["#" + "".join(f"{int(c):02x}" for c in kind) for kind in kinds]
-    )
+    distinct, of_triangle = np.unique(colours, axis=0, return_inverse=True)
     groups = {
-        name: of_triangle.reshape(-1) == k for k, name in enumerate(names) if kinds[k, 0] >= 0
+        "#" + "".join(f"{int(part):02x}" for part in colour): of_triangle.reshape(-1) == k
+        for k, colour in enumerate(distinct)
+        if colour[0] >= 0 and len(distinct) <= MAX_COLOURS
     }
     return RawMesh(corners, groups)
 
 
 def _require_all_lines(path: Path, content: bytes) -> None:
-    """A text file holds a line for each element its header counts; of one cut short the reader takes what is there."""
+    """Raise InputError for a truncated text file, of which trimesh would read what is left.
+
+    A text file has a line for each element that its header counts.
+    """
     header, end, body = content.partition(b"end_header")
     if not end or not re.search(rb"^format\s+ascii", header, re.MULTILINE):
         return
-    said = sum(int(count) for count in re.findall(rb"^element\s+\S+\s+(\d+)", header, re.MULTILINE))
-    there = sum(1 for line in body.splitlines() if line.strip())
-    if there < said:
+    counts = re.findall(rb"^element\s+\S+\s+(\d+)", header, re.MULTILINE)
+    declared = sum(map(int, counts))
+    held = sum(1 for line in body.splitlines() if line.strip())
+    if held < declared:
         raise InputError(
-            f"{path}: truncated: its header counts {said} lines and {there} are there; export it again"
+            f"{path}: truncated: its header counts {declared} lines and {held} are there; "
+            "export it again"
         )
 
 
-def _colours(mesh: Any) -> np.ndarray | None:
-    """Red, green, blue (m, 3) of each triangle, -1 where its corners differ; None without colours."""
+def _triangle_colours(mesh: Any) -> np.ndarray | None:
+    """Red, green, blue of each triangle, (m, 3); -1 where its corners differ; None if uncoloured."""
     if mesh.visual.kind == "face":
         return np.asarray(mesh.visual.face_colors)[:, :3].astype(np.int64)
     if mesh.visual.kind == "vertex":

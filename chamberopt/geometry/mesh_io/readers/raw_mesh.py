@@ -11,12 +11,15 @@ import numpy as np
 
 @dataclass(frozen=True)
 class ElementNumbers:
-    """The origin of each of m triangles.
+    """The element of the file to which each of m triangles belongs; results can be exported by it.
 
-    elements (m,) int64: the number that the file gives the element, shared by the triangles of a quadrilateral; where
-    the file numbers none (``own`` false) the place, from 1, of the triangle in it (OBJ: of the polygon, VTK: of the
-    cell); 0 is not in the file: it closes a hole · faces (m,) int8: which face of a solid element, from 1 as Abaqus
-    counts its S1, S2 ...; 0 is a shell · instance: Abaqus's instance that the numbers count in, "" without.
+    Args:
+        elements: number that the file gives the element, (m,) int64. The triangles of a
+            quadrilateral share one. If the file does not number its elements (`own` is false),
+            the position from 1 of the triangle, polygon (OBJ) or cell (VTK). 0: not in the file.
+        faces: face of a solid element, (m,) int8, from 1 as Abaqus counts its S1, S2 ...; 0: shell.
+        own: whether the numbers are the file's own.
+        instance: the Abaqus instance in which the numbers count, if any.
     """
 
     elements: np.ndarray
@@ -24,8 +27,8 @@ class ElementNumbers:
     own: bool = False
     instance: str = ""
 
-    def of(self, rows: np.ndarray) -> ElementNumbers:
-        """That of some of the triangles, in the order of rows: indices, -1 for one that is new, or a mask."""
+    def select(self, rows: np.ndarray) -> ElementNumbers:
+        """Numbers of some of the triangles, by a mask (m,) or by indices; index -1: not in the file."""
         if rows.dtype == bool:
             rows = np.flatnonzero(rows)
         elements, faces = (
@@ -35,17 +38,20 @@ class ElementNumbers:
 
 
 def number_by_position(count: int) -> ElementNumbers:
-    """That of a file which numbers nothing: its triangles from 1 on."""
+    """Numbers for a file that has none: its triangles from 1 on."""
     return ElementNumbers(np.arange(1, count + 1), np.zeros(count, dtype=np.int8))
 
 
 @dataclass(frozen=True)
 class RawMesh:
-    """The triangles of a file, before anything is judged or put right.
+    """The triangles of a file, before they are checked.
 
-    corners (m, 3, 3) in the file's numbers and order · groups: name -> (m,) bool, the file's sets, groups,
-    properties, colours · unit: what the file states its numbers are in, None where it does not · notes: what
-    was left out or turned into triangles · numbering of its elements, None where triangles are all it has.
+    Args:
+        corners: (m, 3, 3), in the file's numbers and order.
+        groups: name -> its triangles, (m,) bool: the file's sets, groups, properties or colours.
+        unit: of the file's numbers, if the file states one.
+        notes: what was left out or turned into triangles.
+        numbering: of the file's elements; None if the file has only triangles.
     """
 
     corners: np.ndarray
@@ -55,8 +61,8 @@ class RawMesh:
     numbering: ElementNumbers | None = None
 
 
-def joined(pieces: list[tuple[str, np.ndarray]]) -> RawMesh:
-    """One mesh of named pieces (name, corners (k, 3, 3)); pieces of one name make one group, "" makes none."""
+def join_pieces(pieces: list[tuple[str, np.ndarray]]) -> RawMesh:
+    """Join pieces (name, corners (k, 3, 3)); pieces of one name make one group, "" makes none."""
     pieces = [(name, corners) for name, corners in pieces if len(corners)]
     if not pieces:
         return RawMesh(np.zeros((0, 3, 3)))
@@ -68,24 +74,23 @@ def joined(pieces: list[tuple[str, np.ndarray]]) -> RawMesh:
     return RawMesh(np.concatenate([corners for _, corners in pieces]), groups)
 
 
-def scene_pieces(scene: Any) -> list[tuple[str, np.ndarray]]:
-    """(name, corners (k, 3, 3)) of each mesh in a scene, moved to where the scene puts it."""
-    pieces = []
-    for node in scene.graph.nodes_geometry:
-        transform, name = scene.graph[node]
-        mesh = scene.geometry[name]
-        if not hasattr(mesh, "faces"):
-            continue  # lines and points
-        vertices = (
-            np.asarray(mesh.vertices, dtype=np.float64) @ transform[:3, :3].T + transform[:3, 3]
-        )
-        told = str(mesh.metadata.get("name") or node)
-        pieces.append(("" if told.startswith("geometry_") else told, vertices[mesh.faces]))
-    return pieces
-
-
 def load_pieces(kind: str, content: bytes) -> list[tuple[str, np.ndarray]]:
-    """Read a file of some kind ("stl", "3mf") with trimesh: name and corners (k, 3, 3) of each mesh."""
+    """Read a file of some kind ("stl", "3mf") with trimesh; pieces as `scene_pieces` gives them."""
     import trimesh
 
     return scene_pieces(trimesh.load_scene(io.BytesIO(content), file_type=kind, process=False))
+
+
+def scene_pieces(scene: Any) -> list[tuple[str, np.ndarray]]:
+    """Name and corners (k, 3, 3) of each mesh of a trimesh scene, placed as in the scene."""
+    pieces = []
+    for node in scene.graph.nodes_geometry:
+        transform, key = scene.graph[node]
+        mesh = scene.geometry[key]
+        if not hasattr(mesh, "faces"):
+            continue  # lines and points
+        points = np.asarray(mesh.vertices, dtype=np.float64)
+        points = points @ transform[:3, :3].T + transform[:3, 3]
+        name = str(mesh.metadata.get("name") or node)
+        pieces.append(("" if name.startswith("geometry_") else name, points[mesh.faces]))
+    return pieces

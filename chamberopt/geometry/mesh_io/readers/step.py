@@ -1,4 +1,4 @@
-"""STEP files (parts and assemblies), tessellated by OpenCASCADE."""
+"""Read STEP files, parts and assemblies; OpenCASCADE makes triangles of them."""
 
 from __future__ import annotations
 
@@ -12,18 +12,20 @@ from pathlib import Path
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.geometry.mesh_io.readers.raw_mesh import RawMesh, joined, scene_pieces
+from chamberopt.geometry.mesh_io.readers.raw_mesh import RawMesh, join_pieces, scene_pieces
 
-# STEP is tessellated to this distance from the true surface and angle between neighbours: a facet of a 10 mm
-# cylinder then turns a ball by less than the scatter of rough steel does.
-STEP_MM, STEP_RAD = 0.01, 0.1
-STEP_SECONDS = 1800.0
+# Largest distance from the true surface, and angle between neighbours. A facet of a 10 mm cylinder
+# then turns a ball by less than the scatter of rough steel does.
+MAX_DISTANCE_MM, MAX_ANGLE_RAD = 0.01, 0.1
+TIMEOUT_S = 1800.0
+CONVERT = "import sys, cascadio; cascadio.step_to_glb(*sys.argv[1:3], *map(float, sys.argv[3:]))"
 
 
 def read_step(path: Path, content: bytes) -> RawMesh:
-    """STEP's solids, tessellated; bodies by their product's name. The file states its unit: metres come out.
+    """Read the solids of a STEP file, in metres; names of products name the triangles.
 
-    OpenCASCADE works in a process of its own: a damaged file can take its process down.
+    An assembly's parts are placed as in the assembly. OpenCASCADE runs in a process of its own,
+    because a damaged file can crash it.
     """
     import trimesh
 
@@ -32,15 +34,15 @@ def read_step(path: Path, content: bytes) -> RawMesh:
     with tempfile.TemporaryDirectory() as folder:
         step, glb = Path(folder) / "part.step", Path(folder) / "part.glb"
         step.write_bytes(content)
-        work = (
-            "import sys, cascadio; cascadio.step_to_glb(*sys.argv[1:3], *map(float, sys.argv[3:]))"
-        )
-        command = [sys.executable, "-c", work, str(step), str(glb), str(STEP_MM), str(STEP_RAD)]
-        subprocess.run(command, capture_output=True, timeout=STEP_SECONDS, check=False)
+        limits = str(MAX_DISTANCE_MM), str(MAX_ANGLE_RAD)
+        command = [sys.executable, "-c", CONVERT, str(step), str(glb), *limits]
+        subprocess.run(command, capture_output=True, timeout=TIMEOUT_S, check=False)
         pieces = scene_pieces(trimesh.load_scene(glb, process=False)) if glb.is_file() else []
     if not pieces:
         raise InputError(
-            f"{path}: holds no solid that could be meshed, or is damaged; export it again as AP214 or AP242"
+            f"{path}: holds no solid that could be meshed, or is damaged; "
+            "export it again as AP214 or AP242"
         )
-    told = f"STEP: meshed to {1e3 * STEP_MM:g} µm and {np.degrees(STEP_RAD):.1f} degrees"
-    return replace(joined(pieces), unit="m", notes=(told,))
+    angle = np.degrees(MAX_ANGLE_RAD)
+    note = f"STEP: meshed to {1e3 * MAX_DISTANCE_MM:g} µm and {angle:.1f} degrees"
+    return replace(join_pieces(pieces), unit="m", notes=(note,))

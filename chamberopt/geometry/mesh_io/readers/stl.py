@@ -1,41 +1,54 @@
-"""STL files, binary and text, read by trimesh."""
+"""Read STL files, binary and text, with trimesh."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from chamberopt.common.errors import InputError
-from chamberopt.geometry.mesh_io.readers.raw_mesh import RawMesh, joined, load_pieces
+from chamberopt.geometry.mesh_io.readers.raw_mesh import RawMesh, join_pieces, load_pieces
+
+HEADER, RECORD = 84, 50  # bytes of a binary STL: before the triangles, and of each triangle
 
 
 def read_stl(path: Path, content: bytes) -> RawMesh:
-    """Binary or text; the solids of a text file by their names."""
-    return joined(load_pieces("stl", _whole_stl(path, content)))
+    """Read an STL; the solids of a text file give names."""
+    return join_pieces(load_pieces("stl", _complete_stl(path, content)))
 
 
-def _whole_stl(path: Path, content: bytes) -> bytes:
-    """The STL without what some exporters put behind it. InputError when it is truncated.
+def is_binary_stl(content: bytes) -> bool:
+    """Whether the length fits the number of triangles: a binary STL has no other mark."""
+    length = HEADER + RECORD * _declared_triangles(content)
+    return len(content) >= HEADER and len(content) == length and not _is_text_stl(content)
 
-    A binary STL says how many triangles it holds, a text one ends with endsolid.
+
+def _complete_stl(path: Path, content: bytes) -> bytes:
+    """The STL without what some exporters append to it.
+
+    Raises:
+        InputError: it is truncated. A binary STL states its number of triangles, a text STL ends
+            with "endsolid".
     """
-    if is_text_stl(content):
+    if _is_text_stl(content):
         if not content.rstrip().splitlines()[-1].strip().lower().startswith(b"endsolid"):
             raise InputError(
                 f"{path}: truncated, the last line is not 'endsolid'; export or copy it again"
             )
         return content
-    declared = int.from_bytes(content[80:84], "little")
-    if len(content) < 84 or len(content) < 84 + 50 * declared:
-        held = max(0, (len(content) - 84) // 50)
-        told = (
-            f"it says {declared} triangles and holds {held}"
-            if len(content) >= 84
-            else "shorter than its header"
-        )
-        raise InputError(f"{path}: truncated or not an STL: {told}; export or copy it again")
-    return content[: 84 + 50 * declared]
+    declared = _declared_triangles(content)
+    if len(content) < HEADER:
+        reason = "shorter than its header"
+    elif len(content) < HEADER + RECORD * declared:
+        held = (len(content) - HEADER) // RECORD
+        reason = f"it says {declared} triangles and holds {held}"
+    else:
+        return content[: HEADER + RECORD * declared]
+    raise InputError(f"{path}: truncated or not an STL: {reason}; export or copy it again")
 
 
-def is_text_stl(content: bytes) -> bool:
-    """A text STL; binary ones may begin with 'solid' too."""
+def _declared_triangles(content: bytes) -> int:
+    return int.from_bytes(content[80:84], "little")
+
+
+def _is_text_stl(content: bytes) -> bool:
+    """Whether it is a text STL; binary ones may begin with "solid" too."""
     return content.lstrip()[:5].lower() == b"solid" and b"facet" in content[:2000].lower()

@@ -290,7 +290,7 @@ def test_the_target_is_chosen_by_the_names_and_frame_of_the_file(tmp_path: Path)
     part = build_chamber(design(text_stl(tmp_path / "setup.stl", drawing), placed=lower)).part
 
     assert 1e6 * part.area[part.target].sum() == pytest.approx(400.0)
-    with pytest.raises(InputError, match=r"part\.target\.surface: 'WALL' is no name"):
+    with pytest.raises(InputError, match=r"part\.target\.surface: 'WALL' is not a name"):
         build_chamber(design(tmp_path / "setup.stl", placed={"target": {"surface": "WALL"}}))
 
 
@@ -333,7 +333,7 @@ def leaking(drawing: Drawing) -> Drawing:
         (
             as_pieces(),
             {"sonotrode": "SONO"},
-            r"chamber\.sonotrode: 'SONO' is no name.*did you mean 'SONOTRODE'",
+            r"chamber\.sonotrode: 'SONO' is not a name.*did you mean 'SONOTRODE'",
         ),
         (
             as_pieces(),

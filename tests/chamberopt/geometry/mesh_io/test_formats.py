@@ -534,7 +534,7 @@ def test_content_counts_and_not_the_name(tmp_path: Path) -> None:
 
 
 REFUSED = {
-    "unknown": ("part.xyz", "hello", "not a mesh file that is known.*\\.stl.*\\.bdf"),
+    "unknown": ("part.xyz", "hello", "mesh format is not known.*\\.stl.*\\.bdf"),
     "obj": ("p.obj", "v 0 0 0\nv 1 0 0\nf 1 2 9\n", "a face names a vertex that is not there"),
     "obj number": ("p.obj", "v 0 0 0\nv 1 0 x\n", "line 2: 'v' with no number"),
     "nastran grid twice": (
