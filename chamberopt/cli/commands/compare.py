@@ -38,12 +38,12 @@ def compare(
     treatment_time_s
         Compare after this time; results of another treatment time are simulated again.
     """
-    from chamberopt.output.compare.candidates import gathered
+    from chamberopt.output.compare.candidates import read_candidates
     from chamberopt.output.compare.comparison import comparison_of
-    from chamberopt.output.compare.files import COMPARE, write_comparison
+    from chamberopt.output.compare.comparison_folder import COMPARE, write_comparison
     from chamberopt.output.compare.table import as_text
 
-    gathered_candidates = gathered(candidates, treatment_time_s)
+    gathered_candidates = read_candidates(candidates, treatment_time_s)
     with results_folder(out, "compare") as folder:
         results = _results(gathered_candidates, folder, workers, cluster)
         comparison = comparison_of(results, [one.label for one in gathered_candidates])
@@ -56,7 +56,7 @@ def _results(
 ) -> list[Result]:
     """The results of all candidates; missing ones are simulated."""
     from chamberopt.common.parallel.executor import open_executor
-    from chamberopt.output.compare.candidates import simulated
+    from chamberopt.output.compare.candidates import simulate_missing
 
     if not any(one.missing for one in candidates):
         return [one.result for one in candidates if one.result is not None]
@@ -70,6 +70,6 @@ def _results(
             compile_simulator(design, chamber, cavity)
             return design, advice
 
-        results, remarks = simulated(candidates, folder, executor, prepare)
+        results, remarks = simulate_missing(candidates, folder, executor, prepare)
     print_remarks(remarks)
     return results

@@ -1,4 +1,4 @@
-"""What `compare` was given, designs and results mixed; and the simulating of what is missing, on common seeds."""
+"""The candidates of `compare`: designs, which are simulated, and results."""
 
 from __future__ import annotations
 
@@ -15,14 +15,13 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.common.progress import progress_bar
 from chamberopt.design.design import Design
 from chamberopt.design.load import load_design
-from chamberopt.output.compare.comparison import part_unit
+from chamberopt.output.compare.comparison import labels, part_unit
 from chamberopt.output.compare.inputs import (
-    require_one_time,
     require_same_part,
+    require_same_time,
     require_same_triangles,
     require_several,
 )
-from chamberopt.output.compare.parameters import labels
 from chamberopt.output.results.load import Result, load_result
 from chamberopt.output.save_run import save_simulation
 from chamberopt.output.vtp_files import COVERAGE, read_surface
@@ -34,15 +33,20 @@ if TYPE_CHECKING:
     from sim_core import AnalyticCavity
 
 Prepare = Callable[[Design, "Chamber", "AnalyticCavity | None"], "tuple[Design, list[Advice]]"]
-"""Chooses the effects of a design that leaves them open, and compiles."""
+"""Chooses the effects of a design with effects = "auto", and compiles the simulator."""
 
 
 @dataclass(frozen=True)
 class Candidate:
     """One argument of `compare`.
 
-    path: as given · design: what is to be compared · result: as it was read, None of a design · missing: whether it is
-    to be simulated · chamber: built where it is.
+    Args:
+        label: short name, unique among the candidates.
+        path: as given.
+        design: the design to compare.
+        result: as read from the folder; None for a design.
+        missing: whether it has to be simulated.
+        chamber: built where it has to be simulated.
     """
 
     label: str
@@ -54,31 +58,41 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class Draws:
-    """On what a candidate is simulated: seed and stream, replicas (None: as its accuracy asks), for what objective."""
+class SeedSettings:
+    """Random numbers and objective of a simulation.
+
+    Args:
+        seed: of the design's process.
+        plan: replicas, stream of random numbers and objective.
+    """
 
     seed: int
-    stream: str
-    replicas: int | None
-    objective_name: str
+    plan: ReplicaPlan
 
 
-def gathered(paths: Sequence[str | Path], treatment_time_s: float | None = None) -> list[Candidate]:
-    """The candidates that paths name: designs where they are files, else results; nothing is simulated yet.
+def read_candidates(
+    paths: Sequence[str | Path], treatment_time_s: float | None = None
+) -> list[Candidate]:
+    """Read the candidates, without simulating anything.
 
-    treatment_time_s: all are to be peened so long; results of another time will be simulated again. Raises InputError
-    for what cannot be read, built or compared.
+    Args:
+        paths: design files and results folders.
+        treatment_time_s: peening time of all candidates; results of another time are marked to be
+            simulated again.
+
+    Raises:
+        InputError: a candidate cannot be read, built or compared with the first.
     """
-    places = [Path(path) for path in paths]
-    require_several([place.parent if place.name == "result.json" else place for place in places])
-    found = [_read(place) for place in places]
+    files = [Path(path) for path in paths]
+    require_several([file.parent if file.name == "result.json" else file for file in files])
+    found = [_read(file) for file in files]
     if treatment_time_s is not None:
-        found = [_peened_for(one, treatment_time_s) for one in found]
+        found = [_with_treatment_time(one, treatment_time_s) for one in found]
     designs = [one.design for one in found]
-    require_one_time(places, designs)
+    require_same_time(files, designs)
     target: np.ndarray | None = None
     built = []
-    for one, label in zip(found, labels([_named(place) for place in places]), strict=True):
+    for one, label in zip(found, labels([_named(file) for file in files]), strict=True):
         own, chamber = None, None
         if one.design.part.target.reachable:
             own = target if one.result is None else _target(one.result)
@@ -87,18 +101,19 @@ def gathered(paths: Sequence[str | Path], treatment_time_s: float | None = None)
             own = chamber.part.target if one.design.part.target.reachable else None
         if own is not None:
             target = own if target is None else target
-            require_same_triangles(one.path, own, places[0], target)
+            require_same_triangles(one.path, own, files[0], target)
         built.append(replace(one, label=label, chamber=chamber))
-    require_same_part(places, designs, [_mesh(one) for one in built])
+    require_same_part(files, designs, [_mesh(one) for one in built])
     return built
 
 
-def simulated(
+def simulate_missing(
     candidates: Sequence[Candidate], folder: Path, executor: Executor, prepare: Prepare
 ) -> tuple[list[Result], list[str]]:
-    """The result of each; what is missing is simulated into folders inside `folder`. With remarks.
+    """Return the result of each candidate, and remarks for the user.
 
-    Designs get seed, stream and number of replicas of the first candidate; results of another treatment time their own.
+    Designs are simulated with seed, stream and number of replicas of the first candidate. Results
+    of another treatment time keep their own. New results are written to folders inside `folder`.
     """
     results: list[Result] = []
     remarks: list[str] = []
@@ -108,72 +123,69 @@ def simulated(
             results.append(one.result)
             continue
         if one.result is not None:
-            draws = _draws(one.result)
+            settings = _seed_settings(one.result)
             seconds = one.design.process.treatment_time_s
             remarks.append(f"{one.label}: simulated again for {seconds:g} s, on its own seeds")
         else:
-            draws = (
-                _draws(results[0])
+            settings = (
+                _seed_settings(results[0])
                 if results
-                else Draws(one.design.process.seed, "search", None, "uniform_coverage")
+                else SeedSettings(one.design.process.seed, ReplicaPlan())
             )
-            remarks += _overridden(one, draws)
-        new, said = _simulate(one, draws, folder / name, executor, prepare)
+            remarks += _overridden(one, settings)
+        new, more = _simulate(one, settings, folder / name, executor, prepare)
         results.append(new)
-        remarks += said
+        remarks += more
     return results, remarks
 
 
 def _simulate(
-    one: Candidate, draws: Draws, folder: Path, executor: Executor, prepare: Prepare
+    one: Candidate, settings: SeedSettings, folder: Path, executor: Executor, prepare: Prepare
 ) -> tuple[Result, list[str]]:
     assert one.chamber is not None
-    asked = _drawn(one.design, draws)
-    cavity = (
-        analytic_cavity(asked, one.chamber)
-        if one.result and one.result.data.get("analytic")
-        else None
-    )
-    design, advice = prepare(asked, one.chamber, cavity)
+    design = _with_seeds(one.design, settings)
+    analytic = one.result is not None and one.result.data.get("analytic")
+    cavity = analytic_cavity(design, one.chamber) if analytic else None
+    design, advice = prepare(design, one.chamber, cavity)
     with progress_bar(f"{one.label}: replicas") as progress:
-        plan = ReplicaPlan(draws.replicas, draws.stream, draws.objective_name)
-        evaluation = evaluate(design, one.chamber, executor, progress, plan, cavity)
+        evaluation = evaluate(design, one.chamber, executor, progress, settings.plan, cavity)
     remarks = save_simulation(folder, design, one.chamber, evaluation, advice)
     return load_result(folder), [f"{one.label}: {text}" for text in (*map(str, advice), *remarks)]
 
 
-def _drawn(design: Design, draws: Draws) -> Design:
-    """The design with these draws in place of its own: its file then says what was done."""
-    values: dict[str, Any] = {"process.seed": draws.seed}
-    if draws.replicas is not None:
-        values["process.accuracy.replicas"] = draws.replicas
+def _with_seeds(design: Design, settings: SeedSettings) -> Design:
+    """Return the design with these settings, so that its file tells what was simulated."""
+    values: dict[str, Any] = {"process.seed": settings.seed}
+    if settings.plan.count is not None:
+        values["process.accuracy.replicas"] = settings.plan.count
         values["process.accuracy.objective_half_width"] = None
     return design.changed(values)
 
 
-def _overridden(one: Candidate, draws: Draws) -> list[str]:
-    """What a design asks for and does not get."""
-    process = one.design.process
-    said = []
-    if process.seed != draws.seed:
-        said.append(f"seed = {draws.seed} in place of {process.seed}")
-    if draws.replicas is not None and process.accuracy.objective_half_width is not None:
-        said.append(
-            f"{draws.replicas} replicas in place of as many as make ± {process.accuracy.objective_half_width:g}"
+def _overridden(one: Candidate, settings: SeedSettings) -> list[str]:
+    """Remarks on values of a design that the first candidate's settings replace."""
+    process, accuracy = one.design.process, one.design.process.accuracy
+    changes = []
+    if process.seed != settings.seed:
+        changes.append(f"seed = {settings.seed} instead of {process.seed}")
+    if settings.plan.count is not None and accuracy.objective_half_width is not None:
+        changes.append(
+            f"{settings.plan.count} replicas instead of as many as give "
+            f"± {accuracy.objective_half_width:g}"
         )
-    elif draws.replicas not in (None, process.accuracy.replicas):
-        said.append(f"{draws.replicas} replicas in place of {process.accuracy.replicas}")
-    return [f"{one.label}: {' and '.join(said)}, as the first candidate"] if said else []
+    elif settings.plan.count not in (None, accuracy.replicas):
+        changes.append(f"{settings.plan.count} replicas instead of {accuracy.replicas}")
+    return [f"{one.label}: {' and '.join(changes)}, as the first candidate"] if changes else []
 
 
-def _read(place: Path) -> Candidate:
-    if place.suffix == ".toml" or (place.is_file() and place.name != "result.json"):
-        return Candidate("", place, load_design(place), None, missing=True)
-    result = load_result(place)
-    return Candidate("", place, result.design, result, missing=False)
+def _read(path: Path) -> Candidate:
+    if path.suffix == ".toml" or (path.is_file() and path.name != "result.json"):
+        return Candidate("", path, load_design(path), None, missing=True)
+    result = load_result(path)
+    return Candidate("", path, result.design, result, missing=False)
 
 
-def _peened_for(one: Candidate, seconds: float) -> Candidate:
+def _with_treatment_time(one: Candidate, seconds: float) -> Candidate:
     if one.design.process.treatment_time_s == seconds:
         return one
     return replace(
@@ -181,15 +193,11 @@ def _peened_for(one: Candidate, seconds: float) -> Candidate:
     )
 
 
-def _named(place: Path) -> Path:
-    """A design by its name without .toml, a result by its folder."""
-    return (
-        place.with_suffix("")
-        if place.suffix == ".toml"
-        else place.parent
-        if place.name == "result.json"
-        else place
-    )
+def _named(path: Path) -> Path:
+    """Return the path that names a candidate: a design without .toml, the folder of a result."""
+    if path.suffix == ".toml":
+        return path.with_suffix("")
+    return path.parent if path.name == "result.json" else path
 
 
 def _mesh(one: Candidate) -> tuple[str, str]:
@@ -203,13 +211,14 @@ def _target(result: Result) -> np.ndarray:
     return np.asarray(read_surface(result.folder / COVERAGE)["target"]) > 0
 
 
-def _draws(result: Result) -> Draws:
+def _seed_settings(result: Result) -> SeedSettings:
     seed, stream = result.seeds
-    return Draws(seed, stream, int(result.data["replicas"]), result.objective_name)
+    plan = ReplicaPlan(int(result.data["replicas"]), stream, result.objective_name)
+    return SeedSettings(seed, plan)
 
 
 def _folder_names(candidates: Sequence[Candidate]) -> list[str]:
-    """The last name of each, told apart by a number where two are the same."""
+    """Return the last name of each path, with a number where two are the same."""
     names: list[str] = []
     for one in candidates:
         name, number = _named(one.path).resolve().name, 1

@@ -1,29 +1,37 @@
-"""Results side by side: what differs in the designs, and what that did to the part."""
+"""Compare results: what differs in the designs, and how the figures differ."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from chamberopt.coverage.metrics import NEVER, parse_objective
 from chamberopt.coverage.statistics.confidence_interval import Estimate
+from chamberopt.design.shapes.base import is_custom
 from chamberopt.output.compare.difference import Difference, confidence_of_each, difference
-from chamberopt.output.compare.inputs import require_one_time, require_same_part, require_several
-from chamberopt.output.compare.parameters import differing, labels
+from chamberopt.output.compare.inputs import require_same_part, require_same_time, require_several
 from chamberopt.output.results.load import Result, load_result
 
 TIME = "time_to_98_s"
+# The number of replicas tells more than the rule that decided it.
+REPLICAS = "process.accuracy.replicas"
+STOPPING_RULES = ("process.accuracy.objective_half_width", "process.accuracy.max_replicas")
 
 
 @dataclass(frozen=True)
 class Comparison:
     """Two or more results of the same part.
 
-    parameters: the dotted design values that differ, one per result · metrics: the objective, then every
-    metric, one Estimate per result · differences: each later result minus the first · confidence: of the interval of
-    each difference, so that those of one figure hold all together with 95 %.
+    Args:
+        results: the results.
+        labels: their short names.
+        parameters: dotted design values that differ, one for each result.
+        metrics: the objective, then every metric; one Estimate for each result.
+        differences: each later result minus the first, by metric.
+        confidence: of the interval of each difference, chosen so that the intervals of one figure
+            hold together with 95 %.
     """
 
     results: tuple[Result, ...]
@@ -34,7 +42,7 @@ class Comparison:
     confidence: float
 
     def as_json(self) -> dict[str, Any]:
-        """The comparison as plain JSON values."""
+        """Return the comparison as plain JSON values."""
         return {
             "results": [str(result.folder) for result in self.results],
             "labels": list(self.labels),
@@ -54,10 +62,11 @@ class Comparison:
 
 
 def compare(paths: Sequence[str | Path]) -> Comparison:
-    """Compare results folders of the same part and target; the first is what the others are measured against.
+    """Compare results folders of the same part and target with the first of them.
 
-    Raises InputError for fewer than two, for one given twice, for folders that are no results, and for different parts,
-    targets or treatment times.
+    Raises:
+        InputError: there are fewer than two, one is given twice, one is not a result, or parts,
+            targets or treatment times differ.
     """
     folders = [Path(path) for path in paths]
     require_several(folders)
@@ -65,19 +74,16 @@ def compare(paths: Sequence[str | Path]) -> Comparison:
 
 
 def comparison_of(results: Sequence[Result], names: Sequence[str]) -> Comparison:
-    """The comparison of results that were read, under these names. Raises InputError as `compare` does.
+    """Compare results under these names; raises InputError as `compare` does.
 
-    Where two were run on the same seeds their replicas are compared pair by pair, else as independent (Welch).
+    Results on the same seeds are compared replica by replica, others as independent (Welch).
     """
-    first, places, designs = (
-        results[0],
-        [result.folder for result in results],
-        [result.design for result in results],
-    )
+    first, folders = results[0], [result.folder for result in results]
+    designs = [result.design for result in results]
     require_same_part(
-        places, designs, [(result.part_sha256, part_unit(result)) for result in results]
+        folders, designs, [(result.part_sha256, part_unit(result)) for result in results]
     )
-    require_one_time(places, designs)
+    require_same_time(folders, designs)
     same_goal = all(result.objective_name == first.objective_name for result in results)
     metrics = (
         {first.objective_name: tuple(result.objective for result in results)} if same_goal else {}
@@ -88,7 +94,7 @@ def comparison_of(results: Sequence[Result], names: Sequence[str]) -> Comparison
     return Comparison(
         results=tuple(results),
         labels=tuple(names),
-        parameters=differing(results),
+        parameters=_differing_values(results),
         metrics=metrics,
         differences={
             name: tuple(_difference(name, first, other, confidence) for other in results[1:])
@@ -99,7 +105,7 @@ def comparison_of(results: Sequence[Result], names: Sequence[str]) -> Comparison
 
 
 def part_unit(result: Result) -> str:
-    """The unit that the numbers of its part's file were taken in."""
+    """Return the unit in which the part's file was read."""
     return str(result.data.get("part_unit") or result.design.part.unit)
 
 
@@ -112,6 +118,52 @@ def _difference(name: str, first: Result, other: Result, confidence: float) -> D
         one.metrics[TIME].value >= NEVER for one in (first, other) if TIME in one.metrics
     ):
         return replace(
-            gap, half_width=NEVER, times=None, replicas=None
-        )  # "never" has no replicas that scatter
+            gap, half_width=NEVER, time_ratio=None, replicas=None
+        )  # "never" does not scatter
     return gap
+
+
+def labels(paths: Sequence[Path]) -> tuple[str, ...]:
+    """Return the last part of each path, with as much of what precedes it as makes it unique."""
+    resolved = [path.resolve() for path in paths]
+    for depth in range(1, max(len(path.parts) for path in resolved) + 1):
+        names = tuple("/".join(path.parts[-depth:]) for path in resolved)
+        if len(set(names)) == len(names):
+            return names
+    return tuple(f"{path.name} ({i})" for i, path in enumerate(resolved, start=1))
+
+
+def _differing_values(results: Sequence[Result]) -> dict[str, tuple[Any, ...]]:
+    """Return the dotted design values that are not the same in all results; None where missing."""
+    designs = [_design_values(result) for result in results]
+    names = dict.fromkeys(name for design in designs for name in design)
+    rows = {name: tuple(design.get(name) for design in designs) for name in names}
+    return {name: values for name, values in rows.items() if len(set(map(str, values))) > 1}
+
+
+def _design_values(result: Result) -> dict[str, Any]:
+    """Return all values of a result's design, and those that a design does not contain."""
+    values = _flattened(result.design.model_dump(mode="json", exclude={"part": {"mesh", "unit"}}))
+    for name in STOPPING_RULES:
+        values.pop(name, None)
+    if is_custom(values["chamber.shape"]):
+        values["chamber.shape"] = Path(values["chamber.shape"]).name  # its content is shape_sha256
+    return {
+        **values,
+        REPLICAS: result.data.get("replicas", values.get(REPLICAS)),
+        "shape_sha256": result.data.get("shape_sha256", "")[:12],
+        "analytic": bool(result.data.get("analytic", False)),
+    }
+
+
+def _flattened(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Return nested tables, and lists of tables, as one table with dotted names."""
+    flat: dict[str, Any] = {}
+    for name, value in table.items():
+        if isinstance(value, list | tuple) and any(isinstance(one, Mapping) for one in value):
+            value = {str(place): one for place, one in enumerate(value)}
+        if isinstance(value, Mapping):
+            flat |= _flattened(value, f"{prefix}{name}.")
+        else:
+            flat[prefix + name] = value
+    return flat

@@ -1,4 +1,4 @@
-"""A figure of two candidates: how far apart, whether that is real, and if not, how long to simulate to know."""
+"""The difference of a figure between two candidates: is it real, and what would show it?"""
 
 from __future__ import annotations
 
@@ -20,45 +20,52 @@ from chamberopt.coverage.statistics.confidence_interval import (
     welch_half_width,
 )
 
-LONGEST = 1000  # times as long as was simulated: what takes more is not foretold
+MAX_TIME_RATIO = 1000  # no forecast beyond this many times the simulated time
 
 
 @dataclass(frozen=True)
 class Difference:
-    """A later candidate's figure minus the first's.
+    """The figure of a later candidate minus that of the first.
 
-    value, half_width: with its interval · paired: replica by replica, on the same seeds; else independent (Welch) ·
-    replicas: how many of the later candidate would tell the difference from nothing if it is as large as it looks,
-    times: so many times those there are; None where it is real, where there is none, or beyond LONGEST times.
+    Args:
+        value: the difference.
+        half_width: of its interval.
+        paired: whether replicas were compared pair by pair on the same seeds; else the samples are
+            taken as independent (Welch).
+        time_ratio: replicas over the number of replicas there are.
+        replicas: number of replicas of the later candidate that would show the difference if it is
+            as large as it looks. None, as is time_ratio, where the difference is real or 0, or
+            beyond MAX_TIME_RATIO.
     """
 
     value: float
     half_width: float
     paired: bool
-    times: float | None = None
+    time_ratio: float | None = None
     replicas: int | None = None
 
     @property
     def real(self) -> bool:
-        """Whether it is larger than its interval."""
+        """Whether the difference is larger than its half-width."""
         return abs(self.value) > self.half_width
 
     def as_json(self) -> dict[str, Any]:
-        """Plain JSON values."""
+        """Return plain JSON values."""
         return {
             "value": self.value,
             "half_width": self.half_width,
             "paired": self.paired,
             "real": self.real,
-            "times_as_long": self.times,
+            "times_as_long": self.time_ratio,
             "replicas": self.replicas,
         }
 
 
 def confidence_of_each(comparisons: int) -> float:
-    """Confidence of each of so many intervals for all of them together to hold with 95 %.
+    """Confidence of each interval such that all of them hold together with 95 %.
 
-    Bonferroni's inequality: O. J. Dunn, "Multiple comparisons among means", J. Am. Stat. Assoc. 56 (1961) 52.
+    Source: Bonferroni's inequality, O. J. Dunn, "Multiple comparisons among means",
+    J. Am. Stat. Assoc. 56 (1961) 52.
     """
     return 1.0 - (1.0 - CONFIDENCE) / comparisons
 
@@ -66,7 +73,10 @@ def confidence_of_each(comparisons: int) -> float:
 def difference(
     after: Estimate, before: Estimate, same_seeds: bool, confidence: float = CONFIDENCE
 ) -> Difference:
-    """after - before, with its interval; as pairs where both have as many replicas, on the same seeds."""
+    """Return after - before with its interval.
+
+    Replicas are compared pair by pair where both have the same number on the same seeds.
+    """
     count = len(after.pseudovalues)
     paired = same_seeds and count == len(before.pseudovalues) > 0
     gap = (paired_difference if paired else independent_difference)(after, before, confidence)
@@ -75,30 +85,31 @@ def difference(
     )
     if found.real or found.value == 0.0 or min(count, len(before.pseudovalues)) < 2:
         return found
-    scatter = _of_pairs(gap, confidence) if paired else _of_two(after, before, confidence)
-    # The bias in an interval is of what so few dents do not say: it is taken to shrink like the scatter.
-    needed = _smallest(
+    if paired:
+        scatter = _paired_half_width(gap, confidence)
+    else:
+        scatter = partial(welch_half_width, after.pseudovalues, before.pseudovalues, confidence)
+    # The bias comes from having few dents, so it is assumed to shrink as the scatter does.
+    needed = _smallest_number(
         lambda n: scatter(n / count) + gap.bias * math.sqrt(count / n), count, abs(gap.value)
     )
-    return found if needed is None else replace(found, times=needed / count, replicas=needed)
+    return found if needed is None else replace(found, time_ratio=needed / count, replicas=needed)
 
 
-def _of_pairs(gap: Estimate, confidence: float) -> Callable[[float], float]:
-    """Half-width from so many times as many pairs of the same scatter."""
+def _paired_half_width(gap: Estimate, confidence: float) -> Callable[[float], float]:
+    """Return the half-width as a function of the number of pairs, as a multiple of today's."""
     count, deviation = len(gap.pseudovalues), float(np.std(gap.pseudovalues, ddof=1))
-    return lambda times: (
-        student_quantile(count * times - 1.0, confidence) * deviation / math.sqrt(count * times)
+    return lambda ratio: (
+        student_quantile(count * ratio - 1.0, confidence) * deviation / math.sqrt(count * ratio)
     )
 
 
-def _of_two(after: Estimate, before: Estimate, confidence: float) -> Callable[[float], float]:
-    """Half-width from so many times as many replicas of each, of the same scatter."""
-    return partial(welch_half_width, after.pseudovalues, before.pseudovalues, confidence)
+def _smallest_number(half_width: Callable[[float], float], count: int, gap: float) -> int | None:
+    """Return the smallest number of replicas above count whose half-width is below the gap.
 
-
-def _smallest(half_width: Callable[[float], float], count: int, gap: float) -> int | None:
-    """The smallest number of replicas above count whose half-width is below the gap; None beyond LONGEST times."""
-    low, high = count, LONGEST * count
+    None if that is more than MAX_TIME_RATIO * count.
+    """
+    low, high = count, MAX_TIME_RATIO * count
     if half_width(high) >= gap:
         return None
     while high - low > 1:

@@ -1,4 +1,4 @@
-"""How coverage, impact speeds and angles are spread over the target, of several results in the same bins."""
+"""Histograms of coverage, impact speed and impact angle over the target, in common bins."""
 
 from __future__ import annotations
 
@@ -8,31 +8,44 @@ from typing import Any
 
 import numpy as np
 
-from chamberopt.output.compare.covered import Covered
+from chamberopt.output.compare.target_surface import TargetSurface
 
 BINS = 40
 
 
 @dataclass(frozen=True)
 class Histogram:
-    """edges (n + 1,) in the unit · shares: of each result (n,), 0..1 of its area or impacts, None where not known."""
+    """A histogram of several results.
+
+    Args:
+        unit: of the edges.
+        edges: of the bins, shape (n + 1,).
+        shares: for each result the share of its area or impacts in each bin, shape (n,); None where
+            it is unknown.
+    """
 
     unit: str
     edges: np.ndarray
     shares: tuple[np.ndarray | None, ...]
 
     def as_json(self) -> dict[str, Any]:
-        """Plain JSON values."""
+        """Return plain JSON values."""
         shares = [None if one is None else one.tolist() for one in self.shares]
         return {"unit": self.unit, "edges": self.edges.tolist(), "shares": shares}
 
 
 @dataclass(frozen=True)
 class Distributions:
-    """coverage: shares of the target's area, what is hidden from the shot at 0 · speed, angle: shares of its impacts.
+    """Distributions of several results over one target.
 
-    impacts, mean_speed [m/s], mean_angle [degrees]: of each result, None where it has no single impacts · dents: a
-    triangle of the target, of each.
+    Args:
+        coverage: shares of the target's area; what lies outside the cavity has coverage 0.
+        speed: shares of the impacts by normal speed.
+        angle: shares of the impacts by angle.
+        impacts: number of impacts of each result; None where it stores no single impacts.
+        mean_speed: [m/s], of each result, or None.
+        mean_angle: [degrees], of each result, or None.
+        dents: mean number of dents per triangle of the target, of each result.
     """
 
     coverage: Histogram
@@ -44,7 +57,7 @@ class Distributions:
     dents: tuple[float, ...]
 
     def as_json(self) -> dict[str, Any]:
-        """Plain JSON values."""
+        """Return plain JSON values."""
         return {
             "coverage": self.coverage.as_json(),
             "normal_speed": self.speed.as_json(),
@@ -56,24 +69,24 @@ class Distributions:
         }
 
 
-def distributions(candidates: Sequence[Covered]) -> Distributions:
-    """Of results of one part and target."""
+def distributions(candidates: Sequence[TargetSurface]) -> Distributions:
+    """Compute the distributions of results of one part and target."""
     hits = [one.hits_on_target for one in candidates]
     speeds = [None if one is None else one.speed.astype(float) for one in hits]
     angles = [None if one is None else one.angle.astype(float) for one in hits]
     return Distributions(
-        coverage=_of_coverage(candidates),
-        speed=_of_impacts("m/s", np.linspace(0.0, _fastest(speeds), BINS + 1), speeds),
-        angle=_of_impacts("degrees", np.linspace(0.0, 90.0, BINS - 4 + 1), angles),
+        coverage=_coverage_histogram(candidates),
+        speed=_impact_histogram("m/s", np.linspace(0.0, _top_speed(speeds), BINS + 1), speeds),
+        angle=_impact_histogram("degrees", np.linspace(0.0, 90.0, BINS - 4 + 1), angles),
         impacts=tuple(None if one is None else len(one) for one in hits),
         mean_speed=tuple(map(_mean, speeds)),
         mean_angle=tuple(map(_mean, angles)),
-        dents=tuple(one.dents_a_triangle for one in candidates),
+        dents=tuple(one.dents_per_triangle for one in candidates),
     )
 
 
-def _of_coverage(candidates: Sequence[Covered]) -> Histogram:
-    """Of a triangle that is partly hidden, that part is at 0."""
+def _coverage_histogram(candidates: Sequence[TargetSurface]) -> Histogram:
+    """Shares of area by coverage; the part of a triangle outside the cavity counts as 0."""
     columns = []
     for one in candidates:
         area, exposed = one.area[one.target], np.minimum(one.exposed, one.area)[one.target]
@@ -90,8 +103,10 @@ def _of_coverage(candidates: Sequence[Covered]) -> Histogram:
     )
 
 
-def _of_impacts(unit: str, edges: np.ndarray, columns: Sequence[np.ndarray | None]) -> Histogram:
-    """What is beyond the last edge is in the last bin; no impacts, no shares."""
+def _impact_histogram(
+    unit: str, edges: np.ndarray, columns: Sequence[np.ndarray | None]
+) -> Histogram:
+    """Shares of impacts; values beyond the last edge are in the last bin."""
     shares = [
         None
         if one is None
@@ -101,8 +116,8 @@ def _of_impacts(unit: str, edges: np.ndarray, columns: Sequence[np.ndarray | Non
     return Histogram(unit, edges, tuple(shares))
 
 
-def _fastest(speeds: Sequence[np.ndarray | None]) -> float:
-    """The speed that one impact in a thousand exceeds, of the candidate where that is most; at least 0.1 m/s."""
+def _top_speed(speeds: Sequence[np.ndarray | None]) -> float:
+    """Return the largest 99.9 % quantile of the candidates' speeds, at least 0.1 m/s."""
     return max(
         [0.1, *(float(np.quantile(one, 0.999)) for one in speeds if one is not None and len(one))]
     )

@@ -1,4 +1,4 @@
-"""A comparison as text: what differs, every figure, and what is to be made of each difference."""
+"""A comparison as text: what differs, every figure, and whether each difference is real."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from typing import Any
 from chamberopt.coverage.metrics import NEVER
 from chamberopt.coverage.statistics.confidence_interval import CONFIDENCE, Estimate
 from chamberopt.output.compare.comparison import TIME, Comparison
-from chamberopt.output.compare.difference import LONGEST, ZERO_TOLERANCE, Difference
+from chamberopt.output.compare.difference import MAX_TIME_RATIO, ZERO_TOLERANCE, Difference
 
-COUNTED = "process.accuracy.coverage_model"
+COVERAGE_MODEL = "process.accuracy.coverage_model"
 HEADER = ("difference", "real", "to know: simulate")
 
 
 def as_text(comparison: Comparison) -> str:
-    """Two candidates in one table; of more, what they are and then each later one against the first."""
+    """Return one table for two candidates; for more, one of figures and then one of differences."""
     first, *later = comparison.labels
     rows = [
         [name, *(_shown(value) for value in values)]
@@ -45,20 +45,21 @@ def as_text(comparison: Comparison) -> str:
 
 
 def _legend(comparison: Comparison) -> list[str]:
-    """How the table is to be read."""
+    """Lines that explain the table."""
     first, *later = comparison.labels
     lines = [
-        "(± 95 % interval. real: the difference is larger than its own interval, which holds for each figure alone."
+        "(±: 95 % interval. real: the difference is larger than its interval, which holds for each "
+        "figure alone."
     ]
     if any(gap.replicas for several in comparison.differences.values() for gap in several):
         lines.append(
-            "to know: times what was simulated, and replicas, if the difference is as large as it looks; even then it "
-            "shows in one case of two."
+            "to know: how many times as long to simulate, and replicas, if the difference is as "
+            "large as it looks; even then it shows in one case of two."
         )
     if len(later) > 1:
         lines.append(
-            f"Differences have intervals of {100.0 * comparison.confidence:.4g} %, so that all {len(later)} of a "
-            f"figure hold together with {100.0 * CONFIDENCE:g} % (Bonferroni)."
+            f"Differences have intervals of {100.0 * comparison.confidence:.4g} %, so that all "
+            f"{len(later)} of a figure hold together with {100.0 * CONFIDENCE:g} % (Bonferroni)."
         )
     for k, label in enumerate(later):
         paired = [several[k].paired for several in comparison.differences.values()]
@@ -66,32 +67,33 @@ def _legend(comparison: Comparison) -> list[str]:
             lines.append(f"{label} - {first}: paired, replica by replica on the same seeds.")
         elif comparison.results[k + 1].seeds == comparison.results[0].seeds:
             lines.append(
-                f"{label} - {first}: as independent, for they have not the same number of replicas."
+                f"{label} - {first}: taken as independent, because the numbers of replicas differ."
             )
         else:
             lines.append(f"{label} - {first}: independent, on other seeds.")
-    if COUNTED in comparison.parameters:
+    if COVERAGE_MODEL in comparison.parameters:
         lines.append(
-            f"Coverage is counted in two ways ({COUNTED}): differences may be of the counting, not of the chambers."
+            f"Coverage is counted in two ways ({COVERAGE_MODEL}): differences may come from that, "
+            "not from the chambers."
         )
     return [*lines[:-1], lines[-1] + ")"]
 
 
 def two_digits(half_width: float) -> str:
-    """Of an interval, without an exponent where that is short: 1300, 0.0048."""
+    """Format a half-width with two digits and no exponent if that is short: 1300, 0.0048."""
     return f"{float(f'{half_width:.2g}'):g}"
 
 
 def _cells(gap: Difference) -> list[str]:
-    """Difference, whether it is real, and what it takes to know."""
+    """Cells of a difference: its value, whether it is real, and what it takes to know."""
     shown = _value(gap.value, "+.4g" if gap.value else "g", gap.half_width)
     if gap.value == 0.0:
         return [shown, "no", ""]
     if gap.real:
         return [shown, "yes", ""]
-    if gap.times is None or gap.replicas is None:
-        return [shown, "no", f"more than {LONGEST} × as long"]
-    return [shown, "no", f"{_times(gap.times)} × as long, {gap.replicas} replicas"]
+    if gap.time_ratio is None or gap.replicas is None:
+        return [shown, "no", f"more than {MAX_TIME_RATIO} × as long"]
+    return [shown, "no", f"{_times(gap.time_ratio)} × as long, {gap.replicas} replicas"]
 
 
 def _times(times: float) -> str:
@@ -105,7 +107,7 @@ def _figure(name: str, estimate: Estimate) -> str:
 
 
 def _value(value: float, form: str, half_width: float) -> str:
-    """A number, and its interval if it has one; of what rounding leaves of a zero, 0."""
+    """Format a number and its half-width; numbers below ZERO_TOLERANCE are shown as 0."""
     value, half_width = (0.0 if abs(x) < ZERO_TOLERANCE else x for x in (value, half_width))
     return f"{value:{form}}" + (f" ± {two_digits(half_width)}" if half_width else "")
 
@@ -115,7 +117,7 @@ def _shown(value: Any) -> str:
 
 
 def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Cells under each other; the first row is the header."""
+    """Align the cells of rows; the first row is the header."""
     count = max(map(len, rows))
     whole = [[*row, *[""] * (count - len(row))] for row in rows]
     widths = [max(len(row[i]) for row in whole) for i in range(count)]

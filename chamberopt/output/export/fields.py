@@ -60,7 +60,8 @@ def write_fields(folder: str | Path, to: str, path: str | Path) -> list[str]:
     surface = load_coverage(result)
     if "element" not in surface.cell_data:
         raise InputError(
-            f"{result.folder / COVERAGE}: written by a version without element numbers; simulate again"
+            f"{result.folder / COVERAGE}: written by a version without element numbers; "
+            "simulate again"
         )
     try:
         if to not in DECKS:
@@ -94,7 +95,7 @@ def _write_deck(result: Result, surface: Any, to: str, path: Path) -> list[str]:
     added = int((number == 0).sum())
     if added:
         remarks.append(
-            f"left out {added} triangles that belong to no element of the file: they close its holes"
+            f"left out {added} triangles that are in no element of the file: they close its holes"
         )
     remarks += _elements_left_out(fields)
     meanings = [f"{name.upper()}: {COLUMNS[name][0]}" for name in fields.columns]

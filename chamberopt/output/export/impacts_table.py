@@ -1,4 +1,4 @@
-"""Write every impact of a result as a table, for residual stress solvers: .parquet, .csv, .csv.gz."""
+"""The table of every impact of a result, for residual stress solvers: .parquet, .csv, .csv.gz."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ WriteRows = Callable[[Sequence[np.ndarray]], None]
 
 
 def write_impacts(
-    files: Sequence[Path], result: Result, rebuilt: RebuiltChamber, executor: Executor, *, frame: FrameName = "part",
-    replicas: int | None = None, progress: Progress | None = None,
+    files: Sequence[Path], result: Result, rebuilt: RebuiltChamber, executor: Executor, *,
+    frame: FrameName = "part", replicas: int | None = None, progress: Progress | None = None,
 ) -> int:  # fmt: skip
-    """Simulate a result again and write all its impacts into each file, in the format of its ending.
+    """Simulate a result again and write its impacts into each file, in the format of its ending.
 
     The table has one row for each impact, replica after replica, in order of time. Its columns are
     in impact_columns.py. Files appear complete or not at all.

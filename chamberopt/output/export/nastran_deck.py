@@ -1,8 +1,10 @@
-"""Fields as Nastran pressures on shells: PLOAD4 in the large field format, one load set a quantity.
+"""Fields as Nastran pressures on shells: PLOAD4 in the large field format.
 
-Source: MSC Nastran Quick Reference Guide, PLOAD4. P1 alone is a pressure over the whole element, for
-shells of first and second order. On a solid the entry needs the grids of the loaded face, which are
-not stored.
+Each quantity is a load set.
+
+Source: MSC Nastran Quick Reference Guide, PLOAD4. P1 alone is a pressure over the whole element,
+for shells of first and second order. On a solid the entry needs the grids of the loaded face, which
+are not stored.
 """
 
 from __future__ import annotations

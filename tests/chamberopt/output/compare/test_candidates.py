@@ -17,7 +17,7 @@ from chamberopt.design.design import Design, validate
 from chamberopt.design.load import load_design, save_design
 from chamberopt.output import viewer
 from chamberopt.output.compare import candidates
-from chamberopt.output.compare.candidates import gathered, simulated
+from chamberopt.output.compare.candidates import read_candidates, simulate_missing
 from chamberopt.output.compare.comparison import comparison_of
 from chamberopt.output.results.load import load_result
 from chamberopt.output.save_run import save_simulation
@@ -71,8 +71,8 @@ def as_is(design: Design, *_: Any) -> tuple[Design, list[Any]]:
 
 
 def run(paths: list[Path], out: Path, seconds: float | None = None) -> tuple[Any, list[str]]:
-    found = gathered(paths, seconds)
-    results, remarks = simulated(found, out, SerialExecutor(), as_is)
+    found = read_candidates(paths, seconds)
+    results, remarks = simulate_missing(found, out, SerialExecutor(), as_is)
     return comparison_of(results, [one.label for one in found]), remarks
 
 
@@ -88,7 +88,7 @@ def test_designs_of_one_name_on_the_draws_of_the_first(
     )
     compared, remarks = run([first, second], tmp_path / "out")
     assert compared.labels == ("a/plate", "b/plate")
-    instead = "seed = 7 in place of 1 and 5 replicas in place of as many as make ± 0.01"
+    instead = "seed = 7 instead of 1 and 5 replicas instead of as many as give ± 0.01"
     assert remarks == [f"b/plate: {instead}, as the first candidate"]
     assert set(compared.parameters) == {"shot.mass_g"}
     assert all(gap.paired for (gap,) in compared.differences.values())
@@ -130,9 +130,9 @@ def test_another_treatment_time_is_simulated_again_on_its_own_seeds(
     save_simulation(tmp_path / "short", short, CHAMBER, poisson_evaluation(short, CHAMBER, 20, 6))
     paths = [made("long.toml"), tmp_path / "short"]
     with pytest.raises(InputError, match=r"peened for 2 s.*for 5 s.*--treatment-time-s"):
-        gathered(paths)
+        read_candidates(paths)
     with pytest.raises(InputError, match=r"treatment_time_s"):
-        gathered(paths, -1.0)
+        read_candidates(paths, -1.0)
     compared, remarks = run(paths, tmp_path / "out", 5.0)
     assert remarks == ["short: simulated again for 5 s, on its own seeds"]
     assert [design.process.treatment_time_s for design, _ in simulations.done] == [5.0, 5.0]
@@ -155,11 +155,11 @@ def test_everything_is_refused_before_anything_is_simulated(
         (one, "given twice"),
     ):
         with pytest.raises(InputError, match=said):
-            gathered([one, second])
+            read_candidates([one, second])
     with pytest.raises(InputError, match=r"another part \(blade.stl\)"):
-        gathered([one, DESIGNS / "blade.toml"], 5.0)
+        read_candidates([one, DESIGNS / "blade.toml"], 5.0)
     with pytest.raises(InputError, match="two or more"):
-        gathered([one])
+        read_candidates([one])
     assert simulations.done == []
 
 
@@ -181,7 +181,7 @@ def test_designs_share_the_first_ones_reachable_target(
     save_design(validate(Design, data), tmp_path / "wide.toml")
     data["chamber"]["diameter_mm"] = 40.0
     save_design(validate(Design, data), tmp_path / "narrow.toml")
-    wide, narrow = gathered([tmp_path / "wide.toml", tmp_path / "narrow.toml"])
+    wide, narrow = read_candidates([tmp_path / "wide.toml", tmp_path / "narrow.toml"])
     assert wide.chamber is not None
     assert narrow.chamber is not None
     np.testing.assert_array_equal(wide.chamber.part.target, narrow.chamber.part.target)
@@ -190,8 +190,8 @@ def test_designs_share_the_first_ones_reachable_target(
     save_simulation(
         tmp_path / "result", narrow.design, alone, poisson_evaluation(narrow.design, alone)
     )
-    with pytest.raises(InputError, match=r"its target is \d+ triangles.*give its design"):
-        gathered([tmp_path / "wide.toml", tmp_path / "result"])
+    with pytest.raises(InputError, match=r"its target of \d+ triangles.*give its design"):
+        read_candidates([tmp_path / "wide.toml", tmp_path / "result"])
 
 
 def test_a_result_whose_parts_file_is_gone_is_compared_but_not_simulated_again(
@@ -205,6 +205,9 @@ def test_a_result_whose_parts_file_is_gone_is_compared_but_not_simulated_again(
     moved = validate(Design, data)
     save_simulation(tmp_path / "old", moved, CHAMBER, poisson_evaluation(moved, CHAMBER))
     shutil.rmtree(parts)
-    assert [one.missing for one in gathered([tmp_path / "old", made("new.toml")])] == [False, True]
+    assert [one.missing for one in read_candidates([tmp_path / "old", made("new.toml")])] == [
+        False,
+        True,
+    ]
     with pytest.raises(InputError, match=r"plate\.stl"):
-        gathered([tmp_path / "old", made("new.toml")], 6.0)
+        read_candidates([tmp_path / "old", made("new.toml")], 6.0)

@@ -15,10 +15,10 @@ from chamberopt.coverage.statistics.confidence_interval import Estimate, estimat
 from chamberopt.design.design import validate
 from chamberopt.design.load import Design, load_design
 from chamberopt.output import viewer
-from chamberopt.output.compare import files
+from chamberopt.output.compare import comparison_folder
 from chamberopt.output.compare.comparison import compare
-from chamberopt.output.compare.difference import LONGEST, confidence_of_each, difference
-from chamberopt.output.compare.files import write_comparison
+from chamberopt.output.compare.comparison_folder import write_comparison
+from chamberopt.output.compare.difference import MAX_TIME_RATIO, confidence_of_each, difference
 from chamberopt.output.compare.table import as_text
 from chamberopt.output.save_run import save_simulation
 from chamberopt.output.vtp_files import read_surface
@@ -32,7 +32,7 @@ CHAMBER = build_chamber(PLATE)
 def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(viewer, "draw_coverage", lambda *_: "skipped")
     for name in ("draw_coverage", "draw_difference"):
-        monkeypatch.setattr(files, name, lambda *_: "skipped")
+        monkeypatch.setattr(comparison_folder, name, lambda *_: "skipped")
 
 
 def left(folder: Path, per_mm2: float, seed: int = 0, design=PLATE, **changes: object) -> Path:
@@ -52,7 +52,7 @@ def test_the_same_twice(tmp_path: Path) -> None:
         assert gap.value == 0.0
         assert gap.paired
         assert not gap.real
-        assert gap.times is None
+        assert gap.time_ratio is None
         if name not in (
             "p05_coverage",
             "time_to_98_s",
@@ -119,7 +119,7 @@ def test_simulated_so_much_longer_the_difference_shows_in_half_of_the_cases(pair
     gap = difference(estimate(true_gap + noise[1]), estimate(noise[0]), same_seeds=paired)
     assert not gap.real
     assert gap.replicas is not None
-    assert gap.times == pytest.approx(gap.replicas / count)
+    assert gap.time_ratio == pytest.approx(gap.replicas / count)
     # 1.96 standard errors in the limit: the foretold number is not far above (Student's t of more replicas is near it).
     limit = (1.96 * spread / true_gap) ** 2 * (1 if paired else 2)
     assert limit < gap.replicas < 1.2 * limit
@@ -136,10 +136,10 @@ def test_simulated_so_much_longer_the_difference_shows_in_half_of_the_cases(pair
 def test_what_would_take_for_ever_is_not_foretold(tmp_path: Path) -> None:
     values = np.array([1.0, 2.0, 3.0, 4.0])
     tiny = difference(estimate(values[::-1] + 1e-4), estimate(values), same_seeds=True)
-    assert (tiny.real, tiny.times, tiny.replicas) == (False, None, None)
+    assert (tiny.real, tiny.time_ratio, tiny.replicas) == (False, None, None)
     both = compare([left(tmp_path / "a", 20), left(tmp_path / "b", 20)])
     text = as_text(replace(both, differences={name: (tiny,) for name in both.differences}))
-    assert row(text, "mean_coverage").endswith(f"more than {LONGEST} × as long")
+    assert row(text, "mean_coverage").endswith(f"more than {MAX_TIME_RATIO} × as long")
 
 
 def test_never_is_not_told_from_late(tmp_path: Path) -> None:
@@ -185,7 +185,7 @@ def test_three_results_and_what_is_written(tmp_path: Path) -> None:
             100.0 * mean.value, abs=edges[1] - edges[0]
         )
     assert (tmp_path / "out" / "distributions.png").stat().st_size > 50_000
-    with pytest.raises(InputError, match="never overwritten"):
+    with pytest.raises(InputError, match="nothing is ever overwritten"):
         write_comparison(tmp_path / "out", three)
 
 
@@ -193,7 +193,10 @@ def test_results_without_single_impacts_are_compared_all_the_same(tmp_path: Path
     both = compare([left(tmp_path / "new", 20), left(tmp_path / "older", 30, hits=())])
     remarks = write_comparison(tmp_path / "out", both)
     assert remarks[0] == "skipped"
-    assert "difference.png skipped: older: no single impacts" in remarks[1]
+    assert (
+        "difference.png skipped: older: results of an older version, without single impacts"
+        in remarks[1]
+    )
     about = json.loads((tmp_path / "out" / "compare.json").read_text())
     assert about["local_differences_to_first"] is None
     assert about["distributions"]["angle"]["shares"][1] is None

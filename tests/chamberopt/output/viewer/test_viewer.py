@@ -196,7 +196,7 @@ def test_averaging_keeps_the_mean_and_does_not_cross_edges() -> None:
 
 
 def test_importing_chamberopt_does_not_import_pyvista() -> None:
-    modules = "chamberopt.output.results.load, chamberopt.output.compare.files"
+    modules = "chamberopt.output.results.load, chamberopt.output.compare.comparison_folder"
     code = f"import sys, {modules}; assert 'pyvista' not in sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True, env=dict(os.environ))
 

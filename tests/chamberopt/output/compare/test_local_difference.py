@@ -9,8 +9,8 @@ from matplotlib.image import imread
 
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.output import viewer
-from chamberopt.output.compare.covered import Covered, covered
-from chamberopt.output.compare.local import local_difference
+from chamberopt.output.compare.local_difference import local_difference
+from chamberopt.output.compare.target_surface import TargetSurface, read_target_surface
 from chamberopt.output.results.load import load_result
 from chamberopt.output.save_run import save_simulation
 from chamberopt.output.viewer import draw_difference, missing_opengl, write_differences
@@ -30,7 +30,7 @@ def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def peened(
     folder: Path, per_mm2: np.ndarray | float, seed: int, chamber: Chamber = CHAMBER
-) -> Covered:
+) -> TargetSurface:
     """A result whose dents fell at random, so many in all on each mm² of a triangle."""
     rng = np.random.default_rng(seed)
     mean = per_mm2 * 1e6 * chamber.exposed_area / 4
@@ -39,7 +39,7 @@ def peened(
         for _ in range(4)
     ]
     save_simulation(folder, PLATE, chamber, evaluation_of(PLATE, chamber, tallies))
-    return covered(load_result(folder))
+    return read_target_surface(load_result(folder))
 
 
 def on_the_right() -> np.ndarray:
@@ -56,7 +56,7 @@ def test_more_on_one_half_is_found_there_and_not_elsewhere(tmp_path: Path) -> No
     assert not found.real[~target].any()
     away = (
         np.abs(CHAMBER.part.vertices[CHAMBER.part.triangles].mean(axis=1)[:, 0])
-        > 1e-3 * found.reach
+        > 1e-3 * found.radius
     )
     wanted = np.exp(-20.0 * 1e6 * DENT * TIMES) - np.exp(-40.0 * 1e6 * DENT * TIMES)
     assert found.value[target & right & away].mean() == pytest.approx(wanted, abs=0.01)
@@ -80,7 +80,7 @@ def test_one_in_twenty_is_real_by_chance_where_nothing_differs(
         ]
         found = local_difference(pair[0], pair[1])
         shares.append(found.more + found.less)
-        assert (found.reach > 0.0) == (per_mm2 < 10.0)
+        assert (found.radius > 0.0) == (per_mm2 < 10.0)
     assert np.mean(shares) < 0.07
     if per_mm2 > 10.0:
         assert np.mean(shares) > 0.02  # ... and the interval is not too wide

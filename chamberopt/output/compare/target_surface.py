@@ -1,4 +1,4 @@
-"""The target of one result, triangle by triangle, as its folder has it."""
+"""The target of one result, triangle by triangle, as stored in its folder."""
 
 from __future__ import annotations
 
@@ -12,12 +12,19 @@ from chamberopt.output.results.load import Result, load_coverage
 
 
 @dataclass(frozen=True)
-class Covered:
-    """Triangles of a part, (m,) each, of which only the target's count.
+class TargetSurface:
+    """The triangles of a part; only those of the target are compared.
 
-    centre (m, 3) mm, in the chamber · normal (m, 3), unit vectors · target bool · area, exposed mm² · coverage 0..1, 0
-    where hidden from the shot · dents: simulated numbers · times: treatment over simulated time · hits: None in results
-    of older versions.
+    Args:
+        centre: in the chamber [mm], shape (m, 3).
+        normal: unit vectors, shape (m, 3).
+        target: which triangles belong to the target, shape (m,) bool.
+        area: [mm²], shape (m,).
+        exposed: exposed area [mm²], shape (m,).
+        coverage: 0 to 1, 0 outside the cavity, shape (m,).
+        dents: number of simulated dents, shape (m,).
+        time_ratio: treatment time over simulated time.
+        hits: single impacts; None in results of older versions.
     """
 
     centre: np.ndarray
@@ -27,27 +34,27 @@ class Covered:
     exposed: np.ndarray
     coverage: np.ndarray
     dents: np.ndarray
-    times: float
+    time_ratio: float
     hits: HitsByTriangle | None
 
     @property
     def hits_on_target(self) -> Hits | None:
-        """The impacts that count, one by one."""
+        """The single impacts on the exposed target."""
         return None if self.hits is None else self.hits.on(self.target & (self.exposed > 0.0))
 
     @property
-    def dents_a_triangle(self) -> float:
-        """Mean over the target."""
+    def dents_per_triangle(self) -> float:
+        """Mean number of dents over the triangles of the target."""
         return float(self.dents[self.target].mean())
 
 
-def covered(result: Result) -> Covered:
-    """Read a results folder. Raises InputError for files gone or damaged."""
+def read_target_surface(result: Result) -> TargetSurface:
+    """Read the target of a results folder; InputError if files are missing or damaged."""
     surface = load_coverage(result)
     points, triangles = np.asarray(surface.points, dtype=float), np.asarray(surface.regular_faces)
     vectors = area_vectors(points, triangles)
     area = np.linalg.norm(vectors, axis=1)
-    return Covered(
+    return TargetSurface(
         centre=points[triangles].mean(axis=1),
         normal=vectors / np.maximum(area, 1e-300)[:, None],
         target=np.asarray(surface["target"]) > 0,
@@ -55,6 +62,6 @@ def covered(result: Result) -> Covered:
         exposed=np.asarray(surface["exposed_area_mm2"], dtype=float),
         coverage=np.nan_to_num(np.asarray(surface["coverage"], dtype=float)),
         dents=np.asarray(surface["dents"], dtype=float),
-        times=result.design.process.treatment_time_s / float(result.data["simulated_time_s"]),
+        time_ratio=result.design.process.treatment_time_s / float(result.data["simulated_time_s"]),
         hits=load_matching_hits(result.folder, np.asarray(surface["impacts"])),
     )
