@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 from typing import TYPE_CHECKING
+from xml.etree import ElementTree
 
 import numpy as np
 
 from chamberopt.common.files import atomic_write
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from chamberopt.coverage.statistics.confidence_interval import Estimate
+
+SVG = "http://www.w3.org/2000/svg"
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -32,6 +36,39 @@ def save_picture(figure: Figure, path: Path) -> None:
     """Write the figure as .png, atomically."""
     with atomic_write(path) as temporary:
         figure.savefig(temporary)
+
+
+def svg_text(
+    figure: Figure, name: str, tooltips: Mapping[str, Sequence[str]] | None = None
+) -> str:
+    """The figure as an SVG element for an HTML page; its text can be selected and searched.
+
+    Args:
+        name: makes the ids inside unique among the figures of a page.
+        tooltips: texts that appear when pointing at the markers of the line with this gid, in
+            the order of its points.
+    """
+    from matplotlib import rc_context
+
+    file = io.StringIO()
+    with rc_context({"svg.fonttype": "none", "svg.hashsalt": name}):
+        no_metadata = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+        figure.savefig(file, format="svg", metadata=no_metadata)
+    text = file.getvalue()
+    ElementTree.register_namespace("", SVG)
+    ElementTree.register_namespace("xlink", "http://www.w3.org/1999/xlink")
+    root = ElementTree.fromstring(text)
+    for element in root.iter():
+        identity = element.get("id", "")
+        for marker, tooltip in zip(
+            element.iter(f"{{{SVG}}}use"), (tooltips or {}).get(identity, ()), strict=False
+        ):
+            ElementTree.SubElement(marker, f"{{{SVG}}}title").text = tooltip
+        if identity and f"#{identity}" not in text:
+            del element.attrib["id"]  # such as axes_1, the same in every figure
+    root.set("width", f"{100.0 * figure.get_figwidth():g}")  # pixels; the page may shrink it
+    del root.attrib["height"]
+    return ElementTree.tostring(root, encoding="unicode")
 
 
 def style_axes(axes: Axes, x_label: str = "", y_label: str = "") -> None:

@@ -89,8 +89,12 @@ def draw_convergence(
     candidates: Sequence[EvaluatedCandidate],
     y_label: str,
     smaller_is_better: bool = False,
-) -> None:
-    """Draw every evaluation in its order with 95 % intervals, the best so far, and confirmations."""
+) -> dict[str, list[str]]:
+    """Draw every evaluation in its order with 95 % intervals, the best so far, and confirmations.
+
+    Returns:
+        Tooltips for svg_text: value and parameters of each point, by gid of its line.
+    """
     from matplotlib.ticker import MaxNLocator
 
     search = [one for one in candidates if one.stage == "search"]
@@ -99,8 +103,18 @@ def draw_convergence(
     feasible = [one for one in evaluated if one.feasible]
     infeasible = [one for one in evaluated if not one.feasible]
     failed = [one.number for one in search if not one.objective]
-    _draw_intervals(axes, feasible, BLUE, "evaluation, 95 % interval")
-    _draw_intervals(axes, infeasible, GREY, "misses a constraint", marker="x")
+    last = max((one.number for one in candidates), default=1) + 0.5
+    tooltips = {}
+    for group, colour, marker, label in (
+        (feasible, BLUE, "o", "evaluation, 95 % interval"),
+        (infeasible, GREY, "x", "misses a constraint"),
+        (confirmed, GREEN, "o", "confirmed on fresh seeds"),
+    ):
+        if group:
+            x, y, half_width = zip(*map(_point, group), strict=True)
+            axes.errorbar(x, y, yerr=half_width, fmt=marker, ms=5, lw=1, color=colour, label=label,
+                          gid=label)  # fmt: skip
+            tooltips[label] = [_tooltip(one) for one in group]
     if failed:
         axes.plot(failed, np.full(len(failed), 0.02), "|", color=GREY, clip_on=False,
                   label="could not be simulated", transform=axes.get_xaxis_transform())  # fmt: skip
@@ -110,28 +124,25 @@ def draw_convergence(
         numbers = [one.number for one in feasible]
         axes.step([*numbers, search[-1].number], [*values, values[-1]], where="post", color=BLUE,
                   alpha=0.5, label="best so far (as searched)")  # fmt: skip
-    last = max((one.number for one in candidates), default=1) + 0.5
     if confirmed:
         axes.axvspan(len(search) + 0.5, last, color=GREEN, alpha=0.08, lw=0)
-        _draw_intervals(axes, confirmed, GREEN, "confirmed on fresh seeds")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xlim(0.5, last)
     if shown := [one.objective for one in (*evaluated, *confirmed) if one.objective]:
         axes.set_ylim(*value_range(shown))
     style_axes(axes, "evaluation", y_label)
+    return tooltips
 
 
-def _draw_intervals(
-    axes: Axes, candidates: Sequence[EvaluatedCandidate], colour: str, label: str, marker: str = "o"
-) -> None:
-    rows = [
-        (c.number, c.objective.value, c.objective.half_width) for c in candidates if c.objective
-    ]
-    if rows:
-        x, y, half_width = zip(*rows, strict=True)
-        axes.errorbar(
-            x, y, yerr=half_width, fmt=marker, ms=5, lw=1, color=colour, label=label, gid=label
-        )
+def _point(candidate: EvaluatedCandidate) -> tuple[int, float, float]:
+    assert candidate.objective is not None
+    return candidate.number, candidate.objective.value, candidate.objective.half_width
+
+
+def _tooltip(candidate: EvaluatedCandidate) -> str:
+    number, value, half_width = _point(candidate)
+    rows = [f"{name} = {one:.4g}" for name, one in candidate.parameters.items()]
+    return "\n".join([f"evaluation {number}: {value:.4g} ± {half_width:.2g}", *rows])
 
 
 def _draw_parameter(

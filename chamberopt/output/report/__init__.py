@@ -1,6 +1,6 @@
-"""A result as one page for a browser, with all it needs inside. The only room that imports plotly."""
+"""A result as one HTML page that needs nothing but a browser."""
 
-from chamberopt.output.report.facts import facts
+from chamberopt.output.report.contents import report_contents
 from chamberopt.output.report.page import write_part_page, write_report
 
-__all__ = ["facts", "write_part_page", "write_report"]
+__all__ = ["report_contents", "write_part_page", "write_report"]

@@ -1,17 +1,17 @@
-"""Pieces of HTML. Every text that comes in is escaped here: folder names, notes and file names are anybody's."""
+"""Pieces of HTML. All text is escaped here, because names of folders and files may hold markup."""
 
 from __future__ import annotations
 
 import html
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
-FIGURE = ' class="figure"'
+NUMBER = ' class="number"'
 
 
 def text(value: object) -> str:
-    """As text, whatever it holds; a figure and its interval stay on one line."""
+    """The value as escaped text; a number and its interval stay on one line."""
     return html.escape(str(value), quote=True).replace(" ± ", "\u00a0±\u00a0")
 
 
@@ -20,22 +20,26 @@ def paragraph(value: object, kind: str = "") -> str:
 
 
 def items(values: Iterable[object]) -> str:
-    """A list; nothing of nothing."""
+    """An HTML list; an empty string for no items."""
     rows = "".join(f"<li>{text(value)}</li>" for value in values)
     return f"<ul>{rows}</ul>" if rows else ""
 
 
 def table(
-    caption: str, head: Sequence[object], rows: Iterable[Sequence[object]], figures: bool = True
+    caption: str, head: Sequence[object], rows: Iterable[Sequence[object]], numbers: bool = True
 ) -> str:
-    """The first column heads its row; figures: the others are numbers, to the right."""
+    """A table whose first column heads its row.
+
+    Args:
+        numbers: whether the other columns are numbers, set to the right.
+    """
+    kind = NUMBER if numbers else ""
     top = "".join(
-        f'<th scope="col"{FIGURE if figures and i else ""}>{text(cell)}</th>'
-        for i, cell in enumerate(head)
+        f'<th scope="col"{kind if i else ""}>{text(cell)}</th>' for i, cell in enumerate(head)
     )
-    kind = FIGURE if figures else ""
     body = "".join(
-        f'<tr><th scope="row">{text(first)}</th>{"".join(f"<td{kind}>{text(cell)}</td>" for cell in rest)}</tr>'
+        f'<tr><th scope="row">{text(first)}</th>'
+        f"{''.join(f'<td{kind}>{text(cell)}</td>' for cell in rest)}</tr>"
         for first, *rest in rows
     )
     named = f"<caption>{text(caption)}</caption>" if caption else ""
@@ -48,26 +52,25 @@ def section(title: str, *content: str) -> str:
 
 
 def pair(*content: str) -> str:
-    """Side by side where there is room."""
+    """Pieces side by side where the page is wide enough."""
     return f'<div class="pair">{"".join(f"<div>{one}</div>" for one in content)}</div>'
 
 
 def fold(title: str, content: str, kind: str = "") -> str:
-    """Closed until it is asked for."""
+    """Content that is hidden until its title is clicked."""
     return f"<details{_class(kind)}><summary>{text(title)}</summary>{content}</details>"
 
 
-def chart(name: str, figure: Mapping[str, Any], said: str) -> str:
-    """A place for a chart, what it shows in words, and its data for charts.js."""
-    source = embedded(figure, f'class="chart" data-into="{text(name)}"')
-    place = f'<div id="{text(name)}" class="chart" role="img" aria-label="{text(said)}"></div>'
-    return f"<figure>{place}<figcaption>{text(said)}</figcaption></figure>{source}"
+def chart(name: str, svg: str, caption: str) -> str:
+    """A chart with a caption, which is also its description for screen readers."""
+    place = f'<div id="{text(name)}" class="chart" role="img" aria-label="{text(caption)}">{svg}'
+    return f"<figure>{place}</div><figcaption>{text(caption)}</figcaption></figure>"
 
 
-def embedded(value: Any, attributes: str) -> str:
-    """JSON in the page. No text in it can end the script element."""
+def embedded_json(value: Any, name: str) -> str:
+    """JSON in a script element with this id, which no text in it can end."""
     inside = json.dumps(value, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
-    return f'<script type="application/json" {attributes}>{inside}</script>'
+    return f'<script type="application/json" id="{text(name)}">{inside}</script>'
 
 
 def _class(kind: str) -> str:

@@ -1,4 +1,4 @@
-"""The pages: one HTML file each, with all it needs inside. A policy in its head forbids it any request."""
+"""The HTML pages of results: one file each, which no part of is fetched from anywhere."""
 
 from __future__ import annotations
 
@@ -13,177 +13,187 @@ from typing import Any
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import write_text
+from chamberopt.output.plots.colours import hex_colours
 from chamberopt.output.report import html
-from chamberopt.output.report.facts import START, design_file, facts
-from chamberopt.output.report.part3d import Scene, part_scene, quantities
+from chamberopt.output.report.contents import START, read_design_file, report_contents
+from chamberopt.output.report.part3d import Scene, common_quantities, part_scene
 from chamberopt.output.report.sections import sections
 from chamberopt.output.results.load import load_result, summary
 
 REPORT = "report.html"
 GENERATOR = '<meta name="generator" content="chamberopt'
-# The browser itself holds the page to it: nothing is fetched, whatever the texts on it say.
+# The browser enforces that nothing is fetched, even if a text of the result held markup.
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; "
     "img-src data: blob:; worker-src blob:; font-src data:; base-uri 'none'; form-action 'none'"
 )
-HOW = "Drag to turn, wheel to zoom; point at a triangle for its figures."
+HELP = (
+    "Drag to turn, use the wheel to zoom, point at a triangle to see its numbers. "
+    "Grey: not in the target, or out of reach. Light grey: never hit."
+)
+SUBTITLES = {
+    "study": "Report of a study: the best chamber found",
+    "simulation": "Report of one simulated chamber",
+}
 
 
 def write_report(result: str | Path, path: str | Path | None = None) -> tuple[Path, dict[str, Any]]:
-    """Write the report of a results folder; the file, and what it says as plain values.
+    """Write the report of a results folder.
 
-    path: RESULT/report.html if left out. Raises InputError for a folder that is no finished result, and for a path
-    that holds anything but such a page.
+    Args:
+        path: of the page; RESULT/report.html if left out.
+
+    Returns:
+        Path of the page, and what it says as plain JSON values.
+
+    Raises:
+        InputError: the folder is no finished result, or the path holds anything but a report.
     """
-    said = facts(result)
+    contents = report_contents(result)
     loaded = load_result(result)
-    path = free_page(loaded.folder / REPORT if path is None else path)
-    scene = part_scene(loaded, said["name"])
-    before = loaded.folder / START
-    with_start = said["kind"] == "study" and (before / "coverage.vtp").is_file()
-    start = part_scene(load_result(before), START, 0) if with_start else None
-    shown = ({START: start} if start else {}) | {
-        "best" if said["kind"] == "study" else "result": scene
-    }
-    body = sections(said, viewer([scene]), shown, design_file(loaded.folder))
-    head = f"<header><h1>{html.text(said['name'])}</h1>{html.paragraph(_subtitle(said), 'soft')}</header>"
-    write_page(path, f"{said['name']}: report", head + body, [scene])
-    return path, {**said, "remarks": list(scene.remarks)}
+    path = require_free_page(loaded.folder / REPORT if path is None else path)
+    is_study = contents["kind"] == "study"
+    scene = part_scene(loaded, contents["name"])
+    scenes = {"best" if is_study else "result": scene}
+    start = loaded.folder / START
+    if is_study and (start / "coverage.vtp").is_file():
+        scenes = {START: part_scene(load_result(start), START, max_triangles=0), **scenes}
+    made = f"simulated {contents['made'][:10]}, " if contents["made"] else ""
+    subtitle = (
+        f"{SUBTITLES.get(contents['kind'], '')}; "
+        f"{made}report made {datetime.now(UTC).date()} by chamberopt"
+    )
+    head = (
+        f"<header><h1>{html.text(contents['name'])}</h1>{html.paragraph(subtitle, 'soft')}</header>"
+    )
+    body = sections(contents, viewer([scene]), scenes, read_design_file(loaded.folder))
+    write_page(path, f"{contents['name']}: report", head + body, [scene])
+    return path, {**contents, "remarks": list(scene.remarks)}
 
 
 def write_part_page(results: Sequence[Path], path: Path) -> list[str]:
-    """Write a page of the parts in three dimensions alone, side by side, turning together; returns remarks.
+    """Write a page of parts in three dimensions only, side by side, which turn together.
 
-    Raises InputError as write_report does, and when a part is too large for a page.
+    Returns:
+        Remarks, such as triangles left out.
+
+    Raises:
+        InputError: as write_report, and for a part that is too large for a page.
     """
-    path = free_page(path)
+    path = require_free_page(path)
     loaded = [load_result(one) for one in results]
-    names = _names([one.folder.resolve() for one in loaded])
+    names = _unique_names([one.folder.resolve() for one in loaded])
     scenes = [part_scene(one, name) for one, name in zip(loaded, names, strict=True)]
     for scene, one in zip(scenes, loaded, strict=True):
         if scene.data is None:
             raise InputError(f"{one.folder}: {scene.remarks[-1]}")
     if len(scenes) > 1:
-        named = (
-            tuple(f"{name}: {remark}" for remark in scene.remarks)
-            for name, scene in zip(names, scenes, strict=True)
-        )
         scenes = [
-            replace(scene, remarks=remarks) for scene, remarks in zip(scenes, named, strict=True)
+            replace(scene, remarks=tuple(f"{name}: {remark}" for remark in scene.remarks))
+            for name, scene in zip(names, scenes, strict=True)
         ]
-    said = [f"{name}: {summary(one)}" for name, one in zip(names, loaded, strict=True)]
+    summaries = [f"{name}: {summary(one)}" for name, one in zip(names, loaded, strict=True)]
     title = ", ".join(names)
-    content = html.section("Part in its chamber", html.items(said), viewer(scenes))
+    content = html.section("Part in its chamber", html.items(summaries), viewer(scenes))
     write_page(path, title, f"<header><h1>{html.text(title)}</h1></header>{content}", scenes)
     return [remark for scene in scenes for remark in scene.remarks]
 
 
-def _names(folders: Sequence[Path]) -> list[str]:
-    """The folders' names, with the folder above where they are not told apart, or are a study's start."""
+def _unique_names(folders: Sequence[Path]) -> list[str]:
+    """The folders' names; with the folder above if two are the same or one is a study's start."""
     names = [folder.name for folder in folders]
-    alone = len(set(names)) == len(names) and START not in names
-    return names if alone else ["/".join(folder.parts[-2:]) for folder in folders]
+    unique = len(set(names)) == len(names) and START not in names
+    return names if unique else ["/".join(folder.parts[-2:]) for folder in folders]
 
 
-def free_page(path: str | Path) -> Path:
-    """A path that may be written: free, or a page of ours. Else InputError."""
+def require_free_page(path: str | Path) -> Path:
+    """Return the path; raise InputError unless it is free or holds an older report."""
     path = Path(path)
     if path.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"{path}: a report is one .html file; give such a name (--out FILE.html)")
     if not path.resolve().parent.is_dir():
         raise InputError(f"{path}: the folder does not exist; make it first")
     try:
-        if os.path.lexists(path) and (
-            not path.is_file() or GENERATOR.encode() not in path.read_bytes()[:2000]
-        ):
-            raise InputError(
-                f"{path}: is there, and no report of ours to replace; give another name (--out FILE.html)"
-            )
+        is_report = path.is_file() and GENERATOR.encode() in path.read_bytes()[:2000]
     except OSError as error:
         raise InputError(
             f"{path}: cannot be read: {error.strerror}; give another name (--out FILE.html)"
         ) from None
+    if os.path.lexists(path) and not is_report:
+        raise InputError(
+            f"{path}: this file exists and is no report, so it is not replaced; "
+            "give another name (--out FILE.html)"
+        )
     return path
 
 
 def viewer(scenes: Sequence[Scene]) -> str:
-    """The place of the parts with their controls, which part.js brings to life."""
+    """HTML for the parts in 3D and their controls, which part.js fills."""
     drawn = [scene.data for scene in scenes if scene.data]
     remarks = "".join(
         html.paragraph(remark, "soft") for scene in scenes for remark in scene.remarks
     )
     if not drawn:
         return remarks
-    options = "".join(f"<option>{html.text(one['label'])}</option>" for one in quantities(drawn))
-    most = max(
+    options = "".join(
+        f"<option>{html.text(one['label'])}</option>" for one in common_quantities(drawn)
+    )
+    last = max(
         max((time for time, _ in one["curve"]), default=3.0 * one["treatment"]) for one in drawn
     )
     now = max(one["treatment"] for one in drawn)
-    panels = "".join(
-        f'<figure><div class="part" id="part-{i}" role="img" aria-label="{html.text(one["title"])}: the part in its '
-        f'chamber in three dimensions, coloured by the chosen quantity"></div>'
-        + (f"<figcaption>{html.text(one['title'])}</figcaption>" if len(drawn) > 1 else "")
-        + "</figure>"
-        for i, one in enumerate(drawn)
-    )
+    panels = ""
+    for i, one in enumerate(drawn):
+        title = html.text(one["title"])
+        description = (
+            f"{title}: the part in its chamber in three dimensions, coloured by the chosen quantity"
+        )
+        caption = f"<figcaption>{title}</figcaption>" if len(drawn) > 1 else ""
+        panels += (
+            f'<figure><div class="part" id="part-{i}" role="img" aria-label="{description}"></div>'
+            f"{caption}</figure>"
+        )
     return (
         f'<div class="controls"><label>Colour by <select id="quantity">{options}</select></label>'
         '<label><input type="checkbox" id="glass" checked> show the chamber</label>'
-        '<label><input type="checkbox" id="fit"> fit the colours to what is there</label>'
-        f'<span id="times"><label for="time">after</label><input type="range" id="time" min="0" max="{most:g}" '
-        f'step="{now / 60.0:.15g}" value="{now:g}"><output id="at" for="time"></output></span></div>'
+        '<label><input type="checkbox" id="fit"> fit the colours to the values shown</label>'
+        '<span id="times"><label for="time">after</label>'
+        f'<input type="range" id="time" min="0" max="{last:g}" step="{now / 60.0:.15g}" '
+        f'value="{now:g}"><output id="at" for="time"></output></span></div>'
         f'<div class="panels">{panels}</div><div id="label" role="status" hidden></div>'
-        f"{html.paragraph(f'{HOW} Grey: not in the target, or out of reach; light grey: never hit.', 'soft')}{remarks}"
-        "<noscript><p>The pictures of this page are drawn by a script, which this browser does not run.</p></noscript>"
+        f"{html.paragraph(HELP, 'soft')}{remarks}"
+        "<noscript><p>A script draws the part in 3D; this browser does not run it.</p></noscript>"
     )
 
 
 def write_page(path: Path, title: str, body: str, scenes: Sequence[Scene]) -> None:
-    """Put a page together and write it, whole or not at all. Raises InputError where it cannot be written."""
+    """Put a page together and write it atomically; raise InputError if it cannot be written."""
     from plotly.offline import get_plotlyjs
 
-    drawn = [scene.data for scene in scenes if scene.data]
-    carried = {"quantities": quantities(drawn), "scenes": drawn, "scales": _colour_scales(drawn)}
-    parts = html.embedded(carried, 'id="parts"') if drawn else ""
-    scripts = "".join(
-        f"<script>{script}</script>"
-        for script in (get_plotlyjs(), _own("part.js"), _own("charts.js"))
-    )
+    data = ""
+    if drawn := [scene.data for scene in scenes if scene.data]:
+        quantities = common_quantities(drawn)
+        colour_maps = {name: hex_colours(name) for name in {one["colours"] for one in quantities}}
+        content = {"quantities": quantities, "scenes": drawn, "scales": colour_maps}
+        data = html.embedded_json(content, "parts")
     page = (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
-        f'{GENERATOR} {html.text(version("chamberopt"))}"><meta name="viewport" content="width=device-width">'
-        f"<title>{html.text(title)}</title><style>{_own('style.css')}</style></head>\n"
-        f"<body><main>{body}</main>\n{parts}\n{scripts}</body></html>\n"
+        f'{GENERATOR} {html.text(version("chamberopt"))}">'
+        '<meta name="viewport" content="width=device-width">'
+        f"<title>{html.text(title)}</title><style>{_asset('style.css')}</style></head>\n"
+        f"<body><main>{body}</main>\n{data}\n"
+        f"<script>{get_plotlyjs()}</script><script>{_asset('part.js')}</script></body></html>\n"
     )
     try:
         write_text(path, page)
     except OSError as error:
-        why = f"{path}: cannot be written: {error.strerror}; give another place (--out FILE.html)"
-        raise InputError(why) from None
-
-
-def _subtitle(said: dict[str, Any]) -> str:
-    what = {
-        "study": "Report of a study: the best chamber found",
-        "simulation": "Report of one simulated chamber",
-    }
-    made = f"simulated {said['made'][:10]}, " if said["made"] else ""
-    return (
-        f"{what.get(said['kind'], '')}; {made}report made {datetime.now(UTC).date()} by chamberopt"
-    )
-
-
-def _colour_scales(drawn: Sequence[dict[str, Any]]) -> dict[str, list[str]]:
-    from plotly.colors import sequential
-
-    return {
-        name: getattr(sequential, name.title())
-        for name in {one["colours"] for one in quantities(drawn)}
-    }
+        raise InputError(
+            f"{path}: cannot be written: {error.strerror}; give another place (--out FILE.html)"
+        ) from None
 
 
 @cache
-def _own(name: str) -> str:
-    """A script or style that lies beside this file."""
+def _asset(name: str) -> str:
+    """Text of a script or style sheet of this package."""
     return Path(__file__).with_name(name).read_text(encoding="utf-8")

@@ -1,10 +1,13 @@
-// The part in three dimensions: colours it by a quantity, or by the coverage at a time; tells a triangle's numbers.
+// The part in 3D: colours it by a quantity or by the coverage at a time, and shows a triangle's numbers.
 "use strict";
+addEventListener("beforeprint", () => {
+  for (const fold of document.querySelectorAll("details.print")) fold.open = true;
+});
 (() => {
   const element = document.getElementById("parts");
   if (!element) return;
   const { quantities, scenes, scales } = JSON.parse(element.textContent);
-  const NEVER_HIT = "#d9d9d9", SLIVER = 1 / 64; // of the bar, below its lower end: for triangles without a value
+  const NEVER_HIT = "#d9d9d9", SLIVER = 1 / 64; // share of the colour bar, at its lower end, for triangles without a value
   const find = (id) => document.getElementById(id);
   const controls = { quantity: find("quantity"), time: find("time"), fit: find("fit"), glass: find("glass") };
   const label = find("label");
@@ -15,7 +18,7 @@
     for (const name of ["number", "element"]) if (scene[name]) scene[name] = new Int32Array(bytes(scene[name]));
   }
 
-  // Three digits that count; what floating point leaves of 0 is 0.
+  // Three significant digits; rounding errors around 0 are shown as 0.
   const number = (x) => !Number.isFinite(x) ? "–" : Math.abs(x) < 1e-12 ? "0" : Math.abs(x) >= 1e4
     ? Math.round(x).toString() : String(Number(x.toPrecision(3)));
   const seconds = () => Number(controls.time.value);
@@ -27,7 +30,7 @@
     return moves(scene) ? scene.columns["shown-density"].map((d) => covered(d, scene)) : scene.columns[chosen().name];
   }
 
-  // 1st to 99th percentile of all results together, outwards to round numbers.
+  // Range of the colours: 1st to 99th percentile of all results, widened to round numbers.
   function range(all) {
     if (chosen().unit === "%" && !controls.fit.checked) return [0, 100];
     const known = Float32Array.from(all.flatMap((one) => Array.from(one.filter(Number.isFinite)))).sort();
@@ -64,22 +67,22 @@
     return `${(100 * (c0 + share * (c1 - c0))).toFixed(1)} %`;
   }
 
-  function sayTime() {
+  function showTime() {
     const named = (scene) => mean(scene) && (scenes.length > 1 ? `${mean(scene)} (${scene.title})` : mean(scene));
-    const said = scenes.map(named).filter(Boolean).join(", ");
-    find("at").textContent = `${number(seconds())} s${said ? `: the target is covered to ${said} on average` : ""}`;
+    const means = scenes.map(named).filter(Boolean).join(", ");
+    find("at").textContent = `${number(seconds())} s${means ? `: the target is covered to ${means} on average` : ""}`;
     find("times").hidden = !scenes.some(moves);
   }
 
   const plots = scenes.map((scene, i) => find(`part-${i}`));
-  let waiting = false; // a slider moves faster than a large part is coloured
+  let waiting = false; // a slider moves faster than a large part can be coloured
   function recolour() {
-    sayTime();
+    showTime();
     if (waiting) return;
     waiting = true;
     requestAnimationFrame(() => {
       waiting = false;
-      colouring().forEach((look, i) => Plotly.restyle(plots[i], look, [0]));
+      colouring().forEach((style, i) => Plotly.restyle(plots[i], style, [0]));
     });
   }
 
@@ -113,7 +116,7 @@
     label.style.top = `${Math.max(top, 4)}px`;
   }
 
-  // Glass is seen through, so a pointer must reach what is behind it: only the part is drawn where plotly picks.
+  // The chamber is transparent, so the pointer must reach the part behind it: plotly may pick only the part.
   function pickThePartOnly(plot) {
     const inside = plot._fullLayout.scene._scene;
     for (const trace of Object.values(inside.traces))
@@ -136,10 +139,10 @@
     modebar: { bgcolor: "rgba(255,255,255,0.6)", color: "#56616a", activecolor: "#1c2226" },
   };
   const buttons = [["toImage", "resetCameraLastSave3d"]];
-  const looks = colouring();
+  const styles = colouring();
   const drawn = scenes.map((scene, i) => {
-    const [part, ...others] = scene.figure, look = looks[i];
-    const first = { ...part, ...look, intensity: look.intensity[0], colorscale: look.colorscale[0] };
+    const [part, ...others] = scene.figure, style = styles[i];
+    const first = { ...part, ...style, intensity: style.intensity[0], colorscale: style.colorscale[0] };
     const config = { displaylogo: false, responsive: true, modeBarButtons: buttons };
     return Plotly.newPlot(plots[i], [first, ...others], { ...layout, scene: scene.view }, config).then((plot) => {
       pickThePartOnly(plot);
@@ -150,9 +153,9 @@
     });
   });
   Promise.all(drawn).then(() => { document.body.dataset.drawn = "yes"; });
-  sayTime();
+  showTime();
 
-  // What WebGL has drawn is gone by the time a printer asks for it: an image stands in.
+  // A printer cannot read what WebGL has drawn, so an image takes its place.
   addEventListener("beforeprint", () => {
     for (const plot of plots) {
       const image = document.createElement("img");

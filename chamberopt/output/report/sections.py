@@ -1,4 +1,4 @@
-"""The page's text, section by section, in the order a reader asks."""
+"""The text of the page, section by section."""
 
 from __future__ import annotations
 
@@ -7,302 +7,298 @@ from collections.abc import Mapping
 from typing import Any
 
 from chamberopt.output.report import charts, html
-from chamberopt.output.report.formatting import plain, share, with_interval, with_unit
+from chamberopt.output.report.numbers import plain, share, with_interval, with_unit
 from chamberopt.output.report.part3d import Scene
 
-Facts = Mapping[str, Any]
-SURE = (
-    "The intervals count chance: how far the figures would move if the same design were simulated anew. How well its "
-    "restitution, friction and materials fit your machine they cannot know: calibrate those."
+Contents = Mapping[str, Any]  # of report_contents, or a part of it
+LIMITS_OF_INTERVALS = (
+    "The intervals cover random variation between simulations only. They do not include errors in "
+    "your restitution, friction and material data: calibrate those with your machine."
 )
-TILES = ("mean_coverage", "p05_coverage", "time_to_98_s")  # beside the objective
+TILES = ("mean_coverage", "p05_coverage", "time_to_98_s")  # shown beside the objective
 
 
-def sections(said: Facts, viewer: str, shown: Mapping[str, Scene], design: tuple[str, str]) -> str:
-    """All of the page below its title. viewer: HTML of the part in 3D · shown: coverage of each candidate, by name ·
-    design: name and text of the design file.
+def sections(
+    contents: Contents, viewer: str, scenes: Mapping[str, Scene], design_file: tuple[str, str]
+) -> str:
+    """HTML of the page below its title.
+
+    Args:
+        viewer: HTML of the part in 3D.
+        scenes: by name of the result, for the coverage of its triangles.
+        design_file: name and text.
     """
-    study = said["kind"] == "study"
+    is_study = contents["kind"] == "study"
     parts = [
-        _question(said),
-        _answer(said),
-        html.section("The best chamber" if study else "The chamber", viewer),
+        _question(contents),
+        _answer(contents),
+        html.section("The best chamber" if is_study else "The chamber", viewer),
     ]
-    if study:
-        parts += [_front(said), _convergence(said), _influence(said)]
+    if is_study:
+        parts += [_pareto_front(contents), _convergence(contents), _influence(contents)]
     parts += [
-        _coverage(said, shown),
-        _accuracy(said),
-        _effects(said),
-        _notes(said),
-        _design(said, *design),
+        _coverage(contents, scenes),
+        _accuracy_and_cost(contents),
+        _effects(contents),
+        _notes(contents),
+        _design(contents, *design_file),
+        html.section("Made with", html.table("", (), contents["identity"].items(), numbers=False)),
     ]
-    return "".join(
-        [
-            *parts,
-            html.section("Made with", html.table("", (), said["identity"].items(), figures=False)),
-        ]
-    )
+    return "".join(parts)
 
 
-def _question(said: Facts) -> str:
-    asked = said["question"]
-    target = asked["target"]
-    area = target.get("target_exposed_area_mm2")
-    reach = (
-        f", of which the shot can reach {plain(area)} mm² in {target['target_triangles']} triangles"
-        if area
-        else ""
+def _question(contents: Contents) -> str:
+    question = contents["question"]
+    part, target = question["part"], question["target"]
+    reach = ""
+    if area := target.get("target_exposed_area_mm2"):
+        triangles = target["target_triangles"]
+        reach = f" (the shot can reach {plain(area)} mm² of it, in {triangles} triangles)"
+    peening = (
+        f"for {plain(question['treatment_time_s'])} s in a chamber of shape “{question['shape']}”"
     )
-    peened = f"for {plain(asked['treatment_time_s'])} s in a chamber of shape “{asked['shape']}”"
-    goal, meaning = (asked["objective"][key] for key in ("label", "meaning"))
-    goal += f" ({meaning})" if meaning else ""
-    if said["kind"] != "study":
-        text = f"How is the target of {asked['part']}{reach} covered when it is peened {peened}?"
+    if contents["kind"] != "study":
+        text = f"How is the target of {part}{reach} covered when it is peened {peening}?"
         return html.section("The question", html.paragraph(text))
-    aim = "smallest" if asked["smaller_is_better"] else "largest"
+    objective = question["objective"]
+    meaning = f" ({objective['meaning']})" if objective["meaning"] else ""
+    aim = "smallest" if question["smaller_is_better"] else "largest"
     text = (
-        f"Which chamber gives the {aim} {goal}? The part is {asked['part']}, with its target{reach}, peened {peened}. "
-        f"{asked['evaluations']} candidates were simulated; they were chosen by: {asked['algorithm']}."
+        f"Which chamber gives the {aim} {objective['label']}{meaning}? "
+        f"The part is {part}; its target{reach} is peened {peening}. "
+        f"{question['evaluations']} candidates were simulated, chosen by: {question['algorithm']}."
     )
-    limits = (
-        f"Constraints: {'; '.join(asked['constraints'])}."
-        if asked["constraints"]
-        else "There were no constraints."
-    )
+    limits = "There were no constraints."
+    if question["constraints"]:
+        limits = f"Constraints: {', '.join(question['constraints'])}."
     rows = [
         (
-            one["name"],
-            f"{plain(one['low'])} to {plain(one['high'])}",
-            plain(one["start"]),
-            plain(one["best"]),
+            row["name"],
+            f"{plain(row['low'])} to {plain(row['high'])}",
+            plain(row["start"]),
+            plain(row["best"]),
         )
-        for one in asked["vary"]
+        for row in question["vary"]
     ]
     varied = html.table("What was varied", ("parameter", "bounds", "start", "best"), rows)
-    return html.section(
-        "The question", html.pair(html.paragraph(text) + html.paragraph(limits), varied)
-    )
+    texts = html.paragraph(text) + html.paragraph(limits)
+    return html.section("The question", html.pair(texts, varied))
 
 
-def _answer(said: Facts) -> str:
-    told = html.paragraph(said["answer"], "said")
+def _answer(contents: Contents) -> str:
     tiles = []
-    for i, row in enumerate(said["metrics"]):
+    for i, row in enumerate(contents["metrics"]):
         if i and row["name"] not in TILES:
             continue
-        was = (
-            f'<dd class="was">start: {html.text(_figure(row, "start"))}</dd>'
-            if "start" in row
-            else ""
-        )
-        tiles.append(
-            f"<div><dt>{html.text(row['label'])}</dt><dd>{html.text(_figure(row, 'result'))}</dd>{was}</div>"
-        )
-    inside = f'{told}<dl class="tiles">{"".join(tiles)}</dl>{html.paragraph(SURE, "soft")}'
-    return f'<section class="answer"><h2>The answer</h2>{inside}</section>'
+        start = ""
+        if "start" in row:
+            start = f'<dd class="start">start: {html.text(_tile_value(row, "start"))}</dd>'
+        value = html.text(_tile_value(row, "result"))
+        tiles.append(f"<div><dt>{html.text(row['label'])}</dt><dd>{value}</dd>{start}</div>")
+    content = (
+        f"{html.paragraph(contents['answer'], 'sentence')}"
+        f'<dl class="tiles">{"".join(tiles)}</dl>{html.paragraph(LIMITS_OF_INTERVALS, "soft")}'
+    )
+    return f'<section class="answer"><h2>The answer</h2>{content}</section>'
 
 
-def _figure(row: Facts, which: str) -> str:
-    if row["name"] == "time_to_98_s" and row[which]["half_width"] >= row[which]["value"]:
+def _tile_value(row: Contents, which: str) -> str:
+    value, half_width = row[which]["value"], row[which]["half_width"]
+    if row["name"] == "time_to_98_s" and half_width >= value:
         return "not known yet"
-    return with_interval(row[which]["value"], row[which]["half_width"], row["unit"])
+    return with_interval(value, half_width, row["unit"])
 
 
-def _bare(row: Facts, which: str, sign: bool = False) -> str:
+def _interval(row: Contents, which: str, sign: bool = False) -> str:
     return with_interval(row[which]["value"], row[which]["half_width"], sign=sign)
 
 
-def _label(row: Facts) -> str:
+def _label(row: Contents) -> str:
     return f"{row['label']} [{row['unit']}]" if row["unit"] else str(row["label"])
 
 
-def _goal(said: Facts) -> str:
-    return _label(said["question"]["objective"])
-
-
-def _front(said: Facts) -> str:
-    front = said["front"]
+def _pareto_front(contents: Contents) -> str:
+    front = contents["front"]
     if not front:
         return ""
-    first, second = (_label(goal) for goal in front[0]["objectives"])
+    first, second = (_label(objective) for objective in front[0]["objectives"])
     text = (
-        f"Two objectives were sought at once: {first}, and {second}. These candidates, confirmed on fresh seeds, are "
-        "beaten in both by none; the answer above is the best by the first."
+        f"The study had two objectives: {first}, and {second}. Each of these candidates was "
+        "confirmed on fresh seeds, and no other is better in both objectives. "
+        "The answer above is the best by the first objective."
     )
     rows = (
         (
-            n,
-            *(_bare(goal, "result") for goal in one["objectives"]),
-            *map(plain, one["parameters"].values()),
+            number,
+            *(_interval(objective, "result") for objective in row["objectives"]),
+            *map(plain, row["parameters"].values()),
         )
-        for n, one in enumerate(front, start=1)
+        for number, row in enumerate(front, start=1)
     )
-    table = html.table("The front", ("", first, second, *front[0]["parameters"]), rows)
+    head = ("", first, second, *front[0]["parameters"])
+    table = html.table("The Pareto front", head, rows)
     return html.section("Two objectives", html.paragraph(text), table)
 
 
-def _convergence(said: Facts) -> str:
-    rows = said["evaluations"]
+def _convergence(contents: Contents) -> str:
+    rows, question = contents["evaluations"], contents["question"]
     if not rows:
         return ""
-    drawn = charts.convergence(rows, _goal(said), said["question"]["smaller_is_better"])
-    text = "The objective of every evaluation in its order; the last, on fresh seeds, are what the answer rests on."
-    poor = [row for row in rows if row["reason"]]
-    reasons = html.table(
-        "",
-        ("evaluation", "reason"),
-        ((row["number"], row["reason"]) for row in poor),
-        figures=False,
+    svg = charts.convergence_chart(
+        rows, _label(question["objective"]), question["smaller_is_better"]
     )
-    folded = (
-        html.fold(f"{len(poor)} evaluations failed or missed a constraint", reasons) if poor else ""
+    caption = (
+        "The objective of every evaluation in its order. The answer rests on the last ones, which "
+        "ran on fresh seeds. Point at a mark to see its parameters."
     )
-    return html.section("How the search went", html.chart("convergence", drawn, text), folded)
+    failed = [(row["number"], row["reason"]) for row in rows if row["reason"]]
+    folded = ""
+    if failed:
+        reasons = html.table("", ("evaluation", "reason"), failed, numbers=False)
+        folded = html.fold(f"{len(failed)} evaluations failed or missed a constraint", reasons)
+    return html.section("How the search went", html.chart("convergence", svg, caption), folded)
 
 
-def _influence(said: Facts) -> str:
-    found = said["influence"]
-    if not found:
+def _influence(contents: Contents) -> str:
+    influence, objective = contents["influence"], contents["question"]["objective"]
+    if not influence:
         return ""
-    rows, unit = found["parameters"], said["question"]["objective"]["unit"]
-    content = [html.items(found["said"])]
-    if rows:
+    parameters = influence["parameters"]
+    content = [html.items(influence["said"])]
+    if parameters:
         head = (
             "parameter",
             "moved alone costs up to",
-            "and for sure",
+            "and certainly",
             "share of variance",
             "no loss within",
         )
-        content.append(
-            html.table(
-                "By the model of all evaluations", head, (_mattered(row, unit) for row in rows)
+        rows = [
+            (
+                row["name"],
+                with_interval(row["loss"], row["loss_half_width"], objective["unit"]),
+                with_unit(row["surely"], objective["unit"]) if row["surely"] else "not known",
+                share(row["share"]),
+                " to ".join(map(plain, row["flat"])),
             )
+            for row in parameters
+        ]
+        caption = (
+            "Each parameter alone. Band: 95 % interval of the model. "
+            "Shaded range: no more than the noise is lost."
         )
-        text = "Each parameter alone. Band: 95 % interval of the model; shaded: where no more than the noise is lost."
-        content.append(html.chart("slices", charts.slices(rows, _goal(said)), text))
+        svg = charts.slices_chart(parameters, _label(objective))
+        content.append(html.table("By a model of all evaluations", head, rows))
+        content.append(html.chart("slices", svg, caption))
     return html.section("Which parameters mattered", *content)
 
 
-def _mattered(row: Facts, unit: str) -> tuple[str, ...]:
-    loss = with_interval(row["loss"], row["loss_half_width"], unit)
-    surely = with_unit(row["surely"], unit) if row["surely"] else "not told"
-    return row["name"], loss, surely, share(row["share"]), " to ".join(map(plain, row["flat"]))
-
-
-def _coverage(said: Facts, shown: Mapping[str, Scene]) -> str:
-    study = "start" in said["coverage_against_time"]
-    head: tuple[str, ...]
-    rows: list[tuple[str, ...]]
-    if study:
+def _coverage(contents: Contents, scenes: Mapping[str, Scene]) -> str:
+    has_start = "start" in contents["coverage_against_time"]
+    head: tuple[str, ...] = ("", "with 95 % interval")
+    rows: list[tuple[str, ...]] = [
+        (_label(row), _interval(row, "result")) for row in contents["metrics"]
+    ]
+    if has_start:
         head = ("", "start", "best", "change", "more than noise")
         rows = [
             (
                 _label(row),
-                _bare(row, "start"),
-                _bare(row, "result"),
-                _bare(row, "change", sign=True),
+                _interval(row, "start"),
+                _interval(row, "result"),
+                _interval(row, "change", sign=True),
                 "yes" if row["real"] else "no",
             )
-            for row in said["metrics"]
+            for row in contents["metrics"]
             if "start" in row
         ]
-    else:
-        head, rows = (
-            ("", "with 95 % interval"),
-            [(_label(row), _bare(row, "result")) for row in said["metrics"]],
-        )
-    curves = {name: rows for name, rows in said["coverage_against_time"].items() if rows}
-    pair = [
-        html.chart(
-            "histogram",
-            charts.histogram({n: (s.coverage, s.area) for n, s in shown.items()}),
-            HISTOGRAM,
-        )
-    ]
-    if curves:
-        chart = charts.against_time(curves, said["question"]["treatment_time_s"])
-        pair.append(
-            html.chart("against-time", chart, "Coverage against peening time, with 95 % intervals.")
-        )
-    figures = html.table("± 95 % intervals", head, rows)
-    title = "Compared with the start" if study else "Coverage"
-    return html.section(title, figures, html.pair(*pair))
-
-
-HISTOGRAM = "How much of the target's area has which coverage at the end of the treatment, as the picture above shows it."
-
-
-def _accuracy(said: Facts) -> str:
-    titles = {"answer": "What the answer cost", "evaluations": "Evaluations of the study"}
-    known = html.table("How well it is known", (), said["accuracy"].items(), figures=False)
-    paid = "".join(
-        html.table(titles[name], (), rows.items(), figures=False)
-        for name, rows in said["cost"].items()
+    caption = (
+        "How much of the target's area has which coverage at the end of the treatment, "
+        "as the picture above shows it."
     )
-    return html.section("Accuracy, and its price", html.pair(known, paid))
+    shown = {name: (scene.coverage, scene.area) for name, scene in scenes.items()}
+    pair = [html.chart("histogram", charts.histogram_chart(shown), caption)]
+    if curves := {name: rows for name, rows in contents["coverage_against_time"].items() if rows}:
+        treatment_time = contents["question"]["treatment_time_s"]
+        svg = charts.coverage_over_time_chart(curves, treatment_time)
+        caption = "Coverage against peening time, with 95 % intervals; 98 % counts as full."
+        pair.append(html.chart("against-time", svg, caption))
+    table = html.table("± 95 % intervals", head, rows)
+    title = "Compared with the start" if has_start else "Coverage"
+    return html.section(title, table, html.pair(*pair))
 
 
-def _effects(said: Facts) -> str:
-    found = said["effects"]
-    if found["pilot"]:
-        text = "The effects were chosen by a short pilot run, in which each was switched alone:"
+def _accuracy_and_cost(contents: Contents) -> str:
+    titles = {"answer": "What the answer cost", "evaluations": "Evaluations of the study"}
+    accuracy = html.table("How accurate it is", (), contents["accuracy"].items(), numbers=False)
+    cost = "".join(
+        html.table(titles[name], (), rows.items(), numbers=False)
+        for name, rows in contents["cost"].items()
+    )
+    return html.section("Accuracy and cost", html.pair(accuracy, cost))
+
+
+def _effects(contents: Contents) -> str:
+    effects, pilot = contents["effects"]["effects"], contents["effects"]["pilot"]
+    switched = [(one["effect"], one["value"]) for one in effects]
+    content = [html.table("In this result", (), switched, numbers=False)]
+    if pilot:
         rows = [
             (
                 one["effect"],
                 one["verdict"],
-                *(_changed(change) for change in one["changes"].values()),
+                *(_percentage(change) for change in one["changes"].values()),
             )
-            for one in found["pilot"]
+            for one in pilot
         ]
-        head = ("effect", "verdict", *(f"{name} with it" for name in found["pilot"][0]["changes"]))
-        told = html.table("", head, rows) + html.items(one["said"] for one in found["pilot"])
+        head = ("effect", "verdict", *(f"change of {name}" for name in pilot[0]["changes"]))
+        content += [
+            html.paragraph(
+                "The effects were chosen by a short pilot run, in which each was switched alone:"
+            ),
+            html.table("", head, rows),
+            html.items(one["said"] for one in pilot),
+        ]
     else:
-        text = "No pilot run was made to estimate what each effect changes; chamberopt check, given the design, makes one."
-        told = ""
-    on = [(one["effect"], one["value"]) for one in found["effects"]]
-    return html.section(
-        "Physical effects",
-        html.table("In this result", (), on, figures=False),
-        html.paragraph(text),
-        told,
-    )
+        content.append(
+            html.paragraph(
+                "No pilot run was made to estimate what each effect changes. "
+                "“chamberopt check” makes one for a design."
+            )
+        )
+    return html.section("Physical effects", *content)
 
 
-def _changed(change: Facts) -> str:
+def _percentage(change: Contents) -> str:
     return with_interval(100.0 * change["value"], 100.0 * change["half_width"], "%", sign=True)
 
 
-def _notes(said: Facts) -> str:
-    warned = said["warnings"]
-    found = [*(f"Warning: {text}" for text in warned or ()), *said["notes"]]
-    told = [html.paragraph(note, "warning") for note in found]
-    if warned is None:
-        told.append(
-            html.paragraph(
-                "Whether the design itself gives cause for warnings, “chamberopt check” tells."
-            )
+def _notes(contents: Contents) -> str:
+    warnings = contents["warnings"]
+    notes = [*(f"Warning: {text}" for text in warnings or ()), *contents["notes"]]
+    content = [html.paragraph(note, "warning") for note in notes]
+    if warnings is None:
+        content.append(
+            html.paragraph("The design was not checked; “chamberopt check” lists its warnings.")
         )
-    elif not found:
-        told.append(html.paragraph("The run left no notes or warnings."))
-    return html.section("Notes and warnings", "".join(told))
+    elif not notes:
+        content.append(html.paragraph("There are no notes or warnings."))
+    return html.section("Notes and warnings", *content)
 
 
-def _design(said: Facts, name: str, text: str) -> str:
-    rows = said["design"]
+def _design(contents: Contents, name: str, text: str) -> str:
+    rows = contents["design"]
     changed = [(row["name"], row["start"], row["value"]) for row in rows if "start" in row]
-    differs = (
-        html.table("What differs from the start", ("", "start", "best"), changed) if changed else ""
-    )
-    whole = html.table(
-        "", ("", "value"), [(row["name"], row["value"]) for row in rows], figures=False
-    )
+    differences = ""
+    if changed:
+        differences = html.table("What differs from the start", ("", "start", "best"), changed)
+    values = [(row["name"], row["value"]) for row in rows]
+    every = html.table("", ("", "value"), values, numbers=False)
     link = f"data:text/plain;charset=utf-8;base64,{base64.b64encode(text.encode()).decode()}"
     save = f'<p><a download="{html.text(name)}" href="{link}">Save {html.text(name)}</a></p>'
-    file = html.fold(
-        f"{name}, which chamberopt simulate takes", f"{save}<pre>{html.text(text)}</pre>"
-    )
     return html.section(
-        "The design", differs, html.fold("Every number of the design", whole, "print"), file
+        "The design",
+        differences,
+        html.fold("Every value of the design", every, "print"),
+        html.fold(f"{name}, for chamberopt simulate", f"{save}<pre>{html.text(text)}</pre>"),
     )

@@ -14,11 +14,10 @@ import pytest
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError
 from chamberopt.output import viewer
-from chamberopt.output.report import charts, facts, write_part_page, write_report
-from chamberopt.output.report.formatting import plain, with_interval
-from chamberopt.output.report.influence import influence
+from chamberopt.output.report import report_contents, write_part_page, write_report
+from chamberopt.output.report.conclusions import influence
+from chamberopt.output.report.numbers import Label, objective_label, plain, with_interval
 from chamberopt.output.report.part3d import part_scene
-from chamberopt.output.report.words import Words, goal_words
 from chamberopt.output.results.load import load_result
 from chamberopt.output.vtp_files import read_surface
 from tests.helpers.results.report_folders import simulated, studied
@@ -128,16 +127,18 @@ def test_a_number_alone_has_four_digits_that_count(value: float, said: str) -> N
 
 
 def test_a_goal_that_is_a_metric_reads_as_the_metric() -> None:
-    assert goal_words("minus_time_to_98_s") == Words(
+    assert objective_label("minus_time_to_98_s") == Label(
         "time until 95 % of the target's area is 98 % covered", "s", -1.0
     )
-    assert goal_words("p05_coverage").unit == "%"
-    assert goal_words("uniform_coverage").meaning == "mean minus standard deviation of coverage"
-    assert goal_words("of a later version").label == "of a later version"
+    assert objective_label("p05_coverage").unit == "%"
+    assert (
+        objective_label("uniform_coverage").meaning == "mean minus standard deviation of coverage"
+    )
+    assert objective_label("of a later version").text == "of a later version"
 
 
 def test_a_simulation_is_answered_in_one_sentence(simulation: Path) -> None:
-    said, result = facts(simulation), load_result(simulation)
+    said, result = report_contents(simulation), load_result(simulation)
     mean = result.metrics["mean_coverage"]
     assert with_interval(100 * mean.value, 100 * mean.half_width, "%") in said["answer"]
     assert said["answer"].startswith("After 5 s the target is covered to ")
@@ -150,7 +151,7 @@ def test_a_simulation_is_answered_in_one_sentence(simulation: Path) -> None:
 
 
 def test_a_study_is_answered_with_its_gain(study: Path) -> None:
-    said, about = facts(study), load_result(study).data["study"]
+    said, about = report_contents(study), load_result(study).data["study"]
     gain = about["gain"]
     assert with_interval(gain["value"], gain["half_width"], sign=True) in said["answer"]
     assert "more than noise" in said["answer"]
@@ -180,7 +181,7 @@ def test_no_gain_is_said_to_be_none(study: Path, tmp_path: Path) -> None:
     start = json.loads((folder / "start" / "result.json").read_text())
     same = {name: best[name] for name in ("objective", "metrics")}
     (folder / "start" / "result.json").write_text(json.dumps(start | same))
-    said = facts(folder)
+    said = report_contents(folder)
     assert "No better chamber than the start was found" in said["answer"]
     assert not said["metrics"][0]["real"]
 
@@ -203,7 +204,7 @@ def a_model(mean: list, half_width: list, **other: object) -> dict:
 
 def test_what_a_parameter_costs_has_an_interval() -> None:
     """It may cost 0.5 ± 0.5 at its far end, but 0.4 ± 0.05 in the middle: 0.35 for sure."""
-    told = influence(a_model([1.0, 0.6, 0.5], [0.03, 0.04, 0.5]), Words("goal"))
+    told = influence(a_model([1.0, 0.6, 0.5], [0.03, 0.04, 0.5]), Label("goal"))
     (one,) = told["parameters"]
     assert (one["loss"], one["loss_half_width"]) == pytest.approx((0.5, math.hypot(0.5, 0.03)))
     assert one["surely"] == pytest.approx(0.35)
@@ -213,12 +214,12 @@ def test_what_a_parameter_costs_has_an_interval() -> None:
 
 
 def test_too_little_to_tell_is_said() -> None:
-    unsure = influence(a_model([1.0, 0.9, 0.8], [0.2, 0.2, 0.2]), Words("goal"))
+    unsure = influence(a_model([1.0, 0.9, 0.8], [0.2, 0.2, 0.2]), Label("goal"))
     assert unsure["parameters"][0]["surely"] == 0.0
-    assert "20 evaluations are too few to tell the influence of x from none" in unsure["said"][0]
+    assert "20 evaluations are too few to show an influence of x" in unsure["said"][0]
     none = influence(
         {**a_model([1.0] * 3, [0.0] * 3), "model": None, "evaluations": 3, "failed": 1},
-        Words("goal"),
+        Label("goal"),
     )
     assert none["parameters"] == []
     assert none["said"] == [
@@ -228,24 +229,11 @@ def test_too_little_to_tell_is_said() -> None:
 
 
 def test_a_time_that_shall_be_short_is_shown_as_a_time() -> None:
-    told = influence(
-        a_model([-400.0, -900.0, -2000.0], [10.0] * 3), goal_words("minus_time_to_98_s")
-    )["parameters"][0]
+    told = influence(a_model([-400.0, -900.0, -2000.0], [10.0] * 3), objective_label("minus_time_to_98_s"))[
+        "parameters"
+    ][0]
     assert told["mean"] == [400.0, 900.0, 2000.0]
     assert told["loss"] == pytest.approx(1600.0)
-    rows = [
-        {
-            "number": i + 1,
-            "stage": "search",
-            "value": v,
-            "half_width": 1.0,
-            "feasible": True,
-            "parameters": {},
-        }
-        for i, v in enumerate((900.0, 400.0, 600.0))
-    ]
-    best = charts.convergence(rows, "time [s]", smaller=True)["data"][1]
-    assert best["y"] == [900.0, 400.0, 400.0, 400.0]
 
 
 def test_a_front_of_two_objectives_is_listed(study: Path, tmp_path: Path) -> None:
@@ -256,24 +244,8 @@ def test_a_front_of_two_objectives_is_listed(study: Path, tmp_path: Path) -> Non
     front = [{"parameters": {"shot.mass_g": 7.5}, "standing": "feasible", "objectives": goals}]
     folder = changed(study, tmp_path / "front", lambda data: data["study"].update(front=front))
     said = Page(write_report(folder)[0]).said
-    assert "Two objectives were sought at once" in said
+    assert "The study had two objectives" in said
     assert "71.3\u00a0±\u00a02.0" in said  # seconds, not their negative
-
-
-def test_what_failed_or_missed_is_marked(study: Path) -> None:
-    drawn = charts.convergence(facts(study)["evaluations"], "goal", smaller=False)
-    shown = {trace["name"]: trace["x"] for trace in drawn["data"]}
-    assert shown["could not be simulated"]
-    assert shown["confirmed on fresh seeds"]
-    assert shown["misses a constraint"]
-    best = next(trace["y"] for trace in drawn["data"] if trace["name"] == "best so far")
-    assert best == sorted(best)
-
-
-def test_a_histogram_holds_all_of_the_area() -> None:
-    coverage, area = np.array([0.0, 0.5, 1.0]), np.array([1.0, 2.0, 1.0])
-    (trace,) = charts.histogram({"result": (coverage, area)})["data"]
-    assert sum(trace["y"]) == pytest.approx(200.0)  # each class has two corners
 
 
 @pytest.mark.parametrize("kind", ["simulation", "study"])
@@ -374,7 +346,7 @@ def test_coverage_of_marked_dents_is_told_at_no_other_time(
 
     page = Page(write_report(changed(simulation, tmp_path / "marked", marks))[0])
     assert not {"density", "shown-density"} & set(page.parts()["scenes"][0]["columns"])
-    assert "Every dent was marked" in page.said
+    assert "marked every dent" in page.said
 
 
 def test_what_a_pilot_estimated_of_each_effect_is_told(simulation: Path, tmp_path: Path) -> None:
@@ -391,10 +363,10 @@ def test_what_a_pilot_estimated_of_each_effect_is_told(simulation: Path, tmp_pat
 def test_a_part_too_large_for_a_page_is_drawn_less_and_says_so(simulation: Path) -> None:
     result, surface = load_result(simulation), read_surface(simulation / "coverage.vtp")
     target = int(((surface["target"] > 0) & (surface["exposed_area_mm2"] > 0)).sum())
-    less = part_scene(result, "", most=target)
-    assert any("the target alone is drawn" in remark for remark in less.remarks)
+    less = part_scene(result, "", max_triangles=target)
+    assert any("only its target is drawn" in remark for remark in less.remarks)
     assert next(trace for trace in less.data["figure"] if trace["name"] == "rest")["i"] == []
-    none = part_scene(result, "", most=target - 1)
+    none = part_scene(result, "", max_triangles=target - 1)
     assert none.data is None
     assert any("chamberopt inspect shows it" in remark for remark in none.remarks)
 
@@ -422,7 +394,7 @@ def test_only_a_report_of_ours_is_replaced(simulation: Path, tmp_path: Path) -> 
     write_report(simulation, path)
     precious = tmp_path / "precious.html"
     precious.write_text("<p>keep me</p>")
-    with pytest.raises(InputError, match=r"precious\.html: is there, and no report of ours"):
+    with pytest.raises(InputError, match=r"precious\.html: this file exists and is no report"):
         write_report(simulation, precious)
     assert precious.read_text() == "<p>keep me</p>"
     with pytest.raises(InputError, match=r"one \.html file"):
@@ -437,11 +409,11 @@ def test_the_command(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture)
     assert main(["report", str(folder)]) == 0
     out = capsys.readouterr().out
     assert f"report in {folder / 'report.html'}" in out
-    assert facts(folder)["answer"] in out
+    assert report_contents(folder)["answer"] in out
     assert load_result(folder).data == load_result(study).data
     assert main(["report", str(folder), "--json", "--out", str(tmp_path / "r.html")]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["report"] == str(tmp_path / "r.html")
-    assert told["metrics"] == facts(folder)["metrics"]
+    assert told["metrics"] == report_contents(folder)["metrics"]
     assert main(["report", str(tmp_path)]) == 2
     assert "not a results folder" in capsys.readouterr().err

@@ -1,0 +1,248 @@
+"""Sentences and table rows of the report: the answer, which parameters matter, accuracy and cost."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from chamberopt.coverage.metrics import NEVER
+from chamberopt.optimize.candidates import POINTS_PER_PARAMETER
+from chamberopt.output.report.numbers import (
+    Label,
+    metric_label,
+    objective_label,
+    plain,
+    share,
+    with_interval,
+    with_unit,
+)
+
+if TYPE_CHECKING:
+    from chamberopt.coverage.statistics.confidence_interval import Estimate
+    from chamberopt.output.results.load import Result
+
+STEPS = {
+    "chamber": "to build the chamber",
+    "simulate": "to simulate",
+    "coverage": "to compute the coverage",
+}
+STOP_REASONS = {
+    "replicas": "the requested number of replicas",
+    "accuracy": "the requested accuracy was reached",
+    "max_replicas": "the largest allowed number; the requested accuracy was not reached",
+}
+COLLISIONS = {
+    "walls": "with walls and part",
+    "balls": "between balls",
+    "sonotrode": "with the sonotrode",
+}
+
+
+def answer(result: Result, start: Result | None, gain: Estimate | None) -> str:
+    """The answer in one sentence, with its uncertainty.
+
+    For a study: objective of start and best, and whether the change is more than noise. For a
+    simulation: its coverage.
+    """
+    label = objective_label(result.objective_name)
+    if start is None or gain is None:
+        mean = metric_label("mean_coverage")
+        treatment_time = result.design.process.treatment_time
+        text = (
+            f"After {plain(treatment_time)} s the target is covered to "
+            f"{mean.format(result.metrics['mean_coverage'])} on average"
+        )
+        if label.text != mean.text:
+            text += f", and its {label.text} is {label.format(result.objective)}"
+        return f"{text} (95 % intervals); {full_coverage(result)}."
+    before, after = label.format(start.objective), label.format(result.objective)
+    study = result.data["study"]
+    if study["best"]["parameters"] == study["start"]["parameters"]:
+        return (
+            f"No better chamber than the start was found: its {label.text} is {before} "
+            "(95 % interval)."
+        )
+    values = f"from {before} at the start to {after}"
+    change = label.format(gain, sign=True)
+    intervals = "(95 % intervals, both simulated again with fresh seeds)"
+    if gain.low > 0.0:
+        return (
+            f"The best chamber found changes the {label.text} {values}: a change of {change} "
+            f"{intervals}, which is more than noise."
+        )
+    return (
+        f"No chamber was found that is certainly better: the {label.text} goes {values}, but the "
+        f"change of {change} is within the noise {intervals}."
+    )
+
+
+def full_coverage(result: Result) -> str:
+    """Half a sentence: when 95 % of the target is covered to 98 %, as far as that is known."""
+    time = result.metrics.get("time_to_98_s")
+    if time is None:
+        return "this older result does not say when it would be covered to 98 %"
+    if time.value >= NEVER:
+        return "at this rate 95 % of its area would never be covered to 98 %"
+    if time.half_width >= time.value:
+        return "how long it takes until 95 % of its area is covered to 98 % is not known yet"
+    return f"95 % of its area is covered to 98 % after {Label('', 's').format(time)}"
+
+
+def accuracy_rows(result: Result, study: Mapping[str, Any] | None) -> dict[str, str]:
+    """The intervals of the answer, and the replicas behind them."""
+    objective, mean = objective_label(result.objective_name), metric_label("mean_coverage")
+    stop_reason = result.data.get("stopped_by", "")
+    rows = {
+        f"95 % interval of the {objective.text}": objective.format(result.objective),
+        f"95 % interval of the {mean.text}": mean.format(result.metrics["mean_coverage"]),
+        "replicas, each with its own seed": f"{result.data['replicas']}",
+        "number of replicas": STOP_REASONS.get(stop_reason, stop_reason),
+    }
+    if study and "accuracy" in study:
+        search = study["accuracy"]["search"]
+        replicas = f"up to {search['replicas']} replicas"
+        if half_width := search.get("objective_half_width"):
+            replicas = f"± {half_width:g} requested"
+        time = search.get("simulated_time_s")
+        rows["a candidate of the search"] = replicas + (f" of {plain(time)} s" if time else "")
+    exact = result.data.get("analytic")
+    rows["chamber's walls"] = "exact planes and cylinders" if exact else "triangles"
+    return {name: text for name, text in rows.items() if text}
+
+
+def cost_rows(
+    result: Result, study: Mapping[str, Any] | None, evaluations: Sequence[Mapping[str, Any]]
+) -> dict[str, dict[str, str]]:
+    """What the result cost.
+
+    Returns:
+        "answer": simulated time, collisions and run time of the result itself; for a study also
+        "evaluations": their numbers and the run time of all.
+    """
+    data = result.data
+    collisions = data["collisions"]
+    kinds = [
+        f"{_count(collisions[name])} {kind}"
+        for name, kind in COLLISIONS.items()
+        if name in collisions
+    ]
+    rows = {
+        "answer": {
+            "simulated time": f"{plain(data['simulated_time_s'])} s",
+            "collisions": f"{_count(collisions.get('total', 0))}: {', '.join(kinds)}",
+            **{STEPS.get(name, name): f"{s:.2f} s" for name, s in data["timings_s"].items()},
+        }
+    }
+    if study:
+        rows["evaluations"] = {
+            "in the search": _count(study["evaluations"]),
+            "of these failed": _count(study.get("failed", 0)),
+            "of these miss a constraint": _count(study.get("missing_a_constraint", 0)),
+            "confirmations": _count(sum(row["stage"] == "confirm" for row in evaluations)),
+            "run time of all": f"{plain(study['seconds'], 3)} s",
+        }
+    return rows
+
+
+def _count(number: float) -> str:
+    return plain(float(number), 12)
+
+
+def influence(study: Mapping[str, Any], label: Label) -> dict[str, Any]:
+    """Which parameters mattered, by the study's model of all its evaluations.
+
+    Args:
+        study: "study" of result.json.
+        label: of the objective; numbers are returned in its unit.
+
+    Returns:
+        "said": sentences; "parameters": one row each, the most important first, empty without a
+        model. A row holds
+            loss, loss_half_width: cost of moving this parameter alone from its best value to the
+                worst one within its bounds.
+            surely: cost of such a move that is certain, 0 if the intervals reach zero.
+            share: of the objective's variance over the bounds, by its main effect.
+            flat: range in which it may lie without losing more than the noise.
+            values, mean, half_width, effect: its curves.
+    """
+    model, count, names = study.get("model"), study["evaluations"], list(study["vary"])
+    if not model:
+        return {
+            "parameters": [],
+            "said": [_reason_without_model(count, study.get("failed", 0), len(names))],
+        }
+    rows = sorted(
+        (_parameter_row(name, study, label) for name in names),
+        key=lambda row: (-row["surely"], -row["loss"]),
+    )
+    sentences = []
+    first = rows[0]
+    if first["surely"]:
+        loss = with_interval(first["loss"], first["loss_half_width"], label.unit)
+        sentences.append(
+            f"{first['name']} mattered most: moved alone from its best value to another within its "
+            f"bounds, it costs up to {loss}, and certainly "
+            f"{with_unit(first['surely'], label.unit)} or more."
+        )
+    if uncertain := [row["name"] for row in rows if not row["surely"]]:
+        *others, last = uncertain
+        listed = f"{', '.join(others)} and {last}" if others else last
+        sentences.append(
+            f"{count} evaluations are too few to show an influence of {listed}: "
+            "the intervals reach zero."
+        )
+    shares = sum(row["share"] for row in rows)
+    if len(rows) > 1:
+        rest = ""
+        if shares < 0.8:
+            rest = (
+                "; the rest is how parameters act together, so each curve below holds near the "
+                "best design"
+            )
+        sentences.append(
+            "The effects of single parameters are "
+            f"{share(shares)} of the variance over the bounds{rest}."
+        )
+    noise = with_unit(abs(label.factor) * model["noise"], label.unit)
+    sentences.append(
+        f"In its shaded range, each parameter alone loses no more than the noise, {noise}. "
+        f"Of all designs with every parameter in its range, {share(model['together'])} lose no "
+        "more than that."
+    )
+    return {"parameters": rows, "said": sentences}
+
+
+def _parameter_row(name: str, study: Mapping[str, Any], label: Label) -> dict[str, Any]:
+    parameter, best = study["model"]["parameters"][name], study["model"]["expected"]
+    size = abs(label.factor)
+    losses = [size * (best["value"] - mean) for mean in parameter["mean"]]
+    half_widths = [size * math.hypot(half, best["half_width"]) for half in parameter["half_width"]]
+    worst = max(range(len(losses)), key=losses.__getitem__)
+    certain = [loss - half for loss, half in zip(losses, half_widths, strict=True)]
+    return {
+        "name": name,
+        "share": parameter["share_of_variance"],
+        "loss": max(0.0, losses[worst]),
+        "loss_half_width": half_widths[worst],
+        "surely": max(0.0, *certain),
+        "flat": parameter["flat"],
+        "bounds": study["vary"][name],
+        "start": study["start"]["parameters"][name],
+        "best": study["best"]["parameters"][name],
+        "values": parameter["values"],
+        "mean": [label.factor * value for value in parameter["mean"]],
+        "half_width": [size * value for value in parameter["half_width"]],
+        "effect": [label.factor * value for value in parameter["main_effect"]],
+    }
+
+
+def _reason_without_model(count: int, failed: int, parameters: int) -> str:
+    needed = POINTS_PER_PARAMETER * parameters
+    if count - failed < needed:
+        evaluations = f"{count} evaluations" + (f", {failed} of them failed," if failed else "")
+        return (
+            f"{evaluations} are too few to tell what each parameter does: {needed} or more are "
+            "needed for a model of them."
+        )
+    return "This result holds no model of the evaluations, so the effect of parameters is unknown."

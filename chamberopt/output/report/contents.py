@@ -1,0 +1,242 @@
+"""What a report says, as plain JSON values: collected from a results folder before any HTML."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from chamberopt.common.errors import InputError
+from chamberopt.coverage.statistics.confidence_interval import (
+    Estimate,
+    independent_difference,
+    paired_difference,
+)
+from chamberopt.optimize.storage.study_folder import STUDY
+from chamberopt.optimize.storage.trial_log import HISTORY, read_trials
+from chamberopt.output.report.conclusions import accuracy_rows, answer, cost_rows, influence
+from chamberopt.output.report.numbers import metric_label, objective_label
+from chamberopt.output.results.load import load_result
+
+if TYPE_CHECKING:
+    from chamberopt.output.results.load import Result
+
+START = "start"
+
+
+def report_contents(folder: str | Path) -> dict[str, Any]:
+    """Everything on the page except its pictures.
+
+    Raises:
+        InputError: the folder is no finished result.
+    """
+    result = load_result(folder)
+    study = result.data.get("study")
+    has_start = study and (result.folder / START).is_dir()
+    start = load_result(result.folder / START) if has_start else None
+    gain = None if start is None else _change(result.objective, start.objective, result, start)
+    rows = read_trials(result.folder) if study and (result.folder / HISTORY).is_file() else []
+    label = objective_label(result.objective_name)
+    candidates = {"result": result} if start is None else {"start": start, "best": result}
+    return {
+        "kind": result.kind,
+        "name": result.folder.resolve().name,
+        "made": result.data.get("created", ""),
+        "answer": answer(result, start, gain),
+        "question": _question(result, study),
+        "metrics": _metrics(result, start),
+        "front": [_pareto_row(row) for row in study.get("front", [])] if study else [],
+        "evaluations": [_evaluation(row, label.factor) for row in rows],
+        "influence": influence(study, label) if study and start else None,
+        "coverage_against_time": {
+            name: one.data.get("coverage_against_time", []) for name, one in candidates.items()
+        },
+        "accuracy": accuracy_rows(result, study),
+        "cost": cost_rows(result, study, rows),
+        "effects": _effects(result),
+        "notes": _notes(result, study),
+        "warnings": result.data.get("warnings"),
+        "design": _design(result, start),
+        "identity": {
+            "part, SHA-256": result.part_sha256,
+            "seed": f"{result.seeds[0]}, stream “{result.seeds[1]}”",
+            **{name: str(version) for name, version in result.data.get("versions", {}).items()},
+        },
+    }
+
+
+def _change(after: Estimate, before: Estimate, result: Result, start: Result) -> Estimate:
+    """The difference, from pairs of replicas where both ran on the same seeds."""
+    same_seeds = result.seeds == start.seeds
+    return (paired_difference if same_seeds else independent_difference)(after, before)
+
+
+def _question(result: Result, study: Mapping[str, Any] | None) -> dict[str, Any]:
+    label, design = objective_label(result.objective_name), result.design
+    chamber = result.data.get("chamber", {})
+    target = ("target_triangles", "target_exposed_area_mm2")
+    question: dict[str, Any] = {
+        "part": design.part.mesh_path.name,
+        "target": {name: chamber[name] for name in target if name in chamber},
+        "shape": design.chamber.shape,
+        "treatment_time_s": design.process.treatment_time,
+        "objective": {
+            "name": result.objective_name,
+            "label": label.text,
+            "unit": label.unit,
+            "meaning": label.meaning,
+        },
+        "smaller_is_better": label.factor < 0.0,
+        "constraints": [],
+        "vary": [],
+    }
+    if not study:
+        return question
+    with suppress(OSError, ValueError):  # an older study has no file
+        tables = tomllib.loads((result.folder / STUDY).read_text(encoding="utf-8"))
+        question["constraints"] = [
+            " and ".join(f"{name} {'≥' if side == 'min' else '≤'} {limit:g}"
+                         for side, limit in limits.items())
+            for name, limits in tables.get("constraints", {}).items()
+        ]  # fmt: skip
+    question["vary"] = [
+        {
+            "name": name,
+            "low": low,
+            "high": high,
+            "start": study["start"]["parameters"][name],
+            "best": study["best"]["parameters"][name],
+        }
+        for name, (low, high) in study["vary"].items()
+    ]
+    return {**question, "evaluations": study["evaluations"], "algorithm": study["algorithm"]}
+
+
+def _metrics(result: Result, start: Result | None) -> list[dict[str, Any]]:
+    """Objective and metrics in the unit shown, with start, change and whether it is significant."""
+    label = objective_label(result.objective_name)
+    before = None if start is None else start.objective
+    entries = [(result.objective_name, label, result.objective, before)]
+    entries += [
+        (name, metric_label(name), metric, start.metrics.get(name) if start else None)
+        for name, metric in result.metrics.items()
+        if metric_label(name).text != label.text  # else the objective is this metric
+    ]
+    rows = []
+    for name, label, value, before in entries:
+        row: dict[str, Any] = {
+            "name": name,
+            "label": label.text,
+            "unit": label.unit,
+            "result": label.scale(value),
+        }
+        if start is not None and before is not None:
+            change = _change(value, before, result, start)
+            row |= {
+                "start": label.scale(before),
+                "change": label.scale(change),
+                "real": abs(change.value) > change.half_width,
+            }
+        rows.append(row)
+    return rows
+
+
+def _evaluation(row: Mapping[str, Any], factor: float) -> dict[str, Any]:
+    value, half_width = row["objective"], row["half_width"]
+    return {
+        "number": row["number"] + 1,
+        "stage": row["stage"],
+        "value": None if value is None else factor * value,
+        "half_width": None if half_width is None else abs(factor) * half_width,
+        "feasible": bool(row["feasible"]),
+        "reason": row["reason"],
+        "parameters": row["parameters"],
+    }
+
+
+def _pareto_row(row: Mapping[str, Any]) -> dict[str, Any]:
+    """A candidate of the confirmed Pareto front, its objectives in the unit shown."""
+    objectives = []
+    for name, value in row["objectives"].items():
+        label = objective_label(name)
+        scaled = label.scale(Estimate(value["value"], value["half_width"]))
+        objectives.append({"label": label.text, "unit": label.unit, "result": scaled})
+    return {"parameters": row["parameters"], "objectives": objectives}
+
+
+def _effects(result: Result) -> dict[str, Any]:
+    """Which effects are on, and what a pilot run estimated of each where one was made."""
+    effects = result.design.effects.model_dump(mode="json", exclude={"auto"})
+    return {
+        "pilot": result.data.get("effects", []),
+        "effects": [
+            {"effect": name, "value": _effect_text(name, value)} for name, value in effects.items()
+        ],
+    }
+
+
+def _effect_text(name: str, value: Any) -> str:
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key} = {_text(one)}" for key, one in value.items() if one is not None)
+    if name == "rest" and value is None:
+        return "on where a still surface faces up"
+    return "on" if value else "off"
+
+
+def _notes(result: Result, study: Mapping[str, Any] | None) -> list[str]:
+    """What limits the answer: what is uncertain in the study, then the notes of the simulation."""
+    if not study:
+        return list(result.notes)
+    unknown = [
+        f"constraints: {one['reason']}"
+        for one in study.get("confirmed", [])
+        if one["parameters"] == study["best"]["parameters"] and one.get("standing") == "not known"
+    ]
+    return [*unknown, *study.get("at_bounds", []), *result.notes]
+
+
+def _design(result: Result, start: Result | None) -> list[dict[str, Any]]:
+    """Every value of the design by its dotted name, with the start's where that differs."""
+    values = dict(_flatten(result.data["design"]))
+    before = dict(_flatten(start.data["design"])) if start else {}
+    # The file's name only: its folder is private to the machine.
+    values["part.mesh"] = before["part.mesh"] = result.design.part.mesh_path.name
+    rows = []
+    for name, value in values.items():
+        row = {"name": name, "value": _text(value)}
+        if start and _text(before.get(name)) != row["value"]:
+            row["start"] = _text(before.get(name))
+        rows.append(row)
+    return rows
+
+
+def _flatten(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _flatten(value, f"{prefix}{name}.")
+        elif value not in ([], None):
+            yield prefix + name, value
+
+
+def _text(value: Any) -> str:
+    if value is None:
+        return "–"
+    if isinstance(value, str):
+        return value
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.6g}" if isinstance(value, float) else json.dumps(value, ensure_ascii=False)
+
+
+def read_design_file(folder: Path) -> tuple[str, str]:
+    """Name and text of the design that the result belongs to."""
+    for name in ("best.toml", "design.toml"):
+        path = folder / name
+        if path.is_file():
+            return name, path.read_text(encoding="utf-8")
+    raise InputError(
+        f"{folder}: neither best.toml nor design.toml is there; give a complete results folder"
+    )
