@@ -38,9 +38,7 @@ def save_picture(figure: Figure, path: Path) -> None:
         figure.savefig(temporary)
 
 
-def svg_text(
-    figure: Figure, name: str, tooltips: Mapping[str, Sequence[str]] | None = None
-) -> str:
+def svg_text(figure: Figure, name: str, tooltips: Mapping[str, Sequence[str]] | None = None) -> str:
     """The figure as an SVG element for an HTML page; its text can be selected and searched.
 
     Args:

@@ -229,9 +229,9 @@ def test_too_little_to_tell_is_said() -> None:
 
 
 def test_a_time_that_shall_be_short_is_shown_as_a_time() -> None:
-    told = influence(a_model([-400.0, -900.0, -2000.0], [10.0] * 3), objective_label("minus_time_to_98_s"))[
-        "parameters"
-    ][0]
+    told = influence(
+        a_model([-400.0, -900.0, -2000.0], [10.0] * 3), objective_label("minus_time_to_98_s")
+    )["parameters"][0]
     assert told["mean"] == [400.0, 900.0, 2000.0]
     assert told["loss"] == pytest.approx(1600.0)
 
@@ -338,13 +338,13 @@ def test_an_older_result_without_single_hits_shows_what_it_has(
     ]
 
 
-def test_coverage_of_marked_dents_is_told_at_no_other_time(
-    simulation: Path, tmp_path: Path
-) -> None:
-    def marks(data: dict) -> None:
-        data["design"]["process"]["accuracy"]["coverage_model"] = "dents"
-
-    page = Page(write_report(changed(simulation, tmp_path / "marked", marks))[0])
+def test_marked_dents_have_no_coverage_at_other_times(simulation: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "marked"
+    shutil.copytree(simulation, folder)
+    surface = viewer.read_surface(folder / "coverage.vtp")
+    surface.field_data["coverage_model"] = ["dents"]
+    surface.save(folder / "coverage.vtp")
+    page = Page(write_report(folder)[0])
     assert not {"density", "shown-density"} & set(page.parts()["scenes"][0]["columns"])
     assert "marked every dent" in page.said
 
