@@ -184,7 +184,7 @@ def closest_points(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def rotation_matrix(degrees: tuple[float, float, float]) -> np.ndarray:
-    """Matrix (3, 3) of rotations about the fixed axes x, then y, then z; quarter turns are exact."""
+    """Matrix (3, 3) of rotations about the fixed axes x, y, z in turn; exact for quarter turns."""
     matrix = np.eye(3)
     for axis, angle in enumerate(degrees):
         quarters, rest = divmod(angle, 90.0)

@@ -133,7 +133,7 @@ def _distances(corners: np.ndarray, planes: np.ndarray) -> np.ndarray:
 def _interval(
     corners: np.ndarray, distance: np.ndarray, along: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Where triangles cross the other's plane: first and last position (k,) along both planes' line."""
+    """Where triangles cross the plane of the others: first and last position (k,) on the line."""
     positions = []
     for i, j in ((0, 1), (1, 2), (2, 0)):
         through = distance[:, i] * distance[:, j] < 0.0

@@ -1,7 +1,9 @@
-"""Abaqus input files: nodes, shells, solids, parts and instances; sets and surfaces give names.
+"""Read Abaqus input files: shells and solids of parts and instances; sets and surfaces as groups.
 
-A keyword that makes or moves nodes or elements in a way not understood here is refused by name, never passed over.
-Keywords as in the Abaqus Keywords Reference Guide.
+A keyword that makes or moves nodes or elements in a way that is not supported is refused by name,
+never ignored.
+
+Source: Abaqus Keywords Reference Guide.
 """
 
 from __future__ import annotations
@@ -15,20 +17,19 @@ from pathlib import Path
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.geometry.mesh_io.readers.elements import CORNERS, EDGES, Block, Elements, surface_of
+from chamberopt.geometry.mesh_io.readers.elements import (
+    CORNERS,
+    EDGES,
+    Block,
+    ElementMesh,
+    extract_surface,
+)
 from chamberopt.geometry.mesh_io.readers.raw_mesh import RawMesh
 
-REFUSED = (
-    "INCLUDE",
-    "SYSTEM",
-    "NGEN",
-    "NFILL",
-    "NCOPY",
-    "NMAP",
-    "ELGEN",
-    "ELCOPY",
+UNSUPPORTED = (
+    "INCLUDE", "SYSTEM", "NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY",
     "SUBSTRUCTURE GENERATE",
-)
+)  # fmt: skip
 SHELL = re.compile(r"(?:STRI|SFM3D|M3D|R3D|CPS|CPE|DS|S)(3|4|6|8|9)\D*5?$")
 STRI65 = re.compile(r"STRI65$")  # six nodes, five degrees of freedom
 SOLID = re.compile(r"(?:AC3D|DC3D|C3D)(4|5|6|8|10|13|15|20)\D*$")
@@ -37,21 +38,24 @@ WITHOUT_SURFACE = re.compile(
 )
 SHELL_KIND = {3: "triangle", 6: "triangle", 4: "quad", 8: "quad", 9: "quad"}
 SOLID_KIND = {
-    4: "tetra", 10: "tetra", 5: "pyramid", 13: "pyramid", 6: "wedge", 15: "wedge", 8: "hexahedron", 20: "hexahedron",
+    4: "tetra", 10: "tetra", 5: "pyramid", 13: "pyramid", 6: "wedge", 15: "wedge",
+    8: "hexahedron", 20: "hexahedron",
 }  # fmt: skip
 Options = dict[str, str]
-Member = tuple[str, int]  # the instance that a set speaks of, "" for any, and the number there
+Member = tuple[str, int]  # instance that a set names ("" for any), and a number in it
+Place = tuple[int, int]  # position of a placed scope, and the file's number in it
+NO_ROWS = np.zeros(0, dtype=np.int64)
 
 
 @dataclass
 class _Scope:
-    """What stands between *PART and *END PART, or outside of all parts: by the file's own numbers."""
+    """What stands between *PART and *END PART, or outside of all parts, by the file's numbers."""
 
     nodes: dict[int, list[float]] = field(default_factory=dict)
-    elements: dict[int, tuple[str, list[int], int]] = field(default_factory=dict)
-    sets: dict[str, list[Member]] = field(default_factory=lambda: defaultdict(list))
+    elements: dict[int, tuple[str, list[int]]] = field(default_factory=dict)
+    element_sets: dict[str, list[Member]] = field(default_factory=lambda: defaultdict(list))
     node_sets: dict[str, list[Member]] = field(default_factory=lambda: defaultdict(list))
-    faces: dict[str, list[tuple[str, str]]] = field(default_factory=lambda: defaultdict(list))
+    surfaces: dict[str, list[tuple[str, str]]] = field(default_factory=lambda: defaultdict(list))
 
 
 @dataclass
@@ -59,16 +63,13 @@ class _Instance:
     part: str
     lines: list[list[float]]
 
-    def placed(self, points: np.ndarray) -> np.ndarray:
-        """Moved by the first data line, then turned about the axis of the second: a, b and degrees."""
+    def place(self, points: np.ndarray) -> np.ndarray:
+        """Move by the first data line, then rotate about the axis a-b of the second, in degrees."""
         if self.lines:
             points = points + np.array((self.lines[0] + [0.0] * 3)[:3])
         if len(self.lines) > 1:
-            a, b, degrees = (
-                np.array(self.lines[1][:3]),
-                np.array(self.lines[1][3:6]),
-                self.lines[1][6],
-            )
+            line = self.lines[1]
+            a, b, degrees = np.array(line[:3]), np.array(line[3:6]), line[6]
             axis = (b - a) / np.linalg.norm(b - a)
             angle, arm = np.radians(degrees), points - a
             along = np.outer(arm @ axis, axis)  # Rodrigues' formula
@@ -77,10 +78,14 @@ class _Instance:
 
 
 def read_abaqus(path: Path, content: bytes) -> RawMesh:
-    """The surface in an input file. Raises InputError with keyword and line for what is not understood."""
-    scopes, instances, notes = _scopes(path, content.decode("utf-8", errors="replace"))
+    """Read the surface in an input file.
+
+    Raises:
+        InputError: with keyword and line, for what is not supported.
+    """
+    scopes, instances, notes = _read_scopes(path, content.decode("utf-8", errors="replace"))
     try:
-        return surface_of(_assembled(scopes, instances, notes))
+        return extract_surface(_assemble(scopes, instances, notes))
     except KeyError as error:
         raise InputError(
             f"{path}: names {error.args[0]}, which is not there; export the whole model"
@@ -88,7 +93,7 @@ def read_abaqus(path: Path, content: bytes) -> RawMesh:
 
 
 def _keywords(text: str) -> Iterator[tuple[str, Options, list[str], int]]:
-    """Keyword, options, data lines and line number of each block; comments left out."""
+    """Keyword, options, data lines and line number of each block, without comments."""
     keyword, first = "", 0
     options: Options = {}
     data: list[str] = []
@@ -115,48 +120,44 @@ def _keywords(text: str) -> Iterator[tuple[str, Options, list[str], int]]:
         yield keyword, options, data, first
 
 
-def _scopes(path: Path, text: str) -> tuple[dict[str, _Scope], dict[str, _Instance], list[str]]:
-    """Parts by upper-case name ("" is outside of parts), instances by name, and notes."""
-    scopes, instances, passed = {"": _Scope()}, {}, Counter[str]()
-    now = ""
+def _read_scopes(
+    path: Path, text: str
+) -> tuple[dict[str, _Scope], dict[str, _Instance], list[str]]:
+    """Parts by upper-case name ("": outside of parts), instances by name, and notes."""
+    scopes, instances, left_out = {"": _Scope()}, {}, Counter[str]()
+    current = ""
     for keyword, options, data, line in _keywords(text):
-        scope = scopes[now]
+        scope = scopes[current]
         try:
-            if keyword in REFUSED:
+            if keyword in UNSUPPORTED:
                 raise ValueError(f"*{keyword} is not supported; write the model out flat")
             if keyword == "PART":
-                now = options["NAME"].upper()
-                scopes[now] = _Scope()
+                current = options["NAME"].upper()
+                scopes[current] = _Scope()
             elif keyword == "END PART":
-                now = ""
+                current = ""
             elif keyword == "INSTANCE":
-                numbers = [
-                    [float(value) for value in row.split(",") if value.strip()] for row in data
-                ]
-                instances[options["NAME"].upper()] = _Instance(options["PART"].upper(), numbers)
+                rows = [[float(value) for value in row.split(",") if value.strip()] for row in data]
+                instances[options["NAME"].upper()] = _Instance(options["PART"].upper(), rows)
             elif keyword == "NODE":
                 _add_nodes(scope, options, data)
             elif keyword == "ELEMENT":
-                _add_elements(scope, options, data, passed)
+                _add_elements(scope, options, data, left_out)
             elif keyword in ("ELSET", "NSET"):
-                sets = scope.sets if keyword == "ELSET" else scope.node_sets
+                sets = scope.element_sets if keyword == "ELSET" else scope.node_sets
                 sets[options[keyword]] += _members(options, data, sets)
             elif keyword == "SURFACE" and options.get("TYPE", "ELEMENT").upper() == "ELEMENT":
                 for row in data:
-                    whose, _, face = row.partition(",")
-                    scope.faces[options["NAME"]].append(
-                        (_tail(whose.strip()), face.strip().upper())
-                    )
+                    of, _, face = row.partition(",")
+                    member = of.strip().rpartition(".")[2].strip('"')  # part-1.top -> top
+                    scope.surfaces[options["NAME"]].append((member, face.strip().upper()))
         except (ValueError, KeyError, IndexError) as error:
             reason = f"lacks {error.args[0]}=" if isinstance(error, KeyError) else str(error)
             raise InputError(
                 f"{path}: line {line}: *{keyword}: {reason}; export it again"
             ) from None
-    return (
-        scopes,
-        instances,
-        [f"left out {count} {kind}: it has no surface" for kind, count in passed.items()],
-    )
+    notes = [f"left out {count} {kind}: it has no surface" for kind, count in left_out.items()]
+    return scopes, instances, notes
 
 
 def _add_nodes(scope: _Scope, options: Options, data: list[str]) -> None:
@@ -165,28 +166,30 @@ def _add_nodes(scope: _Scope, options: Options, data: list[str]) -> None:
             "cylindrical and spherical coordinates are not supported; write rectangular ones"
         )
     for row in data:
-        number, *place = row.split(",")
-        scope.nodes[int(number)] = [
-            float(value) if value.strip() else 0.0 for value in [*place, "", ""][:3]
-        ]
+        number, *values = row.split(",")
+        point = [float(value) if value.strip() else 0.0 for value in [*values, "", ""][:3]]
+        scope.nodes[int(number)] = point
         if "NSET" in options:
             scope.node_sets[options["NSET"]].append(("", int(number)))
 
 
-def _add_elements(scope: _Scope, options: Options, data: list[str], passed: Counter[str]) -> None:
+def _add_elements(scope: _Scope, options: Options, data: list[str], left_out: Counter[str]) -> None:
     name = options["TYPE"].upper()
     shell, solid = SHELL.match(name), SOLID.match(name)
     if WITHOUT_SURFACE.match(name):
-        passed[name] += len(data)
+        left_out[name] += len(data)
         return
     if STRI65.match(name):
         count, kind = 6, "triangle"
-    elif shell or solid:
-        count = int((shell or solid)[1])  # type: ignore[index]
-        kind = SHELL_KIND[count] if shell else SOLID_KIND[count]
+    elif shell:
+        count = int(shell[1])
+        kind = SHELL_KIND[count]
+    elif solid:
+        count = int(solid[1])
+        kind = SOLID_KIND[count]
     else:
         raise ValueError(
-            f"type={name} is not supported; use S3, S4, S8R, C3D4, C3D8, C3D10 or their like"
+            f"type={name} is not supported; use S3, S4, S8R, C3D4, C3D8, C3D10 or similar"
         )
     flat = [int(value) for row in data for value in row.split(",") if value.strip()]
     if len(flat) % (count + 1):
@@ -195,13 +198,13 @@ def _add_elements(scope: _Scope, options: Options, data: list[str], passed: Coun
         )
     for at in range(0, len(flat), count + 1):
         number, *nodes = flat[at : at + count + 1]
-        scope.elements[number] = kind, nodes[: CORNERS[kind] + len(EDGES[kind])], count
+        scope.elements[number] = kind, nodes[: CORNERS[kind] + len(EDGES[kind])]
         if "ELSET" in options:
-            scope.sets[options["ELSET"]].append(("", number))
+            scope.element_sets[options["ELSET"]].append(("", number))
 
 
 def _members(options: Options, data: list[str], sets: dict[str, list[Member]]) -> list[Member]:
-    """What a *ELSET or *NSET lists, counts out with GENERATE, or takes over from another set."""
+    """The members that *ELSET or *NSET lists, generates, or copies from another set."""
     members: list[Member] = []
     instance = options.get("INSTANCE", "").upper()
     by_upper = {name.upper(): name for name in sets}
@@ -212,112 +215,110 @@ def _members(options: Options, data: list[str], sets: dict[str, list[Member]]) -
             members += [(instance, number) for number in range(first, last + 1, step)]
             continue
         for word in words:
-            whose, _, name = word.rpartition(".")
-            known = (
-                [(whose.upper() or instance, int(name))]
-                if name.isdigit()
-                else sets[by_upper[name.upper()]]
-            )
-            members += known
+            of, _, name = word.rpartition(".")
+            if name.isdigit():
+                members.append((of.upper() or instance, int(name)))
+            else:
+                members += sets[by_upper[name.upper()]]
     return members
 
 
-def _tail(name: str) -> str:
-    """part-1.top -> top: which instance a set is of is left aside."""
-    return name.rpartition(".")[2].strip('"')
-
-
-def _assembled(
+def _assemble(
     scopes: dict[str, _Scope], instances: dict[str, _Instance], notes: list[str]
-) -> Elements:
-    """All instances in one mesh; without instances, whatever the file holds."""
+) -> ElementMesh:
+    """All instances in one mesh; if there are none, everything in the file."""
     placed = [(scopes[instance.part], instance) for instance in instances.values()]
     placed += [
         (scope, _Instance("", [])) for name, scope in scopes.items() if not (name and instances)
     ]
-    points: list[np.ndarray] = []
-    groups: dict[tuple[str, int], list[list[int]]] = defaultdict(list)
-    members: dict[
-        tuple[int, int], tuple[tuple[str, int], int]
-    ] = {}  # (scope, number) -> block and row in it
-    row_of: dict[tuple[int, int], int] = {}
+    points: list[np.ndarray] = [np.zeros((0, 3))]
+    blocks: dict[tuple[str, int], list[list[int]]] = defaultdict(list)
+    block_of: dict[Place, tuple[tuple[str, int], int]] = {}  # block and row of each element
+    row_of: dict[Place, int] = {}  # row of each node in the points
     for at, (scope, instance) in enumerate(placed):
         before = len(row_of)
         row_of.update({(at, number): before + k for k, number in enumerate(scope.nodes)})
         if scope.nodes:
-            points.append(instance.placed(np.array(list(scope.nodes.values()))))
-        for number, (kind, nodes, _) in scope.elements.items():
-            block = groups[kind, len(nodes)]
-            members[at, number] = (kind, len(nodes)), len(block)
-            block.append([_row(row_of, at, node, number) for node in nodes])
-    starts, total = {}, 0
-    for key, rows in groups.items():
-        starts[key], total = total, total + len(rows)
-    mesh = Elements(np.concatenate(points) if points else np.zeros((0, 3)), [], notes=notes)
-    mesh.blocks = [Block(kind, np.array(rows)) for (kind, _), rows in groups.items()]
-    index = {who: starts[key] + row for who, (key, row) in members.items()}
-    _number(mesh, index, list(instances))
+            points.append(instance.place(np.array(list(scope.nodes.values()))))
+        for number, (kind, nodes) in scope.elements.items():
+            for node in nodes:
+                if (at, node) not in row_of:
+                    raise KeyError(f"node {node} in element {number}")
+            rows = blocks[kind, len(nodes)]
+            block_of[at, number] = (kind, len(nodes)), len(rows)
+            rows.append([row_of[at, node] for node in nodes])
+    first, total = {}, 0
+    for key, rows in blocks.items():
+        first[key], total = total, total + len(rows)
+    elements = [Block(kind, np.array(rows)) for (kind, _), rows in blocks.items()]
+    mesh = ElementMesh(np.concatenate(points), elements, notes=notes)
+    element_of = {place: first[key] + row for place, (key, row) in block_of.items()}
+    _number_elements(mesh, element_of, list(instances))
     for at, (scope, _) in enumerate(placed):
-        _name(mesh, scope, at, index, row_of, list(instances))
+        # Sets outside of parts mean the instance that they name, or every instance.
+        own = [at] if scope.elements or scope.nodes else list(range(len(instances) + 1))
+        _add_groups(mesh, scope, _Rows(element_of, row_of, own, list(instances)))
     return mesh
 
 
-def _number(mesh: Elements, index: dict[tuple[int, int], int], instances: list[str]) -> None:
-    """The elements' own numbers; their places where several instances count each for itself."""
-    mesh.own = len({at for at, _ in index}) < 2 and len(instances) < 2
+def _number_elements(mesh: ElementMesh, element_of: dict[Place, int], instances: list[str]) -> None:
+    """Give elements the file's numbers, or positions if several instances number their own."""
+    mesh.own = len({at for at, _ in element_of}) < 2 and len(instances) < 2
     mesh.instance = instances[0] if len(instances) == 1 else ""
-    mesh.numbers = np.arange(1, len(index) + 1)
-    for (_, number), row in index.items() if mesh.own else ():
+    mesh.numbers = np.arange(1, len(element_of) + 1)
+    for (_, number), row in element_of.items() if mesh.own else ():
         mesh.numbers[row] = number
 
 
-def _row(row_of: dict[tuple[int, int], int], at: int, node: int, element: int) -> int:
-    if (at, node) not in row_of:
-        raise KeyError(f"node {node} in element {element}")
-    return row_of[at, node]
+@dataclass(frozen=True)
+class _Rows:
+    """Rows of the mesh for the members of a scope's sets.
 
+    Args:
+        element_of, row_of: row of each element and of each node.
+        own: placed scopes in which a member without an instance counts.
+    """
 
-def _name(
-    mesh: Elements,
-    scope: _Scope,
-    at: int,
-    index: dict[tuple[int, int], int],
-    row_of: dict[tuple[int, int], int],
-    instances: list[str],
-) -> None:
-    """Adds a scope's sets and surfaces; those outside of parts speak of the instance they name, or of every one."""
-    home = [at] if scope.elements or scope.nodes else list(range(len(instances) + 1))
+    element_of: dict[Place, int]
+    row_of: dict[Place, int]
+    own: list[int]
+    instances: list[str]
 
-    def found(members: list[Member], known: dict[tuple[int, int], int]) -> np.ndarray:
+    def elements(self, members: list[Member]) -> np.ndarray:
+        return self._find(members, self.element_of)
+
+    def nodes(self, members: list[Member]) -> np.ndarray:
+        return self._find(members, self.row_of)
+
+    def _find(self, members: list[Member], rows: dict[Place, int]) -> np.ndarray:
         places = (
-            (who, n)
-            for name, n in members
-            for who in ([instances.index(name)] if name in instances else home)
+            (at, number)
+            for name, number in members
+            for at in ([self.instances.index(name)] if name in self.instances else self.own)
         )
-        return np.array([known[place] for place in places if place in known], dtype=np.int64)
+        return np.array([rows[place] for place in places if place in rows], dtype=np.int64)
 
-    def joined(one: dict[str, np.ndarray], name: str, more: np.ndarray) -> None:
-        one[name] = np.concatenate([one.get(name, np.zeros(0, dtype=np.int64)), more])
 
-    for name, members in scope.sets.items():
-        joined(mesh.element_sets, name, found(members, index))
+def _add_groups(mesh: ElementMesh, scope: _Scope, rows: _Rows) -> None:
+    """Add the sets and surfaces of a scope."""
+    for name, members in scope.element_sets.items():
+        known = mesh.element_sets.get(name, NO_ROWS)
+        mesh.element_sets[name] = np.concatenate([known, rows.elements(members)])
     for name, members in scope.node_sets.items():
-        joined(mesh.node_sets, name, found(members, row_of))
-    for name, faces in scope.faces.items():
-        elements, sides = mesh.face_sets.get(
-            name, (np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))
-        )
-        for whose, face in faces:
-            if whose.isdigit():
-                more = found([("", int(whose))], index)
-            elif whose in scope.sets:
-                more = found(scope.sets[whose], index)
-            elif whose in mesh.element_sets:
-                more = mesh.element_sets[whose]
+        known = mesh.node_sets.get(name, NO_ROWS)
+        mesh.node_sets[name] = np.concatenate([known, rows.nodes(members)])
+    for name, faces in scope.surfaces.items():
+        elements, sides = mesh.face_sets.get(name, (NO_ROWS, NO_ROWS))
+        for of, face in faces:
+            if of.isdigit():
+                more = rows.elements([("", int(of))])
+            elif of in scope.element_sets:
+                more = rows.elements(scope.element_sets[of])
+            elif of in mesh.element_sets:
+                more = mesh.element_sets[of]
             else:
-                raise KeyError(f"the element set {whose}")
-            side = (
-                int(face[1:]) - 1 if re.fullmatch(r"S\d", face) else 0
-            )  # SPOS, SNEG, "": the shell itself
+                raise KeyError(f"the element set {of}")
+            # SPOS, SNEG and "" are the shell itself.
+            side = int(face[1:]) - 1 if re.fullmatch(r"S\d", face) else 0
             elements, sides = np.r_[elements, more], np.r_[sides, np.full(len(more), side)]
         mesh.face_sets[name] = elements, sides

@@ -1,8 +1,12 @@
-"""Finite elements -> triangles: shells become TRI3, solids give their skin, sets become names of triangles.
+"""Make triangles of finite elements: shells as they are, the skin of solids, sets as groups.
 
-quad8  3---6---2     corner triangles (0 4 7) (1 5 4) (2 6 5) (3 7 6), then the middle 4 5 6 7 by its
-       7       5     shorter diagonal; a mid-edge node that the file leaves out makes the edge straight
-       0---4---1
+A quadrilateral with mid-edge nodes becomes six triangles: the corner triangles (0 4 7) (1 5 4)
+(2 6 5) (3 7 6), then the middle 4 5 6 7, cut along its shorter diagonal. If the file leaves out a
+mid-edge node, the edge is straight.
+
+    3---6---2
+    7       5
+    0---4---1
 """
 
 from __future__ import annotations
@@ -24,14 +28,9 @@ FACES: dict[str, tuple[Face, ...]] = {
     "pyramid": ((0, 1, 2, 3), (0, 4, 1), (1, 4, 2), (2, 4, 3), (3, 4, 0)),
     "wedge": ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)),
     "hexahedron": (
-        (0, 1, 2, 3),
-        (4, 7, 6, 5),
-        (0, 4, 5, 1),
-        (1, 5, 6, 2),
-        (2, 6, 7, 3),
-        (3, 7, 4, 0),
+        (0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0),
     ),
-}
+}  # fmt: skip
 # Edges in the order of their mid-edge nodes, which follow the corners (VTK's and Abaqus's order).
 EDGES: dict[str, tuple[Face, ...]] = {
     "triangle": ((0, 1), (1, 2), (2, 0)),
@@ -43,14 +42,18 @@ EDGES: dict[str, tuple[Face, ...]] = {
 }
 CORNERS = {"triangle": 3, "quad": 4, "tetra": 4, "pyramid": 5, "wedge": 6, "hexahedron": 8}
 SHELLS = ("triangle", "quad")
+SOLIDS = ("tetra", "pyramid", "wedge", "hexahedron")
 NONE = -1
 
 
 @dataclass(frozen=True)
 class Block:
-    """Elements of one kind: nodes (k, p) rows of the points, corners first, then mid-edge nodes (or NONE).
+    """Elements of one kind.
 
-    More nodes than corners and edges have (face and body centres) are left aside.
+    Args:
+        kind: a key of FACES.
+        nodes: (k, p) rows of the mesh's points, corners first, then mid-edge nodes (or NONE).
+            Further nodes (face and body centres) are ignored.
     """
 
     kind: str
@@ -58,12 +61,17 @@ class Block:
 
 
 @dataclass
-class Elements:
-    """A finite element mesh. Elements count through all blocks.
+class ElementMesh:
+    """A finite element mesh; elements count through all blocks.
 
-    points (n, 3) in the file's numbers · numbers (e,): what the file calls each element, its own number if ``own``,
-    else its place · instance: Abaqus's, in which the numbers count · element_sets: name -> elements · face_sets: name
-    -> (elements, which face of each) · node_sets: name -> points; a triangle belongs where all of its corners do.
+    Args:
+        points: (n, 3) in the file's numbers.
+        numbers: the file's number of each element, (e,); its position if `own` is false.
+        instance: the Abaqus instance in which the numbers count.
+        element_sets: name -> elements.
+        face_sets: name -> elements, and the face of each.
+        node_sets: name -> points. A triangle belongs to the group if all of its corners do.
+        notes: for the user.
     """
 
     points: np.ndarray
@@ -79,8 +87,12 @@ class Elements:
 
 @dataclass(frozen=True)
 class _Polygons:
-    """Faces with n corners: corners, mids (k, n) points or NONE · owner, side (k,): element, its face · shell (k,)
-    the shell element that lies on the face, or NONE.
+    """Faces with n corners.
+
+    Args:
+        corners, mids: (k, n) points; mids of edges may be NONE.
+        owner, side: (k,), the element, and which of its faces it is.
+        shell: (k,), the shell element that lies on the face, or NONE.
     """
 
     corners: np.ndarray
@@ -93,77 +105,66 @@ class _Polygons:
         return _Polygons(*(column[keep] for column in vars(self).values()))
 
 
-def surface_of(mesh: Elements) -> RawMesh:
-    """The triangles that bound the elements, in their order, with the sets' names."""
-    soup, groups, notes = [], [], list(mesh.notes)
-    order, origins = [], []
+def extract_surface(mesh: ElementMesh) -> RawMesh:
+    """The triangles that bound the elements, in the order of these, with the sets as groups."""
+    corners, owners, origins, groups, notes = [], [], [], [], list(mesh.notes)
+    has_solids = any(block.kind in SOLIDS for block in mesh.blocks)
     for n in (3, 4):
-        shells, solids = (
-            _polygons(mesh, n, SHELLS),
-            _polygons(mesh, n, tuple(set(FACES) - set(SHELLS))),
-        )
-        if any(block.kind not in SHELLS for block in mesh.blocks):
-            faces, inside = _coated(_skin(solids, mesh.points, mesh.blocks), shells)
+        faces = _polygons(mesh, n, SHELLS)
+        if has_solids:
+            skin = _skin(_polygons(mesh, n, SOLIDS), mesh.points, mesh.blocks)
+            faces, inside = _with_shells(skin, faces)
             if inside:
                 notes.append(
-                    f"left out {inside} shell elements that are not on the skin of the solid elements"
+                    f"left out {inside} shell elements that are not on the skin of the solid "
+                    "elements"
                 )
-        else:
-            faces = shells
-        triangles, of_face = _triangulated(faces, mesh.points)
-        order.append(faces.owner[of_face])
+        triangles, of_face = _triangulate(faces, mesh.points)
+        corners.append(mesh.points[triangles])
+        owners.append(faces.owner[of_face])
         origins.append(np.stack(_origin(mesh, faces), axis=1)[of_face])
-        soup.append(mesh.points[triangles])
-        groups.append({name: mask[of_face] for name, mask in _named(mesh, faces).items()})
-    sequence = np.argsort(np.concatenate(order), kind="stable")
-    masks = {name: np.concatenate([part[name] for part in groups])[sequence] for name in groups[0]}
-    named = {name: mask for name, mask in masks.items() if mask.any()}
-    elements, sides = np.concatenate(origins)[sequence].T
-    numbering = ElementNumbers(elements, sides.astype(np.int8), mesh.own, mesh.instance)
+        groups.append({name: mask[of_face] for name, mask in _groups(mesh, faces).items()})
+    order = np.argsort(np.concatenate(owners), kind="stable")
+    masks = {name: np.concatenate([part[name] for part in groups])[order] for name in groups[0]}
+    elements, sides = np.concatenate(origins)[order].T
     return RawMesh(
-        np.concatenate(soup)[sequence].reshape(-1, 3, 3), named, None, tuple(notes), numbering
+        np.concatenate(corners)[order].reshape(-1, 3, 3),
+        {name: mask for name, mask in masks.items() if mask.any()},
+        notes=tuple(notes),
+        numbering=ElementNumbers(elements, sides.astype(np.int8), mesh.own, mesh.instance),
     )
 
 
-def _origin(mesh: Elements, faces: _Polygons) -> tuple[np.ndarray, np.ndarray]:
-    """Number (k,) of the element that each face is of, and which of a solid's faces it is, from 1; 0: a shell.
+def _origin(mesh: ElementMesh, faces: _Polygons) -> tuple[np.ndarray, np.ndarray]:
+    """Number (k,) of the element of each face, and which face of a solid it is, from 1; 0: shell.
 
-    A shell that lies on a solid is what the file's author looks at the surface with: it comes first.
+    Where a shell lies on a solid, the shell counts: the file's author put it there to show results.
     """
-    coated = faces.shell != NONE
-    solid = [np.full(len(block.nodes), block.kind not in SHELLS) for block in mesh.blocks]
-    of_solid = np.concatenate([np.zeros(0, dtype=bool), *solid])[faces.owner]
-    number = mesh.numbers[np.where(coated, faces.shell, faces.owner)]
-    return number, np.where(of_solid & ~coated, faces.side + 1, 0)
+    has_shell = faces.shell != NONE
+    is_solid = [np.full(len(block.nodes), block.kind in SOLIDS) for block in mesh.blocks]
+    of_solid = np.concatenate([np.zeros(0, dtype=bool), *is_solid])[faces.owner]
+    number = mesh.numbers[np.where(has_shell, faces.shell, faces.owner)]
+    return number, np.where(of_solid & ~has_shell, faces.side + 1, 0)
 
 
-def _polygons(mesh: Elements, n: int, kinds: tuple[str, ...]) -> _Polygons:
+def _polygons(mesh: ElementMesh, n: int, kinds: tuple[str, ...]) -> _Polygons:
     """All faces with n corners of the elements of some kinds."""
-    rows: list[tuple[np.ndarray, ...]] = []
+    empty = np.zeros((0, n), dtype=np.int64), np.zeros(0, dtype=np.int64)
+    rows = [(empty[0], empty[0], empty[1], empty[1], empty[1])]
     first = 0
     for block in mesh.blocks:
         number = np.arange(first, first + len(block.nodes))
         first += len(block.nodes)
-        for side, face in enumerate(FACES[block.kind]):
+        for k, face in enumerate(FACES[block.kind]):
             if len(face) == n and block.kind in kinds:
-                full = np.full_like(number, side)
-                rows.append(
-                    (
-                        block.nodes[:, face],
-                        _mids(block, face),
-                        number,
-                        full,
-                        np.full_like(number, NONE),
-                    )
-                )
-    if not rows:
-        return _Polygons(*np.zeros((2, 0, n), dtype=np.int64), *np.zeros((3, 0), dtype=np.int64))
+                side, shell = np.full_like(number, k), np.full_like(number, NONE)
+                rows.append((block.nodes[:, face], _mids(block, face), number, side, shell))
     return _Polygons(*(np.concatenate(column) for column in zip(*rows, strict=True)))
 
 
 def _mids(block: Block, face: Face) -> np.ndarray:
-    """Points (k, n) in the middle of the face's edges; NONE where an element has none."""
-    edges = {frozenset(edge): CORNERS[block.kind] + at for at, edge in enumerate(EDGES[block.kind])}
+    """Points (k, n) in the middle of a face's edges; NONE where an element has none."""
+    edges = {frozenset(edge): CORNERS[block.kind] + k for k, edge in enumerate(EDGES[block.kind])}
     columns = [edges[frozenset((face[k], face[(k + 1) % len(face)]))] for k in range(len(face))]
     if block.nodes.shape[1] <= max(edges.values()):
         return np.full((len(block.nodes), len(face)), NONE)
@@ -171,10 +172,9 @@ def _mids(block: Block, face: Face) -> np.ndarray:
 
 
 def _skin(faces: _Polygons, points: np.ndarray, blocks: list[Block]) -> _Polygons:
-    """The faces that belong to one solid only, facing away from it."""
-    _, same, times = np.unique(
-        np.sort(faces.corners, axis=1), axis=0, return_inverse=True, return_counts=True
-    )
+    """The faces that belong to one solid only, turned to face away from it."""
+    keys = np.sort(faces.corners, axis=1)
+    _, same, times = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
     faces = faces.select(times[same.reshape(-1)] == 1)
     if not len(faces.corners):
         return faces
@@ -182,32 +182,33 @@ def _skin(faces: _Polygons, points: np.ndarray, blocks: list[Block]) -> _Polygon
         [points[block.nodes[:, : CORNERS[block.kind]]].mean(axis=1) for block in blocks]
     )
     at = points[faces.corners]
-    across = np.cross(at[:, 1] - at[:, 0], at[:, -1] - at[:, 0])
-    inward = np.einsum("ij,ij->i", across, at.mean(axis=1) - middle[faces.owner]) < 0.0
+    normal = np.cross(at[:, 1] - at[:, 0], at[:, -1] - at[:, 0])
+    inward = np.einsum("ij,ij->i", normal, at.mean(axis=1) - middle[faces.owner]) < 0.0
     corners = np.where(inward[:, None], faces.corners[:, ::-1], faces.corners)
     mids = np.where(inward[:, None], np.roll(faces.mids[:, ::-1], -1, axis=1), faces.mids)
     return _Polygons(corners, mids, faces.owner, faces.side, faces.shell)
 
 
-def _coated(skin: _Polygons, shells: _Polygons) -> tuple[_Polygons, int]:
-    """The skin with the shell elements that lie on it, whose names it takes; and how many shells do not."""
+def _with_shells(skin: _Polygons, shells: _Polygons) -> tuple[_Polygons, int]:
+    """The skin with the shell elements that lie on it, and the number of shells that do not."""
     if not len(shells.corners):
         return skin, 0
     keys = np.sort(np.concatenate([skin.corners, shells.corners]), axis=1)
-    _, same = np.unique(keys, axis=0, return_inverse=True)
-    on_skin, on_shell = same.reshape(-1)[: len(skin.corners)], same.reshape(-1)[len(skin.corners) :]
-    coat = np.full(int(same.max()) + 1, NONE)
-    coat[on_shell] = shells.owner
+    key = np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1)
+    on_skin, on_shell = key[: len(skin.corners)], key[len(skin.corners) :]
+    shell_of_key = np.full(int(key.max()) + 1, NONE)
+    shell_of_key[on_shell] = shells.owner
     inside = int((~np.isin(on_shell, on_skin)).sum())
-    return _Polygons(skin.corners, skin.mids, skin.owner, skin.side, coat[on_skin]), inside
+    shell = shell_of_key[on_skin]
+    return _Polygons(skin.corners, skin.mids, skin.owner, skin.side, shell), inside
 
 
-def _named(mesh: Elements, faces: _Polygons) -> dict[str, np.ndarray]:
-    """Name -> which faces (k,) it holds. A name may be that of a node set and of an element set at once."""
-    named: dict[str, np.ndarray] = {}
+def _groups(mesh: ElementMesh, faces: _Polygons) -> dict[str, np.ndarray]:
+    """Name -> its faces, (k,) bool. A node set and an element set may share a name."""
+    groups: dict[str, np.ndarray] = {}
 
     def add(name: str, mask: np.ndarray) -> None:
-        named[name] = named[name] | mask if name in named else mask
+        groups[name] = groups[name] | mask if name in groups else mask
 
     for name, elements in mesh.element_sets.items():
         add(name, np.isin(faces.owner, elements) | np.isin(faces.shell, elements))
@@ -217,23 +218,21 @@ def _named(mesh: Elements, faces: _Polygons) -> dict[str, np.ndarray]:
         inside = np.zeros(len(mesh.points), dtype=bool)
         inside[nodes] = True
         add(name, inside[faces.corners].all(axis=1))
-    return named
+    return groups
 
 
-def _triangulated(faces: _Polygons, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles (t, 3) of points, and the face (t,) each one lies in; collapsed ones are left out."""
-    n = faces.corners.shape[1]
+def _triangulate(faces: _Polygons, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles (t, 3) of points, and the face (t,) of each; collapsed ones are left out."""
     curved = (faces.mids != NONE).any(axis=1)
     plain, bent = np.flatnonzero(~curved), np.flatnonzero(curved)
     pieces = [_split(faces.corners[plain], plain, points)]
     if len(bent):
-        corners, mids = faces.corners[bent], faces.mids[bent].copy()
-        missing = (
-            mids == NONE
-        )  # the corner itself stands in: the edge is straight, one triangle falls flat
-        mids[missing] = corners[missing]
+        corners = faces.corners[bent]
+        # A missing node is replaced by the corner: the edge is straight, one triangle collapses.
+        mids = np.where(faces.mids[bent] == NONE, corners, faces.mids[bent])
         pieces += [
-            (np.stack([corners[:, k], mids[:, k], mids[:, k - 1]], axis=1), bent) for k in range(n)
+            (np.stack([corners[:, k], mids[:, k], mids[:, k - 1]], axis=1), bent)
+            for k in range(corners.shape[1])
         ]
         pieces.append(_split(mids, bent, points))
     triangles = np.concatenate([piece for piece, _ in pieces])
@@ -246,7 +245,7 @@ def _triangulated(faces: _Polygons, points: np.ndarray) -> tuple[np.ndarray, np.
 def _split(
     polygons: np.ndarray, of_face: np.ndarray, points: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles as they are; quadrilaterals cut along the shorter diagonal."""
+    """Triangles as they are, quadrilaterals cut along the shorter diagonal."""
     if polygons.shape[1] == 3:
         return polygons, of_face
     a, b, c, d = (points[polygons[:, k]] for k in range(4))

@@ -1,7 +1,9 @@
-"""Gmsh's .msh, versions 2.2 and 4.1, text and binary; physical groups give names.
+"""Read Gmsh's .msh, versions 2.2 and 4.1, text and binary; physical groups as groups.
 
-Both encodings hold the same numbers in the same order, so one reader asks for "two int, three double" and a
-stream answers. Formats: Gmsh reference manual, sections "MSH file format" and "Node ordering".
+Both encodings hold the same numbers in the same order, so that one reader serves both: it asks a
+stream for "two int, three double".
+
+Source: Gmsh reference manual, sections "MSH file format" and "Node ordering".
 """
 
 from __future__ import annotations
@@ -13,15 +15,22 @@ from pathlib import Path
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.geometry.mesh_io.readers.elements import CORNERS, EDGES, Block, Elements, surface_of
+from chamberopt.geometry.mesh_io.readers.elements import (
+    CORNERS,
+    EDGES,
+    SHELLS,
+    Block,
+    ElementMesh,
+    extract_surface,
+)
 from chamberopt.geometry.mesh_io.readers.raw_mesh import RawMesh
 
 # Gmsh's number of an element type: kind, nodes.
 TYPES = {
     2: ("triangle", 3), 9: ("triangle", 6), 3: ("quad", 4), 16: ("quad", 8), 10: ("quad", 9),
-    4: ("tetra", 4), 11: ("tetra", 10), 7: ("pyramid", 5), 19: ("pyramid", 13), 14: ("pyramid", 14),
-    6: ("wedge", 6), 18: ("wedge", 15), 13: ("wedge", 18), 5: ("hexahedron", 8), 17: ("hexahedron", 20),
-    12: ("hexahedron", 27),
+    4: ("tetra", 4), 11: ("tetra", 10), 7: ("pyramid", 5), 19: ("pyramid", 13),
+    14: ("pyramid", 14), 6: ("wedge", 6), 18: ("wedge", 15), 13: ("wedge", 18),
+    5: ("hexahedron", 8), 17: ("hexahedron", 20), 12: ("hexahedron", 27),
 }  # fmt: skip
 WITHOUT_SURFACE = {15: 1, 1: 2, 8: 3, 26: 4, 27: 5}  # points and lines: nodes
 # Where Gmsh's order of mid-edge nodes is not that of `elements.EDGES`.
@@ -30,7 +39,8 @@ MIDS = {
     "pyramid": ((0, 1), (0, 3), (0, 4), (1, 2), (1, 4), (2, 3), (2, 4), (3, 4)),
     "wedge": ((0, 1), (0, 2), (0, 3), (1, 2), (1, 4), (2, 5), (3, 4), (3, 5), (4, 5)),
     "hexahedron": (
-        (0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 7), (5, 6), (6, 7),
+        (0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3),
+        (2, 6), (3, 7), (4, 5), (4, 7), (5, 6), (6, 7),
     ),
 }  # fmt: skip
 PHYSICAL = re.compile(rb"^\s*(\d)\s+(-?\d+)\s+\"([^\"]*)\"", re.M)
@@ -44,20 +54,6 @@ class _Stream:
         self.tokens = np.array(section.split()) if text else np.zeros(0)
         self.bytes = section
 
-    def _take(self, count: int, kind: str) -> np.ndarray:
-        if self.text:
-            taken = self.tokens[self.at : self.at + count].astype(
-                np.float64 if kind == "f8" else np.int64
-            )
-            self.at += count
-        else:
-            size = count * int(kind[1])
-            taken = np.frombuffer(self.bytes[self.at : self.at + size], dtype=self.order + kind)
-            self.at += size
-        if len(taken) < count or count < 0:
-            raise InputError(f"{self.path}: truncated or damaged; export or copy it again")
-        return taken
-
     def ints(self, count: int) -> np.ndarray:
         return self._take(count, "i4")
 
@@ -67,36 +63,62 @@ class _Stream:
     def reals(self, count: int) -> np.ndarray:
         return self._take(count, "f8")
 
-    def numbered(self, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """An int and three doubles, count times: numbers (count,) and places (count, 3)."""
-        if self.text:
-            rows = self.reals(4 * count).reshape(count, 4)
-            return rows[:, 0].astype(np.int64), rows[:, 1:]
-        kind = np.dtype([("number", self.order + "i4"), ("place", self.order + "f8", 3)])
-        records = np.frombuffer(self.bytes[self.at : self.at + count * kind.itemsize], dtype=kind)
-        return records["number"].astype(np.int64), records["place"]
+    def one_int(self) -> int:
+        return int(self.ints(1)[0])
 
-    def whole(self) -> int:
-        """A number that stands as text in binary files too."""
+    def one_size(self) -> int:
+        return int(self.sizes(1)[0])
+
+    def text_size(self) -> int:
+        """A count that is text even in binary files."""
         if self.text:
-            return int(self.sizes(1)[0])
+            return self.one_size()
         line, _, self.bytes = self.bytes.partition(b"\n")
         return int(line)
 
+    def numbered_points(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """An int and three doubles, `count` times: numbers (count,) and points (count, 3)."""
+        if self.text:
+            rows = self.reals(4 * count).reshape(count, 4)
+            return rows[:, 0].astype(np.int64), rows[:, 1:]
+        kind = np.dtype([("number", self.order + "i4"), ("point", self.order + "f8", 3)])
+        records = np.frombuffer(self.bytes[self.at : self.at + count * kind.itemsize], dtype=kind)
+        return records["number"].astype(np.int64), records["point"]
+
+    def _take(self, count: int, kind: str) -> np.ndarray:
+        if self.text:
+            taken = self.tokens[self.at : self.at + count]
+            taken = taken.astype(np.float64 if kind == "f8" else np.int64)
+            self.at += count
+        else:
+            size = count * int(kind[1])
+            taken = np.frombuffer(self.bytes[self.at : self.at + size], dtype=self.order + kind)
+            self.at += size
+        if len(taken) < count or count < 0:
+            raise InputError(f"{self.path}: truncated or damaged; export or copy it again")
+        return taken
+
 
 @dataclass
-class _Mesh:
-    """Node numbers and places, then elements in batches: type, own number and nodes (k, 1 + p) by number, physical tags
-    of all k.
+class _GmshMesh:
+    """Nodes and elements by Gmsh's numbers.
+
+    Args:
+        batches: Gmsh's type of some elements, rows (k, 1 + p) of their number and nodes, and the
+            physical groups that all of them belong to.
     """
 
     numbers: list[np.ndarray] = field(default_factory=list)
-    places: list[np.ndarray] = field(default_factory=list)
+    points: list[np.ndarray] = field(default_factory=list)
     batches: list[tuple[int, np.ndarray, tuple[int, ...]]] = field(default_factory=list)
 
 
 def read_gmsh(path: Path, content: bytes) -> RawMesh:
-    """The surface in a .msh. Raises InputError for other versions and for elements that are not understood."""
+    """Read the surface in a .msh.
+
+    Raises:
+        InputError: other versions, and elements that are not supported.
+    """
     found = re.match(
         rb"\s*\$MeshFormat\s+([\d.]+)\s+([01])\s+(\d+)[ \t]*\r?\n?(.{0,4})", content, re.S
     )
@@ -110,86 +132,81 @@ def read_gmsh(path: Path, content: bytes) -> RawMesh:
     streams = {
         name: _Stream(path, body, text, order) for name, body in _sections(path, content).items()
     }
-    mesh = _Mesh()
-    (_read_2 if found[1][:1] == b"2" else _read_4)(streams, mesh)
-    names = {
-        (int(d), int(n)): name.decode("utf-8", "replace")
-        for d, n, name in PHYSICAL.findall(_names(content))
+    mesh = (_read_version_2 if found[1][:1] == b"2" else _read_version_4)(streams)
+    names = content.partition(b"$PhysicalNames")[2].partition(b"$EndPhysicalNames")[0]
+    name_of = {
+        (int(dimension), int(group)): name.decode("utf-8", "replace")
+        for dimension, group, name in PHYSICAL.findall(names)
     }
-    return surface_of(_elements(path, mesh, names))
-
-
-def _names(content: bytes) -> bytes:
-    return content.partition(b"$PhysicalNames")[2].partition(b"$EndPhysicalNames")[0]
+    return extract_surface(_element_mesh(path, mesh, name_of))
 
 
 def _sections(path: Path, content: bytes) -> dict[str, bytes]:
     sections = {}
     for name in ("Entities", "Nodes", "Elements"):
         start = content.find(f"${name}".encode())
-        if start < 0:
-            continue
         end = content.rfind(f"$End{name}".encode())
-        if end < 0:
+        if start >= 0 and end < 0:
             raise InputError(
                 f"{path}: truncated: ${name} has no $End{name}; export or copy it again"
             )
-        sections[name] = content[start:end].partition(b"\n")[2]
-    for name in ("Nodes", "Elements"):
-        if name not in sections:
+        if start >= 0:
+            sections[name] = content[start:end].partition(b"\n")[2]
+        elif name != "Entities":
             raise InputError(f"{path}: holds no ${name}; mesh it and save it again")
     return sections
 
 
-def _read_2(streams: dict[str, _Stream], mesh: _Mesh) -> None:
+def _read_version_2(streams: dict[str, _Stream]) -> _GmshMesh:
     nodes, elements = streams["Nodes"], streams["Elements"]
-    numbers, places = nodes.numbered(nodes.whole())
-    mesh.numbers.append(numbers)
-    mesh.places.append(places)
-    left = elements.whole()
+    numbers, points = nodes.numbered_points(nodes.text_size())
+    left = elements.text_size()
     rows: dict[tuple[int, tuple[int, ...]], list[np.ndarray]] = {}
     while left > 0:
         if elements.text:
-            own, kind, tags = elements.ints(3).tolist()
+            number, kind, tags = elements.ints(3).tolist()
             count = 1
         else:
             kind, count, tags = elements.ints(3).tolist()
         for _ in range(count):
             if not elements.text:
-                own = int(elements.ints(1)[0])
-            physical = elements.ints(tags)[:1].tolist()
-            nodes_of = elements.ints(_size(elements.path, kind))
-            rows.setdefault((kind, tuple(physical)), []).append(np.r_[own, nodes_of])
+                number = elements.one_int()
+            physical = tuple(elements.ints(tags)[:1].tolist())
+            nodes_of = elements.ints(_node_count(elements.path, kind))
+            rows.setdefault((kind, physical), []).append(np.r_[number, nodes_of])
         left -= count
-    mesh.batches += [(kind, np.array(nodes), physical) for (kind, physical), nodes in rows.items()]
+    batches = [(kind, np.array(own), physical) for (kind, physical), own in rows.items()]
+    return _GmshMesh([numbers], [points], batches)
 
 
-def _read_4(streams: dict[str, _Stream], mesh: _Mesh) -> None:
+def _read_version_4(streams: dict[str, _Stream]) -> _GmshMesh:
+    mesh = _GmshMesh()
     physical: dict[tuple[int, int], tuple[int, ...]] = {}
     if "Entities" in streams:
         entities = streams["Entities"]
         for dimension, count in enumerate(entities.sizes(4).tolist()):
             for _ in range(count):
-                tag = int(entities.ints(1)[0])
-                entities.reals(3 if dimension == 0 else 6)
-                physical[dimension, tag] = tuple(entities.ints(int(entities.sizes(1)[0])).tolist())
+                tag = entities.one_int()
+                entities.reals(3 if dimension == 0 else 6)  # bounding box
+                physical[dimension, tag] = tuple(entities.ints(entities.one_size()).tolist())
                 if dimension > 0:
-                    entities.ints(int(entities.sizes(1)[0]))  # what bounds it
+                    entities.ints(entities.one_size())  # bounding entities
     nodes, elements = streams["Nodes"], streams["Elements"]
     for _ in range(int(nodes.sizes(4)[0])):
         dimension, _, parametric = nodes.ints(3).tolist()
-        count = int(nodes.sizes(1)[0])
+        count = nodes.one_size()
         mesh.numbers.append(nodes.sizes(count))
         width = 3 + (dimension if parametric else 0)
-        mesh.places.append(nodes.reals(width * count).reshape(count, width)[:, :3])
+        mesh.points.append(nodes.reals(width * count).reshape(count, width)[:, :3])
     for _ in range(int(elements.sizes(4)[0])):
         dimension, tag, kind = elements.ints(3).tolist()
-        count, width = int(elements.sizes(1)[0]), _size(elements.path, kind) + 1
+        count, width = elements.one_size(), _node_count(elements.path, kind) + 1
         rows = elements.sizes(count * width).reshape(count, width)
         mesh.batches.append((kind, rows, physical.get((dimension, tag), ())))
+    return mesh
 
 
-def _size(path: Path, kind: int) -> int:
+def _node_count(path: Path, kind: int) -> int:
     if kind in WITHOUT_SURFACE:
         return WITHOUT_SURFACE[kind]
     if kind not in TYPES:
@@ -199,37 +216,37 @@ def _size(path: Path, kind: int) -> int:
     return TYPES[kind][1]
 
 
-def _elements(path: Path, mesh: _Mesh, names: dict[tuple[int, int], str]) -> Elements:
-    """The elements that have a surface, and those of each physical group; 0 is none."""
+def _element_mesh(path: Path, mesh: _GmshMesh, name_of: dict[tuple[int, int], str]) -> ElementMesh:
+    """The elements that have a surface, and those of each physical group; group 0 means none."""
     numbers = np.concatenate([np.zeros(0, dtype=np.int64), *mesh.numbers])
-    places = np.concatenate([np.zeros((0, 3)), *(place.reshape(-1, 3) for place in mesh.places)])
+    points = np.concatenate([np.zeros((0, 3)), *(point.reshape(-1, 3) for point in mesh.points)])
     by_number = np.argsort(numbers, kind="stable")
-    made, first = Elements(places, []), 0
+    result, first = ElementMesh(points, []), 0
     members: dict[str, list[np.ndarray]] = {}
-    own: list[np.ndarray] = []
-    for kind, numbered, groups in mesh.batches:
-        if kind in WITHOUT_SURFACE or not len(numbered):
+    own = [np.zeros(0, dtype=np.int64)]
+    for kind, rows, groups in mesh.batches:
+        if kind in WITHOUT_SURFACE or not len(rows):
             continue
-        rows = numbered[:, 1:]
-        own.append(numbered[:, 0])
-        at = by_number[
-            np.minimum(np.searchsorted(numbers, rows, sorter=by_number), len(numbers) - 1)
-        ]
-        if not np.array_equal(numbers[at], rows):
+        nodes = rows[:, 1:]
+        own.append(rows[:, 0])
+        place = np.searchsorted(numbers, nodes, sorter=by_number)
+        at = by_number[np.minimum(place, len(numbers) - 1)]
+        if not np.array_equal(numbers[at], nodes):
             raise InputError(f"{path}: an element names a node that is not there; export it again")
-        name, dimension = TYPES[kind][0], 2 if TYPES[kind][0] in ("triangle", "quad") else 3
-        made.blocks.append(Block(name, _reordered(name, at)))
-        for group in groups:
-            if group:
-                told = names.get((dimension, group), f"physical {group}")
-                members.setdefault(told, []).append(np.arange(first, first + len(rows)))
+        name = TYPES[kind][0]
+        result.blocks.append(Block(name, _reorder(name, at)))
+        for group in filter(None, groups):
+            dimension = 2 if name in SHELLS else 3
+            group_name = name_of.get((dimension, group), f"physical {group}")
+            members.setdefault(group_name, []).append(np.arange(first, first + len(rows)))
         first += len(rows)
-    made.numbers = np.concatenate([np.zeros(0, dtype=np.int64), *own])
-    made.element_sets = {name: np.concatenate(parts) for name, parts in members.items()}
-    return made
+    result.numbers = np.concatenate(own)
+    result.element_sets = {name: np.concatenate(parts) for name, parts in members.items()}
+    return result
 
 
-def _reordered(kind: str, nodes: np.ndarray) -> np.ndarray:
+def _reorder(kind: str, nodes: np.ndarray) -> np.ndarray:
+    """Nodes with the mid-edge nodes in the order of `elements.EDGES`."""
     corners = CORNERS[kind]
     if kind not in MIDS or nodes.shape[1] == corners:
         return nodes

@@ -1,7 +1,9 @@
-"""Nastran bulk data (CATIA V5, Patran, HyperMesh ...): GRID, shells, solids; properties and sets give names.
+"""Read Nastran bulk data (CATIA V5, Patran, HyperMesh ...); properties and sets as groups.
 
-A card of geometry that is not understood is refused by name rather than passed over. Fields as in the MSC
-Nastran Quick Reference Guide: small (8 columns), large (16, name with *) and free (commas) format.
+A card of geometry that is not supported is refused by name, never ignored. Fields come in the small
+format (8 columns), the large format (16 columns, name with *) and the free format (commas).
+
+Source: MSC Nastran Quick Reference Guide.
 """
 
 from __future__ import annotations
@@ -19,8 +21,8 @@ from chamberopt.geometry.mesh_io.readers.elements import (
     EDGES,
     NONE,
     Block,
-    Elements,
-    surface_of,
+    ElementMesh,
+    extract_surface,
 )
 from chamberopt.geometry.mesh_io.readers.raw_mesh import RawMesh
 
@@ -29,53 +31,59 @@ KINDS = {
     "CQUAD4": "quad", "CQUADR": "quad", "CQUAD8": "quad",
     "CTETRA": "tetra", "CPYRAM": "pyramid", "CPENTA": "wedge", "CHEXA": "hexahedron",
 }  # fmt: skip
-# Nastran counts mid-edge nodes of these bottom, upright, top; here they are bottom, top, upright.
+# Nastran counts the mid-edge nodes of these bottom, upright, top; `elements` bottom, top, upright.
 REORDERED = {
     "wedge": [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 13, 14, 9, 10, 11],
     "hexahedron": [*range(12), 16, 17, 18, 19, 12, 13, 14, 15],
 }
-REFUSED = {
+UNSUPPORTED = {
     "INCLUDE": "put the included file's text in its place",
-    "CORD1R": "use CORD2R", "CORD1C": "use CORD2C", "CORD1S": "use CORD2S", "CORD3G": "use CORD2R",
-    "SPOINT": "remove it", "GRDSET": "write its values into each GRID",
+    "CORD1R": "use CORD2R", "CORD1C": "use CORD2C", "CORD1S": "use CORD2S",
+    "CORD3G": "use CORD2R", "SPOINT": "remove it",
+    "GRDSET": "write its values into each GRID",
     "CQUAD": "export CQUAD4 or CQUAD8", "CTRIAX6": "export a solid's surface",
 }  # fmt: skip
 WITHOUT_SURFACE = re.compile(
     r"C(BAR|BEAM|ROD|TUBE|BUSH|ELAS|DAMP|MASS|ONM|ONROD|GAP|WELD|FAST|VISC|BEND|SEAM|HBDY)"
 )
 SYSTEMS = ("CORD2R", "CORD2C", "CORD2S")
-KEPT = {"GRID", *KINDS, *SYSTEMS, *REFUSED}
+GEOMETRY_CARDS = {"GRID", *KINDS, *SYSTEMS, *UNSUPPORTED}
 NUMBER = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+))(?:[ED]?([-+]?\d+))?$")
 Card = tuple[str, list[str], int]
 
 
 def read_nastran(path: Path, content: bytes) -> RawMesh:
-    """The surface in bulk data. Raises InputError with card and line for what is missing or not understood."""
+    """Read the surface in bulk data.
+
+    Raises:
+        InputError: with card and line, for what is missing or not supported.
+    """
     text = content.decode("latin-1")
     cards: dict[str, list[Card]] = defaultdict(list)
-    passed: Counter[str] = Counter()
+    left_out: Counter[str] = Counter()
     for name, fields, line in _cards(text):
-        if name in KEPT:
+        if name in GEOMETRY_CARDS:
             cards[name].append((name, fields, line))
         elif WITHOUT_SURFACE.match(name):
-            passed[name] += 1
-    for name, remedy in REFUSED.items():
+            left_out[name] += 1
+    for name, remedy in UNSUPPORTED.items():
         if cards[name]:
             raise InputError(f"{path}: line {cards[name][0][2]}: {name} is not supported; {remedy}")
     try:
-        points, row_of = _points(path, cards)
-        mesh = Elements(points, [])
-        _add_elements(path, mesh, cards, row_of, _property_names(text), _sets(text))
+        points, row_of = _points(cards)
+        mesh = ElementMesh(points, [])
+        numbers, properties = _add_blocks(mesh, cards, row_of)
     except (ValueError, IndexError) as error:
         raise InputError(
             f"{path}: cannot be read as Nastran bulk data: {error}; export it again"
         ) from None
-    mesh.notes += [f"left out {count} {name}: it has no surface" for name, count in passed.items()]
-    return surface_of(mesh)
+    _add_groups(mesh, numbers, properties, text)
+    mesh.notes += [f"left out {n} {name}: it has no surface" for name, n in left_out.items()]
+    return extract_surface(mesh)
 
 
 def _cards(text: str) -> Iterator[Card]:
-    """Name, fields after the name, and line number of each card; continuation lines joined."""
+    """Name, further fields and line number of each card; continuation lines are joined."""
     lines = text.splitlines()
     start = next(
         (k + 1 for k, line in enumerate(lines) if re.match(r"\s*BEGIN\s+BULK", line, re.I)), 0
@@ -99,11 +107,11 @@ def _cards(text: str) -> Iterator[Card]:
 
 
 def _fields(line: str) -> tuple[str, list[str]]:
-    """What stands in the first field, without the large format's *, and the values after it."""
+    """The first field of a line, without the large format's *, and the values after it."""
     if "," in line:
         head, *values = (value.strip() for value in line.split(","))
-        values = values[: 4 if "*" in head else 8]
-        values += [""] * ((4 if "*" in head else 8) - len(values))
+        count = 4 if "*" in head else 8
+        values = (values + [""] * count)[:count]
     else:
         line = line.expandtabs(8)
         head, width = line[:8].strip(), 16 if "*" in line[:8] else 8
@@ -112,27 +120,27 @@ def _fields(line: str) -> tuple[str, list[str]]:
 
 
 def _number(text: str, line: int, what: str) -> float:
-    """1.5, 1.5E-3, 1.5D-3 and Nastran's 1.5-3; blank is 0."""
+    """Value of 1.5, 1.5E-3, 1.5D-3 or Nastran's 1.5-3; blank means 0."""
     if not text:
         return 0.0
     found = NUMBER.match(text.upper())
     if not found:
-        raise ValueError(f"line {line}: {what} is {text!r}, which is no number")
+        raise ValueError(f"line {line}: {what} is {text!r}, which is not a number")
     return float(f"{found[1]}e{found[2] or 0}")
 
 
 def _whole(text: str, line: int, what: str) -> int:
     if not re.fullmatch(r"\d*", text):
-        raise ValueError(f"line {line}: {what} is {text!r}, which is no whole number")
+        raise ValueError(f"line {line}: {what} is {text!r}, which is not a whole number")
     return int(text or 0)
 
 
-def _points(path: Path, cards: dict[str, list[Card]]) -> tuple[np.ndarray, dict[int, int]]:
+def _points(cards: dict[str, list[Card]]) -> tuple[np.ndarray, dict[int, int]]:
     """Points (n, 3) in the basic coordinate system, and the row of each grid number."""
-    systems = _Systems(path, [card for name in SYSTEMS for card in cards[name]])
+    systems = _CoordinateSystems([card for name in SYSTEMS for card in cards[name]])
     row_of: dict[int, int] = {}
     points = np.zeros((len(cards["GRID"]), 3))
-    own: dict[int, list[int]] = defaultdict(list)
+    rows_of_system: dict[int, list[int]] = defaultdict(list)
     for row, (_, fields, line) in enumerate(cards["GRID"]):
         number = _whole(fields[0], line, "GRID's number")
         points[row] = [_number(text, line, "a GRID coordinate") for text in fields[2:5]]
@@ -141,24 +149,27 @@ def _points(path: Path, cards: dict[str, list[Card]]) -> tuple[np.ndarray, dict[
                 f"line {line}: GRID {number} is given twice, at two places; give each number once"
             )
         if fields[1] not in ("", "0"):
-            own[_whole(fields[1], line, "GRID's coordinate system")].append(row)
-    for system, rows in own.items():
-        points[rows] = systems.basic(system, points[rows])
+            system = _whole(fields[1], line, "GRID's coordinate system")
+            rows_of_system[system].append(row)
+    for system, rows in rows_of_system.items():
+        points[rows] = systems.to_basic(system, points[rows])
     return points, row_of
 
 
-class _Systems:
-    """CORD2R, CORD2C, CORD2S, each perhaps given in another: origin A, a point B on z, a point C in the xz plane."""
+class _CoordinateSystems:
+    """Coordinate systems CORD2R, CORD2C, CORD2S, each perhaps given in another.
 
-    def __init__(self, path: Path, cards: list[Card]) -> None:
-        self.path = path
+    Each card has the origin A, a point B on the z axis and a point C in the xz plane.
+    """
+
+    def __init__(self, cards: list[Card]) -> None:
         self.cards = {
             _whole(fields[0], line, f"{name}'s number"): (name, fields, line)
             for name, fields, line in cards
         }
         self.frames: dict[int, tuple[np.ndarray, np.ndarray]] = {0: (np.zeros(3), np.eye(3))}
 
-    def basic(self, number: int, points: np.ndarray) -> np.ndarray:
+    def to_basic(self, number: int, points: np.ndarray) -> np.ndarray:
         """Points (n, 3) given in a coordinate system, in the basic one."""
         origin, axes = self._frame(number, ())
         name = "CORD2R" if number == 0 else self.cards[number][0]
@@ -171,6 +182,7 @@ class _Systems:
         return origin + points @ axes
 
     def _frame(self, number: int, above: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+        """Origin (3,) and axes (3, 3) of a system; `above` are the systems that refer to it."""
         if number in above or (number != 0 and number not in self.cards):
             raise ValueError(
                 f"coordinate system {number} is not defined; export it along with the mesh"
@@ -179,10 +191,8 @@ class _Systems:
             _, fields, line = self.cards[number]
             parent = _whole(fields[1], line, "the reference system")
             self._frame(parent, (*above, number))
-            given = np.array(
-                [_number(text, line, "a coordinate") for text in fields[2:11]]
-            ).reshape(3, 3)
-            a, b, c = self.basic(parent, given)
+            numbers = [_number(text, line, "a coordinate") for text in fields[2:11]]
+            a, b, c = self.to_basic(parent, np.array(numbers).reshape(3, 3))
             z = (b - a) / np.linalg.norm(b - a)
             y = np.cross(z, c - a)
             y /= np.linalg.norm(y)
@@ -190,55 +200,60 @@ class _Systems:
         return self.frames[number]
 
 
-def _add_elements(
-    path: Path,
-    mesh: Elements,
-    cards: dict[str, list[Card]],
-    row_of: dict[int, int],
-    names: dict[int, str],
-    sets: dict[int, set[int]],
-) -> None:
-    """Blocks of elements, in the file's order within each kind, and who belongs to which property and set."""
+def _add_blocks(
+    mesh: ElementMesh, cards: dict[str, list[Card]], row_of: dict[int, int]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Add blocks of elements, in the file's order within each card.
+
+    Returns:
+        Number and property of each element, (e,).
+    """
     numbers: list[int] = []
     properties: list[int] = []
     for card, kind in KINDS.items():
-        size = CORNERS[kind] + len(EDGES[kind])
+        corners, size = CORNERS[kind], CORNERS[kind] + len(EDGES[kind])
         nodes = np.full((len(cards[card]), size), NONE)
         for row, (_, fields, line) in enumerate(cards[card]):
-            numbers.append(_whole(fields[0], line, f"{card}'s number"))
-            properties.append(_whole(fields[1], line, f"{card}'s property") or numbers[-1])
-            count = CORNERS[kind] if card.endswith(("3", "4", "R")) else size
+            number = _whole(fields[0], line, f"{card}'s number")
+            numbers.append(number)
+            properties.append(_whole(fields[1], line, f"{card}'s property") or number)
+            count = corners if card.endswith(("3", "4", "R")) else size
             for column, text in enumerate(fields[2 : 2 + count]):
                 grid = _whole(text, line, f"a grid of {card}")
                 if grid and grid not in row_of:
                     raise ValueError(
-                        f"line {line}: {card} {numbers[-1]} names grid {grid}, which is not there"
+                        f"line {line}: {card} {number} names grid {grid}, which is not there"
                     )
                 nodes[row, column] = row_of[grid] if grid else NONE
-            if (nodes[row, : CORNERS[kind]] == NONE).any():
-                raise ValueError(
-                    f"line {line}: {card} {numbers[-1]} has fewer than {CORNERS[kind]} corners"
-                )
+            if (nodes[row, :corners] == NONE).any():
+                raise ValueError(f"line {line}: {card} {number} has fewer than {corners} corners")
         if len(nodes):
             mesh.blocks.append(Block(kind, nodes[:, REORDERED.get(kind, range(size))]))
     mesh.numbers = np.array(numbers, dtype=np.int64)
-    of_property = np.array(properties, dtype=np.int64)
-    for number in np.unique(of_property).tolist():
-        members = np.flatnonzero(of_property == number)
+    return mesh.numbers, np.array(properties, dtype=np.int64)
+
+
+def _add_groups(mesh: ElementMesh, numbers: np.ndarray, properties: np.ndarray, text: str) -> None:
+    """Add a group for each property, by number and name, and for each set."""
+    names = _property_names(text)
+    for number in np.unique(properties).tolist():
+        members = np.flatnonzero(properties == number)
         mesh.element_sets[f"PID {number}"] = members
         if number in names:
             mesh.element_sets[names[number]] = members
-    for number, elements in sets.items():
-        mesh.element_sets[f"SET {number}"] = np.flatnonzero(np.isin(numbers, list(elements)))
+    for number, elements in _sets(text).items():
+        members = np.flatnonzero(np.isin(numbers, list(elements)))
+        mesh.element_sets[f"SET {number}"] = members
 
 
 def _property_names(text: str) -> dict[int, str]:
-    """Names of properties that preprocessors leave in comments: HyperMesh, ANSA, Patran, Femap."""
+    """Names of properties from the comments of HyperMesh, ANSA, Patran and Femap."""
     names = {}
     for pattern in (
         r"^\$HMNAME (?:PROP|COMP)\s+(?P<number>\d+)\s*\"(?P<name>[^\"]+)\"",
         r"^\$ANSA_NAME(?:_COMMENT)?;(?P<number>\d+);P\w+;(?P<name>[^;\n\r]+)",
-        r"^\$ Elements and Element Properties for region : (?P<name>[^\n\r]+)\s+P\w+\s+(?P<number>\d+)",
+        r"^\$ Elements and Element Properties for region : "
+        r"(?P<name>[^\n\r]+)\s+P\w+\s+(?P<number>\d+)",
         r"^\$ Femap(?: with NX Nastran)? Property (?P<number>\d+) : (?P<name>[^\n\r]+)",
     ):
         for found in re.finditer(pattern, text, re.M):
@@ -247,7 +262,7 @@ def _property_names(text: str) -> dict[int, str]:
 
 
 def _sets(text: str) -> dict[int, set[int]]:
-    """Case control's SET n = 1, 2, 10 THRU 20: taken as elements."""
+    """Elements of the case control's sets, such as SET 4 = 1, 2, 10 THRU 20."""
     sets = {}
     for found in re.finditer(r"^\s*SET\s+(\d+)\s*=((?:[^\n,]*,\s*\n?)*[^\n]*)", text, re.M | re.I):
         members: set[int] = set()

@@ -55,7 +55,7 @@ def _require_all_lines(path: Path, content: bytes) -> None:
 
 
 def _triangle_colours(mesh: Any) -> np.ndarray | None:
-    """Red, green, blue of each triangle, (m, 3); -1 where its corners differ; None if uncoloured."""
+    """Red, green, blue of each triangle, (m, 3); -1 if its corners differ. None without colours."""
     if mesh.visual.kind == "face":
         return np.asarray(mesh.visual.face_colors)[:, :3].astype(np.int64)
     if mesh.visual.kind == "vertex":

@@ -28,7 +28,7 @@ class ElementNumbers:
     instance: str = ""
 
     def select(self, rows: np.ndarray) -> ElementNumbers:
-        """Numbers of some of the triangles, by a mask (m,) or by indices; index -1: not in the file."""
+        """Numbers of some triangles, by a mask (m,) or by indices; index -1: not in the file."""
         if rows.dtype == bool:
             rows = np.flatnonzero(rows)
         elements, faces = (
