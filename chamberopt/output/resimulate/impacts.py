@@ -1,5 +1,8 @@
-"""Every impact of a result. Impact logs are not kept on disk: the same seeds give the same bits, so that the replicas
-are simulated again, and what they say is held against the result.
+"""Impacts of a result, simulated again.
+
+Results keep figures, not impact logs. The same design, chamber and seed give the same impacts to
+the last bit, so replicas are simulated again when their impacts are wanted, and what they add up to
+is compared with the result.
 """
 
 from __future__ import annotations
@@ -18,7 +21,11 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import core_count, share
 from chamberopt.common.progress import Progress
 from chamberopt.coverage.coverage_from_impacts import Tally, mean_speed_per_triangle, tally_impacts
-from chamberopt.output.resimulate.rebuild import REMEDY, RebuiltChamber, made_by
+from chamberopt.coverage.dent_marking import mark_points, marked_share, sample_points
+from chamberopt.coverage.dents import Dents, dents_on_part
+from chamberopt.coverage.metrics import target_coverage
+from chamberopt.design.process import MAX_SIMULATED_TREATMENT
+from chamberopt.output.resimulate.rebuild import REMEDY, RebuiltChamber, Replica, made_by
 from chamberopt.output.vtp_files import COVERAGE, read_surface
 from chamberopt.simulation.replicas import run_in_order, simulate_seed
 
@@ -27,15 +34,16 @@ if TYPE_CHECKING:
     from chamberopt.output.results.load import Result
     from sim_core import ImpactLog
 
-AT_ONCE = 4e6  # impacts in memory, some 200 bytes each while they are simulated
+MAX_IMPACTS_IN_MEMORY = 4e6  # of all replicas being simulated; each takes about 200 bytes
 
 
 @dataclass(frozen=True)
 class ReplicaImpacts:
-    """What hit the part in one replica, in order of time.
+    """Impacts on the part in one replica, in order of time.
 
-    number: of the replica, from 0 · log: as the simulator wrote it, its triangles the chamber's · part_triangle (n,)
-    int32: the part's own triangle that was hit, as coverage.vtp counts them.
+    number: of the replica, from 0.
+    log: as the simulator wrote it; its triangles are those of the chamber.
+    part_triangle: triangle of the part that was hit, numbered as in coverage.vtp, int32, shape (n,).
     """
 
     number: int
@@ -45,21 +53,32 @@ class ReplicaImpacts:
 
 def simulate_impacts(
     result: Result,
-    ground: RebuiltChamber,
+    rebuilt: RebuiltChamber,
     executor: Executor,
     replicas: int | None = None,
     progress: Progress | None = None,
 ) -> Iterator[ReplicaImpacts]:
-    """Every impact on the part, one replica after another; only a few replicas are in memory at a time.
+    """Simulate the replicas of a result again and yield the impacts on its part, one at a time.
 
-    ground: `rebuild_chamber` the result. replicas: only so many, the first ones. After the last of all replicas InputError
-    unless they gave the result's own figures, triangle by triangle, to the last bit; of fewer that cannot be said.
+    Only a few replicas are in memory at a time.
+
+    Args:
+        result: of a simulation or study.
+        rebuilt: what rebuild_chamber returned for it.
+        executor: runs the replicas.
+        replicas: how many, from the first; None for all.
+        progress: called after each replica.
+
+    Raises:
+        InputError: after the last of all replicas, unless they gave the result's dents, impacts and
+            speeds on every triangle to the last bit. Fewer replicas cannot be compared.
     """
-    design, chamber = result.design, ground.chamber
+    design, chamber = result.design, rebuilt.chamber
     count = replica_count(result, replicas)
     seed, stream = result.seeds
-    setting = share(executor, (design, chamber, ground.cavity or chamber_mesh(chamber)))
-    logs = run_in_order(_log, setting, seed, executor, stream, range(count), _ahead(result))
+    setting = share(executor, (design, chamber, rebuilt.cavity or chamber_mesh(chamber)))
+    ahead = _replicas_ahead(result)
+    logs = run_in_order(_impact_log, setting, seed, executor, stream, range(count), ahead)
     tallies = []
     for number, log in enumerate(logs):
         counted = tally_impacts(log, chamber, design)
@@ -74,23 +93,54 @@ def simulate_impacts(
 
 
 def replica_count(result: Result, replicas: int | None) -> int:
-    """How many replicas: all of the result's unless fewer are asked for. InputError for more, or for none."""
+    """How many replicas to simulate: all unless fewer are wanted. InputError for more or none."""
     there = int(result.data["replicas"])
     if replicas is not None and not 1 <= replicas <= there:
         raise InputError(f"--replicas: given {replicas}; the result has {there}, give 1 to {there}")
     return replicas or there
 
 
-def _ahead(result: Result) -> int:
-    """How many replicas to begin before the one that is handed on: one a core, unless their logs are long."""
-    kept, seconds = read_surface(result.folder / COVERAGE), result.design.process.treatment_time
+def simulate_dents(replica: Replica, time: float) -> Dents:
+    """Simulate a replica for a time [s], which may be longer than the result's, and return its dents.
+
+    Raises:
+        InputError: the time is too long to simulate.
+        sim_core.SimulationError: the simulation had to stop.
+    """
+    from sim_core import simulate
+
+    if not 0.0 < time <= MAX_SIMULATED_TREATMENT:
+        raise InputError(
+            f"--at-s: given {time:g}; a dent map simulates all of it: more than 0, at most "
+            f"{MAX_SIMULATED_TREATMENT:g} s are supported"
+        )
+    impacts = simulate(replace(replica.scene, duration=time)).impacts
+    return dents_on_part(replica.on_chamber(impacts), replica.chamber, replica.design)
+
+
+def dented_share(dents: Dents, chamber: Chamber, spacing: float) -> float:
+    """Share of the target inside dents; what lies outside the cavity counts as not peened.
+
+    spacing: of the sample points on the surface [m].
+    """
+    samples = sample_points(chamber, spacing)
+    first = mark_points(samples, dents.place, dents.normal, dents.radius, dents.time)
+    end = dents.time.max(initial=0.0)
+    marked = marked_share(samples, first, end, len(chamber.part.triangles))
+    coverage, weight = target_coverage(marked, chamber)
+    return float(coverage @ weight)
+
+
+def _replicas_ahead(result: Result) -> int:
+    """Replicas to begin before the one that is yielded: one a core, unless their logs are long."""
+    surface, seconds = read_surface(result.folder / COVERAGE), result.design.process.treatment_time
     times = result.data["simulated_time_s"] / seconds / result.data["replicas"]
-    each = float(np.nansum(kept["impacts_per_mm2"] * kept["exposed_area_mm2"])) * times
-    return max(0, min(core_count(), int(AT_ONCE / max(each, 1.0)) - 1))
+    impacts = float(np.nansum(surface["impacts_per_mm2"] * surface["exposed_area_mm2"])) * times
+    return max(0, min(core_count(), int(MAX_IMPACTS_IN_MEMORY / max(impacts, 1.0)) - 1))
 
 
-def _log(setting: Any, seed: int) -> ImpactLog:
-    """One replica, on a worker."""
+def _impact_log(setting: Any, seed: int) -> ImpactLog:
+    """Simulate one replica on a worker."""
     design, chamber, mesh = setting
     return simulate_seed(design, chamber, mesh, seed).impacts
 
@@ -104,19 +154,19 @@ def _on_part(number: int, log: ImpactLog, chamber: Chamber) -> ReplicaImpacts:
 
 
 def _require_same_figures(result: Result, total: Tally) -> None:
-    kept = read_surface(result.folder / COVERAGE)
-    again = {
+    surface = read_surface(result.folder / COVERAGE)
+    simulated = {
         "dents": total.dents,
         "impacts": total.impacts,
         "mean_normal_speed": mean_speed_per_triangle(total),
     }
-    for name, values in again.items():
-        if name not in kept.array_names:
+    for name, values in simulated.items():
+        if name not in surface.array_names:
             continue
-        wrong = ~np.isclose(kept[name], values, rtol=0.0, atol=0.0, equal_nan=True)
+        wrong = ~np.isclose(surface[name], values, rtol=0.0, atol=0.0, equal_nan=True)
         if wrong.any():
             raise InputError(
-                f"{result.folder}: this program on this machine does not simulate it again bit for bit: {name} of "
-                f"{wrong.sum()} of {len(wrong)} triangles differ, the first is triangle {np.flatnonzero(wrong)[0]} "
-                f"(made by {made_by(result)}); {REMEDY}"
+                f"{result.folder}: this program on this machine does not simulate it again bit for "
+                f"bit: {name} of {wrong.sum()} of {len(wrong)} triangles differ, the first is "
+                f"triangle {np.flatnonzero(wrong)[0]} (made by {made_by(result)}); {REMEDY}"
             )

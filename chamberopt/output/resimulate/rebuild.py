@@ -1,6 +1,4 @@
-"""What a result was simulated in, and its replicas: the same design, chamber and seed make the same scene again, to the
-last bit.
-"""
+"""Build the chamber and replicas of a result again, exactly as they were simulated."""
 
 from __future__ import annotations
 
@@ -27,7 +25,10 @@ REMEDY = "simulate the design again, and use that result"
 
 @dataclass(frozen=True)
 class RebuiltChamber:
-    """Where a result was simulated: its chamber, built again, and the analytical cavity if it was simulated in one."""
+    """Chamber of a result.
+
+    cavity: the analytical cavity that was simulated in place of the chamber's mesh, if it was.
+    """
 
     chamber: Chamber
     cavity: AnalyticCavity | None
@@ -35,70 +36,75 @@ class RebuiltChamber:
 
 @dataclass(frozen=True)
 class Replica:
-    """One replica of a result: what it was simulated from. cavity: in place of the chamber's mesh, where it was."""
+    """One replica of a result, ready to be simulated again; cavity as in RebuiltChamber."""
 
     design: Design
     chamber: Chamber
     cavity: AnalyticCavity | None
     scene: Scene
 
-    def booked(self, impacts: ImpactLog) -> ImpactLog:
-        """The impacts, with the chamber's triangles, also where the cavity has others."""
+    def on_chamber(self, impacts: ImpactLog) -> ImpactLog:
+        """Impacts with the triangles of the chamber, also where an analytical cavity has others."""
         return impacts_on_chamber(impacts, self.chamber) if self.cavity else impacts
 
 
 def rebuild_chamber(result: Result) -> RebuiltChamber:
-    """The chamber of a simulation, or of a study's best or start, as it was simulated; its target is the result's.
+    """Build the chamber of a result again, with the result's own target.
 
-    Raises InputError when a file that the design names has changed since, or this version builds another chamber.
+    Raises:
+        InputError: a file that the design names has changed since, or this version of the program
+            builds another chamber.
     """
     part = posed_part(result.design)[0]
-    kept = read_surface(result.folder / COVERAGE)
-    if part.sha256 != result.part_sha256 or kept.n_cells != len(part.triangles):
-        _refuse_file(result, "part.mesh", result.design.part.mesh_path)
+    surface = read_surface(result.folder / COVERAGE)
+    if part.sha256 != result.part_sha256 or surface.n_cells != len(part.triangles):
+        _refuse_changed_file(result, "part.mesh", result.design.part.mesh_path)
     if result.design.chamber.sha256 != result.data.get("shape_sha256", ""):
-        _refuse_file(result, "chamber", "the file of its shape")
-    target = np.asarray(kept["target"]) > 0 if result.design.part.target.reachable else None
+        _refuse_changed_file(result, "chamber", "the file of its shape")
+    target = np.asarray(surface["target"]) > 0 if result.design.part.target.reachable else None
     chamber = build_chamber(result.design, target)
-    drawn = read_surface(result.folder / CHAMBER)
-    same = np.array_equal(drawn.points, chamber.vertices * MM) and np.array_equal(
-        drawn["tag"], chamber.tags
+    written = read_surface(result.folder / CHAMBER)
+    same = (
+        np.array_equal(written.points, chamber.vertices * MM)
+        and np.array_equal(written["tag"], chamber.tags)
+        and np.array_equal(written.regular_faces, chamber.triangles)
     )
-    if not same or not np.array_equal(drawn.regular_faces, chamber.triangles):
+    if not same:
         raise InputError(
-            f"{result.folder}: its chamber comes out differently now: a file that the design names has changed, or "
-            f"another version made it ({made_by(result)}); {REMEDY}"
+            f"{result.folder}: its chamber comes out differently now: a file that the design names "
+            f"has changed, or another version made it ({made_by(result)}); {REMEDY}"
         )
-    return RebuiltChamber(
-        chamber, analytic_cavity(result.design, chamber) if result.data.get("analytic") else None
-    )
+    analytic = result.data.get("analytic")
+    return RebuiltChamber(chamber, analytic_cavity(result.design, chamber) if analytic else None)
 
 
 def rebuild_replica(result: Result, number: int = 0) -> Replica:
-    """A replica of a simulation, or of a study's best or start. InputError for one that is not there, or cannot be
-    simulated again.
+    """Build one replica of a result again, numbered from 0.
+
+    Raises:
+        InputError: the result has no such replica, or its chamber cannot be built again.
     """
     there = int(result.data["replicas"])
     if not 0 <= number < there:
         raise InputError(
             f"--replica: given {number}; the result has {there}, give 0 to {there - 1}"
         )
-    ground, (seed, stream) = rebuild_chamber(result), result.seeds
-    mesh = ground.cavity or chamber_mesh(ground.chamber)
+    rebuilt, (seed, stream) = rebuild_chamber(result), result.seeds
+    mesh = rebuilt.cavity or chamber_mesh(rebuilt.chamber)
     scene = build_scene(result.design, mesh, replica_seed(seed, number, stream))
-    return Replica(result.design, ground.chamber, ground.cavity, scene)
-
-
-def _refuse_file(result: Result, field: str, path: object) -> NoReturn:
-    raise InputError(
-        f"{field}: {path}: not what {result.folder} was simulated with; restore it, or {REMEDY}"
-    )
+    return Replica(result.design, rebuilt.chamber, rebuilt.cavity, scene)
 
 
 def made_by(result: Result) -> str:
-    """The versions that a result was made by."""
+    """Versions of the programs that made a result, for messages."""
     made = result.data.get("versions", {})
     names = ("chamberopt", "manifold3d", "numba", "numpy", "system")
     return (
         ", ".join(f"{name} {made[name]}" for name in names if name in made) or "an unknown version"
+    )
+
+
+def _refuse_changed_file(result: Result, field: str, path: object) -> NoReturn:
+    raise InputError(
+        f"{field}: {path}: not what {result.folder} was simulated with; restore it, or {REMEDY}"
     )

@@ -1,24 +1,29 @@
-"""What a drawing process does: one job, as JSON on its command line."""
+"""The drawing process: draws the one picture that its command line describes as JSON."""
 
 import json
 import sys
 
 from chamberopt.common.errors import InputError
-from chamberopt.output.viewer import window
-from chamberopt.output.viewer.images import coverage, difference, part, replay_film
+from chamberopt.output.viewer.images.coverage import render_coverage
+from chamberopt.output.viewer.images.dents import render_dents
+from chamberopt.output.viewer.images.difference import render_difference
+from chamberopt.output.viewer.images.part import render_part
+from chamberopt.output.viewer.images.replay_film import render_replay
+from chamberopt.output.viewer.window import render_inspect
 
-DRAWERS = {
-    "coverage": coverage.draw,
-    "difference": difference.draw,
-    "inspect": window.draw,
-    "part": part.draw,
-    "replay": replay_film.draw,
+RENDERERS = {
+    "coverage": render_coverage,
+    "dents": render_dents,
+    "difference": render_difference,
+    "inspect": render_inspect,
+    "part": render_part,
+    "replay": render_replay,
 }
 
 if __name__ == "__main__":
     job = json.loads(sys.argv[1])
     try:
-        DRAWERS[job["draw"]](job)
+        RENDERERS[job["draw"]](job)
     except InputError as error:
         print(error, file=sys.stderr)
         sys.exit(2)

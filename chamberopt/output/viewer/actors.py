@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,6 +13,8 @@ from chamberopt.output.vtp_files import Surface, pyvista
 GREY, DARK, GLASS, SONOTRODE, BACKGROUND = "#b9bec4", "#2b3440", "#9db7cc", "#e08a2e", "white"
 FAULT, PALE = "#d01c1c", "#eceff2"
 ROUND = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)  # steps of a colour bar, times a power of ten
+LIFT = 0.1  # of discs off the surface, in their radii: the facets of a round edge do not hide them
+DISC_SIDES = 24
 STILL = {"render": False, "reset_camera": False}  # nothing is seen before all is there
 
 
@@ -104,6 +106,60 @@ def near(plotter: Any, part: DrawnPart, limits: tuple[float, float], bar: bool) 
     plotter.reset_camera(bounds=part.target.bounds)
     plotter.camera.SetWindowCenter(0.14 if bar else 0.0, 0.0)  # makes room for the colour bar
     plotter.enable_anti_aliasing("ssaa")
+
+
+class Discs(NamedTuple):
+    """Flat discs on a surface, one a row.
+
+    place: centres [mm], shape (k, 3).
+    normal: unit vectors away from the surface, shape (k, 3).
+    radius: [mm], shape (k,).
+    colour: red, green, blue, uint8, shape (k, 3).
+    """
+
+    place: np.ndarray
+    normal: np.ndarray
+    radius: np.ndarray
+    colour: np.ndarray
+
+    def only(self, rows: np.ndarray) -> Discs:
+        """A copy of some rows."""
+        return Discs(*(column[rows] for column in self))
+
+
+def disc_actor(discs: Discs, ambient: float = 1.0) -> Any:
+    """Return an actor that shows discs, later ones over earlier ones.
+
+    ambient: brightness of a disc seen edge on, as a share of one seen face on.
+    """
+    import vtk
+
+    points = pyvista().PolyData(discs.place + LIFT * discs.radius[:, None] * discs.normal)
+    points["normal"], points["diameter"] = discs.normal, 2.0 * discs.radius
+    points["colour"] = discs.colour
+    # A regular polygon with the area of the circle of diameter 1.
+    angle = 2.0 * np.pi / DISC_SIDES
+    radius = 0.5 * np.sqrt(angle / np.sin(angle))
+    # The mapper turns the x axis of its source into the normal.
+    polygon = pyvista().Polygon(radius=radius, normal=(1.0, 0.0, 0.0), n_sides=DISC_SIDES)
+    mapper = vtk.vtkGlyph3DMapper()
+    mapper.SetInputData(points)
+    mapper.SetSourceData(polygon)
+    mapper.SetScaleArray("diameter")
+    mapper.SetScaleModeToScaleByMagnitude()
+    mapper.SetOrientationArray("normal")
+    mapper.SetOrientationModeToDirection()
+    mapper.SetScalarModeToUsePointFieldData()
+    mapper.SelectColorArray("colour")
+    mapper.SetColorModeToDirectScalars()
+    actor = vtk.vtkActor()
+    actor.SetMapper(mapper)
+    actor.GetProperty().SetAmbient(ambient)
+    actor.GetProperty().SetDiffuse(1.0 - ambient)
+    # VTK draws translucent actors after all others and without writing their depth: each disc is
+    # hidden by surfaces in front of it, and covers those drawn before it.
+    actor.ForceTranslucentOn()
+    return actor
 
 
 def as_it_stands(text: str) -> str:

@@ -47,7 +47,7 @@ def inspect(
     Window(opened(subjects, look), look).run()
 
 
-def draw(job: dict[str, Any]) -> None:
+def render_inspect(job: dict[str, Any]) -> None:
     """What a drawing process does of it: the picture that the window would show."""
     look = ViewState.from_json(job["look"])
     stage = ResultPlotter(

@@ -27,7 +27,7 @@ def draw_coverage(
     )
 
 
-def draw(job: dict[str, Any]) -> None:
+def render_coverage(job: dict[str, Any]) -> None:
     """Each result twice: in its chamber, and the target from near; several results side by side."""
     folders = [Path(folder) for folder in job["folders"]]
     parts = [DrawnPart(read_surface(folder / COVERAGE)) for folder in folders]

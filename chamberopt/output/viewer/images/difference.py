@@ -45,7 +45,7 @@ def draw_difference(surface: str | Path, titles: Sequence[str], picture: str | P
     )
 
 
-def draw(job: dict[str, Any]) -> None:
+def render_difference(job: dict[str, Any]) -> None:
     """Each candidate from below, where the shot comes from, and from the other side above."""
     surface = read_surface(Path(job["surface"]))
     titles = job["titles"]

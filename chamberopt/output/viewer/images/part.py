@@ -50,7 +50,7 @@ def draw_part(
         return draw_in_subprocess(job, path)
 
 
-def draw(job: dict[str, Any]) -> None:
+def render_part(job: dict[str, Any]) -> None:
     """The part's surface from two opposite sides, edges shining through it, where there are any; and in its chamber."""
     with np.load(job["part"]) as data:
         corners, marked, missed, edges = (

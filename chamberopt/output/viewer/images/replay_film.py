@@ -33,7 +33,7 @@ SLOWEST = 10.0  # s a frame, without a graphics card
 FEW = 2000  # balls that are drawn round; of more, with fewer sides
 
 
-def replay(
+def draw_replay(
     result: Path,
     seen: Flight,
     film: Path,
@@ -68,7 +68,7 @@ def replay(
         return draw_in_subprocess(job, film, 600.0 + SLOWEST * len(seen.time))
 
 
-def draw(job: dict[str, Any]) -> None:
+def render_replay(job: dict[str, Any]) -> None:
     """All frames, one after another, in one plotter."""
     with np.load(job["flight"]) as data:
         flight = dict(data)
