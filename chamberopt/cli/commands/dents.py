@@ -6,6 +6,7 @@ from pathlib import Path
 
 from chamberopt.cli.options import View, app
 from chamberopt.cli.prepare import load_replica
+from chamberopt.common.errors import InputError
 
 
 @app.command
@@ -34,24 +35,24 @@ def dents(
     pixels
         Longer side of one view in pixels.
     """
-    from chamberopt.output.resimulate.dent_map import coverage, default_views, dent_map, peened
+    from chamberopt.output.resimulate.impacts import dented_share, simulate_dents
     from chamberopt.output.viewer import parse_view
-    from chamberopt.output.viewer.images.dent_map import FINER, dent_picture, require_pixels
+    from chamberopt.output.viewer.images.dents import draw_dents, require_pixels
     from chamberopt.output.viewer.subprocess_drawing import picture_path
 
     path = picture_path(picture, "")
     eye = parse_view(view) if view else None
     require_pixels(pixels)
     loaded, resimulated = load_replica(result, replica)
-    design, chamber = resimulated.design, resimulated.chamber
+    design, recorded = resimulated.design, resimulated.scene.duration
     time = design.process.treatment_time if at_s is None else at_s
-    left = peened(resimulated, time)
-    share = coverage(left, chamber, design.process.accuracy.sample_spacing)
-    sides = [eye] if eye else default_views(chamber)
-    maps = [dent_map(chamber, left, side, FINER * pixels) for side in sides]
-    recorded = resimulated.scene.duration
+    found = simulate_dents(resimulated, time)
+    share = dented_share(found, resimulated.chamber, design.process.accuracy.sample_spacing)
     beyond = f", simulated on from {recorded:g} s" if time > recorded else ""
-    title = f"{len(left):,} dents after {time:g} s in replica {replica}{beyond}"
+    title = f"{len(found):,} dents after {time:g} s in replica {replica}{beyond}"
     title += f": {share:.1%} of the target"
-    dent_picture(maps, left, f"{loaded.folder.resolve().name}: {title}", path)
+    heading = f"{loaded.folder.resolve().name}: {title}"
+    failure = draw_dents(loaded.folder, found, heading, path, eye, pixels)
+    if failure:
+        raise InputError(failure)
     print(f"{title}\npicture in {path}")

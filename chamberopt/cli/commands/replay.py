@@ -47,18 +47,17 @@ def replay(
     fps
         Frames shown per second.
     """
-    from chamberopt.output.resimulate.flight import flight
+    from chamberopt.output.resimulate.flight import simulate_flight
     from chamberopt.output.viewer import parse_view
     from chamberopt.output.viewer.images.film import film_path, require_playable
-    from chamberopt.output.viewer.images.replay_film import EYE
-    from chamberopt.output.viewer.images.replay_film import replay as draw_film
+    from chamberopt.output.viewer.images.replay_film import DEFAULT_VIEW, draw_replay
 
     path = film_path(film)
     require_playable(fps, size, frames, path)
-    eye = parse_view(view) if view else EYE
+    eye = parse_view(view) if view else DEFAULT_VIEW
     loaded, resimulated = load_replica(result, replica)
-    flown = flight(resimulated, from_s, 1e-3 * span_ms, frames)
-    failure = draw_film(loaded.folder, flown, path, fps, size, eye)
+    flown = simulate_flight(resimulated, from_s, 1e-3 * span_ms, frames)
+    failure = draw_replay(loaded.folder, flown, path, fps, size, eye)
     if failure:
         raise InputError(failure)
     print(f"{len(flown.time)} frames, {len(flown.impacts)} impacts on the part: film in {path}")

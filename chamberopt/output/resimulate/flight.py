@@ -1,5 +1,6 @@
-"""Some milliseconds of shot flight, frame by frame: every position is the simulator's own, at that very time, and none
-is put in between.
+"""Some milliseconds of shot flight, frame by frame.
+
+Every position is the simulator's own at the time of its frame; nothing is interpolated.
 """
 
 from __future__ import annotations
@@ -17,20 +18,26 @@ if TYPE_CHECKING:
     from chamberopt.output.resimulate.rebuild import Replica
     from sim_core import ImpactLog, PartRotation, Vibration
 
-SHORTEST = 1e-6  # s
-MOST_FRAMES = 2000
-MOST_POSITIONS = 10_000_000  # of all balls in all frames and their trails: 240 MB
+MIN_SPAN = 1e-6  # s
+MAX_FRAMES = 2000
+MAX_POSITIONS = 10_000_000  # of all balls in all frames and their trails: 240 MB
 
 
 @dataclass(frozen=True)
 class Flight:
-    """Frames of one replica; times from the end of its warm-up, as in its impact log.
+    """Frames of one replica; times count from the end of its warm-up, as in its impact log.
 
-    time (f,) s · balls (f, n, 3) m: their centres · trail (f, k, n, 3) m: where they were since the frame before,
-    NaN before the first · diameter (n,) m · sonotrodes: by tag, the displacement of each face (f, 3) m; without those
-    that have no one phase ("random_phase") · amplitude m: the largest · part_angle (f,) rad about part_axis (point m,
-    direction), None where the part stands still · dents, impacts: of the time shown, places in the part's frame ·
-    part_triangle (i,): what each impact hit.
+    time: of the frames [s], shape (f,).
+    balls: centres [m], shape (f, n, 3).
+    trail: centres at k times since the frame before [m], shape (f, k, n, 3); NaN in the first.
+    diameter: of the balls [m], shape (n,).
+    sonotrodes: displacement of each face by its tag [m], shape (f, 3); faces of which each ball
+        meets another phase (motion "random_phase") are left out.
+    amplitude: the largest of the sonotrodes [m].
+    part_angle: rotation of the part [rad], shape (f,).
+    part_axis: of the rotation, a point [m] and a direction; None where the part stands still.
+    dents, impacts: on the part within the time shown, in the part's frame.
+    part_triangle: triangle of the part that each impact hit.
     """
 
     time: np.ndarray
@@ -46,63 +53,73 @@ class Flight:
     part_triangle: np.ndarray
 
 
-def flight(replayed: Replica, start: float, span: float, frames: int, trail: int = 4) -> Flight:
-    """Frames of ``span`` [s] from ``start`` [s after the warm-up], the first and last at its ends, evenly spaced.
+def simulate_flight(
+    replica: Replica, start: float, span: float, frames: int, trail: int = 4
+) -> Flight:
+    """Simulate a replica again and record evenly spaced frames, the first and last at its ends.
 
-    trail: exact places of each ball noted from frame to frame, the frame's own among them. Raises InputError for what
-    the replica has not simulated, and sim_core.SimulationError.
+    Args:
+        replica: to simulate.
+        start: time of the first frame after the warm-up [s].
+        span: time from the first to the last frame [s].
+        frames: how many.
+        trail: positions of each ball recorded from one frame to the next, the frame's included.
+
+    Raises:
+        InputError: the replica did not simulate that time, or there are too many frames.
+        sim_core.SimulationError: the simulation had to stop.
     """
     from sim_core import simulate
 
-    scene = replayed.scene
+    scene = replica.scene
     _require_simulated(start, span, frames, scene.duration, trail * len(scene.balls))
     end = min(start + span, scene.duration)
-    every = np.linspace(start, end, (frames - 1) * trail + 1)
-    seen = simulate(
-        replace(scene, duration=end), frames=every
-    )  # the same bits as of the whole, as far as it goes
-    impacts = replayed.booked(seen.impacts)
-    shown = (impacts.time >= start) & (replayed.chamber.source[impacts.triangle] >= 0)
-    impacts = impacts.only(shown)
-    time, turn = every[::trail], scene.physics.part_rotation
-    waving = () if scene.physics.random_phase else scene.physics.vibrations
-    before = np.full((1, trail, *seen.frames.shape[1:]), np.nan)
+    times = np.linspace(start, end, (frames - 1) * trail + 1)
+    # Cut short at `end`, a scene gives the same bits up to there as the whole one.
+    simulated = simulate(replace(scene, duration=end), frames=times)
+    impacts = replica.on_chamber(simulated.impacts)
+    on_part = replica.chamber.source[impacts.triangle] >= 0
+    impacts = impacts.only((impacts.time >= start) & on_part)
+    positions = simulated.frames
+    before = np.full((1, trail, *positions.shape[1:]), np.nan)
+    later = positions[:-1].reshape(frames - 1, trail, *positions.shape[1:])
+    time, rotation = times[::trail], scene.physics.part_rotation
+    vibrations = () if scene.physics.random_phase else scene.physics.vibrations
+    axis = None
+    if rotation is not None:
+        direction = np.array(rotation.axis)
+        axis = np.array(rotation.axis_point), direction / np.linalg.norm(direction)
     return Flight(
         time=time,
-        balls=seen.frames[::trail],
-        trail=np.concatenate(
-            [before, seen.frames[:-1].reshape(frames - 1, trail, *seen.frames.shape[1:])]
-        ),
+        balls=positions[::trail],
+        trail=np.concatenate([before, later]),
         diameter=scene.balls.diameters,
-        sonotrodes={one.tag: displacement(one, scene.warmup + time) for one in waving},
+        sonotrodes={one.tag: face_displacement(one, scene.warmup + time) for one in vibrations},
         amplitude=max((float(one.amplitude) for one in scene.physics.vibrations), default=0.0),
-        part_angle=angle(turn, scene.warmup + time),
-        part_axis=None
-        if turn is None
-        else (np.array(turn.axis_point), np.array(turn.axis) / np.linalg.norm(turn.axis)),
-        dents=dents_on_part(impacts, replayed.chamber, replayed.design),
+        part_angle=rotation_angle(rotation, scene.warmup + time),
+        part_axis=axis,
+        dents=dents_on_part(impacts, replica.chamber, replica.design),
         impacts=impacts,
-        part_triangle=replayed.chamber.source[impacts.triangle],
+        part_triangle=replica.chamber.source[impacts.triangle],
     )
 
 
-def displacement(vibration: Vibration, time: np.ndarray) -> np.ndarray:
-    """Where a vibrating face is from its middle (f, 3) [m] at times (f,) [s] from the scene's start."""
-    return np.asarray(
-        np.sin(2.0 * math.pi * vibration.frequency * time + vibration.phase)[:, None]
-        * vibration.peak
-    )
+def face_displacement(vibration: Vibration, time: np.ndarray) -> np.ndarray:
+    """Displacement of a vibrating face [m], shape (f, 3), at times from the scene's start [s]."""
+    phase = 2.0 * math.pi * vibration.frequency * time + vibration.phase
+    return np.asarray(np.sin(phase)[:, None] * vibration.peak)
 
 
-def angle(turn: PartRotation | None, time: np.ndarray) -> np.ndarray:
-    """How far a part has turned (f,) [rad] at times (f,) [s] from the scene's start; 0 where it does not."""
-    if turn is None:
+def rotation_angle(rotation: PartRotation | None, time: np.ndarray) -> np.ndarray:
+    """Angle of a part [rad], shape (f,), at times from the scene's start [s]; 0 if it stands still."""
+    if rotation is None:
         return np.zeros(len(time))
-    if turn.rpm is not None:
-        return 2.0 * math.pi * turn.rpm / 60.0 * time + turn.phase
-    assert turn.amplitude is not None
-    assert turn.frequency is not None
-    return np.asarray(turn.amplitude * np.sin(2.0 * math.pi * turn.frequency * time + turn.phase))
+    if rotation.rpm is not None:
+        return 2.0 * math.pi * rotation.rpm / 60.0 * time + rotation.phase
+    assert rotation.amplitude is not None
+    assert rotation.frequency is not None
+    phase = 2.0 * math.pi * rotation.frequency * time + rotation.phase
+    return np.asarray(rotation.amplitude * np.sin(phase))
 
 
 def _require_simulated(
@@ -112,15 +129,16 @@ def _require_simulated(
         raise InputError(
             f"--from-s: given {start:g}; the replica was simulated from 0 to {duration:g} s"
         )
-    if not SHORTEST <= span <= (duration - start) * (1.0 + 1e-9):
+    if not MIN_SPAN <= span <= (duration - start) * (1.0 + 1e-9):
         left = 1e3 * (duration - start)
         raise InputError(
-            f"--span-ms: given {1e3 * span:g}; from {start:g} s on, {left:.6g} ms were simulated: give from "
-            f"{1e3 * SHORTEST:g} to that, or begin earlier"
+            f"--span-ms: given {1e3 * span:g}; from {start:g} s on, {left:.6g} ms were simulated: "
+            f"give from {1e3 * MIN_SPAN:g} to that, or begin earlier"
         )
-    if not 2 <= frames <= MOST_FRAMES:
-        raise InputError(f"--frames: given {frames}; 2 to {MOST_FRAMES} are supported")
-    if frames * positions > MOST_POSITIONS:
+    if not 2 <= frames <= MAX_FRAMES:
+        raise InputError(f"--frames: given {frames}; 2 to {MAX_FRAMES} are supported")
+    if frames * positions > MAX_POSITIONS:
         raise InputError(
-            f"--frames: given {frames}, too many for so much shot; at most {MOST_POSITIONS // positions} are supported"
+            f"--frames: given {frames}, too many for so much shot; at most "
+            f"{MAX_POSITIONS // positions} are supported"
         )

@@ -68,8 +68,8 @@ def in_chamber(
 ) -> None:
     """The part inside the glass chamber, over the sonotrode."""
     show(plotter, part, limits, bar)
-    room(plotter, chamber)
-    plotter.add_text(as_it_stands(title), position="upper_left", font_size=13, color=DARK)
+    add_chamber(plotter, chamber)
+    plotter.add_text(escape_dollars(title), position="upper_left", font_size=13, color=DARK)
     legend = "orange: sonotrode   grey: not in the target"
     plotter.add_text(legend, position="lower_left", font_size=9, color=DARK)
     plotter.camera_position = [(1.0, -1.6, 0.35), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
@@ -77,7 +77,7 @@ def in_chamber(
     plotter.enable_anti_aliasing("ssaa")
 
 
-def room(plotter: Any, chamber: Surface) -> tuple[dict[int, Any], list[Any]]:
+def add_chamber(plotter: Any, chamber: Surface) -> tuple[dict[int, Any], list[Any]]:
     """The sonotrodes, and the walls as glass with their edges: the actors of the former by tag, and of the latter. No
     click finds them.
     """
@@ -141,7 +141,7 @@ def disc_actor(discs: Discs, ambient: float = 1.0) -> Any:
     angle = 2.0 * np.pi / DISC_SIDES
     radius = 0.5 * np.sqrt(angle / np.sin(angle))
     # The mapper turns the x axis of its source into the normal.
-    polygon = pyvista().Polygon(radius=radius, normal=(1.0, 0.0, 0.0), n_sides=DISC_SIDES)
+    polygon = pyvista().Disc(inner=0.0, outer=radius, normal=(1.0, 0.0, 0.0), c_res=DISC_SIDES)
     mapper = vtk.vtkGlyph3DMapper()
     mapper.SetInputData(points)
     mapper.SetSourceData(polygon)
@@ -162,7 +162,7 @@ def disc_actor(discs: Discs, ambient: float = 1.0) -> Any:
     return actor
 
 
-def as_it_stands(text: str) -> str:
+def escape_dollars(text: str) -> str:
     """Text for VTK, which would set what is between two $ as a formula: a folder's name is none."""
     return text.replace("$", r"\$")
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from chamberopt.geometry.triangles import unit_normals
-from chamberopt.output.viewer.actors import DARK, STILL, as_it_stands, ticks
+from chamberopt.output.viewer.actors import DARK, STILL, escape_dollars, ticks
 from chamberopt.output.vtp_files import pyvista
 from chamberopt.simulation.triangle_fields import Quantity
 
@@ -136,5 +136,5 @@ def keys(plotter: Any, text: str, size: Size) -> None:
 def _words(plotter: Any, name: str, text: str, place: tuple[float, float], font: int) -> Any:
     """A text at a place [pixels] of the view, its lower left corner there."""
     return plotter.add_text(
-        as_it_stands(text), position=place, font_size=font, color=DARK, name=name, render=False
+        escape_dollars(text), position=place, font_size=font, color=DARK, name=name, render=False
     )

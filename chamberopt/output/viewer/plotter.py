@@ -11,7 +11,14 @@ import numpy as np
 from chamberopt.common.errors import InputError
 from chamberopt.geometry.triangles import unit_normals
 from chamberopt.output.viewer import overlay
-from chamberopt.output.viewer.actors import GREY, PALE, SONOTRODE, light, room, target_and_rest
+from chamberopt.output.viewer.actors import (
+    GREY,
+    PALE,
+    SONOTRODE,
+    add_chamber,
+    light,
+    target_and_rest,
+)
 from chamberopt.output.viewer.opened_result import OpenedResult, limits, offered, same_part
 from chamberopt.output.viewer.view_state import FROM, KEYS, Vector, ViewState
 from chamberopt.output.vtp_files import Surface, pyvista
@@ -127,7 +134,7 @@ class ResultPlotter:
         passed = one.passed(look)
         actors = target_and_rest(plotter, one.part, scale, passed)
         if look.chamber:
-            faces, walls = room(plotter, one.chamber)
+            faces, walls = add_chamber(plotter, one.chamber)
             actors += [*faces.values(), *walls]
         if look.cut is not None:
             kept = actors if look.cut_part else actors[2:]

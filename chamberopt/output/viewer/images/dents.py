@@ -180,13 +180,15 @@ def render_side(
     plotter.camera.parallel_scale = 0.5 * rows * pixel_mm
     plotter.renderer.ResetCameraClippingRange()
     bare = _screenshot(plotter)
-    shown = _with_rims(discs.only(discs.normal @ towards_eye > 0.0), pixel_mm)
-    dents = disc_actor(shown, AMBIENT)
-    plotter.add_actor(dents, **STILL)
+    shown = discs.only(discs.normal @ towards_eye > 0.0)
+    if not len(shown.radius):
+        return bare.astype(np.uint8), pixel_mm
+    actor = disc_actor(_with_rims(shown, pixel_mm), AMBIENT)
+    plotter.add_actor(actor, **STILL)
     dented = _screenshot(plotter)
     # At an edge a disc reaches over the target, into the air or over the rest of the part. Pixels
     # that do not show the target keep the colour that they have without dents.
-    plotter.remove_actor(dents, render=False)
+    plotter.remove_actor(actor, render=False)
     plotter.set_background("black")
     target.prop.color, rest.prop.color, rest.prop.lighting = "white", "black", False
     share = _screenshot(plotter) / 255.0
@@ -204,7 +206,8 @@ def _with_rims(discs: Discs, pixel_mm: float) -> Discs:
     rimmed = 2.0 * discs.radius > MIN_RIM_PIXELS * pixel_mm
     row = np.repeat(np.arange(len(rimmed)), 1 + rimmed)
     found = discs.only(row)
-    upper = np.append(False, row[1:] == row[:-1])
+    upper = np.zeros(len(row), dtype=bool)
+    upper[1:] = row[1:] == row[:-1]
     lower = rimmed[row] & ~upper
     found.radius[upper] *= INNER
     found.colour[lower] = (RIM_SHADE * found.colour[lower]).astype(np.uint8)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.common.files import atomic_write
-from chamberopt.output.viewer.actors import BACKGROUND, DARK, FAULT, GREY, SONOTRODE, room
+from chamberopt.output.viewer.actors import BACKGROUND, DARK, FAULT, GREY, SONOTRODE, add_chamber
 from chamberopt.output.viewer.subprocess_drawing import draw_in_subprocess, picture_path
 from chamberopt.output.vtp_files import CHAMBER, MM, pyvista, read_surface, write_chamber
 
@@ -72,7 +72,7 @@ def render_part(job: dict[str, Any]) -> None:
         plotter.subplot(0, column)
         plotter.set_background(BACKGROUND)
         if cavity is not None and side == 0.0:
-            room(plotter, cavity)
+            add_chamber(plotter, cavity)
             side = 1.0
         for chosen, colour in ((~(marked | missed), GREY), (marked, SONOTRODE), (missed, FAULT)):
             if chosen.any():

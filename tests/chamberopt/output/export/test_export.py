@@ -213,7 +213,7 @@ def test_csv_holds_what_parquet_holds_whatever_the_number_of_workers(
     files = [tmp_path / name for name in ("i.csv", "i.csv.gz", "i.parquet")]
     write_impacts(files, result, ground, SerialExecutor())
     monkeypatch.setattr(
-        "chamberopt.output.resimulate.impacts.AT_ONCE", 1.0
+        "chamberopt.output.resimulate.impacts.MAX_IMPACTS_IN_MEMORY", 1.0
     )  # nor are all replicas in memory
     with local_executor(2) as executor:
         write_impacts([tmp_path / "two.csv.gz"], result, ground, executor)

@@ -13,13 +13,13 @@ from PIL import Image, ImageSequence
 from chamberopt.chamber.build import TAG_PART, TAG_SONOTRODE
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError
-from chamberopt.output.resimulate.flight import angle, displacement, flight
+from chamberopt.output.resimulate.flight import face_displacement, rotation_angle, simulate_flight
 from chamberopt.output.resimulate.rebuild import Replica, rebuild_replica
 from chamberopt.output.results.load import Result, load_result
 from chamberopt.output.viewer import missing_opengl, subprocess_drawing
 from chamberopt.output.viewer.images import film
 from chamberopt.output.viewer.images.film import film_path, write_film
-from chamberopt.output.viewer.images.replay_film import replay, turn_matrix
+from chamberopt.output.viewer.images.replay_film import draw_replay, rotation_matrix
 from sim_core import Balls, Gravity, PartRotation, Physics, Scene, simulate
 from sim_core.effects.part_rotation import angle_now, checked_turn, turned
 from tests.helpers.results.short_plate import plate_result
@@ -46,7 +46,9 @@ def test_a_ball_alone_is_where_the_closed_form_has_it(replica: Replica) -> None:
     scene = Scene(
         replica.scene.mesh, ball, Physics(gravity=Gravity()), 0.3, warmup=0.02, record=(TAG_PART,)
     )
-    seen = flight(replace(replica, scene=scene), start=0.0137, span=0.2, frames=77, trail=3)
+    seen = simulate_flight(
+        replace(replica, scene=scene), start=0.0137, span=0.2, frames=77, trail=3
+    )
     assert seen.time[0] == 0.0137
     assert seen.time[-1] == pytest.approx(0.2137, abs=1e-15)
     np.testing.assert_allclose(np.diff(seen.time), 0.2 / 76, rtol=1e-9)
@@ -69,28 +71,28 @@ def test_a_ball_alone_is_where_the_closed_form_has_it(replica: Replica) -> None:
 def test_what_is_shown_is_the_run_itself(replica: Replica) -> None:
     """The scene cut short where the film ends gives the same bits as the whole; at an impact the ball is on the part"""
     whole = simulate(replica.scene).impacts
-    seen = flight(replica, 0.05, 0.1, 11)
+    seen = simulate_flight(replica, 0.05, 0.1, 11)
     shown = (whole.time >= 0.05) & (whole.time <= seen.time[-1])
     assert shown.sum() > 100
     for column in COLUMNS:
         np.testing.assert_array_equal(getattr(seen.impacts, column), getattr(whole, column)[shown])
     np.testing.assert_array_equal(seen.part_triangle, replica.chamber.source[whole.triangle[shown]])
     for row in np.flatnonzero(np.diff(whole.time, append=np.inf) > 1e-9)[[5, 50, 100]]:
-        at = flight(replica, float(whole.time[row]), 1e-3, 2)
+        at = simulate_flight(replica, float(whole.time[row]), 1e-3, 2)
         np.testing.assert_allclose(at.balls[0, whole.ball[row]], whole.position[row], atol=1e-12)
 
 
 def test_the_sonotrode_is_where_the_shot_met_it(replica: Replica) -> None:
     scene = replace(replica.scene, record=(TAG_SONOTRODE,), duration=0.1)
     met = simulate(scene).impacts
-    face = displacement(scene.physics.vibrations[0], scene.warmup + met.time)
+    face = face_displacement(scene.physics.vibrations[0], scene.warmup + met.time)
     lowest = met.position[:, 2] - scene.balls.radius
     assert np.ptp(lowest) > 2e-5
     np.testing.assert_allclose(face[:, 2], lowest, atol=1e-9)
-    seen = flight(replica, 0.01, 0.002, 5)
+    seen = simulate_flight(replica, 0.01, 0.002, 5)
     np.testing.assert_array_equal(
         seen.sonotrodes[TAG_SONOTRODE],
-        displacement(scene.physics.vibrations[0], scene.warmup + seen.time),
+        face_displacement(scene.physics.vibrations[0], scene.warmup + seen.time),
     )
 
 
@@ -102,10 +104,12 @@ def test_a_turning_part_is_drawn_as_the_simulator_has_it(motion: dict[str, float
     assert turning is not None
     times = np.array([0.0, 0.013, 0.4])
     expected = np.array([angle_now(turning, time) for time in times])
-    np.testing.assert_allclose(np.exp(1j * angle(turn, times)), np.exp(1j * expected), atol=1e-12)
-    np.testing.assert_array_equal(angle(None, times), 0.0)
+    np.testing.assert_allclose(
+        np.exp(1j * rotation_angle(turn, times)), np.exp(1j * expected), atol=1e-12
+    )
+    np.testing.assert_array_equal(rotation_angle(None, times), 0.0)
     corners = np.random.default_rng(0).normal(size=(5, 3))
-    matrix = turn_matrix(np.array(point), np.array(axis), expected[1])
+    matrix = rotation_matrix(np.array(point), np.array(axis), expected[1])
     there = turned(corners, np.array(point), np.array(axis), expected[1])
     np.testing.assert_allclose(corners @ matrix[:3, :3].T + matrix[:3, 3], there, atol=1e-14)
 
@@ -124,7 +128,7 @@ def test_what_was_not_simulated_is_not_shown(
     replica: Replica, start: float, span: float, frames: int, said: str
 ) -> None:
     with pytest.raises(InputError, match=said):
-        flight(replica, start, span, frames)
+        simulate_flight(replica, start, span, frames)
 
 
 def test_a_replica_or_a_part_that_is_not_there_is_said(result: Result, tmp_path: Path) -> None:
@@ -205,9 +209,9 @@ def test_where_no_film_can_be_is_said(tmp_path: Path, monkeypatch: pytest.Monkey
 
 @needs_opengl
 def test_a_replay_shows_balls_that_move_and_hits(result: Result, tmp_path: Path) -> None:
-    seen = flight(rebuild_replica(result), 0.02, 0.008, 6)
+    seen = simulate_flight(rebuild_replica(result), 0.02, 0.008, 6)
     assert len(seen.impacts) > 5
-    assert replay(result.folder, seen, tmp_path / "plate.gif", 20, (320, 240)) is None
+    assert draw_replay(result.folder, seen, tmp_path / "plate.gif", 20, (320, 240)) is None
     with Image.open(tmp_path / "plate.gif") as image:
         pages = [
             np.array(page.convert("RGB")).astype(int) for page in ImageSequence.Iterator(image)

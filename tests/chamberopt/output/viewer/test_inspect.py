@@ -12,7 +12,7 @@ import pytest
 from chamberopt.common.errors import InputError
 from chamberopt.coverage.part_impacts import save_hits, sort_hits_by_triangle
 from chamberopt.output.viewer import ResultInfo, ViewState, missing_opengl, parse_clip, parse_view
-from chamberopt.output.viewer.actors import as_it_stands, ticks
+from chamberopt.output.viewer.actors import escape_dollars, ticks
 from chamberopt.output.viewer.opened_result import OpenedResult, limits, same_part
 from chamberopt.output.viewer.plotter import where_the_target_is_seen
 from chamberopt.output.viewer.subprocess_drawing import without_display
@@ -216,7 +216,7 @@ def test_a_target_that_looks_down_is_seen_from_below() -> None:
 
 
 def test_a_dollar_in_a_name_is_no_formula() -> None:
-    assert as_it_stands("x$y$_{z}") == r"x\$y\$_{z}"
+    assert escape_dollars("x$y$_{z}") == r"x\$y\$_{z}"
 
 
 # The window, driven without a display
