@@ -169,9 +169,11 @@ class _ReplayScene:
         made = flight["dent_time"] <= now
         recent = flight["dent_time"][made] > now - self.recent
         old, new = pyvista().Color(DENT).int_rgb, pyvista().Color(HIT).int_rgb
-        columns = (flight[name][made] for name in ("dent_place", "dent_normal", "dent_radius"))
         colour = np.where(recent[:, None], new, old).astype(np.uint8)
-        discs = Discs(*columns, colour=colour)
+        place, normal, radius = (
+            flight[f"dent_{name}"][made] for name in ("place", "normal", "radius")
+        )
+        discs = Discs(place, normal, radius, colour)
         self.plotter.remove_actor("dents", render=False)
         if made.any():
             actor = disc_actor(discs)
