@@ -12,7 +12,7 @@ ROOT = Path(__file__).resolve().parents[1]
 ORDER = {
     "chamberopt": "common geometry design chamber coverage simulation optimize output api cli __main__",
     "chamberopt/design": "table materials shapes effects+part+process+shot+sonotrode design load",
-    "chamberopt/chamber": "target bores_and_deflectors reach part build dimensionless scene analytic checks",
+    "chamberopt/chamber": "target deflector_meshes bores_and_deflectors reach part build dimensionless scene analytic checks",
     "chamberopt/coverage": "statistics dents coverage_from_impacts part_impacts+metrics dent_marking "
     "coverage_estimators intensity",
     "chamberopt/simulation": "resting_balls replicas evaluation evaluate "

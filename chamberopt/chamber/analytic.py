@@ -1,7 +1,7 @@
-"""Chamber -> analytical cavity: exact planes and a true circle, where the chamber is a cylinder, box or prism.
+"""Analytical cavity of a chamber: exact planes and a true circle for a cylinder, box or prism.
 
-The paper's first system beside its second: the same chamber without facets, in the same event loop. Possible where the
-part is the lid and nothing reaches in.
+It is the first of the paper's two systems: the same chamber without facets, in the same event
+loop. It is possible where the part is the lid and nothing reaches into the chamber.
 """
 
 from __future__ import annotations
@@ -21,18 +21,21 @@ if TYPE_CHECKING:
     from chamberopt.design.load import Design
     from sim_core import AnalyticCavity, ImpactLog
 
-FLAT = 1e-7  # m: a corner this near a plane is in it; CAD files round to a tenth of that, dents are a thousand times it
-UPRIGHT = 1e-6  # of a side's normal along z
-SAME_VOLUME = 1e-6  # relative: by which the chamber may fall short of the convex prism about it
-NO_AREA = 1e-15  # m²: a triangle smaller than this has no direction
+# Distance [m] within which a corner lies in a plane. CAD files round to a tenth of it; dents are a
+# thousand times as large.
+FLATNESS = 1e-7
+MAX_NORMAL_Z = 1e-6  # share of an upright side's normal along z
+VOLUME_TOLERANCE = 1e-6  # relative: how much smaller than its convex prism the chamber may be
+MIN_AREA = 1e-15  # m²: the direction of a smaller triangle is not checked
 REMEDY = "simulate without the analytical cavity"
 
 
 def analytic_cavity(design: Design, chamber: Chamber) -> AnalyticCavity:
-    """The exact cavity that a design's chamber stands for: a true circle for the shape "cylinder", else its polygon.
+    """The exact cavity of a chamber: a true circle for the shape "cylinder", otherwise its polygon.
 
-    Raises InputError, naming what is in the way, where the chamber is no cylinder, box or prism with the part for its
-    lid, or an effect is asked for that is not supported there.
+    Raises:
+        InputError: the chamber is not a cylinder, box or prism with the part as its lid, or an
+            effect of the design is not supported in an analytical cavity.
     """
     from sim_core import cylinder_cavity, prism_cavity
 
@@ -42,25 +45,26 @@ def analytic_cavity(design: Design, chamber: Chamber) -> AnalyticCavity:
                 f"effects.{name}: not supported with an analytical cavity; leave it out, or {REMEDY}"
             )
     bottom, top = (float(z) for z in (chamber.vertices[:, 2].min(), chamber.vertices[:, 2].max()))
-    _require_plain(chamber, bottom, top)
+    _require_flat_or_upright(chamber, bottom, top)
     outline = _outline(chamber, bottom, top)
     tags = (TAG_SONOTRODE, TAG_PART, TAG_WALL)
     if not isinstance(design.chamber, Cylinder):
         return prism_cavity(outline, bottom, top, tags)
     off = float(np.abs(np.linalg.norm(outline, axis=1) - 0.5 * design.chamber.diameter).max())
-    if off > FLAT:
+    if off > FLATNESS:
         raise _refused(f"its side is not a circle of chamber.diameter_mm, by {1e3 * off:.3g} mm")
     return cylinder_cavity(design.chamber.diameter, bottom, top, tags)
 
 
 def cavity_note(cavity: AnalyticCavity) -> str:
-    """A note for the result: what was simulated in place of the chamber's triangles."""
+    """A note for the result, on what was simulated in place of the chamber's triangles."""
     what = "cylinder" if cavity.radius is not None else f"prism of {len(cavity.outline)} sides"
-    return f"simulated in an analytical cavity, an exact {what} of {1e6 * cavity.volume:.5g} cm³, not the mesh"
+    volume = f"{1e6 * cavity.volume:.5g} cm³"
+    return f"simulated in an analytical cavity, an exact {what} of {volume}, not the mesh"
 
 
 def impacts_on_chamber(impacts: ImpactLog, chamber: Chamber) -> ImpactLog:
-    """The impacts on the ceiling of an analytical cavity, booked on the chamber's triangles under them."""
+    """Impacts on the ceiling of an analytical cavity, with the chamber's triangles at their places."""
     from sim_core import find_triangles
 
     ceiling = np.flatnonzero(chamber.tags == TAG_PART)
@@ -71,32 +75,36 @@ def impacts_on_chamber(impacts: ImpactLog, chamber: Chamber) -> ImpactLog:
 
 
 def _refused(why: str) -> InputError:
-    return InputError(f"the chamber is no cylinder, box or prism: {why}; {REMEDY}")
+    return InputError(f"the chamber is not a cylinder, box or prism: {why}; {REMEDY}")
 
 
-def _require_plain(chamber: Chamber, bottom: float, top: float) -> None:
-    """InputError for a surface that is neither the sonotrode below, nor the part above, nor an upright wall."""
+def _require_flat_or_upright(chamber: Chamber, bottom: float, top: float) -> None:
+    """Raise InputError unless the sonotrode is flat below, the part flat above, the wall upright."""
     area = areas(chamber.vertices, chamber.triangles)
     heights = chamber.vertices[chamber.triangles][:, :, 2]
     along = area_vectors(chamber.vertices, chamber.triangles)[:, 2]
-    floor, ceiling = heights.max(axis=1) < bottom + FLAT, heights.min(axis=1) > top - FLAT
-    upright = np.abs(along) <= UPRIGHT * np.linalg.norm(
+    floor, ceiling = heights.max(axis=1) < bottom + FLATNESS, heights.min(axis=1) > top - FLATNESS
+    upright = np.abs(along) <= MAX_NORMAL_Z * np.linalg.norm(
         area_vectors(chamber.vertices, chamber.triangles), axis=1
     )
-    seen = area > NO_AREA
+    checked = area > MIN_AREA
     for tag, own, name, wanted in (
         (TAG_PART, ceiling, "the part reaches into the cavity", "a flat ceiling"),
         (TAG_SONOTRODE, floor, "the sonotrode is not flat", "a flat floor"),
         (TAG_WALL, upright & ~floor & ~ceiling, "the wall is not upright", "upright sides"),
     ):
-        wrong = np.flatnonzero(seen & (chamber.tags == tag) & ~own)
+        wrong = np.flatnonzero(checked & (chamber.tags == tag) & ~own)
         if len(wrong):
             z = float(heights[wrong].mean(axis=1)[area[wrong].argmax()])
             raise _refused(f"{name} at z = {1e3 * z:.4g} mm, where {wanted} is needed")
 
 
 def _outline(chamber: Chamber, bottom: float, top: float) -> np.ndarray:
-    """The convex outline (n, 2) [m], anticlockwise; InputError where the chamber does not fill the prism over it."""
+    """The convex outline (n, 2) [m] of the floor, counter-clockwise.
+
+    Raises:
+        InputError: the chamber does not fill the prism over it.
+    """
     from scipy.spatial import ConvexHull
 
     floor = np.unique(chamber.triangles[chamber.tags == TAG_SONOTRODE])
@@ -105,16 +113,17 @@ def _outline(chamber: Chamber, bottom: float, top: float) -> np.ndarray:
     missing = 1.0 - float(tetrahedron_volumes(chamber.vertices, chamber.triangles).sum()) / (
         hull.volume * (top - bottom)
     )
-    if abs(missing) > SAME_VOLUME:
+    if abs(missing) > VOLUME_TOLERANCE:
         raise _refused(
-            f"its sides are not convex: it lacks {missing:.2g} of the volume between its floor and ceiling"
+            f"its sides are not convex: it lacks {missing:.2g} of the volume between its floor and "
+            "ceiling"
         )
     return outline
 
 
 def _without_straight_corners(outline: np.ndarray) -> np.ndarray:
-    """The corners (n, 2) at which the outline turns: cutting leaves some in the middle of a side."""
+    """The corners (n, 2) at which the outline turns; cutting leaves others within a side."""
     before, after = np.roll(outline, 1, axis=0), np.roll(outline, -1, axis=0)
     chord = after - before
     off = chord[:, 0] * (outline - before)[:, 1] - chord[:, 1] * (outline - before)[:, 0]
-    return np.asarray(outline[np.abs(off) > FLAT * np.hypot(*chord.T)])
+    return np.asarray(outline[np.abs(off) > FLATNESS * np.hypot(*chord.T)])

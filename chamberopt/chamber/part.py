@@ -1,4 +1,4 @@
-"""Design -> Part: the triangles of the part's file, its target chosen and meshed, posed in the chamber."""
+"""Read the part of a design, choose and mesh its target, and pose it in the chamber."""
 
 from __future__ import annotations
 
@@ -20,17 +20,26 @@ if TYPE_CHECKING:
     from chamberopt.design.design import Design
     from chamberopt.design.part import Target
 
-MOST_ELEMENTS = 3e5  # a few minutes of meshing; what follows is slow too
+MAX_ELEMENTS = 3e5  # makes a few minutes of meshing, and slow steps after it
 
 
 @dataclass(frozen=True)
 class Part:
-    """The user's own triangles, in the file's order (unless target.element_mm asks for others), in the chamber: closed,
-    unless the file draws it as the piece that bounds the room of a whole set-up.
+    """The part in the chamber's frame.
 
-    vertices (n, 3) m · triangles (m, 3) int32 · area (m,) m² · target (m,) bool: what must be covered · name ·
-    sha256 of the mesh file as it was read · unit that its numbers were taken in · names that the file gives · elements
-    (m,) int64: which of the file's each triangle is of, `mesh_io.Numbering`; from 1 on if not given.
+    It has the user's own triangles in the file's order, unless target.element_mm asks for others.
+    It is closed, unless its file draws it as the piece that bounds the room of a whole set-up.
+
+    Attributes:
+        vertices: [m], shape (n, 3).
+        triangles: shape (m, 3), int32.
+        area: [m²], shape (m,).
+        target: whether a triangle must be covered, shape (m,).
+        sha256: of the mesh file as it was read.
+        unit: of the numbers in the file.
+        names: of the file's groups.
+        elements: number of the file's element that each triangle belongs to
+            (`mesh_io.ElementNumbers`), shape (m,), int64; from 1 on if not given.
     """
 
     vertices: np.ndarray
@@ -49,13 +58,16 @@ class Part:
 
 
 def posed_part(design: Design) -> tuple[Part, list[str]]:
-    """The part turned about the file's x, then y, then z, its box centred on the axis, then moved; and notes.
+    """The part in the chamber's frame, and notes on its file.
 
-    Sideways by the offset, up or down so that its lowest point is at the sonotrode distance. One that is drawn with
-    its chamber stays in it as it is drawn, and may be only the piece of its surface that is drawn. Raises InputError
-    when the file cannot be used or the target is empty.
+    It is turned about the file's x, then y, then z, its box is centred on the axis, and it is moved
+    sideways by the offset, and up or down until its lowest point is at the sonotrode distance. A
+    part that is drawn with its chamber stays as it is drawn.
+
+    Raises:
+        InputError: the file cannot be used, or the target is empty.
     """
-    mesh, target = _mesh(design)
+    mesh, target = _meshed_part(design)
     turn, shift = _pose(mesh, design)
     vertices = snap_to_grid(mesh.vertices @ turn.T + shift)
     area = areas(vertices, mesh.triangles)
@@ -67,55 +79,61 @@ def posed_part(design: Design) -> tuple[Part, list[str]]:
 
 
 def part_meshes(design: Design) -> tuple[PartMesh, PartMesh]:
-    """The part as its file has it, and as it is simulated, triangle by triangle that of `posed_part`; both in the
-    file's frame. They differ where target.element_mm asks for other triangles.
+    """The part as its file has it and as it is simulated, both in the file's frame.
+
+    They differ where target.element_mm asks for other triangles. The second has the triangles of
+    `posed_part`.
     """
-    setup = design.chamber.setup()
-    return read_part_cached(
-        design.part.mesh_path, design.part.unit
-    ) if setup is None else setup.part, _mesh(design)[0]
+    return _part_of_file(design), _meshed_part(design)[0]
 
 
 def turning_axis(design: Design) -> tuple[np.ndarray, np.ndarray]:
-    """Point [m] and direction, (3,) each, of the axis that effects.part_turn names, in the chamber's frame."""
+    """Point [m] and direction, (3,) each, of the axis of effects.part_turn in the chamber's frame."""
     turn = design.effects.part_turn
     if turn is None:
-        raise ValueError("nothing turns in this design")
+        raise ValueError("the part of this design does not turn")
     matrix, shift = part_pose(design)
     return matrix @ np.array(turn.through) + shift, matrix @ np.array(turn.axis)
 
 
 def part_pose(design: Design) -> tuple[np.ndarray, np.ndarray]:
-    """From the part file's frame to the chamber's: matrix (3, 3), then shift (3,) [m]."""
-    return _pose(_mesh(design)[0], design)
+    """From the part file's frame to the chamber's: rotation (3, 3), then shift (3,) [m]."""
+    return _pose(_meshed_part(design)[0], design)
 
 
-def _mesh(design: Design) -> tuple[PartMesh, np.ndarray]:
-    """The part's mesh and target, meshed once per file: a study builds a hundred chambers around the same part."""
-    part, setup = design.part, design.chamber.setup()
-    mesh = read_part_cached(part.mesh_path, part.unit) if setup is None else setup.part
+def _part_of_file(design: Design) -> PartMesh:
+    """The part as its file has it; a file is read once, also if many chambers are built from it."""
+    setup = design.chamber.setup()
+    return (
+        read_part_cached(design.part.mesh_path, design.part.unit) if setup is None else setup.part
+    )
+
+
+def _meshed_part(design: Design) -> tuple[PartMesh, np.ndarray]:
+    """The part with the triangles to simulate, and which of them are the target."""
+    part, mesh = design.part, _part_of_file(design)
     if part.target.element is None:
         return mesh, chosen_triangles(mesh, part.target)
-    return _meshed_once(part.mesh_path, part.unit, part.target, mesh.sha256)
+    return _remeshed_once(part.mesh_path, part.unit, part.target, mesh.sha256)
 
 
 @lru_cache(maxsize=4)
-def _meshed_once(
+def _remeshed_once(
     path: Path, unit: str, target: Target, _sha256: str
 ) -> tuple[PartMesh, np.ndarray]:
     mesh = read_part_cached(path, unit)
-    return _in_elements(mesh, chosen_triangles(mesh, target), target.element)  # type: ignore[arg-type]
+    return _remesh_target(mesh, chosen_triangles(mesh, target), target.element)  # type: ignore[arg-type]
 
 
-def _in_elements(mesh: PartMesh, target: np.ndarray, size: float) -> tuple[PartMesh, np.ndarray]:
-    """The part with its target in triangles with sides of about size [m], and that target."""
+def _remesh_target(mesh: PartMesh, target: np.ndarray, size: float) -> tuple[PartMesh, np.ndarray]:
+    """The part with its target in triangles with sides of about a size [m], and that target."""
     area = float(areas(mesh.vertices, mesh.triangles)[target].sum())
     count = area / (np.sqrt(3.0) / 4.0 * size * size)
-    if count > MOST_ELEMENTS:
-        fits = 1e3 * size * np.sqrt(count / MOST_ELEMENTS)
+    if count > MAX_ELEMENTS:
+        fits = 1e3 * size * np.sqrt(count / MAX_ELEMENTS)
         raise InputError(
-            f"part.target.element_mm: given {1e3 * size:g}, which makes some {1e-6 * count:.3g} million triangles of "
-            f"the target's {1e6 * area:.4g} mm²; give at least {fits:.2g}"
+            f"part.target.element_mm: given {1e3 * size:g}, which makes some {1e-6 * count:.3g} "
+            f"million triangles of the target's {1e6 * area:.4g} mm²; give at least {fits:.2g}"
         )
     vertices, triangles, source = remesh(
         mesh.vertices, mesh.triangles, target, target.astype(np.int64), size
@@ -125,14 +143,14 @@ def _in_elements(mesh: PartMesh, target: np.ndarray, size: float) -> tuple[PartM
     longest = np.linalg.norm(sides - np.roll(sides, 1, axis=1), axis=2).max(axis=1)
     shape = triangle_quality(vertices, triangles[chosen])
     note = (
-        f"target.element_mm = {1e3 * size:g}: the target's {target.sum()} triangles became {chosen.sum()}, longest "
-        f"sides {1e3 * np.median(longest):.3g} mm in the middle and {1e3 * longest.max():.3g} mm at most, shape "
-        f"{shape.min():.2f} at worst (1: equilateral)"
+        f"target.element_mm = {1e3 * size:g}: the target's {target.sum()} triangles became "
+        f"{chosen.sum()}, longest sides {1e3 * np.median(longest):.3g} mm in the middle and "
+        f"{1e3 * longest.max():.3g} mm at most, shape {shape.min():.2f} at worst (1: equilateral)"
     )
     triangles = triangles.astype(np.int32)
-    places = _places(mesh, vertices[triangles], source)
-    groups = {name: mask[places] for name, mask in mesh.groups.items()}
-    numbering = mesh.numbering.select(places)
+    origin = _find_origin(mesh, vertices[triangles], source)
+    groups = {name: mask[origin] for name, mask in mesh.groups.items()}
+    numbering = mesh.numbering.select(origin)
     notes = (*mesh.notes, note)
     meshed = replace(
         mesh,
@@ -145,9 +163,13 @@ def _in_elements(mesh: PartMesh, target: np.ndarray, size: float) -> tuple[PartM
     return meshed, chosen
 
 
-def _places(mesh: PartMesh, corners: np.ndarray, source: np.ndarray) -> np.ndarray:
-    """The triangle of the mesh (k,) that the middle of each of corners (k, 3, 3) [m] lies in: where they are not those
-    of its source, that is only one in the same flat face.
+def _find_origin(mesh: PartMesh, corners: np.ndarray, source: np.ndarray) -> np.ndarray:
+    """The triangle of the mesh in whose area the middle of each new triangle lies, (k,).
+
+    Args:
+        corners: of the new triangles [m], shape (k, 3, 3).
+        source: triangle of the mesh in the same flat face, shape (k,); already right where the new
+            triangle has its corners.
     """
     from sim_core import TriangleMesh, closest_points
 
@@ -155,15 +177,15 @@ def _places(mesh: PartMesh, corners: np.ndarray, source: np.ndarray) -> np.ndarr
     surface = TriangleMesh(
         mesh.vertices, mesh.triangles, np.zeros(len(mesh.triangles), dtype=np.uint8)
     )
-    places = source.copy()
-    places[moved] = closest_points(
+    origin = source.copy()
+    origin[moved] = closest_points(
         surface, corners[moved].mean(axis=1), float(np.ptp(mesh.vertices))
     ).triangle
-    return places
+    return origin
 
 
 def _pose(mesh: PartMesh, design: Design) -> tuple[np.ndarray, np.ndarray]:
-    """From the part file's frame to the chamber's: matrix (3, 3), then shift (3,) [m]."""
+    """From the part file's frame to the chamber's: rotation (3, 3), then shift (3,) [m]."""
     setup = design.chamber.setup()
     if setup is not None:
         return setup.turn, setup.shift + np.array(

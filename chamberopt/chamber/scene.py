@@ -1,4 +1,4 @@
-"""Chamber + process settings -> Scene: the shot at rest low in the chamber, shaken by the sonotrode."""
+"""Make the simulator's scene for a design: its chamber, shot, effects, and duration."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from chamberopt.chamber.build import TAG_PART, TAG_SONOTRODE, turning_axis
 from chamberopt.common.errors import InputError
 from chamberopt.design.shapes import further_sonotrode_tag
 
-# Every ball is compared with every other: 20,000 take about 40 µs a prediction, a thousand times a second each.
-MOST_BALLS = 20_000
+# A prediction compares one ball with every other. For 20,000 balls it takes about 40 µs, and every
+# ball needs about a thousand predictions a simulated second.
+MAX_BALLS = 20_000
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -25,9 +26,9 @@ STREAMS = ("search", "confirm")
 def replica_seed(seed: int, replica: int, stream: str = "search") -> int:
     """The random seed of one replica, 128 bits.
 
-    The same for every candidate of a study (common random numbers), different between replicas, and
-    different between the streams, so that a candidate chosen on "search" is judged on draws it has not seen.
-    From sha256 rather than hash(), which Python salts anew in every process.
+    It is the same for every candidate of a study (common random numbers), and differs between
+    replicas and between streams, so that a candidate chosen on "search" is confirmed on seeds that
+    did not select it. It comes from sha256, because hash() differs between Python processes.
     """
     if stream not in STREAMS:
         raise ValueError(f"stream {stream!r}: one of {', '.join(STREAMS)}")
@@ -41,23 +42,24 @@ def start_velocities(rng: np.random.Generator, count: int, rms_speed: float) -> 
 
 
 def chamber_mesh(chamber: Chamber) -> TriangleMesh:
-    """The chamber's surface for the simulator. Make it once per chamber: its search tree goes with it."""
+    """The chamber's surface for the simulator; make it once a chamber, because it holds a tree."""
     from sim_core import TriangleMesh
 
     return TriangleMesh(chamber.vertices, chamber.triangles, chamber.tags)
 
 
 def require_ball_count(design: Design) -> None:
-    """InputError for more balls than the simulator is made for."""
-    if design.shot.count > MOST_BALLS:
+    """Raise InputError for more balls than the simulator supports."""
+    if design.shot.count > MAX_BALLS:
         raise InputError(
-            f"shot: {design.shot.count} balls of {1e3 * min(design.shot.diameters):g} mm or more in "
-            f"{design.shot.mass_g:g} g, more than the {MOST_BALLS} supported; lower shot.mass_g or use larger balls"
+            f"shot: {design.shot.count} balls of {1e3 * min(design.shot.diameters):g} mm or more "
+            f"in {design.shot.mass_g:g} g, more than the {MAX_BALLS} supported; lower shot.mass_g "
+            "or use larger balls"
         )
 
 
-def part_turn(design: Design, phase: float = 0.0) -> PartRotation | None:
-    """How the part turns, if it does; ``phase`` [rad] at the start."""
+def part_rotation(design: Design, phase: float = 0.0) -> PartRotation | None:
+    """The rotation of the part, if it turns, with its phase [rad] at the start."""
     from sim_core import PartRotation
 
     turn = design.effects.part_turn
@@ -68,10 +70,10 @@ def part_turn(design: Design, phase: float = 0.0) -> PartRotation | None:
 
 
 def require_turnable(design: Design, mesh: TriangleMesh) -> None:
-    """InputError if the part is to turn in its chamber and cannot."""
+    """Raise InputError if the part should turn but its chamber leaves no room for that."""
     from sim_core import SceneError, require_free_rotation
 
-    turn = part_turn(design)
+    turn = part_rotation(design)
     try:
         if turn is not None:
             require_free_rotation(mesh, turn, design.shot.diameter)
@@ -80,12 +82,11 @@ def require_turnable(design: Design, mesh: TriangleMesh) -> None:
 
 
 def balls_can_rest(design: Design, mesh: TriangleMesh | AnalyticCavity) -> bool:
-    """Whether balls can lie still: as the design says, or wherever its chamber has a still surface that faces up."""
+    """Whether balls can lie still: as the design says, or where a still surface faces up."""
     from sim_core import Gravity, can_rest
 
-    asked = design.effects.rest
-    if asked is not None:
-        return asked
+    if design.effects.rest is not None:
+        return design.effects.rest
     moving = [TAG_SONOTRODE, *(further_sonotrode_tag(k) for k in range(len(design.sonotrodes)))]
     if design.effects.part_turn is not None:
         moving.append(TAG_PART)
@@ -94,8 +95,11 @@ def balls_can_rest(design: Design, mesh: TriangleMesh | AnalyticCavity) -> bool:
 
 
 def vibrations(design: Design, phase: float) -> Vibration | tuple[Vibration, ...]:
-    """How the sonotrode moves, or each of several; ``phase`` [rad] at the start: of the first, the others have theirs
-    on top, so that among those of one frequency a phase is a shift in time, whatever the draw.
+    """The vibration of the sonotrode, or of each of several.
+
+    Args:
+        phase: of the first sonotrode at the start [rad]. The phases of the others are added to it,
+            so that at one frequency the shift in time between two sonotrodes is always the same.
     """
     from sim_core import Vibration
 
@@ -114,12 +118,14 @@ def scene_physics(
     mesh: TriangleMesh | AnalyticCavity,
     phase: float = 0.0,
     turn_phase: float = 0.0,
-    draws: int = 0,
+    phase_seed: int = 0,
 ) -> Physics:
-    """The effects of a design in its chamber's mesh, or analytical cavity.
+    """The effects of a design in its chamber's mesh or analytical cavity.
 
-    ``phase`` and ``turn_phase`` [rad]: of the sonotrode and of a part that turns, at the start; ``draws``: the seed
-    of arrival phases that are drawn anew.
+    Args:
+        phase: of the sonotrode at the start [rad].
+        turn_phase: of a turning part at the start [rad].
+        phase_seed: for motion = "random_phase", the seed of each ball's phase.
     """
     from sim_core import (
         BallCollisions,
@@ -135,42 +141,46 @@ def scene_physics(
     sonotrode, effects, materials = design.sonotrode, design.effects, design.materials
     if effects.auto:
         raise InputError(
-            'effects: still "auto"; advice.settled decides them, as simulate and run do'
+            'effects: still "auto"; resolve them first with a pilot run, as simulate and run do'
         )
-    # One (C0, v0) per tag, in the order of the tags: TAG_PART, TAG_SONOTRODE, TAG_WALL, further sonotrodes.
-    pairs = (
+    # One (C0, v0) a tag, in the order TAG_PART, TAG_SONOTRODE, TAG_WALL, further sonotrodes.
+    laws = (
         materials.part,
         materials.sonotrode,
         materials.wall,
         *(materials.sonotrode for _ in design.sonotrodes),
     )
-    surfaces = tuple((pair.restitution, pair.yield_speed) for pair in pairs)
-    of_balls = (materials.shot.restitution, materials.shot.yield_speed)
-    rubs, accuracy = effects.friction, design.process.accuracy
+    surfaces = tuple((law.restitution, law.yield_speed) for law in laws)
+    balls = (materials.shot.restitution, materials.shot.yield_speed)
+    friction, accuracy = effects.friction, design.process.accuracy
     return Physics(
         gravity=Gravity() if effects.gravity else None,
-        restitution=Restitution(surfaces, of_balls, accuracy.elastic_below),
+        restitution=Restitution(surfaces, balls, accuracy.elastic_below),
         vibration=vibrations(design, phase),
-        part_rotation=part_turn(design, turn_phase),
+        part_rotation=part_rotation(design, turn_phase),
         rest=Rest() if balls_can_rest(design, mesh) else None,
-        friction=Friction((rubs.surfaces,) * len(surfaces), rubs.balls)
-        if rubs is not None
+        friction=Friction((friction.surfaces,) * len(surfaces), friction.balls)
+        if friction is not None
         else None,
         drag=Drag(piece=accuracy.drag_step) if effects.drag else None,
         ball_collisions=BallCollisions() if effects.ball_collisions else None,
-        random_phase=RandomPhase(draws) if sonotrode.motion == "random_phase" else None,
+        random_phase=RandomPhase(phase_seed) if sonotrode.motion == "random_phase" else None,
     )
 
 
 def build_scene(design: Design, mesh: TriangleMesh | AnalyticCavity, seed: int) -> Scene:
-    """The scene one replica simulates, in a chamber's mesh (`chamber_mesh`) or `analytic.analytic_cavity`.
+    """The scene that one replica simulates. Equal arguments give bit-identical scenes.
 
-    The shot starts packed low in the chamber with the speed scale of the sonotrode, 2 pi f A, so that the
-    warm-up has to forget only the arrangement, not to heat or cool the shot through orders of magnitude; the
-    phase of the sonotrode is drawn anew, and so is that of a turning part, which may take longer to turn once than
-    a replica lasts. Same design, chamber and seed: same scene, to the last bit.
+    The shot starts packed low in the chamber with the speed scale of the sonotrode, 2 pi f A: then
+    the warm-up has to forget only the arrangement, and the shot's energy need not grow or shrink by
+    orders of magnitude. The phases of the sonotrode and of a turning part are random, because a
+    part may take longer for one turn than a replica lasts.
 
-    Raises InputError when the shot does not fit or has too many balls, or the part cannot turn.
+    Args:
+        mesh: from `chamber_mesh` or `analytic.analytic_cavity`.
+        seed: from `replica_seed`.
+    Raises:
+        InputError: the shot does not fit or has too many balls, or the part cannot turn.
     """
     from sim_core import AnalyticCavity, Balls, Scene, SceneError, pack_balls
 
@@ -181,24 +191,25 @@ def build_scene(design: Design, mesh: TriangleMesh | AnalyticCavity, seed: int) 
     sonotrode, shot = design.sonotrode, design.shot
     phase = rng.uniform(0.0, 2.0 * np.pi)
     turn_phase = 0.0 if design.effects.part_turn is None else rng.uniform(0.0, 2.0 * np.pi)
-    swing = max(one.amplitude for one in (sonotrode, *design.sonotrodes))
+    clearance = max(one.amplitude for one in (sonotrode, *design.sonotrodes))
     try:
         diameter = np.array(shot.diameters)
-        turn = part_turn(design, turn_phase)
+        turn = part_rotation(design, turn_phase)
+        # floor = 0: no balls in a well below the sonotrode's face
         positions = pack_balls(
-            mesh, shot.count, diameter, rng, clear=swing, part_rotation=turn, floor=0.0
-        )  # not in a sump
+            mesh, shot.count, diameter, rng, clear=clearance, part_rotation=turn, floor=0.0
+        )
     except SceneError as error:
         raise InputError(
             f"shot: {error}; see shot.mass_g, shot.diameter_mm and [chamber]"
         ) from None
     velocities = start_velocities(rng, len(positions), sonotrode.peak_speed)
-    draws = int(rng.integers(2**32)) if sonotrode.motion == "random_phase" else 0
+    phase_seed = int(rng.integers(2**32)) if sonotrode.motion == "random_phase" else 0
     accuracy = design.process.accuracy
     return Scene(
         mesh=mesh,
         balls=Balls(positions, velocities, diameter, shot.density),
-        physics=scene_physics(design, mesh, phase, turn_phase, draws),
+        physics=scene_physics(design, mesh, phase, turn_phase, phase_seed),
         duration=design.process.recorded_time,
         warmup=accuracy.warmup_time,
         record=(TAG_PART,),

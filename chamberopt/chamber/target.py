@@ -1,4 +1,4 @@
-"""Which triangles of the part must be covered: by the file's names, by direction, by box; conditions intersect."""
+"""Choose the triangles that must be covered, by the file's names, by direction, and by box."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ if TYPE_CHECKING:
 
 
 def chosen_triangles(mesh: PartMesh, wanted: Target) -> np.ndarray:
-    """The target's triangles (m,) bool, chosen in the file's own frame.
+    """Which triangles meet all conditions of the target, (m,) bool, in the file's own frame.
 
-    Raises InputError for a name that the file does not have, and when nothing is chosen.
+    Raises:
+        InputError: the file does not have one of the names, or nothing is chosen.
     """
     chosen = select_triangles(
         mesh.groups, wanted.surface, len(mesh.triangles), "part.target.surface"
@@ -25,7 +26,7 @@ def chosen_triangles(mesh: PartMesh, wanted: Target) -> np.ndarray:
     if wanted.direction is not None and wanted.angle_deg is not None:
         normal = area_vectors(mesh.vertices, mesh.triangles)
         direction = np.asarray(wanted.direction) / np.linalg.norm(wanted.direction)
-        # atan2 of sine and cosine: acos alone is a hundred times coarser near 0 and 180 degrees
+        # atan2 of sine and cosine: acos is a hundred times coarser near 0 and 180 degrees
         angle = np.degrees(
             np.arctan2(np.linalg.norm(np.cross(normal, direction), axis=1), normal @ direction)
         )
@@ -38,8 +39,8 @@ def chosen_triangles(mesh: PartMesh, wanted: Target) -> np.ndarray:
     if not chosen.any():
         low_text, high_text = _corner(mesh.vertices.min(axis=0)), _corner(mesh.vertices.max(axis=0))
         raise InputError(
-            f"part.target: chooses none of the {len(chosen)} triangles; in its own file the part goes from "
-            f"{low_text} to {high_text} mm: widen box_mm or angle_deg"
+            f"part.target: chooses none of the {len(chosen)} triangles; in its own file the part "
+            f"goes from {low_text} to {high_text} mm: widen box_mm or angle_deg"
         )
     return chosen
 

@@ -1,10 +1,12 @@
-"""What keeps the shot from the surface: gaps too narrow for a ball or wedges that hold one, pockets behind a narrow
-mouth, hollows sharper than a ball; each in a sentence with its place and what to do.
+"""Warnings about what keeps the shot from the surface, each with its place and a remedy.
+
+These are gaps too narrow for a ball, wedges that hold one, pockets behind a narrow mouth, and hollows
+sharper than a ball.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -17,135 +19,150 @@ from chamberopt.chamber.checks.place_names import (
     one_of,
     surface_names,
 )
-from chamberopt.chamber.reach.largest_ball import Touches
-from chamberopt.chamber.reach.reach import FORGIVEN
+from chamberopt.chamber.reach.connectivity import connected_groups
+from chamberopt.chamber.reach.largest_ball import TouchPoints
+from chamberopt.chamber.reach.reach import TOLERATED_OVERLAP
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.chamber.reach.reach import Reach
 
-# Two faces hold a ball by friction, however hard it is pushed in, if half the angle between them has a tangent below
-# the coefficient, here that of dry steel: then they count as facing each other. Hollows that open wider are roots.
+# Two faces hold a ball by friction, however hard it is pushed in, if the tangent of half the angle
+# between them is below the coefficient of friction, here that of dry steel. Such faces count as
+# facing each other; hollows that open wider count as roots.
 FRICTION = 0.3
-FACING = -(1.0 - FRICTION**2) / (1.0 + FRICTION**2)  # cosine between their normals
-PASSING = 0.1  # a width that goes through the ball's diameter is seen this near to it on both sides
-MOST_SAID = 4
-COMPLETE = 0.995  # share of the target beyond which what is left is not worth a word
+MAX_COSINE = -(1.0 - FRICTION**2) / (1.0 + FRICTION**2)  # between the normals of facing faces
+WIDTH_TOLERANCE = 0.1  # share of the ball's diameter within which a gap is as wide as the ball
+MAX_WARNINGS = 4  # of one kind
+MIN_MISSED_SHARE = 0.005  # share of the target that is worth a warning
+
+
+class GapKind(NamedTuple):
+    """The two surfaces that a gap lies between, and whether a ball can wedge in it."""
+
+    one: str
+    two: str
+    wedge: bool
 
 
 def gap_warnings(reach: Reach, chamber: Chamber, largest: float, turns: bool = False) -> list[str]:
-    """Gaps narrower than a ball, those of most area first; ``largest`` [m]: diameter of the largest ball; ``turns``:
-    the part does.
+    """Warnings about gaps narrower than a ball, those with the largest area first.
+
+    Args:
+        largest: diameter of the largest ball [m].
+        turns: whether the part does.
     """
-    found = reach.touches
-    facing = (found.against >= 0) & (found.opposite < FACING)
-    narrow = facing & (found.radius < 0.5 * largest)
-    entrance = found.only(
-        facing & reach.reached & ~narrow & (found.radius < 0.5 * (1.0 + PASSING) * largest)
-    ).centre
-    inside, names = found.only(narrow), surface_names(chamber)
-    alike: dict[tuple[str, str, bool], list[Touches]] = {}
+    touches = reach.touches
+    facing = (touches.obstacle >= 0) & (touches.cosine < MAX_COSINE)
+    narrow = facing & (touches.radius < 0.5 * largest)
+    almost_narrow = touches.radius < 0.5 * (1.0 + WIDTH_TOLERANCE) * largest
+    entrance = touches.select(facing & reach.reached & ~narrow & almost_narrow).centre
+    inside, names = touches.select(narrow), surface_names(chamber)
+    gaps: dict[GapKind, list[TouchPoints]] = {}
     for members in _clusters(inside.centre, 2.0 * reach.spacing):
-        gap = inside.only(members)
+        gap = inside.select(members)
         if gap.area.sum() > (0.5 * largest) ** 2:
-            wedge = _meets(gap, entrance, largest, 2.0 * reach.spacing)
-            alike.setdefault((*_sides(gap, names), wedge), []).append(gap)
-    largest_first = sorted(alike.items(), key=lambda item: -sum(gap.area.sum() for gap in item[1]))[
-        :MOST_SAID
+            wedge = _is_wedge(gap, entrance, largest, 2.0 * reach.spacing)
+            gaps.setdefault(GapKind(*_sides(gap, names), wedge), []).append(gap)
+    kinds = sorted(gaps, key=lambda kind: -sum(gap.area.sum() for gap in gaps[kind]))
+    return [
+        _gap_warning(kind, gaps[kind], reach.diameter, largest, turns)
+        for kind in kinds[:MAX_WARNINGS]
     ]
-    return [_said(*kind, gaps, reach.diameter, largest, turns) for kind, gaps in largest_first]
 
 
 def pocket_warnings(reach: Reach, chamber: Chamber) -> list[str]:
-    """Rooms that would hold a ball but that none gets into, those of most area first."""
-    found, shut = reach.touches, reach.fits & ~reach.reached
-    target = on_target(chamber)[found.triangle]
-    said = []
-    for room in np.unique(reach.room[shut]):
-        own = shut & (reach.room == room)
-        area, wanted = float(found.area[own].sum()), float(found.area[own & target].sum())
-        if room < len(reach.room_volume) and reach.room_volume[room] > 0.0:
-            much = f", though {mm2(wanted)} of the target are in it" if wanted else ""
-            said.append(
+    """Warnings about pockets that would hold a ball that cannot get in, the largest area first."""
+    touches, closed = reach.touches, reach.fits & ~reach.reached
+    target = on_target(chamber)[touches.triangle]
+    warnings = []
+    for region in np.unique(reach.region[closed]):
+        own = closed & (reach.region == region)
+        if region < len(reach.region_volume) and reach.region_volume[region] > 0.0:
+            in_target = float(touches.area[own & target].sum())
+            loss = f", though {mm2(in_target)} of the target are in it" if in_target else ""
+            warnings.append(
                 (
-                    area,
-                    f"a pocket around {around(found.point[own], found.area[own])} would hold a ball of "
-                    f"{1e3 * reach.diameter:g} mm but has no way in for one{much}; widen its mouth, close it, or use "
-                    "smaller balls",
+                    float(touches.area[own].sum()),
+                    f"a pocket around {around(touches.point[own], touches.area[own])} would hold a "
+                    f"ball of {1e3 * reach.diameter:g} mm but has no way in for one{loss}; widen "
+                    "its mouth, close it, or use smaller balls",
                 )
             )
-    return [text for _, text in sorted(said, key=lambda one: -one[0])[:MOST_SAID]]
+    return [text for _, text in sorted(warnings, key=lambda one: -one[0])[:MAX_WARNINGS]]
 
 
 def target_warnings(reach: Reach, chamber: Chamber, only_reachable: bool = False) -> list[str]:
-    """What of the target no process could cover, as no ball can touch it; ``only_reachable``: as part.target says."""
-    found = reach.touches
-    own = on_target(chamber)[found.triangle]
-    whole, missed = float(found.area[own].sum()), own & ~reach.reached
-    left = float(found.area[missed].sum())
-    if not whole or left < (1.0 - COMPLETE) * whole:
+    """A warning about the share of the target that no ball can touch, for any peening time.
+
+    Args:
+        only_reachable: part.target.reachable of the design.
+    """
+    touches = reach.touches
+    own = on_target(chamber)[touches.triangle]
+    whole, missed = float(touches.area[own].sum()), own & ~reach.reached
+    left = float(touches.area[missed].sum())
+    if not whole or left < MIN_MISSED_SHARE * whole:
         return []
     sharp = own & ~reach.fits
-    place = one_of(found.point[missed], found.area[missed])
+    place = one_of(touches.point[missed], touches.area[missed])
     remedy = "narrow [part.target]" + (
         "" if only_reachable else ", or set part.target.reachable = true"
     )
-    if found.area[sharp].sum() > 0.5 * left:
-        order = np.argsort(found.radius[own])
-        beyond = np.cumsum(found.area[own][order]) > 0.5 * left
-        fitting = 2e3 * float(found.radius[own][order][np.argmax(beyond)])
-        remedy = f"balls of {fitting:.2g} mm would fit half of that; or {remedy}"
+    if touches.area[sharp].sum() > 0.5 * left:
+        order = np.argsort(touches.radius[own])
+        second_half = np.cumsum(touches.area[own][order]) > 0.5 * left
+        diameter_mm = 2e3 * float(touches.radius[own][order][np.argmax(second_half)])
+        remedy = f"balls of {diameter_mm:.2g} mm would fit half of that; or {remedy}"
     return [
-        f"{left / whole:.1%} of the target in the chamber ({mm2(left)}) cannot be touched by a ball of "
-        f"{1e3 * reach.diameter:g} mm, whatever the process: e.g. at {place}; {remedy}"
+        f"{left / whole:.1%} of the target in the chamber ({mm2(left)}) cannot be touched by a ball "
+        f"of {1e3 * reach.diameter:g} mm, however long it is peened: e.g. at {place}; {remedy}"
     ]
 
 
 def _clusters(centre: np.ndarray, near: float) -> list[np.ndarray]:
-    """Members of each group of places that hang together in steps of ``near`` [m]."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
+    """Members of each group of points (n, 3) [m] that are connected by steps of at most ``near`` [m]."""
     from scipy.spatial import KDTree
 
     if not len(centre):
         return []
     pairs = KDTree(centre).query_pairs(near, output_type="ndarray")
-    links = coo_array((np.ones(len(pairs), dtype=bool), tuple(pairs.T)), shape=(len(centre),) * 2)
-    label = connected_components(links, directed=False)[1]
+    label = connected_groups(pairs, len(centre))
     order = np.argsort(label, kind="stable")
     return np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
 
 
-def _meets(gap: Touches, entrance: np.ndarray, largest: float, near: float) -> bool:
-    """Whether the gap begins as wide as a ball where one can come from, and narrows steadily from there."""
+def _is_wedge(gap: TouchPoints, entrance: np.ndarray, largest: float, near: float) -> bool:
+    """Whether a gap begins as wide as a ball, at an entrance that balls reach, and narrows steadily.
+
+    Args:
+        entrance: centres of reached balls in gaps slightly wider than a ball [m], shape (n, 3).
+        largest: diameter of the ball [m].
+        near: distance from the gap to its entrance [m].
+    """
     from scipy.spatial import KDTree
 
-    begins = gap.centre[gap.radius > 0.5 * (1.0 - PASSING) * largest]
+    begins = gap.centre[gap.radius > 0.5 * (1.0 - WIDTH_TOLERANCE) * largest]
     return bool(len(begins) and len(entrance) and KDTree(entrance).query(begins)[0].min() < near)
 
 
-def _sides(gap: Touches, names: np.ndarray) -> tuple[str, str]:
+def _sides(gap: TouchPoints, names: np.ndarray) -> tuple[str, str]:
     """The two surfaces that most of a gap lies between."""
-    pairs = np.sort(np.c_[names[gap.triangle], names[gap.against]].astype(str), axis=1)
+    pairs = np.sort(np.c_[names[gap.triangle], names[gap.obstacle]].astype(str), axis=1)
     sides, counts = np.unique(pairs, axis=0, return_counts=True)
     one, two = sides[counts.argmax()]
     return str(one), str(two)
 
 
-def _said(
-    one: str,
-    two: str,
-    wedge: bool,
-    gaps: list[Touches],
-    smallest: float,
-    largest: float,
-    turns: bool,
+def _gap_warning(
+    kind: GapKind, gaps: list[TouchPoints], smallest: float, largest: float, turns: bool
 ) -> str:
-    """One sentence on gaps of a kind."""
+    """One sentence on gaps of a kind, for balls from a smallest to a largest diameter [m]."""
+    one, two = kind.one, kind.two
     biggest = max(gaps, key=lambda gap: gap.area.sum())
     radius = np.concatenate([gap.radius for gap in gaps])
     low, high = (
-        max(0.0, 1e3 * (2.0 * end - FORGIVEN * 0.5 * smallest))
+        max(0.0, 1e3 * (2.0 * end - TOLERATED_OVERLAP * 0.5 * smallest))
         for end in (radius.min(), radius.max())
     )
     between = f"between {one} and {two}" if one != two else f"of {one}"
@@ -156,22 +173,18 @@ def _said(
         else f"each of {len(gaps)} gaps {between}, one {where},"
     )
     ball = f"a ball of {1e3 * largest:g} mm"
-    if wedge:
-        caught = f"narrows from more than {ball} to {low:.3g} mm, so gently that friction holds it: it can wedge there"
+    if kind.wedge:
+        fault = (
+            f"narrows from more than {ball} to {low:.3g} mm, so gently that friction holds it: it "
+            "can wedge there"
+        )
     else:
-        wide = f"{low:.3g} to {high:.3g}" if low < 0.98 * high else f"{high:.3g}"
-        caught = f"is {wide} mm wide, narrower than {ball}: {_kept_out(high, smallest)}"
+        width = f"{low:.3g} to {high:.3g}" if low < 0.98 * high else f"{high:.3g}"
+        balls = "no ball gets" if high < 1e3 * smallest else "only the smaller balls get"
+        fault = f"is {width} mm wide, narrower than {ball}: {balls} in there"
         if turns and "part" in one + two:
-            caught += ", or one may be jammed as the part turns"
-    return f"{what} {caught}; {_remedy({one, two})}"
-
-
-def _kept_out(width_mm: float, smallest: float) -> str:
-    return (
-        "no ball gets in there"
-        if width_mm < 1e3 * smallest
-        else "only the smaller balls get in there"
-    )
+            fault += ", or one may be jammed as the part turns"
+    return f"{what} {fault}; {_remedy({one, two})}"
 
 
 def _remedy(sides: set[str]) -> str:

@@ -1,4 +1,4 @@
-"""Where shot can come to rest, seen before anything runs: what faces up and neither vibrates nor turns."""
+"""Places where balls can come to rest: surfaces that face up and neither vibrate nor turn."""
 
 from __future__ import annotations
 
@@ -8,14 +8,15 @@ import numpy as np
 
 from chamberopt.chamber.build import TAG_PART, TAG_SONOTRODE, TAG_WALL
 from chamberopt.chamber.checks.place_names import around, mm2
+from chamberopt.chamber.reach.connectivity import connected_groups
 from chamberopt.geometry.triangles import area_vectors
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.design.load import Design
 
-LEVEL = 1e-9  # m: corners whose heights differ by less are level but for rounding
-UPWARD = 1e-6  # of a triangle's area: what faces up by less is upright but for rounding
+HEIGHT_TOLERANCE = 1e-9  # m: corners whose heights differ by less are level, except for rounding
+AREA_TOLERANCE = 1e-6  # share of a triangle's area: a smaller upward part is rounding
 REMEDY = {
     TAG_PART: "turn it (effects.part_turn), tilt it (part.rotate_deg), or lower chamber.{key} to its top side",
     TAG_WALL: "make it slope towards the sonotrode",
@@ -23,22 +24,27 @@ REMEDY = {
 
 
 class Ledge(NamedTuple):
-    """What of part or wall faces up: one sentence, and whether enough of it is ``level`` for a ball to lie on."""
+    """Surfaces of part or wall that face up.
 
-    said: str
+    Attributes:
+        message: one sentence.
+        level: whether enough of them is level for a ball to lie on.
+    """
+
+    message: str
     level: bool
 
 
-def ledges(design: Design, chamber: Chamber) -> list[Ledge]:
-    """Where balls can come to rest, on part and wall."""
+def find_ledges(design: Design, chamber: Chamber) -> list[Ledge]:
+    """The places on part and wall where balls can come to rest."""
     from sim_core import Rest
 
     if not design.effects.gravity:
         return []
-    normal = -area_vectors(chamber.vertices, chamber.triangles)  # to the shot
+    normal = -area_vectors(chamber.vertices, chamber.triangles)  # towards the shot
     area = np.linalg.norm(normal, axis=1)
-    upward = normal[:, 2] > UPWARD * area
-    downward = normal[:, 2] < -UPWARD * area
+    upward = normal[:, 2] > AREA_TOLERANCE * area
+    downward = normal[:, 2] < -AREA_TOLERANCE * area
     flat = upward & (np.hypot(normal[:, 0], normal[:, 1]) <= Rest().resistance * normal[:, 2])
     cross_section = np.pi / 4.0 * design.shot.diameter**2
     found = []
@@ -47,47 +53,43 @@ def ledges(design: Design, chamber: Chamber) -> list[Ledge]:
         if not faces.any() or (tag == TAG_PART and design.effects.part_turn is not None):
             continue
         level = bool(area[faces & flat].sum() >= cross_section)
-        # where balls lie, rather than roll off
+        # balls stay here and do not roll off
         shown = faces & flat if level else faces & _in_hollows(chamber, upward, downward)
         if not shown.any():
             continue
-        much = mm2(area[shown].sum())
-        where, how = (
-            ("on", f"{much} of it are level")
-            if level
-            else ("in hollows of", f"{much} face up, none level")
+        size = mm2(area[shown].sum())
+        if level:
+            where, extent = "on", f"{size} of it are level"
+        else:
+            where, extent = "in hollows of", f"{size} face up, none level"
+        message = (
+            f"balls can come to rest {where} the {name}, which neither vibrates nor turns: "
+            f"{extent}, {_place(chamber, shown, area)}; "
+            f"{REMEDY[tag].format(key=design.chamber.ceiling_key)}"
         )
-        found.append(
-            Ledge(
-                f"balls can come to rest {where} the {name}, which neither vibrates nor turns: {how}, "
-                f"{_place(chamber, shown, area)}; {REMEDY[tag].format(key=design.chamber.ceiling_key)}",
-                level,
-            )
-        )
+        found.append(Ledge(message, level))
     return found
 
 
 def _in_hollows(chamber: Chamber, upward: np.ndarray, downward: np.ndarray) -> np.ndarray:
-    """Which faces that go ``upward`` (k,), others ``downward``, are at the bottom of a hollow: every way leads up.
+    """Which upward faces are at the bottom of a hollow, from where every way leads up; (k,) bool.
 
-    A wall that leans out has its lowest points on the sonotrode, and off what faces down beside it a ball falls.
+    A wall that leans out is not a hollow: its lowest points are on the sonotrode. A face beside one
+    that faces down is not one either, because a ball falls off there.
+
+    Args:
+        upward: which faces face up, shape (k,).
+        downward: which face down, shape (k,).
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     count, height = len(chamber.vertices), chamber.vertices[:, 2]
     one, two = (
         chamber.triangles[:, [0, 1, 2, 1, 2, 0]].reshape(-1, 2, 3).transpose(1, 0, 2).reshape(2, -1)
     )
-    alike = np.abs(height[one] - height[two]) <= LEVEL
-    links = coo_array(
-        (np.ones(alike.sum(), dtype=bool), (one[alike], two[alike])), shape=(count, count)
-    )
-    plateaus, plateau = connected_components(links, directed=False)
-    bottom = np.ones(plateaus, dtype=bool)
-    bottom[plateau[one[height[two] < height[one] - LEVEL]]] = (
-        False  # each edge is there both ways round
-    )
+    level = np.abs(height[one] - height[two]) <= HEIGHT_TOLERANCE
+    plateau = connected_groups(np.c_[one[level], two[level]], count)
+    bottom = np.ones(plateau.max() + 1, dtype=bool)
+    # Every edge occurs in both directions, so one comparison finds all lower neighbours.
+    bottom[plateau[one[height[two] < height[one] - HEIGHT_TOLERANCE]]] = False
     bottom[plateau[chamber.triangles[downward | (chamber.tags == TAG_SONOTRODE)]]] = False
     return np.asarray(upward & bottom[plateau[chamber.triangles]].any(axis=1))
 

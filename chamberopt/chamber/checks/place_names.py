@@ -1,4 +1,4 @@
-"""Where something is, in the words of a chamber's designer."""
+"""Names of places and surfaces of a chamber, for messages."""
 
 from __future__ import annotations
 
@@ -13,21 +13,23 @@ from chamberopt.geometry.triangles import area_vectors
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
 
-STEEP = 0.5  # cosine to the vertical: what is steeper than 60 degrees is a side, neither top nor underside
+MIN_UPWARD = 0.5  # cosine to the vertical: a surface steeper than 60 degrees is a side
 CEILING, SIDE_WALL, SONOTRODE = "the ceiling", "the wall", "the sonotrode"
 
 
 def surface_names(chamber: Chamber) -> np.ndarray:
-    """What a designer calls each triangle, (k,) of str."""
-    normal = -area_vectors(chamber.vertices, chamber.triangles)  # to the shot
+    """The name of the surface that each triangle belongs to, (k,) of str."""
+    normal = -area_vectors(chamber.vertices, chamber.triangles)  # towards the shot
     size = np.linalg.norm(normal, axis=1)
     up = np.divide(normal[:, 2], size, out=np.zeros_like(size), where=size > 0.0)
     on_part = np.select(
-        [up > STEEP, up < -STEEP],
+        [up > MIN_UPWARD, up < -MIN_UPWARD],
         ["the part's upper side", "the part's underside"],
         "the part's side",
     )
-    on_wall = np.select([up > STEEP, up < -STEEP], ["a ledge of the wall", CEILING], SIDE_WALL)
+    on_wall = np.select(
+        [up > MIN_UPWARD, up < -MIN_UPWARD], ["a ledge of the wall", CEILING], SIDE_WALL
+    )
     words = np.where(chamber.tags == TAG_PART, on_part, on_wall).astype(object)
     words[chamber.tags == TAG_SONOTRODE] = SONOTRODE
     for tag in np.unique(chamber.tags[chamber.tags > TAG_WALL]):
@@ -36,18 +38,18 @@ def surface_names(chamber: Chamber) -> np.ndarray:
 
 
 def around(points: np.ndarray, weights: np.ndarray | None = None) -> str:
-    """The middle of points (n, 3) [m] as "(x, y, z) mm"; ``weights`` (n,): what each counts."""
+    """The mean of points (n, 3) [m] with weights (n,), as "(x, y, z) mm"."""
     middle = np.average(1e3 * points, axis=0, weights=weights)
     return f"({', '.join(f'{x:.1f}' for x in np.round(middle, 1) + 0.0)}) mm"
 
 
 def mm2(area: float) -> str:
-    """An area [m²] to three figures."""
+    """An area [m²] as text in mm², to three figures."""
     return f"{float(f'{1e6 * area:.3g}'):g} mm²"
 
 
 def one_of(points: np.ndarray, weights: np.ndarray) -> str:
-    """That of the points (n, 3) [m] nearest to their middle, as ``around``: of a ring the middle is nowhere near."""
+    """The point of (n, 3) [m] closest to their mean, as text; the mean of a ring is far from it."""
     middle = np.average(points, axis=0, weights=weights)
     return around(points[[np.linalg.norm(points - middle, axis=1).argmin()]])
 

@@ -1,8 +1,9 @@
-"""Which places a ball can get to from which: the rooms that a ball's centre can move in.
+"""Regions in which a ball's centre can move: from where to where a ball gets in the cavity.
 
-Open space is a grid of cells in which a centre may lie anywhere, looked for from coarse to fine. Where it is too tight
-for such cells, places midway between the walls lead on: the centres of the largest balls that touch, and what cells
-without open space nearby hold that is farthest from all walls. The straight way from one to the next is followed.
+The open space is a grid of cells in which the centre may lie anywhere, refined from coarse to fine.
+Where it is too narrow for such cells, points midway between the walls continue it: the centres of
+the largest balls that touch the surface, and, in cells without open space nearby, the point that is
+farthest from all walls. Two points are linked if the ball can move straight from one to the other.
 """
 
 from __future__ import annotations
@@ -14,22 +15,28 @@ import numpy as np
 from chamberopt.geometry.triangles import area_vectors
 
 if TYPE_CHECKING:
-    from chamberopt.chamber.reach.largest_ball import Touches
+    from chamberopt.chamber.reach.largest_ball import TouchPoints
     from sim_core import TriangleMesh
 
-MOST_CELLS = 3e6  # half a second; beyond it cells grow
+MAX_CELLS = 3e6  # take half a second; with more, cells are made larger
 HALVINGS = 3
 EDGE = 0.5  # of the ball's radius
 DIAGONAL = np.sqrt(3.0)
 NEIGHBOURS = 8
-NEARBY = 5  # cells wide: beside a plain wall there is open space two cells from where a centre may lie at all
+NEARBY = 5  # cells: beside a plain wall, open space is two cells from where a centre can lie at all
 PUSHES, SHORTER = 12, 0.7  # the last step is a hundredth of a cell
-STEP = 0.25  # of the radius: how finely a straight way is followed
+STEP = 0.25  # of the radius: steps in which a straight way is checked
 
 
 class Cells(NamedTuple):
-    """The grid: its ``low`` corner (3,) [m], a cell's ``edge`` [m], and the open space (nx, ny, nz) int32 that each
-    belongs to, from 1 on; 0 where a centre may not lie anywhere in it. ``unsure``: there it may lie somewhere.
+    """A grid of cubic cells over the cavity.
+
+    Attributes:
+        low: lowest corner [m], shape (3,).
+        edge: of a cell [m].
+        space: number of the open space that a cell belongs to, from 1 on, shape (nx, ny, nz); 0 where
+            the centre of a ball may not lie anywhere in the cell.
+        unsure: whether the centre may lie in some of the cell, shape (nx, ny, nz).
     """
 
     low: np.ndarray
@@ -38,7 +45,7 @@ class Cells(NamedTuple):
     unsure: np.ndarray
 
     def middles(self, chosen: np.ndarray) -> np.ndarray:
-        """Of the cells that are true in (nx, ny, nz), (n, 3) [m]."""
+        """Middles (n, 3) [m] of the cells that are true in (nx, ny, nz)."""
         return np.asarray(self.low + self.edge * (np.argwhere(chosen) + 0.5))
 
     def at(self, places: np.ndarray) -> np.ndarray:
@@ -50,15 +57,15 @@ class Cells(NamedTuple):
 
 
 def cell_edge(mesh: TriangleMesh, radius: float) -> float:
-    """Side [m] of the cells that suit a ball, or as many as there may be."""
+    """Side [m] of the cells for a ball of this radius [m]; larger if there would be too many."""
     volume = float(np.prod(np.ptp(mesh.vertices, axis=0)))
-    return float(max(EDGE * radius, (volume / MOST_CELLS) ** (1.0 / 3.0)))
+    return float(max(EDGE * radius, (volume / MAX_CELLS) ** (1.0 / 3.0)))
 
 
 def open_cells(mesh: TriangleMesh, radius: float) -> Cells:
-    """Cells in which a ball of this radius [m] is free wherever its centre lies, and what hangs together of them.
+    """Cells in which the centre of a ball of this radius [m] may lie anywhere, and open spaces.
 
-    Also outside the cavity, and inside the part: no ball that touches is there.
+    Cells outside the cavity and inside the part count too, but no ball touches the surface there.
     """
     from scipy.ndimage import label
 
@@ -86,15 +93,28 @@ def _halved(cells: np.ndarray) -> np.ndarray:
     return cells
 
 
-def rooms(
-    mesh: TriangleMesh, touches: Touches, radius: float, spacing: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """The room (p,) int that each touch lies in, -1 where a ball of this radius [m] does not fit, and the volume [m³]
-    that its centre has in each room; ``spacing`` [m] of the touches, at most.
-    """
+def connected_groups(links: np.ndarray, count: int) -> np.ndarray:
+    """Group number (count,) of each node, where links (k, 2) connect the nodes of a group."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
+    ones = np.ones(len(links), dtype=np.int8)
+    graph = coo_array((ones, (links[:, 0], links[:, 1])), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1])
+
+
+def find_regions(
+    mesh: TriangleMesh, touches: TouchPoints, radius: float, spacing: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """The regions in which the centre of a ball can move.
+
+    Args:
+        radius: of the ball [m].
+        spacing: largest distance between neighbouring touch points [m].
+    Returns:
+        Region of each touch point, -1 where the ball does not fit, (p,) int; and the volume [m³] of
+        the open space in each region.
+    """
     cells = open_cells(mesh, radius)
     spaces = int(cells.space.max())
     fits = touches.radius > radius
@@ -104,30 +124,24 @@ def rooms(
     cells = cells._replace(space=np.where(inside[cells.space], cells.space, 0))
     tight = node < 0
     node[tight] = spaces + np.arange(tight.sum())
-    tights = np.concatenate([centre[tight], _midways(mesh, cells, radius)])
-    count = spaces + len(tights)
-
-    def joined(links: np.ndarray) -> np.ndarray:
-        graph = coo_array(
-            (np.ones(len(links), dtype=np.int8), (links[:, 0], links[:, 1])), shape=(count, count)
-        )
-        return np.asarray(connected_components(graph, directed=False)[1])
-
-    links = _ways_out(mesh, cells, tights, radius, spacing) + np.array([spaces, 0])
-    room = joined(links)
-    room = joined(
-        np.concatenate([links, _ways_on(mesh, tights, room[spaces:], radius, spacing) + spaces])
-    )
-    which = np.full(len(touches.point), -1)
-    which[fits] = room[node]
-    filled = np.bincount(cells.space.ravel(), minlength=spaces + 1)[1:]
-    return which, np.bincount(room[:spaces], filled, int(room.max(initial=-1)) + 1) * cells.edge**3
+    narrow = np.concatenate([centre[tight], _midway_points(mesh, cells, radius)])
+    count = spaces + len(narrow)
+    links = _links_to_spaces(mesh, cells, narrow, radius, spacing) + np.array([spaces, 0])
+    region = connected_groups(links, count)
+    more = _links_between(mesh, narrow, region[spaces:], radius, spacing) + spaces
+    region = connected_groups(np.concatenate([links, more]), count)
+    of_touch = np.full(len(touches.point), -1)
+    of_touch[fits] = region[node]
+    size = np.bincount(cells.space.ravel(), minlength=spaces + 1)[1:]
+    volume = np.bincount(region[:spaces], size, int(region.max(initial=-1)) + 1) * cells.edge**3
+    return of_touch, volume
 
 
-def _midways(mesh: TriangleMesh, cells: Cells, radius: float) -> np.ndarray:
-    """Places (n, 3) [m] where a centre may lie in cells that no open space is near, or more than one.
+def _midway_points(mesh: TriangleMesh, cells: Cells, radius: float) -> np.ndarray:
+    """Points (n, 3) [m] where a centre may lie in cells near no open space, or near several.
 
-    From the cell's middle away from whatever is nearest, in ever smaller steps: to midway between the walls.
+    Each moves from the cell's middle away from the closest wall, in ever smaller steps, until it is
+    midway between the walls.
     """
     from scipy.ndimage import maximum_filter, minimum_filter
 
@@ -153,37 +167,37 @@ def _midways(mesh: TriangleMesh, cells: Cells, radius: float) -> np.ndarray:
     return best[widest >= radius]
 
 
-def _ways_out(
+def _links_to_spaces(
     mesh: TriangleMesh, cells: Cells, centre: np.ndarray, radius: float, spacing: float
 ) -> np.ndarray:
-    """Links (k, 2) from tight places to open spaces nearby, one for each of both."""
+    """Links (k, 2) from points in narrow places (n, 3) [m] to open spaces nearby, one for each pair."""
     from scipy.ndimage import binary_erosion
     from scipy.spatial import KDTree
 
     free = cells.space > 0
-    rim = free & ~binary_erosion(free, structure=np.ones((3, 3, 3)))
-    if not rim.any() or not len(centre):
+    border_cells = free & ~binary_erosion(free, structure=np.ones((3, 3, 3)))
+    if not border_cells.any() or not len(centre):
         return np.zeros((0, 2), dtype=np.int64)
-    border, of_border = cells.middles(rim), cells.space[rim] - 1
+    border, border_space = cells.middles(border_cells), cells.space[border_cells] - 1
     far = 3.0 * cells.edge + spacing
     most = min(NEIGHBOURS, len(border))
     away, found = KDTree(border).query(centre, k=range(1, most + 1), distance_upper_bound=far)
-    led = np.full((len(centre), most), -1)  # the open spaces that each is known to lead to
+    linked = np.full((len(centre), most), -1)  # the open spaces that each point is linked to
     for k in range(most):
         here = np.flatnonzero(np.isfinite(away[:, k]))
-        space = of_border[found[here, k]]
-        new = (led[here, :k] != space[:, None]).all(axis=1)
+        space = border_space[found[here, k]]
+        new = (linked[here, :k] != space[:, None]).all(axis=1)
         here, space = here[new], space[new]
-        way = _clear_way(mesh, centre[here], border[found[here, k]], radius)
-        led[here[way], k] = space[way]
-    start, column = np.nonzero(led >= 0)
-    return np.column_stack([start, led[start, column]])
+        way = _is_way_clear(mesh, centre[here], border[found[here, k]], radius)
+        linked[here[way], k] = space[way]
+    start, column = np.nonzero(linked >= 0)
+    return np.column_stack([start, linked[start, column]])
 
 
-def _ways_on(
-    mesh: TriangleMesh, centre: np.ndarray, room: np.ndarray, radius: float, spacing: float
+def _links_between(
+    mesh: TriangleMesh, centre: np.ndarray, region: np.ndarray, radius: float, spacing: float
 ) -> np.ndarray:
-    """Links (k, 2) between tight places near each other that are not yet known to be in one room."""
+    """Links (k, 2) between nearby points in narrow places that are not in the same region yet."""
     from scipy.spatial import KDTree
 
     if len(centre) < 2:
@@ -193,14 +207,16 @@ def _ways_on(
     )
     here, k = np.nonzero(np.isfinite(away))
     there = found[here, k]
-    new = room[here] != room[there]
+    new = region[here] != region[there]
     here, there = here[new], there[new]
-    way = _clear_way(mesh, centre[here], centre[there], radius)
+    way = _is_way_clear(mesh, centre[here], centre[there], radius)
     return np.column_stack([here[way], there[way]])
 
 
-def _clear_way(mesh: TriangleMesh, start: np.ndarray, end: np.ndarray, radius: float) -> np.ndarray:
-    """Whether a ball gets straight from each start (n, 3) [m] to its end: (n,) bool."""
+def _is_way_clear(
+    mesh: TriangleMesh, start: np.ndarray, end: np.ndarray, radius: float
+) -> np.ndarray:
+    """Whether the ball can move straight from each start (n, 3) [m] to its end, (n,) bool."""
     from sim_core import closest_points
 
     clear = np.ones(len(start), dtype=bool)
@@ -208,7 +224,7 @@ def _clear_way(mesh: TriangleMesh, start: np.ndarray, end: np.ndarray, radius: f
         return clear
     steps = int(np.ceil(np.linalg.norm(end - start, axis=1).max() / (STEP * radius))) + 1
     for share in np.linspace(0.0, 1.0, steps + 1)[1:-1]:
-        asked = np.flatnonzero(clear)
-        found = closest_points(mesh, start[asked] + share * (end - start)[asked], radius)
-        clear[asked[found.triangle >= 0]] = False
+        rows = np.flatnonzero(clear)
+        found = closest_points(mesh, start[rows] + share * (end - start)[rows], radius)
+        clear[rows[found.triangle >= 0]] = False
     return clear

@@ -1,8 +1,8 @@
-"""How large a ball can touch the cavity's surface, place by place.
+"""The largest ball that touches the cavity's surface at a point, without reaching into it elsewhere.
 
-From each place a ball grows along the normal until something else stops it: the largest that touches there without
-reaching into the surface anywhere. Found from above, shrinking it past the nearest obstacle until none is left (J. Ma,
-S. W. Bae, S. Choi, The Visual Computer 28 (2012) 7).
+A ball that touches at the point is shrunk past the closest obstacle until none is left.
+
+Source: J. Ma, S. W. Bae, S. Choi, The Visual Computer 28 (2012) 7.
 """
 
 from __future__ import annotations
@@ -16,18 +16,24 @@ from chamberopt.geometry.triangles import area_vectors
 if TYPE_CHECKING:
     from sim_core import TriangleMesh
 
-ROUNDS = 50  # of shrinking; 5 are usual
-# The sequence that fills a square evenly from the first point on: M. Roberts, "The unreasonable effectiveness of
-# quasirandom sequences" (2018), with the powers of the plastic number.
-EVEN = np.array([0.7548776662466927, 0.5698402909980532])
+MAX_SHRINKS = 50  # 5 are usual
+# A sequence that fills a square evenly from its first point on, from powers of the plastic number.
+# Source: M. Roberts, "The unreasonable effectiveness of quasirandom sequences" (2018).
+SEQUENCE_STEP = np.array([0.7548776662466927, 0.5698402909980532])
 
 
-class Touches(NamedTuple):
-    """Places on the surface, and the largest ball that touches there.
+class TouchPoints(NamedTuple):
+    """Points of the surface, and the largest ball that touches at each.
 
-    ``triangle`` (p,) int · ``point`` (p, 3) m · ``normal`` (p, 3) into the cavity · ``area`` (p,) m² that each stands
-    for · ``radius`` (p,) m, up to the largest asked for · ``against`` (p,): the triangle that stops it there, else -1 ·
-    ``opposite`` (p,): cosine between the normal and the direction it is stopped in, -1 from straight across, else 0.
+    Attributes:
+        triangle: that the point lies on, shape (p,), int.
+        point: [m], shape (p, 3).
+        normal: unit vector into the cavity, shape (p, 3).
+        area: that the point stands for [m²], shape (p,).
+        radius: of the largest ball, up to a limit [m], shape (p,).
+        obstacle: triangle that limits the ball, else -1; shape (p,).
+        cosine: between the normal and that of the obstacle as the ball meets it, -1 where they
+            face each other, 0 without an obstacle; shape (p,).
     """
 
     triangle: np.ndarray
@@ -35,44 +41,50 @@ class Touches(NamedTuple):
     normal: np.ndarray
     area: np.ndarray
     radius: np.ndarray
-    against: np.ndarray
-    opposite: np.ndarray
+    obstacle: np.ndarray
+    cosine: np.ndarray
 
     @property
     def centre(self) -> np.ndarray:
-        """Of the largest balls (p, 3) [m]."""
+        """Centres of the largest balls (p, 3) [m]."""
         return np.asarray(self.point + self.radius[:, None] * self.normal)
 
-    def only(self, chosen: np.ndarray) -> Touches:
-        """Some of them."""
-        return Touches(*(column[chosen] for column in self))
+    def select(self, rows: np.ndarray) -> TouchPoints:
+        """The points of these rows."""
+        return TouchPoints(*(column[rows] for column in self))
 
 
-def touches(mesh: TriangleMesh, spacing: np.ndarray, most: float, forgiven: float) -> Touches:
-    """Places about ``spacing`` (m,) [m] apart on each triangle, at least one, and the largest balls there.
+def find_touch_points(
+    mesh: TriangleMesh, spacing: np.ndarray, max_radius: float, overlap: float
+) -> TouchPoints:
+    """Points on all triangles of a mesh, and the largest balls there.
 
-    ``most`` [m]: radius beyond which it does not matter; ``forgiven`` [m]: so far a ball may reach into a surface.
+    Args:
+        spacing: distance between the points on each triangle [m], shape (m,); each has at least one.
+        max_radius: limit of the radius [m].
+        overlap: how far a ball may reach into a surface [m].
     """
-    triangle, point, area = spread(mesh.vertices, mesh.triangles, spacing)
+    triangle, point, area = spread_points(mesh.vertices, mesh.triangles, spacing)
     outward = area_vectors(mesh.vertices, mesh.triangles)
     size = np.linalg.norm(outward, axis=1)
     normal = -np.divide(
         outward, size[:, None], out=np.zeros_like(outward), where=size[:, None] > 0.0
     )[triangle]
-    return Touches(
-        triangle, point, normal, area, *largest_balls(mesh, point, normal, most, forgiven)
+    return TouchPoints(
+        triangle, point, normal, area, *largest_balls(mesh, point, normal, max_radius, overlap)
     )
 
 
-def spread(
+def spread_points(
     vertices: np.ndarray, triangles: np.ndarray, spacing: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Places spread evenly over triangles: triangle (p,), point (p, 3) [m], and the area (p,) [m²] of each."""
+    """Points spread evenly over triangles: triangle (p,), point (p, 3) [m], and area (p,) [m²]."""
     size = np.linalg.norm(area_vectors(vertices, triangles), axis=1)
     count = np.where(size > 0.0, np.maximum(np.ceil(size / spacing**2), 1.0), 0.0).astype(np.int64)
     triangle = np.repeat(np.arange(len(triangles)), count)
-    # one sequence through all: were it begun anew on each, a row of like triangles would be looked at in a few lines
-    u, v = ((1.0 / 3.0 + np.arange(len(triangle))[:, None] * EVEN) % 1.0).T
+    # One sequence over all triangles: if it began again on each, the points of a row of similar
+    # triangles would lie on a few lines.
+    u, v = ((1.0 / 3.0 + np.arange(len(triangle))[:, None] * SEQUENCE_STEP) % 1.0).T
     fold = u + v > 1.0  # the square's other half falls onto the triangle
     u, v = np.where(fold, 1.0 - u, u), np.where(fold, 1.0 - v, v)
     a, b, c = (vertices[triangles[triangle, k]] for k in range(3))
@@ -84,36 +96,35 @@ def spread(
 
 
 def largest_balls(
-    mesh: TriangleMesh, point: np.ndarray, normal: np.ndarray, most: float, forgiven: float
+    mesh: TriangleMesh, point: np.ndarray, normal: np.ndarray, max_radius: float, overlap: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Radius, against and opposite (p,) of the largest ball that touches at each point, as in Touches.
+    """Radius, obstacle and cosine (p,) of the largest ball at each point, as in TouchPoints.
 
-    A ball of radius R that touches at p reaches ``forgiven`` > 0 deep at q where |q - p - R n| = R - forgiven.
+    A ball of radius R that touches at p with normal n reaches an overlap o > 0 deep into a surface
+    at q where |q - p - R n| = R - o.
     """
     from sim_core import closest_points
 
-    radius = np.full(len(point), most)
-    against, opposite = np.full(len(point), -1), np.zeros(len(point))
-    asked = np.arange(len(point))
-    for _ in range(ROUNDS):
-        centre = point[asked] + radius[asked, None] * normal[asked]
-        found = closest_points(mesh, centre, radius[asked] - forgiven)
+    radius = np.full(len(point), max_radius)
+    obstacle, cosine = np.full(len(point), -1), np.zeros(len(point))
+    rows = np.arange(len(point))
+    for _ in range(MAX_SHRINKS):
+        centre = point[rows] + radius[rows, None] * normal[rows]
+        found = closest_points(mesh, centre, radius[rows] - overlap)
         hit = found.triangle >= 0
-        asked = asked[hit]
-        if not len(asked):
+        rows = rows[hit]
+        if not len(rows):
             break
-        to = found.point[hit] - point[asked]
-        ahead = np.einsum("ij,ij->i", to, normal[asked]) - forgiven
-        square = np.einsum("ij,ij->i", to, to) - forgiven**2
+        to = found.point[hit] - point[rows]
+        ahead = np.einsum("ij,ij->i", to, normal[rows]) - overlap
+        square = np.einsum("ij,ij->i", to, to) - overlap**2
         fits = np.divide(
             square, 2.0 * ahead, out=np.zeros_like(ahead), where=(ahead > 0.0) & (square > 0.0)
         )
-        against[asked] = found.triangle[hit]
-        shrunk = fits < (1.0 - 1e-9) * radius[asked]
-        radius[asked] = np.minimum(np.maximum(fits, forgiven), radius[asked])
-        across = (
-            np.einsum("ij,ij->i", point[asked] - found.point[hit], normal[asked]) + radius[asked]
-        )
-        opposite[asked] = across / np.maximum(radius[asked] - forgiven, forgiven)
-        asked = asked[shrunk & (fits > forgiven)]
-    return radius, against, opposite
+        obstacle[rows] = found.triangle[hit]
+        shrunk = fits < (1.0 - 1e-9) * radius[rows]
+        radius[rows] = np.minimum(np.maximum(fits, overlap), radius[rows])
+        across = np.einsum("ij,ij->i", point[rows] - found.point[hit], normal[rows]) + radius[rows]
+        cosine[rows] = across / np.maximum(radius[rows] - overlap, overlap)
+        rows = rows[shrunk & (fits > overlap)]
+    return radius, obstacle, cosine

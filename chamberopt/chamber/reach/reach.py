@@ -1,4 +1,4 @@
-"""What the shot can reach: where a ball can touch the cavity's surface, coming from the room over the sonotrode."""
+"""Where a ball can touch the cavity's surface when it comes from the sonotrode."""
 
 from __future__ import annotations
 
@@ -7,87 +7,106 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.chamber.reach.connectivity import cell_edge, rooms
-from chamberopt.chamber.reach.largest_ball import Touches, touches
+from chamberopt.chamber.reach.connectivity import cell_edge, find_regions
+from chamberopt.chamber.reach.largest_ball import TouchPoints, find_touch_points
 from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE
 from chamberopt.geometry.triangles import areas
 
 if TYPE_CHECKING:
     from sim_core import TriangleMesh
 
-# So much of its radius a ball may reach into a surface: what facets that turn by 8 degrees each take from it, or by 3
-# in a hollow hardly rounder than the ball. A dent is deeper, and so are the tolerances of a gap.
-FORGIVEN = 0.01
-FINE = 1.0 / 3.0  # of the radius: distance between places looked at
-MOST_PLACES = 100_000  # on the part, and as many on all else
-LEAST_PLACES = 4  # on a triangle of the part, unless there are too many
-WIDER = 1.25  # of the largest ball's radius: up to there widths are told apart
+# Share of its radius that a ball may reach into a surface. This is what facets that turn by 8 degrees
+# each take from it, or by 3 in a hollow hardly rounder than the ball. Dents are deeper, and so are
+# the tolerances of a gap.
+TOLERATED_OVERLAP = 0.01
+SPACING = 1.0 / 3.0  # of the radius: distance between touch points
+MAX_POINTS = 100_000  # on the part, and as many on everything else
+MIN_POINTS = 4  # on a triangle of the part, unless there are too many
+MEASURED_WIDTH = 1.25  # of the largest ball: wider gaps are not measured
 
 
 @dataclass(frozen=True)
 class Reach:
-    """What a ball of ``diameter`` [m] reaches in a cavity, ``mesh``.
+    """What a ball reaches in a cavity.
 
-    touches: the places looked at · fits (p,) bool: no wall is in a ball's way there · reached (p,) bool: and it gets
-    there from over the sonotrode · room (p,) int, -1 where it does not fit · room_volume (r,) m³ that its centre has
-    in the open of each room · spacing m between places, at most · share (k,): of each of the cavity's triangles.
+    Attributes:
+        diameter: of the ball [m].
+        touches: the p points that were checked.
+        fits: whether no wall is in the ball's way at the point, shape (p,).
+        reached: whether it fits and gets there from the sonotrode, shape (p,).
+        region: number of the region that its centre can move in, -1 where it does not fit; (p,).
+        region_volume: of the open space in each region [m³].
+        spacing: largest distance between touch points [m].
+        share: of each triangle of the cavity, the share that the ball can touch, shape (k,).
     """
 
     mesh: TriangleMesh
     diameter: float
-    touches: Touches
+    touches: TouchPoints
     fits: np.ndarray
     reached: np.ndarray
-    room: np.ndarray
-    room_volume: np.ndarray
+    region: np.ndarray
+    region_volume: np.ndarray
     spacing: float
     share: np.ndarray
 
 
-def reach(mesh: TriangleMesh, diameter: float, largest: float | None = None) -> Reach:
-    """Where a ball of ``diameter`` [m], the smallest of the shot, can touch the surface; ``largest`` [m] of the shot.
+def find_reach(mesh: TriangleMesh, diameter: float, largest: float | None = None) -> Reach:
+    """Where a ball can touch the surface of a cavity.
 
-    A ball is taken smaller by FORGIVEN. In tight places it is followed from place to place, in steps of a quarter
-    radius: a bent passage hardly wider than the ball may be taken for closed.
+    The ball is taken as smaller by TOLERATED_OVERLAP. In narrow places it is followed from point to
+    point in steps of a quarter radius, so that a bent passage hardly wider than the ball may count
+    as closed.
+
+    Args:
+        diameter: of the smallest ball of the shot [m].
+        largest: diameter of the largest [m].
     """
     radius = 0.5 * diameter
-    forgiven = FORGIVEN * radius
-    most = max(
-        radius + 1.01 * np.sqrt(3.0) * cell_edge(mesh, radius), WIDER * 0.5 * (largest or diameter)
+    overlap = TOLERATED_OVERLAP * radius
+    max_radius = max(
+        radius + 1.01 * np.sqrt(3.0) * cell_edge(mesh, radius),
+        MEASURED_WIDTH * 0.5 * (largest or diameter),
     )
-    spacing = _spacing(mesh, FINE * radius)
-    found = touches(mesh, spacing, most, forgiven)
-    room, volume = rooms(mesh, found, radius - forgiven, float(spacing.max()))
-    fits = found.radius >= radius
-    room = np.where(fits, room, -1)
-    started = np.unique(room[fits & (mesh.tags[found.triangle] == TAG_SONOTRODE)])
-    reached = fits & np.isin(room, started)
+    spacing = _spacing(mesh, SPACING * radius)
+    touches = find_touch_points(mesh, spacing, max_radius, overlap)
+    region, volume = find_regions(mesh, touches, radius - overlap, float(spacing.max()))
+    fits = touches.radius >= radius
+    region = np.where(fits, region, -1)
+    start = np.unique(region[fits & (mesh.tags[touches.triangle] == TAG_SONOTRODE)])
+    reached = fits & np.isin(region, start)
     count = len(mesh.triangles)
-    whole = np.bincount(found.triangle, found.area, count)
-    touched = np.bincount(found.triangle[reached], found.area[reached], count)
+    whole = np.bincount(touches.triangle, touches.area, count)
+    touched = np.bincount(touches.triangle[reached], touches.area[reached], count)
     share = np.divide(touched, whole, out=np.zeros(count), where=whole > 0.0)
-    return Reach(mesh, diameter, found, fits, reached, room, volume, float(spacing.max()), share)
+    return Reach(
+        mesh, diameter, touches, fits, reached, region, volume, float(spacing.max()), share
+    )
 
 
-def part_share(found: Reach, source: np.ndarray, count: int) -> np.ndarray:
-    """The share of each of the part's ``count`` triangles, of what is in the cavity, that a ball can touch (count,).
+def reached_part_share(reach: Reach, source: np.ndarray, count: int) -> np.ndarray:
+    """Of each part triangle in the cavity, the share that the ball can touch.
 
-    ``source`` (k,): the part's triangle that each of the cavity's lies on, else -1. 0 of what is not in the cavity.
+    Args:
+        source: part triangle that each triangle of the cavity lies on, else -1; shape (k,).
+        count: of the part's triangles.
+    Returns:
+        Shape (count,); 0 for triangles outside the cavity.
     """
-    size, own = areas(found.mesh.vertices, found.mesh.triangles), source >= 0
+    size, own = areas(reach.mesh.vertices, reach.mesh.triangles), source >= 0
     touched, whole = (
-        np.bincount(source[own], weights[own], count) for weights in (found.share * size, size)
+        np.bincount(source[own], weights[own], count) for weights in (reach.share * size, size)
     )
     return np.divide(touched, whole, out=np.zeros(count), where=whole > 0.0)
 
 
 def _spacing(mesh: TriangleMesh, wanted: float) -> np.ndarray:
-    """Distance [m] between places on each triangle (k,)."""
+    """Distance [m] between touch points on each triangle (k,)."""
     size = areas(mesh.vertices, mesh.triangles)
     spacing = np.full(len(size), wanted)
     for chosen in (mesh.tags == TAG_PART, mesh.tags != TAG_PART):
-        spacing[chosen] = max(wanted, float(np.sqrt(size[chosen].sum() / MOST_PLACES)))
+        spacing[chosen] = max(wanted, float(np.sqrt(size[chosen].sum() / MAX_POINTS)))
     on_part = mesh.tags == TAG_PART
-    if LEAST_PLACES * on_part.sum() <= MOST_PLACES:
-        spacing[on_part] = np.minimum(spacing[on_part], np.sqrt(size[on_part] / LEAST_PLACES))
+    if MIN_POINTS * on_part.sum() <= MAX_POINTS:
+        spacing[on_part] = np.minimum(spacing[on_part], np.sqrt(size[on_part] / MIN_POINTS))
     return np.maximum(spacing, 1e-12)

@@ -92,11 +92,11 @@ def _draw_fault(error: SurfaceError, screenshot: Path) -> None:
 
 def _draw_target(chamber: Chamber, reach: Reach, screenshot: Path) -> None:
     """Draw the part with its target, and in red the target's triangles that no ball can touch."""
-    from chamberopt.chamber.reach.reach import part_share
+    from chamberopt.chamber.reach.reach import reached_part_share
     from chamberopt.output.viewer import draw_part
 
     part = chamber.part
-    missed = part.target & (part_share(reach, chamber.source, len(part.triangles)) <= 0.5)
+    missed = part.target & (reached_part_share(reach, chamber.source, len(part.triangles)) <= 0.5)
     title = f"{part.name}: the target in orange"
     if missed.any():
         title += ", in red where hardly a ball can touch it"

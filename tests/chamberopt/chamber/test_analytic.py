@@ -94,7 +94,7 @@ def test_a_box_and_a_prism_are_their_outlines() -> None:
     ],
 )
 def test_other_chambers_are_refused(mesh, said: str) -> None:  # type: ignore[no-untyped-def]
-    with pytest.raises(InputError, match=f"no cylinder, box or prism: .*{said}"):
+    with pytest.raises(InputError, match=f"not a cylinder, box or prism: .*{said}"):
         analytic_cavity(EDGED, chamber_of(mesh()))
 
 

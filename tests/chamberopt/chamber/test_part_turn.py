@@ -41,7 +41,7 @@ def written(tmp_path: Path, motion: str) -> Path:
 @pytest.mark.parametrize(
     ("motion", "words"),
     [
-        ("{}", "effects.part_turn: says no motion"),
+        ("{}", "effects.part_turn: gives no motion"),
         ("{ rpm = 30, angle_deg = 20, frequency_hz = 1 }", "effects.part_turn.rpm: given beside"),
         ("{ angle_deg = 20 }", "effects.part_turn.angle_deg: given without frequency_hz"),
         ("{ frequency_hz = 2 }", "effects.part_turn.frequency_hz: given without angle_deg"),
@@ -92,7 +92,7 @@ def test_the_axis_goes_with_the_part_wherever_it_is_posed(design: Design) -> Non
 
 def test_replicas_start_at_angles_of_their_own(design: Design, mesh) -> None:  # type: ignore[no-untyped-def]
     few = design.changed({"shot.mass_g": 0.2})
-    one, two, again = (build_scene(few, mesh, seed).physics.turn for seed in (1, 2, 1))
+    one, two, again = (build_scene(few, mesh, seed).physics.part_rotation for seed in (1, 2, 1))
     assert one == again
     assert one is not None
     assert two is not None
@@ -132,4 +132,4 @@ def test_balls_rest_beside_a_turning_part_if_asked_or_if_something_still_faces_u
     asked = design.model_copy(update={"effects": design.effects.model_copy(update={"rest": True})})
     physics = build_scene(asked, mesh, 1).physics
     assert physics.rest is not None
-    assert physics.turn is not None
+    assert physics.part_rotation is not None

@@ -11,7 +11,7 @@ import pytest
 
 from chamberopt.chamber.build import TAG_SONOTRODE, Chamber, build_chamber
 from chamberopt.chamber.checks.check import describe, shot_reach, warnings
-from chamberopt.chamber.checks.ledges import ledges
+from chamberopt.chamber.checks.ledges import find_ledges
 from chamberopt.chamber.reach.reach import Reach
 from chamberopt.design.design import Design, validate
 from chamberopt.design.load import load_design
@@ -69,15 +69,15 @@ def test_a_level_top_is_warned_of_with_area_place_and_remedy(gear: tuple[Design,
     area = float(said.split("turns: ")[1].split(" mm²")[0])
     shaft = math.pi * 8**2
     assert 0.5 * math.pi * 22**2 - shaft < area < math.pi * 22**2 - shaft / 2
-    (ledge,) = ledges(design, chamber)
+    (ledge,) = find_ledges(design, chamber)
     assert ledge.level
-    assert not ledges(without_gravity(design), chamber)
+    assert not find_ledges(without_gravity(design), chamber)
 
 
 def test_slopes_are_a_note_and_no_warning() -> None:
     """A gutter round the wall; the blade's own slopes, and walls that lean out, lead down to the sonotrode."""
     design, chamber = made("blade")
-    assert not ledges(design, chamber)
+    assert not find_ledges(design, chamber)
     data = design.model_dump()
     data["chamber"] = {
         "shape": "prism",
@@ -89,20 +89,20 @@ def test_slopes_are_a_note_and_no_warning() -> None:
     leaning = validate(
         Design, {**data, "chamber": {**data["chamber"], "sonotrode_distance_mm": 15.0}}
     )
-    assert not ledges(leaning, build_chamber(leaning))
+    assert not find_ledges(leaning, build_chamber(leaning))
     profile = [[24, 0], [24, 12], [28, 8], [32, 12], [32, 57]]
     data["chamber"] = {"shape": "revolve", "profile_mm": profile, "sonotrode_distance_mm": 15.0}
     gutter = validate(Design, data)
-    (found,) = ledges(gutter, build_chamber(gutter))
+    (found,) = find_ledges(gutter, build_chamber(gutter))
     assert not found.level
-    assert "in hollows of the wall" in found.said
-    assert "none level" in found.said
-    assert "z = 8 to 12 mm" in found.said
+    assert "in hollows of the wall" in found.message
+    assert "none level" in found.message
+    assert "z = 8 to 12 mm" in found.message
 
 
 def test_nothing_comes_to_rest_under_a_lid_or_on_a_part_that_turns() -> None:
     for name in ("plate", "gear_turning"):
-        assert not ledges(*made(name)), name
+        assert not find_ledges(*made(name)), name
 
 
 def test_a_turning_part_is_described_in_the_chambers_frame() -> None:

@@ -12,7 +12,7 @@ import trimesh
 from chamberopt.chamber.build import TAG_PART, TAG_SONOTRODE, TAG_WALL, Chamber, Part, build_chamber
 from chamberopt.chamber.checks.gaps import gap_warnings, pocket_warnings, target_warnings
 from chamberopt.chamber.reach.largest_ball import largest_balls
-from chamberopt.chamber.reach.reach import FORGIVEN, Reach, part_share, reach
+from chamberopt.chamber.reach.reach import TOLERATED_OVERLAP, Reach, find_reach, reached_part_share
 from chamberopt.chamber.scene import build_scene, chamber_mesh
 from chamberopt.design.load import load_design
 from chamberopt.geometry.triangles import area_vectors, areas
@@ -53,7 +53,7 @@ def cavity(*pieces: trimesh.Trimesh, above_mm: float = 10.0) -> Chamber:
 
 
 def reached(chamber: Chamber, ball: float = BALL) -> Reach:
-    return reach(chamber_mesh(chamber), ball)
+    return find_reach(chamber_mesh(chamber), ball)
 
 
 def reached_area_mm2(found: Reach, chosen: np.ndarray) -> float:
@@ -74,7 +74,7 @@ def slot(width_mm: float, deep_mm: float = 6.0) -> Chamber:
 @pytest.mark.parametrize("wider", [1.02, 1.1, 1.5])
 def test_of_a_slot_wider_than_the_ball_all_but_its_corners_is_touched(wider: float) -> None:
     found = reached(slot(3.0 * wider))
-    r = 1.5 * (1.0 - FORGIVEN)  # a ball may reach so much less far into a square corner
+    r = 1.5 * (1.0 - TOLERATED_OVERLAP)  # a ball may reach so much less far into a square corner
     walls = 2 * (20 - 2 * r) * (6 - r)
     assert reached_area_mm2(found, facing_x(found)) == pytest.approx(walls, rel=0.02)
 
@@ -103,9 +103,9 @@ def test_a_groove_is_touched_down_to_where_the_ball_lies_on_both_flanks(half_ang
     flanks = (found.mesh.tags[found.touches.triangle] == TAG_PART) & (
         np.abs(found.touches.normal[:, 1]) < 0.5
     )
-    # a reach into the other flank of FORGIVEN r lets the ball that much / sin(2a) further down
-    first = 1.5 / np.tan(a) - FORGIVEN * 1.5 / np.sin(2 * a)
-    wide = 20.0 - 2 * 1.5 * (1.0 - FORGIVEN)
+    # a reach into the other flank of TOLERATED_OVERLAP r lets the ball that much / sin(2a) further down
+    first = 1.5 / np.tan(a) - TOLERATED_OVERLAP * 1.5 / np.sin(2 * a)
+    wide = 20.0 - 2 * 1.5 * (1.0 - TOLERATED_OVERLAP)
     assert reached_area_mm2(found, flanks) == pytest.approx(2 * wide * (flank - first), rel=0.02)
     touched = found.touches.point[flanks & found.reached]
     lowest = (10.0 + deep - 1e3 * touched[:, 2].max()) / np.cos(a)
@@ -130,7 +130,7 @@ def test_a_pocket_is_reached_through_a_neck_wider_than_the_ball(neck: float, ope
     chamber = pocket(neck)
     found = reached(chamber)
     ceiling = (found.touches.normal[:, 2] < -0.9) & (found.touches.point[:, 2] > 19e-3)
-    r = 1.5 * (1 - FORGIVEN)
+    r = 1.5 * (1 - TOLERATED_OVERLAP)
     expected = (8 - 2 * r) * (20 - 2 * r) if open_ else 0.0
     assert reached_area_mm2(found, ceiling) == pytest.approx(expected, rel=0.03)
     said = pocket_warnings(found, chamber)
@@ -150,7 +150,7 @@ def test_a_round_groove_is_touched_if_it_is_rounder_than_the_ball(radius: float)
     own = (found.touches.point[:, 2] > 10.01e-3) & (np.abs(found.touches.normal[:, 1]) < 0.5)
     whole = np.pi * radius * 20.0
     assert 1e6 * found.touches.area[own].sum() == pytest.approx(whole, rel=0.03)
-    expected = (20.0 - 3.0 * (1.0 - FORGIVEN)) / 20.0 if radius > 1.5 else 0.0
+    expected = (20.0 - 3.0 * (1.0 - TOLERATED_OVERLAP)) / 20.0 if radius > 1.5 else 0.0
     assert reached_area_mm2(found, own) / whole == pytest.approx(expected, abs=0.02)
 
 
@@ -183,7 +183,8 @@ def test_smaller_balls_reach_more_of_a_gear() -> None:
     count = len(chamber.part.triangles)
     target = chamber.part.target
     shares = [
-        part_share(reach(mesh, d), chamber.source, count)[target] for d in (1e-3, 1.5e-3, 4e-3)
+        reached_part_share(find_reach(mesh, d), chamber.source, count)[target]
+        for d in (1e-3, 1.5e-3, 4e-3)
     ]
     weights = chamber.exposed_area[target]
     means = [np.average(share, weights=weights) for share in shares]
@@ -196,7 +197,7 @@ def test_no_impact_falls_where_no_ball_is_said_to_reach() -> None:
     values = {"process.accuracy.simulated_time_s": 0.1, "process.accuracy.warmup_time_s": 0.02}
     design = load_design(DESIGNS / "gear.toml").changed(values)
     mesh = chamber_mesh(build_chamber(design))
-    found = reach(mesh, design.shot.diameter)
+    found = find_reach(mesh, design.shot.diameter)
     impacts = simulate(build_scene(design, mesh, 1)).impacts
     assert len(impacts) > 300
     assert (found.share[impacts.triangle] > 0.0).all()
@@ -204,5 +205,6 @@ def test_no_impact_falls_where_no_ball_is_said_to_reach() -> None:
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     radius = 0.5 * design.shot.diameter
     assert (
-        largest_balls(mesh, impacts.position, normal, 2 * radius, FORGIVEN * radius)[0] >= radius
+        largest_balls(mesh, impacts.position, normal, 2 * radius, TOLERATED_OVERLAP * radius)[0]
+        >= radius
     ).all()

@@ -1,0 +1,82 @@
+"""Meshes of a design's deflectors: read from their files, or made from their sizes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from chamberopt.common.errors import InputError
+from chamberopt.design.shapes import lofted
+from chamberopt.geometry.mesh_io import SurfaceError, read_part_cached
+from chamberopt.geometry.triangles import rotation_matrix
+
+if TYPE_CHECKING:
+    from chamberopt.design.design import Design
+    from chamberopt.design.shapes.hole_and_deflector_tables import Deflector
+
+SIDES = 64  # flat sides of a round rod, their corners on the circle
+
+
+class DeflectorMesh(NamedTuple):
+    """A deflector as it stands in the chamber.
+
+    Attributes:
+        name: in the design.
+        at_mm: its middle in the design [mm], for messages.
+        vertices: [m], shape (n, 3).
+        triangles: shape (m, 3), normals outward.
+        notes: what was assumed and repaired in its file.
+    """
+
+    name: str
+    at_mm: tuple[float, float, float]
+    vertices: np.ndarray
+    triangles: np.ndarray
+    notes: list[str]
+
+
+def read_deflectors(design: Design) -> list[DeflectorMesh]:
+    """All deflectors of a design; InputError for a file that cannot be used."""
+    return [
+        _read(deflector, f"chamber.deflectors.{k}")
+        for k, deflector in enumerate(design.chamber.deflectors)
+    ]
+
+
+def _read(deflector: Deflector, name: str) -> DeflectorMesh:
+    vertices, triangles, notes = _mesh_about_its_middle(deflector, name)
+    vertices = vertices @ rotation_matrix(deflector.rotate_deg).T + np.array(deflector.at)
+    return DeflectorMesh(name, deflector.at_mm, vertices, triangles, notes)
+
+
+def _mesh_about_its_middle(
+    deflector: Deflector, name: str
+) -> tuple[np.ndarray, np.ndarray, list[str]]:
+    """Vertices [m], triangles and notes of a deflector before it is turned."""
+    import trimesh
+
+    if deflector.kind == "mesh":
+        try:
+            mesh = read_part_cached(deflector.mesh_path, deflector.unit)
+        except SurfaceError:
+            raise
+        except InputError as error:  # its message is about a part
+            raise InputError(f"{name}.mesh: {str(error).replace('part.unit', 'unit')}") from None
+        middle = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2.0
+        notes = [
+            note.replace("part.unit", f"{name}.unit").replace("the part measures", "it measures")
+            for note in mesh.notes
+        ]
+        return mesh.vertices - middle, mesh.triangles, notes
+    if deflector.kind == "ball":
+        ball = trimesh.creation.icosphere(subdivisions=3, radius=deflector.diameter / 2.0)
+        return np.asarray(ball.vertices), np.asarray(ball.faces), []
+    if deflector.kind == "plate":
+        box = trimesh.creation.box(deflector.size)
+        return np.asarray(box.vertices), np.asarray(box.faces), []
+    angle = 2.0 * np.pi * np.arange(SIDES) / SIDES
+    circle = deflector.diameter / 2.0 * np.c_[np.cos(angle), np.sin(angle)]
+    half = deflector.length / 2.0
+    rod = lofted([np.c_[circle, np.full(SIDES, -half)], np.c_[circle, np.full(SIDES, half)]])
+    return rod.vertices, rod.triangles, []
