@@ -1,4 +1,4 @@
-"""Save a finished simulation or study: its data, its pictures and, last of all, result.json."""
+"""Save a finished simulation, study or sweep: its data, its pictures and, last of all, result.json."""
 
 from __future__ import annotations
 
@@ -10,14 +10,16 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.common.files import make_output_folder
 from chamberopt.output import viewer
 from chamberopt.output.plots.study import convergence_picture, pareto_picture, slices_picture
+from chamberopt.output.plots.sweep import sweep_map
 from chamberopt.output.results.load import summary
-from chamberopt.output.results.write import write_result, write_simulation, write_study
+from chamberopt.output.results.write import write_result, write_simulation, write_study, write_sweep
 from chamberopt.simulation.candidate_result import complete_result
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.design.load import Design
     from chamberopt.optimize.run_study import StudyResult
+    from chamberopt.optimize.run_sweep import SweepResult
     from chamberopt.simulation.effect_pilot import Advice
     from chamberopt.simulation.evaluation import Evaluation
 
@@ -81,6 +83,18 @@ def save_study(
     data = write_study(folder, study_result, start, best)
     remarks = _draw_study(folder, study_result)
     write_result(folder, data, advice, warned)
+    return remarks
+
+
+def save_sweep(folder: str | Path, sweep: SweepResult) -> list[str]:
+    """Complete the folder of a sweep that has ended; return remarks for the user.
+
+    Adds the files of results.write.write_sweep, map.png and, last of all, result.json.
+    """
+    folder = Path(folder)
+    data = write_sweep(folder, sweep)
+    remarks = sweep_map(folder / "map.png", sweep)
+    write_result(folder, data)
     return remarks
 
 

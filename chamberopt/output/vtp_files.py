@@ -1,4 +1,7 @@
-"""Surfaces of a results folder: the part with what its triangles got, and the chamber. Both open in ParaView."""
+"""Write and read the surfaces of a results folder, which also open in ParaView.
+
+coverage.vtp is the part with the fields of its triangles, chamber.vtp the closed cavity.
+"""
 
 from __future__ import annotations
 
@@ -23,11 +26,11 @@ COVERAGE_MODEL = "coverage_model"  # field data of coverage.vtp
 MM = 1e3
 
 Surface = Any
-"""A pyvista.PolyData: pyvista's own annotations refuse numpy's."""
+"""A pyvista.PolyData; pyvista's own annotations do not fit numpy's."""
 
 
 def pyvista() -> Any:
-    """The library, imported when it is needed: half a second."""
+    """Import pyvista only where it is used, because that takes half a second."""
     import pyvista
 
     return pyvista
@@ -57,8 +60,11 @@ def read_coverage_model(surface: Surface) -> str:
 
 
 def write_chamber(folder: Path, chamber: Chamber) -> None:
-    """The closed cavity [mm]: chamber.stl for CAD, chamber.vtp with tags (0 part, 1 sonotrode, 2 wall, 3 ... more),
-    and which hole or deflector (fittings.fitting_names), -1: none.
+    """Write the closed cavity [mm] as chamber.stl for CAD and as chamber.vtp with cell data.
+
+    tag: 0 part, 1 sonotrode, 2 wall, 3 and more further sonotrodes.
+    source: triangle of the part, -1 elsewhere.
+    fitting: number of the hole or deflector, -1 elsewhere; only in chambers that have some.
     """
     fields = {"tag": chamber.tags, "source": chamber.source}
     if chamber.fitting is not None:
@@ -84,21 +90,22 @@ def _write_surface(
 
 
 def read_surface(path: Path) -> Surface:
-    """A .vtp of a results folder. VTK reads a damaged one as an empty mesh: here that is an InputError."""
+    """Read a .vtp of a results folder; InputError if it is missing or damaged."""
     if not path.is_file():
         raise InputError(
             f"{path}: not there; give a results folder that simulate or run has finished"
         )
-    with _quietly():
+    with _vtk_messages_off():
         surface = pyvista().read(path)
+    # VTK reads a damaged file as an empty mesh.
     if not isinstance(surface, pyvista().PolyData) or surface.n_cells == 0:
         raise InputError(f"{path}: damaged, no triangles could be read; simulate again")
     return surface
 
 
 @contextmanager
-def _quietly() -> Iterator[None]:
-    """Without what VTK says of a damaged file, on three ways, in words nobody can act on."""
+def _vtk_messages_off() -> Iterator[None]:
+    """Suppress VTK's messages on a damaged file: warnings, its own log and Python's log."""
     disabled = logging.root.manager.disable
     with warnings.catch_warnings(), pyvista().vtk_verbosity("off"):
         warnings.simplefilter("ignore")

@@ -50,7 +50,8 @@ def sweep(
     from chamberopt.common.progress import progress_bar
     from chamberopt.optimize.load_study import load_study
     from chamberopt.optimize.run_sweep import plan_sweep, run_sweep
-    from chamberopt.output.results.sweep_results import caution, write_sweep
+    from chamberopt.output.results.write import best_row_note
+    from chamberopt.output.save_run import save_sweep
 
     loaded = load_study(study)
     plan = plan_sweep(loaded, grid, sobol, seed)
@@ -62,7 +63,7 @@ def sweep(
         compile_simulator(design, chamber)
         with progress_bar("candidates") as progress:
             result = run_sweep(loaded, plan, folder, executor, progress)
-        print_remarks(write_sweep(folder, result))
+        print_remarks(save_sweep(folder, result))
     effort = replicas_text(loaded.at_search_accuracy(design))
     lines = [f"{len(result.trials)} candidates in {result.seconds:.0f} s, {effort} each"]
     best = result.best
@@ -75,5 +76,5 @@ def sweep(
     failed = [trial for trial in result.trials if trial.objective is None]
     if failed:
         notes.append(f"{len(failed)} candidates failed, the first because: {failed[0].reason}")
-    notes.append(caution(result))
+    notes.append(best_row_note(result))
     print_result([*lines, *note_lines(notes)], folder, json)

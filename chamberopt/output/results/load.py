@@ -1,4 +1,4 @@
-"""Read a results folder back."""
+"""Read results folders."""
 
 from __future__ import annotations
 
@@ -27,10 +27,12 @@ FORMAT = 1
 
 @dataclass(frozen=True)
 class Result:
-    """A results folder read back.
+    """A results folder that has been read.
 
-    kind: "simulation" or "study"; a study stands for its best design as confirmed. design: the candidate the
-    figures belong to · data: all of result.json.
+    kind: "simulation" or "study"; a study stands for its best design as confirmed.
+    design: the candidate that the figures belong to.
+    seeds: process.seed and the name of the random stream.
+    data: everything in result.json.
     """
 
     folder: Path
@@ -46,29 +48,34 @@ class Result:
 
 
 def load_result(path: str | Path) -> Result:
-    """Read a results folder (or its result.json). InputError when it is none, unfinished or damaged."""
+    """Read a results folder, given itself or its result.json.
+
+    Raises:
+        InputError: it is not a results folder, or unfinished, or damaged.
+    """
     path = Path(path)
     file = path if path.name == RESULT else path / RESULT
     folder = file.parent
     if not file.is_file():
         if is_study_folder(folder) or (folder / HISTORY).is_file():
             raise InputError(
-                f"{folder}: a study that did not finish: it has no {RESULT} yet; go on with: chamberopt run STUDY.toml "
-                f"--out {shlex.quote(str(folder))}"
+                f"{folder}: this study has not finished, {RESULT} is missing; continue it with: "
+                f"chamberopt run STUDY.toml --out {shlex.quote(str(folder))}"
             )
         raise InputError(
-            f"{folder}: not a results folder: {RESULT} is not there; give one made by simulate or run"
+            f"{folder}: not a results folder, {RESULT} is missing; give one made by simulate or run"
         )
     try:
         data = json.loads(file.read_text(encoding="utf-8"), parse_constant=_refuse_constant)
         if data["format"] != FORMAT:
             raise InputError(
-                f"{file}: written in format {data['format']}, this version reads {FORMAT}; simulate again"
+                f"{file}: written in format {data['format']}, this version reads {FORMAT}; "
+                "simulate again"
             )
         if data["kind"] == "sweep":
-            what = "a sweep, a map of candidates that stands for no single one"
             raise InputError(
-                f"{folder}: {what}; simulate the design you want of it, such as its best.toml"
+                f"{folder}: a sweep is a map of many candidates, not the result of one; simulate "
+                "the design that you want from it, such as its best.toml"
             )
         return Result(
             folder=folder,
@@ -97,7 +104,7 @@ def load_result(path: str | Path) -> Result:
 
 
 def load_coverage(result: Result) -> Surface:
-    """Read the coverage.vtp of a result. InputError if it is missing, damaged or another result's."""
+    """Read the coverage.vtp of a result; InputError if missing, damaged or another result's."""
     surface = read_surface(result.folder / COVERAGE)
     require_matching_coverage(
         result.folder,
@@ -132,7 +139,7 @@ def require_matching_coverage(
 
 
 def summary(evaluation: Evaluation | Result) -> str:
-    """One line: the objective with its interval, mean and spread of coverage."""
+    """Return one line with the objective and its interval, and mean and spread of coverage."""
     goal = evaluation.objective
     mean, spread = (evaluation.metrics[name] for name in ("mean_coverage", "std_coverage"))
     name = evaluation.objective_name.replace("_", " ")
@@ -145,4 +152,4 @@ def _share(estimate: Estimate) -> str:
 
 
 def _refuse_constant(name: str) -> float:
-    raise ValueError(f"{name} is no figure")
+    raise ValueError(f"{name} is not a number")

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from chamberopt.optimize.run_study import StudyResult
+    from chamberopt.optimize.run_sweep import SweepResult
     from chamberopt.simulation.effect_pilot import Advice
 
 
@@ -55,6 +56,32 @@ def write_study(
     return {"kind": "study", **candidate, "study": _about_study(study_result)}
 
 
+def write_sweep(folder: Path, sweep: SweepResult) -> dict[str, Any]:
+    """Add the data files of a sweep that has ended to its folder; return its result.json.
+
+    run_sweep has written design.toml, study.toml and history.jsonl. This adds history.csv and,
+    unless no candidate is feasible, best.toml.
+    """
+    write_text(folder / "history.csv", trials_as_csv(read_trials(folder)))
+    if sweep.best is not None:
+        save_design(sweep.study.design.changed(sweep.best.parameters), folder / "best.toml")
+    return _about_sweep(sweep)
+
+
+def best_row_note(sweep: SweepResult) -> str:
+    """Explain what the best row of a sweep is worth."""
+    if sweep.best is None:
+        return (
+            "no candidate meets the constraints, so there is no best.toml: loosen the constraints "
+            "or widen [vary]"
+        )
+    return (
+        f"the best of {len(sweep.trials)} candidates is also the luckiest, so its figures are too "
+        "good; for figures without this bias simulate best.toml with another process.seed, or "
+        "search with chamberopt run"
+    )
+
+
 def write_result(
     folder: Path,
     data: dict[str, Any],
@@ -65,7 +92,7 @@ def write_result(
 
     Args:
         folder: of the result.
-        data: what write_simulation or write_study returned.
+        data: what write_simulation, write_study or write_sweep returned.
         advice: why effects were chosen, if the design left the choice to the program.
         warned: warnings of `chamberopt check`; None if it was not run.
     """
@@ -165,8 +192,36 @@ def _about_study(result: StudyResult) -> dict[str, Any]:
     }
 
 
+def _about_sweep(sweep: SweepResult) -> dict[str, Any]:
+    plan, study, best = sweep.plan, sweep.study, sweep.best
+    return {
+        "kind": "sweep",
+        "format": FORMAT,
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "sweep": {
+            "objective": study.objective.goals[0],
+            "vary": {name: list(bounds) for name, bounds in study.vary.items()},
+            "method": plan.method,
+            "count": plan.count,
+            "seed": plan.seed,
+            "candidates": len(sweep.trials),
+            "failed": sum(trial.objective is None for trial in sweep.trials),
+            "missing_a_constraint": sum(
+                t.objective is not None and not t.feasible for t in sweep.trials
+            ),
+            "accuracy": study.at_search_accuracy(study.design).process.accuracy.model_dump(
+                exclude_none=True
+            ),
+            "best": best.row() if best else None,
+            "seconds": round(sweep.seconds, 3),
+        },
+        "notes": [best_row_note(sweep)],
+        "versions": versions(),
+    }
+
+
 def _design_values(design: Design, folder: Path) -> dict[str, Any]:
-    """The design as its file would say it, its files relative to the folder."""
+    """Values of the design as in its file, with paths relative to the folder."""
     values: dict[str, Any] = with_paths_from(
         folder.resolve(), design.model_dump(mode="json", exclude_none=True)
     )

@@ -15,7 +15,7 @@ from chamberopt.optimize.run_sweep import plan_sweep, run_sweep
 from chamberopt.optimize.storage.trial_log import read_trials
 from chamberopt.optimize.study import Study
 from chamberopt.output.results.load import load_result
-from chamberopt.output.results.sweep_results import write_sweep
+from chamberopt.output.save_run import save_sweep
 from chamberopt.simulation.evaluation import Evaluation
 from tests.helpers import worker_jobs
 from tests.helpers.synthetic import DESIGNS, plate_design
@@ -146,7 +146,7 @@ def test_what_a_sweep_leaves(vary: dict, way: tuple, tmp_path: Path) -> None:
         lambda *now: seen.append(now),
         worker_jobs.hill,
     )
-    assert write_sweep(tmp_path, sweep) == []
+    assert save_sweep(tmp_path, sweep) == []
     assert seen[-1][:2] == (len(sweep.trials), len(sweep.trials))
     assert (tmp_path / "map.png").stat().st_size > 10_000
     assert load_design(tmp_path / "best.toml").shot.mass_g == pytest.approx(
@@ -237,7 +237,7 @@ def test_a_sweep_names_what_it_maximises(tmp_path: Path) -> None:
     sweep = run_sweep(
         question, plan_sweep(question, 2, None), tmp_path, SerialExecutor(), None, worker_jobs.hill
     )
-    write_sweep(tmp_path, sweep)
+    save_sweep(tmp_path, sweep)
     assert (
         json.loads((tmp_path / "result.json").read_text())["sweep"]["objective"] == "1 shot_count"
     )
@@ -246,7 +246,7 @@ def test_a_sweep_names_what_it_maximises(tmp_path: Path) -> None:
 def test_another_plan_on_a_finished_sweep_is_refused_as_another(tmp_path: Path) -> None:
     question = study()
     folder = tmp_path / "map"
-    write_sweep(
+    save_sweep(
         folder,
         run_sweep(
             question,

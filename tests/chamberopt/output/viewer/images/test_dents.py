@@ -49,7 +49,7 @@ def coverage_file(folder: Path, chamber: Chamber) -> Path:
         "exposed_area_mm2": chamber.exposed_area * 1e6,
         "target": chamber.part.target.astype(np.uint8),
     }
-    write_coverage(folder / "coverage.vtp", chamber, fields)
+    write_coverage(folder / "coverage.vtp", chamber, fields, "avrami")
     return folder / "coverage.vtp"
 
 
