@@ -24,14 +24,19 @@ def compile_simulator(
 
     Otherwise the first minute would look like a hang.
     """
+    import sim_core
     from chamberopt.chamber.scene import chamber_mesh, require_ball_count, scene_physics
-    from chamberopt.common.progress import compile_with_message
 
     require_ball_count(design)
     shot = design.shot
     physics = scene_physics(design, cavity or chamber_mesh(chamber))
     is_cylinder = cavity is not None and cavity.radius is not None
-    compile_with_message(physics, shot.count, shot.mix is None, is_cylinder)
+    variant = physics, shot.count, shot.mix is None, is_cylinder
+    if sim_core.is_compiled(*variant):
+        return
+    print("compiling the simulator (once per set of effects) ...", file=sys.stderr, flush=True)
+    seconds = sim_core.compile_simulator(*variant)
+    print(f"compiled in {seconds:.0f} s", file=sys.stderr, flush=True)
 
 
 def resolve_effects(

@@ -5,10 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, TextIO
-
-if TYPE_CHECKING:
-    from sim_core import Physics
+from typing import TextIO
 
 # Called as progress(done, total, best value so far or None).
 Progress = Callable[[int, int, "float | None"], None]
@@ -55,26 +52,3 @@ def progress_bar(what: str, stream: TextIO | None = None) -> Iterator[Progress]:
             bar.update(task, completed=done, total=total, best=text)
 
         yield show
-
-
-def compile_with_message(
-    physics: Physics,
-    balls: int,
-    alike: bool = True,
-    bore: bool = False,
-    stream: TextIO | None = None,
-) -> float:
-    """Compile the simulator for these effects, with a message, unless that was done before here.
-
-    Returns:
-        Seconds that it took; 0 if the compiled simulator was there.
-    """
-    import sim_core
-
-    stream = stream or sys.stderr
-    if sim_core.is_compiled(physics, balls, alike, bore):
-        return 0.0
-    print("compiling the simulator (once per set of effects) ...", file=stream, flush=True)
-    seconds = float(sim_core.compile_simulator(physics, balls, alike, bore))
-    print(f"compiled in {seconds:.0f} s", file=stream, flush=True)
-    return seconds

@@ -32,15 +32,10 @@ MAX_VALUE_TEXT = 60  # characters of a given value that a message repeats
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing to put right.
+    """One thing to put right."""
 
-    Args:
-        field: dotted name; "" for the whole file.
-        text: sentence with the value and the remedy.
-    """
-
-    field: str
-    text: str
+    field: str  # dotted name; "" for the whole file
+    text: str  # sentence with the value given and the remedy
 
 
 class CrossCheckError(ValueError):
@@ -51,29 +46,25 @@ class CrossCheckError(ValueError):
         super().__init__("; ".join(f"{p.field}: {p.text}" for p in self.problems))
 
 
-def closest_names(name: str, known: Iterable[str], count: int = 1) -> list[str]:
-    """The known names most similar to `name`, best first; case is ignored. Empty if none is."""
+def closest_name(name: str, known: Iterable[str]) -> str | None:
+    """The known name most similar to `name`, if one is; case is ignored."""
     by_lower = {word.lower(): word for word in known}
-    close = difflib.get_close_matches(name.lower(), by_lower, n=count, cutoff=SIMILARITY)
-    return [by_lower[word] for word in close]
+    close = difflib.get_close_matches(name.lower(), by_lower, n=1, cutoff=SIMILARITY)
+    return by_lower[close[0]] if close else None
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """A hint: "did you mean 'x'?", the allowed names, or both if there are few."""
     words = list(known)
-    close = closest_names(name, words)
+    close = closest_name(name, words)
     allowed = f"allowed: {', '.join(words)}"
-    if not close:
+    if close is None:
         return allowed
-    return f"did you mean {close[0]!r}?" + (f" ({allowed})" if len(words) <= MAX_CHOICES else "")
+    return f"did you mean {close!r}?" + (f" ({allowed})" if len(words) <= MAX_CHOICES else "")
 
 
 def format_problems(problems: Iterable[Problem], path: Path | None = None, source: str = "") -> str:
-    """One line per problem, `file:line: field: text`; without the line if it is unknown.
-
-    Args:
-        source: text of the file, in which the fields' lines are looked up.
-    """
+    """One line per problem, `file:line: field: text`; `source` is the file's text."""
     line_of = key_lines(source)
     texts = []
     for problem in problems:
@@ -110,8 +101,8 @@ def explain_missing_file(path: Path, what: str, pattern: str) -> str:
         return f"{path}: no such {what}; the folder {folder} does not exist"
     names = sorted(p.name for p in folder.glob(pattern) if p.is_file())
     # Without the suffixes, which are alike and would make every name similar.
-    close = closest_names(path.stem, (Path(name).stem for name in names))
-    likely = [str(folder / name) for name in names if Path(name).stem in close]
+    close = closest_name(path.stem, (Path(name).stem for name in names))
+    likely = [str(folder / name) for name in names if Path(name).stem == close]
     if likely:
         return f"{path}: no such {what}; did you mean {' or '.join(likely)}?"
     found = ", ".join(names[:MAX_CHOICES]) or "none"
@@ -291,8 +282,8 @@ def _explain(detail: ErrorDetails, model: type[BaseModel]) -> Problem:
     text = f"given {_format_value(value)}; allowed: {describe_allowed(field)}"
     if kind == "literal_error" and isinstance(value, str):
         choices = map(str, get_args(_alternatives(field.annotation)[0]))
-        close = closest_names(value, choices)
-        text += f"; did you mean {close[0]!r}?" if close else ""
+        close = closest_name(value, choices)
+        text += f"; did you mean {close!r}?" if close else ""
     if isinstance(value, str) and re.fullmatch(r"\s*[-+.\deE]+\s*", value):
         text += "; write it without quotes"
     return Problem(name, text)
@@ -306,9 +297,9 @@ def _explain_unknown_key(key: str, table: type[BaseModel], model: type[BaseModel
     renamed = getattr(table, "RENAMED", {})
     if key in renamed:
         return f"is now called {renamed[key]!r}; rename it"
-    close = closest_names(key, table.model_fields)
+    close = closest_name(key, table.model_fields)
     if close:
-        return f"unknown key; did you mean {close[0]!r}?"
+        return f"unknown key; did you mean {close!r}?"
     for name in _all_names(model):
         home, _, last = name.rpartition(".")
         if last.lower() == key.lower():

@@ -29,19 +29,12 @@ SAME_VOLUME = 1e-9
 
 @dataclass(frozen=True)
 class SolidSurface:
-    """The closed surface of a solid.
+    """The closed surface of a solid."""
 
-    Args:
-        vertices: (n, 3) float64 [m].
-        triangles: (k, 3) int32, rows of the vertices; normals point outward.
-        solid: label of the solid that each triangle comes from, (k,) int64.
-        source: index there of the triangle on which it lies, (k,) int32.
-    """
-
-    vertices: np.ndarray
-    triangles: np.ndarray
-    solid: np.ndarray
-    source: np.ndarray
+    vertices: np.ndarray  # (n, 3) float64 [m]
+    triangles: np.ndarray  # (k, 3) int32, rows of the vertices; normals point outward
+    solid: np.ndarray  # (k,) int64, label of the solid that each triangle comes from
+    source: np.ndarray  # (k,) int32, index there of the triangle on which it lies
 
     def select(self, keep: np.ndarray) -> SolidSurface:
         """The triangles marked by `keep` (k,), with only the vertices that they use."""
@@ -52,16 +45,11 @@ class SolidSurface:
 
 @dataclass(frozen=True)
 class Solid:
-    """A closed body.
-
-    Args:
-        label: id that its own triangles carry; -1 for the result of an operation.
-        name: for messages.
-    """
+    """A closed body."""
 
     body: Manifold
-    label: int
-    name: str
+    label: int  # that its own triangles carry; -1 for the result of an operation
+    name: str  # for messages
 
     @property
     def volume(self) -> float:

@@ -61,11 +61,8 @@ class DaskExecutor(Executor):
         self._executor = self._client.get_executor(pure=False)
 
     def share(self, value: Any) -> Any:
-        """See `chamberopt.common.parallel.executor.share`.
-
-        The value is sent as a task's result rather than as scattered data: the scheduler can
-        compute a result again if the workers that hold it die.
-        """
+        # As a task's result rather than as scattered data: the scheduler can compute a result
+        # again if the workers that hold it die.
         return self._client.submit(
             pickle.loads, pickle.dumps(value, pickle.HIGHEST_PROTOCOL), pure=False
         )

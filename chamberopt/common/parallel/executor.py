@@ -87,7 +87,6 @@ class SerialExecutor(Executor):
     """Runs each task in the calling thread: on cluster workers, in tests, debuggers, profilers."""
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Run the task before returning."""
         future: Future[Any] = Future()
         try:
             future.set_result(fn(*args, **kwargs))

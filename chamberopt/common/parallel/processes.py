@@ -71,11 +71,9 @@ class ProcessExecutor(Executor):
         self._ended = False
 
     def share(self, value: Any) -> SharedFile:
-        """See `chamberopt.common.parallel.executor.share`."""
         return SharedFile(value)
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Queue a task."""
         return self._feeders.submit(self._run, fn, args, kwargs)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:

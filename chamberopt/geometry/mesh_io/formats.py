@@ -21,17 +21,11 @@ from chamberopt.geometry.mesh_io.readers.vtk import read_vtk
 
 
 class MeshFormat(NamedTuple):
-    """A mesh format.
-
-    Args:
-        suffixes: usual endings of file names.
-        content: what the file begins with, or a line that it holds.
-        read: its reader.
-    """
+    """A mesh format and its reader."""
 
     name: str
-    suffixes: tuple[str, ...]
-    content: re.Pattern[bytes]
+    suffixes: tuple[str, ...]  # usual endings of file names
+    content: re.Pattern[bytes]  # what the file begins with, or a line that it holds
     read: Callable[[Path, bytes], RawMesh]
 
 

@@ -27,19 +27,12 @@ WELD = 1e-6  # of the bounding box's diagonal: what a text format with 6 digits 
 
 
 class SewnSurface(NamedTuple):
-    """Triangles with common vertices.
+    """Triangles with common vertices."""
 
-    Args:
-        points: (n, 3) [m].
-        triangles: (k, 3), rows of the points.
-        source: the given triangle that each one is, (k,); -1 if it closes a hole.
-        notes: what was changed.
-    """
-
-    points: np.ndarray
-    triangles: np.ndarray
-    source: np.ndarray
-    notes: list[str]
+    points: np.ndarray  # (n, 3) [m]
+    triangles: np.ndarray  # (k, 3), rows of the points
+    source: np.ndarray  # (k,), the given triangle that each one is; -1 if it closes a hole
+    notes: list[str]  # what was changed
 
 
 def sew(path: Path, corners: np.ndarray) -> SewnSurface:

@@ -32,25 +32,15 @@ from chamberopt.geometry.mesh_io.units import METRES_PER, find_unit
 
 @dataclass(frozen=True)
 class PartMesh:
-    """A closed part in the coordinates of its file.
+    """A closed part in the coordinates of its file."""
 
-    Args:
-        vertices: (n, 3) float64 [m].
-        triangles: (m, 3) int32, in the file's order; normals point outward.
-        numbering: the file's element that each triangle belongs to.
-        notes: what was changed.
-        sha256: of the file as read.
-        groups: name in the file -> its triangles, (m,) bool.
-        unit: of the file's numbers.
-    """
-
-    vertices: np.ndarray
-    triangles: np.ndarray
-    numbering: ElementNumbers
-    notes: tuple[str, ...]
-    sha256: str
-    groups: dict[str, np.ndarray] = field(default_factory=dict)
-    unit: str = "m"
+    vertices: np.ndarray  # (n, 3) float64 [m]
+    triangles: np.ndarray  # (m, 3) int32, in the file's order; normals point outward
+    numbering: ElementNumbers  # the file's element to which each triangle belongs
+    notes: tuple[str, ...]  # what was changed
+    sha256: str  # of the file as read
+    groups: dict[str, np.ndarray] = field(default_factory=dict)  # name -> triangles, (m,) bool
+    unit: str = "m"  # of the file's numbers
 
     @property
     def elements(self) -> np.ndarray:
@@ -65,15 +55,10 @@ class PartMesh:
 
 @dataclass(frozen=True)
 class TriangleSoup:
-    """The triangles of a file in metres, before a closed surface is made of them.
-
-    Args:
-        corners: (m, 3, 3) [m], in the coordinates of the file.
-        The others: as in PartMesh.
-    """
+    """The triangles of a file in metres, before a closed surface is made of them."""
 
     path: Path
-    corners: np.ndarray
+    corners: np.ndarray  # (m, 3, 3) [m], in the coordinates of the file
     numbering: ElementNumbers
     groups: dict[str, np.ndarray]
     notes: tuple[str, ...]

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -45,6 +45,7 @@ Options = dict[str, str]
 Member = tuple[str, int]  # instance that a set names ("" for any), and a number in it
 Place = tuple[int, int]  # position of a placed scope, and the file's number in it
 NO_ROWS = np.zeros(0, dtype=np.int64)
+_FindRows = Callable[[list[Member], bool], np.ndarray]
 
 
 @dataclass
@@ -254,10 +255,21 @@ def _assemble(
     mesh = ElementMesh(np.concatenate(points), elements, notes=notes)
     element_of = {place: first[key] + row for place, (key, row) in block_of.items()}
     _number_elements(mesh, element_of, list(instances))
+    names = list(instances)
     for at, (scope, _) in enumerate(placed):
         # Sets outside of parts mean the instance that they name, or every instance.
-        own = [at] if scope.elements or scope.nodes else list(range(len(instances) + 1))
-        _add_groups(mesh, scope, _Rows(element_of, row_of, own, list(instances)))
+        own = [at] if scope.elements or scope.nodes else list(range(len(names) + 1))
+
+        def find(members: list[Member], elements: bool, own: list[int] = own) -> np.ndarray:
+            rows = element_of if elements else row_of
+            places = (
+                (which, number)
+                for name, number in members
+                for which in ([names.index(name)] if name in names else own)
+            )
+            return np.array([rows[place] for place in places if place in rows], dtype=np.int64)
+
+        _add_groups(mesh, scope, find)
     return mesh
 
 
@@ -270,50 +282,22 @@ def _number_elements(mesh: ElementMesh, element_of: dict[Place, int], instances:
         mesh.numbers[row] = number
 
 
-@dataclass(frozen=True)
-class _Rows:
-    """Rows of the mesh for the members of a scope's sets.
-
-    Args:
-        element_of, row_of: row of each element and of each node.
-        own: placed scopes in which a member without an instance counts.
-    """
-
-    element_of: dict[Place, int]
-    row_of: dict[Place, int]
-    own: list[int]
-    instances: list[str]
-
-    def elements(self, members: list[Member]) -> np.ndarray:
-        return self._find(members, self.element_of)
-
-    def nodes(self, members: list[Member]) -> np.ndarray:
-        return self._find(members, self.row_of)
-
-    def _find(self, members: list[Member], rows: dict[Place, int]) -> np.ndarray:
-        places = (
-            (at, number)
-            for name, number in members
-            for at in ([self.instances.index(name)] if name in self.instances else self.own)
-        )
-        return np.array([rows[place] for place in places if place in rows], dtype=np.int64)
-
-
-def _add_groups(mesh: ElementMesh, scope: _Scope, rows: _Rows) -> None:
-    """Add the sets and surfaces of a scope."""
-    for name, members in scope.element_sets.items():
-        known = mesh.element_sets.get(name, NO_ROWS)
-        mesh.element_sets[name] = np.concatenate([known, rows.elements(members)])
-    for name, members in scope.node_sets.items():
-        known = mesh.node_sets.get(name, NO_ROWS)
-        mesh.node_sets[name] = np.concatenate([known, rows.nodes(members)])
+def _add_groups(mesh: ElementMesh, scope: _Scope, find: _FindRows) -> None:
+    """Add the sets and surfaces of a scope; `find` gives the rows of elements or nodes."""
+    for of_mesh, sets in (
+        (mesh.element_sets, scope.element_sets),
+        (mesh.node_sets, scope.node_sets),
+    ):
+        for name, members in sets.items():
+            rows = find(members, sets is scope.element_sets)
+            of_mesh[name] = np.concatenate([of_mesh.get(name, NO_ROWS), rows])
     for name, faces in scope.surfaces.items():
         elements, sides = mesh.face_sets.get(name, (NO_ROWS, NO_ROWS))
         for of, face in faces:
             if of.isdigit():
-                more = rows.elements([("", int(of))])
+                more = find([("", int(of))], True)
             elif of in scope.element_sets:
-                more = rows.elements(scope.element_sets[of])
+                more = find(scope.element_sets[of], True)
             elif of in mesh.element_sets:
                 more = mesh.element_sets[of]
             else:

@@ -50,35 +50,26 @@ NONE = -1
 class Block:
     """Elements of one kind.
 
-    Args:
-        kind: a key of FACES.
-        nodes: (k, p) rows of the mesh's points, corners first, then mid-edge nodes (or NONE).
-            Further nodes (face and body centres) are ignored.
+    Nodes are corners first, then mid-edge nodes (or NONE). Further nodes are ignored.
     """
 
-    kind: str
-    nodes: np.ndarray
+    kind: str  # a key of FACES
+    nodes: np.ndarray  # (k, p) rows of the mesh's points
 
 
 @dataclass
 class ElementMesh:
     """A finite element mesh; elements count through all blocks.
 
-    Args:
-        points: (n, 3) in the file's numbers.
-        numbers: the file's number of each element, (e,); its position if `own` is false.
-        instance: the Abaqus instance in which the numbers count.
-        element_sets: name -> elements.
-        face_sets: name -> elements, and the face of each.
-        node_sets: name -> points. A triangle belongs to the group if all of its corners do.
-        notes: for the user.
+    Sets are by name: elements (e,), elements and the face of each, and points. A triangle is in the
+    group of a node set if all of its corners are.
     """
 
-    points: np.ndarray
+    points: np.ndarray  # (n, 3) in the file's numbers
     blocks: list[Block]
     numbers: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    own: bool = True
-    instance: str = ""
+    own: bool = True  # numbers (e,) are the file's own; else positions
+    instance: str = ""  # the Abaqus instance in which the numbers count
     element_sets: dict[str, np.ndarray] = field(default_factory=dict)
     face_sets: dict[str, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
     node_sets: dict[str, np.ndarray] = field(default_factory=dict)
@@ -87,19 +78,13 @@ class ElementMesh:
 
 @dataclass(frozen=True)
 class _Polygons:
-    """Faces with n corners.
+    """Faces with n corners."""
 
-    Args:
-        corners, mids: (k, n) points; mids of edges may be NONE.
-        owner, side: (k,), the element, and which of its faces it is.
-        shell: (k,), the shell element that lies on the face, or NONE.
-    """
-
-    corners: np.ndarray
-    mids: np.ndarray
-    owner: np.ndarray
-    side: np.ndarray
-    shell: np.ndarray
+    corners: np.ndarray  # (k, n) points
+    mids: np.ndarray  # (k, n) points in the middle of edges, or NONE
+    owner: np.ndarray  # (k,), the element
+    side: np.ndarray  # (k,), which of the element's faces it is
+    shell: np.ndarray  # (k,), the shell element that lies on the face, or NONE
 
     def select(self, keep: np.ndarray) -> _Polygons:
         return _Polygons(*(column[keep] for column in vars(self).values()))

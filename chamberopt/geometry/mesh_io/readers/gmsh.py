@@ -9,8 +9,8 @@ Source: Gmsh reference manual, sections "MSH file format" and "Node ordering".
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -99,18 +99,15 @@ class _Stream:
         return taken
 
 
-@dataclass
-class _GmshMesh:
+class _GmshMesh(NamedTuple):
     """Nodes and elements by Gmsh's numbers.
 
-    Args:
-        batches: Gmsh's type of some elements, rows (k, 1 + p) of their number and nodes, and the
-            physical groups that all of them belong to.
+    Batches of elements are Gmsh's type, rows (k, 1 + p) of number and nodes, and physical groups.
     """
 
-    numbers: list[np.ndarray] = field(default_factory=list)
-    points: list[np.ndarray] = field(default_factory=list)
-    batches: list[tuple[int, np.ndarray, tuple[int, ...]]] = field(default_factory=list)
+    numbers: list[np.ndarray]
+    points: list[np.ndarray]
+    batches: list[tuple[int, np.ndarray, tuple[int, ...]]]
 
 
 def read_gmsh(path: Path, content: bytes) -> RawMesh:
@@ -180,7 +177,7 @@ def _read_version_2(streams: dict[str, _Stream]) -> _GmshMesh:
 
 
 def _read_version_4(streams: dict[str, _Stream]) -> _GmshMesh:
-    mesh = _GmshMesh()
+    mesh = _GmshMesh([], [], [])
     physical: dict[tuple[int, int], tuple[int, ...]] = {}
     if "Entities" in streams:
         entities = streams["Entities"]

@@ -13,19 +13,14 @@ import numpy as np
 class ElementNumbers:
     """The element of the file to which each of m triangles belongs; results can be exported by it.
 
-    Args:
-        elements: number that the file gives the element, (m,) int64. The triangles of a
-            quadrilateral share one. If the file does not number its elements (`own` is false),
-            the position from 1 of the triangle, polygon (OBJ) or cell (VTK). 0: not in the file.
-        faces: face of a solid element, (m,) int8, from 1 as Abaqus counts its S1, S2 ...; 0: shell.
-        own: whether the numbers are the file's own.
-        instance: the Abaqus instance in which the numbers count, if any.
+    The triangles of a quadrilateral share a number. If the file does not number its elements (`own`
+    is false), the number is the position from 1 of the triangle, polygon (OBJ) or cell (VTK).
     """
 
-    elements: np.ndarray
-    faces: np.ndarray
-    own: bool = False
-    instance: str = ""
+    elements: np.ndarray  # (m,) int64, the element's number; 0: not in the file
+    faces: np.ndarray  # (m,) int8, face of a solid element, from 1 as Abaqus's S1, S2 ...; 0: shell
+    own: bool = False  # whether the numbers are the file's own
+    instance: str = ""  # the Abaqus instance in which the numbers count, if any
 
     def select(self, rows: np.ndarray) -> ElementNumbers:
         """Numbers of some triangles, by a mask (m,) or by indices; index -1: not in the file."""
@@ -46,19 +41,14 @@ def number_by_position(count: int) -> ElementNumbers:
 class RawMesh:
     """The triangles of a file, before they are checked.
 
-    Args:
-        corners: (m, 3, 3), in the file's numbers and order.
-        groups: name -> its triangles, (m,) bool: the file's sets, groups, properties or colours.
-        unit: of the file's numbers, if the file states one.
-        notes: what was left out or turned into triangles.
-        numbering: of the file's elements; None if the file has only triangles.
+    Groups are the file's sets, groups, properties or colours: name -> triangles, (m,) bool.
     """
 
-    corners: np.ndarray
+    corners: np.ndarray  # (m, 3, 3), in the file's numbers and order
     groups: dict[str, np.ndarray] = field(default_factory=dict)
-    unit: str | None = None
-    notes: tuple[str, ...] = ()
-    numbering: ElementNumbers | None = None
+    unit: str | None = None  # of the file's numbers, if the file states one
+    notes: tuple[str, ...] = ()  # what was left out or turned into triangles
+    numbering: ElementNumbers | None = None  # None if the file has only triangles
 
 
 def join_pieces(pieces: list[tuple[str, np.ndarray]]) -> RawMesh:
