@@ -1,15 +1,18 @@
-"""Which effects a design needs: an estimate from dimensionless groups, and a short paired pilot run with each switched.
+"""Which effects a design needs: dimensionless groups, and short pilot runs with each effect switched.
 
-The pilot simulates the design, and the design with one effect switched, from the same starts, and compares what a short
-run knows without bias: the mean normal speed of impacts on the target, and the dented area a second on the half of
-it nearer to the sonotrode and on the other, told as the coverage that comes of it if it is spread evenly there. It
-advises; it never switches. A design that says ``effects = "auto"`` asks for the switching too: see settled.
+The pilot simulates the design, and the design with one effect switched, from the same starts. It compares
+what a short run measures without bias: the mean normal speed of the impacts on the target, and the dented
+area per second on two halves of the target, the one nearer to the sonotrode and the farther one. Dented
+areas are shown as the coverage that they would give if they were spread evenly.
+
+The pilot advises and changes nothing. Only a design with effects = "auto" leaves the choice to it
+(with_effects_resolved).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -18,6 +21,7 @@ import numpy as np
 
 from chamberopt.chamber import dimensionless
 from chamberopt.chamber.scene import balls_can_rest, chamber_mesh
+from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
 from chamberopt.coverage.metrics import exposed_target
 from chamberopt.coverage.statistics.confidence_interval import Estimate, estimate
 from chamberopt.simulation.evaluate import evaluate
@@ -29,37 +33,86 @@ if TYPE_CHECKING:
     from chamberopt.design.load import Design
 
 Prepare = Callable[["Design"], None]
-FIGURES = SPEED, NEARER, FARTHER = (
+
+MEASURED = SPEED, NEARER, FARTHER = (
     "mean impact speed",
     "coverage of the target's half nearer to the sonotrode",
     "coverage of its farther half",
 )
 REPLICAS = 8
-IMPACTS = 300_000  # on the target, all replicas together: speed and dents to about half a per cent
-FIRST_LOOK = 0.05  # s of each replica, to learn how often the target is hit
-LONGEST = 20.0  # s of each replica
-# What switching friction on takes for it, assumed: dry metal (mu), and beta0 between those that S. Foerster, M. Louge,
-# H. Chang and K. Allia, Phys. Fluids 6 (1994) 1108, measured (0.43, 0.44) and none.
-FRICTION = {"mu": 0.3, "beta0": 0.2}
-ACCURACY = 0.01  # [-]: changes below are taken to be of no matter
+# Impacts on the target in all replicas together: speed and dents then have an error of about 0.5 %.
+IMPACTS = 300_000
+FIRST_TIME = 0.05  # s of each replica, to find how often the target is hit
+MAX_TIME = 20.0  # s of each replica
+# Friction that is assumed when the pilot switches it on: mu of dry metal, and beta0 between none and what
+# S. Foerster, M. Louge, H. Chang and K. Allia, Phys. Fluids 6 (1994) 1108, measured (0.43, 0.44).
+ASSUMED_FRICTION = {"mu": 0.3, "beta0": 0.2}
+ACCURACY = 0.01  # smaller changes do not matter
 
 
 @dataclass(frozen=True)
 class Switch:
-    """An effect that can be on or off in a design: ``reason``: what the groups say of it, one sentence."""
+    """How to switch an effect of a design.
 
-    effect: str
-    on: Callable[[Design, Chamber], bool]
-    values: tuple[Any, Any]  # on and off
+    Args:
+        is_on: whether the effect is on in a design.
+        values: of the effect's key when switched on and off.
+        reason: what a dimensionless group says of its importance.
+    """
+
+    is_on: Callable[[Design, Chamber], bool]
+    values: tuple[Any, Any]
     reason: Callable[[Design, Chamber], str]
+
+
+SWITCHES = {
+    "gravity": Switch(
+        lambda design, chamber: design.effects.gravity,
+        (True, False),
+        lambda design, chamber: (
+            f"g H / V² = {dimensionless.gravity_speed_change(design, chamber):.2g}"
+        ),
+    ),
+    "ball_collisions": Switch(
+        lambda design, chamber: design.effects.ball_collisions,
+        (True, False),
+        lambda design, chamber: (
+            f"mean free path {dimensionless.free_path(design, chamber):.2g} chamber heights"
+        ),
+    ),
+    "friction": Switch(
+        lambda design, chamber: design.effects.friction is not None,
+        (ASSUMED_FRICTION, None),
+        lambda design, chamber: (
+            f"an impact without slip turns {dimensionless.MAX_SPIN_SHARE:.0%} of the sideways speed "
+            "into spin"
+        ),
+    ),
+    "drag": Switch(
+        lambda design, chamber: design.effects.drag,
+        (True, False),
+        lambda design, chamber: (
+            f"{dimensionless.drag_loss(design, chamber):.2g} of the speed is lost on the way up"
+        ),
+    ),
+    "rest": Switch(
+        lambda design, chamber: balls_can_rest(design, chamber_mesh(chamber)),
+        (True, False),
+        lambda design, chamber: "a surface that does not move faces up, so balls can lie on it",
+    ),
+}
 
 
 @dataclass(frozen=True)
 class Advice:
-    """What switching one effect on changes, with 95 % intervals: the mean impact speed by a share of it, coverages by
-    so much.
+    """What switching an effect on changes.
 
-    ``verdict``: "matters", "makes no difference" (both at ``accuracy``) or "undecided".
+    Args:
+        on: whether the design has it on.
+        reason: what a dimensionless group says of its importance.
+        changes: change of each of MEASURED with its 95 % interval: of the mean impact speed as a share of
+            it, of coverages as their difference.
+        accuracy: changes below do not matter.
     """
 
     effect: str
@@ -70,30 +123,29 @@ class Advice:
 
     @property
     def verdict(self) -> str:
-        """From the largest change and its interval."""
-        if all(abs(e.value) + e.half_width <= self.accuracy for e in self.changes.values()):
-            return "makes no difference"
-        if any(abs(e.value) - e.half_width > self.accuracy for e in self.changes.values()):
-            return "matters"
-        return "undecided"
+        return _verdict(self.changes, self.accuracy)
+
+    @property
+    def largest_change(self) -> float:
+        return max(abs(change.value) for change in self.changes.values())
 
     def as_json(self) -> dict[str, Any]:
-        """Plain JSON values."""
-        changes = {
-            name: {"value": e.value, "half_width": e.half_width} for name, e in self.changes.items()
-        }
+        """As JSON values."""
         return {
             "effect": self.effect,
             "on": self.on,
             "verdict": self.verdict,
             "said": str(self),
-            "changes": changes,
+            "changes": {
+                name: {"value": change.value, "half_width": change.half_width}
+                for name, change in self.changes.items()
+            },
         }
 
     def __str__(self) -> str:
-        """One sentence for a person."""
-        name, most = max(self.changes.items(), key=lambda item: abs(item[1].value))
-        seen = f"{name} changes by {100 * most.value:+.2g} ± {100 * most.half_width:.1g} % with it"
+        """The advice as a sentence for the user."""
+        name, largest = max(self.changes.items(), key=lambda item: abs(item[1].value))
+        change = f"{100 * largest.value:+.2g} ± {100 * largest.half_width:.1g} %"
         at = f"at {100 * self.accuracy:g} %"
         advice = {
             ("matters", True): "needed",
@@ -103,49 +155,20 @@ class Advice:
             ("undecided", True): f"not decided {at}: keep it",
             ("undecided", False): f"not decided {at}: on is the safe side",
         }[self.verdict, self.on]
-        return f"{self.effect} is {'on' if self.on else 'off'}: {advice} ({self.reason}; pilot: {seen})"
+        state = "on" if self.on else "off"
+        return (
+            f"{self.effect} is {state}: {advice} "
+            f"({self.reason}; pilot runs: it changes the {name} by {change})"
+        )
 
 
-SWITCHES = (
-    Switch(
-        "gravity",
-        lambda design, chamber: design.effects.gravity,
-        (True, False),
-        lambda design, chamber: (
-            f"g H / V² = {dimensionless.gravity_speed_change(design, chamber):.2g}"
-        ),
-    ),
-    Switch(
-        "ball_collisions",
-        lambda design, chamber: design.effects.ball_collisions,
-        (True, False),
-        lambda design, chamber: (
-            f"mean free path {dimensionless.free_path(design, chamber):.2g} chamber heights"
-        ),
-    ),
-    Switch(
-        "friction",
-        lambda design, chamber: design.effects.friction is not None,
-        (FRICTION, None),
-        lambda design, chamber: (
-            f"a hit that sticks takes {dimensionless.MAX_SPIN_SHARE:.0%} of the sideways speed into spin"
-        ),
-    ),
-    Switch(
-        "drag",
-        lambda design, chamber: design.effects.drag,
-        (True, False),
-        lambda design, chamber: (
-            f"{dimensionless.drag_loss(design, chamber):.2g} of the speed is lost on the way up"
-        ),
-    ),
-    Switch(
-        "rest",
-        lambda design, chamber: balls_can_rest(design, chamber_mesh(chamber)),
-        (True, False),
-        lambda design, chamber: "something still faces up, where balls can lie",
-    ),
-)
+def _verdict(changes: Mapping[str, Estimate], accuracy: float) -> str:
+    """Whether changes matter: "matters", "makes no difference" or "undecided"."""
+    if all(abs(one.value) + one.half_width <= accuracy for one in changes.values()):
+        return "makes no difference"
+    if any(abs(one.value) - one.half_width > accuracy for one in changes.values()):
+        return "matters"
+    return "undecided"
 
 
 def advise(
@@ -157,21 +180,14 @@ def advise(
 ) -> list[Advice]:
     """Advice on every effect that can be switched in this design, the most important first.
 
-    prepare(variant) is called before each variant runs: every set of effects is compiled once. Raises InputError and
-    sim_core.SimulationError as evaluate does.
+    Args:
+        prepare: called with each variant of the design before it runs, for example to compile the
+            simulator for its effects.
+
+    Raises:
+        InputError, sim_core.SimulationError: as `evaluate` does.
     """
-    pilot = _Pilot(design, chamber, executor, prepare)
-    switches = [switch for switch in SWITCHES if _applies(switch, design, chamber)]
-    said = []
-    for done, switch in enumerate(switches):
-        if progress:
-            progress(done, len(switches), None)
-        on = switch.on(design, chamber)
-        other = pilot.figures({switch: not on})
-        without, with_it = (other, pilot.base) if on else (pilot.base, other)
-        changes = {name: _change(name, with_it[name], without[name]) for name in FIGURES}
-        said.append(Advice(switch.effect, on, switch.reason(design, chamber), changes, ACCURACY))
-    return sorted(said, key=lambda one: -_size(one))
+    return _advise(_Pilot(design, chamber, executor, prepare), progress)
 
 
 def with_effects_resolved(
@@ -181,55 +197,53 @@ def with_effects_resolved(
     progress: Progress | None = None,
     prepare: Prepare | None = None,
 ) -> tuple[Design, list[Advice]]:
-    """The design as it is, without advice; or, if it leaves its effects to us (effects.auto), with those switched off
-    that a pilot shows to make no difference, and the advice.
+    """Choose the effects of a design that has effects = "auto"; other designs stay as they are.
 
-    All are on at first; each is switched off alone, and then all that this shows to be safe, together: as long as that
-    does make a difference, the most important of them stays on.
+    All effects are on at first. Each is switched off alone, and then all together that make no
+    difference alone. While that does make a difference, the most important of them is kept.
+
+    Args:
+        prepare: called with each variant of the design before it runs.
+
+    Returns:
+        The design with its effects chosen, and the advice behind it, empty if there was no choice.
     """
     if not design.effects.auto:
         return design, []
-    whole = _with(
-        design, {switch: True for switch in SWITCHES if _applies(switch, design, chamber)}
-    )
-    advice = advise(whole, chamber, executor, progress, prepare)
+    complete = _switched(design, dict.fromkeys(_switchable(design, chamber), True))
+    pilot = _Pilot(complete, chamber, executor, prepare)
+    advice = _advise(pilot, progress)
     off = [one.effect for one in advice if one.verdict == "makes no difference"]
-    pilot = _Pilot(whole, chamber, executor, prepare) if len(off) > 1 else None
-    while pilot is not None and len(off) > 1:
-        without = pilot.figures({switch: False for switch in SWITCHES if switch.effect in off})
-        changes = {name: _change(name, pilot.base[name], without[name]) for name in FIGURES}
-        if Advice("", True, "", changes, ACCURACY).verdict != "matters":
+    while len(off) > 1:
+        without = pilot.measure(dict.fromkeys(off, False))
+        if _verdict(_changes(pilot.unchanged, without), ACCURACY) != "matters":
             break
         off = off[1:]
-    return _with(whole, {switch: False for switch in SWITCHES if switch.effect in off}), advice
+    return _switched(complete, dict.fromkeys(off, False)), advice
 
 
 class _Pilot:
-    """Short runs of a design with some effects switched; ``base``: the figures of none switched."""
+    """Short runs of a design with some of its effects switched."""
 
     def __init__(
         self, design: Design, chamber: Chamber, executor: Executor, prepare: Prepare | None
     ) -> None:
-        self._design, self._chamber, self._executor, self._prepare = (
-            design,
-            chamber,
-            executor,
-            prepare,
-        )
-        look = evaluate(self._switched({}, FIRST_LOOK), chamber, executor)
-        hits = look.total.impacts[exposed_target(chamber)].sum()
-        self._seconds = float(np.clip(FIRST_LOOK * IMPACTS / max(hits, 1), FIRST_LOOK, LONGEST))
-        self.base = self.figures({})
+        self.design, self.chamber = design, chamber
+        self._executor, self._prepare = executor, prepare
+        first = evaluate(self._variant({}, FIRST_TIME), chamber, executor)
+        hits = first.total.impacts[exposed_target(chamber)].sum()
+        self._time = float(np.clip(FIRST_TIME * IMPACTS / max(hits, 1), FIRST_TIME, MAX_TIME))
+        self.unchanged = self.measure({})
 
-    def figures(self, wanted: dict[Switch, bool]) -> dict[str, np.ndarray]:
-        """Each of FIGURES in every replica, (REPLICAS,)."""
-        return _figures(self._switched(wanted, self._seconds), self._chamber, self._executor)
+    def measure(self, effects: Mapping[str, bool]) -> dict[str, np.ndarray]:
+        """Each of MEASURED in every replica, (REPLICAS,), with some effects switched on or off."""
+        return _measure(self._variant(effects, self._time), self.chamber, self._executor)
 
-    def _switched(self, wanted: dict[Switch, bool], seconds: float) -> Design:
-        variant = _with(self._design, wanted).changed(
+    def _variant(self, effects: Mapping[str, bool], time: float) -> Design:
+        variant = _switched(self.design, effects).changed(
             {
                 "process.accuracy.replicas": REPLICAS,
-                "process.accuracy.simulated_time_s": seconds,
+                "process.accuracy.simulated_time_s": time,
                 "process.accuracy.objective_half_width": None,
                 "process.accuracy.coverage_model": "avrami",
             }
@@ -239,61 +253,89 @@ class _Pilot:
         return variant
 
 
-def _applies(switch: Switch, design: Design, chamber: Chamber) -> bool:
-    """Whether an effect can be switched in this design at all."""
-    if switch.effect == "rest":
-        return balls_can_rest(design.changed({"effects.rest": None}), chamber_mesh(chamber))
-    if design.shot.mix is not None and switch.effect == "friction":
-        return False  # not supported together
-    return switch.effect != "ball_collisions" or design.shot.count > 1
+def _advise(pilot: _Pilot, progress: Progress | None) -> list[Advice]:
+    effects, advice = _switchable(pilot.design, pilot.chamber), []
+    for done, effect in enumerate(effects):
+        if progress:
+            progress(done, len(effects), None)
+        switch = SWITCHES[effect]
+        is_on = switch.is_on(pilot.design, pilot.chamber)
+        other = pilot.measure({effect: not is_on})
+        with_it, without = (pilot.unchanged, other) if is_on else (other, pilot.unchanged)
+        reason = switch.reason(pilot.design, pilot.chamber)
+        advice.append(Advice(effect, is_on, reason, _changes(with_it, without), ACCURACY))
+    return sorted(advice, key=lambda one: -one.largest_change)
 
 
-def _with(design: Design, wanted: dict[Switch, bool]) -> Design:
+def _switchable(design: Design, chamber: Chamber) -> list[str]:
+    """Names of the effects that can be switched in this design."""
+
+    def can_be_switched(effect: str) -> bool:
+        if effect == "rest":
+            return balls_can_rest(design.changed({"effects.rest": None}), chamber_mesh(chamber))
+        if effect == "friction":
+            return design.shot.mix is None  # not supported together
+        return effect != "ball_collisions" or design.shot.count > 1
+
+    return [effect for effect in SWITCHES if can_be_switched(effect)]
+
+
+def _switched(design: Design, effects: Mapping[str, bool]) -> Design:
     values: dict[str, Any] = {"effects.auto": False}
-    for switch, on in wanted.items():
-        present, (value_on, value_off) = getattr(design.effects, switch.effect), switch.values
-        values[f"effects.{switch.effect}"] = (present or value_on) if on else value_off
+    for effect, on in effects.items():
+        value_on, value_off = SWITCHES[effect].values
+        values[f"effects.{effect}"] = (
+            (getattr(design.effects, effect) or value_on) if on else value_off
+        )
     if not values.get("effects.gravity", design.effects.gravity):
-        values["effects.rest"] = None  # nothing lies still without gravity
+        values["effects.rest"] = None  # without gravity nothing lies still
     return design.changed(values)
 
 
-def _size(one: Advice) -> float:
-    return max(abs(change.value) for change in one.changes.values())
-
-
-def _figures(design: Design, chamber: Chamber, executor: Executor) -> dict[str, np.ndarray]:
-    """The three figures of every replica."""
+def _measure(design: Design, chamber: Chamber, executor: Executor) -> dict[str, np.ndarray]:
+    """Each of MEASURED in every replica of a design."""
     replicas = evaluate(design, chamber, executor).replicas
     target = exposed_target(chamber)
-    away = np.linalg.norm(
-        chamber.part.vertices[chamber.part.triangles].mean(axis=1), axis=1
-    )  # of the sonotrode's middle
-    near = target & (away <= _middle(away[target], chamber.exposed_area[target]))
+    centres = chamber.part.vertices[chamber.part.triangles].mean(axis=1)
+    distance = np.linalg.norm(centres, axis=1)  # from the middle of the sonotrode
+    near = target & (distance <= _median(distance[target], chamber.exposed_area[target]))
 
-    def of_each(figure: Callable[[Tally], float]) -> np.ndarray:
-        return np.array([figure(replica) for replica in replicas])
+    def in_each(value: Callable[[Tally], float]) -> np.ndarray:
+        return np.array([value(replica) for replica in replicas])
 
     def coverage(half: np.ndarray) -> np.ndarray:
         if not half.any():  # a target of a triangle or two may be all on one side
             return np.zeros(len(replicas))
-        times = design.process.treatment_time / chamber.exposed_area[half].sum()
-        return -np.expm1(-of_each(lambda t: t.dented_area[half].sum() / t.simulated_time) * times)
+        rate = in_each(lambda tally: tally.dented_area[half].sum() / tally.simulated_time)
+        return coverage_from_dent_density(
+            rate * (design.process.treatment_time / chamber.exposed_area[half].sum())
+        )
 
     return {
-        SPEED: of_each(lambda t: t.speed_sum[target].sum() / max(1, t.impacts[target].sum())),
+        SPEED: in_each(
+            lambda tally: tally.speed_sum[target].sum() / max(1, tally.impacts[target].sum())
+        ),
         NEARER: coverage(near),
         FARTHER: coverage(target & ~near),
     }
 
 
-def _middle(distances: np.ndarray, areas: np.ndarray) -> float:
-    """The distance within which half the area lies."""
+def _median(distances: np.ndarray, areas: np.ndarray) -> float:
+    """The distance within which half of the area lies."""
     order = np.argsort(distances, kind="stable")
     return float(distances[order][np.searchsorted(np.cumsum(areas[order]), 0.5 * areas.sum())])
 
 
-def _change(name: str, with_it: np.ndarray, without: np.ndarray) -> Estimate:
-    """Mean change, from replicas paired by their seeds; infinitely uncertain where nothing was hit."""
-    scale = float(without.mean()) if name == SPEED else 1.0
-    return estimate((with_it - without) / scale) if scale > 0.0 else Estimate(0.0, math.inf)
+def _changes(
+    with_it: Mapping[str, np.ndarray], without: Mapping[str, np.ndarray]
+) -> dict[str, Estimate]:
+    """Mean changes, from replicas paired by their seeds; infinitely uncertain if nothing was hit."""
+    changes = {}
+    for name in MEASURED:
+        scale = float(without[name].mean()) if name == SPEED else 1.0
+        changes[name] = (
+            estimate((with_it[name] - without[name]) / scale)
+            if scale > 0.0
+            else Estimate(0.0, math.inf)
+        )
+    return changes

@@ -354,7 +354,7 @@ def test_an_accuracy_asked_for_is_what_confirms(tmp_path: Path) -> None:
         seen.add((stream, replicas, design.process.accuracy.objective_half_width))
         return judged(hill(shares(design)) + np.linspace(-0.01, 0.01, replicas or 4))
 
-    run(with_search_accuracy({"coverage": 0.05}, asked), tmp_path / "out", simulator)
+    run(with_search_accuracy({"objective_half_width": 0.05}, asked), tmp_path / "out", simulator)
     assert seen == {("search", None, 0.05), ("confirm", None, 0.01)}
 
 

@@ -20,7 +20,7 @@ from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.design.design import validate
 from chamberopt.design.load import Design
 from chamberopt.simulation import effect_pilot
-from chamberopt.simulation.effect_pilot import FIGURES, Advice, advise, with_effects_resolved
+from chamberopt.simulation.effect_pilot import MEASURED, Advice, advise, with_effects_resolved
 from tests.helpers.synthetic import plate_design
 
 PLATE = plate_design()
@@ -64,7 +64,7 @@ def test_groups_are_what_their_formulas_say() -> None:
 def test_a_verdict_follows_from_the_largest_change_and_its_interval(
     value: float, half_width: float, on: bool, said: str
 ) -> None:
-    changes = {FIGURES[0]: Estimate(value, half_width), FIGURES[1]: Estimate(0.0, 0.001)}
+    changes = {MEASURED[0]: Estimate(value, half_width), MEASURED[1]: Estimate(0.0, 0.001)}
     one = Advice("drag", on, "because", changes, 0.01)
     assert said in str(one)
     assert "because" in str(one)
