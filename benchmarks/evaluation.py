@@ -36,7 +36,6 @@ def evaluation(accuracy: float) -> dict[str, Any]:
     from chamberopt.chamber.scene import build_scene, chamber_mesh
     from chamberopt.common.parallel.executor import local_executor
     from chamberopt.design.load import load_design
-    from chamberopt.simulation.convergence.parameters import changed
     from chamberopt.simulation.evaluate import evaluate
     from sim_core import compile_simulator
 
@@ -46,7 +45,7 @@ def evaluation(accuracy: float) -> dict[str, Any]:
         "process.accuracy.max_replicas": 1000,
     }
     clock = [("import", time.process_time())]
-    design = changed(load_design(ROOT / "designs" / "gear.toml"), asked)
+    design = load_design(ROOT / "designs" / "gear.toml").changed(asked)
     chamber = build_chamber(design)
     clock.append(("csg", time.process_time()))
     scene = build_scene(design, chamber_mesh(chamber), 1)
@@ -79,13 +78,13 @@ def evaluation(accuracy: float) -> dict[str, Any]:
 def replica_shares(design: Any, chamber: Any) -> dict[str, float]:
     """Of a replica's CPU seconds: fixed, warm-up, recorded; from replicas with neither, with the first, with both."""
     from chamberopt.chamber.scene import chamber_mesh, replica_seed
-    from chamberopt.simulation.convergence.parameters import TIME, WARM_UP, changed
+    from chamberopt.simulation.convergence.parameters import TIME, WARM_UP
     from chamberopt.simulation.replicas import ReplicaSetting, simulate_replica
 
     mesh = chamber_mesh(chamber)
     lengths = [
-        changed(design, {TIME: NO_TIME, WARM_UP: 0.0}),
-        changed(design, {TIME: NO_TIME}),
+        design.changed({TIME: NO_TIME, WARM_UP: 0.0}),
+        design.changed({TIME: NO_TIME}),
         design,
     ]
     # Builds the search tree, once for all replicas.

@@ -1,4 +1,4 @@
-"""The ladder of accuracy on paper: a table to read, rows for a spreadsheet, everything as JSON, and the diagram."""
+"""Results of a convergence study: text to read, a table (.csv), everything as JSON, a picture."""
 
 from __future__ import annotations
 
@@ -14,150 +14,199 @@ from chamberopt.common.versions import versions
 from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.design.load import save_design
 from chamberopt.output.plots.accuracy import accuracy_picture
-from chamberopt.simulation.convergence.recommendation import (
-    ASKED,
-    choices,
-    described,
-    explained,
-    recommend,
-    short,
-    unrecorded,
-)
+from chamberopt.simulation.convergence.parameters import FACETS, setting_text, short_name
+from chamberopt.simulation.convergence.recommendation import ACCURACIES, recommend, replica_cost
 from chamberopt.simulation.convergence.runs import Run
 from chamberopt.simulation.convergence.study import ConvergenceStudy
 
-FORMAT = 1
+FORMAT = 2
 
 
-def rows(ladder: ConvergenceStudy) -> list[dict[str, Any]]:
-    """Every rung and every level of replicas, one kind of row for all; None where a column says nothing."""
-    found = [
-        _rung_row(rung, ladder.reference)
-        for rung in (ladder.reference, *ladder.rungs, *ladder.dents)
+def write_accuracy_results(folder: Path, study: ConvergenceStudy) -> None:
+    """Leave accuracy.json, accuracy.csv, accuracy.png and the design in an empty folder."""
+    save_design(study.design, folder / "design.toml")
+    table = io.StringIO()
+    writer = csv.DictWriter(table, list(rows(study)[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows(study))
+    write_text(folder / "accuracy.csv", table.getvalue())
+    write_text(
+        folder / "accuracy.json", json.dumps(as_json(study), indent=2, allow_nan=False) + "\n"
+    )
+    accuracy_picture(folder / "accuracy.png", study)
+
+
+def rows(study: ConvergenceStudy) -> list[dict[str, Any]]:
+    """One row a run and a batch size, with the same columns; None where a column does not apply."""
+    columns = ("rms_error", "rms_low", "rms_high", "mean_half_width", "batches")
+    runs = [
+        _run_row(run, study.reference) | dict.fromkeys(columns)
+        for run in (study.reference, *study.runs, *study.models)
     ]
-    for level in ladder.levels:
-        found.append(
-            dict.fromkeys(found[0])
-            | {
-                "knob": "replicas",
-                "setting": str(level.replicas),
-                "replicas": level.replicas,
-                "cpu_s": level.cpu_s,
-                "rms_error": level.rms,
-                "rms_low": level.low,
-                "rms_high": level.high,
-                "half_width_said": level.said,
-                "sub_pools": level.blocks,
-            }
-        )
-    return found
+    sizes = [
+        dict.fromkeys(runs[0])
+        | {
+            "parameter": "replicas",
+            "setting": str(size.replicas),
+            "replicas": size.replicas,
+            "cpu_s": size.cpu_s,
+            "rms_error": size.rms,
+            "rms_low": size.low,
+            "rms_high": size.high,
+            "mean_half_width": size.half_width,
+            "batches": size.batches,
+        }
+        for size in study.sizes
+    ]
+    return [*runs, *sizes]
 
 
-def _rung_row(rung: Run, reference: Run) -> dict[str, Any]:
+def _run_row(run: Run, reference: Run) -> dict[str, Any]:
     return {
-        "knob": rung.knob,
-        "setting": rung.setting,
-        "replicas": rung.replicas,
-        "cpu_s": rung.cpu.value,
-        "cpu_s_half_width": rung.cpu.half_width,
-        "cpu_times_reference": rung.cpu.value / reference.cpu.value,
-        "objective": rung.objective.value,
-        "objective_half_width": rung.objective.half_width,
-        "mean_coverage": rung.mean.value,
-        "mean_coverage_half_width": rung.mean.half_width,
-        "bias": rung.bias.value,
-        "bias_half_width": rung.bias.half_width,
-        "bias_mean_coverage": rung.mean_bias.value,
-        "bias_mean_coverage_half_width": rung.mean_bias.half_width,
-        "rms_error": None,
-        "rms_low": None,
-        "rms_high": None,
-        "half_width_said": None,
-        "sub_pools": None,
+        "parameter": run.parameter,
+        "setting": run.setting,
+        "replicas": run.replicas,
+        "cpu_s": run.cpu.value,
+        "cpu_s_half_width": run.cpu.half_width,
+        "cpu_times_reference": run.cpu.value / reference.cpu.value,
+        "objective": run.objective.value,
+        "objective_half_width": run.objective.half_width,
+        "mean_coverage": run.mean.value,
+        "mean_coverage_half_width": run.mean.half_width,
+        "bias": run.bias.value,
+        "bias_half_width": run.bias.half_width,
+        "bias_mean_coverage": run.mean_bias.value,
+        "bias_mean_coverage_half_width": run.mean_bias.half_width,
     }
 
 
-def as_text(ladder: ConvergenceStudy) -> list[str]:
-    """What the command prints."""
-    lines = [described(ladder), ""]
-    lines += [f"{'replicas':>10}{'CPU s':>9}{'RMS error':>12}{'95 % interval':>20}{'± said':>10}"]
-    for one in ladder.levels:
-        lines += [
-            f"{one.replicas:10}{one.cpu_s:9.2f}{one.rms:12.4f}{one.low:11.4f} .. {one.high:.4f}{one.said:10.4f}"
-        ]
-    lines += [explained(ladder), unrecorded(ladder), ""]
+def as_text(study: ConvergenceStudy) -> list[str]:
+    """The lines that the command prints."""
+    lines = [describe_reference(study), ""]
+    lines.append(
+        f"{'replicas':>10}{'CPU s':>9}{'RMS error':>12}{'95 % interval':>20}{'own interval':>15}"
+    )
     lines += [
-        f"{'knob':24}{'setting':>24}{'CPU s a replica':>19}{'bias of objective':>21}{'of mean coverage':>21}"
+        f"{size.replicas:10}{size.cpu_s:9.2f}{size.rms:12.4f}{size.low:11.4f} .. {size.high:.4f}"
+        f"{f'± {size.half_width:.4f}':>15}"
+        for size in study.sizes
     ]
-    for rung in (*ladder.rungs, *ladder.dents):
-        cpu = f"{rung.cpu.value:.3f} ± {rung.cpu.half_width:.3f}"
-        lines += [
-            f"{short(rung.knob):24}{rung.setting:>24}{cpu:>19}{_signed(rung.bias):>21}{_signed(rung.mean_bias):>21}"
-        ]
-    if ladder.dents:
-        lines += [
-            f"the last {len(ladder.dents)}: from the same impacts of {ladder.dent_time:.3g} s of treatment"
-        ]
-    lines += ["", "Pareto front (CPU s, error as the half-width of a 95 % interval, with bias):"]
-    lines += [f"{one.cpu_s:10.2f}{one.error:10.4f}   {one.name}" for one in choices(ladder)]
-    for accuracy in ASKED:
-        lines += ["", *recommend(ladder, accuracy).lines]
-    spent = f"{ladder.spent_s:.0f} CPU s were spent on simulating, {ladder.wall_s:.0f} s by the clock, compiling included"
-    return [*lines, "", spent]
+    lines += [describe_error_law(study), describe_replica_cost(study), ""]
+    lines.append(
+        f"{'parameter':24}{'setting':>24}{'CPU s a replica':>19}"
+        f"{'bias of objective':>21}{'of mean coverage':>21}"
+    )
+    for run in (*study.runs, *study.models):
+        cpu = f"{run.cpu.value:.3f} ± {run.cpu.half_width:.3f}"
+        lines.append(
+            f"{short_name(run.parameter):24}{run.setting:>24}{cpu:>19}"
+            f"{_signed(run.bias):>21}{_signed(run.mean_bias):>21}"
+        )
+    if study.models:
+        lines.append(
+            f"the last {len(study.models)}: from the same impacts of {study.model_time:.3g} s of "
+            "treatment"
+        )
+    for accuracy in ACCURACIES:
+        lines += ["", *recommend(study, accuracy).lines]
+    return [
+        *lines,
+        "",
+        f"{study.cpu_s:.0f} CPU s of simulation, {study.wall_s:.0f} s in all with compiling",
+    ]
 
 
 def _signed(bias: Estimate) -> str:
-    return (
-        "0"
-        if bias.value == bias.half_width == 0.0
-        else f"{bias.value:+.4f} ± {bias.half_width:.4f}"
-    )
+    exact = bias.value == bias.half_width == 0.0
+    return "0" if exact else f"{bias.value:+.4f} ± {bias.half_width:.4f}"
 
 
-def as_json(ladder: ConvergenceStudy) -> dict[str, Any]:
+def as_json(study: ConvergenceStudy) -> dict[str, Any]:
     """Everything, for accuracy.json."""
-    power, halving = ladder.law, ladder.law.halving
-    front = [asdict(one) for one in choices(ladder)]
-    advice = [
-        {**asdict(one), "lines": one.lines}
-        for one in (recommend(ladder, accuracy) for accuracy in ASKED)
-    ]
-    for one in advice:  # JSON has no infinity
-        if not one["replicas"]:
-            one["cpu_s"] = one["half_width"] = None
+    law = study.law
+    middle, low, high = law.halving
+    recommendations = []
+    for accuracy in ACCURACIES:
+        advice = recommend(study, accuracy)
+        row = {**asdict(advice), "lines": advice.lines}
+        recommendations.append(row if advice.replicas else row | {"cpu_s": None})
     return {
         "format": FORMAT,
-        "reference": {"said": described(ladder), "settings": ladder.settings},
-        "rows": rows(ladder),
-        "law": {"scale": power.scale, "power": power.power, "power_half_width": power.half_width},
+        "reference": {"text": describe_reference(study), "settings": study.settings},
+        "rows": rows(study),
+        "law": {"scale": law.scale, "power": law.power, "power_half_width": law.half_width},
         "halving": {
-            "times": halving[0],
-            "low": halving[1],
-            "high": min(halving[2], 1e9),
-            "said": explained(ladder),
+            "times": middle,
+            "low": low,
+            "high": min(high, 1e9),  # JSON has no infinity
+            "text": describe_error_law(study),
         },
-        "a_replica": unrecorded(ladder),
-        "dent_time_s": ladder.dent_time,
-        "front": front,
-        "recommendations": advice,
-        "cpu_s": ladder.spent_s,
-        "wall_s": ladder.wall_s,
-        "design": ladder.design.model_dump(
+        "a_replica": describe_replica_cost(study),
+        "dent_time_s": study.model_time,
+        "recommendations": recommendations,
+        "cpu_s": study.cpu_s,
+        "wall_s": study.wall_s,
+        "design": study.design.model_dump(
             mode="json", exclude_none=True, exclude={"part": {"mesh"}}
         ),
         "versions": versions(),
     }
 
 
-def write_accuracy_results(folder: Path, ladder: ConvergenceStudy) -> None:
-    """Leave accuracy.json, accuracy.csv, accuracy.png and the design in an empty folder."""
-    save_design(ladder.design, folder / "design.toml")
-    table = io.StringIO()
-    writer = csv.DictWriter(table, list(rows(ladder)[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows(ladder))
-    write_text(folder / "accuracy.csv", table.getvalue())
-    write_text(
-        folder / "accuracy.json", json.dumps(as_json(ladder), indent=2, allow_nan=False) + "\n"
+def describe_reference(study: ConvergenceStudy) -> str:
+    """Settings and estimates of the reference."""
+    run = study.reference
+    settings = ", ".join(
+        f"{short_name(name)} {setting_text(value)}" for name, value in study.settings.items()
     )
-    accuracy_picture(folder / "accuracy.png", ladder)
+    walls = ""
+    if FACETS in study.settings:
+        walls = (
+            f"; no chamber here has a round wall, so {FACETS} can only be compared with the finest"
+        )
+    return (
+        f"reference: {run.replicas} replicas with {settings}: objective {run.objective.value:.4f} "
+        f"± {run.objective.half_width:.2g}, mean coverage {run.mean.value:.4f} ± "
+        f"{run.mean.half_width:.2g}, in {run.replicas * run.cpu.value:.0f} CPU s{walls}"
+    )
+
+
+def describe_replica_cost(study: ConvergenceStudy) -> str:
+    """Cost of a replica, and the share spent on its start and warm-up."""
+    (start, per_second), accuracy = replica_cost(study), study.design.process.accuracy
+    whole = start + per_second * (accuracy.warmup_time + accuracy.simulated_time)
+    return (
+        f"a replica takes {start:.3f} CPU s to start and {per_second:.3f} for each simulated "
+        f"second; a replica as designed spends {start / whole:.0%} on its start and "
+        f"{per_second * accuracy.warmup_time / whole:.0%} on its warm-up"
+    )
+
+
+def describe_error_law(study: ConvergenceStudy) -> str:
+    """The cost of halving the error, and the reason if it is not 4."""
+    law, sizes = study.law, study.sizes
+    middle, low, high = law.halving
+    merged = [str(size.replicas) for size in sizes if size.are_merged]
+    left_out = len(merged) <= len(sizes) - 2
+    if low <= 4.0 <= high:
+        reason = "as independent replicas should: 4"
+    elif middle < 4.0:
+        reason = "less than the 4 of independent replicas"
+        if not left_out:
+            reason += ", because triangles are merged where dents are few, and more replicas end it"
+    else:
+        estimating = 1.0 - sizes[-1].replicas * study.reference.cpu.value / sizes[-1].cpu_s
+        reason = (
+            "more than the 4 of independent replicas: some replicas differ much from the others, "
+            f"or the estimate, {estimating:.0%} of the largest batch's time, takes too long"
+        )
+    text = (
+        f"more replicas alone: halving the error costs {middle:.2f} times as much "
+        f"({low:.2f} to {high:.2f}), {reason} (error ~ cost^-{law.power:.2f} ± {law.half_width:.2f})"
+    )
+    if merged and left_out:
+        text += (
+            f"; {', '.join(merged)} replicas are left out, because triangles are merged where "
+            "dents are few"
+        )
+    return text

@@ -1,1 +1,1 @@
-"""What accuracy costs: knobs, the ladder that tries them, and what follows from it."""
+"""The convergence study of `chamberopt accuracy`: what numerical accuracy costs, and what to set."""

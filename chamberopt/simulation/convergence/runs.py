@@ -1,32 +1,38 @@
-"""A setting of the ladder, simulated: its replicas, what they say, and what each cost."""
+"""One setting of a convergence study: its replicas, what they estimate and what they cost."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from concurrent.futures import Executor
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from chamberopt.chamber.scene import replica_seed
 from chamberopt.coverage.coverage_estimators import coverage_estimates, target_patches
 from chamberopt.coverage.coverage_from_impacts import Tally
+from chamberopt.coverage.dent_marking import marked_share
 from chamberopt.coverage.metrics import parse_objective
 from chamberopt.coverage.statistics.confidence_interval import Estimate, estimate, paired_difference
-from chamberopt.design.design import Design
-from chamberopt.simulation.evaluate import weighted_sum
-
-if TYPE_CHECKING:
-    from chamberopt.chamber.build import Chamber
-    from sim_core import TriangleMesh
+from chamberopt.simulation.evaluate import marked_coverage_estimates, weighted_sum
+from chamberopt.simulation.replicas import ReplicaSetting, simulate_replica
 
 
 @dataclass(frozen=True)
 class Run:
-    """One setting, simulated. cpu: CPU seconds a replica · bias, mean_bias: objective and mean coverage, less those of
-    the knob's finest setting; exactly 0 for that one.
+    """Result of one setting.
+
+    Args:
+        parameter: dotted name of the numerical parameter that differs from the reference.
+        setting: its value as text.
+        replicas: number of replicas.
+        cpu: CPU seconds of a replica.
+        objective, mean: objective and mean coverage.
+        bias, mean_bias: their differences from the reference; exactly 0 for the reference.
     """
 
-    knob: str
+    parameter: str
     setting: str
     replicas: int
     cpu: Estimate
@@ -36,56 +42,116 @@ class Run:
     mean_bias: Estimate
 
     @property
-    def known(self) -> bool:
-        """Whether the bias is told apart from none."""
+    def is_biased(self) -> bool:
+        """Whether the bias differs from 0 by more than its interval."""
         return abs(self.bias.value) > self.bias.half_width
 
     @property
-    def bound(self) -> float:
-        """The bias with its interval: it is hardly larger."""
+    def max_bias(self) -> float:
+        """Absolute bias at the far end of its interval."""
         return abs(self.bias.value) + self.bias.half_width
 
+    @property
+    def max_mean_bias(self) -> float:
+        """Absolute bias of the mean coverage at the far end of its interval."""
+        return abs(self.mean_bias.value) + self.mean_bias.half_width
 
-class Pool:
-    """Replicas of one design, added in their order: what they left, and CPU seconds of each."""
 
-    def __init__(self, design: Design, chamber: Chamber, mesh: TriangleMesh) -> None:
-        self.design, self.chamber, self.mesh = design, chamber, mesh
-        self.tallies: list[Tally] = []
-        self.cpu: list[float] = []
+@dataclass
+class Replicas:
+    """The replicas of one design, in their order.
+
+    Args:
+        setting: without sample points coverage is estimated from dent rates.
+        skipped: first replicas whose time does not count, because they build a search tree.
+        tallies, shares: dents, and marked share of each triangle, of each replica.
+        cpu: CPU seconds of each replica.
+    """
+
+    setting: ReplicaSetting
+    skipped: int = 1
+    tallies: list[Tally] = field(default_factory=list)
+    shares: list[np.ndarray] = field(default_factory=list)
+    cpu: list[float] = field(default_factory=list)
 
     @property
     def cost(self) -> Estimate:
-        """CPU seconds a replica; the first, which builds the mesh's search tree, left out."""
-        return estimate(self.cpu[1:], 0.0)
+        """CPU seconds of a replica."""
+        return estimate(self.cpu[self.skipped :], 0.0)
 
-    def figures(self, part: slice = slice(None)) -> tuple[Estimate, Estimate, bool]:
-        """Objective, mean coverage, and whether triangles were taken together."""
-        return figures(self.tallies[part], self.chamber, self.design)
+    def estimates(self, part: slice = slice(None)) -> tuple[Estimate, Estimate, bool]:
+        """Objective, mean coverage, and whether triangles were merged for lack of dents."""
+        are_merged = False
+        design, chamber, _, samples = self.setting
+        if samples is None:
+            tallies = self.tallies[part]
+            patches = target_patches(tallies, chamber, design.process.treatment_time)
+            metrics = coverage_estimates(tallies, chamber, patches)
+            are_merged = patches.are_merged
+        else:
+            metrics = marked_coverage_estimates(self.shares[part], chamber)
+        objective = weighted_sum(parse_objective("uniform_coverage"), metrics)
+        return objective, metrics["mean_coverage"], are_merged
 
-    def rung(self, knob: str, setting: str, reference: Pool) -> Run:
-        goal, mean, _ = self.figures()
-        base, base_mean, _ = reference.figures()
-        bias, mean_bias = paired_difference(goal, base), paired_difference(mean, base_mean)
-        return Run(knob, setting, len(self.tallies), self.cost, goal, mean, bias, mean_bias)
+    def run(self, parameter: str, setting: str, reference: Replicas) -> Run:
+        """The result of these replicas, compared with the reference's."""
+        objective, mean, _ = self.estimates()
+        bias = mean_bias = Estimate(0.0, 0.0)
+        if self is not reference:
+            reference_objective, reference_mean, _ = reference.estimates()
+            bias = paired_difference(objective, reference_objective)
+            mean_bias = paired_difference(mean, reference_mean)
+        count = len(self.tallies)
+        return Run(parameter, setting, count, self.cost, objective, mean, bias, mean_bias)
 
 
-def figures(
-    tallies: Sequence[Tally], chamber: Chamber, design: Design
-) -> tuple[Estimate, Estimate, bool]:
-    """Objective and mean coverage, as evaluate() has them, and whether triangles were taken together."""
-    ground = target_patches(tallies, chamber, design.process.treatment_time)
-    found = coverage_estimates(tallies, chamber, ground)
-    return (
-        weighted_sum(parse_objective("uniform_coverage"), found),
-        found["mean_coverage"],
-        ground.are_merged,
-    )
+def add_replicas(designs: Sequence[Replicas], executor: Executor) -> float:
+    """Simulate one more replica of each; of a design that is listed twice, two.
+
+    Returns:
+        CPU seconds.
+    """
+    futures = []
+    for one in designs:
+        number = len(one.cpu)
+        one.cpu.append(0.0)
+        futures.append((one, number, executor.submit(simulate_timed, one.setting, number)))
+    spent = 0.0
+    try:
+        for one, number, future in futures:
+            tally, share, one.cpu[number] = future.result()
+            one.tallies.append(tally)
+            if share is not None:
+                one.shares.append(share)
+            spent += one.cpu[number]
+    finally:
+        for _, _, future in futures:
+            future.cancel()
+    return spent
 
 
-def dents_alone(whole: Tally) -> Tally:
-    """All that the figures of coverage need: hundreds of replicas are held at once."""
-    none = np.zeros(0)
+def simulate_timed(setting: ReplicaSetting, number: int) -> tuple[Tally, np.ndarray | None, float]:
+    """Dents of one replica, marked share of each triangle, and CPU seconds of this thread."""
+    begin = time.thread_time()
+    process, samples = setting.design.process, setting.samples
+    replica = simulate_replica(setting, replica_seed(process.seed, number))
+    share = None
+    if samples is not None and replica.first_marked is not None:
+        triangles = len(setting.chamber.part.triangles)
+        share = marked_share(samples, replica.first_marked, process.treatment_time, triangles)
+    return _dents_only(replica.tally), share, time.thread_time() - begin
+
+
+def _dents_only(tally: Tally) -> Tally:
+    """The part of a tally that coverage needs, because hundreds of replicas are kept."""
+    empty = np.zeros(0)
     return Tally(
-        whole.simulated_time, none, none, none, none, none, whole.dent_triangle, whole.dent_area
+        tally.simulated_time,
+        empty,
+        empty,
+        empty,
+        empty,
+        empty,
+        tally.dent_triangle,
+        tally.dent_area,
     )

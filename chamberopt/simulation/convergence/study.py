@@ -1,70 +1,84 @@
-"""The ladder of accuracy: every knob that trades it for time, each at several settings, against one reference.
+"""Convergence study: each numerical parameter at several settings, compared with one reference.
 
-The reference has every knob at its finest setting; each rung has one knob coarser. All are simulated in turns, a few
-replicas each, so that a machine that slows down slows them all. Sub-pools of the reference's replicas say how the
-error falls with their number; the difference of a rung from the reference is its bias. Dents one by one take a whole
-treatment: they are compared with the rates of the same impacts.
+The reference has every parameter at its finest setting; each other run has one parameter coarser.
+All take turns, a few replicas each, so that a machine that slows down slows them all. The error
+against the number of replicas comes from batches of the reference's replicas, and the bias of a
+setting is its difference from the reference. Marking one dent at a time takes a whole treatment, so
+the coverage models are compared in runs of their own, on the same impacts.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chamberopt.chamber.scene import chamber_mesh, replica_seed
+from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.errors import InputError
 from chamberopt.common.progress import Progress
-from chamberopt.coverage.coverage_from_impacts import Tally
-from chamberopt.coverage.statistics.confidence_interval import Estimate
+from chamberopt.coverage.dent_marking import sample_points
 from chamberopt.design.design import Design
-from chamberopt.simulation.convergence.dent_runs import dent_rungs
-from chamberopt.simulation.convergence.error_law import Law, Level, law_of, rms_error, rms_interval
-from chamberopt.simulation.convergence.parameters import REFERENCE, designs
-from chamberopt.simulation.convergence.runs import Pool, Run, dents_alone
-from chamberopt.simulation.replicas import ReplicaSetting, simulate_replica
+from chamberopt.design.process import MAX_SIMULATED_TREATMENT
+from chamberopt.simulation.convergence.error_law import (
+    BatchSize,
+    ErrorLaw,
+    fit_error_law,
+    rms_error,
+    rms_interval,
+)
+from chamberopt.simulation.convergence.parameters import MODEL, study_designs
+from chamberopt.simulation.convergence.runs import Replicas, Run, add_replicas
+from chamberopt.simulation.replicas import ReplicaSetting
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.design.shapes import ChamberTable
     from sim_core import TriangleMesh
 
-LEAST_ROUNDS = 3  # fewer replicas of a rung have no interval
-LEAST_REPLICAS = 32  # of the reference: two levels
-MOST_REPLICAS = 1024  # of the reference: what they leave takes a few hundred MB
-LEAST_BLOCKS = 4  # sub-pools of a level
-DENT_SHARE = 0.2  # of the budget, for dents one by one
-NO_ERROR = 1e-12  # of a share of area: rounding
+MIN_ROUNDS = 3  # a run needs three replicas for an interval
+MIN_REPLICAS, MAX_REPLICAS = 32, 1024  # of the reference: two batch sizes; a few hundred MB
+MIN_BATCHES = 4  # of one size
+MODEL_SHARE = 0.2  # of the budget, for the coverage models
+MODEL_REPLICAS = 3
+# CPU seconds of one replica with each coverage model over those of one simulation: four
+# simulations, and about 7 for marking at three spacings.
+MODEL_LOAD = 11.0
+ZERO_ERROR = 1e-12  # of a share of area: rounding
 
 
 @dataclass(frozen=True)
 class ConvergenceStudy:
-    """All that was simulated.
+    """Everything that was simulated.
 
-    settings: of the reference, by knob · rungs: one knob coarser each, and the design as it is · levels, law: error
-    against CPU seconds of sub-pools of the reference · dents: rates, then dents one by one from coarse to fine, all
-    from the same impacts of dent_time s of treatment; their bias is against the last · spent_s: CPU seconds.
+    Args:
+        settings: of the reference, by parameter.
+        runs: one parameter coarser each, and the design as it is.
+        sizes, law: error against CPU seconds of batches of the reference.
+        models: dent rates, then marked dents from coarse to fine, all from the same impacts of
+            model_time seconds of treatment; biases are against the last. Empty if the points do
+            not fit into memory.
+        cpu_s, wall_s: CPU seconds of the simulations, and time the study took.
     """
 
     design: Design
     settings: dict[str, Any]
     reference: Run
-    rungs: tuple[Run, ...]
-    levels: tuple[Level, ...]
-    law: Law
-    dents: tuple[Run, ...]
-    dent_time: float
-    spent_s: float
+    runs: tuple[Run, ...]
+    sizes: tuple[BatchSize, ...]
+    law: ErrorLaw
+    models: tuple[Run, ...]
+    model_time: float
+    cpu_s: float
     wall_s: float
 
 
 def require_budget(budget_s: float) -> None:
-    """InputError for CPU seconds that are none."""
+    """Raise InputError unless the budget is a positive, finite number."""
     if not 0.0 < budget_s < math.inf:
         raise InputError(
             f"--budget-s: given {budget_s:g}; give the CPU seconds to spend, more than 0"
@@ -76,108 +90,113 @@ def run_convergence_study(
     budget_s: float,
     executor: Executor,
     progress: Progress | None = None,
-    ready: Callable[[Design, Chamber], None] = lambda design, chamber: None,
+    prepare: Callable[[Design, Chamber], None] = lambda design, chamber: None,
 ) -> ConvergenceStudy:
-    """Simulate the whole ladder for about so many CPU seconds; at least three replicas of every rung.
+    """Simulate all runs for about the budgeted CPU seconds, at least three replicas of each.
 
-    Each round has one replica of every rung, and of the reference as many as there are rungs.
+    Each round adds one replica to every run, and as many to the reference as there are runs.
 
-    ready: called for each design of the ladder before any is simulated, to compile. Raises InputError for a budget
-    that is none, and what evaluate() raises.
+    Args:
+        prepare: called for each design before any is simulated, to compile.
+
+    Raises:
+        InputError: the budget is not positive, or evaluate() raises it.
     """
     from chamberopt.chamber.build import build_chamber
 
     require_budget(budget_s)
     started = time.perf_counter()
-    settings, ladder = designs(design)
-    shapes: dict[ChamberTable, tuple[Chamber, TriangleMesh]] = {}
-    pools = {}
-    for key, one in ladder.items():
-        if one.chamber not in shapes:
-            first = next(iter(shapes.values()), None)
+    settings, designs = study_designs(design)
+    chambers: dict[ChamberTable, tuple[Chamber, TriangleMesh]] = {}
+    replicas = {}
+    for key, one in designs.items():
+        if one.chamber not in chambers:
+            first = next(iter(chambers.values()), None)
             chamber = build_chamber(one, first and first[0].part.target)
-            shapes[one.chamber] = chamber, chamber_mesh(chamber)
-        pools[key] = Pool(one, *shapes[one.chamber])
-        ready(one, pools[key].chamber)
-    reference, *others = pools.values()
+            chambers[one.chamber] = chamber, chamber_mesh(chamber)
+        replicas[key] = Replicas(ReplicaSetting(one, *chambers[one.chamber], None))
+        prepare(one, replicas[key].setting.chamber)
+    (reference_key, reference), *others = replicas.items()
     rounds, spent = 0, 0.0
-    while len(reference.tallies) < MOST_REPLICAS:
-        few = rounds < LEAST_ROUNDS or len(reference.tallies) < LEAST_REPLICAS
-        if not few and spent >= (1.0 - DENT_SHARE) * budget_s:
+    while len(reference.tallies) < MAX_REPLICAS:
+        enough = rounds >= MIN_ROUNDS and len(reference.tallies) >= MIN_REPLICAS
+        if enough and spent >= (1.0 - MODEL_SHARE) * budget_s:
             break
-        spent += _play_round([*others, *[reference] * len(others)], executor)
+        spent += add_replicas([*(one for _, one in others), *[reference] * len(others)], executor)
         rounds += 1
         if progress:
             progress(min(round(spent), round(budget_s)), round(budget_s), None)
-    dents, dent_time, dents_spent = dent_rungs(reference, budget_s - spent, executor)
-    levels = _levels(reference)
-    own = reference.rung(REFERENCE, "", reference)
-    nothing = Estimate(0.0, 0.0)
+    models, model_time, models_spent = _run_coverage_models(reference, budget_s - spent, executor)
+    sizes = _batch_sizes(reference)
     return ConvergenceStudy(
         design=design,
         settings=settings,
-        reference=replace(own, bias=nothing, mean_bias=nothing),
-        rungs=tuple(
-            pool.rung(*key, reference) for key, pool in pools.items() if pool is not reference
-        ),
-        levels=levels,
-        law=law_of(levels, own.objective.pseudovalues),
-        dents=dents,
-        dent_time=dent_time,
-        spent_s=spent + dents_spent,
+        reference=reference.run(*reference_key, reference),
+        runs=tuple(one.run(*key, reference) for key, one in others),
+        sizes=sizes,
+        law=fit_error_law(sizes),
+        models=models,
+        model_time=model_time,
+        cpu_s=spent + models_spent,
         wall_s=time.perf_counter() - started,
     )
 
 
-def _play_round(pools: Sequence[Pool], executor: Executor) -> float:
-    """One replica more of each of these, of one named twice two; CPU seconds."""
-    futures = []
-    for pool in pools:
-        number = len(pool.cpu)
-        pool.cpu.append(0.0)
-        futures.append(
-            (pool, number, executor.submit(_replica, pool.design, pool.chamber, pool.mesh, number))
+def _run_coverage_models(
+    reference: Replicas, budget_s: float, executor: Executor
+) -> tuple[tuple[Run, ...], float, float]:
+    """Compare dent rates with marked dents at finer and finer sample points.
+
+    Returns:
+        The runs, seconds of treatment that the budget allows, and CPU seconds.
+    """
+    design, chamber, mesh, _ = reference.setting
+    accuracy = design.process.accuracy
+    cpu_per_second = reference.cost.value / (accuracy.warmup_time + accuracy.simulated_time)
+    affordable = budget_s / MODEL_REPLICAS / MODEL_LOAD / cpu_per_second - accuracy.warmup_time
+    seconds = float(
+        min(
+            design.process.treatment_time,
+            MAX_SIMULATED_TREATMENT,
+            max(affordable, accuracy.simulated_time),
         )
-    spent = 0.0
+    )
+    treated = design.changed({"process.treatment_time_s": seconds, MODEL: "dents"})
+    setting = ReplicaSetting(treated, chamber, mesh, None)
+    models = {"avrami": Replicas(setting, skipped=0)}
     try:
-        for pool, number, future in futures:
-            left, pool.cpu[number] = future.result()
-            pool.tallies.append(left)
-            spent += pool.cpu[number]
-    finally:
-        for _, _, future in futures:
-            future.cancel()
-    return spent
-
-
-def _replica(
-    design: Design, chamber: Chamber, mesh: TriangleMesh, number: int
-) -> tuple[Tally, float]:
-    """The dents of one replica, and its CPU seconds on this thread."""
-    begin = time.thread_time()
-    seed = replica_seed(design.process.seed, number)
-    left = simulate_replica(ReplicaSetting(design, chamber, mesh, None), seed).tally
-    return dents_alone(left), time.thread_time() - begin
-
-
-def _levels(pool: Pool) -> tuple[Level, ...]:
-    """Sub-pools of 4, 8, 16 ... replicas."""
-    whole, size = pool.figures()[0].value, len(pool.tallies)
-    levels, count = [], 4
-    while size // count >= LEAST_BLOCKS:
-        blocks = size // count
-        begin = time.thread_time()
-        found = [pool.figures(slice(b * count, (b + 1) * count)) for b in range(blocks)]
-        estimating = (time.thread_time() - begin) / blocks
-        rms = rms_error(np.array([goal.value for goal, _, _ in found]), whole, count / size)
-        said = float(np.mean([goal.half_width for goal, _, _ in found]))
-        cpu = count * pool.cost.value + estimating
-        if min(rms, said) < NO_ERROR:
-            why = "no dent on the target was simulated, so there is no error to measure"
-            raise InputError(
-                f"process.accuracy.simulated_time_s: {why}; raise it, or see chamberopt check"
+        for spacing in (2 * accuracy.sample_mm, accuracy.sample_mm, accuracy.sample_mm / 2):
+            samples = sample_points(chamber, 1e-3 * spacing)
+            models[f"dents, sample_mm {spacing:g}"] = Replicas(
+                setting._replace(samples=samples), skipped=0
             )
-        joined = any(one[2] for one in found)
-        levels.append(Level(count, blocks, rms, *rms_interval(rms, blocks), said, cpu, joined))
+    except InputError:  # too many points for the memory
+        return (), seconds, 0.0
+    spent = sum(add_replicas(list(models.values()), executor) for _ in range(MODEL_REPLICAS))
+    *_, finest = models.values()
+    return tuple(one.run(MODEL, name, finest) for name, one in models.items()), seconds, spent
+
+
+def _batch_sizes(reference: Replicas) -> tuple[BatchSize, ...]:
+    """Errors of batches of 4, 8, 16 ... replicas."""
+    whole, total = reference.estimates()[0].value, len(reference.tallies)
+    sizes, count = [], 4
+    while total // count >= MIN_BATCHES:
+        batches = total // count
+        begin = time.thread_time()
+        estimates = [reference.estimates(slice(b * count, (b + 1) * count)) for b in range(batches)]
+        estimating = (time.thread_time() - begin) / batches
+        values = np.array([objective.value for objective, _, _ in estimates])
+        rms = rms_error(values, whole, count / total)
+        half_width = float(np.mean([objective.half_width for objective, _, _ in estimates]))
+        if min(rms, half_width) < ZERO_ERROR:
+            raise InputError(
+                "process.accuracy.simulated_time_s: no dent on the target was simulated, so there "
+                "is no error to measure; raise it, or see chamberopt check"
+            )
+        cpu_s = count * reference.cost.value + estimating
+        are_merged = any(merged for _, _, merged in estimates)
+        interval = rms_interval(rms, batches)
+        sizes.append(BatchSize(count, batches, rms, *interval, half_width, cpu_s, are_merged))
         count *= 2
-    return tuple(levels)
+    return tuple(sizes)

@@ -21,7 +21,7 @@ from chamberopt.design.shapes import SHAPES, TAG_SONOTRODE, TAG_WALL
 from chamberopt.design.shapes.construction.surface import ShapeSurface
 from chamberopt.design.shapes.construction.surface_check import find_fault
 from chamberopt.geometry.triangles import areas
-from chamberopt.simulation.convergence.parameters import FACETS, knobs
+from chamberopt.simulation.convergence.parameters import FACETS, numerical_parameters
 
 DESIGNS = Path(__file__).resolve().parents[4] / "designs"
 NOTHING = np.zeros((0, 3)), np.zeros((0, 3), dtype=int)
@@ -672,9 +672,11 @@ def test_points_of_a_profile_vary(tmp_path: Path) -> None:
         build_chamber(design.changed({"chamber.sonotrode_distance_mm": 70.0}))
 
 
-def test_facets_are_a_knob_only_where_something_is_round(tmp_path: Path) -> None:
+def test_facets_are_a_numerical_parameter_only_where_something_is_round(tmp_path: Path) -> None:
     block_ = trimesh.creation.box((10, 10, 10))
 
-    assert FACETS in knobs(design_with(tmp_path, "box", block_))
-    assert FACETS not in knobs(design_with(tmp_path, "box", block_, corner_radius_mm=0.0))
-    assert FACETS in knobs(design_with(tmp_path, "revolve", block_))
+    assert FACETS in numerical_parameters(design_with(tmp_path, "box", block_))
+    assert FACETS not in numerical_parameters(
+        design_with(tmp_path, "box", block_, corner_radius_mm=0.0)
+    )
+    assert FACETS in numerical_parameters(design_with(tmp_path, "revolve", block_))

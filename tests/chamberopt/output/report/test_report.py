@@ -341,7 +341,7 @@ def test_an_older_result_without_single_hits_shows_what_it_has(
 def test_marked_dents_have_no_coverage_at_other_times(simulation: Path, tmp_path: Path) -> None:
     folder = tmp_path / "marked"
     shutil.copytree(simulation, folder)
-    surface = viewer.read_surface(folder / "coverage.vtp")
+    surface = read_surface(folder / "coverage.vtp")
     surface.field_data["coverage_model"] = ["dents"]
     surface.save(folder / "coverage.vtp")
     page = Page(write_report(folder)[0])
