@@ -32,9 +32,8 @@ ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
 from chamberopt.common.parallel.executor import SerialExecutor, local_executor, share  # noqa: E402
-from chamberopt.optimize.load_study import load_study  # noqa: E402
 from chamberopt.optimize.run_sweep import evaluate_point, plan_sweep  # noqa: E402
-from chamberopt.optimize.study import Study  # noqa: E402
+from chamberopt.optimize.study import Study, load_study  # noqa: E402
 
 CANDIDATES, NOTHINGS = 24, 1000
 ASKED = 0.9

@@ -1,4 +1,4 @@
-"""chamberopt: designs ultrasonic shot peening chambers. See chamberopt.api for use from Python."""
+"""chamberopt: design of ultrasonic shot peening chambers. See chamberopt.api for use from Python."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ __all__ = ["Design", "Study", "load_design", "load_study", "optimise", "show", "
 
 
 def __getattr__(name: str) -> Any:
-    """The workbench's names, imported when first asked for: `chamberopt --help` needs none of them."""
+    """Import a name of chamberopt.api when it is first used: `chamberopt --help` needs none."""
     if name in __all__:
         return getattr(import_module("chamberopt.api"), name)
     raise AttributeError(f"module 'chamberopt' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    """The same names, for a Python prompt."""
+    """List these names at a Python prompt too."""
     return sorted({*globals(), *__all__})

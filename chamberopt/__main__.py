@@ -1,4 +1,4 @@
-"""`python -m chamberopt` is the same as `chamberopt`."""
+"""Makes `python -m chamberopt` the same as `chamberopt`."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""From Python, in a few lines: load a design or study, simulate or optimise it, look at the result.
+"""Use from Python: load a design or study, simulate or optimise it, show the result.
 
     import chamberopt
 
@@ -7,21 +7,21 @@
     result.metrics["mean_coverage"]            # Estimate(value=..., half_width=...), 95 % interval
     chamberopt.show(result, "more-shot.png")
 
-Coverage triangle by triangle is in the result's coverage.vtp: cell data on the part's own triangles, which pyvista
-and ParaView read.
+The coverage of each triangle is in the result's coverage.vtp, as cell data on the part's own
+triangles; pyvista and ParaView read it.
 """
 
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from chamberopt.common.errors import InputError
 from chamberopt.design.design import Design
 from chamberopt.design.load import load_design
-from chamberopt.optimize.load_study import load_study
-from chamberopt.optimize.study import Study
+from chamberopt.optimize.study import Study, load_study
 
 if TYPE_CHECKING:
     from chamberopt.common.progress import Progress
@@ -38,11 +38,16 @@ def simulate(
     workers: int | None = None,
     progress: Progress | None = None,
 ) -> Result:
-    """Simulate one design into the new or empty folder ``out``; the result as read back from there.
+    """Simulate one design into a folder, and return the result as read back from there.
 
-    ``analytic``: in an exact cylinder, box or prism, if the chamber is one, in place of its mesh. ``workers``: threads,
-    one per core when None; the figures do not depend on it. Raises InputError for a chamber that cannot be built, does
-    not take the shot or is not analytical, sim_core.SimulationError when a run must stop.
+    Args:
+        out: new or empty folder.
+        analytic: use the exact cylinder, box or prism instead of its mesh, if the chamber is one.
+        workers: number of threads, by default one per core; it does not change the result.
+        progress: called as progress(done, total, None) after each replica.
+    Raises:
+        InputError: the chamber cannot be built, has no room for the shot or is not analytic.
+        sim_core.SimulationError: a run must stop.
     """
     from chamberopt.chamber.analytic import analytic_cavity
     from chamberopt.chamber.build import build_chamber
@@ -58,24 +63,24 @@ def simulate(
     with local_executor(workers) as executor:
         design, advice = with_effects_resolved(design, chamber, executor)
         evaluation = evaluate(design, chamber, executor, progress, cavity=cavity)
-    _warn(
-        [
-            *map(str, advice),
-            *evaluation.notes,
-            *save_simulation(out, design, chamber, evaluation, advice),
-        ]
-    )
+    remarks = save_simulation(out, design, chamber, evaluation, advice)
+    _warn([*map(str, advice), *evaluation.notes, *remarks])
     return load_result(out)
 
 
 def optimise(
     study: Study, out: str | Path, *, workers: int | None = None, progress: Progress | None = None
 ) -> Result:
-    """Run a study into the folder ``out``; the result stands for its best design, as confirmed.
+    """Run a study into a folder; the result is that of its best design, as confirmed.
 
-    ``out``: new, empty, or of the same study: a run that was stopped goes on, of one that has ended the result is read.
-    ``workers`` as in simulate. Raises InputError when the folder is another study's, when the start cannot be
-    simulated, or nothing meets the constraints.
+    Args:
+        out: new, empty, or the folder of the same study. An interrupted study is resumed; of a
+            finished one the result is read.
+        workers: number of threads, by default one per core; it does not change the result.
+        progress: called as progress(done, total, best) after each evaluation.
+    Raises:
+        InputError: the folder is another study's, the start cannot be simulated, or no candidate
+            meets the constraints.
     """
     from chamberopt.chamber.build import build_chamber
     from chamberopt.common.parallel.executor import local_executor
@@ -86,21 +91,24 @@ def optimise(
     from chamberopt.simulation.effect_pilot import with_effects_resolved
 
     _require("study", study, Study, "load_study")
-    with open_study_folder(study, out) as record, local_executor(workers) as executor:
-        if not record.finished:
+    with open_study_folder(study, out) as folder, local_executor(workers) as executor:
+        if not folder.finished:
             start = build_chamber(study.design)
-            study, advice = record.with_effects_resolved(
+            study, advice = folder.with_effects_resolved(
                 lambda design: with_effects_resolved(design, start, executor)
             )
-            found = search_and_confirm(study, record, executor, progress)
-            _warn(
-                [*map(str, advice), *found.best.evaluation.notes, *save_study(out, found, advice)]
-            )
+            result = search_and_confirm(study, folder, executor, progress)
+            remarks = save_study(out, result, advice)
+            _warn([*map(str, advice), *result.best.evaluation.notes, *remarks])
     return load_result(out)
 
 
 def show(result: Result, screenshot: str | Path | None = None) -> None:
-    """The part coloured by coverage in its chamber: in a window, or as a picture in the file ``screenshot``."""
+    """Show the part in its chamber, coloured by coverage.
+
+    Args:
+        screenshot: image file to write instead of opening a window.
+    """
     from chamberopt.output.results.load import Result
     from chamberopt.output.viewer import ViewState, inspect, result_info
 
@@ -108,14 +116,14 @@ def show(result: Result, screenshot: str | Path | None = None) -> None:
     inspect([result_info(result)], ViewState(), screenshot)
 
 
-def _require(name: str, given: object, kind: type, maker: str) -> None:
-    """InputError for what is no design, study or result, such as the path of one."""
+def _require(name: str, given: object, kind: type, source: str) -> None:
+    """Raise InputError unless the argument is of this kind; a path is a common mistake."""
     if not isinstance(given, kind):
         raise InputError(
-            f"{name}: given {given!r}; give a {kind.__name__}, as chamberopt.{maker} makes it"
+            f"{name}: given {given!r}; give a {kind.__name__}, as chamberopt.{source} returns it"
         )
 
 
-def _warn(remarks: list[str]) -> None:
+def _warn(remarks: Iterable[str]) -> None:
     for remark in remarks:
         warnings.warn(remark, stacklevel=3)

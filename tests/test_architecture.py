@@ -17,7 +17,7 @@ ORDER = {
     "coverage_estimators intensity",
     "chamberopt/simulation": "resting_balls replicas evaluation evaluate "
     "triangle_fields+time_curve candidate_result effect_pilot convergence",
-    "chamberopt/optimize": "study load_study+constraints+search+storage "
+    "chamberopt/optimize": "study+search storage "
     "sensitivity+evaluate_candidate candidates run_study pareto+run_sweep",
     "chamberopt/cli": "interrupt+options console prepare commands",
     "chamberopt/output": "vtp_files+disc_averages plots results resimulate viewer "

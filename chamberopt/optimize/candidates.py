@@ -1,4 +1,4 @@
-"""The candidates of a study: each judged once, remembered, and the best judged again on fresh seeds."""
+"""The candidates of a study: each is evaluated once and recorded; the best are confirmed."""
 
 from __future__ import annotations
 
@@ -11,35 +11,45 @@ import numpy as np
 
 from chamberopt.common.progress import Progress
 from chamberopt.coverage.statistics.confidence_interval import Estimate, paired_difference
-from chamberopt.optimize.constraints import FEASIBLE, feasibility_of
-from chamberopt.optimize.evaluate_candidate import CandidateEvaluator, Reference, Simulator, scale
+from chamberopt.optimize.evaluate_candidate import (
+    CandidateEvaluator,
+    Reference,
+    Simulator,
+    objective_unit,
+)
 from chamberopt.optimize.search.acquisition import recommend_point
 from chamberopt.optimize.search.gaussian_process import GaussianProcess, pool_variances
 from chamberopt.optimize.search.scalarisation import draw_weights, scalarise
 from chamberopt.optimize.storage.study_folder import StudyFolder
 from chamberopt.optimize.storage.trial_log import Trial
+from chamberopt.optimize.study.constraints import FEASIBLE, INFEASIBLE, assess_feasibility
 from chamberopt.simulation.evaluation import Evaluation
 
 if TYPE_CHECKING:
-    from chamberopt.design.load import Design
+    from chamberopt.design.design import Design
     from chamberopt.optimize.study import Study
 
-# Candidates nearer to each other than this share of the bounds count as one when the best are picked.
-DISTINCT = 0.02
-# Fewer points than this per parameter do not fix a length scale of a model.
+# Candidates nearer to each other than this share of the bounds count as one in the confirmation.
+MIN_DISTANCE = 0.02
+# With fewer points for each parameter the length scales of a model are not determined.
 POINTS_PER_PARAMETER = 4
 
-FIRST_ALONE = np.array([1.0, 0.0])  # weights of two objectives
+FIRST_OBJECTIVE = np.array([1.0, 0.0])  # weights of two objectives
 
 Stop = Callable[[], bool]
+"""Returns True when the user wants to stop the study."""
 
 
 @dataclass(frozen=True)
 class ConfirmedCandidate:
-    """A candidate judged on fresh seeds; searched: its trial number, None if the surrogate proposed it.
+    """A candidate simulated with new seeds.
 
-    goals: every objective of the study · standing: "feasible" when all the intervals of the constraints' figures keep
-    the limits, "infeasible" when one misses, else "not known" · reason: what is missed, or not known to be kept.
+    Attributes:
+        searched: number of its trial in the search; None if the model recommended it.
+        goals: estimate of each objective of the study.
+        feasibility: "feasible" if the whole intervals of the constrained figures are within their
+            limits, "infeasible" if one is outside, else "not known".
+        reason: the limits that are, or may be, violated.
     """
 
     searched: int | None
@@ -56,42 +66,48 @@ class ConfirmedCandidate:
 
 
 class Candidates:
-    """Gives points of the unit cube their scores; keeps every trial, and judges none that is on record.
+    """Scores points of the unit cube; candidates on record are not evaluated again.
 
-    stop() is asked before each evaluation: KeyboardInterrupt when it says True.
+    Args:
+        stop: called before each evaluation; KeyboardInterrupt is raised when it returns True.
+    Attributes:
+        start: the design of the study as a point, shape (d,).
+        trials: in order, those of the search first.
     """
 
     def __init__(
         self,
         study: Study,
-        record: StudyFolder,
+        folder: StudyFolder,
         simulator: Simulator,
         progress: Progress | None = None,
         stop: Stop | None = None,
     ) -> None:
-        self._study, self._record = study, record
+        self._study, self._folder = study, folder
         self._progress, self._stop = progress, stop
-        self._judge = CandidateEvaluator(study, simulator)
-        self.start = self._judge.start
+        self._evaluator = CandidateEvaluator(study, simulator)
+        self.start = self._evaluator.space.start
         self.trials: list[Trial] = []
-        self._points: list[np.ndarray] = []
-
-    @property
-    def points(self) -> np.ndarray:
-        """Points of the unit cube that the search judged, (n, d)."""
-        return np.array(self._points)
+        self._points: list[np.ndarray] = []  # of the search
 
     def score(self, point: np.ndarray) -> float:
-        """Evaluate one point: objective less penalties. The first, the start, raises if it fails."""
-        trial, _ = self._judged(point, "search", None)
+        """Evaluate a point of the search: the objective less penalties.
+
+        Raises:
+            InputError or an error of sim_core: the start, which comes first, cannot be simulated.
+        """
+        trial, _ = self._evaluate(point, "search", None)
         self._points.append(point)
         return trial.score
 
-    def seen(self, weight: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Scores (n,) and variances (n,) as a model is to learn them; of two objectives, with these weights or new.
+    def model_data(self, weight: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Scores (n,) of the search and their variances (n,), as a model learns them.
 
-        Who could not be simulated counts as the worst of the others: how bad it is nobody knows, and a cliff would bend
-        the model far beyond it.
+        A candidate that could not be simulated gets the worst score of the others: how bad it is
+        nobody knows, and a cliff would bend the model far around it.
+
+        Args:
+            weight: weights of two objectives; by default random ones for this step.
         """
         searched = [trial.goals for trial in self.trials[: len(self._points)]]
         failed = np.array([not goals for goals in searched])
@@ -100,143 +116,128 @@ class Candidates:
         values = np.array([[goal.value for goal in goals] for goals in rows])
         variances = np.array([_variances([goals[k] for goals in rows]) for k in range(len(some))]).T
         score, variance = values[:, 0], variances[:, 0]
-        penalty = self._judge.reference.scale * np.array(
-            [trial.penalty for trial in self.trials[: len(rows)]]
-        )
-        if len(some) > 1 and weight is not FIRST_ALONE:
-            weight = (
-                draw_weights(self._study.optimizer.seed, len(rows)) if weight is None else weight
-            )
+        unit = self._evaluator.reference.unit
+        penalty = unit * np.array([trial.penalty for trial in self.trials[: len(rows)]])
+        if len(some) > 1 and weight is not FIRST_OBJECTIVE:
+            if weight is None:
+                weight = draw_weights(self._study.optimizer.seed, len(rows))
             score, variance = scalarise(values, variances, weight, ~failed)
-            penalty = penalty / self._judge.reference.scale
+            penalty = penalty / unit
         score = score - penalty
         score[failed] = score[~failed].min()
         return score, variance
 
-    def confirm(self) -> list[ConfirmedCandidate]:
-        """The start, then the best candidates, on fresh seeds at the design's own accuracy; failures are left out.
+    def model(self, weight: np.ndarray | None = None) -> GaussianProcess | None:
+        """A model of the whole search; None if there are too few points."""
+        scores, variances = self.model_data(weight)
+        if len(scores) < POINTS_PER_PARAMETER * len(self.start) or np.ptp(scores) == 0.0:
+            return None
+        return GaussianProcess(np.array(self._points), scores, variances)
 
-        With more replicas, unless the design asks for an accuracy, which then says how many. While the best cannot be
-        told from the next, and the study has rounds left, these and the start again with twice the replicas.
+    def confirm(self) -> list[ConfirmedCandidate]:
+        """Simulate the start and the best candidates with new seeds and the design's own accuracy.
+
+        They get more replicas than in the search, unless the design asks for an accuracy, which
+        then sets the number. While the best cannot be told from the next, and the study has rounds
+        left, these and the start are simulated with twice the replicas. Failures are left out.
         """
         settings = self._study.optimizer
-        replicas = (
-            settings.confirm_replicas
-            if self._study.design.process.accuracy.objective_half_width is None
-            else None
-        )
+        asks_for_accuracy = self._study.design.process.accuracy.objective_half_width is not None
+        replicas = None if asks_for_accuracy else settings.confirm_replicas
         promising = self._promising(settings.confirm)
-        confirmed = {
-            i: self._confirmed(searched, point, replicas)
-            for i, (searched, point) in enumerate(promising)
-        }
+        confirmed = [self._confirm(*one, replicas) for one in promising]
         for _ in range(settings.confirm_rounds - 1):
-            again = (
-                hard_to_tell_apart([one for one in confirmed.values() if one]) if replicas else []
-            )
-            if not again:
+            close = close_to_best([one for one in confirmed if one]) if replicas else []
+            if not close:
                 break
             replicas = 2 * (replicas or 0)
-            for i, one in confirmed.items():
-                if one and (i == 0 or any(one is other for other in again)):
-                    confirmed[i] = self._confirmed(*promising[i], replicas) or one
-        return [one for one in confirmed.values() if one]
+            for i, one in enumerate(confirmed):
+                if one and (i == 0 or any(one is other for other in close)):
+                    confirmed[i] = self._confirm(*promising[i], replicas) or one
+        return [one for one in confirmed if one]
 
-    def _confirmed(
+    def _confirm(
         self, searched: int | None, point: np.ndarray, replicas: int | None
     ) -> ConfirmedCandidate | None:
-        trial, evaluation = self._judged(point, "confirm", replicas)
+        trial, evaluation = self._evaluate(point, "confirm", replicas)
         if evaluation is None or not trial.goals:
             return None
-        figures = self._judge.constrained(trial.parameters, evaluation)
-        standing, reason = feasibility_of(self._study.constraints, figures)
-        design, goals = self._judge.design(point), self._judge.goals(evaluation)
+        figures = self._evaluator.constrained(trial.parameters, evaluation)
+        feasibility, reason = assess_feasibility(self._study.constraints, figures)
         return ConfirmedCandidate(
-            searched, trial.parameters, design, evaluation, standing, reason, goals
+            searched=searched,
+            parameters=trial.parameters,
+            design=self._evaluator.space.design_at(point),
+            evaluation=evaluation,
+            feasibility=feasibility,
+            reason=reason,
+            goals=self._evaluator.goals(evaluation),
         )
 
     def _promising(self, count: int) -> list[tuple[int | None, np.ndarray]]:
-        """The start and up to `count` distinct others: the best feasible, and what the surrogate recommends.
+        """The start and up to `count` distinct others, each with its trial number.
 
-        Of two objectives: what it recommends for as many weights of the two, from one end of the front to the other.
+        For one objective: the best feasible candidates and one that the model recommends. For two:
+        what the model recommends for `count` weights, from one end of the front to the other.
         """
         chosen: list[tuple[int | None, np.ndarray]] = [(0, self._points[0])]
 
         def is_new(point: np.ndarray) -> bool:
-            return all(np.abs(point - other).max() > DISTINCT for _, other in chosen)
+            return all(np.abs(point - other).max() > MIN_DISTANCE for _, other in chosen)
 
-        several = len(self._study.objective.goals) > 1
+        has_two_objectives = len(self._study.objective.goals) > 1
         first = (np.arange(count) + 0.5) / count
-        recommended = [
-            self._recommended(weight)
-            for weight in (np.stack([first, 1.0 - first], axis=1) if several else [None])
-        ]
-        proposed = [point for point in recommended if point is not None]
+        weights = np.stack([first, 1.0 - first], axis=1) if has_two_objectives else [None]
+        models = [self.model(weight) for weight in weights]
+        seed = self._study.optimizer.seed
+        recommended = [recommend_point(model, seed) for model in models if model is not None]
         scores = np.array([trial.score for trial in self.trials[: len(self._points)]])
         best_first = [int(i) for i in np.argsort(-scores, kind="stable") if self.trials[i].feasible]
-        # The recommendation takes one of the places, but never the only one; of two objectives it takes all.
-        places = 0 if several and proposed else count - 1 if proposed and count > 1 else count
+        # A recommendation takes one place, but never the only one; for two objectives, all.
+        places = count
+        if recommended and has_two_objectives:
+            places = 0
+        elif recommended and count > 1:
+            places = count - 1
         for i in best_first:
             if len(chosen) <= places and is_new(self._points[i]):
                 chosen.append((i, self._points[i]))
-        for point in proposed:
+        for point in recommended:
             if len(chosen) <= count and is_new(point):
                 chosen.append((None, point))
         return chosen
 
-    def model(self, weight: np.ndarray | None = None) -> GaussianProcess | None:
-        """What the whole search says of every point; None when it is too little."""
-        scores, variances = self.seen(weight)
-        if len(scores) < POINTS_PER_PARAMETER * len(self.start) or np.ptp(scores) == 0.0:
-            return None
-        return GaussianProcess(self.points, scores, variances)
-
-    def _recommended(self, weight: np.ndarray | None) -> np.ndarray | None:
-        model = self.model(weight)
-        return None if model is None else recommend_point(model, self._study.optimizer.seed)
-
-    def _judged(
+    def _evaluate(
         self, point: np.ndarray, stage: str, replicas: int | None
     ) -> tuple[Trial, Evaluation | None]:
-        """From the record, or by an evaluation that is on record when this returns."""
-        number = len(self.trials)
-        trial = self._record.replayed(number, stage, point.tolist())
-        if trial is not None:
-            confirmed = stage == "confirm" and trial.objective is not None
-            evaluation = self._record.evaluation(number) if confirmed else None
-        else:
+        """Take a trial from the record, or evaluate the candidate and record it."""
+        number, evaluation = len(self.trials), None
+        trial = self._folder.recorded.find(number, stage, point.tolist())
+        if trial is None:
             if self._stop and self._stop():
                 raise KeyboardInterrupt
             began = time.perf_counter()
-            bar = max(
-                (t.objective.low for t in self.trials if t.feasible and t.objective),
-                default=-np.inf,
-            )
-            trial, evaluation = self._judge.trial(
-                number, point, stage, replicas, bar if number else None
-            )
-            self._record.append(trial, evaluation, time.perf_counter() - began)
+            lows = (t.objective.low for t in self.trials if t.feasible and t.objective)
+            best_low = max(lows, default=-np.inf) if number else None
+            trial, evaluation = self._evaluator.trial(number, point, stage, replicas, best_low)
+            self._folder.append(trial, evaluation, time.perf_counter() - began)
+        elif stage == "confirm" and trial.objective is not None:
+            evaluation = self._folder.evaluation(number)
         if number == 0:
-            self._judge.reference = Reference(
-                trial.score, scale(self._study.objective.goals[0], trial.metrics)
-            )
+            unit = objective_unit(self._study.objective.goals[0], trial.metrics)
+            self._evaluator.reference = Reference(trial.score, unit)
         self.trials.append(trial)
-        if number + 1 >= len(self._record.trials):
-            self._report(stage)
-        return trial, evaluation
-
-    def _report(self, stage: str) -> None:
-        if self._progress:
+        # Trials from the record but the last one are not shown.
+        if self._progress and number + 1 >= len(self._folder.recorded.trials):
             settings = self._study.optimizer
             total = max(len(self.trials), settings.evaluations + 1 + settings.confirm)
-            best = max(
-                (t.score for t in self.trials if t.feasible and t.stage == stage), default=None
-            )
-            self._progress(len(self.trials), total, best)
+            scores = (t.score for t in self.trials if t.feasible and t.stage == stage)
+            self._progress(len(self.trials), total, max(scores, default=None))
+        return trial, evaluation
 
 
 def _variances(goals: list[Estimate]) -> np.ndarray:
-    """Squared standard errors (n,), pooled over the candidates."""
+    """Squared standard errors (n,) of one objective, pooled over the candidates."""
     replicas = np.array([max(1, len(goal.pseudovalues)) for goal in goals])
     spreads = [
         float(np.var(g.pseudovalues, ddof=1)) if len(g.pseudovalues) > 1 else np.nan for g in goals
@@ -244,9 +245,9 @@ def _variances(goals: list[Estimate]) -> np.ndarray:
     return pool_variances(np.array(spreads), replicas)
 
 
-def hard_to_tell_apart(confirmed: list[ConfirmedCandidate]) -> list[ConfirmedCandidate]:
-    """The best feasible one and those whose difference to it is within the noise; none when it stands alone."""
-    feasible = [one for one in confirmed if one.feasibility != "infeasible"]
+def close_to_best(confirmed: list[ConfirmedCandidate]) -> list[ConfirmedCandidate]:
+    """The best candidate and those within the noise of it; empty if it stands alone."""
+    feasible = [one for one in confirmed if one.feasibility != INFEASIBLE]
     if not feasible:
         return []
     best = max(feasible, key=lambda one: one.goals[0].value)

@@ -1,4 +1,4 @@
-"""The Pareto front of a study with two objectives: what was confirmed of it, and what the search saw."""
+"""The Pareto front of a study with two objectives, as confirmed and as the search saw it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chamberopt.optimize.constraints import INFEASIBLE
+from chamberopt.optimize.study.constraints import FEASIBLE, INFEASIBLE
 
 if TYPE_CHECKING:
     from chamberopt.coverage.statistics.confidence_interval import Estimate
@@ -20,7 +20,10 @@ if TYPE_CHECKING:
 class ParetoPoint:
     """One candidate in the plane of the two objectives.
 
-    stage: "search" or "confirm" · standing: of the constraints · on_front: no other of its stage beats it in both.
+    Attributes:
+        stage: "search" or "confirm".
+        on_front: no other candidate of its stage is better in one objective and as good in the
+            other.
     """
 
     stage: str
@@ -31,9 +34,11 @@ class ParetoPoint:
 
 
 def on_front(values: np.ndarray, among: np.ndarray | None = None) -> np.ndarray:
-    """Which candidates (n,) bool no other is at least as good as in all of their values (n, k) and better in one.
+    """Whether each candidate is on the Pareto front, shape (n,) bool.
 
-    among (n,) bool: who counts at all; the others are not on the front.
+    Args:
+        values: objectives, shape (n, k), to be maximised.
+        among: candidates that count, shape (n,) bool, default all; the others are not on the front.
     """
     counts = np.ones(len(values), dtype=bool) if among is None else among
     as_good = (values[:, None] >= values[None]).all(axis=2)
@@ -43,32 +48,29 @@ def on_front(values: np.ndarray, among: np.ndarray | None = None) -> np.ndarray:
 
 
 def pareto_points(result: StudyResult) -> list[ParetoPoint]:
-    """The candidates as confirmed, then those of the search; the start is the first of each."""
-    names = result.study.objective.goals
-    searched = [trial for trial in result.trials if trial.stage == "search" and trial.goals]
+    """The confirmed candidates, then those of the search; the start is the first of each."""
     stages = {
         "confirm": [(one.parameters, one.goals, one.feasibility) for one in result.confirmed],
         "search": [
-            (trial.parameters, trial.goals, "feasible" if trial.feasible else INFEASIBLE)
-            for trial in searched
+            (trial.parameters, trial.goals, FEASIBLE if trial.feasible else INFEASIBLE)
+            for trial in result.trials
+            if trial.stage == "search" and trial.goals
         ],
     }
-    made = []
+    points = []
     for stage, rows in stages.items():
-        values = np.array([[goal.value for goal in goals] for _, goals, _ in rows]).reshape(
-            -1, len(names)
-        )
-        front = on_front(
-            values, np.array([standing != INFEASIBLE for *_, standing in rows], dtype=bool)
-        )
-        made += [
+        values = np.array([[goal.value for goal in goals] for _, goals, _ in rows])
+        values = values.reshape(-1, len(result.study.objective.goals))
+        feasible = np.array([feasibility != INFEASIBLE for *_, feasibility in rows], dtype=bool)
+        front = on_front(values, feasible)
+        points += [
             ParetoPoint(stage, *row, bool(there)) for row, there in zip(rows, front, strict=True)
         ]
-    return made
+    return points
 
 
 def as_csv(result: StudyResult) -> str:
-    """The points as a table: NAME and NAME_pm, value and half-width, for each of the two objectives."""
+    """The points as a table; NAME_pm is the half-width of the objective NAME."""
     text, names = io.StringIO(), result.study.objective.goals
     goals = [column for name in names for column in (name, f"{name}_pm")]
     table = csv.writer(text, lineterminator="\n")

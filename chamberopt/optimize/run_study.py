@@ -1,9 +1,8 @@
-"""Study -> a better design: the search proposes candidates, the best are judged again on fresh seeds."""
+"""Run a study: search for a better design, then confirm the best candidates with new seeds."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,32 +15,37 @@ from chamberopt.common.files import write_text
 from chamberopt.common.progress import Progress
 from chamberopt.coverage.statistics.confidence_interval import Estimate, paired_difference
 from chamberopt.design.load import save_design
-from chamberopt.optimize.candidates import FIRST_ALONE, Candidates, ConfirmedCandidate, Stop
-from chamberopt.optimize.constraints import NOT_KNOWN
+from chamberopt.optimize.candidates import FIRST_OBJECTIVE, Candidates, ConfirmedCandidate, Stop
 from chamberopt.optimize.evaluate_candidate import Simulator
-from chamberopt.optimize.search.phases import PARETO_PHASES, maximise
+from chamberopt.optimize.search.phases import PARETO_PHASES, SearchSettings, maximise
 from chamberopt.optimize.sensitivity import Sensitivity, analyse_sensitivity
 from chamberopt.optimize.storage.study_folder import STUDY, StudyFolder, open_study_folder
-from chamberopt.optimize.storage.trial_log import Trial
+from chamberopt.optimize.storage.trial_log import HISTORY, Trial
+from chamberopt.optimize.study.constraints import NOT_KNOWN
 from chamberopt.simulation.evaluate import ReplicaPlan, evaluate
 from chamberopt.simulation.evaluation import Evaluation
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
-    from chamberopt.design.load import Design
+    from chamberopt.design.design import Design
     from chamberopt.optimize.study import Study
     from chamberopt.simulation.replicas import Replica
 
 
 @dataclass(frozen=True)
 class StudyResult:
-    """What a study found.
+    """The result of a study.
 
-    start, best, confirmed: judged on the same fresh seeds · gain: objective of best minus start with its 95 %
-    interval from those paired replicas · sensitivity: what a model of the whole search says about the best; None when
-    there is too little to fit · trials: search and confirmation, as they ran · seconds: wall clock of all evaluations,
-    whenever they ran · target (m,) bool: of all candidates, where it is the start's; None where each design's own says
-    it. Of two objectives, best is the best by the first.
+    Attributes:
+        algorithm: the phases of the search that ran.
+        trials: of search and confirmation, in order.
+        start, confirmed, best: confirmed with the same new seeds; confirmed begins with the start.
+            With two objectives, best is the best by the first.
+        gain: objective of best minus start, from these paired replicas.
+        seconds: wall-clock time of all evaluations, earlier runs included [s].
+        target: target of all candidates, shape (m,) bool, if the start determines it; None if each
+            design has its own.
+        sensitivity: by a model of the whole search; None if there are too few points.
     """
 
     study: Study
@@ -58,21 +62,24 @@ class StudyResult:
 
     @property
     def at_bounds(self) -> tuple[str, ...]:
-        """A sentence for each parameter whose best value lies on its bound, where the search could not go on."""
-        said = []
+        """A sentence for each parameter whose best value lies on a bound, where the search ends."""
+        sentences = []
         for name, (low, high) in self.study.vary.items():
             value = self.best.design.value(name)
             for bound, side in ((low, "lower"), (high, "upper")):
                 if abs(value - bound) < 1e-3 * (high - low):
-                    said.append(
-                        f"{name} = {value:g} lies on its {side} bound: better may lie beyond; widen [vary]"
+                    sentences.append(
+                        f"{name} = {value:g} lies on its {side} bound: a better design may lie "
+                        "beyond; widen [vary]"
                     )
-        return tuple(said)
+        return tuple(sentences)
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """A sentence where it is not known whether the best keeps the constraints."""
-        return (f"constraints: {self.best.reason}",) if self.best.feasibility == NOT_KNOWN else ()
+        """A sentence if it is not known whether the best design meets the constraints."""
+        if self.best.feasibility != NOT_KNOWN:
+            return ()
+        return (f"constraints: {self.best.reason}",)
 
     @property
     def improved(self) -> bool:
@@ -88,62 +95,55 @@ def run_study(
     simulator: Simulator | None = None,
     stop: Stop | None = None,
 ) -> StudyResult:
-    """Search for a better design within the budget, then confirm the best and the start on fresh seeds.
+    """Search for a better design within the budget, then confirm the best and the start.
 
-    folder: new, empty, or where this very study was stopped: then what is on record there is not evaluated again, and
-    the end is the same as if it had never been stopped. simulator: stands in for the simulation (tests, other models).
-    progress(done, total, best): after each evaluation. stop(): asked before each; KeyboardInterrupt when it says True.
+    All candidates of the search are simulated with the same seeds. The best of them and the start
+    are then simulated with more replicas and new seeds, because the search's own figures favour
+    lucky candidates. The answer is the best of those. (Picking it by its reported figures favours
+    it a little, too.)
 
-    Every candidate of the search gets the same seeds. The best candidates and the start are then simulated
-    with more replicas on a second stream of seeds, and the answer is the best of those: the search's own
-    figures favour the lucky. (Of the few confirmed the best is still picked by the figures reported: a little
-    in its favour.)
-
-    Raises InputError when the folder is in use or its study another, when the start cannot be simulated, or nothing
-    meets the constraints; OSError when an evaluation cannot be recorded.
+    Args:
+        folder: new, empty, or where this very study was interrupted; then it is resumed, and the
+            result is the same, bit for bit, as without the interruption.
+        progress: called as progress(done, total, best) after each evaluation.
+        simulator: replaces the simulation, e.g. in tests.
+        stop: called before each evaluation; the study stops with KeyboardInterrupt if it is True.
+    Raises:
+        InputError: the folder holds something else or another study, the start cannot be
+            simulated, or no candidate meets the constraints.
+        OSError: a trial cannot be written.
     """
-    with open_study_folder(study, folder) as record:
-        return search_and_confirm(study, record, executor, progress, simulator, stop)
+    with open_study_folder(study, folder) as opened:
+        return search_and_confirm(study, opened, executor, progress, simulator, stop)
 
 
 def search_and_confirm(
     study: Study,
-    record: StudyFolder,
+    folder: StudyFolder,
     executor: Executor,
     progress: Progress | None = None,
     simulator: Simulator | None = None,
     stop: Stop | None = None,
 ) -> StudyResult:
-    """The same from where a record stands. study: the record's, with its effects chosen (StudyFolder.settled)."""
-    folder = record.path
-    record.begin()
-    save_inputs(study, folder)
+    """Run or resume a study in an open folder, see run_study.
+
+    Args:
+        study: the study of the folder, with its effects resolved.
+    """
+    folder.begin()
+    save_inputs(study, folder.path)
     target = fixed_target(study)
     simulator = simulator or chamber_simulator(study, executor, target)
-    candidates = Candidates(study, record, simulator, progress, stop)
-    settings = study.optimizer
-    phases: Sequence[tuple[str, float]] = [
-        (phase.algorithm, phase.share) for phase in settings.phases
-    ]
-    if study.objective.pareto and settings.algorithm == "auto" and not phases:
-        phases = PARETO_PHASES
+    candidates = Candidates(study, folder, simulator, progress, stop)
     algorithm = maximise(
-        candidates.score,
-        candidates.start,
-        settings.algorithm,
-        settings.evaluations,
-        settings.seed,
-        step=settings.initial_step,
-        tolerance=settings.tolerance,
-        phases=phases,
-        seen=candidates.seen,
+        candidates.score, candidates.start, _search_settings(study), candidates.model_data
     )
     confirmed = candidates.confirm()
-    record.require_no_more(len(candidates.trials))
+    folder.recorded.require_end(len(candidates.trials))
     if not confirmed or confirmed[0].searched != 0:
         first = next(trial for trial in candidates.trials if trial.stage == "confirm")
         raise InputError(
-            f"the start could not be simulated on the confirmation's seeds: {first.reason}"
+            "the start could not be simulated with the seeds of the confirmation: " + first.reason
         )
     start = confirmed[0]
     winners = [one for one in confirmed if one.feasible] or [
@@ -151,36 +151,56 @@ def search_and_confirm(
     ]
     if not winners:
         raise InputError(
-            f"constraints: no candidate meets them (the start: {start.reason}); loosen them, widen [vary] or "
-            f"raise optimizer.evaluations; every evaluation is in {folder / 'history.jsonl'}"
+            f"constraints: no candidate meets them (the start: {start.reason}); loosen them, "
+            "widen [vary] or raise optimizer.evaluations; every evaluation is in "
+            f"{folder.path / HISTORY}"
         )
     best = max(winners, key=lambda candidate: candidate.evaluation.objective.value)
+    gain = Estimate(0.0, 0.0)
+    if best is not start:
+        gain = paired_difference(best.goals[0], start.goals[0])
+    model, noise = candidates.model(FIRST_OBJECTIVE), best.evaluation.objective.half_width
     return StudyResult(
         study=study,
-        folder=folder,
+        folder=folder.path,
         algorithm=algorithm,
         trials=tuple(candidates.trials),
         start=start,
         confirmed=tuple(confirmed),
         best=best,
-        gain=Estimate(0.0, 0.0)
-        if best is start
-        else paired_difference(best.goals[0], start.goals[0]),
-        seconds=record.seconds,
+        gain=gain,
+        seconds=folder.seconds,
         target=target,
-        sensitivity=analyse_sensitivity(
-            candidates.model(FIRST_ALONE),
-            study.vary,
-            best.parameters,
-            best.evaluation.objective.half_width,
-        ),
+        sensitivity=analyse_sensitivity(model, study.vary, best.parameters, noise)
+        if model
+        else None,
+    )
+
+
+def _search_settings(study: Study) -> SearchSettings:
+    settings = study.optimizer
+    phases: tuple[tuple[str, float], ...]
+    phases = tuple((phase.algorithm, phase.share) for phase in settings.phases)
+    if study.objective.pareto and settings.algorithm == "auto" and not phases:
+        phases = PARETO_PHASES
+    return SearchSettings(
+        algorithm=settings.algorithm,
+        budget=settings.evaluations,
+        seed=settings.seed,
+        initial_step=settings.initial_step,
+        tolerance=settings.tolerance,
+        phases=phases,
     )
 
 
 def fixed_target(study: Study) -> np.ndarray | None:
-    """The target (m,) bool of every candidate where it is what the shot reaches: found once, in the start's chamber.
+    """The target of all candidates, shape (m,) bool, if it is what the shot reaches; else None.
 
-    A search could else shrink what it has to cover. Raises InputError where the study varies the target itself.
+    It is found once, in the chamber of the start. Otherwise a search could shrink the area that it
+    has to cover.
+
+    Raises:
+        InputError: the study varies the target itself.
     """
     from chamberopt.chamber.build import build_chamber
 
@@ -195,23 +215,25 @@ def fixed_target(study: Study) -> np.ndarray | None:
 
 
 def save_inputs(study: Study, folder: Path) -> None:
-    """The study as files to read and to run again; inputs.json has what it is compared by."""
+    """Write design.toml and study.toml, to be read and run again."""
     import tomli_w
 
     if (folder / STUDY).is_file():
         return
     save_design(study.design, folder / "design.toml")
-    asked = study.model_dump(mode="json", exclude={"design"}, exclude_none=True)
-    write_text(folder / STUDY, tomli_w.dumps({"design": "design.toml", **asked}))
+    values = study.model_dump(mode="json", exclude={"design"}, exclude_none=True)
+    write_text(folder / STUDY, tomli_w.dumps({"design": "design.toml", **values}))
 
 
 def chamber_simulator(study: Study, executor: Executor, target: np.ndarray | None) -> Simulator:
-    """The real thing: chamber, replicas, coverage. Asked again for more replicas it adds to those it has."""
+    """The simulator of a study: chamber, replicas, coverage.
+
+    Asked for more replicas of a candidate, it adds them to those it has.
+    """
     from chamberopt.chamber.build import build_chamber
 
-    known: dict[
-        str, tuple[Chamber, list[Replica]]
-    ] = {}  # of the confirmation, and of the search's last candidate
+    # Chamber and replicas of confirmed candidates, and of the last candidate of the search.
+    known: dict[str, tuple[Chamber, list[Replica]]] = {}
 
     def simulate_candidate(design: Design, stream: str, replicas: int | None) -> Evaluation:
         began = time.perf_counter()
@@ -221,9 +243,9 @@ def chamber_simulator(study: Study, executor: Executor, target: np.ndarray | Non
                 del known[other]
             known[key] = build_chamber(design, target), []
         chamber, done = known[key]
-        built = time.perf_counter() - began
+        seconds = time.perf_counter() - began
         plan = ReplicaPlan(replicas, stream, study.objective.goals[0])
-        result = evaluate(design, chamber, executor, plan=plan, done=done)
-        return replace(result, timings={"chamber": built, **result.timings})
+        evaluation = evaluate(design, chamber, executor, plan=plan, done=done)
+        return replace(evaluation, timings={"chamber": seconds, **evaluation.timings})
 
     return simulate_candidate

@@ -1,6 +1,7 @@
-"""Study -> a map: candidates on a grid, or evenly spread, over the same bounds that a search would have.
+"""Run a sweep: evaluate candidates on a grid, or spread evenly, over the bounds of a study.
 
-Each candidate is one task: its worker builds the chamber and simulates its replicas, and a row of figures comes back.
+Each candidate is one task: a worker builds its chamber, simulates its replicas and returns a row
+of figures.
 """
 
 from __future__ import annotations
@@ -28,13 +29,18 @@ if TYPE_CHECKING:
     from chamberopt.optimize.study import Study
     from chamberopt.simulation.evaluation import Evaluation
 
-MOST_CANDIDATES = 100_000
+MAX_CANDIDATES = 100_000
 
 
 @dataclass(frozen=True)
 class SweepPlan:
-    """Which candidates: method "grid" or "sobol" · count: of values a parameter, or of points · points (n, d): in
-    shares of the bounds · seed: of the points, None for a grid.
+    """The candidates of a sweep.
+
+    Attributes:
+        method: "grid" or "sobol".
+        count: values of each parameter, or number of points.
+        points: in the unit cube, shape (n, d).
+        seed: of the points; None for a grid.
     """
 
     method: str
@@ -42,14 +48,14 @@ class SweepPlan:
     points: np.ndarray
     seed: int | None
 
-    def asked(self) -> dict[str, Any]:
-        """As plain JSON: the points follow from it."""
+    def as_json(self) -> dict[str, Any]:
+        """Plain JSON values; the points follow from them."""
         return {"method": self.method, "count": self.count, "seed": self.seed}
 
 
 @dataclass(frozen=True)
 class SweepResult:
-    """What was found. trials: in the plan's order · seconds: wall clock."""
+    """The trials in the order of the plan, and their wall-clock time [s]."""
 
     study: Study
     plan: SweepPlan
@@ -59,7 +65,7 @@ class SweepResult:
 
     @property
     def best(self) -> Trial | None:
-        """The feasible candidate with the largest objective: the best of so many draws, a lucky one among them."""
+        """The feasible candidate with the largest objective; partly the luckiest one."""
         feasible = [trial for trial in self.trials if trial.feasible]
         return max(feasible, key=lambda trial: trial.score, default=None)
 
@@ -67,24 +73,29 @@ class SweepResult:
 def plan_sweep(
     study: Study, grid: int | None, sobol: int | None, seed: int | None = None
 ) -> SweepPlan:
-    """`grid` values of every parameter, bounds included, or `sobol` points in all; InputError unless one is given.
+    """Plan a sweep of `grid` values of each parameter, bounds included, or `sobol` points in all.
 
-    Sobol points are scrambled (scipy.stats.qmc.Sobol, after A. B. Owen, "Scrambling Sobol' and Niederreiter-Xing
-    points", J. Complexity 14, 1998) with `seed`, or the seed of the study's optimizer.
+    Source: the Sobol points are scrambled as in A. B. Owen, "Scrambling Sobol' and
+    Niederreiter-Xing points", J. Complexity 14, 1998 (scipy.stats.qmc.Sobol).
+
+    Args:
+        seed: of the Sobol points, by default that of the study's optimizer.
+    Raises:
+        InputError: not exactly one of grid and sobol is given, or a number is out of range.
     """
     dimensions = len(study.vary)
     if (grid is None) == (sobol is None):
         given = "neither" if grid is None else "both"
         raise InputError(
-            f"--grid, --sobol: {given} given; give one: values a parameter, or points in all"
+            f"--grid, --sobol: {given} given; give one: values of each parameter, or points in all"
         )
     if grid is not None:
         if seed is not None:
             raise InputError(
-                f"--seed: given {seed}, but a grid draws nothing; leave it out, or take --sobol"
+                f"--seed: given {seed}, but a grid is not random; remove it, or use --sobol"
             )
         if grid < 2:
-            raise InputError(f"--grid: given {grid}; give at least 2 values a parameter")
+            raise InputError(f"--grid: given {grid}; give at least 2 values of each parameter")
         _require_few(grid**dimensions, f"--grid: {grid} values of {dimensions} parameters")
         axis = np.linspace(0.0, 1.0, grid)
         return SweepPlan("grid", grid, np.array(list(product(axis, repeat=dimensions))), None)
@@ -95,7 +106,7 @@ def plan_sweep(
     seed = study.optimizer.seed if seed is None else seed
     if seed < 0:
         raise InputError(f"--seed: given {seed}; give 0 or more")
-    return SweepPlan("sobol", sobol, _sobol(dimensions, sobol, seed), seed)
+    return SweepPlan("sobol", sobol, _sobol_points(dimensions, sobol, seed), seed)
 
 
 def run_sweep(
@@ -106,41 +117,46 @@ def run_sweep(
     progress: Progress | None = None,
     simulator: Simulator | None = None,
 ) -> SweepResult:
-    """CandidateEvaluator every candidate of the plan, at the accuracy of a search and on its seeds.
+    """Evaluate every candidate of a plan, with the accuracy and the seeds of a search.
 
-    folder: new, empty, or where this very sweep was stopped; receives design.toml, study.toml and history.jsonl, its
-    rows in the plan's order whatever the number of workers. simulator: stands in for the simulation; must go to the
-    workers. A candidate that fails is a row with its reason. Raises InputError when all fail, or the folder is of
-    another sweep.
+    A candidate that fails is a row with its reason.
+
+    Args:
+        folder: new, empty, or where this very sweep was interrupted. It receives design.toml,
+            study.toml and history.jsonl, whose rows are in the order of the plan for any number of
+            workers.
+        simulator: replaces the simulation; it is sent to the workers.
+    Raises:
+        InputError: all candidates fail, or the folder holds something else or another sweep.
     """
-    with open_study_folder(study, folder, plan.asked()) as record:
-        if record.finished:
+    with open_study_folder(study, folder, plan.as_json()) as opened:
+        if opened.finished:
             raise InputError(
-                f"{folder}: this sweep is finished, nothing was run; to run it anew give another folder (--out)"
+                f"{folder}: this sweep is finished, nothing was run; to run it again, give another "
+                "folder (--out)"
             )
-        return _go_on(study, plan, record, executor, progress, simulator)
+        return _run(study, plan, opened, executor, progress, simulator)
 
 
-def _go_on(
+def _run(
     study: Study,
     plan: SweepPlan,
-    record: StudyFolder,
+    folder: StudyFolder,
     executor: Executor,
     progress: Progress | None,
     simulator: Simulator | None,
 ) -> SweepResult:
-    """From where the record stands."""
-    record.begin()
-    save_inputs(study, record.path)
+    folder.begin()
+    save_inputs(study, folder.path)
     trials: list[Trial] = []
     for number, point in enumerate(plan.points):
-        trial = record.replayed(number, "sweep", point.tolist())
+        trial = folder.recorded.find(number, "sweep", point.tolist())
         if trial is None:
             break
         trials.append(trial)
     best = max((trial.score for trial in trials if trial.feasible), default=None)
-    for trial, seconds in _judged(study, plan, len(trials), executor, simulator):
-        record.append(trial, None, seconds)
+    for trial, seconds in _evaluate_from(study, plan, len(trials), executor, simulator):
+        folder.append(trial, None, seconds)
         trials.append(trial)
         if trial.feasible:
             best = trial.score if best is None else max(best, trial.score)
@@ -148,17 +164,19 @@ def _go_on(
             progress(len(trials), len(plan.points), best)
     if all(trial.objective is None for trial in trials):
         raise InputError(
-            f"no candidate of the sweep could be simulated, the first for: {trials[0].reason}; change [vary] or the "
-            f"design; every candidate is in {record.path / HISTORY}"
+            "no candidate of the sweep could be simulated, the first because: "
+            f"{trials[0].reason}; change [vary] or the design; every candidate is in "
+            f"{folder.path / HISTORY}"
         )
-    return SweepResult(study, plan, record.path, tuple(trials), record.seconds)
+    return SweepResult(study, plan, folder.path, tuple(trials), folder.seconds)
 
 
-def _judged(
+def _evaluate_from(
     study: Study, plan: SweepPlan, first: int, executor: Executor, simulator: Simulator | None
 ) -> Iterator[tuple[Trial, float]]:
-    """The trials from the ``first`` on in the plan's order, and the seconds that each took; all tasks are there from
-    the start, so that no worker waits for another.
+    """The trials from number `first` on, in the order of the plan, and the seconds of each.
+
+    All tasks are submitted at once, so that no worker waits for another.
     """
     target = share(executor, fixed_target(study) if simulator is None else None)
     numbers = range(first, len(plan.points))
@@ -171,7 +189,7 @@ def _judged(
             try:
                 yield future.result()
             except WorkerLostError as error:
-                yield _lost(study, number, plan.points[number], error), 0.0
+                yield _lost_trial(study, number, plan.points[number], error), 0.0
     finally:
         for future in futures:
             future.cancel()
@@ -184,15 +202,15 @@ def evaluate_point(
     target: np.ndarray | None = None,
     simulator: Simulator | None = None,
 ) -> tuple[Trial, float]:
-    """One candidate from chamber to figures, on one worker, and the seconds it took."""
+    """Evaluate one candidate on one worker; the trial, and its wall-clock time [s]."""
     began = time.perf_counter()
     simulator = simulator or chamber_simulator(study, SerialExecutor(), target)
     trial = CandidateEvaluator(study, simulator).trial(number, point, "sweep")[0]
     return trial, time.perf_counter() - began
 
 
-def _lost(study: Study, number: int, point: np.ndarray, error: WorkerLostError) -> Trial:
-    """The row of a candidate that took its workers down."""
+def _lost_trial(study: Study, number: int, point: np.ndarray, error: WorkerLostError) -> Trial:
+    """The row of a candidate whose workers died."""
 
     def fail(*_: object) -> Evaluation:
         raise InputError(str(error))
@@ -200,16 +218,15 @@ def _lost(study: Study, number: int, point: np.ndarray, error: WorkerLostError) 
     return CandidateEvaluator(study, fail).trial(number, point, "sweep")[0]
 
 
-def _sobol(dimensions: int, count: int, seed: int) -> np.ndarray:
+def _sobol_points(dimensions: int, count: int, seed: int) -> np.ndarray:
     from scipy.stats import qmc
 
     with warnings.catch_warnings():
-        warnings.simplefilter(
-            "ignore", UserWarning
-        )  # not a power of 2: spread a little less evenly, no error
+        # A count that is not a power of 2 is spread a little less evenly, which is no error.
+        warnings.simplefilter("ignore", UserWarning)
         return np.asarray(qmc.Sobol(dimensions, scramble=True, seed=seed).random(count))
 
 
 def _require_few(count: int, what: str) -> None:
-    if count > MOST_CANDIDATES:
-        raise InputError(f"{what}: {count:,} candidates, more than {MOST_CANDIDATES:,}; give fewer")
+    if count > MAX_CANDIDATES:
+        raise InputError(f"{what}: {count:,} candidates, more than {MAX_CANDIDATES:,}; give fewer")

@@ -1,4 +1,8 @@
-"""What a whole search tells of its best design: main effects, slices through it, and which way it is flat."""
+"""How the score depends on each parameter near the best design, by the model of the search.
+
+The model gives main effects (means over the other parameters), slices through the best design,
+and the range in which each parameter may change without loss.
+"""
 
 from __future__ import annotations
 
@@ -11,18 +15,24 @@ import numpy as np
 from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.optimize.search.gaussian_process import GaussianProcess, one_thread
 
-NORMAL = 1.96  # standard deviations of a 95 % interval
-STEPS = 41  # of a slice
-SAMPLE = 9  # main effects are means over 2^SAMPLE points of the other parameters
+NORMAL_95 = 1.96  # standard deviations of a 95 % interval
+SLICE_POINTS = 41
+SAMPLE_EXPONENT = 9  # main effects are means over 2^9 points of the other parameters
+RANGE_POINTS = 201
 
 
 @dataclass(frozen=True)
 class Slice:
-    """The score over one parameter, in the file's units, as the model has it.
+    """The score over one parameter, by the model.
 
-    values (k,) of the parameter · mean (k,), half_width (k,): with the others as in the best design, 95 % · effect
-    (k,): mean over all values of the others · share: of the score's variance over the bounds that this effect is ·
-    flat: from where to where the best design may go, this parameter alone, without losing more than the noise.
+    Attributes:
+        values: values of the parameter in the unit of the file, shape (k,).
+        mean: score with the other parameters as in the best design, shape (k,).
+        half_width: half-width of its 95 % interval, shape (k,).
+        effect: score averaged over all values of the other parameters, shape (k,).
+        share: share of this effect in the variance of the score over the bounds.
+        flat: range of values in which the best design, with this parameter alone changed, loses no
+            more than the noise.
     """
 
     name: str
@@ -36,8 +46,13 @@ class Slice:
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """One slice a parameter; noise: what counts as no loss · expected: the model's own score of the best design ·
-    together: share of the designs with every parameter within its flat range that lose no more than the noise.
+    """One slice for each parameter.
+
+    Attributes:
+        noise: loss that counts as none.
+        expected: the model's score of the best design.
+        together: share of the designs with all parameters in their flat ranges that lose no more
+            than the noise.
     """
 
     slices: tuple[Slice, ...]
@@ -46,19 +61,17 @@ class Sensitivity:
     together: float
 
     def sentences(self) -> list[str]:
-        """What a designer may change, one sentence a parameter."""
-        said = [
-            f"{one.name} may go from {one.flat[0]:.4g} to {one.flat[1]:.4g} without losing more than the noise, "
-            f"{self.noise:.2g}"
+        """What a designer may change: one sentence for each parameter, and one for all."""
+        ranges = [
+            f"{one.name} may go from {one.flat[0]:.4g} to {one.flat[1]:.4g} without losing more "
+            f"than the noise, {self.noise:.2g}"
             for one in self.slices
         ]
-        return [
-            *said,
-            f"of all designs within these ranges {self.together:.0%} lose no more than that",
-        ]
+        share = f"{self.together:.0%}"
+        return [*ranges, f"of all designs within these ranges {share} lose no more than that"]
 
     def as_json(self) -> dict[str, Any]:
-        """As plain JSON values."""
+        """Plain JSON values."""
         return {
             "noise": self.noise,
             "expected": {"value": self.expected.value, "half_width": self.expected.half_width},
@@ -78,65 +91,73 @@ class Sensitivity:
 
 
 def analyse_sensitivity(
-    model: GaussianProcess | None,
+    model: GaussianProcess,
     vary: Mapping[str, tuple[float, float]],
     best: Mapping[str, float],
     noise: float,
-) -> Sensitivity | None:
-    """What the model says about a best design, by dotted name in the file's units; None without a model."""
+) -> Sensitivity:
+    """Sensitivity of the model's score near the best design.
+
+    Args:
+        vary: bounds (low, high) of each parameter, by dotted name, in the units of the file.
+        best: parameters of the best design, in the same units.
+        noise: loss that counts as none.
+    """
     from scipy.stats.qmc import Sobol
 
-    if model is None:
-        return None
     low, high = np.array(list(vary.values()), dtype=float).T
     at = (np.array([best[name] for name in vary]) - low) / (high - low)
-    cloud = Sobol(len(at), seed=1).random_base2(SAMPLE)
-    steps = np.linspace(0.0, 1.0, STEPS)
+    sample = Sobol(len(at), seed=1).random_base2(SAMPLE_EXPONENT)
+    steps = np.linspace(0.0, 1.0, SLICE_POINTS)
     slices, ranges = [], []
     with one_thread():
-        top, doubt = (float(one[0]) for one in model(at[None]))
-        whole = float(model(cloud)[0].var())
+        top, deviation_at_top = (float(one[0]) for one in model(at[None]))
+        whole_variance = float(model(sample)[0].var())
         for i, name in enumerate(vary):
-            line = np.repeat(at[None], STEPS, axis=0)
+            line = np.repeat(at[None], SLICE_POINTS, axis=0)
             line[:, i] = steps
             mean, deviation = model(line)
-            effect = _main_effect(model, cloud, i, steps)
-            ranges.append(_flat(model, at, i, top - noise))
+            effect = _main_effect(model, sample, i, steps)
+            share = float(effect.var()) / whole_variance if whole_variance > 0.0 else 0.0
+            ranges.append(_flat_range(model, at, i, top - noise))
             slices.append(
                 Slice(
                     name=name,
                     values=low[i] + steps * (high[i] - low[i]),
                     mean=mean,
-                    half_width=NORMAL * deviation,
+                    half_width=NORMAL_95 * deviation,
                     effect=effect,
-                    share=min(1.0, float(effect.var()) / whole) if whole > 0.0 else 0.0,
+                    share=min(1.0, share),
                     flat=tuple((low[i] + np.array(ranges[-1]) * (high[i] - low[i])).tolist()),
                 )
             )
         ends = np.array(ranges)
-        within = ends[:, 0] + cloud * (ends[:, 1] - ends[:, 0])
+        within = ends[:, 0] + sample * (ends[:, 1] - ends[:, 0])
         together = float((model(within)[0] >= top - noise).mean())
-    return Sensitivity(tuple(slices), noise, Estimate(top, NORMAL * doubt), together)
+    expected = Estimate(top, NORMAL_95 * deviation_at_top)
+    return Sensitivity(tuple(slices), noise, expected, together)
 
 
 def _main_effect(
-    model: GaussianProcess, cloud: np.ndarray, i: int, steps: np.ndarray
+    model: GaussianProcess, sample: np.ndarray, i: int, steps: np.ndarray
 ) -> np.ndarray:
     """Mean score over the other parameters at each step of parameter i."""
     means = []
     for step in steps:
-        moved = cloud.copy()
+        moved = sample.copy()
         moved[:, i] = step
         means.append(float(model(moved)[0].mean()))
     return np.array(means)
 
 
-def _flat(model: GaussianProcess, at: np.ndarray, i: int, least: float) -> tuple[float, float]:
-    """How far parameter i may move down and up, in shares of the bounds, with the model's mean at `least` or above."""
+def _flat_range(
+    model: GaussianProcess, at: np.ndarray, i: int, threshold: float
+) -> tuple[float, float]:
+    """How far parameter i may go down and up, in shares of the bounds, above the threshold."""
     ends = []
     for bound in (0.0, 1.0):
-        line = np.repeat(at[None], 201, axis=0)
-        line[:, i] = np.linspace(at[i], bound, 201)
-        bad = np.flatnonzero(model(line)[0] < least)
-        ends.append(float(line[max(0, bad[0] - 1) if len(bad) else -1, i]))
+        line = np.repeat(at[None], RANGE_POINTS, axis=0)
+        line[:, i] = np.linspace(at[i], bound, RANGE_POINTS)
+        below = np.flatnonzero(model(line)[0] < threshold)
+        ends.append(float(line[max(0, below[0] - 1) if len(below) else -1, i]))
     return ends[0], ends[1]

@@ -44,8 +44,7 @@ def check(
     from chamberopt.chamber.checks.check import describe, shot_reach
     from chamberopt.common.files import make_output_folder, write_text
     from chamberopt.geometry.mesh_io import SurfaceError
-    from chamberopt.optimize.load_study import load
-    from chamberopt.optimize.study import Study
+    from chamberopt.optimize.study import Study, load
     from chamberopt.output.vtp_files import write_chamber
 
     loaded = load(file)

@@ -53,8 +53,8 @@ def run(
     with Interrupt() as interrupt:
         from chamberopt.chamber.build import build_chamber
         from chamberopt.common.parallel.executor import open_executor
-        from chamberopt.optimize.load_study import load_study
         from chamberopt.optimize.storage.study_folder import open_study_folder
+        from chamberopt.optimize.study import load_study
 
         loaded = load_study(study)
         chamber = build_chamber(loaded.design)
@@ -102,8 +102,8 @@ def _search(
         lambda design: resolve_effects(design, chamber, executor)
     )
     compile_simulator(study.design, chamber)
-    if folder.trials:
-        print_remarks([f"{folder.path}: resuming after {len(folder.trials)} evaluations"])
+    if folder.recorded.trials:
+        print_remarks([f"{folder.path}: resuming after {len(folder.recorded.trials)} evaluations"])
     with progress_bar("evaluations") as progress:
         interrupt.wait_for_evaluation(how_to_resume)
         result = search_and_confirm(

@@ -48,8 +48,8 @@ def sweep(
     from chamberopt.chamber.build import build_chamber
     from chamberopt.common.parallel.executor import open_executor
     from chamberopt.common.progress import progress_bar
-    from chamberopt.optimize.load_study import load_study
     from chamberopt.optimize.run_sweep import plan_sweep, run_sweep
+    from chamberopt.optimize.study import load_study
     from chamberopt.output.results.write import best_row_note
     from chamberopt.output.save_run import save_sweep
 

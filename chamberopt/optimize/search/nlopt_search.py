@@ -1,9 +1,9 @@
-"""NLopt: one algorithm over the unit cube, its quirks dealt with. The only file that imports nlopt."""
+"""Search with one algorithm of NLopt over the unit cube. The only file that imports nlopt."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,78 +12,83 @@ from chamberopt.common.errors import InputError
 LOCAL = "LN_BOBYQA"
 
 
+class NloptSettings(NamedTuple):
+    """How NLopt searches; steps are shares of the bounds."""
+
+    algorithm: str
+    step: float  # first step of local algorithms
+    tolerance: float  # step below which local algorithms stop
+    max_calls: int
+
+
 def seed_nlopt(seed: int) -> None:
-    """Seeds NLopt's random numbers. They are the whole process's: once, before the first algorithm draws."""
+    """Seed NLopt's random numbers, which are shared by the whole process."""
     import nlopt
 
     nlopt.srand(seed)
 
 
 def run_nlopt(
-    function: Callable[[np.ndarray], float],
-    start: np.ndarray,
-    algorithm: str,
-    *,
-    step: float,
-    tolerance: float,
-    most: int,
+    function: Callable[[np.ndarray], float], start: np.ndarray, settings: NloptSettings
 ) -> None:
-    """Maximise function(point (d,) in [0, 1]) -> finite float from `start`, with at most `most` calls or so.
+    """Maximise function(point (d,)) -> finite float over the unit cube, beginning at `start`.
 
-    step, tolerance: first step and least step of local algorithms, in shares of the bounds. The function keeps its own
-    record: what NLopt returns is never looked at. Raises what the function raises, unchanged, and InputError for an
-    algorithm that cannot search so many parameters.
+    The function must keep its own record of points and values: NLopt's result is not used.
+
+    Raises:
+        InputError: the algorithm cannot search this number of parameters. Errors of the function
+            pass unchanged.
     """
     import nlopt
 
-    kept: list[BaseException] = []
+    errors: list[BaseException] = []
 
     def callback(x: np.ndarray, gradient: np.ndarray) -> float:
-        # An exception that crosses NLopt can turn into SystemError: keep it, stop, raise it outside.
-        # After force_stop some algorithms still ask for a few points; any finite answer does.
-        if kept:
+        # An exception that crosses NLopt can become a SystemError, so it is stored, the search is
+        # stopped and the exception is raised outside. Some algorithms ask for a few more points
+        # after force_stop; any finite answer will do.
+        if errors:
             return 0.0
         try:
-            # A copy, for x is NLopt's own reused view; clipped, for BOBYQA can leave the bounds by rounding.
+            # A copy, because x is a view that NLopt reuses; clipped, because BOBYQA can leave the
+            # bounds by rounding.
             return -float(function(np.clip(np.array(x, dtype=float), 0.0, 1.0)))
         except BaseException as error:
-            kept.append(error)
+            errors.append(error)
             optimizer.force_stop()
             return 0.0
 
-    optimizer = _optimizer(algorithm, len(start), step, tolerance, most)
+    optimizer = _make_optimizer(len(start), settings)
     optimizer.set_min_objective(callback)
     try:
         optimizer.optimize(start)
     except (nlopt.ForcedStop, nlopt.RoundoffLimited):
         pass
-    except (
-        Exception
-    ) as error:  # NLopt's own exceptions share no base class from one version to the next
-        if not kept:
+    except Exception as error:  # NLopt's exceptions have no common base class across versions
+        if not errors:
             raise InputError(
-                f"optimizer.algorithm: NLopt's {algorithm} cannot search {len(start)} parameter(s) "
-                f'({error or type(error).__name__}); choose "auto"'
+                f"optimizer.algorithm: NLopt's {settings.algorithm} cannot search {len(start)} "
+                f'parameter(s) ({error or type(error).__name__}); choose "auto"'
             ) from None
-    if kept:
-        raise kept[0]
+    if errors:
+        raise errors[0]
 
 
-def _optimizer(algorithm: str, count: int, step: float, tolerance: float, most: int) -> Any:
+def _make_optimizer(count: int, settings: NloptSettings) -> Any:
     import nlopt
 
-    # Any MLSL name takes the local search it is given only under the G_ name.
-    name = algorithm.replace("GN_MLSL", "G_MLSL")
+    # An MLSL algorithm accepts a local optimiser only under its name with G_.
+    name = settings.algorithm.replace("GN_MLSL", "G_MLSL")
     optimizer = nlopt.opt(getattr(nlopt, name), count)
     optimizer.set_lower_bounds(np.zeros(count))
     optimizer.set_upper_bounds(np.ones(count))
-    optimizer.set_maxeval(most)
+    optimizer.set_maxeval(settings.max_calls)
+    local = optimizer
     if name.startswith("G_MLSL"):
-        inner = nlopt.opt(getattr(nlopt, LOCAL), count)
-        inner.set_initial_step(step)
-        inner.set_xtol_abs(tolerance)
-        optimizer.set_local_optimizer(inner)
-    elif name.startswith("LN_"):
-        optimizer.set_initial_step(step)
-        optimizer.set_xtol_abs(tolerance)
+        local = nlopt.opt(getattr(nlopt, LOCAL), count)
+    if local is not optimizer or name.startswith("LN_"):
+        local.set_initial_step(settings.step)
+        local.set_xtol_abs(settings.tolerance)
+    if local is not optimizer:
+        optimizer.set_local_optimizer(local)
     return optimizer

@@ -1,187 +1,168 @@
-"""Where to look next: phases one after another on one budget, by NLopt on the scores or on a model of them."""
+"""The phases of a search: one algorithm after another on one budget."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from chamberopt.optimize.search.acquisition import propose_point
-from chamberopt.optimize.search.gaussian_process import MOST_POINTS, GaussianProcess
-from chamberopt.optimize.search.nlopt_search import LOCAL, run_nlopt, seed_nlopt
+from chamberopt.optimize.search.gaussian_process import MAX_POINTS, GaussianProcess
+from chamberopt.optimize.search.nlopt_search import LOCAL, NloptSettings, run_nlopt, seed_nlopt
+from chamberopt.optimize.search.stopping import BudgetSpentError, Score, ScoredPoints
 
-# Phases that are not NLopt algorithms: points evenly over the bounds, and a model on which NLopt climbs.
+# Two phases are not algorithms of NLopt: evenly spread points, and the model of the scores.
 SPREAD, MODEL = "sobol", "surrogate"
 AUTO = (SPREAD, MODEL, LOCAL)
-# Of two objectives, where no single score rises: each step of the model weighs them anew.
+# For two objectives there is no single score to climb; each step of the model weights them anew.
 PARETO_PHASES = ((SPREAD, 0.3), (MODEL, 0.7))
-# "auto" spreads this share of the budget, or two points per parameter and two more where that is more, and then
-# follows the model; BOBYQA takes over where there are more points than a model can hold. benchmarks/optimizers.py.
+# "auto" spreads this share of the budget, or two points per parameter plus two if that is more,
+# and then follows the model. BOBYQA takes over where there are more points than the model can
+# hold. Measured in benchmarks/optimizers.py.
 SPREAD_SHARE, SPREAD_PER_PARAMETER = 0.3, 2
-# Every so many steps the model is taken to be rougher than it seems, its length scales this times the fitted: it may
-# have missed a peak between its points.
-DOUBT_EVERY, ROUGH = 4, 0.5
-# First steps of the local searches, in shares of the bounds, one after another from the best so far.
-STEP = 0.15
-SMALLER = (1.0, 0.5, 0.25)
-# A step this small, in shares of the bounds, moves a simulated score less than its noise.
+# The model may have missed a peak between its points. Every 4th step therefore assumes half the
+# fitted length scales, so that the model is less certain away from its points.
+ROUGH_STEP_INTERVAL, ROUGH_LENGTH_FACTOR = 4, 0.5
+# A step this small moves a simulated score less than its noise does.
 TOLERANCE = 0.02
+# First steps of the local searches from the best point so far, as factors of the initial step.
+LOCAL_STEP_FACTORS = (1.0, 0.5, 0.25)
 
-Seen = Callable[[], tuple[np.ndarray, np.ndarray]]
-"""Scores (n,) and their variances (n,) of the points judged so far, in order, as the model is to learn them."""
+ModelData = Callable[[], tuple[np.ndarray, np.ndarray]]
+"""Returns scores (n,) and their variances (n,) at the points so far, as the model learns them."""
+
+
+@dataclass(frozen=True)
+class SearchSettings:
+    """How to search.
+
+    Args:
+        algorithm: "auto", "sobol", "surrogate" or an algorithm of NLopt.
+        budget: number of points to score, the start included.
+        seed: seed of the search's random numbers.
+        initial_step: first step of local algorithms, as a share of the bounds.
+        tolerance: step below which local algorithms stop, as a share of the bounds.
+        phases: (algorithm, share of the budget) one after another, instead of `algorithm`. The
+            last phase gets what the others leave.
+    """
+
+    algorithm: str
+    budget: int
+    seed: int
+    initial_step: float = 0.15
+    tolerance: float = TOLERANCE
+    phases: tuple[tuple[str, float], ...] = ()
 
 
 def maximise(
-    score: Callable[[np.ndarray], float],
-    start: np.ndarray,
-    algorithm: str,
-    budget: int,
-    seed: int,
-    *,
-    step: float = STEP,
-    tolerance: float = TOLERANCE,
-    phases: Sequence[tuple[str, float]] = (),
-    seen: Seen | None = None,
+    score: Score, start: np.ndarray, settings: SearchSettings, model_data: ModelData | None = None
 ) -> str:
-    """Maximise over the unit cube with `budget` calls of `score`, the first at `start`; says which phases ran.
+    """Maximise a score over the unit cube, beginning at `start`.
 
-    score(point (n,)) -> finite float is called once per different point and keeps its own record: NLopt's
-    return value is never looked at. algorithm: "auto" or a phase; phases, in its place: several, with their shares of
-    the budget, the last has what the others leave. step, tolerance: of local algorithms, in shares of the bounds.
-    seen: what the model learns from; absent: the scores, their noise unknown. The same seed and the same answers make
-    the same search.
+    The function `score` is called once per different point and keeps its own record; the same seed
+    and the same scores give the same search. stopping.py lists the reasons to stop.
 
-    Raises InputError for an algorithm that cannot take these parameters, and whatever `score` raises.
+    Args:
+        start: first point, shape (d,).
+        model_data: what the model learns; by default the scores, with unknown noise.
+    Returns:
+        The phases that ran, e.g. "sobol, then surrogate".
+    Raises:
+        InputError: an algorithm cannot take these parameters. Errors of `score` pass unchanged.
     """
-    search = _Search(score, start, budget, seed, step, tolerance, seen)
+    search = _Search(score, start, settings, model_data)
     try:
-        search.judge(start)
-        if phases:
-            ends = np.cumsum([share for _, share in phases]).tolist()
-            plan = list(zip([name for name, _ in phases], [*ends[:-1], 1.0], strict=True))
-        else:
-            plan = search.auto_plan() if algorithm == "auto" else [(algorithm, 1.0)]
-        for phase, end in plan:
-            search.run(phase, max(1, round(end * budget)))
-        if algorithm == "auto" and not phases:
-            search.search_and_confirm(LOCAL)
-    except _BudgetSpentError:
+        search.scored.score(start)
+        for phase, end in search.plan():
+            search.run(phase, max(1, round(end * settings.budget)))
+        if settings.algorithm == "auto" and not settings.phases:
+            search.repeat_local_search()
+    except BudgetSpentError:
         pass
-    return ", then ".join(search.ran) or "none"
-
-
-class _BudgetSpentError(Exception):
-    """Ends a phase or the search from inside an algorithm."""
+    return ", then ".join(search.phases_run) or "none"
 
 
 class _Search:
-    """The points judged and what is left of the budget; a point seen before costs nothing."""
+    """A search under way."""
 
     def __init__(
         self,
-        score: Callable[[np.ndarray], float],
+        score: Score,
         start: np.ndarray,
-        budget: int,
-        seed: int,
-        step: float,
-        tolerance: float,
-        seen: Seen | None,
+        settings: SearchSettings,
+        model_data: ModelData | None,
     ) -> None:
-        self._score, self._start, self._budget, self._seed = score, start, budget, seed
-        self._step, self._tolerance = step, tolerance
-        self._seen = seen or (
-            lambda: (np.array(list(self.scores.values())), np.zeros(len(self.scores)))
-        )
-        self.scores: dict[bytes, float] = {}  # by the point's exact bytes
-        self.points: list[np.ndarray] = []
-        self.ran: list[str] = []
-        self._best, self._best_score = start, -np.inf
-        self._rng = np.random.default_rng(seed)
-        seed_nlopt(seed)
+        self._start, self._settings = start, settings
+        self.scored = ScoredPoints(score, start, settings.budget)
+        self._model_data = model_data or (lambda: (self.scored.scores, np.zeros(len(self.scored))))
+        self.phases_run: list[str] = []
+        self._rng = np.random.default_rng(settings.seed)
+        seed_nlopt(settings.seed)
 
-    def auto_plan(self) -> list[tuple[str, float]]:
-        """The phases of "auto", and how far into the budget each goes."""
-        modelled = min(self._budget, MOST_POINTS)
+    def plan(self) -> list[tuple[str, float]]:
+        """The phases, and the share of the budget at which each ends."""
+        phases, budget = self._settings.phases, self._settings.budget
+        if phases:
+            ends = np.cumsum([share for _, share in phases]).tolist()
+            return list(zip([name for name, _ in phases], [*ends[:-1], 1.0], strict=True))
+        if self._settings.algorithm != "auto":
+            return [(self._settings.algorithm, 1.0)]
+        modelled = min(budget, MAX_POINTS)
         spread = max(SPREAD_SHARE * modelled, SPREAD_PER_PARAMETER * len(self._start) + 2)
-        ends = (spread, modelled, self._budget)
-        return [
-            (phase, min(1.0, end / self._budget)) for phase, end in zip(AUTO, ends, strict=True)
-        ]
+        counts = (spread, modelled, budget)
+        return [(phase, min(1.0, n / budget)) for phase, n in zip(AUTO, counts, strict=True)]
 
-    def run(self, phase: str, stop_at: int) -> None:
-        """One phase, until it converges or so many points are judged."""
-        if len(self.scores) >= min(stop_at, self._budget):
+    def run(self, phase: str, limit: int) -> None:
+        """Run one phase until it converges or there are `limit` points."""
+        limit = min(limit, self._settings.budget)
+        if len(self.scored) >= limit:
             return
-        self.ran.append(phase)
+        self.phases_run.append(phase)
         if phase == SPREAD:
-            self._spread(stop_at)
+            self._spread(limit)
         elif phase == MODEL:
-            self._follow_model(stop_at)
+            self._follow_model(limit)
         else:
-            self._climb(phase, stop_at, self._step)
+            self._search_with_nlopt(phase, limit, self._settings.initial_step)
 
-    def search_and_confirm(self, algorithm: str) -> None:
-        """Rounds of local searches with ever smaller steps, until the budget or no new point comes."""
-        spent = 0
-        while spent < len(self.scores):
-            spent = len(self.scores)
-            for smaller in SMALLER:
-                self._climb(algorithm, self._budget, smaller * self._step)
+    def repeat_local_search(self) -> None:
+        """Repeat rounds of local searches with smaller steps until a round finds no new point."""
+        before = 0
+        while before < len(self.scored):
+            before = len(self.scored)
+            for factor in LOCAL_STEP_FACTORS:
+                step = factor * self._settings.initial_step
+                self._search_with_nlopt(LOCAL, self._settings.budget, step)
 
-    def _spread(self, stop_at: int) -> None:
+    def _spread(self, limit: int) -> None:
         from scipy.stats.qmc import Sobol
 
-        wanted = min(stop_at, self._budget) - len(self.scores)
-        for point in Sobol(len(self._start), seed=self._seed).random_base2(
-            max(1, (wanted - 1).bit_length())
-        )[:wanted]:
-            self.judge(point)
+        wanted = limit - len(self.scored)
+        exponent = max(1, (wanted - 1).bit_length())
+        sobol = Sobol(len(self._start), seed=self._settings.seed)
+        for point in sobol.random_base2(exponent)[:wanted]:
+            self.scored.score(point)
 
-    def _follow_model(self, stop_at: int) -> None:
-        while len(self.scores) < min(stop_at, self._budget):
-            scores, variances = self._seen()
-            if np.ptp(scores) == 0.0:  # nothing to learn from
-                self.judge(self._rng.random(len(self._start)))
+    def _follow_model(self, limit: int) -> None:
+        while len(self.scored) < limit:
+            scores, variances = self._model_data()
+            if np.ptp(scores) == 0.0:  # equal scores give the model nothing to learn
+                self.scored.score(self._rng.random(len(self._start)))
                 continue
-            rough = ROUGH if len(self.points) % DOUBT_EVERY == 0 else 1.0
-            self.judge(
-                propose_point(
-                    GaussianProcess(np.array(self.points), scores, variances, rough), self._rng
-                )
-            )
+            points = self.scored.points
+            is_rough = len(points) % ROUGH_STEP_INTERVAL == 0
+            factor = ROUGH_LENGTH_FACTOR if is_rough else 1.0
+            model = GaussianProcess(np.array(points), scores, variances, factor)
+            self.scored.score(propose_point(model, self._rng))
 
-    def _climb(self, algorithm: str, stop_at: int, step: float) -> None:
-        def within(point: np.ndarray) -> float:
-            if len(self.scores) >= stop_at and point.tobytes() not in self.scores:
-                raise _BudgetSpentError
-            return self.judge(point)
-
+    def _search_with_nlopt(self, algorithm: str, limit: int, step: float) -> None:
+        # Some algorithms keep asking for points that have scores already: 100 calls per point of
+        # the budget end them.
+        max_calls = 100 * self._settings.budget
+        settings = NloptSettings(algorithm, step, self._settings.tolerance, max_calls)
         try:
-            # `most`: a safety net for algorithms that keep asking for points already seen.
-            run_nlopt(
-                within,
-                self._best,
-                algorithm,
-                step=step,
-                tolerance=self._tolerance,
-                most=100 * self._budget,
-            )
-        except _BudgetSpentError:
-            if stop_at >= self._budget:
+            run_nlopt(lambda point: self.scored.score(point, limit), self.scored.best, settings)
+        except BudgetSpentError:
+            if limit >= self._settings.budget:
                 raise
-
-    def judge(self, point: np.ndarray) -> float:
-        """The score of a point, asked for once."""
-        key = point.tobytes()
-        if key not in self.scores:
-            if len(self.scores) >= self._budget:
-                raise _BudgetSpentError
-            self.points.append(point)
-            try:
-                self.scores[key] = float(self._score(point))
-            except BaseException:
-                self.points.pop()
-                raise
-            if self.scores[key] > self._best_score:
-                self._best, self._best_score = point, self.scores[key]
-        return self.scores[key]

@@ -1,4 +1,4 @@
-"""One writer to a folder: a second process is told who the first one is."""
+"""One writer to a folder: a second process is told which process holds it."""
 
 import os
 import platform
@@ -15,10 +15,13 @@ HOLDER = ".lock-holder"
 
 @contextmanager
 def only_writer(folder: Path) -> Iterator[None]:
-    """Holds the folder for the time of a `with` block. Raises InputError when another process does.
+    """Hold the folder during a `with` block.
 
-    The lock is the operating system's and ends with its process, however that ends: nothing is left to clear away.
-    (A forked child shares it until both have ended: workers are spawned.)
+    The lock belongs to the operating system and ends with its process, however that ends, so no
+    lock is left behind. A forked child would share it until both have ended; workers are spawned.
+
+    Raises:
+        InputError: another process holds the folder.
     """
     from filelock import FileLock, Timeout
 
@@ -26,12 +29,17 @@ def only_writer(folder: Path) -> Iterator[None]:
     try:
         lock.acquire(timeout=0)
     except Timeout:
+        try:
+            name = holder.read_text(encoding="utf-8")
+        except (OSError, ValueError):
+            name = "another process"
         raise InputError(
-            f"{folder}: {_said(holder)}; wait until it ends, or give another folder (--out)"
+            f"{folder}: is being written by {name}; wait until it ends, or give another folder "
+            "(--out)"
         ) from None
     try:
         since = datetime.now().astimezone().isoformat(sep=" ", timespec="seconds")
-        with suppress(OSError):  # a full disk is said by what needs it more
+        with suppress(OSError):  # a full disk is reported by the files that matter
             holder.write_text(
                 f"process {os.getpid()} on {platform.node()} since {since}", encoding="utf-8"
             )
@@ -40,10 +48,3 @@ def only_writer(folder: Path) -> Iterator[None]:
         with suppress(OSError):
             holder.unlink(missing_ok=True)
         lock.release()
-
-
-def _said(holder: Path) -> str:
-    try:
-        return f"is being written by {holder.read_text(encoding='utf-8')}"
-    except (OSError, ValueError):
-        return "is being written by another process"

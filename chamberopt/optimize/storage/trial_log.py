@@ -1,6 +1,7 @@
-"""The study's diary: one row per evaluation, on disk before the next begins; what it took in seconds stands apart.
+"""Append-only trial log: one row for each evaluation, on the disk before the next one begins.
 
-Two runs of one study leave the same history.jsonl, byte for byte; only timings.jsonl differs.
+Two runs of one study write the same history.jsonl, byte for byte; run times are kept in a separate
+file, timings.jsonl.
 """
 
 import csv
@@ -24,12 +25,17 @@ TIMINGS = "timings.jsonl"
 
 @dataclass(frozen=True)
 class Trial:
-    """One candidate as it was judged.
+    """One evaluated candidate.
 
-    stage: "search", "confirm" or "sweep" · point: in shares of the bounds · parameters: in the file's units, by dotted
-    name · goals: every objective of the study, empty when the evaluation failed · metrics: without their pseudo-values
-    · penalty: of the constraints, relative to their limits · score: what the optimiser saw, the first objective less
-    penalties · reason: why it is not feasible, else "".
+    Attributes:
+        stage: "search", "confirm" or "sweep".
+        point: place in the unit cube, see study/parameters.py.
+        parameters: values in the units of the file, by dotted name.
+        goals: estimate of each objective of the study; empty when the evaluation failed.
+        metrics: estimates without their pseudo-values.
+        penalty: violation of the constraints, relative to their limits.
+        score: what the search maximises: the first objective less penalties.
+        reason: why the candidate is not feasible, else "".
     """
 
     number: int
@@ -49,36 +55,45 @@ class Trial:
         return self.goals[0] if self.goals else None
 
     def row(self) -> dict[str, Any]:
-        """The trial as plain JSON values; numbers as Python prints them, which reads back to the same bits."""
+        """The trial as plain JSON values, which read back to the same bits."""
+        objective = self.objective
         return {
             "number": self.number,
             "stage": self.stage,
             "point": list(self.point),
             "parameters": self.parameters,
-            **(
-                _plain(self.objective)
-                if self.objective
-                else {"objective": None, "half_width": None}
-            ),
-            "replicas": len(self.objective.pseudovalues) if self.objective else None,
-            "goals": [_whole(goal) for goal in self.goals],
+            "objective": _finite(objective.value) if objective else None,
+            "half_width": _finite(objective.half_width) if objective else None,
+            "replicas": len(objective.pseudovalues) if objective else None,
+            # Pseudo-values tell a model of the search how uncertain each score is.
+            "goals": [
+                {**_as_json(one), "pseudovalues": list(one.pseudovalues), "bias": one.bias}
+                for one in self.goals
+            ],
             "penalty": self.penalty,
             "score": self.score,
             "feasible": self.feasible,
             "reason": self.reason,
-            "metrics": {name: _plain(metric, "value") for name, metric in self.metrics.items()},
+            "metrics": {name: _as_json(metric) for name, metric in self.metrics.items()},
         }
 
     @classmethod
     def from_row(cls, row: Mapping[str, Any]) -> Self:
-        """The trial of a row. Raises KeyError, TypeError, ValueError or AttributeError for what is none."""
+        """The trial of a row.
+
+        Raises:
+            KeyError, TypeError, ValueError or AttributeError: the row is not a trial.
+        """
         return cls(
             number=int(row["number"]),
             stage=str(row["stage"]),
             point=tuple(float(share) for share in row["point"]),
             parameters={name: float(value) for name, value in row["parameters"].items()},
-            goals=tuple(_goal(goal) for goal in row["goals"]),
-            metrics={name: _estimate(metric, "value") for name, metric in row["metrics"].items()},
+            goals=tuple(
+                _estimate(one, tuple(float(x) for x in one["pseudovalues"]), float(one["bias"]))
+                for one in row["goals"]
+            ),
+            metrics={name: _estimate(metric) for name, metric in row["metrics"].items()},
             penalty=float(row["penalty"]),
             score=float(row["score"]),
             feasible=bool(row["feasible"]),
@@ -86,50 +101,43 @@ class Trial:
         )
 
 
-def _plain(estimate: Estimate, name: str = "objective") -> dict[str, float | None]:
-    """JSON knows neither infinity, a half-width that is not known, nor NaN: both are null."""
-    named = {name: estimate.value, "half_width": estimate.half_width}
-    return {key: value if math.isfinite(value) else None for key, value in named.items()}
+def _as_json(estimate: Estimate) -> dict[str, float | None]:
+    return {"value": _finite(estimate.value), "half_width": _finite(estimate.half_width)}
 
 
-def _whole(estimate: Estimate) -> dict[str, Any]:
-    """With pseudo-values, from which a model of the search learns how sure it is."""
-    return {
-        **_plain(estimate, "value"),
-        "pseudovalues": list(estimate.pseudovalues),
-        "bias": estimate.bias,
-    }
+def _finite(number: float) -> float | None:
+    """None for NaN and for the infinite half-width of a single replica: JSON has neither."""
+    return number if math.isfinite(number) else None
 
 
-def _goal(row: Mapping[str, Any]) -> Estimate:
-    bare = _estimate(row, "value")
-    return Estimate(
-        bare.value,
-        bare.half_width,
-        tuple(float(x) for x in row["pseudovalues"]),
-        float(row["bias"]),
-    )
-
-
-def _estimate(row: Mapping[str, Any], name: str) -> Estimate:
-    value, half_width = row[name], row["half_width"]
+def _estimate(
+    row: Mapping[str, Any], pseudovalues: tuple[float, ...] = (), bias: float = 0.0
+) -> Estimate:
+    value, half_width = row["value"], row["half_width"]
     return Estimate(
         math.nan if value is None else float(value),
         math.inf if half_width is None else float(half_width),
+        pseudovalues,
+        bias,
     )
 
 
 class JsonLines:
-    """Rows of JSON, one a line, in a file that only grows: each is on the disk before `append` returns.
+    """A file of JSON rows, one in each line, that only grows.
 
-    lasting: even through a power cut, which costs milliseconds a row.
+    Args:
+        survives_power_cut: force each row to the disk, which takes milliseconds.
     """
 
-    def __init__(self, path: Path, lasting: bool = True) -> None:
-        self.path, self._lasting = path, lasting
+    def __init__(self, path: Path, survives_power_cut: bool = True) -> None:
+        self.path, self._survives_power_cut = path, survives_power_cut
 
     def append(self, row: Mapping[str, Any]) -> None:
-        """Raises OSError where the row cannot be written, a full disk say: the file is then as it was before."""
+        """Write a row.
+
+        Raises:
+            OSError: the row cannot be written, e.g. to a full disk; the file is unchanged.
+        """
         line = (json.dumps(row, allow_nan=False) + "\n").encode()
         created = not self.path.exists()
         with open(self.path, "ab", buffering=0) as file:
@@ -137,33 +145,37 @@ class JsonLines:
             try:
                 while line:
                     line = line[file.write(line) :]
-                if self._lasting:
+                if self._survives_power_cut:
                     os.fsync(file.fileno())
             except OSError as error:
                 with suppress(OSError):
                     os.ftruncate(file.fileno(), length)
                 raise OSError(error.errno, error.strerror, str(self.path)) from error
-        if created and self._lasting:
+        if created and self._survives_power_cut:
             sync_folder(self.path.parent)
 
     def rows(self) -> list[dict[str, Any]]:
-        """Every row, in order, without a last line torn by a crash. InputError names a row that is damaged."""
+        """All rows in order, without a last line that a crash cut off.
+
+        Raises:
+            InputError: a row is damaged, or the file cannot be read.
+        """
         return self._read()[0]
 
     def repair(self) -> None:
-        """Cut off a last line torn by a crash, so that the next row begins a line of its own."""
+        """Remove a last line that a crash cut off, so that the next row begins a new line."""
         length = self._read()[1]
         if self.path.exists() and self.path.stat().st_size > length:
             os.truncate(self.path, length)
 
     def damaged(self, line: int) -> InputError:
-        """What to raise about a row, counted from 1."""
+        """The error for a damaged line; lines are counted from 1."""
         return InputError(
             f"{self.path}:{line}: damaged row; restore the file or run the study in a new folder"
         )
 
     def _read(self) -> tuple[list[dict[str, Any]], int]:
-        """The rows, and how many bytes they take."""
+        """The rows, and their length in bytes."""
         try:
             content = self.path.read_bytes()
         except FileNotFoundError:
@@ -172,7 +184,7 @@ class JsonLines:
             raise InputError(
                 f"{self.path}: cannot be read: {error.strerror}; check its permissions"
             ) from None
-        *lines, torn = content.split(b"\n")  # a row counts when its line is ended
+        *lines, incomplete = content.split(b"\n")  # a row counts once its line has ended
         rows = []
         for number, line in enumerate(lines, start=1):
             try:
@@ -182,44 +194,43 @@ class JsonLines:
             if not isinstance(row, dict):
                 raise self.damaged(number)
             rows.append(row)
-        return rows, len(content) - len(torn)
+        return rows, len(content) - len(incomplete)
 
 
 def read_trials(folder: Path) -> list[dict[str, Any]]:
-    """Every row of a study's history, in order, with its seconds where they are known."""
+    """All rows of a study's trial log in order, each with its seconds, or None where unknown."""
     path = folder / HISTORY
     if not path.is_file():
         raise InputError(f"{path}: is not there; give a study's results folder")
     seconds = read_seconds(folder)
-    return [
-        {**row, "seconds": seconds.get(number)} for number, row in enumerate(JsonLines(path).rows())
-    ]
+    rows = JsonLines(path).rows()
+    return [{**row, "seconds": seconds.get(number)} for number, row in enumerate(rows)]
 
 
 def read_seconds(folder: Path) -> dict[int, float]:
-    """Seconds of wall clock that each evaluation took, by its number."""
-    return {
-        row.get("number", -1): row.get("seconds", 0.0) for row in JsonLines(folder / TIMINGS).rows()
-    }
+    """Wall-clock time of each evaluation [s], by its number."""
+    rows = JsonLines(folder / TIMINGS).rows()
+    return {row.get("number", -1): row.get("seconds", 0.0) for row in rows}
 
 
 def trials_as_csv(rows: list[dict[str, Any]]) -> str:
-    """The history as a table: a column per parameter and metric, NAME_pm for the half-width of NAME."""
-    flat = []
+    """The trial log as a table.
+
+    It has a column for each parameter and metric; NAME_pm is the half-width of NAME.
+    """
+    lines = []
     for row in rows:
         line = {key: row[key] for key in ("number", "stage")}
         line |= row["parameters"]
-        line |= {
-            key: row[key]
-            for key in ("objective", "half_width", "score", "feasible", "reason", "seconds")
-        }
+        for key in ("objective", "half_width", "score", "feasible", "reason", "seconds"):
+            line[key] = row[key]
         for name, metric in row["metrics"].items():
             line |= {name: metric["value"], f"{name}_pm": metric["half_width"]}
-        flat.append(line)
-    # A failed evaluation has no metrics: the columns are those of all rows together.
-    columns = list(dict.fromkeys(name for line in flat for name in line))
+        lines.append(line)
+    # A failed evaluation has no metrics, so the columns are those of all rows together.
+    columns = list(dict.fromkeys(name for line in lines for name in line))
     text = io.StringIO()
     table = csv.DictWriter(text, columns, lineterminator="\n")
     table.writeheader()
-    table.writerows(flat)
+    table.writerows(lines)
     return text.getvalue()

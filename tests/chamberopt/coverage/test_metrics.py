@@ -1,5 +1,6 @@
 """Averages over the exposed target, weighted with area, on parts of a few triangles."""
 
+import math
 from dataclasses import replace
 
 import numpy as np

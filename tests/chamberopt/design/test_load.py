@@ -2,6 +2,7 @@
 
 import math
 import shutil
+import typing
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,8 @@ from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
 from chamberopt.design.load import Design, load_design, save_design
 from chamberopt.design.materials import SHOT_DENSITY
-from chamberopt.optimize.load_study import load, load_study
-from chamberopt.optimize.study import Limits, Study
+from chamberopt.optimize.study import Limits, Study, load, load_study
+from chamberopt.optimize.study.schema import Algorithm
 
 ROOT = Path(__file__).resolve().parents[3]
 DESIGNS = sorted((ROOT / "designs").glob("*.toml"))
@@ -604,7 +605,7 @@ class TestStudies:
 
     def test_the_old_table_draft_names_its_new_name(self, study_file: Path) -> None:
         said = edited(study_file, ("[vary]", "[draft]\nfacets = 32\n[vary]"))
-        assert ":2: draft: renamed; write [search_accuracy] instead of [draft]" in said
+        assert ":2: draft: is now called 'search_accuracy'; rename it" in said
 
     def test_study_and_its_design_at_once(self, study_file: Path) -> None:
         design_file = study_file.with_name("design.toml")
@@ -621,11 +622,7 @@ class TestStudies:
             load_study(study_file.with_name("design.toml"))
 
     def test_algorithms_are_those_that_nlopt_has(self) -> None:
-        import typing
-
         import nlopt
-
-        from chamberopt.optimize.study import Algorithm
 
         ours = {"auto", "sobol", "surrogate"}
         assert ours < set(typing.get_args(Algorithm))
@@ -654,7 +651,7 @@ class TestStudies:
                 '[optimizer]\nalgorithm = "LN_BOBYQA"\nphases = [{ algorithm = "sobol" }]',
                 "give one of the two",
             ),
-            ('[optimizer]\nphases = [{ algorithm = "auto" }]', "which is phases itself"),
+            ('[optimizer]\nphases = [{ algorithm = "auto" }]', "which has phases of its own"),
             (
                 '[optimizer]\nphases = [{ algorithm = "sobol" }, { algorithm = "surrogate" }]',
                 "add up to 1 or more",

@@ -13,14 +13,13 @@ from chamberopt.common.files import make_output_folder
 from chamberopt.common.parallel.executor import SerialExecutor, local_executor
 from chamberopt.coverage.metrics import METRICS
 from chamberopt.design.load import load_design
-from chamberopt.optimize.evaluate_candidate import FAILED
-from chamberopt.optimize.load_study import load_study
+from chamberopt.optimize.evaluate_candidate import FAILURE_PENALTY
 from chamberopt.optimize.run_study import fixed_target, run_study
 from chamberopt.optimize.search.acquisition import recommend_point
 from chamberopt.optimize.search.gaussian_process import GaussianProcess
-from chamberopt.optimize.search.phases import maximise
+from chamberopt.optimize.search.phases import SearchSettings, maximise
 from chamberopt.optimize.storage.trial_log import read_trials, trials_as_csv
-from chamberopt.optimize.study import Limits, Study
+from chamberopt.optimize.study import Limits, Study, load_study
 from chamberopt.output import viewer
 from chamberopt.output.results.load import load_result
 from chamberopt.output.save_run import save_study
@@ -105,7 +104,7 @@ def test_every_algorithm_improves_and_keeps_its_budget(algorithm: str) -> None:
         return hill(x)
 
     start = np.array([0.4, 0.5, 0.375])
-    maximise(score, start, algorithm, 30, seed=1)
+    maximise(score, start, SearchSettings(algorithm, 30, seed=1))
     np.testing.assert_array_equal(points[0], start)
     assert len(points) <= 30
     assert len({x.tobytes() for x in points}) == len(points)
@@ -115,7 +114,11 @@ def test_every_algorithm_improves_and_keeps_its_budget(algorithm: str) -> None:
 def test_same_seed_same_search() -> None:
     def walk(seed: int) -> list[bytes]:
         points: list[bytes] = []
-        maximise(lambda x: points.append(x.tobytes()) or hill(x), np.full(3, 0.4), "auto", 25, seed)
+        maximise(
+            lambda x: points.append(x.tobytes()) or hill(x),
+            np.full(3, 0.4),
+            SearchSettings("auto", 25, seed),
+        )
         return points
 
     assert walk(3) == walk(3)
@@ -133,7 +136,7 @@ def test_one_parameter(tmp_path: Path) -> None:
 
 def test_what_an_algorithm_cannot_do_is_said() -> None:
     with pytest.raises(InputError, match=r"GN_AGS cannot search 12 parameter.*auto"):
-        maximise(lambda x: -float(x @ x), np.full(12, 0.5), "GN_AGS", 30, seed=1)
+        maximise(lambda x: -float(x @ x), np.full(12, 0.5), SearchSettings("GN_AGS", 30, seed=1))
 
 
 def test_a_candidate_that_cannot_be_built_is_a_penalty_with_a_reason(tmp_path: Path) -> None:
@@ -426,7 +429,7 @@ def test_a_corner_of_the_bounds_that_is_no_design_is_a_penalty_with_the_reason(
     failed = [row for row in rows if row["objective"] is None]
     assert any(why in row["reason"] for row in failed)
     assert all(
-        row["reason"] and not row["feasible"] and row["score"] == rows[0]["score"] - FAILED
+        row["reason"] and not row["feasible"] and row["score"] == rows[0]["score"] - FAILURE_PENALTY
         for row in failed
     )
     assert len([row for row in rows if row["stage"] == "search"]) == 24

@@ -10,10 +10,9 @@ from chamberopt.cli import main
 from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import SerialExecutor, local_executor
 from chamberopt.design.load import load_design
-from chamberopt.optimize.load_study import load_study
 from chamberopt.optimize.run_sweep import plan_sweep, run_sweep
 from chamberopt.optimize.storage.trial_log import read_trials
-from chamberopt.optimize.study import Study
+from chamberopt.optimize.study import Study, load_study
 from chamberopt.output.results.load import load_result
 from chamberopt.output.save_run import save_sweep
 from chamberopt.simulation.evaluation import Evaluation
@@ -70,7 +69,7 @@ def test_sobol_points_are_spread_and_their_seed_is_the_studys() -> None:
         ((2, 2), "--grid, --sobol: both given"),
         ((1, None), "--grid: given 1; give at least 2"),
         ((None, 0), "--sobol: given 0; give at least 1"),
-        ((3, None, 1), "--seed: given 1, but a grid draws nothing"),
+        ((3, None, 1), "--seed: given 1, but a grid is not random"),
         ((None, 4, -1), "--seed: given -1; give 0 or more"),
         (
             (400, None),
@@ -111,7 +110,9 @@ def test_a_failed_candidate_is_a_row_and_the_best_is_the_best_feasible(tmp_path:
 def test_when_all_fail_the_reason_is_said(tmp_path: Path) -> None:
     question = study({"shot.mass_g": (5.0, 10.0)})
     plan = plan_sweep(question, 2, None)
-    with pytest.raises(InputError, match=r"the first for: shot: .* do not fit; change \[vary\]"):
+    with pytest.raises(
+        InputError, match=r"the first because: shot: .* do not fit; change \[vary\]"
+    ):
         run_sweep(
             question,
             type(plan)("grid", 2, plan.points[1:], None),

@@ -11,17 +11,16 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import SerialExecutor
 from chamberopt.coverage.statistics.confidence_interval import Estimate, estimate
 from chamberopt.design.load import load_design
-from chamberopt.optimize.constraints import feasibility_of, shortfall
-from chamberopt.optimize.load_study import load_study
 from chamberopt.optimize.pareto import as_csv, on_front, pareto_points
 from chamberopt.optimize.run_study import run_study
 from chamberopt.optimize.search.acquisition import propose_point
 from chamberopt.optimize.search.gaussian_process import GaussianProcess, pool_variances
-from chamberopt.optimize.search.phases import maximise
+from chamberopt.optimize.search.phases import SearchSettings, maximise
 from chamberopt.optimize.search.scalarisation import scalarise
 from chamberopt.optimize.sensitivity import analyse_sensitivity
 from chamberopt.optimize.storage.trial_log import read_trials
-from chamberopt.optimize.study import Limits, Study
+from chamberopt.optimize.study import Limits, Study, load_study
+from chamberopt.optimize.study.constraints import assess_feasibility, expected_violation
 from chamberopt.output.plots.study import pareto_picture, slices_picture
 from tests.helpers.synthetic import DESIGNS, judged
 
@@ -60,7 +59,9 @@ def test_phases_have_their_shares_and_the_last_what_is_left() -> None:
     points: list[np.ndarray] = []
     phases = [("sobol", 0.4), ("LN_SBPLX", 0.3), ("surrogate", 1.0)]
     ran = maximise(
-        lambda x: points.append(x) or bowl(x), np.full(2, 0.5), "auto", 20, 1, phases=phases
+        lambda x: points.append(x) or bowl(x),
+        np.full(2, 0.5),
+        SearchSettings("auto", 20, 1, phases=phases),
     )
     assert ran == "sobol, then LN_SBPLX, then surrogate"
     assert len(points) == 20
@@ -73,11 +74,13 @@ def test_first_step_and_tolerance_are_in_units_of_the_bounds() -> None:
     def walk(**settings) -> list[np.ndarray]:
         points: list[np.ndarray] = []
         maximise(
-            lambda x: points.append(x) or bowl(x), np.full(2, 0.5), "LN_BOBYQA", 60, 1, **settings
+            lambda x: points.append(x) or bowl(x),
+            np.full(2, 0.5),
+            SearchSettings("LN_BOBYQA", 60, 1, **settings),
         )
         return points
 
-    assert abs(walk(step=0.3)[1] - 0.5).max() == pytest.approx(0.3)
+    assert abs(walk(initial_step=0.3)[1] - 0.5).max() == pytest.approx(0.3)
     assert len(walk(tolerance=0.2)) < len(walk(tolerance=1e-4))
 
 
@@ -120,12 +123,12 @@ def test_spreads_are_pooled() -> None:
 
 def test_a_constraint_is_priced_by_what_is_to_be_expected_beyond_it() -> None:
     limits = Limits(min=0.5)
-    assert shortfall(Estimate(0.4, 0.0), limits) == pytest.approx(0.2)
-    assert shortfall(Estimate(0.6, 0.0), limits) == 0.0
+    assert expected_violation(Estimate(0.4, 0.0), limits) == pytest.approx(0.2)
+    assert expected_violation(Estimate(0.6, 0.0), limits) == 0.0
     # Of a normal figure at its limit: its standard error over sqrt(2 pi).
     at_limit = estimate(0.5 + np.array([-0.1, 0.1, -0.1, 0.1]))
     error = np.std(at_limit.pseudovalues, ddof=1) / 2.0
-    assert shortfall(at_limit, limits) == pytest.approx(error / np.sqrt(2.0 * np.pi) / 0.5)
+    assert expected_violation(at_limit, limits) == pytest.approx(error / np.sqrt(2.0 * np.pi) / 0.5)
 
 
 @pytest.mark.parametrize(
@@ -135,8 +138,10 @@ def test_an_answer_keeps_its_limits_to_the_end_of_the_interval(
     half_width: float, standing: str
 ) -> None:
     constraints = {"mean_coverage": Limits(min=0.5, max=0.9)}
-    assert feasibility_of(constraints, {"mean_coverage": Estimate(0.6, half_width)})[0] == standing
-    said, why = feasibility_of(constraints, {"mean_coverage": Estimate(0.3, 0.1)})
+    assert (
+        assess_feasibility(constraints, {"mean_coverage": Estimate(0.6, half_width)})[0] == standing
+    )
+    said, why = assess_feasibility(constraints, {"mean_coverage": Estimate(0.3, 0.1)})
     assert (said, why) == ("infeasible", "mean_coverage 0.3 ± 0.1 < min 0.5")
 
 

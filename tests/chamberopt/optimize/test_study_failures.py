@@ -17,8 +17,8 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.cli import main
 from chamberopt.cli.interrupt import EARLY, FIRST, SECOND
 from chamberopt.coverage.statistics.confidence_interval import Estimate
-from chamberopt.optimize.evaluate_candidate import FAILED
-from chamberopt.optimize.load_study import load_study
+from chamberopt.optimize.evaluate_candidate import FAILURE_PENALTY
+from chamberopt.optimize.study import load_study
 from chamberopt.output.results.load import load_result
 from tests.helpers.results.resumable_study import calls, history, logged, run, study
 from tests.helpers.synthetic import DESIGNS, plate_design, poisson_evaluation
@@ -131,7 +131,7 @@ def test_no_number_is_no_score(tmp_path: Path) -> None:
     result = run(study(), folder, simulator=simulator)
     assert (result.trials[3].objective, result.trials[3].score) == (
         None,
-        result.trials[0].score - FAILED,
+        result.trials[0].score - FAILURE_PENALTY,
     )
     assert "nan" in result.trials[3].reason
     assert run(study(), folder).trials == result.trials

@@ -47,7 +47,7 @@ def noisy_hill(at: dict[str, float], stream: str, replicas: int | None) -> Evalu
 
 def logged(log: Path) -> Callable:
     """The same, each call first a row of `log`."""
-    calls = JsonLines(log, lasting=False)
+    calls = JsonLines(log, survives_power_cut=False)
 
     def simulator(design: Design, stream: str, replicas: int | None) -> Evaluation:
         at = values(design)

@@ -14,7 +14,7 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError
 from chamberopt.design.load import load_design, save_design
-from chamberopt.optimize.load_study import load_study
+from chamberopt.optimize.study import load_study
 from chamberopt.output import viewer
 from chamberopt.output.compare.comparison import compare
 from chamberopt.output.results.load import load_result

@@ -223,7 +223,7 @@ class TestDamage:
             (
                 4,
                 ('"point": [0.', '"point": [0.9'),
-                r"history\.jsonl:4: recorded is the search of \[0\.9.*but what comes",
+                r"history\.jsonl:4: recorded is the search of \[0\.9.*but the search now",
             ),
             (
                 2,
@@ -249,7 +249,8 @@ class TestDamage:
         rows[2]["score"] += 0.3
         (folder / "history.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
         with pytest.raises(
-            InputError, match=r"history\.jsonl:\d: recorded is .*edited, or another version"
+            InputError,
+            match=r"history\.jsonl:\d: recorded is .*edited, or written by another version",
         ):
             run(study(evaluations=6), folder)
 
@@ -289,6 +290,11 @@ class TestChanges:
     """A record answers one question, asked of one program."""
 
     @pytest.fixture
+    def test_a_folder_of_version_0_1_is_refused(self, tmp_path: Path) -> None:
+        (tmp_path / "asked.json").write_text("{}", encoding="utf-8")
+        with pytest.raises(InputError, match=r"run by version 0\.1.*give another folder"):
+            run(study(), tmp_path)
+
     def folder(self, tmp_path: Path) -> Path:
         """A study stopped after three evaluations."""
         run(study(), tmp_path / "whole")
@@ -305,7 +311,7 @@ class TestChanges:
     def test_of_the_study(self, folder: Path) -> None:
         said = self.refused(study(evaluations=17), folder)
         assert "study.optimizer.evaluations: was 16, is 17" in said
-        assert "restore what it was" in said
+        assert "restore these inputs" in said
         assert "--out" in said
 
     def test_of_the_design(self, folder: Path) -> None:

@@ -1,0 +1,130 @@
+"""Constraints: what the file may ask for, and whether a candidate's estimates meet it."""
+
+import math
+from collections.abc import Mapping
+from typing import Self
+
+from pydantic import BaseModel, Field, model_validator
+
+from chamberopt.common import toml_errors
+from chamberopt.common.errors import InputError
+from chamberopt.common.toml_errors import CrossCheckError, Problem
+from chamberopt.coverage.metrics import METRICS
+from chamberopt.coverage.statistics.confidence_interval import Estimate, student_quantile
+from chamberopt.design.design import Design
+from chamberopt.design.table import STRICT
+
+FEASIBLE, NOT_KNOWN, INFEASIBLE = "feasible", "not known", "infeasible"
+
+
+class Limits(BaseModel):
+    """Range that a metric, or a number of the design, must stay within."""
+
+    model_config = STRICT
+
+    min: float | None = Field(default=None, description="least value allowed")
+    max: float | None = Field(default=None, description="largest value allowed")
+
+    @model_validator(mode="after")
+    def _agree(self) -> Self:
+        if self.min is None and self.max is None:
+            raise CrossCheckError([Problem("", "empty; give min, max or both, e.g. { min = 0.9 }")])
+        if self.min is not None and self.max is not None and self.min > self.max:
+            raise CrossCheckError([Problem("min", f"given {self.min:g}, above max = {self.max:g}")])
+        return self
+
+
+def limit_problems(
+    design: Design, vary: Mapping[str, tuple[float, float]], name: str, limits: Limits
+) -> list[Problem]:
+    """Reasons why a constraint makes no sense: an unknown name, or limits no candidate can meet."""
+    field, numbers = f"constraints.{name}", design.numbers()
+    if name in METRICS:
+        low, high = METRICS[name].lowest, METRICS[name].highest
+    elif name in vary:
+        low, high = vary[name]
+    elif name in numbers:
+        try:
+            low = high = design.value(name)
+        except InputError as error:
+            return [Problem(field, str(error).removeprefix(f"{name}: "))]
+    else:
+        known = (*METRICS, *(numbers if "." in name else ()))
+        return [Problem(field, f"not a metric; {toml_errors.did_you_mean(name, known)}")]
+    within = f"{low:g}" if low == high else f"from {low:g} to {high:g}"
+    change = "change the limit or [vary]" if name in numbers else "change the limit"
+    remedy = f"but it is {within} in every candidate; {change}"
+    problems = []
+    if limits.min is not None and limits.min > high:
+        problems.append(Problem(field, f"given min = {limits.min:g}, {remedy}"))
+    if limits.max is not None and limits.max < low:
+        problems.append(Problem(field, f"given max = {limits.max:g}, {remedy}"))
+    return problems
+
+
+def expected_violation(figure: Estimate, limits: Limits) -> float:
+    """Expected excess of the true value over its limits, relative to the limits.
+
+    The mean of max(0, x - limit) for x normally distributed about the estimate. Even an estimate
+    within its limit has a small penalty if it is uncertain, which keeps the search away from the
+    limit by about its own uncertainty. For an exact number it is the plain excess.
+    """
+    violation = 0.0
+    for limit, excess in _excesses(figure, limits):
+        error = standard_error(figure)
+        if error > 0.0:
+            z = excess / error
+            excess = 0.5 * excess * math.erfc(-z / math.sqrt(2.0)) + error * math.exp(
+                -0.5 * z * z
+            ) / math.sqrt(2.0 * math.pi)
+        violation += max(0.0, excess) / (abs(limit) or 1.0)
+    return violation
+
+
+def describe_violations(name: str, figure: Estimate, limits: Limits) -> list[str]:
+    """The limits that the estimate itself violates, one text for each."""
+    texts = []
+    if limits.min is not None and figure.value < limits.min:
+        texts.append(f"{name} {figure.value:.4g} < min {limits.min:g}")
+    if limits.max is not None and figure.value > limits.max:
+        texts.append(f"{name} {figure.value:.4g} > max {limits.max:g}")
+    return texts
+
+
+def assess_feasibility(
+    constraints: Mapping[str, Limits], figures: Mapping[str, Estimate]
+) -> tuple[str, str]:
+    """Whether the estimates meet all limits, judged by their whole 95 % intervals.
+
+    Returns:
+        FEASIBLE, NOT_KNOWN or INFEASIBLE, and the limits that are, or may be, violated.
+    """
+    feasibility, reasons = FEASIBLE, []
+    for name, limits in constraints.items():
+        figure = figures[name]
+        for limit, excess in _excesses(figure, limits):
+            if excess + figure.half_width <= 0.0:
+                continue
+            is_violated = excess > figure.half_width
+            feasibility = INFEASIBLE if is_violated or feasibility == INFEASIBLE else NOT_KNOWN
+            comparison = f"< min {limit:g}" if limit == limits.min else f"> max {limit:g}"
+            value = f"{name} {figure.value:.4g} ± {figure.half_width:.2g}"
+            reasons.append(f"{value} {'' if is_violated else 'may be '}{comparison}")
+    return feasibility, "; ".join(reasons)
+
+
+def standard_error(figure: Estimate) -> float:
+    """Standard error behind the interval of an estimate; 0 if it is exact or has no interval."""
+    if not 0.0 < figure.half_width < math.inf:
+        return 0.0
+    return figure.half_width / student_quantile(max(1, len(figure.pseudovalues) - 1))
+
+
+def _excesses(figure: Estimate, limits: Limits) -> list[tuple[float, float]]:
+    """Each limit, and how far the estimate lies beyond it; negative within the limit."""
+    excesses = []
+    if limits.min is not None:
+        excesses.append((limits.min, limits.min - figure.value))
+    if limits.max is not None:
+        excesses.append((limits.max, figure.value - limits.max))
+    return excesses

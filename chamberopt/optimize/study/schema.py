@@ -1,0 +1,246 @@
+"""The tables of a study file: what varies, what is maximised, what must hold, and the budget."""
+
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
+
+from pydantic import BaseModel, BeforeValidator, Field, model_validator
+
+from chamberopt.common import toml_errors
+from chamberopt.common.errors import InputError
+from chamberopt.common.toml_errors import CrossCheckError, Problem
+from chamberopt.common.toml_fields import list_field, quantity
+from chamberopt.coverage.metrics import METRICS, OBJECTIVES, RENAMED_OBJECTIVES, renamed_objective
+from chamberopt.design.design import Design
+from chamberopt.design.table import STRICT
+from chamberopt.optimize.study.constraints import Limits, limit_problems
+from chamberopt.optimize.study.parameters import Bounds, bound_problems
+
+
+def _refuse_old_name(name: Any) -> Any:
+    if isinstance(name, str) and name in RENAMED_OBJECTIVES:
+        raise CrossCheckError([Problem("", renamed_objective(name))])
+    return name
+
+
+if TYPE_CHECKING:
+    ObjectiveName = str
+else:
+    ObjectiveName = Annotated[Literal[tuple(OBJECTIVES)], BeforeValidator(_refuse_old_name)]
+
+# NLopt's names without the prefix "NLOPT_", and three of our own: evenly spread points, the model
+# of the scores, and "auto", which is these two one after the other.
+Algorithm = Literal[
+    "auto",
+    "sobol",
+    "surrogate",
+    "GN_DIRECT_L",
+    "GN_DIRECT_L_RAND",
+    "GN_ORIG_DIRECT_L",
+    "GN_MLSL_LDS",
+    "GN_CRS2_LM",
+    "GN_ISRES",
+    "GN_ESCH",
+    "GN_AGS",
+    "LN_BOBYQA",
+    "LN_COBYLA",
+    "LN_SBPLX",
+    "LN_NELDERMEAD",
+    "LN_PRAXIS",
+]
+
+
+class Objective(BaseModel):
+    """What is maximised: one objective by name, a weighted sum, or two at once."""
+
+    model_config = STRICT
+
+    name: ObjectiveName = Field(default="uniform_coverage", description="what is maximised")
+    sum: dict[str, float] = Field(
+        default_factory=dict,
+        description="weighted sum of objectives and metrics, instead of a name",
+        json_schema_extra={
+            "form": "{ NAME = WEIGHT, ... }, e.g. { uniform_coverage = 1.0, time_to_98_s = -0.001 }"
+        },
+    )
+    pareto: Annotated[tuple[ObjectiveName, ObjectiveName], Field(strict=False)] | None = list_field(
+        'two names, e.g. ["uniform_coverage", "minus_time_to_98_s"]',
+        "two objectives at once, instead of a name",
+        None,
+    )
+
+    @model_validator(mode="after")
+    def _agree(self) -> Self:
+        names = (*OBJECTIVES, *METRICS)
+        problems = [
+            Problem(
+                f"sum.{name}",
+                renamed_objective(name)
+                if name in RENAMED_OBJECTIVES
+                else f"not an objective or a metric; {toml_errors.did_you_mean(name, names)}",
+            )
+            for name in self.sum
+            if name not in names
+        ]
+        if self.sum and not any(self.sum.values()):
+            problems.append(Problem("sum", "all weights are 0; give one another value"))
+        if self.pareto and self.pareto[0] == self.pareto[1]:
+            problems.append(
+                Problem("pareto", f"given {self.pareto[0]} twice; give two different objectives")
+            )
+        given = [self.name != "uniform_coverage", bool(self.sum), self.pareto is not None]
+        if given.count(True) > 1:
+            problems.append(Problem("", "more than one of name, sum and pareto; give one"))
+        if problems:
+            raise CrossCheckError(problems)
+        return self
+
+    @property
+    def goals(self) -> tuple[str, ...]:
+        """The objectives, as coverage.metrics.parse_objective takes them; two for a Pareto front."""
+        if self.sum:
+            return (" + ".join(f"{weight:.10g} {name}" for name, weight in self.sum.items()),)
+        return self.pareto or (self.name,)
+
+
+class Phase(BaseModel):
+    """A part of a search with one algorithm."""
+
+    model_config = STRICT
+
+    algorithm: Algorithm = Field(
+        description='"sobol", "surrogate" or an NLopt name without its prefix'
+    )
+    share: float = quantity(
+        0.001, 1, "of the evaluations", "the last phase gets what the others leave", 1.0
+    )
+
+    @model_validator(mode="after")
+    def _agree(self) -> Self:
+        if self.algorithm == "auto":
+            text = 'given "auto", which has phases of its own; leave phases out'
+            raise CrossCheckError([Problem("algorithm", text)])
+        return self
+
+
+class Optimizer(BaseModel):
+    """How the best design is searched for, and with which budget."""
+
+    model_config = STRICT
+
+    algorithm: Algorithm = Field(
+        default="auto", description="auto, sobol, surrogate, or an NLopt name without prefix"
+    )
+    phases: Annotated[tuple[Phase, ...], Field(strict=False)] = list_field(
+        "a table [[optimizer.phases]] each",
+        "several algorithms one after another, instead of one",
+        (),
+    )
+    initial_step: float = quantity(
+        0.001, 1, "of the bounds", "first step of local algorithms", 0.15
+    )
+    tolerance: float = quantity(
+        1e-6, 0.5, "of the bounds", "step below which local algorithms stop", 0.02
+    )
+    evaluations: int = Field(
+        default=40, ge=2, le=1000000, description="candidates that the search simulates"
+    )
+    seed: int = Field(
+        default=1, ge=0, le=2**31 - 1, description="seed of the search's own random numbers"
+    )
+    confirm: int = Field(
+        default=3, ge=1, le=1000, description="best candidates simulated again with new seeds"
+    )
+    confirm_replicas: int = Field(
+        default=16, ge=3, le=100000, description="replicas of each confirmation"
+    )
+    first_replicas: int = Field(
+        default=4,
+        ge=0,
+        le=100000,
+        description="replicas after which a clearly worse candidate gets no more; 0: never",
+    )
+    confirm_rounds: int = Field(
+        default=2,
+        ge=1,
+        le=10,
+        description="rounds of confirmation while the best are close, each with twice the replicas",
+    )
+
+    @model_validator(mode="after")
+    def _agree(self) -> Self:
+        problems = []
+        if 0 < self.first_replicas < 3:
+            text = f"given {self.first_replicas}; 3 is the least that gives an interval, 0 gives "
+            problems.append(Problem("first_replicas", f"{text}all replicas to each candidate"))
+        if self.phases and self.algorithm != "auto":
+            text = f"given beside algorithm = {self.algorithm!r}; give one of the two"
+            problems.append(Problem("phases", text))
+        if sum(phase.share for phase in self.phases[:-1]) >= 1.0:
+            text = "the shares before the last phase add up to 1 or more; lower them"
+            problems.append(Problem("phases", text))
+        if problems:
+            raise CrossCheckError(problems)
+        return self
+
+
+class Study(BaseModel):
+    """A design, what may vary in it, what is maximised, what must hold, and the budget.
+
+    `vary` maps a dotted parameter of the design to (low, high) in the units of the file.
+    """
+
+    model_config = STRICT
+    RENAMED: ClassVar[dict[str, str]] = {"draft": "search_accuracy"}  # former names of keys
+
+    design: Design = Field(description="design that the search starts from")
+    vary: dict[str, Bounds] = Field(
+        min_length=1,
+        description='e.g. "chamber.height_mm" = [35, 60]',
+        json_schema_extra={"form": "[low, high]"},
+    )
+    objective: Objective = Field(default_factory=Objective)
+    constraints: dict[str, Limits] = Field(
+        default_factory=dict,
+        description="METRIC = { min =, max = }, or a number of the design in quotes",
+    )
+    optimizer: Optimizer = Field(default_factory=Optimizer)
+    search_accuracy: dict[str, int | float | str] = Field(
+        default_factory=dict,
+        description="while searching, instead of the design's own: keys of [process.accuracy], "
+        "and facets",
+        json_schema_extra={"form": "a number or a text"},
+    )
+
+    def at_search_accuracy(self, design: Design) -> Design:
+        """A candidate at the accuracy of the search, which is usually coarser than its own.
+
+        Raises:
+            InputError: [search_accuracy] does not fit the design.
+        """
+        return design.changed(
+            {
+                "chamber.facets" if name == "facets" else f"process.accuracy.{name}": value
+                for name, value in self.search_accuracy.items()
+            }
+        )
+
+    @model_validator(mode="after")
+    def _agree(self) -> Self:
+        problems = [
+            problem
+            for name, bounds in self.vary.items()
+            for problem in bound_problems(self.design, name, bounds)
+        ]
+        for name, limits in self.constraints.items():
+            problems += limit_problems(self.design, self.vary, name, limits)
+        phases = [phase.algorithm for phase in self.optimizer.phases] or [self.optimizer.algorithm]
+        if self.objective.pareto and not {"auto", "sobol", "surrogate"}.issuperset(phases):
+            text = "given two objectives, which only auto, sobol and surrogate can search"
+            problems.append(Problem("objective.pareto", text))
+        try:
+            self.at_search_accuracy(self.design)
+        except InputError as error:
+            text = str(error).replace("process.accuracy.", "").replace("chamber.", "")
+            problems.append(Problem("search_accuracy", text))
+        if problems:
+            raise CrossCheckError(problems)
+        return self
