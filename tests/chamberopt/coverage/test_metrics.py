@@ -1,6 +1,5 @@
 """Averages over the exposed target, weighted with area, on parts of a few triangles."""
 
-import math
 from dataclasses import replace
 
 import numpy as np

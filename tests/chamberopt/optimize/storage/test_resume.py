@@ -287,14 +287,14 @@ class TestDamage:
 
 @pytest.mark.usefixtures("quick_disk")
 class TestChanges:
-    """A record answers one question, asked of one program."""
+    """A folder belongs to one study, run by one version of the program."""
 
-    @pytest.fixture
     def test_a_folder_of_version_0_1_is_refused(self, tmp_path: Path) -> None:
         (tmp_path / "asked.json").write_text("{}", encoding="utf-8")
         with pytest.raises(InputError, match=r"run by version 0\.1.*give another folder"):
             run(study(), tmp_path)
 
+    @pytest.fixture
     def folder(self, tmp_path: Path) -> Path:
         """A study stopped after three evaluations."""
         run(study(), tmp_path / "whole")
