@@ -42,7 +42,8 @@ def analytic_cavity(design: Design, chamber: Chamber) -> AnalyticCavity:
     for name in ("part_turn", "rest"):
         if getattr(design.effects, name):
             raise InputError(
-                f"effects.{name}: not supported with an analytical cavity; leave it out, or {REMEDY}"
+                f"effects.{name}: not supported with an analytical cavity; leave it out, or "
+                f"{REMEDY}"
             )
     bottom, top = (float(z) for z in (chamber.vertices[:, 2].min(), chamber.vertices[:, 2].max()))
     _require_flat_or_upright(chamber, bottom, top)
@@ -64,7 +65,7 @@ def cavity_note(cavity: AnalyticCavity) -> str:
 
 
 def impacts_on_chamber(impacts: ImpactLog, chamber: Chamber) -> ImpactLog:
-    """Impacts on the ceiling of an analytical cavity, with the chamber's triangles at their places."""
+    """Impacts on the ceiling of an analytical cavity, with the chamber's triangles there."""
     from sim_core import find_triangles
 
     ceiling = np.flatnonzero(chamber.tags == TAG_PART)
@@ -79,7 +80,7 @@ def _refused(why: str) -> InputError:
 
 
 def _require_flat_or_upright(chamber: Chamber, bottom: float, top: float) -> None:
-    """Raise InputError unless the sonotrode is flat below, the part flat above, the wall upright."""
+    """Raise InputError unless sonotrode and part are flat, and the wall between them upright."""
     area = areas(chamber.vertices, chamber.triangles)
     heights = chamber.vertices[chamber.triangles][:, :, 2]
     along = area_vectors(chamber.vertices, chamber.triangles)[:, 2]

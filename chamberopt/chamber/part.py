@@ -88,7 +88,7 @@ def part_meshes(design: Design) -> tuple[PartMesh, PartMesh]:
 
 
 def turning_axis(design: Design) -> tuple[np.ndarray, np.ndarray]:
-    """Point [m] and direction, (3,) each, of the axis of effects.part_turn in the chamber's frame."""
+    """Point [m] and direction, (3,) each, of effects.part_turn's axis in the chamber's frame."""
     turn = design.effects.part_turn
     if turn is None:
         raise ValueError("the part of this design does not turn")

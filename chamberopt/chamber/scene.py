@@ -37,7 +37,7 @@ def replica_seed(seed: int, replica: int, stream: str = "search") -> int:
 
 
 def start_velocities(rng: np.random.Generator, count: int, rms_speed: float) -> np.ndarray:
-    """Isotropic Maxwell velocities [m/s], shape (count, 3), whose rms speed is `rms_speed` [m/s]."""
+    """Isotropic Maxwell velocities [m/s], shape (count, 3), with this rms speed [m/s]."""
     return rng.normal(0.0, rms_speed / np.sqrt(3.0), (count, 3))
 
 

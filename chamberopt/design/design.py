@@ -222,7 +222,7 @@ def _replaced(old: Any, name: str, steps: Sequence[str], value: Any) -> Any:
 
 
 def _of_the_same_kind(old: Any, value: Any) -> Any:
-    """A number as whole or not as the one in its place, so that numpy's numbers can be given too."""
+    """The value, as a whole number or not like the old one: numpy's numbers are accepted too."""
     is_number = isinstance(value, Real) and not isinstance(value, bool)
     if not is_number:
         return value

@@ -1,4 +1,4 @@
-"""Physical effects of a design: one optional key of [effects] each; an absent one is not simulated."""
+"""Physical effects of a design: one optional key of [effects] each."""
 
 import math
 from collections.abc import Iterator
@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from pydantic import Field
 
 from chamberopt.common.toml_errors import Problem
-from chamberopt.common.toml_fields import Triple, list_field, metres, quantity
-from chamberopt.design.table import DesignTable
+from chamberopt.common.toml_fields import Triple, list_field, quantity
+from chamberopt.design.table import DesignTable, Metres
 
 
 class PartTurn(DesignTable):
@@ -47,10 +47,7 @@ class PartTurn(DesignTable):
         """Largest angle to each side [rad] of a part that turns to and fro."""
         return None if self.angle_deg is None else math.radians(self.angle_deg)
 
-    @property
-    def through(self) -> tuple[float, float, float]:
-        """A point on the axis [m], in the part file's frame."""
-        return metres(self.through_mm)
+    through = Metres("through_mm", "A point on the axis [m], in the part file's frame")
 
     @property
     def period(self) -> float:

@@ -17,18 +17,20 @@ __all__ = ["Design", "load_design", "save_design"]
 
 
 def load_design(path: str | Path) -> Design:
-    """The design in a file. Raises InputError that names every problem, with file and line."""
+    """The design in a file.
+
+    Raises:
+        InputError: names every problem, with file and line.
+    """
     path = Path(path)
     source, data = read_toml(path, "design")
     if is_study(data):
-        raise InputError(
-            f"{path}: this is a study file; a design file is wanted: give the one it names"
-        )
+        raise InputError(f"{path}: this is a study file; give the design file that it names")
     return validate(Design, data, path, source)
 
 
 def save_design(design: Design, path: str | Path) -> None:
-    """Writes a design file that loads back as the very same design; paths of meshes and shape count from the file."""
+    """Write a design file that loads back as the same design, with paths relative to the file."""
     import tomli_w
 
     path = Path(path)
@@ -41,7 +43,7 @@ def save_design(design: Design, path: str | Path) -> None:
 
 
 def with_paths_from(folder: Path, value: Any) -> Any:
-    """The values of a design, paths of meshes and of a shape of one's own counting from a folder."""
+    """The values of a design, with paths of meshes and of a custom shape relative to a folder."""
     if isinstance(value, Mapping):
         return {
             name: _relative(inner, folder)
@@ -49,22 +51,25 @@ def with_paths_from(folder: Path, value: Any) -> Any:
             else with_paths_from(folder, inner)
             for name, inner in value.items()
         }
-    return (
-        [with_paths_from(folder, inner) for inner in value]
-        if isinstance(value, list | tuple)
-        else value
-    )
+    is_list = isinstance(value, list | tuple)
+    return [with_paths_from(folder, inner) for inner in value] if is_list else value
 
 
 def _relative(path: str, folder: Path) -> str:
     try:
         return Path(os.path.relpath(path, folder)).as_posix()
-    except ValueError:  # another drive on Windows: only the absolute path leads there
+    except ValueError:  # another drive on Windows has no relative path
         return Path(path).as_posix()
 
 
 def read_toml(path: Path, kind: str) -> tuple[str, dict[str, Any]]:
-    """Text and content of a TOML file that is there, readable, UTF-8, not empty and well formed."""
+    """Text and content of a TOML file.
+
+    Args:
+        kind: "design" or "study", for messages.
+    Raises:
+        InputError: the file is missing, unreadable, not UTF-8, empty, or not valid TOML.
+    """
     if path.is_dir():
         inside = sorted(p.name for p in path.glob("*.toml"))
         hint = f"; files in it: {', '.join(inside[:8])}" if inside else ""
@@ -74,9 +79,8 @@ def read_toml(path: Path, kind: str) -> tuple[str, dict[str, Any]]:
     except FileNotFoundError:
         raise InputError(toml_errors.explain_missing_file(path, f"{kind} file", "*.toml")) from None
     except OSError as error:
-        raise InputError(
-            f"{path}: cannot be read: {error.strerror}; check its permissions"
-        ) from None
+        message = f"{path}: cannot be read: {error.strerror}; check its permissions"
+        raise InputError(message) from None
     except UnicodeDecodeError as error:
         raise InputError(
             f"{path}: not UTF-8 text (byte {error.start}); a {kind} file is TOML, save it as UTF-8"
@@ -90,30 +94,27 @@ def read_toml(path: Path, kind: str) -> tuple[str, dict[str, Any]]:
     try:
         return source, tomllib.loads(source)
     except tomllib.TOMLDecodeError as error:
-        found = re.search(r"^(.*?) \(at line (\d+), column (\d+)\)$", str(error), re.DOTALL)
-        place, text = (
-            (f"{path}:{found[2]}", f"{found[1]}, column {found[3]}") if found else (path, error)
-        )
-        raise InputError(
-            f"{place}: not valid TOML: {text}; correct the line, e.g. name = 1.5"
-        ) from None
-    except (
-        ValueError,
-        RecursionError,
-    ) as error:  # a number of thousands of digits, brackets thousands deep
-        raise InputError(
-            f"{path}: no {kind} file: {error}; start from a copy of a shipped one"
-        ) from None
+        place, text = str(path), str(error)
+        found = re.search(r"^(.*?) \(at line (\d+), column (\d+)\)$", text, re.DOTALL)
+        if found:
+            place, text = f"{path}:{found[2]}", f"{found[1]}, column {found[3]}"
+        message = f"{place}: not valid TOML: {text}; correct the line, e.g. name = 1.5"
+        raise InputError(message) from None
+    # A number with thousands of digits, or thousands of nested brackets.
+    except (ValueError, RecursionError) as error:
+        message = f"{path}: not a {kind} file: {error}; start from a copy of a shipped one"
+        raise InputError(message) from None
 
 
 def is_study(data: Mapping[str, Any]) -> bool:
+    """Whether these are the values of a study file."""
     return isinstance(data.get("design"), str) or any(
         name in data for name in ("vary", "optimizer")
     )
 
 
 def _without_none(value: Any) -> Any:
-    """Without what is not set, and without empty lists."""
+    """The values without keys that are not set or hold an empty list."""
     if isinstance(value, Mapping):
         return {
             name: _without_none(inner)
@@ -124,7 +125,7 @@ def _without_none(value: Any) -> Any:
 
 
 def _lists_on_one_line(toml: str) -> str:
-    """tomli_w gives every number of a list its own line; a position reads better on one."""
+    """Put the numbers of a list on one line; tomli_w writes every number on its own."""
     lines: list[str] = []
     opened = 0
     for line in toml.splitlines():

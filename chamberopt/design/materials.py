@@ -8,7 +8,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from chamberopt.design.table import DesignTable
+from chamberopt.design.table import SI, DesignTable
 
 ShotMaterial = Literal["steel", "tungsten_carbide", "zirconia", "glass"]
 
@@ -34,15 +34,8 @@ class RestitutionTable(DesignTable):
         json_schema_extra={"unit": "m/s"},
     )
 
-    @property
-    def restitution(self) -> float:
-        """C0, dimensionless."""
-        return self.C0
-
-    @property
-    def yield_speed(self) -> float:
-        """v0 [m/s]: slower impacts rebound with C0 and leave no dent."""
-        return self.v0_m_s
+    restitution = SI("C0", 1.0, "C0, dimensionless")
+    yield_speed = SI("v0_m_s", 1.0, "v0 [m/s]: slower impacts rebound with C0 and leave no dent")
 
 
 class PartMaterial(RestitutionTable):

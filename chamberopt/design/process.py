@@ -7,7 +7,7 @@ from pydantic import Field
 
 from chamberopt.common.toml_errors import Problem
 from chamberopt.common.toml_fields import quantity
-from chamberopt.design.table import DesignTable
+from chamberopt.design.table import SI, DesignTable
 
 # Longest treatment [s] simulated from beginning to end; one replica then takes minutes to compute.
 MAX_SIMULATED_TREATMENT = 600.0
@@ -51,30 +51,13 @@ class Accuracy(DesignTable):
             text = f"given {self.max_replicas}, below replicas = {self.replicas}; raise it"
             yield Problem("max_replicas", text)
 
-    @property
-    def simulated_time(self) -> float:
-        """Recorded time of each replica [s]."""
-        return self.simulated_time_s
-
-    @property
-    def warmup_time(self) -> float:
-        """Time of each replica before recording starts [s]."""
-        return self.warmup_time_s
-
-    @property
-    def sample_spacing(self) -> float:
-        """Spacing of the points that dents mark [m]."""
-        return self.sample_mm * 1e-3
-
-    @property
-    def elastic_below(self) -> float:
-        """Normal speed [m/s] below which impacts lose no energy."""
-        return self.elastic_below_mm_s * 1e-3
-
-    @property
-    def drag_step(self) -> float:
-        """Longest time [s] between two drag impulses."""
-        return self.drag_step_ms * 1e-3
+    simulated_time = SI("simulated_time_s", 1.0, "Recorded time of each replica [s]")
+    warmup_time = SI("warmup_time_s", 1.0, "Time of each replica before recording starts [s]")
+    sample_spacing = SI("sample_mm", 1e-3, "Spacing of the points that dents mark [m]")
+    elastic_below = SI(
+        "elastic_below_mm_s", 1e-3, "Normal speed [m/s] below which impacts lose no energy"
+    )
+    drag_step = SI("drag_step_ms", 1e-3, "Longest time [s] between two drag impulses")
 
 
 class Process(DesignTable):
@@ -102,7 +85,6 @@ class Process(DesignTable):
         """Recorded time of each replica [s]; the whole treatment where every dent is marked."""
         return self.treatment_time_s if self._simulates_all else self.accuracy.simulated_time
 
-    @property
-    def treatment_time(self) -> float:
-        """Peening time [s] that the coverage is predicted for."""
-        return self.treatment_time_s
+    treatment_time = SI(
+        "treatment_time_s", 1.0, "Peening time [s] that the coverage is predicted for"
+    )

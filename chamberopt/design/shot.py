@@ -9,7 +9,7 @@ from pydantic import Field
 from chamberopt.common.toml_errors import Problem
 from chamberopt.common.toml_fields import list_field, quantity
 from chamberopt.design.materials import SHOT_DENSITY, ShotMaterial
-from chamberopt.design.table import DesignTable
+from chamberopt.design.table import SI, DesignTable
 
 
 class ShotSize(DesignTable):
@@ -88,10 +88,7 @@ class ShotTable(DesignTable):
         """Ball density [kg/m³]."""
         return self.density_kg_m3 if self.material is None else SHOT_DENSITY[self.material]  # type: ignore[return-value]
 
-    @property
-    def mass(self) -> float:
-        """Wanted mass of the whole charge [kg], not rounded to whole balls."""
-        return self.mass_g * 1e-3
+    mass = SI("mass_g", 1e-3, "Wanted mass of the whole charge [kg], not rounded to whole balls")
 
     @property
     def volume(self) -> float:

@@ -7,7 +7,7 @@ from pydantic import Field
 
 from chamberopt.common.toml_fields import Direction, Position, list_field, quantity
 from chamberopt.design.shapes.hole_and_deflector_tables import PlacedBore
-from chamberopt.design.table import DesignTable
+from chamberopt.design.table import SI, DesignTable
 
 
 class VibratingFace(DesignTable):
@@ -16,15 +16,8 @@ class VibratingFace(DesignTable):
     frequency_khz: float = quantity(0.01, 200, "kHz", "usually 20")
     amplitude_um: float = quantity(0.1, 500, "µm", "zero-to-peak: half of peak-to-valley")
 
-    @property
-    def frequency(self) -> float:
-        """Frequency [Hz]."""
-        return self.frequency_khz * 1e3
-
-    @property
-    def amplitude(self) -> float:
-        """Zero-to-peak amplitude [m]."""
-        return self.amplitude_um * 1e-6
+    frequency = SI("frequency_khz", 1e3, "Frequency [Hz]")
+    amplitude = SI("amplitude_um", 1e-6, "Zero-to-peak amplitude [m]")
 
     @property
     def peak_speed(self) -> float:

@@ -1,13 +1,37 @@
-"""What every table of a design file has in common."""
+"""What every table of a design file has in common, and values in SI units."""
 
 from collections.abc import Iterable
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 from pydantic import BaseModel, ConfigDict, model_validator
 
 from chamberopt.common.toml_errors import CrossCheckError, Problem
+from chamberopt.common.toml_fields import metres
 
-STRICT = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+class SI:
+    """A value in SI units: that of a key, times a factor."""
+
+    def __init__(self, key: str, factor: float, meaning: str) -> None:
+        self._key, self._factor, self.__doc__ = key, factor, meaning
+
+    def __get__(self, table: Any, owner: Any = None) -> float:
+        return self if table is None else getattr(table, self._key) * self._factor  # type: ignore[return-value]
+
+
+class Metres:
+    """A position or three sides in metres: those of a key in mm."""
+
+    def __init__(self, key: str, meaning: str) -> None:
+        self._key, self.__doc__ = key, meaning
+
+    def __get__(self, table: Any, owner: Any = None) -> tuple[float, float, float]:
+        return self if table is None else metres(getattr(table, self._key))  # type: ignore[return-value]
+
+
+STRICT = ConfigDict(
+    frozen=True, extra="forbid", strict=True, allow_inf_nan=False, ignored_types=(SI, Metres)
+)
 
 
 class DesignTable(BaseModel):

@@ -1,4 +1,4 @@
-"""Facts and warnings about a design before it is simulated: volumes, shot, target, likely errors."""
+"""Facts and warnings about a design before it is simulated: volumes, shot, target, errors."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from chamberopt.design.load import Design
     from sim_core import TriangleMesh
 
-# Share of the free volume above which the balls move as a dense bed rather than as a gas: few of them
-# reach the part, and event-driven simulation slows down because collisions are so frequent.
+# Share of the free volume above which the balls move as a dense bed rather than as a gas: few of
+# them reach the part, and event-driven simulation slows down because collisions are so frequent.
 MAX_PACKING_FRACTION = 0.3
 MIN_AMPLITUDES = 10.0  # between part and sonotrode, as for sonotrode_distance_mm of a design
 MAX_HIDDEN_SHARE = 0.05  # of the target's area; more means that a ceiling or wall is misplaced
@@ -109,8 +109,8 @@ def warnings(design: Design, chamber: Chamber, reach: Reach | None = None) -> li
     filled = shot.volume / chamber.volume
     if filled > MAX_PACKING_FRACTION:
         texts.append(
-            f"the balls fill {filled:.0%} of the free volume; above {MAX_PACKING_FRACTION:.0%} they "
-            "hinder each other: lower shot.mass_g or enlarge the chamber"
+            f"the balls fill {filled:.0%} of the free volume; above {MAX_PACKING_FRACTION:.0%} "
+            "they hinder each other: lower shot.mass_g or enlarge the chamber"
         )
     if abs(shot.count * shot.ball_mass - shot.mass) > 0.05 * shot.mass:
         texts.append(
@@ -187,8 +187,8 @@ def _turn_facts(design: Design) -> dict[str, Any]:
 def _heights_in_side_wall(design: Design, chamber: Chamber) -> tuple[float, float] | None:
     """Lowest and highest point [m] where part and side wall are joined; None where they are not.
 
-    None also for a part that closes the chamber like a lid, that turns (its joint is a round shaft),
-    that has a hole for its fixture, or that is drawn with its chamber.
+    None also for a part that closes the chamber like a lid, turns (its joint is a round shaft), has
+    a hole for its fixture, or is drawn with its chamber.
     """
     if (
         design.chamber.holes
@@ -226,8 +226,8 @@ def _sonotrode_warnings(design: Design, mesh: TriangleMesh) -> list[str]:
     if not 0.0 < below < ball:
         return []
     return [
-        f"the gap between turning part and sonotrode is {below * 1e3:.3g} mm, narrower than a ball of "
-        f"{ball * 1e3:g} mm: a ball may be jammed there as the part turns; {remedy}"
+        f"the gap between turning part and sonotrode is {below * 1e3:.3g} mm, narrower than a ball "
+        f"of {ball * 1e3:g} mm: a ball may be jammed there as the part turns; {remedy}"
     ]
 
 

@@ -1,7 +1,7 @@
 """Warnings about what keeps the shot from the surface, each with its place and a remedy.
 
-These are gaps too narrow for a ball, wedges that hold one, pockets behind a narrow mouth, and hollows
-sharper than a ball.
+These are gaps too narrow for a ball, wedges that hold one, pockets behind a narrow mouth, and
+hollows sharper than a ball.
 """
 
 from __future__ import annotations
@@ -115,13 +115,13 @@ def target_warnings(reach: Reach, chamber: Chamber, only_reachable: bool = False
         diameter_mm = 2e3 * float(touches.radius[own][order][np.argmax(second_half)])
         remedy = f"balls of {diameter_mm:.2g} mm would fit half of that; or {remedy}"
     return [
-        f"{left / whole:.1%} of the target in the chamber ({mm2(left)}) cannot be touched by a ball "
-        f"of {1e3 * reach.diameter:g} mm, however long it is peened: e.g. at {place}; {remedy}"
+        f"{left / whole:.1%} of the target in the chamber ({mm2(left)}) cannot be touched by a "
+        f"ball of {1e3 * reach.diameter:g} mm, however long it is peened: e.g. at {place}; {remedy}"
     ]
 
 
 def _clusters(centre: np.ndarray, near: float) -> list[np.ndarray]:
-    """Members of each group of points (n, 3) [m] that are connected by steps of at most ``near`` [m]."""
+    """Members of each group of points (n, 3) [m] linked by steps of at most ``near`` [m]."""
     from scipy.spatial import KDTree
 
     if not len(centre):
@@ -133,7 +133,7 @@ def _clusters(centre: np.ndarray, near: float) -> list[np.ndarray]:
 
 
 def _is_wedge(gap: TouchPoints, entrance: np.ndarray, largest: float, near: float) -> bool:
-    """Whether a gap begins as wide as a ball, at an entrance that balls reach, and narrows steadily.
+    """Whether a gap narrows steadily from an entrance that balls reach, as wide as a ball.
 
     Args:
         entrance: centres of reached balls in gaps slightly wider than a ball [m], shape (n, 3).

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 HEIGHT_TOLERANCE = 1e-9  # m: corners whose heights differ by less are level, except for rounding
 AREA_TOLERANCE = 1e-6  # share of a triangle's area: a smaller upward part is rounding
 REMEDY = {
-    TAG_PART: "turn it (effects.part_turn), tilt it (part.rotate_deg), or lower chamber.{key} to its top side",
+    TAG_PART: "turn it (effects.part_turn), tilt it (part.rotate_deg), or lower chamber.{key} to "
+    "its top side",
     TAG_WALL: "make it slope towards the sonotrode",
 }
 

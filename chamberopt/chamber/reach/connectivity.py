@@ -34,8 +34,8 @@ class Cells(NamedTuple):
     Attributes:
         low: lowest corner [m], shape (3,).
         edge: of a cell [m].
-        space: number of the open space that a cell belongs to, from 1 on, shape (nx, ny, nz); 0 where
-            the centre of a ball may not lie anywhere in the cell.
+        space: number of the open space that a cell belongs to, from 1 on, shape (nx, ny, nz);
+            0 where the centre of a ball may not lie anywhere in the cell.
         unsure: whether the centre may lie in some of the cell, shape (nx, ny, nz).
     """
 
@@ -170,7 +170,7 @@ def _midway_points(mesh: TriangleMesh, cells: Cells, radius: float) -> np.ndarra
 def _links_to_spaces(
     mesh: TriangleMesh, cells: Cells, centre: np.ndarray, radius: float, spacing: float
 ) -> np.ndarray:
-    """Links (k, 2) from points in narrow places (n, 3) [m] to open spaces nearby, one for each pair."""
+    """Links (k, 2) from points in narrow places (n, 3) [m] to open spaces nearby, one a pair."""
     from scipy.ndimage import binary_erosion
     from scipy.spatial import KDTree
 

@@ -1,4 +1,4 @@
-"""The largest ball that touches the cavity's surface at a point, without reaching into it elsewhere.
+"""The largest ball that touches the cavity's surface at a point and reaches into it nowhere.
 
 A ball that touches at the point is shrunk past the closest obstacle until none is left.
 
@@ -57,10 +57,10 @@ class TouchPoints(NamedTuple):
 def find_touch_points(
     mesh: TriangleMesh, spacing: np.ndarray, max_radius: float, overlap: float
 ) -> TouchPoints:
-    """Points on all triangles of a mesh, and the largest balls there.
+    """Points on all triangles of a mesh, at least one on each, and the largest balls there.
 
     Args:
-        spacing: distance between the points on each triangle [m], shape (m,); each has at least one.
+        spacing: distance between the points on each triangle [m], shape (m,).
         max_radius: limit of the radius [m].
         overlap: how far a ball may reach into a surface [m].
     """

@@ -15,9 +15,9 @@ from chamberopt.geometry.triangles import areas
 if TYPE_CHECKING:
     from sim_core import TriangleMesh
 
-# Share of its radius that a ball may reach into a surface. This is what facets that turn by 8 degrees
-# each take from it, or by 3 in a hollow hardly rounder than the ball. Dents are deeper, and so are
-# the tolerances of a gap.
+# Share of its radius that a ball may reach into a surface. This is what facets that turn by 8
+# degrees each take from it, or by 3 in a hollow hardly rounder than the ball. Dents are deeper, and
+# so are the tolerances of a gap.
 TOLERATED_OVERLAP = 0.01
 SPACING = 1.0 / 3.0  # of the radius: distance between touch points
 MAX_POINTS = 100_000  # on the part, and as many on everything else

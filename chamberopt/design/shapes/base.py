@@ -26,7 +26,7 @@ from chamberopt.design.shapes.construction.limits import (
 )
 from chamberopt.design.shapes.construction.surface import ShapeSurface, lofted
 from chamberopt.design.shapes.hole_and_deflector_tables import Deflector, Hole
-from chamberopt.design.table import DesignTable
+from chamberopt.design.table import SI, DesignTable
 
 
 class ChamberTable(DesignTable):
@@ -55,10 +55,9 @@ class ChamberTable(DesignTable):
         """Make the path of a user's own shape absolute, like that of the part's mesh."""
         return str(from_file(shape, info.context)) if is_custom(shape) else shape
 
-    @property
-    def sonotrode_distance(self) -> float:
-        """Mean sonotrode face to lowest point of the part [m]."""
-        return self.sonotrode_distance_mm * 1e-3
+    sonotrode_distance = SI(
+        "sonotrode_distance_mm", 1e-3, "Mean sonotrode face to lowest point of the part [m]"
+    )
 
     @abstractmethod
     def surface(self, vertices: np.ndarray, triangles: np.ndarray) -> ShapeSurface:
@@ -119,10 +118,7 @@ class ParametricChamber(WalledChamber):
 
     height_mm: float = quantity(2, 2000, "mm", "inner height, sonotrode to ceiling")
 
-    @property
-    def height(self) -> float:
-        """Inner height [m]."""
-        return self.height_mm * 1e-3
+    height = SI("height_mm", 1e-3, "Inner height [m]")
 
     @property
     def lean(self) -> float:

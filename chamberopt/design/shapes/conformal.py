@@ -21,6 +21,7 @@ from chamberopt.design.shapes.base import ParametricChamber
 from chamberopt.design.shapes.construction.limits import MIN_LENGTH, refuse_meeting_walls
 from chamberopt.design.shapes.construction.outline import corner_arcs
 from chamberopt.design.shapes.construction.surface import TAG_SONOTRODE, TAG_WALL, ShapeSurface
+from chamberopt.design.table import SI
 from chamberopt.geometry.solids import Outline, extrude, plan_outline
 
 # Tolerance of the outline [m]: an eighth of the error of 64 facets on a wall 70 mm across.
@@ -32,7 +33,8 @@ class Conformal(ParametricChamber):
 
     shape: Literal["conformal"]
     outline: Literal["hull", "silhouette"] = Field(
-        description="what is grown: the convex hull of the part's shadow on the floor, or the shadow itself"
+        description="what is grown: the convex hull of the part's shadow on the floor, or the "
+        "shadow itself"
     )
     gap_mm: float = quantity(
         0.1, 1000, "mm", "between the part's outline and the wall, at the sonotrode"
@@ -45,10 +47,9 @@ class Conformal(ParametricChamber):
         0.0,
     )
 
-    @property
-    def gap(self) -> float:
-        """Distance between the part's outline and the wall, at the sonotrode [m]."""
-        return self.gap_mm * 1e-3
+    gap = SI(
+        "gap_mm", 1e-3, "Distance between the part's outline and the wall, at the sonotrode [m]"
+    )
 
     @property
     def is_round(self) -> bool:

@@ -14,6 +14,7 @@ import numpy as np
 
 from chamberopt.common.toml_fields import quantity
 from chamberopt.design.shapes.base import ParametricChamber, RoundChamber
+from chamberopt.design.table import SI
 
 
 class Cylinder(RoundChamber, ParametricChamber):
@@ -22,10 +23,7 @@ class Cylinder(RoundChamber, ParametricChamber):
     shape: Literal["cylinder"]
     diameter_mm: float = quantity(2, 2000, "mm", "inner diameter, at the sonotrode")
 
-    @property
-    def diameter(self) -> float:
-        """Inner diameter at the sonotrode [m]."""
-        return self.diameter_mm * 1e-3
+    diameter = SI("diameter_mm", 1e-3, "Inner diameter at the sonotrode [m]")
 
     def upright(self) -> np.ndarray:
         """Up the side, then in along the ceiling."""

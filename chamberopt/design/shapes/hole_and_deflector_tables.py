@@ -13,11 +13,10 @@ from chamberopt.common.toml_fields import (
     Position,
     Triple,
     list_field,
-    metres,
     quantity,
     unit_vector,
 )
-from chamberopt.design.table import DesignTable
+from chamberopt.design.table import SI, DesignTable, Metres
 from chamberopt.geometry.mesh_io.units import Unit
 
 SIZE_KEYS = {
@@ -62,25 +61,10 @@ class Deflector(DesignTable):
             text = f"given {list(self.size_mm)}; each side must be from 0.1 to 2000 mm"
             yield Problem("size_mm", text)
 
-    @property
-    def at(self) -> tuple[float, float, float]:
-        """Its middle (x, y, z) [m]."""
-        return metres(self.at_mm)
-
-    @property
-    def size(self) -> tuple[float, float, float]:
-        """Sides of a plate [m]."""
-        return metres(self.size_mm)  # type: ignore[arg-type]
-
-    @property
-    def diameter(self) -> float:
-        """Diameter of a rod or ball [m]."""
-        return self.diameter_mm * 1e-3  # type: ignore[operator]
-
-    @property
-    def length(self) -> float:
-        """Length of a rod [m]."""
-        return self.length_mm * 1e-3  # type: ignore[operator]
+    at = Metres("at_mm", "Its middle (x, y, z) [m]")
+    size = Metres("size_mm", "Sides of a plate [m]")
+    diameter = SI("diameter_mm", 1e-3, "Diameter of a rod or ball [m]")
+    length = SI("length_mm", 1e-3, "Length of a rod [m]")
 
     @property
     def mesh_path(self) -> Path:
@@ -95,20 +79,14 @@ class PlacedBore(DesignTable):
     axis: Direction
     diameter_mm: float
 
-    @property
-    def at(self) -> tuple[float, float, float]:
-        """The point (x, y, z) [m] of its axis that at_mm gives."""
-        return metres(self.at_mm)
+    at = Metres("at_mm", "The point (x, y, z) [m] of its axis that at_mm gives")
 
     @property
     def direction(self) -> tuple[float, float, float]:
         """Its axis, a unit vector."""
         return unit_vector(self.axis)
 
-    @property
-    def diameter(self) -> float:
-        """Its diameter [m]."""
-        return self.diameter_mm * 1e-3
+    diameter = SI("diameter_mm", 1e-3, "Its diameter [m]")
 
 
 class Hole(PlacedBore):
@@ -121,7 +99,4 @@ class Hole(PlacedBore):
     diameter_mm: float = quantity(0.1, 2000, "mm", "of the bore")
     depth_mm: float = quantity(0.1, 2000, "mm", "beyond the wall, along the axis")
 
-    @property
-    def depth(self) -> float:
-        """Depth beyond the wall [m]."""
-        return self.depth_mm * 1e-3
+    depth = SI("depth_mm", 1e-3, "Depth beyond the wall [m]")

@@ -1,4 +1,4 @@
-"""A whole set-up from CAD: sonotrode, chamber and part meshed in one file, the sonotrode's distance still free.
+"""A set-up from CAD: sonotrode, chamber and part in one mesh; the sonotrode's distance can vary.
 
  as drawn        farther                nearer
 |  part  |      |  part  |             |  part  |
@@ -41,7 +41,7 @@ class Imported(ChamberTable):
     )
 
     @property
-    def sonotrode_distance(self) -> float:
+    def sonotrode_distance(self) -> float:  # type: ignore[override]
         """Mean sonotrode face to lowest point of the part [m]."""
         given = self.sonotrode_distance_mm
         return self.setup().distance if given is None else given * 1e-3

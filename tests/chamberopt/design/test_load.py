@@ -616,7 +616,9 @@ class TestStudies:
         assert f"{study_file}:3: optimizer.confirm: given 0" in said
 
     def test_each_kind_of_file_where_the_other_is_wanted(self, study_file: Path) -> None:
-        with pytest.raises(InputError, match="this is a study file; a design file is wanted"):
+        with pytest.raises(
+            InputError, match="this is a study file; give the design file that it names"
+        ):
             load_design(study_file)
         with pytest.raises(InputError, match="this is a design file; a study file is wanted"):
             load_study(study_file.with_name("design.toml"))

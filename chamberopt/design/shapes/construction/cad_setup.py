@@ -146,7 +146,7 @@ def _separate_part(read: TriangleSoup, in_part: np.ndarray) -> tuple[PartMesh | 
 
 
 def _pick(mesh: PartMesh, triangles: np.ndarray, rows: np.ndarray) -> PartMesh:
-    """The rows (m,) bool of the triangles (m, 3), with the vertices, groups and numbers of those."""
+    """The rows (m,) bool of the triangles (m, 3), with their vertices, groups and numbers."""
     used, numbers = np.unique(triangles[rows], return_inverse=True)
     return replace(
         mesh,
@@ -232,7 +232,7 @@ def _is_inside(body: Solid, room: Solid) -> bool:
 
 
 def _pose(mesh: PartMesh, face: np.ndarray) -> tuple[np.ndarray, np.ndarray, list[str]]:
-    """Rotation (3, 3) and shift (3,) [m] that put the face at z = 0, facing up; a note on a turn."""
+    """Rotation (3, 3) and shift (3,) [m] that put the face at z = 0, facing up; and a note."""
     up = -area_vectors(mesh.vertices, mesh.triangles[face]).sum(axis=0)
     up /= np.linalg.norm(up)
     axis = np.round(up)
@@ -251,7 +251,7 @@ def _pose(mesh: PartMesh, face: np.ndarray) -> tuple[np.ndarray, np.ndarray, lis
 
 
 def _rotation_to_z(up: np.ndarray) -> np.ndarray:
-    """The smallest rotation (3, 3) that takes a unit vector to (0, 0, 1); about x from (0, 0, -1)."""
+    """The smallest rotation (3, 3) of a unit vector to (0, 0, 1); about x from (0, 0, -1)."""
     x, y, z = up
     if z < -1.0 + AXIS_TOLERANCE:
         return np.diag([1.0, -1.0, -1.0])

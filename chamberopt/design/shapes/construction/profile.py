@@ -26,7 +26,7 @@ def corner_angles(line: np.ndarray) -> np.ndarray:
 def largest_corner_radius(line: np.ndarray) -> float:
     """Largest radius [m] to which all corners can be rounded.
 
-    The arc of radius r begins r tan(angle / 2) from its corner, so arcs of neighbours must not meet.
+    The arc of radius r begins r tan(angle / 2) from its corner; two arcs must not meet.
     """
     tangent = np.tan(np.abs(corner_angles(line)) / 2.0)
     length = np.hypot(*np.diff(line, axis=0).T)
