@@ -52,7 +52,7 @@ def row(path: Path, runs: int) -> dict[str, Any]:
     from chamberopt.design.load import load_design
     from chamberopt.geometry.mesh_io import read_part
     from sim_core import compile_simulator  # noqa: F401  its import is not timed
-    from sim_core.geometry.obstacle_set import build_ground
+    from sim_core.geometry.obstacle_set import build_obstacle_set
 
     data = load_design(ROOT / "designs" / "gear.toml").model_dump()
     data["part"]["mesh"] = str(path)
@@ -66,7 +66,7 @@ def row(path: Path, runs: int) -> dict[str, Any]:
         seconds["chamber"].append(spent)
         spent, mesh = timed(lambda: chamber_mesh(chamber))  # noqa: B023
         seconds["mesh"].append(spent)
-        spent, _ = timed(lambda: build_ground(mesh, 0.75e-3, 1, 40e-6))  # noqa: B023
+        spent, _ = timed(lambda: build_obstacle_set(mesh, 0.75e-3, 1, 40e-6))  # noqa: B023
         seconds["tree"].append(spent)
     median = {step: round(statistics.median(values), 3) for step, values in seconds.items()}
     return {

@@ -93,8 +93,8 @@ def play(effect: str, on: bool) -> None:
         run.neighbours,
         run.contact,
         run.friction_state,
-        run.phases,
-        run.air,
+        run.random_phase,
+        run.drag,
         run.sizes,
     )
     size = sum(map(array_bytes, kept)) / len(run.motion)

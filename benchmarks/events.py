@@ -30,11 +30,13 @@ from benchmarks.scenes import MESHES, PHYSICS, ROOT, mesh, scene
 from benchmarks.table import print_table, write_csv
 from sim_core import compile_simulator
 from sim_core.detect.ball_mesh import first_contact
+from sim_core.effects.gravity import gravity_acceleration
 from sim_core.geometry.mesh import MAX_TAGS
 from sim_core.loop.impact_log import new_impact_buffer
 from sim_core.loop.simulate import Clock, _Run
-from sim_core.motion import point_at
+from sim_core.motion import state_under
 from sim_core.numerics.jit import jit
+from sim_core.numerics.vec3 import Flight
 
 STEADY = 0.3  # s
 FLIGHT = 0.01  # s: the length of arc that the wall queries search
@@ -69,12 +71,15 @@ def rate(run: _Run, windows: int) -> list[float]:
 
 
 @jit
-def _queries(tree, scratch, motion, gravity, wave, seam, time, length, repeats):  # type: ignore[no-untyped-def]
-    total = 0.0
+def _queries(tree, scratch, motion, gravity, wave, overlap, time, length, repeats):  # type: ignore[no-untyped-def]
+    total, acceleration = 0.0, gravity_acceleration(gravity)
     for _ in range(repeats):
         for ball in range(len(motion)):
-            here = point_at(motion, ball, time, gravity)
-            delay, obstacle = first_contact(tree, scratch, here, gravity, wave, seam, time, length)
+            here = state_under(motion, ball, time, acceleration)
+            flight = Flight(here.position, here.velocity, acceleration)
+            delay, obstacle = first_contact(
+                None, None, None, -1, tree, scratch, flight, wave, None, overlap, time, length
+            )
             if obstacle >= 0:
                 total += delay
     return total
@@ -83,12 +88,12 @@ def _queries(tree, scratch, motion, gravity, wave, seam, time, length, repeats):
 def query_ns(run: _Run, repeats: int = 50) -> float:
     """Our wall query [ns]: first contact of every ball along its next FLIGHT, walls held still."""
     arguments = (
-        run.ground.tree,
+        run.obstacles.tree,
         run.scratch,
         run.motion,
         run.gravity,
         run.wave,
-        run.ground.seam,
+        run.obstacles.face_overlap,
         run.now[0],
         FLIGHT,
     )
@@ -100,9 +105,8 @@ def query_ns(run: _Run, repeats: int = 50) -> float:
 
 def flights(run: _Run) -> tuple[np.ndarray, np.ndarray]:
     """Positions [m] and velocities [m/s] of the balls now, (n, 3) each."""
-    points = [
-        point_at(run.motion, ball, run.now[0], run.gravity) for ball in range(len(run.motion))
-    ]
+    pull = gravity_acceleration(run.gravity)
+    points = [state_under(run.motion, i, run.now[0], pull) for i in range(len(run.motion))]
     return np.array([p.position for p in points]) + run.centre, np.array(
         [p.velocity for p in points]
     )
@@ -160,7 +164,7 @@ class Contestant:
         run = self.run
         balls = len(run.motion)
         shares = run.count / run.count[:3].sum()
-        walls = [*run.ground.tree[:-1], *run.ground.locator]
+        walls = [*run.obstacles.tree[:-1], *run.obstacles.lookup]
         columns = [
             run.motion,
             *run.queue,

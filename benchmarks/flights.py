@@ -4,7 +4,7 @@ import numpy as np
 
 from benchmarks.structures import product
 from benchmarks.structures.shell import FALL, PIECE, Shell, ask
-from sim_core.numerics.vec3 import Vec3, along
+from sim_core.numerics.vec3 import Vec3, add_scaled
 
 SPEEDS = (1.5, 8.5)  # m/s, evenly
 AT_ONCE = 1e-7  # s: a flight this short leads into the wall it starts from
@@ -30,5 +30,5 @@ def sample(shell: Shell, start: np.ndarray, count: int, rng: np.random.Generator
         flights.append([*here, *velocity])
         if rng.random() < 0.5:
             delay *= rng.random()
-        here = along(along(here, delay, velocity), 0.5 * delay * delay, FALL)
+        here = add_scaled(add_scaled(here, delay, velocity), 0.5 * delay * delay, FALL)
     return np.array(flights)

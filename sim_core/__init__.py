@@ -6,7 +6,6 @@ throughout.
 
 from sim_core.balls import Balls
 from sim_core.contact.resting_balls import Resting, can_rest
-from sim_core.effects.ball_collisions import BallCollisions
 from sim_core.effects.contact_mode import Rest
 from sim_core.effects.drag import Drag, drag_coefficient
 from sim_core.effects.friction import Friction
@@ -24,7 +23,7 @@ from sim_core.loop.compile_ahead import compile_simulator, is_compiled
 from sim_core.loop.impact_log import ImpactLog
 from sim_core.loop.simulate import Collisions, SimulationResult, simulate
 from sim_core.scene.packing import pack_balls
-from sim_core.scene.physics import Physics
+from sim_core.scene.physics import BallCollisions, Physics
 from sim_core.scene.scene import Scene, require_free_rotation
 
 __all__ = [

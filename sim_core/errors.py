@@ -1,17 +1,52 @@
-"""What can go wrong: a scene that cannot be simulated, or a simulation that must not go on."""
+"""Errors of this package, and checks of input that raise them."""
+
+from typing import Any
+
+import numpy as np
 
 
 class SceneError(ValueError):
-    """The scene is not one the simulator can take; the message names the ball, triangle or field, and the remedy."""
+    """The scene cannot be simulated; the message names the ball, triangle or field, and the remedy."""
 
 
 class SimulationError(RuntimeError):
-    """An invariant broke or a ball cannot be followed; the message says where, and what to try."""
+    """An invariant is broken or a ball cannot be followed; the message says where and what to try."""
 
 
 def number(name: str, value: object) -> float:
-    """The value as a float; raises SceneError, with the field's name, for what is no number."""
+    """The value as a float; raises SceneError, naming the field, if it is not a number."""
     try:
         return float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):
         raise SceneError(f"{name} is {value!r}: give a number") from None
+
+
+def surface_table(
+    effect: str, form: str, surfaces: Any, balls: Any, tags: int
+) -> tuple[np.ndarray, tuple[float, float]]:
+    """Two coefficients of an effect for each surface tag, and for ball on ball.
+
+    Args:
+        effect: name of the effect, for messages.
+        form: what the two numbers are, e.g. "(C0, v0)".
+        surfaces: as given, one pair for each tag.
+        balls: as given, one pair.
+        tags: number of tags that need a pair.
+
+    Returns:
+        ``surfaces`` as an array of shape (tags or more, 2), and ``balls`` as two floats.
+
+    Raises:
+        SceneError: for a missing tag, or anything that is not a number.
+    """
+    try:
+        table = np.array(surfaces, dtype=np.float64)
+        pair = (float(balls[0]), float(balls[1]))
+    except (TypeError, ValueError, LookupError):
+        given = f"{effect}.surfaces is {surfaces!r} and {effect}.balls {balls!r}"
+        raise SceneError(f"{given}: give {form} for each tag and for the balls") from None
+    if table.ndim != 2 or table.shape[1] != 2 or len(table) < tags:
+        raise SceneError(
+            f"{effect}.surfaces must give {form} for tags 0 to {tags - 1}, not shape {table.shape}"
+        )
+    return table, pair

@@ -1,8 +1,14 @@
 """Motion between events, in the free-fall frame.
 
-Position x(t) = base + velocity t + ½ a t² with one clock for all balls: what differs between two balls is then a
-straight line, pairs need no clock of their own, and a ball's numbers change only when it is hit. The clock is set
-back every window (a whole number of periods of the fastest sonotrode), so that t stays small and its rounding with it.
+Notation:
+    x(t) = base + velocity t + ½ a t²: position of a ball [m]; ``motion`` holds base (0:3) [m] and
+        velocity (3:6) [m/s] of each ball, shape (n, 6)
+    t: time on the window's clock [s], one clock for all balls
+    a: acceleration [m/s²], that of gravity unless the ball is in contact mode
+
+The difference between two balls is then a straight line, pairs need no clock of their own, and the
+numbers of a ball change only at its events. The clock's zero moves on every window, a whole number of
+periods of the fastest sonotrode, so that t stays small and its rounding with it.
 """
 
 from typing import NamedTuple
@@ -12,20 +18,22 @@ import numpy as np
 from sim_core.effects.contact_mode import ContactState, ball_acceleration
 from sim_core.effects.gravity import Gravity, gravity_acceleration
 from sim_core.numerics.jit import inlined, jit
-from sim_core.numerics.vec3 import Vec3, along
+from sim_core.numerics.vec3 import Vec3, add_scaled
 
-WINDOW = 0.02  # s: rounding of t is 3e-18 s here, a ball at 20 m/s moves 0.4 m; longer loses digits, shorter costs set-backs
+# s: rounding of t is 3e-18 s, and a ball at 20 m/s moves 0.4 m. A longer window loses digits, a shorter
+# one costs more changes of the clock.
+WINDOW = 0.02
 
 
-class Point(NamedTuple):
-    """A ball's centre [m] and velocity [m/s] at some time."""
+class BallState(NamedTuple):
+    """Position of a ball's centre [m] and velocity [m/s] at some time."""
 
     position: Vec3
     velocity: Vec3
 
 
 @jit
-def drift(motion: np.ndarray, ball: int, time: float) -> Vec3:
+def free_fall_position(motion: np.ndarray, ball: int, time: float) -> Vec3:
     """Position in the free-fall frame [m]: x(t) - ½ a t²."""
     return Vec3(
         motion[ball, 0] + motion[ball, 3] * time,
@@ -35,23 +43,25 @@ def drift(motion: np.ndarray, ball: int, time: float) -> Vec3:
 
 
 @inlined
-def point_at(motion: np.ndarray, ball: int, time: float, gravity: Gravity | None) -> Point:
-    """Where a ball is, and how fast, at a time of the window."""
-    return point_under(motion, ball, time, gravity_acceleration(gravity))
+def state_at(motion: np.ndarray, ball: int, time: float, gravity: Gravity | None) -> BallState:
+    """State of a ball under gravity at a time of the window."""
+    return state_under(motion, ball, time, gravity_acceleration(gravity))
 
 
 @inlined
-def point_under(motion: np.ndarray, ball: int, time: float, acceleration: Vec3) -> Point:
-    """The same under the ball's own acceleration [m/s²]."""
-    position = along(drift(motion, ball, time), 0.5 * time * time, acceleration)
-    velocity = along(Vec3(motion[ball, 3], motion[ball, 4], motion[ball, 5]), time, acceleration)
-    return Point(position, velocity)
+def state_under(motion: np.ndarray, ball: int, time: float, acceleration: Vec3) -> BallState:
+    """State of a ball under its own acceleration [m/s²] at a time of the window."""
+    position = add_scaled(free_fall_position(motion, ball, time), 0.5 * time * time, acceleration)
+    velocity = add_scaled(
+        Vec3(motion[ball, 3], motion[ball, 4], motion[ball, 5]), time, acceleration
+    )
+    return BallState(position, velocity)
 
 
 @inlined
-def kick(motion: np.ndarray, ball: int, time: float, change: Vec3) -> None:
-    """Change a ball's velocity by ``change`` [m/s] at ``time``; its position at that time stays."""
-    here = drift(motion, ball, time)
+def change_velocity(motion: np.ndarray, ball: int, time: float, change: Vec3) -> None:
+    """Change a ball's velocity by ``change`` [m/s] at ``time``; its position then stays."""
+    here = free_fall_position(motion, ball, time)
     for axis, (now, add) in enumerate(((here.x, change.x), (here.y, change.y), (here.z, change.z))):
         velocity = motion[ball, 3 + axis] + add
         motion[ball, axis] = now - velocity * time
@@ -59,8 +69,10 @@ def kick(motion: np.ndarray, ball: int, time: float, change: Vec3) -> None:
 
 
 @inlined
-def set_off(motion: np.ndarray, ball: int, time: float, here: Point, acceleration: Vec3) -> None:
-    """Give a ball the path that leads through ``here`` at ``time`` under its own acceleration [m/s²]."""
+def set_path(
+    motion: np.ndarray, ball: int, time: float, here: BallState, acceleration: Vec3
+) -> None:
+    """Give a ball the path through ``here`` at ``time`` under its own acceleration [m/s²]."""
     for axis in range(3):
         velocity = here.velocity[axis] - acceleration[axis] * time
         motion[ball, axis] = (

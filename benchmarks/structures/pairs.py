@@ -6,8 +6,8 @@ balls, enters among the answers what it sees later, and returns how many flights
 """
 
 from benchmarks.structures.compiled import jit, search
-from sim_core.detect.ball_ball import meeting_delay
-from sim_core.motion import drift
+from sim_core.detect.ball_ball import pair_delay
+from sim_core.motion import free_fall_position
 from sim_core.numerics.vec3 import Vec3, sub
 
 
@@ -16,13 +16,13 @@ def sooner(motion, reach, ball, other, time, best, partner):  # type: ignore[no-
     """The first meeting known, after ``best`` [s] from ``time``, and its partner, once this other has been looked
     at.
     """
-    here, there = drift(motion, ball, time), drift(motion, other, time)
+    here, there = free_fall_position(motion, ball, time), free_fall_position(motion, other, time)
     closing = Vec3(
         motion[other, 3] - motion[ball, 3],
         motion[other, 4] - motion[ball, 4],
         motion[other, 5] - motion[ball, 5],
     )
-    delay = meeting_delay(sub(there, here), closing, reach)
+    delay = pair_delay(sub(there, here), closing, reach)
     return (delay, other) if delay < best else (best, partner)
 
 

@@ -6,18 +6,17 @@ import numpy as np
 
 from benchmarks.structures.compiled import searches
 from benchmarks.structures.shell import Shell
-from sim_core import Gravity
 from sim_core.detect.ball_mesh import Scratch, first_contact, new_scratch
 from sim_core.geometry.bvh import Tree, build_tree
-from sim_core.geometry.obstacle_set import build_ground
-from sim_core.geometry.obstacles import Obstacles
-from sim_core.geometry.triangle_lookup import Locator
+from sim_core.geometry.obstacle_set import build_obstacle_set
+from sim_core.geometry.obstacles import ObstacleTable
+from sim_core.geometry.triangle_lookup import TriangleLookup
+from sim_core.numerics.vec3 import Flight
 
 
 class EightWide(NamedTuple):
     tree: Tree
     scratch: Scratch
-    gravity: Gravity
     seam: float
 
 
@@ -26,20 +25,21 @@ def build(shell: Shell) -> EightWide:
     grow = shell.grow[:, None]
     low, high = shell.points.min(axis=1) - grow, shell.points.max(axis=1) + grow
     names = np.repeat(np.arange(len(shell.kinds), dtype=np.int32)[:, None], 2, axis=1)
-    tree = build_tree(Obstacles(shell.numbers, shell.kinds, names, low, high), shell.radius)
-    return EightWide(tree, new_scratch(), Gravity(), shell.seam)
+    tree = build_tree(ObstacleTable(shell.numbers, shell.kinds, names, low, high), shell.radius)
+    return EightWide(tree, new_scratch(), shell.seam)
 
 
-def build_product(shell: Shell) -> tuple[EightWide, Locator]:
-    """What the product makes of the mesh, flats merged, and how it then finds the triangle that was hit."""
-    ground = build_ground(shell.mesh, shell.radius)
-    return EightWide(ground.tree, new_scratch(), Gravity(), ground.seam), ground.locator
+def build_product(shell: Shell) -> tuple[EightWide, TriangleLookup]:
+    """What the product makes of the mesh, flat faces merged, and how it then finds the triangle that was hit."""
+    surfaces = build_obstacle_set(shell.mesh, (shell.radius,))
+    return EightWide(surfaces.tree, new_scratch(), surfaces.face_overlap), surfaces.lookup
 
 
 @searches(EightWide)
 def nearest(eight, ball, fall, length):  # type: ignore[no-untyped-def]
     """Delay [s] and name of the first contact within ``length`` [s]: the shell's row, or the product's triangle."""
+    flight = Flight(ball.position, ball.velocity, fall)
     delay, row = first_contact(
-        eight.tree, eight.scratch, ball, eight.gravity, None, eight.seam, 0.0, length
+        None, None, None, -1, eight.tree, eight.scratch, flight, None, None, eight.seam, 0.0, length
     )
     return delay, int(eight.tree.triangles[row, 0]) if row >= 0 else -1

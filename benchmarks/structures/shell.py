@@ -7,11 +7,11 @@ import numpy as np
 from benchmarks.structures.compiled import jit, search
 from sim_core import Gravity, TriangleMesh
 from sim_core.detect.ball_triangle import capsule_delay, face_delay
-from sim_core.geometry.flat_faces import LONE, Flats
-from sim_core.geometry.obstacles import CAPSULE, build_obstacles, seam
-from sim_core.motion import Point
+from sim_core.geometry.flat_faces import LONE, FlatFaces, surface_triangles
+from sim_core.geometry.obstacles import CAPSULE, build_obstacle_table, face_overlap_of
+from sim_core.motion import BallState
 from sim_core.numerics.roots import NEVER
-from sim_core.numerics.vec3 import Vec3
+from sim_core.numerics.vec3 import Flight, Vec3
 
 PIECE = 0.01  # s: arcs are searched in pieces of at most this, as the product does
 TINY = 1e-30  # stands for a chord component of zero, whose inverse would be infinite
@@ -59,17 +59,20 @@ class Chord(NamedTuple):
 
 def build_shell(mesh: TriangleMesh, radius: float) -> Shell:
     """The mesh for balls of this radius [m], nothing vibrating."""
-    count = len(mesh.triangles)
-    no_flats = Flats(np.full(count, LONE, np.int32), np.zeros(0, np.int32), np.zeros((0, 3, 3)), [])
-    obstacles = build_obstacles(mesh, radius, np.zeros(count, dtype=bool), 0.0, no_flats)
+    surface = surface_triangles(mesh)
+    none = np.zeros(0, np.int32)
+    alone = FlatFaces(np.full(len(mesh.triangles), LONE, np.int32), none, np.zeros((0, 3, 3)), [])
+    obstacles = build_obstacle_table(surface._replace(flat_faces=alone), radius)
     corners = mesh.corners - mesh.middle
     numbers, round_ = obstacles.numbers, obstacles.kinds == CAPSULE
     points = corners[obstacles.triangles[:, 0]] + radius * numbers[:, None, 0:3]
     start = numbers[round_, 0:3]
     points[round_] = start[:, None]
     points[round_, 1] += numbers[round_, 6:7] * numbers[round_, 3:6]
-    grow = np.where(round_, radius, seam(radius))
-    return Shell(numbers, obstacles.kinds, points, grow, radius, seam(radius), mesh, corners)
+    grow = np.where(round_, radius, face_overlap_of(radius))
+    return Shell(
+        numbers, obstacles.kinds, points, grow, radius, face_overlap_of(radius), mesh, corners
+    )
 
 
 def sort_rows(shell: Shell, order: np.ndarray) -> Rows:
@@ -96,9 +99,10 @@ def padding(shell: Shell) -> float:
 @jit
 def delay_to(rows, row, ball, fall, limit):  # type: ignore[no-untyped-def]
     """Time [s] until the ball meets one obstacle; NEVER if it does not, or not within ``limit``."""
+    flight = Flight(ball.position, ball.velocity, fall)
     if rows.kinds[row] == CAPSULE:
-        return capsule_delay(rows.numbers, row, ball, fall, rows.radius, limit)
-    return face_delay(rows.numbers, row, ball, fall, rows.radius, rows.seam)
+        return capsule_delay(rows.numbers, row, flight, rows.radius, limit)
+    return face_delay(rows.numbers, row, flight, rows.radius, rows.seam)
 
 
 @jit
@@ -150,7 +154,7 @@ def _ask(structure, flights, fall, delays, obstacles):  # type: ignore[no-untype
         u, v, w = flights[i, 3], flights[i, 4], flights[i, 5]
         flown = 0.0
         while True:
-            ball = Point(
+            ball = BallState(
                 Vec3(
                     x + flown * (u + 0.5 * flown * fall.x),
                     y + flown * (v + 0.5 * flown * fall.y),

@@ -26,11 +26,11 @@ from sim_core.contact.support_changes import BOUNCES, touch_down
 from sim_core.effects.contact_mode import ASLEEP, MODE, ON_BALL, ContactState
 from sim_core.effects.friction import OF_BALLS, FrictionState
 from sim_core.effects.restitution import Restitution, restitution_law
-from sim_core.impulses.ball_ball import pair_kick
-from sim_core.impulses.friction import rub_pair, rub_surface
-from sim_core.motion import Point
+from sim_core.impulses.collision import pair_velocity_change
+from sim_core.impulses.friction import add_pair_friction, add_surface_friction
+from sim_core.motion import BallState
 from sim_core.numerics.jit import jit
-from sim_core.numerics.vec3 import Vec3, dot, sub, times
+from sim_core.numerics.vec3 import Vec3, dot, scaled, sub
 
 # m/s: balls in touch that part by less are in touch for good. Slow hits part them twice as fast: two that went on as
 # one (e = 0) would meet for ever by rounding
@@ -86,29 +86,29 @@ def meet(
             time,
             time_since_start,
             first,
-            times(-1.0, normal),
+            scaled(-1.0, normal),
             into,
             restitution,
             radius,
         )
     elif not slow:
-        change = pair_kick(apart, closing, restitution)
-        change = rub_pair(contact.friction_state, one, two, time, apart, closing, change)
+        change = pair_velocity_change(apart, closing, restitution)
+        change = add_pair_friction(contact.friction_state, one, two, time, apart, closing, change)
         impart(contact, motion, one, time, time_since_start, first, change)
-        impart(contact, motion, two, time, time_since_start, second, times(-1.0, change))
+        impart(contact, motion, two, time, time_since_start, second, scaled(-1.0, change))
     else:
         if pressed:
-            let_go(contact, one, times(-1.0, normal))
+            let_go(contact, one, scaled(-1.0, normal))
             let_go(contact, two, normal)
         give_one, give_two = (
-            response(contact, one, times(-1.0, normal)),
+            response(contact, one, scaled(-1.0, normal)),
             response(contact, two, normal),
         )
         total = max(dot(give_two, normal) - dot(give_one, normal), BLOCKED)
         press = _press(contact.friction_state, contact, one, two, normal)
         push = (into + max(into, SHORTEST_HOP * press, 2.0 * PARTING)) / total
-        impart(contact, motion, one, time, time_since_start, first, times(push, give_one))
-        impart(contact, motion, two, time, time_since_start, second, times(push, give_two))
+        impart(contact, motion, one, time, time_since_start, first, scaled(push, give_one))
+        impart(contact, motion, two, time, time_since_start, second, scaled(push, give_two))
     if pressed:
         touch(contact, one, time_since_start)
         touch(contact, two, time_since_start)
@@ -125,7 +125,7 @@ def _land_on(
     other: int,
     time: float,
     time_since_start: float,
-    here: Point,
+    here: BallState,
     normal: Vec3,
     into: float,
     restitution: Restitution | None,
@@ -139,8 +139,8 @@ def _land_on(
     )
     if landed == BOUNCES:
         e = 1.0 if restitution is None else _law(restitution, into)
-        change = times((1.0 + e) * into, normal)
-        change = rub_surface(
+        change = scaled((1.0 + e) * into, normal)
+        change = add_surface_friction(
             contact.friction_state, ball, time, normal, here.velocity, change, OF_BALLS
         )
         impart(contact, motion, ball, time, time_since_start, here, change)

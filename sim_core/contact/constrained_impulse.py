@@ -4,9 +4,9 @@ import numpy as np
 
 from sim_core.contact.support_changes import settle
 from sim_core.effects.contact_mode import FLYING, MODE, ContactState, onto_cone
-from sim_core.motion import Point, kick, point_under
+from sim_core.motion import BallState, change_velocity, state_under
 from sim_core.numerics.jit import jit
-from sim_core.numerics.vec3 import Vec3, along
+from sim_core.numerics.vec3 import Vec3, add_scaled
 
 BLOCKED = 0.01  # of an inverse mass: a push on balls that give way by less is no greater for it
 # s: balls pressed together without any speed would meet again at once; they part for so long, which lifts them 50 nm
@@ -22,9 +22,9 @@ def acceleration_of(contact: ContactState, ball: int) -> Vec3:
 
 
 @jit
-def place(contact: ContactState, motion: np.ndarray, ball: int, time: float) -> Point:
+def place(contact: ContactState, motion: np.ndarray, ball: int, time: float) -> BallState:
     """Where a ball is [m], and its velocity [m/s], at a time of the window's clock."""
-    return point_under(motion, ball, time, acceleration_of(contact, ball))
+    return state_under(motion, ball, time, acceleration_of(contact, ball))
 
 
 @jit
@@ -42,12 +42,12 @@ def impart(
     ball: int,
     time: float,
     time_since_start: float,
-    at: Point,
+    at: BallState,
     change: Vec3,
 ) -> None:
     """Change a ball's velocity by ``change`` [m/s]; one in contact mode keeps of it what its feet leave."""
     if contact.marks[ball, MODE] == FLYING:
-        kick(motion, ball, time, change)
+        change_velocity(motion, ball, time, change)
     else:
         settle(
             contact,
@@ -55,5 +55,5 @@ def impart(
             ball,
             time,
             time_since_start,
-            Point(at.position, along(at.velocity, 1.0, change)),
+            BallState(at.position, add_scaled(at.velocity, 1.0, change)),
         )

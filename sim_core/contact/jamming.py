@@ -20,7 +20,7 @@ from sim_core.effects.contact_mode import (
     TOUCHED,
     ContactState,
 )
-from sim_core.motion import Point
+from sim_core.motion import BallState
 from sim_core.numerics.jit import jit
 from sim_core.numerics.vec3 import Vec3, dot, sub
 
@@ -51,7 +51,7 @@ def hold(
     else:
         contact.marks[ball, HOLDS] = min(contact.marks[ball, HOLDS] + 1, MOST_HOLDS)
     move_on(
-        contact, motion, ball, time, time_since_start, Point(position, nothing), nothing, JAMMED
+        contact, motion, ball, time, time_since_start, BallState(position, nothing), nothing, JAMMED
     )
     holds = contact.marks[ball, HOLDS]
     contact.memory[ball, STAYS_UNTIL] = time_since_start + WAIT * (2.0**holds - 1.0)

@@ -24,11 +24,11 @@ from sim_core.effects.contact_mode import (
 from sim_core.effects.friction import FrictionState
 from sim_core.effects.vibration import Wave
 from sim_core.geometry.bvh import Tree
-from sim_core.geometry.obstacles import FACE, WAVING_FACE
-from sim_core.motion import Point
+from sim_core.geometry.obstacles import FACE, VIBRATING_FACE
+from sim_core.motion import BallState
 from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.roots import NEVER, first_approach
-from sim_core.numerics.vec3 import Vec3, along, cross, dot, sub
+from sim_core.numerics.vec3 import Vec3, add_scaled, cross, dot, sub
 
 OVER = 1.5  # seams: a foot reaches further over its border than the face does, so that a ball that left it is past it
 ONE_PLANE = 1e-5  # rad: faces that meet at less are told apart at their border only; over a seam that is 1e-13 m
@@ -60,10 +60,10 @@ def _lies_behind(tree: Tree, row: int, normal: Vec3, position: Vec3) -> bool:
     if tree.kinds[row] == FACE:
         turn = cross(normal, one)
         return dot(turn, turn) < ONE_PLANE * ONE_PLANE and dot(normal, one) > 0.0
-    if tree.kinds[row] == WAVING_FACE:
+    if tree.kinds[row] == VIBRATING_FACE:
         return False
     height = dot(normal, position) - tree.radius + BEHIND
-    two = along(one, numbers[row, 6], Vec3(numbers[row, 3], numbers[row, 4], numbers[row, 5]))
+    two = add_scaled(one, numbers[row, 6], Vec3(numbers[row, 3], numbers[row, 4], numbers[row, 5]))
     return dot(normal, one) <= height and dot(normal, two) <= height
 
 
@@ -71,9 +71,9 @@ def _lies_behind(tree: Tree, row: int, normal: Vec3, position: Vec3) -> bool:
 def end_of_path(
     contact: ContactState | None,
     tree: Tree,
-    seam: float,
+    face_overlap: float,
     wave: Wave | None,
-    here: Point,
+    here: BallState,
     acceleration: Vec3,
     ball: int,
     time: float,
@@ -111,10 +111,10 @@ def end_of_path(
                 Vec3(0.0, 0.0, 0.0),
             )
         elif tree.kinds[row] == FACE:
-            delay = _leaves_face(tree.numbers, row, here, acceleration, OVER * seam)
+            delay = _leaves_face(tree.numbers, row, here, acceleration, OVER * face_overlap)
         else:
             delay = _leaves_edge(
-                contact, tree.numbers, ball, support, here, acceleration, OVER * seam
+                contact, tree.numbers, ball, support, here, acceleration, OVER * face_overlap
             )
         if delay < best:
             best, end = delay, LEAVES - support
@@ -137,7 +137,7 @@ def _swing(wave: Wave | None) -> float:
 
 @jit
 def _leaves_face(
-    numbers: np.ndarray, row: int, here: Point, acceleration: Vec3, over: float
+    numbers: np.ndarray, row: int, here: BallState, acceleration: Vec3, over: float
 ) -> float:
     soonest = NEVER
     for k in range(4, 20, 4):
@@ -158,7 +158,7 @@ def _leaves_edge(
     numbers: np.ndarray,
     ball: int,
     support: int,
-    here: Point,
+    here: BallState,
     acceleration: Vec3,
     over: float,
 ) -> float:
@@ -195,9 +195,9 @@ def _leaves_round(
     gone = sub(
         position, Vec3(spots[ball, support, 0], spots[ball, support, 1], spots[ball, support, 2])
     )
-    gone = along(gone, -dot(gone, line), line)
-    velocity = along(velocity, -dot(velocity, line), line)
-    acceleration = along(acceleration, -dot(acceleration, line), line)
+    gone = add_scaled(gone, -dot(gone, line), line)
+    velocity = add_scaled(velocity, -dot(velocity, line), line)
+    acceleration = add_scaled(acceleration, -dot(acceleration, line), line)
     left = spots[ball, support, 3] - math.sqrt(dot(gone, gone))
     if left <= 0.0:
         return 0.0
@@ -221,7 +221,7 @@ def _brake_ends(
     if friction_state is not None:
         slips = friction_state.slips
         change = Vec3(slips[ball, 3], slips[ball, 4], slips[ball, 5])
-        slip = along(Vec3(slips[ball, 0], slips[ball, 1], slips[ball, 2]), time, change)
+        slip = add_scaled(Vec3(slips[ball, 0], slips[ball, 1], slips[ball, 2]), time, change)
         if dot(slip, slip) + dot(change, change) > 0.0:
             return _stops(slip, change)
     if contact.resistance > 0.0:

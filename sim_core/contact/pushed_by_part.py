@@ -18,10 +18,10 @@ from sim_core.effects.contact_mode import (
     drop_support,
     support_normal,
 )
-from sim_core.effects.part_rotation import Turning, from_part
-from sim_core.motion import Point, kick
+from sim_core.effects.part_rotation import RotationState, to_room_frame
+from sim_core.motion import BallState, change_velocity
 from sim_core.numerics.jit import inlined, jit
-from sim_core.numerics.vec3 import Vec3, dot, times
+from sim_core.numerics.vec3 import Vec3, dot, scaled
 
 TOUCHING = (
     1e-2  # s: what lies on a turning part is touched by it more often, in hops of 10 mm/s each 2 ms
@@ -32,7 +32,7 @@ PRESSED = 2  # of DRIVEN
 @inlined
 def taken_from_part(
     contact: ContactState | None,
-    turning: Turning,
+    rotation: RotationState,
     ball: int,
     time: float,
     away: Vec3,
@@ -48,7 +48,10 @@ def taken_from_part(
     if into >= contact.slow:
         return change
     return _constrained(
-        contact, ball, from_part(turning, times(1.0 / math.sqrt(dot(away, away)), away), time), into
+        contact,
+        ball,
+        to_room_frame(rotation, scaled(1.0 / math.sqrt(dot(away, away)), away), time),
+        into,
     )
 
 
@@ -59,7 +62,7 @@ def _constrained(contact: ContactState, ball: int, normal: Vec3, into: float) ->
     lift = SHORTEST_HOP * math.sqrt(
         dot(contact.gravity, contact.gravity)
     )  # what lies on it hops, not too often
-    return times((into + max(into, lift)) / max(dot(give, normal), BLOCKED), give)
+    return scaled((into + max(into, lift)) / max(dot(give, normal), BLOCKED), give)
 
 
 @inlined
@@ -69,12 +72,12 @@ def drive(
     ball: int,
     time: float,
     time_since_start: float,
-    here: Point,
+    here: BallState,
     change: Vec3,
 ) -> None:
     """The turning part changes a ball's velocity by ``change`` [m/s]."""
     if contact is None:
-        kick(motion, ball, time, change)
+        change_velocity(motion, ball, time, change)
         return
     contact.marks[ball, ROLLING] = 0
     impart(contact, motion, ball, time, time_since_start, here, change)

@@ -16,10 +16,10 @@ from sim_core.effects.contact_mode import (
 )
 from sim_core.effects.gravity import Gravity
 from sim_core.geometry.analytic import AnalyticCavity
-from sim_core.geometry.mesh import TriangleMesh, towards_shot
-from sim_core.geometry.obstacle_set import Ground
+from sim_core.geometry.mesh import TriangleMesh, normals_towards_shot
+from sim_core.geometry.obstacle_set import ObstacleSet
 from sim_core.geometry.obstacles import CAPSULE
-from sim_core.geometry.triangle_lookup import triangle_at
+from sim_core.geometry.triangle_lookup import find_triangle
 from sim_core.numerics.vec3 import Vec3
 
 UPWARD = 1e-6  # of the weight: a wall that bears less is upright but for rounding
@@ -48,7 +48,7 @@ class Resting:
 
 def resting(
     contact: ContactState | None,
-    ground: Ground,
+    obstacles: ObstacleSet,
     positions: np.ndarray,
     middle: np.ndarray,
     origin: float,
@@ -65,10 +65,10 @@ def resting(
             if row <= ON_BALL:
                 balls[i, support] = ON_BALL - row
             else:
-                seed = int(ground.tree.triangles[row, 0])
+                seed = int(obstacles.tree.triangles[row, 0])
                 at = Vec3(*(float(x) for x in positions[ball] - middle))
-                lone = ground.tree.kinds[row] == CAPSULE
-                triangles[i, support] = seed if lone else triangle_at(ground.locator, seed, at)
+                lone = obstacles.tree.kinds[row] == CAPSULE
+                triangles[i, support] = seed if lone else find_triangle(obstacles.lookup, seed, at)
     return Resting(
         still,
         positions[still],
@@ -97,6 +97,6 @@ def can_rest(mesh: TriangleMesh | AnalyticCavity, gravity: Gravity | None, *movi
     if gravity is None:
         return False
     acceleration = np.array(gravity, dtype=np.float64)
-    normals, doubled = towards_shot(mesh.corners)
+    normals, doubled = normals_towards_shot(mesh.corners)
     still = (doubled > 0.0) & ~np.isin(mesh.tags, moving)
     return bool((normals[still] @ acceleration < -UPWARD * np.linalg.norm(acceleration)).any())

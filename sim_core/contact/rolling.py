@@ -33,7 +33,7 @@ from sim_core.effects.contact_mode import (
 )
 from sim_core.effects.friction import FrictionState, set_slip, set_spin, spin_at
 from sim_core.numerics.jit import jit
-from sim_core.numerics.vec3 import Vec3, along, cross, dot, sub, times
+from sim_core.numerics.vec3 import Vec3, add_scaled, cross, dot, scaled, sub
 
 BEARS = 1e-9  # of the load: what a foot or two leave of it is rounding
 NO_SLIP = 1e-9  # m/s: rounding of a slip
@@ -68,10 +68,10 @@ def _resisted(
     speed = _size(velocity)
     brake = contact.resistance * _load(weight, size)
     if speed > ROUNDING:
-        return velocity, along(acceleration, -brake / speed, velocity), SLIDING
+        return velocity, add_scaled(acceleration, -brake / speed, velocity), SLIDING
     if size <= brake or size <= STILL_BELOW * weight:
         return NOTHING, NOTHING, ASLEEP
-    return velocity, along(acceleration, -brake / size, acceleration), SLIDING
+    return velocity, add_scaled(acceleration, -brake / size, acceleration), SLIDING
 
 
 @jit
@@ -88,49 +88,49 @@ def _rubbed(
     up, arm, hold, axis = _stand(friction_state, contact, ball, sub(acceleration, contact.gravity))
     spin = spin_at(friction_state, ball, time)
     if arm < friction_state.radius:
-        spin = times(dot(spin, axis), axis)
-    slip = along(velocity, -arm, cross(spin, up))
-    slip = along(slip, -dot(slip, up), up)
+        spin = scaled(dot(spin, axis), axis)
+    slip = add_scaled(velocity, -arm, cross(spin, up))
+    slip = add_scaled(slip, -dot(slip, up), up)
     slipping = _size(slip)
     inertia = 2.5 * (arm / friction_state.radius) ** 2  # k
     need = size / (1.0 + inertia)
     if slipping < contact.capture and need < hold:  # it rolls, or friction holds it
-        velocity = onto_cone(contact, ball, along(velocity, -1.0 / (1.0 + inertia), slip))
-        drift = times(inertia / (1.0 + inertia), acceleration)
+        velocity = onto_cone(contact, ball, add_scaled(velocity, -1.0 / (1.0 + inertia), slip))
+        drift = scaled(inertia / (1.0 + inertia), acceleration)
         brake = min(contact.resistance * load, hold - need)
         speed = _size(velocity)
         if speed > ROUNDING:
-            drift = along(drift, -brake / speed, velocity)
+            drift = add_scaled(drift, -brake / speed, velocity)
         elif inertia * need <= brake or size <= STILL_BELOW * weight:
             _drop_left_supports(contact, ball, acceleration)
             return NOTHING, NOTHING, ASLEEP
         else:
-            drift = along(drift, -brake / size, acceleration)
-        drilling = times(dot(spin, up), up)
-        rolling = times(1.0 / arm, cross(up, velocity))
+            drift = add_scaled(drift, -brake / size, acceleration)
+        drilling = scaled(dot(spin, up), up)
+        rolling = scaled(1.0 / arm, cross(up, velocity))
         set_spin(
             friction_state,
             ball,
             time,
-            along(rolling, 1.0, drilling),
-            times(1.0 / arm, cross(up, drift)),
+            add_scaled(rolling, 1.0, drilling),
+            scaled(1.0 / arm, cross(up, drift)),
         )
         return _kept_to(contact, ball, velocity, drift)
     if _size(velocity) <= ROUNDING and hold == 0.0 and size <= STILL_BELOW * weight:
         return NOTHING, NOTHING, ASLEEP
     rub = NOTHING
     if slipping > NO_SLIP:
-        rub = times(-hold / slipping, slip)
+        rub = scaled(-hold / slipping, slip)
     elif size > 0.0:
         slip = NOTHING
-        rub = times(-hold / size, acceleration)
-    drift = onto_cone(contact, ball, along(contact.gravity, 1.0, rub))
+        rub = scaled(-hold / size, acceleration)
+    drift = onto_cone(contact, ball, add_scaled(contact.gravity, 1.0, rub))
     if dot(up, drift) > STILL_BELOW * weight:
         rub, drift = NOTHING, acceleration
-    twist = times(-inertia / arm, cross(up, rub))
+    twist = scaled(-inertia / arm, cross(up, rub))
     set_spin(friction_state, ball, time, spin, twist)
     if hold > 0.0:
-        set_slip(friction_state, ball, time, slip, along(drift, -arm, cross(twist, up)))
+        set_slip(friction_state, ball, time, slip, add_scaled(drift, -arm, cross(twist, up)))
     return _kept_to(contact, ball, velocity, drift)
 
 
@@ -147,7 +147,7 @@ def _stand(
     load = _size(push)
     for one in range(supports):
         n = support_normal(contact, ball, one)
-        if _size(along(push, -dot(push, n), n)) <= BEARS * load:
+        if _size(add_scaled(push, -dot(push, n), n)) <= BEARS * load:
             return n, friction_state.radius, load * _mu(friction_state, contact, ball, one), NOTHING
     for one in range(supports):
         n = support_normal(contact, ball, one)
@@ -161,14 +161,18 @@ def _stand(
                 (dot(n, push) - c * dot(m, push)) / square,
                 (dot(m, push) - c * dot(n, push)) / square,
             )
-            if a < 0.0 or b < 0.0 or _size(along(along(push, -a, n), -b, m)) > BEARS * load:
+            if (
+                a < 0.0
+                or b < 0.0
+                or _size(add_scaled(add_scaled(push, -a, n), -b, m)) > BEARS * load
+            ):
                 continue
-            middle, across = along(n, 1.0, m), sub(n, m)
+            middle, across = add_scaled(n, 1.0, m), sub(n, m)
             twice = _size(middle)
             hold = a * _mu(friction_state, contact, ball, one) + b * _mu(
                 friction_state, contact, ball, two
             )
-            up, axis = times(1.0 / twice, middle), times(1.0 / _size(across), across)
+            up, axis = scaled(1.0 / twice, middle), scaled(1.0 / _size(across), across)
             return up, 0.5 * twice * friction_state.radius, hold, axis
     return support_normal(contact, ball, 0), friction_state.radius, 0.0, NOTHING
 

@@ -31,9 +31,9 @@ from sim_core.effects.contact_mode import (
 )
 from sim_core.geometry.bvh import Tree
 from sim_core.geometry.obstacles import CAPSULE
-from sim_core.motion import Point, kick, set_off
+from sim_core.motion import BallState, change_velocity, set_path
 from sim_core.numerics.jit import inlined, jit
-from sim_core.numerics.vec3 import Vec3, along, cross, dot
+from sim_core.numerics.vec3 import Vec3, add_scaled, cross, dot
 
 # how a hit on a still surface ends
 BOUNCES, ROLLS, CAUGHT = 0, 1, 2
@@ -55,7 +55,7 @@ def settle(
     ball: int,
     time: float,
     time_since_start: float,
-    at: Point,
+    at: BallState,
 ) -> None:
     """Let a ball go on from ``at`` on those of its feet that hold it. ``time``, ``time_since_start`` [s]: on the window's clock,
     and since the start.
@@ -80,7 +80,7 @@ def settle(
             drop_support(contact, ball, support)
         else:
             if out > 0.0:
-                velocity = along(velocity, -out, normal)
+                velocity = add_scaled(velocity, -out, normal)
             support += 1
     velocity = onto_cone(contact, ball, velocity)
     speed = math.sqrt(dot(velocity, velocity))
@@ -102,7 +102,7 @@ def settle(
         ball,
         time,
         time_since_start,
-        Point(at.position, velocity),
+        BallState(at.position, velocity),
         acceleration,
         mode,
     )
@@ -115,7 +115,7 @@ def move_on(
     ball: int,
     time: float,
     time_since_start: float,
-    at: Point,
+    at: BallState,
     acceleration: Vec3,
     mode: int,
 ) -> None:
@@ -129,7 +129,7 @@ def move_on(
     reset_spin(contact.friction_state, ball, time, mode)
     for axis in range(3):
         contact.acceleration[ball, axis] = acceleration[axis]
-    set_off(motion, ball, time, at, acceleration)
+    set_path(motion, ball, time, at, acceleration)
 
 
 @inlined
@@ -139,16 +139,16 @@ def deflect(
     ball: int,
     time: float,
     time_since_start: float,
-    here: Point,
+    here: BallState,
     change: Vec3,
 ) -> None:
     """Change a ball's velocity by ``change`` [m/s]."""
     if contact is None:
-        kick(motion, ball, time, change)
+        change_velocity(motion, ball, time, change)
         return
     contact.marks[ball, ROLLING] = 0
     if contact.marks[ball, MODE] == FLYING:
-        kick(motion, ball, time, change)
+        change_velocity(motion, ball, time, change)
     else:
         settle(
             contact,
@@ -156,7 +156,7 @@ def deflect(
             ball,
             time,
             time_since_start,
-            Point(here.position, along(here.velocity, 1.0, change)),
+            BallState(here.position, add_scaled(here.velocity, 1.0, change)),
         )
 
 
@@ -166,10 +166,10 @@ def set_out(
     motion: np.ndarray,
     ball: int,
     time: float,
-    here: Point,
+    here: BallState,
     away: Vec3,
     radius: float,
-) -> Point:
+) -> BallState:
     """Put a ball that meets an edge back to ``radius`` [m] from it: contact is up to 1e-13 m deep there, and thousands
     of small hops on one edge would add up. It goes out along the planes of its feet, not into them.
     """
@@ -187,10 +187,10 @@ def set_out(
     acceleration = Vec3(
         contact.acceleration[ball, 0], contact.acceleration[ball, 1], contact.acceleration[ball, 2]
     )
-    there = Point(
-        along(here.position, (radius - distance) / (distance * share), free), here.velocity
+    there = BallState(
+        add_scaled(here.position, (radius - distance) / (distance * share), free), here.velocity
     )
-    set_off(motion, ball, time, there, acceleration)
+    set_path(motion, ball, time, there, acceleration)
     return there
 
 
@@ -203,7 +203,7 @@ def land(
     row: int,
     time: float,
     time_since_start: float,
-    here: Point,
+    here: BallState,
     away: Vec3,
 ) -> int:
     """A ball meets a still surface: does it bounce, roll on as if the surface were one, or stay in contact?"""
@@ -224,7 +224,7 @@ def touch_down(
     round_over: float,
     time: float,
     time_since_start: float,
-    here: Point,
+    here: BallState,
     normal: Vec3,
 ) -> int:
     """The same for anything that stands still, with the radius [m] on which the centre goes round it."""
@@ -252,12 +252,14 @@ def touch_down(
             )
             if came_from >= 0 and not stays:
                 drop_support(contact, ball, came_from)
-            flat = along(velocity, into, normal)
+            flat = add_scaled(velocity, into, normal)
             size = math.sqrt(dot(flat, flat))
             if not stays and size > 0.5 * speed:  # turned into the new face's plane, not slowed
                 velocity = Vec3(flat.x * speed / size, flat.y * speed / size, flat.z * speed / size)
             add_support(contact, ball, row, normal, here.position, scope)
-            settle(contact, motion, ball, time, time_since_start, Point(here.position, velocity))
+            settle(
+                contact, motion, ball, time, time_since_start, BallState(here.position, velocity)
+            )
             return ROLLS
     acceleration = Vec3(
         contact.acceleration[ball, 0], contact.acceleration[ball, 1], contact.acceleration[ball, 2]
@@ -293,11 +295,11 @@ def _lies_in_valley(
 ) -> bool:
     """True when both faces run down to their crease and the ball hardly moves across it: it stays on both."""
     acceleration = contact.gravity
-    down_one = along(acceleration, -dot(acceleration, one), one)
-    down_two = along(acceleration, -dot(acceleration, two), two)
+    down_one = add_scaled(acceleration, -dot(acceleration, one), one)
+    down_two = add_scaled(acceleration, -dot(acceleration, two), two)
     if dot(two, down_one) >= 0.0 or dot(one, down_two) >= 0.0 or sine == 0.0:
         return False
-    across = along(velocity, -dot(velocity, crease) / (sine * sine), crease)
+    across = add_scaled(velocity, -dot(velocity, crease) / (sine * sine), crease)
     return dot(across, across) < contact.capture * contact.capture
 
 
@@ -309,7 +311,7 @@ def step(
     what: int,
     time: float,
     time_since_start: float,
-    here: Point,
+    here: BallState,
 ) -> bool:
     """A ball comes to the end of its path in contact (see end_of_path); False if it does not."""
     if contact is None:
@@ -325,7 +327,7 @@ def _step(
     what: int,
     time: float,
     time_since_start: float,
-    here: Point,
+    here: BallState,
 ) -> bool:
     if what <= LEAVES:
         support = LEAVES - what
@@ -345,7 +347,7 @@ def _step(
         # the brake has used up what was left of the speed, and not merely been set anew
         if dot(velocity, velocity) <= 1e-18 * max(1.0, dot(acceleration, acceleration)):
             velocity = Vec3(0.0, 0.0, 0.0)
-        settle(contact, motion, ball, time, time_since_start, Point(here.position, velocity))
+        settle(contact, motion, ball, time, time_since_start, BallState(here.position, velocity))
         return True
     if what == WAKES:
         settle(contact, motion, ball, time, time_since_start, here)

@@ -1,20 +1,30 @@
-"""When two balls meet. In the free-fall frame both fly straight, with gravity or without, unless one is in contact."""
+"""When two balls meet.
+
+In the free-fall frame both fly straight, with gravity or without, unless one is in contact mode.
+"""
 
 import numpy as np
 
-from sim_core.detect.ball_triangle import CONTACT, HALF, STEPS
+from sim_core.detect.ball_triangle import CONTACT, HALF, MAX_STEPS
 from sim_core.numerics.jit import jit
 from sim_core.numerics.roots import NEVER, first_approach
-from sim_core.numerics.vec3 import Vec3, along, dot
+from sim_core.numerics.vec3 import Flight, Vec3, dot, position_after, velocity_after
 
-STANDING = 1e-12  # m/s: what rounding leaves of a normal velocity that was taken away
+STANDING = 1e-12  # m/s: what rounding leaves of a normal velocity that was removed
 
 
 @jit
-def meeting_delay(apart: Vec3, closing: Vec3, reach: float) -> float:
-    """Time [s] until |apart + closing s| = reach, approaching; 0 when they overlap and approach; NEVER otherwise.
+def pair_delay(apart: Vec3, closing: Vec3, reach: float) -> float:
+    """Time until two balls that fly straight touch.
 
-    ``apart`` [m] and ``closing`` [m/s]: relative position and velocity; ``reach`` [m]: sum of the radii.
+    Args:
+        apart: relative position [m].
+        closing: relative velocity [m/s].
+        reach: sum of the radii [m].
+
+    Returns:
+        Time [s] until |apart + closing s| = reach, approaching; 0 when they overlap and approach;
+        NEVER otherwise.
     """
     rate = dot(apart, closing)
     if rate >= 0.0:
@@ -29,24 +39,26 @@ def meeting_delay(apart: Vec3, closing: Vec3, reach: float) -> float:
 
 
 @jit
-def accelerated_meeting_delay(
-    apart: Vec3, closing: Vec3, acceleration: Vec3, reach: float, limit: float
-) -> float:
-    """The same under a relative acceleration ``acceleration`` [m/s²], within ``limit`` [s]; by the steps of capsule_delay."""
+def accelerated_pair_delay(relative: Flight, reach: float, limit: float) -> float:
+    """Time [s] until |relative position| = reach [m], within ``limit`` [s], or NEVER.
+
+    The steps are those of capsule_delay, for the ``relative`` flight of two balls of which one at
+    least is in contact mode.
+    """
     delay = 0.0
-    for _ in range(STEPS):
-        at = along(along(apart, delay, closing), 0.5 * delay * delay, acceleration)
-        velocity = along(closing, delay, acceleration)
+    for _ in range(MAX_STEPS):
+        at = position_after(relative, delay)
+        velocity = velocity_after(relative, delay)
         distance = np.sqrt(dot(at, at))
         gap = distance - reach
         rate = dot(at, velocity) / distance
         if gap <= CONTACT and rate < -STANDING:
             return delay
-        if (
-            gap <= CONTACT
-        ):  # not approaching: on until it could be as near as now, at once if pressed together
+        if gap <= CONTACT:
+            # not approaching: on until it could be as near as now, at once if pressed together
             gap, rate = 0.0, max(rate, 0.0)
-        step = first_approach(gap, rate, 0.5 * dot(at, acceleration) / distance, HALF * reach)
+        bend = 0.5 * dot(at, relative.acceleration) / distance
+        step = first_approach(gap, rate, bend, HALF * reach)
         if not delay + step < limit:
             return NEVER
         if delay + step == delay:

@@ -1,7 +1,8 @@
-"""When a ball inside an upright cylinder touches its side: seen from above it flies straight, whatever gravity does.
+"""When a ball in an upright cylinder touches its wall: seen from above it flies straight.
 
-The ball is its centre, which stays within R - r of the axis: (R - r)² - |p + v s|² is a quadratic in s, and falls for
-ever once it falls, so that a ball that is out and going further out is in contact now, however far out.
+The ball is its centre p, which stays within R - r of the axis. (R - r)² - |p + v s|² is a quadratic in
+s and never rises again once it falls, so that a ball outside that moves further out is in contact now,
+however far out it is.
 """
 
 import math
@@ -9,41 +10,44 @@ import math
 import numpy as np
 
 from sim_core.detect.ball_triangle import face_normal
-from sim_core.geometry.obstacles import ROUND, Bore
-from sim_core.motion import Point
+from sim_core.geometry.analytic import CylinderAxis
+from sim_core.geometry.obstacles import CYLINDER_WALL
 from sim_core.numerics.jit import jit
 from sim_core.numerics.roots import first_approach
-from sim_core.numerics.vec3 import Vec3
+from sim_core.numerics.vec3 import Flight, Vec3
 
 
 @jit
-def is_round(bore: Bore | None, kind: int) -> bool:
-    """True for the row of the round side; a mesh has none."""
-    if bore is None:
+def is_cylinder_wall(cylinder: CylinderAxis | None, kind: int) -> bool:
+    """True for an obstacle that is the cylinder wall; a mesh has none."""
+    if cylinder is None:
         return False
-    return kind == ROUND
+    return kind == CYLINDER_WALL
 
 
 @jit
-def bore_delay(bore: Bore | None, numbers: np.ndarray, row: int, ball: Point) -> float:
-    """Time [s] until the centre meets the round side from inside; NEVER if it does not."""
-    if bore is None:
+def cylinder_delay(
+    cylinder: CylinderAxis | None, numbers: np.ndarray, row: int, ball: Flight
+) -> float:
+    """Time [s] until the centre meets the cylinder wall from inside; NEVER if it does not."""
+    if cylinder is None:
         return math.inf
-    x, y = ball.position.x - bore.x, ball.position.y - bore.y
+    x, y = ball.position.x - cylinder.x, ball.position.y - cylinder.y
     vx, vy = ball.velocity.x, ball.velocity.y
     reach = numbers[row, 3]
-    return first_approach(
-        reach * reach - (x * x + y * y), -2.0 * (x * vx + y * vy), -(vx * vx + vy * vy), math.inf
-    )
+    gap, rate = reach * reach - (x * x + y * y), -2.0 * (x * vx + y * vy)
+    return first_approach(gap, rate, -(vx * vx + vy * vy), math.inf)
 
 
 @jit
-def facing(bore: Bore | None, numbers: np.ndarray, row: int, kind: int, at: Vec3) -> Vec3:
-    """Unit normal towards the shot of a face, or of the round side where the centre is ``at``."""
-    if bore is None:
+def normal_at(
+    cylinder: CylinderAxis | None, numbers: np.ndarray, row: int, kind: int, at: Vec3
+) -> Vec3:
+    """Unit normal towards the shot of a face, or of the cylinder wall where the centre is ``at``."""
+    if cylinder is None:
         return face_normal(numbers, row)
-    if kind != ROUND:
+    if kind != CYLINDER_WALL:
         return face_normal(numbers, row)
-    x, y = bore.x - at.x, bore.y - at.y
+    x, y = cylinder.x - at.x, cylinder.y - at.y
     distance = math.sqrt(x * x + y * y)
     return Vec3(x / distance, y / distance, 0.0)

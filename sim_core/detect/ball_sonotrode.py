@@ -1,23 +1,22 @@
-"""When a ball on a parabola touches a face of the vibrating sonotrode, exactly."""
+"""When a ball on a parabola touches a face of a vibrating sonotrode, exactly."""
 
 import math
 
 import numpy as np
 
 from sim_core.detect.ball_triangle import HALF, face_normal, within_borders
-from sim_core.effects.sonotrodes import Waves, move_alike
+from sim_core.effects.sonotrodes import SonotrodeWaves, same_sonotrode
 from sim_core.effects.vibration import Wave
 from sim_core.geometry.bvh import Tree
-from sim_core.geometry.obstacles import WAVING_FACE
-from sim_core.motion import Point
+from sim_core.geometry.obstacles import VIBRATING_FACE
 from sim_core.numerics.jit import jit
 from sim_core.numerics.roots import NEVER, WaveGap, first_wave_approach, next_wave_approach
-from sim_core.numerics.vec3 import Vec3, along, dot
+from sim_core.numerics.vec3 import Flight, add_scaled, dot, position_after
 
 
 @jit
 def same_plane(numbers: np.ndarray, row: int, other: int) -> bool:
-    """True when two faces hold the same plane, bit for bit (build_obstacles gives a flat sonotrode one plane)."""
+    """True when two faces hold the same plane, bit for bit, as those of a flat sonotrode do."""
     return (
         numbers[row, 0] == numbers[other, 0]
         and numbers[row, 1] == numbers[other, 1]
@@ -27,31 +26,23 @@ def same_plane(numbers: np.ndarray, row: int, other: int) -> bool:
 
 
 @jit
-def waving_plane_delay(
+def vibrating_plane_delay(
     numbers: np.ndarray,
     row: int,
-    ball: Point,
-    acceleration: Vec3,
+    ball: Flight,
     radius: float,
     wave: Wave | None,
     time: float,
     limit: float,
 ) -> float:
-    """Time [s] until the centre meets the moving plane of a face within ``limit`` [s], or NEVER.
-
-    ``time`` [s] is now, on the window's clock.
-    """
+    """Time [s] until the centre meets the moving plane of a face within ``limit`` [s], or NEVER."""
     if wave is None:
         return NEVER
-    return first_wave_approach(
-        _gap(numbers, row, ball, acceleration, wave, time), limit, HALF * radius
-    )
+    return first_wave_approach(_plane_gap(numbers, row, ball, wave, time), limit, HALF * radius)
 
 
 @jit
-def _gap(
-    numbers: np.ndarray, row: int, ball: Point, acceleration: Vec3, wave: Wave, time: float
-) -> WaveGap:
+def _plane_gap(numbers: np.ndarray, row: int, ball: Flight, wave: Wave, time: float) -> WaveGap:
     """The gap between the centre and the face's moving plane."""
     normal = face_normal(numbers, row)
     lift = dot(normal, wave.axis)
@@ -61,65 +52,76 @@ def _gap(
     return WaveGap(
         dot(normal, ball.position) - numbers[row, 3],
         dot(normal, ball.velocity),
-        0.5 * dot(normal, acceleration),
-        abs(lift) * wave.swing,
+        0.5 * dot(normal, ball.acceleration),
+        abs(lift) * wave.amplitude,
         wave.omega,
         theta,
     )
 
 
 @jit
-def within_waving_borders(
+def within_moved_borders(
     numbers: np.ndarray,
     row: int,
-    ball: Point,
-    acceleration: Vec3,
-    seam: float,
+    ball: Flight,
+    face_overlap: float,
     wave: Wave | None,
     time: float,
     delay: float,
 ) -> bool:
-    """True when the centre meets the face's plane, ``delay`` [s] from now, inside its borders as they are then."""
+    """True when the centre is inside the moved face's borders ``delay`` [s] after ``time`` [s]."""
     if wave is None:
         return False
-    at = along(along(ball.position, delay, ball.velocity), 0.5 * delay * delay, acceleration)
-    shift = wave.swing * math.sin(wave.omega * (time + delay) + wave.phase)
-    return within_borders(numbers, row, along(at, -shift, wave.axis), seam)
+    shift = wave.amplitude * math.sin(wave.omega * (time + delay) + wave.phase)
+    at = add_scaled(position_after(ball, delay), -shift, wave.axis)
+    return within_borders(numbers, row, at, face_overlap)
 
 
 @jit
-def meets_later(
+def find_later_contact(
     tree: Tree,
-    waves: Waves | None,
-    radius: float,
-    row: int,
-    ball: Point,
-    acceleration: Vec3,
-    seam: float,
+    waves: SonotrodeWaves | None,
     wave: Wave | None,
+    row: int,
+    ball: Flight,
+    radius: float,
+    face_overlap: float,
     time: float,
     delay: float,
     limit: float,
 ) -> tuple[float, int]:
-    """Delay [s] and face of a contact within ``limit`` [s] after the plane of face ``row``, which moves as ``wave``
-    says, was met where it has no face; (NEVER, -1) if there is none.
+    """Contact after the plane of a face was met where there is no face.
 
-    Beside the sonotrode, over a pit, a ball is free to be below its plane, and may come down on it afterwards.
+    Beside the sonotrode, over a pit, a ball is free to be below its plane, and may come down on it
+    afterwards.
+
+    Args:
+        tree: of obstacles.
+        waves: of several sonotrodes.
+        wave: of the face.
+        row: a face in the plane.
+        ball: its flight from ``time`` on.
+        radius: of the ball [m].
+        face_overlap: how far faces overlap [m].
+        time: now, on the window's clock [s].
+        delay: when the plane was met [s].
+        limit: end of the search [s].
+
+    Returns:
+        Delay [s] and face of the contact; (NEVER, -1) if there is none.
     """
     if wave is None:
         return NEVER, -1
-    gap = _gap(tree.numbers, row, ball, acceleration, wave, time)
+    gap = _plane_gap(tree.numbers, row, ball, wave, time)
     while True:
         delay = next_wave_approach(gap, delay, limit, HALF * radius)
         if delay >= limit:
             return NEVER, -1
         for face in range(len(tree.kinds)):
             if (
-                tree.kinds[face] == WAVING_FACE
+                tree.kinds[face] == VIBRATING_FACE
                 and same_plane(tree.numbers, row, face)
-                and move_alike(waves, row, face)
-                and within_waving_borders(
-                    tree.numbers, face, ball, acceleration, seam, wave, time, delay
-                )
+                and same_sonotrode(waves, row, face)
+                and within_moved_borders(tree.numbers, face, ball, face_overlap, wave, time, delay)
             ):
                 return delay, face

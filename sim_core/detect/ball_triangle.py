@@ -1,32 +1,45 @@
-"""When a ball on a parabola touches a still triangle: its moved face, or the capsule about a convex edge.
+"""When a ball on a parabola touches a still triangle: its moved face, or the capsule about an edge.
 
-The ball is its centre; see surfaces/obstacles.py for what it meets.
+The ball is its centre; geometry/obstacles.py has the obstacles that the centre meets. ``numbers`` and
+``row`` stand for one of them: ``numbers[row]`` of ObstacleTable.
 """
 
 import numpy as np
 
-from sim_core.geometry.obstacles import PAST_CORNERS
-from sim_core.motion import Point
+from sim_core.geometry.obstacles import MAX_CORNER_OVERLAPS
 from sim_core.numerics.jit import jit
 from sim_core.numerics.roots import NEVER, first_approach
-from sim_core.numerics.vec3 import Vec3, along, cross, dot, sub
+from sim_core.numerics.vec3 import (
+    Flight,
+    Vec3,
+    add_scaled,
+    cross,
+    dot,
+    position_after,
+    sub,
+    velocity_after,
+)
 
-CONTACT = 1e-13  # m: a gap this small is contact with a capsule; a thousandth of what would count as early, 100 x rounding
-STEPS = 1000  # 3 to 6 are used; a grazing touch converges by a factor of four a step, a ball sliding over an edge needs 300
-ROUNDING = 1e-15  # m: of a place in a face's plane
+# A gap this small [m] is contact with a capsule: a thousandth of what would count as early, and a
+# hundred times rounding.
+CONTACT = 1e-13
+# 3 to 6 steps are used; a grazing touch converges by a factor of four a step, and a ball that slides
+# over an edge needs 300.
+MAX_STEPS = 1000
+ROUNDING = 1e-15  # m: of a point in a face's plane
 HALF = 0.5  # of a radius: an overlap deeper than this is the far side of a one-sided face
 
 
 @jit
-def within_borders(numbers: np.ndarray, row: int, at: Vec3, seam: float) -> bool:
-    """True when a point in the face's plane lies inside its borders, or at most ``seam`` [m] over one."""
+def within_borders(numbers: np.ndarray, row: int, at: Vec3, face_overlap: float) -> bool:
+    """True when a point in the face's plane is inside its borders or at most an overlap outside."""
     over = False
     for k in range(4, 20, 4):
         inside = _inside_border(numbers, row, k, at)
-        if inside < -seam:
+        if inside < -face_overlap:
             return False
         over |= inside < 0.0
-    return not over or _near_corners(numbers, row, at, PAST_CORNERS * seam)
+    return not over or _near_corners(numbers, row, at, MAX_CORNER_OVERLAPS * face_overlap)
 
 
 @jit
@@ -36,14 +49,15 @@ def _inward(numbers: np.ndarray, row: int, border: int) -> Vec3:
 
 @jit
 def _inside_border(numbers: np.ndarray, row: int, border: int, at: Vec3) -> float:
+    """Distance of a point from a border [m], negative outside."""
     return dot(_inward(numbers, row, border), at) - numbers[row, border + 3]
 
 
 @jit
 def _near_corners(numbers: np.ndarray, row: int, at: Vec3, reach: float) -> bool:
-    """True when a point over a border is at most ``reach`` [m] past a corner, if it is past the ends of both borders.
+    """False for a point more than ``reach`` [m] past a corner, beyond the ends of both its borders.
 
-    The seams of two borders cross far beyond a corner as sharp as a needle's tip.
+    The overlaps of two borders cross far beyond a corner as sharp as a needle's tip.
     """
     for border in range(4, 20, 4):
         over = _inside_border(numbers, row, border, at)
@@ -62,24 +76,23 @@ def _near_corners(numbers: np.ndarray, row: int, at: Vec3, reach: float) -> bool
 
 @jit
 def face_normal(numbers: np.ndarray, row: int) -> Vec3:
-    """Unit normal towards the shot."""
+    """Unit normal of a face towards the shot."""
     return Vec3(numbers[row, 0], numbers[row, 1], numbers[row, 2])
 
 
 @jit
 def face_delay(
-    numbers: np.ndarray, row: int, ball: Point, acceleration: Vec3, radius: float, seam: float
+    numbers: np.ndarray, row: int, ball: Flight, radius: float, face_overlap: float
 ) -> float:
     """Time [s] until the centre meets the moved face from its shot side; NEVER if it does not."""
     normal = face_normal(numbers, row)
     gap = dot(normal, ball.position) - numbers[row, 3]
-    delay = first_approach(
-        gap, dot(normal, ball.velocity), 0.5 * dot(normal, acceleration), HALF * radius
-    )
+    rate, bend = dot(normal, ball.velocity), 0.5 * dot(normal, ball.acceleration)
+    delay = first_approach(gap, rate, bend, HALF * radius)
     if delay == NEVER:
         return NEVER
-    at = along(along(ball.position, delay, ball.velocity), 0.5 * delay * delay, acceleration)
-    return delay if within_borders(numbers, row, at, seam) else NEVER
+    at = position_after(ball, delay)
+    return delay if within_borders(numbers, row, at, face_overlap) else NEVER
 
 
 @jit
@@ -89,30 +102,34 @@ def away_from_capsule(numbers: np.ndarray, row: int, at: Vec3) -> Vec3:
     direction = Vec3(numbers[row, 3], numbers[row, 4], numbers[row, 5])
     offset = sub(at, start)
     reach = min(max(dot(offset, direction), 0.0), numbers[row, 6])
-    return along(offset, -reach, direction)
+    return add_scaled(offset, -reach, direction)
 
 
 @jit
 def nearer_neighbour(numbers: np.ndarray, row: int, away: Vec3) -> int:
-    """0 or 1: which of a capsule's two triangles faces the ball more; so a dent on an edge is shared fairly."""
+    """Which of a capsule's two triangles, 0 or 1, faces the ball more.
+
+    Impacts on an edge are so shared fairly between its two triangles.
+    """
     lean = Vec3(numbers[row, 7], numbers[row, 8], numbers[row, 9])
     return 0 if dot(lean, away) >= 0.0 else 1
 
 
 @jit
 def capsule_delay(
-    numbers: np.ndarray, row: int, ball: Point, acceleration: Vec3, radius: float, limit: float
+    numbers: np.ndarray, row: int, ball: Flight, radius: float, limit: float
 ) -> float:
     """Time [s] until the centre meets the capsule; NEVER if it does not within ``limit`` [s].
 
-    The distance to a convex body is never below the distance to the plane that touches it at the nearest point.
-    Along the flight that plane distance is a quadratic in time: go to where it closes, take the plane there,
-    repeat. Each stop lies before the true contact, so nothing is stepped over.
+    The distance to a convex body is never below the distance to the plane that touches it at the
+    nearest point. Along the flight that plane distance is a quadratic in time: go to where it
+    closes, take the plane there, and repeat. Each stop lies before the contact, so that none is
+    missed.
     """
     delay = 0.0
-    for _ in range(STEPS):
-        at = along(along(ball.position, delay, ball.velocity), 0.5 * delay * delay, acceleration)
-        velocity = along(ball.velocity, delay, acceleration)
+    for _ in range(MAX_STEPS):
+        at = position_after(ball, delay)
+        velocity = velocity_after(ball, delay)
         away = away_from_capsule(numbers, row, at)
         distance = np.sqrt(dot(away, away))
         if distance == 0.0:
@@ -121,9 +138,9 @@ def capsule_delay(
         rate = dot(away, velocity) / distance
         if gap <= CONTACT and rate < 0.0 and gap > -HALF * radius:
             return delay
-        bend = 0.5 * dot(away, acceleration) / distance
+        bend = 0.5 * dot(away, ball.acceleration) / distance
         if -HALF * radius < gap <= CONTACT and rate * rate <= 4.0 * bend * min(gap, -CONTACT):
-            gap = CONTACT  # touching, and not getting free: on until it could be deeper than now
+            gap = CONTACT  # it touches and does not come free: on until it could be deeper than now
         step = first_approach(gap, rate, bend, HALF * radius)
         if delay + step > limit:
             return NEVER

@@ -1,15 +1,16 @@
-"""When a ball first touches a turning part: looked for in the part's frame, where its tree stands still.
+"""When a ball first touches a turning part, searched for in the part's frame.
 
-The flight is cut into pieces so short that in the part's frame each is a parabola but for a small share of a radius:
-that parabola, with its error, is what the tree is asked about. At an obstacle the true path is followed by
-conservative advancement (Mirtich, PhD thesis, Berkeley 1996): within a piece the gap is never below a quadratic, made
-of its value, rate and curvature now and of the bound on its third derivative; go to where that closes, and look
-again. Every stop lies before the contact, so nothing is stepped over, and near it the steps are Newton's.
+There the part's tree stands still. The flight is cut into pieces so short that in the part's frame
+each is a parabola up to a small share of a radius; the tree is searched along that parabola, widened
+by its error. At an obstacle the true path is followed by conservative advancement (Mirtich, PhD
+thesis, Berkeley 1996): within a piece the gap is never below a quadratic made of its value, rate and
+curvature now and of the bound J on its third derivative. Go to where that closes, and repeat. Each
+stop lies before the contact, so that none is missed, and near it the steps are Newton's.
 """
 
 import numpy as np
 
-from sim_core.detect.ball_mesh import SLACK, TINY, Scratch, stack_children
+from sim_core.detect.ball_mesh import SLACK, Scratch, aim_ray, stack_children
 from sim_core.detect.ball_triangle import (
     CONTACT,
     HALF,
@@ -17,58 +18,68 @@ from sim_core.detect.ball_triangle import (
     face_normal,
     within_borders,
 )
-from sim_core.effects.part_rotation import Seen, Turning, jerk_bound, seen_from_part
+from sim_core.effects.part_rotation import RotationState, jerk_bound, relative_flight
 from sim_core.geometry.bvh import Tree
 from sim_core.geometry.obstacles import CAPSULE
 from sim_core.geometry.turning_part import PartTree
-from sim_core.motion import Point
 from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.roots import NEVER, first_approach
-from sim_core.numerics.vec3 import Vec3, along, dot, sub
+from sim_core.numerics.vec3 import Flight, Vec3, add_scaled, dot, flight_after, position_after, sub
 
-# Of a radius: how far a piece of the path may be from its parabola, and the parabola from its chord. Boxes are asked
-# about with that margin; a fifth and four times of both measured within 4 %.
+# Of a radius: how far a piece of the path may be from its parabola, and the parabola from its chord.
+# Boxes are widened by that; a fifth and four times of both measured within 4 %.
 OFF_PARABOLA = 0.1
 BULGE = 0.25
-STEPS = 1000  # a few are used; a path that runs along a surface at a distance of CONTACT needs one each 1e-7 s or so
-OVERLAP = 1e-8  # m: a centre this far behind a face and coming out was left there by rounding; ten times scene.TOUCH
+# A few are used; a path along a surface at a distance of CONTACT needs one every 1e-7 s or so.
+MAX_STEPS = 1000
+# A centre this far [m] behind a face and coming out was left there by rounding; ten times
+# scene.TOUCH.
+OVERLAP = 1e-8
 
 
 @inlined
 def first_part_contact(
     part: PartTree | None,
-    turning: Turning | None,
+    rotation: RotationState | None,
     scratch: Scratch,
-    ball: Point,
-    acceleration: Vec3,
-    seam: float,
+    ball: Flight,
+    face_overlap: float,
     time: float,
     limit: float,
     known: int,
     first: int,
 ) -> tuple[float, int]:
-    """Delay [s] and obstacle of the first contact with the part before ``limit`` [s]; (limit, known) if there is none.
+    """The first contact with the part, if it is before a known one.
 
-    ``acceleration`` [m/s²]: the ball's acceleration; ``time`` [s]: now, on the window's clock. The part's obstacles are
-    numbered from ``first`` on. A search that runs out of steps answers (how far it got, -1).
+    Args:
+        part: obstacles of the part.
+        rotation: of the part.
+        scratch: working space.
+        ball: its flight in the room from now on.
+        face_overlap: how far faces overlap [m].
+        time: now, on the window's clock [s].
+        limit: when the known contact is, or end of the search [s].
+        known: obstacle of the known contact, negative for none.
+        first: number of the part's first obstacle.
+
+    Returns:
+        Delay [s] and obstacle; (limit, known) if the part is not met before, and (how far it got,
+        -1) if the search ran out of steps.
     """
-    if part is None or turning is None:
+    if part is None or rotation is None:
         return limit, known
-    jerk = _jerk(part, turning, ball, acceleration, limit)
+    jerk = _jerk(part, rotation, ball, limit)
     if jerk < 0.0:
         return limit, known
     best = limit
     found = known
     begin = 0.0
     while begin < best:
-        at = along(along(ball.position, begin, ball.velocity), 0.5 * begin * begin, acceleration)
-        seen = seen_from_part(
-            turning, at, along(ball.velocity, begin, acceleration), acceleration, time + begin
-        )
+        seen = relative_flight(rotation, flight_after(ball, begin), time + begin)
         length = _piece(seen, jerk, best - begin, part.tree.radius)
         last = begin + length >= best
         end = best if last else begin + length
-        _aim(scratch.ray, seen, length, jerk * length * length * length / 6.0)
+        aim_ray(scratch.ray, seen, length, jerk * length * length * length / 6.0)
         scratch.nodes[0] = 0
         scratch.times[0] = np.float32(0.0)
         depth = 1
@@ -78,17 +89,17 @@ def first_part_contact(
             if scratch.times[depth] > longest:
                 continue
             code = scratch.nodes[depth]
-            if code < 0:
-                row = -1 - code
-                delay, sure = _delay(
-                    part.tree, row, turning, ball, acceleration, seen, seam, time, begin, end, jerk
-                )
-                if delay < end:
-                    end = delay
-                    best = delay
-                    found = first + row if sure else -1
+            if code >= 0:
+                depth = stack_children(part.tree, scratch, code, depth, longest)
                 continue
-            depth = stack_children(part.tree, scratch, code, depth, longest)
+            row = -1 - code
+            delay, sure = _obstacle_delay(
+                part.tree, row, rotation, ball, seen, face_overlap, time, begin, end, jerk
+            )
+            if delay < end:
+                end = delay
+                best = delay
+                found = first + row if sure else -1
         begin = end
         if last:
             break
@@ -96,37 +107,37 @@ def first_part_contact(
 
 
 @jit
-def _jerk(part: PartTree, turning: Turning, ball: Point, acceleration: Vec3, limit: float) -> float:
-    """Bound on the third derivative of the path in the part's frame [m/s³]; -1 if the path stays clear of all that
-    the part sweeps.
-    """
+def _jerk(part: PartTree, rotation: RotationState, ball: Flight, limit: float) -> float:
+    """Bound J of the path in the part's frame; -1 if it stays clear of all that the part sweeps."""
     bulge = 0.125 * limit * limit
-    start = sub(ball.position, turning.point)
-    way = along(Vec3(0.0, 0.0, 0.0), limit, along(ball.velocity, 0.5 * limit, acceleration))
-    low = dot(turning.axis, start)
-    rise = dot(turning.axis, way)
-    drop = dot(turning.axis, acceleration)
+    start = sub(ball.position, rotation.point)
+    halfway = add_scaled(ball.velocity, 0.5 * limit, ball.acceleration)
+    way = add_scaled(Vec3(0.0, 0.0, 0.0), limit, halfway)
+    # along the axis
+    low = dot(rotation.axis, start)
+    rise = dot(rotation.axis, way)
+    drop = dot(rotation.axis, ball.acceleration)
     sag = bulge * abs(drop)
     if min(low, low + rise) - sag > part.high or max(low, low + rise) + sag < part.low:
         return -1.0
-    start = along(start, -low, turning.axis)
-    way = along(way, -rise, turning.axis)
-    across = along(acceleration, -drop, turning.axis)
-    force = np.sqrt(dot(across, across))
+    # across the axis
+    start = add_scaled(start, -low, rotation.axis)
+    way = add_scaled(way, -rise, rotation.axis)
+    pull = add_scaled(ball.acceleration, -drop, rotation.axis)
+    force = np.sqrt(dot(pull, pull))
     square = dot(way, way)
     share = min(max(-dot(start, way) / square, 0.0), 1.0) if square > 0.0 else 0.0
-    nearest = along(start, share, way)
+    nearest = add_scaled(start, share, way)
     if np.sqrt(dot(nearest, nearest)) - bulge * force > part.reach:
         return -1.0
-    forward = dot(turning.axis, ball.velocity)
-    across = along(ball.velocity, -forward, turning.axis)
+    across = add_scaled(ball.velocity, -dot(rotation.axis, ball.velocity), rotation.axis)
     speed = np.sqrt(dot(across, across)) + force * limit
-    return jerk_bound(turning, np.sqrt(dot(start, start)) + speed * limit, speed, force)
+    return jerk_bound(rotation, np.sqrt(dot(start, start)) + speed * limit, speed, force)
 
 
 @jit
-def _piece(seen: Seen, jerk: float, length: float, radius: float) -> float:
-    """How far [s] to go at once, at most ``length``."""
+def _piece(seen: Flight, jerk: float, length: float, radius: float) -> float:
+    """Length [s] of the next piece, at most ``length``."""
     bend = np.sqrt(dot(seen.acceleration, seen.acceleration))
     while jerk * length * length * length > 6.0 * OFF_PARABOLA * radius or (
         bend * length * length > 8.0 * BULGE * radius
@@ -136,44 +147,39 @@ def _piece(seen: Seen, jerk: float, length: float, radius: float) -> float:
 
 
 @jit
-def _aim(ray: np.ndarray, seen: Seen, length: float, error: float) -> None:
-    """Chord of the piece as in ball_mesh; both origins are ``error`` [m] further out."""
-    bulge = -0.125 * length * length
-    for axis in range(3):
-        origin = seen.position[axis]
-        shift = bulge * seen.acceleration[axis]
-        speed = seen.velocity[axis] + 0.5 * length * seen.acceleration[axis]
-        if abs(speed) < TINY:
-            speed = TINY
-        ray[axis] = np.float32(origin + max(shift, 0.0) + error)
-        ray[3 + axis] = np.float32(origin + min(shift, 0.0) - error)
-        ray[6 + axis] = np.float32(1.0 / speed)
-
-
-@jit
-def _delay(
+def _obstacle_delay(
     tree: Tree,
     row: int,
-    turning: Turning,
-    ball: Point,
-    acceleration: Vec3,
-    seen: Seen,
-    seam: float,
+    rotation: RotationState,
+    ball: Flight,
+    seen: Flight,
+    face_overlap: float,
     time: float,
     begin: float,
     end: float,
     jerk: float,
 ) -> tuple[float, bool]:
-    """Delay [s] of the contact with one obstacle between ``begin`` and ``end``, NEVER if there is none; False when
-    the steps ran out there.
+    """Delay [s] of the contact with one obstacle in a piece, and whether the search is complete.
 
-    ``seen``: the ball at ``begin``. Contact is a gap of at most CONTACT.
+    NEVER if there is none. Contact is a gap of at most CONTACT.
+
+    Args:
+        tree: of the part.
+        row: the obstacle.
+        rotation: of the part.
+        ball: its flight in the room from now on.
+        seen: its flight in the part's frame at ``begin``.
+        face_overlap: how far faces overlap [m].
+        time: now, on the window's clock [s].
+        begin: of the piece [s].
+        end: of the piece [s].
+        jerk: J [m/s³].
     """
     radius = tree.radius
     round_edge = tree.kinds[row] == CAPSULE
     normal = face_normal(tree.numbers, row)
     delay = begin
-    for _ in range(STEPS):
+    for _ in range(MAX_STEPS):
         if round_edge:
             away = away_from_capsule(tree.numbers, row, seen.position)
             distance = np.sqrt(dot(away, away))
@@ -190,7 +196,7 @@ def _delay(
             gap <= CONTACT
             and rate < 0.0
             and gap > -HALF * radius
-            and (round_edge or within_borders(tree.numbers, row, seen.position, seam))
+            and (round_edge or within_borders(tree.numbers, row, seen.position, face_overlap))
         ):
             return delay, True
         if gap > CONTACT or (gap > -OVERLAP and rate >= 0.0) or round_edge:
@@ -204,11 +210,10 @@ def _delay(
             if delay + step > end:
                 return NEVER, True
             if not round_edge and gap > CONTACT and jerk * near * step * step <= 3.0 * CONTACT:
-                at = along(
-                    along(seen.position, step, seen.velocity), 0.5 * step * step, seen.acceleration
-                )
+                # the step ends in contact up to CONTACT, if the gap surely falls there
+                at = position_after(seen, step)
                 if rate + 2.0 * bend * step < -jerk * step * step and within_borders(
-                    tree.numbers, row, at, seam
+                    tree.numbers, row, at, face_overlap
                 ):
                     return delay + step, True
         else:  # behind a plane beside its face: on until it could come out in front
@@ -216,8 +221,5 @@ def _delay(
             if delay + step > end:
                 return NEVER, True
         delay += max(step, 1e-16)
-        at = along(along(ball.position, delay, ball.velocity), 0.5 * delay * delay, acceleration)
-        seen = seen_from_part(
-            turning, at, along(ball.velocity, delay, acceleration), acceleration, time + delay
-        )
+        seen = relative_flight(rotation, flight_after(ball, delay), time + delay)
     return delay, False

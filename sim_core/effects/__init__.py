@@ -1,5 +1,5 @@
-"""One effect a file: its source, its numbers, its formula, and the neutral answer when it is absent.
+"""Effects of a scene, one a file: source, formula, coefficients, and the neutral result when absent.
 
-Absent means ``None``: numba prunes the branch on the type, so an absent effect is in neither memory nor machine
-code.
+Absent means None: numba removes the branch by its type, so that an absent effect is in neither memory
+nor machine code.
 """

@@ -25,7 +25,7 @@ from sim_core.effects.gravity import Gravity, gravity_acceleration
 from sim_core.effects.restitution import ELASTIC_BELOW, Restitution
 from sim_core.errors import SceneError, number
 from sim_core.numerics.jit import inlined, jit
-from sim_core.numerics.vec3 import Vec3, along, cross, dot
+from sim_core.numerics.vec3 import Vec3, add_scaled, cross, dot
 
 CAPTURE = 1e-3  # m/s: drops from 50 nm; a ten-thousandth of the shot's speed. Lower costs bounces: 22 a decade at e 0.9
 RESISTANCE = 0.005  # [-]: of steel balls on steel, the order of magnitude (assumed); slower than that they lie still
@@ -204,7 +204,7 @@ def onto_cone(contact: ContactState, ball: int, x: Vec3) -> Vec3:
     for one in range(supports):
         n = support_normal(contact, ball, one)
         push = -dot(n, x)
-        y = along(x, push, n)
+        y = add_scaled(x, push, n)
         if push >= -slack and _fits(contact, ball, y, slack):
             return y
     for one in range(supports):

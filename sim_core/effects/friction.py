@@ -1,13 +1,20 @@
-"""Balls rub and spin: mu and beta0 of Walton's hard-sphere collision, and the spins that go with them.
+"""Friction and spin of balls: Walton's hard-sphere collision.
 
-O. R. Walton, in Particulate Two-Phase Flow (ed. Roco, 1993) ch. 25; Foerster, Louge, Chang & Allia, Phys. Fluids 6
-(1994) 1108. With the normal impulse J_n and the velocity v_t at which the touching points pass each other, spin
-counted, the tangential impulse opposes v_t and is the smaller of mu J_n (the points slip throughout) and
-2/7 (1 + beta0) m_eff |v_t| (they stick, and v_t turns into -beta0 v_t): m_eff is m at a surface and m/2 for a pair of
-equal balls; 2/7 is that of solid spheres. beta0 = -1 is smooth, 1 perfectly rough, and both keep the energy.
+Notation:
+    J_n: normal impulse [kg m/s]
+    v_t: velocity at which the touching points pass each other, with spin [m/s], ``slip``
+    mu: coefficient of friction [-]
+    beta0: coefficient of tangential restitution [-]; -1 is smooth, 1 perfectly rough, and both keep
+        the energy
+    m_eff: mass m at a surface, m/2 for a pair of equal balls [kg]
 
-In contact mode (rest.py) mu is also Coulomb's coefficient of the ball that slips, rolls or lies on a surface; see
-resolve/rolling.py.
+The tangential impulse opposes v_t and is the smaller of mu J_n, when the points slip throughout, and
+2/7 (1 + beta0) m_eff |v_t|, when they stick and v_t turns into -beta0 v_t; 2/7 is that of solid
+spheres. In contact mode mu is also Coulomb's coefficient of a ball that slips, rolls or lies on a
+surface; see contact/rolling.py.
+
+Sources: O. R. Walton, in Particulate Two-Phase Flow (ed. Roco, 1993) ch. 25; Foerster, Louge, Chang &
+Allia, Phys. Fluids 6 (1994) 1108.
 """
 
 import math
@@ -15,8 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim_core.effects.per_surface import surface_table
-from sim_core.errors import SceneError
+from sim_core.errors import SceneError, surface_table
 from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.vec3 import Vec3
 
@@ -24,9 +30,11 @@ OF_BALLS = -1  # in place of a surface's tag
 
 
 class Friction(NamedTuple):
-    """``surfaces``: one (mu, beta0) for each tag, by tag number; ``balls``: (mu, beta0) of ball against ball.
+    """Coefficients of friction; mu >= 0, beta0 in [-1, 1].
 
-    mu >= 0; beta0 in [-1, 1].
+    Args:
+        surfaces: (mu, beta0) of each surface, by tag number.
+        balls: (mu, beta0) of ball on ball.
     """
 
     surfaces: tuple[tuple[float, float], ...] | np.ndarray
@@ -34,12 +42,18 @@ class Friction(NamedTuple):
 
 
 class FrictionState(NamedTuple):
-    """Friction as compiled code wants it, with what it keeps of n balls; times are on the window's clock.
+    """Friction as compiled code needs it, for n balls; times are on the window's clock.
 
-    ``surfaces`` (tags, 2), ``mu`` and ``beta0`` of the balls; ``radius`` [m]; ``mu_of_rows`` (m,): mu of each obstacle
-    a ball can stand on. ``spins`` (n, 3) [rad/s] at time 0 and ``twists`` (n, 3) [rad/s²], their constant change while
-    in contact. ``slips`` (n, 6): velocity [m/s] and acceleration of the touching points of a ball that slips in
-    contact; zeros of one that rolls, lies or flies.
+    Args:
+        surfaces: (mu, beta0) of each surface, shape (tags, 2).
+        mu: of ball on ball.
+        beta0: of ball on ball.
+        radius: of the balls [m].
+        mu_of_rows: mu of each obstacle that a ball can stand on, shape (obstacles,).
+        spins: at time 0 [rad/s], shape (n, 3).
+        twists: constant change of the spin while in contact [rad/s²], shape (n, 3).
+        slips: velocity [m/s] at time 0 and acceleration [m/s²] of the touching points of a ball that
+            slips in contact, zero for one that rolls, lies or flies, shape (n, 6).
     """
 
     surfaces: np.ndarray
@@ -53,13 +67,14 @@ class FrictionState(NamedTuple):
 
 
 def checked_friction(friction: Friction, tags: int) -> Friction:
-    """The same with ``surfaces`` as an array (tags, 2); raises SceneError for a missing tag or numbers out of range."""
+    """The coefficients as an array of shape (tags, 2) and floats; raises SceneError if one is bad."""
     surfaces, of_balls = surface_table("friction", "(mu, beta0)", *friction, tags)
     pairs = [(f"surfaces[{i}]", *pair) for i, pair in enumerate(surfaces)] + [("balls", *of_balls)]
     for name, mu, beta0 in pairs:
         if not 0.0 <= mu < math.inf or not -1.0 <= beta0 <= 1.0:
             raise SceneError(
-                f"friction.{name} is ({mu}, {beta0}): mu must be 0 or more and finite, beta0 lie in [-1, 1]"
+                f"friction.{name} is ({mu}, {beta0}): mu must be 0 or more and finite, "
+                "beta0 lie in [-1, 1]"
             )
     return Friction(surfaces, of_balls)
 
@@ -67,34 +82,32 @@ def checked_friction(friction: Friction, tags: int) -> Friction:
 def new_friction_state(
     friction: Friction, spins: np.ndarray, radius: float, tags_of_rows: np.ndarray
 ) -> FrictionState:
-    """All balls in flight, with their spins (n, 3) [rad/s], for a checked Friction.
+    """The state of balls in flight.
 
-    ``radius`` [m]; ``tags_of_rows`` (m,): the tag of each obstacle a ball can stand on.
+    Args:
+        friction: as checked_friction gives it.
+        spins: of the balls [rad/s], shape (n, 3).
+        radius: of the balls [m].
+        tags_of_rows: tag of each obstacle that a ball can stand on, shape (obstacles,).
     """
-    surfaces = np.asarray(friction.surfaces)
-    return FrictionState(
-        surfaces,
-        *friction.balls,
-        radius,
-        surfaces[tags_of_rows, 0],
-        spins.copy(),
-        np.zeros_like(spins),
-        np.zeros((len(spins), 6)),
-    )
+    surfaces, mu_and_beta0 = np.asarray(friction.surfaces), friction.balls
+    mu_of_rows, slips = surfaces[tags_of_rows, 0], np.zeros((len(spins), 6))
+    twists = np.zeros_like(spins)
+    return FrictionState(surfaces, *mu_and_beta0, radius, mu_of_rows, spins.copy(), twists, slips)
 
 
 @jit
-def law_of(friction_state: FrictionState, tag: int) -> tuple[float, float]:
-    """mu and beta0 of a surface, or of the balls (OF_BALLS)."""
+def friction_of(friction: FrictionState, tag: int) -> tuple[float, float]:
+    """mu and beta0 of a surface, or of ball on ball for OF_BALLS."""
     if tag == OF_BALLS:
-        return friction_state.mu, friction_state.beta0
-    return friction_state.surfaces[tag, 0], friction_state.surfaces[tag, 1]
+        return friction.mu, friction.beta0
+    return friction.surfaces[tag, 0], friction.surfaces[tag, 1]
 
 
 @jit
-def spin_at(friction_state: FrictionState, ball: int, time: float) -> Vec3:
-    """A ball's spin [rad/s] at a time of the window."""
-    spins, twists = friction_state.spins, friction_state.twists
+def spin_at(friction: FrictionState, ball: int, time: float) -> Vec3:
+    """Spin of a ball [rad/s] at a time of the window."""
+    spins, twists = friction.spins, friction.twists
     return Vec3(
         spins[ball, 0] + time * twists[ball, 0],
         spins[ball, 1] + time * twists[ball, 1],
@@ -103,33 +116,29 @@ def spin_at(friction_state: FrictionState, ball: int, time: float) -> Vec3:
 
 
 @jit
-def set_spin(
-    friction_state: FrictionState, ball: int, time: float, spin: Vec3, twist: Vec3
-) -> None:
-    """Let a ball spin on from ``spin`` [rad/s] at ``time``, changing by ``twist`` [rad/s²]; it does not slip."""
+def set_spin(friction: FrictionState, ball: int, time: float, spin: Vec3, twist: Vec3) -> None:
+    """Set the spin of a ball that does not slip: ``spin`` [rad/s] at ``time``, ``twist`` [rad/s²]."""
     for axis in range(3):
-        friction_state.spins[ball, axis] = spin[axis] - time * twist[axis]
-        friction_state.twists[ball, axis] = twist[axis]
-        friction_state.slips[ball, axis] = 0.0
-        friction_state.slips[ball, 3 + axis] = 0.0
+        friction.spins[ball, axis] = spin[axis] - time * twist[axis]
+        friction.twists[ball, axis] = twist[axis]
+        friction.slips[ball, axis] = 0.0
+        friction.slips[ball, 3 + axis] = 0.0
 
 
 @jit
-def set_slip(
-    friction_state: FrictionState, ball: int, time: float, slip: Vec3, change: Vec3
-) -> None:
-    """Its touching points pass the surface with ``slip`` [m/s] at ``time``, changing by ``change`` [m/s²]."""
+def set_slip(friction: FrictionState, ball: int, time: float, slip: Vec3, change: Vec3) -> None:
+    """Set the slip of a ball's touching points: ``slip`` [m/s] at ``time``, ``change`` [m/s²]."""
     for axis in range(3):
-        friction_state.slips[ball, axis] = slip[axis] - time * change[axis]
-        friction_state.slips[ball, 3 + axis] = change[axis]
+        friction.slips[ball, axis] = slip[axis] - time * change[axis]
+        friction.slips[ball, 3 + axis] = change[axis]
 
 
 @inlined
-def shift_spins(friction_state: FrictionState | None, window: float) -> None:
+def shift_spins(friction: FrictionState | None, window: float) -> None:
     """Move the clock's zero forward by ``window`` [s]."""
-    if friction_state is None:
+    if friction is None:
         return
-    for ball in range(len(friction_state.spins)):
+    for ball in range(len(friction.spins)):
         for axis in range(3):
-            friction_state.spins[ball, axis] += window * friction_state.twists[ball, axis]
-            friction_state.slips[ball, axis] += window * friction_state.slips[ball, 3 + axis]
+            friction.spins[ball, axis] += window * friction.twists[ball, axis]
+            friction.slips[ball, axis] += window * friction.slips[ball, 3 + axis]

@@ -1,5 +1,6 @@
-"""Uniform gravity: every flight is a parabola. Badreddine et al., "CAD based simulation of ultrasonic shot peening",
-eq. 1.
+"""Uniform gravity: every flight is a parabola.
+
+Source: Badreddine et al., "CAD based simulation of ultrasonic shot peening", eq. 1.
 """
 
 import math
@@ -21,7 +22,7 @@ class Gravity(NamedTuple):
 
 
 def checked_gravity(gravity: Gravity | None) -> Gravity | None:
-    """The same as plain floats, which compiled code is made for; raises SceneError for anything that is not finite."""
+    """The same as plain floats, as compiled code needs them; raises SceneError if not finite."""
     if gravity is None:
         return None
     try:

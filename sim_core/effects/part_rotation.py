@@ -1,10 +1,18 @@
-"""A part that turns about an axis, steadily or to and fro, and how a ball's flight looks from it.
+"""A part that turns about an axis, steadily or to and fro, and a ball's flight relative to it.
 
-In the part's frame its triangles stand still, so their tree is built once; a ball's parabola becomes a curve whose
-position, velocity and acceleration are those of a turning frame (Goldstein, Poole & Safko, Classical Mechanics, 3rd
-ed., section 4.10: Coriolis, centrifugal and Euler terms). That curve differs from the parabola that touches it by at
-most J t³/6, with J a bound on its third derivative: in the plane across the axis the flight w(t) is seen as
-E w with E = exp(-i angle), and E w has the third derivative E''' w + 3 E'' w' + 3 E' w''.
+In the part's frame its triangles stand still, so their tree is built once. A ball's parabola becomes
+a curve there, whose position, velocity and acceleration are those of a turning frame, with Coriolis,
+centrifugal and Euler terms.
+
+Notation:
+    phi: angle of the part [rad]; phi = psi, or A sin(psi) where it turns to and fro
+    psi: argument [rad], growing at ``rate`` [rad/s]; A: ``amplitude`` [rad]
+    w(t): the flight projected on the plane across the axis, as a complex number [m]
+    E: exp(-i phi); the part sees E w, whose third derivative is E''' w + 3 E'' w' + 3 E' w''
+    J: bound on that derivative [m/s³], ``jerk``; the curve differs from the parabola that touches
+        it at t = 0 by at most J t³/6
+
+Source: Goldstein, Poole & Safko, Classical Mechanics, 3rd ed., section 4.10.
 """
 
 import math
@@ -14,12 +22,12 @@ import numpy as np
 
 from sim_core.errors import SceneError, number
 from sim_core.numerics.jit import inlined, jit
-from sim_core.numerics.vec3 import Vec3, along, cross, dot, sub
+from sim_core.numerics.vec3 import Flight, Vec3, add_scaled, cross, dot, sub
 
-FASTEST = 1e5  # rpm; and the angular speed of 1e5 rpm for a part that swings. No peened part turns a tenth as fast.
-LARGEST_SWING = 100.0 * math.pi  # rad, zero-to-peak
+MAX_RPM = 1e5  # also the limit of the speed to and fro; no peened part turns a tenth as fast
+MAX_AMPLITUDE = 100.0 * math.pi  # rad
 TURN = 2.0 * math.pi
-ROUND_AGAIN = 1.01  # turns: a little more than one
+MORE_THAN_ONE = 1.01  # turns
 
 
 class PartRotation(NamedTuple):
@@ -48,93 +56,89 @@ class PartRotation(NamedTuple):
     phase: float = 0.0
 
 
-class Axle(NamedTuple):
-    """What of a Turn the shape of the moving obstacles depends on; hashable.
+class RotationAxis(NamedTuple):
+    """What the obstacles of the part depend on; hashable.
 
-    ``point`` [m] and unit ``axis``; ``swing`` [rad], infinite for a part that goes round.
+    Args:
+        tag: surface tag of the part.
+        point: a point of the axis [m].
+        axis: unit vector.
+        amplitude: largest angle to each side [rad]; infinite for a steady rotation.
     """
 
     tag: int
     point: tuple[float, float, float]
     axis: tuple[float, float, float]
-    swing: float
+    amplitude: float
 
 
-class Turning(NamedTuple):
-    """Turn as compiled code wants it.
+class RotationState(NamedTuple):
+    """PartRotation as compiled code needs it.
 
-    ``axis`` (unit) and ``point`` [m], relative to the mesh's middle; ``rate`` [rad/s] at which the argument grows;
-    ``swings``: the angle is ``swing`` times its sine, or the argument itself; ``speed``, ``acceleration``, ``jerk``
-    [rad/s, s², s³]: bounds on the angle's derivatives; ``argument`` (1,) [rad]: at the window's start, carried from
-    window to window, so that the angle has no step there however long the run.
+    Args:
+        axis: unit vector.
+        point: of the axis, relative to the mesh's middle [m].
+        rate: growth of the argument [rad/s].
+        amplitude: of a rotation to and fro [rad].
+        to_and_fro: whether the angle is ``amplitude`` times the sine of the argument.
+        speed: bound on the angle's first derivative [rad/s].
+        acceleration: bound on its second derivative [rad/s²].
+        jerk: bound on its third derivative [rad/s³].
+        argument: at the window's start [rad], shape (1,); carried from window to window, so that
+            the angle has no step there however long the simulation is.
     """
 
     axis: Vec3
     point: Vec3
     rate: float
-    swing: float
-    swings: bool
+    amplitude: float
+    to_and_fro: bool
     speed: float
     acceleration: float
     jerk: float
     argument: np.ndarray
 
 
-class Seen(NamedTuple):
-    """A ball as seen from the part: position [m], velocity [m/s] and acceleration [m/s²] in its turning frame."""
-
-    position: Vec3
-    velocity: Vec3
-    acceleration: Vec3
-
-
-def checked_turn(turn: PartRotation | None, middle: np.ndarray) -> Turning | None:
-    """Raises SceneError for numbers out of range; ``middle`` (3,) [m] is the mesh's."""
+def new_rotation_state(turn: PartRotation | None, middle: np.ndarray) -> RotationState | None:
+    """The rotation at time 0; ``middle`` (3,) [m] is the mesh's. Raises SceneError, see below."""
     if turn is None:
         return None
-    axle = checked_axle(turn)
-    assert axle is not None
-    rate, swing, swings = 0.0, 0.0, turn.rpm is None
+    axis = checked_axis(turn)
+    assert axis is not None
+    amplitude, to_and_fro = 0.0, turn.rpm is None
     if turn.rpm is not None:
         rate = TURN * float(turn.rpm) / 60.0
         bounds = (abs(rate), 0.0, 0.0)
     else:
         assert turn.amplitude is not None
         assert turn.frequency is not None
-        swing, rate = float(turn.amplitude), TURN * float(turn.frequency)
-        bounds = (swing * rate, swing * rate**2, swing * rate**3)
-    point = np.array(axle.point) - middle
-    return Turning(
-        Vec3(*axle.axis),
-        Vec3(*(float(k) for k in point)),
-        rate,
-        swing,
-        swings,
-        *bounds,
-        np.array([float(turn.phase) % TURN]),
-    )
+        amplitude, rate = float(turn.amplitude), TURN * float(turn.frequency)
+        bounds = (amplitude * rate, amplitude * rate**2, amplitude * rate**3)
+    point = Vec3(*(float(k) for k in np.array(axis.point) - middle))
+    argument = np.array([float(turn.phase) % TURN])
+    return RotationState(Vec3(*axis.axis), point, rate, amplitude, to_and_fro, *bounds, argument)
 
 
-def checked_axle(turn: PartRotation | None) -> Axle | None:
-    """The axis of a Turn; raises SceneError for numbers out of range."""
+def checked_axis(turn: PartRotation | None) -> RotationAxis | None:
+    """The axis of a rotation; raises SceneError, naming the field, for numbers out of range."""
     if turn is None:
         return None
-    fastest = TURN * FASTEST / 60.0
+    fastest = TURN * MAX_RPM / 60.0
     for name in ("rpm", "amplitude", "frequency", "phase"):
         if getattr(turn, name) is not None:
             number(f"part_rotation.{name}", getattr(turn, name))
-    if (turn.rpm is None) == (turn.amplitude is None) or (turn.amplitude is None) != (
-        turn.frequency is None
-    ):
+    one_of_two = (turn.rpm is None) != (turn.amplitude is None)
+    if not one_of_two or (turn.amplitude is None) != (turn.frequency is None):
         raise SceneError("part_rotation: give either rpm, or amplitude and frequency")
-    if turn.rpm is not None and not abs(turn.rpm) <= FASTEST:
+    if turn.rpm is not None and not abs(turn.rpm) <= MAX_RPM:
         raise SceneError(
-            f"part_rotation.rpm is {turn.rpm}: it must lie between {-FASTEST:g} and {FASTEST:g}"
+            f"part_rotation.rpm is {turn.rpm}: it must lie between {-MAX_RPM:g} and {MAX_RPM:g}"
         )
     if turn.amplitude is not None and turn.frequency is not None:
-        if not 0.0 <= turn.amplitude <= LARGEST_SWING:
+        if not 0.0 <= turn.amplitude <= MAX_AMPLITUDE:
             raise SceneError(
-                f"part_rotation.amplitude is {turn.amplitude} rad: it must lie between 0 and {LARGEST_SWING:.0f}"
+                f"part_rotation.amplitude is {turn.amplitude} rad: it must lie between 0 and "
+                f"{MAX_AMPLITUDE:.0f}"
             )
         if not 0.0 < turn.frequency < math.inf:
             raise SceneError(f"part_rotation.frequency is {turn.frequency} Hz: it must be positive")
@@ -152,113 +156,116 @@ def checked_axle(turn: PartRotation | None) -> Axle | None:
     length = math.hypot(*turn.axis)
     x, y, z = (float(k) / length for k in turn.axis)
     px, py, pz = (float(k) for k in turn.axis_point)
-    return Axle(
-        int(turn.tag),
-        (px, py, pz),
-        (x, y, z),
-        math.inf if turn.amplitude is None else float(turn.amplitude),
-    )
+    amplitude = math.inf if turn.amplitude is None else float(turn.amplitude)
+    return RotationAxis(int(turn.tag), (px, py, pz), (x, y, z), amplitude)
 
 
-def angle_now(turning: Turning, time: float) -> float:
+def angle_at(rotation: RotationState, time: float) -> float:
     """The part's angle [rad] at a time of the current window."""
-    argument = float(turning.argument[0]) + turning.rate * time
-    return turning.swing * math.sin(argument) if turning.swings else argument
+    argument = float(rotation.argument[0]) + rotation.rate * time
+    return rotation.amplitude * math.sin(argument) if rotation.to_and_fro else argument
 
 
-def turned(points: np.ndarray, point: np.ndarray, axis: np.ndarray, angle: float) -> np.ndarray:
-    """Points (..., 3) [m] turned by an angle [rad] about a line (Rodrigues)."""
+def rotate_points(
+    points: np.ndarray, point: np.ndarray, axis: np.ndarray, angle: float
+) -> np.ndarray:
+    """Points (..., 3) [m] turned by an angle [rad] about a line, by the formula of Rodrigues."""
     offset = points - point
     lift = (offset @ axis)[..., None] * axis
     across = offset - lift
-    return np.asarray(
-        point + lift + math.cos(angle) * across + math.sin(angle) * np.cross(axis, across)
-    )
+    moved = point + lift + math.cos(angle) * across
+    return np.asarray(moved + math.sin(angle) * np.cross(axis, across))
 
 
 @jit
-def shift_rotation(turning: Turning | None, window: float) -> None:
-    """Move the clock's zero forward by ``window`` [s]: the angle at the new zero is that at the old window's end."""
-    if turning is None:
+def shift_rotation(rotation: RotationState | None, window: float) -> None:
+    """Move the clock's zero forward by ``window`` [s]; the angle is continuous there."""
+    if rotation is None:
         return
-    turning.argument[0] = (turning.argument[0] + turning.rate * window) % TURN
+    rotation.argument[0] = (rotation.argument[0] + rotation.rate * window) % TURN
 
 
 @inlined
-def one_turn(turning: Turning | None, length: float) -> float:
-    """Time [s] by which the part has been wherever it gets, at least ``length``: what lies still and has not been
-    touched by then never will be.
+def time_of_one_turn(rotation: RotationState | None, length: float) -> float:
+    """Time [s], at least ``length``, within which the part has been everywhere it gets.
+
+    A ball that lies still and has not been touched by then never will be.
     """
-    if turning is None:
+    if rotation is None:
         return length
-    if turning.rate == 0.0:
+    if rotation.rate == 0.0:
         return length
-    return max(length, ROUND_AGAIN * TURN / abs(turning.rate))
+    return max(length, MORE_THAN_ONE * TURN / abs(rotation.rate))
 
 
 @jit
-def _turn_back(turning: Turning, vector: Vec3, c: float, s: float) -> Vec3:
-    """A vector of the room in the part's frame: turned by minus the angle whose cosine and sine are c and s."""
-    lift = (1.0 - c) * dot(turning.axis, vector)
-    side = cross(turning.axis, vector)
+def _turn_back(rotation: RotationState, vector: Vec3, c: float, s: float) -> Vec3:
+    """A vector turned about the axis by minus the angle whose cosine is c and whose sine is s."""
+    lift = (1.0 - c) * dot(rotation.axis, vector)
+    side = cross(rotation.axis, vector)
     return Vec3(
-        c * vector.x - s * side.x + lift * turning.axis.x,
-        c * vector.y - s * side.y + lift * turning.axis.y,
-        c * vector.z - s * side.z + lift * turning.axis.z,
+        c * vector.x - s * side.x + lift * rotation.axis.x,
+        c * vector.y - s * side.y + lift * rotation.axis.y,
+        c * vector.z - s * side.z + lift * rotation.axis.z,
     )
 
 
 @jit
-def seen_from_part(
-    turning: Turning, position: Vec3, velocity: Vec3, acceleration: Vec3, time: float
-) -> Seen:
-    """A ball as the part sees it; all arguments in the room's frame, ``time`` [s] of the current window."""
-    argument = turning.argument[0] + turning.rate * time
-    angle, speed, change = argument, turning.rate, 0.0
-    if turning.swings:
-        sine = turning.swing * math.sin(argument)
-        angle = sine
-        speed = turning.swing * turning.rate * math.cos(argument)
-        change = -turning.rate * turning.rate * sine
+def relative_flight(rotation: RotationState, flight: Flight, time: float) -> Flight:
+    """A ball's flight in the part's frame at ``time`` [s] of the window; ``flight`` in the room's."""
+    argument = rotation.argument[0] + rotation.rate * time
+    angle, speed, change = argument, rotation.rate, 0.0
+    if rotation.to_and_fro:
+        angle = rotation.amplitude * math.sin(argument)
+        speed = rotation.amplitude * rotation.rate * math.cos(argument)
+        change = -rotation.rate * rotation.rate * angle
     c, s = math.cos(angle), math.sin(angle)
-    offset = _turn_back(turning, sub(position, turning.point), c, s)
-    side = cross(turning.axis, offset)
-    relative = along(_turn_back(turning, velocity, c, s), -speed, side)
-    bend = along(
-        _turn_back(turning, acceleration, c, s), -2.0 * speed, cross(turning.axis, relative)
-    )
-    bend = along(along(bend, -speed * speed, cross(turning.axis, side)), -change, side)
-    return Seen(along(offset, 1.0, turning.point), relative, bend)
+    offset = _turn_back(rotation, sub(flight.position, rotation.point), c, s)
+    side = cross(rotation.axis, offset)
+    relative = add_scaled(_turn_back(rotation, flight.velocity, c, s), -speed, side)
+    bend = _turn_back(rotation, flight.acceleration, c, s)
+    bend = add_scaled(bend, -2.0 * speed, cross(rotation.axis, relative))  # Coriolis
+    bend = add_scaled(bend, -speed * speed, cross(rotation.axis, side))  # centrifugal
+    bend = add_scaled(bend, -change, side)  # Euler
+    return Flight(add_scaled(offset, 1.0, rotation.point), relative, bend)
 
 
 @jit
-def from_part(turning: Turning, vector: Vec3, time: float) -> Vec3:
-    """A vector of the part's frame in the room's."""
-    argument = turning.argument[0] + turning.rate * time
-    angle = turning.swing * math.sin(argument) if turning.swings else argument
-    return _turn_back(turning, vector, math.cos(angle), -math.sin(angle))
+def to_room_frame(rotation: RotationState, vector: Vec3, time: float) -> Vec3:
+    """A vector of the part's frame in the room's frame."""
+    argument = rotation.argument[0] + rotation.rate * time
+    angle = rotation.amplitude * math.sin(argument) if rotation.to_and_fro else argument
+    return _turn_back(rotation, vector, math.cos(angle), -math.sin(angle))
 
 
 @jit
-def slip(turning: Turning, seen: Seen, away: Vec3, time: float) -> Vec3:
-    """The ball's velocity [m/s] relative to the surface it touches, in the part's frame.
+def slip_velocity(rotation: RotationState, flight: Flight, away: Vec3, time: float) -> Vec3:
+    """The ball's velocity relative to the surface it touches [m/s], in the part's frame.
 
-    ``away`` [m]: from the touched point to the ball's centre. The frame's velocity is that at the centre; the normal
-    component is the same at both.
+    Args:
+        rotation: of the part.
+        flight: the ball in the part's frame, whose own velocity is that at the ball's centre; the
+            normal component is the same at both.
+        away: from the touched point to the ball's centre [m].
+        time: of the window [s].
     """
-    speed = turning.rate
-    if turning.swings:
-        speed *= turning.swing * math.cos(turning.argument[0] + turning.rate * time)
-    return along(seen.velocity, speed, cross(turning.axis, away))
+    speed = rotation.rate
+    if rotation.to_and_fro:
+        speed *= rotation.amplitude * math.cos(rotation.argument[0] + rotation.rate * time)
+    return add_scaled(flight.velocity, speed, cross(rotation.axis, away))
 
 
 @jit
-def jerk_bound(turning: Turning, reach: float, speed: float, acceleration: float) -> float:
-    """J [m/s³] of a flight that stays within ``reach`` [m] of the axis, slower than ``speed`` [m/s] across it.
+def jerk_bound(rotation: RotationState, reach: float, speed: float, acceleration: float) -> float:
+    """J [m/s³] of a flight near the axis.
 
-    ``acceleration`` [m/s²]: acceleration across the axis, in the room.
+    Args:
+        rotation: of the part.
+        reach: the flight stays within this distance of the axis [m].
+        speed: bound on its speed across the axis, in the room [m/s].
+        acceleration: across the axis, in the room [m/s²].
     """
-    first = turning.speed
-    second = turning.acceleration + first * first
-    third = turning.jerk + 3.0 * first * turning.acceleration + first * first * first
+    first = rotation.speed
+    second = rotation.acceleration + first * first
+    third = rotation.jerk + 3.0 * first * rotation.acceleration + first * first * first
     return third * reach + 3.0 * second * speed + 3.0 * first * acceleration

@@ -1,11 +1,17 @@
-"""Normal restitution that falls with impact speed (the paper's eq. 2).
+"""Normal restitution that falls with impact speed.
 
-e(v) = C0 for v < v0, C0 (v / v0)^(-1/4) above: Badreddine et al., "CAD based simulation of ultrasonic shot
-peening", eq. 2, after McNamara & Falcon, Phys. Rev. E 71 (2005) 031302. v is the relative normal speed.
+Notation:
+    v: relative speed along the normal [m/s], ``speed``
+    e: coefficient of restitution [-]: e = C0 for v < v0, and C0 (v / v0)^(-1/4) above
+    C0, v0: coefficients [-] and [m/s], ``c0`` and ``v0``
 
-Impacts slower than ``elastic_below`` lose nothing. Without such a floor a ball coming to rest bounces infinitely
-often in finite time; with it the number of bounces is bounded and what is neglected is below v²/2 per impact (the
-idea of the TC model of Luding & McNamara, Granular Matter 1 (1998) 113, with a speed in place of a time).
+Source: Badreddine et al., "CAD based simulation of ultrasonic shot peening", eq. 2, after McNamara &
+Falcon, Phys. Rev. E 71 (2005) 031302.
+
+Impacts slower than ``elastic_below`` lose nothing. Without such a limit a ball that comes to rest
+bounces infinitely often in finite time; with it the number of bounces is bounded, and what is
+neglected is below v²/2 per impact. This is the idea of the TC model of Luding & McNamara, Granular
+Matter 1 (1998) 113, with a speed in place of a time.
 """
 
 import math
@@ -13,20 +19,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim_core.effects.per_surface import surface_table
-from sim_core.errors import SceneError
+from sim_core.errors import SceneError, surface_table
 from sim_core.numerics.jit import jit
 
-# 10 mm/s [m/s]: a thousandth of the shot's speed. Mean speeds change by < 3 % between 1 and 100 mm/s; lower values
-# spend
-# events on chatter (2 % of sonotrode hits here, a fifth at 1 mm/s).
+# m/s: a thousandth of the shot's speed. Mean speeds change by less than 3 % between 1 and 100 mm/s.
+# Lower values spend events on chatter: 2 % of the impacts on the sonotrode here, 20 % at 1 mm/s.
 ELASTIC_BELOW = 0.01
 
 
 class Restitution(NamedTuple):
-    """C0 (at most 1) and v0 [m/s] of each surface tag, and of ball against ball.
+    """Coefficients of restitution.
 
-    ``surfaces``: one (C0, v0) for each tag, by tag number; ``balls``: (C0, v0); ``elastic_below`` [m/s].
+    Args:
+        surfaces: (C0, v0) of each surface, by tag number; C0 at most 1, v0 in m/s.
+        balls: (C0, v0) of ball on ball.
+        elastic_below: impacts slower than this lose nothing [m/s].
     """
 
     surfaces: tuple[tuple[float, float], ...] | np.ndarray
@@ -35,7 +42,7 @@ class Restitution(NamedTuple):
 
 
 def checked_restitution(restitution: Restitution, tags: int) -> Restitution:
-    """The same with ``surfaces`` as an array (tags, 2); raises SceneError for a missing tag or numbers out of range."""
+    """The coefficients as an array of shape (tags, 2) and floats; raises SceneError if one is bad."""
     surfaces, of_balls = surface_table("restitution", "(C0, v0)", *restitution[:2], tags)
     pairs = [(f"surfaces[{i}]", *pair) for i, pair in enumerate(surfaces)] + [("balls", *of_balls)]
     for name, c0, v0 in pairs:
@@ -65,7 +72,8 @@ def surface_restitution(restitution: Restitution | None, tag: int, speed: float)
         return 1.0
     if speed < restitution.elastic_below:
         return 1.0
-    return restitution_law(speed, restitution.surfaces[tag, 0], restitution.surfaces[tag, 1])  # type: ignore[call-overload]
+    surfaces: np.ndarray = restitution.surfaces  # type: ignore[assignment]
+    return restitution_law(speed, surfaces[tag, 0], surfaces[tag, 1])
 
 
 @jit
@@ -79,6 +87,6 @@ def ball_restitution(restitution: Restitution | None, speed: float) -> float:
 
 
 def restitution_at(speed: np.ndarray, c0: float, v0: float) -> np.ndarray:
-    """The same law on an array of speeds [m/s], any shape."""
+    """The same law on an array of speeds [m/s] of any shape."""
     speed = np.asarray(speed, dtype=np.float64)
     return np.asarray(c0 / np.sqrt(np.sqrt(np.maximum(speed / v0, 1.0))))

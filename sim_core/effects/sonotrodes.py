@@ -1,8 +1,9 @@
-"""Several sonotrodes: each vibrating face goes with the wave of its own tag.
+"""Several sonotrodes, of one frequency or several: each vibrating face has the wave of its own tag.
 
-The clock's window is a whole number of periods of the fastest. The others need not fit into it: what each lacks to
-whole periods is added to its phase at every window's end, counted in 2^-62 of a turn. Whole numbers are added without
-rounding, so that a phase is off by 2^-63 of a turn a window at most: 3e-11 rad after the longest run.
+The clock's window is a whole number of periods of the fastest sonotrode. The others need not fit into
+it: what each lacks to whole periods is added to its phase at every window's end, counted in 2^-62 of a
+turn. Whole numbers are added without rounding, so that a phase is off by at most 2^-63 of a turn a
+window: 3e-11 rad after the longest simulation.
 """
 
 from fractions import Fraction
@@ -19,13 +20,16 @@ PART = PARTS - 1
 TURN = 2.0 * np.pi
 
 
-class Waves(NamedTuple):
-    """Several waves beside the Loop's one, which is then the slowest of them.
+class SonotrodeWaves(NamedTuple):
+    """The waves of k sonotrodes.
 
-    ``numbers`` (k, 6): of each its swing [m], omega [rad/s], phase [rad] at the window's start, and axis; ``first``
-    (k,) [rad]: the phase at the scene's start; ``gone``, ``step`` (k,) int64: how far it is past that now, but for
-    whole turns, and how much farther each window, in PARTS of a turn. ``faces`` (obstacles,) int64: which of them a
-    face goes with.
+    Args:
+        numbers: amplitude [m], omega [rad/s], phase [rad] at the window's start, and axis of each,
+            shape (k, 6).
+        first: phase at the scene's start [rad], shape (k,).
+        gone: phase since then without whole turns, in PARTS of a turn, shape (k,) int64.
+        step: growth of ``gone`` each window, shape (k,) int64.
+        faces: the sonotrode of each obstacle, shape (obstacles,) int64.
     """
 
     numbers: np.ndarray
@@ -35,8 +39,8 @@ class Waves(NamedTuple):
     faces: np.ndarray
 
 
-def whole_periods(vibrations: tuple[Vibration, ...], window: float) -> float:
-    """The window [s] nearest to the one given that is a whole number of periods of the fastest vibration."""
+def whole_period_window(vibrations: tuple[Vibration, ...], window: float) -> float:
+    """The window [s] nearest to the given one that is whole periods of the fastest vibration."""
     if not vibrations:
         return window
     fastest = max(one.frequency for one in vibrations)
@@ -45,10 +49,14 @@ def whole_periods(vibrations: tuple[Vibration, ...], window: float) -> float:
 
 def new_waves(
     vibrations: tuple[Vibration, ...], waves: tuple[Wave, ...], window: float, tags: np.ndarray
-) -> Waves | None:
-    """At the scene's start; ``window`` [s] as whole_periods gives it, ``tags`` (obstacles,) of all obstacles.
+) -> SonotrodeWaves | None:
+    """The waves at the scene's start; None for fewer than two, where one wave needs no table.
 
-    None where fewer than two vibrate: one wave needs no table.
+    Args:
+        vibrations: the sonotrodes.
+        waves: of the sonotrodes.
+        window: as whole_period_window gives it [s].
+        tags: of all obstacles, shape (obstacles,).
     """
     if len(waves) < 2:
         return None
@@ -57,13 +65,13 @@ def new_waves(
         Fraction(float(one.frequency)) / fastest * round(Fraction(window) * fastest)
         for one in vibrations
     ]
-    phases = np.array([wave.phase for wave in waves])
+    random_phase = np.array([wave.phase for wave in waves])
     faces = np.zeros(len(tags), dtype=np.int64)
     for k, one in enumerate(vibrations):
         faces[tags == one.tag] = k
-    return Waves(
-        np.array([[wave.swing, wave.omega, wave.phase, *wave.axis] for wave in waves]),
-        phases,
+    return SonotrodeWaves(
+        np.array([[wave.amplitude, wave.omega, wave.phase, *wave.axis] for wave in waves]),
+        random_phase,
         np.zeros(len(waves), dtype=np.int64),
         np.array([round(PARTS * (count % 1)) & PART for count in periods], dtype=np.int64),
         faces,
@@ -71,30 +79,26 @@ def new_waves(
 
 
 @inlined
-def face_wave(waves: Waves | None, wave: Wave | None, face: int) -> Wave | None:
-    """The motion of the vibrating face of that number among the obstacles."""
+def wave_of_face(waves: SonotrodeWaves | None, wave: Wave | None, face: int) -> Wave | None:
+    """The wave of a vibrating face, given by its number among the obstacles."""
     if waves is None or wave is None:
         return wave
     k, numbers = waves.faces[face], waves.numbers
-    return Wave(
-        numbers[k, 0],
-        numbers[k, 1],
-        numbers[k, 2],
-        Vec3(numbers[k, 3], numbers[k, 4], numbers[k, 5]),
-    )
+    axis = Vec3(numbers[k, 3], numbers[k, 4], numbers[k, 5])
+    return Wave(numbers[k, 0], numbers[k, 1], numbers[k, 2], axis)
 
 
 @inlined
-def move_alike(waves: Waves | None, face: int, other: int) -> bool:
-    """True when two vibrating faces are of one sonotrode."""
+def same_sonotrode(waves: SonotrodeWaves | None, face: int, other: int) -> bool:
+    """True when two vibrating faces belong to the same sonotrode."""
     if waves is None:
         return True
     return bool(waves.faces[face] == waves.faces[other])
 
 
 @jit
-def shift_phases(waves: Waves | None) -> None:
-    """A window has gone by."""
+def shift_phases(waves: SonotrodeWaves | None) -> None:
+    """Move the phases on by one window."""
     if waves is None:
         return
     for k in range(len(waves.step)):

@@ -1,7 +1,12 @@
-"""The sonotrode: one tagged surface moves as a rigid body by amplitude sin(2π frequency t + phase), exactly.
+"""The sonotrode: one tagged surface moves as a rigid body, exactly.
 
-Source: the process itself (a piezoelectric generator at a fixed frequency, amplitude zero-to-peak); the face's peak
-speed is 2π frequency amplitude. Several of them: sonotrodes.py.
+Notation:
+    u(t) = A sin(omega t + phase): displacement along the axis [m]
+    A: amplitude, zero to peak [m], ``amplitude``; omega = 2π frequency [rad/s], ``omega``
+    A omega: peak speed of the face [m/s]
+
+Source: the process itself, a piezoelectric generator at a fixed frequency. Several sonotrodes are in
+sonotrodes.py.
 """
 
 import math
@@ -11,15 +16,20 @@ import numpy as np
 
 from sim_core.errors import SceneError, number
 from sim_core.numerics.jit import jit
-from sim_core.numerics.vec3 import Vec3
+from sim_core.numerics.vec3 import Vec3, scaled
 
-HIGHEST = 1e9  # Hz: generators have 1e5 at most; a wave of 1e300 would be searched for ever, period after period
+MAX_FREQUENCY = 1e9  # Hz: generators have 1e5 at most; 1e300 would be searched without end
 
 
 class Vibration(NamedTuple):
-    """Harmonic motion of the surface ``tag`` along ``axis``.
+    """Harmonic motion of one surface.
 
-    ``amplitude`` [m] zero-to-peak; ``frequency`` [Hz]; ``phase`` [rad] at time 0.
+    Args:
+        tag: of the surface.
+        amplitude: zero-to-peak [m].
+        frequency: in Hz.
+        phase: at time 0 [rad].
+        axis: direction of the motion.
     """
 
     tag: int
@@ -35,21 +45,25 @@ class Vibration(NamedTuple):
 
     @property
     def peak(self) -> np.ndarray:
-        """Displacement of the face at its peak [m], (3,)."""
+        """Displacement of the face at its peak [m], shape (3,)."""
         return self.amplitude * np.array(self.axis) / np.linalg.norm(self.axis)
 
 
 class Wave(NamedTuple):
-    """Vibration as compiled code wants it: ``swing`` [m], ``omega`` [rad/s], ``phase`` [rad], ``axis``."""
+    """Vibration as compiled code needs it: amplitude [m], omega [rad/s], phase [rad], unit axis."""
 
-    swing: float
+    amplitude: float
     omega: float
     phase: float
     axis: Vec3
 
 
 def checked_waves(vibration: Vibration | tuple[Vibration, ...] | None) -> tuple[Wave, ...]:
-    """Of each that vibrates; raises SceneError for numbers out of range, and for one tag that vibrates twice."""
+    """The wave of each vibrating surface.
+
+    Raises:
+        SceneError: for numbers out of range, and for a tag given twice.
+    """
     if vibration is None:
         return ()
     if isinstance(vibration, Vibration):
@@ -57,25 +71,28 @@ def checked_waves(vibration: Vibration | tuple[Vibration, ...] | None) -> tuple[
     each: list[Vibration] = [*vibration] if isinstance(vibration, tuple) else []
     if not each or not all(isinstance(one, Vibration) for one in each):
         raise SceneError(
-            f"physics.vibration is {vibration!r}: give a Vibration, several of them in a tuple, or None"
+            f"physics.vibration is {vibration!r}: give a Vibration, a tuple of several, or None"
         )
     tags = [one.tag for one in each]
     for k, tag in enumerate(tags):
         if tag in tags[:k]:
             raise SceneError(
-                f"vibration[{k}].tag is {tag}, as vibration[{tags.index(tag)}].tag: give each its own"
+                f"vibration[{k}].tag is {tag}, the same as vibration[{tags.index(tag)}].tag: "
+                "give each its own"
             )
     return tuple(_checked_wave(f"vibration[{k}]", one) for k, one in enumerate(each))
 
 
 def _checked_wave(which: str, vibration: Vibration) -> Wave:
+    """The wave of one surface; ``which`` is its name in messages."""
     for name in ("amplitude", "frequency", "phase"):
         number(f"{which}.{name}", getattr(vibration, name))
     if not 0.0 <= vibration.amplitude < math.inf:
         raise SceneError(f"{which}.amplitude is {vibration.amplitude} m: it must be 0 or more")
-    if not 0.0 < vibration.frequency <= HIGHEST:
+    if not 0.0 < vibration.frequency <= MAX_FREQUENCY:
         raise SceneError(
-            f"{which}.frequency is {vibration.frequency} Hz: it must be positive and at most {HIGHEST:g} Hz"
+            f"{which}.frequency is {vibration.frequency} Hz: it must be positive and at most "
+            f"{MAX_FREQUENCY:g} Hz"
         )
     if not math.isfinite(vibration.phase):
         raise SceneError(f"{which}.phase is {vibration.phase} rad: it must be finite")
@@ -92,8 +109,8 @@ def _checked_wave(which: str, vibration: Vibration) -> Wave:
 
 @jit
 def surface_velocity(wave: Wave | None, time: float) -> Vec3:
-    """Velocity of the vibrating surface [m/s] at a time of the current window; zero without vibration."""
+    """Velocity of the vibrating surface [m/s] at a time of the window; zero without vibration."""
     if wave is None:
         return Vec3(0.0, 0.0, 0.0)
-    speed = wave.swing * wave.omega * math.cos(wave.omega * time + wave.phase)
-    return Vec3(speed * wave.axis.x, speed * wave.axis.y, speed * wave.axis.z)
+    speed = wave.amplitude * wave.omega * math.cos(wave.omega * time + wave.phase)
+    return scaled(speed, wave.axis)

@@ -1,10 +1,13 @@
-"""An eight-wide tree of bounding boxes over the obstacles.
+"""An eight-wide tree of bounding boxes over the obstacles; each leaf is one obstacle.
 
-Built top down by the surface area heuristic: a group of boxes is cut where the areas of the two halves' boxes,
-weighted by what they hold, are least, since a box is entered in proportion to its area (Goldsmith & Salmon, IEEE
-Computer Graphics and Applications 7(5) (1987) 14). Eight groups make a node: the largest is cut again until there are
-eight (Wald, Benthin & Boulos, IEEE Symposium on Interactive Ray Tracing 2008). Every leaf is one obstacle, so that
-the box test, eight at once, decides which exact tests are worth their price.
+The tree is built top down by the surface area heuristic: a group of boxes is cut where the areas of
+the two halves' boxes, weighted by the number of obstacles in them, are least, because a box is entered
+in proportion to its area. Eight groups make a node: the largest is cut again until there are eight.
+Leaves hold a single obstacle so that the box test, eight at once, decides which exact tests are worth
+their cost.
+
+Sources: Goldsmith & Salmon, IEEE Computer Graphics and Applications 7(5) (1987) 14; Wald, Benthin &
+Boulos, IEEE Symposium on Interactive Ray Tracing 2008.
 """
 
 from typing import NamedTuple
@@ -12,23 +15,30 @@ from typing import NamedTuple
 import numpy as np
 
 from sim_core.errors import SceneError
-from sim_core.geometry.obstacles import Obstacles
+from sim_core.geometry.obstacles import ObstacleTable
 from sim_core.numerics.jit import jit
 from sim_core.numerics.simd import BOXES
 
-FAR = np.float32(1e30)  # an empty child is a box no flight reaches
-LEVELS = 64  # a tree of 10 million obstacles has about 10
-STACK = BOXES * LEVELS  # a walk keeps at most 7 siblings a level
-BINS = 16  # places tried for a cut along each axis; 8 to 32 measured alike
+FAR = np.float32(1e30)  # an empty child is a box that no flight reaches
+MAX_LEVELS = 64  # a tree of 10 million obstacles has about 10
+STACK = BOXES * MAX_LEVELS  # a walk keeps at most 7 siblings a level
+BINS = 16  # cuts tried along each axis; 8 to 32 measured alike
 EMPTY = -(2**31)
 
 
 class Tree(NamedTuple):
-    """The obstacles and their boxes, ready for compiled code; coordinates relative to the scene's centre.
+    """Obstacles and their boxes, ready for compiled code, relative to the scene's centre.
 
-    ``bounds`` (nodes, 6, 8) float32: low x, y, z and high x, y, z of each node's eight children, padded outward;
-    ``children`` (nodes, 8) int32: >= 0 a node, < 0 obstacle -1 - child; ``numbers``, ``kinds``, ``triangles``: the
-    obstacles, neighbours in space near each other in memory; ``radius`` [m] of the balls they were made for.
+    Obstacles that are neighbours in space are near each other in memory.
+
+    Args:
+        bounds: low x, y, z and high x, y, z of each node's children, shape (nodes, 6, 8) float32,
+            padded outward.
+        children: a node where >= 0, else obstacle -1 - child, shape (nodes, 8) int32.
+        numbers: as in ObstacleTable, shape (k, 20).
+        kinds: as in ObstacleTable, shape (k,).
+        triangles: as in ObstacleTable, shape (k, 2).
+        radius: of the balls that the obstacles are for [m].
     """
 
     bounds: np.ndarray
@@ -39,48 +49,37 @@ class Tree(NamedTuple):
     radius: float
 
 
-def build_tree(obstacles: Obstacles, radius: float) -> Tree:
-    """The tree over the obstacles of balls of this radius [m]."""
-    count = len(obstacles.low)
-    size = max(np.abs(obstacles.low).max(), np.abs(obstacles.high).max())
-    pad = (
-        16.0 * np.finfo(np.float32).eps * size
-    )  # float32 boxes are never smaller than the float64 ones
-    low, high = obstacles.low - pad, obstacles.high + pad
+def build_tree(table: ObstacleTable, radius: float) -> Tree:
+    """The tree over the obstacles for balls of this radius [m]."""
+    count = len(table.low)
+    size = max(np.abs(table.low).max(), np.abs(table.high).max())
+    # float32 boxes are never smaller than the float64 ones
+    pad = 16.0 * np.finfo(np.float32).eps * size
+    low, high = table.low - pad, table.high + pad
     order = np.arange(count)
     most = count + 2  # a node has at least two children
     bounds = np.full((most, 6, BOXES), FAR, dtype=np.float32)
     children = np.full((most, BOXES), EMPTY, dtype=np.int32)
     ranges = np.zeros((most, 3), dtype=np.int64)  # first and last obstacle, and level, of each node
-    bins = np.zeros((BINS, 7))
-    nodes = _grow(
-        low,
-        high,
-        order,
-        bounds,
-        children,
-        ranges,
-        bins,
-        np.zeros((BINS, 7)),
-        np.zeros((BOXES, 2), np.int64),
-    )
-    if ranges[:nodes, 2].max() > LEVELS:
+    bins, groups = np.zeros((2, BINS, 7)), np.zeros((BOXES, 2), np.int64)
+    nodes = _grow(low, high, order, bounds, children, ranges, bins[0], bins[1], groups)
+    if ranges[:nodes, 2].max() > MAX_LEVELS:
         raise SceneError(
-            f"the mesh's triangles are spread so unevenly that their tree is more than {LEVELS} levels deep; "
-            "look for triangles crowded into one point"
+            "the mesh's triangles are spread so unevenly that their tree is more than "
+            f"{MAX_LEVELS} levels deep; look for triangles crowded into one point"
         )
     return Tree(
         np.ascontiguousarray(bounds[:nodes]),
         np.ascontiguousarray(children[:nodes]),
-        np.ascontiguousarray(obstacles.numbers[order]),
-        np.ascontiguousarray(obstacles.kinds[order]),
-        np.ascontiguousarray(obstacles.triangles[order]),
+        np.ascontiguousarray(table.numbers[order]),
+        np.ascontiguousarray(table.kinds[order]),
+        np.ascontiguousarray(table.triangles[order]),
         radius,
     )
 
 
-def joined(trees: list[Tree]) -> tuple[Tree, np.ndarray]:
-    """Several trees as one, and the node (k,) int64 each begins at; the tree's radius is the last's."""
+def join_trees(trees: list[Tree]) -> tuple[Tree, np.ndarray]:
+    """Several trees as one with the last one's radius, and the node each begins at, shape (k,)."""
     if len(trees) == 1:
         return trees[0], np.zeros(1, dtype=np.int64)
     roots = np.cumsum([0, *(len(tree.children) for tree in trees[:-1])])
@@ -116,7 +115,10 @@ def _grow(
     sweep: np.ndarray,
     groups: np.ndarray,
 ) -> int:
-    """Fill bounds and children, sorting ``order`` so that a leaf's obstacle is its place; returns the node count."""
+    """Fill bounds and children, and sort ``order`` so that leaf i holds obstacle order[i].
+
+    Returns the number of nodes.
+    """
     ranges[0, 0], ranges[0, 1], ranges[0, 2] = 0, len(order), 1
     nodes = 1
     node = 0
@@ -149,11 +151,8 @@ def _grow(
                 children[node, g] = -1 - start
             else:
                 children[node, g] = nodes
-                ranges[nodes, 0], ranges[nodes, 1], ranges[nodes, 2] = (
-                    start,
-                    end,
-                    ranges[node, 2] + 1,
-                )
+                ranges[nodes, 0], ranges[nodes, 1] = start, end
+                ranges[nodes, 2] = ranges[node, 2] + 1
                 nodes += 1
         node += 1
     return nodes
@@ -161,7 +160,7 @@ def _grow(
 
 @jit
 def _area_of(low: np.ndarray, high: np.ndarray, order: np.ndarray, start: int, end: int) -> float:
-    """Half the surface area of the box round a group [m²]."""
+    """Half the surface area of the box around a group [m²]."""
     x0, y0, z0, x1, y1, z1 = np.inf, np.inf, np.inf, -np.inf, -np.inf, -np.inf
     for k in range(start, end):
         i = order[k]
@@ -193,7 +192,7 @@ def _merge(box: np.ndarray, row: int, other: np.ndarray, other_row: int) -> None
 
 @jit
 def _cheapest(bins: np.ndarray, left: np.ndarray) -> tuple[float, int]:
-    """Least area x count of the two sides, and the last bin of the left one."""
+    """Least area times count of the two sides, and the last bin of the left side."""
     _clear(left)
     for b in range(BINS):  # left[b]: all bins up to b
         if b > 0:
@@ -236,7 +235,10 @@ def _cut(
     bins: np.ndarray,
     sweep: np.ndarray,
 ) -> int:
-    """Sort a group into two at the cheapest of BINS - 1 places along each axis; returns where the second begins."""
+    """Sort a group into two at the cheapest of BINS - 1 cuts along each axis.
+
+    Returns where the second part begins.
+    """
     best, best_axis, best_bin, best_first, best_scale = np.inf, -1, 0, 0.0, 0.0
     for axis in range(3):
         first, last = np.inf, -np.inf

@@ -1,7 +1,10 @@
-"""The surface point nearest to a place in the cavity, for many places at once: how large a ball fits there.
+"""The surface point closest to a place in the cavity, for many places at once.
 
-A walk through the tree of boxes that leaves out what is farther than the nearest found so far; the distance to a
-triangle after C. Ericson, Real-Time Collision Detection (2005), section 5.1.5.
+The walk through the tree of boxes leaves out what is farther than the closest point found so far. The
+distance is also the radius of the largest ball that fits there.
+
+Source: C. Ericson, Real-Time Collision Detection (2005), section 5.1.5, for the closest point of a
+triangle.
 """
 
 import math
@@ -13,15 +16,21 @@ import numpy as np
 from sim_core.errors import SceneError
 from sim_core.geometry.bvh import STACK, Tree, build_tree
 from sim_core.geometry.mesh import TriangleMesh
-from sim_core.geometry.obstacles import FACE, Obstacles
+from sim_core.geometry.obstacles import FACE, ObstacleTable
 from sim_core.numerics.jit import jit
 from sim_core.numerics.simd import BOXES
-from sim_core.numerics.vec3 import Vec3, along, dot, sub
+from sim_core.numerics.vec3 import Vec3, add_scaled, dot, sub
 
 
 class ClosestPoints(NamedTuple):
-    """``distance`` (n,) [m], ``triangle`` (n,) int32, ``point`` (n, 3) [m] on it; of a place with nothing within its
-    reach: the reach, -1, and the place itself.
+    """Closest points to n places.
+
+    For a place with nothing within its reach: the reach, -1, and the place itself.
+
+    Args:
+        distance: from the place [m], shape (n,).
+        triangle: of the surface, shape (n,) int32.
+        point: on the triangle [m], shape (n, 3).
     """
 
     distance: np.ndarray
@@ -32,9 +41,13 @@ class ClosestPoints(NamedTuple):
 def closest_points(
     mesh: TriangleMesh, places: np.ndarray, reach: float | np.ndarray, tag: int | None = None
 ) -> ClosestPoints:
-    """The surface point nearest to each of the places (n, 3) [m], if one is nearer than ``reach`` [m], () or (n,).
+    """The surface point closest to each place.
 
-    ``tag``: only the triangles that have it count.
+    Args:
+        mesh: the surface.
+        places: positions [m], shape (n, 3).
+        reach: largest distance that is searched [m], one for all or shape (n,).
+        tag: only triangles with this tag count; all if None.
     """
     middle = mesh.middle
     found = ClosestPoints(
@@ -48,7 +61,7 @@ def closest_points(
 
 @lru_cache(maxsize=8)
 def _tree_of(mesh: TriangleMesh, tag: int | None) -> Tree:
-    """The triangles themselves as obstacles: their corners, relative to the mesh's middle, are their nine numbers."""
+    """A tree of the triangles themselves: their nine numbers are their corners."""
     own = np.flatnonzero((mesh.tags == tag) | (tag is None)).astype(np.int32)
     if not len(own):
         raise SceneError(f"the mesh has no triangle of tag {tag}")
@@ -56,14 +69,16 @@ def _tree_of(mesh: TriangleMesh, tag: int | None) -> Tree:
     numbers = np.ascontiguousarray(corners.reshape(len(own), 9))
     triangles = np.repeat(own[:, None], 2, axis=1)
     kinds = np.full(len(own), FACE, dtype=np.uint8)
-    return build_tree(
-        Obstacles(numbers, kinds, triangles, corners.min(axis=1), corners.max(axis=1)), 0.0
-    )
+    table = ObstacleTable(numbers, kinds, triangles, corners.min(axis=1), corners.max(axis=1))
+    return build_tree(table, 0.0)
 
 
 @jit
 def _find(tree: Tree, found: ClosestPoints, stack: np.ndarray, entry: np.ndarray) -> None:
-    """``found`` comes with reaches and places; ``stack`` and ``entry`` are room for the walk: nodes, and how near."""
+    """Replace reaches and places in ``found`` by the closest points.
+
+    ``stack`` and ``entry`` are working space: nodes, and their squared distances [m²].
+    """
     for i in range(len(found.distance)):
         at = Vec3(found.point[i, 0], found.point[i, 1], found.point[i, 2])
         least = found.distance[i] * found.distance[i]
@@ -84,7 +99,7 @@ def _find(tree: Tree, found: ClosestPoints, stack: np.ndarray, entry: np.ndarray
                     stack[size], entry[size] = number, away
                     size += 1
                     continue
-                point = _on_triangle(tree.numbers, -1 - number, at)
+                point = _point_on_triangle(tree.numbers, -1 - number, at)
                 offset = sub(at, point)
                 if dot(offset, offset) < least:
                     least = dot(offset, offset)
@@ -94,7 +109,7 @@ def _find(tree: Tree, found: ClosestPoints, stack: np.ndarray, entry: np.ndarray
                         point.y,
                         point.z,
                     )
-            for k in range(first, size - 1):  # the nearest of the new ones is looked into next
+            for k in range(first, size - 1):  # the closest of the new nodes is visited next
                 if entry[k] < entry[size - 1]:
                     stack[k], stack[size - 1] = stack[size - 1], stack[k]
                     entry[k], entry[size - 1] = entry[size - 1], entry[k]
@@ -111,8 +126,8 @@ def _box_distance_squared(bounds: np.ndarray, node: int, child: int, at: Vec3) -
 
 
 @jit
-def _on_triangle(numbers: np.ndarray, row: int, at: Vec3) -> Vec3:
-    """The point of a triangle nearest to a place."""
+def _point_on_triangle(numbers: np.ndarray, row: int, at: Vec3) -> Vec3:
+    """The point of a triangle closest to a place."""
     a = Vec3(numbers[row, 0], numbers[row, 1], numbers[row, 2])
     b = Vec3(numbers[row, 3], numbers[row, 4], numbers[row, 5])
     c = Vec3(numbers[row, 6], numbers[row, 7], numbers[row, 8])
@@ -122,9 +137,9 @@ def _on_triangle(numbers: np.ndarray, row: int, at: Vec3) -> Vec3:
     if det > 0.0:
         v, w = (cc * pb - bc * pc) / det, (bb * pc - bc * pb) / det
         if v >= 0.0 and w >= 0.0 and v + w <= 1.0:
-            return along(along(a, v, ab), w, ac)
-    best = _on_side(a, b, at)  # outside the face: on the nearest of its three sides
-    for other in (_on_side(b, c, at), _on_side(c, a, at)):
+            return add_scaled(add_scaled(a, v, ab), w, ac)
+    best = _point_on_side(a, b, at)  # outside the face: on the closest of its three sides
+    for other in (_point_on_side(b, c, at), _point_on_side(c, a, at)):
         offset, so_far = sub(at, other), sub(at, best)
         if dot(offset, offset) < dot(so_far, so_far):
             best = other
@@ -132,10 +147,11 @@ def _on_triangle(numbers: np.ndarray, row: int, at: Vec3) -> Vec3:
 
 
 @jit
-def _on_side(a: Vec3, b: Vec3, at: Vec3) -> Vec3:
+def _point_on_side(a: Vec3, b: Vec3, at: Vec3) -> Vec3:
+    """The point of the segment from a to b closest to a place."""
     side = sub(b, a)
     length = dot(side, side)
     share = 0.0
     if length > 0.0:
         share = min(max(dot(sub(at, a), side) / length, 0.0), 1.0)
-    return along(a, share, side)
+    return add_scaled(a, share, side)

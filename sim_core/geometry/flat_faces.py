@@ -1,143 +1,159 @@
-"""Flats: connected triangles of one surface that lie in one plane.
+"""Flat faces: connected triangles of one surface in one plane are one face for the ball.
 
-A fine mesh on a flat wall is the designer's wish to see coverage, not a shape: for the ball it is one face. A flat is
-found by growing from its largest triangle over edges whose far corner lies in that triangle's plane but for rounding.
+A fine mesh on a flat wall is there to show coverage, not a shape. A flat face is found by growing
+from its largest triangle over edges whose far corner lies in that triangle's plane up to rounding.
+Its outline is then cut, square by square, into convex quadrangles. These need not share corners, as
+the triangles of a mesh do, since faces overlap; so they are large inside and small along a curved
+border, and their number follows the outline, not the mesh.
 """
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+import shapely
 
-from sim_core.geometry.mesh import towards_shot
+from sim_core.geometry.mesh import TriangleMesh, edge_partners, normals_towards_shot
 from sim_core.numerics.jit import jit
 
-# A corner this near the plane [m] is in it: below the 1e-12 m within which contacts are promised to be exact, above
-# the rounding of coordinates in a chamber (1e-17 m). Far from the origin the coordinates' own rounding is more.
+# A corner this near the plane [m] lies in it: below the 1e-12 m within which contacts are promised
+# to be exact, above the rounding of coordinates in a chamber (1e-17 m). Far from the origin the
+# rounding of the coordinates themselves is larger.
 IN_PLANE = 1e-13
-MOST_IN_PLANE = 5e-13
+MAX_IN_PLANE = 5e-13
 ROUNDINGS = 4.0
-LEAST = 3  # triangles: two are not worth a search for their outline
+MIN_TRIANGLES = 3  # of a flat face: two are not worth a search for their outline
+LONE = -1  # number of the flat face of a triangle that belongs to none
 
-LONE = -1
+MAX_PIECE_CORNERS = 6  # a piece with more is cut; 4 to 8 gave the same query times
+MAX_HALVINGS = 16  # a square of 1e-5 of the flat face
+# An outline corner nearer than this [m] to the line of its neighbours is left out; a hundredth of
+# the overlap between faces.
+STRAIGHT = 1e-10
 
 
-class Flats(NamedTuple):
-    """``flat`` (m,) int32: which flat a triangle belongs to, LONE if none. Of each flat: ``seed`` (k,) int32, the
-    triangle whose plane it has; ``frames`` (k, 3, 3) float64, a corner [m] and two unit vectors in the plane, the
-    first along the longest edge of the rim, their cross product towards the shot; ``rims``, the directed edges
-    (3 triangle + corner) that border it.
+class FlatFaces(NamedTuple):
+    """The k flat faces of a mesh of m triangles.
+
+    Args:
+        of_triangle: the flat face of each triangle, LONE if none, shape (m,) int32.
+        seed: the triangle whose plane each flat face has, shape (k,) int32.
+        frames: a corner [m] and two unit vectors in the plane, shape (k, 3, 3); the first vector
+            runs along the longest edge of the outline, their cross product points towards the shot.
+        outlines: directed edges (3 triangle + corner) that border each flat face.
     """
 
-    flat: np.ndarray
+    of_triangle: np.ndarray
     seed: np.ndarray
     frames: np.ndarray
-    rims: list[np.ndarray]
+    outlines: list[np.ndarray]
 
 
-def edge_partners(triangles: np.ndarray) -> np.ndarray:
-    """For each directed edge (3 triangle + corner) of a closed mesh the one that runs back along it, shape (3 m,)."""
-    count = int(triangles.max()) + 1
-    a = triangles.reshape(-1).astype(np.int64)
-    b = np.roll(triangles, -1, axis=1).reshape(-1).astype(np.int64)
-    forward, backward = a * count + b, b * count + a
-    order = np.argsort(forward)
-    return np.asarray(order[np.searchsorted(forward, backward, sorter=order)])
+class _Triangles(NamedTuple):
+    """What the search for flat faces reads of each triangle.
 
-
-def in_plane(vertices: np.ndarray) -> float:
-    """How far from a plane [m] a corner may lie to be in it, for coordinates as the user gave them (n, 3) [m]."""
-    rounding = ROUNDINGS * float(np.finfo(np.float64).eps * np.abs(vertices).max())
-    return min(max(IN_PLANE, rounding), MOST_IN_PLANE)
-
-
-def find_flats(
-    corners: np.ndarray, partners: np.ndarray, surface: np.ndarray, tolerance: float
-) -> Flats:
-    """Flats of LEAST triangles and more.
-
-    ``corners`` (m, 3, 3) [m]; ``partners`` as edge_partners gives them; ``surface`` (m,): only triangles of one number
-    join; ``tolerance`` [m], see in_plane.
+    Args:
+        corners: corner positions [m], shape (m, 3, 3).
+        normals: unit normals, shape (m, 3), zero where a triangle has no area.
+        doubled: doubled areas [m²], shape (m,).
+        partners: opposite of each directed edge, shape (3 m,).
+        surface: only triangles of the same number join, shape (m,).
     """
-    normals, doubled = towards_shot(corners)
-    flat = np.full(len(corners), LONE, dtype=np.int32)
+
+    corners: np.ndarray
+    normals: np.ndarray
+    doubled: np.ndarray
+    partners: np.ndarray
+    surface: np.ndarray
+
+
+def in_plane_tolerance(vertices: np.ndarray) -> float:
+    """Distance from a plane [m] up to which a corner lies in it, for vertices (n, 3) [m] as given."""
+    rounding = ROUNDINGS * float(np.finfo(np.float64).eps * np.abs(vertices).max())
+    return min(max(IN_PLANE, rounding), MAX_IN_PLANE)
+
+
+def find_flat_faces(
+    corners: np.ndarray, partners: np.ndarray, surface: np.ndarray, tolerance: float
+) -> FlatFaces:
+    """Flat faces of MIN_TRIANGLES triangles and more.
+
+    Args:
+        corners: corner positions [m], shape (m, 3, 3).
+        partners: as edge_partners gives them, shape (3 m,).
+        surface: only triangles of the same number join, shape (m,).
+        tolerance: see in_plane_tolerance [m].
+    """
+    count = len(corners)
+    normals, doubled = normals_towards_shot(corners)
     largest_first = np.argsort(-doubled, kind="stable")
-    seeds = np.zeros(len(corners), dtype=np.int32)
-    queue = np.zeros(len(corners), dtype=np.int32)
-    tried = np.zeros(len(corners), dtype=np.bool_)
-    count = _grow(
-        corners,
-        normals,
-        doubled,
-        partners,
-        surface,
-        tolerance,
-        largest_first,
-        flat,
-        seeds,
-        queue,
-        tried,
-    )
-    seed = seeds[:count].copy()
-    rims = _rims(flat, partners, count)
-    frames = np.zeros((count, 3, 3))
-    for k, rim in enumerate(rims):
-        start = corners[rim // 3, rim % 3]
-        along = corners[rim // 3, (rim % 3 + 1) % 3] - start
-        length = np.linalg.norm(along, axis=1)
+    of_triangle = np.full(count, LONE, dtype=np.int32)
+    seeds = np.zeros(count, dtype=np.int32)
+    queue = np.zeros(count, dtype=np.int32)
+    mesh = _Triangles(corners, normals, doubled, partners, surface)
+    tried = np.zeros(count, dtype=np.bool_)
+    found = _grow(mesh, tolerance, largest_first, of_triangle, seeds, queue, tried)
+    seed = seeds[:found].copy()
+    outlines = _outlines(of_triangle, partners, found)
+    frames = np.zeros((found, 3, 3))
+    for k, outline in enumerate(outlines):
+        start = corners[outline // 3, outline % 3]
+        edge = corners[outline // 3, (outline % 3 + 1) % 3] - start
+        length = np.linalg.norm(edge, axis=1)
         frames[k, 0] = corners[seed[k], 0]
-        first = along[length.argmax()] / length.max()
-        frames[k, 1] = first
-        frames[k, 2] = np.cross(normals[seed[k]], first)
-    return Flats(flat, seed, frames, rims)
+        frames[k, 1] = edge[length.argmax()] / length.max()
+        frames[k, 2] = np.cross(normals[seed[k]], frames[k, 1])
+    return FlatFaces(of_triangle, seed, frames, outlines)
 
 
-def _rims(flat: np.ndarray, partners: np.ndarray, count: int) -> list[np.ndarray]:
-    """The directed edges between each flat and the rest."""
+def _outlines(of_triangle: np.ndarray, partners: np.ndarray, count: int) -> list[np.ndarray]:
+    """The directed edges between each flat face and the rest."""
     edges = np.arange(len(partners))
-    here, there = flat[edges // 3], flat[partners // 3]
-    rim = edges[(here != there) & (here != LONE)]
-    rim = rim[np.argsort(flat[rim // 3], kind="stable")]
-    return np.split(rim, np.searchsorted(flat[rim // 3], np.arange(1, count))) if count else []
+    here, there = of_triangle[edges // 3], of_triangle[partners // 3]
+    border = edges[(here != there) & (here != LONE)]
+    border = border[np.argsort(of_triangle[border // 3], kind="stable")]
+    cuts = np.searchsorted(of_triangle[border // 3], np.arange(1, count))
+    return np.split(border, cuts) if count else []
 
 
 @jit
 def _grow(
-    corners: np.ndarray,
-    normals: np.ndarray,
-    doubled: np.ndarray,
-    partners: np.ndarray,
-    surface: np.ndarray,
+    mesh: _Triangles,
     tolerance: float,
     largest_first: np.ndarray,
-    flat: np.ndarray,
+    of_triangle: np.ndarray,
     seeds: np.ndarray,
     queue: np.ndarray,
     tried: np.ndarray,
 ) -> int:
+    """Fill ``of_triangle`` and ``seeds``; returns the number of flat faces."""
     count = 0
     for k in range(len(largest_first)):
         seed = largest_first[k]
-        if tried[seed] or doubled[seed] == 0.0:
+        if tried[seed] or mesh.doubled[seed] == 0.0:
             continue
         tried[seed] = True
-        flat[seed] = count
+        of_triangle[seed] = count
         queue[0] = seed
         size, done = 1, 0
         while done < size:
             triangle = queue[done]
             done += 1
             for side in range(3):
-                other = partners[3 * triangle + side] // 3
-                if tried[other] or surface[other] != surface[seed] or doubled[other] == 0.0:
-                    continue
-                if _lies_in(corners, normals, other, seed, tolerance):
+                other = mesh.partners[3 * triangle + side] // 3
+                if (
+                    not tried[other]
+                    and mesh.surface[other] == mesh.surface[seed]
+                    and mesh.doubled[other] != 0.0
+                    and _lies_in_plane(mesh, other, seed, tolerance)
+                ):
                     tried[other] = True
-                    flat[other] = count
+                    of_triangle[other] = count
                     queue[size] = other
                     size += 1
-        if size < LEAST:
+        if size < MIN_TRIANGLES:
             for i in range(size):
-                flat[queue[i]] = LONE
+                of_triangle[queue[i]] = LONE
         else:
             seeds[count] = seed
             count += 1
@@ -145,10 +161,9 @@ def _grow(
 
 
 @jit
-def _lies_in(
-    corners: np.ndarray, normals: np.ndarray, triangle: int, seed: int, tolerance: float
-) -> bool:
+def _lies_in_plane(mesh: _Triangles, triangle: int, seed: int, tolerance: float) -> bool:
     """True when the triangle lies in the seed's plane and faces the same way."""
+    corners, normals = mesh.corners, mesh.normals
     facing = 0.0
     for axis in range(3):
         facing += normals[triangle, axis] * normals[seed, axis]
@@ -157,9 +172,121 @@ def _lies_in(
     for corner in range(3):
         height = 0.0
         for axis in range(3):
-            height += normals[seed, axis] * (
-                corners[triangle, corner, axis] - corners[seed, 0, axis]
-            )
+            offset = corners[triangle, corner, axis] - corners[seed, 0, axis]
+            height += normals[seed, axis] * offset
         if abs(height) > tolerance:
             return False
     return True
+
+
+def cover_with_quadrangles(outline: np.ndarray, area: float) -> np.ndarray | None:
+    """Few convex quadrangles that cover the inside of an outline.
+
+    Args:
+        outline: segments of the border [m], shape (n, 2, 2), in any order; holes are what lies
+            inside an odd number of them.
+        area: of the inside [m²]; a border that crosses itself has a different area.
+
+    Returns:
+        Corners [m], shape (k, 4, 2), counter-clockwise, a triangle with its last corner twice; None
+        if the area does not match.
+    """
+    region = shapely.build_area(shapely.multilinestrings(shapely.linestrings(outline)))
+    region = shapely.simplify(region, STRAIGHT)
+    if region.is_empty or not region.is_valid:
+        return None
+    pieces = np.concatenate([_quadrangles(piece) for piece in _cut(region)])
+    one = _doubled_area(pieces[:, 0], pieces[:, 1], pieces[:, 2])
+    two = _doubled_area(pieces[:, 0], pieces[:, 2], pieces[:, 3])
+    covered = 0.5 * one + 0.5 * two
+    if abs(covered.sum() - area) > 1e-9 * area:
+        return None
+    return np.asarray(pieces[covered > 0.0])
+
+
+def _doubled_area(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
+    """Twice the signed area [m²] of triangles with these corners (n, 2)."""
+    one, two = b - a, c - a
+    return np.asarray(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0])
+
+
+def _cut(region: shapely.Geometry) -> list[shapely.Geometry]:
+    """Pieces of a region: those of its four quarters, and so on until each has few corners."""
+    simple = []
+    todo = [(region, 0)]
+    while todo:
+        piece, depth = todo.pop()
+        for polygon in shapely.get_parts(piece):
+            if shapely.get_dimensions(polygon) < 2 or shapely.is_empty(polygon):
+                continue  # a quarter that misses the piece, or touches it in a point or a line
+            corners = shapely.get_num_coordinates(polygon) - 1
+            if depth == MAX_HALVINGS or corners <= MAX_PIECE_CORNERS:
+                simple.append(polygon)
+                continue
+            x0, y0, x1, y1 = shapely.bounds(polygon)
+            # a strip is cut across only
+            wide, high = x1 - x0 >= 0.5 * (y1 - y0), y1 - y0 >= 0.5 * (x1 - x0)
+            x = [x0, 0.5 * (x0 + x1), x1] if wide else [x0, x1]
+            y = [y0, 0.5 * (y0 + y1), y1] if high else [y0, y1]
+            quarters = [
+                shapely.box(left, low, right, top)
+                for left, right in pairwise(x)
+                for low, top in pairwise(y)
+            ]
+            todo += [(part, depth + 1) for part in shapely.intersection(polygon, quarters)]
+    return simple
+
+
+def _quadrangles(polygon: shapely.Geometry) -> np.ndarray:
+    """Convex quadrangles (k, 4, 2) of a polygon, with no corner added."""
+    ring = shapely.get_coordinates(shapely.orient_polygons(polygon))[:-1]
+    turns = _doubled_area(np.roll(ring, 1, axis=0), ring, np.roll(ring, -1, axis=0))
+    if shapely.get_num_interior_rings(polygon) == 0 and (turns >= 0.0).all():
+        last = len(ring) - 1  # convex: a fan of quadrangles
+        return np.array([ring[[0, k, k + 1, min(k + 2, last)]] for k in range(1, last, 2)])
+    parts = shapely.get_parts(shapely.constrained_delaunay_triangles(polygon))
+    corners = np.array(
+        [shapely.get_coordinates(shapely.orient_polygons(part))[:3] for part in parts]
+    )
+    return corners.reshape(-1, 3, 2)[:, [0, 1, 2, 2]]  # empty for a piece that is only a line
+
+
+class SurfaceTriangles(NamedTuple):
+    """The m triangles of a mesh with all that obstacles are made from.
+
+    Args:
+        mesh: the mesh.
+        corners: corner positions relative to the mesh's middle [m], shape (m, 3, 3).
+        normals: unit normals towards the shot, shape (m, 3), zero where a triangle has no area.
+        doubled: doubled areas [m²], shape (m,).
+        vibrating: whether each triangle vibrates, shape (m,) bool.
+        amplitude: zero-to-peak [m], 0 for triangles that stand still, shape (m,).
+        flat_faces: the flat faces of the mesh.
+    """
+
+    mesh: TriangleMesh
+    corners: np.ndarray
+    normals: np.ndarray
+    doubled: np.ndarray
+    vibrating: np.ndarray
+    amplitude: np.ndarray
+    flat_faces: FlatFaces
+
+
+def surface_triangles(
+    mesh: TriangleMesh, vibrating_tags: tuple[int, ...] = (), amplitudes: tuple[float, ...] = ()
+) -> SurfaceTriangles:
+    """The triangles of a mesh, of which those with ``vibrating_tags`` move by ``amplitudes`` [m]."""
+    corners = mesh.corners - mesh.middle
+    amplitude = np.zeros(len(corners))
+    for tag, largest in zip(vibrating_tags, amplitudes, strict=True):
+        amplitude[mesh.tags == tag] = largest
+    partners, tolerance = edge_partners(mesh.triangles), in_plane_tolerance(mesh.vertices)
+    return SurfaceTriangles(
+        mesh,
+        corners,
+        *normals_towards_shot(corners),
+        np.isin(mesh.tags, vibrating_tags),
+        amplitude,
+        find_flat_faces(corners, partners, mesh.tags, tolerance),
+    )

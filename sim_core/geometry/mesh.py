@@ -10,21 +10,24 @@ from sim_core.errors import SceneError
 MAX_TAGS = 256
 
 
-@dataclass(frozen=True, eq=False)  # hashed by identity: what is built from it can be kept
+@dataclass(frozen=True, eq=False)  # hashed by identity, so that what is built from it can be cached
 class TriangleMesh:
-    """The cavity's surface.
-
-    ``vertices`` [m], shape (n, 3) float64. ``triangles``, shape (m, 3) int32: indices of vertices, wound so that
-    the enclosed cavity has positive volume (normals point out of the cavity, away from the shot). ``tags``, shape
-    (m,) uint8: the surface each triangle belongs to; restitution and vibration go by tag.
-
-    Raises SceneError for wrong shapes, indices or numbers, an open or non-manifold surface, or one that is inside
-    out; the message names the triangle or edge.
+    """Surface of a cavity.
 
         outside      ___________          normals point out of the cavity; a tag is a number
                     |  cavity   |         the user chooses, e.g. 0 part, 1 sonotrode, 2 wall
                     |   o    o  |
                     |___________|
+
+    Args:
+        vertices: positions [m], shape (n, 3) float64.
+        triangles: vertex indices, shape (m, 3) int32, wound so that the enclosed cavity has
+            positive volume: normals point out of the cavity, away from the shot.
+        tags: surface of each triangle, shape (m,) uint8; restitution and vibration go by tag.
+
+    Raises:
+        SceneError: for wrong shapes, indices or numbers, an open or non-manifold surface, or one
+            that is inside out; the message names the triangle or edge.
     """
 
     vertices: np.ndarray
@@ -45,13 +48,13 @@ class TriangleMesh:
             raise SceneError(
                 f"mesh triangles must have shape (m, 3) with m >= 4, not {triangles.shape}"
             )
-        triangles = _whole("triangles", triangles).astype(np.int32)
+        triangles = _whole_numbers("triangles", triangles).astype(np.int32)
         tags = np.asarray(self.tags)
         if tags.shape != (len(triangles),):
             raise SceneError(
                 f"mesh tags must have shape ({len(triangles)},), one a triangle, not {tags.shape}"
             )
-        tags = _whole("tags", tags)
+        tags = _whole_numbers("tags", tags)
         if tags.min() < 0 or tags.max() >= MAX_TAGS:
             raise SceneError(
                 f"mesh tags must lie between 0 and {MAX_TAGS - 1}, not {tags.min()} to {tags.max()}"
@@ -61,21 +64,16 @@ class TriangleMesh:
             raise SceneError(
                 f"mesh vertex {bad[0]} is {vertices[bad[0]].tolist()}: coordinates must be finite"
             )
-        wrong = np.flatnonzero(
-            (triangles < 0).any(axis=1) | (triangles >= len(vertices)).any(axis=1)
-        )
-        if len(wrong):
+        bad = np.flatnonzero(((triangles < 0) | (triangles >= len(vertices))).any(axis=1))
+        if len(bad):
             raise SceneError(
-                f"mesh triangle {wrong[0]} names a vertex outside 0 to {len(vertices) - 1}"
+                f"mesh triangle {bad[0]} names a vertex outside 0 to {len(vertices) - 1}"
             )
         _require_closed(vertices, triangles)
-        for array in (vertices, triangles):
+        arrays = {"vertices": vertices, "triangles": triangles, "tags": tags.astype(np.uint8)}
+        for name, array in arrays.items():
             array.flags.writeable = False
-        tags = tags.astype(np.uint8)
-        tags.flags.writeable = False
-        object.__setattr__(self, "vertices", vertices)
-        object.__setattr__(self, "triangles", triangles)
-        object.__setattr__(self, "tags", tags)
+            object.__setattr__(self, name, array)
 
     @cached_property
     def corners(self) -> np.ndarray:
@@ -84,12 +82,15 @@ class TriangleMesh:
 
     @cached_property
     def middle(self) -> np.ndarray:
-        """Middle of the bounding box [m], (3,): what is computed relative to it loses no digits to a far origin."""
+        """Middle of the bounding box [m], shape (3,).
+
+        Coordinates relative to it lose no digits where the mesh is far from the origin.
+        """
         return np.asarray(0.5 * (self.vertices.min(axis=0) + self.vertices.max(axis=0)))
 
     @property
     def bounds(self) -> np.ndarray:
-        """Lowest and highest corner of the bounding box [m], (2, 3)."""
+        """Lowest and highest corner of the bounding box [m], shape (2, 3)."""
         return np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)])
 
     @property
@@ -98,16 +99,16 @@ class TriangleMesh:
         return enclosed_volume(self.vertices, self.triangles)
 
 
-def _whole(name: str, numbers: np.ndarray) -> np.ndarray:
+def _whole_numbers(name: str, numbers: np.ndarray) -> np.ndarray:
     """The numbers as int64; raises SceneError for one that is not whole, or beyond int32."""
     try:
         whole = (numbers == np.floor(numbers)) & (np.abs(numbers) <= np.iinfo(np.int32).max)
     except TypeError:
         raise SceneError(f"mesh {name} must be whole numbers, not {numbers.dtype}") from None
-    wrong = np.flatnonzero(~whole.reshape(len(numbers), -1).all(axis=1))
-    if len(wrong):
+    bad = np.flatnonzero(~whole.reshape(len(numbers), -1).all(axis=1))
+    if len(bad):
         raise SceneError(
-            f"mesh {name} must be whole numbers: of triangle {wrong[0]}, {numbers[wrong[0]].tolist()}"
+            f"mesh {name} must be whole numbers: triangle {bad[0]} has {numbers[bad[0]].tolist()}"
         )
     return numbers.astype(np.int64)
 
@@ -118,21 +119,50 @@ def enclosed_volume(vertices: np.ndarray, triangles: np.ndarray) -> float:
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
 
 
-def towards_shot(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Unit normals into the cavity (m, 3), zero where a triangle has no area, and twice the areas (m,) [m²]."""
+def normals_towards_shot(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Unit normals towards the shot and doubled areas of triangles.
+
+    Args:
+        corners: corner positions [m], shape (m, 3 corners, 3).
+
+    Returns:
+        Normals into the cavity, shape (m, 3), zero where a triangle has no area, and twice the
+        areas [m²], shape (m,).
+    """
     normals = -np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     doubled = np.linalg.norm(normals, axis=1)
     normals[doubled > 0.0] /= doubled[doubled > 0.0, None]
     return normals, doubled
 
 
+def edge_partners(triangles: np.ndarray) -> np.ndarray:
+    """The opposite of each directed edge (3 triangle + corner) of a closed mesh, shape (3 m,)."""
+    count = int(triangles.max()) + 1
+    a = triangles.reshape(-1).astype(np.int64)
+    b = np.roll(triangles, -1, axis=1).reshape(-1).astype(np.int64)
+    forward, backward = a * count + b, b * count + a
+    order = np.argsort(forward)
+    return np.asarray(order[np.searchsorted(forward, backward, sorter=order)])
+
+
+def connected_components(edges: np.ndarray, count: int) -> np.ndarray:
+    """Number of the connected component of each vertex, shape (count,).
+
+    Args:
+        edges: vertex indices of both ends, shape (n, 2).
+        count: number of vertices.
+    """
+    from scipy.sparse import coo_array, csgraph
+
+    ones = np.ones(len(edges), dtype=np.bool_)
+    graph = coo_array((ones, (edges[:, 0], edges[:, 1])), shape=(count, count))
+    return np.asarray(csgraph.connected_components(graph, directed=False)[1])
+
+
 def _require_closed(vertices: np.ndarray, triangles: np.ndarray) -> None:
-    """Every directed edge once, its reverse once, and the volume positive."""
-    edges = (
-        np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1)
-        .reshape(-1, 2)
-        .astype(np.int64)
-    )
+    """Raise SceneError unless each edge has two triangles and the volume is positive."""
+    ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1)
+    edges = ends.reshape(-1, 2).astype(np.int64)
     twice = np.flatnonzero(edges[:, 0] == edges[:, 1])
     if len(twice):
         raise SceneError(f"mesh triangle {twice[0] // 3} uses one vertex twice; remove it")
@@ -147,10 +177,10 @@ def _require_closed(vertices: np.ndarray, triangles: np.ndarray) -> None:
         )
     lonely = np.flatnonzero(~np.isin(backward, keys))
     if len(lonely):
-        where = vertices[edges[lonely[0]]].mean(axis=0)
+        where = np.round(vertices[edges[lonely[0]]].mean(axis=0), 6).tolist()
         raise SceneError(
-            f"mesh is not closed: {len(lonely)} open edge(s), the first on triangle {lonely[0] // 3} at "
-            f"{np.round(where, 6).tolist()} m; merge duplicate vertices or close the hole"
+            f"mesh is not closed: {len(lonely)} open edge(s), the first on triangle "
+            f"{lonely[0] // 3} at {where} m; merge duplicate vertices or close the hole"
         )
     volume = enclosed_volume(vertices, triangles)
     if not volume > 0.0:

@@ -1,87 +1,78 @@
-"""All that stands still in a scene, or turns as a whole, prepared once for balls of one radius."""
+"""All surfaces of a scene, prepared once as obstacles for the centres of balls of given radii."""
 
 from typing import NamedTuple
 
 import numpy as np
 
-from sim_core.effects.part_rotation import Axle
-from sim_core.geometry.analytic import AnalyticCavity
-from sim_core.geometry.analytic_obstacles import analytic_obstacles, bore_of
-from sim_core.geometry.bvh import Tree, build_tree, joined
-from sim_core.geometry.flat_faces import LONE, Flats, edge_partners, find_flats, in_plane
+from sim_core.effects.part_rotation import RotationAxis
+from sim_core.geometry.analytic import AnalyticCavity, CylinderAxis, build_analytic_table
+from sim_core.geometry.bvh import Tree, build_tree, join_trees
+from sim_core.geometry.flat_faces import LONE, FlatFaces, surface_triangles
 from sim_core.geometry.mesh import TriangleMesh
-from sim_core.geometry.obstacles import Bore, build_obstacles, seam
-from sim_core.geometry.triangle_lookup import Locator, build_locator
-from sim_core.geometry.turning_part import PartTree, chosen, part_of, part_tree
+from sim_core.geometry.obstacles import build_obstacle_table, face_overlap_of
+from sim_core.geometry.triangle_lookup import TriangleLookup, build_lookup
+from sim_core.geometry.turning_part import PartTree, build_part_tree, part_rows, select_rows
 
 
-class Ground(NamedTuple):
-    """The tree of obstacles, which triangle of a flat is where, each triangle's tag, and how far faces overlap [m].
+class ObstacleSet(NamedTuple):
+    """What balls can hit; coordinates are relative to the middle of the mesh or cavity.
 
-    Coordinates are relative to the middle of the mesh. ``part``: what turns, if anything does; its obstacles are not
-    in ``tree``. ``roots`` (k,): the nodes of the tree where the obstacles of each radius begin. ``bore``: of an
-    analytical cylinder; in an analytical cavity the "triangles" are its surfaces.
+    In an analytical cavity the "triangles" are its surfaces.
+
+    Args:
+        tree: obstacles that do not turn.
+        lookup: finds the triangle of a flat face at a point.
+        tags: surface tag of each triangle, shape (m,).
+        face_overlap: how far faces overlap, for the largest balls [m].
+        part: the part, if it turns; its obstacles are not in ``tree``.
+        roots: nodes of the tree where the obstacles of each radius begin, shape (radii,).
+        cylinder: axis of an analytical cylinder.
     """
 
     tree: Tree
-    locator: Locator
+    lookup: TriangleLookup
     tags: np.ndarray
-    seam: float
+    face_overlap: float
     part: PartTree | None
     roots: np.ndarray
-    bore: Bore | None
+    cylinder: CylinderAxis | None
 
 
-def build_ground(
+def build_obstacle_set(
     mesh: TriangleMesh | AnalyticCavity,
-    radius: float | tuple[float, ...],
-    waving_tag: int | tuple[int, ...] = (),
-    swing: float | tuple[float, ...] = (),
-    axle: Axle | None = None,
-) -> Ground:
-    """The ground for balls of this radius [m], or these radii, ascending; triangles of ``waving_tag``, or of each of
-    several, vibrate by ``swing`` [m] zero-to-peak, those of the ``axle``'s tag turn.
+    radii: tuple[float, ...],
+    vibrating_tags: tuple[int, ...] = (),
+    amplitudes: tuple[float, ...] = (),
+    axis: RotationAxis | None = None,
+) -> ObstacleSet:
+    """The obstacles of a scene.
+
+    Args:
+        mesh: the cavity.
+        radii: of the balls [m], ascending; one radius only with a turning part.
+        vibrating_tags: tags of the surfaces that vibrate.
+        amplitudes: zero-to-peak, one for each of ``vibrating_tags`` [m].
+        axis: of the part that turns.
     """
+    overlap = face_overlap_of(radii[-1])
     if isinstance(mesh, AnalyticCavity):
-        floor = next(zip(np.atleast_1d(waving_tag), np.atleast_1d(swing), strict=True), (-1, 0.0))
-        return _analytic_ground(mesh, radius, int(floor[0]), float(floor[1]))
-    corners = mesh.corners - mesh.middle
-    flats = find_flats(corners, edge_partners(mesh.triangles), mesh.tags, in_plane(mesh.vertices))
-    radii = radius if isinstance(radius, tuple) else (radius,)
-    waving, swings = np.zeros(len(corners), dtype=np.bool_), np.zeros(len(corners))
-    for tag, widest in zip(np.atleast_1d(waving_tag), np.atleast_1d(swing), strict=True):
-        waving |= mesh.tags == tag
-        swings[mesh.tags == tag] = widest
-    overlap = seam(radii[-1])
-    locator = build_locator(corners, flats, overlap)
-    if axle is None:
-        trees = [build_tree(build_obstacles(mesh, r, waving, swings, flats), r) for r in radii]
-        tree, roots = joined(trees)
-        return Ground(tree, locator, mesh.tags, overlap, None, roots, None)
-    (radius,) = radii  # a turning part and several sizes are not supported together
-    obstacles = build_obstacles(mesh, radius, waving, swings, flats)
-    turns = part_of(obstacles, mesh, axle, radius)
-    part = part_tree(chosen(obstacles, turns), mesh, axle, radius)
-    return Ground(
-        build_tree(chosen(obstacles, ~turns), radius),
-        locator,
-        mesh.tags,
-        overlap,
-        part,
-        np.zeros(1, np.int64),
-        None,
-    )
-
-
-def _analytic_ground(
-    cavity: AnalyticCavity, radius: float | tuple[float, ...], waving_tag: int, swing: float
-) -> Ground:
-    radii = radius if isinstance(radius, tuple) else (radius,)
-    trees = [build_tree(analytic_obstacles(cavity, r, waving_tag, swing), r) for r in radii]
-    tree, roots = joined(trees)
-    count, overlap = len(cavity.tags), seam(radii[-1])
-    lone = Flats(
-        np.full(count, LONE, dtype=np.int32), np.zeros(0, dtype=np.int32), np.zeros((0, 3, 3)), []
-    )
-    locator = build_locator(np.zeros((count, 3, 3)), lone, overlap)
-    return Ground(tree, locator, cavity.tags, overlap, None, roots, bore_of(cavity))
+        tag, amplitude = next(zip(vibrating_tags, amplitudes, strict=True), (-1, 0.0))
+        tables = [build_analytic_table(mesh, r, tag, amplitude) for r in radii]
+        tree, roots = join_trees([build_tree(*pair) for pair in zip(tables, radii, strict=True)])
+        count = len(mesh.tags)
+        none = np.zeros(0, dtype=np.int32)
+        lone = FlatFaces(np.full(count, LONE, dtype=np.int32), none, np.zeros((0, 3, 3)), [])
+        lookup = build_lookup(np.zeros((count, 3, 3)), lone, overlap)
+        return ObstacleSet(tree, lookup, mesh.tags, overlap, None, roots, mesh.axis)
+    surface = surface_triangles(mesh, vibrating_tags, amplitudes)
+    lookup = build_lookup(surface.corners, surface.flat_faces, overlap)
+    tables = [build_obstacle_table(surface, r) for r in radii]
+    if axis is None:
+        tree, roots = join_trees([build_tree(*pair) for pair in zip(tables, radii, strict=True)])
+        return ObstacleSet(tree, lookup, mesh.tags, overlap, None, roots, None)
+    (table,), (radius,) = tables, radii  # a part that turns is not supported with several sizes
+    turns = part_rows(table, mesh, axis, radius)
+    part = build_part_tree(select_rows(table, turns), mesh, axis, radius)
+    tree = build_tree(select_rows(table, ~turns), radius)
+    root = np.zeros(1, dtype=np.int64)
+    return ObstacleSet(tree, lookup, mesh.tags, overlap, part, root, None)

@@ -1,56 +1,71 @@
-"""Which triangle of a flat a ball has hit: a grid of squares over the flat, each with the triangles that reach it."""
+"""Which triangle of a flat face a ball has hit: a grid of squares over each flat face."""
 
 from typing import NamedTuple
 
 import numpy as np
 
-from sim_core.geometry.flat_faces import LONE, Flats
-from sim_core.geometry.mesh import towards_shot
+from sim_core.geometry.flat_faces import LONE, FlatFaces
+from sim_core.geometry.mesh import normals_towards_shot
 from sim_core.numerics.jit import jit
 from sim_core.numerics.vec3 import Vec3
 
-TRIANGLES_A_SQUARE = 2.0
+TRIANGLES_PER_SQUARE = 2.0
 
 
-class Locator(NamedTuple):
-    """``flat`` (m,) int32 and ``frames`` (k, 3, 3) as in Flats. Of each flat: ``squares`` (k, 4) float64, the grid's
-    lower corner [m] and squares per metre along both axes; ``counts`` (k, 3) int32, squares along both, and the number
-    of the first. ``starts`` (squares + 1,) int32 into ``members``, triangles; ``plan`` (m, 6) float64 [m]: the
-    triangles' corners in their flat's frame.
+class TriangleLookup(NamedTuple):
+    """The grids over k flat faces of a mesh of m triangles.
+
+    Args:
+        of_triangle: flat face of each triangle, shape (m,) int32, as in FlatFaces.
+        frames: frames of the flat faces, shape (k, 3, 3), as in FlatFaces.
+        origin: lower corner of each grid [m], shape (k, 2).
+        squares_per_metre: of each grid along both axes [1/m], shape (k, 2).
+        shape: squares of each grid along both axes, shape (k, 2) int32.
+        first: number of each grid's first square, shape (k,) int32.
+        starts: first entry of each square in ``members``, shape (squares + 1,) int32.
+        members: the triangles that reach each square, int32.
+        corners: corners of the triangles in their flat face's frame [m], shape (m, 6).
     """
 
-    flat: np.ndarray
+    of_triangle: np.ndarray
     frames: np.ndarray
-    squares: np.ndarray
-    counts: np.ndarray
+    origin: np.ndarray
+    squares_per_metre: np.ndarray
+    shape: np.ndarray
+    first: np.ndarray
     starts: np.ndarray
     members: np.ndarray
-    plan: np.ndarray
+    corners: np.ndarray
 
 
-def build_locator(corners: np.ndarray, flats: Flats, seam: float) -> Locator:
-    """The grids of all flats; ``corners`` (m, 3, 3) [m]. A hit may lie up to ``seam`` [m] outside a flat."""
-    flat_count = len(flats.seed)
-    owner = flats.flat
-    inside = np.flatnonzero(owner != LONE)
-    frame = flats.frames[owner[inside]]
-    offset = corners[inside] - frame[:, None, 0]
+def build_lookup(corners: np.ndarray, flat_faces: FlatFaces, face_overlap: float) -> TriangleLookup:
+    """The grids over all flat faces.
+
+    Args:
+        corners: corner positions of the mesh [m], shape (m, 3, 3).
+        flat_faces: the flat faces of the mesh.
+        face_overlap: how far outside its flat face an impact may lie [m].
+    """
+    count = len(flat_faces.seed)
+    inside = np.flatnonzero(flat_faces.of_triangle != LONE)
+    own = flat_faces.of_triangle[inside]
+    frame = flat_faces.frames[own]
     plan = np.zeros((len(corners), 3, 2))
-    plan[inside] = np.einsum("tka,tja->tkj", offset, frame[:, 1:])
-    low, high = plan[inside].min(axis=1) - 2.0 * seam, plan[inside].max(axis=1) + 2.0 * seam
-    floor, top = np.full((flat_count, 2), np.inf), np.full((flat_count, 2), -np.inf)
-    np.minimum.at(floor, owner[inside], low)
-    np.maximum.at(top, owner[inside], high)
-    size = np.maximum(top - floor, 1e-300)
-    squares = np.maximum(np.bincount(owner[inside], minlength=flat_count) / TRIANGLES_A_SQUARE, 1.0)
-    per_metre = np.sqrt(squares / size.prod(axis=1)) if flat_count else np.zeros(0)
+    plan[inside] = np.einsum("tka,tja->tkj", corners[inside] - frame[:, None, 0], frame[:, 1:])
+    margin = 2.0 * face_overlap
+    low, high = plan[inside].min(axis=1) - margin, plan[inside].max(axis=1) + margin
+    origin, top = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
+    np.minimum.at(origin, own, low)
+    np.maximum.at(top, own, high)
+    size = np.maximum(top - origin, 1e-300)
+    squares = np.maximum(np.bincount(own, minlength=count) / TRIANGLES_PER_SQUARE, 1.0)
+    per_metre = np.sqrt(squares / size.prod(axis=1)) if count else np.zeros(0)
     shape = np.maximum(np.floor(size * per_metre[:, None]).astype(np.int64), 1)
     scale = shape / size
     first = np.concatenate([[0], np.cumsum(shape.prod(axis=1))])
-    # every triangle goes to all squares its box touches
-    own = owner[inside]
-    a = np.clip(((low - floor[own]) * scale[own]).astype(np.int64), 0, shape[own] - 1)
-    b = np.clip(((high - floor[own]) * scale[own]).astype(np.int64), 0, shape[own] - 1)
+    # every triangle is a member of all squares that its box touches, numbered by rank in its box
+    a = np.clip(((low - origin[own]) * scale[own]).astype(np.int64), 0, shape[own] - 1)
+    b = np.clip(((high - origin[own]) * scale[own]).astype(np.int64), 0, shape[own] - 1)
     wide = b - a + 1
     copies = wide.prod(axis=1)
     triangle = np.repeat(np.arange(len(inside)), copies)
@@ -60,11 +75,13 @@ def build_locator(corners: np.ndarray, flats: Flats, seam: float) -> Locator:
     square = first[own[triangle]] + y * shape[own[triangle], 0] + x
     order = np.argsort(square, kind="stable")
     starts = np.searchsorted(square[order], np.arange(first[-1] + 1))
-    return Locator(
-        owner,
-        flats.frames,
-        np.concatenate([floor, scale], axis=1),
-        np.column_stack([shape, first[:-1]]).astype(np.int32),
+    return TriangleLookup(
+        flat_faces.of_triangle,
+        flat_faces.frames,
+        origin,
+        scale,
+        shape.astype(np.int32),
+        first[:-1].astype(np.int32),
         starts.astype(np.int32),
         inside[triangle[order]].astype(np.int32),
         plan.reshape(-1, 6),
@@ -72,79 +89,68 @@ def build_locator(corners: np.ndarray, flats: Flats, seam: float) -> Locator:
 
 
 @jit
-def triangle_at(locator: Locator, seed: int, at: Vec3) -> int:
-    """The triangle of the seed's flat that holds a point of its plane, or is nearest to it; a lone one is itself."""
-    flat = locator.flat[seed]
+def find_triangle(lookup: TriangleLookup, seed: int, at: Vec3) -> int:
+    """The triangle of the seed's flat face that holds a point of its plane, or is nearest to it."""
+    flat = lookup.of_triangle[seed]
     if flat == LONE:
         return seed
-    dx, dy, dz = (
-        at.x - locator.frames[flat, 0, 0],
-        at.y - locator.frames[flat, 0, 1],
-        at.z - locator.frames[flat, 0, 2],
-    )
-    u = (
-        dx * locator.frames[flat, 1, 0]
-        + dy * locator.frames[flat, 1, 1]
-        + dz * locator.frames[flat, 1, 2]
-    )
-    v = (
-        dx * locator.frames[flat, 2, 0]
-        + dy * locator.frames[flat, 2, 1]
-        + dz * locator.frames[flat, 2, 2]
-    )
-    across, along = locator.counts[flat, 0], locator.counts[flat, 1]
-    x = int((u - locator.squares[flat, 0]) * locator.squares[flat, 2])
-    y = int((v - locator.squares[flat, 1]) * locator.squares[flat, 3])
-    x, y = min(max(x, 0), across - 1), min(max(y, 0), along - 1)
-    square = locator.counts[flat, 2] + y * across + x
+    frame = lookup.frames
+    dx, dy, dz = at.x - frame[flat, 0, 0], at.y - frame[flat, 0, 1], at.z - frame[flat, 0, 2]
+    u = dx * frame[flat, 1, 0] + dy * frame[flat, 1, 1] + dz * frame[flat, 1, 2]
+    v = dx * frame[flat, 2, 0] + dy * frame[flat, 2, 1] + dz * frame[flat, 2, 2]
+    x = int((u - lookup.origin[flat, 0]) * lookup.squares_per_metre[flat, 0])
+    y = int((v - lookup.origin[flat, 1]) * lookup.squares_per_metre[flat, 1])
+    x = min(max(x, 0), lookup.shape[flat, 0] - 1)
+    y = min(max(y, 0), lookup.shape[flat, 1] - 1)
+    square = lookup.first[flat] + y * lookup.shape[flat, 0] + x
     nearest, least = seed, np.inf
-    for k in range(locator.starts[square], locator.starts[square + 1]):
-        triangle = locator.members[k]
-        outside = _outside(locator.plan, triangle, u, v)
+    for k in range(lookup.starts[square], lookup.starts[square + 1]):
+        triangle = lookup.members[k]
+        outside = _distance_outside(lookup.corners, triangle, u, v)
         if outside < least:
             nearest, least = triangle, outside
     return nearest
 
 
 def find_triangles(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Which of the triangles (m, 3, 3) [m] of one plane holds each point (n, 3) [m] of it, or is nearest to it: (n,).
+    """The triangle of a plane that holds each point, or is nearest to it.
 
-    Triangles wound as in a TriangleMesh, normals away from the shot; a point off the plane is seen along its normal.
+    Args:
+        corners: corner positions of triangles of one plane [m], shape (m, 3, 3), wound as in a
+            TriangleMesh: normals away from the shot.
+        points: positions [m], shape (n, 3); off the plane, a point is projected along its normal.
+
+    Returns:
+        Index of the triangle, shape (n,).
     """
-    corners, points = (
-        np.ascontiguousarray(corners, np.float64),
-        np.ascontiguousarray(points, np.float64),
-    )
-    normals, doubled = towards_shot(corners)
+    corners, points = (np.ascontiguousarray(x, np.float64) for x in (corners, points))
+    normals, doubled = normals_towards_shot(corners)
     seed = int(doubled.argmax())
-    along = corners[seed, 1] - corners[seed, 0]
-    along /= np.linalg.norm(along)
-    frame = np.stack([corners[seed, 0], along, np.cross(normals[seed], along)])
-    flats = Flats(
-        np.zeros(len(corners), dtype=np.int32), np.array([seed], dtype=np.int32), frame[None], []
-    )
+    edge = corners[seed, 1] - corners[seed, 0]
+    edge /= np.linalg.norm(edge)
+    frame = np.stack([corners[seed, 0], edge, np.cross(normals[seed], edge)])
+    all_in_one, seeds = np.zeros(len(corners), dtype=np.int32), np.array([seed], dtype=np.int32)
+    lookup = build_lookup(corners, FlatFaces(all_in_one, seeds, frame[None], []), 0.0)
     found = np.zeros(len(points), dtype=np.int64)
-    _locate(build_locator(corners, flats, 0.0), seed, points, found)
+    _find_each(lookup, seed, points, found)
     return found
 
 
 @jit
-def _locate(locator: Locator, seed: int, points: np.ndarray, found: np.ndarray) -> None:
+def _find_each(lookup: TriangleLookup, seed: int, points: np.ndarray, found: np.ndarray) -> None:
     for i in range(len(points)):
-        found[i] = triangle_at(locator, seed, Vec3(points[i, 0], points[i, 1], points[i, 2]))
+        found[i] = find_triangle(lookup, seed, Vec3(points[i, 0], points[i, 1], points[i, 2]))
 
 
 @jit
-def _outside(plan: np.ndarray, triangle: int, u: float, v: float) -> float:
+def _distance_outside(corners: np.ndarray, triangle: int, u: float, v: float) -> float:
     """How far a point lies outside a triangle's sides [m]; negative inside. Corners run clockwise."""
     worst = -np.inf
     for k in range(3):
         a, b = 2 * k, 2 * ((k + 1) % 3)
-        along_u, along_v = (
-            plan[triangle, b] - plan[triangle, a],
-            plan[triangle, b + 1] - plan[triangle, a + 1],
-        )
-        turn = along_u * (v - plan[triangle, a + 1]) - along_v * (u - plan[triangle, a])
-        length = np.sqrt(along_u * along_u + along_v * along_v)
+        start_u, start_v = corners[triangle, a], corners[triangle, a + 1]
+        side_u, side_v = corners[triangle, b] - start_u, corners[triangle, b + 1] - start_v
+        turn = side_u * (v - start_v) - side_v * (u - start_u)
+        length = np.sqrt(side_u * side_u + side_v * side_v)
         worst = max(worst, turn / length if length > 0.0 else -np.inf)
     return worst

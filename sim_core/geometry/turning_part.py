@@ -1,4 +1,4 @@
-"""The obstacles of a part that turns, in a tree of their own, and whether it can turn at all where it is."""
+"""The obstacles of a part that turns, in a tree of their own, and whether it can turn where it is."""
 
 import math
 from functools import lru_cache
@@ -6,27 +6,29 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim_core.effects.part_rotation import Axle
+from sim_core.effects.part_rotation import RotationAxis
 from sim_core.errors import SceneError
 from sim_core.geometry.bvh import Tree, build_tree
-from sim_core.geometry.flat_faces import edge_partners
-from sim_core.geometry.mesh import TriangleMesh
-from sim_core.geometry.obstacles import Obstacles
+from sim_core.geometry.mesh import TriangleMesh, connected_components, edge_partners
+from sim_core.geometry.obstacles import ObstacleTable
 from sim_core.numerics.jit import jit
-from sim_core.numerics.vec3 import Vec3, along, dot, sub
+from sim_core.numerics.vec3 import Vec3, add_scaled, dot, sub
 
-# Of a radius: how far the joint between part and chamber may gape while the part turns. A ball's centre stays a
-# radius off the wall, so that of a slit no wider it sees nothing.
-OPENING = 0.9
+# Of a radius: how far the joint between part and chamber may open while the part turns. A ball's
+# centre stays a radius off the wall, so that a slit no wider than this does not matter to it.
+MAX_OPENING = 0.9
 ROUNDINGS = 16.0
-TOUCH = 1e-9  # m: a corner's path this near a triangle's border touches and does not cross
+TOUCH = 1e-9  # m: a corner's path this near a triangle's border touches it and does not cross
 
 
 class PartTree(NamedTuple):
-    """The part's obstacles; coordinates relative to the mesh's middle, where the part is at angle 0.
+    """Obstacles of the part, relative to the mesh's middle, where the part is at angle 0.
 
-    ``low``, ``high``: least and largest distance [m] along the axis, from its point, at which a ball's centre can
-    touch the part; ``reach`` [m], the same across the axis.
+    Args:
+        tree: the obstacles.
+        low: least distance along the axis, from its point, at which a ball's centre can touch [m].
+        high: largest such distance [m].
+        reach: largest distance across the axis at which a ball's centre can touch [m].
     """
 
     tree: Tree
@@ -35,185 +37,172 @@ class PartTree(NamedTuple):
     reach: float
 
 
-def part_of(obstacles: Obstacles, mesh: TriangleMesh, axle: Axle, radius: float) -> np.ndarray:
-    """Which obstacles (k,) turn with the part.
+def part_rows(
+    table: ObstacleTable, mesh: TriangleMesh, axis: RotationAxis, radius: float
+) -> np.ndarray:
+    """Which obstacles turn with the part, shape (k,) bool, for balls of this radius [m].
 
-    Raises SceneError where the part cannot turn, see require_free_axle, or meets the chamber in an edge that balls of
-    this radius [m] can touch.
+    Raises:
+        SceneError: where the part cannot turn, see require_free_axis, or meets the chamber in an
+            edge that balls can touch.
     """
-    require_free_axle(mesh, axle, radius)
-    sides = (mesh.tags == axle.tag)[obstacles.triangles]
+    require_free_axis(mesh, axis, radius)
+    sides = (mesh.tags == axis.tag)[table.triangles]
     mixed = np.flatnonzero(sides[:, 0] != sides[:, 1])
     if len(mixed):
-        one, two = obstacles.triangles[mixed[0]]
+        one, two = table.triangles[mixed[0]]
         raise SceneError(
-            f"the turning part meets the chamber in an edge that balls can touch, of triangles {one} and {two}: that "
-            "is not supported; the joint must be a corner that recedes from the shot, as where a shaft goes through "
-            "a ceiling"
+            f"the turning part meets the chamber in an edge that balls can touch, of triangles {one} "
+            f"and {two}: that is not supported; the joint must be a corner that recedes from the "
+            "shot, as where a shaft goes through a ceiling"
         )
     return np.asarray(sides[:, 0])
 
 
-@lru_cache(maxsize=32)  # asked at every replica's start
-def require_free_axle(mesh: TriangleMesh, axle: Axle, radius: float) -> None:
-    """Raises SceneError if the part cannot turn in its chamber.
+@lru_cache(maxsize=32)  # called at every replica's start
+def require_free_axis(mesh: TriangleMesh, axis: RotationAxis, radius: float) -> None:
+    """Raise SceneError if the part cannot turn in its chamber, for balls of this radius [m].
 
-    The line where part and chamber are one surface must stay where it is but for OPENING of a ball's radius [m]: a
-    circle about the axis, as where a round shaft goes through a wall. Elsewhere no corner of the part may pass through
-    a triangle of the chamber as it turns, nor one of the chamber through the part. What is not seen is two edges that
-    cross with no corner of either passing through the other side.
+    The line where part and chamber are one surface must stay where it is up to MAX_OPENING of the
+    radius: a circle about the axis, as where a round shaft goes through a wall. Elsewhere no corner
+    of the part may pass through a triangle of the chamber as it turns, nor one of the chamber
+    through the part. Two edges that cross, with no corner of either passing through the other
+    side, are not noticed.
     """
-    turning = mesh.tags == axle.tag
+    turning = mesh.tags == axis.tag
     joint = _joint(mesh, turning)
-    _require_round_joint(mesh, joint, axle, radius)
-    _require_free_corners(mesh, turning, mesh.vertices[joint[:, 2:]], axle, radius)
+    _require_round_joint(mesh, joint, axis, radius)
+    _require_free_corners(mesh, turning, mesh.vertices[joint[:, 2:]], axis, radius)
 
 
-def part_tree(obstacles: Obstacles, mesh: TriangleMesh, axle: Axle, radius: float) -> PartTree:
-    """The tree of the part's own obstacles of balls of this radius [m]."""
-    corners = mesh.corners[mesh.tags == axle.tag].reshape(-1, 3)
-    height, across = _about(corners, axle)
+def build_part_tree(
+    table: ObstacleTable, mesh: TriangleMesh, axis: RotationAxis, radius: float
+) -> PartTree:
+    """The tree of the part's own obstacles for balls of this radius [m]."""
+    place = _in_axis_frame(mesh.corners[mesh.tags == axis.tag].reshape(-1, 3), axis)
+    height, across = place[:, 2], np.linalg.norm(place[:, :2], axis=1)
     margin = 1.001 * radius  # and what faces overlap
-    # balls are seen from the part as far off as the room and the axis go: float32 rounds that, not the part's size
+    # Boxes are padded for float32 rounding at the size of chamber and axis, not of the part, because
+    # the part may be that far from a ball.
     furthest = (
         np.abs(mesh.vertices - mesh.middle).max()
-        + 2.0 * np.abs(np.array(axle.point) - mesh.middle).max()
+        + 2.0 * np.abs(np.array(axis.point) - mesh.middle).max()
     )
     pad = ROUNDINGS * np.finfo(np.float32).eps * furthest
-    return PartTree(
-        build_tree(obstacles._replace(low=obstacles.low - pad, high=obstacles.high + pad), radius),
-        float(height.min()) - margin,
-        float(height.max()) + margin,
-        float(np.linalg.norm(across, axis=1).max()) + margin,
-    )
+    tree = build_tree(table._replace(low=table.low - pad, high=table.high + pad), radius)
+    low, high, reach = float(height.min()), float(height.max()), float(across.max())
+    return PartTree(tree, low - margin, high + margin, reach + margin)
 
 
-def chosen(obstacles: Obstacles, rows: np.ndarray) -> Obstacles:
-    """Some of the obstacles."""
-    return Obstacles(*(np.ascontiguousarray(column[rows]) for column in obstacles))
+def select_rows(table: ObstacleTable, rows: np.ndarray) -> ObstacleTable:
+    """The given rows of a table."""
+    return ObstacleTable(*(np.ascontiguousarray(column[rows]) for column in table))
 
 
-def _about(points: np.ndarray, axle: Axle) -> tuple[np.ndarray, np.ndarray]:
-    """Distances along the axis (...) [m] and what is left across it (..., 2) [m] of points (..., 3)."""
-    axis = np.array(axle.axis)
-    side = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
+def _in_axis_frame(points: np.ndarray, axis: RotationAxis) -> np.ndarray:
+    """Points (..., 3) [m] in a frame about the axis: two coordinates across, then along."""
+    along = np.array(axis.axis)
+    side = np.cross(along, np.eye(3)[np.abs(along).argmin()])
     side /= np.linalg.norm(side)
-    offset = points - np.array(axle.point)
-    return offset @ axis, np.stack([offset @ side, offset @ np.cross(axis, side)], axis=-1)
-
-
-def _stacked(points: np.ndarray, axle: Axle) -> np.ndarray:
-    """Points (..., 3) [m] in the axle's own axes: two across, then along."""
-    height, across = _about(points, axle)
-    return np.ascontiguousarray(np.concatenate([across, height[..., None]], axis=-1))
+    offset = points - np.array(axis.point)
+    columns = [offset @ side, offset @ np.cross(along, side), offset @ along]
+    return np.ascontiguousarray(np.stack(columns, axis=-1))
 
 
 def _joint(mesh: TriangleMesh, turning: np.ndarray) -> np.ndarray:
-    """The edges (n, 4) between part and chamber: triangle of the part, of the chamber, and both vertices."""
+    """The edges between part and chamber: triangle of each and both vertices, shape (n, 4)."""
     partner = edge_partners(mesh.triangles)
     edges = np.flatnonzero(np.repeat(turning, 3) & ~turning[partner // 3])
     ends = mesh.triangles.reshape(-1)[edges], mesh.triangles[edges // 3, (edges % 3 + 1) % 3]
     return np.stack([edges // 3, partner[edges] // 3, *ends], axis=1)
 
 
-def _require_round_joint(mesh: TriangleMesh, joint: np.ndarray, axle: Axle, radius: float) -> None:
+def _require_round_joint(
+    mesh: TriangleMesh, joint: np.ndarray, axis: RotationAxis, radius: float
+) -> None:
+    """Raise SceneError if a line of the joint would open too far as the part turns."""
     if len(joint) == 0:
         return
-    line = _connected(joint[:, 2:])
-    height, across = _about(mesh.vertices[joint[:, 2:]], axle)
-    way = across[:, 1] - across[:, 0]
-    length = np.maximum(np.einsum("ij,ij->i", way, way), 1e-300)
-    share = np.clip(-np.einsum("ij,ij->i", across[:, 0], way) / length, 0.0, 1.0)
-    nearest = np.linalg.norm(across[:, 0] + share[:, None] * way, axis=1)
+    line = connected_components(joint[:, 2:], len(mesh.vertices))[joint[:, 2]]
+    place = _in_axis_frame(mesh.vertices[joint[:, 2:]], axis)
+    across, height = place[..., :2], place[..., 2]
+    edge = across[:, 1] - across[:, 0]
+    square = np.maximum(np.einsum("ij,ij->i", edge, edge), 1e-300)
+    share = np.clip(-np.einsum("ij,ij->i", across[:, 0], edge) / square, 0.0, 1.0)
+    nearest = np.linalg.norm(across[:, 0] + share[:, None] * edge, axis=1)
     furthest = np.linalg.norm(across, axis=2).max(axis=1)
-    for k in range(int(line.max()) + 1):
-        own = line == k
-        gape = max(furthest[own].max() - nearest[own].min(), np.ptp(height[own]))
-        gape = min(gape, axle.swing * furthest[own].max())
-        if gape > OPENING * radius:
+    for own in (line == k for k in np.unique(line)):
+        gap = max(furthest[own].max() - nearest[own].min(), np.ptp(height[own]))
+        gap = min(gap, axis.amplitude * furthest[own].max())
+        if gap > MAX_OPENING * radius:
             one, two = joint[own][0, :2]
             raise SceneError(
-                f"the turning part is joined to the chamber, at triangles {one} and {two}, along a line that is not "
-                f"round about its axis: turning would open a gap of {1e3 * gape:.3g} mm, and balls of "
-                f"{2e3 * radius:.3g} mm allow {1e3 * OPENING * radius:.3g}; let it go through the wall with a round "
-                "shaft about its axis, or end clear of the wall"
+                f"the turning part is joined to the chamber, at triangles {one} and {two}, along a "
+                "line that is not round about its axis: turning would open a gap of "
+                f"{1e3 * gap:.3g} mm, and balls of {2e3 * radius:.3g} mm allow "
+                f"{1e3 * MAX_OPENING * radius:.3g}; let it go through the wall with a round shaft "
+                "about its axis, or end clear of the wall"
             )
 
 
-def _connected(ends: np.ndarray) -> np.ndarray:
-    """Which line (n,), counted from 0, each edge belongs to; ``ends`` (n, 2): its vertices."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
+class _Sweep(NamedTuple):
+    """How far corners turn, and where they may pass through triangles.
 
-    _, flat = np.unique(ends, return_inverse=True)
-    pairs = flat.reshape(-1, 2)
-    size = int(pairs.max()) + 1
-    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(size, size))
-    return np.asarray(connected_components(graph, directed=False)[1][pairs[:, 0]])
+    Args:
+        joint: edges in the frame of the axis [m], shape (n, 2, 3).
+        amplitude: largest angle to each side [rad].
+        beside: crossings this near the joint do not count [m].
+    """
+
+    joint: np.ndarray
+    amplitude: float
+    beside: float
 
 
 def _require_free_corners(
-    mesh: TriangleMesh, turning: np.ndarray, joint: np.ndarray, axle: Axle, radius: float
+    mesh: TriangleMesh, turning: np.ndarray, joint: np.ndarray, axis: RotationAxis, radius: float
 ) -> None:
-    """``joint`` (n, 2, 3) [m]: beside these edges a corner may pass through what it is joined to."""
-    part, room = np.unique(mesh.triangles[turning]), np.unique(mesh.triangles[~turning])
-    line = _stacked(joint, axle)
-    for corners, triangles in (
-        (np.setdiff1d(part, room), ~turning),
-        (np.setdiff1d(room, part), turning),
-    ):
-        place = np.zeros(2, dtype=np.int64)
-        if _passes_through(
-            _stacked(mesh.vertices[corners], axle),
-            _stacked(mesh.corners[triangles], axle),
-            line,
-            axle.swing,
-            OPENING * radius,
-            place,
-        ):
+    """Raise SceneError if a corner of part or chamber passes through the other as the part turns.
+
+    Args:
+        mesh: of the chamber.
+        turning: which triangles turn, shape (m,) bool.
+        joint: beside these edges [m] a corner may pass through what it is joined to, (n, 2, 3).
+        axis: of the part.
+        radius: of the balls [m].
+    """
+    part, chamber = np.unique(mesh.triangles[turning]), np.unique(mesh.triangles[~turning])
+    sweep = _Sweep(_in_axis_frame(joint, axis), axis.amplitude, MAX_OPENING * radius)
+    for own, other, still in ((part, chamber, ~turning), (chamber, part, turning)):
+        corners, place = np.setdiff1d(own, other), np.zeros(2, dtype=np.int64)
+        vertices = _in_axis_frame(mesh.vertices[corners], axis)
+        triangles = _in_axis_frame(mesh.corners[still], axis)
+        if _passes_through(vertices, triangles, sweep, place):
             at = np.round(mesh.vertices[corners[place[0]]], 6).tolist()
             raise SceneError(
                 f"the part cannot turn: on its way the corner at {at} m passes through triangle "
-                f"{np.flatnonzero(triangles)[place[1]]}; move the axis, or make room about the part"
+                f"{np.flatnonzero(still)[place[1]]}; move the axis, or make room about the part"
             )
 
 
 @jit
 def _passes_through(
-    corners: np.ndarray,
-    triangles: np.ndarray,
-    joint: np.ndarray,
-    swing: float,
-    beside: float,
-    place: np.ndarray,
+    corners: np.ndarray, triangles: np.ndarray, sweep: _Sweep, place: np.ndarray
 ) -> bool:
-    """True when a corner's circle about the axis, as far as it swings, crosses a triangle; ``place``: which two.
-
-    Crossings ``beside`` [m] the joint or nearer do not count.
-    """
+    """True when a corner's arc about the axis crosses a triangle; ``place`` is set to the two."""
     for t in range(len(triangles)):
         a, b, c = triangles[t, 0, 2], triangles[t, 1, 2], triangles[t, 2, 2]
         low, high = min(a, b, c) + TOUCH, max(a, b, c) - TOUCH
         for i in range(len(corners)):
-            if low < corners[i, 2] < high and _crosses(
-                triangles, t, corners, i, joint, swing, beside
-            ):
+            if low < corners[i, 2] < high and _crosses(triangles, t, corners, i, sweep):
                 place[0], place[1] = i, t
                 return True
     return False
 
 
 @jit
-def _crosses(
-    triangles: np.ndarray,
-    t: int,
-    corners: np.ndarray,
-    i: int,
-    joint: np.ndarray,
-    swing: float,
-    beside: float,
-) -> bool:
-    """True when corner i turned by at most ``swing`` [rad] crosses triangle t, away from the joint."""
+def _crosses(triangles: np.ndarray, t: int, corners: np.ndarray, i: int, sweep: _Sweep) -> bool:
+    """True when the arc of corner i crosses triangle t away from the joint."""
     height = corners[i, 2]
     found = 0  # the triangle's cut at the corner's height is a segment
     x0, y0, x1, y1 = 0.0, 0.0, 0.0, 0.0
@@ -245,22 +234,22 @@ def _crosses(
         if TOUCH < s < length - TOUCH:
             x, y = x0 + s * dx, y0 + s * dy
             angle = math.atan2(cx * y - cy * x, cx * x + cy * y)
-            if abs(angle) < swing and not _near(joint, x, y, height, beside):
+            if abs(angle) < sweep.amplitude and not _near(sweep, Vec3(x, y, height)):
                 return True
     return False
 
 
 @jit
-def _near(joint: np.ndarray, x: float, y: float, z: float, reach: float) -> bool:
-    """True when a point lies within ``reach`` [m] of one of the edges (n, 2, 3)."""
-    at = Vec3(x, y, z)
+def _near(sweep: _Sweep, at: Vec3) -> bool:
+    """True when a point is too near the joint to count."""
+    joint = sweep.joint
     for k in range(len(joint)):
         start = Vec3(joint[k, 0, 0], joint[k, 0, 1], joint[k, 0, 2])
-        way = sub(Vec3(joint[k, 1, 0], joint[k, 1, 1], joint[k, 1, 2]), start)
+        edge = sub(Vec3(joint[k, 1, 0], joint[k, 1, 1], joint[k, 1, 2]), start)
         offset = sub(at, start)
-        square = dot(way, way)
-        share = min(max(dot(offset, way) / square, 0.0), 1.0) if square > 0.0 else 0.0
-        away = along(offset, -share, way)
-        if dot(away, away) <= reach * reach:
+        square = dot(edge, edge)
+        share = min(max(dot(offset, edge) / square, 0.0), 1.0) if square > 0.0 else 0.0
+        away = add_scaled(offset, -share, edge)
+        if dot(away, away) <= sweep.beside * sweep.beside:
             return True
     return False

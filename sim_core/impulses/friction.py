@@ -1,24 +1,25 @@
-"""What friction adds to a hit: a tangential kick against the slip of the touching points, and spin.
+"""Friction at a collision: a tangential velocity change against the slip, and spin.
 
-The formulas and their source are in effects/friction.py. Velocities change per mass; a kick j on the surface of a
-solid sphere of radius R, at -R n from its centre, changes its spin by -5/(2R) n x j.
+The formulas and their source are in effects/friction.py. Impulses are per mass, that is, velocity
+changes; a change j on the surface of a solid sphere of radius R, at -R n from its centre, changes its
+spin by -5/(2R) n x j.
 """
 
 import math
 
-from sim_core.effects.friction import OF_BALLS, FrictionState, law_of, spin_at
+from sim_core.effects.friction import OF_BALLS, FrictionState, friction_of, spin_at
 from sim_core.numerics.jit import inlined, jit
-from sim_core.numerics.vec3 import Vec3, along, cross, dot, sub
+from sim_core.numerics.vec3 import Vec3, add_scaled, cross, dot, scaled, sub
 
-STICK = (
-    2.0 / 7.0
-)  # of solid spheres: share of v_t that a kick has to take from the centre to stop the touching point
+# Of solid spheres: the share of v_t by which the centre's velocity changes when the touching point
+# stops.
+STICK = 2.0 / 7.0
 ALONE, PAIR = 1.0, 0.5  # m_eff over m
 
 
 @inlined
-def rub_surface(
-    friction_state: FrictionState | None,
+def add_surface_friction(
+    friction: FrictionState | None,
     ball: int,
     time: float,
     away: Vec3,
@@ -26,25 +27,29 @@ def rub_surface(
     change: Vec3,
     tag: int,
 ) -> Vec3:
-    """The velocity change [m/s] of a ball at a surface, with friction; the ball's spin is changed.
+    """Velocity change [m/s] of a ball at a surface with friction; its spin is changed here.
 
-    ``change`` [m/s]: that without; ``away``: any vector along the normal, from the surface to the ball; ``relative``
-    [m/s]: the ball's velocity minus that of the touched point. All in the room's frame.
+    Args:
+        friction: None without the effect.
+        ball: number of the ball.
+        time: of the window [s].
+        away: any vector along the normal, from the surface to the ball, in the room's frame.
+        relative: the ball's velocity minus that of the touched point, in the room's frame [m/s].
+        change: of the velocity without friction [m/s].
+        tag: of the surface.
     """
-    if friction_state is None:
+    if friction is None:
         return change
     normal = _unit(away)
-    slip = along(
-        relative, -friction_state.radius, cross(spin_at(friction_state, ball, time), normal)
-    )
-    rub = _rub(slip, normal, change, law_of(friction_state, tag), ALONE)
-    _turn(friction_state, ball, normal, rub)
-    return along(change, 1.0, rub)
+    slip = add_scaled(relative, -friction.radius, cross(spin_at(friction, ball, time), normal))
+    tangential = _tangential_change(slip, normal, change, friction_of(friction, tag), ALONE)
+    _add_spin(friction, ball, normal, tangential)
+    return add_scaled(change, 1.0, tangential)
 
 
 @inlined
-def rub_pair(
-    friction_state: FrictionState | None,
+def add_pair_friction(
+    friction: FrictionState | None,
     one: int,
     two: int,
     time: float,
@@ -52,42 +57,52 @@ def rub_pair(
     closing: Vec3,
     change: Vec3,
 ) -> Vec3:
-    """The same for two balls that meet: the velocity change of the first, and minus that of the second.
+    """Velocity change [m/s] of the first of two balls with friction, and minus that of the second.
 
-    ``apart`` [m], ``closing`` [m/s]: second minus first.
+    Args:
+        friction: None without the effect.
+        one: number of the first ball.
+        two: number of the second ball.
+        time: of the window [s].
+        apart: second position minus first [m].
+        closing: second velocity minus first [m/s].
+        change: of the first velocity without friction [m/s].
     """
-    if friction_state is None:
+    if friction is None:
         return change
     normal = _unit(apart)
-    spin = along(spin_at(friction_state, one, time), 1.0, spin_at(friction_state, two, time))
-    slip = along(closing, -friction_state.radius, cross(spin, normal))
-    rub = _rub(slip, normal, change, law_of(friction_state, OF_BALLS), PAIR)  # on the second
-    _turn(friction_state, one, normal, rub)
-    _turn(friction_state, two, normal, rub)  # the opposite kick on the opposite side: the same spin
-    return sub(change, rub)
+    spin = add_scaled(spin_at(friction, one, time), 1.0, spin_at(friction, two, time))
+    slip = add_scaled(closing, -friction.radius, cross(spin, normal))
+    # of the second ball
+    tangential = _tangential_change(slip, normal, change, friction_of(friction, OF_BALLS), PAIR)
+    # the opposite change on the opposite side gives the first ball the same spin
+    _add_spin(friction, one, normal, tangential)
+    _add_spin(friction, two, normal, tangential)
+    return sub(change, tangential)
 
 
 @jit
 def _unit(away: Vec3) -> Vec3:
-    scale = 1.0 / math.sqrt(dot(away, away))
-    return Vec3(scale * away.x, scale * away.y, scale * away.z)
+    return scaled(1.0 / math.sqrt(dot(away, away)), away)
 
 
 @jit
-def _rub(slip: Vec3, normal: Vec3, push: Vec3, law: tuple[float, float], mass: float) -> Vec3:
-    """The tangential kick [m/s] that goes with the normal one ``push`` [m/s]."""
-    mu, beta0 = law
-    slip = along(slip, -dot(slip, normal), normal)
+def _tangential_change(
+    slip: Vec3, normal: Vec3, push: Vec3, coefficients: tuple[float, float], mass: float
+) -> Vec3:
+    """Tangential velocity change [m/s] that goes with the normal one ``push`` [m/s]."""
+    mu, beta0 = coefficients
+    slip = add_scaled(slip, -dot(slip, normal), normal)
     speed = math.sqrt(dot(slip, slip))
     if speed == 0.0:
         return Vec3(0.0, 0.0, 0.0)
     share = min(mu * math.sqrt(dot(push, push)) / speed, STICK * (1.0 + beta0) * mass)
-    return Vec3(-share * slip.x, -share * slip.y, -share * slip.z)
+    return scaled(-share, slip)
 
 
 @jit
-def _turn(friction_state: FrictionState, ball: int, normal: Vec3, rub: Vec3) -> None:
-    """Change the spin of a ball that is kicked by ``rub`` [m/s] at -R ``normal`` from its centre."""
-    torque = cross(normal, rub)
+def _add_spin(friction: FrictionState, ball: int, normal: Vec3, tangential: Vec3) -> None:
+    """Change the spin of a ball for a velocity change [m/s] at -R ``normal`` from its centre."""
+    torque = cross(normal, tangential)
     for axis in range(3):
-        friction_state.spins[ball, axis] -= 2.5 / friction_state.radius * torque[axis]
+        friction.spins[ball, axis] -= 2.5 / friction.radius * torque[axis]

@@ -17,7 +17,7 @@ from sim_core.scene.physics import Physics
 from sim_core.scene.scene import Scene
 
 
-def _mark(physics: Physics, balls: int, alike: bool, bore: bool) -> Path:
+def _mark(physics: Physics, balls: int, alike: bool, cylinder: bool) -> Path:
     """A file that says that this set of effects has been compiled: what is absent is not in the machine code."""
     present = [
         name for name, effect in zip(physics._fields, physics, strict=True) if effect is not None
@@ -25,16 +25,16 @@ def _mark(physics: Physics, balls: int, alike: bool, bore: bool) -> Path:
     kind = ["many" if balls >= MANY else "few", "alike" if alike else "mixed"]
     if len(physics.vibrations) > 1:
         kind.append("sonotrodes")
-    return CACHE_FOLDER / "-".join(["compiled", *present, *kind, *["bore"] * bore])
+    return CACHE_FOLDER / "-".join(["compiled", *present, *kind, *["bore"] * cylinder])
 
 
-def is_compiled(physics: Physics, balls: int, alike: bool = True, bore: bool = False) -> bool:
+def is_compiled(physics: Physics, balls: int, alike: bool = True, cylinder: bool = False) -> bool:
     """True when compile_simulator has done this before, with this version of the sources."""
-    return _mark(physics, balls, alike, bore).exists()
+    return _mark(physics, balls, alike, cylinder).exists()
 
 
 def compile_simulator(
-    physics: Physics, balls: int = 1, alike: bool = True, bore: bool = False
+    physics: Physics, balls: int = 1, alike: bool = True, cylinder: bool = False
 ) -> float:
     """Compiles (or loads from the cache) what a scene with these effects and so many balls, ``alike`` or of several
     sizes, needs, in a mesh or a prism, or in the ``bore`` of an analytical cylinder; returns the seconds it took.
@@ -65,14 +65,14 @@ def compile_simulator(
     walls = int(tags[~floor][0])
     room = (
         cylinder_cavity(2.0, 0.0, 1.0, (int(tags[floor][0]), walls, walls), (0.5, 0.5))
-        if bore
+        if cylinder
         else mesh
     )
     simulate(Scene(room, shot, physics, duration=0.01))
     with contextlib.suppress(
         OSError
     ):  # a cache that cannot be written: every process compiles for itself
-        _mark(physics, balls, alike, bore).touch()
+        _mark(physics, balls, alike, cylinder).touch()
     return time.perf_counter() - start
 
 

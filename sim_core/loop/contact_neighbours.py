@@ -6,7 +6,7 @@ The filter of neighbours.py does not see them; they are looked at one by one, ex
 import numpy as np
 
 from sim_core.contact.constrained_impulse import acceleration_of, place
-from sim_core.detect.ball_ball import accelerated_meeting_delay
+from sim_core.detect.ball_ball import accelerated_pair_delay
 from sim_core.effects.contact_mode import (
     ASLEEP,
     FLYING,
@@ -28,7 +28,7 @@ from sim_core.loop.neighbours import NeighbourFilter, next_meeting
 from sim_core.loop.spatial_blocks import slot_of
 from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.roots import NEVER
-from sim_core.numerics.vec3 import dot, sub
+from sim_core.numerics.vec3 import Flight, dot, sub
 
 LEANING = 2e-5  # m: a ball held still is this near to what holds it, or nearer: hops at 10 mm/s are 5 um high
 
@@ -98,9 +98,8 @@ def _with_grounded(
             continue
         there = place(contact, motion, other, time)
         apart, closing = sub(there.position, here.position), sub(there.velocity, here.velocity)
-        delay = accelerated_meeting_delay(
-            apart, closing, sub(acceleration_of(contact, other), own), reach, best
-        )
+        pull = sub(acceleration_of(contact, other), own)
+        delay = accelerated_pair_delay(Flight(apart, closing, pull), reach, best)
         if delay < best or (delay == best and partner >= 0 and other < partner):
             best = delay
             partner = other

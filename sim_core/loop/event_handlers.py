@@ -6,7 +6,7 @@ from sim_core.contact.ball_on_ball import meet
 from sim_core.contact.jamming import hold
 from sim_core.contact.pushed_by_part import drive, taken_from_part
 from sim_core.contact.support_changes import BOUNCES, ROLLS, deflect, land, set_out, step
-from sim_core.detect.ball_cylinder import facing
+from sim_core.detect.ball_cylinder import normal_at
 from sim_core.detect.ball_triangle import away_from_capsule, face_normal, nearer_neighbour
 from sim_core.effects.contact_mode import (
     ASLEEP,
@@ -20,27 +20,34 @@ from sim_core.effects.contact_mode import (
     static_law,
 )
 from sim_core.effects.friction import FrictionState
-from sim_core.effects.part_rotation import Turning, from_part, seen_from_part, slip
-from sim_core.effects.random_phase import own_wave
-from sim_core.effects.sonotrodes import face_wave
+from sim_core.effects.part_rotation import (
+    RotationState,
+    relative_flight,
+    slip_velocity,
+    to_room_frame,
+)
+from sim_core.effects.random_phase import wave_of_ball
+from sim_core.effects.sonotrodes import wave_of_face
 from sim_core.effects.vibration import surface_velocity
-from sim_core.geometry.ball_sizes import by_mass
-from sim_core.geometry.obstacles import CAPSULE, WAVING_FACE
-from sim_core.geometry.triangle_lookup import triangle_at
+from sim_core.geometry.ball_sizes import share_by_mass
+from sim_core.geometry.obstacles import CAPSULE, VIBRATING_FACE
+from sim_core.geometry.triangle_lookup import find_triangle
 from sim_core.geometry.turning_part import PartTree
-from sim_core.impulses.ball_ball import pair_kick
-from sim_core.impulses.ball_cylinder import leave_cylinder_wall
-from sim_core.impulses.ball_surface import surface_kick
-from sim_core.impulses.drag import catch_up, flies, goes_on
-from sim_core.impulses.friction import rub_pair, rub_surface
+from sim_core.impulses.collision import (
+    leave_cylinder_wall,
+    pair_velocity_change,
+    surface_velocity_change,
+)
+from sim_core.impulses.drag import apply_drag_piece, apply_drag_until, is_flying
+from sim_core.impulses.friction import add_pair_friction, add_surface_friction
 from sim_core.loop.contact_neighbours import count_neighbours, hide, lies_still, wake_if_it_moves
 from sim_core.loop.event_queue import EVENTS
 from sim_core.loop.impact_log import note_impact
 from sim_core.loop.neighbours import follow, reach_of
 from sim_core.loop.state import SONOTRODE, WALLS, SimulationState
-from sim_core.motion import drift, kick, point_under
+from sim_core.motion import change_velocity, free_fall_position, state_under
 from sim_core.numerics.jit import inlined
-from sim_core.numerics.vec3 import Vec3, dot, sub
+from sim_core.numerics.vec3 import Flight, Vec3, dot, sub
 
 JAM_EVENTS = 5_000  # of one ball in one window: with contact mode it is held still then, and each time as many later
 
@@ -50,10 +57,10 @@ def hit_surface(state: SimulationState, ball: int, obstacle: int, time: float) -
     """The ball meets the obstacle now: change its velocity, count the impact, write it down if it is on a recorded
     surface.
     """
-    ground, clock, buffer = state.ground, state.clock, state.buffer
-    tree = ground.tree
-    catch_up(state.air, state.contact, state.motion, ball, time, state.gravity)
-    here = point_under(
+    obstacles, clock, buffer = state.obstacles, state.clock, state.buffer
+    tree = obstacles.tree
+    apply_drag_until(state.drag, state.contact, state.motion, ball, time, state.gravity)
+    here = state_under(
         state.motion, ball, time, ball_acceleration(state.contact, ball, state.gravity)
     )
     time_since_start = clock.now[1] * clock.window + time
@@ -67,12 +74,14 @@ def hit_surface(state: SimulationState, ball: int, obstacle: int, time: float) -
         touched = sub(here.position, away)
         here = set_out(state.contact, state.motion, ball, time, here, away, tree.radius)
     else:
-        away = facing(ground.bore, tree.numbers, obstacle, kind, here.position)
+        away = normal_at(obstacles.cylinder, tree.numbers, obstacle, kind, here.position)
     relative = here.velocity
     landed = BOUNCES
     law = state.restitution
-    if kind == WAVING_FACE:
-        wave = face_wave(state.waves, own_wave(state.phases, state.wave, ball), obstacle)
+    if kind == VIBRATING_FACE:
+        wave = wave_of_face(
+            state.waves, wave_of_ball(state.random_phase, state.wave, ball), obstacle
+        )
         relative = sub(relative, surface_velocity(wave, time))
     else:
         landed = land(
@@ -80,11 +89,11 @@ def hit_surface(state: SimulationState, ball: int, obstacle: int, time: float) -
         )
         law = static_law(state.contact, state.restitution)
     triangle = tree.triangles[obstacle, side]
-    tag = ground.tags[triangle]
+    tag = obstacles.tags[triangle]
     if landed == BOUNCES:
-        change = surface_kick(away, relative, law, tag)
-        change = rub_surface(state.friction_state, ball, time, away, relative, change, tag)
-        change = leave_cylinder_wall(ground.bore, kind, away, relative, change)
+        change = surface_velocity_change(away, relative, law, tag)
+        change = add_surface_friction(state.friction_state, ball, time, away, relative, change, tag)
+        change = leave_cylinder_wall(obstacles.cylinder, kind, away, relative, change)
         deflect(state.contact, state.motion, ball, time, time_since_start, here, change)
     follow(state.neighbours, state.motion, ball, time)
     hide(state.contact, state.neighbours, ball)
@@ -100,7 +109,7 @@ def hit_surface(state: SimulationState, ball: int, obstacle: int, time: float) -
         )
     if landed == ROLLS:
         return
-    if kind == WAVING_FACE:
+    if kind == VIBRATING_FACE:
         state.tally[SONOTRODE] += 1
     else:
         state.tally[WALLS] += 1
@@ -111,7 +120,7 @@ def hit_surface(state: SimulationState, ball: int, obstacle: int, time: float) -
             buffer,
             when,
             ball,
-            triangle_at(ground.locator, triangle, touched),
+            find_triangle(obstacles.lookup, triangle, touched),
             here.position,
             relative,
             speed,
@@ -120,7 +129,7 @@ def hit_surface(state: SimulationState, ball: int, obstacle: int, time: float) -
 
 @inlined
 def hit_part(
-    turning: Turning | None,
+    rotation: RotationState | None,
     part: PartTree | None,
     state: SimulationState,
     ball: int,
@@ -128,18 +137,19 @@ def hit_part(
     time: float,
 ) -> bool:
     """The same for an obstacle of the turning part, seen and written down in the part's frame; False if it is none."""
-    if turning is None or part is None:
+    if rotation is None or part is None:
         return False
-    row = obstacle - len(state.ground.tree.kinds)
+    row = obstacle - len(state.obstacles.tree.kinds)
     if row < 0:
         return False
     clock, buffer, tree = state.clock, state.buffer, part.tree
-    catch_up(state.air, state.contact, state.motion, ball, time, state.gravity)
+    apply_drag_until(state.drag, state.contact, state.motion, ball, time, state.gravity)
     acceleration = ball_acceleration(state.contact, ball, state.gravity)
-    here = point_under(state.motion, ball, time, acceleration)
+    here = state_under(state.motion, ball, time, acceleration)
     time_since_start = clock.now[1] * clock.window + time
     lay_still = lies_still(state.contact, ball)
-    seen = seen_from_part(turning, here.position, here.velocity, acceleration, time)
+    flight = Flight(here.position, here.velocity, acceleration)
+    seen = relative_flight(rotation, flight, time)
     side = 0
     if tree.kinds[row] == CAPSULE:
         away = away_from_capsule(tree.numbers, row, seen.position)
@@ -147,14 +157,16 @@ def hit_part(
     else:
         normal = face_normal(tree.numbers, row)
         away = Vec3(tree.radius * normal.x, tree.radius * normal.y, tree.radius * normal.z)
-    relative = slip(turning, seen, away, time)
+    relative = slip_velocity(rotation, seen, away, time)
     state.tally[WALLS] += 1
     triangle = tree.triangles[row, side]
-    tag = state.ground.tags[triangle]
-    change = from_part(turning, surface_kick(away, relative, state.restitution, tag), time)
+    tag = state.obstacles.tags[triangle]
+    change = to_room_frame(
+        rotation, surface_velocity_change(away, relative, state.restitution, tag), time
+    )
     speed = -dot(away, relative) / math.sqrt(dot(away, away))
-    change = taken_from_part(state.contact, turning, ball, time, away, speed, change)
-    change = _rub_part(state.friction_state, turning, ball, time, away, relative, change, tag)
+    change = taken_from_part(state.contact, rotation, ball, time, away, speed, change)
+    change = _rub_part(state.friction_state, rotation, ball, time, away, relative, change, tag)
     drive(state.contact, state.motion, ball, time, time_since_start, here, change)
     follow(state.neighbours, state.motion, ball, time)
     hide(state.contact, state.neighbours, ball)
@@ -170,7 +182,7 @@ def hit_part(
         )
     if buffer.record[tag] and speed > 0.0:
         when = clock.now[1] * clock.window + time - clock.origin
-        touched = triangle_at(state.ground.locator, triangle, sub(seen.position, away))
+        touched = find_triangle(state.obstacles.lookup, triangle, sub(seen.position, away))
         note_impact(buffer, when, ball, touched, seen.position, relative, speed)
     return True
 
@@ -178,7 +190,7 @@ def hit_part(
 @inlined
 def _rub_part(
     friction_state: FrictionState | None,
-    turning: Turning,
+    rotation: RotationState,
     ball: int,
     time: float,
     away: Vec3,
@@ -189,8 +201,8 @@ def _rub_part(
     """rub_surface for ``away`` and ``relative`` in the part's frame; spins are those of the room."""
     if friction_state is None:
         return change
-    there, slip = from_part(turning, away, time), from_part(turning, relative, time)
-    return rub_surface(friction_state, ball, time, there, slip, change, tag)
+    there, slip = to_room_frame(rotation, away, time), to_room_frame(rotation, relative, time)
+    return add_surface_friction(friction_state, ball, time, there, slip, change, tag)
 
 
 @inlined
@@ -198,7 +210,7 @@ def collide(state: SimulationState, one: int, two: int, time: float) -> None:
     """Two balls meet now."""
     motion = state.motion
     for ball in (one, two):
-        catch_up(state.air, state.contact, motion, ball, time, state.gravity)
+        apply_drag_until(state.drag, state.contact, motion, ball, time, state.gravity)
     _kick_both(state.contact, state, one, two, time)
     follow(state.neighbours, motion, one, time)
     follow(state.neighbours, motion, two, time)
@@ -223,7 +235,7 @@ def _kick_both(
             time,
             time_since_start,
             state.restitution,
-            state.ground.tree.radius,
+            state.obstacles.tree.radius,
         ):
             wake_if_it_moves(contact, state.queue, motion, one, time, time_since_start, reach)
             wake_if_it_moves(contact, state.queue, motion, two, time, time_since_start, reach)
@@ -232,16 +244,21 @@ def _kick_both(
         if contact.marks[two, MODE] == JAMMED and not jammed[1]:
             count_neighbours(contact, motion, two, time, reach)
         return
-    apart = sub(drift(motion, two, time), drift(motion, one, time))
+    apart = sub(free_fall_position(motion, two, time), free_fall_position(motion, one, time))
     closing = Vec3(
         motion[two, 3] - motion[one, 3],
         motion[two, 4] - motion[one, 4],
         motion[two, 5] - motion[one, 5],
     )
-    change = pair_kick(apart, closing, state.restitution)
-    change = rub_pair(state.friction_state, one, two, time, apart, closing, change)
-    kick(motion, one, time, by_mass(state.sizes, one, two, change))
-    kick(motion, two, time, by_mass(state.sizes, two, one, Vec3(-change.x, -change.y, -change.z)))
+    change = pair_velocity_change(apart, closing, state.restitution)
+    change = add_pair_friction(state.friction_state, one, two, time, apart, closing, change)
+    change_velocity(motion, one, time, share_by_mass(state.sizes, one, two, change))
+    change_velocity(
+        motion,
+        two,
+        time,
+        share_by_mass(state.sizes, two, one, Vec3(-change.x, -change.y, -change.z)),
+    )
 
 
 @inlined
@@ -253,9 +270,9 @@ def take_step(
         return False
     motion = state.motion
     lay_still = lies_still(contact, ball)
-    if not flies(contact, ball):
-        catch_up(state.air, contact, motion, ball, time, state.gravity)
-    here = point_under(motion, ball, time, ball_acceleration(contact, ball, state.gravity))
+    if not is_flying(contact, ball):
+        apply_drag_until(state.drag, contact, motion, ball, time, state.gravity)
+    here = state_under(motion, ball, time, ball_acceleration(contact, ball, state.gravity))
     time_since_start = state.clock.now[1] * state.clock.window + time
     if what == RECHECK:
         if count_neighbours(contact, motion, ball, time, reach_of(state.neighbours)):
@@ -276,7 +293,7 @@ def take_step(
 def fly_on(state: SimulationState, ball: int, time: float) -> bool:
     """The ball flies on; True when the air has changed its path."""
     motion = state.motion
-    if not goes_on(state.air, state.contact, motion, ball, time, state.gravity):
+    if not apply_drag_piece(state.drag, state.contact, motion, ball, time, state.gravity):
         return False
     follow(state.neighbours, motion, ball, time)
     return True
@@ -291,10 +308,16 @@ def gives_up(contact: ContactState | None, state: SimulationState, ball: int, ti
         return False
     if contact.marks[ball, DRIVEN] != 0:  # the part would go through it
         return False
-    here = point_under(state.motion, ball, time, ball_acceleration(contact, ball, state.gravity))
+    here = state_under(state.motion, ball, time, ball_acceleration(contact, ball, state.gravity))
     time_since_start = state.clock.now[1] * state.clock.window + time
     hold(
-        contact, state.motion, ball, time, time_since_start, here.position, state.ground.tree.radius
+        contact,
+        state.motion,
+        ball,
+        time,
+        time_since_start,
+        here.position,
+        state.obstacles.tree.radius,
     )
     count_neighbours(contact, state.motion, ball, time, reach_of(state.neighbours))
     follow(state.neighbours, state.motion, ball, time)

@@ -7,16 +7,16 @@ again: the ball's own path, and so its wall contact, still stands.
 import numpy as np
 
 from sim_core.contact.path_end import end_of_path
-from sim_core.detect.ball_mesh import first_contact_from
+from sim_core.detect.ball_mesh import first_contact
 from sim_core.detect.ball_turning_part import first_part_contact
 from sim_core.effects.contact_mode import STILL, ball_acceleration
 from sim_core.effects.drag import shift_drag
 from sim_core.effects.friction import shift_spins
-from sim_core.effects.part_rotation import one_turn, shift_rotation
-from sim_core.effects.random_phase import arrival, own_wave
+from sim_core.effects.part_rotation import shift_rotation, time_of_one_turn
+from sim_core.effects.random_phase import update_phase, wave_of_ball
 from sim_core.effects.sonotrodes import shift_phases
-from sim_core.geometry.ball_sizes import own_seam
-from sim_core.impulses.drag import piece_left
+from sim_core.geometry.ball_sizes import face_overlap_of_ball
+from sim_core.impulses.drag import time_to_next_drag
 from sim_core.loop.contact_neighbours import first_meeting, hide_all
 from sim_core.loop.event_handlers import collide, fly_on, gives_up, hit_part, hit_surface, take_step
 from sim_core.loop.event_queue import (
@@ -33,11 +33,12 @@ from sim_core.loop.event_queue import (
 )
 from sim_core.loop.neighbours import NeighbourFilter, refresh_neighbours, speed_limit
 from sim_core.loop.state import BALLS, SEARCHES, STALE, SimulationState
-from sim_core.motion import point_under, shift_motion
+from sim_core.motion import shift_motion, state_under
 from sim_core.numerics import profiler
 from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.profiler import add_time
 from sim_core.numerics.roots import NEVER
+from sim_core.numerics.vec3 import Flight
 
 # status
 DONE = 0
@@ -120,17 +121,19 @@ def _predict(state: SimulationState, ball: int, time: float, what: int) -> None:
         add_time(state.profiler, profiler.PAIRS)
     if what != PAIRS or (marks[ball, OBSTACLE] < 0 and queue.wall_time[ball] <= time):
         length = _until_meeting(queue.pair_time, marks, ball, time)
-        tree, seam = state.ground.tree, own_seam(state.sizes, state.ground.seam, ball)
+        obstacles, tree = state.obstacles, state.obstacles.tree
+        face_overlap = face_overlap_of_ball(state.sizes, obstacles.face_overlap, ball)
         acceleration = ball_acceleration(state.contact, ball, state.gravity)
-        here = point_under(state.motion, ball, time, acceleration)
-        length = min(length, piece_left(state.air, state.contact, ball, time))
-        length = arrival(state.phases, here.position, here.velocity, acceleration, ball, length)
-        wave = own_wave(state.phases, state.wave, ball)
+        here = state_under(state.motion, ball, time, acceleration)
+        flight = Flight(here.position, here.velocity, acceleration)
+        length = min(length, time_to_next_drag(state.drag, state.contact, ball, time))
+        length = update_phase(state.random_phase, flight, ball, length)
+        wave = wave_of_ball(state.random_phase, state.wave, ball)
         time_since_start = state.clock.now[1] * state.clock.window + time
         length, end = end_of_path(
             state.contact,
             tree,
-            seam,
+            face_overlap,
             wave,
             here,
             acceleration,
@@ -139,29 +142,27 @@ def _predict(state: SimulationState, ball: int, time: float, what: int) -> None:
             time_since_start,
             length,
         )
-        look = one_turn(state.turning, length) if end == STILL else length
-        delay, obstacle = first_contact_from(
+        look = time_of_one_turn(state.rotation, length) if end == STILL else length
+        delay, obstacle = first_contact(
             state.contact,
             state.sizes,
-            state.ground.bore,
+            obstacles.cylinder,
             ball,
             tree,
             state.scratch,
-            here,
-            acceleration,
+            flight,
             wave,
             state.waves,
-            seam,
+            face_overlap,
             time,
             length,
         )
         delay, obstacle = first_part_contact(
-            state.ground.part,
-            state.turning,
+            obstacles.part,
+            state.rotation,
             state.scratch,
-            here,
-            acceleration,
-            seam,
+            flight,
+            face_overlap,
             time,
             delay if obstacle >= 0 else look,
             obstacle,
@@ -198,10 +199,10 @@ def advance(state: SimulationState) -> tuple[int, int]:
             refresh_neighbours(state.neighbours, state.motion)
             hide_all(state.contact, state.neighbours)
             shift_queue(queue, clock.window)
-            shift_rotation(state.turning, clock.window)
+            shift_rotation(state.rotation, clock.window)
             shift_phases(state.waves)
             shift_spins(state.friction_state, clock.window)
-            shift_drag(state.air, clock.window)
+            shift_drag(state.drag, clock.window)
             clock.now[1] += 1.0
             continue
         if buffer.filled[0] == len(buffer.numbers):
@@ -219,7 +220,7 @@ def advance(state: SimulationState) -> tuple[int, int]:
         elif meeting_time(queue.pair_time, ball) <= queue.wall_time[ball]:
             what, second = _meet(state.neighbours, state, ball, time)
         elif obstacle >= 0:
-            if not hit_part(state.turning, state.ground.part, state, ball, obstacle, time):
+            if not hit_part(state.rotation, state.obstacles.part, state, ball, obstacle, time):
                 hit_surface(state, ball, obstacle, time)
             marks[ball, HITS] += 1
             if not _speed_squared(state.motion, ball) <= speed_limit(state.neighbours) ** 2:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from sim_core.geometry.analytic import AnalyticCavity
-from sim_core.geometry.mesh import towards_shot
+from sim_core.geometry.mesh import normals_towards_shot
 from sim_core.loop.contact_neighbours import LEANING
 from sim_core.scene.invariants import clearance
 from sim_core.scene.narrow_gaps import surface_name
@@ -46,7 +46,7 @@ def _surfaces(
     box = np.abs(here - np.clip(here, corners.min(axis=1), corners.max(axis=1))).max(axis=1)
     near = [int(t) for t in np.flatnonzero(box <= radius + slack)]
     gap = {t: float(clearance(corners[[t]], here, 2.0 * radius)[0]) - radius for t in near}
-    normals = towards_shot(corners)[0]
+    normals = normals_towards_shot(corners)[0]
     found: list[int] = []
     for t in sorted((t for t in near if gap[t] <= slack[t]), key=lambda t: gap[t]):
         alike = (

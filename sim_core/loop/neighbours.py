@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim_core.detect.ball_ball import meeting_delay
+from sim_core.detect.ball_ball import pair_delay
 from sim_core.loop.spatial_blocks import (
     MANY,
     Blocks,
@@ -20,7 +20,7 @@ from sim_core.loop.spatial_blocks import (
     sort_blocks,
     widen,
 )
-from sim_core.motion import drift
+from sim_core.motion import free_fall_position
 from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.roots import NEVER
 from sim_core.numerics.simd import BOXES, LANES, balls_near, boxes_hit, lowest_bit
@@ -166,7 +166,7 @@ def _search(
 ) -> tuple[float, int]:
     """What next_meeting returns, from all lanes, or from the blocks that the ball's path enters."""
     if blocks is None:
-        here = drift(motion, ball, time)
+        here = free_fall_position(motion, ball, time)
         velocity = Vec3(motion[ball, 3], motion[ball, 4], motion[ball, 5])
         best = before - time
         partner = -1
@@ -177,7 +177,9 @@ def _search(
                 near &= near - 1
                 closing = sub(Vec3(motion[other, 3], motion[other, 4], motion[other, 5]), velocity)
                 reach = _pair_reach(neighbours.radii, neighbours.reach, ball, other)
-                delay = meeting_delay(sub(drift(motion, other, time), here), closing, reach)
+                delay = pair_delay(
+                    sub(free_fall_position(motion, other, time), here), closing, reach
+                )
                 if delay < best:
                     best = delay
                     partner = other
@@ -211,7 +213,7 @@ def _without(near: int, lane: int) -> int:
 @inlined
 def _aim(ray: np.ndarray, motion: np.ndarray, ball: int, time: float) -> None:
     """The ball's straight path from now on, as boxes_hit wants it."""
-    here = drift(motion, ball, time)
+    here = free_fall_position(motion, ball, time)
     for axis in range(3):
         speed = motion[ball, 3 + axis]
         ray[axis] = ray[3 + axis] = np.float32(here[axis])
@@ -233,14 +235,14 @@ def _nearest(
 
     Ties go to the lower ball, so that the order of the lanes does not matter.
     """
-    here = drift(motion, ball, time)
+    here = free_fall_position(motion, ball, time)
     velocity = Vec3(motion[ball, 3], motion[ball, 4], motion[ball, 5])
     while near != 0:
         other = ball_in(neighbours.blocks, first + lowest_bit(near))
         near &= near - 1
         closing = sub(Vec3(motion[other, 3], motion[other, 4], motion[other, 5]), velocity)
         reach = _pair_reach(neighbours.radii, neighbours.reach, ball, other)
-        delay = meeting_delay(sub(drift(motion, other, time), here), closing, reach)
+        delay = pair_delay(sub(free_fall_position(motion, other, time), here), closing, reach)
         if delay < best or (delay == best and other < partner):
             best = delay
             partner = other

@@ -11,20 +11,24 @@ from sim_core.balls import Balls
 from sim_core.contact.resting_balls import Resting, resting
 from sim_core.detect.ball_mesh import Scratch, new_scratch
 from sim_core.effects.contact_mode import ContactState, checked_rest, new_contact_state
-from sim_core.effects.drag import Air, checked_drag, new_air
+from sim_core.effects.drag import DragState, checked_drag, new_drag_state
 from sim_core.effects.friction import FrictionState, checked_friction, new_friction_state
 from sim_core.effects.gravity import checked_gravity, gravity_acceleration
-from sim_core.effects.part_rotation import Turning, angle_now, checked_axle, checked_turn
-from sim_core.effects.random_phase import Phases, checked_random_phase, new_phases
+from sim_core.effects.part_rotation import RotationState, angle_at, checked_axis, new_rotation_state
+from sim_core.effects.random_phase import (
+    RandomPhaseState,
+    checked_random_phase,
+    new_random_phase_state,
+)
 from sim_core.effects.restitution import Restitution, checked_restitution
-from sim_core.effects.sonotrodes import Waves, new_waves, whole_periods
+from sim_core.effects.sonotrodes import SonotrodeWaves, new_waves, whole_period_window
 from sim_core.effects.vibration import Wave, checked_waves
 from sim_core.errors import SceneError, SimulationError
 from sim_core.geometry.analytic import AnalyticCavity
-from sim_core.geometry.ball_sizes import Sizes, new_sizes
+from sim_core.geometry.ball_sizes import BallSizes, new_ball_sizes
 from sim_core.geometry.mesh import MAX_TAGS
-from sim_core.geometry.obstacle_set import build_ground
-from sim_core.impulses.drag import catch_all_up
+from sim_core.geometry.obstacle_set import build_obstacle_set
+from sim_core.impulses.drag import apply_drag_to_all
 from sim_core.loop.contact_neighbours import hide_all
 from sim_core.loop.event_queue import EventQueue, new_event_queue
 from sim_core.loop.events import BUFFER_FULL, DONE, TOO_FAST, TOO_MANY_EVENTS, advance
@@ -34,7 +38,7 @@ from sim_core.loop.neighbours import NeighbourFilter, new_neighbour_filter
 from sim_core.loop.state import Clock, SimulationState
 from sim_core.motion import WINDOW
 from sim_core.numerics.profiler import Profiler
-from sim_core.scene.invariants import contained, narrowest_gap, posed
+from sim_core.scene.invariants import contained, narrowest_gap, turned_corners
 from sim_core.scene.scene import TOUCH, Scene
 
 CHECK_EVERY = (
@@ -85,7 +89,7 @@ def simulate(scene: Scene, frames: Sequence[float] | np.ndarray = ()) -> Simulat
         scene.warmup + scene.duration, record=True, frames=_checked_frames(frames, scene)
     )
     balls = run.balls()
-    still = resting(run.contact, run.ground, balls.positions, run.centre, scene.warmup)
+    still = resting(run.contact, run.obstacles, balls.positions, run.centre, scene.warmup)
     return SimulationResult(
         impact_log(run.chunks, run.centre),
         balls,
@@ -107,7 +111,7 @@ def _checked_frames(frames: Sequence[float] | np.ndarray, scene: Scene) -> np.nd
     return scene.warmup + times
 
 
-_ground = lru_cache(maxsize=8)(build_ground)  # replicas of one chamber share it
+_obstacle_set = lru_cache(maxsize=8)(build_obstacle_set)  # replicas of one chamber share it
 
 
 class _Run:
@@ -123,25 +127,25 @@ class _Run:
         if scene.physics.restitution is not None:
             self.restitution = checked_restitution(scene.physics.restitution, tags)
         self.centre = scene.mesh.middle
-        self.window = whole_periods(vibrations, WINDOW)
-        tags_waving, swings = (
-            tuple(one.tag for one in vibrations),
-            tuple(float(one.amplitude) for one in vibrations),
-        )
-        vibrating = scene.mesh.corners[np.isin(scene.mesh.tags, tags_waving)] - self.centre
+        self.window = whole_period_window(vibrations, WINDOW)
+        tags_vibrating = tuple(one.tag for one in vibrations)
+        amplitudes = tuple(float(one.amplitude) for one in vibrations)
+        vibrating = scene.mesh.corners[np.isin(scene.mesh.tags, tags_vibrating)] - self.centre
         random_phase = checked_random_phase(scene.physics.random_phase, len(vibrations))
-        self.phases: Phases | None = new_phases(
+        self.random_phase: RandomPhaseState | None = new_random_phase_state(
             random_phase, self.wave, vibrating, 0.5 * scene.balls.diameters
         )
-        self.turning: Turning | None = checked_turn(scene.physics.part_rotation, self.centre)
-        radii = tuple(float(r) for r in 0.5 * scene.balls.sizes)
-        self.ground = _ground(
-            scene.mesh, radii, tags_waving, swings, checked_axle(scene.physics.part_rotation)
+        self.rotation: RotationState | None = new_rotation_state(
+            scene.physics.part_rotation, self.centre
         )
-        self.waves: Waves | None = new_waves(
+        radii = tuple(float(r) for r in 0.5 * scene.balls.sizes)
+        self.obstacles = _obstacle_set(
+            scene.mesh, radii, tags_vibrating, amplitudes, checked_axis(scene.physics.part_rotation)
+        )
+        self.waves: SonotrodeWaves | None = new_waves(
             vibrations, waves, self.window, self._tags_of_obstacles()
         )
-        self.sizes: Sizes | None = new_sizes(scene.balls, self.ground.roots)
+        self.sizes: BallSizes | None = new_ball_sizes(scene.balls, self.obstacles.roots)
         self.collide = scene.physics.ball_collisions is not None
         self.motion = np.concatenate(
             [scene.balls.positions - self.centre, scene.balls.velocities], axis=1
@@ -157,7 +161,9 @@ class _Run:
             self.friction_state,
         )
         drag = checked_drag(scene.physics.drag)
-        self.air: Air | None = new_air(drag, scene.balls.diameters, scene.balls.densities)
+        self.drag: DragState | None = new_drag_state(
+            drag, scene.balls.diameters, scene.balls.densities
+        )
         self.neighbours = self._new_filter(
             2.0 * max(1.0, float(np.abs(scene.balls.velocities).max()))
         )
@@ -176,7 +182,7 @@ class _Run:
         )
 
     def _tags_of_obstacles(self) -> np.ndarray:
-        return np.asarray(self.ground.tags[self.ground.tree.triangles[:, 0]])
+        return np.asarray(self.obstacles.tags[self.obstacles.tree.triangles[:, 0]])
 
     def _new_filter(self, fastest: float) -> NeighbourFilter | None:
         if not self.collide:
@@ -221,21 +227,21 @@ class _Run:
                 SimulationState(
                     self.motion,
                     self.neighbours,
-                    self.ground,
+                    self.obstacles,
                     self.queue,
                     self.scratch,
                     self.gravity,
                     self.restitution,
                     self.wave,
-                    self.turning,
+                    self.rotation,
                     clock,
                     buffer,
                     self.count,
                     self.profiler,
                     self.contact,
                     self.friction_state,
-                    self.phases,
-                    self.air,
+                    self.random_phase,
+                    self.drag,
                     self.sizes,
                     self.waves,
                 )
@@ -258,7 +264,7 @@ class _Run:
         positions = self._states()[0]
         where = np.round(positions[ball], 6).tolist()
         between, by_part = touching(self.scene, self._corners(), positions, ball)
-        if self.turning is not None and (by_part or self.contact is not None):
+        if self.rotation is not None and (by_part or self.contact is not None):
             through = "" if by_part else ", and the turning part presses on it through other balls"
             return (
                 f"ball {ball} is caught between {between}{through}, at {where} m, {self._when()}; make room there for "
@@ -294,7 +300,7 @@ class _Run:
         )
         base, velocities = self.motion[:, :3], self.motion[:, 3:]
         velocities_now = velocities + now * acceleration
-        catch_all_up(self.air, self.contact, velocities_now, now)
+        apply_drag_to_all(self.drag, self.contact, velocities_now, now)
         return (
             base + velocities * now + 0.5 * now * now * acceleration + self.centre,
             velocities_now,
@@ -340,9 +346,9 @@ class _Run:
         """The triangles where they are now, if some of them turn."""
         turn = self.scene.physics.part_rotation
         mesh = self.scene.mesh
-        if turn is None or self.turning is None or isinstance(mesh, AnalyticCavity):
+        if turn is None or self.rotation is None or isinstance(mesh, AnalyticCavity):
             return None
-        return posed(mesh, turn, angle_now(self.turning, float(self.now[0])))
+        return turned_corners(mesh, turn, angle_at(self.rotation, float(self.now[0])))
 
     def balls(self) -> Balls:
         """The balls as they are now."""

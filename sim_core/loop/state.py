@@ -6,16 +6,16 @@ import numpy as np
 
 from sim_core.detect.ball_mesh import Scratch
 from sim_core.effects.contact_mode import ContactState
-from sim_core.effects.drag import Air
+from sim_core.effects.drag import DragState
 from sim_core.effects.friction import FrictionState
 from sim_core.effects.gravity import Gravity
-from sim_core.effects.part_rotation import Turning
-from sim_core.effects.random_phase import Phases
+from sim_core.effects.part_rotation import RotationState
+from sim_core.effects.random_phase import RandomPhaseState
 from sim_core.effects.restitution import Restitution
-from sim_core.effects.sonotrodes import Waves
+from sim_core.effects.sonotrodes import SonotrodeWaves
 from sim_core.effects.vibration import Wave
-from sim_core.geometry.ball_sizes import Sizes
-from sim_core.geometry.obstacle_set import Ground
+from sim_core.geometry.ball_sizes import BallSizes
+from sim_core.geometry.obstacle_set import ObstacleSet
 from sim_core.loop.event_queue import EventQueue
 from sim_core.loop.impact_log import ImpactBuffer
 from sim_core.loop.neighbours import NeighbourFilter
@@ -48,20 +48,20 @@ class SimulationState(NamedTuple):
 
     motion: np.ndarray
     neighbours: NeighbourFilter | None
-    ground: Ground
+    obstacles: ObstacleSet
     queue: EventQueue
     scratch: Scratch
     gravity: Gravity | None
     restitution: Restitution | None
     wave: Wave | None
-    turning: Turning | None
+    rotation: RotationState | None
     clock: Clock
     buffer: ImpactBuffer
     tally: np.ndarray
     profiler: Profiler | None
     contact: ContactState | None
     friction_state: FrictionState | None
-    phases: Phases | None
-    air: Air | None
-    sizes: Sizes | None
-    waves: Waves | None
+    random_phase: RandomPhaseState | None
+    drag: DragState | None
+    sizes: BallSizes | None
+    waves: SonotrodeWaves | None

@@ -1,8 +1,8 @@
-"""The one way this package compiles: numba, cached on disk, never stale.
+"""The only compiler of this package: numba, with a cache on disk that is never stale.
 
-numba's own cache notices an edit only in the file of the cached function. A helper changed in another file would go
-on giving the old answer, so the cache lives in a folder named by a digest of every source file of the package: any
-edit, anywhere, starts a fresh one.
+numba's own cache notices an edit only in the file of the cached function: if a helper in another
+file changed, the old machine code would run on. The cache therefore lives in a folder named by a
+digest of every source file of the package, so that any edit starts a fresh one.
 """
 
 import hashlib
@@ -16,14 +16,15 @@ from typing import Any
 
 import numba
 
-_settings: Any = numba.config  # both are untyped, or typed without what is used here
+# Both are untyped, or typed without the attributes used here.
+_settings: Any = numba.config
 _njit: Any = numba.njit
 
-KEPT_DIGESTS = 4  # older folders are removed: each holds a few MB that nothing will read again
+MAX_CACHES = 4  # older folders are removed: each holds a few MB that nothing reads any more
 
 
 def _cache_root() -> Path:
-    """Where compiled code is kept: NUMBA_CACHE_DIR if the user set one, else the user's cache folder."""
+    """Folder for compiled code: NUMBA_CACHE_DIR if set, else the user's cache folder."""
     chosen = os.environ.get("NUMBA_CACHE_DIR")
     if chosen:
         return Path(chosen)
@@ -39,6 +40,7 @@ def _cache_root() -> Path:
 
 
 def _sources_digest() -> str:
+    """Digest of numba's version and of the path and text of every source file."""
     digest = hashlib.sha256(numba.__version__.encode())
     package = Path(__file__).parents[1]
     for source in sorted(package.rglob("*.py")):
@@ -51,16 +53,16 @@ CACHE_FOLDER = _cache_root() / f"sim_core-{_sources_digest()}"
 
 
 def _remove_old_caches() -> None:
-    """Keep the newest few folders; a folder in use by another process is simply made again there."""
+    """Remove all but the newest few folders; a process that still uses one makes it again."""
     folders = sorted(
         CACHE_FOLDER.parent.glob("sim_core-*"), key=lambda f: f.stat().st_mtime, reverse=True
     )
-    for folder in folders[KEPT_DIGESTS:]:
+    for folder in folders[MAX_CACHES:]:
         shutil.rmtree(folder, ignore_errors=True)
 
 
 def _cache_is_usable() -> bool:
-    """True when the folder can be written; where it cannot, every process compiles for itself."""
+    """True when the folder can be written; otherwise every process compiles for itself."""
     try:
         if not CACHE_FOLDER.exists():
             CACHE_FOLDER.mkdir(parents=True, exist_ok=True)
@@ -74,35 +76,30 @@ _CACHED = _cache_is_usable() and not _settings.DISABLE_JIT
 
 
 def _compiled(function: Callable[..., Any], inline: bool) -> Callable[..., Any]:
+    # numba reads the folder when the decorator runs; other packages keep theirs
     before = _settings.CACHE_DIR
-    _settings.CACHE_DIR = str(
-        CACHE_FOLDER
-    )  # read when the decorator runs; other packages keep theirs
+    _settings.CACHE_DIR = str(CACHE_FOLDER)
     try:
-        return _njit(
-            cache=_CACHED,
-            nogil=True,
-            error_model="numpy",
-            fastmath=False,
-            _nrt=False,
-            forceinline=inline,
-        )(function)
+        options = {"nogil": True, "error_model": "numpy", "fastmath": False, "_nrt": False}
+        return _njit(cache=_CACHED, forceinline=inline, **options)(function)
     finally:
         _settings.CACHE_DIR = before
 
 
 def jit(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile for nopython mode: no fastmath (bits are promised), GIL released, cached by source digest.
+    """Compile a function in nopython mode, cached by the digest of the sources.
 
-    ``_nrt=False``: compiled code may not make arrays, and in return does not count references to them. Counting is
-    atomic and took half of the event loop's time. Everything the loop works on is made before it starts.
+    fastmath is off, because results are promised bit for bit; the GIL is released. ``_nrt=False``:
+    compiled code cannot make arrays, and in return does not count references to them. Counting is
+    atomic and took half of the event loop's time. All arrays of the loop are made before it starts.
     """
     return _compiled(function, inline=False)
 
 
 def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The same, for a step of the event loop that is called at one place: it becomes part of its caller.
+    """Compile a step of the event loop that has one call site, as a part of its caller.
 
-    A call hands over every array as seven words and more, a hundred for a step; that took a fifth of the loop's time.
+    A call passes every array as seven words or more, a hundred for a step; that took a fifth of
+    the loop's time.
     """
     return _compiled(function, inline=True)

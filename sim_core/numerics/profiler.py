@@ -1,4 +1,4 @@
-"""Where the event loop's time goes, part by part; absent from the machine code unless it is asked for."""
+"""Time spent in each part of the event loop; not in the machine code unless it is requested."""
 
 from typing import NamedTuple
 
@@ -7,26 +7,30 @@ import numpy as np
 from sim_core.numerics.jit import inlined
 from sim_core.numerics.simd import ticks
 
-# parts of the loop
 NEXT, RESOLVE, PAIRS, WALLS, SCHEDULE = 0, 1, 2, 3, 4
-PARTS = ("next event", "resolve", "pairs", "walls", "calendar")
+PARTS = ("next event", "resolve", "pairs", "walls", "event queue")
 
 
 class Profiler(NamedTuple):
-    """``spent`` (parts,) int64: ticks of the processor's clock in each part; ``last`` (1,): when the last one ended."""
+    """Clock readings [ticks of the processor].
+
+    Args:
+        spent: time in each of PARTS, shape (parts,) int64.
+        last: when the last part ended, shape (1,) int64.
+    """
 
     spent: np.ndarray
     last: np.ndarray
 
 
 def new_profiler() -> Profiler:
-    """A profiler that has measured nothing."""
+    """A profiler with nothing recorded."""
     return Profiler(np.zeros(len(PARTS), dtype=np.int64), np.zeros(1, dtype=np.int64))
 
 
 @inlined
 def add_time(profiler: Profiler | None, part: int) -> None:
-    """What has passed since the last lap was spent in this part; a negative part only starts the clock."""
+    """Book the time since the last call on this part; a negative part only starts the clock."""
     if profiler is None:
         return
     now = ticks()

@@ -1,7 +1,17 @@
 """When a gap closes: the first time a function of time is at or below zero *and* falling.
 
-A gap that opens again is never a hit, whatever rounding did to its sign: an overlapping pair that approaches
-collides now, one that separates does not (Bannerman, Strobl, Formella & Pöschel, Comp. Part. Mech. 1 (2014) 191).
+A gap that opens again is never a contact, whatever rounding did to its sign: an overlapping pair
+that approaches collides now, one that separates does not (Bannerman, Strobl, Formella & Pöschel,
+Comp. Part. Mech. 1 (2014) 191).
+
+Notation:
+    s: time from now [s]
+    a, b, c: coefficients of a quadratic gap c + b s + a s² [m/s², m/s, m]
+    A, omega, theta: amplitude [m], angular frequency [rad/s] and phase now [rad] of the vibrating
+        face, whose gap is c + b s + a s² - A sin(omega s + theta); ``WaveGap`` in the code
+    rate, curvature: first and second derivative of the gap
+    depth: an overlap deeper than this is no overlap but the far side of a one-sided surface, which
+        can only be met after coming out in front of it [m]
 """
 
 import math
@@ -13,19 +23,15 @@ from sim_core.numerics.jit import jit
 
 NEVER = math.inf
 
-# Newton stops here [m]: a gap of this size is contact. Rounding of a 0.1 m coordinate is 1e-17 m; a looser
-# value would hit early, a tighter one would spend steps on noise.
+# Newton stops at a gap of this size [m], which is contact. Rounding of a 0.1 m coordinate is
+# 1e-17 m; a larger value makes contacts early, a smaller one spends steps on rounding.
 GAP_TOLERANCE = 1e-15
-NEWTON_STEPS = 60  # quadratic convergence needs about 6; a double root halves the error a step: 50
+NEWTON_STEPS = 60  # quadratic convergence needs 6; a double root halves the error a step, so 50
 
 
 @jit
 def first_approach(c: float, b: float, a: float, depth: float) -> float:
-    """Smallest s >= 0 with gap c + b s + a s² <= 0 and falling; NEVER if there is none.
-
-    ``depth`` [unit of c]: an overlap deeper than this is no overlap but the far side of a one-sided surface, which
-    can only be met after coming out in front of it.
-    """
+    """Smallest s >= 0 at which c + b s + a s² is at most 0 and falls; NEVER if there is none."""
     if c <= 0.0 and c > -depth and (b < 0.0 or (b == 0.0 and a < 0.0)):
         return 0.0
     if a >= 0.0 and (b >= 0.0 or c <= 0.0):
@@ -35,44 +41,47 @@ def first_approach(c: float, b: float, a: float, depth: float) -> float:
         if disc <= 0.0:  # a tangent touch does not approach
             return NEVER
         if b < 0.0:
-            return 2.0 * c / (np.sqrt(disc) - b)  # for either sign of a, and without cancellation
+            return 2.0 * c / (np.sqrt(disc) - b)  # holds for either sign of a, no cancellation
         return -(b + np.sqrt(disc)) / (2.0 * a)
     if b <= 0.0:
         return NEVER
-    if disc > 0.0:  # overlapping and receding: out, up, and back down
+    if disc > 0.0:  # overlapping and receding: the gap opens, and closes again later
         return -(b + np.sqrt(disc)) / (2.0 * a)
-    return -b / (2.0 * a) if c > -depth else NEVER  # turns back while still overlapping
+    return -b / (2.0 * a) if c > -depth else NEVER  # turns while it still overlaps
 
 
 class WaveGap(NamedTuple):
-    """Gap of a ballistic ball above a vibrating face: c + b s + a s² - swing sin(omega s + theta) [m], swing >= 0."""
+    """Gap [m] between a ball in flight and a vibrating face; see the notation above."""
 
     c: float
     b: float
     a: float
-    swing: float
+    amplitude: float
     omega: float
     theta: float
 
 
 @jit
 def _gap(w: WaveGap, s: float) -> float:
-    return w.c + s * (w.b + w.a * s) - w.swing * math.sin(w.omega * s + w.theta)
+    return w.c + s * (w.b + w.a * s) - w.amplitude * math.sin(w.omega * s + w.theta)
 
 
 @jit
 def _rate(w: WaveGap, s: float) -> float:
-    return w.b + 2.0 * w.a * s - w.swing * w.omega * math.cos(w.omega * s + w.theta)
+    return w.b + 2.0 * w.a * s - w.amplitude * w.omega * math.cos(w.omega * s + w.theta)
 
 
 @jit
 def _curvature(w: WaveGap, s: float) -> float:
-    return 2.0 * w.a + w.swing * w.omega * w.omega * math.sin(w.omega * s + w.theta)
+    return 2.0 * w.a + w.amplitude * w.omega * w.omega * math.sin(w.omega * s + w.theta)
 
 
 @jit
 def _convex_approach(w: WaveGap, start: float, end: float) -> float:
-    """First approach in [start, end], where the gap is convex: Newton from the left never oversteps."""
+    """First approach in [start, end], where the gap is convex.
+
+    Newton started from the left never oversteps a root of a convex function.
+    """
     s = start
     for _ in range(NEWTON_STEPS):
         gap = _gap(w, s)
@@ -91,8 +100,8 @@ def _convex_approach(w: WaveGap, start: float, end: float) -> float:
 
 
 @jit
-def _crest(w: WaveGap, start: float, end: float) -> float:
-    """Where a concave gap is largest in [start, end]: safeguarded Newton on its rate."""
+def _time_of_largest_gap(w: WaveGap, start: float, end: float) -> float:
+    """Time in [start, end] at which a concave gap is largest: safeguarded Newton on its rate."""
     low = start
     high = end
     s = 0.5 * (low + high)
@@ -114,17 +123,17 @@ def _crest(w: WaveGap, start: float, end: float) -> float:
 
 @jit
 def _concave_approach(w: WaveGap, start: float, end: float) -> float:
-    """First approach in [start, end], where the gap is concave: Newton from the right, where it is negative."""
+    """First approach in [start, end], where the gap is concave: Newton from the right end."""
     gap = _gap(w, start)
     rate = _rate(w, start)
     if gap <= 0.0 and rate < 0.0:
         return start
     if _gap(w, end) > 0.0:
         return NEVER
-    if gap <= 0.0:  # overlapping by rounding, and receding
+    if gap <= 0.0:  # overlaps by rounding, and recedes
         if _rate(w, end) >= 0.0:
             return NEVER
-        top = _crest(w, start, end)
+        top = _time_of_largest_gap(w, start, end)
         if _gap(w, top) <= 0.0:
             return top
     s = end
@@ -141,48 +150,48 @@ def _concave_approach(w: WaveGap, start: float, end: float) -> float:
 
 
 @jit
-def _reaches_envelope(w: WaveGap, depth: float) -> float:
-    """A time [s] before which there is no approach: when the ball comes to the swing's envelope, or comes back to it.
+def _time_to_band(w: WaveGap, depth: float) -> float:
+    """A time before which there is no approach: when the ball reaches the band the face moves in.
 
-    Inside the envelope that is now, unless the ball is faster than the face ever moves all the way out: its speed is
-    least now or on leaving. Behind the face, ``depth`` [m] below its swing, it must come out over the crests.
+    Inside the band that is now, unless the ball leaves it faster than the face ever moves: its
+    speed is least now or on leaving. A ball more than ``depth`` behind the band must first come
+    out over the highest position of the face.
     """
-    height = w.c - w.swing
-    if height > 0.0 or w.c <= -w.swing - depth:
+    height = w.c - w.amplitude
+    if height > 0.0 or w.c <= -w.amplitude - depth:
         return first_approach(height, w.b, w.a, 0.0)
     disc = w.b * w.b - 4.0 * w.a * height
-    if w.b <= 0.0 or min(w.b * w.b, disc) <= w.swing * w.swing * w.omega * w.omega:
+    if w.b <= 0.0 or min(w.b * w.b, disc) <= w.amplitude * w.amplitude * w.omega * w.omega:
         return 0.0
     return -(w.b + math.sqrt(disc)) / (2.0 * w.a) if w.a < 0.0 else NEVER
 
 
 @jit
 def first_wave_approach(w: WaveGap, limit: float, depth: float) -> float:
-    """First s in [0, limit] at which the ball meets the vibrating face, approaching it; NEVER if none.
+    """First s in [0, limit] at which the ball meets the vibrating face and approaches it, or NEVER.
 
-    The ball is carried to the swing's envelope first; inside it the gap is split where its curvature changes sign,
-    sin(angle) = -2a / (swing omega²), so that each piece has at most one approach and Newton started from the safe
-    side cannot miss it nor come early. ``depth`` as in first_approach.
+    The search starts where the ball reaches the band the face moves in. Inside it the gap is split
+    where its curvature changes sign, sin(angle) = -2a / (A omega²). Each piece then has at most one
+    approach, and Newton started from the safe side can neither miss it nor come early.
     """
-    s = _reaches_envelope(w, depth)
+    s = _time_to_band(w, depth)
     if s >= limit:
         return NEVER
-    strength = w.swing * w.omega * w.omega
-    if abs(2.0 * w.a) >= strength:  # too gentle to bend the gap the other way: one piece
+    strength = w.amplitude * w.omega * w.omega
+    if abs(2.0 * w.a) >= strength:  # the curvature never changes sign: one piece
         if w.a <= 0.0:
             return _concave_approach(w, s, limit)
         return _convex_approach(w, s, limit)
     alpha = math.asin(-2.0 * w.a / strength)
     while s < limit:
-        height = w.c + s * (w.b + w.a * s) - w.swing
+        height = w.c + s * (w.b + w.a * s) - w.amplitude
         if height > 0.0:
             s += first_approach(height, w.b + 2.0 * w.a * s, w.a, 0.0)
             if s >= limit:
                 return NEVER
         angle = w.omega * s + w.theta
-        half = float(
-            math.floor((angle - alpha) / math.pi)
-        )  # pieces begin at half π ± alpha; even ones are convex
+        # pieces begin at half π ± alpha; even ones are convex
+        half = float(math.floor((angle - alpha) / math.pi))
         while _piece_start(half + 1.0, alpha) <= angle:
             half += 1.0
         while _piece_start(half, alpha) > angle:
@@ -192,7 +201,7 @@ def first_wave_approach(w: WaveGap, limit: float, depth: float) -> float:
         hit = _convex_approach(w, s, end) if half % 2.0 == 0.0 else _concave_approach(w, s, end)
         if hit < NEVER:
             return hit
-        if next_piece <= s:  # rounding at a piece's very end
+        if next_piece <= s:  # rounding at the end of a piece
             next_piece = s + 1e-9 / w.omega
         s = next_piece
     return NEVER
@@ -200,25 +209,23 @@ def first_wave_approach(w: WaveGap, limit: float, depth: float) -> float:
 
 @jit
 def next_wave_approach(w: WaveGap, s: float, limit: float, depth: float) -> float:
-    """First approach within ``limit`` [s] after the one at s, as if the ball had passed through the face there."""
-    out = s + first_wave_approach(
-        _later(WaveGap(-w.c, -w.b, -w.a, w.swing, w.omega, w.theta + math.pi), s),
-        limit - s,
-        math.inf,
-    )
+    """First approach before ``limit`` after the one at s, if the ball passes through the face."""
+    # seen from behind the face, the ball comes out where the gap with its sign changed closes
+    behind = WaveGap(-w.c, -w.b, -w.a, w.amplitude, w.omega, w.theta + math.pi)
+    out = s + first_wave_approach(_shifted(behind, s), limit - s, math.inf)
     if out >= limit:
         return NEVER
-    return out + first_wave_approach(_later(w, out), limit - out, depth)
+    return out + first_wave_approach(_shifted(w, out), limit - out, depth)
 
 
 @jit
-def _later(w: WaveGap, s: float) -> WaveGap:
-    return WaveGap(
-        w.c + s * (w.b + w.a * s), w.b + 2.0 * w.a * s, w.a, w.swing, w.omega, w.theta + w.omega * s
-    )
+def _shifted(w: WaveGap, s: float) -> WaveGap:
+    """The same gap with its time counted from s on."""
+    height, rate = w.c + s * (w.b + w.a * s), w.b + 2.0 * w.a * s
+    return WaveGap(height, rate, w.a, w.amplitude, w.omega, w.theta + w.omega * s)
 
 
 @jit
 def _piece_start(half: float, alpha: float) -> float:
-    """Wave angle at which half-cycle piece number ``half`` begins."""
+    """Angle omega s + theta [rad] at which piece number ``half`` begins."""
     return half * math.pi + (alpha if half % 2.0 == 0.0 else -alpha)

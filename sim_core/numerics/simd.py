@@ -1,7 +1,7 @@
-"""Eight comparisons in one instruction: conservative float32 filters in front of the exact float64 tests.
+"""Eight comparisons in one instruction: float32 filters in front of the exact float64 tests.
 
-A filter may let through too much, never too little, so results do not depend on it, bit for bit. Each has a plain
-numpy twin that stands in when numba's JIT is off.
+A filter may let through too much but never too little, so that results do not depend on it, bit for
+bit. Each has a numpy version that replaces it when numba's JIT is off.
 """
 
 import time
@@ -14,15 +14,15 @@ from numba.core import cgutils, types
 from numba.extending import intrinsic
 
 BOXES = 8  # children of a tree node
-WIDTH = 8  # numbers in one instruction; sixteen (512 bits) ran a quarter slower: the processor lowers its clock
-LANES = 2 * WIDTH  # balls looked at before one branch on what was found
+WIDTH = 8  # numbers in one instruction; 16 ran a quarter slower, as the processor lowers its clock
+LANES = 2 * WIDTH  # balls compared before one branch on the result
 
 _F32 = ir.FloatType()
 _I32 = ir.IntType(32)
 
 
 class _Vectors:
-    """Few-line builder of n-wide float32 code."""
+    """Builder of float32 code that works on ``width`` numbers at once."""
 
     def __init__(self, builder: Any, width: int) -> None:
         self.builder = builder
@@ -41,6 +41,7 @@ class _Vectors:
         return self.builder.load(address, align=4)
 
     def store(self, vector: Any, data: Any, index: Any) -> None:
+        """``width`` consecutive numbers to data[index]."""
         address = self.builder.bitcast(self.builder.gep(data, [index]), self.type.as_pointer())
         self.builder.store(vector, address, align=4)
 
@@ -51,7 +52,7 @@ class _Vectors:
         return self.builder.select(self.builder.fcmp_ordered(">", a, b), a, b)
 
     def fused(self, a: Any, b: Any, c: Any) -> Any:
-        """a b + c in one rounding: a filter may round as it likes."""
+        """a b + c with one rounding, which is allowed in a filter."""
         kind = ir.FunctionType(self.type, [self.type] * 3)
         function = cgutils.get_or_insert_function(
             self.builder.module, kind, f"llvm.fma.v{self.width}f32"
@@ -107,7 +108,7 @@ def _boxes_hit(
     return signature, codegen
 
 
-def _boxes_hit_twin(bounds: Any, node: int, ray: Any, longest: Any, enter: Any) -> int:
+def _boxes_hit_numpy(bounds: Any, node: int, ray: Any, longest: Any, enter: Any) -> int:
     box = bounds[node]
     with np.errstate(over="ignore", invalid="ignore"):
         one = (box[0:3] - ray[0:3, None]) * ray[6:9, None]
@@ -152,7 +153,7 @@ def _balls_near(typing_context: Any, lanes: Any, first: Any, probe: Any) -> Any:
                 closing = v.sum(closing, apart, relative)
                 speed = v.sum(speed, relative, relative)
             miss = v.fused(square, number(7), number(8))
-            # or equal: a touching pair may have one velocity in float32
+            # equality counts: a touching pair may have the same velocity in float32
             may_meet = builder.fcmp_ordered(
                 ">=", builder.fmul(closing, closing), builder.fmul(speed, miss)
             )
@@ -168,7 +169,7 @@ def _balls_near(typing_context: Any, lanes: Any, first: Any, probe: Any) -> Any:
     return signature, codegen
 
 
-def _balls_near_twin(lanes: Any, first: int, probe: Any) -> int:
+def _balls_near_numpy(lanes: Any, first: int, probe: Any) -> int:
     block = lanes[:, first : first + LANES]
     with np.errstate(over="ignore", invalid="ignore"):
         apart = block[0:3] - probe[0:3, None]
@@ -192,7 +193,7 @@ def _lowest_bit(typing_context: Any, bits: Any) -> Any:
     return signature, codegen
 
 
-def _lowest_bit_twin(bits: int) -> int:
+def _lowest_bit_numpy(bits: int) -> int:
     return (int(bits) & -int(bits)).bit_length() - 1
 
 
@@ -212,10 +213,13 @@ def _ticks(typing_context: Any) -> Any:
 _settings: Any = numba.config
 _plain = _settings.DISABLE_JIT
 
-# boxes_hit(bounds (nodes, 6, 8) f32, node, ray (9,) f32, longest f32, enter (8,) f32 out) -> bit mask
-boxes_hit: Any = _boxes_hit_twin if _plain else _boxes_hit
-# balls_near(lanes (6, n) f32, first lane, probe (10,) f32) -> bit mask of LANES balls
-balls_near: Any = _balls_near_twin if _plain else _balls_near
-lowest_bit: Any = _lowest_bit_twin if _plain else _lowest_bit
+# boxes_hit(bounds, node, ray, longest, enter) -> bit mask of the children that a flight enters
+#   bounds: boxes of the tree, shape (nodes, 6, 8) float32; ray: see detect/ball_mesh.py, shape (9,)
+#   longest: end of the flight [s] float32; enter: entry times [s], shape (8,) float32, written
+boxes_hit: Any = _boxes_hit_numpy if _plain else _boxes_hit
+# balls_near(lanes, first, probe) -> bit mask of the LANES balls that may meet the probe
+#   lanes: positions and velocities, shape (6, n) float32; first: lane; probe: shape (10,) float32
+balls_near: Any = _balls_near_numpy if _plain else _balls_near
+lowest_bit: Any = _lowest_bit_numpy if _plain else _lowest_bit
 # ticks() -> the processor's clock, in its own unit
 ticks: Any = time.perf_counter_ns if _plain else _ticks

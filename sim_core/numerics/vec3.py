@@ -1,4 +1,4 @@
-"""3-vectors as NamedTuples: registers in compiled code, where a numpy row would be an allocation."""
+"""3-vectors as NamedTuples: registers in compiled code, where a numpy row would be allocated."""
 
 from typing import NamedTuple
 
@@ -6,11 +6,19 @@ from sim_core.numerics.jit import jit
 
 
 class Vec3(NamedTuple):
-    """A vector (x, y, z); metres, metres per second or dimensionless as its name says."""
+    """A vector (x, y, z). Its unit, if any, is given where it is used."""
 
     x: float
     y: float
     z: float
+
+
+class Flight(NamedTuple):
+    """A ball's centre on its parabola: position [m], velocity [m/s] and acceleration [m/s²] now."""
+
+    position: Vec3
+    velocity: Vec3
+    acceleration: Vec3
 
 
 @jit
@@ -20,13 +28,13 @@ def sub(a: Vec3, b: Vec3) -> Vec3:
 
 
 @jit
-def along(a: Vec3, s: float, b: Vec3) -> Vec3:
+def add_scaled(a: Vec3, s: float, b: Vec3) -> Vec3:
     """a + s b."""
     return Vec3(a.x + s * b.x, a.y + s * b.y, a.z + s * b.z)
 
 
 @jit
-def times(s: float, a: Vec3) -> Vec3:
+def scaled(s: float, a: Vec3) -> Vec3:
     """s a."""
     return Vec3(s * a.x, s * a.y, s * a.z)
 
@@ -41,3 +49,22 @@ def cross(a: Vec3, b: Vec3) -> Vec3:
 def dot(a: Vec3, b: Vec3) -> float:
     """Scalar product."""
     return a.x * b.x + a.y * b.y + a.z * b.z
+
+
+@jit
+def position_after(flight: Flight, delay: float) -> Vec3:
+    """Position [m] after ``delay`` [s]."""
+    moved = add_scaled(flight.position, delay, flight.velocity)
+    return add_scaled(moved, 0.5 * delay * delay, flight.acceleration)
+
+
+@jit
+def velocity_after(flight: Flight, delay: float) -> Vec3:
+    """Velocity [m/s] after ``delay`` [s]."""
+    return add_scaled(flight.velocity, delay, flight.acceleration)
+
+
+@jit
+def flight_after(flight: Flight, delay: float) -> Flight:
+    """The same flight ``delay`` [s] later."""
+    return Flight(position_after(flight, delay), velocity_after(flight, delay), flight.acceleration)

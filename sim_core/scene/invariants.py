@@ -14,10 +14,10 @@ from sim_core.balls import Balls
 from sim_core.effects.gravity import Gravity
 from sim_core.effects.part_rotation import (
     PartRotation,
-    angle_now,
-    checked_axle,
-    checked_turn,
-    turned,
+    angle_at,
+    checked_axis,
+    new_rotation_state,
+    rotate_points,
 )
 from sim_core.geometry.mesh import TriangleMesh
 from sim_core.numerics.jit import jit
@@ -138,18 +138,22 @@ def _solid_angles(corners: np.ndarray, points: np.ndarray, angle: np.ndarray) ->
             angle[i] += 2.0 * math.atan2(dot(a, cross(b, c)), below)
 
 
-def posed(mesh: TriangleMesh, turn: PartRotation, angle: float | None = None) -> np.ndarray:
+def turned_corners(
+    mesh: TriangleMesh, turn: PartRotation, angle: float | None = None
+) -> np.ndarray:
     """Corners (m, 3, 3) [m] of the mesh's triangles, those of the part turned by ``angle`` [rad]: at the start, if
     none is given.
     """
-    turning = checked_turn(turn, mesh.middle)
-    assert turning is not None
-    angle = angle_now(turning, 0.0) if angle is None else angle
-    axle = checked_axle(turn)
-    assert axle is not None
+    rotation = new_rotation_state(turn, mesh.middle)
+    assert rotation is not None
+    angle = angle_at(rotation, 0.0) if angle is None else angle
+    rotation_axis = checked_axis(turn)
+    assert rotation_axis is not None
     corners = mesh.corners.copy()
-    own = mesh.tags == axle.tag
-    corners[own] = turned(corners[own], np.array(axle.point), np.array(axle.axis), angle)
+    own = mesh.tags == rotation_axis.tag
+    corners[own] = rotate_points(
+        corners[own], np.array(rotation_axis.point), np.array(rotation_axis.axis), angle
+    )
     return corners
 
 

@@ -19,7 +19,7 @@ OPPOSED = (
 )  # cosine: parallel but for 0.05 mrad; a ball that overlaps by 1 nm would have 40 um to move out
 
 
-class Pinch(NamedTuple):
+class NarrowGap(NamedTuple):
     """``ball`` is in a gap ``narrower`` [m] than itself between the triangles ``one`` and ``two``; ``swings``: so when
     the vibrating surface that has one of them, or those that have both, come nearest to the other.
     """
@@ -31,17 +31,17 @@ class Pinch(NamedTuple):
     swings: bool
 
 
-def find_pinch(
+def find_narrow_gap(
     mesh: TriangleMesh, physics: Physics, balls: Balls, corners: np.ndarray
-) -> Pinch | None:
+) -> NarrowGap | None:
     """The first ball that does not fit where it starts; ``corners`` (m, 3, 3) [m]: the triangles at the start."""
     radius, swing = 0.5 * balls.diameters, _swing(physics)
     asked = (
         clearance(corners, balls.positions, balls.radius) < radius - 0.5 * TIGHT
     )  # two such gaps, or one of more
     for vibration in physics.vibrations:
-        waving = mesh.tags == vibration.tag
-        both = [corners[own] for own in (waving, ~waving) if own.any()]
+        vibrating = mesh.tags == vibration.tag
+        both = [corners[own] for own in (vibrating, ~vibrating) if own.any()]
         near = [
             clearance(some, balls.positions, balls.radius + swing) < radius + swing for some in both
         ]
@@ -49,7 +49,7 @@ def find_pinch(
     for ball in np.flatnonzero(asked):
         found = _tightest(mesh, physics, balls.positions[ball], float(radius[ball]), corners)
         if found is not None:
-            return Pinch(int(ball), *found)
+            return NarrowGap(int(ball), *found)
     return None
 
 
@@ -90,10 +90,10 @@ def _tightest(
     least, moves = gap.copy(), np.full(len(near), -1)  # which of the vibrations has it, if any
     turns = np.zeros(len(near), np.bool_) if turn is None else mesh.tags[near] == turn.tag
     for k, vibration in enumerate(physics.vibrations):
-        waving = mesh.tags[near] == vibration.tag
-        towards = away[waving] @ vibration.peak
-        least[waving] -= np.abs(towards) - np.sin(vibration.phase) * towards
-        moves[waving] = k
+        vibrating = mesh.tags[near] == vibration.tag
+        towards = away[vibrating] @ vibration.peak
+        least[vibrating] -= np.abs(towards) - np.sin(vibration.phase) * towards
+        moves[vibrating] = k
     swings = (moves[:, None] != moves) & ~turns[:, None] & ~turns
     room = np.where(swings, least[:, None] + least, gap[:, None] + gap)
     room[away @ away.T > OPPOSED] = np.inf

@@ -10,7 +10,7 @@ from sim_core.effects.part_rotation import PartRotation
 from sim_core.errors import SceneError
 from sim_core.geometry.analytic import AnalyticCavity
 from sim_core.geometry.mesh import TriangleMesh
-from sim_core.scene.invariants import clearance, contained, enclosed, posed
+from sim_core.scene.invariants import clearance, contained, enclosed, turned_corners
 
 BATCH = 256  # positions tried at once
 TRIES = 40  # batches without a free place before the layer is made higher (or the shot is refused)
@@ -59,7 +59,7 @@ def _free_of(
     """Those of points (n, 3) [m] that are inside and so far [m] from every surface, as a function of the two."""
     if isinstance(mesh, AnalyticCavity):
         return lambda points, reach: points[(mesh.gaps(points) >= reach).all(axis=1)]
-    corners = mesh.corners if part_rotation is None else posed(mesh, part_rotation)
+    corners = mesh.corners if part_rotation is None else turned_corners(mesh, part_rotation)
 
     def free(points: np.ndarray, reach: float) -> np.ndarray:
         points = points[clearance(corners, points, reach) >= reach]

@@ -1,8 +1,10 @@
-"""Which effects a scene calls for: one optional field an effect; None is absent from memory and machine code."""
+"""Which effects a scene has, one optional field an effect.
+
+An effect that is None is absent from memory and machine code.
+"""
 
 from typing import NamedTuple
 
-from sim_core.effects.ball_collisions import BallCollisions
 from sim_core.effects.contact_mode import Rest
 from sim_core.effects.drag import Drag
 from sim_core.effects.friction import Friction
@@ -13,10 +15,28 @@ from sim_core.effects.restitution import Restitution
 from sim_core.effects.vibration import Vibration
 
 
-class Physics(NamedTuple):
-    """The scene's effects. With none given balls fly straight and collide elastically between still walls;
+class BallCollisions(NamedTuple):
+    """Collisions of balls with one another.
 
-    ``ball_collisions=None`` lets them fly through each other; several sonotrodes are a tuple of Vibrations.
+    Without them a single ball, or shot so thin that its balls hardly ever meet, spends no time on
+    pairs: there is no neighbour filter, and overlaps are not checked. What a collision does is up
+    to the other effects.
+    """
+
+
+class Physics(NamedTuple):
+    """Effects of a scene. With the defaults balls fly straight and collide elastically.
+
+    Args:
+        gravity: uniform.
+        restitution: of surfaces and balls.
+        vibration: of one surface, or of several in a tuple.
+        rest: contact mode.
+        part_rotation: of one part.
+        friction: of surfaces and balls, with spin.
+        random_phase: of the vibration, for each ball.
+        ball_collisions: present unless it is None; balls then fly through each other.
+        drag: of still air.
     """
 
     gravity: Gravity | None = None
@@ -31,7 +51,7 @@ class Physics(NamedTuple):
 
     @property
     def vibrations(self) -> tuple[Vibration, ...]:
-        """Of all surfaces that vibrate."""
+        """The vibrations as a tuple."""
         if self.vibration is None:
             return ()
         return (self.vibration,) if isinstance(self.vibration, Vibration) else self.vibration

@@ -6,23 +6,22 @@ from functools import lru_cache
 import numpy as np
 
 from sim_core.balls import Balls
-from sim_core.effects.ball_collisions import BallCollisions
 from sim_core.effects.contact_mode import Rest, checked_rest
 from sim_core.effects.drag import Drag, checked_drag
 from sim_core.effects.friction import Friction, checked_friction
 from sim_core.effects.gravity import checked_gravity
-from sim_core.effects.part_rotation import PartRotation, checked_axle
+from sim_core.effects.part_rotation import PartRotation, checked_axis
 from sim_core.effects.random_phase import RandomPhase, checked_random_phase
 from sim_core.effects.restitution import Restitution, checked_restitution
 from sim_core.effects.vibration import checked_waves
 from sim_core.errors import SceneError
 from sim_core.geometry.analytic import AnalyticCavity
-from sim_core.geometry.mesh import TriangleMesh, towards_shot
-from sim_core.geometry.turning_part import require_free_axle
+from sim_core.geometry.mesh import TriangleMesh, normals_towards_shot
+from sim_core.geometry.turning_part import require_free_axis
 from sim_core.scene.analytic_scene import require_clear, require_supported
-from sim_core.scene.invariants import clearance, contained, enclosed, narrowest_gap, posed
-from sim_core.scene.narrow_gaps import find_pinch, surface_name, vibrating_name
-from sim_core.scene.physics import Physics
+from sim_core.scene.invariants import clearance, contained, enclosed, narrowest_gap, turned_corners
+from sim_core.scene.narrow_gaps import find_narrow_gap, surface_name, vibrating_name
+from sim_core.scene.physics import BallCollisions, Physics
 
 LONGEST = 1e6  # s: eleven days of peening
 STEP = (
@@ -101,16 +100,16 @@ class Scene:
             )
         checked_drag(self.physics.drag)
         checked_random_phase(self.physics.random_phase, len(vibrations))
-        axle = checked_axle(turn)
+        rotation_axis = checked_axis(turn)
         tags = np.unique(self.mesh.tags).tolist()
-        if turn is not None and axle is not None and isinstance(self.mesh, TriangleMesh):
+        if turn is not None and rotation_axis is not None and isinstance(self.mesh, TriangleMesh):
             if turn.tag not in tags:
                 raise SceneError(f"part_rotation.tag is {turn.tag}, but the mesh has tags {tags}")
             if turn.tag in [one.tag for one in vibrations]:
                 raise SceneError(
                     f"part_rotation.tag and vibration.tag are both {turn.tag}: one surface cannot do both"
                 )
-            require_free_axle(self.mesh, axle, self.balls.radius)
+            require_free_axis(self.mesh, rotation_axis, self.balls.radius)
         for one in vibrations:
             if one.tag not in tags:
                 raise SceneError(f"vibration.tag is {one.tag}, but the mesh has tags {tags}")
@@ -140,7 +139,7 @@ class Scene:
                 "triangle of that body so that normals point away from the shot"
             )
         turn = self.physics.part_rotation
-        corners = None if turn is None else posed(self.mesh, turn)
+        corners = None if turn is None else turned_corners(self.mesh, turn)
         inside = (
             contained(self.mesh, balls.positions)
             if corners is None
@@ -171,10 +170,10 @@ class Scene:
     def _require_room_above_sonotrode(self, corners: np.ndarray) -> None:
         """A vibrating surface is not where the mesh has it: its ``corners`` are displaced by its phase here."""
         for vibration in self.physics.vibrations:
-            waving = self.mesh.tags == vibration.tag
-            corners[waving] += np.sin(vibration.phase) * vibration.peak
+            vibrating = self.mesh.tags == vibration.tag
+            corners[vibrating] += np.sin(vibration.phase) * vibration.peak
             gap = (
-                clearance(corners[waving], self.balls.positions, self.balls.radius)
+                clearance(corners[vibrating], self.balls.positions, self.balls.radius)
                 - 0.5 * self.balls.diameters
             )
             worst = int(gap.argmin())
@@ -187,7 +186,7 @@ class Scene:
 
     def _require_room_between(self, corners: np.ndarray) -> None:
         assert isinstance(self.mesh, TriangleMesh)
-        pinch = find_pinch(self.mesh, self.physics, self.balls, corners)
+        pinch = find_narrow_gap(self.mesh, self.physics, self.balls, corners)
         if pinch is None:
             return
         one, two = (
@@ -205,9 +204,9 @@ def require_free_rotation(mesh: TriangleMesh, turn: PartRotation, diameter: floa
     """Raises SceneError if the part cannot turn in its chamber, with balls of this diameter [m], or its numbers are
     out of range: what a Scene asks, without the balls.
     """
-    axle = checked_axle(turn)
-    assert axle is not None
-    require_free_axle(mesh, axle, 0.5 * diameter)
+    rotation_axis = checked_axis(turn)
+    assert rotation_axis is not None
+    require_free_axis(mesh, rotation_axis, 0.5 * diameter)
 
 
 @lru_cache(maxsize=32)  # replicas of one chamber share the answer
@@ -226,7 +225,7 @@ def _inside_out(mesh: TriangleMesh) -> int:
         (np.ones(len(rows), dtype=np.bool_), (rows, columns)), shape=(len(mesh.vertices),) * 2
     )
     shell = connected_components(links, directed=False)[1][mesh.triangles[:, 0]]
-    normals, doubled = towards_shot(mesh.corners)
+    normals, doubled = normals_towards_shot(mesh.corners)
     order = np.lexsort((-doubled, shell))  # the largest of each shell first
     largest = order[np.unique(shell[order], return_index=True)[1]]
     if len(largest) == 1:

@@ -18,7 +18,7 @@ from sim_core import (
     Restitution,
     Vibration,
 )
-from sim_core.effects.drag import SHORTEST
+from sim_core.effects.drag import MIN_PIECE
 from tests.hard_cases.outcome import CONSTANT
 from tests.helpers.scenes.cavities import FLOOR
 from tests.helpers.scenes.turning_parts import PART
@@ -133,7 +133,7 @@ def physics_of(
         Friction((much.rough[0],) * TAGS, much.rough[1]),
         RandomPhase(seed),
         BallCollisions(),
-        Drag(air, air * speed * diameter / 1e4, max(0.1 * wide / speed, SHORTEST)),
+        Drag(air, air * speed * diameter / 1e4, max(0.1 * wide / speed, MIN_PIECE)),
     )
     return Physics(
         **{name: effect if name in effects else None for name, effect in present._asdict().items()}

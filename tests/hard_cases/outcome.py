@@ -19,7 +19,7 @@ from sim_core import (
     TriangleMesh,
     simulate,
 )
-from sim_core.scene.invariants import clearance, contained, narrowest_gap, posed
+from sim_core.scene.invariants import clearance, contained, narrowest_gap, turned_corners
 from tests.helpers.scenes.fuzzed_chambers import Chamber
 from tests.sim_core.loop.test_containment import REACH, ROUNDING, clearance_at, later
 
@@ -215,7 +215,7 @@ def _in_the_room(mesh: TriangleMesh, physics: Physics) -> np.ndarray:
 
 def corners_now(mesh: TriangleMesh, physics: Physics) -> np.ndarray | None:
     """The triangles (m, 3, 3) [m] where a turning part is now; None if none turns."""
-    return None if physics.part_rotation is None else posed(mesh, physics.part_rotation)
+    return None if physics.part_rotation is None else turned_corners(mesh, physics.part_rotation)
 
 
 def is_still(physics: Physics) -> bool:

@@ -7,24 +7,23 @@ infinite where there is no contact.
 import numpy as np
 
 from sim_core import Gravity
-from sim_core.detect.ball_ball import meeting_delay
+from sim_core.detect.ball_ball import pair_delay
 from sim_core.detect.ball_mesh import Scratch, first_contact, new_scratch
-from sim_core.detect.ball_sonotrode import waving_plane_delay
+from sim_core.detect.ball_sonotrode import vibrating_plane_delay
 from sim_core.detect.ball_triangle import capsule_delay, face_delay
 from sim_core.effects.vibration import Wave
 from sim_core.geometry.bvh import Tree
-from sim_core.geometry.obstacle_set import Ground
-from sim_core.motion import Point
+from sim_core.geometry.obstacle_set import ObstacleSet
 from sim_core.numerics.jit import jit
-from sim_core.numerics.vec3 import Vec3
+from sim_core.numerics.vec3 import Flight, Vec3
 
 
 def faces(
-    numbers: np.ndarray, rows: np.ndarray, flights: np.ndarray, radius: float, seam: float
+    numbers: np.ndarray, rows: np.ndarray, flights: np.ndarray, radius: float, face_overlap: float
 ) -> np.ndarray:
     """Contact of each flight with the face in its row of ``numbers``."""
     found = np.empty(len(rows))
-    _faces(numbers, rows, flights, radius, seam, found)
+    _faces(numbers, rows, flights, radius, face_overlap, found)
     return found
 
 
@@ -44,7 +43,7 @@ def meetings(apart: np.ndarray, closing: np.ndarray, reach: np.ndarray) -> np.nd
     return found
 
 
-def waving_planes(
+def vibrating_planes(
     planes: np.ndarray,
     waves: np.ndarray,
     flights: np.ndarray,
@@ -53,15 +52,15 @@ def waving_planes(
     limits: np.ndarray,
 ) -> np.ndarray:
     """Contact of each flight with its vibrating plane: ``planes`` (n, 20) as obstacles hold them, ``waves`` (n, 6)
-    swing, omega, phase and axis, ``times`` (n,) now, ``limits`` (n,) [s].
+    amplitude, omega, phase and axis, ``times`` (n,) now, ``limits`` (n,) [s].
     """
     found = np.empty(len(times))
-    _waving_planes(planes, waves, flights, times, radius, limits, found)
+    _vibrating_planes(planes, waves, flights, times, radius, limits, found)
     return found
 
 
 def contacts(
-    ground: Ground,
+    surfaces: ObstacleSet,
     flights: np.ndarray,
     gravity: Gravity | None,
     wave: Wave | None,
@@ -72,32 +71,20 @@ def contacts(
     triangles (-1: none).
     """
     found, obstacles = np.empty(len(lengths)), np.empty(len(lengths), dtype=np.int64)
-    _contacts(
-        ground.tree,
-        new_scratch(),
-        flights,
-        gravity,
-        wave,
-        ground.seam,
-        time,
-        lengths,
-        found,
-        obstacles,
-    )
-    return found, np.where(obstacles >= 0, ground.tree.triangles[obstacles, 0], -1)
+    fall = np.zeros(3) if gravity is None else np.array(gravity)
+    parabolas = np.column_stack([flights, np.tile(fall, (len(flights), 1))])
+    overlap, scratch = surfaces.face_overlap, new_scratch()
+    _contacts(surfaces.tree, scratch, parabolas, wave, overlap, time, lengths, found, obstacles)
+    return found, np.where(obstacles >= 0, surfaces.tree.triangles[obstacles, 0], -1)
 
 
 @jit
-def _ball(flights: np.ndarray, i: int) -> Point:
-    return Point(
+def _ball(flights: np.ndarray, i: int) -> Flight:
+    return Flight(
         Vec3(flights[i, 0], flights[i, 1], flights[i, 2]),
         Vec3(flights[i, 3], flights[i, 4], flights[i, 5]),
+        Vec3(flights[i, 6], flights[i, 7], flights[i, 8]),
     )
-
-
-@jit
-def _fall(flights: np.ndarray, i: int) -> Vec3:
-    return Vec3(flights[i, 6], flights[i, 7], flights[i, 8])
 
 
 @jit
@@ -106,11 +93,11 @@ def _faces(
     rows: np.ndarray,
     flights: np.ndarray,
     radius: float,
-    seam: float,
+    face_overlap: float,
     found: np.ndarray,
 ) -> None:
     for i in range(len(rows)):
-        found[i] = face_delay(numbers, rows[i], _ball(flights, i), _fall(flights, i), radius, seam)
+        found[i] = face_delay(numbers, rows[i], _ball(flights, i), radius, face_overlap)
 
 
 @jit
@@ -123,15 +110,13 @@ def _capsules(
     found: np.ndarray,
 ) -> None:
     for i in range(len(rows)):
-        found[i] = capsule_delay(
-            numbers, rows[i], _ball(flights, i), _fall(flights, i), radius, limit
-        )
+        found[i] = capsule_delay(numbers, rows[i], _ball(flights, i), radius, limit)
 
 
 @jit
 def _meetings(apart: np.ndarray, closing: np.ndarray, reach: np.ndarray, found: np.ndarray) -> None:
     for i in range(len(reach)):
-        found[i] = meeting_delay(
+        found[i] = pair_delay(
             Vec3(apart[i, 0], apart[i, 1], apart[i, 2]),
             Vec3(closing[i, 0], closing[i, 1], closing[i, 2]),
             reach[i],
@@ -139,7 +124,7 @@ def _meetings(apart: np.ndarray, closing: np.ndarray, reach: np.ndarray, found: 
 
 
 @jit
-def _waving_planes(
+def _vibrating_planes(
     planes: np.ndarray,
     waves: np.ndarray,
     flights: np.ndarray,
@@ -152,8 +137,8 @@ def _waving_planes(
         wave = Wave(
             waves[i, 0], waves[i, 1], waves[i, 2], Vec3(waves[i, 3], waves[i, 4], waves[i, 5])
         )
-        found[i] = waving_plane_delay(
-            planes, i, _ball(flights, i), _fall(flights, i), radius, wave, times[i], limits[i]
+        found[i] = vibrating_plane_delay(
+            planes, i, _ball(flights, i), radius, wave, times[i], limits[i]
         )
 
 
@@ -162,15 +147,15 @@ def _contacts(
     tree: Tree,
     scratch: Scratch,
     flights: np.ndarray,
-    gravity: Gravity | None,
     wave: Wave | None,
-    seam: float,
+    face_overlap: float,
     time: float,
     lengths: np.ndarray,
     found: np.ndarray,
     obstacles: np.ndarray,
 ) -> None:
     for i in range(len(lengths)):
+        ball = _ball(flights, i)
         found[i], obstacles[i] = first_contact(
-            tree, scratch, _ball(flights, i), gravity, wave, seam, time, lengths[i]
+            None, None, None, -1, tree, scratch, ball, wave, None, face_overlap, time, lengths[i]
         )

@@ -23,7 +23,7 @@ from sim_core import (
     Vibration,
     pack_balls,
 )
-from sim_core.geometry.obstacle_set import build_ground
+from sim_core.geometry.obstacle_set import build_obstacle_set
 from tests.helpers.scenes.cavities import CEILING, FLOOR
 
 SPEED = 3.0  # m/s: of the shot at the start a component, and of the sonotrode at its peak
@@ -64,7 +64,7 @@ def random_chamber(family: str, seed: int) -> Chamber:
 def has_moving_edge(mesh: TriangleMesh, radius: float, vibration: Vibration) -> bool:
     """True when something cuts into the floor so that it cannot vibrate: not supported, and said so."""
     try:
-        build_ground(mesh, radius, vibration.tag, vibration.amplitude)
+        build_obstacle_set(mesh, (radius,), (vibration.tag,), (vibration.amplitude,))
     except SceneError:
         return True
     return False

@@ -8,12 +8,11 @@ from sim_core import Gravity, PartRotation, TriangleMesh
 from sim_core.detect.ball_mesh import Scratch, new_scratch
 from sim_core.detect.ball_turning_part import first_part_contact
 from sim_core.effects.gravity import gravity_acceleration
-from sim_core.effects.part_rotation import Turning, checked_axle, checked_turn
-from sim_core.geometry.obstacle_set import Ground, build_ground
+from sim_core.effects.part_rotation import RotationState, checked_axis, new_rotation_state
+from sim_core.geometry.obstacle_set import ObstacleSet, build_obstacle_set
 from sim_core.geometry.turning_part import PartTree
-from sim_core.motion import Point
 from sim_core.numerics.jit import jit
-from sim_core.numerics.vec3 import Vec3
+from sim_core.numerics.vec3 import Flight, Vec3
 from sim_core.scene.invariants import clearance, contained
 from tests.helpers.scenes.cavities import CEILING, box_around
 
@@ -68,19 +67,17 @@ BODIES = {
 @jit
 def _search(  # type: ignore[no-untyped-def]
     part: PartTree,
-    turning: Turning,
+    rotation: RotationState,
     scratch: Scratch,
     position: Vec3,
     velocity: Vec3,
     gravity,
-    seam,
+    face_overlap,
     time,
     limit,
 ):
-    fall = gravity_acceleration(gravity)
-    return first_part_contact(
-        part, turning, scratch, Point(position, velocity), fall, seam, time, limit, -1, 0
-    )
+    ball = Flight(position, velocity, gravity_acceleration(gravity))
+    return first_part_contact(part, rotation, scratch, ball, face_overlap, time, limit, -1, 0)
 
 
 class Rotor:
@@ -92,11 +89,13 @@ class Rotor:
         self.turn = turn
         self.radius = 0.5 * diameter
         self.mesh: TriangleMesh = box_around(body, half)
-        self.ground: Ground = build_ground(self.mesh, self.radius, axle=checked_axle(turn))
+        self.obstacles: ObstacleSet = build_obstacle_set(
+            self.mesh, (self.radius,), axis=checked_axis(turn)
+        )
         self.own = np.ascontiguousarray(self.mesh.corners[self.mesh.tags == turn.tag])
-        turning = checked_turn(turn, self.mesh.middle)
-        assert turning is not None
-        self.turning = turning
+        rotation = new_rotation_state(turn, self.mesh.middle)
+        assert rotation is not None
+        self.rotation = rotation
         self.scratch = new_scratch()
 
     def search(
@@ -109,9 +108,9 @@ class Rotor:
     ) -> tuple[float, int]:
         """The answer of the code under test: delay [s] and obstacle, -1 if there is none within ``limit`` [s]."""
         place, speed = Vec3(*map(float, position)), Vec3(*map(float, velocity))
-        seam = self.ground.seam
+        part, overlap = self.obstacles.part, self.obstacles.face_overlap
         delay, row = _search(
-            self.ground.part, self.turning, self.scratch, place, speed, gravity, seam, time, limit
+            part, self.rotation, self.scratch, place, speed, gravity, overlap, time, limit
         )
         return float(delay), int(row)
 

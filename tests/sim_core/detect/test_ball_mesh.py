@@ -9,8 +9,8 @@ import pytest
 import trimesh
 
 from sim_core import Balls, Gravity, Physics, Restitution, Scene, TriangleMesh, simulate
-from sim_core.geometry.obstacle_set import build_ground
-from sim_core.geometry.obstacles import PAST_CORNERS, seam
+from sim_core.geometry.obstacle_set import build_obstacle_set
+from sim_core.geometry.obstacles import MAX_CORNER_OVERLAPS, face_overlap_of
 from sim_core.scene.invariants import clearance, contained
 from sim_core.scene.scene import TOUCH
 from tests.helpers.contacts import calls
@@ -67,7 +67,7 @@ def compare_with_reference(family: str, bodies: int, shots: int, seed: int) -> N
     for _ in range(bodies):
         body = random_body(rng, family)
         mesh = box_around(body, HALF)
-        ground = build_ground(mesh, RADIUS)
+        surfaces = build_obstacle_set(mesh, (RADIUS,))
         centre = mesh.middle
         start, velocity = shots_at(body, shots, rng)
         length = 0.04 / np.linalg.norm(velocity, axis=1)
@@ -75,7 +75,7 @@ def compare_with_reference(family: str, bodies: int, shots: int, seed: int) -> N
             start, velocity, fall, body.triangles, RADIUS, length
         )
         flights = np.concatenate([start - centre, velocity], axis=1)
-        found, triangles = calls.contacts(ground, flights, gravity, None, 0.0, length)
+        found, triangles = calls.contacts(surfaces, flights, gravity, None, 0.0, length)
         found[mesh.tags[triangles] != CEILING] = np.inf  # the room's walls
         hit = np.flatnonzero(np.isfinite(found))
         hits += len(hit)
@@ -139,7 +139,7 @@ def test_first_contact_from_any_start(shape: str, count: int) -> None:
         pull = PULLS[group // 2 % len(PULLS)] if aim != "random" else PULLS[group // 2 % 2]
         corners, triangles = body_of(rng, shape)
         mesh = room_with(corners[None], triangles, half, offset)
-        ground = build_ground(mesh, radius)
+        surfaces = build_obstacle_set(mesh, (radius,))
         touch, normal = touches(rng, corners, triangles, radius, size)
         flights = flights_to(
             rng, aim, touch, normal, np.broadcast_to(np.array(pull), (size, 3)), radius
@@ -150,10 +150,10 @@ def test_first_contact_from_any_start(shape: str, count: int) -> None:
         free = clearance(seen, flights[:, :3], radius) >= radius - TOUCH
         flights = flights[free & contained(mesh, flights[:, :3] + offset)]
         tilt = (
-            1.1 * PAST_CORNERS * seam(radius) / radius
-        )  # faces reach a seam over their borders, three past their corners
+            1.1 * MAX_CORNER_OVERLAPS * face_overlap_of(radius) / radius
+        )  # faces reach an overlap over their borders, three past their corners
         lengths = rng.uniform(0.002, 0.02, len(flights))
-        found, _ = calls.contacts(ground, flights, pull, None, 0.0, lengths)
+        found, _ = calls.contacts(surfaces, flights, pull, None, 0.0, lengths)
         everywhere = np.broadcast_to(seen, (len(flights), *seen.shape))
         verdict = judge_triangles(everywhere, flights, radius, lengths, found, TOLERANCE, tilt)
         require(verdict, found, f"{shape}, {aim}")

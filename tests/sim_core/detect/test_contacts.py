@@ -12,8 +12,15 @@ import pytest
 
 from sim_core import TriangleMesh
 from sim_core.effects.gravity import STANDARD
-from sim_core.geometry.flat_faces import edge_partners, find_flats, in_plane
-from sim_core.geometry.obstacles import CAPSULE, FACE, NUMBERS, Obstacles, build_obstacles, seam
+from sim_core.geometry.flat_faces import surface_triangles
+from sim_core.geometry.obstacles import (
+    CAPSULE,
+    FACE,
+    NUMBERS,
+    ObstacleTable,
+    build_obstacle_table,
+    face_overlap_of,
+)
 from sim_core.numerics.roots import WaveGap, first_wave_approach
 from tests.helpers.contacts import calls
 from tests.helpers.contacts import cases as contact_cases
@@ -67,15 +74,9 @@ def families(count: int, hard: bool, aims: tuple[str, ...] = AIMS) -> list[tuple
     return [(*pair, min(CHUNK, share)) for pair in pairs for _ in range(math.ceil(share / CHUNK))]
 
 
-def obstacles_around(mesh: TriangleMesh, radius: float) -> Obstacles:
+def obstacles_around(mesh: TriangleMesh, radius: float) -> ObstacleTable:
     """All obstacles of a mesh that stands still."""
-    flats = find_flats(
-        mesh.corners - mesh.middle,
-        edge_partners(mesh.triangles),
-        mesh.tags,
-        in_plane(mesh.vertices),
-    )
-    return build_obstacles(mesh, radius, np.zeros(len(mesh.triangles), dtype=bool), 0.0, flats)
+    return build_obstacle_table(surface_triangles(mesh), radius)
 
 
 def obstacles_of(rng: np.random.Generator, shape: str, count: int):  # type: ignore[no-untyped-def]
@@ -107,13 +108,15 @@ def test_faces(count: int, hard: bool) -> None:
         past = units(rng, cases) * (spread(rng, 1e-12, 1e-6, cases) * border)[:, None]
         touch = np.einsum("nk,nkd->nd", where, triangle) + radius * normal + past
         flights = flights_to(rng, aim, touch, normal, falls_for(rng, cases), radius)
-        found = calls.faces(obstacles.numbers, rows, flights, radius, seam(radius))
+        found = calls.faces(obstacles.numbers, rows, flights, radius, face_overlap_of(radius))
         found[found > LIMIT] = np.inf
-        verdict, outside = judge_faces(triangle, flights, radius, seam(radius), LIMIT, found)
+        verdict, outside = judge_faces(
+            triangle, flights, radius, face_overlap_of(radius), LIMIT, found
+        )
         require(
             verdict, found, f"faces, {shape}, {aim}", hits=0.3 if aim in ("random", "fast") else 0.0
         )
-        assert outside.max() <= 3.2 * seam(radius), (
+        assert outside.max() <= 3.2 * face_overlap_of(radius), (
             f"{shape}, {aim}: a contact {outside.max():.3g} m beside the face"
         )
 
@@ -188,7 +191,7 @@ WAVE_AIMS = (
 
 
 def wave_cases(rng: np.random.Generator, aim: str, count: int):  # type: ignore[no-untyped-def]
-    """Planes, waves, flights, times and limits for calls.waving_planes; radius 1.5 mm.
+    """Planes, waves, flights, times and limits for calls.vibrating_planes; radius 1.5 mm.
 
     random           0.1 to 10 m/s from up to 0.1 m above, any phase
     fast             20 m/s
@@ -273,7 +276,7 @@ def test_vibrating_planes(count: int, aim: str) -> None:
     cases = count if aim == "random" else math.ceil(count / (len(WAVE_AIMS) - 1))
     for _ in range(math.ceil(cases / CHUNK)):
         planes, waves, flights, times, radius, limits = wave_cases(rng, aim, min(CHUNK, cases))
-        found = calls.waving_planes(planes, waves, flights, times, radius, limits)
+        found = calls.vibrating_planes(planes, waves, flights, times, radius, limits)
         verdict = judge_waves(planes, waves, flights, times, radius, limits, found)
         require(verdict, found, f"waves, {aim}")
 
@@ -315,7 +318,9 @@ def test_a_face_ends_at_its_needles_tip() -> None:
     past = np.array([-1e-3, 0.0, 1e-9, 1e-7, 1e-6, 1e-5, 5e-5])
     flights = np.zeros((len(past), 9))
     flights[:, 0], flights[:, 2], flights[:, 5] = past, radius + 1e-3, -1.0
-    found = calls.faces(obstacles.numbers, np.full(len(past), row), flights, radius, seam(radius))
+    found = calls.faces(
+        obstacles.numbers, np.full(len(past), row), flights, radius, face_overlap_of(radius)
+    )
     assert np.isfinite(found).tolist() == [True, True, True, False, False, False, False]
 
 

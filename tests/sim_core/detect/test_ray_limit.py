@@ -6,7 +6,7 @@ import trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from sim_core import TriangleMesh
-from sim_core.geometry.obstacle_set import build_ground
+from sim_core.geometry.obstacle_set import build_obstacle_set
 from tests.helpers.contacts import calls
 from tests.helpers.contacts.cases import units
 from tests.helpers.contacts.reference import columns, dot, from_segments
@@ -44,13 +44,13 @@ def test_the_first_triangle_on_a_ray_is_the_one_embree_sees(count: int) -> None:
     rng = np.random.default_rng(8)
     mesh = bumpy_chamber(rng)
     embree = RayMeshIntersector(trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False))
-    ground = build_ground(mesh, RADIUS)
+    surfaces = build_obstacle_set(mesh, (RADIUS,))
     different = 0
     for _ in range(count // CHUNK):
         origin = 0.3 * SIZE * units(rng, CHUNK) * rng.uniform(size=(CHUNK, 1))
         direction = units(rng, CHUNK)
         flights = np.concatenate([origin - mesh.middle, direction], axis=1)
-        found, triangle = calls.contacts(ground, flights, None, None, 0.0, np.full(CHUNK, 1.0))
+        found, triangle = calls.contacts(surfaces, flights, None, None, 0.0, np.full(CHUNK, 1.0))
         assert np.isfinite(found).all(), "a ray has left a closed chamber"
         seen = embree.intersects_first(origin, direction)
         other = np.flatnonzero(triangle != seen)

@@ -33,10 +33,10 @@ KEPT = {
     "restitution": ("restitution", "Restitution"),
     "vibration": ("wave", "Wave"),
     "rest": ("contact", "ContactState"),
-    "part_rotation": ("turning", "Turning"),
+    "part_rotation": ("rotation", "RotationState"),
     "friction": ("friction_state", "FrictionState"),
-    "random_phase": ("phases", "Phases"),
-    "drag": ("air", "Air"),
+    "random_phase": ("random_phase", "RandomPhaseState"),
+    "drag": ("drag", "DragState"),
     "ball_collisions": ("neighbours", "NeighbourFilter"),
 }
 STEEL = (0.9, 1.0)
@@ -113,13 +113,13 @@ def test_the_machine_code_of_a_bare_scene_knows_no_effect(bare: dict[str, list[s
     assert not wrong
     # what only an effect calls was never compiled, so it cannot be in what was
     for function in (
-        "roots.first_wave_approach",
-        "resolve.footing.touch_down",
-        "resolve.leaning.meet",
-        "effects.part_rotation.seen_from_part",
+        "numerics.roots.first_wave_approach",
+        "contact.support_changes.touch_down",
+        "contact.ball_on_ball.meet",
+        "effects.part_rotation.relative_flight",
         "effects.restitution.restitution_law",
-        "resolve.rubbing._rub",
-        "neighbours.next_meeting",
+        "impulses.friction._tangential_change",
+        "loop.neighbours.next_meeting",
     ):
         module, _, name = f"sim_core.{function}".rpartition(".")
         assert hasattr(sys.modules.get(module) or __import__(module, fromlist=[name]), name), (

@@ -228,8 +228,10 @@ def test_a_part_seen_from_its_own_frame_spins_the_balls_as_it_does_in_the_rooms(
             0.03,
         )
     )
-    posed = rough._replace(part_rotation=PartRotation(PART, rpm=0.0, phase=angle))
-    two = simulate(Scene(room, shot(*(turned(x, angle) for x in (places, v, w))), posed, 0.03))
+    turned_corners = rough._replace(part_rotation=PartRotation(PART, rpm=0.0, phase=angle))
+    two = simulate(
+        Scene(room, shot(*(turned(x, angle) for x in (places, v, w))), turned_corners, 0.03)
+    )
     assert one.collisions.total == two.collisions.total > 10
     assert np.abs(one.balls.spins - w).max() > 10.0  # type: ignore[operator]
     np.testing.assert_allclose(two.balls.spins, turned(one.balls.spins, angle), atol=1e-7)  # type: ignore[arg-type]

@@ -20,7 +20,7 @@ from sim_core import (
     Vibration,
     simulate,
 )
-from sim_core.effects.random_phase import drawn
+from sim_core.effects.random_phase import draw_phase
 from tests.helpers.scenes.cavities import CEILING, FLOOR, box
 from tests.helpers.scenes.gas import jackknife
 from tests.sim_core.loop.test_determinism import fingerprint
@@ -43,7 +43,9 @@ def flights(count: int) -> tuple[ImpactLog, np.ndarray]:
 
 
 def test_draws_are_uniform_and_independent() -> None:
-    draws = np.array([[drawn(7, ball, k) for k in range(1000)] for ball in range(50)]) / math.tau
+    draws = (
+        np.array([[draw_phase(7, ball, k) for k in range(1000)] for ball in range(50)]) / math.tau
+    )
     assert kstest(draws.ravel(), "uniform").pvalue > UNLIKELY
     for one, two in (
         (draws[1:], draws[:-1]),

@@ -24,7 +24,7 @@ from sim_core import (
     simulate,
 )
 from sim_core.effects.contact_mode import ASLEEP, MODE
-from sim_core.effects.sonotrodes import PARTS, new_waves, shift_phases, whole_periods
+from sim_core.effects.sonotrodes import PARTS, new_waves, shift_phases, whole_period_window
 from sim_core.effects.vibration import checked_waves
 from sim_core.loop import compile_ahead
 from sim_core.loop.simulate import _Run
@@ -77,7 +77,7 @@ FREQUENCIES = (20e3, 19.7e3, math.pi * 1e4, 40e3, 123.456, 20e3)
 def test_phases_do_not_drift(windows: int) -> None:
     """Against fractions: the window is a whole number of periods of the fastest, of which there are 800 in it."""
     vibrations = tuple(Vibration(k, 25e-6, f, 0.1 * k) for k, f in enumerate(FREQUENCIES))
-    window = whole_periods(vibrations, WINDOW)
+    window = whole_period_window(vibrations, WINDOW)
     assert window * 40e3 == 800
     waves = new_waves(vibrations, checked_waves(vibrations), window, np.array([0, 3, 2]))
     assert waves is not None

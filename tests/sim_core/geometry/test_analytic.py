@@ -27,10 +27,10 @@ from sim_core import (
     prism_cavity,
     simulate,
 )
-from sim_core.detect.ball_cylinder import bore_delay
-from sim_core.geometry.obstacles import NUMBERS, Bore
-from sim_core.motion import Point
-from sim_core.numerics.vec3 import Vec3
+from sim_core.detect.ball_cylinder import cylinder_delay
+from sim_core.geometry.analytic import CylinderAxis
+from sim_core.geometry.obstacles import NUMBERS
+from sim_core.numerics.vec3 import Flight, Vec3
 from sim_core.scene.invariants import energy
 from tests.helpers.scenes import cavities
 
@@ -39,6 +39,7 @@ TAGS = (cavities.FLOOR, cavities.CEILING, cavities.SIDES)
 SQUARE = np.array([[0.0, 0.0], [0.03, 0.0], [0.03, 0.04], [0.0, 0.04]])
 BOX = prism_cavity(SQUARE, 0.0, 0.02, TAGS)
 CYLINDER = cylinder_cavity(0.05, 0.0, 0.02, TAGS)
+NOTHING = Vec3(0.0, 0.0, 0.0)
 STEEL = Restitution(((0.91, 0.5),) * 3, (0.91, 1.5))
 SHAKEN = Physics(
     Gravity(), STEEL, Vibration(cavities.FLOOR, 25e-6, 20e3, 0.4), ball_collisions=BallCollisions()
@@ -148,8 +149,8 @@ def test_the_round_side_is_never_missed(family: str) -> None:
     numbers = np.zeros((1, NUMBERS))
     numbers[0, 3] = 1.0
     for place, velocity in zip(*flights(family, 3000), strict=True):
-        ball = Point(Vec3(*place.tolist(), 0.3), Vec3(*velocity.tolist(), 1.0))
-        delay = bore_delay(Bore(0.0, 0.0), numbers, 0, ball)
+        ball = Flight(Vec3(*place.tolist(), 0.3), Vec3(*velocity.tolist(), 1.0), NOTHING)
+        delay = cylinder_delay(CylinderAxis(0.0, 0.0), numbers, 0, ball)
         assert 0.0 <= delay < np.inf
         x, y = (
             Decimal(p) + Decimal(v) * Decimal(delay)
@@ -163,10 +164,10 @@ def test_the_round_side_is_never_missed(family: str) -> None:
 def test_a_start_in_overlap_of_rounding_going_in_is_no_contact() -> None:
     numbers = np.zeros((1, NUMBERS))
     numbers[0, 3] = 1.0
-    ball = Point(Vec3(1.0 + 2.0**-52, 0.0, 0.0), Vec3(-2.0, 0.0, 0.0))
-    assert bore_delay(Bore(0.0, 0.0), numbers, 0, ball) == pytest.approx(1.0, abs=1e-15)
-    still = Point(Vec3(0.5, 0.0, 0.0), Vec3(0.0, 0.0, 3.0))
-    assert bore_delay(Bore(0.0, 0.0), numbers, 0, still) == np.inf
+    ball = Flight(Vec3(1.0 + 2.0**-52, 0.0, 0.0), Vec3(-2.0, 0.0, 0.0), NOTHING)
+    assert cylinder_delay(CylinderAxis(0.0, 0.0), numbers, 0, ball) == pytest.approx(1.0, abs=1e-15)
+    still = Flight(Vec3(0.5, 0.0, 0.0), Vec3(0.0, 0.0, 3.0), NOTHING)
+    assert cylinder_delay(CylinderAxis(0.0, 0.0), numbers, 0, still) == np.inf
 
 
 @pytest.mark.parametrize(
@@ -204,9 +205,9 @@ def test_what_is_not_supported_says_so(room: AnalyticCavity, changes: dict, said
             CYLINDER,
             (0.03, 0.0, 0.01),
             3e-3,
-            "ball 0 at .* is outside the cavity, beyond the round side",
+            "ball 0 at .* is outside the cavity, beyond the cylinder wall",
         ),
-        (CYLINDER, (0.0, 0.024, 0.01), 3e-3, "overlaps the round side by 0.0005 m"),
+        (CYLINDER, (0.0, 0.024, 0.01), 3e-3, "overlaps the cylinder wall by 0.0005 m"),
         (BOX, (0.001, 0.02, 0.01), 3e-3, "overlaps side 5 by 0.0005 m"),
         (
             BOX,

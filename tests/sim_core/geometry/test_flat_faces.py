@@ -9,12 +9,10 @@ import trimesh
 
 from sim_core import Balls, Gravity, Physics, Scene, TriangleMesh, simulate
 from sim_core.detect.ball_mesh import first_contact, new_scratch
-from sim_core.geometry import obstacle_set as ground_module
-from sim_core.geometry.flat_faces import LONE, Flats
-from sim_core.geometry.obstacle_set import Ground, build_ground
-from sim_core.geometry.rectangle_cover import cover
-from sim_core.motion import Point
-from sim_core.numerics.vec3 import Vec3
+from sim_core.geometry import flat_faces
+from sim_core.geometry.flat_faces import LONE, FlatFaces, cover_with_quadrangles
+from sim_core.geometry.obstacle_set import ObstacleSet, build_obstacle_set
+from sim_core.numerics.vec3 import Flight, Vec3
 from sim_core.scene.invariants import clearance, contained
 from tests.helpers.scenes.cavities import CEILING, box_around, cylinder
 
@@ -42,15 +40,15 @@ def slanted_block() -> TriangleMesh:
     return box_around(block, 0.03)
 
 
-def without_flats(mesh: TriangleMesh, monkeypatch: pytest.MonkeyPatch) -> Ground:
-    def none(corners: np.ndarray, *_: object) -> Flats:
-        return Flats(
+def without_flat_faces(mesh: TriangleMesh, monkeypatch: pytest.MonkeyPatch) -> ObstacleSet:
+    def none(corners: np.ndarray, *_: object) -> FlatFaces:
+        return FlatFaces(
             np.full(len(corners), LONE, np.int32), np.zeros(0, np.int32), np.zeros((0, 3, 3)), []
         )
 
     with monkeypatch.context() as patch:
-        patch.setattr(ground_module, "find_flats", none)
-        return build_ground(mesh, RADIUS)
+        patch.setattr(flat_faces, "find_flat_faces", none)
+        return build_obstacle_set(mesh, (RADIUS,))
 
 
 def places_for_a_ball(room: TriangleMesh, count: int, rng: np.random.Generator) -> np.ndarray:
@@ -66,13 +64,19 @@ def places_for_a_ball(room: TriangleMesh, count: int, rng: np.random.Generator) 
 def test_contacts_with_a_flat_are_those_with_its_triangles(
     mesh: TriangleMesh, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    merged, split = build_ground(mesh, RADIUS), without_flats(mesh, monkeypatch)
+    merged, split = build_obstacle_set(mesh, (RADIUS,)), without_flat_faces(mesh, monkeypatch)
     assert len(merged.tree.kinds) < 0.1 * len(split.tree.kinds)
     scratch, rng = new_scratch(), np.random.default_rng(1)
     for place in places_for_a_ball(mesh, 2000, rng) - mesh.middle:
-        ball = Point(Vec3(*place.tolist()), Vec3(*rng.normal(0.0, 3.0, 3).tolist()))
-        one = first_contact(merged.tree, scratch, ball, Gravity(), None, merged.seam, 0.0, 0.1)
-        two = first_contact(split.tree, scratch, ball, Gravity(), None, split.seam, 0.0, 0.1)
+        velocity = Vec3(*rng.normal(0.0, 3.0, 3).tolist())
+        ball = Flight(Vec3(*place.tolist()), velocity, Vec3(*Gravity()))
+        one, two = (
+            first_contact(
+                *(None, None, None, -1, surfaces.tree, scratch, ball),
+                *(None, None, surfaces.face_overlap, 0.0, 0.1),
+            )
+            for surfaces in (merged, split)
+        )
         speed = np.linalg.norm(ball.velocity) + 1.0
         assert (
             one[0] == two[0] or abs(one[0] - two[0]) * speed < 5e-12
@@ -112,10 +116,10 @@ def test_a_cover_fills_an_outline_with_holes_once() -> None:
     hole = np.array([[-0.1, -0.1], [0.2, -0.1], [0.2, 0.2], [-0.1, 0.2]])
     segments = outline(star.tolist(), hole.tolist())
     region = shapely.Polygon(star, [hole])
-    faces = shapely.polygons(cover(segments, region.area))
+    faces = shapely.polygons(cover_with_quadrangles(segments, region.area))
     assert shapely.area(faces).sum() == pytest.approx(region.area, rel=1e-12)
     assert shapely.union_all(faces).symmetric_difference(region).area < 1e-12
 
 
 def test_an_outline_that_crosses_itself_is_left_to_its_triangles() -> None:
-    assert cover(outline([(0, 0), (1, 1), (1, 0), (0, 1)]), 1.0) is None
+    assert cover_with_quadrangles(outline([(0, 0), (1, 1), (1, 0), (0, 1)]), 1.0) is None

@@ -4,16 +4,16 @@ import numpy as np
 import trimesh
 
 from sim_core import Balls, Physics, Scene, simulate
-from sim_core.geometry.obstacle_set import build_ground
+from sim_core.geometry.obstacle_set import build_obstacle_set
 from sim_core.geometry.obstacles import CAPSULE, FACE
 from tests.helpers.scenes.cavities import CEILING, box, box_around, cylinder
 
 
 def test_only_edges_convex_towards_the_shot_are_obstacles() -> None:
     for room in (box((0.1, 0.1, 0.1)), cylinder(0.03, 0.04)):
-        assert (build_ground(room, 1.5e-3).tree.kinds == FACE).all()
+        assert (build_obstacle_set(room, (1.5e-3,)).tree.kinds == FACE).all()
     room = box_around(trimesh.creation.box((0.02, 0.02, 0.02)), 0.05)
-    kinds = build_ground(room, 1.5e-3).tree.kinds
+    kinds = build_obstacle_set(room, (1.5e-3,)).tree.kinds
     assert (kinds == CAPSULE).sum() == 12  # a cube's edges, not the diagonals of its faces
 
 

@@ -22,7 +22,7 @@ from sim_core import (
     simulate,
 )
 from sim_core.geometry.analytic import CEILING, FLOOR, SIDE
-from sim_core.impulses.ball_cylinder import RECONTACT_ANGLE
+from sim_core.impulses.collision import RECONTACT_ANGLE
 
 RADIUS, HEIGHT, DIAMETER, G = 0.035, 0.02, 3e-3, 9.80665
 REACH = RADIUS - 0.5 * DIAMETER

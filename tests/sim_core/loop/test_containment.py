@@ -11,8 +11,8 @@ import pytest
 
 from benchmarks.scenes import scene
 from sim_core import Physics, Scene, SimulationResult, simulate
-from sim_core.geometry.mesh import towards_shot
-from sim_core.geometry.sonotrode_border import find_rim
+from sim_core.geometry.flat_faces import surface_triangles
+from sim_core.geometry.sonotrode_border import find_border
 from sim_core.scene.invariants import clearance, closest_pair, contained
 from tests.helpers.scenes.fuzzed_chambers import FAMILIES, Chamber, random_chamber
 
@@ -77,16 +77,14 @@ def clearance_at(chamber: Chamber, points: np.ndarray, time: np.ndarray) -> np.n
 
 def has_sharp_rim(chamber: Chamber, points: np.ndarray, time: np.ndarray) -> np.ndarray:
     """False (n,) for centres of balls so near the sonotrode that a gentle slope beside it, which goes on under it
-    (surfaces/rim.py), may be met past its end.
+    (geometry/sonotrode_border.py), may be met past its end.
     """
     mesh, balls, sharp = chamber.mesh, chamber.balls, np.ones(len(points), dtype=bool)
-    normals, _ = towards_shot(mesh.corners)
     for one in chamber.physics.vibrations:
-        rim = find_rim(
-            mesh.triangles, mesh.corners, normals, balls.radius, mesh.tags == one.tag, one.amplitude
-        )
+        surface = surface_triangles(mesh, (one.tag,), (one.amplitude,))
+        border = find_border(surface, balls.radius)
         near = height_at(chamber, points, time) < balls.radius + 2.0 * one.amplitude
-        sharp &= ~near | (len(rim.slopes) == 0)
+        sharp &= ~near | (len(border.slopes) == 0)
     return sharp
 
 
