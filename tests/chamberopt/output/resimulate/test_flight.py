@@ -20,7 +20,7 @@ from chamberopt.output.viewer.images import film
 from chamberopt.output.viewer.images.film import film_path, write_film
 from chamberopt.output.viewer.images.replay_film import draw_replay, rotation_matrix
 from sim_core import Balls, Gravity, PartRotation, Physics, Scene, simulate
-from sim_core.effects.part_rotation import angle_now, checked_turn, turned
+from sim_core.effects.part_rotation import angle_at, new_rotation_state, rotate_points
 from tests.helpers.results.short_plate import plate_result
 
 G = 9.80665
@@ -99,17 +99,17 @@ def test_the_sonotrode_is_where_the_shot_met_it(replica: Replica) -> None:
 def test_a_turning_part_is_drawn_as_the_simulator_has_it(motion: dict[str, float]) -> None:
     point, axis = (0.01, 0.02, 0.03), (0.0, 0.6, 0.8)
     turn = PartRotation(TAG_PART, point, axis, phase=0.7, **motion)
-    turning = checked_turn(turn, np.zeros(3))
+    turning = new_rotation_state(turn, np.zeros(3))
     assert turning is not None
     times = np.array([0.0, 0.013, 0.4])
-    expected = np.array([angle_now(turning, time) for time in times])
+    expected = np.array([angle_at(turning, time) for time in times])
     np.testing.assert_allclose(
         np.exp(1j * rotation_angle(turn, times)), np.exp(1j * expected), atol=1e-12
     )
     np.testing.assert_array_equal(rotation_angle(None, times), 0.0)
     corners = np.random.default_rng(0).normal(size=(5, 3))
     matrix = rotation_matrix(np.array(point), np.array(axis), expected[1])
-    there = turned(corners, np.array(point), np.array(axis), expected[1])
+    there = rotate_points(corners, np.array(point), np.array(axis), expected[1])
     np.testing.assert_allclose(corners @ matrix[:3, :3].T + matrix[:3, 3], there, atol=1e-14)
 
 
