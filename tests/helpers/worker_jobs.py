@@ -1,4 +1,4 @@
-"""Jobs for workers of every kind: small functions that their processes can import, and that leave marks in a folder."""
+"""Small functions for worker processes to import; some count their calls in files of a folder."""
 
 import os
 import signal
@@ -14,7 +14,7 @@ from tests.helpers.synthetic import judged
 
 
 def mark(folder: Path, name: object) -> None:
-    """One more byte in the file of that name: how often something happened, in whatever process."""
+    """Add a byte to the file of that name, to count events over all processes."""
     with open(folder / str(name), "ab") as file:
         file.write(b".")
 
@@ -36,7 +36,7 @@ def pid_of(_: object) -> int:
 
 
 def die(folder: Path, times: int = 1) -> str:
-    """Takes its process down so many times, then answers."""
+    """Kill the own process some times, then answer."""
     mark(folder, "die")
     if marks(folder)["die"] <= times:
         os.kill(os.getpid(), signal.SIGKILL)
@@ -53,7 +53,7 @@ def open_nothing(folder: Path) -> bytes:
 
 
 class AwkwardError(InputError):
-    """Cannot be unpickled: its class takes two arguments and keeps one."""
+    """Cannot be unpickled: its class takes two arguments and stores one."""
 
     def __init__(self, text: str, more: int) -> None:
         super().__init__(text)
@@ -65,7 +65,7 @@ def refuse_awkwardly() -> None:
 
 
 class Counted:
-    """Says in a folder in which process it was opened."""
+    """Counts in a folder in which processes it is unpickled."""
 
     def __init__(self, folder: Path, size: int) -> None:
         self.folder, self.ballast = folder, np.zeros(size)
@@ -81,7 +81,7 @@ def size_of(counted: Counted, _: int) -> int:
 
 
 def hill(design: Design, stream: str, replicas: int | None) -> Evaluation:
-    """An evaluator: heavier shot is better up to 6 g; above 9 g nothing can be simulated."""
+    """An evaluator for which heavier shot is better up to 6 g; above 9 g it raises InputError."""
     mass = design.shot.mass_g
     if mass > 9.0:
         raise InputError(f"shot: {mass:g} g do not fit")
@@ -92,7 +92,7 @@ def hill(design: Design, stream: str, replicas: int | None) -> Evaluation:
 
 
 def deadly(design: Design, stream: str, replicas: int | None) -> Evaluation:
-    """An evaluator whose process does not survive 6 g."""
+    """An evaluator that kills its process at 6 g."""
     if abs(design.shot.mass_g - 6.0) < 1e-9:
         os.kill(os.getpid(), signal.SIGKILL)
     return hill(design, stream, replicas)

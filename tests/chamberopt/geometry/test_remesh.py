@@ -1,4 +1,4 @@
-"""The target in triangles of a wished size: the same surface, the size asked for, no slivers of its own making."""
+"""Remeshing keeps the surface, reaches the wanted size and makes no slivers."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from chamberopt.geometry.remesh import remesh, triangle_quality
 
 
 def plate_with_hole() -> trimesh.Trimesh:
-    """60 x 40 x 10 with a hole of 24 flats, triangulated as CAD does: needles from the rim to the corners."""
+    """A plate 60 x 40 x 10 with a hole of 24 flat sides, in long thin triangles as from CAD."""
     outline = shapely.box(0, 0, 60, 40).difference(shapely.Point(20, 20).buffer(6.0, quad_segs=6))
     rings = [np.array(ring.coords)[:-1] for ring in (outline.exterior, *outline.interiors)]
     points = np.concatenate(rings)
@@ -79,7 +79,7 @@ def test_small_triangles_become_larger_ones() -> None:
 
 
 def test_only_the_target_is_meshed_and_it_keeps_its_border() -> None:
-    """The upper half of a box's finely divided mantle: what it covers stays what it was."""
+    """The target is the upper half of a finely divided box; the lower half stays as it was."""
     mesh = BOX.subdivide().subdivide()
     target = mesh.triangles_center[:, 2] > 0
     area = mesh.area_faces[target].sum()

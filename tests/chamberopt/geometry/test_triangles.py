@@ -2,16 +2,37 @@
 
 import numpy as np
 import pytest
+import trimesh
 
-from chamberopt.geometry.triangles import closest_points
+from chamberopt.geometry.triangles import closest_points, find_shells, winding_number
 
 
 @pytest.mark.parametrize("size", [1.0, 5e-4, 5e-5])
 def test_contact_is_the_nearest_point_of_the_triangle(size: float) -> None:
-    """However small the triangle: a library's fixed tolerance once moved the contact by tenths of a millimetre."""
+    """Also for small triangles: a library's tolerance once moved contacts by 0.1 mm."""
     corners = np.tile(np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), (4, 1, 1))
     balls = np.array([[0.2, 0.2, 0.5], [0.5, -0.3, 0.4], [-1.0, -1.0, 0.1], [0.7, 0.01, 1.0]])
     contacts = np.array([[0.2, 0.2, 0], [0.5, 0, 0], [0, 0, 0], [0.7, 0.01, 0]])
     np.testing.assert_allclose(
         closest_points(size * corners, size * balls), size * contacts, atol=1e-12 * size
+    )
+
+
+def test_pieces_of_a_surface_and_their_volumes() -> None:
+    a, b = trimesh.creation.box((1, 1, 1)), trimesh.creation.box((2, 2, 2))
+    vertices = np.r_[a.vertices, b.vertices + 5.0]
+    triangles = np.r_[a.faces, np.asarray(b.faces)[:, ::-1] + len(a.vertices)]
+
+    shells, volumes = find_shells(vertices, triangles)
+
+    assert (np.bincount(shells) == 12).all()
+    assert sorted(volumes) == pytest.approx([-8.0, 1.0])
+
+
+def test_the_winding_number_tells_inside_from_outside() -> None:
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=1.0)
+    points = np.array([[0.0, 0.0, 0.0], [0.7, 0.1, 0.0], [1.5, 0.0, 0.0], [0.0, -9.0, 3.0]])
+
+    assert winding_number(points, ball.vertices[ball.faces]) == pytest.approx(
+        [1, 1, 0, 0], abs=1e-12
     )

@@ -1,4 +1,4 @@
-"""A real Dask scheduler and two workers, each a process of its own: same bits, and one killed costs its task only."""
+"""A real Dask scheduler with two worker processes: same bits, and a killed worker is survived."""
 
 import os
 import signal
@@ -37,7 +37,7 @@ ROOT = Path(__file__).parents[4]
 
 @dataclass
 class Dask:
-    """Programs of one dask_cluster."""
+    """The processes of a Dask cluster."""
 
     folder: Path
     programs: list[subprocess.Popen]
@@ -70,7 +70,7 @@ class Dask:
         return self.start("worker", "--nthreads", "1", "--no-nanny")
 
     def kill_a_worker(self) -> None:
-        """One that is there, with no time for a farewell."""
+        """Kill a running worker."""
         next(program for program in self.programs[1:] if program.poll() is None).kill()
 
     def end(self) -> None:
@@ -109,21 +109,21 @@ def test_a_scheduler_file_and_its_address_lead_to_the_same_workers(dask: Dask) -
 
 def test_what_is_shared_travels_once_a_worker(dask: Dask, tmp_path: Path) -> None:
     with DaskExecutor(str(dask.scheduler_file)) as executor:
-        parcel = share(executor, worker_jobs.Counted(tmp_path, 1000))
-        assert set(executor.map(worker_jobs.size_of, [parcel] * 20, range(20))) == {1000}
+        shared = share(executor, worker_jobs.Counted(tmp_path, 1000))
+        assert set(executor.map(worker_jobs.size_of, [shared] * 20, range(20))) == {1000}
     counts = worker_jobs.marks(tmp_path)
     assert len(counts) == 2
-    assert sum(counts.values()) <= 3  # opened by one worker, given on to the other
+    assert sum(counts.values()) <= 3  # loaded by one worker, passed on to the other
 
 
 def test_a_killed_worker_costs_its_task_only(dask: Dask, tmp_path: Path) -> None:
     with DaskExecutor(str(dask.scheduler_file)) as executor:
-        parcel = share(executor, worker_jobs.Counted(tmp_path, 1000))
-        assert executor.submit(worker_jobs.size_of, parcel, -1).result() == 1000
+        shared = share(executor, worker_jobs.Counted(tmp_path, 1000))
+        assert executor.submit(worker_jobs.size_of, shared, -1).result() == 1000
         victim, heir = (int(name) for name in (*worker_jobs.marks(tmp_path), "0")[:2])
-        futures = [executor.submit(worker_jobs.size_of, parcel, n) for n in range(40)]
+        futures = [executor.submit(worker_jobs.size_of, shared, n) for n in range(40)]
         futures[5].result()
-        os.kill(victim, signal.SIGKILL)  # the one that had opened what is shared
+        os.kill(victim, signal.SIGKILL)  # the worker that had loaded the shared value
         assert [future.result(60) for future in futures] == [1000] * 40
         assert victim != heir
         dask.start_worker()
@@ -131,11 +131,11 @@ def test_a_killed_worker_costs_its_task_only(dask: Dask, tmp_path: Path) -> None
 
 
 def test_a_sweep_goes_on_when_a_worker_is_killed(dask: Dask, tmp_path: Path) -> None:
-    question = Study(
+    study = Study(
         design=load_design(ROOT / "designs" / "gear.toml"), vary={"shot.mass_g": (2.0, 10.0)}
     )
-    plan = plan_sweep(question, 40, None)
-    run_sweep(question, plan, tmp_path / "serial", SerialExecutor(), None, worker_jobs.hill)
+    plan = plan_sweep(study, 40, None)
+    run_sweep(study, plan, tmp_path / "serial", SerialExecutor(), None, worker_jobs.hill)
     done = []
 
     def progress(count: int, total: int, best: float | None) -> None:
@@ -144,7 +144,7 @@ def test_a_sweep_goes_on_when_a_worker_is_killed(dask: Dask, tmp_path: Path) -> 
             dask.kill_a_worker()
 
     with DaskExecutor(str(dask.scheduler_file)) as executor:
-        run_sweep(question, plan, tmp_path / "cluster", executor, progress, worker_jobs.hill)
+        run_sweep(study, plan, tmp_path / "cluster", executor, progress, worker_jobs.hill)
         dask.start_worker()
         executor._client.wait_for_workers(2, timeout=60)
     assert done == list(range(1, 41))
@@ -152,18 +152,18 @@ def test_a_sweep_goes_on_when_a_worker_is_killed(dask: Dask, tmp_path: Path) -> 
 
 
 def test_the_same_bits_as_on_this_machine(dask: Dask, tmp_path: Path) -> None:
-    """Candidates as tasks, which build their chamber on the worker; replicas as tasks, to which it travels."""
-    question = small_study()
-    plan = plan_sweep(question, None, 4)
-    chamber = build_chamber(question.design)
+    """Tasks are candidates, which build their chamber on the worker, and replicas, which receive it."""
+    study = small_study()
+    plan = plan_sweep(study, None, 4)
+    chamber = build_chamber(study.design)
     evaluations = []
     for name, executor in (
         ("serial", SerialExecutor()),
         ("cluster", DaskExecutor(str(dask.scheduler_file))),
     ):
         with executor:
-            run_sweep(question, plan, tmp_path / name, executor)
-            evaluations.append(evaluate(question.design, chamber, executor, plan=ReplicaPlan(5)))
+            run_sweep(study, plan, tmp_path / name, executor)
+            evaluations.append(evaluate(study.design, chamber, executor, plan=ReplicaPlan(5)))
     assert rows(tmp_path / "cluster") == rows(tmp_path / "serial")
     one, other = evaluations
     assert one.metrics == other.metrics
@@ -184,13 +184,13 @@ def test_a_scheduler_that_is_not_there_is_status_2(tmp_path: Path, capsys, monke
             str(tmp_path / "o"),
         ]
         assert main(command) == 2
-    said = capsys.readouterr().err
-    assert f"--cluster: no scheduler answers at {address} within 0.5 s" in said
-    assert "start one with `dask scheduler`" in said
+    message = capsys.readouterr().err
+    assert f"--cluster: no scheduler answers at {address} within 0.5 s" in message
+    assert "start one with `dask scheduler`" in message
     assert not (tmp_path / "o").exists()
 
 
-def test_a_scheduler_without_workers_is_said(tmp_path: Path) -> None:
+def test_a_scheduler_without_workers_is_refused(tmp_path: Path) -> None:
     alone = Dask(tmp_path, [])
     try:
         alone.start("scheduler", "--host", "127.0.0.1", "--port", "0")
@@ -213,17 +213,17 @@ def test_another_version_on_a_worker_is_refused(
         DaskExecutor(str(dask.scheduler_file))
 
 
-def test_tasks_that_the_cluster_gives_up_say_why() -> None:
+def test_tasks_that_the_cluster_cancels_give_the_reason() -> None:
     killed: Future = Future()
     worker = type("Worker", (), {"address": "tcp://10.0.0.7:1"})()
     killed.set_exception(distributed.KilledWorker("task", worker, 3))
     gone: Future = Future()
     gone.set_exception(CancelledError())
-    for theirs, kind, said in (
+    for dask_future, kind, message in (
         (killed, WorkerLostError, "4 workers died .* tcp://10.0.0.7"),
         (gone, ClusterLostError, "ended"),
     ):
-        ours: Future = Future()
-        dask_cluster._copy_outcome(theirs, ours)
-        with pytest.raises(kind, match=said):
-            ours.result()
+        future: Future = Future()
+        dask_cluster._copy_outcome(dask_future, future)
+        with pytest.raises(kind, match=message):
+            future.result()

@@ -1,4 +1,4 @@
-"""Workers of every kind give the same answers; one that is lost costs its task alone, and twice lost is said so."""
+"""All kinds of workers give the same results; a task is repeated once if its worker dies."""
 
 import pickle
 import sys
@@ -50,7 +50,7 @@ def test_replicas_come_in_order_and_no_more_are_begun_than_asked_for() -> None:
         assert begun == seeds
 
 
-def test_an_error_travels_as_what_it_is(processes: Executor) -> None:
+def test_an_error_arrives_as_it_was_raised(processes: Executor) -> None:
     with pytest.raises(InputError, match=r"^shot: too many$"):
         processes.submit(worker_jobs.refuse, "shot: too many").result()
 
@@ -63,7 +63,7 @@ def test_an_error_of_the_system_is_the_tasks_own_and_no_lost_worker(
     assert worker_jobs.marks(tmp_path) == {"tried": 1}
 
 
-def test_an_error_that_cannot_travel_is_told_in_words(processes: Executor) -> None:
+def test_an_error_that_cannot_be_pickled_arrives_as_text(processes: Executor) -> None:
     with pytest.raises(RuntimeError, match=r"^AwkwardError: open edges$"):
         processes.submit(worker_jobs.refuse_awkwardly).result()
 
@@ -79,7 +79,7 @@ def test_a_lost_process_costs_its_task_alone(processes: Executor, tmp_path: Path
     assert len(before & set(processes.pids)) == 1  # type: ignore[attr-defined]
 
 
-def test_a_task_that_takes_its_processes_down_is_said_so(
+def test_a_task_that_kills_two_processes_fails_with_the_reason(
     processes: Executor, tmp_path: Path
 ) -> None:
     with pytest.raises(
@@ -92,13 +92,13 @@ def test_a_task_that_takes_its_processes_down_is_said_so(
 
 
 def test_what_is_shared_travels_once_a_worker(processes: Executor, tmp_path: Path) -> None:
-    parcel = share(processes, worker_jobs.Counted(tmp_path, 100_000))
-    assert len(pickle.dumps((worker_jobs.size_of, (parcel, 1), {}))) < 300
-    assert set(processes.map(worker_jobs.size_of, [parcel] * 20, range(20))) == {100_000}
+    shared = share(processes, worker_jobs.Counted(tmp_path, 100_000))
+    assert len(pickle.dumps((worker_jobs.size_of, (shared, 1), {}))) < 300
+    assert set(processes.map(worker_jobs.size_of, [shared] * 20, range(20))) == {100_000}
     assert worker_jobs.marks(tmp_path) == {str(pid): 1 for pid in processes.pids}  # type: ignore[attr-defined]
-    file = Path(parcel.path)
+    file = Path(shared.path)
     assert file.exists()
-    del parcel
+    del shared
     assert not file.exists()
 
 
@@ -127,7 +127,7 @@ def test_leaving_by_an_exception_does_not_wait_for_the_tasks(tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize(
-    ("workers", "cluster", "said"),
+    ("workers", "cluster", "message"),
     [
         (0, None, "--workers: given 0; give at least 1"),
         (2, "tcp://127.0.0.1:8786", "--workers: given 2, but --cluster has workers of its own"),
@@ -140,10 +140,12 @@ def test_leaving_by_an_exception_does_not_wait_for_the_tasks(tmp_path: Path) -> 
         ),
     ],
 )
-def test_what_cannot_be_is_said(workers: int | None, cluster: str | None, said: str) -> None:
+def test_invalid_workers_are_refused(
+    workers: int | None, cluster: str | None, message: str
+) -> None:
     if cluster and not workers:
         pytest.importorskip("distributed", reason="Dask is not installed")
-    with pytest.raises(InputError, match=said):
+    with pytest.raises(InputError, match=message):
         open_executor(workers, cluster)
 
 

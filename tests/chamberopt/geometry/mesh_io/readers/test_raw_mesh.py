@@ -1,4 +1,4 @@
-"""Which element of its file each triangle is of, whatever the format and whatever was healed since."""
+"""Triangles keep the element numbers of their file, in every format and through healing."""
 
 import re
 from pathlib import Path
@@ -10,24 +10,28 @@ import trimesh
 
 from chamberopt.design.shapes.construction.cad_setup import read_setup
 from chamberopt.geometry.mesh_io import PartMesh, close_surface, read_part, read_triangles
-from tests.chamberopt.geometry.mesh_io.test_formats import (
+from tests.helpers.mesh_files import (
     CORNERS,
     GMSH_4,
     OBJ_HEAD,
     QUADS,
     TOP,
     gmsh_2,
+    nastran_text,
+    node_list,
     nodes_text,
     obj_face,
     written,
 )
 
 NUMBERS = (907, 3, 512, 11, 10, 77)  # of the six quadrilaterals: gaps, not rising
-PARTS = Path(__file__).resolve().parents[4] / "designs" / "parts"
+
+
+PARTS = Path(__file__).resolve().parents[5] / "designs" / "parts"
 
 
 def quads_of(part: PartMesh) -> np.ndarray:
-    """Which of QUADS each triangle of the box lies in, by its place."""
+    """Index into QUADS of the face in which each triangle of the box lies, by its position."""
     middles = 1e3 * part.vertices[part.triangles].mean(axis=1)
     off = []
     for quad in QUADS:
@@ -45,23 +49,16 @@ def assert_numbered(part: PartMesh, numbers: tuple[int, ...], own: bool) -> None
     assert not part.numbering.faces.any()
 
 
-def nastran_text(cards: list[str], points: np.ndarray = CORNERS) -> str:
-    grids = [f"GRID,{k},,{x:.9f},{y:.9f},{z:.9f}" for k, (x, y, z) in enumerate(points, start=1)]
-    return "\n".join(["BEGIN BULK", *grids, *cards, "ENDDATA"]) + "\n"
-
-
-def listed(nodes: tuple[int, ...]) -> str:
-    return ",".join(str(k + 1) for k in nodes)
-
-
 def test_nastran(tmp_path: Path) -> None:
-    cards = [f"CQUAD4,{n},1,{listed(quad)}" for n, quad in zip(NUMBERS[:4], QUADS[:4], strict=True)]
+    cards = [
+        f"CQUAD4,{n},1,{node_list(quad)}" for n, quad in zip(NUMBERS[:4], QUADS[:4], strict=True)
+    ]
     for number, (a, b, c, d) in zip(
         (10, 77), QUADS[4:], strict=True
     ):  # triangles are kept apart from quadrilaterals
         cards += [
-            f"CTRIA3,{number},1,{listed((a, b, c))}",
-            f"CTRIA3,{number + 1000},1,{listed((a, c, d))}",
+            f"CTRIA3,{number},1,{node_list((a, b, c))}",
+            f"CTRIA3,{number + 1000},1,{node_list((a, c, d))}",
         ]
     part = read_part(written(tmp_path / "box.bdf", nastran_text(cards)), "mm")
     part.elements[part.elements > 1000] -= 1000
@@ -69,7 +66,7 @@ def test_nastran(tmp_path: Path) -> None:
 
 
 def abaqus_text(instances: int) -> str:
-    quads = "".join(f"{n}, {listed(quad)}\n" for n, quad in zip(NUMBERS, QUADS, strict=True))
+    quads = "".join(f"{n}, {node_list(quad)}\n" for n, quad in zip(NUMBERS, QUADS, strict=True))
     mesh = "*Node\n" + nodes_text(CORNERS) + "*Element, type=S4\n" + quads
     if not instances:
         return "*Heading\n" + mesh
@@ -95,7 +92,7 @@ def test_abaqus(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("binary", [True, False])
 def test_gmsh_2(tmp_path: Path, binary: bool) -> None:
-    """Its elements are read group by group: the numbers, here places from 1 with a line first, go along."""
+    """Elements are read group by group and keep their numbers, here 1 for a line and 2 to 7."""
     elements = [
         (1, (0, 1), np.array([0, 1])),
         *((3, (7 + k % 2, 1), np.array(quad)) for k, quad in enumerate(QUADS)),
@@ -107,11 +104,11 @@ def test_gmsh_2(tmp_path: Path, binary: bool) -> None:
 def test_gmsh_4(tmp_path: Path) -> None:
     points = "".join(f"{x} {y} {z}\n" for x, y, z in CORNERS)
     quads = "".join(
-        f"{n} {listed(quad).replace(',', ' ')}\n"
+        f"{n} {node_list(quad).replace(',', ' ')}\n"
         for n, quad in zip(NUMBERS[1:], QUADS[1:], strict=True)
     )
     text = GMSH_4.format(points=points, quads=quads)
-    top = int(re.search(rf"^(\d+) {listed(TOP).replace(',', ' ')}$", text, re.M)[1])  # type: ignore[index]
+    top = int(re.search(rf"^(\d+) {node_list(TOP).replace(',', ' ')}$", text, re.M)[1])  # type: ignore[index]
     assert_numbered(
         read_part(written(tmp_path / "box.msh", text), "mm"), (top, *NUMBERS[1:]), own=True
     )
@@ -146,13 +143,13 @@ def test_a_solids_faces_have_its_number_but_a_shell_on_it_comes_first(
     low, high, top = range(8), (*range(4, 8), *range(8, 12)), (8, 9, 10, 11)
     if program == "nastran":
         cards = [
-            f"CHEXA,{n},1,{listed(k[:6])}\n+,{listed(k[6:])}"
+            f"CHEXA,{n},1,{node_list(k[:6])}\n+,{node_list(k[6:])}"
             for n, k in ((9, tuple(low)), (44, high))
         ]
-        text = nastran_text([*cards, f"CQUAD4,300,2,{listed(top)}"], points)
+        text = nastran_text([*cards, f"CQUAD4,300,2,{node_list(top)}"], points)
     else:
-        bricks = "".join(f"{n}, {listed(tuple(k))}\n" for n, k in ((44, high), (9, low)))
-        skin = f"*Element, type=M3D4\n300, {listed(top)}\n"
+        bricks = "".join(f"{n}, {node_list(tuple(k))}\n" for n, k in ((44, high), (9, low)))
+        skin = f"*Element, type=M3D4\n300, {node_list(top)}\n"
         text = f"*Heading\n*Node\n{nodes_text(points)}*Element, type=C3D8\n{bricks}{skin}"
 
     part = read_part(written(tmp_path / "bricks.inp", text), "mm")
@@ -171,7 +168,7 @@ def test_a_solids_faces_have_its_number_but_a_shell_on_it_comes_first(
 
 
 def test_numbers_stay_with_their_triangles_through_healing(tmp_path: Path) -> None:
-    """A ball with a triangle missing, one given twice and one without area; the rest in any order."""
+    """A ball in random order: one triangle is missing, one is given twice, one has no area."""
     ball = trimesh.creation.icosphere(subdivisions=4, radius=10.0)
     order = np.random.default_rng(1).permutation(len(ball.faces))
     numbers = 10 * np.arange(len(order)) + 3
@@ -179,7 +176,7 @@ def test_numbers_stay_with_their_triangles_through_healing(tmp_path: Path) -> No
     missing = given.pop(503)
     a, b, c = given[1003]
     given |= {99_999: (b, c, a), 99_998: (a, a, b)}
-    cards = [f"CTRIA3,{n},1,{listed(nodes)}" for n, nodes in given.items()]
+    cards = [f"CTRIA3,{n},1,{node_list(nodes)}" for n, nodes in given.items()]
 
     part = read_part(written(tmp_path / "ball.bdf", nastran_text(cards, ball.vertices)), "mm")
 
@@ -200,7 +197,7 @@ def test_numbers_stay_with_their_triangles_through_healing(tmp_path: Path) -> No
 
 def test_one_body_of_several_keeps_its_numbers(tmp_path: Path) -> None:
     points = np.concatenate([CORNERS, CORNERS + np.array([100.0, 0.0, 0.0])])
-    cards = [f"CQUAD4,{n + shift},{1 + shift // 2000},{listed(tuple(k + shift // 250 for k in quad))}"
+    cards = [f"CQUAD4,{n + shift},{1 + shift // 2000},{node_list(tuple(k + shift // 250 for k in quad))}"
              for shift in (0, 2000) for n, quad in zip(NUMBERS, QUADS, strict=True)]  # fmt: skip
     read = read_triangles(written(tmp_path / "two.bdf", nastran_text(cards, points)), "mm")
 
