@@ -1,4 +1,4 @@
-"""Save a finished simulation, study or sweep: its data, its pictures and, last of all, result.json."""
+"""Save a finished simulation, study or sweep: data, pictures and, last of all, result.json."""
 
 from __future__ import annotations
 

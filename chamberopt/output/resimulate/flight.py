@@ -111,7 +111,7 @@ def face_displacement(vibration: Vibration, time: np.ndarray) -> np.ndarray:
 
 
 def rotation_angle(rotation: PartRotation | None, time: np.ndarray) -> np.ndarray:
-    """Angle of a part [rad], shape (f,), at times from the scene's start [s]; 0 if it stands still."""
+    """Angle of a part [rad], shape (f,), at times from the scene's start [s]; 0 if it is fixed."""
     if rotation is None:
         return np.zeros(len(time))
     if rotation.rpm is not None:

@@ -43,7 +43,7 @@ class ReplicaImpacts:
 
     number: of the replica, from 0.
     log: as the simulator wrote it; its triangles are those of the chamber.
-    part_triangle: triangle of the part that was hit, numbered as in coverage.vtp, int32, shape (n,).
+    part_triangle: triangle that was hit, numbered as in coverage.vtp, int32, shape (n,).
     """
 
     number: int
@@ -101,7 +101,7 @@ def replica_count(result: Result, replicas: int | None) -> int:
 
 
 def simulate_dents(replica: Replica, time: float) -> Dents:
-    """Simulate a replica for a time [s], which may be longer than the result's, and return its dents.
+    """Return the dents of a replica simulated for a time [s], even longer than the result's.
 
     Raises:
         InputError: the time is too long to simulate.

@@ -1,4 +1,4 @@
-"""The part in its chamber, in three dimensions. The only room that imports pyvista."""
+"""Pictures, films and a window of the part in its chamber, drawn with pyvista."""
 
 from chamberopt.output.viewer.images.coverage import draw_coverage
 from chamberopt.output.viewer.images.difference import draw_difference, write_differences

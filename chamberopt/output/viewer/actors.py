@@ -1,4 +1,4 @@
-"""What is put into a plotter: the part, its chamber as glass, the colour bar."""
+"""What is put into a plotter: the part, the chamber as glass, discs, colour bars."""
 
 from __future__ import annotations
 
@@ -8,104 +8,107 @@ import numpy as np
 
 from chamberopt.design.shapes import TAG_WALL, is_sonotrode
 from chamberopt.output.viewer.drawn_part import DrawnPart
+from chamberopt.output.viewer.view_state import DEFAULT_VIEW
 from chamberopt.output.vtp_files import Surface, pyvista
 
 GREY, DARK, GLASS, SONOTRODE, BACKGROUND = "#b9bec4", "#2b3440", "#9db7cc", "#e08a2e", "white"
 FAULT, PALE = "#d01c1c", "#eceff2"
-ROUND = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)  # steps of a colour bar, times a power of ten
+VIEW_FROM_BELOW = (1.0, -1.4, -0.8)  # a little below, where the shot comes from
+SHARP_EDGE = 30  # degrees between the triangles at an edge of the chamber that is drawn
+ROUND_STEPS = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)  # of colour bars, times powers of ten
 LIFT = 0.1  # of discs off the surface, in their radii: the facets of a round edge do not hide them
 DISC_SIDES = 24
-STILL = {"render": False, "reset_camera": False}  # nothing is seen before all is there
-
-
-def show(plotter: Any, part: DrawnPart, limits: tuple[float, float], bar: bool) -> None:
-    """The target coloured by its quantity, the rest of the part grey, lit from the camera."""
-    light(plotter)
-    target = target_and_rest(plotter, part, limits)[0]
-    if bar:
-        steps, written = ticks(limits)
-        plotter.add_scalar_bar(
-            part.quantity.title + "\n", mapper=target.mapper, vertical=True, fmt=written, n_labels=steps + 1,
-            color=DARK, width=0.06, height=0.55, position_x=0.88, position_y=0.2,
-            title_font_size=20, label_font_size=20,
-        )  # fmt: skip
+NO_RENDER = {"render": False, "reset_camera": False}  # until everything is in the plotter
 
 
 def light(plotter: Any) -> None:
-    """White behind, and a lamp that goes with the camera."""
+    """Make the background white and put a light beside the camera."""
     plotter.set_background(BACKGROUND)
     plotter.remove_all_lights()
     plotter.add_light(pyvista().Light(light_type="headlight"))
 
 
-def target_and_rest(
-    plotter: Any, part: DrawnPart, limits: tuple[float, float], passed: np.ndarray | None = None
-) -> list[Any]:
-    """The actors: the target coloured by its quantity, and, if there is more of the part, that in grey.
-
-    passed: triangles of the target, bool, that are pale instead.
-    """
-    drawn = np.clip(part.target["shown"], *limits)
-    if passed is not None:
-        drawn[passed] = np.inf
-    part.target["drawn"] = drawn
-    target = plotter.add_mesh(
-        part.target, scalars="drawn", cmap=part.quantity.colours, nan_color=GREY, clim=limits,
-        ambient=0.7, diffuse=0.3, show_scalar_bar=False, above_color=None if passed is None else PALE, **STILL,
-    )  # fmt: skip
-    if not part.rest.n_cells:
-        return [target]
-    return [target, plotter.add_mesh(part.rest, color=GREY, ambient=0.45, diffuse=0.55, **STILL)]
-
-
-def in_chamber(
-    plotter: Any,
-    part: DrawnPart,
-    chamber: Surface,
-    title: str,
-    limits: tuple[float, float],
-    bar: bool,
+def draw_in_chamber(
+    plotter: Any, part: DrawnPart, chamber: Surface, title: str, limits: tuple[float, float]
 ) -> None:
-    """The part inside the glass chamber, over the sonotrode."""
-    show(plotter, part, limits, bar)
+    """Draw the part inside the glass chamber, over the sonotrode."""
+    light(plotter)
+    add_part(plotter, part, limits)
     add_chamber(plotter, chamber)
     plotter.add_text(escape_dollars(title), position="upper_left", font_size=13, color=DARK)
     legend = "orange: sonotrode   grey: not in the target"
     plotter.add_text(legend, position="lower_left", font_size=9, color=DARK)
-    plotter.camera_position = [(1.0, -1.6, 0.35), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
+    plotter.camera_position = [DEFAULT_VIEW, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
     plotter.reset_camera()
     plotter.enable_anti_aliasing("ssaa")
 
 
-def add_chamber(plotter: Any, chamber: Surface) -> tuple[dict[int, Any], list[Any]]:
-    """The sonotrodes, and the walls as glass with their edges: the actors of the former by tag, and of the latter. No
-    click finds them.
-    """
-    tags = np.asarray(chamber["tag"])
-    faces = {}
-    for tag in np.unique(tags[is_sonotrode(tags)]):
-        face = chamber.extract_cells(tags == tag).extract_surface(algorithm="dataset_surface")
-        faces[int(tag)] = plotter.add_mesh(
-            face, color=SONOTRODE, lighting=False, pickable=False, **STILL
+def draw_target(plotter: Any, part: DrawnPart, limits: tuple[float, float], bar: bool) -> None:
+    """Draw the target from near, with a colour bar if wanted."""
+    light(plotter)
+    target = add_part(plotter, part, limits)[0]
+    if bar:
+        steps, number_format = colour_bar_ticks(limits)
+        plotter.add_scalar_bar(
+            part.quantity.title + "\n", mapper=target.mapper, vertical=True, fmt=number_format,
+            n_labels=steps + 1, color=DARK, width=0.06, height=0.55, position_x=0.88,
+            position_y=0.2, title_font_size=20, label_font_size=20,
+        )  # fmt: skip
+    if part.averaging_radius:
+        text = (
+            f"averaged over {part.averaging_radius:.1f} mm around each triangle: few dents were "
+            "simulated"
         )
-    wall = chamber.extract_cells(tags == TAG_WALL).extract_surface(algorithm="dataset_surface")
-    rims = wall.extract_feature_edges(30, non_manifold_edges=False, manifold_edges=False)
-    return faces, [
-        plotter.add_mesh(wall, color=GLASS, opacity=0.16, specular=0.3, pickable=False, **STILL),
-        plotter.add_mesh(rims, color=DARK, line_width=2, opacity=0.6, pickable=False, **STILL),
-    ]
-
-
-def near(plotter: Any, part: DrawnPart, limits: tuple[float, float], bar: bool) -> None:
-    """The target from near and a little below, where the shot comes from."""
-    show(plotter, part, limits, bar)
-    if part.reach:
-        text = f"averaged over {part.reach:.1f} mm around each triangle: few dents were simulated"
         plotter.add_text(text, position="lower_left", font_size=9, color=DARK)
-    plotter.camera_position = [(1.0, -1.4, -0.8), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
+    plotter.camera_position = [VIEW_FROM_BELOW, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
     plotter.reset_camera(bounds=part.target.bounds)
     plotter.camera.SetWindowCenter(0.14 if bar else 0.0, 0.0)  # makes room for the colour bar
     plotter.enable_anti_aliasing("ssaa")
+
+
+def add_part(
+    plotter: Any, part: DrawnPart, limits: tuple[float, float], pale: np.ndarray | None = None
+) -> list[Any]:
+    """Add the target, coloured by its quantity, and the rest of the part in grey, if any.
+
+    pale: triangles of the target, bool, that are drawn pale instead.
+
+    Returns:
+        The actors, the target's first.
+    """
+    drawn = np.clip(part.target["shown"], *limits)
+    if pale is not None:
+        drawn[pale] = np.inf
+    part.target["drawn"] = drawn
+    target = plotter.add_mesh(
+        part.target, scalars="drawn", cmap=part.quantity.colours, nan_color=GREY, clim=limits,
+        ambient=0.7, diffuse=0.3, show_scalar_bar=False,
+        above_color=None if pale is None else PALE, **NO_RENDER,
+    )  # fmt: skip
+    if not part.rest.n_cells:
+        return [target]
+    rest = plotter.add_mesh(part.rest, color=GREY, ambient=0.45, diffuse=0.55, **NO_RENDER)
+    return [target, rest]
+
+
+def add_chamber(plotter: Any, chamber: Surface) -> tuple[dict[int, Any], list[Any]]:
+    """Add the sonotrodes, and the walls as glass with their edges; clicks pass through them.
+
+    Returns:
+        The actors of the sonotrodes by tag, and those of the walls.
+    """
+    tags = np.asarray(chamber["tag"])
+    style = {"pickable": False, **NO_RENDER}
+    faces = {}
+    for tag in np.unique(tags[is_sonotrode(tags)]):
+        face = chamber.extract_cells(tags == tag).extract_surface(algorithm="dataset_surface")
+        faces[int(tag)] = plotter.add_mesh(face, color=SONOTRODE, lighting=False, **style)
+    wall = chamber.extract_cells(tags == TAG_WALL).extract_surface(algorithm="dataset_surface")
+    edges = wall.extract_feature_edges(SHARP_EDGE, non_manifold_edges=False, manifold_edges=False)
+    return faces, [
+        plotter.add_mesh(wall, color=GLASS, opacity=0.16, specular=0.3, **style),
+        plotter.add_mesh(edges, color=DARK, line_width=2, opacity=0.6, **style),
+    ]
 
 
 class Discs(NamedTuple):
@@ -163,18 +166,16 @@ def disc_actor(discs: Discs, ambient: float = 1.0) -> Any:
 
 
 def escape_dollars(text: str) -> str:
-    """Text for VTK, which would set what is between two $ as a formula: a folder's name is none."""
+    """Escape `$`, so that VTK does not typeset a folder's name as a formula."""
     return text.replace("$", r"\$")
 
 
-def ticks(limits: tuple[float, float]) -> tuple[int, str]:
-    """How many steps a bar is divided into, so that its labels are round, and how they are written."""
+def colour_bar_ticks(limits: tuple[float, float]) -> tuple[int, str]:
+    """Return into how many round steps a colour bar is divided, and the format of its labels."""
     span = limits[1] - limits[0]
     for steps in (5, 4, 6, 7, 8, 9, 10, 3):
         step = span / steps
-        if any(np.isclose(step / 10.0 ** np.floor(np.log10(step)), one) for one in ROUND):
-            return (
-                steps,
-                f"%.{next((n for n in range(9) if np.isclose(round(step, n), step, rtol=1e-6)), 9)}f",
-            )
+        if any(np.isclose(step / 10.0 ** np.floor(np.log10(step)), one) for one in ROUND_STEPS):
+            exact = (n for n in range(9) if np.isclose(round(step, n), step, rtol=1e-6))
+            return steps, f"%.{next(exact, 9)}f"
     return 5, f"%.{max(0, int(np.ceil(1.0 - np.log10(span)))) if span > 0.0 else 2}f"

@@ -1,4 +1,4 @@
-"""A part ready to be drawn: its target with one quantity on it, and the rest."""
+"""The part of a result, ready to be drawn: its target coloured by one quantity, and the rest."""
 
 from __future__ import annotations
 
@@ -15,49 +15,52 @@ from chamberopt.simulation.triangle_fields import QUANTITIES, Quantity
 
 
 class DrawnPart:
-    """A part ready to be drawn: `target` with one quantity as cell data "shown", in the unit shown, and the `rest`.
+    """The target of a part with the values of one quantity, and the rest of the part.
 
-    Both have cell data "row", the triangle's row in coverage.vtp. reach [mm]: how far around a triangle coverage is
-    averaged, 0 where it is not. marked: whether coverage is from dents marked one by one, known at one time only.
+    target: exposed triangles of the target, with cell data "shown" in the quantity's unit.
+    rest: all other triangles.
+    marked: whether dents were marked one by one, so that coverage is known at one time only.
+    quantity: the one in "shown".
+
+    Target and rest have cell data "row", the number of the triangle in coverage.vtp.
     """
 
     def __init__(self, surface: Surface, quantity: Quantity = QUANTITIES["coverage"]) -> None:
-        wanted = (surface["target"] > 0) & (surface["exposed_area_mm2"] > 0)
+        on_target = (surface["target"] > 0) & (surface["exposed_area_mm2"] > 0)
         surface["row"] = np.arange(surface.n_cells)
-        self.target = surface.extract_cells(wanted).extract_surface(algorithm="dataset_surface")
-        self.rest = surface.extract_cells(~wanted)
+        self.target = surface.extract_cells(on_target).extract_surface(algorithm="dataset_surface")
+        self.rest = surface.extract_cells(~on_target)
         self.marked = read_coverage_model(surface) == "dents"
         self.show(quantity)
 
     def show(self, quantity: Quantity, times: float = 1.0) -> None:
-        """Another quantity; coverage and what is counted per area at so many treatment times."""
+        """Put a quantity into "shown".
+
+        times: the peening time over the treatment time; scales coverage and what grows with time.
+        """
         self.quantity = quantity
-        self.reach = self.coverage_reach if quantity.name == "coverage" else 0.0
         self.target["shown"] = self.values(quantity, times)
 
     def values(self, quantity: Quantity, times: float = 1.0) -> np.ndarray:
-        """Of the target's triangles, in the unit shown."""
+        """Values of the target's triangles in the quantity's unit; `times` as in show."""
         if quantity.column not in self.target.cell_data:
             raise InputError(
                 f"coverage.vtp has no {quantity.column}: an older result; simulate again"
             )
         if quantity.name != "coverage":
-            return (
-                quantity.factor
-                * np.asarray(self.target[quantity.column])
-                * (times if quantity.grows else 1.0)
-            )
+            scale = quantity.factor * (times if quantity.grows else 1.0)
+            return scale * np.asarray(self.target[quantity.column])
         value = self._averages[0]
         return 100.0 * (value if self.marked else coverage_from_dent_density(value * times))
 
     @property
-    def coverage_reach(self) -> float:
-        """The reach of coverage, whatever is shown."""
+    def averaging_radius(self) -> float:
+        """Radius of the discs that coverage is averaged over [mm], 0 where it is not."""
         return self._averages[1]
 
     @cached_property
     def _averages(self) -> tuple[np.ndarray, float]:
-        """What coverage is computed from, averaged: its dent density, or itself where dents are marked; and reach."""
+        """Averages of the dent density, or of marked coverage, and the radius of their discs."""
         return average_over_discs(
             np.asarray(self.target.cell_centers().points),
             np.asarray(self.target.cell_normals),
@@ -68,7 +71,7 @@ class DrawnPart:
 
 
 def colour_range(parts: Sequence[DrawnPart]) -> tuple[float, float]:
-    """Round limits that hold nearly all of what is shown on every part."""
+    """Return round limits that hold nearly all values shown on all parts."""
     values = np.concatenate([part.target["shown"] for part in parts])
     values = values[np.isfinite(values)]
     if parts[0].quantity.unit != "%":
@@ -80,7 +83,7 @@ def colour_range(parts: Sequence[DrawnPart]) -> tuple[float, float]:
 
 
 def _round_range(low: float, high: float) -> tuple[float, float]:
-    """Limits outward to round numbers; 0 where it is not far."""
+    """Widen limits to round numbers, and down to 0 if that is near."""
     span = high - low if high > low else max(abs(high), 1e-12)
     step = 10.0 ** np.floor(np.log10(span)) / 2.0
     low = 0.0 if 0.0 <= low < 0.4 * high else step * np.floor(low / step)

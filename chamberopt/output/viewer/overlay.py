@@ -1,4 +1,4 @@
-"""Words and small pictures beside the part: title, colour bar, what the colours mean, a triangle's numbers."""
+"""Text and charts over a view: title, colour bar, legend, a triangle's numbers, list of keys."""
 
 from __future__ import annotations
 
@@ -9,92 +9,84 @@ from typing import Any
 import numpy as np
 
 from chamberopt.geometry.triangles import unit_normals
-from chamberopt.output.viewer.actors import DARK, STILL, escape_dollars, ticks
+from chamberopt.output.viewer.actors import DARK, NO_RENDER, colour_bar_ticks, escape_dollars
 from chamberopt.output.vtp_files import pyvista
 from chamberopt.simulation.triangle_fields import Quantity
 
-SMALL, LARGE = 8, 10  # fonts, in views of NARROW pixels or more
-NARROW = 750
-HIGH, WIDE = 2.3, 1.0  # a line, and a letter in the mean: pixels for each unit of font size
-EDGE = 10  # pixels between words and the view's edge
-MARK = "#d6006c"  # of the triangle that is asked about; in none of the colour maps
+SMALL_FONT, LARGE_FONT = 8, 10  # in views of at least FULL_WIDTH pixels
+FULL_WIDTH = 750
+MIN_SCALE = 0.75  # of fonts in narrower views
+LINE_HEIGHT, LETTER_WIDTH = 2.3, 1.0  # pixels for each unit of font size; the width is a mean
+MIN_LETTERS = 12  # in a line
+EDGE = 10  # pixels between text and the edge of the view
+MARK = "#d6006c"  # of the chosen triangle; in none of the colour maps
 BINS = 20
 
 Size = tuple[int, int]
-"""Pixels of a view."""
+"""Width and height of a view [pixels]."""
 
 
 def fonts(size: Size) -> tuple[int, int]:
-    """The small and the large one: smaller in narrow views."""
-    share = min(max(size[0] / NARROW, 0.75), 1.0)
-    return round(SMALL * share), round(LARGE * share)
+    """Return the small and the large font size of a view."""
+    scale = min(max(size[0] / FULL_WIDTH, MIN_SCALE), 1.0)
+    return round(SMALL_FONT * scale), round(LARGE_FONT * scale)
 
 
-def wrapped(text: str, width: float, font: int) -> str:
-    """Lines no wider than `width` [pixels]."""
-    letters = max(int(width / (WIDE * font)), 12)
+def wrap(text: str, width: float, font: int) -> str:
+    """Wrap text to lines of a width [pixels]."""
+    letters = max(int(width / (LETTER_WIDTH * font)), MIN_LETTERS)
     return "\n".join("\n".join(textwrap.wrap(line, letters)) for line in text.splitlines())
 
 
-def title(plotter: Any, text: str, lines: Sequence[str], size: Size) -> None:
-    """In the upper left, as wide as leaves the bar its room; under it a triangle's numbers, if any."""
+def show_title(plotter: Any, title: str, lines: Sequence[str], size: Size) -> None:
+    """Write the title in the upper left, and below it the lines on a triangle, if any."""
     small, large = fonts(size)
-    above = wrapped(text, 0.72 * size[0], large)
-    _words(
-        plotter, "title", above, (EDGE, size[1] - EDGE), large
-    ).prop.justification_vertical = "top"
+    title = wrap(title, 0.72 * size[0], large)
+    text = _add_text(plotter, "title", title, (EDGE, size[1] - EDGE), large)
+    text.prop.justification_vertical = "top"
     if lines:
-        below = size[1] - 3 * EDGE - HIGH * large * len(above.splitlines())
-        numbers = wrapped("\n".join(lines), 0.4 * size[0], small)
-        _words(
-            plotter, "numbers", numbers, (EDGE, below), small
-        ).prop.justification_vertical = "top"
+        below = size[1] - 3 * EDGE - LINE_HEIGHT * large * len(title.splitlines())
+        numbers = wrap("\n".join(lines), 0.4 * size[0], small)
+        text = _add_text(plotter, "numbers", numbers, (EDGE, below), small)
+        text.prop.justification_vertical = "top"
 
 
-def bar(
-    plotter: Any,
-    quantity: Quantity,
-    limits: tuple[float, float],
-    actor: Any,
-    number: int,
-    size: Size,
+def show_colour_bar(
+    plotter: Any, quantity: Quantity, limits: tuple[float, float], actor: Any, name: str, size: Size
 ) -> None:
-    """The colour bar of an actor at the view's right edge, its title above it with the unit."""
-    steps, written = ticks(limits)
-    scale = plotter.add_scalar_bar(
-        title=bar_name(number),  # the words above it are ours: VTK would shrink them to the bar
-        mapper=actor.mapper, vertical=True, fmt=written, n_labels=steps + 1, color=DARK, label_font_size=16,
-        width=50 / size[0], height=0.46, position_x=1.0 - 100 / size[0], position_y=0.4, render=False,
+    """Draw the colour bar of an actor at the right edge of the view, its title above it."""
+    steps, number_format = colour_bar_ticks(limits)
+    bar = plotter.add_scalar_bar(
+        title=name,  # blanks: VTK would shrink a title to the bar, so it is written below
+        mapper=actor.mapper, vertical=True, fmt=number_format, n_labels=steps + 1, color=DARK,
+        label_font_size=16, width=50 / size[0], height=0.46, position_x=1.0 - 100 / size[0],
+        position_y=0.4, render=False,
     )  # fmt: skip
-    scale.DrawAboveRangeSwatchOff()
-    scale.DrawNanAnnotationOff()
-    words = "\n".join(textwrap.wrap(quantity.title, 20))
-    above = _words(plotter, "bar title", words, (size[0] - EDGE, 0.885 * size[1]), fonts(size)[1])
-    above.prop.justification_horizontal = "right"
+    bar.DrawAboveRangeSwatchOff()
+    bar.DrawNanAnnotationOff()
+    title = "\n".join(textwrap.wrap(quantity.title, 20))
+    place = (size[0] - EDGE, 0.885 * size[1])
+    text = _add_text(plotter, "bar title", title, place, fonts(size)[1])
+    text.prop.justification_horizontal = "right"
 
 
-def bar_name(number: int) -> str:
-    """What pyvista calls the bar of a view by, and writes above it: nothing to be seen."""
-    return " " * (number + 1)
-
-
-def legend(
+def show_legend(
     plotter: Any, entries: Sequence[tuple[str, str]], remarks: Sequence[str], size: Size
 ) -> None:
-    """Lower left: a patch of each colour with what it means, and remarks above."""
+    """Draw a patch of each colour with its meaning in the lower left, and remarks above."""
     small, _ = fonts(size)
-    line = HIGH * small
+    line = LINE_HEIGHT * small
     for row, (colour, meaning) in enumerate(reversed(entries)):
         y = EDGE + row * line
-        patch = _words(plotter, f"patch {row}", "    ", (EDGE, y), small)
+        patch = _add_text(plotter, f"patch {row}", "    ", (EDGE, y), small)
         patch.prop.background_color, patch.prop.background_opacity = colour, 1.0
-        _words(plotter, f"meaning {row}", meaning, (EDGE + 4 * small, y), small)
-    text = wrapped("\n".join(remarks), 0.32 * size[0], small)
-    _words(plotter, "remarks", text, (EDGE, 2 * EDGE + len(entries) * line), small)
+        _add_text(plotter, f"meaning {row}", meaning, (EDGE + 4 * small, y), small)
+    text = wrap("\n".join(remarks), 0.32 * size[0], small)
+    _add_text(plotter, "remarks", text, (EDGE, 2 * EDGE + len(entries) * line), small)
 
 
-def histogram(plotter: Any, speed: np.ndarray) -> None:
-    """Impact speeds (k,) [m/s] of a triangle as a chart in the lower right."""
+def show_histogram(plotter: Any, speed: np.ndarray) -> None:
+    """Draw the impact speeds (k,) [m/s] of a triangle as a chart in the lower right."""
     chart = pyvista().Chart2D(size=(0.36, 0.33), loc=(0.63, 0.02))
     counts, edges = np.histogram(speed, BINS, (0.0, float(speed.max()) or 1.0))
     chart.bar(0.5 * (edges[:-1] + edges[1:]), counts.astype(float), color=MARK)
@@ -110,31 +102,31 @@ def histogram(plotter: Any, speed: np.ndarray) -> None:
     plotter.add_chart(chart)
 
 
-def mark(plotter: Any, corners: np.ndarray, length: float) -> None:
-    """A triangle (3, 3) [mm] outlined, with a pin of some length on it."""
-    foot = corners.mean(axis=0)
-    tip = foot + length * unit_normals(corners)
-    style = {"color": MARK, "lighting": False, "pickable": False, **STILL}
+def mark_triangle(plotter: Any, corners: np.ndarray, length: float) -> None:
+    """Outline a triangle (3, 3) [mm] and put a pin of a length [mm] on it."""
+    centre = corners.mean(axis=0)
+    tip = centre + length * unit_normals(corners)
+    style = {"color": MARK, "lighting": False, "pickable": False, **NO_RENDER}
     plotter.add_mesh(
         pyvista().MultipleLines(np.vstack([corners, corners[:1]])), line_width=3, **style
     )
-    plotter.add_mesh(pyvista().Line(foot, tip), line_width=3, **style)
+    plotter.add_mesh(pyvista().Line(centre, tip), line_width=3, **style)
     plotter.add_mesh(pyvista().Sphere(radius=0.12 * length, center=tip), **style)
 
 
-def keys(plotter: Any, text: str, size: Size) -> None:
-    """The list of keys, over everything."""
+def show_keys(plotter: Any, text: str, size: Size) -> None:
+    """Write the list of keys over everything."""
     font = fonts(size)[0]
     left = max(EDGE, 0.5 * size[0] - 30 * font)
-    prop = _words(plotter, "keys", text, (left, 0.5 * size[1]), font).prop
+    prop = _add_text(plotter, "keys", text, (left, 0.5 * size[1]), font).prop
     prop.font_family = "courier"
     prop.justification_vertical = "center"
     prop.background_color, prop.background_opacity = "white", 0.94
     prop.show_frame, prop.frame_color = True, DARK
 
 
-def _words(plotter: Any, name: str, text: str, place: tuple[float, float], font: int) -> Any:
-    """A text at a place [pixels] of the view, its lower left corner there."""
+def _add_text(plotter: Any, name: str, text: str, place: tuple[float, float], font: int) -> Any:
+    """Add text whose lower left corner is at a place [pixels] of the view."""
     return plotter.add_text(
         escape_dollars(text), position=place, font_size=font, color=DARK, name=name, render=False
     )

@@ -1,4 +1,4 @@
-"""The views of inspect, one a result: all that is in a plotter follows from one ViewState."""
+"""The views of `inspect`, one for each result; everything in them follows from one ViewState."""
 
 from __future__ import annotations
 
@@ -11,90 +11,101 @@ import numpy as np
 from chamberopt.common.errors import InputError
 from chamberopt.geometry.triangles import unit_normals
 from chamberopt.output.viewer import overlay
-from chamberopt.output.viewer.actors import (
-    GREY,
-    PALE,
-    SONOTRODE,
-    add_chamber,
-    light,
-    target_and_rest,
+from chamberopt.output.viewer.actors import GREY, PALE, SONOTRODE, add_chamber, add_part, light
+from chamberopt.output.viewer.opened_result import (
+    OpenedResult,
+    colour_limits,
+    common_quantities,
+    same_part,
 )
-from chamberopt.output.viewer.opened_result import OpenedResult, limits, offered, same_part
-from chamberopt.output.viewer.view_state import FROM, KEYS, Vector, ViewState
+from chamberopt.output.viewer.view_state import DEFAULT_VIEW, KEYS, Plane, ViewState
 from chamberopt.output.vtp_files import Surface, pyvista
 from chamberopt.simulation.triangle_fields import QUANTITIES
 
-MOST = 6
-PER_VIEW = {
-    1: (1400, 900),
-    2: (1000, 900),
-    3: (800, 800),
-    4: (900, 700),
-}  # pixels, by the number of results
+MAX_RESULTS = 6
+VIEW_SIZES = {1: (1400, 900), 2: (1000, 900), 3: (800, 800), 4: (900, 700)}  # by number of results
+SMALLEST_VIEW = (700, 650)  # with more results
+SCREEN = (1500, 850)  # pixels; a window of this size fits on most screens
 VIEW_ANGLE = 30.0  # degrees
-BELOW = 2.0  # times as steep as from above: past the sonotrode
-SCREEN = 1500, 850  # pixels: a window no larger fits on most
+STEEPER_BELOW = 2.0  # times as steep from below as from above, to see past the sonotrode
+PIN_LENGTH = 0.06  # of the mark on a triangle, as a share of the target's size
 
 
 class ResultPlotter:
-    """A plotter with a view for each result. size: pixels of each · menu: whether the keys of quantities are listed."""
+    """A plotter with one view for each result.
+
+    plotter: of pyvista.
+    results: opened.
+    linked: whether the views turn together, because they show the same part.
+    quantities: names of those that all results have.
+    """
 
     def __init__(
         self,
-        seen: Sequence[OpenedResult],
+        results: Sequence[OpenedResult],
         off_screen: bool,
         size: tuple[int, int] | None = None,
         menu: bool = False,
     ) -> None:
-        self.menu = menu
-        if len(seen) > MOST:
+        """Open the plotter.
+
+        Args:
+            results: at most MAX_RESULTS.
+            off_screen: whether to draw without a window.
+            size: of each view [pixels]; chosen by the number of results if left out.
+            menu: whether to list the keys of the quantities.
+        """
+        if len(results) > MAX_RESULTS:
             raise InputError(
-                f"inspect: {len(seen)} results cannot be told apart in one window; give at most {MOST}"
+                f"inspect: {len(results)} results are too many for one window; give at most "
+                f"{MAX_RESULTS}"
             )
-        self.seen = list(seen)
-        rows = 2 if len(seen) > 3 else 1
-        self.shape = rows, -(-len(seen) // rows)
-        wide, high = size or PER_VIEW.get(len(seen), (700, 650))
+        self.results, self.menu = list(results), menu
+        rows = 2 if len(results) > 3 else 1
+        self.shape = rows, -(-len(results) // rows)
+        width, height = size or VIEW_SIZES.get(len(results), SMALLEST_VIEW)
         if menu:
-            wide, high = min(wide, SCREEN[0] // self.shape[1]), min(high, SCREEN[1] // rows)
-        whole = [wide * self.shape[1], high * self.shape[0]]
+            width, height = min(width, SCREEN[0] // self.shape[1]), min(height, SCREEN[1] // rows)
         self.plotter = pyvista().Plotter(
-            off_screen=off_screen, shape=self.shape, window_size=whole, border=len(seen) > 1
+            off_screen=off_screen,
+            shape=self.shape,
+            window_size=[width * self.shape[1], height * self.shape[0]],
+            border=len(results) > 1,
         )
-        self.plotter.enable_anti_aliasing("msaa", multi_samples=8)  # not ssaa: it moves charts
-        self.linked = same_part(seen)
-        self.drawn: list[set[str]] = [set() for _ in seen]
-        self.offered = offered(seen)
+        self.plotter.enable_anti_aliasing("msaa", multi_samples=8)  # ssaa would move the charts
+        self.linked = same_part(results)
+        self.quantities = common_quantities(results)
+        self._actors: list[set[str]] = [set() for _ in results]  # drawn here, by name
 
-    def draw(self, look: ViewState) -> None:
-        """Everything anew; only the cameras stay as they are. InputError where a result does not have what is asked."""
-        scale = limits(self.seen, look)
-        for number, one in enumerate(self.seen):
-            self._at(number)
-            self._clear(number)
-            self._draw_one(number, one, look, scale)
-        if look.keys:
-            self._at(0)
-            overlay.keys(self.plotter, KEYS, self.size())
-            self.drawn[0].add("keys")
+    def draw(self, state: ViewState) -> None:
+        """Draw everything for a state, cameras excepted; InputError if a result cannot show it."""
+        limits = colour_limits(self.results, state)
+        for number, result in enumerate(self.results):
+            self._select_view(number)
+            self._clear_view(number)
+            self._draw_view(number, result, state, limits)
+        if state.keys:
+            self._select_view(0)
+            overlay.show_keys(self.plotter, KEYS, self.view_size())
+            self._actors[0].add("keys")
 
-    def aim(self, look: ViewState) -> None:
-        """Point the cameras, all the same way, at all there is to see."""
-        boxes = [_box(one, look) for one in self.seen]
-        for number, one in enumerate(self.seen):
-            self._at(number)
-            box = reduce(_both, boxes) if self.linked else boxes[number]
-            eye, middle = _eye(one, look), box.mean(axis=1)
+    def aim(self, state: ViewState) -> None:
+        """Point the cameras, all the same way, at everything that is drawn."""
+        boxes = [_bounds(result, state) for result in self.results]
+        for number, result in enumerate(self.results):
+            self._select_view(number)
+            box = reduce(_union, boxes) if self.linked else boxes[number]
+            eye, middle = _eye(result, state), box.mean(axis=1)
             up = (0.0, 1.0, 0.0) if abs(eye[2]) > 0.99 * np.linalg.norm(eye) else (0.0, 0.0, 1.0)
             self.plotter.camera_position = [tuple(middle + eye), tuple(middle), up]
-            self.plotter.camera.view_angle = VIEW_ANGLE  # zooming narrows it, each time again
+            self.plotter.camera.view_angle = VIEW_ANGLE  # zoom() narrows it, so it is set each time
             self.plotter.reset_camera(bounds=box.ravel().tolist())
             self.plotter.camera.zoom(1.15)
         if self.linked:
             self.plotter.link_views()
 
-    def row_picked(self, x: float, y: float) -> tuple[int, int] | None:
-        """(view, triangle) under a point of the window [pixels], None beside the part."""
+    def pick_triangle(self, x: float, y: float) -> tuple[int, int] | None:
+        """Return view and triangle at a point of the window [pixels], None beside the part."""
         import vtk
 
         renderer = self.plotter.iren.get_poked_renderer(x, y)
@@ -102,146 +113,155 @@ class ResultPlotter:
         picker = vtk.vtkCellPicker()
         picker.SetTolerance(1e-4)
         picker.Pick(x, y, 0.0, renderer)
-        if picker.GetCellId() < 0 or number >= len(self.seen):
+        if picker.GetCellId() < 0 or number >= len(self.results):
             return None
         return number, int(pyvista().wrap(picker.GetDataSet())["row"][picker.GetCellId()])
 
-    def size(self) -> tuple[int, int]:
-        """Pixels of one view."""
-        wide, high = self.plotter.window_size
-        return wide // self.shape[1], high // self.shape[0]
+    def view_size(self) -> tuple[int, int]:
+        """Width and height of one view [pixels]."""
+        width, height = self.plotter.window_size
+        return width // self.shape[1], height // self.shape[0]
 
-    def _at(self, number: int) -> None:
+    def _select_view(self, number: int) -> None:
         self.plotter.subplot(*divmod(number, self.shape[1]))
 
-    def _clear(self, number: int) -> None:
+    def _clear_view(self, number: int) -> None:
         plotter, renderer = self.plotter, self.plotter.renderer
-        if overlay.bar_name(number) in plotter.scalar_bars:
-            plotter.remove_scalar_bar(overlay.bar_name(number), render=False)
-        for name in self.drawn[number]:  # not handles, and not what holds the charts
+        if _bar_name(number) in plotter.scalar_bars:
+            plotter.remove_scalar_bar(_bar_name(number), render=False)
+        for name in self._actors[number]:  # not the handles, and not what holds the charts
             renderer.remove_actor(name, reset_camera=False, render=False)
         if renderer.has_charts:
             plotter.remove_chart(0)
 
-    def _draw_one(
-        self, number: int, one: OpenedResult, look: ViewState, scale: tuple[float, float]
+    def _draw_view(
+        self, number: int, result: OpenedResult, state: ViewState, limits: tuple[float, float]
     ) -> None:
-        plotter, size, quantity = self.plotter, self.size(), QUANTITIES[look.quantity]
-        shown = look.triangle if look.view in (None, number) else None
+        plotter, size = self.plotter, self.view_size()
         before = set(plotter.renderer.actors)
-        lines: list[str] = []
         light(plotter)
-        passed = one.passed(look)
-        actors = target_and_rest(plotter, one.part, scale, passed)
-        if look.chamber:
-            faces, walls = add_chamber(plotter, one.chamber)
+        pale = result.above_threshold(state)
+        part_actors = add_part(plotter, result.part, limits, pale)
+        actors = list(part_actors)
+        if state.chamber:
+            faces, walls = add_chamber(plotter, result.chamber)
             actors += [*faces.values(), *walls]
-        if look.cut is not None:
-            kept = actors if look.cut_part else actors[2:]
-            _cut(kept, look.cut, one)
+        if state.cut is not None:
+            _cut(actors if state.cut_part else actors[2:], state.cut, result)
+        lines: list[str] = []
         speed = np.zeros(0)
-        if shown is not None:
-            lines, speed = _told(one, shown, look)
-            corners = one.surface.points[one.surface.regular_faces[shown]]
-            overlay.mark(plotter, corners, 0.06 * one.part.target.length)
-        words = one.subject.title
+        if state.triangle is not None and state.view in (None, number):
+            lines, speed = _triangle_lines(result, state.triangle, state)
+            corners = result.surface.points[result.surface.regular_faces[state.triangle]]
+            overlay.mark_triangle(plotter, corners, PIN_LENGTH * result.part.target.length)
+        title = result.info.title
         if self.menu and number == 0:
-            words += "\n" + overlay.wrapped(
-                _menu(self.offered, look), 0.6 * size[0], overlay.fonts(size)[1]
-            )
-        overlay.title(plotter, words, lines, size)
-        overlay.bar(plotter, quantity, scale, actors[0], number, size)
-        overlay.legend(plotter, _colours(one, look), _remarks(one, look, passed), size)
-        self.drawn[number] = set(plotter.renderer.actors) - before
+            menu = _menu(self.quantities, state)
+            title += "\n" + overlay.wrap(menu, 0.6 * size[0], overlay.fonts(size)[1])
+        overlay.show_title(plotter, title, lines, size)
+        quantity = QUANTITIES[state.quantity]
+        overlay.show_colour_bar(plotter, quantity, limits, part_actors[0], _bar_name(number), size)
+        overlay.show_legend(plotter, _legend(result, state), _remarks(result, state, pale), size)
+        self._actors[number] = set(plotter.renderer.actors) - before
         if len(speed):
-            overlay.histogram(plotter, speed)
+            overlay.show_histogram(plotter, speed)
 
 
-def _menu(names: Sequence[str], look: ViewState) -> str:
-    """The keys of the quantities, the one that is shown in brackets."""
-    keys = [f"{key} {name}" for key, name in enumerate(QUANTITIES, 1) if name in names]
-    return (
-        "  ".join(f"[{key}]" if key.endswith(f" {look.quantity}") else key for key in keys)
-        + "  h keys"
-    )
+def _bar_name(number: int) -> str:
+    """Name of a view's colour bar, which VTK also writes: blanks, of another length in each."""
+    return " " * (number + 1)
 
 
-def _told(one: OpenedResult, triangle: int, look: ViewState) -> tuple[list[str], np.ndarray]:
-    """What is said of a triangle, and its impact speeds (k,) [m/s]."""
-    lines = one.numbers(triangle, look)
-    if one.hits is None:
+def _menu(names: Sequence[str], state: ViewState) -> str:
+    """List the keys of the quantities, with the one shown in brackets."""
+    keys = [
+        f"[{key} {name}]" if name == state.quantity else f"{key} {name}"
+        for key, name in enumerate(QUANTITIES, 1)
+        if name in names
+    ]
+    return "  ".join([*keys, "h keys"])
+
+
+def _triangle_lines(
+    result: OpenedResult, triangle: int, state: ViewState
+) -> tuple[list[str], np.ndarray]:
+    """Return the lines on a triangle, and its impact speeds (k,) [m/s]."""
+    lines = result.describe_triangle(triangle, state)
+    if result.hits is None:
         return [*lines, "impact speeds: not kept in this result"], np.zeros(0)
-    return lines, one.hits.of(triangle).speed
+    return lines, result.hits.of(triangle).speed
 
 
-def _remarks(one: OpenedResult, look: ViewState, passed: np.ndarray) -> list[str]:
-    """What the colours do not say."""
-    quantity, remarks = QUANTITIES[look.quantity], []
+def _remarks(result: OpenedResult, state: ViewState, pale: np.ndarray) -> list[str]:
+    """Return remarks on time, threshold and averaging."""
+    quantity, part, remarks = QUANTITIES[state.quantity], result.part, []
     if quantity.name == "coverage" or quantity.grows:
-        at = one.subject.treatment_s if look.time_s is None else look.time_s
+        treatment = result.info.treatment_s
+        time = treatment if state.time_s is None else state.time_s
+        remarks.append(f"after {time:.4g} s" + (" (the treatment)" if time == treatment else ""))
+    if state.below is not None:
+        area = np.asarray(part.target["exposed_area_mm2"])
+        share = 100.0 * area[~pale].sum() / area.sum()
+        remarks.append(f"below {state.below:g} %: {share:.1f} % of the area")
+    if part.averaging_radius and (quantity.name == "coverage" or state.below is not None):
         remarks.append(
-            f"after {at:.4g} s" + (" (the treatment)" if at == one.subject.treatment_s else "")
-        )
-    if look.below is not None:
-        area = np.asarray(one.part.target["exposed_area_mm2"])
-        remarks.append(
-            f"below {look.below:g} %: {100.0 * area[~passed].sum() / area.sum():.1f} % of the area"
-        )
-    if one.part.coverage_reach and (quantity.name == "coverage" or look.below is not None):
-        remarks.append(
-            f"coverage averaged over {one.part.coverage_reach:.1f} mm around each triangle: few dents"
+            f"coverage averaged over {part.averaging_radius:.1f} mm around each triangle: few dents"
         )
     return remarks
 
 
-def _colours(one: OpenedResult, look: ViewState) -> list[tuple[str, str]]:
-    """(colour, meaning) of what is no quantity."""
-    grey = "not in the target" + (
-        ", or no such impact" if np.isnan(one.part.target["shown"]).any() else ""
-    )
-    entries = [(GREY, grey)]
-    if look.below is not None:
-        entries.append((PALE, f"coverage {look.below:g} % or more"))
-    return [(SONOTRODE, "sonotrode"), *entries] if look.chamber else entries
+def _legend(result: OpenedResult, state: ViewState) -> list[tuple[str, str]]:
+    """Return (colour, meaning) of colours that stand for no value."""
+    no_value = np.isnan(result.part.target["shown"]).any()
+    entries = [(GREY, "not in the target" + (", or no such impact" if no_value else ""))]
+    if state.below is not None:
+        entries.append((PALE, f"coverage {state.below:g} % or more"))
+    return [(SONOTRODE, "sonotrode"), *entries] if state.chamber else entries
 
 
-def _eye(one: OpenedResult, look: ViewState) -> np.ndarray:
-    """Where it is seen from: in front of the triangle that is asked about, if any."""
-    if look.eye is not None or look.triangle is None or look.triangle >= one.surface.n_cells:
-        return where_the_target_is_seen(one.part.target) if look.eye is None else np.array(look.eye)
-    corners = one.surface.points[one.surface.regular_faces[look.triangle]]
+def _eye(result: OpenedResult, state: ViewState) -> np.ndarray:
+    """Return the direction to the eye: as wanted, or in front of the chosen triangle."""
+    if state.eye is not None:
+        return np.array(state.eye)
+    if state.triangle is None or state.triangle >= result.surface.n_cells:
+        return view_of_target(result.part.target)
+    corners = result.surface.points[result.surface.regular_faces[state.triangle]]
     return unit_normals(corners) + np.array([0.2, -0.3, 0.1])
 
 
-def where_the_target_is_seen(target: Surface) -> np.ndarray:
-    """From a little above, where the rim of the chamber hides least, unless twice as much is to be seen from below."""
-    above, below = np.array(FROM), np.array(FROM) * [1.0, 1.0, -BELOW]
+def view_of_target(target: Surface) -> np.ndarray:
+    """Return a direction to the eye from which much of the target is seen.
+
+    From a little above, where the chamber's edge hides least, unless twice as much of the target is
+    seen from below.
+    """
+    above, below = np.array(DEFAULT_VIEW), np.array(DEFAULT_VIEW) * [1.0, 1.0, -STEEPER_BELOW]
     area, normal = np.asarray(target["exposed_area_mm2"]), np.asarray(target.cell_normals)
-    seen = [
+    from_above, from_below = (
         float(area @ np.maximum(normal @ eye, 0.0)) / float(np.linalg.norm(eye))
         for eye in (above, below)
-    ]
-    return below if seen[1] > 2.0 * seen[0] else above
+    )
+    return below if from_below > 2.0 * from_above else above
 
 
-def _cut(actors: Sequence[Any], cut: tuple[Vector, Vector | None], one: OpenedResult) -> None:
-    """Take away what lies on the normal's side."""
+def _cut(actors: Sequence[Any], cut: Plane, result: OpenedResult) -> None:
+    """Cut away what lies on the normal's side of a plane."""
     normal, origin = cut
-    point = one.chamber.center if origin is None else origin
+    point = result.chamber.center if origin is None else origin
     plane = pyvista().core.utilities.helpers.generate_plane(-np.array(normal), point)
     for actor in actors:
         actor.mapper.AddClippingPlane(plane)
 
 
-def _box(one: OpenedResult, look: ViewState) -> np.ndarray:
-    """Bounds (3, 2) [mm] of all there is to see: of the target alone where no chamber is drawn."""
-    if not look.chamber:
-        return np.reshape(one.part.target.bounds, (3, 2))
-    return _both(np.reshape(one.surface.bounds, (3, 2)), np.reshape(one.chamber.bounds, (3, 2)))
+def _bounds(result: OpenedResult, state: ViewState) -> np.ndarray:
+    """Return bounds (3, 2) [mm] of what is drawn, or of the target if the chamber is not."""
+    if not state.chamber:
+        return np.reshape(result.part.target.bounds, (3, 2))
+    boxes = (np.reshape(one.bounds, (3, 2)) for one in (result.surface, result.chamber))
+    return _union(*boxes)
 
 
-def _both(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """The box round two boxes."""
-    return np.stack(
-        [np.minimum(one[:, 0], other[:, 0]), np.maximum(one[:, 1], other[:, 1])], axis=1
-    )
+def _union(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return the box round two boxes, (3, 2) each."""
+    low, high = np.minimum(one[:, 0], other[:, 0]), np.maximum(one[:, 1], other[:, 1])
+    return np.stack([low, high], axis=1)

@@ -1,5 +1,7 @@
-"""Drawing in a process of its own: where an OpenGL library is there but its driver is not, VTK does not raise, it takes
-the process down, and a picture must never cost the results.
+"""Drawing in a process of its own.
+
+Where OpenGL's library is installed but its driver is not, VTK does not raise an error: it ends the
+process. In a process of its own that costs the picture, never the result.
 """
 
 from __future__ import annotations
@@ -18,19 +20,23 @@ from chamberopt.common.errors import InputError
 INSTALL = (
     "install OpenGL for machines without a display (Debian: apt install libegl1 libgl1-mesa-dri)"
 )
+MAX_SECONDS = 600.0  # for one picture
+OFFSCREEN_WINDOWS = (
+    ("libEGL.so.1", "vtkEGLRenderWindow"),
+    ("libOSMesa.so.8", "vtkOSOpenGLRenderWindow"),
+)
 
 
 def missing_opengl() -> str | None:
-    """None when pictures can be tried on this machine, else one line that says what is missing."""
+    """Return None if pictures can be tried on this machine, else one line on what is missing."""
     if not sys.platform.startswith("linux") or offscreen_window():
         return None
     return f"no OpenGL library found: {INSTALL}"
 
 
 def offscreen_window() -> str | None:
-    """VTK's name for the window that needs no display, by what is installed."""
-    windows = (("libEGL.so.1", "vtkEGLRenderWindow"), ("libOSMesa.so.8", "vtkOSOpenGLRenderWindow"))
-    for library, window in windows:
+    """Return VTK's name of a window that needs no display, or None if no library is installed."""
+    for library, window in OFFSCREEN_WINDOWS:
         try:
             ctypes.CDLL(library)
         except OSError:
@@ -40,7 +46,7 @@ def offscreen_window() -> str | None:
 
 
 def without_display() -> dict[str, str]:
-    """The environment of a process that draws without a display."""
+    """Return the environment of a process that draws without a display."""
     environment = dict(os.environ)
     window = offscreen_window()
     if sys.platform.startswith("linux") and window:
@@ -50,12 +56,22 @@ def without_display() -> dict[str, str]:
 
 
 def picture_path(picture: str | Path, option: str = "--screenshot ") -> Path:
-    """Where --screenshot, or another option, may write. InputError for what is no .png, or in no folder."""
+    """Return where an option may write a .png; InputError as file_path."""
     return file_path(picture, (".png",), "pictures are written as .png", option)
 
 
 def file_path(file: str | Path, suffixes: tuple[str, ...], written: str, option: str = "") -> Path:
-    """Where a file may be written. InputError for another suffix, in no folder, or where none can be made."""
+    """Return where a file may be written.
+
+    Args:
+        file: wanted.
+        suffixes: that are supported.
+        written: the sentence about them in the message.
+        option: begins the message.
+
+    Raises:
+        InputError: another suffix, a missing folder, or a place that cannot be written.
+    """
     path = Path(file)
     if path.suffix.lower() not in suffixes:
         raise InputError(f"{option}{path}: {written}; give such a name")
@@ -63,10 +79,8 @@ def file_path(file: str | Path, suffixes: tuple[str, ...], written: str, option:
         raise InputError(f"{option}{path}: the folder does not exist; make it first")
     if path.is_dir():
         raise InputError(f"{option}{path}: is a folder; give another name")
-    try:
-        with tempfile.TemporaryFile(
-            dir=path.resolve().parent
-        ):  # better now than after all is simulated and drawn
+    try:  # now, not after everything has been simulated and drawn
+        with tempfile.TemporaryFile(dir=path.resolve().parent):
             pass
     except OSError as error:
         raise InputError(
@@ -76,23 +90,36 @@ def file_path(file: str | Path, suffixes: tuple[str, ...], written: str, option:
 
 
 def draw_in_subprocess(
-    job: dict[str, Any], picture: str | Path, patience: float = 600.0
+    job: dict[str, Any], picture: str | Path, max_seconds: float = MAX_SECONDS
 ) -> str | None:
-    """Does a drawing job in a process of its own. None, or one line saying why there is no picture.
+    """Do a drawing job in a process of its own.
 
-    patience [s]: subprocess.TimeoutExpired after so long.
+    Args:
+        job: as JSON; "draw" names one of viewer.__main__.RENDERERS.
+        picture: file to write.
+        max_seconds: after which the process is stopped.
+
+    Returns:
+        None, or one line that says why there is no picture.
+
+    Raises:
+        InputError: the job cannot be drawn as it was wanted.
+        subprocess.TimeoutExpired: it took too long.
     """
-    missing = missing_opengl()
+    name, missing = Path(picture).name, missing_opengl()
     if missing:
-        return f"{Path(picture).name} skipped: {missing}"
-    job = {**job, "picture": str(picture)}
-    command = [sys.executable, "-m", "chamberopt.output.viewer", json.dumps(job)]
+        return f"{name} skipped: {missing}"
     run = subprocess.run(
-        command,
+        [
+            sys.executable,
+            "-m",
+            "chamberopt.output.viewer",
+            json.dumps({**job, "picture": str(picture)}),
+        ],
         env=without_display(),
         capture_output=True,
         text=True,
-        timeout=patience,
+        timeout=max_seconds,
         check=False,
     )
     if run.returncode == 0 and Path(picture).is_file():
@@ -100,7 +127,5 @@ def draw_in_subprocess(
     if run.returncode == 2:
         raise InputError(run.stderr.strip().splitlines()[-1])
     if "Traceback" in run.stderr:
-        return (
-            f"{Path(picture).name} skipped: drawing failed ({run.stderr.strip().splitlines()[-1]})"
-        )
-    return f"{Path(picture).name} skipped: drawing failed (status {run.returncode}); {INSTALL}"
+        return f"{name} skipped: drawing failed ({run.stderr.strip().splitlines()[-1]})"
+    return f"{name} skipped: drawing failed (status {run.returncode}); {INSTALL}"

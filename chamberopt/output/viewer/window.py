@@ -1,4 +1,4 @@
-"""Results in a window of their own, whose keys and handles change one ViewState; or as a picture of it."""
+"""The window of `inspect`, whose keys and handles change one ViewState; or a picture of it."""
 
 from __future__ import annotations
 
@@ -15,171 +15,177 @@ from chamberopt.output.viewer.actors import DARK
 from chamberopt.output.viewer.opened_result import OpenedResult, ResultInfo
 from chamberopt.output.viewer.plotter import ResultPlotter
 from chamberopt.output.viewer.subprocess_drawing import draw_in_subprocess, picture_path
-from chamberopt.output.viewer.view_state import ViewState, pressed
+from chamberopt.output.viewer.view_state import ViewState, state_after_key
 from chamberopt.simulation.triangle_fields import QUANTITIES
 
-HANDLED = "12345678bcxgurh"
-STILL = 4  # pixels that the mouse may move in a click
+HANDLED_KEYS = "12345678bcxgurh"
+MAX_CLICK_MOTION = 4  # pixels that the mouse may move between press and release
 
 
 def inspect(
-    subjects: Sequence[ResultInfo], look: ViewState, screenshot: str | Path | None = None
+    infos: Sequence[ResultInfo], state: ViewState, screenshot: str | Path | None = None
 ) -> None:
-    """Turn the parts in their chambers with the mouse; or, with `screenshot`, write a picture without a window.
+    """Show results in a window, or write a picture of it.
 
-    Raises InputError when a folder has no coverage or another's, lacks what is asked, or there is no display.
+    Args:
+        infos: of the results.
+        state: what is shown first.
+        screenshot: .png file to write; no window is opened then.
+
+    Raises:
+        InputError: a result's files are missing, damaged or another's, a result does not have what
+            is wanted, or there is no display.
     """
     if screenshot is not None:
-        job = {
-            "draw": "inspect",
-            "subjects": [asdict(one) for one in subjects],
-            "look": asdict(look),
-        }
-        trouble = draw_in_subprocess(job, picture_path(screenshot))
-        if trouble:
-            raise InputError(trouble)
+        results = [asdict(one) for one in infos]
+        job = {"draw": "inspect", "results": results, "state": asdict(state)}
+        skipped = draw_in_subprocess(job, picture_path(screenshot))
+        if skipped:
+            raise InputError(skipped)
         return
     on_linux = sys.platform.startswith("linux")
     if on_linux and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         raise InputError(
-            "inspect: there is no display to open a window on; write a picture: --screenshot FILE.png"
+            "inspect: there is no display to open a window on; write a picture: --screenshot "
+            "FILE.png"
         )
-    Window(opened(subjects, look), look).run()
+    Window(open_results(infos, state), state).run()
 
 
 def render_inspect(job: dict[str, Any]) -> None:
-    """What a drawing process does of it: the picture that the window would show."""
-    look = ViewState.from_json(job["look"])
-    stage = ResultPlotter(
-        opened([ResultInfo(**one) for one in job["subjects"]], look), off_screen=True
-    )
-    stage.draw(look)
-    stage.aim(look)
+    """Draw in the drawing process what the window would show."""
+    state = ViewState.from_json(job["state"])
+    results = open_results([ResultInfo(**one) for one in job["results"]], state)
+    view = ResultPlotter(results, off_screen=True)
+    view.draw(state)
+    view.aim(state)
     with atomic_write(Path(job["picture"])) as temporary:
-        stage.plotter.screenshot(temporary)
+        view.plotter.screenshot(temporary)
 
 
-def opened(subjects: Sequence[ResultInfo], look: ViewState) -> list[OpenedResult]:
-    """The results, each of which has what is looked at. InputError where one does not."""
-    seen = [OpenedResult(one) for one in subjects]
-    for one in seen:
-        one.show(look)
-        if look.triangle is not None:
-            one.numbers(look.triangle, look)
-    return seen
+def open_results(infos: Sequence[ResultInfo], state: ViewState) -> list[OpenedResult]:
+    """Open results; InputError if one cannot show what the state wants."""
+    results = [OpenedResult(one) for one in infos]
+    for one in results:
+        one.show(state)
+        if state.triangle is not None:
+            one.describe_triangle(state.triangle, state)
+    return results
 
 
 class Window:
-    """A stage on the screen, and the look that its keys, slider, plane and clicks change."""
+    """A ResultPlotter on the screen, and the state that keys, slider, plane and clicks change."""
 
     def __init__(
-        self, seen: Sequence[OpenedResult], look: ViewState, off_screen: bool = False
+        self, results: Sequence[OpenedResult], state: ViewState, off_screen: bool = False
     ) -> None:
-        self.stage = ResultPlotter(seen, off_screen, menu=True)
-        self.first = self.look = look
+        self.view = ResultPlotter(results, off_screen, menu=True)
+        self.first = self.state = state
         self.slider: Any = None
         self.plane: Any = None
-        self._down = (0, 0)
-        self.stage.draw(look)
-        self.stage.aim(look)
-        self._handles()
+        self._pressed_at = (0, 0)
+        self.view.draw(state)
+        self.view.aim(state)
+        self._update_handles()
 
     def run(self) -> None:
-        """Until it is closed."""
-        plotter, iren = self.stage.plotter, self.stage.plotter.iren
+        """Show the window until it is closed."""
+        plotter, iren = self.view.plotter, self.view.plotter.iren
         iren.clear_key_event_callbacks()
-        for key in HANDLED:
-            plotter.add_key_event(key, lambda key=key: self.pressed(key))
-        # Of VTK's own keys only those that quit: the others would act beside ours.
+        for key in HANDLED_KEYS:
+            plotter.add_key_event(key, lambda key=key: self.press_key(key))
+        # Of VTK's own keys only q stays: the others would act in addition to ours.
         iren.style.AddObserver(
             "CharEvent",
             lambda style, _: style.OnChar() if iren.interactor.GetKeySym() == "q" else 0,
         )
-        iren.add_observer("LeftButtonPressEvent", lambda *_: self._press())
-        iren.add_observer("LeftButtonReleaseEvent", lambda *_: self._release())
+        iren.add_observer("LeftButtonPressEvent", lambda *_: self._on_mouse_press())
+        iren.add_observer("LeftButtonReleaseEvent", lambda *_: self._on_mouse_release())
         plotter.show(title="chamberopt inspect")
 
-    def change(self, look: ViewState) -> None:
-        """Another look; one that a result cannot give leaves the present one."""
-        before, self.look = self.look, look
+    def change(self, state: ViewState) -> None:
+        """Show another state; if a result cannot, print why and keep the present one."""
+        before, self.state = self.state, state
         try:
-            self.stage.draw(look)
+            self.view.draw(state)
         except InputError as error:
             print(error, file=sys.stderr)
-            self.look = before
-            self.stage.draw(before)
-        self._handles()
-        self.stage.plotter.render()
+            self.state = before
+            self.view.draw(before)
+        self._update_handles()
+        self.view.plotter.render()
 
-    def pressed(self, key: str) -> None:
-        """A key."""
+    def press_key(self, key: str) -> None:
+        """React to a key."""
         if key == "r":
             self._remove_handles()
-        self.change(pressed(self.look, key, self.first, self.stage.offered))
+        self.change(state_after_key(self.state, key, self.first, self.view.quantities))
         if key in "rg":
-            self.stage.aim(self.look)
-            self.stage.plotter.render()
+            self.view.aim(self.state)
+            self.view.plotter.render()
 
-    def slid(self, seconds: float) -> None:
-        """The time slider, let go at so many seconds."""
+    def set_time(self, seconds: float) -> None:
+        """React to the time slider being released."""
         if seconds != self._seconds():
-            self.change(replace(self.look, time_s=seconds))
+            self.change(replace(self.state, time_s=seconds))
 
-    def clicked(self, view: int, triangle: int) -> None:
-        """A triangle, in all views of the same part."""
-        self.change(replace(self.look, triangle=triangle, view=None if self.stage.linked else view))
+    def select_triangle(self, view: int, triangle: int) -> None:
+        """React to a click on a triangle, in all views of the same part."""
+        view_shown = None if self.view.linked else view
+        self.change(replace(self.state, triangle=triangle, view=view_shown))
 
-    def cut(self, normal: Sequence[float], origin: Sequence[float]) -> None:
-        """The plane, let go somewhere."""
-        if self.look.cut is not None:
-            self.change(replace(self.look, cut=(tuple(normal), tuple(origin))))  # type: ignore[arg-type]
+    def move_plane(self, normal: Sequence[float], origin: Sequence[float]) -> None:
+        """React to the cutting plane being released."""
+        if self.state.cut is not None:
+            self.change(replace(self.state, cut=(tuple(normal), tuple(origin))))  # type: ignore[arg-type]
 
-    def _press(self) -> None:
-        self._down = self.stage.plotter.iren.get_event_position()
+    def _on_mouse_press(self) -> None:
+        self._pressed_at = self.view.plotter.iren.get_event_position()
 
-    def _release(self) -> None:
-        x, y = self.stage.plotter.iren.get_event_position()
-        if abs(x - self._down[0]) + abs(y - self._down[1]) > STILL:
+    def _on_mouse_release(self) -> None:
+        x, y = self.view.plotter.iren.get_event_position()
+        if abs(x - self._pressed_at[0]) + abs(y - self._pressed_at[1]) > MAX_CLICK_MOTION:
             return
-        found = self.stage.row_picked(x, y)
+        found = self.view.pick_triangle(x, y)
         if found is not None:
-            self.clicked(*found)
+            self.select_triangle(*found)
 
     def _seconds(self) -> float:
-        """The time that is shown: of the first result, where each shows its own treatment's."""
-        return (
-            self.stage.seen[0].subject.treatment_s if self.look.time_s is None else self.look.time_s
-        )
+        """Return the time shown, of the first result if each shows its own treatment time."""
+        time = self.state.time_s
+        return self.view.results[0].info.treatment_s if time is None else time
 
-    def _handles(self) -> None:
-        """The slider where time changes what is shown, and the plane where something is cut."""
-        seen, plotter = self.stage.seen, self.stage.plotter
-        coverage, quantity = self.look.quantity == "coverage", QUANTITIES[self.look.quantity]
-        timed = (coverage and not any(one.part.marked for one in seen)) or quantity.grows
+    def _update_handles(self) -> None:
+        """Show the slider where time changes what is shown, and the plane where there is a cut."""
+        results, plotter = self.view.results, self.view.plotter
+        quantity = QUANTITIES[self.state.quantity]
+        marked = any(one.part.marked for one in results)
+        timed = quantity.grows or (quantity.name == "coverage" and not marked)
         if timed and self.slider is None:
-            plotter.subplot(
-                self.stage.shape[0] - 1, 0
-            )  # the view at the window's corner, which VTK measures from
+            # VTK measures its place from the window's corner, so it belongs to the view there.
+            plotter.subplot(self.view.shape[0] - 1, 0)
             self.slider = plotter.add_slider_widget(
-                self.slid, (0.0, max(one.subject.longest_s for one in seen)), value=self._seconds(), title="time [s]",
-                color=DARK, pointa=(0.42, 0.06), pointb=(0.6, 0.06), fmt="%.4g", title_height=0.018,
-                slider_width=0.03, tube_width=0.005,
+                self.set_time, (0.0, max(one.info.longest_s for one in results)),
+                value=self._seconds(), title="time [s]", color=DARK, pointa=(0.42, 0.06), pointb=(0.6, 0.06), fmt="%.4g",
+                title_height=0.018, slider_width=0.03, tube_width=0.005,
             )  # fmt: skip
         if self.slider is not None:
             self.slider.GetRepresentation().SetValue(self._seconds())
             self.slider.SetEnabled(timed)
-        if self.look.cut is not None and self.plane is None:
-            normal, origin = self.look.cut
+        if self.state.cut is not None and self.plane is None:
+            normal, origin = self.state.cut
+            chamber = results[0].chamber
             plotter.subplot(0, 0)
             self.plane = plotter.add_plane_widget(
-                self.cut, normal=normal, origin=seen[0].chamber.center if origin is None else origin, color=DARK,
-                bounds=seen[0].chamber.bounds, factor=1.0, test_callback=False, outline_opacity=0.0,
+                self.move_plane, normal=normal, bounds=chamber.bounds, factor=1.0, color=DARK,
+                origin=chamber.center if origin is None else origin, test_callback=False,
+                outline_opacity=0.0,
             )  # fmt: skip
-        if self.look.cut is None and self.plane is not None:
+        if self.state.cut is None and self.plane is not None:
             plotter.clear_plane_widgets()
             self.plane = None
 
     def _remove_handles(self) -> None:
-        self.stage.plotter.clear_slider_widgets()
-        self.stage.plotter.clear_plane_widgets()
+        self.view.plotter.clear_slider_widgets()
+        self.view.plotter.clear_plane_widgets()
         self.slider = self.plane = None

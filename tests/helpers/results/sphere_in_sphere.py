@@ -78,9 +78,9 @@ def ball_result(
 def picture(subject: ResultInfo, look: ViewState) -> np.ndarray:
     """What the window would show of it, (height, width, 3) uint8."""
     from chamberopt.output.viewer.plotter import ResultPlotter
-    from chamberopt.output.viewer.window import opened
+    from chamberopt.output.viewer.window import open_results
 
-    stage = ResultPlotter(opened([subject], look), off_screen=True, size=SIZE)
+    stage = ResultPlotter(open_results([subject], look), off_screen=True, size=SIZE)
     stage.draw(look)
     stage.aim(look)
     image = np.asarray(stage.plotter.screenshot(None))[..., :3]
@@ -102,13 +102,13 @@ def right_and_wrong(folder: Path) -> dict[str, np.ndarray]:
 
     right = ball_result(folder / "ball")
     drawn = {name: picture(right, look) for name, look in LOOKS.items()}
-    coverage, scale = QUANTITIES["coverage"], plotter.limits
+    coverage, scale = QUANTITIES["coverage"], plotter.colour_limits
     QUANTITIES["coverage"] = replace(coverage, colours="cividis")
     drawn["other colours"] = picture(right, LOOKS["coverage"])
     QUANTITIES["coverage"] = coverage
-    plotter.limits = lambda seen, look: (scale(seen, look)[0], 1.25 * scale(seen, look)[1])
+    plotter.colour_limits = lambda seen, look: (scale(seen, look)[0], 1.25 * scale(seen, look)[1])
     drawn["other limits"] = picture(right, LOOKS["coverage"])
-    plotter.limits = scale
+    plotter.colour_limits = scale
     drawn["moved"] = picture(ball_result(folder / "moved" / "ball", moved=1.0), LOOKS["coverage"])
     drawn["lost"] = picture(ball_result(folder / "lost" / "ball", lost=10), LOOKS["coverage"])
     return drawn
@@ -116,18 +116,18 @@ def right_and_wrong(folder: Path) -> dict[str, np.ndarray]:
 
 def driven(folder: Path) -> list[dict[str, Any]]:
     """What a window shows after each key, click and slide: its look, and what is in its views."""
-    from chamberopt.output.viewer.window import Window, opened
+    from chamberopt.output.viewer.window import Window, open_results
 
     subjects = [
         ball_result(folder / "one"),
         ball_result(folder / "two"),
         ball_result(folder / "marked", marked=True),
     ]
-    window = Window(opened(subjects[:2], ViewState()), ViewState(), off_screen=True)
+    window = Window(open_results(subjects[:2], ViewState()), ViewState(), off_screen=True)
     steps: list[dict[str, Any]] = []
 
     def step(name: str) -> None:
-        stage = window.stage
+        stage = window.view
         stage.plotter.screenshot(None)
         views = []
         for renderer in stage.plotter.renderers:
@@ -140,31 +140,31 @@ def driven(folder: Path) -> list[dict[str, Any]]:
                 "charts": len(renderer.get_charts()), "eye": list(renderer.camera.position),
             })  # fmt: skip
         steps.append({
-            "step": name, "look": asdict(window.look), "views": views,
+            "step": name, "look": asdict(window.state), "views": views,
             "slider": bool(window.slider is not None and window.slider.GetEnabled()), "plane": window.plane is not None,
         })  # fmt: skip
 
     step("opened")
     for key in "3b1cxg":
-        window.pressed(key)
+        window.press_key(key)
         step(key)
-    window.cut((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    window.move_plane((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     step("cut")
-    window.clicked(1, 404)
+    window.select_triangle(1, 404)
     step("clicked")
-    window.pressed("h")
+    window.press_key("h")
     step("h")
-    window.slid(25.0)
+    window.set_time(25.0)
     step("slid")
-    window.pressed("6")  # no result has it
+    window.press_key("6")  # no result has it
     step("6")
-    window.pressed("r")
+    window.press_key("r")
     step("r")
-    width = window.stage.plotter.window_size[0]
-    window.stage.plotter.subplot(0, 1)
-    steps[-1]["picked"] = window.stage.row_picked(int(0.75 * width), 450)
-    steps[-1]["beside"] = window.stage.row_picked(int(0.55 * width), 450)
-    window = Window(opened(subjects[2:], ViewState()), ViewState(), off_screen=True)
+    width = window.view.plotter.window_size[0]
+    window.view.plotter.subplot(0, 1)
+    steps[-1]["picked"] = window.view.pick_triangle(int(0.75 * width), 450)
+    steps[-1]["beside"] = window.view.pick_triangle(int(0.55 * width), 450)
+    window = Window(open_results(subjects[2:], ViewState()), ViewState(), off_screen=True)
     step("marked")
     return steps
 

@@ -7,59 +7,66 @@ from pathlib import Path
 from typing import Any
 
 from chamberopt.common.files import atomic_write
-from chamberopt.output.viewer.actors import in_chamber, near
+from chamberopt.output.viewer.actors import draw_in_chamber, draw_target
 from chamberopt.output.viewer.drawn_part import DrawnPart, colour_range
 from chamberopt.output.viewer.subprocess_drawing import draw_in_subprocess
 from chamberopt.output.vtp_files import CHAMBER, COVERAGE, pyvista, read_surface
 
-COLUMNS = 4  # results beside each other: more go below
+MAX_COLUMNS = 4  # results beside each other; further ones are drawn below
 
 
 def draw_coverage(
     folders: Sequence[str | Path], titles: Sequence[str], picture: str | Path
 ) -> str | None:
-    """Draw the coverage of one result, or of several side by side on one colour scale, into a .png.
+    """Draw the coverage of one result, or of several side by side on one colour scale.
 
-    folders: each with coverage.vtp and chamber.vtp. Returns None, or one line saying why there is no picture.
+    Args:
+        folders: each with coverage.vtp and chamber.vtp.
+        titles: of the results.
+        picture: file to write, .png.
+
+    Returns:
+        None, or one line that says why there is no picture.
     """
-    return draw_in_subprocess(
-        {"draw": "coverage", "folders": [str(f) for f in folders], "titles": list(titles)}, picture
-    )
+    job = {"draw": "coverage", "folders": [str(one) for one in folders], "titles": list(titles)}
+    return draw_in_subprocess(job, picture)
 
 
 def render_coverage(job: dict[str, Any]) -> None:
-    """Each result twice: in its chamber, and the target from near; several results side by side."""
+    """Draw each result twice in the drawing process: in its chamber, and the target from near."""
     folders = [Path(folder) for folder in job["folders"]]
     parts = [DrawnPart(read_surface(folder / COVERAGE)) for folder in folders]
     chambers = [read_surface(folder / CHAMBER) for folder in folders]
     limits = colour_range(parts)
-    single = len(folders) == 1
     plotter, place = panels(len(folders))
     for column, (part, chamber, title) in enumerate(
         zip(parts, chambers, job["titles"], strict=True)
     ):
         plotter.subplot(*place(0, column))
-        in_chamber(plotter, part, chamber, title, limits, bar=False)
+        draw_in_chamber(plotter, part, chamber, title, limits)
         plotter.subplot(*place(1, column))
-        near(plotter, part, limits, bar=single or column == len(folders) - 1)
+        draw_target(plotter, part, limits, bar=column == len(folders) - 1)
     with atomic_write(Path(job["picture"])) as temporary:
         plotter.screenshot(temporary)
 
 
 def panels(count: int) -> tuple[Any, Callable[[int, int], tuple[int, int]]]:
-    """A plotter for so many results with two views each, and where view 0 or 1 of the k-th goes: (row, column).
+    """Make a plotter with two views of each of `count` results.
 
-    One result has its views beside each other, several below, in bands of COLUMNS results.
+    The views of a single result stand beside each other. Those of several results stand one below
+    the other, in bands of MAX_COLUMNS results.
+
+    Returns:
+        The plotter, and a function that gives row and column of view 0 or 1 of the k-th result.
     """
     if count == 1:
-        return pyvista().Plotter(
-            off_screen=True, shape=(1, 2), window_size=[1800, 900], border=False
-        ), lambda v, k: (0, v)
-    columns, bands = min(count, COLUMNS), -(-count // COLUMNS)
-    plotter = pyvista().Plotter(
-        off_screen=True,
-        shape=(2 * bands, columns),
-        window_size=[900 * columns, 1500 * bands],
-        border=False,
-    )
-    return plotter, lambda view, k: (2 * (k // COLUMNS) + view, k % COLUMNS)
+        size, shape = [1800, 900], (1, 2)
+    else:
+        columns, bands = min(count, MAX_COLUMNS), -(-count // MAX_COLUMNS)
+        size, shape = [900 * columns, 1500 * bands], (2 * bands, columns)
+    plotter = pyvista().Plotter(off_screen=True, shape=shape, window_size=size, border=False)
+
+    def place(view: int, k: int) -> tuple[int, int]:
+        return (0, view) if count == 1 else (2 * (k // MAX_COLUMNS) + view, k % MAX_COLUMNS)
+
+    return plotter, place

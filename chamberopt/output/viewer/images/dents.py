@@ -17,7 +17,7 @@ import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import atomic_write
-from chamberopt.output.viewer.actors import GREY, STILL, Discs, disc_actor, light
+from chamberopt.output.viewer.actors import GREY, NO_RENDER, Discs, disc_actor, light
 from chamberopt.output.viewer.drawn_part import DrawnPart
 from chamberopt.output.viewer.subprocess_drawing import draw_in_subprocess
 from chamberopt.output.viewer.view_state import Vector
@@ -168,10 +168,10 @@ def render_side(
     plotter = pyvista().Plotter(off_screen=True, window_size=[columns, rows])
     plotter.enable_anti_aliasing("ssaa")
     light(plotter)
-    target = plotter.add_mesh(part.target, color="black", lighting=False, **STILL)
+    target = plotter.add_mesh(part.target, color="black", lighting=False, **NO_RENDER)
     rest = plotter.add_mesh(
         part.rest if part.rest.n_cells else pyvista().Sphere(radius=0.0),
-        color=GREY, ambient=AMBIENT, diffuse=1.0 - AMBIENT, **STILL,
+        color=GREY, ambient=AMBIENT, diffuse=1.0 - AMBIENT, **NO_RENDER,
     )  # fmt: skip
     middle = 0.5 * (low + high) @ frame
     distance = 2.0 * float(part.target.length)
@@ -184,7 +184,7 @@ def render_side(
     if not len(shown.radius):
         return bare.astype(np.uint8), pixel_mm
     actor = disc_actor(_with_rims(shown, pixel_mm), AMBIENT)
-    plotter.add_actor(actor, **STILL)
+    plotter.add_actor(actor, **NO_RENDER)
     dented = _screenshot(plotter)
     # At an edge a disc reaches over the target, into the air or over the rest of the part. Pixels
     # that do not show the target keep the colour that they have without dents.

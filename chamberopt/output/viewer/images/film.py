@@ -1,4 +1,4 @@
-"""Pictures that move: frames of constant length, as .gif or .mp4."""
+"""Write frames as a film, .gif or .mp4."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.files import atomic_write
 from chamberopt.output.viewer.subprocess_drawing import file_path
 
-COLOURS = 96  # of a GIF, the same in all frames: a palette of each frame's own would flicker
-SAMPLED = 12  # frames that they are chosen from
-FASTEST = 50  # frames a second: a GIF counts in hundredths, and browsers slow down what is faster
-MOST_PIXELS = 300_000_000  # of all frames: 0.9 GB
-BLOCK = 16  # pixels: what MP4 players can be relied on to show is a multiple of it
+COLOURS = 96  # of a GIF, the same in all frames: with palettes of their own frames would flicker
+SAMPLED_FRAMES = 12  # that the palette is chosen from
+MAX_FPS = 50  # a GIF counts in hundredths of a second, and browsers slow down what is faster
+MIN_SIDE, MAX_SIDE = 64, 4096  # pixels
+MAX_PIXELS = 300_000_000  # of all frames: 0.9 GB
+BLOCK = 16  # pixels: every MP4 player shows sides that are multiples of it
 
 
 def film_path(film: str | Path) -> Path:
-    """Where a film may be written. InputError for what is no .gif or .mp4, in no folder, or cannot be written here."""
+    """Return where a film may be written; InputError for other suffixes or unusable places."""
     path = file_path(film, (".gif", ".mp4"), "films are written as .gif or .mp4")
     if path.suffix.lower() == ".mp4" and find_spec("imageio_ffmpeg") is None:
         raise InputError(
@@ -30,22 +31,24 @@ def film_path(film: str | Path) -> Path:
 
 
 def require_playable(fps: int, size: tuple[int, int], frames: int, path: Path) -> None:
-    """InputError for what no player shows as it is meant, or is too much to hold."""
-    if not 1 <= fps <= FASTEST:
-        raise InputError(f"--fps: given {fps}; 1 to {FASTEST} are supported")
-    if min(size) < 64 or max(size) > 4096:
-        raise InputError(f"--size: given {size[0]} {size[1]}; 64 to 4096 pixels are supported")
+    """Raise InputError for a film that players do not show properly or that memory cannot hold."""
+    if not 1 <= fps <= MAX_FPS:
+        raise InputError(f"--fps: given {fps}; 1 to {MAX_FPS} are supported")
+    given = f"--size: given {size[0]} {size[1]}"
+    if min(size) < MIN_SIDE or max(size) > MAX_SIDE:
+        raise InputError(f"{given}; {MIN_SIDE} to {MAX_SIDE} pixels are supported")
     if path.suffix.lower() == ".mp4" and any(side % BLOCK for side in size):
-        raise InputError(f"--size: given {size[0]} {size[1]}; for .mp4 give multiples of {BLOCK}")
-    most = MOST_PIXELS // (size[0] * size[1])
+        raise InputError(f"{given}; for .mp4 give multiples of {BLOCK}")
+    most = MAX_PIXELS // (size[0] * size[1])
     if frames > most:
         raise InputError(
-            f"--frames: given {frames}; at most {most} are supported at {size[0]} x {size[1]} pixels"
+            f"--frames: given {frames}; at most {most} are supported at {size[0]} x {size[1]} "
+            "pixels"
         )
 
 
 def write_film(path: Path, frames: Sequence[np.ndarray], fps: int) -> None:
-    """Frames (rows, columns, 3) uint8 each; a GIF plays for ever."""
+    """Write frames, each (rows, columns, 3) uint8, at `fps` frames a second; a GIF repeats."""
     with atomic_write(path) as temporary:
         if path.suffix.lower() == ".gif":
             _write_gif(temporary, frames, fps)
@@ -60,26 +63,24 @@ def write_film(path: Path, frames: Sequence[np.ndarray], fps: int) -> None:
 def _write_gif(path: Path, frames: Sequence[np.ndarray], fps: int) -> None:
     from PIL import Image
 
-    some = [frames[k] for k in np.unique(np.linspace(0, len(frames) - 1, SAMPLED).astype(int))]
-    palette = Image.fromarray(_fair_share(some)).quantize(COLOURS, method=Image.Quantize.MEDIANCUT)
+    sampled = np.unique(np.linspace(0, len(frames) - 1, SAMPLED_FRAMES).astype(int))
+    pixels = _balanced_pixels([frames[k] for k in sampled])
+    palette = Image.fromarray(pixels).quantize(COLOURS, method=Image.Quantize.MEDIANCUT)
     images = [
         Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
         for frame in frames
     ]
     images[0].save(
-        path,
-        save_all=True,
-        append_images=images[1:],
-        duration=round(1000 / fps),
-        loop=0,
-        optimize=True,
-        disposal=1,
-    )
+        path, save_all=True, append_images=images[1:], duration=round(1000 / fps), loop=0,
+        optimize=True, disposal=1,
+    )  # fmt: skip
 
 
-def _fair_share(frames: Sequence[np.ndarray]) -> np.ndarray:
-    """Colours (1, n, 3) uint8 of these frames, each as often as the square root of its pixels: what is small and bright
-    counts beside a large background.
+def _balanced_pixels(frames: Sequence[np.ndarray]) -> np.ndarray:
+    """Return the colours of frames as one row of pixels, (1, n, 3) uint8.
+
+    Each colour occurs as often as the square root of its pixels, so small bright things get
+    colours of their own beside a large background.
     """
     pixels = np.concatenate([frame.reshape(-1, 3) for frame in frames])
     codes = (pixels >> 2).astype(np.uint32) @ np.array([1, 64, 4096], dtype=np.uint32)

@@ -26,20 +26,29 @@ def draw_part(
     missed: np.ndarray | None = None,
     chamber: Chamber | None = None,
 ) -> str | None:
-    """Draw a part as its file has it into a .png, from two sides; for what is wrong with it, or what its target is.
+    """Draw a part from two sides.
 
-    corners (m, 3, 3) m · marked (m,) bool: triangles in orange · missed (m,) bool: in red · edges (k, 2, 3) m: drawn
-    red, through the part · chamber: drawn as glass round the part, beside the two.
-    Returns None, or one line saying why there is no picture. Raises InputError where no such file can be.
+    Args:
+        corners: of its triangles [m], shape (n, 3, 3).
+        title: written above the picture.
+        picture: file to write, .png.
+        marked: triangles drawn orange, bool, shape (n,).
+        edges: drawn red and seen through the part [m], shape (k, 2, 3).
+        missed: triangles drawn red, bool, shape (n,).
+        chamber: drawn as glass round the part in a third view.
+
+    Returns:
+        None, or one line that says why there is no picture.
+
+    Raises:
+        InputError: `picture` cannot be written.
     """
     path = picture_path(picture)
+    none = np.zeros(len(corners), dtype=bool)
+    marked, missed = (none if chosen is None else chosen for chosen in (marked, missed))
+    edges = np.zeros((0, 2, 3)) if edges is None else edges
     with tempfile.TemporaryDirectory() as folder:
         part = Path(folder) / "part.npz"
-        marked, missed = (
-            np.zeros(len(corners), dtype=bool) if chosen is None else chosen
-            for chosen in (marked, missed)
-        )
-        edges = np.zeros((0, 2, 3)) if edges is None else edges
         np.savez(
             part, corners=corners * MM, marked=marked & ~missed, missed=missed, edges=edges * MM
         )
@@ -51,45 +60,35 @@ def draw_part(
 
 
 def render_part(job: dict[str, Any]) -> None:
-    """The part's surface from two opposite sides, edges shining through it, where there are any; and in its chamber."""
+    """Draw the part in the drawing process: from two opposite sides, and in its chamber."""
     with np.load(job["part"]) as data:
         corners, marked, missed, edges = (
-            data["corners"],
-            data["marked"],
-            data["missed"],
-            data["edges"],
+            data[name] for name in ("corners", "marked", "missed", "edges")
         )
     surface = pyvista().PolyData.from_regular_faces(
         corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
     )
     lines = pyvista().line_segments_from_points(edges.reshape(-1, 3)) if len(edges) else None
-    cavity = read_surface(Path(job["chamber"])) if "chamber" in job else None
-    views = (1.0, -1.0) if cavity is None else (1.0, -1.0, 0.0)
+    views = [((1.0, -1.6, 0.7), None), ((-1.0, 1.6, -0.7), None)]
+    if "chamber" in job:
+        views.append((views[0][0], read_surface(Path(job["chamber"]))))
     plotter = pyvista().Plotter(
         off_screen=True, shape=(1, len(views)), window_size=[900 * len(views), 900], border=False
     )
-    for column, side in enumerate(views):
+    for column, (eye, chamber) in enumerate(views):
         plotter.subplot(0, column)
         plotter.set_background(BACKGROUND)
-        if cavity is not None and side == 0.0:
-            add_chamber(plotter, cavity)
-            side = 1.0
+        if chamber is not None:
+            add_chamber(plotter, chamber)
         for chosen, colour in ((~(marked | missed), GREY), (marked, SONOTRODE), (missed, FAULT)):
             if chosen.any():
-                plotter.add_mesh(
-                    surface.extract_cells(chosen),
-                    color=colour,
-                    opacity=1.0 if lines is None else 0.35,
-                )
+                opacity = 1.0 if lines is None else 0.35
+                plotter.add_mesh(surface.extract_cells(chosen), color=colour, opacity=opacity)
         if lines is not None:
             plotter.add_mesh(lines, color=FAULT, line_width=6, lighting=False)
         if column == 0:
             plotter.add_text(job["title"], position="upper_left", font_size=11, color=DARK)
-        plotter.camera_position = [
-            (side, -1.6 * side, 0.7 * side),
-            (0.0, 0.0, 0.0),
-            (0.0, 0.0, 1.0),
-        ]
+        plotter.camera_position = [eye, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
         plotter.reset_camera()
         plotter.enable_anti_aliasing("ssaa")
     with atomic_write(Path(job["picture"])) as temporary:

@@ -74,14 +74,24 @@ def draw_replay(
     point, axis = (np.zeros(3), np.zeros(3)) if flight.part_axis is None else flight.part_axis
     with tempfile.TemporaryDirectory() as folder:
         data = Path(folder) / "flight.npz"
+        poses = [rotation_matrix(point * MM, axis, float(angle)) for angle in flight.part_angle]
         np.savez(
-            data, time=flight.time, balls=flight.balls * MM, trail=flight.trail * MM, diameter=flight.diameter * MM,
-            pose=[rotation_matrix(point * MM, axis, float(angle)) for angle in flight.part_angle],
+            data,
+            time=flight.time,
+            balls=flight.balls * MM,
+            trail=flight.trail * MM,
+            diameter=flight.diameter * MM,
+            pose=poses,
             tags=np.array(list(flight.sonotrodes), dtype=int),
-            displacements=np.array(list(flight.sonotrodes.values())) * MM, dent_place=flight.dents.place * MM,
-            dent_normal=-flight.dents.normal, dent_radius=flight.dents.radius * MM, dent_time=flight.dents.time,
-            hit_time=flight.impacts.time, hit_ball=flight.impacts.ball, hit_triangle=flight.part_triangle,
-        )  # fmt: skip
+            displacements=np.array(list(flight.sonotrodes.values())) * MM,
+            dent_place=flight.dents.place * MM,
+            dent_normal=-flight.dents.normal,
+            dent_radius=flight.dents.radius * MM,
+            dent_time=flight.dents.time,
+            hit_time=flight.impacts.time,
+            hit_ball=flight.impacts.ball,
+            hit_triangle=flight.part_triangle,
+        )
         job = {"draw": "replay", "folder": str(result), "flight": str(data), "title": title,
                "fps": fps, "size": list(size), "view": list(view)}  # fmt: skip
         return draw_in_subprocess(job, film, 600.0 + MAX_FRAME_SECONDS * len(flight.time))

@@ -97,7 +97,7 @@ def test_what_is_no_result_is_said(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="not a results folder"):
         load_result(tmp_path)
     (tmp_path / "history.jsonl").write_text("{}\n")
-    with pytest.raises(InputError, match="did not finish"):
+    with pytest.raises(InputError, match="has not finished"):
         load_result(tmp_path)
     folder = tmp_path / "plate"
     save_simulation(folder, DESIGN, CHAMBER, EVALUATION)

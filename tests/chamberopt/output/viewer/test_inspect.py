@@ -12,11 +12,11 @@ import pytest
 from chamberopt.common.errors import InputError
 from chamberopt.coverage.part_impacts import save_hits, sort_hits_by_triangle
 from chamberopt.output.viewer import ResultInfo, ViewState, missing_opengl, parse_clip, parse_view
-from chamberopt.output.viewer.actors import escape_dollars, ticks
-from chamberopt.output.viewer.opened_result import OpenedResult, limits, same_part
-from chamberopt.output.viewer.plotter import where_the_target_is_seen
+from chamberopt.output.viewer.actors import colour_bar_ticks, escape_dollars
+from chamberopt.output.viewer.opened_result import OpenedResult, colour_limits, same_part
+from chamberopt.output.viewer.plotter import view_of_target
 from chamberopt.output.viewer.subprocess_drawing import without_display
-from chamberopt.output.viewer.view_state import pressed
+from chamberopt.output.viewer.view_state import state_after_key
 from chamberopt.output.vtp_files import pyvista, read_surface
 from chamberopt.simulation.triangle_fields import QUANTITIES
 from tests.helpers.results.sphere_in_sphere import TREATMENT, ball_result
@@ -69,27 +69,30 @@ def test_an_eye_is_said_by_a_direction() -> None:
 
 def test_keys() -> None:
     first = ViewState("speed", below=80.0)
-    assert [pressed(first, str(n + 1), first, ALL).quantity for n in range(len(ALL))] == ALL
-    assert pressed(first, "4", first, ["coverage"]) == first  # not there
+    assert [state_after_key(first, str(n + 1), first, ALL).quantity for n in range(len(ALL))] == ALL
+    assert state_after_key(first, "4", first, ["coverage"]) == first  # not there
     look, thresholds = first, []
     for _ in range(6):
-        look = pressed(look, "b", first, ALL)
+        look = state_after_key(look, "b", first, ALL)
         thresholds.append(look.below)
     assert thresholds == [75.0, 50.0, None, 98.0, 90.0, 75.0]
-    look = pressed(first, "x", first, ALL)
+    look = state_after_key(first, "x", first, ALL)
     assert (look.cut is not None, look.cut_part) == (True, True)
-    look = pressed(look, "c", first, ALL)
+    look = state_after_key(look, "c", first, ALL)
     assert (look.cut, look.cut_part) == (None, False)
-    assert not pressed(first, "g", first, ALL).chamber
-    assert pressed(pressed(first, "h", first, ALL), "h", first, ALL) == first
-    assert pressed(ViewState(triangle=3, view=0), "u", first, ALL) == ViewState()
-    assert pressed(ViewState("angle", time_s=3.0), "r", first, ALL) == first
-    assert pressed(ViewState(time_s=3.0), str(1 + ALL.index("interval")), first, ALL).time_s is None
+    assert not state_after_key(first, "g", first, ALL).chamber
+    assert state_after_key(state_after_key(first, "h", first, ALL), "h", first, ALL) == first
+    assert state_after_key(ViewState(triangle=3, view=0), "u", first, ALL) == ViewState()
+    assert state_after_key(ViewState("angle", time_s=3.0), "r", first, ALL) == first
+    assert (
+        state_after_key(ViewState(time_s=3.0), str(1 + ALL.index("interval")), first, ALL).time_s
+        is None
+    )
 
 
 @pytest.mark.parametrize("high", [0.35, 1.5, 2.0, 8.5, 90.0, 100.0, 500.0])
 def test_bars_have_round_labels(high: float) -> None:
-    steps, written = ticks((0.0, high))
+    steps, written = colour_bar_ticks((0.0, high))
     labels = [high * k / steps for k in range(steps + 1)]
     assert [float(written % label) for label in labels] == pytest.approx(labels)
     assert len({written % label for label in labels}) == len(labels)
@@ -107,7 +110,7 @@ def test_time_moves_what_grows(ball: ResultInfo) -> None:
         np.testing.assert_allclose(
             seen.part.target["shown"], 100.0 * (1.0 - bare**times), atol=1e-9
         )
-    assert limits([seen], later) == (0.0, 100.0)
+    assert colour_limits([seen], later) == (0.0, 100.0)
     impacts = seen.part.values(QUANTITIES["impacts"])
     seen.show(ViewState("impacts", time_s=2.0 * TREATMENT))
     np.testing.assert_allclose(seen.part.target["shown"], 2.0 * impacts)
@@ -128,17 +131,17 @@ def test_marked_dents_have_one_time(tmp_path: Path) -> None:
 
 def test_below_is_of_coverage_whatever_is_shown(ball: ResultInfo) -> None:
     seen = OpenedResult(ball)
-    passed = seen.passed(ViewState("speed", below=60.0))
+    passed = seen.above_threshold(ViewState("speed", below=60.0))
     np.testing.assert_array_equal(passed, seen.part.target["coverage"] >= 0.6)
     assert passed.any()
-    later = seen.passed(ViewState("speed", below=60.0, time_s=4.0 * TREATMENT))
+    later = seen.above_threshold(ViewState("speed", below=60.0, time_s=4.0 * TREATMENT))
     assert (later & ~passed).any()
-    assert not seen.passed(ViewState()).any()
+    assert not seen.above_threshold(ViewState()).any()
 
 
 def test_a_triangles_numbers(ball: ResultInfo) -> None:
     seen = OpenedResult(ball)
-    lines = seen.numbers(404, ViewState())
+    lines = seen.describe_triangle(404, ViewState())
     text = "\n".join(lines)
     surface = seen.surface
     assert lines[0] == "triangle 404"
@@ -147,13 +150,15 @@ def test_a_triangles_numbers(ball: ResultInfo) -> None:
     assert "mean normal speed: 2.5 m/s" in lines
     assert "simulated: 4 impacts, 20 dents" in lines
     assert "energy" not in text  # not in this result
-    assert "mean normal speed: none" in seen.numbers(405, ViewState())
-    assert "not in the target" in seen.numbers(int(np.argmin(surface["target"])), ViewState())
+    assert "mean normal speed: none" in seen.describe_triangle(405, ViewState())
+    assert "not in the target" in seen.describe_triangle(
+        int(np.argmin(surface["target"])), ViewState()
+    )
     np.testing.assert_array_equal(seen.hits.of(404).speed, [1.0, 2.0, 3.0, 4.0])
     surface["element"] = np.arange(surface.n_cells) + 1000
-    assert seen.numbers(404, ViewState())[0] == "triangle 404, element 1404"
+    assert seen.describe_triangle(404, ViewState())[0] == "triangle 404, element 1404"
     with pytest.raises(InputError, match="triangles 0 to 1279"):
-        seen.numbers(1280, ViewState())
+        seen.describe_triangle(1280, ViewState())
 
 
 def test_files_of_another_result_are_noticed(tmp_path: Path, ball: ResultInfo) -> None:
@@ -161,7 +166,7 @@ def test_files_of_another_result_are_noticed(tmp_path: Path, ball: ResultInfo) -
     folder = Path(ball.folder)
     (tmp_path / "hits.npz").write_bytes((folder / "hits.npz").read_bytes())
     save_hits(folder / "hits.npz", sort_hits_by_triangle([OpenedResult(other).hits.hits], 1280))
-    with pytest.raises(InputError, match="of another result"):
+    with pytest.raises(InputError, match="not those of the coverage"):
         _ = OpenedResult(ball).hits
     (folder / "hits.npz").unlink()
     assert OpenedResult(ball).hits is None
@@ -175,7 +180,7 @@ def test_files_of_another_result_are_noticed(tmp_path: Path, ball: ResultInfo) -
 
 def test_what_an_older_result_lacks_is_said(ball: ResultInfo) -> None:
     seen = OpenedResult(ball)
-    assert seen.offered == ["coverage", "impacts", "speed", "p90-speed"]
+    assert seen.quantities == ["coverage", "impacts", "speed", "p90-speed"]
     with pytest.raises(InputError, match=r"--quantity energy.*simulate again"):
         seen.show(ViewState("energy"))
 
@@ -209,10 +214,10 @@ def test_a_target_that_looks_down_is_seen_from_below() -> None:
             .triangulate()
         )
         plate["exposed_area_mm2"] = np.full(plate.n_cells, 0.125)
-        assert np.sign(where_the_target_is_seen(plate)[2]) == side
+        assert np.sign(view_of_target(plate)[2]) == side
     ball = pyvista().Sphere()
     ball["exposed_area_mm2"] = np.ones(ball.n_cells)
-    assert where_the_target_is_seen(ball)[2] > 0.0
+    assert view_of_target(ball)[2] > 0.0
 
 
 def test_a_dollar_in_a_name_is_no_formula() -> None:
@@ -251,7 +256,7 @@ def test_a_window_shows_what_its_keys_say(steps: dict[str, dict[str, Any]]) -> N
     assert any("below 98 %: 100.0 %" in text for text in first("b")["words"])
     second = {step: steps[step]["views"][1]["planes"] for step in ("opened", "c", "x", "g")}
     assert second == {"opened": [0] * 5, "c": [0, 0, 1, 1, 1], "x": [1] * 5, "g": [1, 1]}
-    assert any("forget the triangle" in text for text in first("h")["words"])
+    assert any("deselect the triangle" in text for text in first("h")["words"])
 
 
 @needs_opengl

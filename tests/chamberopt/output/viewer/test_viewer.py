@@ -132,12 +132,12 @@ def test_screenshot_without_a_display(
     )
     inspect([subject], look, tmp_path / "shot.png")
     ((job, picture),) = drawn
-    assert (job["draw"], job["subjects"], picture) == (
+    assert (job["draw"], job["results"], picture) == (
         "inspect",
         [asdict(subject)],
         tmp_path / "shot.png",
     )
-    assert ViewState.from_json(json.loads(json.dumps(job["look"]))) == look
+    assert ViewState.from_json(json.loads(json.dumps(job["state"]))) == look
     if sys.platform.startswith("linux"):
         with pytest.raises(InputError, match=r"no display.*--screenshot"):
             inspect([subject], look)
