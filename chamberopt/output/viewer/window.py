@@ -166,8 +166,9 @@ class Window:
             plotter.subplot(self.view.shape[0] - 1, 0)
             self.slider = plotter.add_slider_widget(
                 self.set_time, (0.0, max(one.info.longest_s for one in results)),
-                value=self._seconds(), title="time [s]", color=DARK, pointa=(0.42, 0.06), pointb=(0.6, 0.06), fmt="%.4g",
-                title_height=0.018, slider_width=0.03, tube_width=0.005,
+                value=self._seconds(), title="time [s]", color=DARK, fmt="%.4g",
+                pointa=(0.42, 0.06), pointb=(0.6, 0.06), title_height=0.018, slider_width=0.03,
+                tube_width=0.005,
             )  # fmt: skip
         if self.slider is not None:
             self.slider.GetRepresentation().SetValue(self._seconds())
