@@ -1,11 +1,14 @@
-"""Writes blade.stl: a twisted, tapered, compressor-like blade that hangs down from its root block.
+"""Write blade.stl: a twisted, tapered, compressor-like blade that hangs down from its root block.
 
-Run `python designs/parts/blade.py`. The aerofoil goes from its tip at z = 0 up to z = SPAN, the block lies
-above. Not a real blade: a free-form test part, without a fillet between aerofoil and block. Millimetres.
+Run `python designs/parts/blade.py`. The aerofoil goes from its tip at z = 0 up to z = SPAN, with
+the block above. It is a free-form test part and not a real blade: there is no fillet between
+aerofoil and block. Lengths are in millimetres.
 
-Section: NACA four-digit camber line and thickness with the closed trailing edge (E. N. Jacobs, K. E. Ward and
-R. M. Pinkerton, NACA Report 460, 1933; last coefficient -0.1036 instead of -0.1015), moved outward by
-EDGE_RADIUS so that the trailing edge is round and can be peened.
+The section is a NACA four-digit camber line and thickness with the closed trailing edge (last
+coefficient -0.1036 instead of -0.1015), moved outward by EDGE_RADIUS so that the trailing edge is
+round and can be peened.
+
+Source: E. N. Jacobs, K. E. Ward and R. M. Pinkerton, NACA Report 460, 1933.
 """
 
 from __future__ import annotations
@@ -43,7 +46,7 @@ def half_thickness(x: np.ndarray, thickness: float) -> np.ndarray:
 
 
 def fine_section(span: float) -> np.ndarray:
-    """One section (n, 2) mm, finely sampled, counter-clockwise from the trailing edge over the upper side."""
+    """One section (n, 2) mm in fine steps, counter-clockwise from the trailing edge."""
     chord, thickness, camber, stagger = (
         pair[0] + (pair[1] - pair[0]) * span
         for pair in (CHORD, THICKNESS, CAMBER, np.radians(STAGGER_DEG))
@@ -66,8 +69,8 @@ def fine_section(span: float) -> np.ndarray:
     return (section - middle) @ np.array([[c, s], [-s, c]])
 
 
-def stops(curve: np.ndarray) -> np.ndarray:
-    """Places (n,) along a closed curve, as indices into it: edges short enough that turn little enough."""
+def edge_ends(curve: np.ndarray) -> np.ndarray:
+    """Ends (n,) of short edges along a closed curve, as indices into it; more at bends."""
     step = np.roll(curve, -1, axis=0) - curve
     length = np.linalg.norm(step, axis=1)
     heading = np.arctan2(step[:, 1], step[:, 0])
@@ -102,7 +105,7 @@ def lattice(spacing: float) -> np.ndarray:
 
 def main(path: Path) -> None:
     spans = np.linspace(0.0, 1.0, 1 + round(SPAN / EDGE))
-    places = stops(fine_section(0.5))
+    places = edge_ends(fine_section(0.5))
     rings = []
     for span in spans:
         fine = fine_section(span)

@@ -1,16 +1,18 @@
-"""Writes gear.stl: a pinion shaft, an involute spur gear with an integral shaft, to be held from above.
+"""Write gear.stl: a pinion shaft, an involute spur gear with an integral shaft, held from above.
 
-Run `python designs/parts/gear.py`. Axis z; teeth from z = 0 to FACE_WIDTH, shaft above. Millimetres.
+Run `python designs/parts/gear.py`. The axis is z, the teeth go from z = 0 to FACE_WIDTH, with the
+shaft above. Lengths are in millimetres.
 
-Tooth form (no profile shift), from the basic rack of ISO 53 profile A, rolled on the pitch circle:
-  involute            inv(a) = tan a - a; half tooth angle at radius r: pi/2z + inv(ALPHA) - inv(acos(r_b /
-  r)) root fillet         the trochoid that the rack's rounded tip leaves: the common normal goes through
-  the pitch point
-                      (law of gearing), so the tip's arc at normal angle b touches the gear at
-                      (d/tan b + RHO cos b, r_p - d - RHO sin b), turned by (d/tan b - x_c) / r_p,
-                      with d the depth of the arc's centre below the pitch line and x_c its distance from the
-                      middle of the rack tooth. b runs from ALPHA (where it meets the involute, tangent) to
-                      90 degrees.
+The tooth form (no profile shift) comes from the basic rack of ISO 53 profile A, rolled on the pitch
+circle:
+
+Involute: inv(a) = tan a - a. The half tooth angle at radius r is
+    pi/2z + inv(ALPHA) - inv(acos(r_b / r)).
+Root fillet: the trochoid that the rack's rounded tip leaves. The common normal goes through the
+    pitch point (law of gearing), so the tip's arc at normal angle b touches the gear at
+    (d/tan b + RHO cos b, r_p - d - RHO sin b), turned by (d/tan b - x_c) / r_p. Here d is the depth
+    of the arc's centre below the pitch line and x_c its distance from the middle of the rack tooth.
+    b runs from ALPHA, where it is tangent to the involute, to 90 degrees.
 """
 
 from __future__ import annotations
@@ -51,7 +53,7 @@ def flank(radius: np.ndarray) -> np.ndarray:
 
 
 def fillet(normal_angle: np.ndarray) -> np.ndarray:
-    """Points (n, 2) of the trochoid, same frame: normal angle ALPHA at the involute, pi/2 at the root."""
+    """Points (n, 2) of the trochoid in the same frame, from ALPHA at the involute to pi/2."""
     depth = DEDENDUM - RHO
     centre = np.pi * MODULE / 4 - depth * np.tan(ALPHA) - RHO / np.cos(ALPHA)
     x = depth / np.tan(normal_angle) + RHO * np.cos(normal_angle)
@@ -61,26 +63,24 @@ def fillet(normal_angle: np.ndarray) -> np.ndarray:
 
 
 def evenly(curve: np.ndarray, spacing: float) -> np.ndarray:
-    """Points (n + 1, 2) evenly spaced along a finely sampled curve, ends included, about `spacing` apart."""
+    """Points (n + 1, 2) along a finely sampled curve, about `spacing` apart, with both ends."""
     arc = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))]
     stops = np.linspace(0.0, arc[-1], 1 + max(1, round(arc[-1] / spacing)))
     return np.c_[np.interp(stops, arc, curve[:, 0]), np.interp(stops, arc, curve[:, 1])]
 
 
 def profile() -> np.ndarray:
-    """The outline (n, 2) mm, counter-clockwise; a tooth points along each axis (TEETH a multiple of 4)."""
+    """The outline (n, 2) mm, counter-clockwise, with a tooth along each axis (TEETH = 4 k)."""
     root_to_form = fillet(np.linspace(np.pi / 2, ALPHA, 2000))
     root_angle = np.linspace(-1.0, 1.0, 101) * np.arctan2(root_to_form[0, 0], root_to_form[0, 1])
     root = ROOT_RADIUS * np.c_[np.sin(root_angle), np.cos(root_angle)]
     mirrored = root_to_form[::-1] * [-1.0, 1.0]
-    space = evenly(
-        np.r_[mirrored[:-1], root, root_to_form[1:]], 0.5 * EDGE
-    )  # the fillet is strongly curved
+    # Half the edge length, because the fillet is strongly curved.
+    space = evenly(np.r_[mirrored[:-1], root, root_to_form[1:]], 0.5 * EDGE)
     right = evenly(flank(np.linspace(np.hypot(*root_to_form[-1]), TIP_RADIUS, 2000)), EDGE)
     half_tip = np.pi / TEETH - np.arctan2(right[-1, 0], right[-1, 1])  # half the tip's angle
-    tip_count = 2 * max(
-        1, round(half_tip * TIP_RADIUS / EDGE)
-    )  # even: a corner on the tip circle's full radius
+    # An even number puts a corner in the middle of the tip, at its full radius.
+    tip_count = 2 * max(1, round(half_tip * TIP_RADIUS / EDGE))
     tip_angle = np.pi / TEETH + half_tip * np.linspace(-1.0, 1.0, tip_count + 1)[1:-1]
     tip = TIP_RADIUS * np.c_[np.sin(tip_angle), np.cos(tip_angle)]
     left = right[::-1] * [-1.0, 1.0]

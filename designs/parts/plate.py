@@ -1,6 +1,6 @@
-"""Writes plate.stl: a flat test plate, its middle on the z axis, its lower face at z = 0.
+"""Write plate.stl: a flat test plate, its middle on the z axis, its lower face at z = 0.
 
-Run `python designs/parts/plate.py`. Millimetres.
+Run `python designs/parts/plate.py`. Lengths are in millimetres.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from surfaces import Patch, save, tube
 
 SIDE = 60.0
 THICKNESS = 10.0
-EDGE = 2.0  # triangle edge wanted
+EDGE = 2.0  # wanted edge of triangles
 
 
 def square_face(z: float, up: bool) -> Patch:
-    """A face of squares split in two, the diagonals alternating."""
+    """A face of squares, each split in two by alternating diagonals."""
     count = round(SIDE / EDGE)
     line = np.linspace(-SIDE / 2, SIDE / 2, count + 1)
     rows = np.stack([np.c_[line, np.full_like(line, y), np.full_like(line, z)] for y in line])

@@ -1,9 +1,10 @@
-"""Writes plate_setup.bdf: the plate's whole set-up as a mesher would hand it on, sonotrode, chamber and part as groups.
+"""Write plate_setup.bdf: the plate's whole set-up as a mesher writes it.
 
-The room under plate.stl in a cylinder of 50 mm, 15 mm high: what of the plate closes it is PART, with plate.stl's own
-triangles in its middle. As drawn in CAD the chamber lies on its side: the sonotrode, at x = 120, looks along -x.
+Sonotrode, chamber and part are groups. The room under plate.stl is a cylinder of 50 mm, 15 mm high.
+The piece of the plate that closes it is PART, with plate.stl's own triangles in its middle. As
+drawn in CAD, the chamber lies on its side: the sonotrode, at x = 120, faces -x.
 
-Run `python designs/parts/plate_setup.py`. Millimetres.
+Run `python designs/parts/plate_setup.py`. Lengths are in millimetres.
 """
 
 from __future__ import annotations
@@ -15,13 +16,13 @@ from plate import EDGE, square_face
 from surfaces import GRID_MM, Patch, planar, rings_of_points, tube
 
 RADIUS, HEIGHT, FACETS, SONOTRODE_AT = 25.0, 15.0, 64, 120.0
-MIDDLE = 14.0  # half the side of the square that is meshed as plate.stl is
+MIDDLE = 14.0  # half the side of the square with the triangles of plate.stl
 SPACING = 3.0  # of points between that square and the wall, and on the sonotrode
 GROUPS = ("PART", "SONOTRODE", "WALL")
 
 
 def lid() -> list[Patch]:
-    """The plate's face over the room: its middle, and what is around that."""
+    """The plate's face over the room: its middle, and the ring around it."""
     points, triangles = square_face(HEIGHT, up=True)
     inside = (np.abs(points[triangles][..., :2]) <= MIDDLE + 1e-9).all(axis=(1, 2))
     count = round(2 * MIDDLE / EDGE)
@@ -38,7 +39,7 @@ def lid() -> list[Patch]:
 
 
 def circle() -> np.ndarray:
-    """The wall's corners (64, 2)."""
+    """Corners (64, 2) of the wall in plan."""
     angle = 2 * np.pi * np.arange(FACETS) / FACETS
     return RADIUS * np.c_[np.cos(angle), np.sin(angle)]
 

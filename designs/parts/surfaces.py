@@ -1,7 +1,7 @@
-"""Patches of triangles that the part scripts sew into one closed surface [mm] and write as binary STL.
+"""Patches of triangles [mm], joined into one closed surface and written as binary STL.
 
-Every coordinate is rounded to a grid before it is used, so that another processor's last bit in a sine does
-not change which triangles appear: the same script gives the same bytes.
+Every coordinate is rounded to a grid before it is used. So the triangles do not depend on the last
+bit of a sine on some processor: the same script gives the same bytes.
 """
 
 from __future__ import annotations
@@ -11,18 +11,18 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import Delaunay
 
-GRID_MM = 1e-4  # every corner is put on this grid (0.1 µm, far below any dent), so that patches share corners
+# Grid of all corners, so that patches share corners: 0.1 µm, far below any dent.
+GRID_MM = 1e-4
 
-Patch = tuple[
-    np.ndarray, np.ndarray
-]  # corners (n, 3) mm, triangles (m, 3), counter-clockwise seen from outside
+# Corners (n, 3) mm, and triangles (m, 3), counter-clockwise seen from outside.
+Patch = tuple[np.ndarray, np.ndarray]
 
 
 def tube(rings: np.ndarray, closed: bool = True) -> Patch:
-    """Quads between successive rings, each split in two, the diagonals alternating.
+    """Quads between successive rings, each split in two by alternating diagonals; normals outward.
 
-    rings (k, n, 3) mm: ring i + 1 lies above ring i, each counter-clockwise seen from above; normals point
-    outward.
+    Args:
+        rings: shape (k, n, 3), mm; ring i + 1 lies above ring i, each counter-clockwise from above.
     """
     k, n, _ = rings.shape
     i, j = np.meshgrid(np.arange(k - 1), np.arange(n if closed else n - 1), indexing="ij")
@@ -36,11 +36,13 @@ def tube(rings: np.ndarray, closed: bool = True) -> Patch:
 
 
 def planar(loops: list[np.ndarray], inner: np.ndarray, spacing: float, z: float, up: bool) -> Patch:
-    """A flat face at height z bounded by loops (even-odd), filled with the given inner points, then relaxed.
+    """A flat face at height z inside loops (even-odd), with inner points that are then relaxed.
 
-    loops: closed polygons (n, 2) mm whose edges must all appear in the mesh; inner (p, 2) mm: those nearer
-    to a loop than half the spacing are left out. Raises ValueError when a loop is too coarse for an edge of
-    it to appear.
+    Args:
+        loops: closed polygons (n, 2) mm whose edges must all appear in the mesh.
+        inner: points (p, 2) mm; those closer to a loop than half the spacing are left out.
+    Raises:
+        ValueError: a loop is too coarse for one of its edges to appear.
     """
     border = np.round(np.concatenate(loops) / GRID_MM) * GRID_MM
     starts = np.concatenate([np.roll(np.arange(len(loop)), 0) for loop in loops])
@@ -64,14 +66,15 @@ def planar(loops: list[np.ndarray], inner: np.ndarray, spacing: float, z: float,
     missing = [edge for edge in edges.tolist() if tuple(sorted(edge)) not in present]
     if missing:
         raise ValueError(
-            f"{len(missing)} edges of the border are missing from the face, first {border[missing[0]]}"
+            f"{len(missing)} edges of the border are missing from the face, the first is "
+            f"{border[missing[0]]}"
         )
     flat = np.r_[border, points]
     return np.c_[flat, np.full(len(flat), z)], triangles if up else triangles[:, ::-1]
 
 
 def rings_of_points(radii: np.ndarray, spacing: float, symmetry: int) -> np.ndarray:
-    """Points (n, 2) mm on circles, about `spacing` apart, in multiples of `symmetry`, rings staggered."""
+    """Points (n, 2) mm on staggered circles, about `spacing` apart, in multiples of `symmetry`."""
     rings = []
     for index, radius in enumerate(radii):
         count = max(symmetry, symmetry * round(2 * np.pi * radius / spacing / symmetry))
@@ -81,7 +84,7 @@ def rings_of_points(radii: np.ndarray, spacing: float, symmetry: int) -> np.ndar
 
 
 def save(path: Path, patches: list[Patch]) -> None:
-    """Sews the patches together, makes sure that they close and face outward, and writes a binary STL."""
+    """Join the patches, check that they are closed and face outward, and write a binary STL."""
     shift = np.cumsum([0] + [len(points) for points, _ in patches[:-1]])
     points = np.concatenate([points for points, _ in patches])
     triangles = np.concatenate(
@@ -115,7 +118,7 @@ def save(path: Path, patches: list[Patch]) -> None:
 
 
 def _fill(border: np.ndarray, edges: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Counter-clockwise Delaunay triangles of border and points, inside the border, in a fixed order."""
+    """Counter-clockwise Delaunay triangles inside the border, in a fixed order."""
     points = np.round(np.r_[border, points] / GRID_MM) * GRID_MM
     triangles = np.asarray(Delaunay(points).simplices, dtype=np.int64)
     a, b, c = (points[triangles[:, k]] for k in range(3))
@@ -125,9 +128,8 @@ def _fill(border: np.ndarray, edges: np.ndarray, points: np.ndarray) -> np.ndarr
     triangles = np.where((twice_area < 0)[:, None], triangles[:, ::-1], triangles)
     keep = (np.abs(twice_area) > 1e-6) & _inside((a + b + c) / 3, border, edges)
     triangles = triangles[keep]
-    first = np.argmin(
-        triangles, axis=1
-    )  # start each triangle at its lowest corner, then sort: one fixed order
+    # Each triangle starts at its lowest corner, and the triangles are sorted: one fixed order.
+    first = np.argmin(triangles, axis=1)
     triangles = np.take_along_axis(triangles, (first[:, None] + np.arange(3)) % 3, axis=1)
     return triangles[np.lexsort(triangles.T[::-1])]
 
@@ -141,7 +143,7 @@ def _average_of_neighbours(points: np.ndarray, triangles: np.ndarray) -> np.ndar
 
 
 def _inside(points: np.ndarray, border: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """True where a ray to the right crosses the border an odd number of times."""
+    """Whether a ray to the right crosses the border an odd number of times, for each point."""
     a, b = border[edges[:, 0]], border[edges[:, 1]]
     x, y = points[:, 0, None], points[:, 1, None]
     spans = (a[:, 1] > y) != (b[:, 1] > y)
