@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from chamberopt.coverage.statistics.confidence_interval import student_quantile
-from chamberopt.simulation.convergence.parameters import TIME, WARM_UP, setting_text
+from chamberopt.simulation.convergence.parameters import REFERENCE, TIME, WARM_UP, setting_text
 from chamberopt.simulation.convergence.runs import Run
 from chamberopt.simulation.convergence.study import ConvergenceStudy
 
@@ -69,7 +70,9 @@ def recommend(study: ConvergenceStudy, accuracy: float) -> Recommendation:
     A coarser setting is taken only if its CPU time is significantly less. Savings of several
     parameters multiply. The simulated time is the cheapest for this accuracy.
     """
-    settings, saving, remarks = dict(study.settings), 1.0, []
+    settings, remarks = dict(study.settings), []
+    reference = study.reference.cpu.value
+    factor, warm_up_saving = 1.0, 0.0
     for name in settings:
         if name == TIME:
             continue
@@ -77,22 +80,23 @@ def recommend(study: ConvergenceStudy, accuracy: float) -> Recommendation:
         if good := [run for run in cheaper if run.max_bias <= BIAS_SHARE * accuracy]:
             best = min(good, key=lambda run: run.cpu.value)
             settings[name] = type(study.settings[name])(best.setting)
-            if name != WARM_UP:  # its saving is in the simulated seconds
-                saving *= best.cpu.value / study.reference.cpu.value
+            if name == WARM_UP:  # the same for every simulated time
+                warm_up_saving = reference - best.cpu.value
+            else:
+                factor *= best.cpu.value / reference
         elif not all(run.is_biased for run in cheaper):
             remarks.append(
                 f"{name}: cheaper settings may do, but their bias is not known well enough; "
                 "raise --budget-s"
             )
     remarks += _model_remarks(study, accuracy)
-    start, per_second = replica_cost(study)
-    times = [float(run.setting) for run in study.runs if run.parameter == TIME]
-    costs = []
-    for seconds in (*times, float(study.settings[TIME])):
-        count = replicas_for(study, accuracy, seconds)
-        cpu_s = saving * (start + per_second * (seconds + settings[WARM_UP]))
-        costs.append((count * cpu_s, count, seconds))
-    cpu_s, replicas, settings[TIME] = min(costs)
+    options = []
+    for run in (study.reference, *study.runs):
+        if run.parameter in (REFERENCE, TIME):
+            seconds = float(run.setting or study.settings[TIME])
+            count = replicas_for(study, accuracy, seconds)
+            options.append((count * factor * (run.cpu.value - warm_up_saving), count, seconds))
+    cpu_s, replicas, settings[TIME] = min(options)
     if replicas > MAX_REPLICAS:
         remarks.append(f"this would need more than {MAX_REPLICAS:,} replicas, the largest number")
         return Recommendation(accuracy, settings, 0, math.inf, tuple(remarks))
@@ -104,19 +108,6 @@ def saves_time(study: ConvergenceStudy, run: Run) -> bool:
     return run.cpu.high < study.reference.cpu.low
 
 
-def replica_cost(study: ConvergenceStudy) -> tuple[float, float]:
-    """CPU seconds of a replica's start, and of each simulated second, warm-up included."""
-    runs = [run for run in study.runs if run.parameter in (TIME, WARM_UP)]
-    seconds, cpu = [float(study.settings[TIME]) + float(study.settings[WARM_UP])], [study.reference]
-    for run in runs:
-        settings = study.settings | {run.parameter: run.setting}
-        seconds.append(float(settings[TIME]) + float(settings[WARM_UP]))
-        cpu.append(run)
-    weights = [1.0 / max(run.cpu.half_width, 1e-3 * run.cpu.value) for run in cpu]
-    per_second, start = np.polyfit(seconds, [run.cpu.value for run in cpu], 1, w=weights)
-    return max(0.0, float(start)), float(per_second)
-
-
 def replicas_for(study: ConvergenceStudy, accuracy: float, seconds: float) -> int:
     """Number of replicas of this simulated time whose interval is within the accuracy.
 
@@ -125,18 +116,17 @@ def replicas_for(study: ConvergenceStudy, accuracy: float, seconds: float) -> in
     """
     time_ratio = float(study.settings[TIME]) / seconds
     variance = np.var(study.reference.objective.pseudovalues, ddof=1) * time_ratio
-    low, high = 3, MAX_REPLICAS + 1
-    while low < high:
-        middle = (low + high) // 2
-        enough = student_quantile(middle - 1) * math.sqrt(variance / middle) <= accuracy
-        low, high = (low, middle) if enough else (middle + 1, high)
+    counts = range(3, MAX_REPLICAS + 1)
+    needed = 3 + bisect_left(
+        counts, -accuracy, key=lambda n: -student_quantile(n - 1) * math.sqrt(variance / n)
+    )
     sizes = study.sizes
     if accuracy < sizes[-1].half_width:
-        return low
+        return needed
     negative_logs = np.maximum.accumulate([-math.log(size.half_width) for size in sizes])
     logs = [math.log(size.replicas) for size in sizes]
     batch = math.exp(np.interp(-math.log(accuracy), negative_logs, logs))
-    return max(low, math.ceil(round(batch * time_ratio, 6)))
+    return max(needed, math.ceil(round(batch * time_ratio, 6)))
 
 
 def _model_remarks(study: ConvergenceStudy, accuracy: float) -> Iterator[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -145,13 +145,6 @@ def simulate_timed(setting: ReplicaSetting, number: int) -> tuple[Tally, np.ndar
 def _dents_only(tally: Tally) -> Tally:
     """The part of a tally that coverage needs, because hundreds of replicas are kept."""
     empty = np.zeros(0)
-    return Tally(
-        tally.simulated_time,
-        empty,
-        empty,
-        empty,
-        empty,
-        empty,
-        tally.dent_triangle,
-        tally.dent_area,
+    return replace(
+        tally, impacts=empty, dents=empty, dented_area=empty, speed_sum=empty, angle_sum=empty
     )

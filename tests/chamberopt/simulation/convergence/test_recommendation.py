@@ -17,7 +17,7 @@ from chamberopt.simulation.convergence.parameters import (
     TIME,
     WARM_UP,
 )
-from chamberopt.simulation.convergence.recommendation import recommend, replica_cost, replicas_for
+from chamberopt.simulation.convergence.recommendation import recommend, replicas_for
 from chamberopt.simulation.convergence.runs import Run
 from chamberopt.simulation.convergence.study import ConvergenceStudy
 from tests.helpers.synthetic import DESIGNS
@@ -71,11 +71,6 @@ def study_of(*runs: Run, models: tuple[Run, ...] = ()) -> ConvergenceStudy:
     )
 
 
-def test_cost_of_a_replica_is_a_line() -> None:
-    start, per_second = replica_cost(study_of())
-    assert (start, per_second) == (pytest.approx(0.05), pytest.approx(0.1))
-
-
 def test_replicas_are_those_whose_interval_is_narrow_enough() -> None:
     needed = replicas_for(study_of(), 0.001, 1.5)
     assert (
@@ -100,6 +95,14 @@ def test_cheapest_setting_within_a_third_of_the_accuracy_is_taken() -> None:
     seconds = tight.settings[TIME] + tight.settings[WARM_UP]
     assert tight.cpu_s == pytest.approx(tight.replicas * (0.05 + 0.1 * seconds))
     assert usual.cpu_s < tight.cpu_s / 50
+
+
+def test_a_shorter_warm_up_saves_its_own_cpu_time() -> None:
+    rough = recommend(study_of(), 0.1)
+    assert rough.settings[WARM_UP] == 0.2
+    assert rough.cpu_s == pytest.approx(
+        rough.replicas * (0.05 + 0.1 * (rough.settings[TIME] + 0.2))
+    )
 
 
 def test_an_accuracy_out_of_reach_is_reported() -> None:
