@@ -91,7 +91,7 @@ def figures(replicas: list[Tally], chamber: Chamber, design: Design) -> dict[str
 def exact(x: np.ndarray, weight: np.ndarray) -> dict[str, float]:
     """The figures of known x."""
     share = -np.expm1(-x)
-    true = {name: METRICS[name].from_coverage(share, weight / weight.sum()) for name in NAMES}  # type: ignore[misc]
+    true = {name: METRICS[name].of_coverage(share, weight / weight.sum()) for name in NAMES}  # type: ignore[misc]
     return {**true, "uniform_coverage": true["mean_coverage"] - true["std_coverage"]}
 
 

@@ -47,23 +47,14 @@ P05_OF_NORMAL = 1.645  # standard deviations by which a normal 5th percentile li
 
 @dataclass(frozen=True)
 class TargetPatches:
-    """The exposed target, divided into patches with enough dents.
+    """The exposed target, divided into patches with enough dents."""
 
-    Args:
-        patch: patch of each part triangle, -1 off the target, (m,).
-        area: exposed areas of the patches [m²], (p,).
-        hidden_fraction: share of the target's area outside the cavity.
-        time_ratio: treatment time over the simulated time of one replica.
-        dent_area: area of dents that, all alike, would scatter as these do [m²].
-        triangles: number of triangles in the patches.
-    """
-
-    patch: np.ndarray
-    area: np.ndarray
-    hidden_fraction: float
-    time_ratio: float
-    dent_area: float
-    triangles: int
+    patch: np.ndarray  # patch of each part triangle, -1 off the target, (m,)
+    area: np.ndarray  # exposed areas of the patches [m²], (p,)
+    hidden_fraction: float  # share of the target's area outside the cavity
+    time_ratio: float  # treatment time over the simulated time of one replica
+    dent_area: float  # area of dents that, all alike, would scatter as these do [m²]
+    triangles: int  # number of triangles in the patches
 
     @property
     def are_merged(self) -> bool:

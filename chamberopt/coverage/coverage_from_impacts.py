@@ -25,26 +25,19 @@ if TYPE_CHECKING:
 class Tally:
     """Sums of the impacts on each part triangle, over one or more replicas.
 
-    Every column is a plain sum, so tallies add: `a + b`. The tally of one replica also has its single dents, which sums
-    of tallies do not keep.
-
-    Args:
-        simulated_time: recorded time of all replicas together [s].
-        impacts, dents: number of impacts, and of those that leave a dent, (m,).
-        dented_area: area of the dents [m²], (m,).
-        speed_sum: sum of normal speeds [m/s], (m,).
-        angle_sum: sum of impact angles [degrees], (m,).
-        dent_triangle: part triangle of each dent, (k,) int.
-        dent_area: area of each dent [m²], (k,).
+    Every column is a plain sum, so tallies add: `a + b`. The tally of one replica also has its single
+    dents, which sums of tallies do not keep.
     """
 
-    simulated_time: float
-    impacts: np.ndarray
-    dents: np.ndarray
-    dented_area: np.ndarray
-    speed_sum: np.ndarray
-    angle_sum: np.ndarray
+    simulated_time: float  # recorded time of all replicas together [s]
+    impacts: np.ndarray  # number of impacts, (m,)
+    dents: np.ndarray  # number of dents, (m,)
+    dented_area: np.ndarray  # area of the dents [m²], (m,)
+    speed_sum: np.ndarray  # sum of normal speeds [m/s], (m,)
+    angle_sum: np.ndarray  # sum of impact angles [degrees], (m,)
+    # Part triangle of each dent, (k,) int.
     dent_triangle: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int32))
+    # Area of each dent [m²], (k,).
     dent_area: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def __add__(self, other: Tally) -> Tally:
@@ -61,9 +54,9 @@ _SUMS = tuple(column.name for column in fields(Tally) if not column.name.startsw
 def tally_impacts(impacts: ImpactLog, chamber: Chamber, design: Design) -> Tally:
     """Sum the impacts of one replica on each part triangle.
 
-    A dent counts whole for the triangle under its contact point, even if it reaches over the edge. Neighbours trade
-    what they lose, so sums over an area are unbiased, while a triangle much smaller than a dent is noisy. Impacts below
-    the yield speed count as impacts without dents.
+    A dent counts whole for the triangle under its contact point, even if it reaches over the edge.
+    Neighbours trade what they lose, so sums over an area are unbiased, while a triangle much smaller than
+    a dent is noisy. Impacts below the yield speed count as impacts without dents.
     """
     source = chamber.source[impacts.triangle]
     on_part = source >= 0
@@ -113,7 +106,7 @@ def mean_speed_per_triangle(total: Tally) -> np.ndarray:
 
 
 def mean_angle_per_triangle(total: Tally) -> np.ndarray:
-    """Mean angle [degrees from the surface] of the impacts on each triangle, (m,); NaN if nothing hit it."""
+    """Mean angle of the impacts on each part triangle [degrees], (m,); NaN if nothing hit it."""
     return _per_impact(total.angle_sum, total.impacts)
 
 

@@ -48,19 +48,12 @@ PLASTIC_NUMBER = 1.32471795724474602596  # real root of x³ = x + 1
 
 @dataclass(frozen=True)
 class SamplePoints:
-    """Points on the part's exposed surface.
+    """Points on the part's exposed surface."""
 
-    Args:
-        place: positions [m], (p, 3).
-        normal: unit normals of the surface, (p, 3).
-        triangle: part triangle of each point, (p,).
-        area: area that each point stands for [m²], (p,).
-    """
-
-    place: np.ndarray
-    normal: np.ndarray
-    triangle: np.ndarray
-    area: np.ndarray
+    place: np.ndarray  # positions [m], (p, 3)
+    normal: np.ndarray  # unit normals of the surface, (p, 3)
+    triangle: np.ndarray  # part triangle of each point, (p,)
+    area: np.ndarray  # area that each point stands for [m²], (p,)
 
 
 def sample_points(chamber: Chamber, spacing: float) -> SamplePoints:
@@ -145,25 +138,22 @@ def mark_points(
     tree = cKDTree(samples.place)
     for begin in range(0, len(place), DENTS_AT_ONCE):
         some = slice(begin, begin + DENTS_AT_ONCE)
-        point, dent, _ = points_in_dents(
+        point, dent = _points_in_dents(
             tree, samples.normal, place[some], normal[some], radius[some]
         )
         np.minimum.at(first, point, time[some][dent])
     return first
 
 
-def points_in_dents(
+def _points_in_dents(
     tree: cKDTree, facing: np.ndarray, place: np.ndarray, normal: np.ndarray, radius: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """All pairs of a point and a disc that holds it.
+) -> tuple[np.ndarray, np.ndarray]:
+    """Index of the point and of the disc of all pairs of a point and a disc that holds it.
 
     Args:
         tree: search tree of the points.
         facing: unit normals of the surface at the points, (p, 3).
         place, normal, radius: the discs, as in `mark_points`.
-
-    Returns:
-        Index of the point, index of the disc, and distance as a share of the disc's radius, a row a pair.
     """
     from scipy.spatial import cKDTree
 
@@ -178,7 +168,7 @@ def points_in_dents(
         detour = np.where(bend > 0.0, 2.0 * bend / (1.0 + cosine), 0.0)
     square = pairs["v"] ** 2 + detour
     inside = square <= radius[dent] ** 2
-    return point[inside], dent[inside], np.sqrt(square[inside]) / radius[dent[inside]]
+    return point[inside], dent[inside]
 
 
 def marked_share(

@@ -26,19 +26,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Dents:
-    """Dents in order of time, in the part's own frame.
+    """Dents in order of time, in the part's own frame."""
 
-    Args:
-        place: contact points [m], (k, 3).
-        normal: unit normals of the triangles that were hit, (k, 3).
-        radius: radii of the dents [m], (k,).
-        time: times of the impacts [s], (k,).
-    """
-
-    place: np.ndarray
-    normal: np.ndarray
-    radius: np.ndarray
-    time: np.ndarray
+    place: np.ndarray  # contact points [m], (k, 3)
+    normal: np.ndarray  # unit normals of the triangles that were hit, (k, 3)
+    radius: np.ndarray  # radii of the dents [m], (k,)
+    time: np.ndarray  # times of the impacts [s], (k,)
 
     def __len__(self) -> int:
         return len(self.time)

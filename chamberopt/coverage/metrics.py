@@ -1,7 +1,7 @@
-"""The registry of metrics and objectives: what is computed of a candidate and what a study can maximise.
+"""The registry of metrics, computed of every candidate, and of objectives, which a study can maximise.
 
-A new metric is one entry of `METRICS`, a new objective one entry of `OBJECTIVES`. Study files, tables, reports and
-result folders take names, units and ranges from here. All metrics are over the exposed target, weighted with its area.
+A new metric is one entry of `METRICS`, a new objective one of `OBJECTIVES`. Study files, tables, reports
+and result folders take names, units and ranges from here. All metrics are over the exposed target.
 """
 
 from __future__ import annotations
@@ -27,37 +27,38 @@ P05 = 0.05  # share of the target's area that may be covered less than p05_cover
 
 @dataclass(frozen=True)
 class Metric:
-    """A named number of a candidate.
+    """A named number of a candidate, as a function of coverage or of impacts.
 
-    Args:
-        function: the metric of the impacts of all replicas together, without correction for a short simulation.
-        lowest, highest: range that the metric can have.
-        from_coverage: the metric of the coverage of target triangles and their shares of its area, (m,) each; None for
-            a metric that does not depend on coverage alone.
-        in_version_0_1: whether result folders of version 0.1.0 have it.
+    A metric with neither function has an estimator of its own, see simulation/evaluate.py.
     """
 
     name: str
     unit: str
     summary: str
-    function: Callable[[Tally, Chamber, Design], float]
     lowest: float = -math.inf
     highest: float = math.inf
-    from_coverage: Callable[[np.ndarray, np.ndarray], float] | None = None
-    in_version_0_1: bool = True
+    # Function of the coverage of target triangles and their shares of its area, (m,) each.
+    of_coverage: Callable[[np.ndarray, np.ndarray], float] | None = None
+    # Function of the impacts of replicas.
+    of_impacts: Callable[[Tally, Chamber, Design], float] | None = None
+    in_version_0_1: bool = True  # whether result folders of version 0.1.0 have it
+
+    def value(self, total: Tally, chamber: Chamber, design: Design) -> float:
+        """The metric of these impacts, without correction for a short simulation."""
+        if self.of_impacts is not None:
+            return self.of_impacts(total, chamber, design)
+        assert self.of_coverage is not None
+        coverage = coverage_at(total, chamber, design.process.treatment_time)
+        return self.of_coverage(*target_coverage(coverage, chamber))
 
 
 @dataclass(frozen=True)
 class ObjectiveFunction:
-    """What a study maximises: a weighted sum of metrics.
-
-    Args:
-        terms: weight of each metric, by its name.
-    """
+    """What a study maximises: a weighted sum of metrics."""
 
     name: str
     summary: str
-    terms: dict[str, float]
+    terms: dict[str, float]  # weight of each metric, by its name
 
 
 def exposed_target(chamber: Chamber) -> np.ndarray:
@@ -69,16 +70,16 @@ def require_target(chamber: Chamber) -> None:
     """Raise InputError if no triangle of the target bounds the cavity."""
     if not exposed_target(chamber).any():
         raise InputError(
-            "part.target: no triangle of the target bounds the cavity, so its coverage is not defined; "
-            "widen [part.target] or move the part into the chamber"
+            "part.target: no triangle of the target bounds the cavity, so its coverage is not "
+            "defined; widen [part.target] or move the part into the chamber"
         )
 
 
 def target_coverage(coverage: np.ndarray, chamber: Chamber) -> tuple[np.ndarray, np.ndarray]:
     """Coverage of every target triangle and its share of the target's area.
 
-    Area outside the cavity counts as not covered. If it were left out, an optimiser would hide places that are hard to
-    reach behind a lower ceiling.
+    Area outside the cavity counts as not covered. If it were left out, an optimiser would hide places
+    that are hard to reach behind a lower ceiling.
 
     Args:
         coverage: coverage of the exposed area of each part triangle, (m,).
@@ -123,38 +124,6 @@ def seconds_to_98(p05: float, seconds: float) -> float:
     return min(NEVER, -math.log(1.0 - FULL_COVERAGE) / rate) if rate > 0.0 else NEVER
 
 
-def _coverage_metric(
-    name: str,
-    summary: str,
-    from_coverage: Callable[[np.ndarray, np.ndarray], float],
-    highest: float,
-) -> Metric:
-    def of_tally(total: Tally, chamber: Chamber, design: Design) -> float:
-        return from_coverage(*_coverage_at_treatment_end(total, chamber, design))
-
-    return Metric(name, "", summary, of_tally, 0.0, highest, from_coverage)
-
-
-def _coverage_at_treatment_end(
-    total: Tally, chamber: Chamber, design: Design
-) -> tuple[np.ndarray, np.ndarray]:
-    return target_coverage(coverage_at(total, chamber, design.process.treatment_time), chamber)
-
-
-def _time_to_98(total: Tally, chamber: Chamber, design: Design) -> float:
-    p05 = p05_coverage(*_coverage_at_treatment_end(total, chamber, design))
-    return seconds_to_98(p05, design.process.treatment_time)
-
-
-def _intensity_uniformity(total: Tally, chamber: Chamber, design: Design) -> float:
-    """1 - standard deviation / mean of the local mean normal speed; 0 if nothing hit. See intensity.py."""
-    target = chamber.part.target
-    hits, area = total.impacts[target], chamber.part.area[target]
-    local = np.divide(total.speed_sum[target], hits, out=np.zeros(len(hits)), where=hits > 0)
-    mean = mean_coverage(local, area / area.sum())
-    return 1.0 - std_coverage(local, area / area.sum()) / mean if mean > 0.0 else 0.0
-
-
 def _mean_normal_speed(total: Tally, chamber: Chamber, design: Design) -> float:
     target = exposed_target(chamber)
     impacts = total.impacts[target].sum()
@@ -174,18 +143,27 @@ def _shot_count(total: Tally, chamber: Chamber, design: Design) -> float:
 METRICS = {
     metric.name: metric
     for metric in (
-        _coverage_metric("mean_coverage", "mean coverage of the target", mean_coverage, 1.0),
-        _coverage_metric(
-            "std_coverage", "standard deviation of coverage over the target", std_coverage, 0.5
+        Metric("mean_coverage", "", "mean coverage of the target", 0.0, 1.0, mean_coverage),
+        Metric(
+            "std_coverage",
+            "",
+            "standard deviation of coverage over the target",
+            0.0,
+            0.5,
+            std_coverage,
         ),
-        _coverage_metric(
-            "p05_coverage", "coverage that 95 % of the target's area exceeds", p05_coverage, 1.0
+        Metric(
+            "p05_coverage",
+            "",
+            "coverage that 95 % of the target's area exceeds",
+            0.0,
+            1.0,
+            p05_coverage,
         ),
         Metric(
             "time_to_98_s",
             "s",
             "time until 95 % of the target's area is 98 % covered",
-            _time_to_98,
             0.0,
             NEVER,
             in_version_0_1=False,
@@ -194,29 +172,31 @@ METRICS = {
             "intensity_uniformity",
             "",
             "1 - relative spread of the local impact speed",
-            _intensity_uniformity,
             in_version_0_1=False,
         ),
         Metric(
             "mean_normal_speed_m_s",
             "m/s",
             "mean normal speed of the impacts",
-            _mean_normal_speed,
             0.0,
+            of_impacts=_mean_normal_speed,
         ),
         Metric(
-            "impacts_per_mm2_s", "1/(mm² s)", "impacts per area and second", _impacts_per_mm2_s, 0.0
+            "impacts_per_mm2_s",
+            "1/(mm² s)",
+            "impacts per area and second",
+            0.0,
+            of_impacts=_impacts_per_mm2_s,
         ),
-        Metric("shot_count", "balls", "number of balls", _shot_count, 0.0),
+        Metric("shot_count", "balls", "number of balls", 0.0, of_impacts=_shot_count),
     )
 }
 
 OBJECTIVES = {
     one.name: one
     for one in (
-        # 1 only if everything is covered, and covered evenly.
         ObjectiveFunction(
-            "uniform_coverage",
+            "uniform_coverage",  # 1 only if everything is covered, and covered evenly
             "mean minus standard deviation of coverage",
             {"mean_coverage": 1.0, "std_coverage": -1.0},
         ),

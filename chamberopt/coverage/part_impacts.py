@@ -29,21 +29,13 @@ HITS_FILE = "hits.npz"
 
 @dataclass(frozen=True)
 class Hits:
-    """Impacts of one or more replicas on the part, one row each.
+    """Impacts of one or more replicas on the part, one row each."""
 
-    Args:
-        triangle: part triangle, (k,) int32.
-        speed: normal speed [m/s], (k,) float32 as all that follow.
-        angle: angle between path and surface [degrees]; 90 is head on.
-        dent: diameter of the dent [m]; 0 if the impact leaves none.
-        energy: kinetic energy of the motion along the normal, m v² / 2 [J].
-    """
-
-    triangle: np.ndarray
-    speed: np.ndarray
-    angle: np.ndarray
-    dent: np.ndarray
-    energy: np.ndarray
+    triangle: np.ndarray  # part triangle, (k,) int32
+    speed: np.ndarray  # normal speed [m/s], (k,) float32 as all that follow
+    angle: np.ndarray  # angle between path and surface [degrees]; 90 is head on
+    dent: np.ndarray  # diameter of the dent [m]; 0 if the impact leaves none
+    energy: np.ndarray  # kinetic energy of the motion along the normal, m v² / 2 [J]
 
     def __len__(self) -> int:
         return len(self.triangle)
@@ -51,13 +43,9 @@ class Hits:
 
 @dataclass(frozen=True)
 class HitsByTriangle:
-    """Impacts in the order of their triangles.
+    """Impacts in the order of their triangles."""
 
-    Args:
-        first: rows first[t] to first[t + 1] belong to triangle t, (m + 1,) int64.
-    """
-
-    first: np.ndarray
+    first: np.ndarray  # rows first[t] to first[t + 1] belong to triangle t, (m + 1,) int64
     hits: Hits
 
     def of(self, triangle: int) -> Hits:

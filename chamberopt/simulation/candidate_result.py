@@ -18,18 +18,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class CandidateResult:
-    """A simulated candidate with the fields and curves of its result folder.
-
-    Args:
-        triangle_fields: cell data of coverage.vtp, by name, (m,) each.
-        time_curve: coverage against peening time, a row a time.
-    """
+    """A simulated candidate with the fields and curves of its result folder."""
 
     design: Design
     chamber: Chamber
     evaluation: Evaluation
-    triangle_fields: dict[str, np.ndarray]
-    time_curve: list[dict[str, float]]
+    triangle_fields: dict[str, np.ndarray]  # cell data of coverage.vtp, by name, (m,) each
+    time_curve: list[dict[str, float]]  # coverage against peening time, a row a time
 
 
 def complete_result(design: Design, chamber: Chamber, evaluation: Evaluation) -> CandidateResult:

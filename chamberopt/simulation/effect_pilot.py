@@ -52,17 +52,11 @@ ACCURACY = 0.01  # smaller changes do not matter
 
 @dataclass(frozen=True)
 class Switch:
-    """How to switch an effect of a design.
+    """How to switch an effect of a design."""
 
-    Args:
-        is_on: whether the effect is on in a design.
-        values: of the effect's key when switched on and off.
-        reason: what a dimensionless group says of its importance.
-    """
-
-    is_on: Callable[[Design, Chamber], bool]
-    values: tuple[Any, Any]
-    reason: Callable[[Design, Chamber], str]
+    is_on: Callable[[Design, Chamber], bool]  # whether the effect is on in a design
+    values: tuple[Any, Any]  # of the effect's key when switched on and off
+    reason: Callable[[Design, Chamber], str]  # what a dimensionless group says of its importance
 
 
 SWITCHES = {
@@ -105,21 +99,15 @@ SWITCHES = {
 
 @dataclass(frozen=True)
 class Advice:
-    """What switching an effect on changes.
-
-    Args:
-        on: whether the design has it on.
-        reason: what a dimensionless group says of its importance.
-        changes: change of each of MEASURED with its 95 % interval: of the mean impact speed as a share of
-            it, of coverages as their difference.
-        accuracy: changes below do not matter.
-    """
+    """What switching an effect on changes."""
 
     effect: str
-    on: bool
-    reason: str
+    on: bool  # whether the design has it on
+    reason: str  # what a dimensionless group says of its importance
+    # change of each of MEASURED with its 95 % interval: of the mean impact speed as a share of it,
+    # of coverages as their difference
     changes: dict[str, Estimate]
-    accuracy: float
+    accuracy: float  # changes below do not matter
 
     @property
     def verdict(self) -> str:

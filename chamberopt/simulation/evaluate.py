@@ -65,16 +65,12 @@ MARKED_CURVE_POINTS = 50
 
 @dataclass(frozen=True)
 class ReplicaPlan:
-    """Which replicas to simulate.
+    """Which replicas to simulate."""
 
-    Args:
-        count: number of replicas; None for as many as the design's [process.accuracy] asks for.
-        stream: stream of seeds, "search" or "confirm".
-        objective_name: the objective, whose interval decides when a wanted accuracy is reached.
-    """
-
+    # number of replicas; None for as many as the design's [process.accuracy] asks for
     count: int | None = None
-    stream: str = "search"
+    stream: str = "search"  # stream of seeds, "search" or "confirm"
+    # the objective, whose interval decides when a wanted accuracy is reached
     objective_name: str = "uniform_coverage"
 
 
@@ -198,8 +194,8 @@ def estimate_metrics(
         if name in special:
             estimates[name] = special[name]
             continue
-        plain = metric.function(total, chamber, design)
-        without = np.array([metric.function(part, chamber, design) for part in without_each])
+        plain = metric.value(total, chamber, design)
+        without = np.array([metric.value(part, chamber, design) for part in without_each])
         pseudovalues = n * plain - (n - 1) * without if n > 1 else np.array([plain])
         estimates[name] = estimate(pseudovalues, metric.lowest, metric.highest)
     return estimates
@@ -229,10 +225,10 @@ def marked_coverage_estimates(
     replicas = [target_coverage(share, chamber) for share in shares]
     return {
         name: estimate(
-            [metric.from_coverage(*one) for one in replicas], metric.lowest, metric.highest
+            [metric.of_coverage(*one) for one in replicas], metric.lowest, metric.highest
         )
         for name, metric in METRICS.items()
-        if metric.from_coverage
+        if metric.of_coverage
     }
 
 

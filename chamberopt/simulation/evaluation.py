@@ -28,50 +28,33 @@ from chamberopt.coverage.statistics.confidence_interval import Estimate
 
 @dataclass(frozen=True)
 class MarkedCoverage:
-    """Coverage by the model "dents", which marks every single dent on the surface.
+    """Coverage by the model "dents", which marks every single dent on the surface."""
 
-    Args:
-        share: share of each part triangle inside dents, (m,); NaN where not exposed.
-        interval_width: width of its 95 % interval, (m,); NaN with a single replica.
-        curve: peening time [s] and mean coverage of the target then, a pair a time.
-    """
-
-    share: np.ndarray
-    interval_width: np.ndarray
+    share: np.ndarray  # share of each part triangle inside dents, (m,); NaN where not exposed
+    interval_width: np.ndarray  # width of its 95 % interval, (m,); NaN with a single replica
+    # peening time [s] and mean coverage of the target then, a pair a time
     curve: tuple[tuple[float, Estimate], ...]
 
 
 @dataclass(frozen=True)
 class Evaluation:
-    """One candidate, simulated in independent replicas.
-
-    Args:
-        objective: the weighted sum of metrics that a study maximises.
-        metrics: estimate of each metric, by its name.
-        total: sum of the replicas' tallies.
-        replicas: tally of each replica.
-        timings: wall-clock time of each step [s].
-        collisions: number of simulated collisions of each kind, warm-up included.
-        notes: what to know before trusting the result.
-        stream: stream of seeds, "search" or "confirm".
-        stopped_by: what ended it: "replicas" (their number was given), "accuracy" or "max_replicas".
-        analytic: whether it ran in an exact cavity instead of the chamber's mesh.
-        hits: single impacts of each replica on the part; empty if they were not kept.
-        marked: coverage by the model "dents"; None for the model "avrami".
-    """
+    """One candidate, simulated in independent replicas."""
 
     objective_name: str
-    objective: Estimate
-    metrics: dict[str, Estimate]
-    total: Tally
-    replicas: tuple[Tally, ...]
-    timings: dict[str, float]
-    collisions: dict[str, int]
-    notes: tuple[str, ...] = ()
-    stream: str = "search"
+    objective: Estimate  # the weighted sum of metrics that a study maximises
+    metrics: dict[str, Estimate]  # estimate of each metric, by its name
+    total: Tally  # sum of the replicas' tallies
+    replicas: tuple[Tally, ...]  # tally of each replica
+    timings: dict[str, float]  # wall-clock time of each step [s]
+    collisions: dict[str, int]  # number of simulated collisions of each kind, warm-up included
+    notes: tuple[str, ...] = ()  # what to know before trusting the result
+    stream: str = "search"  # stream of seeds, "search" or "confirm"
+    # what ended it: "replicas" (their number was given), "accuracy" or "max_replicas"
     stopped_by: str = "replicas"
-    analytic: bool = False
+    analytic: bool = False  # whether it ran in an exact cavity instead of the chamber's mesh
+    # single impacts of each replica on the part; empty if they were not kept
     hits: tuple[Hits, ...] = ()
+    # coverage by the model "dents"; None for the model "avrami"
     marked: MarkedCoverage | None = None
 
     @cached_property

@@ -34,34 +34,24 @@ MIN_GROWTH, MAX_GROWTH = 1.25, 2.0
 
 
 class ReplicaSetting(NamedTuple):
-    """What all replicas of a candidate have in common.
-
-    Args:
-        samples: points for the coverage model "dents"; None for the model "avrami".
-    """
+    """What all replicas of a candidate have in common."""
 
     design: Design
     chamber: Chamber
     mesh: TriangleMesh | AnalyticCavity
+    # points for the coverage model "dents"; None for the model "avrami"
     samples: SamplePoints | None
 
 
 @dataclass(frozen=True)
 class Replica:
-    """What is kept of one replica; its impact log is not.
-
-    Args:
-        collisions: number of collisions of each kind.
-        resting: the balls at rest at its end; None if there are none.
-        bouncing_share: share of the balls that bounce on one spot at its end.
-        first_marked: first time at which each sample point is inside a dent [s], (p,); None without
-            sample points.
-    """
+    """What is kept of one replica; its impact log is not."""
 
     tally: Tally
-    collisions: dict[str, int]
-    resting: RestingBalls | None
-    bouncing_share: float
+    collisions: dict[str, int]  # number of collisions of each kind
+    resting: RestingBalls | None  # the balls at rest at its end; None if there are none
+    bouncing_share: float  # share of the balls that bounce on one spot at its end
+    # first time at which each sample point is inside a dent [s], (p,); None without sample points
     first_marked: np.ndarray | None
     hits: Hits
 

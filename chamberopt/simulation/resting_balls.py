@@ -31,15 +31,10 @@ MIN_BOUNCING_SHARE = 0.1  # of the shot, to be worth a note
 
 @dataclass(frozen=True)
 class RestingBalls:
-    """The balls at rest at the end of a replica.
+    """The balls at rest at the end of a replica."""
 
-    Args:
-        share: their share of the shot.
-        line: how many there are, on what and where.
-    """
-
-    share: float
-    line: str
+    share: float  # their share of the shot
+    line: str  # how many there are, on what and where
 
 
 def find_resting_balls(

@@ -36,21 +36,15 @@ DEFAULT_COLOURS, COUNT_COLOURS, UNCERTAINTY_COLOURS = "viridis", "cividis", "mag
 
 @dataclass(frozen=True)
 class Quantity:
-    """A number that can be shown on each triangle.
-
-    Args:
-        column: its field in coverage.vtp.
-        factor: from that field to the unit that is shown.
-        grows: whether it is proportional to the peening time.
-    """
+    """A number that can be shown on each triangle."""
 
     name: str
     label: str
     unit: str
-    column: str
-    factor: float = 1.0
+    column: str  # its field in coverage.vtp
+    factor: float = 1.0  # from that field to the unit that is shown
     colours: str = DEFAULT_COLOURS
-    grows: bool = False
+    grows: bool = False  # whether it is proportional to the peening time
 
     @property
     def title(self) -> str:

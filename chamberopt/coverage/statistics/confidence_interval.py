@@ -23,17 +23,13 @@ ZERO_TOLERANCE = 1e-12  # a value below is a rounding error of zero
 
 @dataclass(frozen=True)
 class Estimate:
-    """A value with its 95 % interval.
-
-    Args:
-        half_width: half of the interval's width; infinite if there is only one replica.
-        pseudovalues: one value a replica, from which value and interval come, (n,).
-        bias: bound on the error that more replicas would not remove; included in half_width.
-    """
+    """A value with its 95 % interval."""
 
     value: float
-    half_width: float
+    half_width: float  # half of the interval's width; infinite if there is only one replica
+    # One value a replica, from which value and interval come, (n,).
     pseudovalues: tuple[float, ...] = field(default=(), repr=False)
+    # Bound on the error that more replicas would not remove; included in half_width.
     bias: float = 0.0
 
     @property

@@ -47,9 +47,9 @@ def uniform_coverage(replicas: list[Tally]) -> Estimate:
 
 def uncorrected(replicas: list[Tally]) -> float:
     total = sum(replicas[1:], replicas[0])
-    return METRICS["mean_coverage"].function(total, CHAMBER, DESIGN) - METRICS[
+    return METRICS["mean_coverage"].value(total, CHAMBER, DESIGN) - METRICS[
         "std_coverage"
-    ].function(total, CHAMBER, DESIGN)
+    ].value(total, CHAMBER, DESIGN)
 
 
 def poisson_replicas(rng: np.random.Generator, replicas: int, seconds: float) -> list[Tally]:
@@ -64,7 +64,7 @@ def test_pseudovalues_of_a_mean_are_the_sample() -> None:
     replicas = poisson_replicas(rng, 6, 10.0)
     rate = METRICS["impacts_per_mm2_s"]
     got = estimate_metrics(replicas, CHAMBER, DESIGN)["impacts_per_mm2_s"]
-    each = np.array([rate.function(replica, CHAMBER, DESIGN) for replica in replicas])
+    each = np.array([rate.value(replica, CHAMBER, DESIGN) for replica in replicas])
     np.testing.assert_allclose(got.pseudovalues, each, rtol=1e-9)
     assert got.value == pytest.approx(each.mean())
     assert got.half_width == pytest.approx(2.570582 * each.std(ddof=1) / np.sqrt(6), rel=1e-6)
