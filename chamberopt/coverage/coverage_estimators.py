@@ -1,20 +1,21 @@
-"""Mean, standard deviation and 5th percentile of coverage over the target, with confidence intervals.
+"""Mean, standard deviation and 5th percentile of the target's coverage, with confidence intervals.
 
 Notation
-    C   coverage of a place at the treatment time: 1 - exp(-x)
-    x   expected dented area over area there at the treatment time
-    h   share of the target's area outside the cavity, C = 0           (hidden_fraction)
-    v   variance of x within patches                                   (variance_within)
-    m1, m2  means of exp(-x) and exp(-2 x) over the exposed target      (uncovered.mean, .mean_square)
+    x       expected dented area over area of a place at the treatment time
+    C       its coverage, 1 - exp(-x)
+    h       share of the target's area outside the cavity, where C = 0      (hidden_fraction)
+    v       variance of x within patches                                    (variance_within)
+    m1, m2  means of exp(-x) and exp(-2 x) over the exposed target
 
     mean C   = (1 - h) (1 - m1)
     mean C²  = (1 - h) (1 - 2 m1 + m2)
 
 The expectations of mean and standard deviation do not depend on how long was simulated
-(poisson_survival.py), that of the 5th percentile as little as possible (rate_mixture.py). Both want a few
-dents on a triangle for each unit of x. Where there are fewer, neighbouring triangles are merged into
-patches. Differences within a patch are known by their variance v alone: the values are then put midway
-between "x is equal within patches" and "all of v lies there", and the interval includes both.
+(poisson_survival.py), that of the 5th percentile as little as possible (rate_mixture.py). Both want
+a few dents on a triangle for each unit of x. Where there are fewer, neighbouring triangles are
+merged into patches. Differences within a patch are known by their variance v alone: the values are
+then put midway between "x is equal within patches" and "all of v lies there", and the interval
+includes both.
 """
 
 from __future__ import annotations
@@ -37,10 +38,10 @@ from chamberopt.geometry.triangles import unit_normals
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
 
-# Dents on a patch for each unit of x. From 1 on the product over dents scatters no more than what it
-# estimates, from 2 on its interval does. 3 is for places where dents are larger than elsewhere: on 400
-# triangles, a quarter in shadow, intervals of the standard deviation held the truth in 88 % at 2 and in
-# 96 % at 3.
+# Dents on a patch for each unit of x. From 1 on the product over dents scatters no more than what
+# it estimates, from 2 on its interval does. 3 is for places where dents are larger than elsewhere:
+# on 400 triangles, a quarter in shadow, intervals of the standard deviation held the truth in 88 %
+# at 2 and in 96 % at 3.
 MIN_EXPOSURE = 3.0
 P05_OF_NORMAL = 1.645  # standard deviations by which a normal 5th percentile lies below the mean
 
@@ -103,8 +104,8 @@ def target_patches(
 def _merging_coordinates(chamber: Chamber, target: np.ndarray, exposure: np.ndarray) -> np.ndarray:
     """Coordinates in which triangles that may be merged are near each other, (m, 6).
 
-    They are the centres and the normals, these as long as two patches, so that a sharp edge separates
-    the triangles on its sides.
+    They are the centres and the normals, these as long as two patches, so that a sharp edge
+    separates the triangles on its sides.
     """
     corners = chamber.part.vertices[chamber.part.triangles[target]]
     patch_size = math.sqrt(
@@ -143,7 +144,7 @@ def _mean_and_std(
     mean = exposed * (1.0 - m1)
     variance = exposed * (1.0 - 2.0 * m1 + m2) - mean**2
     max_shift, max_added = _max_effect_of_variance(variance_within, m1)
-    # Half of what the variance within patches takes off the mean, and of what it adds to the variance.
+    # Half of what v takes off the mean, and of what it adds to the variance.
     shift = exposed * min(variance_within * max(m1, 0.0) / 2.0, max_shift) / 2.0
     added = exposed * min(variance_within * max(m2, 0.0), max_added) / 2.0
     of_variance = estimate(
@@ -152,9 +153,9 @@ def _mean_and_std(
         0.25,
         added,
     )
-    # The square root is steep at 0: the chord over the interval of the variance takes the place of the
-    # tangent. If that interval reaches 0, so does the one of the standard deviation, and the length of
-    # its upper side serves for both sides.
+    # The square root is steep at 0: the chord over the interval of the variance takes the place of
+    # the tangent. If that interval reaches 0, so does the one of the standard deviation, and the
+    # length of its upper side serves for both sides.
     value, reach, slope = math.sqrt(of_variance.value), of_variance.half_width, 0.0
     if 0.0 < reach < math.inf:
         low = math.sqrt(max(0.0, of_variance.value - reach))
@@ -168,10 +169,10 @@ def _mean_and_std(
 def _max_effect_of_variance(variance: float, uncovered: float) -> tuple[float, float]:
     """Largest effect on coverage that x can have by varying within patches.
 
-    The second order of a Taylor series exceeds all bounds where the variance is large, but x is not below
-    0. Of all x >= 0 with one mean and variance, exp(-x) has the largest mean if x is 0 or one other value
-    (the lower principal representation: S. Karlin and W. J. Studden, "Tchebycheff Systems", Wiley 1966,
-    chapter 3).
+    The second order of a Taylor series exceeds all bounds where the variance is large, but x is not
+    below 0. Of all x >= 0 with one mean and variance, exp(-x) has the largest mean if x is 0 or one
+    other value (the lower principal representation: S. Karlin and W. J. Studden, "Tchebycheff
+    Systems", Wiley 1966, chapter 3).
 
     Args:
         variance: variance of x.
@@ -190,8 +191,8 @@ def _max_effect_of_variance(variance: float, uncovered: float) -> tuple[float, f
 def time_to_98_estimate(p05: Estimate, seconds: float) -> Estimate:
     """Time [s] to full coverage from p05_coverage after `seconds`.
 
-    Where it is never reached, the value is NEVER and the interval as wide. The chord over the interval
-    takes the place of the tangent, because the time is steep where little is covered.
+    Where it is never reached, the value is NEVER and the interval as wide. The chord over the
+    interval takes the place of the tangent, because the time is steep where little is covered.
     """
     value, slope = seconds_to_98(p05.value, seconds), 0.0
     reach = min(p05.half_width, 1.0)
@@ -247,8 +248,8 @@ def _p05(
     x = np.array(
         [mixture.low_quantile(counts, share), *(n / (n - 1) * one for one in without_each)]
     )
-    # If all of the variance within patches were there, x would lie as far below the mean as before in
-    # standard deviations.
+    # If all of the variance within patches were there, x would lie as far below the mean as before
+    # in standard deviations.
     mean_x, variance = mixture.moments(counts)
     widening = math.sqrt(1.0 + variance_within / variance) if variance_within > 0.0 else 1.0
     widened = max(0.0, mean_x - (mean_x - x[0]) * widening)
@@ -261,8 +262,8 @@ def _p05(
     )
     value = -math.expm1(-x[0])
     bias = float(np.abs(value + np.expm1(-alternatives)).max()) + abs(value + math.expm1(-widened))
-    # How far p05 lies below the mean goes with the standard deviation and is known no better. Where that
-    # may be 0, a normal distribution tells how far at most.
+    # How far p05 lies below the mean goes with the standard deviation and is known no better. Where
+    # that may be 0, a normal distribution tells how far at most.
     below = abs(mean.value - value)
     if std.value > std.half_width:
         bias += std.half_width / std.value * below
@@ -272,11 +273,11 @@ def _p05(
 
 
 def _variance_within(replicas: Sequence[Tally], target: TargetPatches, chamber: Chamber) -> float:
-    """Variance of x over the triangles less that over the patches, both free of the dents' own scatter.
+    """Variance of x over the triangles less that over the patches, both free of counting noise.
 
-    Squares are made of pairs of dents from different replicas. Within one replica a ball that bounces on
-    its spot puts all of its dents on one triangle, which tells nothing of where dents fall in the next.
-    A single replica offers only the pairs of its own dents.
+    Squares are made of pairs of dents from different replicas. Within one replica a ball that
+    bounces on its spot puts all of its dents on one triangle, which tells nothing of where dents
+    fall in the next. A single replica offers only the pairs of its own dents.
     """
     on, n = target.patch >= 0, len(replicas)
     exposed, patch, count = chamber.exposed_area[on], target.patch[on], len(target.area)
@@ -306,7 +307,8 @@ def few_dents_note(replicas: Sequence[Tally], target: TargetPatches) -> tuple[st
     if not target.are_merged and dents:
         return ()
     return (
-        f"only {dents / target.triangles:.1f} dents per target triangle were simulated: neighbouring "
-        f"triangles are merged into {len(target.area)} patches, which makes the intervals wider; raise "
-        "process.accuracy.simulated_time_s or replicas, or mesh the part more coarsely",
+        f"only {dents / target.triangles:.1f} dents per target triangle were simulated: "
+        f"neighbouring triangles are merged into {len(target.area)} patches, which makes the "
+        "intervals wider; raise process.accuracy.simulated_time_s or replicas, or mesh the part "
+        "more coarsely",
     )

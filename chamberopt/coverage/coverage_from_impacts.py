@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 class Tally:
     """Sums of the impacts on each part triangle, over one or more replicas.
 
-    Every column is a plain sum, so tallies add: `a + b`. The tally of one replica also has its single
-    dents, which sums of tallies do not keep.
+    Every column is a plain sum, so tallies add: `a + b`. The tally of one replica also has its
+    single dents, which sums of tallies do not keep.
     """
 
     simulated_time: float  # recorded time of all replicas together [s]
@@ -55,8 +55,8 @@ def tally_impacts(impacts: ImpactLog, chamber: Chamber, design: Design) -> Tally
     """Sum the impacts of one replica on each part triangle.
 
     A dent counts whole for the triangle under its contact point, even if it reaches over the edge.
-    Neighbours trade what they lose, so sums over an area are unbiased, while a triangle much smaller than
-    a dent is noisy. Impacts below the yield speed count as impacts without dents.
+    Neighbours trade what they lose, so sums over an area are unbiased, while a triangle much
+    smaller than a dent is noisy. Impacts below the yield speed count as impacts without dents.
     """
     source = chamber.source[impacts.triangle]
     on_part = source >= 0

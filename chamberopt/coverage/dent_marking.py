@@ -1,12 +1,12 @@
 """Coverage model "dents": the share of the surface inside discs, each dent one disc on the surface.
 
-The surface is sampled by points. A dent marks the points that are nearer to its contact point than its
-radius, measured along the surface, so it bends across triangles and round edges. What several dents
-share counts once.
+The surface is sampled by points. A dent marks the points that are nearer to its contact point than
+its radius, measured along the surface, so it bends across triangles and round edges. What several
+dents share counts once.
 
 Notation
-    p, q      sample point and contact point [m]            (samples.place, place)
-    n_p, n_q  unit normals of the surface there             (samples.normal, normal)
+    p, q      sample point and contact point [m]            (samples.place, dents.place)
+    n_p, n_q  unit normals of the surface there             (samples.normal, dents.normal)
     theta     angle between the normals
     a, b      (p - q).n_q and (q - p).n_p [m]
 
@@ -15,9 +15,9 @@ On two planes that meet in an edge the distance along the surface is
     distance² = |p - q|² + 2 a b / (1 + cos theta),
 
 exact for the straight way over the edge. With h and y the distances of p and q from the edge and s
-along it, a = -h sin theta and b = -y sin theta (both + in a hollow),
-|p - q|² = h² + y² + 2 h y cos theta + s², and unfolded the distance² is (h + y)² + s². The far side of a
-thin blade faces the other way, cos theta = -1, and is infinitely far.
+along it, a = -h sin theta and b = -y sin theta (both + in a hollow), |p - q|² = h² + y² + 2 h y cos
+theta + s², and unfolded the distance² is (h + y)² + s². The far side of a thin blade faces the
+other way, cos theta = -1, and is infinitely far.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.coverage.dents import dents_on_part
+from chamberopt.coverage.dents import Dents
 from chamberopt.coverage.metrics import exposed_target
 from chamberopt.geometry.triangles import area_vectors
 
@@ -36,8 +36,6 @@ if TYPE_CHECKING:
     from scipy.spatial import cKDTree
 
     from chamberopt.chamber.build import Chamber
-    from chamberopt.design.load import Design
-    from sim_core import ImpactLog
 
 MAX_POINTS = 5_000_000  # about a gigabyte with all intermediate results
 DENTS_AT_ONCE = 5_000  # searched for together, to bound memory
@@ -59,7 +57,8 @@ class SamplePoints:
 def sample_points(chamber: Chamber, spacing: float) -> SamplePoints:
     """Spread points evenly over the part's exposed surface, the same ones every time.
 
-    Within a triangle they follow the additive recurrence of the plastic number, folded from the square.
+    Within a triangle they follow the additive recurrence of the plastic number, folded from the
+    square.
 
     Args:
         spacing: about one point for each spacing² [m], at least one a triangle of the cavity.
@@ -76,12 +75,13 @@ def sample_points(chamber: Chamber, spacing: float) -> SamplePoints:
     count = np.maximum(1, np.rint(area / spacing**2)).astype(int)
     if count.sum() > MAX_POINTS:
         raise InputError(
-            f"process.accuracy.sample_mm: given {spacing * 1e3:g}, which takes {count.sum():,} points "
-            f"for a surface of {area.sum() * 1e6:.4g} mm²; at most {MAX_POINTS:,} are supported: raise it"
+            f"process.accuracy.sample_mm: given {spacing * 1e3:g}, which takes {count.sum():,} "
+            f"points for a surface of {area.sum() * 1e6:.4g} mm²; at most {MAX_POINTS:,} are "
+            "supported: raise it"
         )
     owner = np.repeat(np.arange(len(index)), count)
     number = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
-    # Each triangle starts elsewhere in the sequence, or all single points would lie in the same corner.
+    # Each triangle starts elsewhere in the sequence, or all single points would be in one corner.
     u, v = (
         ((number + 0.5) / PLASTIC_NUMBER**power + owner / PLASTIC_NUMBER ** (power + 2) + 0.5) % 1.0
         for power in (1, 2)
@@ -106,59 +106,39 @@ def few_points_note(samples: SamplePoints, chamber: Chamber) -> tuple[str, ...]:
         return ()
     return (
         f"the median target triangle has {median:.0f} sample points, fewer than "
-        f"{MIN_POINTS_PER_TRIANGLE}: std_coverage comes out too large and uniform_coverage too low; "
-        "lower process.accuracy.sample_mm",
+        f"{MIN_POINTS_PER_TRIANGLE}: std_coverage comes out too large and uniform_coverage too "
+        "low; lower process.accuracy.sample_mm",
     )
 
 
-def first_marked_times(
-    samples: SamplePoints, impacts: ImpactLog, chamber: Chamber, design: Design
-) -> np.ndarray:
+def first_marked_times(samples: SamplePoints, dents: Dents) -> np.ndarray:
     """First time at which each point is inside a dent [s], (p,); inf if it never is."""
-    dents = dents_on_part(impacts, chamber, design)
-    return mark_points(samples, dents.place, dents.normal, dents.radius, dents.time)
-
-
-def mark_points(
-    samples: SamplePoints,
-    place: np.ndarray,
-    normal: np.ndarray,
-    radius: np.ndarray,
-    time: np.ndarray,
-) -> np.ndarray:
-    """First time [s] at which each point is inside one of these discs, (p,); inf if it never is.
-
-    Args:
-        place, normal: contact points [m] and unit normals of the discs, (k, 3).
-        radius, time: their radii [m] and times [s], (k,).
-    """
     from scipy.spatial import cKDTree
 
     first = np.full(len(samples.area), np.inf)
     tree = cKDTree(samples.place)
-    for begin in range(0, len(place), DENTS_AT_ONCE):
+    for begin in range(0, len(dents), DENTS_AT_ONCE):
         some = slice(begin, begin + DENTS_AT_ONCE)
-        point, dent = _points_in_dents(
-            tree, samples.normal, place[some], normal[some], radius[some]
+        point, dent = _points_in_discs(
+            tree, samples.normal, dents.place[some], dents.normal[some], dents.radius[some]
         )
-        np.minimum.at(first, point, time[some][dent])
+        np.minimum.at(first, point, dents.time[some][dent])
     return first
 
 
-def _points_in_dents(
+def _points_in_discs(
     tree: cKDTree, facing: np.ndarray, place: np.ndarray, normal: np.ndarray, radius: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Index of the point and of the disc of all pairs of a point and a disc that holds it.
+    """Indices of the point and the disc of all pairs of a point and a disc that holds it.
 
     Args:
         tree: search tree of the points.
         facing: unit normals of the surface at the points, (p, 3).
-        place, normal, radius: the discs, as in `mark_points`.
     """
     from scipy.spatial import cKDTree
 
-    # No way along the surface is shorter than the straight line, so the pairs that are near in space
-    # include all pairs that are near along the surface.
+    # No way along the surface is shorter than the straight line, so the pairs that are near in
+    # space include all pairs that are near along the surface.
     pairs = tree.sparse_distance_matrix(cKDTree(place), radius.max(), output_type="ndarray")
     point, dent = pairs["i"], pairs["j"]
     cosine = (facing[point] * normal[dent]).sum(axis=1)
@@ -166,8 +146,7 @@ def _points_in_dents(
     bend = (away * facing[point]).sum(axis=1) * -(away * normal[dent]).sum(axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         detour = np.where(bend > 0.0, 2.0 * bend / (1.0 + cosine), 0.0)
-    square = pairs["v"] ** 2 + detour
-    inside = square <= radius[dent] ** 2
+    inside = pairs["v"] ** 2 + detour <= radius[dent] ** 2
     return point[inside], dent[inside]
 
 

@@ -1,4 +1,4 @@
-"""What a single impact does to the part: the size of the dent it leaves, and the angle at which the ball comes.
+"""The size of the dent that a single impact leaves, and the angle at which the ball comes.
 
 Notation
     d   dent diameter [m]                               (dent_diameter)
@@ -70,7 +70,8 @@ def dent_diameter(
     from sim_core import restitution_at
 
     speed = np.asarray(normal_speed, dtype=float)
-    # Below v0 the contact is elastic (Kirk): the energy that c0 < 1 loses there goes into waves, not into a dent.
+    # Below v0 the contact is elastic (Kirk): the energy that c0 < 1 loses there goes into waves,
+    # not into a dent.
     dents = speed > v0
     e = np.where(dents, restitution_at(speed, c0, v0), 1.0)
     return (

@@ -5,10 +5,10 @@ Notation
     w    area of a patch over the area of the target                 (weight, (p,))
     uniformity = 1 - (standard deviation of v) / (mean of v), both weighted with w
 
-Almen intensity grows nearly linearly with the speed of the shot for balls of one size and kind (SAE J443
-measures it; M. Guagliano, "Relating Almen intensity to residual stresses induced by shot peening",
-J. Mater. Process. Technol. 110 (2001) 277). So the mean normal speed varies over the part as the
-intensity would.
+Almen intensity grows nearly linearly with the speed of the shot for balls of one size and kind (SAE
+J443 measures it; M. Guagliano, "Relating Almen intensity to residual stresses induced by shot
+peening", J. Mater. Process. Technol. 110 (2001) 277). So the mean normal speed varies over the part
+as the intensity would.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 def intensity_uniformity(replicas: Sequence[Tally], target: TargetPatches) -> Estimate:
     """Estimate the intensity uniformity by the delete-one jackknife: 1 is even, 0 not hit at all.
 
-    A place that is not hit or lies outside the cavity has speed 0. Local means of few impacts scatter;
-    their variance, which shows from replica to replica, is subtracted.
+    A place that is not hit or lies outside the cavity has speed 0. Local means of few impacts
+    scatter; their variance, which shows from replica to replica, is subtracted.
     """
     on = target.patch >= 0
     patch, patches = target.patch[on], len(target.area)
@@ -54,8 +54,8 @@ def _uniformity(speeds: np.ndarray, hits: np.ndarray, target: TargetPatches) -> 
         return 0.0
     noise = np.zeros(len(total))
     if count > 1:
-        # Variance of a ratio of sums, from the residual of each replica's sum (W. G. Cochran, "Sampling
-        # Techniques", Wiley 1977).
+        # Variance of a ratio of sums, from the residual of each replica's sum (W. G. Cochran,
+        # "Sampling Techniques", Wiley 1977).
         residuals = ((speeds - local * hits) ** 2).sum(axis=0) * count / (count - 1)
         np.divide(residuals, total.astype(float) ** 2, out=noise, where=total > 0)
     variance = float(weight @ (local**2 - noise)) - mean**2

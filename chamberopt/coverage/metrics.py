@@ -1,7 +1,8 @@
-"""The registry of metrics, computed of every candidate, and of objectives, which a study can maximise.
+"""The registry of metrics of a candidate, and of objectives that a study can maximise.
 
-A new metric is one entry of `METRICS`, a new objective one of `OBJECTIVES`. Study files, tables, reports
-and result folders take names, units and ranges from here. All metrics are over the exposed target.
+A new metric is one entry of `METRICS`, a new objective one of `OBJECTIVES`. Study files, tables,
+reports and result folders take names, units and ranges from here. All metrics are over the exposed
+target.
 """
 
 from __future__ import annotations
@@ -78,8 +79,8 @@ def require_target(chamber: Chamber) -> None:
 def target_coverage(coverage: np.ndarray, chamber: Chamber) -> tuple[np.ndarray, np.ndarray]:
     """Coverage of every target triangle and its share of the target's area.
 
-    Area outside the cavity counts as not covered. If it were left out, an optimiser would hide places
-    that are hard to reach behind a lower ceiling.
+    Area outside the cavity counts as not covered. If it were left out, an optimiser would hide
+    places that are hard to reach behind a lower ceiling.
 
     Args:
         coverage: coverage of the exposed area of each part triangle, (m,).
@@ -110,9 +111,7 @@ def p05_coverage(coverage: np.ndarray, weight: np.ndarray) -> float:
 
 
 def seconds_to_98(p05: float, seconds: float) -> float:
-    """Peening time [s] until the 5th percentile of the coverage is 98 %, which counts as full (SAE J2277).
-
-    By Avrami's equation, 1 - exp(-rate · time).
+    """Peening time until the 5th percentile of the coverage is FULL_COVERAGE, by Avrami's equation.
 
     Args:
         p05: 5th percentile of the coverage after `seconds` of peening.

@@ -145,8 +145,8 @@ def load_matching_hits(folder: Path, impacts: np.ndarray) -> HitsByTriangle | No
     found = load_hits(path)
     if not np.array_equal(np.diff(found.first), impacts):
         raise InputError(
-            f"{path}: its impacts are not those of the coverage.vtp beside it but of another result; "
-            "simulate again"
+            f"{path}: its impacts are not those of the coverage.vtp beside it but of another "
+            "result; simulate again"
         )
     return found
 

@@ -1,9 +1,9 @@
-"""Which effects a design needs: dimensionless groups, and short pilot runs with each effect switched.
+"""Which effects a design needs: dimensionless groups, and pilot runs with each effect switched.
 
-The pilot simulates the design, and the design with one effect switched, from the same starts. It compares
-what a short run measures without bias: the mean normal speed of the impacts on the target, and the dented
-area per second on two halves of the target, the one nearer to the sonotrode and the farther one. Dented
-areas are shown as the coverage that they would give if they were spread evenly.
+The pilot simulates the design, and the design with one effect switched, from the same starts. It
+compares what a short run measures without bias: the mean normal speed of the impacts on the target,
+and the dented area per second on two halves of the target, the one nearer to the sonotrode and the
+farther one. Dented areas are shown as the coverage that they would give if they were spread evenly.
 
 The pilot advises and changes nothing. Only a design with effects = "auto" leaves the choice to it
 (with_effects_resolved).
@@ -44,56 +44,20 @@ REPLICAS = 8
 IMPACTS = 300_000
 FIRST_TIME = 0.05  # s of each replica, to find how often the target is hit
 MAX_TIME = 20.0  # s of each replica
-# Friction that is assumed when the pilot switches it on: mu of dry metal, and beta0 between none and what
-# S. Foerster, M. Louge, H. Chang and K. Allia, Phys. Fluids 6 (1994) 1108, measured (0.43, 0.44).
+# Friction that is assumed when the pilot switches it on: mu of dry metal, and beta0 between none
+# and what S. Foerster, M. Louge, H. Chang and K. Allia, Phys. Fluids 6 (1994) 1108, measured (0.43,
+# 0.44).
 ASSUMED_FRICTION = {"mu": 0.3, "beta0": 0.2}
 ACCURACY = 0.01  # smaller changes do not matter
 
 
-@dataclass(frozen=True)
-class Switch:
-    """How to switch an effect of a design."""
-
-    is_on: Callable[[Design, Chamber], bool]  # whether the effect is on in a design
-    values: tuple[Any, Any]  # of the effect's key when switched on and off
-    reason: Callable[[Design, Chamber], str]  # what a dimensionless group says of its importance
-
-
-SWITCHES = {
-    "gravity": Switch(
-        lambda design, chamber: design.effects.gravity,
-        (True, False),
-        lambda design, chamber: (
-            f"g H / V² = {dimensionless.gravity_speed_change(design, chamber):.2g}"
-        ),
-    ),
-    "ball_collisions": Switch(
-        lambda design, chamber: design.effects.ball_collisions,
-        (True, False),
-        lambda design, chamber: (
-            f"mean free path {dimensionless.free_path(design, chamber):.2g} chamber heights"
-        ),
-    ),
-    "friction": Switch(
-        lambda design, chamber: design.effects.friction is not None,
-        (ASSUMED_FRICTION, None),
-        lambda design, chamber: (
-            f"an impact without slip turns {dimensionless.MAX_SPIN_SHARE:.0%} of the sideways speed "
-            "into spin"
-        ),
-    ),
-    "drag": Switch(
-        lambda design, chamber: design.effects.drag,
-        (True, False),
-        lambda design, chamber: (
-            f"{dimensionless.drag_loss(design, chamber):.2g} of the speed is lost on the way up"
-        ),
-    ),
-    "rest": Switch(
-        lambda design, chamber: balls_can_rest(design, chamber_mesh(chamber)),
-        (True, False),
-        lambda design, chamber: "a surface that does not move faces up, so balls can lie on it",
-    ),
+# Values of each effect's key when it is switched on and off.
+SWITCHED = {
+    "gravity": (True, False),
+    "ball_collisions": (True, False),
+    "friction": (ASSUMED_FRICTION, None),
+    "drag": (True, False),
+    "rest": (True, False),
 }
 
 
@@ -104,8 +68,8 @@ class Advice:
     effect: str
     on: bool  # whether the design has it on
     reason: str  # what a dimensionless group says of its importance
-    # change of each of MEASURED with its 95 % interval: of the mean impact speed as a share of it,
-    # of coverages as their difference
+    # Change of each of MEASURED with its 95 % interval: of the mean impact speed as a share of it,
+    # of coverages as their difference.
     changes: dict[str, Estimate]
     accuracy: float  # changes below do not matter
 
@@ -246,13 +210,34 @@ def _advise(pilot: _Pilot, progress: Progress | None) -> list[Advice]:
     for done, effect in enumerate(effects):
         if progress:
             progress(done, len(effects), None)
-        switch = SWITCHES[effect]
-        is_on = switch.is_on(pilot.design, pilot.chamber)
+        is_on = (
+            balls_can_rest(pilot.design, chamber_mesh(pilot.chamber))
+            if effect == "rest"
+            else bool(getattr(pilot.design.effects, effect))
+        )
         other = pilot.measure({effect: not is_on})
         with_it, without = (pilot.unchanged, other) if is_on else (other, pilot.unchanged)
-        reason = switch.reason(pilot.design, pilot.chamber)
+        reason = _reason(effect, pilot.design, pilot.chamber)
         advice.append(Advice(effect, is_on, reason, _changes(with_it, without), ACCURACY))
     return sorted(advice, key=lambda one: -one.largest_change)
+
+
+def _reason(effect: str, design: Design, chamber: Chamber) -> str:
+    """What a dimensionless group says of the importance of an effect."""
+    return {
+        "gravity": f"g H / V² = {dimensionless.gravity_speed_change(design, chamber):.2g}",
+        "ball_collisions": (
+            f"mean free path {dimensionless.free_path(design, chamber):.2g} chamber heights"
+        ),
+        "friction": (
+            f"an impact without slip turns {dimensionless.MAX_SPIN_SHARE:.0%} of the sideways "
+            "speed into spin"
+        ),
+        "drag": (
+            f"{dimensionless.drag_loss(design, chamber):.2g} of the speed is lost on the way up"
+        ),
+        "rest": "a surface that does not move faces up, so balls can lie on it",
+    }[effect]
 
 
 def _switchable(design: Design, chamber: Chamber) -> list[str]:
@@ -265,13 +250,13 @@ def _switchable(design: Design, chamber: Chamber) -> list[str]:
             return design.shot.mix is None  # not supported together
         return effect != "ball_collisions" or design.shot.count > 1
 
-    return [effect for effect in SWITCHES if can_be_switched(effect)]
+    return [effect for effect in SWITCHED if can_be_switched(effect)]
 
 
 def _switched(design: Design, effects: Mapping[str, bool]) -> Design:
     values: dict[str, Any] = {"effects.auto": False}
     for effect, on in effects.items():
-        value_on, value_off = SWITCHES[effect].values
+        value_on, value_off = SWITCHED[effect]
         values[f"effects.{effect}"] = (
             (getattr(design.effects, effect) or value_on) if on else value_off
         )
@@ -317,7 +302,7 @@ def _median(distances: np.ndarray, areas: np.ndarray) -> float:
 def _changes(
     with_it: Mapping[str, np.ndarray], without: Mapping[str, np.ndarray]
 ) -> dict[str, Estimate]:
-    """Mean changes, from replicas paired by their seeds; infinitely uncertain if nothing was hit."""
+    """Mean changes, from replicas with the same seeds; infinitely uncertain if nothing was hit."""
     changes = {}
     for name in MEASURED:
         scale = float(without[name].mean()) if name == SPEED else 1.0

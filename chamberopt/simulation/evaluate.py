@@ -1,4 +1,4 @@
-"""Evaluate a candidate: simulate it in independent replicas and estimate its metrics with intervals.
+"""Evaluate a candidate: simulate independent replicas and estimate its metrics with intervals.
 
 Notation
     n     number of replicas
@@ -7,8 +7,8 @@ Notation
 
 Coverage, the time to full coverage and the intensity uniformity have estimators of their own
 (coverage/coverage_estimators.py, coverage/intensity.py). The other metrics are ratios of sums: the
-delete-one jackknife over replicas corrects their bias of order 1/n and gives the standard error
-(B. Efron and R. J. Tibshirani, "An Introduction to the Bootstrap", Chapman & Hall 1993, chapter 11).
+delete-one jackknife over replicas corrects their bias of order 1/n and gives the standard error (B.
+Efron and R. J. Tibshirani, "An Introduction to the Bootstrap", Chapman & Hall 1993, chapter 11).
 """
 
 from __future__ import annotations
@@ -67,14 +67,11 @@ MARKED_CURVE_POINTS = 50
 class ReplicaPlan:
     """Which replicas to simulate."""
 
-    # number of replicas; None for as many as the design's [process.accuracy] asks for
+    # Number of replicas; None for as many as the design's [process.accuracy] asks for.
     count: int | None = None
     stream: str = "search"  # stream of seeds, "search" or "confirm"
-    # the objective, whose interval decides when a wanted accuracy is reached
+    # The objective, whose interval decides when a wanted accuracy is reached.
     objective_name: str = "uniform_coverage"
-
-
-DEFAULT_PLAN = ReplicaPlan()
 
 
 def evaluate(
@@ -82,14 +79,14 @@ def evaluate(
     chamber: Chamber,
     executor: Executor,
     progress: Progress | None = None,
-    plan: ReplicaPlan = DEFAULT_PLAN,
+    plan: ReplicaPlan | None = None,
     cavity: AnalyticCavity | None = None,
     done: list[Replica] | None = None,
 ) -> Evaluation:
     """Simulate a candidate in independent replicas and estimate its objective and metrics.
 
-    The result does not depend on the number of workers: replicas are added in order, and their results,
-    never a clock, decide how many there are.
+    The result does not depend on the number of workers: replicas are added in order, and their
+    results, never a clock, decide how many there are.
 
     Args:
         cavity: simulate in this exact cavity instead of the chamber's mesh.
@@ -99,6 +96,7 @@ def evaluate(
         InputError: the shot does not fit into the chamber.
         sim_core.SimulationError: a replica cannot be simulated.
     """
+    plan = plan or ReplicaPlan()
     accuracy = design.process.accuracy
     wanted = accuracy.objective_half_width if plan.count is None else None
     count = plan.count or accuracy.replicas
@@ -216,8 +214,8 @@ def marked_coverage_estimates(
 ) -> dict[str, Estimate]:
     """Coverage metrics of parts on which every dent is marked: plain means over the replicas.
 
-    Such a part shows the grain of its dents. Its std_coverage is larger and its p05_coverage lower than
-    those of the expected coverage, the more so the smaller the triangles are.
+    Such a part shows the grain of its dents. Its std_coverage is larger and its p05_coverage lower
+    than those of the expected coverage, the more so the smaller the triangles are.
 
     Args:
         shares: marked share of each part triangle, (m,), a replica each.
@@ -270,6 +268,7 @@ def _accuracy_note(
     )
     return (
         f"the wanted accuracy of ± {wanted:g} was not reached: the simulation stopped at "
-        f"process.accuracy.max_replicas = {replicas} with ± {objective.half_width:.2g}, and {needed} "
-        "replicas would be needed; raise process.accuracy.max_replicas or simulated_time_s",
+        f"process.accuracy.max_replicas = {replicas} with ± {objective.half_width:.2g}, and "
+        f"{needed} replicas would be needed; raise process.accuracy.max_replicas or "
+        "simulated_time_s",
     )

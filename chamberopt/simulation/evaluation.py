@@ -1,9 +1,9 @@
 """The evaluation of a candidate, and its file.
 
 The file is an .npz of all arrays, with one more entry, `tree`: JSON of everything else. In it
-{"array": name} stands for an array and {"is": class, "of": fields} for a dataclass. Sequences come back
-as tuples. A study keeps its confirmed candidates in such files, exactly, so that it can be resumed
-without simulating them again.
+{"array": name} stands for an array and {"is": class, "of": fields} for a dataclass. Sequences come
+back as tuples. A study keeps its confirmed candidates in such files, exactly, so that it can be
+resumed without simulating them again.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class MarkedCoverage:
 
     share: np.ndarray  # share of each part triangle inside dents, (m,); NaN where not exposed
     interval_width: np.ndarray  # width of its 95 % interval, (m,); NaN with a single replica
-    # peening time [s] and mean coverage of the target then, a pair a time
+    # Peening time [s] and mean coverage of the target then, a pair a time.
     curve: tuple[tuple[float, Estimate], ...]
 
 
@@ -49,12 +49,12 @@ class Evaluation:
     collisions: dict[str, int]  # number of simulated collisions of each kind, warm-up included
     notes: tuple[str, ...] = ()  # what to know before trusting the result
     stream: str = "search"  # stream of seeds, "search" or "confirm"
-    # what ended it: "replicas" (their number was given), "accuracy" or "max_replicas"
+    # What ended it: "replicas" (their number was given), "accuracy" or "max_replicas".
     stopped_by: str = "replicas"
     analytic: bool = False  # whether it ran in an exact cavity instead of the chamber's mesh
-    # single impacts of each replica on the part; empty if they were not kept
+    # Single impacts of each replica on the part; empty if they were not kept.
     hits: tuple[Hits, ...] = ()
-    # coverage by the model "dents"; None for the model "avrami"
+    # Coverage by the model "dents"; None for the model "avrami".
     marked: MarkedCoverage | None = None
 
     @cached_property

@@ -16,6 +16,7 @@ from chamberopt.chamber.scene import build_scene, replica_seed
 from chamberopt.common.errors import WorkerLostError
 from chamberopt.coverage.coverage_from_impacts import Tally, tally_impacts
 from chamberopt.coverage.dent_marking import SamplePoints, first_marked_times
+from chamberopt.coverage.dents import dents_on_part
 from chamberopt.coverage.part_impacts import Hits, hits_on_part
 from chamberopt.simulation.resting_balls import RestingBalls, bouncing_share, find_resting_balls
 
@@ -39,7 +40,7 @@ class ReplicaSetting(NamedTuple):
     design: Design
     chamber: Chamber
     mesh: TriangleMesh | AnalyticCavity
-    # points for the coverage model "dents"; None for the model "avrami"
+    # Points for the coverage model "dents"; None for the model "avrami".
     samples: SamplePoints | None
 
 
@@ -51,7 +52,7 @@ class Replica:
     collisions: dict[str, int]  # number of collisions of each kind
     resting: RestingBalls | None  # the balls at rest at its end; None if there are none
     bouncing_share: float  # share of the balls that bounce on one spot at its end
-    # first time at which each sample point is inside a dent [s], (p,); None without sample points
+    # First time at which each sample point is inside a dent [s], (p,); None without sample points.
     first_marked: np.ndarray | None
     hits: Hits
 
@@ -62,8 +63,8 @@ def simulate_replicas(
     """Simulate the replicas of these numbers; the results do not depend on the number of workers.
 
     Args:
-        setting: a ReplicaSetting as executor.share returns it. Keep it until the last replica, because it
-            goes to each worker once.
+        setting: a ReplicaSetting as executor.share returns it. Keep it until the last replica,
+            because it goes to each worker once.
         seed: of the design's process.
         stream: stream of seeds.
     """
@@ -142,7 +143,7 @@ def simulate_replica(setting: ReplicaSetting, seed: int) -> Replica:
         bouncing_share=bouncing_share(result.balls.velocities),
         first_marked=None
         if samples is None
-        else first_marked_times(samples, impacts, chamber, design),
+        else first_marked_times(samples, dents_on_part(impacts, chamber, design)),
         hits=hits_on_part(impacts, chamber, design),
     )
 

@@ -45,8 +45,8 @@ def find_resting_balls(
     Args:
         balls: number of all balls.
         diameter: of the balls [m].
-        part_turns: the part rotates. Its position at the end is then unknown, so no ball is said to touch
-            it.
+        part_turns: the part rotates. Its position at the end is then unknown, so no ball is said to
+            touch it.
     """
     if len(resting) == 0:
         return None
@@ -86,9 +86,9 @@ def bouncing_notes(shares: Sequence[float]) -> tuple[str, ...]:
         return ()
     return (
         f"in {len(large)} of {len(shares)} replicas up to {_percent(max(large))} of the shot ends "
-        "bouncing straight up and down, each ball on its spot: between parallel faces friction takes all "
-        "sideways speed, which rough faces would give back; shorten process.accuracy.simulated_time_s, or "
-        "do not trust where the dents are",
+        "bouncing straight up and down, each ball on its spot: between parallel faces friction "
+        "takes all sideways speed, which rough faces would give back; shorten "
+        "process.accuracy.simulated_time_s, or do not trust where the dents are",
     )
 
 
@@ -104,8 +104,9 @@ def resting_notes(resting: Sequence[RestingBalls], replicas: int) -> tuple[str, 
     mean = sum(one.share for one in resting) / replicas
     worst = max(resting, key=lambda one: one.share)
     return (
-        f"balls came to rest in {len(resting)} of {replicas} replicas and no longer peen: at the end "
-        f"{_percent(mean)} of the shot, on average over all replicas; in the worst one, {worst.line}",
+        f"balls came to rest in {len(resting)} of {replicas} replicas and no longer peen: at the "
+        f"end {_percent(mean)} of the shot, on average over all replicas; in the worst one, "
+        f"{worst.line}",
     )
 
 

@@ -23,12 +23,13 @@ def coverage_against_time(
 ) -> list[dict[str, float]]:
     """Coverage of the target at rising peening times.
 
-    By the model "avrami" the curve goes on until the 5th percentile is 98 %, at least to the treatment
-    time and at most to MAX_TREATMENT_TIMES of it, as long as the mean is known well enough. By the model
-    "dents" it is the mean alone and ends with the treatment.
+    By the model "avrami" the curve goes on until the 5th percentile is 98 %, at least to the
+    treatment time and at most to MAX_TREATMENT_TIMES of it, as long as the mean is known well
+    enough. By the model "dents" it is the mean alone and ends with the treatment.
 
     Returns:
-        Rows with time_s, mean_coverage, half_width and, by "avrami", p05_coverage and p05_half_width.
+        Rows with time_s, mean_coverage, half_width and, by "avrami", p05_coverage and
+        p05_half_width.
     """
     if evaluation.marked is not None:
         return [
@@ -63,7 +64,8 @@ def coverage_against_time(
 def _nearest_rising(value: np.ndarray, half_width: np.ndarray, fixed: np.ndarray) -> np.ndarray:
     """The nearest curve that never falls, with weights from the intervals.
 
-    Each time is estimated on patches of its own, so a step from one to the next could look like a fall.
+    Each time is estimated on patches of its own, so a step from one to the next could look like a
+    fall.
 
     Args:
         fixed: points that must keep their value, (n,) bool.

@@ -1,4 +1,4 @@
-"""What is known of each triangle of the part: the fields of coverage.vtp and the quantities to show.
+"""What is known of each part triangle: the fields of coverage.vtp and the quantities to show.
 
 Notation
     x   dent density of a triangle at the treatment time: area of its dents over its area
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from chamberopt.simulation.evaluation import Evaluation
 
 # Colour maps with even steps of lightness, which colour-blind readers can tell apart too.
-DEFAULT_COLOURS, COUNT_COLOURS, UNCERTAINTY_COLOURS = "viridis", "cividis", "magma"
+COLOURS, COUNTS, WIDTHS = "viridis", "cividis", "magma"
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Quantity:
     unit: str
     column: str  # its field in coverage.vtp
     factor: float = 1.0  # from that field to the unit that is shown
-    colours: str = DEFAULT_COLOURS
+    colours: str = COLOURS
     grows: bool = False  # whether it is proportional to the peening time
 
     @property
@@ -55,33 +55,16 @@ QUANTITIES = {
     one.name: one
     for one in (
         Quantity("coverage", "coverage", "%", "coverage", 100.0),
-        Quantity(
-            "impacts",
-            "impacts per area",
-            "1/mm²",
-            "impacts_per_mm2",
-            colours=COUNT_COLOURS,
-            grows=True,
-        ),
+        Quantity("impacts", "impacts per area", "1/mm²", "impacts_per_mm2", 1.0, COUNTS, True),
         Quantity("speed", "mean normal speed", "m/s", "mean_normal_speed"),
         Quantity("p90-speed", "normal speed, 90th percentile", "m/s", "p90_normal_speed"),
         Quantity("angle", "mean impact angle, 90° is head on", "°", "mean_angle_deg"),
         Quantity("dent", "mean dent diameter", "µm", "mean_dent_um"),
         Quantity(
-            "energy",
-            "energy of impacts per area",
-            "mJ/mm²",
-            "energy_per_mm2",
-            colours=COUNT_COLOURS,
-            grows=True,
+            "energy", "energy of impacts per area", "mJ/mm²", "energy_per_mm2", 1.0, COUNTS, True
         ),
         Quantity(
-            "interval",
-            "width of coverage's 95 % interval",
-            "%",
-            "coverage_interval",
-            100.0,
-            UNCERTAINTY_COLOURS,
+            "interval", "width of coverage's 95 % interval", "%", "coverage_interval", 100.0, WIDTHS
         ),
     )
 }
@@ -96,7 +79,7 @@ def compute_triangle_fields(
         Arrays (m,) by name:
 
         coverage: at the treatment time, 0..1.
-        impacts_per_mm2, energy_per_mm2: impacts and their energy [mJ] per area at the treatment time.
+        impacts_per_mm2, energy_per_mm2: impacts and energy [mJ] per area at the treatment time.
         dent_density: area of dents over area at the treatment time.
         impacts, dents: simulated numbers.
         mean_normal_speed [m/s], mean_angle_deg: means over the impacts; 90 is head on.
@@ -165,20 +148,20 @@ def coverage_bounds(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Ends of the 95 % interval of the coverage of each triangle by Avrami's equation.
 
-    x is a sum of dents that fall as a Poisson process, each with a weight of its own. The gamma interval
-    for such sums holds for few dents and for none. It does not know dents that come in series from a ball
-    that bounces on its spot.
+    x is a sum of dents that fall as a Poisson process, each with a weight of its own. The gamma
+    interval for such sums holds for few dents and for none. It does not know dents that come in
+    series from a ball that bounces on its spot.
 
     Args:
         area: exposed area [m²], (m,).
         time_ratio: treatment time over simulated time.
-        over: sums values (m,) of triangles over the neighbours of each; `area` must be such a sum too.
+        over: sums values (m,) over the neighbours of each triangle; `area` must be such sums too.
 
     Returns:
         Lower and upper ends, (m,) each.
 
-    Source: M. P. Fay and E. J. Feuer, "Confidence intervals for directly standardized rates", Statistics
-    in Medicine 16 (1997) 791.
+    Source: M. P. Fay and E. J. Feuer, "Confidence intervals for directly standardized rates",
+    Statistics in Medicine 16 (1997) 791.
     """
     from scipy.special import gammaincinv
 

@@ -80,8 +80,8 @@ def estimate(
     """
     values = np.asarray(pseudovalues, dtype=float)
     mean = float(np.clip(values.mean(), lowest, highest))
-    # The pseudo-values move with a clipped mean, so that sums and differences of estimates agree with
-    # sums and differences of their pseudo-values.
+    # The pseudo-values move with a clipped mean, so that sums and differences of estimates agree
+    # with sums and differences of their pseudo-values.
     values = values + (mean - values.mean())
     n = len(values)
     half_width, bias = float("inf"), float(bias)
@@ -103,8 +103,8 @@ def paired_difference(
 ) -> Estimate:
     """Difference after - before of replicas that ran on the same seeds, pair by pair.
 
-    A peening chamber is chaotic, so equal seeds hardly correlate. Where they do, the interval is right
-    too. With different numbers of replicas the two are taken as independent.
+    A peening chamber is chaotic, so equal seeds hardly correlate. Where they do, the interval is
+    right too. With different numbers of replicas the two are taken as independent.
     """
     if not after.pseudovalues or len(after.pseudovalues) != len(before.pseudovalues):
         return independent_difference(after, before, confidence)
@@ -136,8 +136,8 @@ def welch_half_width(
     Args:
         times: as if each sample had this many times as many values of the same scatter.
 
-    Source: B. L. Welch, "The generalization of 'Student's' problem when several different population
-    variances are involved", Biometrika 34 (1947) 28.
+    Source: B. L. Welch, "The generalization of 'Student's' problem when several different
+    population variances are involved", Biometrika 34 (1947) 28.
     """
     a, b = times * len(after), times * len(before)
     va, vb = float(np.var(after, ddof=1)) / a, float(np.var(before, ddof=1)) / b

@@ -9,21 +9,21 @@ Notation
     x      expected area of the dents on the patch within T, over A
     exp(-x)  uncovered fraction of the patch at T, by Avrami's equation
 
-The dented area k sum(s_j) in the place of x makes the uncovered fraction too large, because exp is not
-linear, and the fewer dents, the worse. But the product over the dents
+The dented area k sum(s_j) in the place of x makes the uncovered fraction too large, because exp is
+not linear, and the fewer dents, the worse. But the product over the dents
 
     product of (1 - k s_j)
 
-has exactly exp(-x) for its mean, for dents of any sizes and however short t is: it is the generating
-functional of a Poisson process (J. F. C. Kingman, "Poisson Processes", Oxford 1993, chapter 3.2). For
-dents of one size it is the estimator of I. J. Good and G. H. Toulmin, Biometrika 43 (1956) 45. With 2 k
-its mean is exp(-2 x), and both together give the variance of coverage over a surface free of counting
-noise.
+has exactly exp(-x) for its mean, for dents of any sizes and however short t is: it is the
+generating functional of a Poisson process (J. F. C. Kingman, "Poisson Processes", Oxford 1993,
+chapter 3.2). For dents of one size it is the estimator of I. J. Good and G. H. Toulmin, Biometrika
+43 (1956) 45. With 2 k its mean is exp(-2 x), and both together give the variance of coverage over a
+surface free of counting noise.
 
-The price is scatter: the mean square of a patch is exp(x (k s - 2)). Its expansion has orders in k s. The
-replicas show the first order (more dents or fewer, with everything else that shifts a whole replica).
-How much larger the sum of all orders is, is a mean of such products again. The delete-one jackknife
-would count order m of it m times over (B. Efron and C. Stein, Ann. Stat. 9 (1981) 586).
+The price is scatter: the mean square of a patch is exp(x (k s - 2)). Of its orders in k s the
+replicas show the first (more dents or fewer, with everything that shifts a whole replica). How much
+larger the sum of all orders is, is a mean of such products again. The delete-one jackknife would
+count order m of it m times over (B. Efron and C. Stein, Ann. Stat. 9 (1981) 586).
 """
 
 from __future__ import annotations
@@ -114,8 +114,8 @@ def _rescaled(
 ) -> np.ndarray:
     """First-order deviations, enlarged to what all orders together make: L K^-1 deviations.
 
-    K and L are the Cholesky factors of the covariances `first_order` and `all_orders` of the Poisson
-    process, (2, 2). The second is kept from being smaller than the first.
+    K and L are the Cholesky factors of the covariances `first_order` and `all_orders` of the
+    Poisson process, (2, 2). The second is kept from being smaller than the first.
 
     Args:
         deviations: (2, n).
@@ -137,7 +137,7 @@ def _rescaled(
 
 
 def _survival_product(dents: PatchDents, per_area: np.ndarray) -> np.ndarray:
-    """Product of 1 - k s over the dents of each patch, (p,). Beyond exp(50) it is noise and cut off."""
+    """Product of 1 - k s over the dents of each patch, (p,), cut off at exp(50) as noise."""
     factor = 1.0 - per_area[dents.patch] * dents.area
     logs = np.log(np.maximum(np.abs(factor), 1e-12))  # exactly 0 has no logarithm
     negative = np.bincount(dents.patch, factor < 0.0, len(per_area)).astype(int) % 2 == 1

@@ -6,13 +6,13 @@ Notation
     count      dents on a patch, expressed in dents of one size, (p,)
     weight     area of a patch over the area of all, (p,)
 
-A patch with few dents has a low rate or bad luck. The nonparametric maximum-likelihood mixture of Poisson
-distributions tells the two apart as far as counts can (J. Kiefer and J. Wolfowitz, Ann. Math. Stat. 27
-(1956) 887; found by expectation maximisation, EM: N. Laird, JASA 73 (1978) 805). What counts cannot tell
-is left to the start of EM, a gamma distribution with the mean and variance that the counts do tell, and
-to a small number of steps. With many steps EM gathers the rates in clumps, which on a real part is as
-wrong as no steps at all. The value between the two is the answer, and their distance tells how far it
-can be trusted.
+A patch with few dents has a low rate or bad luck. The nonparametric maximum-likelihood mixture of
+Poisson distributions tells the two apart as far as counts can (J. Kiefer and J. Wolfowitz, Ann.
+Math. Stat. 27 (1956) 887; found by expectation maximisation, EM: N. Laird, JASA 73 (1978) 805).
+What counts cannot tell is left to the start of EM, a gamma distribution with the mean and variance
+that the counts do tell, and to a small number of steps. With many steps EM gathers the rates in
+clumps, which on a real part is as wrong as no steps at all. The value between the two is the
+answer, and their distance tells how far it can be trusted.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ class RateMixture:
         return 0.98 * gamma / gamma.sum() + 0.02 / RATES
 
     def low_quantile(self, counts: np.ndarray, share: float, steps: int = STEPS) -> float:
-        """The x that all but `share` of the area exceed, from the mixture after some steps of EM."""
+        """The x that all but `share` of the area exceed, by the mixture after some steps of EM."""
         mean, variance = self.moments(counts)
         if mean == 0.0:
             return 0.0

@@ -6,11 +6,11 @@ import numpy as np
 
 
 def patches(places: np.ndarray, content: np.ndarray, minimum: float) -> np.ndarray:
-    """Merge triangles into patches of at least `minimum` content each, if all together have that much.
+    """Merge triangles into patches of at least `minimum` content, if all together have that much.
 
-    The whole is halved across its longest side, and the halves again, as long as both sides keep enough.
-    A triangle that has enough by itself can be a patch of its own. All cells of a level are cut at once
-    and ties go by index, so the same input gives the same patches.
+    The whole is halved across its longest side, and the halves again, as long as both sides keep
+    enough. A triangle that has enough by itself can be a patch of its own. All cells of a level are
+    cut at once and ties go by index, so the same input gives the same patches.
 
     Args:
         places: triangles that are near each other in this space may be merged, (m, d).

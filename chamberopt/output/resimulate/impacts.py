@@ -21,7 +21,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import core_count, share
 from chamberopt.common.progress import Progress
 from chamberopt.coverage.coverage_from_impacts import Tally, mean_speed_per_triangle, tally_impacts
-from chamberopt.coverage.dent_marking import mark_points, marked_share, sample_points
+from chamberopt.coverage.dent_marking import first_marked_times, marked_share, sample_points
 from chamberopt.coverage.dents import Dents, dents_on_part
 from chamberopt.coverage.metrics import target_coverage
 from chamberopt.design.process import MAX_SIMULATED_TREATMENT
@@ -124,7 +124,7 @@ def dented_share(dents: Dents, chamber: Chamber, spacing: float) -> float:
     spacing: of the sample points on the surface [m].
     """
     samples = sample_points(chamber, spacing)
-    first = mark_points(samples, dents.place, dents.normal, dents.radius, dents.time)
+    first = first_marked_times(samples, dents)
     end = dents.time.max(initial=0.0)
     marked = marked_share(samples, first, end, len(chamber.part.triangles))
     coverage, weight = target_coverage(marked, chamber)

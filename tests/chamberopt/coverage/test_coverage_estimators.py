@@ -30,7 +30,8 @@ TREATMENT = 50.0
 DESIGN = plate_design(process__treatment_time_s=TREATMENT)
 CHAMBER = patchwork(np.full(400, 1e-6))
 DENT = 0.1e-6  # m²: a tenth of a triangle
-# Dents per triangle and second: the expected coverage is 1 - exp(-rate · DENT / area · 50 s), 0.5 to 0.95.
+# Dents per triangle and second: the expected coverage is 1 - exp(-rate · DENT / area · 50 s), 0.5
+# to 0.95.
 RATE = np.random.default_rng(0).uniform(0.14, 0.6, 400)
 
 
@@ -47,9 +48,9 @@ def uniform_coverage(replicas: list[Tally]) -> Estimate:
 
 def uncorrected(replicas: list[Tally]) -> float:
     total = sum(replicas[1:], replicas[0])
-    return METRICS["mean_coverage"].value(total, CHAMBER, DESIGN) - METRICS[
-        "std_coverage"
-    ].value(total, CHAMBER, DESIGN)
+    return METRICS["mean_coverage"].value(total, CHAMBER, DESIGN) - METRICS["std_coverage"].value(
+        total, CHAMBER, DESIGN
+    )
 
 
 def poisson_replicas(rng: np.random.Generator, replicas: int, seconds: float) -> list[Tally]:
@@ -58,8 +59,8 @@ def poisson_replicas(rng: np.random.Generator, replicas: int, seconds: float) ->
 
 
 def test_pseudovalues_of_a_mean_are_the_sample() -> None:
-    # For a statistic linear in the tally the jackknife is the plain mean and its standard error: s/√n ·
-    # t(n-1).
+    # For a statistic linear in the tally the jackknife is the plain mean and its standard error:
+    # s/√n · t(n-1).
     rng = np.random.default_rng(5)
     replicas = poisson_replicas(rng, 6, 10.0)
     rate = METRICS["impacts_per_mm2_s"]
@@ -119,7 +120,8 @@ def test_the_poorest_twentieth_is_held_by_its_interval_however_short_the_simulat
 
 
 def test_an_even_part_is_not_better_than_its_mean() -> None:
-    # The correction can take a spread that is all noise below zero; the figures shown must still agree.
+    # The correction can take a spread that is all noise below zero; the figures shown must still
+    # agree.
     even = patchwork(np.full(400, 1e-6))
     rng = np.random.default_rng(4)
     counts = rng.poisson(0.4, (8, 400))
@@ -370,7 +372,8 @@ def test_real_simulations_hold_their_long_run_value() -> None:
 
 def test_a_ball_that_bounces_on_its_spot_does_not_empty_the_mean() -> None:
     """Few dents, and in each replica forty on one triangle, another each time: what one ball did says nothing
-    of how coverage varies, and the figures stay where Poisson dents alone would have them, or say that they may not.
+    of how coverage varies, and the figures stay where Poisson dents alone would have them, or say
+    that they may not.
     """
     rng, chamber = np.random.default_rng(3), patchwork(np.full(700, 1e-6))
     rate = 0.6 / (

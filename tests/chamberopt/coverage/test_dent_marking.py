@@ -9,11 +9,11 @@ from chamberopt.common.parallel.executor import SerialExecutor
 from chamberopt.coverage.dent_marking import (
     SamplePoints,
     few_points_note,
-    mark_points,
+    first_marked_times,
     marked_share,
     sample_points,
 )
-from chamberopt.coverage.dents import dent_diameters
+from chamberopt.coverage.dents import Dents, dent_diameters
 from chamberopt.design.load import load_design
 from chamberopt.design.shot import ShotSize
 from chamberopt.simulation.evaluate import evaluate
@@ -48,13 +48,8 @@ def marked_area(
 ) -> float:
     k = len(places)
     normal = np.tile(UP, (k, 1)) if normals is None else np.array(normals, dtype=float)
-    first = mark_points(
-        samples,
-        np.array(places, dtype=float),
-        normal,
-        np.full(k, radius),
-        np.arange(k, dtype=float),
-    )
+    place, time = np.array(places, dtype=float), np.arange(k, dtype=float)
+    first = first_marked_times(samples, Dents(place, normal, np.full(k, radius), time))
     return float(samples.area[np.isfinite(first)].sum())
 
 
@@ -110,9 +105,8 @@ def test_random_dents_cover_what_avrami_says_at_any_time() -> None:
         place = np.column_stack(
             [rng.uniform(-r, 10 + r, (count, 2)), np.zeros(count)]
         )  # spilling over the rim both ways
-        first = mark_points(
-            plane, place, np.tile(UP, (count, 1)), np.full(count, r), np.linspace(0.0, 1.0, count)
-        )
+        normal, time = np.tile(UP, (count, 1)), np.linspace(0.0, 1.0, count)
+        first = first_marked_times(plane, Dents(place, normal, np.full(count, r), time))
         shares.append([np.mean(first <= t) for t in (0.25, 0.5, 1.0)])
     got, error = np.mean(shares, axis=0), np.std(shares, axis=0, ddof=1) / np.sqrt(12)
     density = count * np.pi * r**2 / (10 + 2 * r) ** 2
