@@ -1,7 +1,7 @@
-"""sim_core: exact event-driven dynamics of balls in a closed triangle mesh, or a cavity of exact surfaces.
+"""sim_core: exact event-driven dynamics of balls in a closed cavity.
 
-Build a Scene from a TriangleMesh (or a cylinder_cavity or prism_cavity), Balls and Physics, then simulate it. SI units
-throughout.
+Build a Scene from a TriangleMesh (or a cylinder_cavity or prism_cavity), Balls and Physics, then
+simulate it. All quantities are in SI units.
 """
 
 from sim_core.balls import Balls

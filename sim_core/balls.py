@@ -1,4 +1,4 @@
-"""The shot: spheres of one size or a few, as columns of positions, velocities and, where they rub, spins."""
+"""The shot: spheres of one size or a few, with positions, velocities and, with friction, spins."""
 
 from dataclasses import dataclass
 
@@ -6,20 +6,24 @@ import numpy as np
 
 from sim_core.errors import SceneError, number
 
-MOST_SIZES = (
-    8  # each has obstacles of its own; more is a distribution, which a few sizes stand for well
-)
-FASTEST = 1e6  # m/s: shot has 20; the filters' float32 squares of much more overflow
+MAX_SIZES = 8  # each has obstacles of its own; a few sizes stand for a distribution well
+MAX_SPEED = 1e6  # m/s: shot has 20; the filters' float32 squares of much more overflow
 
 
 @dataclass(frozen=True)
 class Balls:
-    """Balls, all alike or of a few sizes.
+    """n balls, all alike or of a few sizes.
 
-    ``positions`` [m] and ``velocities`` [m/s], shape (n, 3) float64; ``diameter`` [m] and ``density`` [kg/m³]: one
-    number, or one for each ball, shape (n,); given for each and all equal, they become one number. ``spins`` [rad/s],
-    shape (n, 3), only with Physics.friction, where None is no spin. Raises SceneError for wrong shapes, numbers that
-    are not finite, speeds beyond FASTEST, or more than MOST_SIZES different diameters.
+    Args:
+        positions: of the centres [m], shape (n, 3).
+        velocities: in m/s, shape (n, 3).
+        diameter: one number [m], or one for each ball, shape (n,).
+        density: one number [kg/m³], or one for each ball, shape (n,).
+        spins: in rad/s, shape (n, 3), only with Physics.friction, where None is no spin.
+
+    Raises:
+        SceneError: for wrong shapes, numbers that are not finite, speeds beyond MAX_SPEED, or more
+            than MAX_SIZES different diameters.
     """
 
     positions: np.ndarray
@@ -30,12 +34,12 @@ class Balls:
 
     def __post_init__(self) -> None:
         for name in ("diameter", "density"):
-            object.__setattr__(
-                self, name, _each(name, getattr(self, name), np.shape(self.positions)[:1])
-            )
-        if len(self.sizes) > MOST_SIZES:
+            value = _one_or_each(name, getattr(self, name), np.shape(self.positions)[:1])
+            object.__setattr__(self, name, value)
+        if len(self.sizes) > MAX_SIZES:
             raise SceneError(
-                f"balls.diameter has {len(self.sizes)} different values: at most {MOST_SIZES} sizes are supported"
+                f"balls.diameter has {len(self.sizes)} different values: "
+                f"at most {MAX_SIZES} sizes are supported"
             )
         for name in ("positions", "velocities", "spins"):
             if getattr(self, name) is None and name == "spins":
@@ -53,21 +57,21 @@ class Balls:
                 raise SceneError(
                     f"balls.{name}: ball {bad[0]} has {array[bad[0]].tolist()}; give finite numbers"
                 )
-            most, unit = {
-                "velocities": (FASTEST, "m/s"),
-                "spins": (FASTEST / self.radius, "rad/s"),
-            }.get(name, (np.inf, ""))
-            if np.abs(array).max() > most:
+            limits = {"velocities": (MAX_SPEED, "m/s"), "spins": (MAX_SPEED / self.radius, "rad/s")}
+            limit, unit = limits.get(name, (np.inf, ""))
+            if np.abs(array).max() > limit:
                 worst = int(np.abs(array).max(axis=1).argmax())
                 raise SceneError(
-                    f"balls.{name}: ball {worst} has {array[worst].tolist()} {unit}; at most {most:g}"
+                    f"balls.{name}: ball {worst} has {array[worst].tolist()} {unit}; "
+                    f"at most {limit:g}"
                 )
             array.flags.writeable = False
             object.__setattr__(self, name, array)
         for name, others in (("velocities", self.velocities), ("spins", self.spins)):
             if others is not None and others.shape != self.positions.shape:
                 raise SceneError(
-                    f"balls.positions has {len(self.positions)} balls, balls.{name} {len(others)}: give one each"
+                    f"balls.positions has {len(self.positions)} balls, balls.{name} {len(others)}: "
+                    "give one each"
                 )
 
     def __len__(self) -> int:
@@ -75,12 +79,12 @@ class Balls:
 
     @property
     def alike(self) -> bool:
-        """True when all have one diameter and one density."""
+        """True when all balls have the same diameter and density."""
         return np.ndim(self.diameter) == 0 and np.ndim(self.density) == 0
 
     @property
     def radius(self) -> float:
-        """Half the diameter [m]; of the largest ball, if there are several sizes."""
+        """Radius [m] of the largest ball."""
         return 0.5 * float(self.sizes[-1])
 
     @property
@@ -90,27 +94,27 @@ class Balls:
 
     @property
     def diameters(self) -> np.ndarray:
-        """Of each ball [m], shape (n,)."""
+        """Diameter of each ball [m], shape (n,)."""
         return np.broadcast_to(self.diameter, len(self))
 
     @property
     def densities(self) -> np.ndarray:
-        """Of each ball [kg/m³], shape (n,)."""
+        """Density of each ball [kg/m³], shape (n,)."""
         return np.broadcast_to(self.density, len(self))
 
     @property
     def ball_mass(self) -> float:
-        """Mass of one ball [kg]; the mean, if they differ."""
+        """Mean mass of a ball [kg]."""
         return float(self.masses.mean())
 
     @property
     def masses(self) -> np.ndarray:
-        """Of each ball [kg], shape (n,)."""
+        """Mass of each ball [kg], shape (n,)."""
         return np.asarray(self.densities * np.pi / 6.0 * self.diameters**3)
 
 
-def _each(name: str, given: object, count: tuple[int, ...]) -> float | np.ndarray:
-    """One positive number, or one for each ball, (n,)."""
+def _one_or_each(name: str, given: object, count: tuple[int, ...]) -> float | np.ndarray:
+    """One positive number, also if all balls have the same, or one for each ball, shape (n,)."""
     if np.ndim(given) == 0:  # type: ignore[arg-type]
         values = np.array([number(f"balls.{name}", given)])
     else:
@@ -120,7 +124,8 @@ def _each(name: str, given: object, count: tuple[int, ...]) -> float | np.ndarra
             raise SceneError(f"balls.{name} must be one number, or one for each ball") from None
         if values.shape != count:
             raise SceneError(
-                f"balls.{name} has shape {values.shape} for {count} balls: give one number, or one each"
+                f"balls.{name} has shape {values.shape} for {count} balls: "
+                "give one number, or one each"
             )
     bad = np.flatnonzero(~(np.isfinite(values) & (values > 0.0)))
     if len(bad):

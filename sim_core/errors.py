@@ -6,11 +6,11 @@ import numpy as np
 
 
 class SceneError(ValueError):
-    """The scene cannot be simulated; the message names the ball, triangle or field, and the remedy."""
+    """The scene cannot be simulated; the message names ball, triangle or field, and remedy."""
 
 
 class SimulationError(RuntimeError):
-    """An invariant is broken or a ball cannot be followed; the message says where and what to try."""
+    """An invariant is broken or a ball cannot be followed; the message says what to try."""
 
 
 def number(name: str, value: object) -> float:

@@ -7,8 +7,8 @@ Notation:
     a: acceleration [m/s²], that of gravity unless the ball is in contact mode
 
 The difference between two balls is then a straight line, pairs need no clock of their own, and the
-numbers of a ball change only at its events. The clock's zero moves on every window, a whole number of
-periods of the fastest sonotrode, so that t stays small and its rounding with it.
+numbers of a ball change only at its events. The clock's zero moves on every window, a whole number
+of periods of the fastest sonotrode, so that t stays small and its rounding with it.
 """
 
 from typing import NamedTuple
@@ -16,12 +16,12 @@ from typing import NamedTuple
 import numpy as np
 
 from sim_core.effects.contact_mode import ContactState, ball_acceleration
-from sim_core.effects.gravity import Gravity, gravity_acceleration
+from sim_core.effects.gravity import Gravity
 from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.vec3 import Vec3, add_scaled
 
-# s: rounding of t is 3e-18 s, and a ball at 20 m/s moves 0.4 m. A longer window loses digits, a shorter
-# one costs more changes of the clock.
+# s: rounding of t is 3e-18 s, and a ball at 20 m/s moves 0.4 m. A longer window loses digits, a
+# shorter one costs more changes of the clock.
 WINDOW = 0.02
 
 
@@ -40,12 +40,6 @@ def free_fall_position(motion: np.ndarray, ball: int, time: float) -> Vec3:
         motion[ball, 1] + motion[ball, 4] * time,
         motion[ball, 2] + motion[ball, 5] * time,
     )
-
-
-@inlined
-def state_at(motion: np.ndarray, ball: int, time: float, gravity: Gravity | None) -> BallState:
-    """State of a ball under gravity at a time of the window."""
-    return state_under(motion, ball, time, gravity_acceleration(gravity))
 
 
 @inlined

@@ -1,1 +1,1 @@
-"""WHEN: the first time two things touch, approaching each other. Nothing here changes anything."""
+"""When a ball meets something."""

@@ -1,8 +1,8 @@
 """When a ball in an upright cylinder touches its wall: seen from above it flies straight.
 
-The ball is its centre p, which stays within R - r of the axis. (R - r)² - |p + v s|² is a quadratic in
-s and never rises again once it falls, so that a ball outside that moves further out is in contact now,
-however far out it is.
+The ball is its centre p, which stays within R - r of the axis. (R - r)² - |p + v s|² is a quadratic
+in s and never rises again once it falls, so that a ball outside that moves further out is in
+contact now, however far out it is.
 """
 
 import math
@@ -43,7 +43,7 @@ def cylinder_delay(
 def normal_at(
     cylinder: CylinderAxis | None, numbers: np.ndarray, row: int, kind: int, at: Vec3
 ) -> Vec3:
-    """Unit normal towards the shot of a face, or of the cylinder wall where the centre is ``at``."""
+    """Unit normal towards the shot of a face, or of the wall where the centre is ``at``."""
     if cylinder is None:
         return face_normal(numbers, row)
     if kind != CYLINDER_WALL:

@@ -1,4 +1,4 @@
-"""Which obstacle a ball meets first: a walk down the tree along its parabola, nearest boxes first."""
+"""Which obstacle a ball meets first: a walk down the tree along its parabola."""
 
 from typing import NamedTuple
 

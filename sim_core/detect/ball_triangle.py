@@ -1,7 +1,7 @@
 """When a ball on a parabola touches a still triangle: its moved face, or the capsule about an edge.
 
-The ball is its centre; geometry/obstacles.py has the obstacles that the centre meets. ``numbers`` and
-``row`` stand for one of them: ``numbers[row]`` of ObstacleTable.
+The ball is its centre; geometry/obstacles.py has the obstacles that the centre meets. ``numbers``
+and ``row`` stand for one of them: ``numbers[row]`` of ObstacleTable.
 """
 
 import numpy as np
@@ -23,8 +23,8 @@ from sim_core.numerics.vec3 import (
 # A gap this small [m] is contact with a capsule: a thousandth of what would count as early, and a
 # hundred times rounding.
 CONTACT = 1e-13
-# 3 to 6 steps are used; a grazing touch converges by a factor of four a step, and a ball that slides
-# over an edge needs 300.
+# 3 to 6 steps are used; a grazing touch converges by a factor of four a step, and a ball that
+# slides over an edge needs 300.
 MAX_STEPS = 1000
 ROUNDING = 1e-15  # m: of a point in a face's plane
 HALF = 0.5  # of a radius: an overlap deeper than this is the far side of a one-sided face

@@ -1,11 +1,12 @@
 """When a ball first touches a turning part, searched for in the part's frame.
 
 There the part's tree stands still. The flight is cut into pieces so short that in the part's frame
-each is a parabola up to a small share of a radius; the tree is searched along that parabola, widened
-by its error. At an obstacle the true path is followed by conservative advancement (Mirtich, PhD
-thesis, Berkeley 1996): within a piece the gap is never below a quadratic made of its value, rate and
-curvature now and of the bound J on its third derivative. Go to where that closes, and repeat. Each
-stop lies before the contact, so that none is missed, and near it the steps are Newton's.
+each is a parabola up to a small share of a radius; the tree is searched along that parabola,
+widened by its error. At an obstacle the true path is followed by conservative advancement (Mirtich,
+PhD thesis, Berkeley 1996): within a piece the gap is never below a quadratic made of its value,
+rate and curvature now and of the bound J on its third derivative. Go to where that closes, and
+repeat. Each stop lies before the contact, so that none is missed, and near it the steps are
+Newton's.
 """
 
 import numpy as np
@@ -26,8 +27,8 @@ from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.roots import NEVER, first_approach
 from sim_core.numerics.vec3 import Flight, Vec3, add_scaled, dot, flight_after, position_after, sub
 
-# Of a radius: how far a piece of the path may be from its parabola, and the parabola from its chord.
-# Boxes are widened by that; a fifth and four times of both measured within 4 %.
+# Of a radius: how far a piece of the path may be from its parabola, and the parabola from its
+# chord. Boxes are widened by that; a fifth and four times of both measured within 4 %.
 OFF_PARABOLA = 0.1
 BULGE = 0.25
 # A few are used; a path along a surface at a distance of CONTACT needs one every 1e-7 s or so.
@@ -75,11 +76,11 @@ def first_part_contact(
     found = known
     begin = 0.0
     while begin < best:
-        seen = relative_flight(rotation, flight_after(ball, begin), time + begin)
-        length = _piece(seen, jerk, best - begin, part.tree.radius)
+        relative = relative_flight(rotation, flight_after(ball, begin), time + begin)
+        length = _piece(relative, jerk, best - begin, part.tree.radius)
         last = begin + length >= best
         end = best if last else begin + length
-        aim_ray(scratch.ray, seen, length, jerk * length * length * length / 6.0)
+        aim_ray(scratch.ray, relative, length, jerk * length * length * length / 6.0)
         scratch.nodes[0] = 0
         scratch.times[0] = np.float32(0.0)
         depth = 1
@@ -94,7 +95,7 @@ def first_part_contact(
                 continue
             row = -1 - code
             delay, sure = _obstacle_delay(
-                part.tree, row, rotation, ball, seen, face_overlap, time, begin, end, jerk
+                part.tree, row, rotation, ball, relative, face_overlap, time, begin, end, jerk
             )
             if delay < end:
                 end = delay
@@ -136,9 +137,9 @@ def _jerk(part: PartTree, rotation: RotationState, ball: Flight, limit: float) -
 
 
 @jit
-def _piece(seen: Flight, jerk: float, length: float, radius: float) -> float:
+def _piece(relative: Flight, jerk: float, length: float, radius: float) -> float:
     """Length [s] of the next piece, at most ``length``."""
-    bend = np.sqrt(dot(seen.acceleration, seen.acceleration))
+    bend = np.sqrt(dot(relative.acceleration, relative.acceleration))
     while jerk * length * length * length > 6.0 * OFF_PARABOLA * radius or (
         bend * length * length > 8.0 * BULGE * radius
     ):
@@ -152,7 +153,7 @@ def _obstacle_delay(
     row: int,
     rotation: RotationState,
     ball: Flight,
-    seen: Flight,
+    relative: Flight,
     face_overlap: float,
     time: float,
     begin: float,
@@ -168,7 +169,7 @@ def _obstacle_delay(
         row: the obstacle.
         rotation: of the part.
         ball: its flight in the room from now on.
-        seen: its flight in the part's frame at ``begin``.
+        relative: its flight in the part's frame at ``begin``.
         face_overlap: how far faces overlap [m].
         time: now, on the window's clock [s].
         begin: of the piece [s].
@@ -181,22 +182,22 @@ def _obstacle_delay(
     delay = begin
     for _ in range(MAX_STEPS):
         if round_edge:
-            away = away_from_capsule(tree.numbers, row, seen.position)
+            away = away_from_capsule(tree.numbers, row, relative.position)
             distance = np.sqrt(dot(away, away))
             if distance <= HALF * radius:
                 return NEVER, True
             normal = Vec3(away.x / distance, away.y / distance, away.z / distance)
             gap = distance - radius
         else:
-            gap = dot(normal, seen.position) - tree.numbers[row, 3]
-        rate = dot(normal, seen.velocity)
-        bend = 0.5 * dot(normal, seen.acceleration)
+            gap = dot(normal, relative.position) - tree.numbers[row, 3]
+        rate = dot(normal, relative.velocity)
+        bend = 0.5 * dot(normal, relative.acceleration)
         left = end - delay
         if (
             gap <= CONTACT
             and rate < 0.0
             and gap > -HALF * radius
-            and (round_edge or within_borders(tree.numbers, row, seen.position, face_overlap))
+            and (round_edge or within_borders(tree.numbers, row, relative.position, face_overlap))
         ):
             return delay, True
         if gap > CONTACT or (gap > -OVERLAP and rate >= 0.0) or round_edge:
@@ -211,7 +212,7 @@ def _obstacle_delay(
                 return NEVER, True
             if not round_edge and gap > CONTACT and jerk * near * step * step <= 3.0 * CONTACT:
                 # the step ends in contact up to CONTACT, if the gap surely falls there
-                at = position_after(seen, step)
+                at = position_after(relative, step)
                 if rate + 2.0 * bend * step < -jerk * step * step and within_borders(
                     tree.numbers, row, at, face_overlap
                 ):
@@ -221,5 +222,5 @@ def _obstacle_delay(
             if delay + step > end:
                 return NEVER, True
         delay += max(step, 1e-16)
-        seen = relative_flight(rotation, flight_after(ball, delay), time + delay)
+        relative = relative_flight(rotation, flight_after(ball, delay), time + delay)
     return delay, False

@@ -1,5 +1,5 @@
-"""Effects of a scene, one a file: source, formula, coefficients, and the neutral result when absent.
+"""Effects of a scene, one a file: source, formula, and the neutral result when absent.
 
-Absent means None: numba removes the branch by its type, so that an absent effect is in neither memory
-nor machine code.
+Absent means None: numba removes the branch by its type, so that an absent effect is in neither
+memory nor machine code.
 """

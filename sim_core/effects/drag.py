@@ -12,14 +12,14 @@ Notation:
 Both decelerations have closed solutions, which are used. Buoyancy and added mass, 1.5e-4 of steel's
 weight and inertia, are left out. 3 mm steel at 5 m/s decelerates by 0.4 m/s².
 
-Flights stay parabolas: the air acts by impulses along the velocity, one in the middle of each piece of
-a flight (half a flight, impulse, half a flight). If an event comes before, the ball is given the rest
-of the impulse, or what was too much is taken back, so that velocities at events hold to second order
-in h. Within a piece the path is off the true one by at most a h²/8, with a the ball's deceleration:
-5 µm for 0.4 m/s² and 10 ms.
+Flights stay parabolas: the air acts by impulses along the velocity, one in the middle of each piece
+of a flight (half a flight, impulse, half a flight). If an event comes before, the ball is given the
+rest of the impulse, or what was too much is taken back, so that velocities at events hold to second
+order in h. Within a piece the path is off the true one by at most a h²/8, with a the ball's
+deceleration: 5 µm for 0.4 m/s² and 10 ms.
 
-Sources: Schiller & Naumann, Z. Ver. Dtsch. Ing. 77 (1935) 318; Clift, Grace & Weber, Bubbles, Drops and
-Particles (1978), chapter 5; Strang, SIAM J. Numer. Anal. 5 (1968) 506.
+Sources: Schiller & Naumann, Z. Ver. Dtsch. Ing. 77 (1935) 318; Clift, Grace & Weber, Bubbles, Drops
+and Particles (1978), chapter 5; Strang, SIAM J. Numer. Anal. 5 (1968) 506.
 """
 
 import math
@@ -91,7 +91,7 @@ def checked_drag(drag: Drag | None) -> Drag | None:
 def new_drag_state(
     drag: Drag | None, diameters: np.ndarray, densities: np.ndarray
 ) -> DragState | None:
-    """The state of balls of these diameters [m] and densities [kg/m³], shape (n,) each, at time 0."""
+    """The state at time 0 of balls of these diameters [m] and densities [kg/m³], (n,) each."""
     if drag is None:
         return None
     return DragState(

@@ -8,13 +8,13 @@ Notation:
         the energy
     m_eff: mass m at a surface, m/2 for a pair of equal balls [kg]
 
-The tangential impulse opposes v_t and is the smaller of mu J_n, when the points slip throughout, and
-2/7 (1 + beta0) m_eff |v_t|, when they stick and v_t turns into -beta0 v_t; 2/7 is that of solid
+The tangential impulse opposes v_t and is the smaller of mu J_n, when the points slip throughout,
+and 2/7 (1 + beta0) m_eff |v_t|, when they stick and v_t turns into -beta0 v_t; 2/7 is that of solid
 spheres. In contact mode mu is also Coulomb's coefficient of a ball that slips, rolls or lies on a
 surface; see contact/rolling.py.
 
-Sources: O. R. Walton, in Particulate Two-Phase Flow (ed. Roco, 1993) ch. 25; Foerster, Louge, Chang &
-Allia, Phys. Fluids 6 (1994) 1108.
+Sources: O. R. Walton, in Particulate Two-Phase Flow (ed. Roco, 1993) ch. 25; Foerster, Louge, Chang
+& Allia, Phys. Fluids 6 (1994) 1108.
 """
 
 import math
@@ -52,7 +52,8 @@ class FrictionState(NamedTuple):
         mu_of_rows: mu of each obstacle that a ball can stand on, shape (obstacles,).
         spins: at time 0 [rad/s], shape (n, 3).
         twists: constant change of the spin while in contact [rad/s²], shape (n, 3).
-        slips: velocity [m/s] at time 0 and acceleration [m/s²] of the touching points of a ball that
+        slips: velocity [m/s] at time 0 and acceleration [m/s²] of the touching points of a ball
+        that
             slips in contact, zero for one that rolls, lies or flies, shape (n, 6).
     """
 
@@ -67,7 +68,7 @@ class FrictionState(NamedTuple):
 
 
 def checked_friction(friction: Friction, tags: int) -> Friction:
-    """The coefficients as an array of shape (tags, 2) and floats; raises SceneError if one is bad."""
+    """The coefficients as an array (tags, 2) and floats; raises SceneError if one is bad."""
     surfaces, of_balls = surface_table("friction", "(mu, beta0)", *friction, tags)
     pairs = [(f"surfaces[{i}]", *pair) for i, pair in enumerate(surfaces)] + [("balls", *of_balls)]
     for name, mu, beta0 in pairs:
@@ -117,7 +118,7 @@ def spin_at(friction: FrictionState, ball: int, time: float) -> Vec3:
 
 @jit
 def set_spin(friction: FrictionState, ball: int, time: float, spin: Vec3, twist: Vec3) -> None:
-    """Set the spin of a ball that does not slip: ``spin`` [rad/s] at ``time``, ``twist`` [rad/s²]."""
+    """Set the ``spin`` [rad/s] at ``time`` and ``twist`` [rad/s²] of a ball without slip."""
     for axis in range(3):
         friction.spins[ball, axis] = spin[axis] - time * twist[axis]
         friction.twists[ball, axis] = twist[axis]

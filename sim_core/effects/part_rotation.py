@@ -1,8 +1,8 @@
 """A part that turns about an axis, steadily or to and fro, and a ball's flight relative to it.
 
-In the part's frame its triangles stand still, so their tree is built once. A ball's parabola becomes
-a curve there, whose position, velocity and acceleration are those of a turning frame, with Coriolis,
-centrifugal and Euler terms.
+In the part's frame its triangles stand still, so their tree is built once. A ball's parabola
+becomes a curve there, whose position, velocity and acceleration are those of a turning frame, with
+Coriolis, centrifugal and Euler terms.
 
 Notation:
     phi: angle of the part [rad]; phi = psi, or A sin(psi) where it turns to and fro
@@ -212,7 +212,7 @@ def _turn_back(rotation: RotationState, vector: Vec3, c: float, s: float) -> Vec
 
 @jit
 def relative_flight(rotation: RotationState, flight: Flight, time: float) -> Flight:
-    """A ball's flight in the part's frame at ``time`` [s] of the window; ``flight`` in the room's."""
+    """The flight in the part's frame at ``time`` [s]; the given one is in the room's frame."""
     argument = rotation.argument[0] + rotation.rate * time
     angle, speed, change = argument, rotation.rate, 0.0
     if rotation.to_and_fro:

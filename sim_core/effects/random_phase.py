@@ -1,15 +1,15 @@
 """Random arrival: each ball that comes to the vibrating face finds it at a phase drawn at random.
 
-From there to contact the face's path is exact. With the plain sinusoid a single ball that loses energy
-can fall into step with the face and hit it at the same phase for ever; in a chamber its collisions
-with others and with slanted walls decorrelate it. Where that is so the two agree in mean speeds and
-impact rates (tests/sim_core/effects/test_random_phase.py). A uniform phase at the edge of the band
-that the face moves in is what a ball finds that arrives at any time; the phase at contact is not
-uniform, because a rising face is met more often.
+From there to contact the face's path is exact. With the plain sinusoid a single ball that loses
+energy can fall into step with the face and hit it at the same phase for ever; in a chamber its
+collisions with others and with slanted walls decorrelate it. Where that is so the two agree in mean
+speeds and impact rates (tests/sim_core/effects/test_random_phase.py). A uniform phase at the edge
+of the band that the face moves in is what a ball finds that arrives at any time; the phase at
+contact is not uniform, because a rising face is met more often.
 
-The phase stays while the ball is within reach of the face, so that a second impact before it gets away
-finds the face continuing as it did. A draw is a hash of seed, ball and number of the draw: no state is
-shared, and the same scene gives the same bits on any thread.
+The phase stays while the ball is within reach of the face, so that a second impact before it gets
+away finds the face continuing as it did. A draw is a hash of seed, ball and number of the draw: no
+state is shared, and the same scene gives the same bits on any thread.
 
 Source: C. Wellons, "Prospecting for hash functions" (2018), 32 bits, multipliers below 2^31.
 """
@@ -24,8 +24,8 @@ from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.roots import first_approach
 from sim_core.numerics.vec3 import Flight, Vec3, dot
 
-# A ball this far [m] above the band that the face moves in is out of it. Less would be rounding in a
-# chamber a kilometre wide.
+# A ball this far [m] above the band that the face moves in is out of it. Less would be rounding in
+# a chamber a kilometre wide.
 CLEAR = 1e-9
 SEEDS = 2**32
 WORD = SEEDS - 1
@@ -58,7 +58,7 @@ class RandomPhaseState(NamedTuple):
 
 
 def checked_random_phase(random_phase: RandomPhase | None, sonotrodes: int) -> RandomPhase | None:
-    """The effect with a plain seed; raises SceneError for a bad seed or not exactly one sonotrode."""
+    """The effect with a plain seed; raises SceneError for a bad seed or number of sonotrodes."""
     if random_phase is None:
         return None
     seed = random_phase.seed

@@ -5,8 +5,8 @@ Notation:
     e: coefficient of restitution [-]: e = C0 for v < v0, and C0 (v / v0)^(-1/4) above
     C0, v0: coefficients [-] and [m/s], ``c0`` and ``v0``
 
-Source: Badreddine et al., "CAD based simulation of ultrasonic shot peening", eq. 2, after McNamara &
-Falcon, Phys. Rev. E 71 (2005) 031302.
+Source: Badreddine et al., "CAD based simulation of ultrasonic shot peening", eq. 2, after McNamara
+& Falcon, Phys. Rev. E 71 (2005) 031302.
 
 Impacts slower than ``elastic_below`` lose nothing. Without such a limit a ball that comes to rest
 bounces infinitely often in finite time; with it the number of bounces is bounded, and what is
@@ -42,13 +42,14 @@ class Restitution(NamedTuple):
 
 
 def checked_restitution(restitution: Restitution, tags: int) -> Restitution:
-    """The coefficients as an array of shape (tags, 2) and floats; raises SceneError if one is bad."""
+    """The coefficients as an array (tags, 2) and floats; raises SceneError if one is bad."""
     surfaces, of_balls = surface_table("restitution", "(C0, v0)", *restitution[:2], tags)
     pairs = [(f"surfaces[{i}]", *pair) for i, pair in enumerate(surfaces)] + [("balls", *of_balls)]
     for name, c0, v0 in pairs:
         if not 0.0 <= c0 <= 1.0 or not 0.0 < v0 < math.inf:
             raise SceneError(
-                f"restitution.{name} is ({c0}, {v0}): C0 must lie in [0, 1] and v0 be positive [m/s]"
+                f"restitution.{name} is ({c0}, {v0}): C0 must lie in [0, 1] and v0 be positive "
+                "[m/s]"
             )
     if not 0.0 <= restitution.elastic_below < math.inf:
         raise SceneError(

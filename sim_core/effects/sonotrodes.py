@@ -1,8 +1,10 @@
 """Several sonotrodes, of one frequency or several: each vibrating face has the wave of its own tag.
 
-The clock's window is a whole number of periods of the fastest sonotrode. The others need not fit into
-it: what each lacks to whole periods is added to its phase at every window's end, counted in 2^-62 of a
-turn. Whole numbers are added without rounding, so that a phase is off by at most 2^-63 of a turn a
+The clock's window is a whole number of periods of the fastest sonotrode. The others need not fit
+into
+it: what each lacks to whole periods is added to its phase at every window's end, counted in 2^-62
+of a turn. Whole numbers are added without rounding, so that a phase is off by at most 2^-63 of a
+turn a
 window: 3e-11 rad after the longest simulation.
 """
 

@@ -5,8 +5,8 @@ Notation:
     A: amplitude, zero to peak [m], ``amplitude``; omega = 2π frequency [rad/s], ``omega``
     A omega: peak speed of the face [m/s]
 
-Source: the process itself, a piezoelectric generator at a fixed frequency. Several sonotrodes are in
-sonotrodes.py.
+Source: the process itself, a piezoelectric generator at a fixed frequency. Several sonotrodes are
+in sonotrodes.py.
 """
 
 import math

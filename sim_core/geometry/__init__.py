@@ -1,1 +1,1 @@
-"""What a ball can hit."""
+"""What balls can hit: meshes, analytical cavities, obstacles and their tree."""

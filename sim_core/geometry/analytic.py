@@ -124,7 +124,7 @@ class AnalyticCavity:
         return np.column_stack([flat, wall])
 
     def contains(self, points: np.ndarray, amplitude: float = 0.0) -> np.ndarray:
-        """Which points (n, 3) [m] are inside, shape (n,) bool, with the floor one amplitude down."""
+        """Which points (n, 3) [m] are inside, (n,) bool, with the floor one amplitude down."""
         gaps = self.gaps(points)
         gaps[:, FLOOR] += amplitude
         return np.asarray((gaps > 0.0).all(axis=1))

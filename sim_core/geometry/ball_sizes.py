@@ -1,7 +1,7 @@
 """Balls of several sizes or densities: what differs from ball to ball; None where all are alike.
 
-Each size has obstacles of its own, the mesh moved out by its own radius, all in one tree with a root
-for each size.
+Each size has obstacles of its own, the mesh moved out by its own radius, all in one tree with a
+root for each size.
 """
 
 from typing import NamedTuple

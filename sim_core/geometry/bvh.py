@@ -1,10 +1,10 @@
 """An eight-wide tree of bounding boxes over the obstacles; each leaf is one obstacle.
 
 The tree is built top down by the surface area heuristic: a group of boxes is cut where the areas of
-the two halves' boxes, weighted by the number of obstacles in them, are least, because a box is entered
-in proportion to its area. Eight groups make a node: the largest is cut again until there are eight.
-Leaves hold a single obstacle so that the box test, eight at once, decides which exact tests are worth
-their cost.
+the two halves' boxes, weighted by the number of obstacles in them, are least, because a box is
+entered in proportion to its area. Eight groups make a node: the largest is cut again until there
+are eight. Leaves hold a single obstacle so that the box test, eight at once, decides which exact
+tests are worth their cost.
 
 Sources: Goldsmith & Salmon, IEEE Computer Graphics and Applications 7(5) (1987) 14; Wald, Benthin &
 Boulos, IEEE Symposium on Interactive Ray Tracing 2008.

@@ -1,7 +1,7 @@
 """The surface point closest to a place in the cavity, for many places at once.
 
-The walk through the tree of boxes leaves out what is farther than the closest point found so far. The
-distance is also the radius of the largest ball that fits there.
+The walk through the tree of boxes leaves out what is farther than the closest point found so far.
+The distance is also the radius of the largest ball that fits there.
 
 Source: C. Ericson, Real-Time Collision Detection (2005), section 5.1.5, for the closest point of a
 triangle.

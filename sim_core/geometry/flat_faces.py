@@ -68,7 +68,7 @@ class _Triangles(NamedTuple):
 
 
 def in_plane_tolerance(vertices: np.ndarray) -> float:
-    """Distance from a plane [m] up to which a corner lies in it, for vertices (n, 3) [m] as given."""
+    """Distance from a plane [m] up to which a corner lies in it, for vertices (n, 3) [m]."""
     rounding = ROUNDINGS * float(np.finfo(np.float64).eps * np.abs(vertices).max())
     return min(max(IN_PLANE, rounding), MAX_IN_PLANE)
 
@@ -276,7 +276,7 @@ class SurfaceTriangles(NamedTuple):
 def surface_triangles(
     mesh: TriangleMesh, vibrating_tags: tuple[int, ...] = (), amplitudes: tuple[float, ...] = ()
 ) -> SurfaceTriangles:
-    """The triangles of a mesh, of which those with ``vibrating_tags`` move by ``amplitudes`` [m]."""
+    """The triangles of a mesh; those with ``vibrating_tags`` move by ``amplitudes`` [m]."""
     corners = mesh.corners - mesh.middle
     amplitude = np.zeros(len(corners))
     for tag, largest in zip(vibrating_tags, amplitudes, strict=True):

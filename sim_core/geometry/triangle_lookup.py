@@ -144,7 +144,7 @@ def _find_each(lookup: TriangleLookup, seed: int, points: np.ndarray, found: np.
 
 @jit
 def _distance_outside(corners: np.ndarray, triangle: int, u: float, v: float) -> float:
-    """How far a point lies outside a triangle's sides [m]; negative inside. Corners run clockwise."""
+    """How far a point lies outside a clockwise triangle's sides [m]; negative inside."""
     worst = -np.inf
     for k in range(3):
         a, b = 2 * k, 2 * ((k + 1) % 3)

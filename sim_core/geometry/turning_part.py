@@ -1,4 +1,4 @@
-"""The obstacles of a part that turns, in a tree of their own, and whether it can turn where it is."""
+"""The obstacles of a part that turns, in a tree of their own, and whether it can turn."""
 
 import math
 from functools import lru_cache
@@ -52,9 +52,9 @@ def part_rows(
     if len(mixed):
         one, two = table.triangles[mixed[0]]
         raise SceneError(
-            f"the turning part meets the chamber in an edge that balls can touch, of triangles {one} "
-            f"and {two}: that is not supported; the joint must be a corner that recedes from the "
-            "shot, as where a shaft goes through a ceiling"
+            "the turning part meets the chamber in an edge that balls can touch, of triangles "
+            f"{one} and {two}: that is not supported; the joint must be a corner that recedes "
+            "from the shot, as where a shaft goes through a ceiling"
         )
     return np.asarray(sides[:, 0])
 
@@ -82,8 +82,8 @@ def build_part_tree(
     place = _in_axis_frame(mesh.corners[mesh.tags == axis.tag].reshape(-1, 3), axis)
     height, across = place[:, 2], np.linalg.norm(place[:, :2], axis=1)
     margin = 1.001 * radius  # and what faces overlap
-    # Boxes are padded for float32 rounding at the size of chamber and axis, not of the part, because
-    # the part may be that far from a ball.
+    # Boxes are padded for float32 rounding at the size of chamber and axis, not of the part,
+    # because the part may be that far from a ball.
     furthest = (
         np.abs(mesh.vertices - mesh.middle).max()
         + 2.0 * np.abs(np.array(axis.point) - mesh.middle).max()

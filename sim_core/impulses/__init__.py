@@ -1,1 +1,1 @@
-"""WHAT CHANGES: velocities before and after a contact. Nothing here asks when."""
+"""Velocity changes at contacts and by the air."""

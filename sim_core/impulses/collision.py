@@ -1,12 +1,13 @@
 """Velocity changes at a collision without friction.
 
 The normal relative velocity is reversed and multiplied by e, the tangential is kept; effects/
-restitution.py gives e. Two equal balls keep their momentum; geometry/ball_sizes.py has unequal ones.
+restitution.py gives e. Two equal balls keep their momentum; geometry/ball_sizes.py has unequal
+ones.
 
-A ball that circles in a cylinder and loses the last of its normal speed to restitution would hit the
-wall infinitely often in finite time, and slide on it from then on. Instead it goes on leaving and
-meeting the wall at a small angle: no energy comes in or goes, and friction finds the same force,
-m v²/R on average. The sides of a mesh are flat and need none of this.
+A ball that circles in a cylinder and loses the last of its normal speed to restitution would hit
+the wall infinitely often in finite time, and slide on it from then on. Instead it goes on leaving
+and meeting the wall at a small angle: no energy comes in or goes, and friction finds the same
+force, m v²/R on average. The sides of a mesh are flat and need none of this.
 """
 
 import math
@@ -17,8 +18,8 @@ from sim_core.geometry.obstacles import CYLINDER_WALL
 from sim_core.numerics.jit import jit
 from sim_core.numerics.vec3 import Vec3, add_scaled, dot, scaled
 
-# Smallest angle [rad] at which a ball leaves a cylinder wall: it moves R angle²/2 = 0.2 nm away. A ball
-# of 5 m/s hits the wall a million times a second, a tenth of what counts as a jam.
+# Smallest angle [rad] at which a ball leaves a cylinder wall: it moves R angle²/2 = 0.2 nm away. A
+# ball of 5 m/s hits the wall a million times a second, a tenth of what counts as a jam.
 RECONTACT_ANGLE = 1e-4
 
 
@@ -89,7 +90,8 @@ def leave_cylinder_wall(
     if departure >= least:
         return change
     rate = away.x * relative.x + away.y * relative.y
-    # the energy that the departure needs beyond that of the approach comes from the tangential speed
+    # the energy that the departure needs beyond that of the approach comes from the tangential
+    # speed
     borrowed = max(least * least - rate * rate, 0.0)
     slower = math.sqrt(tangential * tangential - borrowed)
     lost = math.copysign(slower, tangential) - tangential

@@ -1,9 +1,9 @@
 """Drag impulses: in the middle of each piece of a flight, and corrected when an event comes before.
 
-A ball gets no impulse on leaving what it has hit. Where it bounces a thousand times on its way up with
-the sonotrode, an impulse that is taken back at the next bounce, in the opposite direction, would take
-energy from each bounce and leave none. A ball in contact mode gets none either, because it is slow:
-3 mm steel that rolls at 1.7 m/s loses to the air what it loses by default to rolling
+A ball gets no impulse on leaving what it has hit. Where it bounces a thousand times on its way up
+with the sonotrode, an impulse that is taken back at the next bounce, in the opposite direction,
+would take energy from each bounce and leave none. A ball in contact mode gets none either, because
+it is slow: 3 mm steel that rolls at 1.7 m/s loses to the air what it loses by default to rolling
 (Rest.resistance).
 """
 
@@ -100,7 +100,7 @@ def apply_drag_piece(
 def apply_drag_to_all(
     drag: DragState | None, contact: ContactState | None, velocities: np.ndarray, time: float
 ) -> None:
-    """Correct the velocities (n, 3) [m/s] of flying balls so that the air has acted until ``time``."""
+    """Correct velocities (n, 3) [m/s] of flying balls so that the air has acted until now."""
     if drag is None:
         return
     for ball in range(len(velocities)):

@@ -1,8 +1,8 @@
 """Friction at a collision: a tangential velocity change against the slip, and spin.
 
 The formulas and their source are in effects/friction.py. Impulses are per mass, that is, velocity
-changes; a change j on the surface of a solid sphere of radius R, at -R n from its centre, changes its
-spin by -5/(2R) n x j.
+changes; a change j on the surface of a solid sphere of radius R, at -R n from its centre, changes
+its spin by -5/(2R) n x j.
 """
 
 import math

@@ -1,1 +1,1 @@
-"""Compilation, vectors, roots of polynomials, SIMD filters, profiler."""
+"""Compilation, vectors, roots of gaps, SIMD filters, profiler."""

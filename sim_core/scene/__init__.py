@@ -1,1 +1,1 @@
-"""What is simulated: scene, physics, packing, and what is refused."""
+"""What is simulated: the scene, its effects, packing, and what is refused."""

@@ -1,4 +1,4 @@
-"""What a scene with an analytical cavity must fulfil."""
+"""Checks of a scene with an analytical cavity."""
 
 import numpy as np
 
@@ -11,19 +11,17 @@ from sim_core.scene.physics import Physics
 
 
 def require_supported(cavity: AnalyticCavity, physics: Physics) -> None:
-    """Raises SceneError for effects that are not supported in an analytical cavity."""
+    """Raise SceneError for effects that are not supported in an analytical cavity."""
     remedy = "leave it out, or give the cavity as a mesh"
     for name in ("rest", "part_rotation"):
         if getattr(physics, name) is not None:
             raise SceneError(f"physics.{name} is not supported with an analytical cavity; {remedy}")
     gravity = physics.gravity
-    if (
-        cavity.radius is not None
-        and gravity is not None
-        and (gravity[0] != 0.0 or gravity[1] != 0.0)
-    ):
+    tilted = gravity is not None and (gravity[0] != 0.0 or gravity[1] != 0.0)
+    if cavity.radius is not None and gravity is not None and tilted:
         raise SceneError(
-            f"physics.gravity is {tuple(gravity)}: not supported with an analytical cylinder unless along z; {remedy}"
+            f"physics.gravity is {tuple(gravity)}: not supported with an analytical cylinder "
+            f"unless along z; {remedy}"
         )
     if len(physics.vibrations) > 1:
         raise SceneError(
@@ -34,13 +32,15 @@ def require_supported(cavity: AnalyticCavity, physics: Physics) -> None:
 
 
 def _require_floor(cavity: AnalyticCavity, vibration: Vibration, remedy: str) -> None:
+    """Raise SceneError unless it is the floor alone that vibrates, along z."""
     if not (vibration.axis[0] == 0.0 and vibration.axis[1] == 0.0):
         raise SceneError(
-            f"vibration.axis is {vibration.axis}: not supported with an analytical cavity unless along z; {remedy}"
+            f"vibration.axis is {vibration.axis}: not supported with an analytical cavity unless "
+            f"along z; {remedy}"
         )
-    swings = np.flatnonzero(cavity.tags == vibration.tag)
-    if len(swings) and swings.tolist() != [FLOOR]:
-        others = ", ".join(cavity.name(int(k)) for k in swings)
+    vibrating = np.flatnonzero(cavity.tags == vibration.tag)
+    if len(vibrating) and vibrating.tolist() != [FLOOR]:
+        others = ", ".join(cavity.name(int(k)) for k in vibrating)
         raise SceneError(
             f"vibration.tag is {vibration.tag}, that of {others}: not supported; the floor "
             "alone of an analytical cavity can vibrate, give it a tag of its own"
@@ -50,36 +50,34 @@ def _require_floor(cavity: AnalyticCavity, vibration: Vibration, remedy: str) ->
 def require_clear(
     cavity: AnalyticCavity, balls: Balls, vibrations: tuple[Vibration, ...], touch: float
 ) -> None:
-    """Raises SceneError for a ball outside the cavity, in a surface by more than ``touch`` [m], or wider than the
-    cavity where it is narrowest; the vibrating floor is where its phase has it.
+    """Raise SceneError for a ball that does not fit.
+
+    That is one outside the cavity, one that overlaps a surface by more than ``touch`` [m], and one
+    wider than the cavity where it is narrowest. The vibrating floor is where its phase has it.
     """
     gap, radii = cavity.gaps(balls.positions), 0.5 * balls.diameters
-    swing = 0.0
+    amplitude = 0.0
     for vibration in vibrations:
-        swing = vibration.amplitude
-        gap[:, FLOOR] -= swing * np.sin(vibration.phase) * np.sign(vibration.axis[2])
+        amplitude = vibration.amplitude
+        gap[:, FLOOR] -= amplitude * np.sin(vibration.phase) * np.sign(vibration.axis[2])
     over = gap - radii[:, None]
     ball, surface = (int(k) for k in np.unravel_index(over.argmin(), over.shape))
     where = f"ball {ball} at {balls.positions[ball].tolist()} m"
     if gap[ball, surface] <= 0.0:
         raise SceneError(f"{where} is outside the cavity, beyond {cavity.name(surface)}")
     if over[ball, surface] < -touch:
-        moving = (
-            " (displaced by its phase at the start)" if surface == FLOOR and swing > 0.0 else ""
-        )
+        moved = surface == FLOOR and amplitude > 0.0
+        moving = " (displaced by its phase at the start)" if moved else ""
         raise SceneError(
             f"{where} overlaps {cavity.name(surface)}{moving} by {-over[ball, surface]:.3g} m; "
             "move it or make it smaller"
         )
-    height = cavity.top - cavity.bottom - swing
+    height = cavity.top - cavity.bottom - amplitude
     for room, one, two in (cavity.narrowest(), (height, FLOOR, CEILING)):
         if room < 2.0 * radii.max() - TIGHT:
-            between = (
-                f"between {cavity.name(one)} and {cavity.name(two)}"
-                if one != two
-                else "in the cylinder"
-            )
+            both = f"between {cavity.name(one)} and {cavity.name(two)}"
+            between = both if one != two else "in the cylinder"
             raise SceneError(
-                f"ball {int(radii.argmax())} does not fit {between}: the gap is narrower than the ball by "
-                f"{2.0 * radii.max() - room:.3g} m; widen it or make the ball smaller"
+                f"ball {int(radii.argmax())} does not fit {between}: the gap is narrower than the "
+                f"ball by {2.0 * radii.max() - room:.3g} m; widen it or make the ball smaller"
             )

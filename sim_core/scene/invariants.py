@@ -1,7 +1,7 @@
-"""What must never break, checked by other means than the code under test.
+"""Invariants of a simulation, checked by other means than the code under test.
 
-Containment by counting ray crossings (not by contact times), overlap by plain distances, energy and momentum by
-their sums.
+Containment is checked by counting ray crossings (not by contact times), overlap by plain distances,
+energy and momentum by their sums.
 """
 
 import math
@@ -23,59 +23,61 @@ from sim_core.geometry.mesh import TriangleMesh
 from sim_core.numerics.jit import jit
 from sim_core.numerics.vec3 import Vec3, cross, dot, sub
 
-# Ray directions no designer's edge is parallel to, so that a ray through an edge or corner is a coincidence; where it
-# happens all the same, the next direction is asked.
+# Directions that no designer's edge is parallel to, so that a ray through an edge or corner is
+# rare; where it happens, the next direction is tried.
 RAYS = np.array([[0.3671, 0.2113, 0.9058], [-0.5317, 0.7411, 0.4098], [0.6119, -0.4733, -0.6337]])
-BORDER = 1e-12  # of the mesh's size squared: a ray passing an edge by less is asked again along the next direction
+BORDER = 1e-12  # of the mesh's size squared: a ray that passes an edge by less is undecided
 
 
-class _Shadows(NamedTuple):
-    """The triangles seen along a ray.
+class _Projection(NamedTuple):
+    """The triangles projected along a ray.
 
-    ``corners`` (m, 3, 3) with the ray as third axis; ``boxes`` (m, 4): low, high of the first axis and of the second;
-    ``turn`` (3, 3), rows the axes; ``border`` [m²].
+    Args:
+        corners: corner positions with the ray as third axis [m], shape (m, 3, 3).
+        boxes: low and high of the first axis and of the second [m], shape (m, 4).
+        axes: of the projection, shape (3, 3), one a row.
+        border: a doubled area smaller than this is undecided [m²].
     """
 
     corners: np.ndarray
     boxes: np.ndarray
-    turn: np.ndarray
+    axes: np.ndarray
     border: float
 
 
 @lru_cache(maxsize=32)
-def _shadows(mesh: TriangleMesh, k: int) -> _Shadows:
-    return _cast(mesh.corners, mesh, k)
+def _projection(mesh: TriangleMesh, k: int) -> _Projection:
+    return _project(mesh.corners, mesh, k)
 
 
-def _cast(triangles: np.ndarray, mesh: TriangleMesh, k: int) -> _Shadows:
-    """The triangles (m, 3, 3) seen along ray k; the ``mesh`` gives the scale."""
+def _project(triangles: np.ndarray, mesh: TriangleMesh, k: int) -> _Projection:
+    """The triangles (m, 3, 3) projected along ray k; the mesh gives the scale."""
     ray = RAYS[k] / np.linalg.norm(RAYS[k])
     side = np.cross(ray, [1.0, 0.0, 0.0])
     side /= np.linalg.norm(side)
-    turn = np.stack([side, np.cross(ray, side), ray])
-    corners = np.ascontiguousarray(triangles @ turn.T)
+    axes = np.stack([side, np.cross(ray, side), ray])
+    corners = np.ascontiguousarray(triangles @ axes.T)
     low, high = corners.min(axis=1), corners.max(axis=1)
     boxes = np.stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1]], axis=1)
-    return _Shadows(corners, boxes, turn, BORDER * float(np.ptp(mesh.vertices, axis=0).max()) ** 2)
+    return _Projection(
+        corners, boxes, axes, BORDER * float(np.ptp(mesh.vertices, axis=0).max()) ** 2
+    )
 
 
 @jit
-def _crossings(shadows: _Shadows, u: float, v: float, w: float) -> int:
-    """Triangles that the ray from (u, v, w) along the third axis crosses; -1: too near an edge to tell."""
+def _crossings(projection: _Projection, u: float, v: float, w: float) -> int:
+    """Number of triangles that the ray from (u, v, w) along axis 3 crosses; -1: undecided."""
     crossed = 0
-    corners, boxes = shadows.corners, shadows.boxes
+    corners, boxes = projection.corners, projection.boxes
     for t in range(len(boxes)):
         if u < boxes[t, 0] or u > boxes[t, 1] or v < boxes[t, 2] or v > boxes[t, 3]:
             continue
         au, av = corners[t, 0, 0] - u, corners[t, 0, 1] - v
         bu, bv = corners[t, 1, 0] - u, corners[t, 1, 1] - v
         cu, cv = corners[t, 2, 0] - u, corners[t, 2, 1] - v
-        a, b, c = (
-            bu * cv - bv * cu,
-            cu * av - cv * au,
-            au * bv - av * bu,
-        )  # twice the areas seen from the ray
-        if min(abs(a), abs(b), abs(c)) <= shadows.border:
+        # twice the areas seen along the ray
+        a, b, c = bu * cv - bv * cu, cu * av - cv * au, au * bv - av * bu
+        if min(abs(a), abs(b), abs(c)) <= projection.border:
             return -1
         if (a > 0.0) == (b > 0.0) == (c > 0.0):
             above = a * corners[t, 0, 2] + b * corners[t, 1, 2] + c * corners[t, 2, 2]
@@ -85,30 +87,37 @@ def _crossings(shadows: _Shadows, u: float, v: float, w: float) -> int:
 
 
 @jit
-def _count(shadows: _Shadows, points: np.ndarray, crossed: np.ndarray) -> None:
+def _count(projection: _Projection, points: np.ndarray, crossed: np.ndarray) -> None:
     for i in range(len(points)):
-        crossed[i] = _crossings(shadows, points[i, 0], points[i, 1], points[i, 2])
+        crossed[i] = _crossings(projection, points[i, 0], points[i, 1], points[i, 2])
 
 
 def contained(
     mesh: TriangleMesh, points: np.ndarray, corners: np.ndarray | None = None
 ) -> np.ndarray:
-    """Which points (n, 3) [m] lie inside the mesh, shape (n,) bool, by the parity of crossings along a ray.
+    """Which points lie inside the mesh, by the parity of crossings along a ray.
 
-    ``corners`` (m, 3, 3) [m]: where the triangles are now, if not where the mesh has them. Where a turned part goes
-    through a wall the surface has slits: who is out by the parity, is out only if the surface's solid angle, which a
-    slit hardly changes, says so too.
+    Where a turned part goes through a wall the surface has slits: a point outside by the parity is
+    outside only if the surface's solid angle, which a slit hardly changes, agrees.
+
+    Args:
+        mesh: the surface.
+        points: positions [m], shape (n, 3).
+        corners: where the triangles are now [m], shape (m, 3, 3), if not where the mesh has them.
+
+    Returns:
+        Shape (n,) bool.
     """
     points = np.asarray(points, dtype=np.float64)
     inside = np.zeros(len(points), dtype=np.bool_)
-    asked = np.arange(len(points))
+    undecided = np.arange(len(points))
     for k in range(len(RAYS)):
-        shadows = _shadows(mesh, k) if corners is None else _cast(corners, mesh, k)
-        crossed = np.zeros(len(asked), dtype=np.int64)
-        _count(shadows, np.ascontiguousarray(points[asked] @ shadows.turn.T), crossed)
-        inside[asked] = crossed % 2 == 1
-        asked = asked[crossed < 0]
-        if len(asked) == 0:
+        projection = _projection(mesh, k) if corners is None else _project(corners, mesh, k)
+        crossed = np.zeros(len(undecided), dtype=np.int64)
+        _count(projection, np.ascontiguousarray(points[undecided] @ projection.axes.T), crossed)
+        inside[undecided] = crossed % 2 == 1
+        undecided = undecided[crossed < 0]
+        if len(undecided) == 0:
             break
     if corners is not None:
         inside[~inside] = enclosed(corners, points[~inside])
@@ -116,7 +125,7 @@ def contained(
 
 
 def enclosed(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Which points (n, 3) [m] the triangles (m, 3, 3) [m] go round, shape (n,) bool, by their solid angle."""
+    """Which points (n, 3) [m] the triangles (m, 3, 3) [m] enclose, (n,) bool, by solid angle."""
     angle = np.zeros(len(points))
     _solid_angles(
         np.ascontiguousarray(corners), np.ascontiguousarray(points, dtype=np.float64), angle
@@ -126,7 +135,10 @@ def enclosed(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 @jit
 def _solid_angles(corners: np.ndarray, points: np.ndarray, angle: np.ndarray) -> None:
-    """Of all triangles, seen from each point: van Oosterom & Strackee, IEEE Trans. Biomed. Eng. 30 (1983) 125."""
+    """Solid angle of all triangles, seen from each point.
+
+    Source: van Oosterom & Strackee, IEEE Trans. Biomed. Eng. 30 (1983) 125.
+    """
     for i in range(len(points)):
         at = Vec3(points[i, 0], points[i, 1], points[i, 2])
         for t in range(len(corners)):
@@ -141,34 +153,34 @@ def _solid_angles(corners: np.ndarray, points: np.ndarray, angle: np.ndarray) ->
 def turned_corners(
     mesh: TriangleMesh, turn: PartRotation, angle: float | None = None
 ) -> np.ndarray:
-    """Corners (m, 3, 3) [m] of the mesh's triangles, those of the part turned by ``angle`` [rad]: at the start, if
-    none is given.
+    """Corners (m, 3, 3) [m] of the mesh with the part turned by ``angle`` [rad].
+
+    Without an angle the part is where it is at the start.
     """
     rotation = new_rotation_state(turn, mesh.middle)
     assert rotation is not None
     angle = angle_at(rotation, 0.0) if angle is None else angle
-    rotation_axis = checked_axis(turn)
-    assert rotation_axis is not None
+    axis = checked_axis(turn)
+    assert axis is not None
     corners = mesh.corners.copy()
-    own = mesh.tags == rotation_axis.tag
-    corners[own] = rotate_points(
-        corners[own], np.array(rotation_axis.point), np.array(rotation_axis.axis), angle
-    )
+    own = mesh.tags == axis.tag
+    point, direction = np.array(axis.point), np.array(axis.axis)
+    corners[own] = rotate_points(corners[own], point, direction, angle)
     return corners
 
 
 @jit
 def _distance_squared(corners: np.ndarray, t: int, px: float, py: float, pz: float) -> float:
-    """Squared distance from a point to a triangle: Ericson, Real-Time Collision Detection (2005), section 5.1.5."""
+    """Squared distance [m²] from a point to a triangle.
+
+    Source: C. Ericson, Real-Time Collision Detection (2005), section 5.1.5.
+    """
     ax, ay, az = corners[t, 0, 0], corners[t, 0, 1], corners[t, 0, 2]
     bx, by, bz = corners[t, 1, 0] - ax, corners[t, 1, 1] - ay, corners[t, 1, 2] - az
     cx, cy, cz = corners[t, 2, 0] - ax, corners[t, 2, 1] - ay, corners[t, 2, 2] - az
     x, y, z = px - ax, py - ay, pz - az
-    bb, bc, cc = (
-        bx * bx + by * by + bz * bz,
-        bx * cx + by * cy + bz * cz,
-        cx * cx + cy * cy + cz * cz,
-    )
+    bb, bc = bx * bx + by * by + bz * bz, bx * cx + by * cy + bz * cz
+    cc = cx * cx + cy * cy + cz * cz
     xb, xc = x * bx + y * by + z * bz, x * cx + y * cy + z * cz
     det = bb * cc - bc * bc
     v, w = -1.0, -1.0
@@ -178,7 +190,7 @@ def _distance_squared(corners: np.ndarray, t: int, px: float, py: float, pz: flo
         dx, dy, dz = x - v * bx - w * cx, y - v * by - w * cy, z - v * bz - w * cz
         return dx * dx + dy * dy + dz * dz
     nearest = math.inf
-    for side in range(3):  # outside the face: the nearest of the three borders
+    for side in range(3):  # outside the face: the closest of the three borders
         if side == 0:
             ox, oy, oz, ex, ey, ez = x, y, z, bx, by, bz
         elif side == 1:
@@ -217,7 +229,7 @@ def _clear(
 
 
 def clearance(corners: np.ndarray, points: np.ndarray, reach: float) -> np.ndarray:
-    """Distance (n,) [m] from points (n, 3) to the nearest of the triangles (m, 3 corners, 3), at most ``reach`` [m]."""
+    """Distance (n,) [m] from points (n, 3) to the closest triangle (m, 3, 3), at most ``reach``."""
     points = np.ascontiguousarray(points, dtype=np.float64)
     gap = np.zeros(len(points))
     _clear(corners, corners.min(axis=1), corners.max(axis=1), points, reach, gap)
@@ -225,21 +237,22 @@ def clearance(corners: np.ndarray, points: np.ndarray, reach: float) -> np.ndarr
 
 
 def closest_pair(balls: Balls) -> tuple[float, int, int]:
-    """Smallest centre distance [m] among the balls, and which two; (inf, -1, -1) for a single ball."""
+    """Smallest centre distance [m], and of which two balls; (inf, -1, -1) for a single ball."""
     if len(balls) < 2:
         return math.inf, -1, -1
     from scipy.spatial import KDTree
 
     distance, partner = KDTree(balls.positions).query(balls.positions, k=2)
     one = int(distance[:, 1].argmin())
-    two = int(partner[one, 1])  # of balls in one place the first found may be either
+    two = int(partner[one, 1])  # of balls in one place, the first may be either one
     return float(distance[one, 1]), one, two if two != one else int(partner[one, 0])
 
 
 def narrowest_gap(balls: Balls) -> tuple[float, int, int]:
-    """Smallest gap [m] between the surfaces of two balls, negative when they overlap, and which two.
+    """Smallest gap [m] between two balls, negative when they overlap, and which two.
 
-    (inf, -1, -1) for a single ball; of several sizes also when no two are nearer than the largest's diameter.
+    (inf, -1, -1) for a single ball, and for balls of several sizes if no two are nearer than the
+    largest diameter.
     """
     if np.ndim(balls.diameter) == 0:
         distance, one, two = closest_pair(balls)
@@ -256,7 +269,7 @@ def narrowest_gap(balls: Balls) -> tuple[float, int, int]:
 
 
 def energy(balls: Balls, gravity: Gravity | None = None) -> float:
-    """Kinetic plus potential energy [J], that of spins included, potential zero at the origin."""
+    """Kinetic energy, with that of spins, plus potential energy [J], which is 0 at the origin."""
     each = 0.5 * np.einsum("ij,ij->i", balls.velocities, balls.velocities)
     if balls.spins is not None:  # the moment of inertia of a solid sphere: 2/5 m R²
         each += 0.2 * (0.5 * balls.diameters) ** 2 * np.einsum("ij,ij->i", balls.spins, balls.spins)

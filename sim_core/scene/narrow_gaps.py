@@ -1,7 +1,8 @@
-"""Gaps narrower than the ball that starts in them, or about to be: no motion of a rigid ball there is right.
+"""Gaps narrower than the ball that starts in them, or about to become so.
 
-Asked are two surfaces that the ball touches on opposite sides; in a wedge it could still move out. A vibrating surface
-counts where its swing brings it nearest; of two, both.
+No motion of a rigid ball there is right. Two surfaces are checked that the ball touches on opposite
+sides; from a wedge it could still move out. A vibrating surface counts where its vibration brings
+it nearest, and two of them where both do.
 """
 
 from typing import NamedTuple
@@ -14,39 +15,42 @@ from sim_core.scene.invariants import clearance
 from sim_core.scene.physics import Physics
 
 TIGHT = 1e-13  # m: narrower by less is rounding; a contact is found as exactly
-OPPOSED = (
-    -1.0 + 1e-9
-)  # cosine: parallel but for 0.05 mrad; a ball that overlaps by 1 nm would have 40 um to move out
+# Cosine of normals: parallel up to 0.05 mrad. A ball that overlaps by 1 nm there could move out 40
+# um.
+OPPOSED = -1.0 + 1e-9
 
 
 class NarrowGap(NamedTuple):
-    """``ball`` is in a gap ``narrower`` [m] than itself between the triangles ``one`` and ``two``; ``swings``: so when
-    the vibrating surface that has one of them, or those that have both, come nearest to the other.
+    """A ball that does not fit.
+
+    Args:
+        ball: number of the ball.
+        one: triangle on one side.
+        two: triangle on the other side.
+        narrower: how much narrower than the ball the gap is [m].
+        vibrates: whether that is so when the vibrating surfaces come nearest, not at the start.
     """
 
     ball: int
     one: int
     two: int
     narrower: float
-    swings: bool
+    vibrates: bool
 
 
 def find_narrow_gap(
     mesh: TriangleMesh, physics: Physics, balls: Balls, corners: np.ndarray
 ) -> NarrowGap | None:
-    """The first ball that does not fit where it starts; ``corners`` (m, 3, 3) [m]: the triangles at the start."""
-    radius, swing = 0.5 * balls.diameters, _swing(physics)
-    asked = (
-        clearance(corners, balls.positions, balls.radius) < radius - 0.5 * TIGHT
-    )  # two such gaps, or one of more
+    """The first ball that does not fit where it starts; ``corners`` (m, 3, 3) [m] at the start."""
+    radius, approach = 0.5 * balls.diameters, _largest_approach(physics)
+    # two such gaps, or one of more than that
+    near = clearance(corners, balls.positions, balls.radius) < radius - 0.5 * TIGHT
     for vibration in physics.vibrations:
-        vibrating = mesh.tags == vibration.tag
+        vibrating, reach = mesh.tags == vibration.tag, balls.radius + approach
         both = [corners[own] for own in (vibrating, ~vibrating) if own.any()]
-        near = [
-            clearance(some, balls.positions, balls.radius + swing) < radius + swing for some in both
-        ]
-        asked |= np.all(near, axis=0)
-    for ball in np.flatnonzero(asked):
+        beside = [clearance(some, balls.positions, reach) < radius + approach for some in both]
+        near |= np.all(beside, axis=0)
+    for ball in np.flatnonzero(near):
         found = _tightest(mesh, physics, balls.positions[ball], float(radius[ball]), corners)
         if found is not None:
             return NarrowGap(int(ball), *found)
@@ -54,7 +58,7 @@ def find_narrow_gap(
 
 
 def surface_name(mesh: TriangleMesh, physics: Physics, triangle: int) -> str:
-    """E.g. "triangle 7", or "the turning part (triangle 12)"."""
+    """Name of a surface for messages, e.g. "the turning part (triangle 12)"."""
     turn, tag = physics.part_rotation, int(mesh.tags[triangle])
     if tag in [one.tag for one in physics.vibrations]:
         return f"{vibrating_name(physics, tag)} (triangle {triangle})"
@@ -64,52 +68,49 @@ def surface_name(mesh: TriangleMesh, physics: Physics, triangle: int) -> str:
 
 
 def vibrating_name(physics: Physics, tag: int) -> str:
-    """E.g. "the vibrating surface of tag 3"; without its tag where there is but one."""
+    """Name of a vibrating surface for messages, with its tag if there are several."""
     return "the vibrating surface" + (f" of tag {tag}" if len(physics.vibrations) > 1 else "")
 
 
-def _swing(physics: Physics) -> float:
-    """How much nearer [m] two surfaces may come to each other than they are at the start, or more."""
+def _largest_approach(physics: Physics) -> float:
+    """Bound on how much nearer [m] two surfaces come to each other than at the start."""
     return sum(2.0 * one.amplitude for one in physics.vibrations)
 
 
 def _tightest(
     mesh: TriangleMesh, physics: Physics, here: np.ndarray, radius: float, corners: np.ndarray
 ) -> tuple[int, int, float, bool] | None:
-    turn, reach = physics.part_rotation, radius + _swing(physics)
+    """The two triangles that leave a ball the least room, how much it lacks [m], and when."""
+    turn, reach = physics.part_rotation, radius + _largest_approach(physics)
     box = np.abs(here - np.clip(here, corners.min(axis=1), corners.max(axis=1))).max(axis=1)
     near = np.flatnonzero(box <= reach)
     away = here - _nearest_points(corners[near], here)
     distance = np.linalg.norm(away, axis=1)
     touched = (distance <= reach) & (distance > 0.0)
-    near, gap, away = (
-        near[touched],
-        distance[touched] - radius,
-        away[touched] / distance[touched, None],
-    )
-    least, moves = gap.copy(), np.full(len(near), -1)  # which of the vibrations has it, if any
+    near, gap = near[touched], distance[touched] - radius
+    away = away[touched] / distance[touched, None]
+    least, moves = gap.copy(), np.full(len(near), -1)  # number of the vibration, if any
     turns = np.zeros(len(near), np.bool_) if turn is None else mesh.tags[near] == turn.tag
     for k, vibration in enumerate(physics.vibrations):
         vibrating = mesh.tags[near] == vibration.tag
         towards = away[vibrating] @ vibration.peak
         least[vibrating] -= np.abs(towards) - np.sin(vibration.phase) * towards
         moves[vibrating] = k
-    swings = (moves[:, None] != moves) & ~turns[:, None] & ~turns
-    room = np.where(swings, least[:, None] + least, gap[:, None] + gap)
+    closer = (moves[:, None] != moves) & ~turns[:, None] & ~turns
+    room = np.where(closer, least[:, None] + least, gap[:, None] + gap)
     room[away @ away.T > OPPOSED] = np.inf
     if room.min(initial=np.inf) >= -TIGHT:
         return None
     one, two = np.unravel_index(room.argmin(), room.shape)
-    return int(near[one]), int(near[two]), float(-room[one, two]), bool(swings[one, two])
+    return int(near[one]), int(near[two]), float(-room[one, two]), bool(closer[one, two])
 
 
 def _nearest_points(corners: np.ndarray, point: np.ndarray) -> np.ndarray:
-    """The point (m, 3) of each triangle (m, 3, 3) nearest to a point (3,): on its face, or else on its border."""
+    """The point of each triangle (m, 3, 3) closest to a point (3,): on its face or its border."""
     a, edge = corners, np.roll(corners, -1, axis=1) - corners
     tiny = np.finfo(float).tiny  # a triangle may have no area
-    share = np.einsum("mki,mki->mk", point - a, edge) / np.maximum(
-        np.einsum("mki,mki->mk", edge, edge), tiny
-    )
+    square = np.maximum(np.einsum("mki,mki->mk", edge, edge), tiny)
+    share = np.einsum("mki,mki->mk", point - a, edge) / square
     border = a + np.clip(share, 0.0, 1.0)[..., None] * edge
     nearest = np.linalg.norm(point - border, axis=2).argmin(axis=1)
     found = border[np.arange(len(corners)), nearest]
@@ -117,8 +118,7 @@ def _nearest_points(corners: np.ndarray, point: np.ndarray) -> np.ndarray:
     square = np.einsum("mi,mi->m", normal, normal)
     height = np.einsum("mi,mi->m", point - a[:, 0], normal) / np.maximum(square, tiny)
     foot = point - height[:, None] * normal
-    over = (square > 0.0) & (
-        np.einsum("mki,mi->mk", np.cross(edge, foot[:, None] - a), normal) >= 0.0
-    ).all(axis=1)
+    inside = np.einsum("mki,mi->mk", np.cross(edge, foot[:, None] - a), normal) >= 0.0
+    over = (square > 0.0) & inside.all(axis=1)
     found[over] = foot[over]
     return found

@@ -1,4 +1,4 @@
-"""Everything a simulation needs, cross-checked once."""
+"""Everything a simulation needs, checked once."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -16,20 +16,21 @@ from sim_core.effects.restitution import Restitution, checked_restitution
 from sim_core.effects.vibration import checked_waves
 from sim_core.errors import SceneError
 from sim_core.geometry.analytic import AnalyticCavity
-from sim_core.geometry.mesh import TriangleMesh, normals_towards_shot
+from sim_core.geometry.mesh import TriangleMesh, connected_components, normals_towards_shot
 from sim_core.geometry.turning_part import require_free_axis
 from sim_core.scene.analytic_scene import require_clear, require_supported
 from sim_core.scene.invariants import clearance, contained, enclosed, narrowest_gap, turned_corners
 from sim_core.scene.narrow_gaps import find_narrow_gap, surface_name, vibrating_name
 from sim_core.scene.physics import BallCollisions, Physics
 
-LONGEST = 1e6  # s: eleven days of peening
-STEP = (
-    1e-4  # of a triangle's size: how far before and behind it is asked which side the cavity is on
-)
-TOUCH = 1e-9  # m: overlap at the start that is taken for rounding of the input; ten thousand times less than a dent
+MAX_DURATION = 1e6  # s: eleven days of peening
+STEP = 1e-4  # of a triangle's size: distance to the points on both its sides that are tested
+# m: overlap at the start that is taken for rounding of the input; ten thousand times less than a
+# dent
+TOUCH = 1e-9
 
-KINDS = {  # of the effects that are checked by name; gravity may be any three numbers
+# Effects whose type is checked; gravity may be any three numbers.
+EFFECT_TYPES = {
     "restitution": Restitution,
     "rest": Rest,
     "part_rotation": PartRotation,
@@ -42,13 +43,22 @@ KINDS = {  # of the effects that are checked by name; gravity may be any three n
 
 @dataclass(frozen=True)
 class Scene:
-    """A closed mesh or an analytical cavity, balls inside it, the effects, and how long.
+    """A cavity, balls inside it, the effects, and the duration.
 
-    ``duration`` [s] is simulated after ``warmup`` [s], during which nothing is recorded; ``record``: tags whose
-    impacts are logged (all if None). Raises SceneError, naming the ball, triangle or field: a ball outside the
-    mesh, overlapping a surface or another ball, or in a gap narrower than itself; a body in the mesh that is inside
-    out; a tag without restitution; a vibrating or turning tag that the mesh lacks; a part that cannot turn; numbers
-    out of range; an analytical cavity with contact mode, a turning part, or, in a cylinder, gravity across it.
+    Args:
+        mesh: a closed mesh or an analytical cavity.
+        balls: the shot at the start.
+        physics: the effects.
+        duration: of the recorded simulation [s].
+        warmup: simulated before, without recording [s].
+        record: tags of the surfaces whose impacts are logged; all if None.
+
+    Raises:
+        SceneError: naming the ball, triangle or field, for a ball outside the mesh, overlapping a
+            surface or another ball, or in a gap narrower than itself; a body in the mesh that is
+            inside out; a tag without restitution; a vibrating or turning tag that the mesh lacks; a
+            part that cannot turn; numbers out of range; an analytical cavity with contact mode, a
+            turning part, or, in a cylinder, gravity across it.
     """
 
     mesh: TriangleMesh | AnalyticCavity
@@ -60,56 +70,56 @@ class Scene:
 
     def __post_init__(self) -> None:
         for name, value in (("duration", self.duration), ("warmup", self.warmup)):
-            if not isinstance(value, (int, float, np.number)) or not 0.0 <= value <= LONGEST:
-                raise SceneError(f"scene.{name} is {value!r}: give seconds from 0 to {LONGEST:g}")
+            if not isinstance(value, (int, float, np.number)) or not 0.0 <= value <= MAX_DURATION:
+                raise SceneError(
+                    f"scene.{name} is {value!r}: give seconds from 0 to {MAX_DURATION:g}"
+                )
         if self.duration == 0.0:
             raise SceneError("scene.duration is 0 s: it must be positive")
         if self.record is not None and not all(tag in self.mesh.tags for tag in self.record):
-            raise SceneError(
-                f"scene.record is {self.record}, but the mesh has tags {np.unique(self.mesh.tags).tolist()}"
-            )
+            tags = np.unique(self.mesh.tags).tolist()
+            raise SceneError(f"scene.record is {self.record}, but the mesh has tags {tags}")
         self._require_physics()
         self._require_room()
 
     def _require_physics(self) -> None:
         for name, effect in self.physics._asdict().items():
-            kind = KINDS.get(name)
+            kind = EFFECT_TYPES.get(name)
             if kind is not None and effect is not None and not isinstance(effect, kind):
                 raise SceneError(f"physics.{name} is {effect!r}: give a {kind.__name__}, or None")
         checked_waves(self.physics.vibration)
-        vibrations, restitution, turn = (
-            self.physics.vibrations,
-            self.physics.restitution,
-            self.physics.part_rotation,
-        )
+        vibrations, turn = self.physics.vibrations, self.physics.part_rotation
         checked_gravity(self.physics.gravity)
         checked_rest(self.physics.rest)
         for name in ("rest", "part_rotation", "friction"):
             if getattr(self.physics, name) is not None and not self.balls.alike:
                 raise SceneError(
-                    f"physics.{name} is given, and balls of several sizes or densities: not supported together yet; "
-                    f"give one diameter and density, or leave {name} out"
+                    f"physics.{name} is given, and balls of several sizes or densities: not "
+                    f"supported together yet; give one diameter and density, or leave {name} out"
                 )
-        if restitution is not None:
-            checked_restitution(restitution, int(self.mesh.tags.max()) + 1)
+        tag_count = int(self.mesh.tags.max()) + 1
+        if self.physics.restitution is not None:
+            checked_restitution(self.physics.restitution, tag_count)
         if self.physics.friction is not None:
-            checked_friction(self.physics.friction, int(self.mesh.tags.max()) + 1)
+            checked_friction(self.physics.friction, tag_count)
         elif self.balls.spins is not None:
             raise SceneError(
-                "balls.spins are given without physics.friction, where nothing rubs: give a Friction, or no spins"
+                "balls.spins are given without physics.friction, where spins have no effect: "
+                "give a Friction, or no spins"
             )
         checked_drag(self.physics.drag)
         checked_random_phase(self.physics.random_phase, len(vibrations))
-        rotation_axis = checked_axis(turn)
+        axis = checked_axis(turn)
         tags = np.unique(self.mesh.tags).tolist()
-        if turn is not None and rotation_axis is not None and isinstance(self.mesh, TriangleMesh):
+        if turn is not None and axis is not None and isinstance(self.mesh, TriangleMesh):
             if turn.tag not in tags:
                 raise SceneError(f"part_rotation.tag is {turn.tag}, but the mesh has tags {tags}")
             if turn.tag in [one.tag for one in vibrations]:
                 raise SceneError(
-                    f"part_rotation.tag and vibration.tag are both {turn.tag}: one surface cannot do both"
+                    f"part_rotation.tag and vibration.tag are both {turn.tag}: "
+                    "one surface cannot do both"
                 )
-            require_free_axis(self.mesh, rotation_axis, self.balls.radius)
+            require_free_axis(self.mesh, axis, self.balls.radius)
         for one in vibrations:
             if one.tag not in tags:
                 raise SceneError(f"vibration.tag is {one.tag}, but the mesh has tags {tags}")
@@ -126,7 +136,8 @@ class Scene:
         gap_between, one, two = narrowest_gap(self.balls)
         if gap_between < -TOUCH:
             raise SceneError(
-                f"balls {one} and {two} overlap by {-gap_between:.3g} m at the start; move one of them"
+                f"balls {one} and {two} overlap by {-gap_between:.3g} m at the start; "
+                "move one of them"
             )
 
     def _require_room_in_mesh(self) -> None:
@@ -135,8 +146,8 @@ class Scene:
         wrong = _inside_out(self.mesh)
         if wrong >= 0:
             raise SceneError(
-                f"mesh triangle {wrong} belongs to a body that is inside out: the cavity is behind it; reverse every "
-                "triangle of that body so that normals point away from the shot"
+                f"mesh triangle {wrong} belongs to a body that is inside out: the cavity is behind "
+                "it; reverse every triangle of that body so that normals point away from the shot"
             )
         turn = self.physics.part_rotation
         corners = None if turn is None else turned_corners(self.mesh, turn)
@@ -151,88 +162,76 @@ class Scene:
             raise SceneError(
                 f"ball {outside[0]} at {where} m is outside the mesh ({len(outside)} in all)"
             )
-        still = (
-            self.mesh.corners if corners is None else corners
-        )  # where its phase has a turning part
-        # a vibrating face is not where the mesh has it; it is judged at its phase, below
+        # a turning part is where its phase has it; vibrating faces are checked at theirs below
+        still = self.mesh.corners if corners is None else corners
         still = still[~np.isin(self.mesh.tags, [one.tag for one in self.physics.vibrations])]
         gap = clearance(still, balls.positions, balls.radius) - 0.5 * balls.diameters
         worst = int(gap.argmin())
         if gap[worst] < -TOUCH:
             raise SceneError(
-                f"ball {worst} at {balls.positions[worst].tolist()} m overlaps a surface by {-gap[worst]:.3g} m; "
-                "move it or make it smaller"
+                f"ball {worst} at {balls.positions[worst].tolist()} m overlaps a surface by "
+                f"{-gap[worst]:.3g} m; move it or make it smaller"
             )
         corners = self.mesh.corners.copy() if corners is None else corners
         self._require_room_above_sonotrode(corners)
         self._require_room_between(corners)
 
     def _require_room_above_sonotrode(self, corners: np.ndarray) -> None:
-        """A vibrating surface is not where the mesh has it: its ``corners`` are displaced by its phase here."""
+        """Check the balls against vibrating surfaces, and displace ``corners`` by their phases."""
+        balls = self.balls
         for vibration in self.physics.vibrations:
             vibrating = self.mesh.tags == vibration.tag
             corners[vibrating] += np.sin(vibration.phase) * vibration.peak
-            gap = (
-                clearance(corners[vibrating], self.balls.positions, self.balls.radius)
-                - 0.5 * self.balls.diameters
-            )
+            gap = clearance(corners[vibrating], balls.positions, balls.radius)
+            gap -= 0.5 * balls.diameters
             worst = int(gap.argmin())
             if gap[worst] < -TOUCH:
                 raise SceneError(
-                    f"ball {worst} at {self.balls.positions[worst].tolist()} m starts {-gap[worst]:.3g} m inside "
-                    f"{vibrating_name(self.physics, vibration.tag)}, which is displaced by its phase at the start; "
-                    "keep one amplitude clear of it"
+                    f"ball {worst} at {balls.positions[worst].tolist()} m starts "
+                    f"{-gap[worst]:.3g} m inside {vibrating_name(self.physics, vibration.tag)}, "
+                    "which is displaced by its phase at the start; keep one amplitude clear of it"
                 )
 
     def _require_room_between(self, corners: np.ndarray) -> None:
         assert isinstance(self.mesh, TriangleMesh)
-        pinch = find_narrow_gap(self.mesh, self.physics, self.balls, corners)
-        if pinch is None:
+        gap = find_narrow_gap(self.mesh, self.physics, self.balls, corners)
+        if gap is None:
             return
-        one, two = (
-            surface_name(self.mesh, self.physics, triangle) for triangle in (pinch.one, pinch.two)
-        )
-        when = " at the end of its swing" if pinch.swings else ""
+        one, two = (surface_name(self.mesh, self.physics, side) for side in (gap.one, gap.two))
+        when = " at the end of its swing" if gap.vibrates else ""
         raise SceneError(
-            f"ball {pinch.ball} at {self.balls.positions[pinch.ball].tolist()} m does not fit between {one} and {two}: "
-            f"the gap is narrower than the ball by {pinch.narrower:.3g} m{when}; widen it, start the ball elsewhere, "
-            "or make it smaller"
+            f"ball {gap.ball} at {self.balls.positions[gap.ball].tolist()} m does not fit between "
+            f"{one} and {two}: the gap is narrower than the ball by {gap.narrower:.3g} m{when}; "
+            "widen it, start the ball elsewhere, or make it smaller"
         )
 
 
 def require_free_rotation(mesh: TriangleMesh, turn: PartRotation, diameter: float) -> None:
-    """Raises SceneError if the part cannot turn in its chamber, with balls of this diameter [m], or its numbers are
-    out of range: what a Scene asks, without the balls.
+    """Raise SceneError if a part cannot turn in its chamber, with balls of this diameter [m].
+
+    This is the part of a Scene's check that needs no balls; it covers numbers out of range too.
     """
-    rotation_axis = checked_axis(turn)
-    assert rotation_axis is not None
-    require_free_axis(mesh, rotation_axis, 0.5 * diameter)
+    axis = checked_axis(turn)
+    assert axis is not None
+    require_free_axis(mesh, axis, 0.5 * diameter)
 
 
 @lru_cache(maxsize=32)  # replicas of one chamber share the answer
 def _inside_out(mesh: TriangleMesh) -> int:
     """A triangle whose own closed shell is wound the wrong way round; -1 if there is none.
 
-    The mesh as a whole encloses a positive volume whichever way a small body in it is wound. A shell is judged by its
-    largest triangle, and called wrong only if the cavity is behind it and not before it.
+    The mesh as a whole encloses a positive volume whichever way a small body in it is wound. A
+    shell is tested at its largest triangle, and is wrong only if the cavity is behind that triangle
+    and not in front of it.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    ends = mesh.triangles[:, [0, 1]].T, mesh.triangles[:, [1, 2]].T
-    rows, columns = np.concatenate(ends, axis=1)
-    links = coo_array(
-        (np.ones(len(rows), dtype=np.bool_), (rows, columns)), shape=(len(mesh.vertices),) * 2
-    )
-    shell = connected_components(links, directed=False)[1][mesh.triangles[:, 0]]
+    edges = np.concatenate([mesh.triangles[:, :2], mesh.triangles[:, 1:]])
+    shell = connected_components(edges, len(mesh.vertices))[mesh.triangles[:, 0]]
     normals, doubled = normals_towards_shot(mesh.corners)
     order = np.lexsort((-doubled, shell))  # the largest of each shell first
     largest = order[np.unique(shell[order], return_index=True)[1]]
     if len(largest) == 1:
         return -1
-    middle, step = (
-        mesh.corners[largest].mean(axis=1),
-        STEP * np.sqrt(doubled[largest])[:, None] * normals[largest],
-    )
+    middle = mesh.corners[largest].mean(axis=1)
+    step = STEP * np.sqrt(doubled[largest])[:, None] * normals[largest]
     wrong = largest[~contained(mesh, middle + step) & contained(mesh, middle - step)]
     return int(wrong[0]) if len(wrong) else -1
