@@ -12,7 +12,6 @@ from sim_core import (
     Balls,
     Gravity,
     Physics,
-    Restitution,
     Scene,
     SceneError,
     SimulationError,
@@ -20,6 +19,7 @@ from sim_core import (
     simulate,
 )
 from sim_core.scene.invariants import clearance, contained, narrowest_gap, turned_corners
+from tests.helpers.scenes.cavities import uniform_restitution
 from tests.helpers.scenes.fuzzed_chambers import Chamber
 from tests.sim_core.loop.test_containment import REACH, ROUNDING, clearance_at, later
 
@@ -29,7 +29,7 @@ DEEPEST = 1e-12  # m: a contact is found to 1e-13, and a ball that slides on edg
 CONSTANT = 1e6  # m/s: a yield speed v0 that no ball reaches, so that e = C0 at any speed
 # Effects that change nothing, where a case wants none: fewer combinations of effects have to be compiled.
 WEIGHTLESS = Gravity(0.0, 0.0, 0.0)
-LOSSLESS = Restitution(((1.0, CONSTANT),) * 3, (1.0, CONSTANT))
+LOSSLESS = uniform_restitution(1.0, CONSTANT)
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ from tests.hard_cases.outcome import (
     verdict,
     with_rest,
 )
-from tests.helpers.scenes.cavities import FLOOR, box, box_around, cylinder
+from tests.helpers.scenes.cavities import FLOOR, box, box_around, cylinder, uniform_restitution
 from tests.helpers.scenes.fuzzed_chambers import Chamber
 
 SIDE = 0.03  # m
@@ -222,7 +222,7 @@ def shot_on_a_sonotrode_swinging_a_millimetre() -> Outcome:
 
 
 def _plastic(e: float) -> Physics:
-    return Physics(WEIGHTLESS, Restitution(((e, 1e3),) * 3, (e, 1e3), 0.0))
+    return Physics(WEIGHTLESS, uniform_restitution(e, 1e3, 0.0))
 
 
 def perfectly_plastic_walls() -> Outcome:
@@ -277,7 +277,7 @@ def restitution_of_one() -> Outcome:
     """e = 1 given as a number is no loss."""
     rng = np.random.default_rng(13)
     balls = Balls(pack_balls(ROOM, 30, 3e-3, rng), rng.normal(0.0, 3.0, (30, 3)), 3e-3)
-    physics = Physics(Gravity(), Restitution(((1.0, 1e3),) * 3, (1.0, 1e3)))
+    physics = Physics(Gravity(), uniform_restitution(1.0, 1e3))
     seen = play(Chamber(ROOM, balls, physics), 1.0, 4, record=())
     drift = abs(energy(seen.end, Gravity()) / energy(balls, Gravity()) - 1.0)
     return verdict(seen, "keeps its energy", near("energy", drift, 0.0, DRIFT))
@@ -286,7 +286,7 @@ def restitution_of_one() -> Outcome:
 def plastic_ball_under_gravity(e: float) -> Outcome:
     """It drops, may bounce a few times, and lies: at r over the floor, at rest, without further events."""
     start = one_ball((0.011, 0.013, RADIUS + DROP), (0.0, 0.0, 0.0))
-    physics = Physics(Gravity(), Restitution(((e, 1e3),) * 3, (e, 1e3)))
+    physics = Physics(Gravity(), uniform_restitution(e, 1e3))
     seen = play(Chamber(ROOM, start, with_rest(physics)), 5.0, 5)
     bounces = 2 if e < 1e-6 else 2 + math.ceil(math.log(1e-3) / math.log(e))
     return verdict(

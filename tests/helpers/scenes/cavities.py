@@ -1,11 +1,13 @@
-"""Closed triangle meshes the tests simulate in; tags: 0 ceiling (the part's place), 1 floor (the sonotrode's), 2
-sides.
+"""Cavities that tests simulate in, and what goes into them.
+
+Tags: 0 ceiling (the part's place), 1 floor (the sonotrode's), 2 sides.
 """
 
 import numpy as np
 import trimesh
 
-from sim_core import Balls, TriangleMesh
+from sim_core import Balls, Restitution, TriangleMesh
+from sim_core.effects.restitution import ELASTIC_BELOW
 
 CEILING, FLOOR, SIDES = 0, 1, 2
 
@@ -43,7 +45,7 @@ def cylinder(
 
 
 def box_around(obstacle: trimesh.Trimesh, half: float) -> TriangleMesh:
-    """A cube of half side ``half`` [m] about the origin with a solid body in it: the cavity is what is left."""
+    """A cube of half side ``half`` [m] about the origin with a solid body in it."""
     room = trimesh.creation.box((2 * half, 2 * half, 2 * half))
     vertices = np.concatenate([room.vertices, obstacle.vertices])
     triangles = np.concatenate([room.faces, obstacle.faces[:, ::-1] + len(room.vertices)])
@@ -54,3 +56,8 @@ def box_around(obstacle: trimesh.Trimesh, half: float) -> TriangleMesh:
 def balls_at(positions: np.ndarray, diameter: float = 3e-3) -> Balls:
     """Balls at rest."""
     return Balls(positions, np.zeros_like(positions, dtype=float), diameter)
+
+
+def uniform_restitution(c0: float, v0: float, elastic_below: float = ELASTIC_BELOW) -> Restitution:
+    """The same restitution (C0, v0) of all three surfaces and of ball on ball."""
+    return Restitution(((c0, v0),) * 3, (c0, v0), elastic_below)

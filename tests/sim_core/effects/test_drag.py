@@ -18,7 +18,6 @@ from sim_core import (
     Physics,
     RandomPhase,
     Rest,
-    Restitution,
     Scene,
     SceneError,
     TriangleMesh,
@@ -26,7 +25,7 @@ from sim_core import (
     simulate,
 )
 from sim_core.scene.invariants import closest_pair, contained, energy
-from tests.helpers.scenes.cavities import FLOOR, box, cylinder
+from tests.helpers.scenes.cavities import FLOOR, box, cylinder, uniform_restitution
 from tests.sim_core.physics.test_conservation import gas
 
 DIAMETER, DENSITY = 3e-3, 7800.0
@@ -184,7 +183,7 @@ def test_air_so_thin_that_it_does_nothing_changes_nothing() -> None:
 def test_drag_goes_with_contact_mode_and_drawn_phases() -> None:
     """Heavy air over a lossy floor: shot comes to rest on the still floor, and goes on over the shaking one."""
     room = box((0.03, 0.03, 0.03))
-    law = Restitution(((0.6, 1.0),) * 3, (0.6, 1.0))
+    law = uniform_restitution(0.6, 1.0)
     physics = Physics(Gravity(), law, rest=Rest(), drag=Drag(density=50.0))
     start = gas(room, 20, 1.0, 1)
     assert len(simulate(Scene(room, start, physics, 2.0)).resting) == 20
@@ -197,7 +196,7 @@ def test_drag_goes_with_contact_mode_and_drawn_phases() -> None:
 def test_no_ball_jams_on_its_way_up_with_the_sonotrode() -> None:
     """It bounces there at ever the same 10 mm/s; kicks that took from each bounce would end in infinitely many."""
     room = cylinder(0.035, 0.04)
-    law = Restitution(((0.91, 1.0),) * 3, (0.91, 1.0))
+    law = uniform_restitution(0.91, 1.0)
     physics = Physics(Gravity(), law, Vibration(FLOOR, 25e-6, 20e3, 0.3), drag=Drag())
     start = gas(room, 200, 2.0, 1)
     up = Balls(start.positions + np.array([0.0, 0.0, 5e-5]), start.velocities, DIAMETER)

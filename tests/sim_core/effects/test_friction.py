@@ -9,7 +9,6 @@ from sim_core import (
     Gravity,
     PartRotation,
     Physics,
-    Restitution,
     Scene,
     SceneError,
     Vibration,
@@ -18,7 +17,7 @@ from sim_core import (
 )
 from sim_core.scene.invariants import energy, momentum
 from tests.hard_cases.outcome import WEIGHTLESS
-from tests.helpers.scenes.cavities import FLOOR, box
+from tests.helpers.scenes.cavities import FLOOR, box, uniform_restitution
 from tests.helpers.scenes.turning_parts import BODIES, PART, box_around
 
 DIAMETER = 3e-3
@@ -32,7 +31,7 @@ def physics(mu: float, beta0: float, e: float = 1.0) -> Physics:
     """Without weight; the same law everywhere."""
     return Physics(
         WEIGHTLESS,
-        Restitution(((e, 1e3),) * 3, (e, 1e3), 0.0),
+        uniform_restitution(e, 1e3, 0.0),
         friction=Friction(((mu, beta0),) * 3, (mu, beta0)),
     )
 

@@ -1,195 +1,247 @@
-"""Several sonotrodes at once, each with its own axis, amplitude, frequency and phase, against a bead between two
-vibrating plates whose every flight is searched for its end in small steps.
-"""
+"""Several sonotrodes: what one alone, or one that keeps still, must not change; phases over many windows; refusals."""
 
 import math
+from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
 
-from sim_core import Balls, Gravity, ImpactLog, Physics, Scene, TriangleMesh, Vibration, simulate
-from tests.helpers.scenes.cavities import CEILING, FLOOR, SIDES, box
+from sim_core import (
+    Balls,
+    Gravity,
+    PartRotation,
+    Physics,
+    RandomPhase,
+    Rest,
+    Restitution,
+    Scene,
+    SceneError,
+    SimulationResult,
+    TriangleMesh,
+    Vibration,
+    pack_balls,
+    simulate,
+)
+from sim_core.effects.contact_mode import ASLEEP, MODE
+from sim_core.effects.sonotrodes import PARTS, new_waves, shift_phases, whole_period_window
+from sim_core.effects.vibration import checked_waves
+from sim_core.loop import compile_ahead
+from sim_core.loop.simulate import _Run
+from sim_core.motion import WINDOW
+from tests.helpers.scenes.cavities import CEILING, FLOOR, SIDES, balls_at, box
 from tests.sim_core.geometry.test_sonotrode_border import trough
 
-R = 1.5e-3  # m
-TOP = 0.02  # m
-PARTED = 3  # tag
-UP, DOWN, EAST = (0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)
-STEPS = 600  # a period of the faster plate
-STRONG = (Vibration(FLOOR, 25e-6, 20e3, 0.4), Vibration(CEILING, 40e-6, 19.7e3, 2.0, DOWN))
-# so weak that an error grows by a few per cent a hit
-WEAK = (Vibration(FLOOR, 2e-6, 210.0, 0.4), Vibration(CEILING, 1e-6, 333.3, 2.0, DOWN))
+LAW = (0.9, 1.0)
+LAWS = Restitution((LAW,) * 4, LAW)
+LOW = Vibration(FLOOR, 25e-6, 20e3, 0.3)
+HIGH = Vibration(CEILING, 25e-6, 19.7e3, 1.0, (0.0, 0.0, -1.0))
+ACROSS = Vibration(SIDES, 10e-6, 21.3e3, 2.0, (1.0, 0.0, 0.0))
+ROOM = box((0.03, 0.03, 0.02))
+MIDDLE = np.array([[0.015, 0.015, 0.01]])
 
 
-def angle(plate: Vibration, time: np.ndarray) -> np.ndarray:
-    """Of the wave, less whole turns before digits are lost: frequency x time in 64 bits of mantissa."""
-    turns = np.asarray(time, dtype=np.longdouble) * np.longdouble(plate.frequency)
-    return np.asarray(math.tau * (turns - np.floor(turns)).astype(float) + plate.phase)
+def played(vibration: object, duration: float = 0.1) -> SimulationResult:
+    rng = np.random.default_rng(3)
+    places = pack_balls(ROOM, 20, 3e-3, rng, 1e-4)
+    shot = Balls(places, rng.normal(0.0, 1.0, places.shape), 3e-3)
+    return simulate(Scene(ROOM, shot, Physics(Gravity(), LAWS, vibration), duration))  # type: ignore[arg-type]
 
 
-def height(plate: Vibration, time: np.ndarray) -> np.ndarray:
-    """Of the plate above its rest [m]: floor and ceiling are upright."""
-    return plate.axis[2] * plate.amplitude * np.sin(angle(plate, time))
+def test_a_tuple_of_one_is_that_one_to_the_last_bit() -> None:
+    one, other = played(LOW), played((LOW,))
+    assert one.collisions == other.collisions
+    for name in ("time", "ball", "triangle", "position", "velocity"):
+        np.testing.assert_array_equal(getattr(one.impacts, name), getattr(other.impacts, name))
+    np.testing.assert_array_equal(one.balls.velocities, other.balls.velocities)
 
 
-def speed(plate: Vibration, time: np.ndarray) -> np.ndarray:
-    """Upward [m/s]."""
-    return plate.axis[2] * plate.peak_speed * np.cos(angle(plate, time))
+@pytest.mark.parametrize("still", [HIGH, HIGH._replace(frequency=19.7)])
+def test_one_beside_it_that_keeps_still_changes_nothing(still: Vibration) -> None:
+    """But the rounding of its clock, which a chamber makes ten times larger every hit or two: so the first hits."""
+    one, other = played(LOW), played((still._replace(amplitude=0.0), LOW))
+    np.testing.assert_array_equal(one.impacts.triangle[:60], other.impacts.triangle[:60])
+    np.testing.assert_allclose(one.impacts.time[:60], other.impacts.time[:60], rtol=0.0, atol=1e-9)
 
 
-def next_hit(
-    plates: tuple[Vibration, ...], start: float, z: float, v: float, g: float, last: int
-) -> tuple[float, int]:
-    """How long [s] until the bead, at z with speed v, meets which plate: 0 floor, 1 ceiling; it leaves the ``last``."""
-
-    def gap(s: np.ndarray, k: int) -> np.ndarray:
-        at = z + v * s - 0.5 * g * s * s
-        plate = height(plates[k], start + s)
-        return at - R - plate if k == 0 else TOP + plate - R - at
-
-    step = 1.0 / (STEPS * max(plate.frequency for plate in plates))
-    fastest = (
-        math.sqrt(v * v + 2.0 * g * TOP) + g * 100.0 * step
-    )  # of the bead, while it goes from plate to plate
-    begin = 0.0
-    while True:
-        at = z + v * begin - 0.5 * g * begin * begin
-        clear = min(
-            at - R - plates[0].amplitude, TOP - R - plates[1].amplitude - at
-        )  # of both swings
-        if clear > fastest * step:
-            begin += clear / fastest
-            continue
-        s = begin + step * np.arange(20 * STEPS + 1)
-        ends = []
-        for k in (0, 1):
-            gaps = gap(s, k)
-            skip = 1 if begin == 0.0 and k == last else 0  # where it leaves the plate it touches it
-            below = np.flatnonzero(gaps[skip:] < 0.0)
-            if len(below):
-                i = below[0] + skip
-                ends.append((brentq(gap, s[i - 1], s[i], (k,), xtol=1e-18, rtol=1e-15), k))
-        if ends:
-            return min(ends)
-        begin = float(s[-1])
+def test_all_of_them_are_counted_as_sonotrodes() -> None:
+    result = played((LOW, HIGH, ACROSS))
+    assert result.collisions.walls == 0
+    assert result.collisions.sonotrode == len(result.impacts)
 
 
-def box_log(plates: tuple[Vibration, ...], duration: float, g: float, v: float = 1.0) -> ImpactLog:
-    room = box((0.03, 0.03, TOP))
-    ball = Balls(np.array([[0.011, 0.013, 0.008]]), np.array([[0.0, 0.0, v]]), 2 * R)
-    return simulate(Scene(room, ball, Physics(Gravity(z=-g), vibration=plates), duration)).impacts
+FREQUENCIES = (20e3, 19.7e3, math.pi * 1e4, 40e3, 123.456, 20e3)
 
 
-def plates_hit(log: ImpactLog, room: TriangleMesh) -> np.ndarray:
-    tags = room.tags[log.triangle]
-    assert np.isin(tags, [FLOOR, CEILING]).all()
-    return np.where(tags == FLOOR, 0, 1)
+@pytest.mark.parametrize("windows", [1, 1_000_000])
+def test_phases_do_not_drift(windows: int) -> None:
+    """Against fractions: the window is a whole number of periods of the fastest, of which there are 800 in it."""
+    vibrations = tuple(Vibration(k, 25e-6, f, 0.1 * k) for k, f in enumerate(FREQUENCIES))
+    window = whole_period_window(vibrations, WINDOW)
+    assert window * 40e3 == 800
+    waves = new_waves(vibrations, checked_waves(vibrations), window, np.array([0, 3, 2]))
+    assert waves is not None
+    assert waves.faces.tolist() == [0, 3, 2]
+    for _ in range(windows):
+        shift_phases(waves)
+    for k, frequency in enumerate(FREQUENCIES):
+        turns = Fraction(frequency) / Fraction(40e3) * 800 * windows % 1
+        off = (waves.numbers[k, 2] - 0.1 * k) / math.tau - float(turns)
+        assert abs(off - round(off)) < 1e-14 + windows / PARTS
+    assert (
+        waves.numbers[[3, 0, 5], 2] == [0.1 * 3, 0.0, 0.1 * 5]
+    ).all()  # whole periods to the last bit
 
 
-@pytest.mark.parametrize("g", [0.0, 9.80665])
-def test_a_bead_between_two_gentle_plates_follows_its_reference_for_hundreds_of_hits(
-    g: float,
+def test_one_vibration_needs_no_table() -> None:
+    assert new_waves((LOW,), checked_waves(LOW), 0.02, np.zeros(3)) is None
+    assert _Run(Scene(ROOM, balls_at(MIDDLE), Physics(vibration=(LOW,)), 1.0)).waves is None
+
+
+@pytest.mark.parametrize("wall", [FLOOR, 3])
+@pytest.mark.parametrize("phase", np.linspace(0.0, 2.0 * np.pi, 4, endpoint=False))
+def test_a_vibrating_wall_beyond_does_not_hide_the_face_a_ball_comes_down_on(
+    phase: float, wall: int
 ) -> None:
-    log = box_log(WEAK, 4.0, g)
-    which = plates_hit(log, box((0.03, 0.03, TOP)))
-    now, z, v, last = 0.0, 0.008, 1.0, -1
-    assert len(log) > 150
-    for n in range(len(log)):
-        flight, last = next_hit(WEAK, now, z, v, g, last)
-        now, z, v = now + flight, z + v * flight - 0.5 * g * flight * flight, v - g * flight
-        assert last == which[n]
-        assert log.time[n] == pytest.approx(now, abs=1e-9)
-        v = 2.0 * float(speed(WEAK[last], now)) - v
+    """As in test_sonotrode_border, but behind the face there is a wall that vibrates, with the floor or on its own."""
+    room = trough([(0.021, 1e-4), (0.022, -3e-3), (0.04, -3e-3)], left=0.012)
+    behind = (room.corners[:, :, 0] == 0.012).all(axis=1)
+    room = TriangleMesh(room.vertices, room.triangles, np.where(behind, wall, room.tags))
+    start = Balls(np.array([[0.026, 0.02, 1.5e-3 - 10e-6]]), np.array([[-3.3, 0.0, 0.6]]), 3e-3)
+    floor = LOW._replace(phase=phase)
+    plates = (floor, ACROSS._replace(tag=wall)) if wall != FLOOR else floor
+    physics = Physics(Gravity(0.0, 0.0, -500.0), None, plates)  # type: ignore[arg-type]
+    log = simulate(Scene(room, start, physics, 0.004)).impacts
+    assert room.tags[log.triangle].tolist() == [FLOOR, wall]
+    assert log.time[0] == pytest.approx(2 * 0.6 / 500, rel=0.05)
+
+
+def test_a_ball_that_lies_still_waits_for_the_slowest() -> None:
+    """It lies 0.2 mm from a wall that comes by 0.5 mm, five times a second, while the ceiling shakes at 20 kHz."""
+    upright = box((0.03, 0.03, 0.02))
+    west = (upright.corners[:, :, 0] == 0.0).all(axis=1)
+    room = TriangleMesh(upright.vertices, upright.triangles, np.where(west, 3, upright.tags))
+    wall = Vibration(3, 0.5e-3, 5.0, -2.0, (1.0, 0.0, 0.0))
+    comes = (math.asin(0.4) - wall.phase) / (math.tau * 5.0)
+    for plates in ((HIGH, wall), (wall, HIGH)):
+        run = _Run(
+            Scene(
+                room,
+                balls_at(np.array([[1.7e-3, 0.015, 1.5e-3]])),
+                Physics(Gravity(), LAWS, plates, Rest()),
+                1.0,
+            )
+        )
+        run.play(comes - 1e-9, record=False)
+        assert run.contact is not None
+        assert run.contact.marks[0, MODE] == ASLEEP
+        run.play(comes + 1e-6, record=True)
+        (page,) = run.chunks
+        assert page[0][0, 0] == pytest.approx(comes, abs=1e-12)
+        assert run.balls().velocities[0, 0] == pytest.approx(
+            (1.0 + 0.9) * wall.peak_speed * math.cos(math.asin(0.4)), rel=1e-3
+        )
+
+
+def two_faced(angle: float) -> TriangleMesh:
+    """The trough, its floor and the slope beside it [degrees] of two tags."""
+    room = trough([(0.04, 0.02 * math.tan(math.radians(angle)))])
+    slope = (room.corners[:, :, 0] >= 0.02).all(axis=1) & (room.corners[:, :, 2] < 0.019).all(
+        axis=1
+    )
+    slope &= np.ptp(room.corners[:, :, 1], axis=1) > 0.0
+    return TriangleMesh(room.vertices, room.triangles, np.where(slope, 3, room.tags))
 
 
 @pytest.mark.parametrize(
-    ("g", "v", "duration"), [(0.0, 1.0, 1.5), (9.80665, 1.0, 1.5), (0.0, -0.05, 60.0)]
+    ("vibration", "said"),
+    [
+        ((), r"physics.vibration is \(\): give a Vibration, several"),
+        ((LOW, 3), r"physics.vibration is .*: give a Vibration, several"),
+        (0.5, "physics.vibration is 0.5: give a Vibration, several"),
+        ((LOW, HIGH._replace(tag=FLOOR)), r"vibration\[1\].tag is 1, as vibration\[0\].tag"),
+        ((LOW, HIGH._replace(tag=7)), r"vibration.tag is 7, but the mesh has tags \[0, 1, 2\]"),
+        ((LOW, HIGH._replace(amplitude=-1e-6)), r"vibration\[1\].amplitude is -1e-06"),
+        ((LOW, HIGH._replace(frequency="high")), r"vibration\[1\].frequency is 'high'"),
+        ((LOW, HIGH._replace(frequency=0.0)), r"vibration\[1\].frequency is 0.0"),
+        ((LOW, HIGH._replace(phase=math.nan)), r"vibration\[1\].phase is nan"),
+        ((LOW, HIGH._replace(axis=(0.0, 0.0, 0.0))), r"vibration\[1\].axis is"),
+    ],
 )
-def test_each_hit_gives_twice_the_plates_speed_and_the_next_comes_on_time(
-    g: float, v: float, duration: float
-) -> None:
-    """Such plates throw a bead about by chance, so that each flight is followed anew from where it began."""
-    plates = STRONG if duration < 10.0 else tuple(p._replace(amplitude=1e-9) for p in STRONG)
-    log = box_log(plates, duration, g, v)
-    which = plates_hit(log, box((0.03, 0.03, TOP)))
-    shift = np.where(which == 0, height(plates[0], log.time), height(plates[1], log.time))
-    np.testing.assert_allclose(
-        log.position[:, 2], np.where(which == 0, R, TOP - R) + shift, atol=1e-12
-    )
-    shaken = np.where(which == 0, speed(plates[0], log.time), speed(plates[1], log.time))
-    before = log.velocity[:, 2] + shaken  # the log has it as the plate sees it
-    after = shaken - log.velocity[:, 2]
-    np.testing.assert_allclose(after[:-1] - g * np.diff(log.time), before[1:], atol=1e-8)
-    np.testing.assert_allclose(after - before, 2.0 * (shaken - before), atol=1e-12)
-    assert len(log) > 100
-    for n in range(0, len(log) - 1, 1 + len(log) // 100):
-        flight, last = next_hit(plates, log.time[n], log.position[n, 2], after[n], g, which[n])
-        assert last == which[n + 1]
-        assert log.time[n + 1] - log.time[n] == pytest.approx(flight, abs=1e-11)
+def test_a_wrong_one_of_several_is_named(vibration: object, said: str) -> None:
+    with pytest.raises(SceneError, match=said):
+        Scene(ROOM, balls_at(MIDDLE), Physics(vibration=vibration), 1.0)  # type: ignore[arg-type]
 
 
-def test_the_same_chamber_upside_down_gives_the_same_upside_down() -> None:
-    room = box((0.03, 0.03, TOP), (0.0, 0.0, 0.0))
-    places = np.array([[0.003, 0.004, 0.001], [-0.006, 0.005, -0.002], [-0.004, -0.005, 0.004]])
-    speeds = np.array([[0.2, 0.1, 1.0], [-0.1, 0.3, 0.7], [0.3, -0.2, -0.8]])
-    flip = np.array([1.0, 1.0, -1.0])
-    exchanged = (WEAK[1]._replace(tag=FLOOR, axis=UP), WEAK[0]._replace(tag=CEILING, axis=DOWN))
-    down, up = (
-        simulate(
-            Scene(room, Balls(turn * places, turn * speeds, 2 * R), Physics(vibration=plates), 0.3)
+def test_what_several_cannot_be_beside_is_refused() -> None:
+    both = Physics(vibration=(LOW, HIGH))
+    with pytest.raises(
+        SceneError, match=r"random_phase is given, and 2 vibrating surfaces: not supported together"
+    ):
+        Scene(ROOM, balls_at(MIDDLE), both._replace(random_phase=RandomPhase()), 1.0)
+    with pytest.raises(SceneError, match=r"part_rotation.tag and vibration.tag are both 0"):
+        Scene(
+            ROOM, balls_at(MIDDLE), both._replace(part_rotation=PartRotation(CEILING, rpm=1.0)), 1.0
         )
-        for turn, plates in ((1.0, WEAK), (flip, exchanged))
+
+
+@pytest.mark.parametrize("blunt", [0.0, 8.0])
+def test_two_that_meet_in_a_blunt_edge_are_refused(blunt: float) -> None:
+    plates = (LOW, LOW._replace(tag=3, phase=1.0))
+    ball = balls_at(np.array([[0.01, 0.02, 0.01]]))
+    with pytest.raises(
+        SceneError, match=r"vibrating triangles \d+ and \d+, of tags (1 and 3|3 and 1), meet"
+    ):
+        simulate(Scene(two_faced(blunt), ball, Physics(vibration=plates), 0.01))
+    simulate(Scene(two_faced(20.0), ball, Physics(vibration=plates), 0.01))
+
+
+def test_a_ball_inside_one_of_them_is_named_with_its_tag() -> None:
+    lowered = (LOW._replace(phase=-0.5 * math.pi), HIGH._replace(phase=0.5 * math.pi))
+    near = balls_at(np.array([[0.015, 0.015, 0.02 - 1.5e-3 - 10e-6]]))
+    with pytest.raises(
+        SceneError,
+        match=r"starts 1.5e-05 m inside the vibrating surface of tag 0, which is displaced",
+    ):
+        Scene(ROOM, near, Physics(vibration=lowered), 1.0)
+    Scene(
+        ROOM, near, Physics(vibration=(lowered[0], lowered[1]._replace(phase=-0.5 * math.pi))), 1.0
     )
-    assert down.collisions == up.collisions
-    assert down.collisions.sonotrode > 20
-    np.testing.assert_allclose(down.balls.positions, flip * up.balls.positions, atol=1e-9)
-    np.testing.assert_allclose(down.balls.velocities, flip * up.balls.velocities, atol=1e-6)
 
 
-def test_a_wall_that_goes_to_and_fro_gives_its_own_speed_along_its_own_axis() -> None:
-    """Floor and side walls, of which two face the ball: each hit changes one component by twice that face's speed."""
-    sides = Vibration(SIDES, 15e-6, 23.1e3, 1.0, EAST)
-    room = box((0.03, 0.03, TOP))
-    ball = Balls(np.array([[0.011, 0.013, 0.008]]), np.array([[1.3, 0.0, 0.9]]), 2 * R)
-    log = simulate(Scene(room, ball, Physics(vibration=(STRONG[0], sides)), 1.0)).impacts
-    tags = room.tags[log.triangle]
-    assert {FLOOR, CEILING, SIDES} <= set(tags.tolist())
-    velocity = np.array([1.3, 0.0, 0.9])
-    for tag, time, seen in zip(tags, log.time, log.velocity, strict=True):
-        face = {FLOOR: (STRONG[0], 2), SIDES: (sides, 0)}.get(int(tag))
-        shaken = np.zeros(3)
-        if face is not None:
-            shaken[face[1]] = face[0].peak_speed * np.cos(angle(face[0], time))
-        np.testing.assert_allclose(seen, velocity - shaken, atol=1e-8)
-        velocity[face[1] if face is not None else 2] *= -1.0
-        velocity += 2.0 * shaken
-
-
-def ridge(second: int) -> TriangleMesh:
-    """A floor in one plane, in two by a ridge of 80 degrees: the left of tag FLOOR, the right of tag ``second``."""
-    room = trough([(0.021, 0.006), (0.022, 0.0), (0.04, 0.0)])
-    level = (room.corners[:, :, 2] == 0.0).all(axis=1)
-    right = level & (room.corners[:, :, 0] > 0.021).all(axis=1)
-    return TriangleMesh(room.vertices, room.triangles, np.where(right, second, room.tags))
-
-
-@pytest.mark.parametrize("first", [0, 1])
-def test_two_faces_in_one_plane_are_hit_at_their_own_times(first: int) -> None:
-    """Whichever of the two is given first; the balls fall so slowly that their hits show the phase."""
-    room = ridge(PARTED)
-    plates = (Vibration(FLOOR, 25e-6, 20e3, 0.0), Vibration(PARTED, 25e-6, 20e3, 3.0))
-    ball = Balls(
-        np.array([[0.01, 0.02, 0.0016], [0.031, 0.02, 0.0016]]),
-        np.tile([0.0, 0.0, -0.4], (2, 1)),
-        2 * R,
+def test_both_of_two_narrow_the_gap_between_them() -> None:
+    """3.04 mm: enough for a ball of 3 mm and one swing of 25 um, not for two."""
+    tight = box((0.03, 0.03, 3.04e-3))
+    ball = balls_at(np.array([[0.015, 0.015, 1.52e-3]]))
+    at_rest = (LOW._replace(phase=0.0), HIGH._replace(phase=0.0))
+    for one in at_rest:
+        Scene(tight, ball, Physics(vibration=one), 1.0)
+    said = (
+        r"does not fit between the vibrating surface of tag [01] \(triangle \d+\) and the vibrating surface of tag "
+        r"[01] \(triangle \d+\): the gap is narrower than the ball by 1e-05 m at the end of its swing"
     )
-    log = simulate(
-        Scene(room, ball, Physics(vibration=(plates[first], plates[1 - first])), 0.005)
-    ).impacts
-    for k, plate in enumerate(plates):
-        own = log.ball == k
-        expected, _ = next_hit((plate, STRONG[1]), 0.0, 0.0016, -0.4, 0.0, -1)
-        assert log.time[own][0] == pytest.approx(expected, abs=1e-12)
-        assert (room.tags[log.triangle[own]] == plate.tag)[:1].all()
-    assert abs(log.time[log.ball == 0][0] - log.time[log.ball == 1][0]) > 1e-6
+    with pytest.raises(SceneError, match=said):
+        Scene(tight, ball, Physics(vibration=at_rest), 1.0)
+
+
+@pytest.mark.parametrize("turn", [None, PartRotation(1, rpm=10.0)])
+def test_the_simulator_is_compiled_ahead_for_several(
+    turn: PartRotation | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The scene it is compiled with has two of them; and the code for one is not taken for that."""
+    scenes: list[Scene] = []
+    monkeypatch.setattr(compile_ahead, "simulate", scenes.append)
+    monkeypatch.setattr(compile_ahead, "CACHE_FOLDER", tmp_path)
+    several = tuple(one._replace(tag=tag) for one, tag in ((LOW, 0), (HIGH, 3), (ACROSS, 2)))
+    physics = Physics(None, LAWS, several, part_rotation=turn)
+    compile_ahead.compile_simulator(physics._replace(vibration=LOW._replace(tag=0)))
+    assert not compile_ahead.is_compiled(physics, 1)
+    compile_ahead.compile_simulator(physics)
+    assert compile_ahead.is_compiled(physics, 1)
+    assert (
+        new_waves(
+            scenes[1].physics.vibrations, checked_waves(several[:2]), 0.02, scenes[1].mesh.tags
+        )
+        is not None
+    )
+    assert {0, 3} < set(scenes[1].mesh.tags.tolist())

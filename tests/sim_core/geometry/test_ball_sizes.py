@@ -24,7 +24,14 @@ from sim_core import (
     simulate,
 )
 from sim_core.scene.invariants import clearance, contained, energy, momentum, narrowest_gap
-from tests.helpers.scenes.cavities import CEILING, FLOOR, box, box_around, cylinder
+from tests.helpers.scenes.cavities import (
+    CEILING,
+    FLOOR,
+    box,
+    box_around,
+    cylinder,
+    uniform_restitution,
+)
 from tests.helpers.scenes.gas import SURE
 from tests.sim_core.loop.test_determinism import fingerprint
 
@@ -132,9 +139,7 @@ def test_every_size_touches_at_its_own_radius(name: str) -> None:
 def test_each_ball_of_a_mixture_flies_as_it_does_alone() -> None:
     """Where they do not collide with one another, to the last bit: its obstacles are those of its own size."""
     room = cylinder(0.012, 0.02, sections=12)
-    physics = Physics(
-        Gravity(), Restitution(((0.9, 0.7),) * 3, (0.9, 0.7)), Vibration(FLOOR, 25e-6, 20e3, 0.3)
-    )
+    physics = Physics(Gravity(), uniform_restitution(0.9, 0.7), Vibration(FLOOR, 25e-6, 20e3, 0.3))
     physics = physics._replace(ball_collisions=None)
     balls = mixture(room, (4, 4, 4), 10, clear=50e-6)
     together = simulate(Scene(room, balls, physics, 0.2))
@@ -149,7 +154,7 @@ def test_each_ball_of_a_mixture_flies_as_it_does_alone() -> None:
 
 def test_a_mixture_in_a_chamber_that_shakes_stays_inside_and_apart() -> None:
     room = cylinder(0.015, 0.02, sections=37)
-    law = Restitution(((0.9, 0.7),) * 3, (0.9, 0.7))
+    law = uniform_restitution(0.9, 0.7)
     physics = Physics(
         Gravity(), law, Vibration(FLOOR, 25e-6, 20e3), random_phase=RandomPhase(), drag=Drag()
     )

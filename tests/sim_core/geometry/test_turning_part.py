@@ -25,7 +25,7 @@ from sim_core import (
 )
 from sim_core.scene.invariants import clearance
 from tests.helpers.jit_on_and_off import with_and_without_jit
-from tests.helpers.scenes.cavities import box_around
+from tests.helpers.scenes.cavities import box_around, uniform_restitution
 from tests.helpers.scenes.turning_parts import BODIES, PART, Rotor, bar
 
 EARLY = 1e-12  # m
@@ -281,10 +281,7 @@ def crowd(turn: PartRotation, duration: float, count: int = 40, seed: int = 4) -
     tags[(room.corners[:, :, 2] == room.corners[:, :, 2].min()).all(axis=1)] = 1
     room = TriangleMesh(room.vertices, room.triangles, tags)
     physics = Physics(
-        Gravity(),
-        Restitution(((0.9, 1.0),) * 3, (0.9, 1.0)),
-        Vibration(1, 40e-6, 20e3, 0.3),
-        part_rotation=turn,
+        Gravity(), uniform_restitution(0.9, 1.0), Vibration(1, 40e-6, 20e3, 0.3), part_rotation=turn
     )
     rng = np.random.default_rng(seed)
     positions = pack_balls(room, count, 3e-3, rng, clear=50e-6, part_rotation=turn)

@@ -5,7 +5,7 @@ import pytest
 
 from sim_core import Balls, Gravity, Physics, Restitution, Scene, TriangleMesh, pack_balls, simulate
 from sim_core.scene.invariants import closest_pair, contained, energy
-from tests.helpers.scenes.cavities import box, cylinder
+from tests.helpers.scenes.cavities import box, cylinder, uniform_restitution
 
 DIAMETER = 3e-3
 
@@ -58,7 +58,7 @@ def test_two_balls_meet_head_on_and_keep_their_momentum() -> None:
 
 def test_dissipation_never_raises_the_energy() -> None:
     room = cylinder(0.02, 0.02)
-    physics = Physics(Gravity(), Restitution(((0.9, 0.7),) * 3, (0.9, 0.7)))
+    physics = Physics(Gravity(), uniform_restitution(0.9, 0.7))
     balls = gas(room, 40, 3.0, 3)
     before = energy(balls, physics.gravity)
     for _ in range(20):

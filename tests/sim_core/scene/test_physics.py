@@ -9,7 +9,6 @@ from sim_core import (
     Gravity,
     Physics,
     Rest,
-    Restitution,
     Scene,
     SceneError,
     Vibration,
@@ -18,12 +17,12 @@ from sim_core import (
 )
 from sim_core.loop.jam_message import touching
 from sim_core.loop.simulate import _Run
-from tests.helpers.scenes.cavities import FLOOR, box, cylinder
+from tests.helpers.scenes.cavities import FLOOR, box, cylinder, uniform_restitution
 
 DIAMETER = 3e-3
 THROUGH = Physics(
     Gravity(),
-    Restitution(((0.9, 0.7),) * 3, (0.9, 0.7)),
+    uniform_restitution(0.9, 0.7),
     Vibration(FLOOR, 25e-6, 20e3, 0.3),
     ball_collisions=None,
 )
