@@ -12,38 +12,43 @@ STEEL = (0.3, 0.2)  # mu and beta0, of every surface
 
 
 class Effect(NamedTuple):
-    """``off`` and ``on``: the physics without it and with it; ``asked``: what compiled code calls it."""
+    """An effect to be measured.
+
+    Args:
+        off: the physics without it.
+        on: the physics with it.
+        variables: its names in compiled code.
+    """
 
     off: Physics
     on: Physics
-    asked: tuple[str, ...]
+    variables: tuple[str, ...]
 
 
-LOSSLESS = PHYSICS._replace(
-    restitution=None
-)  # between still walls, shot that loses energy would come to rest
+# between still walls, shot that loses energy would come to rest
+LOSSLESS = PHYSICS._replace(restitution=None)
 EFFECTS = {
     "gravity": Effect(PHYSICS._replace(gravity=None), PHYSICS, ("gravity",)),
     "restitution": Effect(PHYSICS._replace(restitution=None), PHYSICS, ("restitution",)),
     "vibration": Effect(LOSSLESS._replace(vibration=None), LOSSLESS, ("wave",)),
-    "random_phase": Effect(PHYSICS, PHYSICS._replace(random_phase=RandomPhase(1)), ("phases",)),
+    "random_phase": Effect(PHYSICS, PHYSICS._replace(random_phase=RandomPhase(1)), ("random_phase",)),
     "ball_collisions": Effect(
         PHYSICS._replace(ball_collisions=None), PHYSICS, ("neighbours", "pair_time")
     ),
     "friction": Effect(
-        PHYSICS, PHYSICS._replace(friction=Friction((STEEL,) * 3, STEEL)), ("friction_state",)
+        PHYSICS, PHYSICS._replace(friction=Friction((STEEL,) * 3, STEEL)), ("friction", "friction_state")
     ),
-    "drag": Effect(PHYSICS, PHYSICS._replace(drag=Drag()), ("air",)),
+    "drag": Effect(PHYSICS, PHYSICS._replace(drag=Drag()), ("drag",)),
     "rest": Effect(PHYSICS, PHYSICS._replace(rest=Rest()), ("contact",)),
-    "turn": Effect(
-        PHYSICS, PHYSICS._replace(part_rotation=PartRotation(PART, rpm=30.0)), ("turning", "part")
+    "part_rotation": Effect(
+        PHYSICS, PHYSICS._replace(part_rotation=PartRotation(PART, rpm=30.0)), ("rotation", "part")
     ),
     "sizes": Effect(PHYSICS, PHYSICS, ("sizes",)),
 }
 
 
 def effect_scene(effect: str, on: bool) -> Scene:
-    """The chamber with the effect on, or all the same without it; of several sizes, every second ball is smaller."""
+    """The chamber with the effect on or off; with several sizes, every second ball is smaller."""
     still = scene(NAME)
     balls = still.balls
     if effect == "sizes" and on:

@@ -112,7 +112,7 @@ def measure(effect: str, rounds: int) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         (place / "without").mkdir()
-        stripped = never_had(EFFECTS[effect].asked, place / "without")
+        stripped = never_had(EFFECTS[effect].variables, place / "without")
         sources = {"on": (True, ROOT), "off": (False, ROOT), "never": (False, stripped)}
         programs = {
             name: Program(effect, on, source, place / f"cache-{name}")

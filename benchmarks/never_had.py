@@ -1,7 +1,8 @@
-"""A copy of the simulator that never had an effect: what a program without it would cost, to hold the real one against.
+"""A copy of the simulator that never had an effect, to compare the cost of the real one with.
 
-The compiled functions ask whether an effect is there by ``name is None``. In the copy the answer is written into the
-source, and what can then not be reached is taken out: no line of it is left for the compiler to prune.
+The compiled functions test whether an effect is absent by ``name is None``. In the copy the result is
+written into the source, and code that cannot be reached is removed: nothing of the effect is left for
+the compiler to prune.
 """
 
 import ast
@@ -13,7 +14,7 @@ COMPILERS = {"jit", "inlined"}
 
 
 class _Without(ast.NodeTransformer):
-    """Writes True for ``NAME is None``, and drops what that makes unreachable."""
+    """Writes True for ``NAME is None``, and removes what that makes unreachable."""
 
     def __init__(self, names: frozenset[str]) -> None:
         self.names = names
@@ -21,11 +22,10 @@ class _Without(ast.NodeTransformer):
 
     def visit_Compare(self, node: ast.Compare) -> ast.AST:
         self.generic_visit(node)
-        asked = (
-            node.left.attr if isinstance(node.left, ast.Attribute) else getattr(node.left, "id", "")
-        )
+        left = node.left
+        name = left.attr if isinstance(left, ast.Attribute) else getattr(left, "id", "")
         none = isinstance(node.comparators[0], ast.Constant) and node.comparators[0].value is None
-        if asked not in self.names or not none or not isinstance(node.ops[0], (ast.Is, ast.IsNot)):
+        if name not in self.names or not none or not isinstance(node.ops[0], (ast.Is, ast.IsNot)):
             return node
         self.answers += 1
         return ast.Constant(isinstance(node.ops[0], ast.Is))
@@ -68,9 +68,17 @@ def _constant(node: ast.expr) -> bool | None:
 
 
 def never_had(names: tuple[str, ...], folder: Path) -> Path:
-    """Write such a copy of sim_core into ``folder``; ``names``: what the effect is called where it is asked for.
+    """Write a copy of sim_core without an effect.
 
-    Returns the folder, to be put on the module search path. Raises ValueError if nothing asks for the names.
+    Args:
+        names: of the effect in compiled code.
+        folder: for the copy.
+
+    Returns:
+        The folder, for the module search path.
+
+    Raises:
+        ValueError: if no compiled function has these names.
     """
     copy = folder / "sim_core"
     shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
@@ -83,5 +91,5 @@ def never_had(names: tuple[str, ...], folder: Path) -> Path:
             path.write_text(ast.unparse(changed), encoding="utf-8")
             answers += without.answers
     if answers == 0:
-        raise ValueError(f"no compiled function asks whether {names} is None")
+        raise ValueError(f"no compiled function tests whether {names} is None")
     return folder

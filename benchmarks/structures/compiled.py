@@ -19,7 +19,7 @@ _digest = hashlib.sha256(
 )
 _FOLDER = (
     sim_core_jit.CACHE_FOLDER / f"structures-{_digest.hexdigest()[:16]}"
-)  # never stale, see sim_core/jit.py
+)  # never stale, see sim_core/numerics/jit.py
 _SEARCHES: dict[type, Any] = {}
 
 

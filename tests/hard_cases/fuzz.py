@@ -189,7 +189,7 @@ def _falls_through_air(physics: Physics) -> bool:
 
 
 def _given_back(physics: Physics) -> float:
-    """Energy [J/kg] that captures and hops of balls pressed together may bring in (resolve/pushing.py)."""
+    """Energy [J/kg] that captures and hops of balls pressed together may bring in (contact/constrained_impulse.py)."""
     if physics.rest is None:
         return 0.0
     weight = float(np.linalg.norm(physics.gravity or 0.0))
