@@ -31,12 +31,16 @@ EFFECTS = {
     "gravity": Effect(PHYSICS._replace(gravity=None), PHYSICS, ("gravity",)),
     "restitution": Effect(PHYSICS._replace(restitution=None), PHYSICS, ("restitution",)),
     "vibration": Effect(LOSSLESS._replace(vibration=None), LOSSLESS, ("wave",)),
-    "random_phase": Effect(PHYSICS, PHYSICS._replace(random_phase=RandomPhase(1)), ("random_phase",)),
+    "random_phase": Effect(
+        PHYSICS, PHYSICS._replace(random_phase=RandomPhase(1)), ("random_phase",)
+    ),
     "ball_collisions": Effect(
         PHYSICS._replace(ball_collisions=None), PHYSICS, ("neighbours", "pair_time")
     ),
     "friction": Effect(
-        PHYSICS, PHYSICS._replace(friction=Friction((STEEL,) * 3, STEEL)), ("friction", "friction_state")
+        PHYSICS,
+        PHYSICS._replace(friction=Friction((STEEL,) * 3, STEEL)),
+        ("friction", "friction_state"),
     ),
     "drag": Effect(PHYSICS, PHYSICS._replace(drag=Drag()), ("drag",)),
     "rest": Effect(PHYSICS, PHYSICS._replace(rest=Rest()), ("contact",)),
