@@ -31,7 +31,7 @@ ASKED, ASKED_QUICK = 0.01, 0.03
 
 
 def evaluation(accuracy: float) -> dict[str, Any]:
-    """The row of one evaluation in this process; nothing of chamberopt may have been imported before."""
+    """The row of one evaluation in this process, in which chamberopt is not imported yet."""
     from chamberopt.chamber.build import build_chamber
     from chamberopt.chamber.scene import build_scene, chamber_mesh
     from chamberopt.common.parallel.executor import local_executor
@@ -76,7 +76,10 @@ def evaluation(accuracy: float) -> dict[str, Any]:
 
 
 def replica_shares(design: Any, chamber: Any) -> dict[str, float]:
-    """Of a replica's CPU seconds: fixed, warm-up, recorded; from replicas with neither, with the first, with both."""
+    """Shares of start, warm-up and recorded time in the CPU seconds of a replica.
+
+    Measured with replicas that have neither warm-up nor recorded time, the first, and both.
+    """
     from chamberopt.chamber.scene import chamber_mesh, replica_seed
     from chamberopt.simulation.convergence.parameters import TIME, WARM_UP
     from chamberopt.simulation.replicas import ReplicaSetting, simulate_replica

@@ -1,4 +1,4 @@
-"""Charts of coverage and impacts: histograms, and coverage over peening time, of several results."""
+"""Charts of coverage and impacts: histograms, and coverage over peening time."""
 
 from __future__ import annotations
 

@@ -81,9 +81,9 @@ def style_axes(axes: Axes, x_label: str = "", y_label: str = "") -> None:
 
 
 def value_range(estimates: Sequence[Estimate]) -> tuple[float, float]:
-    """Axis limits that show every value, and its interval as far as it is no longer than the span of the values.
+    """Axis limits that show every value, and its interval up to the span of the values.
 
-    A wider interval, such as that of a time which may be infinite, would press all else into one line.
+    A wider interval, such as that of a time that may be infinite, would flatten everything else.
     """
     values = np.array([one.value for one in estimates])
     half_widths = np.array([one.half_width for one in estimates])

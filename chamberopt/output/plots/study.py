@@ -1,4 +1,4 @@
-"""Charts of a study: its search, slices through its best design, and two objectives' Pareto front."""
+"""Charts of a study: its search, slices through its best design, and the Pareto front."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sentences and table rows of the report: the answer, which parameters matter, accuracy and cost."""
+"""Sentences and rows of the report: the answer, influence of parameters, accuracy and cost."""
 
 from __future__ import annotations
 

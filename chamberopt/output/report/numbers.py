@@ -63,7 +63,7 @@ def metric_label(name: str) -> Label:
 
 
 def objective_label(name: str) -> Label:
-    """The label of an objective; one that is a metric, or minus a metric, has the metric's label."""
+    """The label of an objective: the metric's label where it is plus or minus a metric."""
     try:
         objective = parse_objective(name)
     except InputError:  # written by another version of the program

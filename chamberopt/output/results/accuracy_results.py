@@ -188,7 +188,8 @@ def describe_error_law(study: ConvergenceStudy) -> str:
         )
     text = (
         f"more replicas alone: halving the error costs {middle:.2f} times as much "
-        f"({low:.2f} to {high:.2f}), {reason} (error ~ cost^-{law.power:.2f} ± {law.half_width:.2f})"
+        f"({low:.2f} to {high:.2f}), {reason} "
+        f"(error ~ cost^-{law.power:.2f} ± {law.half_width:.2f})"
     )
     if merged and left_out:
         text += (

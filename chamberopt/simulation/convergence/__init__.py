@@ -1,1 +1,1 @@
-"""The convergence study of `chamberopt accuracy`: what numerical accuracy costs, and what to set."""
+"""Convergence study of `chamberopt accuracy`: the cost of accuracy, and what to set."""

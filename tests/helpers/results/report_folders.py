@@ -1,4 +1,4 @@
-"""Results folders to report on: a simulation and a study of the plate, whose dents fell at random."""
+"""Results folders for reports: a simulation and a study of the plate with random dents."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -41,7 +41,10 @@ def simulated(folder: Path, per_mm2: float = 60.0, hits: bool = True) -> tuple[P
 
 
 def studied(folder: Path, evaluations: int = 12) -> Path:
-    """A study's folder. More shot makes more dents, far sonotrodes cannot be simulated, near ones miss a constraint."""
+    """A study's folder.
+
+    More shot makes more dents. Far sonotrodes cannot be simulated, near ones miss a constraint.
+    """
     chamber = build_chamber(DESIGN)
     question = Study(
         design=DESIGN,

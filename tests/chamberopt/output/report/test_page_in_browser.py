@@ -1,4 +1,4 @@
-"""The page opened and used in a real browser without a display: it draws, answers to its controls, asks for nothing."""
+"""The page in a real browser without a display: it draws, reacts, and fetches nothing."""
 
 import io
 import shutil
@@ -46,17 +46,17 @@ def browser() -> Iterator[Any]:
         browser.close()
 
 
-class Watched:
-    """A page that was opened, with all it said and asked for meanwhile."""
+class OpenPage:
+    """An open page, with its errors and requests."""
 
     def __init__(self, browser: Any, path: Path, width: int = 1280) -> None:
-        self.troubles: list[str] = []
+        self.errors: list[str] = []
         self.requests: list[str] = []
         self.page = browser.new_page(viewport={"width": width, "height": 800})
-        self.page.on("pageerror", lambda error: self.troubles.append(str(error)))
+        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         self.page.on(
             "console",
-            lambda said: self.troubles.append(said.text) if said.type == "error" else None,
+            lambda message: self.errors.append(message.text) if message.type == "error" else None,
         )
         self.page.on("request", lambda request: self.requests.append(request.url))
         self.page.goto(path.as_uri())
@@ -71,20 +71,20 @@ class Watched:
 
 
 @pytest.fixture(scope="module")
-def shown(browser: Any, study: Path, tmp_path_factory: pytest.TempPathFactory) -> Watched:
+def shown(browser: Any, study: Path, tmp_path_factory: pytest.TempPathFactory) -> OpenPage:
     path, _ = write_report(study, tmp_path_factory.mktemp("page") / "report.html")
-    return Watched(browser, path)
+    return OpenPage(browser, path)
 
 
 def coloured(pixels: np.ndarray) -> float:
-    """Share of pixels with a strong colour: of the part's map and its bar, for all else there is pale or grey."""
+    """Share of pixels with a strong colour; only the part's map and its colour bar have any."""
     return float((np.ptp(pixels, axis=2) > 0.25).mean())
 
 
-def test_it_is_drawn_and_asks_for_nothing(shown: Watched, tmp_path: Path) -> None:
+def test_the_page_is_drawn_and_fetches_nothing(shown: OpenPage, tmp_path: Path) -> None:
     shown.page.screenshot(path=tmp_path / "report.png", full_page=True)
     assert (tmp_path / "report.png").stat().st_size > 50_000
-    assert shown.troubles == []
+    assert shown.errors == []
     assert all(url.startswith(("file:", "data:", "blob:")) for url in shown.requests)
     assert len([url for url in shown.requests if url.startswith("file:")]) == 1
     assert coloured(shown.pixels()) > 0.02
@@ -93,7 +93,7 @@ def test_it_is_drawn_and_asks_for_nothing(shown: Watched, tmp_path: Path) -> Non
     assert shown.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
 
 
-def test_another_quantity_has_its_own_bar(shown: Watched) -> None:
+def test_another_quantity_has_its_own_bar(shown: OpenPage) -> None:
     bar = shown.page.locator("#part-0 .infolayer")
     assert "coverage [%]" in bar.text_content()
     before = shown.pixels()
@@ -110,7 +110,7 @@ def test_another_quantity_has_its_own_bar(shown: Watched) -> None:
     )
 
 
-def test_time_goes_by(shown: Watched) -> None:
+def test_the_slider_shows_coverage_at_other_times(shown: OpenPage) -> None:
     before, said = shown.pixels(), shown.page.locator("#at").text_content()
     slider = shown.page.locator("#time")
     slider.focus()
@@ -126,7 +126,7 @@ def test_time_goes_by(shown: Watched) -> None:
     shown.page.wait_for_function("document.getElementById('part-0').data[0].intensity[0] > 50")
 
 
-def test_a_triangle_tells_its_figures(shown: Watched) -> None:
+def test_pointing_at_a_triangle_shows_its_numbers(shown: OpenPage) -> None:
     shown.page.evaluate("document.getElementById('part-0').scrollIntoView({block: 'center'})")
     box = shown.page.locator("#part-0").bounding_box()
     label = shown.page.locator("#label")
@@ -143,7 +143,7 @@ def test_a_triangle_tells_its_figures(shown: Watched) -> None:
     pytest.fail("no triangle of the target answered to the pointer")
 
 
-def test_the_chamber_can_be_hidden_and_what_is_folded_opens(shown: Watched) -> None:
+def test_the_chamber_can_be_hidden_and_folded_text_opens(shown: OpenPage) -> None:
     before = shown.pixels()
     shown.page.uncheck("#glass")
     assert np.abs(shown.pixels() - before).max() > 0.05
@@ -158,11 +158,12 @@ def test_a_narrow_window_needs_no_scrolling_sideways(
 ) -> None:
     """Two parts, side by side where there is room, turn together."""
     write_part_page([study / "start", study], tmp_path / "parts.html")
-    narrow = Watched(browser, tmp_path / "parts.html", 800)
+    narrow = OpenPage(browser, tmp_path / "parts.html", 800)
     assert narrow.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     narrow.page.evaluate(
-        "Plotly.relayout(document.getElementById('part-0'), {'scene.camera': {eye: {x: 0.1, y: 0.2, z: 1.5}}})"
+        "Plotly.relayout(document.getElementById('part-0'), "
+        "{'scene.camera': {eye: {x: 0.1, y: 0.2, z: 1.5}}})"
     )
     turned = "document.getElementById('part-1').layout.scene.camera.eye.z == 1.5"
     narrow.page.wait_for_function(turned, timeout=WAIT)
-    assert narrow.troubles == []
+    assert narrow.errors == []

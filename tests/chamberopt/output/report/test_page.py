@@ -1,8 +1,7 @@
-"""What a report says is what the result holds, and the page that says it needs nothing but itself."""
+"""A report says what the result holds, and its page needs nothing but itself."""
 
 import base64
 import json
-import math
 import re
 import shutil
 from html.parser import HTMLParser
@@ -15,8 +14,7 @@ from chamberopt.cli import main
 from chamberopt.common.errors import InputError
 from chamberopt.output import viewer
 from chamberopt.output.report import report_contents, write_part_page, write_report
-from chamberopt.output.report.conclusions import influence
-from chamberopt.output.report.numbers import Label, objective_label, plain, with_interval
+from chamberopt.output.report.numbers import with_interval
 from chamberopt.output.report.part3d import part_scene
 from chamberopt.output.results.load import load_result
 from chamberopt.output.vtp_files import read_surface
@@ -43,13 +41,13 @@ def study(tmp_path_factory: pytest.TempPathFactory, no_pictures: None) -> Path:
 
 
 class Page(HTMLParser):
-    """The elements of a page as a browser would see them, and its text outside scripts and styles."""
+    """The elements of a page as a browser sees them, and its text outside scripts and styles."""
 
     def __init__(self, path: Path) -> None:
         super().__init__()
         self.elements: list[tuple[str, dict]] = []
         self.scripts: list[str] = []
-        self.said = ""
+        self.text = ""
         self._inside = ""
         self.feed(path.read_text(encoding="utf-8"))
 
@@ -63,7 +61,7 @@ class Page(HTMLParser):
         if self._inside == "script":
             self.scripts[-1] += data
         elif self._inside != "style":
-            self.said += data
+            self.text += data
 
     def handle_endtag(self, tag: str) -> None:
         self._inside = ""
@@ -89,90 +87,42 @@ def changed(folder: Path, copy: Path, change) -> Path:
     return copy
 
 
-@pytest.mark.parametrize(
-    ("value", "half_width", "said"),
-    [
-        (0.80934, 0.00407, "0.809 ± 0.004"),
-        (0.2301, 0.0132, "0.230 ± 0.013"),
-        (0.577, 0.00996, "0.577 ± 0.010"),
-        (5e-18, 1e-18, "0"),
-        (5e-18, 0.02, "0.000 ± 0.020"),
-        (-0.0001, 0.02, "0.000 ± 0.020"),
-        (2166.9, 1678.4, "2200 ± 1700"),
-        (3708.0, 497781.0, "4000 ± 500\u202f000"),
-        (363.0, 0.0, "363"),
-        (-9.96, 0.5, "−10.0 ± 0.5"),
-        (1.5, math.inf, "1.5 ± not known"),
-        (math.nan, 1.0, "not known"),
-    ],
-)
-def test_an_interval_has_one_or_two_digits_and_its_value_the_same_decimals(
-    value, half_width, said
-) -> None:
-    assert with_interval(value, half_width) == said
-
-
-@pytest.mark.parametrize(
-    ("value", "said"),
-    [
-        (33.9552, "33.96"),
-        (5e-18, "0"),
-        (4311860.0, "4\u202f311\u202f860"),
-        (1e-7, "1e-07"),
-        (120.0, "120"),
-    ],
-)
-def test_a_number_alone_has_four_digits_that_count(value: float, said: str) -> None:
-    assert plain(value) == said
-
-
-def test_a_goal_that_is_a_metric_reads_as_the_metric() -> None:
-    assert objective_label("minus_time_to_98_s") == Label(
-        "time until 95 % of the target's area is 98 % covered", "s", -1.0
-    )
-    assert objective_label("p05_coverage").unit == "%"
-    assert (
-        objective_label("uniform_coverage").meaning == "mean minus standard deviation of coverage"
-    )
-    assert objective_label("of a later version").text == "of a later version"
-
-
 def test_a_simulation_is_answered_in_one_sentence(simulation: Path) -> None:
-    said, result = report_contents(simulation), load_result(simulation)
+    contents, result = report_contents(simulation), load_result(simulation)
     mean = result.metrics["mean_coverage"]
-    assert with_interval(100 * mean.value, 100 * mean.half_width, "%") in said["answer"]
-    assert said["answer"].startswith("After 5 s the target is covered to ")
-    assert said["influence"] is None
-    assert said["evaluations"] == []
-    assert not said["effects"]["pilot"]
-    assert {"effect": "gravity", "value": "on"} in said["effects"]["effects"]
-    assert said["identity"]["part, SHA-256"] == result.part_sha256
-    json.dumps(said, allow_nan=False)
+    assert with_interval(100 * mean.value, 100 * mean.half_width, "%") in contents["answer"]
+    assert contents["answer"].startswith("After 5 s the target is covered to ")
+    assert contents["influence"] is None
+    assert contents["evaluations"] == []
+    assert not contents["effects"]["pilot"]
+    assert {"effect": "gravity", "value": "on"} in contents["effects"]["effects"]
+    assert contents["identity"]["part, SHA-256"] == result.part_sha256
+    json.dumps(contents, allow_nan=False)
 
 
 def test_a_study_is_answered_with_its_gain(study: Path) -> None:
-    said, about = report_contents(study), load_result(study).data["study"]
+    contents, about = report_contents(study), load_result(study).data["study"]
     gain = about["gain"]
-    assert with_interval(gain["value"], gain["half_width"], sign=True) in said["answer"]
-    assert "more than noise" in said["answer"]
-    first = said["metrics"][0]
+    assert with_interval(gain["value"], gain["half_width"], sign=True) in contents["answer"]
+    assert "more than noise" in contents["answer"]
+    first = contents["metrics"][0]
     assert (first["change"]["value"], first["change"]["half_width"]) == (
         gain["value"],
         gain["half_width"],
     )
     assert first["real"]
-    assert [one["name"] for one in said["question"]["vary"]] == list(about["vary"])
-    assert said["question"]["constraints"] == ["chamber.sonotrode_distance_mm ≥ 9.5"]
-    failed = [one for one in said["evaluations"] if one["value"] is None]
+    assert [one["name"] for one in contents["question"]["vary"]] == list(about["vary"])
+    assert contents["question"]["constraints"] == ["chamber.sonotrode_distance_mm ≥ 9.5"]
+    failed = [one for one in contents["evaluations"] if one["value"] is None]
     assert len(failed) == about["failed"] > 0
     assert all(one["reason"] == "<b>not</b> this one" for one in failed)
-    changed = {row["name"] for row in said["design"] if "start" in row}
+    changed = {row["name"] for row in contents["design"] if "start" in row}
     assert changed <= set(about["vary"])
     assert changed
-    json.dumps(said, allow_nan=False)
+    json.dumps(contents, allow_nan=False)
 
 
-def test_no_gain_is_said_to_be_none(study: Path, tmp_path: Path) -> None:
+def test_no_gain_is_reported_as_none(study: Path, tmp_path: Path) -> None:
     folder = tmp_path / "flat"
     shutil.copytree(study, folder)
     best = json.loads((folder / "result.json").read_text())
@@ -181,59 +131,9 @@ def test_no_gain_is_said_to_be_none(study: Path, tmp_path: Path) -> None:
     start = json.loads((folder / "start" / "result.json").read_text())
     same = {name: best[name] for name in ("objective", "metrics")}
     (folder / "start" / "result.json").write_text(json.dumps(start | same))
-    said = report_contents(folder)
-    assert "No better chamber than the start was found" in said["answer"]
-    assert not said["metrics"][0]["real"]
-
-
-def a_model(mean: list, half_width: list, **other: object) -> dict:
-    """result.json's "study" of one parameter x in 0 .. 2, best at 0."""
-    curve = {"values": [0.0, 1.0, 2.0], "mean": mean, "half_width": half_width, "main_effect": mean}
-    return {
-        "evaluations": 20,
-        "vary": {"x": [0.0, 2.0]},
-        "start": {"parameters": {"x": 1.0}},
-        "best": {"parameters": {"x": 0.0}},
-        "model": {
-            "noise": 0.01, "expected": {"value": mean[0], "half_width": half_width[0]}, "together": 1.0,
-            "parameters": {"x": {"flat": [0.0, 0.1], "share_of_variance": 1.0, **curve}},
-        },
-        **other,
-    }  # fmt: skip
-
-
-def test_what_a_parameter_costs_has_an_interval() -> None:
-    """It may cost 0.5 ± 0.5 at its far end, but 0.4 ± 0.05 in the middle: 0.35 for sure."""
-    told = influence(a_model([1.0, 0.6, 0.5], [0.03, 0.04, 0.5]), Label("goal"))
-    (one,) = told["parameters"]
-    assert (one["loss"], one["loss_half_width"]) == pytest.approx((0.5, math.hypot(0.5, 0.03)))
-    assert one["surely"] == pytest.approx(0.35)
-    assert told["said"][0].startswith("x mattered most")
-    assert "0.5 ± 0.5" in told["said"][0]
-    assert "0.35 or more" in told["said"][0]
-
-
-def test_too_little_to_tell_is_said() -> None:
-    unsure = influence(a_model([1.0, 0.9, 0.8], [0.2, 0.2, 0.2]), Label("goal"))
-    assert unsure["parameters"][0]["surely"] == 0.0
-    assert "20 evaluations are too few to show an influence of x" in unsure["said"][0]
-    none = influence(
-        {**a_model([1.0] * 3, [0.0] * 3), "model": None, "evaluations": 3, "failed": 1},
-        Label("goal"),
-    )
-    assert none["parameters"] == []
-    assert none["said"] == [
-        "3 evaluations, 1 of them failed, are too few to tell what each parameter does: 4 or more are needed for a "
-        "model of them."
-    ]
-
-
-def test_a_time_that_shall_be_short_is_shown_as_a_time() -> None:
-    told = influence(
-        a_model([-400.0, -900.0, -2000.0], [10.0] * 3), objective_label("minus_time_to_98_s")
-    )["parameters"][0]
-    assert told["mean"] == [400.0, 900.0, 2000.0]
-    assert told["loss"] == pytest.approx(1600.0)
+    contents = report_contents(folder)
+    assert "No better chamber than the start was found" in contents["answer"]
+    assert not contents["metrics"][0]["real"]
 
 
 def test_a_front_of_two_objectives_is_listed(study: Path, tmp_path: Path) -> None:
@@ -243,9 +143,9 @@ def test_a_front_of_two_objectives_is_listed(study: Path, tmp_path: Path) -> Non
     }
     front = [{"parameters": {"shot.mass_g": 7.5}, "standing": "feasible", "objectives": goals}]
     folder = changed(study, tmp_path / "front", lambda data: data["study"].update(front=front))
-    said = Page(write_report(folder)[0]).said
-    assert "The study had two objectives" in said
-    assert "71.3\u00a0±\u00a02.0" in said  # seconds, not their negative
+    text = Page(write_report(folder)[0]).text
+    assert "The study had two objectives" in text
+    assert "71.3\u00a0±\u00a02.0" in text  # seconds, not their negative
 
 
 @pytest.mark.parametrize("kind", ["simulation", "study"])
@@ -272,7 +172,7 @@ def test_the_page_needs_nothing_but_itself(
     assert all(a["aria-label"] for a in charts_shown)
 
 
-def test_what_others_wrote_stays_text(simulation: Path, tmp_path: Path) -> None:
+def test_markup_in_names_and_notes_stays_text(simulation: Path, tmp_path: Path) -> None:
     note = "</script><script>alert(2)</script>"
 
     def spoil(data: dict) -> None:
@@ -283,8 +183,8 @@ def test_what_others_wrote_stays_text(simulation: Path, tmp_path: Path) -> None:
     assert not any(tag in ("img", "i") for tag, _ in page.elements)
     assert not any("alert(2)" in script for script in page.scripts)
     assert page.parts()["scenes"][0]["title"] == NASTY
-    for said in (NASTY, note, "<i>python", "</style>"):
-        assert said in page.said
+    for text in (NASTY, note, "<i>python", "</style>"):
+        assert text in page.text
 
 
 def test_the_page_carries_the_columns_of_the_target(simulation: Path, tmp_path: Path) -> None:
@@ -329,7 +229,7 @@ def test_an_older_result_without_single_hits_shows_what_it_has(
         del data["metrics"][later]
     (folder / "result.json").write_text(json.dumps(data))
     page = Page(write_report(folder)[0])
-    assert "older result does not say" in page.said
+    assert "older result does not say" in page.text
     assert [one["name"] for one in page.parts()["quantities"]] == [
         "coverage",
         "impacts",
@@ -346,21 +246,27 @@ def test_marked_dents_have_no_coverage_at_other_times(simulation: Path, tmp_path
     surface.save(folder / "coverage.vtp")
     page = Page(write_report(folder)[0])
     assert not {"density", "shown-density"} & set(page.parts()["scenes"][0]["columns"])
-    assert "marked every dent" in page.said
+    assert "marked every dent" in page.text
 
 
-def test_what_a_pilot_estimated_of_each_effect_is_told(simulation: Path, tmp_path: Path) -> None:
-    said = "drag is on: needed (0.1 of the speed is lost on the way up; pilot: ...)"
+def test_pilot_estimates_of_each_effect_are_shown(simulation: Path, tmp_path: Path) -> None:
+    sentence = "drag is on: needed (0.1 of the speed is lost on the way up; pilot: ...)"
     changes = {"mean impact speed": {"value": -0.042, "half_width": 0.004}}
-    advice = {"effect": "drag", "on": True, "verdict": "matters", "said": said, "changes": changes}
+    advice = {
+        "effect": "drag",
+        "on": True,
+        "verdict": "matters",
+        "said": sentence,
+        "changes": changes,
+    }
     folder = changed(simulation, tmp_path / "auto", lambda data: data.update(effects=[advice]))
     page = Page(write_report(folder)[0])
-    assert "chosen by a short pilot run" in page.said
-    assert "−4.2\u00a0±\u00a00.4 %" in page.said
-    assert said in page.said
+    assert "chosen by a short pilot run" in page.text
+    assert "−4.2\u00a0±\u00a00.4 %" in page.text
+    assert sentence in page.text
 
 
-def test_a_part_too_large_for_a_page_is_drawn_less_and_says_so(simulation: Path) -> None:
+def test_a_part_too_large_for_a_page_is_reduced_with_a_remark(simulation: Path) -> None:
     result, surface = load_result(simulation), read_surface(simulation / "coverage.vtp")
     target = int(((surface["target"] > 0) & (surface["exposed_area_mm2"] > 0)).sum())
     less = part_scene(result, "", max_triangles=target)
@@ -386,10 +292,10 @@ def test_parts_side_by_side(simulation: Path, study: Path, tmp_path: Path) -> No
         "study/start",
         f"{study.parent.name}/study",
     ]
-    assert all(remark in page.said for remark in remarks)
+    assert all(remark in page.text for remark in remarks)
 
 
-def test_only_a_report_of_ours_is_replaced(simulation: Path, tmp_path: Path) -> None:
+def test_only_an_older_report_is_replaced(simulation: Path, tmp_path: Path) -> None:
     path, _ = write_report(simulation, tmp_path / "page.html")
     write_report(simulation, path)
     precious = tmp_path / "precious.html"
@@ -412,8 +318,8 @@ def test_the_command(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture)
     assert report_contents(folder)["answer"] in out
     assert load_result(folder).data == load_result(study).data
     assert main(["report", str(folder), "--json", "--out", str(tmp_path / "r.html")]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["report"] == str(tmp_path / "r.html")
-    assert told["metrics"] == report_contents(folder)["metrics"]
+    found = json.loads(capsys.readouterr().out)
+    assert found["report"] == str(tmp_path / "r.html")
+    assert found["metrics"] == report_contents(folder)["metrics"]
     assert main(["report", str(tmp_path)]) == 2
     assert "not a results folder" in capsys.readouterr().err

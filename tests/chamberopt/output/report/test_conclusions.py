@@ -1,0 +1,60 @@
+"""What the report says about parameters follows from the model's curves and their intervals."""
+
+import math
+
+import pytest
+
+from chamberopt.output.report.conclusions import influence
+from chamberopt.output.report.numbers import Label, objective_label
+
+
+def a_model(mean: list, half_width: list, **other: object) -> dict:
+    """result.json's "study" of one parameter x in 0 .. 2, best at 0."""
+    curve = {"values": [0.0, 1.0, 2.0], "mean": mean, "half_width": half_width, "main_effect": mean}
+    return {
+        "evaluations": 20,
+        "vary": {"x": [0.0, 2.0]},
+        "start": {"parameters": {"x": 1.0}},
+        "best": {"parameters": {"x": 0.0}},
+        "model": {
+            "noise": 0.01,
+            "expected": {"value": mean[0], "half_width": half_width[0]},
+            "together": 1.0,
+            "parameters": {"x": {"flat": [0.0, 0.1], "share_of_variance": 1.0, **curve}},
+        },
+        **other,
+    }  # fmt: skip
+
+
+def test_the_cost_of_moving_a_parameter_has_an_interval() -> None:
+    """It costs 0.5 ± 0.5 at its far end, but 0.4 ± 0.05 in the middle: certainly 0.35."""
+    found = influence(a_model([1.0, 0.6, 0.5], [0.03, 0.04, 0.5]), Label("goal"))
+    (one,) = found["parameters"]
+    assert (one["loss"], one["loss_half_width"]) == pytest.approx((0.5, math.hypot(0.5, 0.03)))
+    assert one["surely"] == pytest.approx(0.35)
+    assert found["said"][0].startswith("x mattered most")
+    assert "0.5 ± 0.5" in found["said"][0]
+    assert "0.35 or more" in found["said"][0]
+
+
+def test_too_few_evaluations_are_reported() -> None:
+    unsure = influence(a_model([1.0, 0.9, 0.8], [0.2, 0.2, 0.2]), Label("goal"))
+    assert unsure["parameters"][0]["surely"] == 0.0
+    assert "20 evaluations are too few to show an influence of x" in unsure["said"][0]
+    none = influence(
+        {**a_model([1.0] * 3, [0.0] * 3), "model": None, "evaluations": 3, "failed": 1},
+        Label("goal"),
+    )
+    assert none["parameters"] == []
+    assert none["said"] == [
+        "3 evaluations, 1 of them failed, are too few to tell what each parameter does: "
+        "4 or more are needed for a model of them."
+    ]
+
+
+def test_a_time_to_minimise_is_shown_as_a_time() -> None:
+    found = influence(
+        a_model([-400.0, -900.0, -2000.0], [10.0] * 3), objective_label("minus_time_to_98_s")
+    )["parameters"][0]
+    assert found["mean"] == [400.0, 900.0, 2000.0]
+    assert found["loss"] == pytest.approx(1600.0)
