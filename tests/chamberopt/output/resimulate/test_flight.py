@@ -1,31 +1,22 @@
-"""A replay shows what was simulated: each ball on its flight, at the very time; and says what it cannot show."""
+"""Every ball is where the simulation has it at the time of the frame."""
 
 from dataclasses import replace
-from itertools import pairwise
-from pathlib import Path
 
-import imageio.v2 as imageio
 import numpy as np
 import pytest
-from PIL import Image, ImageSequence
 
 from chamberopt.chamber.build import TAG_PART, TAG_SONOTRODE
-from chamberopt.cli import main
 from chamberopt.common.errors import InputError
 from chamberopt.output.resimulate.flight import face_displacement, rotation_angle, simulate_flight
 from chamberopt.output.resimulate.rebuild import Replica, rebuild_replica
 from chamberopt.output.results.load import Result
-from chamberopt.output.viewer import missing_opengl, subprocess_drawing
-from chamberopt.output.viewer.images import film
-from chamberopt.output.viewer.images.film import film_path, write_film
-from chamberopt.output.viewer.images.replay_film import draw_replay, rotation_matrix
+from chamberopt.output.viewer.images.replay_film import rotation_matrix
 from sim_core import Balls, Gravity, PartRotation, Physics, Scene, simulate
 from sim_core.effects.part_rotation import angle_at, new_rotation_state, rotate_points
 from tests.helpers.results.short_plate import plate_result
 
 G = 9.80665
 COLUMNS = ("time", "ball", "triangle", "position", "velocity", "normal_speed")
-needs_opengl = pytest.mark.skipif(missing_opengl() is not None, reason="no OpenGL library")
 
 
 @pytest.fixture(scope="module")
@@ -128,103 +119,3 @@ def test_what_was_not_simulated_is_not_shown(
 ) -> None:
     with pytest.raises(InputError, match=said):
         simulate_flight(replica, start, span, frames)
-
-
-def test_films_play_back_as_they_were_written(tmp_path: Path) -> None:
-    """A bright spot of four pixels keeps its colour beside a large grey gradient."""
-    grey = np.tile(np.linspace(100, 200, 64, dtype=np.uint8)[None, :, None], (48, 1, 3))
-    frames = [grey.copy() for _ in range(7)]
-    for k, frame in enumerate(frames):
-        frame[10:12, 5 * k + 4 : 5 * k + 6] = (255, 46, 154)
-    write_film(tmp_path / "spot.gif", frames, fps=20)
-    with Image.open(tmp_path / "spot.gif") as image:
-        pages = [
-            (np.array(page.convert("RGB")), page.info["duration"])
-            for page in ImageSequence.Iterator(image)
-        ]
-        assert image.info["loop"] == 0
-    assert [duration for _, duration in pages] == [50] * 7
-    for (page, _), frame in zip(pages, frames, strict=True):
-        assert np.abs(page.astype(int) - frame).max() < 12
-    pytest.importorskip("imageio_ffmpeg")
-    write_film(tmp_path / "spot.mp4", frames, fps=20)
-    again = imageio.mimread(tmp_path / "spot.mp4")
-    assert len(again) == 7
-    assert all(
-        np.abs(page.astype(int) - frame).mean() < 8
-        for page, frame in zip(again, frames, strict=True)
-    )
-
-
-def test_where_no_film_can_be_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(
-        InputError, match=r"shot\.avi: films are written as \.gif or \.mp4; give such a name"
-    ):
-        film_path(tmp_path / "shot.avi")
-    with pytest.raises(InputError, match="the folder does not exist"):
-        film_path(tmp_path / "nowhere" / "shot.gif")
-    (tmp_path / "shot.gif").mkdir()
-    with pytest.raises(InputError, match=r"shot\.gif: is a folder"):
-        film_path(tmp_path / "shot.gif")
-
-    def refuse(**_: object) -> None:
-        raise PermissionError(13, "Permission denied")
-
-    with monkeypatch.context() as patch:
-        patch.setattr(subprocess_drawing.tempfile, "TemporaryFile", refuse)
-        with pytest.raises(InputError, match=r"a\.gif: cannot be written: Permission"):
-            film_path(tmp_path / "a.gif")
-    monkeypatch.setattr(film, "find_spec", lambda _: None)
-    with pytest.raises(InputError, match=r"pip install 'chamberopt\[mp4\]'"):
-        film_path(tmp_path / "shot.mp4")
-    for fps, size, frames, name, said in (
-        (0, (64, 64), 9, "a.gif", "--fps"),
-        (20, (10, 64), 9, "a.gif", "--size"),
-        (20, (100, 64), 9, "a.mp4", "multiples of 16"),
-        (
-            20,
-            (2000, 1500),
-            101,
-            "a.gif",
-            "--frames: given 101; at most 100 are supported at 2000 x 1500 pixels",
-        ),
-    ):
-        with pytest.raises(InputError, match=said):
-            film.require_playable(fps, size, frames, Path(name))
-
-
-@needs_opengl
-def test_a_replay_shows_balls_that_move_and_hits(result: Result, tmp_path: Path) -> None:
-    seen = simulate_flight(rebuild_replica(result), 0.02, 0.008, 6)
-    assert len(seen.impacts) > 5
-    assert draw_replay(result.folder, seen, tmp_path / "plate.gif", 20, (320, 240)) is None
-    with Image.open(tmp_path / "plate.gif") as image:
-        pages = [
-            np.array(page.convert("RGB")).astype(int) for page in ImageSequence.Iterator(image)
-        ]
-    assert len(pages) == 6
-    assert all((np.abs(one - other).max(axis=2) > 40).sum() > 200 for one, other in pairwise(pages))
-    last = pages[-1]
-    assert (np.abs(last - [0xE0, 0x8A, 0x2E]).max(axis=2) < 24).mean() > 0.03  # the sonotrode
-    red, green, blue = last.transpose(2, 0, 1)
-    assert (
-        (red > 120) & (green < 0.55 * red) & (blue > 1.3 * green)
-    ).sum() > 20  # magenta: balls that have just hit
-    assert list(tmp_path.iterdir()) == [tmp_path / "plate.gif"]
-
-
-def test_on_the_command_line(
-    result: Result, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    folder = str(result.folder)
-    for arguments, said in (
-        (["replay", folder, str(tmp_path / "a.avi")], ".gif or .mp4"),
-        (["replay", str(tmp_path), str(tmp_path / "a.gif")], "not a results folder"),
-        (["replay", folder, str(tmp_path / "a.gif"), "--span-ms", "1000"], "--span-ms: given 1000"),
-        (["replay", folder, str(tmp_path / "a.gif"), "--replica", "9"], "--replica: given 9"),
-        (["replay", folder, str(tmp_path / "a.gif"), "--fps", "99"], "--fps: given 99"),
-    ):
-        assert main(arguments) == 2
-        said_there = capsys.readouterr().err.strip().splitlines()
-        assert said in said_there[-1]
-        assert not list(tmp_path.glob("a.*"))

@@ -1,8 +1,9 @@
-"""Pictures of a fixed result against committed ones: other colours, another scale or another mesh are noticed.
+"""Views of a fixed result compared with committed pictures: other colours, scales or meshes are noticed.
 
-Compared are means over blocks of 20 by 20 pixels, which hardly depend on how a driver smooths edges. TOLERANCE, of 1:
-softening every edge over three pixels changes a block by 0.011, losing one triangle in ten by 0.035 and more.
-To draw them anew, after a change that is meant and looked at: python -m tests.chamberopt.output.viewer.test_images
+Compared are means over blocks of 20 by 20 pixels, which hardly depend on how a driver smooths edges.
+TOLERANCE is a share of 1: softening every edge over three pixels changes a block by 0.011, losing one
+triangle in ten by 0.035 and more. To draw the pictures again, after a change that is wanted and has
+been looked at: python -m tests.chamberopt.output.viewer.test_plotter
 """
 
 import subprocess
@@ -14,17 +15,17 @@ import pytest
 from PIL import Image
 from scipy.ndimage import uniform_filter
 
-from chamberopt.output.viewer import missing_opengl
+from chamberopt.output.viewer.plotter import view_of_target
 from chamberopt.output.viewer.subprocess_drawing import without_display
+from chamberopt.output.vtp_files import pyvista
+from tests.helpers.opengl import needs_opengl
 
 REFERENCES = Path(__file__).parents[3] / "pictures"
 BLOCK, TOLERANCE = 20, 0.02
 
-pytestmark = pytest.mark.skipif(missing_opengl() is not None, reason="no OpenGL library")
-
 
 def drawn(folder: Path) -> dict[str, np.ndarray]:
-    """Of tests/looked_at.py, in a process of its own."""
+    """Draw the pictures of tests/helpers/results/sphere_in_sphere.py in a process of its own."""
     command = [
         sys.executable,
         "-m",
@@ -59,19 +60,36 @@ def pictures(tmp_path_factory: pytest.TempPathFactory) -> dict[str, np.ndarray]:
     return drawn(tmp_path_factory.mktemp("pictures"))
 
 
+@needs_opengl
 @pytest.mark.parametrize("name", ["coverage", "pick"])
 def test_a_result_looks_as_it_did(pictures: dict[str, np.ndarray], name: str) -> None:
     assert difference(pictures[name], reference(name)) < TOLERANCE
 
 
+@needs_opengl
 @pytest.mark.parametrize("wrong", ["other colours", "other limits", "moved", "lost"])
 def test_what_is_wrong_is_noticed(pictures: dict[str, np.ndarray], wrong: str) -> None:
     assert difference(pictures[wrong], reference("coverage")) > TOLERANCE
 
 
+@needs_opengl
 @pytest.mark.parametrize("name", ["coverage", "pick"])
 def test_softer_edges_are_no_change(name: str) -> None:
     assert difference(uniform_filter(reference(name), (3, 3, 1)), reference(name)) < TOLERANCE
+
+
+def test_a_target_that_looks_down_is_seen_from_below() -> None:
+    for looks, side in ((-1.0, -1.0), (1.0, 1.0)):
+        plate = (
+            pyvista()
+            .Plane(direction=(0.0, 0.0, looks), i_resolution=2, j_resolution=2)
+            .triangulate()
+        )
+        plate["exposed_area_mm2"] = np.full(plate.n_cells, 0.125)
+        assert np.sign(view_of_target(plate)[2]) == side
+    ball = pyvista().Sphere()
+    ball["exposed_area_mm2"] = np.ones(ball.n_cells)
+    assert view_of_target(ball)[2] > 0.0
 
 
 if __name__ == "__main__":

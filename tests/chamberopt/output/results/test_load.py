@@ -1,0 +1,72 @@
+"""Damaged, unfinished and foreign folders are refused with a reason."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from chamberopt.chamber.build import build_chamber
+from chamberopt.common.errors import InputError
+from chamberopt.output import viewer
+from chamberopt.output.results.load import load_result
+from chamberopt.output.save_run import save_simulation
+from tests.helpers.synthetic import plate_design, poisson_evaluation
+
+DESIGN = plate_design()
+CHAMBER = build_chamber(DESIGN)
+EVALUATION = poisson_evaluation(DESIGN, CHAMBER)
+
+
+@pytest.fixture
+def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        viewer, "draw_coverage", lambda *_: "coverage.png skipped: no OpenGL library found"
+    )
+
+
+def wrong_figures(text: str) -> list[str]:
+    """The same result.json, well formed, with an objective that is no figure and a metric missing."""
+    wrong = []
+    for value in ("x", None, float("nan"), []):
+        data = json.loads(text)
+        data["objective"]["value"] = value
+        wrong.append(json.dumps(data))
+    data = json.loads(text)
+    del data["metrics"]["std_coverage"]
+    return [*wrong, json.dumps(data)]
+
+
+@pytest.mark.usefixtures("no_pictures")
+def test_a_result_can_be_looked_at_without_the_parts_file(tmp_path: Path) -> None:
+    folder = tmp_path / "plate"
+    save_simulation(folder, DESIGN, CHAMBER, EVALUATION)
+    data = json.loads((folder / "result.json").read_text())
+    data["design"]["part"]["mesh"] = "gone.stl"
+    (folder / "result.json").write_text(json.dumps(data))
+    assert not load_result(folder).design.part.mesh_path.exists()
+    assert load_result(folder).objective.value == EVALUATION.objective.value
+
+
+@pytest.mark.usefixtures("no_pictures")
+def test_what_is_no_result_is_said(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="not a results folder"):
+        load_result(tmp_path)
+    (tmp_path / "history.jsonl").write_text("{}\n")
+    with pytest.raises(InputError, match="has not finished"):
+        load_result(tmp_path)
+    folder = tmp_path / "plate"
+    save_simulation(folder, DESIGN, CHAMBER, EVALUATION)
+    text = (folder / "result.json").read_text()
+    for damaged in (
+        text[: len(text) // 2],
+        "[]",
+        "{}",
+        text.replace('"metrics"', '"metric"'),
+        *wrong_figures(text),
+    ):
+        (folder / "result.json").write_text(damaged)
+        with pytest.raises(InputError, match="damaged"):
+            load_result(folder)
+    (folder / "result.json").write_text(text.replace('"format": 1', '"format": 99'))
+    with pytest.raises(InputError, match="format 99"):
+        load_result(folder)

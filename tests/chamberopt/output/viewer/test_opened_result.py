@@ -1,0 +1,106 @@
+"""An opened result shows its own values, and refuses files of another result."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chamberopt.common.errors import InputError
+from chamberopt.coverage.part_impacts import save_hits, sort_hits_by_triangle
+from chamberopt.output.viewer import ResultInfo, ViewState
+from chamberopt.output.viewer.opened_result import OpenedResult, colour_limits, same_part
+from chamberopt.simulation.triangle_fields import QUANTITIES
+from tests.helpers.results.sphere_in_sphere import TREATMENT, ball_result
+
+
+def test_time_moves_what_grows(ball: ResultInfo) -> None:
+    seen = OpenedResult(ball)
+    now, later = ViewState(), ViewState(time_s=2.0 * TREATMENT)
+    bare = 1.0 - seen.part.values(QUANTITIES["coverage"]) / 100.0
+    for look, times in ((now, 1.0), (later, 2.0)):
+        seen.show(look)
+        np.testing.assert_allclose(
+            seen.part.target["shown"], 100.0 * (1.0 - bare**times), atol=1e-9
+        )
+    assert colour_limits([seen], later) == (0.0, 100.0)
+    impacts = seen.part.values(QUANTITIES["impacts"])
+    seen.show(ViewState("impacts", time_s=2.0 * TREATMENT))
+    np.testing.assert_allclose(seen.part.target["shown"], 2.0 * impacts)
+    speed = seen.part.values(QUANTITIES["speed"])
+    seen.show(ViewState("speed", time_s=2.0 * TREATMENT))
+    np.testing.assert_array_equal(seen.part.target["shown"], speed)
+
+
+def test_marked_dents_have_one_time(tmp_path: Path) -> None:
+    subject = ball_result(tmp_path / "ball", marked=True)
+    seen = OpenedResult(subject)
+    seen.show(ViewState())
+    np.testing.assert_allclose(seen.part.target["shown"], 100.0 * seen.part.target["coverage"])
+    with pytest.raises(InputError, match="marked one by one, at the treatment time of 10 s"):
+        seen.show(ViewState(time_s=3.0))
+    seen.show(ViewState("impacts", time_s=3.0))
+
+
+def test_below_is_of_coverage_whatever_is_shown(ball: ResultInfo) -> None:
+    seen = OpenedResult(ball)
+    passed = seen.above_threshold(ViewState("speed", below=60.0))
+    np.testing.assert_array_equal(passed, seen.part.target["coverage"] >= 0.6)
+    assert passed.any()
+    later = seen.above_threshold(ViewState("speed", below=60.0, time_s=4.0 * TREATMENT))
+    assert (later & ~passed).any()
+    assert not seen.above_threshold(ViewState()).any()
+
+
+def test_a_triangles_numbers(ball: ResultInfo) -> None:
+    seen = OpenedResult(ball)
+    lines = seen.describe_triangle(404, ViewState())
+    text = "\n".join(lines)
+    surface = seen.surface
+    assert lines[0] == "triangle 404"
+    assert f"coverage: {100.0 * surface['coverage'][404]:.4g} %" in lines
+    assert f"impacts per area: {surface['impacts_per_mm2'][404]:.4g} 1/mm²" in lines
+    assert "mean normal speed: 2.5 m/s" in lines
+    assert "simulated: 4 impacts, 20 dents" in lines
+    assert "energy" not in text  # not in this result
+    assert "mean normal speed: none" in seen.describe_triangle(405, ViewState())
+    assert "not in the target" in seen.describe_triangle(
+        int(np.argmin(surface["target"])), ViewState()
+    )
+    np.testing.assert_array_equal(seen.hits.of(404).speed, [1.0, 2.0, 3.0, 4.0])
+    surface["element"] = np.arange(surface.n_cells) + 1000
+    assert seen.describe_triangle(404, ViewState())[0] == "triangle 404, element 1404"
+    with pytest.raises(InputError, match="triangles 0 to 1279"):
+        seen.describe_triangle(1280, ViewState())
+
+
+def test_files_of_another_result_are_noticed(tmp_path: Path, ball: ResultInfo) -> None:
+    other = ball_result(tmp_path / "other", lost=7)
+    folder = Path(ball.folder)
+    (tmp_path / "hits.npz").write_bytes((folder / "hits.npz").read_bytes())
+    save_hits(folder / "hits.npz", sort_hits_by_triangle([OpenedResult(other).hits.hits], 1280))
+    with pytest.raises(InputError, match="not those of the coverage"):
+        _ = OpenedResult(ball).hits
+    (folder / "hits.npz").unlink()
+    assert OpenedResult(ball).hits is None
+    (folder / "coverage.vtp").write_bytes(Path(other.folder, "coverage.vtp").read_bytes())
+    with pytest.raises(InputError, match=r"of another result than result\.json"):
+        OpenedResult(ball)
+    (folder / "coverage.vtp").write_bytes((folder / "chamber.vtp").read_bytes())
+    with pytest.raises(InputError, match="has no coverage"):
+        OpenedResult(ball)
+
+
+def test_what_an_older_result_lacks_is_said(ball: ResultInfo) -> None:
+    seen = OpenedResult(ball)
+    assert seen.quantities == ["coverage", "impacts", "speed", "p90-speed"]
+    with pytest.raises(InputError, match=r"--quantity energy.*simulate again"):
+        seen.show(ViewState("energy"))
+
+
+def test_only_views_of_the_same_part_are_linked(tmp_path: Path, ball: ResultInfo) -> None:
+    moved, other = (
+        ball_result(tmp_path / "moved", moved=1.0),
+        ball_result(tmp_path / "other", lost=7),
+    )
+    assert same_part([OpenedResult(ball), OpenedResult(moved)])
+    assert not same_part([OpenedResult(ball), OpenedResult(other)])

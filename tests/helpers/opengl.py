@@ -1,0 +1,7 @@
+"""Mark of tests that draw."""
+
+import pytest
+
+from chamberopt.output.viewer import missing_opengl
+
+needs_opengl = pytest.mark.skipif(missing_opengl() is not None, reason="no OpenGL library")
