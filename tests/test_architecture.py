@@ -11,6 +11,9 @@ ROOT = Path(__file__).resolve().parents[1]
 # Who may import whom: each package from those before it in its row, and from itself.
 ORDER = {
     "chamberopt": "common geometry design chamber coverage simulation optimize output api cli __main__",
+    "chamberopt/geometry": "triangles solids+remesh slivers mesh_io",
+    "chamberopt/geometry/mesh_io": "surface_error units+holes+self_intersection readers formats "
+    "healing part_mesh",
     "chamberopt/design": "table materials shapes effects+part+process+shot+sonotrode design load",
     "chamberopt/chamber": "target deflector_meshes bores_and_deflectors reach part build dimensionless scene analytic checks",
     "chamberopt/coverage": "statistics dents coverage_from_impacts part_impacts+metrics dent_marking "
