@@ -1,4 +1,4 @@
-"""A chamber that is a cylinder, box or prism is recognised; anything else is refused, saying what is in the way."""
+"""A chamber that is a cylinder, box or prism is recognised; all others are refused."""
 
 from functools import cache
 
@@ -44,7 +44,7 @@ def chamber_of(mesh: TriangleMesh) -> Chamber:
 def extruded(
     outline: list[tuple[float, float]], top: float = 0.015, lean: float = 0.0
 ) -> TriangleMesh:
-    """A room over the outline, fanned from its first corner; the ceiling ``lean`` [m] wider than the floor."""
+    """A room over an outline; its ceiling is ``lean`` [m] wider than its floor."""
     from shapely import Polygon
     from trimesh.creation import extrude_polygon
 
@@ -135,7 +135,7 @@ def test_impacts_are_booked_on_the_triangle_under_them() -> None:
 
 
 def both(design: Design) -> list[float]:
-    """Differences of mean coverage and impact rate over their 95 % half-widths; each says which of the two it is."""
+    """Differences of mean coverage and impact rate, relative to their 95 % half-widths."""
     with local_executor() as executor:
         exact = evaluate(design, plate(), executor, cavity=analytic_cavity(design, plate()))
         meshed = evaluate(design, plate(), executor)
@@ -150,7 +150,7 @@ def both(design: Design) -> list[float]:
 
 
 def test_the_plate_is_peened_as_in_its_mesh() -> None:
-    """95 % half-widths: the two differ by less than twice their common one, but for one time in ten thousand."""
+    """Two results differ by more than twice their common half-width once in ten thousand times."""
     design = PLATE.changed(
         {"process.accuracy.replicas": 6, "process.accuracy.simulated_time_s": 1.0}
     )

@@ -1,4 +1,4 @@
-"""Deflectors, fixture holes, further sonotrodes: what they add to the cavity or take from it, what is refused."""
+"""Deflectors, fixture holes and further sonotrodes change the cavity as they should."""
 
 import dataclasses
 from pathlib import Path
@@ -175,7 +175,7 @@ def test_a_hole_goes_its_depth_beyond_the_wall(plain: Chamber) -> None:
 
 
 def test_a_hole_takes_the_shaft_of_the_part(plain: Chamber) -> None:
-    """The gear's shaft of 16 mm goes up into a bore of 20 mm: a ring is added, and more of the shaft is exposed."""
+    """The shaft of 16 mm in a bore of 20 mm: a ring is added, and more of the shaft is exposed."""
     hole = {"at_mm": [0.0, 12.0, 40.0], "axis": [0, 0, 1], "diameter_mm": 34.0, "depth_mm": 5.0}
     chamber = build_chamber(design(holes=[{**hole, "at_mm": [0.0, 0.0, 40.0]}]))
 
@@ -231,7 +231,7 @@ def test_a_ball_on_it_is_said_to_lie_there() -> None:
 
 
 def test_each_sonotrode_vibrates_its_own_way() -> None:
-    """A phase is ahead of the first's, whatever the first's is; the law of the sonotrode holds for its tag too."""
+    """A phase is relative to the first sonotrode's; all sonotrodes have the same restitution."""
     made = design(
         sonotrodes=[
             sonotrode(phase_deg=90.0, frequency_khz=30.0),
@@ -254,7 +254,7 @@ def test_each_sonotrode_vibrates_its_own_way() -> None:
 
 
 def test_balls_do_not_rest_on_a_sonotrode_that_looks_up(tmp_path: Path) -> None:
-    """Beside the gear's own face there is none to lie on but a second sonotrode's, sunk into the floor's plane."""
+    """Balls cannot lie on the sonotrode, but on the lower side of a second one's well."""
     data = design().model_dump()
     trimesh.creation.icosphere(subdivisions=2, radius=3).export(tmp_path / "part.stl")
     rod = trimesh.convex.convex_hull(

@@ -1,4 +1,4 @@
-"""Chambers: closed, of the right volume, every triangle traced to its origin; and what is said or refused."""
+"""Chambers are closed, have the right volume, and each triangle is traced to its origin."""
 
 from pathlib import Path
 from typing import Any
@@ -50,7 +50,7 @@ def overlap(design: Design, chamber: Chamber) -> float:
 
 
 def shape_volume(design: Design) -> float:
-    """Volume [m³] of the whole shape, its corners on the grid: within 0.5 nm of the prism over a polygon."""
+    """Volume [m³] of the whole shape, whose corners are on a grid of 1 nm."""
     chamber = design.chamber
     shape = chamber.surface(np.zeros((0, 3)), np.zeros((0, 3), dtype=int))
     volume = make_solid(shape.vertices, shape.triangles, "shape").volume
@@ -150,7 +150,7 @@ def test_any_size_offset_and_rotation_makes_a_sound_chamber(name: str, seed: int
     ("diameter", "height"), [(44.0, 45.0), (70.0, 25.0), (44.0, 25.0), (16.0, 45.0)]
 )
 def test_faces_that_coincide_with_the_gear_stay_sound(diameter: float, height: float) -> None:
-    """Tip circle on the wall, ceiling on the upper face, shaft on the wall: where booleans go wrong."""
+    """Tip circle or shaft on the wall, ceiling on the upper face: hard cases for booleans."""
     design = shipped(
         "gear",
         chamber={"diameter_mm": diameter, "height_mm": height, "sonotrode_distance_mm": 15.0},
@@ -246,7 +246,7 @@ def test_a_void_inside_the_part_is_no_chamber(tmp_path: Path) -> None:
 
 
 def test_rotation_is_about_x_then_y_then_z(tmp_path: Path) -> None:
-    """Sides (10, 20, 30): about x they become (10, 30, 20), about y (20, 30, 10), about z (30, 20, 10)."""
+    """Sides (10, 20, 30) are permuted by quarter turns about x, then y, then z."""
     design = with_mesh(tmp_path, box((10, 20, 30)), part={"rotate_deg": (90.0, 90.0, 90.0)})
 
     sides = np.ptp(build_chamber(design).part.vertices, axis=0)

@@ -1,4 +1,4 @@
-"""effects.part_turn in a design: what it may say, and the motion that the simulator gets from it."""
+"""effects.part_turn of a design: its allowed values, and the rotation that the simulator gets."""
 
 from pathlib import Path
 
@@ -83,7 +83,7 @@ def test_a_saved_design_loads_as_the_same(tmp_path: Path, motion: str) -> None:
 
 def test_the_axis_goes_with_the_part_wherever_it_is_posed(design: Design) -> None:
     point, axis = turning_axis(design)
-    # the gear's axis is its file's z axis: turned about x by 90 degrees it lies along -y, at half the gear's height
+    # The gear's axis is z in its file: after 90 degrees about x it lies along -y, at half height.
     np.testing.assert_allclose(axis, [0.0, -1.0, 0.0], atol=1e-15)
     np.testing.assert_allclose(point[[0, 2]], [0.0, 0.015 + 0.022], atol=1e-4)
     lower = design.changed({"chamber.sonotrode_distance_mm": 10.0, "part.offset_mm.0": 3.0})

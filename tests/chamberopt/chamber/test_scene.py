@@ -1,4 +1,4 @@
-"""The scene a replica starts from: reproducible, packed low, at the sonotrode's speed scale."""
+"""The scene of a replica is reproducible, packed low, and has the sonotrode's speed scale."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The target by the names of the part's file, alone and with the other conditions; and its elements."""
+"""The target by names of the part's file, alone and with other conditions; its elements."""
 
 from pathlib import Path
 from typing import Any
@@ -126,7 +126,7 @@ def with_reachable(reachable: bool, **values: float) -> Design:
 
 
 def test_what_the_shot_cannot_touch_can_be_left_out_of_the_target() -> None:
-    """The sharp roots of the gear's teeth; larger balls leave out more. Every other condition still holds."""
+    """Sharp tooth roots are left out, more of them for larger balls; other conditions still hold."""
     whole = build_chamber(with_reachable(False))
     small, large = (build_chamber(with_reachable(True, shot__diameter_mm=d)) for d in (1.5, 3.0))
     assert (small.part.target <= whole.part.target).all()

@@ -1,4 +1,4 @@
-"""Design and study files: units, bounds, cross-checks, and that a wrong file is told what to put right."""
+"""Design and study files: units, bounds, cross-checks, and messages that name the remedy."""
 
 import math
 import shutil

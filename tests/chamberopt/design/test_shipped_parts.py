@@ -1,4 +1,4 @@
-"""The shipped parts: same bytes again, closed, outward, well shaped, and the gear a true involute gear."""
+"""The shipped parts are reproducible, closed and well shaped; the gear is a true involute gear."""
 
 import subprocess
 import sys

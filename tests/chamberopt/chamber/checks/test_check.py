@@ -1,4 +1,4 @@
-"""What `check` says before anything runs: where shot can come to rest, how the part turns, what sticks out."""
+"""Facts and warnings of `check`: resting places, the part's rotation, parts outside the chamber."""
 
 import math
 from dataclasses import replace
@@ -60,7 +60,7 @@ def gear() -> tuple[Design, Chamber]:
 
 
 def test_a_level_top_is_warned_of_with_area_place_and_remedy(gear: tuple[Design, Chamber]) -> None:
-    """The gear's upper face: a disc with teeth, 20 mm from root to root and 22 to their tips, less the shaft."""
+    """The gear's upper face: a toothed disc between radius 20 and 22 mm, less the shaft."""
     design, chamber = gear
     (said,) = (text for text in warned(design, chamber) if "come to rest" in text)
     assert "come to rest on the part, which neither vibrates nor turns" in said
@@ -75,7 +75,7 @@ def test_a_level_top_is_warned_of_with_area_place_and_remedy(gear: tuple[Design,
 
 
 def test_slopes_are_a_note_and_no_warning() -> None:
-    """A gutter round the wall; the blade's own slopes, and walls that lean out, lead down to the sonotrode."""
+    """A gutter round the wall holds balls; the blade's slopes and leaning walls do not."""
     design, chamber = made("blade")
     assert not find_ledges(design, chamber)
     data = design.model_dump()
@@ -116,7 +116,7 @@ def test_a_turning_part_is_described_in_the_chambers_frame() -> None:
 
 
 def test_a_part_through_the_side_wall_is_warned_of(gear: tuple[Design, Chamber]) -> None:
-    """Not of a shaft that goes out through the ceiling, nor of a lid, nor of a shaft that turns in the wall."""
+    """No warning for a shaft through the ceiling, a lid, or a shaft that turns in the wall."""
     assert not any("side wall between z" in text for text in warned(*gear))
     for name in ("plate", "gear_turning"):
         assert not any("side wall between z" in text for text in warned(*made(name))), name
@@ -126,7 +126,7 @@ def test_a_part_through_the_side_wall_is_warned_of(gear: tuple[Design, Chamber])
 
 
 def test_a_part_that_turns_down_to_the_sonotrode_is_warned_of() -> None:
-    """The gear of 22 mm, 15 mm over the sonotrode, turned about a line 6.9 mm under its own axis: down to 1.2 mm."""
+    """The gear turned about a line 6.9 mm below its own axis comes down to 1.2 mm."""
     eccentric = {"effects.part_turn.through_mm.1": -6.9}
     design, chamber = made("gear_turning")
     said = " ".join(warned(design.changed(eccentric), chamber))

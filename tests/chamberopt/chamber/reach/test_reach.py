@@ -1,6 +1,4 @@
-"""What a ball can reach, where geometry says it in closed form; and that no impact falls on what it calls out of
-reach.
-"""
+"""The reach of a ball agrees with closed forms, and no impact falls out of its reach."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -37,7 +35,7 @@ ROOM = block((-10, 0, 0), (10, 20, 10))
 
 
 def cavity(*pieces: trimesh.Trimesh, above_mm: float = 10.0) -> Chamber:
-    """The pieces as one cavity over a sonotrode at z = 0; what lies above z is the part, and all of it the target."""
+    """The pieces as one cavity over a sonotrode at z = 0; all of it above a height is the target."""
     whole = trimesh.boolean.union(pieces, engine="manifold")
     vertices, triangles = 1e-3 * np.asarray(whole.vertices), np.asarray(whole.faces)
     z = vertices[triangles][..., 2]
@@ -164,7 +162,7 @@ def test_a_half_sphere_smaller_than_the_ball_is_not_touched() -> None:
 
 
 def test_the_largest_ball_at_a_place_is_the_inscribed_one() -> None:
-    """At the middle of a wall of a box 6 mm wide it is 3 mm in radius; at 1 mm from a square corner, 1 mm."""
+    """The radius is 3 mm in the middle of a 6 mm wide box, and 1 mm at 1 mm from a corner."""
     mesh = chamber_mesh(cavity(block((-3, 0, 0), (3, 40, 40)), above_mm=39.0))
     point = 1e-3 * np.array([[-3.0, 20, 20], [-3.0, 1, 20], [0.0, 20, 0]])
     normal = np.array([[1.0, 0, 0], [1, 0, 0], [0, 0, 1]])

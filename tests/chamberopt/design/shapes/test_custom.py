@@ -1,4 +1,4 @@
-"""A user's own shape: checked, varied, recorded and saved like the shipped ones; and what is said of a wrong one."""
+"""A custom shape is checked, varied, recorded and saved like the shipped ones."""
 
 import json
 import pickle
@@ -58,7 +58,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def said_of(folder: Path, *changes: tuple[str, str], file: str = "pyramid.py") -> str:
-    """What is said when the file has these changes; whatever it is, the command line says it and exits with 2."""
+    """The message after these changes to the file; the command line prints it and exits with 2."""
     text = (folder / file).read_text(encoding="utf-8")
     for old, new in changes:
         assert old in text

@@ -1,6 +1,6 @@
-"""Set-ups from CAD: the same room from every way of drawing it, its sonotrode moved, and what is refused.
+"""Set-ups from CAD give the same room however they are drawn; bad ones are refused.
 
-The room: a box of 40 x 40 x 20 mm with a block of 20 x 20 mm hanging 8 mm down from its ceiling.
+The room is a box of 40 x 40 x 20 mm with a block of 20 x 20 mm that hangs 8 mm down from its ceiling.
 """
 
 from pathlib import Path
@@ -49,7 +49,7 @@ def box(half: float, low: float, high: float) -> np.ndarray:
 
 
 def as_pieces(top: float = 20.0, block: float = DRAWN) -> Drawing:
-    """One closed surface: of the block only what bounds the room. The ceiling reaches ``top`` mm to each side."""
+    """One closed surface with only the bounding faces of the block; ``top``: half the ceiling [mm]."""
     inner, outer = square(10, 20), square(top, 20)
     ring = [
         np.array([outer[k], outer[(k + 1) % 4], inner[(k + 1) % 4], inner[k]]) for k in range(4)
@@ -454,7 +454,7 @@ def test_a_study_moves_the_sonotrode_of_a_drawn_set_up(tmp_path: Path) -> None:
 
 
 def test_the_shipped_set_up_is_the_plates_own_chamber() -> None:
-    """Same room, and the same triangles to cover in the same places, whichever way round the file draws them."""
+    """The room and the target's triangles are the same whichever way round the file draws them."""
     drawn, parametric = (
         load_design(DESIGNS / f"{name}.toml") for name in ("plate_imported", "plate")
     )

@@ -1,4 +1,4 @@
-"""Parametric cavities against the solids they stand for, by formulas and by shapely, which know nothing of the code."""
+"""Parametric cavities agree with independent formulas and with shapely."""
 
 import re
 from pathlib import Path
@@ -62,7 +62,7 @@ def simpson(area_at: Any, height: float) -> float:
 
 
 def rounded_polygon_area(sides: int, sharp: float, radius: float, facets: int) -> float:
-    """Of an equiangular polygon of a sharp area with arcs, whose ends are on the sides, at its corners."""
+    """Area of an equiangular polygon with rounded corners, from its area with sharp ones."""
     turn = 2.0 * np.pi / sides
     steps = np.ceil(facets / sides - 1e-9)
     if facets / sides < 0.5 or radius <= 0.05:
@@ -70,7 +70,7 @@ def rounded_polygon_area(sides: int, sharp: float, radius: float, facets: int) -
     return sharp - sides * radius**2 * (np.tan(turn / 2.0) - 0.5 * steps * np.sin(turn / steps))
 
 
-# ------------------------------------------------------------------------------------------------ cylinder, revolve
+# ---- cylinder, revolve
 
 
 @pytest.mark.parametrize("facets", [8, 9, 64, 1024])
@@ -164,7 +164,7 @@ def test_a_revolved_cone_and_a_step_are_what_they_are() -> None:
 
 @pytest.mark.parametrize("corner", [0.0, 1.5])
 def test_a_revolved_profile_by_pappus(corner: float) -> None:
-    """Area times the way of its centroid. Rounded: opened and closed by a disc, mirrored at the axis, without floor."""
+    """Volume by Pappus: area times the path of its centroid, rounded by opening with a disc."""
     half = shapely.Polygon([[0.0, -20.0], [30.0, -20.0], *PROFILE])
     whole = shapely.union(half, affinity.scale(half, -1.0, 1.0, origin=(0.0, 0.0)))
     fine = {"quad_segs": 256}
@@ -195,7 +195,7 @@ def test_a_profile_may_overhang_and_a_leaning_one_is_sheared() -> None:
     )
 
 
-# --------------------------------------------------------------------------------------------------------- box, prism
+# ---- box, prism
 
 
 def test_a_box_and_a_hexagon_have_their_sizes() -> None:
@@ -234,7 +234,7 @@ def test_boxes_lean_and_are_rounded(lean: float, corner: float) -> None:
     assert np.degrees(np.arcsin(-sides[flat][:, 2])) == pytest.approx(lean, abs=1e-9)
 
 
-# ---------------------------------------------------------------------------------------------------------- conformal
+# ---- conformal
 
 
 def block(
@@ -344,7 +344,7 @@ def test_a_gap_too_narrow_for_the_shot_is_said() -> None:
     assert note.startswith("chamber.gap_mm = 2 is narrower than a ball of 3 mm")
 
 
-# ------------------------------------------------------------------------------------------------- whatever the values
+# ---- whatever the values
 
 
 def mm(low: float, high: float) -> st.SearchStrategy[float]:
@@ -551,7 +551,7 @@ def test_what_is_said_to_fit_does(
     checked(surface(shape, **keys, **{key: float(said[1])}))
 
 
-# ------------------------------------------------------------------------------------------------------ with a part
+# ---- with a part
 
 
 TABLES: dict[str, dict[str, Any]] = {
