@@ -23,7 +23,8 @@ from benchmarks.noisy_problems import REPLICAS, Problem, chambers, functions
 from benchmarks.table import print_table, write_csv
 from chamberopt.optimize.search.acquisition import recommend_point
 from chamberopt.optimize.search.gaussian_process import GaussianProcess, pool_variances
-from chamberopt.optimize.search.phases import SearchSettings, maximise
+from chamberopt.optimize.search.phases import maximise
+from chamberopt.optimize.study import schema
 
 EVALUATIONS, SEEDS = 40, 10
 
@@ -68,7 +69,7 @@ def ours(record: Record, evaluations: int, algorithm: str = "auto") -> np.ndarra
     maximise(
         record.ask,
         record.problem.begin(record.seed),
-        SearchSettings(algorithm, evaluations, record.seed),
+        schema.Optimizer(algorithm=algorithm, evaluations=evaluations, seed=record.seed),
         record.seen,
     )
     return record.fitted

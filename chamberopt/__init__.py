@@ -1,4 +1,4 @@
-"""chamberopt: design of ultrasonic shot peening chambers. See chamberopt.api for use from Python."""
+"""Design of ultrasonic shot peening chambers. See chamberopt.api for use from Python."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def results_folder(out: Path | None, name: str) -> Iterator[Path]:
-    """Yield --out, which must be new or empty, or the first free of results/NAME, results/NAME-2 ...
+    """Yield --out, which must be new or empty, or the first free of results/NAME, NAME-2 ...
 
     If the block raises and the folder is still empty, the folder is removed.
     """
@@ -118,7 +118,7 @@ def replicas_text(design: Design) -> str:
 
 
 def table_lines(table: Mapping[str, Any], prefix: str = "") -> list[str]:
-    """A nested table as aligned lines; its lists "notes" and "warnings" as one line for each item."""
+    """A nested table as aligned lines; each of its notes and warnings is a line."""
     lines: list[str] = []
     for name, value in table.items():
         label = f"{prefix + name:33} "

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from concurrent.futures import BrokenExecutor
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -95,6 +96,10 @@ class CandidateEvaluator:
 
         parameters = self.space.values_at(point)
         is_start = stage == "search" and number == 0
+        worst = self.reference.score - FAILURE_PENALTY * self.reference.unit
+        failed = Trial(
+            number, stage, tuple(point.tolist()), parameters, (), {}, 0.0, worst, False, ""
+        )
         try:
             evaluation = self._evaluate(self.space.design_at(point), stage, replicas, best_low)
             goals = self.goals(evaluation)
@@ -103,19 +108,7 @@ class CandidateEvaluator:
         except (InputError, SceneError, SimulationError) as error:
             if is_start:
                 raise
-            failed = Trial(
-                number=number,
-                stage=stage,
-                point=tuple(point.tolist()),
-                parameters=parameters,
-                goals=(),
-                metrics={},
-                penalty=0.0,
-                score=self.reference.score - FAILURE_PENALTY * self.reference.unit,
-                feasible=False,
-                reason=str(error),
-            )
-            return failed, None
+            return replace(failed, reason=str(error)), None
         except Exception as error:
             # A fault of the program or the machine, not of the candidate: it is not recorded.
             values = ", ".join(f"{name} = {value!r}" for name, value in parameters.items())
@@ -133,17 +126,15 @@ class CandidateEvaluator:
             for name, limits in constraints.items()
             for text in describe_violations(name, figures[name], limits)
         ]
-        trial = Trial(
-            number=number,
-            stage=stage,
-            point=tuple(point.tolist()),
-            parameters=parameters,
+        # Without pseudo-values, which a confirmation has in a file of its own.
+        metrics = {
+            name: Estimate(metric.value, metric.half_width)
+            for name, metric in evaluation.metrics.items()
+        }
+        trial = replace(
+            failed,
             goals=goals,
-            # Without pseudo-values, which a confirmation has in a file of its own.
-            metrics={
-                name: Estimate(metric.value, metric.half_width)
-                for name, metric in evaluation.metrics.items()
-            },
+            metrics=metrics,
             penalty=penalty,
             score=goals[0].value - unit * penalty,
             feasible=not violations,

@@ -17,7 +17,7 @@ from chamberopt.coverage.statistics.confidence_interval import Estimate, paired_
 from chamberopt.design.load import save_design
 from chamberopt.optimize.candidates import FIRST_OBJECTIVE, Candidates, ConfirmedCandidate, Stop
 from chamberopt.optimize.evaluate_candidate import Simulator
-from chamberopt.optimize.search.phases import PARETO_PHASES, SearchSettings, maximise
+from chamberopt.optimize.search.phases import PARETO_PHASES, maximise
 from chamberopt.optimize.sensitivity import Sensitivity, analyse_sensitivity
 from chamberopt.optimize.storage.study_folder import STUDY, StudyFolder, open_study_folder
 from chamberopt.optimize.storage.trial_log import HISTORY, Trial
@@ -135,9 +135,10 @@ def search_and_confirm(
     target = fixed_target(study)
     simulator = simulator or chamber_simulator(study, executor, target)
     candidates = Candidates(study, folder, simulator, progress, stop)
-    algorithm = maximise(
-        candidates.score, candidates.start, _search_settings(study), candidates.model_data
-    )
+    settings = study.optimizer
+    if study.objective.pareto and settings.algorithm == "auto" and not settings.phases:
+        settings = settings.model_copy(update={"phases": PARETO_PHASES})
+    algorithm = maximise(candidates.score, candidates.start, settings, candidates.model_data)
     confirmed = candidates.confirm()
     folder.recorded.require_end(len(candidates.trials))
     if not confirmed or confirmed[0].searched != 0:
@@ -174,22 +175,6 @@ def search_and_confirm(
         sensitivity=analyse_sensitivity(model, study.vary, best.parameters, noise)
         if model
         else None,
-    )
-
-
-def _search_settings(study: Study) -> SearchSettings:
-    settings = study.optimizer
-    phases: tuple[tuple[str, float], ...]
-    phases = tuple((phase.algorithm, phase.share) for phase in settings.phases)
-    if study.objective.pareto and settings.algorithm == "auto" and not phases:
-        phases = PARETO_PHASES
-    return SearchSettings(
-        algorithm=settings.algorithm,
-        budget=settings.evaluations,
-        seed=settings.seed,
-        initial_step=settings.initial_step,
-        tolerance=settings.tolerance,
-        phases=phases,
     )
 
 

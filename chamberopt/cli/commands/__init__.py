@@ -1,29 +1,7 @@
-"""The commands, one file each; importing one registers it with the application."""
+"""The commands, one file each; importing this package registers them all with the application."""
 
-from chamberopt.cli.commands import (
-    accuracy,
-    check,
-    compare,
-    dents,
-    export,
-    inspect,
-    replay,
-    report,
-    run,
-    simulate,
-    sweep,
-)
+from importlib import import_module
+from pkgutil import iter_modules
 
-__all__ = [
-    "accuracy",
-    "check",
-    "compare",
-    "dents",
-    "export",
-    "inspect",
-    "replay",
-    "report",
-    "run",
-    "simulate",
-    "sweep",
-]
+for _module in iter_modules(__path__):
+    import_module(f"{__name__}.{_module.name}")

@@ -60,9 +60,9 @@ def export(
         Coordinates of impacts: "part" (default), as in the part's file and in its unit; or
         "chamber", in mm.
     replicas
-        Export the impacts of this many replicas only; they are then not compared with the result.
+        Export the impacts of this many replicas only; they are not compared with the result.
     out
-        Folder for the files, new or empty; for a single format it may be a file that does not exist.
+        Folder for the files, new or empty; for a single format also a file that does not exist.
     """
     from chamberopt.output.results.load import load_result
 

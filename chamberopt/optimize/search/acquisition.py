@@ -22,7 +22,7 @@ from collections.abc import Callable
 import numpy as np
 
 from chamberopt.optimize.search.gaussian_process import GaussianProcess, one_thread
-from chamberopt.optimize.search.nlopt_search import LOCAL, NloptSettings, run_nlopt
+from chamberopt.optimize.search.nlopt_search import LOCAL, run_nlopt
 
 OUTCOME_COUNT = 16
 # Points where the model's best may be, and points where the knowledge gradient is computed before
@@ -130,7 +130,7 @@ def _climb(function: Function, starts: np.ndarray) -> np.ndarray:
 
     for start in starts:
         algorithm = LOCAL if len(start) > 1 else "LN_SBPLX"  # BOBYQA needs two parameters
-        run_nlopt(value, start, NloptSettings(algorithm, STEP, TOLERANCE, MAX_CALLS))
+        run_nlopt(value, start, algorithm, STEP, TOLERANCE, MAX_CALLS)
     return max(tried, key=lambda one: one[0])[1]
 
 

@@ -3,22 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from chamberopt.common.errors import InputError
 
 LOCAL = "LN_BOBYQA"
-
-
-class NloptSettings(NamedTuple):
-    """How NLopt searches; steps are shares of the bounds."""
-
-    algorithm: str
-    step: float  # first step of local algorithms
-    tolerance: float  # step below which local algorithms stop
-    max_calls: int
 
 
 def seed_nlopt(seed: int) -> None:
@@ -29,12 +20,20 @@ def seed_nlopt(seed: int) -> None:
 
 
 def run_nlopt(
-    function: Callable[[np.ndarray], float], start: np.ndarray, settings: NloptSettings
+    function: Callable[[np.ndarray], float],
+    start: np.ndarray,
+    algorithm: str,
+    step: float,
+    tolerance: float,
+    max_calls: int,
 ) -> None:
     """Maximise function(point (d,)) -> finite float over the unit cube, beginning at `start`.
 
     The function must keep its own record of points and values: NLopt's result is not used.
 
+    Args:
+        step: first step of local algorithms, as a share of the bounds.
+        tolerance: step below which they stop.
     Raises:
         InputError: the algorithm cannot search this number of parameters. Errors of the function
             pass unchanged.
@@ -58,7 +57,8 @@ def run_nlopt(
             optimizer.force_stop()
             return 0.0
 
-    optimizer = _make_optimizer(len(start), settings)
+    optimizer = _make_optimizer(algorithm, len(start), step, tolerance)
+    optimizer.set_maxeval(max_calls)
     optimizer.set_min_objective(callback)
     try:
         optimizer.optimize(start)
@@ -67,28 +67,27 @@ def run_nlopt(
     except Exception as error:  # NLopt's exceptions have no common base class across versions
         if not errors:
             raise InputError(
-                f"optimizer.algorithm: NLopt's {settings.algorithm} cannot search {len(start)} "
+                f"optimizer.algorithm: NLopt's {algorithm} cannot search {len(start)} "
                 f'parameter(s) ({error or type(error).__name__}); choose "auto"'
             ) from None
     if errors:
         raise errors[0]
 
 
-def _make_optimizer(count: int, settings: NloptSettings) -> Any:
+def _make_optimizer(algorithm: str, count: int, step: float, tolerance: float) -> Any:
     import nlopt
 
     # An MLSL algorithm accepts a local optimiser only under its name with G_.
-    name = settings.algorithm.replace("GN_MLSL", "G_MLSL")
+    name = algorithm.replace("GN_MLSL", "G_MLSL")
     optimizer = nlopt.opt(getattr(nlopt, name), count)
     optimizer.set_lower_bounds(np.zeros(count))
     optimizer.set_upper_bounds(np.ones(count))
-    optimizer.set_maxeval(settings.max_calls)
     local = optimizer
     if name.startswith("G_MLSL"):
         local = nlopt.opt(getattr(nlopt, LOCAL), count)
     if local is not optimizer or name.startswith("LN_"):
-        local.set_initial_step(settings.step)
-        local.set_xtol_abs(settings.tolerance)
+        local.set_initial_step(step)
+        local.set_xtol_abs(tolerance)
     if local is not optimizer:
         optimizer.set_local_optimizer(local)
     return optimizer

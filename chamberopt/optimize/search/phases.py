@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from chamberopt.optimize.search.acquisition import propose_point
 from chamberopt.optimize.search.gaussian_process import MAX_POINTS, GaussianProcess
-from chamberopt.optimize.search.nlopt_search import LOCAL, NloptSettings, run_nlopt, seed_nlopt
+from chamberopt.optimize.search.nlopt_search import LOCAL, run_nlopt, seed_nlopt
 from chamberopt.optimize.search.stopping import BudgetSpentError, Score, ScoredPoints
+from chamberopt.optimize.study.schema import Optimizer, Phase
 
 # Two phases are not algorithms of NLopt: evenly spread points, and the model of the scores.
 SPREAD, MODEL = "sobol", "surrogate"
 AUTO = (SPREAD, MODEL, LOCAL)
 # For two objectives there is no single score to climb; each step of the model weights them anew.
-PARETO_PHASES = ((SPREAD, 0.3), (MODEL, 0.7))
+PARETO_PHASES = (Phase(algorithm="sobol", share=0.3), Phase(algorithm="surrogate", share=0.7))
 # "auto" spreads this share of the budget, or two points per parameter plus two if that is more,
 # and then follows the model. BOBYQA takes over where there are more points than the model can
 # hold. Measured in benchmarks/optimizers.py.
@@ -24,8 +24,6 @@ SPREAD_SHARE, SPREAD_PER_PARAMETER = 0.3, 2
 # The model may have missed a peak between its points. Every 4th step therefore assumes half the
 # fitted length scales, so that the model is less certain away from its points.
 ROUGH_STEP_INTERVAL, ROUGH_LENGTH_FACTOR = 4, 0.5
-# A step this small moves a simulated score less than its noise does.
-TOLERANCE = 0.02
 # First steps of the local searches from the best point so far, as factors of the initial step.
 LOCAL_STEP_FACTORS = (1.0, 0.5, 0.25)
 
@@ -33,30 +31,8 @@ ModelData = Callable[[], tuple[np.ndarray, np.ndarray]]
 """Returns scores (n,) and their variances (n,) at the points so far, as the model learns them."""
 
 
-@dataclass(frozen=True)
-class SearchSettings:
-    """How to search.
-
-    Args:
-        algorithm: "auto", "sobol", "surrogate" or an algorithm of NLopt.
-        budget: number of points to score, the start included.
-        seed: seed of the search's random numbers.
-        initial_step: first step of local algorithms, as a share of the bounds.
-        tolerance: step below which local algorithms stop, as a share of the bounds.
-        phases: (algorithm, share of the budget) one after another, instead of `algorithm`. The
-            last phase gets what the others leave.
-    """
-
-    algorithm: str
-    budget: int
-    seed: int
-    initial_step: float = 0.15
-    tolerance: float = TOLERANCE
-    phases: tuple[tuple[str, float], ...] = ()
-
-
 def maximise(
-    score: Score, start: np.ndarray, settings: SearchSettings, model_data: ModelData | None = None
+    score: Score, start: np.ndarray, settings: Optimizer, model_data: ModelData | None = None
 ) -> str:
     """Maximise a score over the unit cube, beginning at `start`.
 
@@ -65,6 +41,7 @@ def maximise(
 
     Args:
         start: first point, shape (d,).
+        settings: algorithm or phases, budget and seed, as in the study file.
         model_data: what the model learns; by default the scores, with unknown noise.
     Returns:
         The phases that ran, e.g. "sobol, then surrogate".
@@ -75,7 +52,7 @@ def maximise(
     try:
         search.scored.score(start)
         for phase, end in search.plan():
-            search.run(phase, max(1, round(end * settings.budget)))
+            search.run(phase, max(1, round(end * settings.evaluations)))
         if settings.algorithm == "auto" and not settings.phases:
             search.repeat_local_search()
     except BudgetSpentError:
@@ -87,14 +64,10 @@ class _Search:
     """A search under way."""
 
     def __init__(
-        self,
-        score: Score,
-        start: np.ndarray,
-        settings: SearchSettings,
-        model_data: ModelData | None,
+        self, score: Score, start: np.ndarray, settings: Optimizer, model_data: ModelData | None
     ) -> None:
         self._start, self._settings = start, settings
-        self.scored = ScoredPoints(score, start, settings.budget)
+        self.scored = ScoredPoints(score, start, settings.evaluations)
         self._model_data = model_data or (lambda: (self.scored.scores, np.zeros(len(self.scored))))
         self.phases_run: list[str] = []
         self._rng = np.random.default_rng(settings.seed)
@@ -102,10 +75,10 @@ class _Search:
 
     def plan(self) -> list[tuple[str, float]]:
         """The phases, and the share of the budget at which each ends."""
-        phases, budget = self._settings.phases, self._settings.budget
+        phases, budget = self._settings.phases, self._settings.evaluations
         if phases:
-            ends = np.cumsum([share for _, share in phases]).tolist()
-            return list(zip([name for name, _ in phases], [*ends[:-1], 1.0], strict=True))
+            ends = np.cumsum([phase.share for phase in phases]).tolist()
+            return list(zip([phase.algorithm for phase in phases], [*ends[:-1], 1.0], strict=True))
         if self._settings.algorithm != "auto":
             return [(self._settings.algorithm, 1.0)]
         modelled = min(budget, MAX_POINTS)
@@ -115,7 +88,7 @@ class _Search:
 
     def run(self, phase: str, limit: int) -> None:
         """Run one phase until it converges or there are `limit` points."""
-        limit = min(limit, self._settings.budget)
+        limit = min(limit, self.scored.budget)
         if len(self.scored) >= limit:
             return
         self.phases_run.append(phase)
@@ -133,7 +106,7 @@ class _Search:
             before = len(self.scored)
             for factor in LOCAL_STEP_FACTORS:
                 step = factor * self._settings.initial_step
-                self._search_with_nlopt(LOCAL, self._settings.budget, step)
+                self._search_with_nlopt(LOCAL, self.scored.budget, step)
 
     def _spread(self, limit: int) -> None:
         from scipy.stats.qmc import Sobol
@@ -159,10 +132,13 @@ class _Search:
     def _search_with_nlopt(self, algorithm: str, limit: int, step: float) -> None:
         # Some algorithms keep asking for points that have scores already: 100 calls per point of
         # the budget end them.
-        max_calls = 100 * self._settings.budget
-        settings = NloptSettings(algorithm, step, self._settings.tolerance, max_calls)
+        max_calls, tolerance = 100 * self.scored.budget, self._settings.tolerance
+
+        def score(point: np.ndarray) -> float:
+            return self.scored.score(point, limit)
+
         try:
-            run_nlopt(lambda point: self.scored.score(point, limit), self.scored.best, settings)
+            run_nlopt(score, self.scored.best, algorithm, step, tolerance, max_calls)
         except BudgetSpentError:
-            if limit >= self._settings.budget:
+            if limit >= self.scored.budget:
                 raise

@@ -1,4 +1,4 @@
-"""What a study file says: the design, what varies, what is maximised, what must hold, the budget."""
+"""What a study file says: design, what varies, what is maximised, what must hold, and budget."""
 
 from chamberopt.optimize.study.constraints import Limits
 from chamberopt.optimize.study.load import load, load_study

@@ -70,7 +70,7 @@ def expected_violation(figure: Estimate, limits: Limits) -> float:
     limit by about its own uncertainty. For an exact number it is the plain excess.
     """
     violation = 0.0
-    for limit, excess in _excesses(figure, limits):
+    for limit, excess, _ in _excesses(figure, limits):
         error = standard_error(figure)
         if error > 0.0:
             z = excess / error
@@ -83,12 +83,11 @@ def expected_violation(figure: Estimate, limits: Limits) -> float:
 
 def describe_violations(name: str, figure: Estimate, limits: Limits) -> list[str]:
     """The limits that the estimate itself violates, one text for each."""
-    texts = []
-    if limits.min is not None and figure.value < limits.min:
-        texts.append(f"{name} {figure.value:.4g} < min {limits.min:g}")
-    if limits.max is not None and figure.value > limits.max:
-        texts.append(f"{name} {figure.value:.4g} > max {limits.max:g}")
-    return texts
+    return [
+        f"{name} {figure.value:.4g} {comparison}"
+        for _, excess, comparison in _excesses(figure, limits)
+        if excess > 0.0
+    ]
 
 
 def assess_feasibility(
@@ -102,12 +101,11 @@ def assess_feasibility(
     feasibility, reasons = FEASIBLE, []
     for name, limits in constraints.items():
         figure = figures[name]
-        for limit, excess in _excesses(figure, limits):
+        for _, excess, comparison in _excesses(figure, limits):
             if excess + figure.half_width <= 0.0:
                 continue
             is_violated = excess > figure.half_width
             feasibility = INFEASIBLE if is_violated or feasibility == INFEASIBLE else NOT_KNOWN
-            comparison = f"< min {limit:g}" if limit == limits.min else f"> max {limit:g}"
             value = f"{name} {figure.value:.4g} ± {figure.half_width:.2g}"
             reasons.append(f"{value} {'' if is_violated else 'may be '}{comparison}")
     return feasibility, "; ".join(reasons)
@@ -120,11 +118,11 @@ def standard_error(figure: Estimate) -> float:
     return figure.half_width / student_quantile(max(1, len(figure.pseudovalues) - 1))
 
 
-def _excesses(figure: Estimate, limits: Limits) -> list[tuple[float, float]]:
-    """Each limit, and how far the estimate lies beyond it; negative within the limit."""
+def _excesses(figure: Estimate, limits: Limits) -> list[tuple[float, float, str]]:
+    """Each limit, how far the estimate lies beyond it (negative: within), and the violation."""
     excesses = []
     if limits.min is not None:
-        excesses.append((limits.min, limits.min - figure.value))
+        excesses.append((limits.min, limits.min - figure.value, f"< min {limits.min:g}"))
     if limits.max is not None:
-        excesses.append((limits.max, figure.value - limits.max))
+        excesses.append((limits.max, figure.value - limits.max, f"> max {limits.max:g}"))
     return excesses

@@ -95,7 +95,7 @@ class Objective(BaseModel):
 
     @property
     def goals(self) -> tuple[str, ...]:
-        """The objectives, as coverage.metrics.parse_objective takes them; two for a Pareto front."""
+        """The objectives, as parse_objective takes them; a Pareto front has two."""
         if self.sum:
             return (" + ".join(f"{weight:.10g} {name}" for name, weight in self.sum.items()),)
         return self.pareto or (self.name,)

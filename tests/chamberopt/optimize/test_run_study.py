@@ -17,9 +17,10 @@ from chamberopt.optimize.evaluate_candidate import FAILURE_PENALTY
 from chamberopt.optimize.run_study import fixed_target, run_study
 from chamberopt.optimize.search.acquisition import recommend_point
 from chamberopt.optimize.search.gaussian_process import GaussianProcess
-from chamberopt.optimize.search.phases import SearchSettings, maximise
+from chamberopt.optimize.search.phases import maximise
 from chamberopt.optimize.storage.trial_log import read_trials, trials_as_csv
 from chamberopt.optimize.study import Limits, Study, load_study
+from chamberopt.optimize.study.schema import Optimizer
 from chamberopt.output import viewer
 from chamberopt.output.results.load import load_result
 from chamberopt.output.save_run import save_study
@@ -104,7 +105,7 @@ def test_every_algorithm_improves_and_keeps_its_budget(algorithm: str) -> None:
         return hill(x)
 
     start = np.array([0.4, 0.5, 0.375])
-    maximise(score, start, SearchSettings(algorithm, 30, seed=1))
+    maximise(score, start, Optimizer(algorithm=algorithm, evaluations=30))
     np.testing.assert_array_equal(points[0], start)
     assert len(points) <= 30
     assert len({x.tobytes() for x in points}) == len(points)
@@ -117,7 +118,7 @@ def test_same_seed_same_search() -> None:
         maximise(
             lambda x: points.append(x.tobytes()) or hill(x),
             np.full(3, 0.4),
-            SearchSettings("auto", 25, seed),
+            Optimizer(evaluations=25, seed=seed),
         )
         return points
 
@@ -136,7 +137,9 @@ def test_one_parameter(tmp_path: Path) -> None:
 
 def test_what_an_algorithm_cannot_do_is_said() -> None:
     with pytest.raises(InputError, match=r"GN_AGS cannot search 12 parameter.*auto"):
-        maximise(lambda x: -float(x @ x), np.full(12, 0.5), SearchSettings("GN_AGS", 30, seed=1))
+        maximise(
+            lambda x: -float(x @ x), np.full(12, 0.5), Optimizer(algorithm="GN_AGS", evaluations=30)
+        )
 
 
 def test_a_candidate_that_cannot_be_built_is_a_penalty_with_a_reason(tmp_path: Path) -> None:

@@ -15,12 +15,13 @@ from chamberopt.optimize.pareto import as_csv, on_front, pareto_points
 from chamberopt.optimize.run_study import run_study
 from chamberopt.optimize.search.acquisition import propose_point
 from chamberopt.optimize.search.gaussian_process import GaussianProcess, pool_variances
-from chamberopt.optimize.search.phases import SearchSettings, maximise
+from chamberopt.optimize.search.phases import maximise
 from chamberopt.optimize.search.scalarisation import scalarise
 from chamberopt.optimize.sensitivity import analyse_sensitivity
 from chamberopt.optimize.storage.trial_log import read_trials
 from chamberopt.optimize.study import Limits, Study, load_study
 from chamberopt.optimize.study.constraints import assess_feasibility, expected_violation
+from chamberopt.optimize.study.schema import Optimizer
 from chamberopt.output.plots.study import pareto_picture, slices_picture
 from tests.helpers.synthetic import DESIGNS, judged
 
@@ -57,11 +58,12 @@ def bowl(x: np.ndarray) -> float:
 
 def test_phases_have_their_shares_and_the_last_what_is_left() -> None:
     points: list[np.ndarray] = []
-    phases = [("sobol", 0.4), ("LN_SBPLX", 0.3), ("surrogate", 1.0)]
+    shares = {"sobol": 0.4, "LN_SBPLX": 0.3, "surrogate": 1.0}
+    phases = [{"algorithm": name, "share": share} for name, share in shares.items()]
     ran = maximise(
         lambda x: points.append(x) or bowl(x),
         np.full(2, 0.5),
-        SearchSettings("auto", 20, 1, phases=phases),
+        Optimizer(evaluations=20, phases=phases),
     )
     assert ran == "sobol, then LN_SBPLX, then surrogate"
     assert len(points) == 20
@@ -76,7 +78,7 @@ def test_first_step_and_tolerance_are_in_units_of_the_bounds() -> None:
         maximise(
             lambda x: points.append(x) or bowl(x),
             np.full(2, 0.5),
-            SearchSettings("LN_BOBYQA", 60, 1, **settings),
+            Optimizer(algorithm="LN_BOBYQA", evaluations=60, **settings),
         )
         return points
 
