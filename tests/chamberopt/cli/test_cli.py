@@ -466,14 +466,14 @@ class TestWhole:
         assert (status, compared["folder"]) == (0, str(Path("results/compare")))
         assert compared["parameters"] == {"shot.mass_g": [3.308, 9.9]}
         assert compared["differences_to_first"]["impacts_per_mm2_s"][0]["paired"]
-        assert "heavier: seed = 1 in place of 5, as the first candidate" in err
+        assert "heavier: seed = 1 instead of 5, as the first candidate" in err
 
         # The folders that it left are results: simulated so by themselves, and compared again to the same figures.
         status, out, _ = chamberopt("simulate", "results/compare/heavier/design.toml", "--json")
         alone = json.loads(out)["metrics"]["mean_coverage"]["value"]
         assert alone == compared["metrics"]["mean_coverage"][1]["value"]
         status, out, err = chamberopt("compare", "results/compare/plate", "results/compare/heavier")
-        assert (status, "shot.mass_g" in out, "in place of" in err) == (0, True, False)
+        assert (status, "shot.mass_g" in out, "instead of" in err) == (0, True, False)
         assert out.splitlines()[-1] == f"results in {Path('results/compare-2')}"
 
     def test_compare_refuses_before_it_makes_a_folder(self, small: Path, chamberopt: Said) -> None:

@@ -15,15 +15,12 @@ from chamberopt.coverage.metrics import METRICS
 from chamberopt.design.load import load_design
 from chamberopt.optimize.evaluate_candidate import FAILURE_PENALTY
 from chamberopt.optimize.run_study import fixed_target, run_study
-from chamberopt.optimize.search.acquisition import recommend_point
-from chamberopt.optimize.search.gaussian_process import GaussianProcess
-from chamberopt.optimize.search.phases import maximise
 from chamberopt.optimize.storage.trial_log import read_trials, trials_as_csv
 from chamberopt.optimize.study import Limits, Study, load_study
-from chamberopt.optimize.study.schema import Optimizer
 from chamberopt.output import viewer
 from chamberopt.output.results.load import load_result
 from chamberopt.output.save_run import save_study
+from tests.helpers.known_optima import OPTIMUM, PEAK, hill
 from tests.helpers.synthetic import DESIGNS, judged, plate_design
 
 GEAR = load_design(DESIGNS / "gear.toml")
@@ -32,13 +29,6 @@ BOUNDS = {
     "chamber.sonotrode_distance_mm": (5.0, 25.0),
     "shot.mass_g": (2.0, 10.0),
 }
-OPTIMUM = np.array([0.7, 0.3, 0.55])  # in shares of the bounds
-PEAK = 0.8
-
-
-def hill(x: np.ndarray) -> float:
-    """One broad hill, steeper across than along, PEAK at OPTIMUM."""
-    return PEAK - float(((x - OPTIMUM) ** 2 * [0.6, 1.5, 0.8]).sum())
 
 
 def shares(design) -> np.ndarray:
@@ -91,40 +81,6 @@ def test_finds_a_known_optimum_in_noise(tmp_path: Path) -> None:
     assert held >= 5
 
 
-@pytest.mark.parametrize("algorithm", [
-    "GN_DIRECT_L", "GN_DIRECT_L_RAND", "GN_ORIG_DIRECT_L", "GN_MLSL_LDS", "GN_CRS2_LM", "GN_ISRES", "GN_ESCH",
-    "GN_AGS", "LN_BOBYQA", "LN_COBYLA", "LN_SBPLX", "LN_NELDERMEAD", "LN_PRAXIS", "sobol", "surrogate",
-])  # fmt: skip
-def test_every_algorithm_improves_and_keeps_its_budget(algorithm: str) -> None:
-    points: list[np.ndarray] = []
-
-    def score(x: np.ndarray) -> float:
-        assert x.min() >= 0.0
-        assert x.max() <= 1.0
-        points.append(x)
-        return hill(x)
-
-    start = np.array([0.4, 0.5, 0.375])
-    maximise(score, start, Optimizer(algorithm=algorithm, evaluations=30))
-    np.testing.assert_array_equal(points[0], start)
-    assert len(points) <= 30
-    assert len({x.tobytes() for x in points}) == len(points)
-    assert max(map(hill, points)) > hill(start)
-
-
-def test_same_seed_same_search() -> None:
-    def walk(seed: int) -> list[bytes]:
-        points: list[bytes] = []
-        maximise(
-            lambda x: points.append(x.tobytes()) or hill(x),
-            np.full(3, 0.4),
-            Optimizer(evaluations=25, seed=seed),
-        )
-        return points
-
-    assert walk(3) == walk(3)
-
-
 def test_one_parameter(tmp_path: Path) -> None:
     question = Study(design=GEAR, vary={"shot.mass_g": (2.0, 10.0)}, optimizer={"evaluations": 20})
     result = run(
@@ -133,13 +89,6 @@ def test_one_parameter(tmp_path: Path) -> None:
         lambda design, s, n: judged(-abs(np.full(3, design.value("shot.mass_g") - 7))),
     )
     assert result.best.design.value("shot.mass_g") == pytest.approx(7.0, abs=0.3)
-
-
-def test_what_an_algorithm_cannot_do_is_said() -> None:
-    with pytest.raises(InputError, match=r"GN_AGS cannot search 12 parameter.*auto"):
-        maximise(
-            lambda x: -float(x @ x), np.full(12, 0.5), Optimizer(algorithm="GN_AGS", evaluations=30)
-        )
 
 
 def test_a_candidate_that_cannot_be_built_is_a_penalty_with_a_reason(tmp_path: Path) -> None:
@@ -268,17 +217,6 @@ def test_a_folder_in_use_is_refused(tmp_path: Path) -> None:
         make_output_folder(tmp_path / "precious.txt")
 
 
-def test_the_model_of_the_scores_recommends_the_hilltop() -> None:
-    rng = np.random.default_rng(0)
-    points = rng.random((40, 3))
-    scores = np.array([hill(x) for x in points]) + rng.normal(0, 0.03, 40)
-    model = GaussianProcess(points, scores)
-    assert hill(recommend_point(model, 1)) > PEAK - 0.03
-    np.testing.assert_array_equal(
-        recommend_point(model, 1), recommend_point(GaussianProcess(points, scores), 1)
-    )
-
-
 def test_the_real_thing_end_to_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # Twice the amplitude hits harder and more often: even a study of seconds must see that.
     monkeypatch.setattr(viewer, "draw_coverage", lambda *_: None)
@@ -362,27 +300,6 @@ def test_an_accuracy_asked_for_is_what_confirms(tmp_path: Path) -> None:
 
     run(with_search_accuracy({"objective_half_width": 0.05}, asked), tmp_path / "out", simulator)
     assert seen == {("search", None, 0.05), ("confirm", None, 0.01)}
-
-
-@pytest.mark.parametrize(
-    ("search_accuracy", "said"),
-    [
-        ({"replicas": 1}, r"search_accuracy.*replicas"),
-        ({"replica": 3}, r"search_accuracy.*replica"),
-        ({"coverage_model": "dint"}, r"search_accuracy.*coverage_model"),
-        ({"facets": 2}, r"search_accuracy.*facets"),
-    ],
-)
-def test_a_wrong_search_accuracy_is_named(search_accuracy: dict, said: str) -> None:
-    with pytest.raises(ValueError, match=said):
-        with_search_accuracy(search_accuracy)
-
-
-def test_how_well_a_design_is_known_is_none_of_its_choices() -> None:
-    with pytest.raises(
-        ValueError, match=r"process\.accuracy\.simulated_time_s.*see \[search_accuracy\]"
-    ):
-        with_search_accuracy({}, **{"process.accuracy.simulated_time_s": (0.5, 2.0)})
 
 
 @pytest.mark.parametrize(

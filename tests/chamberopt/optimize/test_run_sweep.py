@@ -159,7 +159,7 @@ def test_what_a_sweep_leaves(vary: dict, way: tuple, tmp_path: Path) -> None:
     assert said["kind"] == "sweep"
     assert said["sweep"]["best"]["number"] == sweep.best.number
     assert "luckiest" in said["notes"][0]
-    with pytest.raises(InputError, match=r"a sweep, .*; simulate .* best\.toml"):
+    with pytest.raises(InputError, match=r"a sweep .*; simulate .* best\.toml"):
         load_result(tmp_path)
 
 
@@ -196,7 +196,7 @@ def test_the_command_line_maps_a_study(tmp_path: Path, capsys) -> None:
     assert main(command) == 0
     said = capsys.readouterr().out
     assert "2 candidates in" in said
-    assert "the luckiest of them" in said
+    assert "also the luckiest" in said
     assert {"result.json", "history.csv", "map.png", "best.toml"} <= {
         path.name for path in (tmp_path / "out").iterdir()
     }

@@ -1,0 +1,80 @@
+"""The phases of a search keep their budget, improve on the start and are reproducible."""
+
+import numpy as np
+import pytest
+
+from chamberopt.common.errors import InputError
+from chamberopt.optimize.search.phases import maximise
+from chamberopt.optimize.study.schema import Optimizer
+from tests.helpers.known_optima import bowl, hill
+
+
+def test_phases_have_their_shares_and_the_last_what_is_left() -> None:
+    points: list[np.ndarray] = []
+    shares = {"sobol": 0.4, "LN_SBPLX": 0.3, "surrogate": 1.0}
+    phases = [{"algorithm": name, "share": share} for name, share in shares.items()]
+    ran = maximise(
+        lambda x: points.append(x) or bowl(x),
+        np.full(2, 0.5),
+        Optimizer(evaluations=20, phases=phases),
+    )
+    assert ran == "sobol, then LN_SBPLX, then surrogate"
+    assert len(points) == 20
+    spread = np.array(points[1:8])
+    assert all(np.histogram(spread[:, k], 4, (0.0, 1.0))[0].min() >= 1 for k in (0, 1))
+    assert max(map(bowl, points)) > 0.79
+
+
+def test_first_step_and_tolerance_are_in_units_of_the_bounds() -> None:
+    def walk(**settings) -> list[np.ndarray]:
+        points: list[np.ndarray] = []
+        maximise(
+            lambda x: points.append(x) or bowl(x),
+            np.full(2, 0.5),
+            Optimizer(algorithm="LN_BOBYQA", evaluations=60, **settings),
+        )
+        return points
+
+    assert abs(walk(initial_step=0.3)[1] - 0.5).max() == pytest.approx(0.3)
+    assert len(walk(tolerance=0.2)) < len(walk(tolerance=1e-4))
+
+
+@pytest.mark.parametrize("algorithm", [
+    "GN_DIRECT_L", "GN_DIRECT_L_RAND", "GN_ORIG_DIRECT_L", "GN_MLSL_LDS", "GN_CRS2_LM", "GN_ISRES", "GN_ESCH",
+    "GN_AGS", "LN_BOBYQA", "LN_COBYLA", "LN_SBPLX", "LN_NELDERMEAD", "LN_PRAXIS", "sobol", "surrogate",
+])  # fmt: skip
+def test_every_algorithm_improves_and_keeps_its_budget(algorithm: str) -> None:
+    points: list[np.ndarray] = []
+
+    def score(x: np.ndarray) -> float:
+        assert x.min() >= 0.0
+        assert x.max() <= 1.0
+        points.append(x)
+        return hill(x)
+
+    start = np.array([0.4, 0.5, 0.375])
+    maximise(score, start, Optimizer(algorithm=algorithm, evaluations=30))
+    np.testing.assert_array_equal(points[0], start)
+    assert len(points) <= 30
+    assert len({x.tobytes() for x in points}) == len(points)
+    assert max(map(hill, points)) > hill(start)
+
+
+def test_same_seed_same_search() -> None:
+    def walk(seed: int) -> list[bytes]:
+        points: list[bytes] = []
+        maximise(
+            lambda x: points.append(x.tobytes()) or hill(x),
+            np.full(3, 0.4),
+            Optimizer(evaluations=25, seed=seed),
+        )
+        return points
+
+    assert walk(3) == walk(3)
+
+
+def test_what_an_algorithm_cannot_do_is_said() -> None:
+    with pytest.raises(InputError, match=r"GN_AGS cannot search 12 parameter.*auto"):
+        maximise(
+            lambda x: -float(x @ x), np.full(12, 0.5), Optimizer(algorithm="GN_AGS", evaluations=30)
+        )

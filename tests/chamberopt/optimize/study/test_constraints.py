@@ -1,0 +1,56 @@
+"""Constraints are judged by the intervals of the figures."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chamberopt.coverage.statistics.confidence_interval import Estimate, estimate
+from chamberopt.optimize.study import Limits
+from chamberopt.optimize.study.constraints import assess_feasibility, expected_violation
+from tests.helpers.known_optima import bowl, bowl_shares, run_bowl
+from tests.helpers.synthetic import judged
+
+
+def test_a_constraint_is_priced_by_what_is_to_be_expected_beyond_it() -> None:
+    limits = Limits(min=0.5)
+    assert expected_violation(Estimate(0.4, 0.0), limits) == pytest.approx(0.2)
+    assert expected_violation(Estimate(0.6, 0.0), limits) == 0.0
+    # Of a normal figure at its limit: its standard error over sqrt(2 pi).
+    at_limit = estimate(0.5 + np.array([-0.1, 0.1, -0.1, 0.1]))
+    error = np.std(at_limit.pseudovalues, ddof=1) / 2.0
+    assert expected_violation(at_limit, limits) == pytest.approx(error / np.sqrt(2.0 * np.pi) / 0.5)
+
+
+@pytest.mark.parametrize(
+    ("half_width", "standing"), [(0.05, "feasible"), (0.2, "not known"), (0.0, "feasible")]
+)
+def test_an_answer_keeps_its_limits_to_the_end_of_the_interval(
+    half_width: float, standing: str
+) -> None:
+    constraints = {"mean_coverage": Limits(min=0.5, max=0.9)}
+    assert (
+        assess_feasibility(constraints, {"mean_coverage": Estimate(0.6, half_width)})[0] == standing
+    )
+    said, why = assess_feasibility(constraints, {"mean_coverage": Estimate(0.3, 0.1)})
+    assert (said, why) == ("infeasible", "mean_coverage 0.3 ± 0.1 < min 0.5")
+
+
+def test_a_number_of_the_design_can_be_a_constraint(tmp_path: Path) -> None:
+    limits = {"shot.mass_g": Limits(max=4.0)}  # the best is at 4.4
+    result = run_bowl(
+        tmp_path, lambda d, s, n: judged(np.full(3, bowl(bowl_shares(d)))), constraints=limits
+    )
+    assert 3.5 < result.best.design.shot.mass_g <= 4.0
+    assert result.best.feasibility == "feasible"
+
+
+def test_where_no_constraint_is_surely_kept_the_answer_says_so(tmp_path: Path) -> None:
+    def simulator(design, stream, replicas):
+        made = judged(np.full(4, bowl(bowl_shares(design))))
+        made.metrics["mean_coverage"] = estimate([0.4, 0.6, 0.5, 0.52])
+        return made
+
+    result = run_bowl(tmp_path, simulator, constraints={"mean_coverage": Limits(min=0.5)})
+    assert result.best.feasibility == "not known"
+    assert "mean_coverage 0.505 ± 0.13 may be < min 0.5" in result.warnings[0]
