@@ -91,7 +91,7 @@ def as_json(result: StudyResult) -> list[dict[str, Any]]:
             "parameters": one.parameters,
             "standing": one.feasibility,
             "objectives": {
-                name: {"value": goal.value, "half_width": goal.half_width}
+                name: goal.interval_json()
                 for name, goal in zip(result.study.objective.goals, one.goals, strict=True)
             },
         }

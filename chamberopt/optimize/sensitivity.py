@@ -74,7 +74,7 @@ class Sensitivity:
         """Plain JSON values."""
         return {
             "noise": self.noise,
-            "expected": {"value": self.expected.value, "half_width": self.expected.half_width},
+            "expected": self.expected.interval_json(),
             "together": self.together,
             "parameters": {
                 one.name: {

@@ -88,10 +88,7 @@ class Advice:
             "on": self.on,
             "verdict": self.verdict,
             "said": str(self),
-            "changes": {
-                name: {"value": change.value, "half_width": change.half_width}
-                for name, change in self.changes.items()
-            },
+            "changes": {name: one.interval_json() for name, one in self.changes.items()},
         }
 
     def __str__(self) -> str:

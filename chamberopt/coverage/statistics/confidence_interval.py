@@ -11,7 +11,7 @@ Notation
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -40,29 +40,33 @@ class Estimate:
     def high(self) -> float:
         return self.value + self.half_width
 
-    def to_json(self, unit: str | None = None) -> dict[str, Any]:
-        """As JSON values. Two results can be compared later because the pseudo-values are in it."""
-        return {
-            "value": self.value,
-            "half_width": self.half_width,
-            **({} if unit is None else {"unit": unit}),
-            "pseudovalues": list(self.pseudovalues),
-            "bias": self.bias,
-        }
+    def interval_json(self) -> dict[str, float | None]:
+        """Value and half-width as JSON values; null where they are not finite."""
+        return {"value": _finite(self.value), "half_width": _finite(self.half_width)}
+
+    def to_json(self) -> dict[str, Any]:
+        """As JSON values, with the pseudo-values by which results can be compared later."""
+        return {**self.interval_json(), "pseudovalues": list(self.pseudovalues), "bias": self.bias}
 
     @classmethod
-    def from_json(cls, data: dict[str, Any]) -> Estimate:
-        """The estimate that `to_json` or `short_json` wrote.
+    def from_json(cls, data: Mapping[str, Any]) -> Estimate:
+        """The estimate that `to_json` or `interval_json` wrote.
 
         Raises:
             KeyError, TypeError, ValueError: the data are not an estimate.
         """
+        value, half_width = data["value"], data["half_width"]
         return cls(
-            float(data["value"]),
-            float(data["half_width"]),
+            math.nan if value is None else float(value),
+            math.inf if half_width is None else float(half_width),
             tuple(float(x) for x in data.get("pseudovalues", ())),
             float(data.get("bias", 0.0)),
         )
+
+
+def _finite(number: float) -> float | None:
+    """None for NaN and for the infinite half-width of a single replica: JSON has neither."""
+    return number if math.isfinite(number) else None
 
 
 def estimate(

@@ -192,8 +192,5 @@ def _damaged(path: Path, error: Exception) -> InputError:
 
 
 def _advice(changes: dict[str, dict[str, Any]], **others: Any) -> Advice:
-    estimates = {
-        name: Estimate(**{**one, "pseudovalues": tuple(one["pseudovalues"])})
-        for name, one in changes.items()
-    }
+    estimates = {name: Estimate.from_json(one) for name, one in changes.items()}
     return Advice(changes=estimates, **others)

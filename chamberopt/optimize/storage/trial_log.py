@@ -57,24 +57,22 @@ class Trial:
     def row(self) -> dict[str, Any]:
         """The trial as plain JSON values, which read back to the same bits."""
         objective = self.objective
+        interval = (objective or Estimate(math.nan, math.nan)).interval_json()
         return {
             "number": self.number,
             "stage": self.stage,
             "point": list(self.point),
             "parameters": self.parameters,
-            "objective": _finite(objective.value) if objective else None,
-            "half_width": _finite(objective.half_width) if objective else None,
+            "objective": interval["value"],
+            "half_width": interval["half_width"],
             "replicas": len(objective.pseudovalues) if objective else None,
             # Pseudo-values tell a model of the search how uncertain each score is.
-            "goals": [
-                {**_as_json(one), "pseudovalues": list(one.pseudovalues), "bias": one.bias}
-                for one in self.goals
-            ],
+            "goals": [one.to_json() for one in self.goals],
             "penalty": self.penalty,
             "score": self.score,
             "feasible": self.feasible,
             "reason": self.reason,
-            "metrics": {name: _as_json(metric) for name, metric in self.metrics.items()},
+            "metrics": {name: metric.interval_json() for name, metric in self.metrics.items()},
         }
 
     @classmethod
@@ -89,37 +87,13 @@ class Trial:
             stage=str(row["stage"]),
             point=tuple(float(share) for share in row["point"]),
             parameters={name: float(value) for name, value in row["parameters"].items()},
-            goals=tuple(
-                _estimate(one, tuple(float(x) for x in one["pseudovalues"]), float(one["bias"]))
-                for one in row["goals"]
-            ),
-            metrics={name: _estimate(metric) for name, metric in row["metrics"].items()},
+            goals=tuple(Estimate.from_json(one) for one in row["goals"]),
+            metrics={name: Estimate.from_json(metric) for name, metric in row["metrics"].items()},
             penalty=float(row["penalty"]),
             score=float(row["score"]),
             feasible=bool(row["feasible"]),
             reason=str(row["reason"]),
         )
-
-
-def _as_json(estimate: Estimate) -> dict[str, float | None]:
-    return {"value": _finite(estimate.value), "half_width": _finite(estimate.half_width)}
-
-
-def _finite(number: float) -> float | None:
-    """None for NaN and for the infinite half-width of a single replica: JSON has neither."""
-    return number if math.isfinite(number) else None
-
-
-def _estimate(
-    row: Mapping[str, Any], pseudovalues: tuple[float, ...] = (), bias: float = 0.0
-) -> Estimate:
-    value, half_width = row["value"], row["half_width"]
-    return Estimate(
-        math.nan if value is None else float(value),
-        math.inf if half_width is None else float(half_width),
-        pseudovalues,
-        bias,
-    )
 
 
 class JsonLines:

@@ -48,7 +48,7 @@ class Comparison:
             "labels": list(self.labels),
             "parameters": {name: list(values) for name, values in self.parameters.items()},
             "metrics": {
-                name: [{"value": e.value, "half_width": e.half_width} for e in values]
+                name: [one.interval_json() for one in values]
                 for name, values in self.metrics.items()
             },
             "confidence_of_each_difference": self.confidence,

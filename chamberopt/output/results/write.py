@@ -22,6 +22,7 @@ from chamberopt.simulation.candidate_result import CandidateResult
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from chamberopt.coverage.statistics.confidence_interval import Estimate
     from chamberopt.optimize.run_study import StudyResult
     from chamberopt.optimize.run_sweep import SweepResult
     from chamberopt.simulation.effect_pilot import Advice
@@ -119,9 +120,10 @@ def _write_candidate(folder: Path, candidate: CandidateResult) -> dict[str, Any]
     return {
         "format": FORMAT,
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
-        "objective": {"name": evaluation.objective_name, **evaluation.objective.to_json("")},
+        "objective": {"name": evaluation.objective_name, **_with_unit(evaluation.objective, "")},
         "metrics": {
-            name: value.to_json(METRICS[name].unit) for name, value in evaluation.metrics.items()
+            name: _with_unit(value, METRICS[name].unit)
+            for name, value in evaluation.metrics.items()
         },
         "coverage_against_time": candidate.time_curve,
         "seed": design.process.seed,
@@ -163,7 +165,7 @@ def _about_study(result: StudyResult) -> dict[str, Any]:
         "missing_a_constraint": sum(
             trial.objective is not None and not trial.feasible for trial in search
         ),
-        "gain": result.gain.to_json(""),
+        "gain": _with_unit(result.gain, ""),
         "improved": result.improved,
         "at_bounds": list(result.at_bounds),
         **({"model": result.sensitivity.as_json()} if result.sensitivity else {}),
@@ -171,9 +173,9 @@ def _about_study(result: StudyResult) -> dict[str, Any]:
         "best": {"searched_as": result.best.searched, "parameters": result.best.parameters},
         "start": {
             "parameters": result.start.parameters,
-            "objective": result.start.evaluation.objective.to_json(""),
+            "objective": _with_unit(result.start.evaluation.objective, ""),
             "metrics": {
-                name: value.to_json(METRICS[name].unit)
+                name: _with_unit(value, METRICS[name].unit)
                 for name, value in result.start.evaluation.metrics.items()
             },
         },
@@ -181,7 +183,7 @@ def _about_study(result: StudyResult) -> dict[str, Any]:
             {
                 "searched_as": candidate.searched,
                 "parameters": candidate.parameters,
-                "objective": candidate.evaluation.objective.to_json(""),
+                "objective": _with_unit(candidate.evaluation.objective, ""),
                 "feasible": candidate.feasible,
                 "standing": candidate.feasibility,
                 "reason": candidate.reason,
@@ -218,6 +220,10 @@ def _about_sweep(sweep: SweepResult) -> dict[str, Any]:
         "notes": [best_row_note(sweep)],
         "versions": versions(),
     }
+
+
+def _with_unit(estimate: Estimate, unit: str) -> dict[str, Any]:
+    return {**estimate.to_json(), "unit": unit}
 
 
 def _design_values(design: Design, folder: Path) -> dict[str, Any]:

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from chamberopt.chamber.build import build_chamber
-from chamberopt.common.errors import InputError
-from chamberopt.common.parallel.executor import SerialExecutor, local_executor
+from chamberopt.common.parallel.executor import local_executor
 from chamberopt.coverage.coverage_estimators import (
     _max_effect_of_variance,
     few_dents_note,
@@ -13,17 +12,8 @@ from chamberopt.coverage.coverage_estimators import (
 )
 from chamberopt.coverage.coverage_from_impacts import Tally
 from chamberopt.coverage.metrics import METRICS, OBJECTIVES
-from chamberopt.coverage.statistics.confidence_interval import (
-    Estimate,
-    estimate,
-    independent_difference,
-    paired_difference,
-)
-from chamberopt.coverage.statistics.triangle_patches import patches
-from chamberopt.design.design import validate
-from chamberopt.design.load import Design
+from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.simulation.evaluate import ReplicaPlan, estimate_metrics, evaluate, weighted_sum
-from chamberopt.simulation.replicas import MIN_REPLICAS_TO_STOP, next_replica_count
 from tests.helpers.synthetic import equal_dents, patchwork, plate_design
 
 TREATMENT = 50.0
@@ -56,19 +46,6 @@ def uncorrected(replicas: list[Tally]) -> float:
 def poisson_replicas(rng: np.random.Generator, replicas: int, seconds: float) -> list[Tally]:
     counts = rng.poisson(RATE * seconds, (replicas, len(RATE)))
     return [equal_dents(seconds, k, DENT) for k in counts]
-
-
-def test_pseudovalues_of_a_mean_are_the_sample() -> None:
-    # For a statistic linear in the tally the jackknife is the plain mean and its standard error:
-    # s/√n · t(n-1).
-    rng = np.random.default_rng(5)
-    replicas = poisson_replicas(rng, 6, 10.0)
-    rate = METRICS["impacts_per_mm2_s"]
-    got = estimate_metrics(replicas, CHAMBER, DESIGN)["impacts_per_mm2_s"]
-    each = np.array([rate.value(replica, CHAMBER, DESIGN) for replica in replicas])
-    np.testing.assert_allclose(got.pseudovalues, each, rtol=1e-9)
-    assert got.value == pytest.approx(each.mean())
-    assert got.half_width == pytest.approx(2.570582 * each.std(ddof=1) / np.sqrt(6), rel=1e-6)
 
 
 def test_correction_takes_the_simulated_time_out_of_the_figure() -> None:
@@ -132,146 +109,7 @@ def test_an_even_part_is_not_better_than_its_mean() -> None:
     assert goal.value == metrics["mean_coverage"].value - metrics["std_coverage"].value <= 1.0
 
 
-def test_differences() -> None:
-    rng = np.random.default_rng(3)
-    common = rng.normal(0.0, 1.0, 10)
-    before = estimate(common)
-    after = estimate(common + 0.1 + rng.normal(0, 0.01, 10))
-    paired, apart = paired_difference(after, before), independent_difference(after, before)
-    assert paired.value == pytest.approx(0.1, abs=0.02)
-    assert paired.half_width < 0.02  # what is common to both cancels
-    assert apart.half_width > 0.5  # not so when they are taken as independent
-    same = paired_difference(before, before)
-    assert (same.value, same.half_width) == (0.0, 0.0)
-    assert (
-        independent_difference(
-            Estimate(1.0, 0.0, (1.0, 1.0)), Estimate(0.0, 0.0, (0.0, 0.0))
-        ).half_width
-        == 0
-    )
-
-
-def test_value_stays_in_its_range_and_one_replica_has_no_interval() -> None:
-    assert estimate([1.02, 1.01, 1.03], 0.0, 1.0).value == 1.0
-    assert estimate([0.5], 0.0, 1.0).half_width == np.inf
-
-
-def test_what_is_made_of_a_clipped_value_agrees_with_its_interval() -> None:
-    """A correction that overshoots is clipped; objective and gain must not keep the overshoot in their intervals."""
-    metrics = {
-        "mean_coverage": estimate([0.7, 0.8, 0.75]),
-        "std_coverage": estimate([0.6, 0.7, 0.62], 0.0, 0.5),
-    }
-    goal = weighted_sum(OBJECTIVES["uniform_coverage"], metrics)
-    assert goal.value == pytest.approx(0.75 - 0.5)
-    assert np.mean(goal.pseudovalues) == pytest.approx(goal.value)
-    gain = paired_difference(goal, estimate([0.1, 0.12, 0.11]))
-    assert np.mean(gain.pseudovalues) == pytest.approx(gain.value)
-
-
-def test_evaluate_gives_the_same_numbers_on_any_number_of_workers() -> None:
-    design = plate_design(
-        process__accuracy__simulated_time_s=0.02, process__accuracy__warmup_time_s=0.02,
-        process__accuracy__replicas=4,
-    )  # fmt: skip
-    chamber = build_chamber(design)
-    seen: list[tuple[int, int, float | None]] = []
-    serial = evaluate(design, chamber, SerialExecutor(), lambda *args: seen.append(args))
-    with local_executor(3) as executor:
-        threaded = evaluate(design, chamber, executor)
-    assert serial.objective == threaded.objective
-    assert serial.metrics == threaded.metrics
-    np.testing.assert_array_equal(serial.total.dented_area, threaded.total.dented_area)
-    assert seen == [(i, 4, None) for i in range(1, 5)]
-    assert serial.total.impacts.sum() > 0
-    assert serial.total.simulated_time == pytest.approx(0.08)
-    assert serial.collisions["total"] > serial.total.impacts.sum()
-    assert any("dents per target triangle" in note for note in serial.notes)
-    # Replicas there are, are added to: the same as all at once.
-    done: list = []
-    few = evaluate(design, chamber, SerialExecutor(), plan=ReplicaPlan(3), done=done)
-    assert (len(few.replicas), len(done)) == (3, 3)
-    assert evaluate(design, chamber, SerialExecutor(), done=done).metrics == serial.metrics
-    # Fresh draws for a confirmation.
-    other = evaluate(design, chamber, SerialExecutor(), plan=ReplicaPlan(3, "confirm"))
-    assert other.objective.value != serial.objective.value
-    assert (other.stream, len(other.replicas)) == ("confirm", 3)
-
-
 # Accuracy asked for
-
-
-def accurate(coverage: float, most: int) -> Design:
-    """The plate in short replicas, as many as make the objective known to within this, or at most so many."""
-    design = plate_design(
-        process__accuracy__simulated_time_s=0.05, process__accuracy__warmup_time_s=0.02
-    )
-    accuracy = {
-        **design.process.accuracy.model_dump(),
-        "objective_half_width": coverage,
-        "max_replicas": most,
-    }
-    return validate(
-        Design,
-        {**design.model_dump(), "process": {**design.process.model_dump(), "accuracy": accuracy}},
-    )
-
-
-def test_replicas_are_added_until_the_accuracy_holds_or_the_budget_ends() -> None:
-    chamber = build_chamber(accurate(0.2, 100))
-    loose = evaluate(accurate(0.2, 100), chamber, SerialExecutor())
-    assert loose.stopped_by == "accuracy"
-    assert loose.objective.half_width <= 0.2
-    assert len(loose.replicas) >= MIN_REPLICAS_TO_STOP
-    tight = evaluate(accurate(0.001, 14), chamber, SerialExecutor())
-    assert (tight.stopped_by, len(tight.replicas)) == ("max_replicas", 14)
-    assert tight.objective.half_width > 0.001
-    assert any("max_replicas = 14" in note and "not reached" in note for note in tight.notes)
-    # The same replicas at once say the same: how they were added leaves no trace.
-    again = evaluate(accurate(0.001, 14), chamber, SerialExecutor(), plan=ReplicaPlan(14))
-    assert again.metrics == tight.metrics
-    assert again.stopped_by == "replicas"
-
-
-def test_an_accuracy_that_cannot_be_is_refused() -> None:
-    with pytest.raises(InputError, match=r"process\.accuracy\.max_replicas.*below replicas"):
-        accurate(0.01, 5)
-    with pytest.raises(InputError, match=r"process\.accuracy\.objective_half_width"):
-        accurate(-0.01, 50)
-
-
-def test_how_many_replicas_come_next() -> None:
-    assert next_replica_count(10, 0.01, 0.01, 200) == 10  # reached
-    assert (
-        next_replica_count(10, 0.0101, 0.01, 200) == 13
-    )  # at least a quarter more: few looks, little luck
-    assert next_replica_count(10, 0.013, 0.01, 200) == 17  # as foretold
-    assert (
-        next_replica_count(10, 1.0, 0.01, 200) == 20
-    )  # but no more than twice: what foretells is rough
-    assert next_replica_count(150, 1.0, 0.01, 200) == 200
-    assert next_replica_count(200, 1.0, 0.01, 200) == 200  # spent
-    assert next_replica_count(10, np.inf, 0.01, 200) == 20
-
-
-def test_stopping_when_it_looks_good_keeps_the_95_percent() -> None:
-    rng = np.random.default_rng(8)
-    held, runs = 0, 2000
-    for _ in range(runs):
-        sample, n, wanted = rng.normal(size=400), MIN_REPLICAS_TO_STOP, 0.45
-        while (more := next_replica_count(n, estimate(sample[:n]).half_width, wanted, 400)) > n:
-            n = more
-        got = estimate(sample[:n])
-        held += got.low <= 0.0 <= got.high
-    assert 0.92 <= held / runs <= 0.98, held / runs
-
-
-def test_differences_of_unequal_numbers_of_replicas_are_taken_as_independent() -> None:
-    one, other = estimate([0.5, 0.6, 0.55, 0.52]), estimate([0.4, 0.3, 0.35], bias=0.1)
-    gap = paired_difference(one, other)
-    assert gap == independent_difference(one, other)
-    assert gap.half_width > 0.1
-    assert paired_difference(other, other).bias == pytest.approx(0.2)
 
 
 # Figures that do not depend on how long was simulated
@@ -333,21 +171,6 @@ def test_few_dents_are_said_and_make_the_interval_wide() -> None:
     runs = [estimate_metrics(of_all_sizes(rng, 0.5), CHAMBER, DESIGN) for _ in range(60)]
     for name, wanted in zip(names, true, strict=True):
         assert sum(run[name].low <= wanted <= run[name].high for run in runs) >= 54
-
-
-def test_patches_are_near_and_hold_enough() -> None:
-    rng = np.random.default_rng(11)
-    places, content = rng.random((3000, 3)), rng.uniform(0.0, 0.8, 3000)
-    patch = patches(places, content, 2.0)
-    held = np.bincount(patch, content)
-    assert held.min() >= 2.0
-    assert held.mean() < 4.0
-    middles = np.column_stack(
-        [np.bincount(patch, places[:, k]) / np.bincount(patch) for k in range(3)]
-    )
-    assert np.linalg.norm(places - middles[patch], axis=1).mean() < 0.1
-    np.testing.assert_array_equal(patches(places, content + 2.0, 2.0), np.arange(3000))
-    assert set(patches(places, 0.0 * content, 2.0)) == {0}
 
 
 @pytest.mark.long

@@ -1,0 +1,54 @@
+"""Estimates keep their range, and differences have intervals, paired or independent."""
+
+import json
+
+import numpy as np
+import pytest
+
+from chamberopt.coverage.statistics.confidence_interval import (
+    Estimate,
+    estimate,
+    independent_difference,
+    paired_difference,
+)
+
+
+def test_differences() -> None:
+    rng = np.random.default_rng(3)
+    common = rng.normal(0.0, 1.0, 10)
+    before = estimate(common)
+    after = estimate(common + 0.1 + rng.normal(0, 0.01, 10))
+    paired, apart = paired_difference(after, before), independent_difference(after, before)
+    assert paired.value == pytest.approx(0.1, abs=0.02)
+    assert paired.half_width < 0.02  # what is common to both cancels
+    assert apart.half_width > 0.5  # not so when they are taken as independent
+    same = paired_difference(before, before)
+    assert (same.value, same.half_width) == (0.0, 0.0)
+    assert (
+        independent_difference(
+            Estimate(1.0, 0.0, (1.0, 1.0)), Estimate(0.0, 0.0, (0.0, 0.0))
+        ).half_width
+        == 0
+    )
+
+
+def test_value_stays_in_its_range_and_one_replica_has_no_interval() -> None:
+    assert estimate([1.02, 1.01, 1.03], 0.0, 1.0).value == 1.0
+    assert estimate([0.5], 0.0, 1.0).half_width == np.inf
+
+
+def test_differences_of_unequal_numbers_of_replicas_are_taken_as_independent() -> None:
+    one, other = estimate([0.5, 0.6, 0.55, 0.52]), estimate([0.4, 0.3, 0.35], bias=0.1)
+    gap = paired_difference(one, other)
+    assert gap == independent_difference(one, other)
+    assert gap.half_width > 0.1
+    assert paired_difference(other, other).bias == pytest.approx(0.2)
+
+
+def test_an_estimate_comes_back_from_json() -> None:
+    one = estimate([0.5, 0.6, 0.8], bias=0.01)
+    assert Estimate.from_json(json.loads(json.dumps(one.to_json()))) == one
+    interval = json.loads(json.dumps(one.interval_json()))
+    assert Estimate.from_json(interval) == Estimate(one.value, one.half_width)
+    single = json.dumps(estimate([0.5]).to_json(), allow_nan=False)  # its half-width is infinite
+    assert Estimate.from_json(json.loads(single)) == estimate([0.5])
