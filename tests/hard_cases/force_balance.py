@@ -1,4 +1,6 @@
-"""Can what balls touch carry them? Forces at contacts, found by a linear programme; nothing of the code under test."""
+"""Can what balls touch carry them? Forces at contacts, found by a linear programme; nothing of the
+code under test.
+"""
 
 import numpy as np
 from scipy.optimize import linprog
@@ -14,9 +16,11 @@ STEP = 1e-7  # m: over which a distance is differentiated
 def force_lacking(
     mesh: TriangleMesh, balls: Balls, still: np.ndarray, slack: float, friction: float
 ) -> np.ndarray:
-    """The least force, as a share of the weight, that each of the ``still`` balls lacks, shape (k,); gravity along -z.
+    """The least force, as a share of the weight, that each of the ``still`` balls lacks, shape
+    (k,); gravity along -z.
 
-    Contacts are what is within ``slack`` [m] of touching; they only push, and within ``friction`` [-] of their normal.
+    Contacts are what is within ``slack`` [m] of touching; they only push, and within ``friction``
+    [-] of their normal.
     """
     seat = {int(ball): k for k, ball in enumerate(still)}
     pushes: list[

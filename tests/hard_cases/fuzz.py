@@ -1,4 +1,6 @@
-"""Random scenes: any chamber, any shot, any effects. They run with all invariants, or stop with a message."""
+"""Random scenes: any chamber, any shot, any effects. They run with all invariants, or stop with a
+message.
+"""
 
 import math
 from pathlib import Path
@@ -41,9 +43,9 @@ TURNING = {f"turning {name}": body for name, body in BODIES.items()}
 class Plan(NamedTuple):
     """What a scene is made of.
 
-    ``wide`` [m]: width of the chamber; ``far`` [widths]: its distance from the origin; ``speed`` [m/s] of the shot;
-    ``effects``: the names of those present (fuzzed_effects.py), which is what machine code depends on, and how ``much``
-    of each.
+    ``wide`` [m]: width of the chamber; ``far`` [widths]: its distance from the origin; ``speed``
+    [m/s] of the shot; ``effects``: the names of those present (fuzzed_effects.py), which is what
+    machine code depends on, and how ``much`` of each.
     """
 
     family: str
@@ -137,8 +139,8 @@ def duration_of(plan: Plan) -> float:
 
 
 def judge(plan: Plan, keep: Path = FOUND) -> str:
-    """How it ended: "ran", or the message it was refused or stopped with. A broken invariant is an AssertionError, and
-    the scene is kept in the file ``keep``.
+    """How it ended: "ran", or the message it was refused or stopped with. A broken invariant is an
+    AssertionError, and the scene is kept in the file ``keep``.
     """
     try:
         chamber = chamber_of(plan)
@@ -163,7 +165,9 @@ def judge(plan: Plan, keep: Path = FOUND) -> str:
 
 
 def require_invariants(chamber: Chamber, duration: float) -> None:
-    """Plays it: no ball leaves, none overlaps, energy is kept or lost, never won from walls that stand still."""
+    """Plays it: no ball leaves, none overlaps, energy is kept or lost, never won from walls that
+    stand still.
+    """
     physics = chamber.physics
     pieces = (
         1 if physics.random_phase is not None else PIECES
@@ -172,7 +176,8 @@ def require_invariants(chamber: Chamber, duration: float) -> None:
     size = float(np.ptp(chamber.mesh.vertices, axis=0).max())
     far = float(np.abs(chamber.mesh.vertices).max())
     assert seen.penetration <= allowed(chamber.mesh), f"overlap {seen.penetration:.3g} m"
-    # far from the origin each restart rounds places, and with them what a fall through the chamber gives
+    # far from the origin each restart rounds places, and with them what a fall through the chamber
+    # gives
     drift = 1e-12 + 1e-15 * PIECES * far / size
     assert not seen.energy_drift > drift, f"energy drifts by {seen.energy_drift:.3g}"
     if is_still(physics) and not _falls_through_air(physics):
@@ -184,12 +189,16 @@ def require_invariants(chamber: Chamber, duration: float) -> None:
 
 
 def _falls_through_air(physics: Physics) -> bool:
-    """True where kicks in the middle of a flight are taken for drag all along it: of second order in the energy."""
+    """True where kicks in the middle of a flight are taken for drag all along it: of second order
+    in the energy.
+    """
     return physics.drag is not None and any(physics.gravity or ())
 
 
 def _given_back(physics: Physics) -> float:
-    """Energy [J/kg] that captures and hops of balls pressed together may bring in (contact/constrained_impulse.py)."""
+    """Energy [J/kg] that captures and hops of balls pressed together may bring in
+    (contact/constrained_impulse.py).
+    """
     if physics.rest is None:
         return 0.0
     weight = float(np.linalg.norm(physics.gravity or 0.0))

@@ -1,4 +1,6 @@
-"""Which effects a random scene has: a few combinations, for each is compiled; their numbers vary freely."""
+"""Which effects a random scene has: a few combinations, for each is compiled; their numbers vary
+freely.
+"""
 
 import math
 from typing import NamedTuple
@@ -57,12 +59,14 @@ LID = 3
 
 
 class Strengths(NamedTuple):
-    """How much of each effect, where it is present; speeds and widths are those of shot and chamber.
+    """How much of each effect, where it is present; speeds and widths are those of shot and
+    chamber.
 
-    ``weight``: g wide / speed²; ``restitution``: e; ``elastic_below`` [speeds]; ``swing``: [diameters] of the floor,
-    ``beat``: the face's peak speed; ``tip``: the part's speed at its tip, ``to_and_fro``: it swings; ``rough``: mu and
-    beta0 of balls that start spinning, once for surfaces, once for balls; ``slowing``: share of the air's deceleration
-    that takes all of the speed on one width; ``spread``: smallest over largest diameter.
+    ``weight``: g wide / speed²; ``restitution``: e; ``elastic_below`` [speeds]; ``swing``:
+    [diameters] of the floor, ``beat``: the face's peak speed; ``tip``: the part's speed at its tip,
+    ``to_and_fro``: it swings; ``rough``: mu and beta0 of balls that start spinning, once for
+    surfaces, once for balls; ``slowing``: share of the air's deceleration that takes all of the
+    speed on one width; ``spread``: smallest over largest diameter.
     """
 
     weight: float
@@ -111,7 +115,9 @@ def physics_of(
     middle: np.ndarray,
     seed: int,
 ) -> Physics:
-    """The effects named, for a chamber ``wide`` [m] about ``middle`` (3,) [m] and shot of so much ``speed`` [m/s]."""
+    """The effects named, for a chamber ``wide`` [m] about ``middle`` (3,) [m] and shot of so much
+    ``speed`` [m/s].
+    """
     law = (much.restitution, CONSTANT if much.restitution == 1.0 else speed)
     amplitude = much.swing * diameter
     rate = much.tip * speed / (0.3 * wide)  # rad/s

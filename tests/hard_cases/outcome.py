@@ -23,22 +23,26 @@ from tests.helpers.scenes.cavities import uniform_restitution
 from tests.helpers.scenes.fuzzed_chambers import Chamber
 from tests.sim_core.loop.test_containment import REACH, ROUNDING, clearance_at, later
 
-WATCHED = 20_000  # impacts of each piece whose overlap is measured: where a ball is deepest, if it is ever too deep
+# impacts of each piece whose overlap is measured: where a ball is deepest, if it is ever too deep
+WATCHED = 20_000
 NOT_ELASTIC = math.nan
-DEEPEST = 1e-12  # m: a contact is found to 1e-13, and a ball that slides on edges may be there several at a time
+# m: a contact is found to 1e-13, and a ball that slides on edges may be there several at a time
+DEEPEST = 1e-12
 CONSTANT = 1e6  # m/s: a yield speed v0 that no ball reaches, so that e = C0 at any speed
-# Effects that change nothing, where a case wants none: fewer combinations of effects have to be compiled.
+# Effects that change nothing, where a case wants none: fewer combinations of effects have to be
+# compiled.
 WEIGHTLESS = Gravity(0.0, 0.0, 0.0)
 LOSSLESS = uniform_restitution(1.0, CONSTANT)
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """``ok``: did what physics demands happen; ``said``: what was expected and seen, or the message it stopped with.
+    """``ok``: did what physics demands happen; ``said``: what was expected and seen, or the message
+    it stopped with.
 
-    ``collisions``; ``events_per_s``: collisions and stale meetings a simulated second; ``penetration`` [m]: worst
-    overlap with a surface or a ball, negative while none touched; ``energy_drift`` [-]: worst relative change of the
-    energy, NaN where it need not be kept.
+    ``collisions``; ``events_per_s``: collisions and stale meetings a simulated second;
+    ``penetration`` [m]: worst overlap with a surface or a ball, negative while none touched;
+    ``energy_drift`` [-]: worst relative change of the energy, NaN where it need not be kept.
     """
 
     case: str
@@ -59,8 +63,8 @@ class Claim(NamedTuple):
 
 @dataclass(frozen=True)
 class Case:
-    """A named hard case. ``needs_rest``: it can only go right with the contact mode; ``long``: minutes;
-    ``unsolved``: why it is known to go wrong, empty where it does not.
+    """A named hard case. ``needs_rest``: it can only go right with the contact mode; ``long``:
+    minutes; ``unsolved``: why it is known to go wrong, empty where it does not.
     """
 
     name: str
@@ -75,7 +79,9 @@ class Case:
         return has_rest() or not self.needs_rest
 
     def outcome(self) -> Outcome:
-        """Plays it; an error that nobody expected, of any kind, is an outcome too, and not a good one."""
+        """Plays it; an error that nobody expected, of any kind, is an outcome too, and not a good
+        one.
+        """
         try:
             return replace(self.judge(), case=self.name)
         except Exception as error:
@@ -91,8 +97,8 @@ def named(function: Callable[[], Outcome], **about: bool | str) -> Case:
 class Played:
     """A chamber played piece by piece, and what was seen on the way.
 
-    ``time`` [s], ``ball``, ``triangle``, ``position`` [m], ``normal_speed`` [m/s]: of all recorded impacts.
-    ``track``: the balls at the start and after each piece.
+    ``time`` [s], ``ball``, ``triangle``, ``position`` [m], ``normal_speed`` [m/s]: of all recorded
+    impacts. ``track``: the balls at the start and after each piece.
     """
 
     mesh: TriangleMesh
@@ -136,8 +142,8 @@ class Played:
 def play(
     chamber: Chamber, duration: float, pieces: int = 1, record: tuple[int, ...] | None = None
 ) -> Played:
-    """Plays the chamber for ``duration`` [s] and looks at all overlaps, energies and who is still inside at the end of
-    each of the ``pieces``. Raises SimulationError when a ball is outside.
+    """Plays the chamber for ``duration`` [s] and looks at all overlaps, energies and who is still
+    inside at the end of each of the ``pieces``. Raises SimulationError when a ball is outside.
     """
     mesh, balls, physics = chamber
     seen = Played(mesh, [balls], duration)
@@ -177,7 +183,9 @@ def play(
 
 
 def overlap(chamber: Chamber) -> float:
-    """Deepest overlap [m] of any ball with a surface or, where balls meet, with another ball, now."""
+    """Deepest overlap [m] of any ball with a surface or, where balls meet, with another ball,
+    now.
+    """
     mesh, balls, physics = chamber
     gap = clearance_at(chamber, balls.positions, np.zeros(len(balls)))
     corners = corners_now(mesh, physics)
@@ -190,8 +198,8 @@ def overlap(chamber: Chamber) -> float:
 
 
 def _beneath_the_mesh(chamber: Chamber) -> np.ndarray:
-    """True (n,) for balls so small that a floor, at its lowest, leaves room for their centres below the mesh's; or a
-    lid, the second of two sonotrodes, above it.
+    """True (n,) for balls so small that a floor, at its lowest, leaves room for their centres below
+    the mesh's; or a lid, the second of two sonotrodes, above it.
     """
     balls, vibrations = chamber.balls, chamber.physics.vibrations
     low, high = chamber.mesh.vertices.min(axis=0), chamber.mesh.vertices.max(axis=0)
@@ -205,7 +213,9 @@ def _beneath_the_mesh(chamber: Chamber) -> np.ndarray:
 
 
 def _in_the_room(mesh: TriangleMesh, physics: Physics) -> np.ndarray:
-    """True (m,) for triangles whose impacts are logged where they happen, and not as a turning part sees them."""
+    """True (m,) for triangles whose impacts are logged where they happen, and not as a turning part
+    sees them.
+    """
     return (
         np.ones(len(mesh.tags), dtype=np.bool_)
         if physics.part_rotation is None
@@ -234,7 +244,9 @@ def is_elastic(physics: Physics) -> bool:
 
 
 def energy_above_floor(mesh: TriangleMesh, balls: Balls, physics: Physics) -> float:
-    """Energy of a kilogram of shot [J/kg], potential energy counted from the mesh's lowest corner: never negative."""
+    """Energy of a kilogram of shot [J/kg], potential energy counted from the mesh's lowest corner:
+    never negative.
+    """
     each = 0.5 * (balls.velocities**2).sum(axis=1)
     if balls.spins is not None:
         each += 0.2 * balls.radius**2 * (balls.spins**2).sum(axis=1)
@@ -245,11 +257,15 @@ def energy_above_floor(mesh: TriangleMesh, balls: Balls, physics: Physics) -> fl
 
 
 def allowed(mesh: TriangleMesh) -> float:
-    """Overlap [m] that is allowed: contacts are promised to DEEPEST, coordinates to their own rounding."""
+    """Overlap [m] that is allowed: contacts are promised to DEEPEST, coordinates to their own
+    rounding.
+    """
     return float(DEEPEST + ROUNDING * np.abs(mesh.vertices).max())
 
 
-DRIFT = 1e-12  # relative energy error of a run of up to a million elastic collisions: 1e-16 each, adding up at random
+# relative energy error of a run of up to a million elastic collisions: 1e-16 each, adding up at
+# random
+DRIFT = 1e-12
 
 
 def near(what: str, seen: object, wanted: object, within: float) -> Claim:
@@ -262,7 +278,9 @@ def near(what: str, seen: object, wanted: object, within: float) -> Claim:
 
 
 def verdict(played: Played, expected: str, *claims: Claim, drift: float = DRIFT) -> Outcome:
-    """Claims of the case, and those of every case: no overlap, and energy kept to ``drift`` where nothing loses it."""
+    """Claims of the case, and those of every case: no overlap, and energy kept to ``drift`` where
+    nothing loses it.
+    """
     deepest = allowed(played.mesh)
     every = [
         *claims,
@@ -289,7 +307,9 @@ def refusal(
     message: str,
     error: type[Exception] | tuple[type[Exception], ...] = SceneError,
 ) -> Outcome:
-    """The attempt must be refused with an ``error`` whose message matches the pattern: it names who and where."""
+    """The attempt must be refused with an ``error`` whose message matches the pattern: it names who
+    and where.
+    """
     try:
         attempt()
     except error as said:

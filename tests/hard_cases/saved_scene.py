@@ -1,8 +1,9 @@
 """A scene in a file: what a failure is kept as, to be played again for ever after.
 
-An .npz: ``vertices``, ``triangles``, ``tags``, ``positions``, ``velocities``, ``numbers`` (diameter, density, duration,
-warm-up), ``spins`` if there are any, ``each`` (n, 2), diameter and density of each ball, where they differ, and
-``physics``, the effects as JSON, field by field; absent ones are null.
+An .npz: ``vertices``, ``triangles``, ``tags``, ``positions``, ``velocities``, ``numbers``
+(diameter, density, duration, warm-up), ``spins`` if there are any, ``each`` (n, 2), diameter and
+density of each ball, where they differ, and ``physics``, the effects as JSON, field by field;
+absent ones are null.
 """
 
 import json

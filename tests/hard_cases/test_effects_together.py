@@ -1,7 +1,8 @@
 """Effects beside one another, against what mechanics says of the two together.
 
-All in one combination of effects, which is compiled once (and is one of fuzzed_effects.FEW): what a test does not want
-is there with numbers that do nothing. Steel balls of 3 mm that fly through one another.
+All in one combination of effects, which is compiled once (and is one of fuzzed_effects.FEW): what a
+test does not want is there with numbers that do nothing. Steel balls of 3 mm that fly through one
+another.
 """
 
 import math
@@ -67,8 +68,9 @@ def shot(positions: object, velocities: object = 0.0, spins: object = 0.0) -> Ba
 
 
 def test_a_ball_dropped_on_a_turntable_goes_round_with_two_sevenths_of_its_speed() -> None:
-    """A ball that rolls on a turntable goes round with 2/7 of its angular speed (J. A. Burns, Am. J. Phys. 49 (1981)
-    56). In hops that last s, each of which ends in sticking: at hit k it is at r (1 + 2i/7 omega s)^k.
+    """A ball that rolls on a turntable goes round with 2/7 of its angular speed (J. A. Burns, Am.
+    J. Phys. 49 (1981) 56). In hops that last s, each of which ends in sticking: at hit k it is at r
+    (1 + 2i/7 omega s)^k.
     """
     omega, drop, hops = 10.0, 2e-4, 60
     disk = trimesh.creation.cylinder(radius=0.03, height=0.004, sections=48)
@@ -89,7 +91,9 @@ def test_a_ball_dropped_on_a_turntable_goes_round_with_two_sevenths_of_its_speed
 
 @pytest.mark.parametrize("mu", [0.1, 0.4])
 def test_a_ball_that_a_rough_paddle_pushes_slips_on_the_floor_until_it_rolls(mu: float) -> None:
-    """The paddle's face passes the ball at omega times half its width, and rubs; then the floor takes 2/7 of it all."""
+    """The paddle's face passes the ball at omega times half its width, and rubs; then the floor
+    takes 2/7 of it all.
+    """
     x, y, omega, beta0 = 0.002, 0.012, 10.0, 0.5
     physics = EVERYTHING._replace(
         part_rotation=PartRotation(PART, rpm=60.0 * omega / math.tau), friction=rough(mu, beta0)
@@ -123,7 +127,9 @@ HEAVY = Drag(density=50.0)
 
 
 def test_air_does_not_wake_nor_slow_what_lies_or_rolls_on_the_floor() -> None:
-    """It is left alone there, as drag.py says; and is not slowed afterwards for the time it has spent there."""
+    """It is left alone there, as drag.py says; and is not slowed afterwards for the time it has
+    spent there.
+    """
     physics = EVERYTHING._replace(drag=HEAVY, friction=rough(0.3, 0.0))
     speed = 0.05
     places = [[-0.018, 0.015, R - HALF], [0.0, 0.01, R - HALF]]

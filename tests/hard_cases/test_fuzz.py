@@ -1,4 +1,6 @@
-"""Random scenes keep all invariants or stop with a message; and the scenes that once did not are played again."""
+"""Random scenes keep all invariants or stop with a message; and the scenes that once did not are
+played again.
+"""
 
 import dataclasses
 from pathlib import Path

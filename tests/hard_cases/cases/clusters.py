@@ -1,4 +1,6 @@
-"""Many contacts at nearly one time: Newton's cradle, inelastic collapse, triple contact, dense packings."""
+"""Many contacts at nearly one time: Newton's cradle, inelastic collapse, triple contact, dense
+packings.
+"""
 
 import math
 
@@ -33,7 +35,9 @@ def with_losses(e: float, elastic_below: float = 0.01) -> Restitution:
 
 
 def row(places: list[float], speeds: list[float]) -> Balls:
-    """Balls on a line along x through the middle of the room: x [m] from the first's place, and their speeds [m/s]."""
+    """Balls on a line along x through the middle of the room: x [m] from the first's place, and
+    their speeds [m/s].
+    """
     positions = np.full((len(places), 3), MIDDLE)
     positions[:, 0] += np.array(places) - 0.02
     velocities = np.zeros((len(places), 3))
@@ -63,7 +67,9 @@ def newtons_cradle() -> Outcome:
 
 
 def newtons_cradle_touching() -> Outcome:
-    """The same with no gap at all but the rounding of places: four hits at one time, one after the other."""
+    """The same with no gap at all but the rounding of places: four hits at one time, one after the
+    other.
+    """
     balls = row([0.0, *(2 * DIAMETER + k * DIAMETER for k in range(4))], [1.0, 0, 0, 0, 0])
     seen = play(Chamber(ROOM, balls, Physics()), 5e-3)
     return verdict(
@@ -75,7 +81,9 @@ def newtons_cradle_touching() -> Outcome:
 
 
 def newtons_cradle_with_two() -> Outcome:
-    """Two in, two out: elastic hits in a row exchange velocities, so that their order along the row is kept."""
+    """Two in, two out: elastic hits in a row exchange velocities, so that their order along the row
+    is kept.
+    """
     balls = row(
         [0.0, DIAMETER + 1e-6, *(5 * DIAMETER + k * (DIAMETER + 1e-6) for k in range(3))],
         [2.0, 2.0, 0, 0, 0],
@@ -99,7 +107,8 @@ def never_warmer(seen: Played) -> Claim:
 def inelastic_collapse_of_three() -> Outcome:
     """Two balls close on a third with e below 7 - 4 sqrt(3): infinitely many hits in finite time.
 
-    McNamara & Young, Phys. Fluids A 4 (1992) 496. With a finite precision they end: together, momentum kept.
+    McNamara & Young, Phys. Fluids A 4 (1992) 496. With a finite precision they end: together,
+    momentum kept.
     """
     e = 0.05
     balls = row([0.0, 0.02, 0.04], [1.0, 0.1, -1.0])
@@ -116,7 +125,9 @@ def inelastic_collapse_of_three() -> Outcome:
 
 
 def collapse_of_a_row_between_walls() -> Outcome:
-    """Twenty balls in a row, e = 0.5 between themselves and at the walls: collapses within the first traverse."""
+    """Twenty balls in a row, e = 0.5 between themselves and at the walls: collapses within the
+    first traverse.
+    """
     rng = np.random.default_rng(5)
     balls = row([k * 2 * DIAMETER for k in range(20)], list(rng.normal(0.0, 1.0, 20)))
     seen = play(Chamber(ROOM, balls, Physics(WEIGHTLESS, with_losses(0.5))), 2.0, 20)
@@ -151,7 +162,9 @@ def collapse_of_a_cloud() -> Outcome:
 
 
 def pile_coming_to_rest() -> Outcome:
-    """Fifty balls settle in a box under gravity, e = 0.5: they lie still after a second, and cost nothing then."""
+    """Fifty balls settle in a box under gravity, e = 0.5: they lie still after a second, and cost
+    nothing then.
+    """
     rng = np.random.default_rng(7)
     room = box((0.012, 0.012, 0.06))
     balls = Balls(pack_balls(room, 50, DIAMETER, rng), rng.normal(0.0, 0.5, (50, 3)), DIAMETER)
@@ -170,7 +183,9 @@ def pile_coming_to_rest() -> Outcome:
 
 
 def triple_contact() -> Outcome:
-    """A ball flies between two that touch, at both at once. Which comes first is open; momentum and energy are not."""
+    """A ball flies between two that touch, at both at once. Which comes first is open; momentum and
+    energy are not.
+    """
     half = 0.5 * DIAMETER
     positions = np.array(
         [
@@ -196,7 +211,9 @@ def triple_contact() -> Outcome:
 
 
 def four_balls_close_on_one() -> Outcome:
-    """From the corners of a tetrahedron at one speed: momentum stays none, the energy what it was."""
+    """From the corners of a tetrahedron at one speed: momentum stays none, the energy what it
+    was.
+    """
     corners = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / math.sqrt(3.0)
     positions = MIDDLE + np.concatenate([[[0.0, 0, 0]], 0.01 * corners])
     balls = Balls(positions, np.concatenate([[[0.0, 0, 0]], -2.0 * corners]), DIAMETER)
@@ -212,8 +229,8 @@ def four_balls_close_on_one() -> Outcome:
 def crystal(
     side: int, share: float, jitter: float, rng: np.random.Generator
 ) -> tuple[Chamber, float]:
-    """A face-centred cubic crystal of 4 side³ balls that fills ``share`` of its box, each moved by up to ``jitter`` of
-    the free gap; and the share. Elastic, no gravity.
+    """A face-centred cubic crystal of 4 side³ balls that fills ``share`` of its box, each moved by
+    up to ``jitter`` of the free gap; and the share. Elastic, no gravity.
     """
     count = 4 * side**3
     wide = (count * math.pi / 6.0 / share) ** (1.0 / 3.0) * DIAMETER
@@ -232,7 +249,9 @@ def crystal(
 
 
 def packing_of_64_percent() -> Outcome:
-    """A jittered crystal at the share of random close packing, half the free volume of the gaps gone."""
+    """A jittered crystal at the share of random close packing, half the free volume of the gaps
+    gone.
+    """
     chamber, share = crystal(6, 0.64, 0.9, np.random.default_rng(8))
     seen = play(chamber, 0.005, 5, record=())
     return verdict(
@@ -243,11 +262,13 @@ def packing_of_64_percent() -> Outcome:
 
 
 def compressed(count: int, closer: float, rng: np.random.Generator) -> tuple[Chamber, float]:
-    """An elastic gas whose balls grow, to what the narrowest gap allows, until they hardly can; and its packing.
+    """An elastic gas whose balls grow, to what the narrowest gap allows, until they hardly can; and
+    its packing.
 
-    Stepwise event-driven compression after Lubachevsky & Stillinger, J. Stat. Phys. 60 (1990) 561: irregular, unlike
-    a crystal. Stops when the balls have grown by less than ``closer`` [-] over twenty steps. The packing is a share
-    of the whole box; balls cannot be as dense at its walls as in its middle.
+    Stepwise event-driven compression after Lubachevsky & Stillinger, J. Stat. Phys. 60 (1990) 561:
+    irregular, unlike a crystal. Stops when the balls have grown by less than ``closer`` [-] over
+    twenty steps. The packing is a share of the whole box; balls cannot be as dense at its walls as
+    in its middle.
     """
     side = 0.01
     room = box((side, side, side))

@@ -1,4 +1,6 @@
-"""One ball dropped or thrown at a face, an edge, a corner: exact bounce-back or deflection, by symmetry."""
+"""One ball dropped or thrown at a face, an edge, a corner: exact bounce-back or deflection, by
+symmetry.
+"""
 
 import math
 
@@ -42,7 +44,9 @@ def ball_on_a_face() -> Outcome:
 
 
 def _ridge() -> TriangleMesh:
-    """A room with a square bar in it, an edge of it on top, along y, at z = 0; its ends do not show."""
+    """A room with a square bar in it, an edge of it on top, along y, at z = 0; its ends do not
+    show.
+    """
     bar = trimesh.creation.box((0.01, 0.02, 0.01))
     bar.apply_transform(trimesh.transformations.rotation_matrix(math.pi / 4.0, [0.0, 1.0, 0.0]))
     bar.apply_translation([0.0, 0.0, -0.005 * math.sqrt(2.0)])
@@ -54,7 +58,9 @@ def _ridge() -> TriangleMesh:
 
 
 def _tip(slope: float) -> TriangleMesh:
-    """A room with a four-sided pyramid in it, its tip on top at the origin; ``slope`` [-]: height over half width."""
+    """A room with a four-sided pyramid in it, its tip on top at the origin; ``slope`` [-]: height
+    over half width.
+    """
     wide = 0.01 / slope
     corners = [
         [0.0, 0.0, 0.0],
@@ -70,7 +76,8 @@ def _tip(slope: float) -> TriangleMesh:
 def _deflected(room: TriangleMesh, off: tuple[float, float], what: str) -> Outcome:
     """A ball falls on an edge along y or a tip at the origin, ``off`` (x, y) [m] beside it.
 
-    It is touched where the centre is r from the edge or tip; there its velocity is mirrored at the normal, exactly.
+    It is touched where the centre is r from the edge or tip; there its velocity is mirrored at the
+    normal, exactly.
     """
     start = one_ball((off[0], off[1], RADIUS + DROP), (0.0, 0.0, 0.0))
     aside = np.array([off[0], 0.0 if "edge" in what else off[1]])
@@ -98,7 +105,9 @@ def ball_on_an_edge() -> Outcome:
 
 
 def ball_bouncing_on_an_edge() -> Outcome:
-    """A hundred times on one edge, right above it: each time at the same height, none deeper than the one before."""
+    """A hundred times on one edge, right above it: each time at the same height, none deeper than
+    the one before.
+    """
     drop = 1e-4
     start = one_ball((0.0, 1e-3, RADIUS + drop), (0.0, 0.0, 0.0))
     seen = play(Chamber(_ridge(), start, Physics(Gravity())), 1.0)
@@ -153,7 +162,9 @@ def ball_along_a_shared_edge() -> Outcome:
 
 
 def ball_sliding_along_a_shared_edge() -> Outcome:
-    """It touches the floor all along and does not approach it: nothing happens until it comes to the corner."""
+    """It touches the floor all along and does not approach it: nothing happens until it comes to
+    the corner.
+    """
     room = box((0.03, 0.03, 0.03))
     start = one_ball((0.003, 0.003, RADIUS), (0.1, 0.1, 0.0))
     seen = play(Chamber(room, start, Physics()), 0.2)
@@ -179,7 +190,9 @@ def ball_into_a_corner() -> Outcome:
 
 
 def ball_along_a_row_of_corners() -> Outcome:
-    """Thrown along a row of coplanar triangles over all their corners: no hit but the far walls'."""
+    """Thrown along a row of coplanar triangles over all their corners: no hit but the far
+    walls'.
+    """
     room = box((0.03, 0.03, 0.03))
     fine = room
     for _ in range(3):

@@ -44,7 +44,8 @@ ROOM = box((SIDE, SIDE, SIDE))
 def _to_and_fro(
     side: float, radius: float, speed: float, duration: float, off: float = 0.0
 ) -> Outcome:
-    """Between floor and ceiling of a cube with side [m]: hits at (first way + k (side - 2 r))/v, none is lost.
+    """Between floor and ceiling of a cube with side [m]: hits at (first way + k (side - 2 r))/v,
+    none is lost.
 
     ``off`` [m]: how far from the origin the cube is, along every axis.
     """
@@ -82,7 +83,9 @@ def gas_of_small_balls() -> Outcome:
 
 
 def large_ball_on_a_small_body() -> Outcome:
-    """A ball of a metre falls beside a tetrahedron of a micrometre: mirrored at the line to its tip."""
+    """A ball of a metre falls beside a tetrahedron of a micrometre: mirrored at the line to its
+    tip.
+    """
     tiny, radius = 1e-6, 0.5
     corners = np.array([[0.0, 0.0, 0.0], [1, 0, -1], [-0.5, 0.8, -1], [-0.5, -0.8, -1]]) * tiny
     body = trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]], process=False)
@@ -102,7 +105,9 @@ def large_ball_on_a_small_body() -> Outcome:
 
 
 def triangles_of_two_sizes() -> Outcome:
-    """A wall with a square micrometre set into it, in its plane: bounces on and beside it, as on any wall."""
+    """A wall with a square micrometre set into it, in its plane: bounces on and beside it, as on
+    any wall.
+    """
     tiny, half = 1e-6, 0.5 * SIDE
     square = [(half - tiny, half - tiny), (half, half - tiny), (half, half), (half - tiny, half)]
     floor = [(0.0, 0.0), (SIDE, 0.0), (SIDE, SIDE), (0.0, SIDE), *square]
@@ -172,8 +177,8 @@ def sonotrode_without_swing() -> Outcome:
 
 
 def sonotrode_swinging_a_millimetre() -> Outcome:
-    """1 mm at 20 kHz: the face moves at up to 126 m/s. Each hit mirrors the velocity in the face's frame, at the
-    place where the face is then; between hits nothing happens but the ceiling.
+    """1 mm at 20 kHz: the face moves at up to 126 m/s. Each hit mirrors the velocity in the face's
+    frame, at the place where the face is then; between hits nothing happens but the ceiling.
     """
     swing, omega, phase = 1e-3, math.tau * 20e3, 0.4
     start = one_ball((0.015, 0.015, 0.02), (0.0, 0.0, -3.0))
@@ -226,7 +231,9 @@ def _plastic(e: float) -> Physics:
 
 
 def perfectly_plastic_walls() -> Outcome:
-    """e = 0, no gravity: each wall takes the velocity across it and leaves the rest; after three walls all is gone."""
+    """e = 0, no gravity: each wall takes the velocity across it and leaves the rest; after three
+    walls all is gone.
+    """
     start = one_ball((0.01, 0.01, 0.01), (0.3, 0.2, -0.1))
     seen = play(Chamber(ROOM, start, _plastic(0.0)), 1.0)
     way = SIDE - RADIUS - 0.01
@@ -284,7 +291,9 @@ def restitution_of_one() -> Outcome:
 
 
 def plastic_ball_under_gravity(e: float) -> Outcome:
-    """It drops, may bounce a few times, and lies: at r over the floor, at rest, without further events."""
+    """It drops, may bounce a few times, and lies: at r over the floor, at rest, without further
+    events.
+    """
     start = one_ball((0.011, 0.013, RADIUS + DROP), (0.0, 0.0, 0.0))
     physics = Physics(Gravity(), uniform_restitution(e, 1e3))
     seen = play(Chamber(ROOM, start, with_rest(physics)), 5.0, 5)
@@ -306,7 +315,8 @@ def hundred_million_collisions() -> Outcome:
     physics = Physics(Gravity())
     trial = simulate(Scene(room, balls, physics, 1.0, record=())).collisions.total
     seen = play(Chamber(room, balls, physics), 1.01e8 / trial, record=())
-    # the promise is 1e-11 over 10^7 collisions; rounding, 1e-16 a collision, has a bias of 1/300: 3.3e-11 was measured
+    # the promise is 1e-11 over 10^7 collisions; rounding, 1e-16 a collision, has a bias of 1/300:
+    # 3.3e-11 was measured
     return verdict(
         seen,
         "keeps its energy and its balls",

@@ -19,8 +19,8 @@ TINY = 1e-9  # m: width of slivers and of steps that are almost none
 def floor_with(
     points: list[tuple[float, float, float]], below: list[list[int]] | None = None
 ) -> TriangleMesh:
-    """A box on z = 0 whose floor is triangulated through its corners and further points (x, y, z) [m]: as ``below``
-    says, or as it comes.
+    """A box on z = 0 whose floor is triangulated through its corners and further points (x, y, z)
+    [m]: as ``below`` says, or as it comes.
     """
     corners = [(0.0, 0.0, 0.0), (SIDE, 0.0, 0.0), (SIDE, SIDE, 0.0), (0.0, SIDE, 0.0)]
     floor = np.array([*corners, *points])
@@ -49,7 +49,9 @@ def floor_with(
 def _bounces_as_on_a_plane(
     room: TriangleMesh, at: tuple[float, float], off: float, expected: str
 ) -> Outcome:
-    """Dropped at (x, y) [m]: comes up again straight, as high, as if the floor were plane but for ``off`` [m]."""
+    """Dropped at (x, y) [m]: comes up again straight, as high, as if the floor were plane but for
+    ``off`` [m].
+    """
     seen = play(
         Chamber(room, one_ball((*at, RADIUS + DROP), (0.0, 0.0, 0.0)), Physics(Gravity())), 0.4
     )
@@ -78,7 +80,9 @@ def floor_with_a_sliver() -> Outcome:
 
 
 def floor_with_near_duplicate_corners() -> Outcome:
-    """Corners a nanometre apart: triangles that are almost points, and almost duplicates of their neighbours."""
+    """Corners a nanometre apart: triangles that are almost points, and almost duplicates of their
+    neighbours.
+    """
     room = floor_with([(0.015, 0.015, 0.0), (0.015 + TINY, 0.015, 0.0), (0.015, 0.015 + TINY, 0.0)])
     return _bounces_as_on_a_plane(
         room, (0.015, 0.015), 0.0, "corners a nanometre apart are not felt"
@@ -86,7 +90,9 @@ def floor_with_near_duplicate_corners() -> Outcome:
 
 
 def floor_with_a_pimple() -> Outcome:
-    """A nanometre high on a base of millimetres: the ball falls on its tip and goes straight up again."""
+    """A nanometre high on a base of millimetres: the ball falls on its tip and goes straight up
+    again.
+    """
     height = TINY
     room = floor_with(
         [(0.015, 0.015, height), (0.013, 0.013, 0.0), (0.017, 0.013, 0.0), (0.015, 0.018, 0.0)]
@@ -97,7 +103,9 @@ def floor_with_a_pimple() -> Outcome:
 
 
 def plate_of_a_nanometre() -> Outcome:
-    """Two faces almost in one place, back to back: balls on either side bounce off their own, none goes through."""
+    """Two faces almost in one place, back to back: balls on either side bounce off their own, none
+    goes through.
+    """
     plate = trimesh.creation.box((2.0 * HALF - 1e-3, 2.0 * HALF - 1e-3, TINY))
     room = box_around(plate, HALF)
     place = RADIUS + 0.5 * TINY + DROP
@@ -116,7 +124,9 @@ def plate_of_a_nanometre() -> Outcome:
 
 
 def sliver_of_a_tetrahedron() -> Outcome:
-    """Four corners almost in one plane, a nanometre's rise in the middle: met from above and below."""
+    """Four corners almost in one plane, a nanometre's rise in the middle: met from above and
+    below.
+    """
     corners = np.array(
         [[-0.01, -0.01, 0.0], [0.01, -0.01, 0.0], [0.0, 0.014, 0.0], [0.0, 0.0, TINY]]
     )
@@ -138,8 +148,8 @@ def _open_box() -> TriangleMesh:
 
 
 def t_junction() -> Outcome:
-    """A corner of one triangle in the middle of its neighbour's edge: closed to the eye, open to whoever follows
-    edges; refused with the place.
+    """A corner of one triangle in the middle of its neighbour's edge: closed to the eye, open to
+    whoever follows edges; refused with the place.
     """
     mesh = _open_box()
     vertices, triangles = mesh.vertices, mesh.triangles
@@ -237,7 +247,8 @@ def triangle_without_area() -> Outcome:
     assert partner is not None
     one, two, three = np.roll(triangles[floor], -partner)
     middle = len(vertices)
-    # the floor's edge is split, the wall's is not: a triangle without area fills what would be a T-junction
+    # the floor's edge is split, the wall's is not: a triangle without area fills what would be a
+    # T-junction
     new = [[one, middle, three], [middle, two, three], [one, two, middle]]
     kept = np.delete(triangles, floor, axis=0)
     tags = np.concatenate([np.delete(mesh.tags, floor), [FLOOR, FLOOR, SIDES]])

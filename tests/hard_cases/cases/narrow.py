@@ -37,7 +37,9 @@ BOUNCES = 1000
 
 
 def slot(more: float) -> tuple[TriangleMesh, Balls]:
-    """A slot 2 r + ``more`` [m] wide along z, open for 2 cm along x and y, and a ball in its middle, thrown upwards."""
+    """A slot 2 r + ``more`` [m] wide along z, open for 2 cm along x and y, and a ball in its
+    middle, thrown upwards.
+    """
     room = box((0.02, 0.02, 2.0 * RADIUS + more), centre=(0.0, 0.0, 0.0))
     return room, Balls(np.zeros((1, 3)), np.array([[0.0, 0.0, SPEED]]), 2.0 * RADIUS)
 
@@ -67,7 +69,9 @@ def slot_wider_by(more: float) -> Outcome:
 
 
 def slot_narrower_by(less: float) -> Outcome:
-    """There is no place for a rigid ball: refused at the door, with both sides named where the ball touches both."""
+    """There is no place for a rigid ball: refused at the door, with both sides named where the ball
+    touches both.
+    """
     room, ball = slot(-less)
     return refusal(
         lambda: Scene(room, ball, Physics(), 1.0),
@@ -87,7 +91,9 @@ def upright_slot_narrower_than_two_balls() -> Outcome:
 
 
 def slot_too_tight_for_a_second() -> Outcome:
-    """A picometre of play means 10^12 bounces a second: that is said, instead of being worked on for ever."""
+    """A picometre of play means 10^12 bounces a second: that is said, instead of being worked on
+    for ever.
+    """
     room, ball = slot(1e-12)
     return refusal(
         lambda: simulate(Scene(room, ball, Physics(), 1.0)),
@@ -115,7 +121,9 @@ AMPLITUDE = 25e-6  # m
 
 
 def _low_room(clear: float) -> TriangleMesh:
-    """Floor (the sonotrode, at rest) to ceiling (the part) is a ball's diameter and ``clear`` [m]."""
+    """Floor (the sonotrode, at rest) to ceiling (the part) is a ball's diameter and ``clear``
+    [m].
+    """
     return box((0.02, 0.02, 2.0 * RADIUS + clear))
 
 
@@ -150,8 +158,8 @@ def ball_in_a_room_too_low() -> Outcome:
 
 
 def ball_crushed_by_the_sonotrode() -> Outcome:
-    """It fits at the phase of the start, and is caught between two rigid bodies a quarter period later: no motion of
-    a rigid ball is right, so that it must be said.
+    """It fits at the phase of the start, and is caught between two rigid bodies a quarter period
+    later: no motion of a rigid ball is right, so that it must be said.
     """
     ball = Balls(
         np.array([[0.01, 0.01, RADIUS + 0.25 * AMPLITUDE]]), np.zeros((1, 3)), 2.0 * RADIUS
@@ -164,8 +172,8 @@ def ball_crushed_by_the_sonotrode() -> Outcome:
 
 
 def ball_with_just_the_swing_for_room() -> Outcome:
-    """As wide as the ball at the crest: it fits, whatever the phase. Beside a wall it does not matter how the face
-    swings: nothing nears there.
+    """As wide as the ball at the crest: it fits, whatever the phase. Beside a wall it does not
+    matter how the face swings: nothing nears there.
     """
     for phase in (-0.5 * math.pi, -0.5, 0.5 * math.pi):
         lift = AMPLITUDE * max(0.0, math.sin(phase))
@@ -177,7 +185,9 @@ def ball_with_just_the_swing_for_room() -> Outcome:
 
 
 def ball_in_a_wedge_by_rounding() -> Outcome:
-    """It overlaps both sides of a corner by less than is asked of it: no gap, it can move out, so it is let in."""
+    """It overlaps both sides of a corner by less than is asked of it: no gap, it can move out, so
+    it is let in.
+    """
     less = RADIUS - 5e-10
     ball = Balls(np.array([[less, less, less]]), np.zeros((1, 3)), 2.0 * RADIUS)
     Scene(box((0.02, 0.02, 0.02)), ball, Physics(), 0.1)
@@ -185,7 +195,9 @@ def ball_in_a_wedge_by_rounding() -> Outcome:
 
 
 def ball_with_room_above_the_crest() -> Outcome:
-    """A hair more than the swing: the ball rattles, and never overlaps. Elastic: who is hit gains, so few periods."""
+    """A hair more than the swing: the ball rattles, and never overlaps. Elastic: who is hit gains,
+    so few periods.
+    """
     clear = 1.2 * AMPLITUDE
     ball = Balls(
         np.array([[0.01, 0.01, RADIUS + 0.9 * clear]]), np.array([[0.3, 0.2, -0.5]]), 2.0 * RADIUS
@@ -212,7 +224,9 @@ def design_with_a_part_nearer_than_a_ball() -> Outcome:
 
 
 def design_with_a_part_nearer_than_a_ball_and_its_swing() -> Outcome:
-    """At rest a ball would fit under the part, at the crest it would be crushed: refused, with the swing named."""
+    """At rest a ball would fit under the part, at the crest it would be crushed: refused, with the
+    swing named.
+    """
     from chamberopt.common.errors import InputError
     from tests.helpers.synthetic import plate_design
 
@@ -224,8 +238,9 @@ def design_with_a_part_nearer_than_a_ball_and_its_swing() -> Outcome:
 
 
 def wedge() -> Outcome:
-    """Into a wedge along its plane of symmetry, nearly: mirrored at each wall, the path is a straight line through a
-    fan of images of the wedge, and crosses as many of their walls as lie between its two ends.
+    """Into a wedge along its plane of symmetry, nearly: mirrored at each wall, the path is a
+    straight line through a fan of images of the wedge, and crosses as many of their walls as lie
+    between its two ends.
     """
     angle = math.radians(10.0)
     across = math.tan(math.radians(5.2))  # so that the last crossing is well before the far wall

@@ -1,4 +1,6 @@
-"""What cannot be simulated is refused at the door, with the ball, the triangle or the field named."""
+"""What cannot be simulated is refused at the door, with the ball, the triangle or the field
+named.
+"""
 
 import math
 from collections.abc import Iterator
@@ -25,7 +27,8 @@ def still(*positions: list[float]) -> Balls:
 
 
 def fields(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
-    """Every number in nested NamedTuples and tuples, as (path, the whole with a hole where the number was).
+    """Every number in nested NamedTuples and tuples, as (path, the whole with a hole where the
+    number was).
 
     The hole is a function: number -> the whole.
     """
@@ -46,7 +49,9 @@ def _refilled(whole: Any, k: int, fill: Any, number: float) -> Any:
 
 
 def physics_without_a_number(field: str, fill: Any) -> Outcome:
-    """NaN and both infinities in one field of Physics: each refused, the effect and the field named."""
+    """NaN and both infinities in one field of Physics: each refused, the effect and the field
+    named.
+    """
     effect, _, rest = field.partition(".")
     name = rest.partition("[")[0] if effect != "gravity" else ""
     return _all_refused(

@@ -1,7 +1,8 @@
-"""The contact searches under test, each called for many cases at once: the only door from these tests to them.
+"""The contact searches under test, each called for many cases at once: the only door from these
+tests to them.
 
-Flights (n, 9): position [m], velocity [m/s] and acceleration [m/s²] of a ball's centre. All return delays (n,) [s],
-infinite where there is no contact.
+Flights (n, 9): position [m], velocity [m/s] and acceleration [m/s²] of a ball's centre. All return
+delays (n,) [s], infinite where there is no contact.
 """
 
 import numpy as np
@@ -51,8 +52,8 @@ def vibrating_planes(
     radius: float,
     limits: np.ndarray,
 ) -> np.ndarray:
-    """Contact of each flight with its vibrating plane: ``planes`` (n, 20) as obstacles hold them, ``waves`` (n, 6)
-    amplitude, omega, phase and axis, ``times`` (n,) now, ``limits`` (n,) [s].
+    """Contact of each flight with its vibrating plane: ``planes`` (n, 20) as obstacles hold them,
+    ``waves`` (n, 6) amplitude, omega, phase and axis, ``times`` (n,) now, ``limits`` (n,) [s].
     """
     found = np.empty(len(times))
     _vibrating_planes(planes, waves, flights, times, radius, limits, found)
@@ -67,8 +68,8 @@ def contacts(
     time: float,
     lengths: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """First contact of each flight (n, 6; relative to the mesh's centre) with a whole mesh: delays, and mesh
-    triangles (-1: none).
+    """First contact of each flight (n, 6; relative to the mesh's centre) with a whole mesh: delays,
+    and mesh triangles (-1: none).
     """
     found, obstacles = np.empty(len(lengths)), np.empty(len(lengths), dtype=np.int64)
     fall = np.zeros(3) if gravity is None else np.array(gravity)

@@ -46,8 +46,9 @@ def spread(rng: np.random.Generator, low: float, high: float, count: int) -> np.
 
 
 def tetrahedra(rng: np.random.Generator, shape: str, count: int) -> np.ndarray:
-    """Corners (count, 4, 3) [m] about the origin: plump (10 mm), slivers a nm to 10 µm thin, needles of 10 mm with a
-    base of 0.1 to 10 µm, micro (1 µm), huge (1 m), far (plump, to be put a km away).
+    """Corners (count, 4, 3) [m] about the origin: plump (10 mm), slivers a nm to 10 µm thin,
+    needles of 10 mm with a base of 0.1 to 10 µm, micro (1 µm), huge (1 m), far (plump, to be put a
+    km away).
     """
     corners = units(rng, 4 * count).reshape(count, 4, 3) * 0.01
     if shape == "sliver":
@@ -69,8 +70,9 @@ def tetrahedra(rng: np.random.Generator, shape: str, count: int) -> np.ndarray:
 
 
 def body_of(rng: np.random.Generator, shape: str) -> tuple[np.ndarray, np.ndarray]:
-    """Corners (n, 3) [m] and outward triangles (m, 3) of one body: a tetrahedron, a box, a star with 20 faces and
-    concave edges, or a cone so shallow that its hundred faces are almost one plane.
+    """Corners (n, 3) [m] and outward triangles (m, 3) of one body: a tetrahedron, a box, a star
+    with 20 faces and concave edges, or a cone so shallow that its hundred faces are almost one
+    plane.
     """
     if shape == "box":
         solid = trimesh.creation.box(rng.uniform(0.002, 0.02, 3))
@@ -101,8 +103,8 @@ def _turned(rng: np.random.Generator) -> np.ndarray:
 def touches(
     rng: np.random.Generator, corners: np.ndarray, triangles: np.ndarray, radius: float, count: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Centres (count, 3) of balls that touch a body, and the outward normals there: on its faces, edges and corners,
-    and in a face's plane just past one of its corners, where nothing is.
+    """Centres (count, 3) of balls that touch a body, and the outward normals there: on its faces,
+    edges and corners, and in a face's plane just past one of its corners, where nothing is.
     """
     a, b, c = np.moveaxis(corners[triangles], 1, 0)
     normals = np.cross(b - a, c - a)
@@ -141,8 +143,9 @@ def touches(
 def room_with(
     corners: np.ndarray, triangles: np.ndarray, half: float, centre: np.ndarray
 ) -> TriangleMesh:
-    """A cube of half side ``half`` [m] about ``centre`` and in it solid bodies (n, vertices, 3), all of the same
-    ``triangles`` (m, 3) that wind outward; the bodies are the "part". They may overlap: obstacles do not care.
+    """A cube of half side ``half`` [m] about ``centre`` and in it solid bodies (n, vertices, 3),
+    all of the same ``triangles`` (m, 3) that wind outward; the bodies are the "part". They may
+    overlap: obstacles do not care.
     """
     signs = np.array(
         [[x, y, z] for x in (-half, half) for y in (-half, half) for z in (-half, half)]
@@ -159,7 +162,9 @@ def room_with(
 
 
 def falls_for(rng: np.random.Generator, count: int) -> np.ndarray:
-    """Accelerations (count, 3) [m/s²]: gravity, none, or a hundred times gravity in any direction."""
+    """Accelerations (count, 3) [m/s²]: gravity, none, or a hundred times gravity in any
+    direction.
+    """
     fall = np.zeros((count, 3))
     kind = rng.integers(4, size=count)
     fall[kind >= 1, 2] = -STANDARD
@@ -175,8 +180,8 @@ def flights_to(
     fall: np.ndarray,
     radius: float,
 ) -> np.ndarray:
-    """Flights (n, 9) that bring a centre to the points ``touch`` (n, 3) [m], where it touches a surface with this
-    outward ``normal`` (n, 3).
+    """Flights (n, 9) that bring a centre to the points ``touch`` (n, 3) [m], where it touches a
+    surface with this outward ``normal`` (n, 3).
 
     random        0.1 to 10 m/s, 0.1 to 10 ms before
     fast          20 m/s

@@ -1,4 +1,5 @@
-"""A slow, plain first contact of a ball with triangles: dense sampling, then bisection in extended precision.
+"""A slow, plain first contact of a ball with triangles: dense sampling, then bisection in extended
+precision.
 
 It knows distances only: no planes moved out, no capsules, no tree, no quadratic or quartic.
 """
@@ -12,7 +13,9 @@ GOLDEN = 0.3819660112501051
 
 @numba.njit(cache=True)
 def _point_triangle(p: np.ndarray, corners: np.ndarray) -> float:
-    """Distance from a point (3,) to a triangle (3, 3): to its plane if the foot lies inside, else to a border."""
+    """Distance from a point (3,) to a triangle (3, 3): to its plane if the foot lies inside, else
+    to a border.
+    """
     a, b, c = corners[0], corners[1], corners[2]
     normal = np.cross(b - a, c - a)
     size = np.sqrt((normal * normal).sum())
@@ -44,7 +47,9 @@ def _gap(
 
 @numba.njit(cache=True)
 def bracket(p, v, g, corners, radius, length):  # type: ignore[no-untyped-def]
-    """(last time outside, first known time inside), infinite if the ball passes; the lowest gap seen. Starts apart."""
+    """(last time outside, first known time inside), infinite if the ball passes; the lowest gap
+    seen. Starts apart.
+    """
     step = length / SAMPLES
     before, here = np.inf, _gap(0.0, p, v, g, corners, radius)
     lowest = here
@@ -73,8 +78,8 @@ def bracket(p, v, g, corners, radius, length):  # type: ignore[no-untyped-def]
 
 
 def distance_to_triangles(p: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Distance from points (n, 3) to the nearest of their triangles (n, k, 3 corners, 3), in the arrays' own
-    precision.
+    """Distance from points (n, 3) to the nearest of their triangles (n, k, 3 corners, 3), in the
+    arrays' own precision.
     """
 
     def dot(u: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -103,7 +108,9 @@ def gap_at(
     corners: np.ndarray,
     radius: float,
 ) -> np.ndarray:
-    """Distance from the ball's surface to the triangles at ``time`` (n,), in extended precision (80 bits on x86)."""
+    """Distance from the ball's surface to the triangles at ``time`` (n,), in extended precision (80
+    bits on x86).
+    """
     time, p, v, g, corners = (np.asarray(x, dtype=np.longdouble) for x in (time, p, v, g, corners))
     at = p + v * time[:, None] + g * (time * time)[:, None] / 2
     return distance_to_triangles(at, corners) - np.longdouble(radius)
@@ -117,7 +124,8 @@ def first_contact_reference(
     radius: float,
     length: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """First touch of each ball (n, 3) flying at v (n, 3) under g (3,) with the triangles (k, 3 corners, 3).
+    """First touch of each ball (n, 3) flying at v (n, 3) under g (3,) with the triangles (k, 3
+    corners, 3).
 
     Returns times (n,), inf if none within ``length`` (n,), and the lowest gap seen up to there.
     """

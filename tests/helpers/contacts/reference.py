@@ -1,22 +1,27 @@
-"""Was a contact reported too early, too late, or in the wrong direction? Judged in extended precision.
+"""Was a contact reported too early, too late, or in the wrong direction? Judged in extended
+precision.
 
-No contact is computed here. A judge takes the contact that the code under test reports and proves or refutes it from
-the gap between ball and obstacle as a function of time:
+No contact is computed here. A judge takes the contact that the code under test reports and proves
+or refutes it from the gap between ball and obstacle as a function of time:
 
     early     the gap [m] at the reported contact: it must not be open
-    receding  if the gap is rising there, how far open [m] it gets before it falls again: it must not
-    late      how much deeper [m] than touching, and than at its start, the ball got before the reported contact, or
+    receding  if the gap is rising there, how far open [m] it gets before it falls again: it must
+    not late      how much deeper [m] than touching, and than at its start, the ball got before the
+    reported contact, or
               before the end of the flight if none is reported: a contact was missed
 
-      gap \\               /   A ball that starts in overlap may come out of it: no contact. One that starts deeper
-       0 --\\-------------/--  than half a radius is behind the surface, and can be late only after it has come out
+      gap \\               /   A ball that starts in overlap may come out of it: no contact. One
+      that starts deeper
+       0 --\\-------------/--  than half a radius is behind the surface, and can be late only after
+       it has come out
             \\_  late  _ /     in front.
               \\______/
 
-Between the marks on a flight the gap only rises or only falls, so nothing is missed between them; each judge finds
-its marks by other means than the code under test (that solves quadratics, steps from plane to plane, and splits
-sine waves). Numbers are numpy's longdouble: 64 bits of mantissa on x86, where a gap is known to about 1e-18 m; on
-machines where longdouble is plain float64 the same tests run with about 1e-16 m, still far below the 1e-12 m asked.
+Between the marks on a flight the gap only rises or only falls, so nothing is missed between them;
+each judge finds its marks by other means than the code under test (that solves quadratics, steps
+from plane to plane, and splits sine waves). Numbers are numpy's longdouble: 64 bits of mantissa on
+x86, where a gap is known to about 1e-18 m; on machines where longdouble is plain float64 the same
+tests run with about 1e-16 m, still far below the 1e-12 m asked.
 
 Arrays of vectors have shape (3, n) here: columns are quick to compute with.
 """
@@ -28,11 +33,12 @@ from typing import NamedTuple
 import numpy as np
 
 Long = np.longdouble
-HALVINGS = 44  # a mark is known to 1e-13 of the flight: what the gap turns within that is far below 1e-18 m
+# a mark is known to 1e-13 of the flight: what the gap turns within that is far below 1e-18 m
+HALVINGS = 44
 BEHIND = 0.5  # of a radius: an overlap deeper than this is the far side, not a contact
 SURELY = 1e-12  # m: a gap this wide is open, whatever rounding did
-# m/s: a rate of zero, but for rounding in the code under test: that of the sonotrode's 25 m/s at an angle of 5000 rad,
-# known to 5e-13 rad. In 10 ms a ball receding so slowly gains 1e-13 m.
+# m/s: a rate of zero, but for rounding in the code under test: that of the sonotrode's 25 m/s at an
+# angle of 5000 rad, known to 5e-13 rad. In 10 ms a ball receding so slowly gains 1e-13 m.
 STANDING = 1e-11
 AHEAD = np.concatenate(
     [[0.0], 2.0 ** np.arange(-40, 1)]
@@ -41,7 +47,9 @@ UNSEEN = 1e-17  # m: falls smaller than this are not looked for
 
 
 class Verdict(NamedTuple):
-    """Per case (n,), as float64: see above. ``early`` and ``receding`` are -inf where no contact is reported."""
+    """Per case (n,), as float64: see above. ``early`` and ``receding`` are -inf where no contact is
+    reported.
+    """
 
     early: np.ndarray
     receding: np.ndarray
@@ -83,10 +91,12 @@ def product(a: list[np.ndarray], b: list[np.ndarray]) -> list[np.ndarray]:
 
 
 def marks(polynomial: list[np.ndarray], end: np.ndarray) -> np.ndarray:
-    """Times (k, n), rising from 0 to ``end`` (n,), between which each polynomial only rises or only falls.
+    """Times (k, n), rising from 0 to ``end`` (n,), between which each polynomial only rises or only
+    falls.
 
-    They are the roots of its derivative, which are found by halving where *that* only rises or only falls, and so
-    on down to a straight line. A stretch without a root gives one of its ends: a mark too many does no harm.
+    They are the roots of its derivative, which are found by halving where *that* only rises or only
+    falls, and so on down to a straight line. A stretch without a root gives one of its ends: a mark
+    too many does no harm.
     """
     zero = np.zeros_like(end)
     if len(polynomial) <= 2:
@@ -103,8 +113,8 @@ def marks(polynomial: list[np.ndarray], end: np.ndarray) -> np.ndarray:
 
 
 def depth(gaps: np.ndarray, behind: float = np.inf) -> np.ndarray:
-    """How much deeper (n,) than touching, and than at first, gaps (k, n) in order of time get; where they start
-    deeper than ``behind``, only what follows a gap that is surely open counts.
+    """How much deeper (n,) than touching, and than at first, gaps (k, n) in order of time get;
+    where they start deeper than ``behind``, only what follows a gap that is surely open counts.
     """
     start = np.minimum(gaps[0], 0.0)
     out = np.maximum.accumulate(gaps, axis=0) > SURELY
@@ -183,9 +193,11 @@ def judge_faces(
     limit: float,
     found: np.ndarray,
 ) -> tuple[Verdict, np.ndarray]:
-    """Contacts with the shot sides of triangles (n, 3 corners, 3) that wind clockwise as the shot sees them.
+    """Contacts with the shot sides of triangles (n, 3 corners, 3) that wind clockwise as the shot
+    sees them.
 
-    Also returns how far (n,) [m] outside its triangle each reported contact is: up to ``seam`` is allowed.
+    Also returns how far (n,) [m] outside its triangle each reported contact is: up to ``seam`` is
+    allowed.
     """
     ball = flight_of(flights)
     a, b, c = (columns(corners[:, k]) for k in range(3))
@@ -212,8 +224,9 @@ def judge_faces(
 
     times = marks(height, end)
     gaps = value(height, times)
-    # a parabola falls while closed at most once, from where it closes or else turns: is it over the triangle there?
-    # There, and where it is surely in, for a touch as long as it is shallow may end beside the triangle.
+    # a parabola falls while closed at most once, from where it closes or else turns: is it over the
+    # triangle there? There, and where it is surely in, for a touch as long as it is shallow may end
+    # beside the triangle.
     over = np.ones(len(found), dtype=bool)
     for sunk in (0.0, SURELY):
         begins = np.zeros_like(end)
@@ -240,8 +253,8 @@ def judge_capsules(
 ) -> Verdict:
     """Contacts with the capsules about segments (n, 2 ends, 3).
 
-    The squared distance is a quartic in time, one beside the segment and one off each end: the marks are those of
-    all three, and the times when the centre passes from one region to the next.
+    The squared distance is a quartic in time, one beside the segment and one off each end: the
+    marks are those of all three, and the times when the centre passes from one region to the next.
     """
     ball = flight_of(flights)
     start = columns(ends[:, 0])
@@ -304,9 +317,9 @@ def judge_waves(
 ) -> Verdict:
     """Contacts with vibrating planes; arguments as contact_calls.waving_planes.
 
-    The gap bends by no more than a known curvature, so its value and rate in the middle of a stretch of time bound
-    both all over it. A stretch that is open, or rises, holds no contact; one that falls is judged by its ends;
-    any other is halved, until it is too short to hide a fall.
+    The gap bends by no more than a known curvature, so its value and rate in the middle of a
+    stretch of time bound both all over it. A stretch that is open, or rises, holds no contact; one
+    that falls is judged by its ends; any other is halved, until it is too short to hide a fall.
     """
     ball = flight_of(flights)
     normal = columns(planes[:, 0:3])
@@ -371,10 +384,11 @@ def judge_triangles(
 ) -> Verdict:
     """First contacts with whole meshes: each flight with all of its triangles (n, k, 3 corners, 3).
 
-    A triangle is convex, so it lies behind the plane through its point nearest to the ball, and is not reached
-    before that plane is. Go there, take the nearest point anew, and so on, until the end of the flight or until the
-    ball is ``allowed`` [m] deeper in a triangle than touching, and than it started. ``late`` is then at least that.
-    ``tilt`` [rad]: where faces meet, how far the normal of a contact may be off.
+    A triangle is convex, so it lies behind the plane through its point nearest to the ball, and is
+    not reached before that plane is. Go there, take the nearest point anew, and so on, until the
+    end of the flight or until the ball is ``allowed`` [m] deeper in a triangle than touching, and
+    than it started. ``late`` is then at least that. ``tilt`` [rad]: where faces meet, how far the
+    normal of a contact may be off.
     """
     cases, count = corners.shape[:2]
     ball = flight_of(flights)
@@ -383,7 +397,9 @@ def judge_triangles(
     everyone = np.arange(cases)
 
     def rest(pairs: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """From the nearest points of triangles to the balls at times (pairs,): distances and unit vectors."""
+        """From the nearest points of triangles to the balls at times (pairs,): distances and unit
+        vectors.
+        """
         at = Flight(*(x[:, pairs // count] for x in ball)).at(t)
         away = from_triangles(at, *(corner[:, pairs] for corner in triangles))
         distance = np.sqrt(dot(away, away))
@@ -401,7 +417,8 @@ def judge_triangles(
     start = np.minimum(gap(everyone, np.zeros((1, cases), dtype=Long))[0], 0.0)
     distance, normal = rest(pairs, np.repeat(end, count))
     late = start + radius - distance.reshape(cases, count).min(axis=1)
-    # of the triangles and edges in touch, any that the ball approaches will do, if only with a normal ``tilt`` aside
+    # of the triangles and edges in touch, any that the ball approaches will do, if only with a
+    # normal ``tilt`` aside
     velocity = np.repeat(ball.speed(end), count, axis=1)
     rate = np.where(distance - radius <= allowed, dot(normal, velocity), np.inf)
     position = np.repeat(ball.at(end), count, axis=1)
@@ -432,7 +449,9 @@ def judge_triangles(
 
 
 def _first_root(c: np.ndarray, b: np.ndarray, a: np.ndarray) -> np.ndarray:
-    """Smallest t >= 0 with c + b t + a t² <= 0 and falling, for c >= 0; infinite if there is none."""
+    """Smallest t >= 0 with c + b t + a t² <= 0 and falling, for c >= 0; infinite if there is
+    none.
+    """
     disc = b * b - 4 * a * c
     root = np.sqrt(np.maximum(disc, 0.0))
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -1,7 +1,8 @@
-"""Random watertight chambers, from the plain to the nasty, with balls and effects that keep the balls moving.
+"""Random watertight chambers, from the plain to the nasty, with balls and effects that keep the
+balls moving.
 
-Every family is made about one unit wide; then it is turned at random, made 1 mm to 1 m wide, and every other one is
-put a kilometre from the origin.
+Every family is made about one unit wide; then it is turned at random, made 1 mm to 1 m wide, and
+every other one is put a kilometre from the origin.
 """
 
 from collections.abc import Callable
@@ -62,7 +63,9 @@ def random_chamber(family: str, seed: int) -> Chamber:
 
 
 def has_moving_edge(mesh: TriangleMesh, radius: float, vibration: Vibration) -> bool:
-    """True when something cuts into the floor so that it cannot vibrate: not supported, and said so."""
+    """True when something cuts into the floor so that it cannot vibrate: not supported, and said
+    so.
+    """
     try:
         build_obstacle_set(mesh, (radius,), (vibration.tag,), (vibration.amplitude,))
     except SceneError:
@@ -186,7 +189,9 @@ def throated(diameter: float, rng: np.random.Generator) -> Surface:
 
 
 def slotted(diameter: float, rng: np.random.Generator) -> Surface:
-    """A box with a stack of plates in it, apart by a ball and a little, down to a millionth of it."""
+    """A box with a stack of plates in it, apart by a ball and a little, down to a millionth of
+    it.
+    """
     plates, place = [], -0.4
     for _ in range(4):
         thick = rng.uniform(0.01, 0.05)

@@ -1,7 +1,8 @@
 """An elastic gas of hard spheres in a cube, and what statistical physics says of it.
 
-The balls' mass is one: kT is in m²/s². Energy is kept, so that kT = <v²>/3 holds without error; and because the
-energy of hard spheres is all kinetic, places are as independent of velocities as at constant temperature.
+The balls' mass is one: kT is in m²/s². Energy is kept, so that kT = <v²>/3 holds without error; and
+because the energy of hard spheres is all kinetic, places are as independent of velocities as at
+constant temperature.
 """
 
 from collections.abc import Callable, Iterator
@@ -20,7 +21,9 @@ SURE = 4.5  # standard errors: a normal variable is farther off once in 1.5e5 ti
 
 @dataclass(frozen=True)
 class Gas:
-    """``inner`` [m]: side of the cube the centres can reach, one diameter less than the room's; its volume is V."""
+    """``inner`` [m]: side of the cube the centres can reach, one diameter less than the room's; its
+    volume is V.
+    """
 
     room: TriangleMesh
     balls: Balls
@@ -50,8 +53,8 @@ def lattice_gas(per_side: int, packing: float, seed: int) -> Gas:
 def played(
     gas: Gas, pieces: int, collisions: float, record: tuple[int, ...] | None = None
 ) -> Iterator[tuple[SimulationResult, float]]:
-    """The gas in so many pieces, each of about so many ``collisions`` a ball, and their duration [s]; after a hundred
-    that melt the lattice.
+    """The gas in so many pieces, each of about so many ``collisions`` a ball, and their duration
+    [s]; after a hundred that melt the lattice.
     """
     duration = collisions / enskog_rate(carnahan_starling(gas.packing), gas.kt)
     balls = simulate(
@@ -66,7 +69,8 @@ def played(
 def jackknife(
     estimate: Callable[[np.ndarray], float], rows: np.ndarray, blocks: int = 20
 ) -> tuple[float, float]:
-    """estimate(mean row) and its standard error, from leaving out one block of rows (n, ...) after the other.
+    """estimate(mean row) and its standard error, from leaving out one block of rows (n, ...) after
+    the other.
 
     Efron, The Jackknife, the Bootstrap and Other Resampling Plans (1982), chapter 3.
     """
@@ -83,11 +87,12 @@ def carnahan_starling(packing: float) -> float:
 def in_a_box(gas: Gas) -> float:
     """pV/NkT on the walls of the cube, up to terms of (DIAMETER / inner)².
 
-    A gas at a hard wall has the surface tension γ = ∂Φ/∂n2 of scaled particle theory (Reiss, Frisch, Helfand &
-    Lebowitz, J. Chem. Phys. 32 (1960) 119; in this form Roth, J. Phys.: Condens. Matter 22 (2010) 063102),
-    here reckoned on the surface the centres reach: γ - p d/2, with the pressure of the same theory. The balls crowd at
-    the wall, N = ρ V - A dγ/dμ, so that the middle is thinner than N/V; and a larger cube has more surface, so that
-    the force on the walls is p V - 4 γ V / inner.
+    A gas at a hard wall has the surface tension γ = ∂Φ/∂n2 of scaled particle theory (Reiss,
+    Frisch, Helfand & Lebowitz, J. Chem. Phys. 32 (1960) 119; in this form Roth, J. Phys.: Condens.
+    Matter 22 (2010) 063102), here reckoned on the surface the centres reach: γ - p d/2, with the
+    pressure of the same theory. The balls crowd at the wall, N = ρ V - A dγ/dμ, so that the middle
+    is thinner than N/V; and a larger cube has more surface, so that the force on the walls is p V -
+    4 γ V / inner.
     """
     ratio = DIAMETER / gas.inner
 
@@ -110,9 +115,11 @@ def in_a_box(gas: Gas) -> float:
 
 
 def enskog_rate(compressibility: float, kt: float, diameter: float = DIAMETER) -> float:
-    """Collisions of a ball a second, 4 n d² sqrt(π kT) χ, where pV/NkT = 1 + 4 φ χ is ``compressibility``.
+    """Collisions of a ball a second, 4 n d² sqrt(π kT) χ, where pV/NkT = 1 + 4 φ χ is
+    ``compressibility``.
 
-    Chapman & Cowling, The Mathematical Theory of Non-uniform Gases, 3rd ed. (1970), sections 5.21 and 16.2. By the
-    virial theorem the two go together at any density, with walls or without: both count the contacts.
+    Chapman & Cowling, The Mathematical Theory of Non-uniform Gases, 3rd ed. (1970), sections 5.21
+    and 16.2. By the virial theorem the two go together at any density, with walls or without: both
+    count the contacts.
     """
     return 6.0 * np.sqrt(kt / np.pi) * (compressibility - 1.0) / diameter

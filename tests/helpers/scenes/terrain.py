@@ -17,8 +17,9 @@ def terrain(
 ) -> TriangleMesh:
     """A room over heights (nx, ny) [m] at x (nx,), y (ny,) [m], up to ``top`` [m].
 
-    With ``rng`` each square is cut along a diagonal drawn by lot, and the ground's triangles get one of ``tags`` tags
-    by lot from GROUND on, so that the simulator may not join those that lie in one plane.
+    With ``rng`` each square is cut along a diagonal drawn by lot, and the ground's triangles get
+    one of ``tags`` tags by lot from GROUND on, so that the simulator may not join those that lie in
+    one plane.
     """
     nx, ny = len(x), len(y)
     floor = np.stack([*np.meshgrid(x, y, indexing="ij"), height], axis=-1).reshape(-1, 3)
@@ -45,6 +46,8 @@ def terrain(
 
 
 def profile(x: np.ndarray, z: np.ndarray, half_width: float, top: float) -> TriangleMesh:
-    """The same with heights z (n,) [m] over x (n,) [m] alone, between walls at y = ± ``half_width`` [m]."""
+    """The same with heights z (n,) [m] over x (n,) [m] alone, between walls at y = ± ``half_width``
+    [m].
+    """
     y = np.array([-half_width, half_width])
     return terrain(x, y, np.repeat(z[:, None], 2, axis=1), top)

@@ -25,7 +25,9 @@ def bar(length: float = 0.02, width: float = 0.004, height: float = 0.01) -> tri
 
 
 def star(teeth: int, tip: float, root: float, height: float) -> trimesh.Trimesh:
-    """A prism about the z axis whose outline goes to and fro between two radii [m]: pointed teeth, open gaps."""
+    """A prism about the z axis whose outline goes to and fro between two radii [m]: pointed teeth,
+    open gaps.
+    """
     angle = np.pi * np.arange(2 * teeth) / teeth
     radius = np.where(np.arange(2 * teeth) % 2 == 0, tip, root)
     rim = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
@@ -106,7 +108,9 @@ class Rotor:
         time: float,
         limit: float,
     ) -> tuple[float, int]:
-        """The answer of the code under test: delay [s] and obstacle, -1 if there is none within ``limit`` [s]."""
+        """The answer of the code under test: delay [s] and obstacle, -1 if there is none within
+        ``limit`` [s].
+        """
         place, speed = Vec3(*map(float, position)), Vec3(*map(float, velocity))
         part, overlap = self.obstacles.part, self.obstacles.face_overlap
         delay, row = _search(

@@ -1,7 +1,9 @@
-"""The first contact of a flying ball with a whole mesh of faces, edges and corners, judged in extended precision.
+"""The first contact of a flying ball with a whole mesh of faces, edges and corners, judged in
+extended precision.
 
-Two judges: plain dense sampling with bisection (first_contact_reference.py) on bodies met at random, and the judge of
-contact_reference.py, fast enough for millions, on every shape and aim of contact_cases.py.
+Two judges: plain dense sampling with bisection (first_contact_reference.py) on bodies met at
+random, and the judge of contact_reference.py, fast enough for millions, on every shape and aim of
+contact_cases.py.
 """
 
 import numpy as np
@@ -128,7 +130,9 @@ PULLS = (
 @pytest.mark.parametrize("count", SIZES)
 @pytest.mark.parametrize("shape", BODIES)
 def test_first_contact_from_any_start(shape: str, count: int) -> None:
-    """Half of the flights are random, half hard; in the long run all shapes see more than ``count`` of each."""
+    """Half of the flights are random, half hard; in the long run all shapes see more than ``count``
+    of each.
+    """
     rng = np.random.default_rng(13)
     radius, half = BODIES[shape]
     offset = FAR if shape == "far" else np.zeros(3)

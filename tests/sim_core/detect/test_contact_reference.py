@@ -1,4 +1,6 @@
-"""The judges of contacts convict: whoever answers early, late, not at all, or to a ball that leaves, is found out."""
+"""The judges of contacts convict: whoever answers early, late, not at all, or to a ball that
+leaves, is found out.
+"""
 
 import math
 
@@ -19,8 +21,8 @@ G = 9.80665
 RADIUS = 1.5e-3
 LIMIT = 0.01
 OFF = 2e-12  # m: twice what the tests allow
-# A ball 2 mm above touching falls at 1 m/s: contact where 2 mm = 1 t + g t²/2. It is over the middle of a triangle,
-# an edge, another ball, or a plane that does not vibrate to speak of.
+# A ball 2 mm above touching falls at 1 m/s: contact where 2 mm = 1 t + g t²/2. It is over the
+# middle of a triangle, an edge, another ball, or a plane that does not vibrate to speak of.
 HEIGHT, SPEED = 2e-3, 1.0
 CONTACT = 2 * HEIGHT / (SPEED + math.sqrt(SPEED**2 + 2 * G * HEIGHT))
 STRAIGHT = HEIGHT / SPEED  # two balls: no gravity between them
@@ -30,7 +32,9 @@ TRIANGLE = np.array(
 
 
 def judged(judge: str, found: float, upwards: bool = False) -> Verdict:
-    """The verdict on a reported contact; ``upwards``: of a ball that starts in touch and leaves at 1 m/s."""
+    """The verdict on a reported contact; ``upwards``: of a ball that starts in touch and leaves at
+    1 m/s.
+    """
     height, speed = (0.0, SPEED) if upwards else (HEIGHT, -SPEED)
     flight = np.array([[0.0, 0.0, RADIUS + height, 0.0, 0.0, speed, 0.0, 0.0, -G]])
     said = np.array([found])

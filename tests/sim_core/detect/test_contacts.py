@@ -1,8 +1,9 @@
 """Each exact contact search alone, against a judge in extended precision (contact_reference.py).
 
-A contact is never reported early, never missed, and never from behind, wherever the ball starts and however it
-comes: the aims and shapes are named in cases.py. In the long run a million random and a million hard cases
-for each primitive.
+A contact is never reported early, never missed, and never from behind, wherever the ball starts and
+however it
+comes: the aims and shapes are named in cases.py. In the long run a million random and a million
+hard cases for each primitive.
 """
 
 import math
@@ -51,7 +52,9 @@ SIZES = [pytest.param(QUICK, id="quick"), pytest.param(LONG, id="long", marks=py
 
 
 def require(verdict: Verdict, found: np.ndarray, family: str, hits: float = 0.0) -> None:
-    """Nothing early, nothing late, nothing receding; and at least a share of ``hits``, or the test tests little."""
+    """Nothing early, nothing late, nothing receding; and at least a share of ``hits``, or the test
+    tests little.
+    """
     for said in Verdict._fields:
         column = getattr(verdict, said)
         bad = np.flatnonzero(~(column <= TOLERANCE))
@@ -63,7 +66,9 @@ def require(verdict: Verdict, found: np.ndarray, family: str, hits: float = 0.0)
 
 
 def families(count: int, hard: bool, aims: tuple[str, ...] = AIMS) -> list[tuple[str, str, int]]:
-    """(shape, aim, cases): plump bodies hit at random, or every other pair, ``count`` cases in all."""
+    """(shape, aim, cases): plump bodies hit at random, or every other pair, ``count`` cases in
+    all.
+    """
     pairs = [
         (s, a)
         for s in SHAPES
@@ -80,7 +85,9 @@ def obstacles_around(mesh: TriangleMesh, radius: float) -> ObstacleTable:
 
 
 def obstacles_of(rng: np.random.Generator, shape: str, count: int):  # type: ignore[no-untyped-def]
-    """The obstacles of tetrahedra, and the mesh relative to its centre, as the simulation sees it."""
+    """The obstacles of tetrahedra, and the mesh relative to its centre, as the simulation sees
+    it.
+    """
     radius, half = SHAPES[shape]
     corners = contact_cases.tetrahedra(rng, shape, count)
     offset = FAR if shape == "far" else np.zeros(3)
@@ -163,7 +170,9 @@ def test_capsules(count: int, hard: bool, end: bool) -> None:
 @pytest.mark.parametrize("count", SIZES)
 @pytest.mark.parametrize("aim", AIMS[:-1])
 def test_meetings_of_two_balls(count: int, aim: str) -> None:
-    """In the free-fall frame no gravity is left. The gap of balls that start d apart is known to d² 1e-16 / reach."""
+    """In the free-fall frame no gravity is left. The gap of balls that start d apart is known to d²
+    1e-16 / reach.
+    """
     rng = np.random.default_rng(3)
     cases = count if aim == "random" else math.ceil(count / len(HARD_AIMS[:-1]))
     for _ in range(math.ceil(cases / CHUNK)):
@@ -198,10 +207,10 @@ def wave_cases(rng: np.random.Generator, aim: str, count: int):  # type: ignore[
     chatter          starts in touch, and leaves barely faster than the surface
     crest            meets a crest within 1e-6 to 1e-13 m, almost without speed
     tangent          the same at any phase, moving with the surface
-    receding slower  starts in touch or overlapping by up to 1e-9 m, leaving slower than the surface moves
-    at rest          starts at rest above, below the crests too
-    still            a wave of no swing, or one too slow to bend a parabola the other way
-    behind           starts below the wave, and where gravity allows comes out in front of it and back
+    receding slower  starts in touch or overlapping by up to 1e-9 m, leaving slower than the surface
+    moves at rest          starts at rest above, below the crests too still            a wave of no
+    swing, or one too slow to bend a parabola the other way behind           starts below the wave,
+    and where gravity allows comes out in front of it and back
     """
     radius = 1.5e-3
     axis = np.where(rng.integers(2, size=(count, 1)) == 0, [[0.0, 0.0, 1.0]], units(rng, count))
@@ -282,10 +291,11 @@ def test_vibrating_planes(count: int, aim: str) -> None:
 
 
 def test_a_ball_that_slides_over_an_edge_leaves_it() -> None:
-    """It touches an edge along x, 1e-15 m deep, and moves across it just so fast that it takes off: v² / r > g.
+    """It touches an edge along x, 1e-15 m deep, and moves across it just so fast that it takes off:
+    v² / r > g.
 
-    The plane at the nearest point falls behind the ball so slowly at first that the search once ran out of steps,
-    and reported a contact 1e-10 m above the edge.
+    The plane at the nearest point falls behind the ball so slowly at first that the search once ran
+    out of steps, and reported a contact 1e-10 m above the edge.
     """
     radius = 1.5e-3
     edge = np.zeros((1, NUMBERS))
@@ -300,9 +310,11 @@ def test_a_ball_that_slides_over_an_edge_leaves_it() -> None:
 
 
 def test_a_face_ends_at_its_needles_tip() -> None:
-    """A ball comes down on the plane of a triangle with a corner of 1e-4 rad, in line with it but past the corner.
+    """A ball comes down on the plane of a triangle with a corner of 1e-4 rad, in line with it but
+    past the corner.
 
-    The seams along its two long borders cross 0.1 mm past it, where once was a contact with nothing.
+    The seams along its two long borders cross 0.1 mm past it, where once was a contact with
+    nothing.
     """
     radius = 1.5e-3
     sharp = np.array(
@@ -325,7 +337,9 @@ def test_a_face_ends_at_its_needles_tip() -> None:
 
 
 def test_a_ball_in_touch_with_the_rising_sonotrode_is_met_at_once() -> None:
-    """Contact 3e-19 s ahead in the concave half of the swing: rounding must not leave Newton 1e-12 s behind it."""
+    """Contact 3e-19 s ahead in the concave half of the swing: rounding must not leave Newton 1e-12
+    s behind it.
+    """
     w = WaveGap(
         -2.1362465026236732e-06,
         1.8668212650412204,
@@ -338,7 +352,9 @@ def test_a_ball_in_touch_with_the_rising_sonotrode_is_met_at_once() -> None:
 
 
 def test_a_ball_from_behind_meets_the_sonotrode_after_it_has_come_out() -> None:
-    """It flies over a wall from a place lower than the sonotrode's plane: 5 mm up, 1 mm above, and down again."""
+    """It flies over a wall from a place lower than the sonotrode's plane: 5 mm up, 1 mm above, and
+    down again.
+    """
     b = math.sqrt(2.0 * STANDARD * 6e-3)
     w = WaveGap(-5e-3, b, -0.5 * STANDARD, 4e-5, 2 * math.pi * 2e4, 0.0)
     down = (b + math.sqrt(b * b - 2.0 * STANDARD * 5e-3)) / STANDARD

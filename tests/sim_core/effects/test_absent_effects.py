@@ -1,4 +1,6 @@
-"""An effect that a scene does not ask for is in none of its arrays and in none of the machine code it runs."""
+"""An effect that a scene does not ask for is in none of its arrays and in none of the machine code
+it runs.
+"""
 
 import json
 import os
@@ -27,7 +29,8 @@ from sim_core import (
 from sim_core.loop.simulate import _Run
 from tests.helpers.scenes.cavities import box
 
-# what the loop keeps of an effect, by the name of the field and the kind of thing it is when the effect is there
+# what the loop keeps of an effect, by the name of the field and the kind of thing it is when the
+# effect is there
 KEPT = {
     "gravity": ("gravity", "Gravity"),
     "restitution": ("restitution", "Restitution"),
@@ -66,7 +69,9 @@ def bare_scene(physics: Physics = BARE) -> Scene:
 
 
 def compiled_functions() -> dict[str, list[str]]:
-    """Every function of the simulator that was compiled in this process, with the types it was compiled for."""
+    """Every function of the simulator that was compiled in this process, with the types it was
+    compiled for.
+    """
     found = {}
     for name, module in list(sys.modules.items()):
         if name.startswith("sim_core."):

@@ -1,7 +1,9 @@
-"""Balls in still air: terminal speed, the closed solutions for a constant drag coefficient, and the error of a piece.
+"""Balls in still air: terminal speed, the closed solutions for a constant drag coefficient, and the
+error of a piece.
 
 With C_d = 0.44 (Re > 1000) and k = 3/4 C_d rho_air / (rho D): without gravity v = v0 exp(-k x) and
-t = (exp(k x) - 1) / (k v0); falling from rest x = ln cosh(g t / V) / k and v = V tanh(g t / V), V² = g / k.
+t = (exp(k x) - 1) / (k v0); falling from rest x = ln cosh(g t / V) / k and v = V tanh(g t / V), V²
+= g / k.
 """
 
 import math
@@ -41,7 +43,9 @@ G = 9.80665
 def row(
     distances: np.ndarray, velocity: tuple[float, float, float], tall: float
 ) -> tuple[TriangleMesh, Balls]:
-    """Balls side by side, so far above the floor or, when they fly up, below the ceiling [m]; none meets another."""
+    """Balls side by side, so far above the floor or, when they fly up, below the ceiling [m]; none
+    meets another.
+    """
     positions = np.stack(
         [0.01 * (1.0 + np.arange(len(distances))), np.full(len(distances), 0.01), distances], axis=1
     )
@@ -83,7 +87,9 @@ def test_a_falling_ball_comes_to_its_terminal_speed(
 
 
 def worst(drag: Drag, gravity: bool) -> tuple[float, float]:
-    """Largest errors of place [m] and speed [m/s] at the first impact, over distances that end anywhere in a piece."""
+    """Largest errors of place [m] and speed [m/s] at the first impact, over distances that end
+    anywhere in a piece.
+    """
     distances = np.linspace(0.04, 0.06, 41)
     if gravity:
         room, balls = row(distances, (0.0, 0.0, 0.0), 0.1)
@@ -118,7 +124,9 @@ def test_the_error_of_a_piece_is_as_stated_and_falls_with_its_square(gravity: bo
 
 
 def test_within_a_piece_the_path_is_off_by_at_most_an_eighth_of_the_square() -> None:
-    """Of the deceleration: the first piece of a flight, after a hit, from wall to wall within it."""
+    """Of the deceleration: the first piece of a flight, after a hit, from wall to wall within
+    it.
+    """
     piece, distances = 1e-2, np.linspace(2e-3, 4.5e-2, 40)
     drag = Drag(density=50.0 * AIR, viscosity=VISCOSITY, piece=piece)
     k = K * 0.05
@@ -181,7 +189,9 @@ def test_air_so_thin_that_it_does_nothing_changes_nothing() -> None:
 
 
 def test_drag_goes_with_contact_mode_and_drawn_phases() -> None:
-    """Heavy air over a lossy floor: shot comes to rest on the still floor, and goes on over the shaking one."""
+    """Heavy air over a lossy floor: shot comes to rest on the still floor, and goes on over the
+    shaking one.
+    """
     room = box((0.03, 0.03, 0.03))
     law = uniform_restitution(0.6, 1.0)
     physics = Physics(Gravity(), law, rest=Rest(), drag=Drag(density=50.0))
@@ -194,7 +204,9 @@ def test_drag_goes_with_contact_mode_and_drawn_phases() -> None:
 
 @pytest.mark.long
 def test_no_ball_jams_on_its_way_up_with_the_sonotrode() -> None:
-    """It bounces there at ever the same 10 mm/s; kicks that took from each bounce would end in infinitely many."""
+    """It bounces there at ever the same 10 mm/s; kicks that took from each bounce would end in
+    infinitely many.
+    """
     room = cylinder(0.035, 0.04)
     law = uniform_restitution(0.91, 1.0)
     physics = Physics(Gravity(), law, Vibration(FLOOR, 25e-6, 20e3, 0.3), drag=Drag())

@@ -1,4 +1,6 @@
-"""Balls that rub and spin, hit by hit: Walton's collision against its closed form, and what it must keep."""
+"""Balls that rub and spin, hit by hit: Walton's collision against its closed form, and what it must
+keep.
+"""
 
 import numpy as np
 import pytest
@@ -171,9 +173,11 @@ def test_friction_never_raises_the_energy_of_spinning_balls() -> None:
 
 
 def test_perfectly_rough_elastic_balls_share_their_energy_with_their_spins() -> None:
-    """Energy is kept, and half of it is in the spins: 3 N squares of 6 N, whose share is Beta(3N/2, 3N/2) distributed.
+    """Energy is kept, and half of it is in the spins: 3 N squares of 6 N, whose share is Beta(3N/2,
+    3N/2) distributed.
 
-    Equipartition in the microcanonical ensemble of Kac's sphere; walls as rough as balls take up all momenta.
+    Equipartition in the microcanonical ensemble of Kac's sphere; walls as rough as balls take up
+    all momenta.
     """
     rng = np.random.default_rng(6)
     room, count, looks = box((0.02, 0.02, 0.02)), 60, 250
@@ -212,7 +216,9 @@ def turned(vectors: np.ndarray, angle: float) -> np.ndarray:
 
 
 def test_a_part_seen_from_its_own_frame_spins_the_balls_as_it_does_in_the_rooms() -> None:
-    """Standing still at an angle, against the scene turned back by that angle, where it is as the mesh has it."""
+    """Standing still at an angle, against the scene turned back by that angle, where it is as the
+    mesh has it.
+    """
     angle, rng = 0.9, np.random.default_rng(2)
     room, rough = box_around(BODIES["star"], 0.3), physics(0.2, 0.3, 0.9)
     places = np.array(
@@ -241,8 +247,9 @@ def test_a_part_seen_from_its_own_frame_spins_the_balls_as_it_does_in_the_rooms(
 
 @pytest.mark.parametrize("rpm", [60.0, 2000.0])
 def test_hits_on_a_rough_rotor_keep_the_jacobi_integral(rpm: float) -> None:
-    """A perfectly rough elastic hit turns the touching points' relative velocity round: energy less omega times the
-    angular momentum, spin counted, is kept, as on a smooth rotor (test_turning_part.py).
+    """A perfectly rough elastic hit turns the touching points' relative velocity round: energy less
+    omega times the angular momentum, spin counted, is kept, as on a smooth rotor
+    (test_turning_part.py).
     """
     omega, rng = 2 * np.pi * rpm / 60, np.random.default_rng(8)
     angle, radius = 2 * np.pi * np.arange(24) / 24, 0.0165

@@ -1,4 +1,6 @@
-"""A shaking floor that each ball meets at a phase of its own: what the phase is, and what comes of it."""
+"""A shaking floor that each ball meets at a phase of its own: what the phase is, and what comes of
+it.
+"""
 
 import math
 from concurrent.futures import ThreadPoolExecutor
@@ -32,7 +34,9 @@ ONE_BALL = box((0.01, 0.01, 0.02))
 
 
 def flights(count: int) -> tuple[ImpactLog, np.ndarray]:
-    """Impacts of one ball that flies straight up and down, losing nothing, and which are on the floor."""
+    """Impacts of one ball that flies straight up and down, losing nothing, and which are on the
+    floor.
+    """
     ball = Balls(np.array([[0.005, 0.005, 0.01]]), np.array([[0.0, 0.0, -20.0]]), DIAMETER)
     shaking = Vibration(FLOOR, 25e-6, 20e3)
     scene = Scene(
@@ -55,8 +59,8 @@ def test_draws_are_uniform_and_independent() -> None:
 
 
 def test_the_wall_is_where_its_path_has_it_and_as_fast() -> None:
-    """Height s and speed u of the face at contact are on the path: s² + (u / ω)² = A². The ball's own speed before is
-    that at the ceiling, where it was last.
+    """Height s and speed u of the face at contact are on the path: s² + (u / ω)² = A². The ball's
+    own speed before is that at the ceiling, where it was last.
     """
     log, floor = flights(500)
     hits = np.flatnonzero(floor[1:] & ~floor[:-1]) + 1
@@ -106,8 +110,9 @@ def test_rates_and_speeds_are_those_of_the_sinusoid(law: str, share: float) -> N
 
 
 def test_a_ball_locked_to_the_floor_is_freed() -> None:
-    """A ball that loses energy can jump once a period, always at the phase where the face's speed makes up for what is
-    lost (Luck & Mehta, Phys. Rev. E 48 (1993) 3988); with drawn phases it has no period to keep.
+    """A ball that loses energy can jump once a period, always at the phase where the face's speed
+    makes up for what is lost (Luck & Mehta, Phys. Rev. E 48 (1993) 3988); with drawn phases it has
+    no period to keep.
     """
     frequency, amplitude, e = 50.0, 1.2 * G / (math.tau * 50.0) ** 2, 0.5
     jump = 0.5 * G / frequency

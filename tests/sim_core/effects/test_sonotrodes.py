@@ -1,4 +1,6 @@
-"""Several sonotrodes: what one alone, or one that keeps still, must not change; phases over many windows; refusals."""
+"""Several sonotrodes: what one alone, or one that keeps still, must not change; phases over many
+windows; refusals.
+"""
 
 import math
 from fractions import Fraction
@@ -58,7 +60,9 @@ def test_a_tuple_of_one_is_that_one_to_the_last_bit() -> None:
 
 @pytest.mark.parametrize("still", [HIGH, HIGH._replace(frequency=19.7)])
 def test_one_beside_it_that_keeps_still_changes_nothing(still: Vibration) -> None:
-    """But the rounding of its clock, which a chamber makes ten times larger every hit or two: so the first hits."""
+    """But the rounding of its clock, which a chamber makes ten times larger every hit or two: so
+    the first hits.
+    """
     one, other = played(LOW), played((still._replace(amplitude=0.0), LOW))
     np.testing.assert_array_equal(one.impacts.triangle[:60], other.impacts.triangle[:60])
     np.testing.assert_allclose(one.impacts.time[:60], other.impacts.time[:60], rtol=0.0, atol=1e-9)
@@ -75,7 +79,9 @@ FREQUENCIES = (20e3, 19.7e3, math.pi * 1e4, 40e3, 123.456, 20e3)
 
 @pytest.mark.parametrize("windows", [1, 1_000_000])
 def test_phases_do_not_drift(windows: int) -> None:
-    """Against fractions: the window is a whole number of periods of the fastest, of which there are 800 in it."""
+    """Against fractions: the window is a whole number of periods of the fastest, of which there are
+    800 in it.
+    """
     vibrations = tuple(Vibration(k, 25e-6, f, 0.1 * k) for k, f in enumerate(FREQUENCIES))
     window = whole_period_window(vibrations, WINDOW)
     assert window * 40e3 == 800
@@ -103,7 +109,9 @@ def test_one_vibration_needs_no_table() -> None:
 def test_a_vibrating_wall_beyond_does_not_hide_the_face_a_ball_comes_down_on(
     phase: float, wall: int
 ) -> None:
-    """As in test_sonotrode_border, but behind the face there is a wall that vibrates, with the floor or on its own."""
+    """As in test_sonotrode_border, but behind the face there is a wall that vibrates, with the
+    floor or on its own.
+    """
     room = trough([(0.021, 1e-4), (0.022, -3e-3), (0.04, -3e-3)], left=0.012)
     behind = (room.corners[:, :, 0] == 0.012).all(axis=1)
     room = TriangleMesh(room.vertices, room.triangles, np.where(behind, wall, room.tags))
@@ -117,7 +125,9 @@ def test_a_vibrating_wall_beyond_does_not_hide_the_face_a_ball_comes_down_on(
 
 
 def test_a_ball_that_lies_still_waits_for_the_slowest() -> None:
-    """It lies 0.2 mm from a wall that comes by 0.5 mm, five times a second, while the ceiling shakes at 20 kHz."""
+    """It lies 0.2 mm from a wall that comes by 0.5 mm, five times a second, while the ceiling
+    shakes at 20 kHz.
+    """
     upright = box((0.03, 0.03, 0.02))
     west = (upright.corners[:, :, 0] == 0.0).all(axis=1)
     room = TriangleMesh(upright.vertices, upright.triangles, np.where(west, 3, upright.tags))

@@ -1,5 +1,5 @@
-"""Several sonotrodes at once, each with its own axis, amplitude, frequency and phase, against a bead between two
-vibrating plates whose every flight is searched for its end in small steps.
+"""Several sonotrodes at once, each with its own axis, amplitude, frequency and phase, against a
+bead between two vibrating plates whose every flight is searched for its end in small steps.
 """
 
 import math
@@ -23,7 +23,9 @@ WEAK = (Vibration(FLOOR, 2e-6, 210.0, 0.4), Vibration(CEILING, 1e-6, 333.3, 2.0,
 
 
 def angle(plate: Vibration, time: np.ndarray) -> np.ndarray:
-    """Of the wave, less whole turns before digits are lost: frequency x time in 64 bits of mantissa."""
+    """Of the wave, less whole turns before digits are lost: frequency x time in 64 bits of
+    mantissa.
+    """
     turns = np.asarray(time, dtype=np.longdouble) * np.longdouble(plate.frequency)
     return np.asarray(math.tau * (turns - np.floor(turns)).astype(float) + plate.phase)
 
@@ -41,7 +43,9 @@ def speed(plate: Vibration, time: np.ndarray) -> np.ndarray:
 def next_hit(
     plates: tuple[Vibration, ...], start: float, z: float, v: float, g: float, last: int
 ) -> tuple[float, int]:
-    """How long [s] until the bead, at z with speed v, meets which plate: 0 floor, 1 ceiling; it leaves the ``last``."""
+    """How long [s] until the bead, at z with speed v, meets which plate: 0 floor, 1 ceiling; it
+    leaves the ``last``.
+    """
 
     def gap(s: np.ndarray, k: int) -> np.ndarray:
         at = z + v * s - 0.5 * g * s * s
@@ -109,7 +113,9 @@ def test_a_bead_between_two_gentle_plates_follows_its_reference_for_hundreds_of_
 def test_each_hit_gives_twice_the_plates_speed_and_the_next_comes_on_time(
     g: float, v: float, duration: float
 ) -> None:
-    """Such plates throw a bead about by chance, so that each flight is followed anew from where it began."""
+    """Such plates throw a bead about by chance, so that each flight is followed anew from where it
+    began.
+    """
     plates = STRONG if duration < 10.0 else tuple(p._replace(amplitude=1e-9) for p in STRONG)
     log = box_log(plates, duration, g, v)
     which = plates_hit(log, box((0.03, 0.03, TOP)))
@@ -148,7 +154,9 @@ def test_the_same_chamber_upside_down_gives_the_same_upside_down() -> None:
 
 
 def test_a_wall_that_goes_to_and_fro_gives_its_own_speed_along_its_own_axis() -> None:
-    """Floor and side walls, of which two face the ball: each hit changes one component by twice that face's speed."""
+    """Floor and side walls, of which two face the ball: each hit changes one component by twice
+    that face's speed.
+    """
     sides = Vibration(SIDES, 15e-6, 23.1e3, 1.0, EAST)
     room = box((0.03, 0.03, TOP))
     ball = Balls(np.array([[0.011, 0.013, 0.008]]), np.array([[1.3, 0.0, 0.9]]), 2 * R)
@@ -167,7 +175,9 @@ def test_a_wall_that_goes_to_and_fro_gives_its_own_speed_along_its_own_axis() ->
 
 
 def ridge(second: int) -> TriangleMesh:
-    """A floor in one plane, in two by a ridge of 80 degrees: the left of tag FLOOR, the right of tag ``second``."""
+    """A floor in one plane, in two by a ridge of 80 degrees: the left of tag FLOOR, the right of
+    tag ``second``.
+    """
     room = trough([(0.021, 0.006), (0.022, 0.0), (0.04, 0.0)])
     level = (room.corners[:, :, 2] == 0.0).all(axis=1)
     right = level & (room.corners[:, :, 0] > 0.021).all(axis=1)
@@ -176,7 +186,9 @@ def ridge(second: int) -> TriangleMesh:
 
 @pytest.mark.parametrize("first", [0, 1])
 def test_two_faces_in_one_plane_are_hit_at_their_own_times(first: int) -> None:
-    """Whichever of the two is given first; the balls fall so slowly that their hits show the phase."""
+    """Whichever of the two is given first; the balls fall so slowly that their hits show the
+    phase.
+    """
     room = ridge(PARTED)
     plates = (Vibration(FLOOR, 25e-6, 20e3, 0.0), Vibration(PARTED, 25e-6, 20e3, 3.0))
     ball = Balls(

@@ -1,4 +1,6 @@
-"""Exact planes and cylinders in place of a mesh: where both can say it they agree; the round side is never missed."""
+"""Exact planes and cylinders in place of a mesh: where both can say it they agree; the round side
+is never missed.
+"""
 
 from collections.abc import Callable
 from decimal import Decimal, getcontext
@@ -69,7 +71,9 @@ def hexagonal_mesh() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize("shape", ["box", "hexagon"])
 def test_a_prism_is_its_mesh_event_by_event(shape: str) -> None:
-    """The same planes to within rounding, which a gas amplifies: equal for the first hundred events."""
+    """The same planes to within rounding, which a gas amplifies: equal for the first hundred
+    events.
+    """
     room, mesh = BOX, cavities.box((0.03, 0.04, 0.02))
     if shape == "hexagon":
         outline, vertices, triangles = hexagonal_mesh()
@@ -140,10 +144,11 @@ def flights(family: str, count: int) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize("family", ["random", "touching", "grazing", "slow"])
 def test_the_round_side_is_never_missed(family: str) -> None:
-    """In 60 digits: at the time given the ball is on the side, not on its way in, and it never was beyond before.
+    """In 60 digits: at the time given the ball is on the side, not on its way in, and it never was
+    beyond before.
 
-    Beyond the side a path goes out for ever, so that who is on it to within rounding, and not on the way in, has not
-    passed it. Overlaps by rounding count as touching.
+    Beyond the side a path goes out for ever, so that who is on it to within rounding, and not on
+    the way in, has not passed it. Overlaps by rounding count as touching.
     """
     getcontext().prec = 60
     numbers = np.zeros((1, NUMBERS))

@@ -1,4 +1,6 @@
-"""Balls of several sizes and densities in one room: what collisions keep, and how they share out energy."""
+"""Balls of several sizes and densities in one room: what collisions keep, and how they share out
+energy.
+"""
 
 import math
 from concurrent.futures import ThreadPoolExecutor
@@ -41,7 +43,9 @@ SIZES = np.array([1e-3, 2e-3, 3e-3])  # m
 def mixture(
     room: TriangleMesh, counts: tuple[int, int, int], seed: int, clear: float = 0.0
 ) -> Balls:
-    """So many of each of the SIZES, in random order; the smallest are as dense as tungsten carbide."""
+    """So many of each of the SIZES, in random order; the smallest are as dense as tungsten
+    carbide.
+    """
     rng = np.random.default_rng(seed)
     which = rng.permutation(np.repeat(np.arange(3), counts))
     diameter, density = SIZES[which], np.array([15_000.0, 7_800.0, 3_850.0])[which]
@@ -50,7 +54,9 @@ def mixture(
 
 
 def test_two_unequal_balls_collide_as_momentum_and_energy_say() -> None:
-    """Head on: v1' = ((m1 - m2) v1 + 2 m2 v2) / (m1 + m2) when elastic; they meet when r1 + r2 apart."""
+    """Head on: v1' = ((m1 - m2) v1 + 2 m2 v2) / (m1 + m2) when elastic; they meet when r1 + r2
+    apart.
+    """
     room = box((0.1, 0.02, 0.02))
     start = np.array([[0.02, 0.01, 0.01], [0.08, 0.01, 0.01]])
     balls = Balls(
@@ -137,7 +143,9 @@ def test_every_size_touches_at_its_own_radius(name: str) -> None:
 
 
 def test_each_ball_of_a_mixture_flies_as_it_does_alone() -> None:
-    """Where they do not collide with one another, to the last bit: its obstacles are those of its own size."""
+    """Where they do not collide with one another, to the last bit: its obstacles are those of its
+    own size.
+    """
     room = cylinder(0.012, 0.02, sections=12)
     physics = Physics(Gravity(), uniform_restitution(0.9, 0.7), Vibration(FLOOR, 25e-6, 20e3, 0.3))
     physics = physics._replace(ball_collisions=None)
@@ -169,7 +177,9 @@ def test_a_mixture_in_a_chamber_that_shakes_stays_inside_and_apart() -> None:
 
 
 def test_many_balls_in_blocks_meet_as_few_do() -> None:
-    """Above 1,024 balls the filter looks in blocks: energy and distances say whether it misses a meeting."""
+    """Above 1,024 balls the filter looks in blocks: energy and distances say whether it misses a
+    meeting.
+    """
     room = box((0.08, 0.08, 0.04))
     start = mixture(room, (800, 300, 100), 7)
     result = simulate(Scene(room, start, Physics(Gravity()), 0.1, record=()))

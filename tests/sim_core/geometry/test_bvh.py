@@ -1,4 +1,6 @@
-"""The tree holds every obstacle once, inside its boxes, and finds what testing all of them finds, bit for bit."""
+"""The tree holds every obstacle once, inside its boxes, and finds what testing all of them finds,
+bit for bit.
+"""
 
 import numpy as np
 import trimesh

@@ -1,5 +1,5 @@
-"""Fine triangles on a flat are one face to the ball: contacts are those of the fine mesh, hits are booked on its
-triangles.
+"""Fine triangles on a flat are one face to the ball: contacts are those of the fine mesh, hits are
+booked on its triangles.
 """
 
 import numpy as np
@@ -34,7 +34,9 @@ def fine(mesh: TriangleMesh, times: int) -> TriangleMesh:
 
 
 def slanted_block() -> TriangleMesh:
-    """A room with a block in it that lies along no axis: 24 edges' worth of flats, inside and outside."""
+    """A room with a block in it that lies along no axis: 24 edges' worth of flats, inside and
+    outside.
+    """
     block = trimesh.creation.box((0.02, 0.015, 0.01))
     block.apply_transform(trimesh.transformations.rotation_matrix(0.7, [0.3, 0.5, 0.8]))
     return box_around(block, 0.03)

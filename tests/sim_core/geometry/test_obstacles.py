@@ -18,7 +18,9 @@ def test_only_edges_convex_towards_the_shot_are_obstacles() -> None:
 
 
 def test_hits_on_an_edge_are_shared_by_its_two_faces() -> None:
-    """Balls fall on a roof's ridge from random places near it: either slope gets its share, by symmetry half."""
+    """Balls fall on a roof's ridge from random places near it: either slope gets its share, by
+    symmetry half.
+    """
     ridge = trimesh.creation.box((0.06, 0.02, 0.02))
     ridge.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 4, [1, 0, 0]))
     room = box_around(ridge, 0.05)

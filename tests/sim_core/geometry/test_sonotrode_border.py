@@ -1,4 +1,6 @@
-"""Balls that come onto the vibrating face over its border: from a gentle slope, or out of a pit beside it."""
+"""Balls that come onto the vibrating face over its border: from a gentle slope, or out of a pit
+beside it.
+"""
 
 import numpy as np
 import pytest
@@ -14,8 +16,8 @@ RADIUS = 1.5e-3  # m
 
 
 def trough(right: list[tuple[float, float]], left: float = 0.0) -> TriangleMesh:
-    r"""A prism 4 cm deep. The left half of its floor vibrates; the right half has these corners (x, z) [m];
-    its left wall is at x = ``left`` [m].
+    r"""A prism 4 cm deep. The left half of its floor vibrates; the right half has these corners (x,
+    z) [m]; its left wall is at x = ``left`` [m].
 
     z=2cm  ___________________
           |                   |
@@ -42,7 +44,9 @@ def trough(right: list[tuple[float, float]], left: float = 0.0) -> TriangleMesh:
 
 @pytest.mark.parametrize("phase", np.linspace(np.pi, 2.0 * np.pi, 12))
 def test_a_ball_from_a_gentle_slope_does_not_pass_into_the_face(phase: float) -> None:
-    """It starts over the slope, 16 µm from touching the plane of the face at rest, which swings by 25 µm."""
+    """It starts over the slope, 16 µm from touching the plane of the face at rest, which swings by
+    25 µm.
+    """
     room = trough([(0.04, 0.02 * np.tan(np.radians(5.0)))])
     start = Balls(
         np.array([[0.0201, 0.02, RADIUS + 16e-6]]), np.array([[-1.0, 0.0, -0.08]]), 2.0 * RADIUS
@@ -55,7 +59,9 @@ def test_a_ball_from_a_gentle_slope_does_not_pass_into_the_face(phase: float) ->
 
 @pytest.mark.parametrize("phase", np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False))
 def test_a_ball_out_of_a_pit_comes_down_on_the_face(phase: float) -> None:
-    """It starts within the swing of the face's plane, which it meets where no face is; over a ridge, it falls on it."""
+    """It starts within the swing of the face's plane, which it meets where no face is; over a
+    ridge, it falls on it.
+    """
     room = trough([(0.021, 1e-4), (0.022, -3e-3), (0.04, -3e-3)])
     start = Balls(
         np.array([[0.026, 0.02, RADIUS - 10e-6]]), np.array([[-3.3, 0.0, 0.6]]), 2.0 * RADIUS

@@ -1,4 +1,6 @@
-"""A part that turns: contacts against references made without the code under test, and what turning must keep."""
+"""A part that turns: contacts against references made without the code under test, and what turning
+must keep.
+"""
 
 import os
 from collections.abc import Callable
@@ -44,7 +46,9 @@ MOTIONS = {
 
 
 def checked_flight(rotor, position, velocity, gravity, time, limit):  # type: ignore[no-untyped-def]
-    """The first contact, after holding it against the gap on a dense row of times; (delay, -1) if there is none."""
+    """The first contact, after holding it against the gap on a dense row of times; (delay, -1) if
+    there is none.
+    """
     delay, row = rotor.search(position, velocity, gravity, time, limit)
     assert 0.0 <= delay <= limit
     rows = np.concatenate([np.linspace(0.0, delay, SAMPLES), [delay - 1e-6 * delay, delay - 1e-9]])
@@ -68,7 +72,9 @@ def random_motion(rng: np.random.Generator, motion: dict[str, float]) -> PartRot
 @pytest.mark.parametrize("motion", MOTIONS)
 @pytest.mark.parametrize("body", BODIES)
 def test_random_flights_meet_the_part_when_its_surface_is_there(body: str, motion: str) -> None:
-    """From all sides, slow, fast and at rest, with gravity and without; then off again from where it touched."""
+    """From all sides, slow, fast and at rest, with gravity and without; then off again from where
+    it touched.
+    """
     rng = np.random.default_rng(len(body) * 100 + len(motion))
     hits = 0
     for _ in range(STARTS // 12):
@@ -103,7 +109,9 @@ def test_random_flights_meet_the_part_when_its_surface_is_there(body: str, motio
 def bounced(
     rotor: Rotor, position: np.ndarray, velocity: np.ndarray, time: float, e: float
 ) -> np.ndarray:
-    """Velocity after the ball has hit the part, its normal taken from how the gap changes with the place."""
+    """Velocity after the ball has hit the part, its normal taken from how the gap changes with the
+    place.
+    """
     step = 1e-7
     moved = position + step * np.concatenate([np.eye(3), -np.eye(3)])
     gap = np.array([rotor.gap(p, velocity, None, time, np.zeros(1))[0] for p in moved])
@@ -165,7 +173,9 @@ def one_ball(
 
 
 def reference_time(gap: Callable[[np.longdouble], np.longdouble], before: float) -> np.longdouble:
-    """The first zero of a gap that is positive at 0, by a dense search and bisection in extended precision."""
+    """The first zero of a gap that is positive at 0, by a dense search and bisection in extended
+    precision.
+    """
     step = np.longdouble(before) / 2000
     k = next(k for k in range(1, 2001) if gap(k * step) <= 0)
     low, high = (k - 1) * step, k * step
@@ -218,7 +228,9 @@ def test_a_bar_swinging_to_and_fro_meets_a_resting_ball_when_the_closed_form_say
 
 @pytest.mark.parametrize("e", [1.0, 0.6])
 def test_a_resting_ball_is_thrown_by_the_bar_as_by_a_heavy_moving_face(e: float) -> None:
-    """u' = U + e (U - u) along the normal: 2 U for the elastic one at rest; the tangential part is kept."""
+    """u' = U + e (U - u) along the normal: 2 U for the elastic one at rest; the tangential part is
+    kept.
+    """
     omega, x, y = 2 * np.pi * 2.0, 6e-3, 4.5e-3
     physics = effects(PartRotation(PART, rpm=120.0), e=e)
     angle = np.arctan2(y, x) - np.arcsin(REACH / np.hypot(x, y))
@@ -249,8 +261,9 @@ def test_a_part_that_turns_at_0_rpm_is_the_still_part() -> None:
 
 @pytest.mark.parametrize("rpm", [60.0, 2000.0])
 def test_hits_on_a_steady_rotor_keep_the_jacobi_integral(rpm: float) -> None:
-    """Seen from the rotor, v²/2 - omega² rho²/2 is kept by flights and elastic hits (Goldstein, section 3.12); in the
-    room's terms that is the energy less omega times the angular momentum, which collisions among balls keep too.
+    """Seen from the rotor, v²/2 - omega² rho²/2 is kept by flights and elastic hits (Goldstein,
+    section 3.12); in the room's terms that is the energy less omega times the angular momentum,
+    which collisions among balls keep too.
     """
     omega, rng = 2 * np.pi * rpm / 60, np.random.default_rng(8)
     room = box_around(BODIES["star"], 0.3)
@@ -338,7 +351,9 @@ def test_the_same_scene_gives_the_same_bits_with_the_jit_on_and_off() -> None:
 
 
 def shaft_through_ceiling(sections: int, across: float, tilt: float = 0.0) -> TriangleMesh:
-    """A cube with a prism hanging into it through the ceiling, about the z axis before it is moved ``across`` [m]."""
+    """A cube with a prism hanging into it through the ceiling, about the z axis before it is moved
+    ``across`` [m].
+    """
     shaft = trimesh.creation.cylinder(radius=0.008, height=0.04, sections=sections)
     shaft.apply_transform(trimesh.transformations.rotation_matrix(tilt, [1, 0, 0]))
     shaft.apply_translation([across, 0.0, 0.02])

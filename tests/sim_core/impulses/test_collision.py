@@ -1,7 +1,9 @@
-"""A ball in an analytical cylinder: seen from above it flies along chords of a circle, whatever gravity does.
+"""A ball in an analytical cylinder: seen from above it flies along chords of a circle, whatever
+gravity does.
 
-At radius R - r each chord is as long as the last, 2 (R - r) sin(alpha) for a ball that leaves the side at the angle
-alpha to it; angular momentum about the axis is kept. A polygon of a mesh has no such orbit.
+At radius R - r each chord is as long as the last, 2 (R - r) sin(alpha) for a ball that leaves the
+side at the angle alpha to it; angular momentum about the axis is kept. A polygon of a mesh has no
+such orbit.
 """
 
 import math
@@ -40,7 +42,9 @@ def flown(
 
 
 def sides(log: ImpactLog) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Times (n,), places from the axis (n, 2) and velocities (n, 2), seen from above, of impacts on the round side."""
+    """Times (n,), places from the axis (n, 2) and velocities (n, 2), seen from above, of impacts on
+    the round side.
+    """
     own = log.triangle == SIDE
     return log.time[own], log.position[own, :2] - CENTRE, log.velocity[own, :2]
 
@@ -64,7 +68,9 @@ def test_circling_it_hits_at_even_times(alpha: float) -> None:
 
 
 def test_up_and_down_it_bounces_as_if_there_were_no_side() -> None:
-    """Between floor and ceiling under gravity, elastic: impacts alternate with the times of the closed form."""
+    """Between floor and ceiling under gravity, elastic: impacts alternate with the times of the
+    closed form.
+    """
     up = 2.0
     log = flown((0.01, 0.0, 0.5 * DIAMETER + 0.001), (1.3, 0.4, up), 0.5)
     bounces = log.triangle != SIDE
@@ -100,7 +106,9 @@ def test_a_ball_that_starts_in_contact(outward: float) -> None:
 
 @pytest.mark.parametrize("off", [0.0, 1e-9, -1e-9])
 def test_sliding_along_the_side_it_circles_at_its_own_speed(off: float) -> None:
-    """Thrown along the side: hops of 2 REACH sin(HOP), each turning it by 2 HOP; the chord is shorter than the arc."""
+    """Thrown along the side: hops of 2 REACH sin(HOP), each turning it by 2 HOP; the chord is
+    shorter than the arc.
+    """
     speed = 0.8
     time, place, velocity = sides(flown((REACH, 0.0, 0.01), (off, speed, 0.0), 0.1))
     np.testing.assert_allclose(np.hypot(*place.T), REACH, rtol=0.0, atol=1e-15)
@@ -111,7 +119,9 @@ def test_sliding_along_the_side_it_circles_at_its_own_speed(off: float) -> None:
 
 
 def test_restitution_lets_it_slide_and_takes_no_more_speed() -> None:
-    """Inelastic collapse: normal speeds fall as e^n, each hop is shorter by e, and after a finite time it slides."""
+    """Inelastic collapse: normal speeds fall as e^n, each hop is shorter by e, and after a finite
+    time it slides.
+    """
     e, along, normal = 0.5, 1.0, 0.2
     law = Restitution(((1.0, 100.0), (1.0, 100.0), (e, 100.0)), (1.0, 1.0), elastic_below=0.0)
     physics = Physics(

@@ -1,8 +1,9 @@
-"""An elastic gas under gravity thins out upwards as the barometric formula says, and is equally hot all the way up.
+"""An elastic gas under gravity thins out upwards as the barometric formula says, and is equally hot
+all the way up.
 
 N balls of energy E in all, potential included, and of mass one: a ball is above z with probability
-(1 - g z/E)^(5N/2 - 1), for 3N velocities and N - 1 heights share what it leaves; exp(-g z/kT) with E = 5/2 N kT when N
-is large. Roman, White & Velasco, Eur. J. Phys. 16 (1995) 83.
+(1 - g z/E)^(5N/2 - 1), for 3N velocities and N - 1 heights share what it leaves; exp(-g z/kT) with
+E = 5/2 N kT when N is large. Roman, White & Velasco, Eur. J. Phys. 16 (1995) 83.
 """
 
 import numpy as np
@@ -53,12 +54,14 @@ def compare_with_the_formula(samples: int) -> None:
     heights, squares, total = heights_and_speeds(samples)
     packing = packing_at_the_floor(total)
     assert packing < 2e-3
-    # the balls' own volume thins the gas to exp(-u) (1 + 4 φ - 8 φ exp(-u)): that moves the distribution by at most φ
+    # the balls' own volume thins the gas to exp(-u) (1 + 4 φ - 8 φ exp(-u)): that moves the
+    # distribution by at most φ
     result = kstest(heights.ravel(), lambda z: 1.0 - (1.0 - G * z / total) ** (2.5 * COUNT - 1.0))
     far = np.sqrt(-0.5 * np.log(0.5 * UNLIKELY) / heights.size)
     print(f"KS {result.statistic:.5f}, allowed {far:.5f} + {packing:.5f}")
     assert result.statistic < far + packing
-    # p = n kT (1 + 4 φ) carries the column: <z> = kT/g (1 + 2 φ), and E = N kT (3/2 + 1 + 2 φ); φ at the floor
+    # p = n kT (1 + 4 φ) carries the column: <z> = kT/g (1 + 2 φ), and E = N kT (3/2 + 1 + 2 φ); φ
+    # at the floor
     ratio, error = jackknife(lambda row: float(row.mean()), heights / (total / (2.5 * COUNT * G)))
     print(f"mean height over kT/g {ratio:.4f} +- {error:.4f}, expected {1.0 + 1.2 * packing:.4f}")
     assert abs(ratio - 1.0 - 1.2 * packing) < SURE * error

@@ -1,4 +1,6 @@
-"""What collisions keep: energy of an elastic gas, momentum of a pair, and what they may only lose."""
+"""What collisions keep: energy of an elastic gas, momentum of a pair, and what they may only
+lose.
+"""
 
 import numpy as np
 import pytest

@@ -1,7 +1,9 @@
-"""The pressure of an elastic gas on its walls, and how often its balls meet, against the theory of hard spheres.
+"""The pressure of an elastic gas on its walls, and how often its balls meet, against the theory of
+hard spheres.
 
-V is the volume the centres can reach, (side - diameter)³. A cube of a thousand balls is mostly near its walls: at
-φ = 0.3 they lower pV/NkT by a fifth, which is why the theory has a surface term and two sizes are compared.
+V is the volume the centres can reach, (side - diameter)³. A cube of a thousand balls is mostly near
+its walls: at φ = 0.3 they lower pV/NkT by a fifth, which is why the theory has a surface term and
+two sizes are compared.
 """
 
 from functools import lru_cache
@@ -25,14 +27,17 @@ BLOCKS = 20
 EFFORT = 80_000  # collisions a block, each counted for both balls
 SMALL, LARGE = 6, 10  # balls along an edge at the start
 PACKINGS = [0.02, 0.1, 0.2, 0.3]
-# Of Z - 1: Carnahan & Starling's error (the fourth virial coefficient is 18.36, not 18: 0.3 % at φ = 0.3), N balls that
-# have N - 1 partners, and 1 % of the surface tension, whose whole effect, carried on to no edges, is 0.2 (Z - 1).
+# Of Z - 1: Carnahan & Starling's error (the fourth virial coefficient is 18.36, not 18: 0.3 % at φ
+# = 0.3), N balls that have N - 1 partners, and 1 % of the surface tension, whose whole effect,
+# carried on to no edges, is 0.2 (Z - 1).
 THEORY = 0.003 + 0.001 + 0.002
 
 
 @lru_cache
 def measured(per_side: int, packing: float, effort: int) -> tuple[Gas, np.ndarray]:
-    """The gas, and a row a block: pV/NkT from the impulses on the walls, collisions of a ball a second, mean speed."""
+    """The gas, and a row a block: pV/NkT from the impulses on the walls, collisions of a ball a
+    second, mean speed.
+    """
     gas = lattice_gas(per_side, packing, seed=1)
     rows = []
     for result, duration in played(gas, BLOCKS, effort / per_side**3):
@@ -45,7 +50,9 @@ def measured(per_side: int, packing: float, effort: int) -> tuple[Gas, np.ndarra
 
 
 def without_edges(ratios: list[tuple[float, float]], sizes: list[float]) -> tuple[float, float]:
-    """Two ratios to theory (value, error) on cubes of two sizes [m], carried on to where (1 / size)² is none."""
+    """Two ratios to theory (value, error) on cubes of two sizes [m], carried on to where (1 /
+    size)² is none.
+    """
     weight = sizes[1] ** 2 / (sizes[1] ** 2 - sizes[0] ** 2)
     (small, small_error), (large, large_error) = ratios
     return weight * large - (weight - 1.0) * small, float(
@@ -54,7 +61,8 @@ def without_edges(ratios: list[tuple[float, float]], sizes: list[float]) -> tupl
 
 
 def compare_with_theory(packing: float, effort: int) -> None:
-    """Walls add a term of DIAMETER / inner, which in_a_box has, and edges one of its square, which two sizes give.
+    """Walls add a term of DIAMETER / inner, which in_a_box has, and edges one of its square, which
+    two sizes give.
 
     The mean free path is <v>/ν = 1/(sqrt(2) π n d² χ): Chapman & Cowling, section 5.21.
     """
@@ -97,9 +105,11 @@ def test_pressure_collision_rate_and_mean_free_path(packing: float) -> None:
 
 @pytest.mark.parametrize("packing", PACKINGS)
 def test_the_virial_theorem_ties_the_walls_impulses_to_the_collisions(packing: float) -> None:
-    """3 p V = 2 E + Σ impulse × diameter over the collisions of a time: exact, for any number of balls, of any size.
+    """3 p V = 2 E + Σ impulse × diameter over the collisions of a time: exact, for any number of
+    balls, of any size.
 
-    The closing speeds of pairs that meet average sqrt(π kT), as kT = <v²>/3 (1 + 1/12N, which is left out).
+    The closing speeds of pairs that meet average sqrt(π kT), as kT = <v²>/3 (1 + 1/12N, which is
+    left out).
     """
     gas, rows = measured(LARGE, packing, EFFORT)
     virial, error = jackknife(

@@ -1,4 +1,6 @@
-"""An elastic gas forgets how it started: every ball's velocity comes to have Maxwell's distribution."""
+"""An elastic gas forgets how it started: every ball's velocity comes to have Maxwell's
+distribution.
+"""
 
 import numpy as np
 import pytest
@@ -6,12 +8,15 @@ from scipy.stats import beta, kstest, norm
 
 from tests.helpers.scenes.gas import SURE, jackknife, lattice_gas, played
 
-APART = 12.0  # collisions a ball between samples: what a ball then still remembers is below noise (checked)
+# collisions a ball between samples: what a ball then still remembers is below noise (checked)
+APART = 12.0
 UNLIKELY = 1e-4  # chance of a false alarm
 
 
 def sampled(per_side: int, packing: float, samples: int) -> np.ndarray:
-    """Velocities over sqrt(kT), shape (samples, balls, 3), of a gas whose balls all started equally fast."""
+    """Velocities over sqrt(kT), shape (samples, balls, 3), of a gas whose balls all started equally
+    fast.
+    """
     gas = lattice_gas(per_side, packing, seed=3)
     pieces = played(gas, samples, APART, record=())
     return np.array([result.balls.velocities for result, _ in pieces]) / np.sqrt(gas.kt)
@@ -31,7 +36,9 @@ def fourth_moment(samples: np.ndarray) -> tuple[float, float]:
 
 
 def test_many_balls_have_maxwells_distribution() -> None:
-    """N balls of fixed energy: v lies evenly on a sphere of 3N dimensions, so <v⁴>/<v²>² = 5/3 x 3N/(3N + 2)."""
+    """N balls of fixed energy: v lies evenly on a sphere of 3N dimensions, so <v⁴>/<v²>² = 5/3 x
+    3N/(3N + 2).
+    """
     samples = sampled(5, 0.1, 300)
     count = 3 * samples.shape[1]
     assert abs(memory(samples)) < SURE / np.sqrt(samples[1:, :, 0].size) + 1.0 / samples.shape[1]
@@ -47,9 +54,11 @@ def test_many_balls_have_maxwells_distribution() -> None:
 
 @pytest.mark.parametrize("samples", [4_000, pytest.param(100_000, marks=pytest.mark.long)])
 def test_eight_balls_have_the_distribution_of_few(samples: int) -> None:
-    """A component of a point spread evenly on a sphere in 24 dimensions: (1 + v/R)/2 has a beta distribution.
+    """A component of a point spread evenly on a sphere in 24 dimensions: (1 + v/R)/2 has a beta
+    distribution.
 
-    With eight balls the difference from Maxwell's is plain: <v_x⁴>/<v_x²>² is 3 x 24/26 = 2.77, not 3.
+    With eight balls the difference from Maxwell's is plain: <v_x⁴>/<v_x²>² is 3 x 24/26 = 2.77, not
+    3.
     """
     velocities = sampled(2, 0.05, samples)
     count = 3 * velocities.shape[1]

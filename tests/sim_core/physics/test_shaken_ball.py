@@ -1,7 +1,8 @@
-"""One ball between a shaking floor and a ceiling at rest, under four laws of restitution, against marching.
+"""One ball between a shaking floor and a ceiling at rest, under four laws of restitution, against
+marching.
 
-The marching steps through a flight in a four-hundredth of a period and bisects where a gap closes: slow, and free of
-everything the simulator's own search relies on.
+The marching steps through a flight in a four-hundredth of a period and bisects where a gap closes:
+slow, and free of everything the simulator's own search relies on.
 """
 
 import math
@@ -62,7 +63,9 @@ def floor_height(t: np.ndarray | float) -> np.ndarray | float:
 
 
 def first_contact(z: float, v: float, t: float) -> tuple[float, int]:
-    """Delay [s] until a ball that leaves z [m] with v [m/s] at t [s] touches the ceiling or the floor, and which."""
+    """Delay [s] until a ball that leaves z [m] with v [m/s] at t [s] touches the ceiling or the
+    floor, and which.
+    """
 
     def gaps(s: np.ndarray | float) -> np.ndarray:
         height = z + v * s - 0.5 * G * s * s
@@ -71,7 +74,8 @@ def first_contact(z: float, v: float, t: float) -> tuple[float, int]:
         )
 
     step = 1.0 / SHAKING.frequency / 400.0
-    # the first points lie close together: a ball that has just been hit is still at the surface it leaves
+    # the first points lie close together: a ball that has just been hit is still at the surface it
+    # leaves
     times = step * np.concatenate([[1e-3, 1e-2, 1e-1], np.arange(1.0, 4001.0)])
     while True:
         closed = (gaps(times) <= 0.0).any(axis=0)
@@ -116,7 +120,9 @@ def balls_side_by_side(per_side: int, rng: np.random.Generator) -> tuple[Triangl
 
 
 def compare_impact_by_impact(law: str, per_side: int) -> None:
-    """The flight is chaotic: two marches 1e-12 m apart say how far the rounding of either, 1e-16, may be carried."""
+    """The flight is chaotic: two marches 1e-12 m apart say how far the rounding of either, 1e-16,
+    may be carried.
+    """
     restitution, laws = LAWS[law]
     room, balls = balls_side_by_side(per_side, np.random.default_rng(6))
     log = simulate(Scene(room, balls, Physics(Gravity(), restitution, SHAKING), 0.05)).impacts
@@ -138,7 +144,9 @@ def compare_impact_by_impact(law: str, per_side: int) -> None:
 
 
 def compare_statistics(law: str, per_side: int, duration: float) -> None:
-    """How often and how hard the ceiling is hit: other balls for the marching, drawn from the same distribution."""
+    """How often and how hard the ceiling is hit: other balls for the marching, drawn from the same
+    distribution.
+    """
     restitution, laws = LAWS[law]
     room, balls = balls_side_by_side(24, np.random.default_rng(7))
     result = simulate(Scene(room, balls, Physics(Gravity(), restitution, SHAKING), duration))

@@ -1,4 +1,6 @@
-"""Scenes that cannot be simulated are refused at the door, with the ball, triangle or field named."""
+"""Scenes that cannot be simulated are refused at the door, with the ball, triangle or field
+named.
+"""
 
 import math
 
