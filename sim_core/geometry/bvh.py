@@ -26,6 +26,20 @@ BINS = 16  # cuts tried along each axis; 8 to 32 measured alike
 EMPTY = -(2**31)
 
 
+class _Boxes(NamedTuple):
+    """Bounding boxes of the obstacles, and their order in the tree.
+
+    Args:
+        low: lowest corners [m], shape (k, 3).
+        high: highest corners [m], shape (k, 3).
+        order: the obstacle of each leaf, shape (k,); sorted as the tree grows.
+    """
+
+    low: np.ndarray
+    high: np.ndarray
+    order: np.ndarray
+
+
 class Tree(NamedTuple):
     """Obstacles and their boxes, ready for compiled code, relative to the scene's centre.
 
@@ -62,7 +76,7 @@ def build_tree(table: ObstacleTable, radius: float) -> Tree:
     children = np.full((most, BOXES), EMPTY, dtype=np.int32)
     ranges = np.zeros((most, 3), dtype=np.int64)  # first and last obstacle, and level, of each node
     bins, groups = np.zeros((2, BINS, 7)), np.zeros((BOXES, 2), np.int64)
-    nodes = _grow(low, high, order, bounds, children, ranges, bins[0], bins[1], groups)
+    nodes = _grow(_Boxes(low, high, order), bounds, children, ranges, bins[0], bins[1], groups)
     if ranges[:nodes, 2].max() > MAX_LEVELS:
         raise SceneError(
             "the mesh's triangles are spread so unevenly that their tree is more than "
@@ -105,9 +119,7 @@ def join_trees(trees: list[Tree]) -> tuple[Tree, np.ndarray]:
 
 @jit
 def _grow(
-    low: np.ndarray,
-    high: np.ndarray,
-    order: np.ndarray,
+    boxes: _Boxes,
     bounds: np.ndarray,
     children: np.ndarray,
     ranges: np.ndarray,
@@ -119,6 +131,7 @@ def _grow(
 
     Returns the number of nodes.
     """
+    low, high, order = boxes.low, boxes.high, boxes.order
     ranges[0, 0], ranges[0, 1], ranges[0, 2] = 0, len(order), 1
     nodes = 1
     node = 0
@@ -129,12 +142,12 @@ def _grow(
             chosen, widest = -1, -1.0
             for g in range(count):
                 if groups[g, 1] - groups[g, 0] > 1:
-                    area = _area_of(low, high, order, groups[g, 0], groups[g, 1])
+                    area = _area_of(boxes, groups[g, 0], groups[g, 1])
                     if area > widest:
                         chosen, widest = g, area
             if chosen < 0:
                 break
-            cut = _cut(low, high, order, groups[chosen, 0], groups[chosen, 1], bins, sweep)
+            cut = _cut(boxes, groups[chosen, 0], groups[chosen, 1], bins, sweep)
             groups[count, 0], groups[count, 1] = cut, groups[chosen, 1]
             groups[chosen, 1] = cut
             count += 1
@@ -159,8 +172,9 @@ def _grow(
 
 
 @jit
-def _area_of(low: np.ndarray, high: np.ndarray, order: np.ndarray, start: int, end: int) -> float:
+def _area_of(boxes: _Boxes, start: int, end: int) -> float:
     """Half the surface area of the box around a group [m²]."""
+    low, high, order = boxes.low, boxes.high, boxes.order
     x0, y0, z0, x1, y1, z1 = np.inf, np.inf, np.inf, -np.inf, -np.inf, -np.inf
     for k in range(start, end):
         i = order[k]
@@ -176,10 +190,10 @@ def _half_area(box: np.ndarray, row: int) -> float:
 
 
 @jit
-def _widen(box: np.ndarray, row: int, low: np.ndarray, high: np.ndarray, i: int) -> None:
+def _widen(box: np.ndarray, row: int, boxes: _Boxes, i: int) -> None:
     for axis in range(3):
-        box[row, axis] = min(box[row, axis], low[i, axis])
-        box[row, 3 + axis] = max(box[row, 3 + axis], high[i, axis])
+        box[row, axis] = min(box[row, axis], boxes.low[i, axis])
+        box[row, 3 + axis] = max(box[row, 3 + axis], boxes.high[i, axis])
 
 
 @jit
@@ -219,26 +233,18 @@ def _clear(bins: np.ndarray) -> None:
 
 
 @jit
-def _bin_of(
-    low: np.ndarray, high: np.ndarray, i: int, axis: int, first: float, scale: float
-) -> int:
-    return min(BINS - 1, int((0.5 * (low[i, axis] + high[i, axis]) - first) * scale))
+def _bin_of(boxes: _Boxes, i: int, axis: int, first: float, scale: float) -> int:
+    middle = 0.5 * (boxes.low[i, axis] + boxes.high[i, axis])
+    return min(BINS - 1, int((middle - first) * scale))
 
 
 @jit
-def _cut(
-    low: np.ndarray,
-    high: np.ndarray,
-    order: np.ndarray,
-    start: int,
-    end: int,
-    bins: np.ndarray,
-    sweep: np.ndarray,
-) -> int:
+def _cut(boxes: _Boxes, start: int, end: int, bins: np.ndarray, sweep: np.ndarray) -> int:
     """Sort a group into two at the cheapest of BINS - 1 cuts along each axis.
 
     Returns where the second part begins.
     """
+    low, high, order = boxes.low, boxes.high, boxes.order
     best, best_axis, best_bin, best_first, best_scale = np.inf, -1, 0, 0.0, 0.0
     for axis in range(3):
         first, last = np.inf, -np.inf
@@ -251,8 +257,8 @@ def _cut(
         _clear(bins)
         for k in range(start, end):
             i = order[k]
-            b = _bin_of(low, high, i, axis, first, scale)
-            _widen(bins, b, low, high, i)
+            b = _bin_of(boxes, i, axis, first, scale)
+            _widen(bins, b, boxes, i)
             bins[b, 6] += 1.0
         cost, place = _cheapest(bins, sweep)
         if cost < best:
@@ -261,7 +267,7 @@ def _cut(
         return (start + end) // 2  # all centres in one point
     left, right = start, end - 1
     while left <= right:
-        if _bin_of(low, high, order[left], best_axis, best_first, best_scale) <= best_bin:
+        if _bin_of(boxes, order[left], best_axis, best_first, best_scale) <= best_bin:
             left += 1
         else:
             order[left], order[right] = order[right], order[left]
