@@ -138,7 +138,7 @@ def duration_of(plan: Plan) -> float:
     return TRAVERSES * plan.wide / (fastest * plan.speed)
 
 
-def judge(plan: Plan, keep: Path = FOUND) -> str:
+def play_and_check(plan: Plan, keep: Path = FOUND) -> str:
     """How it ended: "ran", or the message it was refused or stopped with. A broken invariant is an
     AssertionError, and the scene is kept in the file ``keep``.
     """

@@ -1,4 +1,4 @@
-"""What became of a hard case, judged by physics: closed forms, conservation, or a clear refusal."""
+"""The outcome of a hard case, by closed forms, conservation, or a clear refusal."""
 
 import math
 import re
@@ -68,7 +68,7 @@ class Case:
     """
 
     name: str
-    judge: Callable[[], Outcome]
+    run: Callable[[], Outcome]
     needs_rest: bool = False
     long: bool = False
     unsolved: str = ""
@@ -83,7 +83,7 @@ class Case:
         one.
         """
         try:
-            return replace(self.judge(), case=self.name)
+            return replace(self.run(), case=self.name)
         except Exception as error:
             return Outcome(self.name, False, f"{type(error).__name__}: {error}")
 
@@ -277,7 +277,7 @@ def near(what: str, seen: object, wanted: object, within: float) -> Claim:
     return Claim(off <= within, f"{what} off by {off:.2g} (allowed {within:.2g})")
 
 
-def verdict(played: Played, expected: str, *claims: Claim, drift: float = DRIFT) -> Outcome:
+def outcome_of(played: Played, expected: str, *claims: Claim, drift: float = DRIFT) -> Outcome:
     """Claims of the case, and those of every case: no overlap, and energy kept to ``drift`` where
     nothing loses it.
     """

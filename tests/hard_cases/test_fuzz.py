@@ -22,7 +22,7 @@ from sim_core import (
     SimulationError,
     Vibration,
 )
-from tests.hard_cases.fuzz import Plan, judge, plans, require_invariants
+from tests.hard_cases.fuzz import Plan, plans, play_and_check, require_invariants
 from tests.hard_cases.fuzzed_effects import FEW, MANY
 from tests.hard_cases.saved_scene import FOLDER, load_scene, save_scene
 from tests.helpers.scenes.cavities import CEILING, FLOOR
@@ -37,7 +37,7 @@ SLOW = [HealthCheck.too_slow, HealthCheck.data_too_large]
 )
 @given(plans(FEW))
 def test_any_scene_runs_or_says_why_not(plan: Plan) -> None:
-    judge(plan)
+    play_and_check(plan)
 
 
 @pytest.mark.long
@@ -49,7 +49,7 @@ def test_any_scene_runs_or_says_why_not(plan: Plan) -> None:
 )
 @given(plans(MANY))
 def test_many_scenes_run_or_say_why_not(plan: Plan) -> None:
-    judge(plan)
+    play_and_check(plan)
 
 
 @pytest.mark.parametrize("path", SAVED, ids=[path.stem for path in SAVED])

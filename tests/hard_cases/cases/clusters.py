@@ -16,8 +16,8 @@ from tests.hard_cases.outcome import (
     Played,
     named,
     near,
+    outcome_of,
     play,
-    verdict,
     with_rest,
 )
 from tests.helpers.scenes.cavities import box
@@ -54,7 +54,7 @@ def newtons_cradle() -> Outcome:
     )
     seen = play(Chamber(ROOM, balls, Physics()), pieces * 0.5 * gap / speed, pieces)
     order = [int(one.velocities[:, 0].argmax()) for one in seen.track]
-    return verdict(
+    return outcome_of(
         seen,
         "the last ball leaves with the first's velocity",
         near("velocities [m/s]", seen.end.velocities[:, 0], [0, 0, 0, 0, speed], 1e-15),
@@ -72,7 +72,7 @@ def newtons_cradle_touching() -> Outcome:
     """
     balls = row([0.0, *(2 * DIAMETER + k * DIAMETER for k in range(4))], [1.0, 0, 0, 0, 0])
     seen = play(Chamber(ROOM, balls, Physics()), 5e-3)
-    return verdict(
+    return outcome_of(
         seen,
         "the last ball leaves with the first's velocity",
         near("velocities [m/s]", seen.end.velocities[:, 0], [0, 0, 0, 0, 1.0], 1e-14),
@@ -89,7 +89,7 @@ def newtons_cradle_with_two() -> Outcome:
         [2.0, 2.0, 0, 0, 0],
     )
     seen = play(Chamber(ROOM, balls, Physics()), 8e-3)
-    return verdict(
+    return outcome_of(
         seen,
         "two balls come, two balls leave",
         near("velocities [m/s]", seen.end.velocities[:, 0], [0, 0, 0, 2.0, 2.0], 1e-14),
@@ -114,7 +114,7 @@ def inelastic_collapse_of_three() -> Outcome:
     balls = row([0.0, 0.02, 0.04], [1.0, 0.1, -1.0])
     seen = play(Chamber(ROOM, balls, Physics(WEIGHTLESS, with_losses(e, 0.0))), 0.05, 5)
     mean = 0.1 / 3.0
-    return verdict(
+    return outcome_of(
         seen,
         "they go on together with the momentum they had",
         near("velocities [m/s]", seen.end.velocities[:, 0], np.full(3, mean), 1e-9),
@@ -132,7 +132,7 @@ def collapse_of_a_row_between_walls() -> Outcome:
     balls = row([k * 2 * DIAMETER for k in range(20)], list(rng.normal(0.0, 1.0, 20)))
     seen = play(Chamber(ROOM, balls, Physics(WEIGHTLESS, with_losses(0.5))), 2.0, 20)
     along = seen.end.positions[:, 0]
-    return verdict(
+    return outcome_of(
         seen,
         "keeps its order and cools",
         Claim(bool((np.diff(along) > 0.0).all()), "balls have passed through each other"),
@@ -150,7 +150,7 @@ def collapse_of_a_cloud() -> Outcome:
     balls = Balls(pack_balls(room, 100, DIAMETER, rng), rng.normal(0.0, 1.0, (100, 3)), DIAMETER)
     seen = play(Chamber(room, balls, Physics(WEIGHTLESS, with_losses(0.3, 1e-6))), 1.0, 20)
     share = float((seen.end.velocities**2).sum() / (balls.velocities**2).sum())
-    return verdict(
+    return outcome_of(
         seen,
         "cools into clusters in a bounded number of events",
         Claim(share < 0.01, f"has kept {share:.2g} of its energy"),
@@ -172,7 +172,7 @@ def pile_coming_to_rest() -> Outcome:
         Chamber(room, balls, with_rest(Physics(Gravity(), with_losses(0.5)))), 2.0, 20, record=()
     )
     speed = float(np.abs(seen.end.velocities).max())
-    return verdict(
+    return outcome_of(
         seen,
         "lies still in the end",
         Claim(speed < 1e-2, f"still at {speed:.2g} m/s"),
@@ -200,7 +200,7 @@ def triple_contact() -> Outcome:
     end = seen.end
     apart = end.positions[:, None] - end.positions
     closing = ((end.velocities[:, None] - end.velocities) * apart).sum(axis=2)
-    return verdict(
+    return outcome_of(
         seen,
         "momentum and energy are kept and all fly apart",
         near("momentum", momentum(end) / momentum(balls)[0], [1.0, 0.0, 0.0], 1e-14),
@@ -218,7 +218,7 @@ def four_balls_close_on_one() -> Outcome:
     positions = MIDDLE + np.concatenate([[[0.0, 0, 0]], 0.01 * corners])
     balls = Balls(positions, np.concatenate([[[0.0, 0, 0]], -2.0 * corners]), DIAMETER)
     seen = play(Chamber(ROOM, balls, Physics()), 0.02)
-    return verdict(
+    return outcome_of(
         seen,
         "momentum and energy are kept",
         near("momentum over m", seen.end.velocities.sum(axis=0), np.zeros(3), 1e-13),
@@ -254,7 +254,7 @@ def packing_of_64_percent() -> Outcome:
     """
     chamber, share = crystal(6, 0.64, 0.9, np.random.default_rng(8))
     seen = play(chamber, 0.005, 5, record=())
-    return verdict(
+    return outcome_of(
         seen,
         f"{len(chamber.balls)} balls fill {share:.0%} of the box and keep their energy",
         Claim(seen.pairs > 50 * len(chamber.balls), f"only {seen.pairs} hits"),
@@ -291,7 +291,7 @@ def random_packing_compressed() -> Outcome:
     """Balls grown to an irregular packing: some touch all but for rounding."""
     chamber, share = compressed(150, 5e-4, np.random.default_rng(9))
     seen = play(chamber, 5e-4, 4, record=())
-    return verdict(
+    return outcome_of(
         seen,
         f"irregular, {share:.0%} of the box filled, keeps its energy",
         Claim(share > 0.5, f"only {share:.0%} filled"),

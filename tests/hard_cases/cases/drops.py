@@ -8,7 +8,7 @@ import numpy as np
 import trimesh
 
 from sim_core import Balls, Gravity, Physics, TriangleMesh
-from tests.hard_cases.outcome import Claim, Outcome, named, near, play, verdict
+from tests.hard_cases.outcome import Claim, Outcome, named, near, outcome_of, play
 from tests.helpers.scenes.cavities import box, box_around
 from tests.helpers.scenes.fuzzed_chambers import Chamber
 from tests.sim_core.loop.test_containment import TOUCH
@@ -34,7 +34,7 @@ def ball_on_a_face() -> Outcome:
     seen = play(Chamber(box((0.03, 0.03, 0.03)), start, Physics(Gravity())), 1.0)
     fall = math.sqrt(2.0 * DROP / G)
     times = fall * np.arange(1.0, 1.0 / fall, 2.0)
-    return verdict(
+    return outcome_of(
         seen,
         "bounces for ever to the height it fell from",
         near("times of the bounces [s]", seen.time, times, EXACT),
@@ -90,7 +90,7 @@ def _deflected(room: TriangleMesh, off: tuple[float, float], what: str) -> Outco
     at = np.array([off[0], off[1], height])
     fall = np.array([0.0, 0.0, -G])
     later = at + 1e-3 * after + 0.5e-6 * fall
-    return verdict(
+    return outcome_of(
         seen,
         f"{what}: the velocity is mirrored at the line to the centre",
         near("time of the hit [s]", seen.time, [hit], EXACT),
@@ -113,7 +113,7 @@ def ball_bouncing_on_an_edge() -> Outcome:
     seen = play(Chamber(_ridge(), start, Physics(Gravity())), 1.0)
     fall = math.sqrt(2.0 * drop / G)
     times = fall * np.arange(1.0, 1.0 / fall, 2.0)
-    return verdict(
+    return outcome_of(
         seen,
         f"comes down {len(times)} times on the edge",
         near("times [s]", seen.time, times, len(times) * (EXACT + 4.0 * TOUCH / (G * fall))),
@@ -152,7 +152,7 @@ def ball_along_a_shared_edge() -> Outcome:
     start = one_ball((0.003, 0.003, RADIUS + 1e-4), (0.1, 0.1, 0.0))
     seen = play(Chamber(room, start, Physics(Gravity())), 0.2)
     fall = math.sqrt(2e-4 / G)
-    return verdict(
+    return outcome_of(
         seen,
         "hops straight on along the diagonal",
         near("times of the hops [s]", seen.time, fall * np.arange(1.0, 0.2 / fall, 2.0), EXACT),
@@ -168,7 +168,7 @@ def ball_sliding_along_a_shared_edge() -> Outcome:
     room = box((0.03, 0.03, 0.03))
     start = one_ball((0.003, 0.003, RADIUS), (0.1, 0.1, 0.0))
     seen = play(Chamber(room, start, Physics()), 0.2)
-    return verdict(
+    return outcome_of(
         seen,
         "slides straight on, not hit once",
         near("hits", len(seen.time), 0, 0),
@@ -181,7 +181,7 @@ def ball_into_a_corner() -> Outcome:
     room = box((0.03, 0.03, 0.03))
     start = one_ball((0.01, 0.01, 0.01), (-1.0, -1.0, -1.0))
     seen = play(Chamber(room, start, Physics()), 0.015)
-    return verdict(
+    return outcome_of(
         seen,
         "comes straight back out of the corner",
         near("hits", len(seen.time), 3, 0),
@@ -209,7 +209,7 @@ def ball_along_a_row_of_corners() -> Outcome:
     way = 0.03 - 2.0 * RADIUS
     first = 0.03 - RADIUS - 0.01
     times = first + way * np.arange(0.0, (1.0 - first) / way)
-    return verdict(
+    return outcome_of(
         seen,
         "meets the end walls alone",
         near("times [s]", seen.time, times, EXACT),

@@ -29,8 +29,8 @@ from tests.hard_cases.outcome import (
     Outcome,
     named,
     near,
+    outcome_of,
     play,
-    verdict,
     with_rest,
 )
 from tests.helpers.scenes.cavities import FLOOR, box, box_around, cylinder, uniform_restitution
@@ -61,7 +61,7 @@ def _to_and_fro(
     # a flight is followed in windows of 20 ms, each of which rounds the place anew
     windows = duration / 0.02
     rounding = ROUNDING * (side + abs(off)) * (len(times) + windows) / speed
-    return verdict(
+    return outcome_of(
         seen,
         f"{len(times)} hits at the times of a uniform motion",
         near("times [s]", seen.time, times, rounding + EXACT * duration),
@@ -75,7 +75,7 @@ def gas_of_small_balls() -> Outcome:
     grid = np.stack(np.meshgrid(*[np.arange(4.0)] * 3), axis=-1).reshape(-1, 3)
     balls = Balls(1e-6 * (1.0 + 3.0 * grid), rng.normal(0.0, 1.0, (64, 3)), 1e-6)
     seen = play(Chamber(box((1.0, 1.0, 1.0)), balls, Physics()), 5.0, 5, record=())
-    return verdict(
+    return outcome_of(
         seen,
         "fly out of their corner and keep their energy",
         Claim(seen.collisions > 500, "few hits"),
@@ -96,7 +96,7 @@ def large_ball_on_a_small_body() -> Outcome:
     seen = play(Chamber(room, ball, Physics()), 0.2)
     normal = np.array([off, 0.0, height]) / radius
     after = np.array([0.0, 0.0, -speed]) + 2.0 * speed * normal[2] * normal
-    return verdict(
+    return outcome_of(
         seen,
         "is mirrored at the line to the tip",
         near("time [s]", seen.time, [0.1], EXACT),
@@ -128,7 +128,7 @@ def triangles_of_two_sizes() -> Outcome:
     ball = one_ball((half, half, RADIUS + 0.5 * way), (1e-7, 0.0, -1.0))
     seen = play(Chamber(room, ball, Physics()), 0.5)
     times = np.arange(0.5 * way, 0.5, way)
-    return verdict(
+    return outcome_of(
         seen,
         "a square micrometre in a wall is not felt",
         near("times [s]", seen.time, times, EXACT),
@@ -141,7 +141,7 @@ def no_gravity() -> Outcome:
     start = Balls(np.array([[0.011, 0.012, 0.013]]), np.array([[1.0, 2.0, 3.0]]), 2.0 * RADIUS)
     seen = play(Chamber(ROOM, start, Physics(Gravity(0.0, 0.0, 0.0))), 2.0)
     without = play(Chamber(ROOM, start, Physics()), 2.0)
-    return verdict(
+    return outcome_of(
         seen,
         "flies straight",
         near("places [m]", seen.end.positions, without.end.positions, 0.0),
@@ -155,7 +155,7 @@ def hundredfold_gravity() -> Outcome:
     start = one_ball((0.011, 0.013, RADIUS + DROP), (0.0, 0.0, 0.0))
     seen = play(Chamber(ROOM, start, Physics(Gravity(z=-100.0 * G))), 0.5)
     times = fall * np.arange(1.0, 0.5 / fall, 2.0)
-    return verdict(
+    return outcome_of(
         seen,
         "bounces for ever to the height it fell from",
         near("times [s]", seen.time, times, EXACT),
@@ -169,7 +169,7 @@ def sonotrode_without_swing() -> Outcome:
     start = one_ball((0.011, 0.013, RADIUS + DROP), (0.0, 0.0, 0.0))
     physics = Physics(Gravity(), LOSSLESS, Vibration(FLOOR, 0.0, 20e3))
     seen = play(Chamber(ROOM, start, physics), 0.5)
-    return verdict(
+    return outcome_of(
         seen,
         "bounces as on a floor that stands still",
         near("times [s]", seen.time, fall * np.arange(1.0, 0.5 / fall, 2.0), EXACT),
@@ -197,7 +197,7 @@ def sonotrode_swinging_a_millimetre() -> Outcome:
         off = max(off, abs(place - face))
         least = min(least, said)
         speed, place = 2.0 * surface - speed, float(z)
-    return verdict(
+    return outcome_of(
         seen,
         f"is mirrored {len(seen.time)} times, where the face is and at its speed",
         near("places [m]", off, 0.0, 1e-12),
@@ -221,7 +221,7 @@ def shot_on_a_sonotrode_swinging_a_millimetre() -> Outcome:
     law = (0.9, 1.0)
     physics = Physics(Gravity(), Restitution((law,) * 3, law), Vibration(FLOOR, 1e-3, 20e3))
     seen = play(Chamber(room, balls, physics), 0.05, 10)
-    return verdict(
+    return outcome_of(
         seen, "stays in the chamber", Claim(seen.collisions > 2_000, f"only {seen.collisions} hits")
     )
 
@@ -239,7 +239,7 @@ def perfectly_plastic_walls() -> Outcome:
     way = SIDE - RADIUS - 0.01
     times = [way / 0.3, (0.01 - RADIUS) / 0.1, way / 0.2]
     corner = [SIDE - RADIUS, SIDE - RADIUS, RADIUS]
-    return verdict(
+    return outcome_of(
         seen,
         "is in the corner after three hits, for good",
         near("times [s]", seen.time, sorted(times), EXACT),
@@ -256,7 +256,7 @@ def perfectly_plastic_pair() -> Outcome:
         3e-3,
     )
     seen = play(Chamber(ROOM, balls, _plastic(0.0)), 0.05)
-    return verdict(
+    return outcome_of(
         seen,
         "go on together",
         near("velocities [m/s]", seen.end.velocities, [[0.1, 0, 0], [0.1, 0, 0]], 1e-16),
@@ -269,7 +269,7 @@ def almost_plastic_wall() -> Outcome:
     start = one_ball((0.01, 0.015, 0.015), (1.0, 0.0, 0.0))
     seen = play(Chamber(ROOM, start, _plastic(1e-9)), 10.0)
     way = SIDE - RADIUS - 0.01
-    return verdict(
+    return outcome_of(
         seen,
         "creeps away from the wall",
         near("hits", len(seen.time), 1, 0),
@@ -287,7 +287,7 @@ def restitution_of_one() -> Outcome:
     physics = Physics(Gravity(), uniform_restitution(1.0, 1e3))
     seen = play(Chamber(ROOM, balls, physics), 1.0, 4, record=())
     drift = abs(energy(seen.end, Gravity()) / energy(balls, Gravity()) - 1.0)
-    return verdict(seen, "keeps its energy", near("energy", drift, 0.0, DRIFT))
+    return outcome_of(seen, "keeps its energy", near("energy", drift, 0.0, DRIFT))
 
 
 def plastic_ball_under_gravity(e: float) -> Outcome:
@@ -298,7 +298,7 @@ def plastic_ball_under_gravity(e: float) -> Outcome:
     physics = Physics(Gravity(), uniform_restitution(e, 1e3))
     seen = play(Chamber(ROOM, start, with_rest(physics)), 5.0, 5)
     bounces = 2 if e < 1e-6 else 2 + math.ceil(math.log(1e-3) / math.log(e))
-    return verdict(
+    return outcome_of(
         seen,
         "lies still on the floor",
         near("place [m]", seen.end.positions[0], [0.011, 0.013, RADIUS], 1e-5),
@@ -317,7 +317,7 @@ def hundred_million_collisions() -> Outcome:
     seen = play(Chamber(room, balls, physics), 1.01e8 / trial, record=())
     # the promise is 1e-11 over 10^7 collisions; rounding, 1e-16 a collision, has a bias of 1/300:
     # 3.3e-11 was measured
-    return verdict(
+    return outcome_of(
         seen,
         "keeps its energy and its balls",
         Claim(seen.collisions >= 1e8, f"only {seen.collisions} collisions"),

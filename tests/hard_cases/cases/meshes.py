@@ -8,7 +8,7 @@ from scipy.spatial import Delaunay
 
 from sim_core import Balls, Gravity, Physics, Scene, TriangleMesh
 from tests.hard_cases.cases.drops import DROP, EXACT, HALF, RADIUS, G, one_ball
-from tests.hard_cases.outcome import Case, Claim, Outcome, named, near, play, refusal, verdict
+from tests.hard_cases.outcome import Case, Claim, Outcome, named, near, outcome_of, play, refusal
 from tests.helpers.scenes.cavities import CEILING, FLOOR, SIDES, box, box_around
 from tests.helpers.scenes.fuzzed_chambers import Chamber
 
@@ -58,7 +58,7 @@ def _bounces_as_on_a_plane(
     fall = math.sqrt(2.0 * DROP / G)
     times = fall * np.arange(1.0, 0.4 / fall, 2.0)
     number = len(times)
-    return verdict(
+    return outcome_of(
         seen,
         expected,
         near("times of the bounces [s]", seen.time, times, EXACT + number * off / (G * fall)),
@@ -115,7 +115,7 @@ def plate_of_a_nanometre() -> Outcome:
     way = HALF - RADIUS - (RADIUS + 0.5 * TINY)
     times = DROP + np.arange(0.0, 0.5, way)
     times = times[times < 0.5]
-    return verdict(
+    return outcome_of(
         seen,
         "each stays on its own side",
         near("times of the upper [s]", seen.time[seen.ball == 0], times, EXACT),
@@ -135,7 +135,7 @@ def sliver_of_a_tetrahedron() -> Outcome:
     positions = np.array([[0.0, 0.0, RADIUS + TINY + DROP], [0.001, 0.001, -RADIUS - DROP]])
     balls = Balls(positions, np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]]), 2.0 * RADIUS)
     seen = play(Chamber(room, balls, Physics()), 0.02)
-    return verdict(
+    return outcome_of(
         seen,
         "comes back from either side",
         near("times [s]", seen.time, [DROP, DROP], EXACT),
@@ -260,7 +260,7 @@ def triangle_without_area() -> Outcome:
         math.floor((2.0 * v + s) / way)
         for v, s in ((0.7, 0.0085), (0.8, 0.0105), (1.0, way - 0.0185))
     ]
-    return verdict(
+    return outcome_of(
         seen,
         "bounces in the box as if it were not there",
         near("hits", len(seen.time), sum(crossings), 0),

@@ -24,9 +24,9 @@ from tests.hard_cases.outcome import (
     Outcome,
     named,
     near,
+    outcome_of,
     play,
     refusal,
-    verdict,
 )
 from tests.helpers.scenes.cavities import CEILING, FLOOR, box
 from tests.helpers.scenes.fuzzed_chambers import Chamber
@@ -55,7 +55,7 @@ def slot_wider_by(more: float) -> Outcome:
     # a wall lies where rounding of its coordinates puts it; each crossing is off by that at most
     off = ROUNDING * RADIUS / SPEED
     sides = room.tags[seen.triangle[: len(seen.time)]]
-    return verdict(
+    return outcome_of(
         seen,
         f"{SPEED / (2.0 * width):.3g} times to and fro a second",
         near("bounces", len(seen.time), BOUNCES, 0),
@@ -109,7 +109,7 @@ def slot_just_as_wide() -> Outcome:
     seen = play(Chamber(room, along, Physics()), 1.0)
     way = 0.02 - 2.0 * RADIUS
     times = (0.5 * way + way * np.arange(60)) / SPEED
-    return verdict(
+    return outcome_of(
         seen,
         "goes to and fro along the slot, touching both sides",
         near("times [s]", seen.time, times[times < 1.0], 1e-12),
@@ -203,7 +203,7 @@ def ball_with_room_above_the_crest() -> Outcome:
         np.array([[0.01, 0.01, RADIUS + 0.9 * clear]]), np.array([[0.3, 0.2, -0.5]]), 2.0 * RADIUS
     )
     seen = play(Chamber(_low_room(clear), ball, _swinging()), 2e-3, 20)
-    return verdict(
+    return outcome_of(
         seen,
         "rattles between sonotrode and part",
         Claim(seen.collisions > 40, f"only {seen.collisions} hits in forty periods"),
@@ -266,7 +266,7 @@ def wedge() -> Outcome:
     seen = play(Chamber(mesh, start, Physics()), 0.3)
     ends = np.flatnonzero(mesh.tags[seen.triangle] == far)
     hits = math.floor((math.pi - math.atan(across) - 0.5 * angle) / angle) + 1
-    return verdict(
+    return outcome_of(
         seen,
         f"comes out of the wedge after {hits} hits",
         near("hits before the far wall", ends[0] if len(ends) else len(seen.time), hits, 0),

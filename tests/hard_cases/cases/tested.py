@@ -50,7 +50,7 @@ def overlap(run: _Run) -> float:
     return float(max(deepest, balls.diameter - closest_pair(balls)[0]))
 
 
-def judged(test: Callable[..., None], *arguments: object) -> Outcome:
+def outcome_of_test(test: Callable[..., None], *arguments: object) -> Outcome:
     """Passed or not, and what it cost."""
     with runs_seen() as runs:
         try:
@@ -77,7 +77,7 @@ def tested(name: str, test: Callable[..., None], *arguments: object) -> Case:
     inspect.signature(test).bind(
         *arguments
     )  # a call that cannot be is found when the table is made
-    return Case(name, functools.partial(judged, test, *arguments))
+    return Case(name, functools.partial(outcome_of_test, test, *arguments))
 
 
 CASES = [

@@ -1,27 +1,24 @@
-"""Was a contact reported too early, too late, or in the wrong direction? Judged in extended
-precision.
+"""Checks in extended precision: is a reported contact too early, too late, or while receding?
 
-No contact is computed here. A judge takes the contact that the code under test reports and proves
-or refutes it from the gap between ball and obstacle as a function of time:
+No contact is computed here. A check takes the contact that the code under test reports and proves or
+refutes it from the gap between ball and obstacle as a function of time:
 
     early     the gap [m] at the reported contact: it must not be open
-    receding  if the gap is rising there, how far open [m] it gets before it falls again: it must
-    not late      how much deeper [m] than touching, and than at its start, the ball got before the
-    reported contact, or
-              before the end of the flight if none is reported: a contact was missed
+    receding  if the gap is rising there, how far open [m] it gets before it falls again: it must not
+    late      how much deeper [m] than touching, and than at its start, the ball got before the
+              reported contact, or before the end of the flight if none is reported: a contact was
+              missed
 
-      gap \\               /   A ball that starts in overlap may come out of it: no contact. One
-      that starts deeper
-       0 --\\-------------/--  than half a radius is behind the surface, and can be late only after
-       it has come out
-            \\_  late  _ /     in front.
+      gap \\               /   A ball that starts in overlap may come out of it: no contact. One that
+       0 --\\-------------/--  starts deeper than half a radius is behind the surface, and can be late
+            \\_  late  _ /     only after it has come out in front.
               \\______/
 
-Between the marks on a flight the gap only rises or only falls, so nothing is missed between them;
-each judge finds its marks by other means than the code under test (that solves quadratics, steps
-from plane to plane, and splits sine waves). Numbers are numpy's longdouble: 64 bits of mantissa on
-x86, where a gap is known to about 1e-18 m; on machines where longdouble is plain float64 the same
-tests run with about 1e-16 m, still far below the 1e-12 m asked.
+Between the marks on a flight the gap only rises or only falls, so that nothing is missed between them.
+Each check finds its marks by other means than the code under test (that solves quadratics, steps from
+plane to plane, and splits sine waves). Numbers are numpy's longdouble: 64 bits of mantissa on x86,
+where a gap is known to about 1e-18 m; on machines where longdouble is plain float64 the same tests run
+with about 1e-16 m, still far below the required 1e-12 m.
 
 Arrays of vectors have shape (3, n) here: columns are quick to compute with.
 """
@@ -46,10 +43,8 @@ AHEAD = np.concatenate(
 UNSEEN = 1e-17  # m: falls smaller than this are not looked for
 
 
-class Verdict(NamedTuple):
-    """Per case (n,), as float64: see above. ``early`` and ``receding`` are -inf where no contact is
-    reported.
-    """
+class ContactErrors(NamedTuple):
+    """Errors of each case (n,) [m], see above; the first two are -inf without a contact."""
 
     early: np.ndarray
     receding: np.ndarray
@@ -123,13 +118,13 @@ def depth(gaps: np.ndarray, behind: float = np.inf) -> np.ndarray:
     return np.where(counts, np.maximum(start - gaps, 0.0), 0.0).max(axis=0)
 
 
-def verdict(
+def contact_errors(
     found: np.ndarray,
     limit: float | np.ndarray,
     gap: Callable[..., np.ndarray],
     rate: np.ndarray,
     late: np.ndarray,
-) -> Verdict:
+) -> ContactErrors:
     """``gap(cases, times (..., cases))``; ``rate`` (n,) is the gap's at the reported contacts."""
     early, receding = np.full(len(found), -np.inf), np.full(len(found), -np.inf)
     hit = np.flatnonzero(np.isfinite(found))
@@ -140,7 +135,7 @@ def verdict(
         ahead = gap(rising, found[rising] + left * AHEAD[:, None])
         still = np.logical_and.accumulate(np.diff(ahead, axis=0) > 0.0, axis=0)
         receding[rising] = np.where(still, ahead[1:], -np.inf).max(axis=0)
-    return Verdict(early, receding, late.astype(float))
+    return ContactErrors(early, receding, late.astype(float))
 
 
 class Flight(NamedTuple):
@@ -185,14 +180,14 @@ def end_of(found: np.ndarray, limit: float | np.ndarray) -> np.ndarray:
     return np.asarray(np.minimum(found, limit), dtype=Long)
 
 
-def judge_faces(
+def check_faces(
     corners: np.ndarray,
     flights: np.ndarray,
     radius: float,
     seam: float,
     limit: float,
     found: np.ndarray,
-) -> tuple[Verdict, np.ndarray]:
+) -> tuple[ContactErrors, np.ndarray]:
     """Contacts with the shot sides of triangles (n, 3 corners, 3) that wind clockwise as the shot
     sees them.
 
@@ -245,12 +240,12 @@ def judge_faces(
         return value([c[i] for c in height], t)
 
     away = np.where(np.isfinite(found), outside(end), 0.0).astype(float)
-    return verdict(found, limit, gap, height[1] + 2 * height[2] * end, late), away
+    return contact_errors(found, limit, gap, height[1] + 2 * height[2] * end, late), away
 
 
-def judge_capsules(
+def check_capsules(
     ends: np.ndarray, flights: np.ndarray, radius: float, limit: float, found: np.ndarray
-) -> Verdict:
+) -> ContactErrors:
     """Contacts with the capsules about segments (n, 2 ends, 3).
 
     The squared distance is a quartic in time, one beside the segment and one off each end: the
@@ -283,7 +278,7 @@ def judge_capsules(
 
     everyone = np.arange(len(found))
     late = depth(gap(everyone, everything), BEHIND * radius)
-    return verdict(found, limit, gap, dot(away(everyone, end), near.speed(end)), late)
+    return contact_errors(found, limit, gap, dot(away(everyone, end), near.speed(end)), late)
 
 
 def _zeros(polynomial: list[np.ndarray], end: np.ndarray) -> np.ndarray:
@@ -291,9 +286,9 @@ def _zeros(polynomial: list[np.ndarray], end: np.ndarray) -> np.ndarray:
     return marks([np.zeros_like(end), *(c / (k + 1) for k, c in enumerate(polynomial))], end)
 
 
-def judge_meetings(
+def check_meetings(
     apart: np.ndarray, closing: np.ndarray, reach: np.ndarray, limit: float, found: np.ndarray
-) -> Verdict:
+) -> ContactErrors:
     """Meetings of two balls: relative position and velocity (n, 3), sum of the radii (n,)."""
     pair = Flight(columns(apart), columns(closing), np.zeros((3, len(reach)), dtype=Long))
     end = end_of(found, limit)
@@ -303,10 +298,10 @@ def judge_meetings(
         return np.asarray(np.sqrt(dot(rest, rest)) - reach[i])
 
     late = depth(gap(np.arange(len(found)), marks(pair.squared()[:3], end)))
-    return verdict(found, limit, gap, dot(pair.at(end), pair.velocity), late)
+    return contact_errors(found, limit, gap, dot(pair.at(end), pair.velocity), late)
 
 
-def judge_waves(
+def check_waves(
     planes: np.ndarray,
     waves: np.ndarray,
     flights: np.ndarray,
@@ -314,12 +309,12 @@ def judge_waves(
     radius: float,
     limits: np.ndarray,
     found: np.ndarray,
-) -> Verdict:
+) -> ContactErrors:
     """Contacts with vibrating planes; arguments as contact_calls.waving_planes.
 
     The gap bends by no more than a known curvature, so its value and rate in the middle of a
     stretch of time bound both all over it. A stretch that is open, or rises, holds no contact; one
-    that falls is judged by its ends; any other is halved, until it is too short to hide a fall.
+    that falls is checked at its ends; any other is halved, until it is too short to hide a fall.
     """
     ball = flight_of(flights)
     normal = columns(planes[:, 0:3])
@@ -363,17 +358,17 @@ def judge_waves(
         i, low, high, middle, half = (x[maybe] for x in (i, low, high, middle, half))
         here, pace, most = gap(i, middle), rate(i, middle), bend[i] * half
         closed = here - half * (np.abs(pace) + most / 2) <= 0.0
-        judged = closed & (pace < -most)
-        if judged.any():
-            k = i[judged]
-            np.maximum.at(late, k, start[k] - gap(k, high[judged]))
+        falling = closed & (pace < -most)
+        if falling.any():
+            k = i[falling]
+            np.maximum.at(late, k, start[k] - gap(k, high[falling]))
         split = closed & (np.abs(pace) <= most) & (most * half > UNSEEN)
         i, low, high, middle = (x[split] for x in (i, low, high, middle))
         i, low, high = np.tile(i, 2), np.concatenate([low, middle]), np.concatenate([middle, high])
-    return verdict(found, limits, gap, rate(everyone, end), late)
+    return contact_errors(found, limits, gap, rate(everyone, end), late)
 
 
-def judge_triangles(
+def check_triangles(
     corners: np.ndarray,
     flights: np.ndarray,
     radius: float,
@@ -381,7 +376,7 @@ def judge_triangles(
     found: np.ndarray,
     allowed: float,
     tilt: float,
-) -> Verdict:
+) -> ContactErrors:
     """First contacts with whole meshes: each flight with all of its triangles (n, k, 3 corners, 3).
 
     A triangle is convex, so it lies behind the plane through its point nearest to the ball, and is
@@ -443,7 +438,7 @@ def judge_triangles(
         )
         on = ~deep & (time < end[i])
         pairs, time = pairs[on], time[on]
-    return verdict(
+    return contact_errors(
         found, limits, lambda i, t: gap(i, np.atleast_2d(t)).reshape(t.shape), rate, late
     )
 

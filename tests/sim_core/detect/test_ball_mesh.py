@@ -1,9 +1,8 @@
-"""The first contact of a flying ball with a whole mesh of faces, edges and corners, judged in
-extended precision.
+"""The first contact of a flying ball with a whole mesh, checked in extended precision.
 
-Two judges: plain dense sampling with bisection (first_contact_reference.py) on bodies met at
-random, and the judge of contact_reference.py, fast enough for millions, on every shape and aim of
-contact_cases.py.
+Two references are used: dense sampling with bisection (tests/helpers/contacts/first_contact.py) on
+random bodies, and the checks of tests/helpers/contacts/reference.py, fast enough for millions of
+cases, on every shape and aim of tests/helpers/contacts/cases.py.
 """
 
 import numpy as np
@@ -27,7 +26,7 @@ from tests.helpers.contacts.cases import (
     units,
 )
 from tests.helpers.contacts.first_contact import first_contact_reference, gap_at
-from tests.helpers.contacts.reference import judge_triangles
+from tests.helpers.contacts.reference import check_triangles
 from tests.helpers.scenes.cavities import CEILING, box_around
 from tests.sim_core.detect.test_contacts import SIZES, TOLERANCE, require
 
@@ -159,8 +158,8 @@ def test_first_contact_from_any_start(shape: str, count: int) -> None:
         lengths = rng.uniform(0.002, 0.02, len(flights))
         found, _ = calls.contacts(surfaces, flights, pull, None, 0.0, lengths)
         everywhere = np.broadcast_to(seen, (len(flights), *seen.shape))
-        verdict = judge_triangles(everywhere, flights, radius, lengths, found, TOLERANCE, tilt)
-        require(verdict, found, f"{shape}, {aim}")
+        errors = check_triangles(everywhere, flights, radius, lengths, found, TOLERANCE, tilt)
+        require(errors, found, f"{shape}, {aim}")
         hits = np.concatenate([hits, np.isfinite(found)])
     assert hits.mean() > 0.3, "the flights do not test much: too few hit"
 

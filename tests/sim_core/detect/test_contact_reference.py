@@ -1,6 +1,4 @@
-"""The judges of contacts convict: whoever answers early, late, not at all, or to a ball that
-leaves, is found out.
-"""
+"""The contact checks notice a contact that is early, late, missing, or of a ball that leaves."""
 
 import math
 
@@ -9,12 +7,12 @@ import pytest
 
 from sim_core.geometry.obstacles import NUMBERS
 from tests.helpers.contacts.reference import (
-    Verdict,
-    judge_capsules,
-    judge_faces,
-    judge_meetings,
-    judge_triangles,
-    judge_waves,
+    ContactErrors,
+    check_capsules,
+    check_faces,
+    check_meetings,
+    check_triangles,
+    check_waves,
 )
 
 G = 9.80665
@@ -31,40 +29,40 @@ TRIANGLE = np.array(
 )  # clockwise from above
 
 
-def judged(judge: str, found: float, upwards: bool = False) -> Verdict:
-    """The verdict on a reported contact; ``upwards``: of a ball that starts in touch and leaves at
+def errors_of(check: str, found: float, upwards: bool = False) -> ContactErrors:
+    """The errors on a reported contact; ``upwards``: of a ball that starts in touch and leaves at
     1 m/s.
     """
     height, speed = (0.0, SPEED) if upwards else (HEIGHT, -SPEED)
     flight = np.array([[0.0, 0.0, RADIUS + height, 0.0, 0.0, speed, 0.0, 0.0, -G]])
     said = np.array([found])
-    if judge == "face":
-        return judge_faces(TRIANGLE[None], flight, RADIUS, 1e-8, LIMIT, said)[0]
-    if judge == "capsule":
-        return judge_capsules(
+    if check == "face":
+        return check_faces(TRIANGLE[None], flight, RADIUS, 1e-8, LIMIT, said)[0]
+    if check == "capsule":
+        return check_capsules(
             np.array([[[-0.01, 0.0, 0.0], [0.01, 0.0, 0.0]]]), flight, RADIUS, LIMIT, said
         )
-    if judge == "meeting":
-        return judge_meetings(flight[:, :3], flight[:, 3:6], np.array([RADIUS]), LIMIT, said)
-    if judge == "wave":
+    if check == "meeting":
+        return check_meetings(flight[:, :3], flight[:, 3:6], np.array([RADIUS]), LIMIT, said)
+    if check == "wave":
         plane = np.zeros((1, NUMBERS))
         plane[0, 2:4] = 1.0, RADIUS
         wave = np.array([[1e-30, 1e5, 0.0, 0.0, 0.0, 1.0]])
-        return judge_waves(plane, wave, flight, np.zeros(1), RADIUS, np.array([LIMIT]), said)
-    return judge_triangles(
+        return check_waves(plane, wave, flight, np.zeros(1), RADIUS, np.array([LIMIT]), said)
+    return check_triangles(
         TRIANGLE[None, None], flight, RADIUS, np.array([LIMIT]), said, 1e-12, 0.0
     )
 
 
-@pytest.mark.parametrize("judge", ["face", "capsule", "meeting", "wave", "mesh"])
-def test_every_judge_convicts(judge: str) -> None:
-    contact = STRAIGHT if judge == "meeting" else CONTACT
-    speed = SPEED if judge == "meeting" else SPEED + G * CONTACT
-    right = judged(judge, contact)
+@pytest.mark.parametrize("check", ["face", "capsule", "meeting", "wave", "mesh"])
+def test_every_check_notices_a_wrong_contact(check: str) -> None:
+    contact = STRAIGHT if check == "meeting" else CONTACT
+    speed = SPEED if check == "meeting" else SPEED + G * CONTACT
+    right = errors_of(check, contact)
     assert all(abs(x[0]) < 1e-17 or x[0] <= 0.0 for x in right)
-    assert judged(judge, contact - OFF / speed).early[0] == pytest.approx(OFF, rel=1e-3)
-    assert judged(judge, contact + OFF / speed).late[0] == pytest.approx(OFF, rel=1e-3)
-    assert judged(judge, math.inf).late[0] >= 1e-12
-    leaving = judged(judge, 0.0, upwards=True)
+    assert errors_of(check, contact - OFF / speed).early[0] == pytest.approx(OFF, rel=1e-3)
+    assert errors_of(check, contact + OFF / speed).late[0] == pytest.approx(OFF, rel=1e-3)
+    assert errors_of(check, math.inf).late[0] >= 1e-12
+    leaving = errors_of(check, 0.0, upwards=True)
     assert leaving.early[0] <= 0.0
     assert leaving.receding[0] > 1e-3

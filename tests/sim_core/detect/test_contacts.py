@@ -1,4 +1,4 @@
-"""Each exact contact search alone, against a judge in extended precision (contact_reference.py).
+"""Each exact contact search alone, against checks in extended precision (tests/helpers/contacts/reference.py).
 
 A contact is never reported early, never missed, and never from behind, wherever the ball starts and
 however it
@@ -36,27 +36,27 @@ from tests.helpers.contacts.cases import (
     units,
 )
 from tests.helpers.contacts.reference import (
-    Verdict,
-    judge_capsules,
-    judge_faces,
-    judge_meetings,
-    judge_waves,
+    ContactErrors,
+    check_capsules,
+    check_faces,
+    check_meetings,
+    check_waves,
 )
 
 TOLERANCE = 1e-12  # m
 LIMIT = 0.02  # s, length of a flight
-CHUNK = 10_000  # cases judged together: arrays that fit the cache
+CHUNK = 10_000  # cases checked together: arrays that fit the cache
 QUICK, LONG = 10_000, 1_000_000
 
 SIZES = [pytest.param(QUICK, id="quick"), pytest.param(LONG, id="long", marks=pytest.mark.long)]
 
 
-def require(verdict: Verdict, found: np.ndarray, family: str, hits: float = 0.0) -> None:
+def require(errors: ContactErrors, found: np.ndarray, family: str, hits: float = 0.0) -> None:
     """Nothing early, nothing late, nothing receding; and at least a share of ``hits``, or the test
     tests little.
     """
-    for said in Verdict._fields:
-        column = getattr(verdict, said)
+    for said in ContactErrors._fields:
+        column = getattr(errors, said)
         bad = np.flatnonzero(~(column <= TOLERANCE))
         assert not len(bad), (
             f"{family}: {len(bad)} of {len(found)} contacts {said}, by up to {column.max():.3g}; the first is case "
@@ -117,11 +117,11 @@ def test_faces(count: int, hard: bool) -> None:
         flights = flights_to(rng, aim, touch, normal, falls_for(rng, cases), radius)
         found = calls.faces(obstacles.numbers, rows, flights, radius, face_overlap_of(radius))
         found[found > LIMIT] = np.inf
-        verdict, outside = judge_faces(
+        errors, outside = check_faces(
             triangle, flights, radius, face_overlap_of(radius), LIMIT, found
         )
         require(
-            verdict, found, f"faces, {shape}, {aim}", hits=0.3 if aim in ("random", "fast") else 0.0
+            errors, found, f"faces, {shape}, {aim}", hits=0.3 if aim in ("random", "fast") else 0.0
         )
         assert outside.max() <= 3.2 * face_overlap_of(radius), (
             f"{shape}, {aim}: a contact {outside.max():.3g} m beside the face"
@@ -158,9 +158,9 @@ def test_capsules(count: int, hard: bool, end: bool) -> None:
         )
         found = calls.capsules(obstacles.numbers, rows, flights, radius, LIMIT)
         ends = np.stack([start, start.astype(np.longdouble) + length[:, None] * along], axis=1)
-        verdict = judge_capsules(ends, flights, radius, LIMIT, found)
+        errors = check_capsules(ends, flights, radius, LIMIT, found)
         require(
-            verdict,
+            errors,
             found,
             f"capsules, {shape}, {aim}",
             hits=0.9 if aim in ("random", "fast") else 0.0,
@@ -183,7 +183,7 @@ def test_meetings_of_two_balls(count: int, aim: str) -> None:
         apart, closing = np.ascontiguousarray(flights[:, :3]), np.ascontiguousarray(flights[:, 3:6])
         found = calls.meetings(apart, closing, reach)
         found[found > LIMIT] = np.inf
-        require(judge_meetings(apart, closing, reach, LIMIT, found), found, f"meetings, {aim}")
+        require(check_meetings(apart, closing, reach, LIMIT, found), found, f"meetings, {aim}")
 
 
 WAVE_AIMS = (
@@ -207,10 +207,12 @@ def wave_cases(rng: np.random.Generator, aim: str, count: int):  # type: ignore[
     chatter          starts in touch, and leaves barely faster than the surface
     crest            meets a crest within 1e-6 to 1e-13 m, almost without speed
     tangent          the same at any phase, moving with the surface
-    receding slower  starts in touch or overlapping by up to 1e-9 m, leaving slower than the surface
-    moves at rest          starts at rest above, below the crests too still            a wave of no
-    swing, or one too slow to bend a parabola the other way behind           starts below the wave,
-    and where gravity allows comes out in front of it and back
+    receding slower  starts in touch or overlapping by up to 1e-9 m, leaving slower than the
+                     surface moves
+    at rest          starts at rest above, below the crests too
+    still            a wave of no amplitude, or one too slow to bend a parabola the other way
+    behind           starts below the wave, and where gravity allows comes out in front of it and
+                     back
     """
     radius = 1.5e-3
     axis = np.where(rng.integers(2, size=(count, 1)) == 0, [[0.0, 0.0, 1.0]], units(rng, count))
@@ -286,8 +288,8 @@ def test_vibrating_planes(count: int, aim: str) -> None:
     for _ in range(math.ceil(cases / CHUNK)):
         planes, waves, flights, times, radius, limits = wave_cases(rng, aim, min(CHUNK, cases))
         found = calls.vibrating_planes(planes, waves, flights, times, radius, limits)
-        verdict = judge_waves(planes, waves, flights, times, radius, limits, found)
-        require(verdict, found, f"waves, {aim}")
+        errors = check_waves(planes, waves, flights, times, radius, limits, found)
+        require(errors, found, f"waves, {aim}")
 
 
 def test_a_ball_that_slides_over_an_edge_leaves_it() -> None:
@@ -305,7 +307,7 @@ def test_a_ball_that_slides_over_an_edge_leaves_it() -> None:
         flight = np.array([[0.0, 0.0, radius - 1e-15, 0.0, speed, 1e-16, 0.0, 0.0, -STANDARD]])
         found = calls.capsules(edge, np.zeros(1, dtype=np.int64), flight, radius, LIMIT)
         ends = np.array([[[-0.01, 0.0, 0.0], [0.01, 0.0, 0.0]]])
-        require(judge_capsules(ends, flight, radius, LIMIT, found), found, f"sliding, {excess}")
+        require(check_capsules(ends, flight, radius, LIMIT, found), found, f"sliding, {excess}")
         assert np.isinf(found[0]) or excess == 1.0
 
 
