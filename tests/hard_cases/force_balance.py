@@ -1,4 +1,4 @@
-"""Can what balls touch carry them? Forces at contacts, found by a linear programme; nothing of the
+"""Can contacts carry the balls? Forces at contacts, found by a linear programme; nothing of the
 code under test.
 """
 

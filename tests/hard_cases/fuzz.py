@@ -1,5 +1,6 @@
-"""Random scenes: any chamber, any shot, any effects. They run with all invariants, or stop with a
-message.
+"""Random scenes with any chamber, shot and effects.
+
+They keep all invariants, or stop with a message.
 """
 
 import math

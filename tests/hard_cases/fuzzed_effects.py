@@ -1,6 +1,4 @@
-"""Which effects a random scene has: a few combinations, for each is compiled; their numbers vary
-freely.
-"""
+"""Effects of random scenes: few combinations, because each is compiled, with random numbers."""
 
 import math
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""A scene in a file: what a failure is kept as, to be played again for ever after.
+"""Scenes in files: a failure is saved as one and becomes a permanent regression test.
 
 An .npz: ``vertices``, ``triangles``, ``tags``, ``positions``, ``velocities``, ``numbers``
 (diameter, density, duration, warm-up), ``spins`` if there are any, ``each`` (n, 2), diameter and

@@ -1,6 +1,4 @@
-"""Random scenes keep all invariants or stop with a message; and the scenes that once did not are
-played again.
-"""
+"""Random scenes keep all invariants or stop with a message, and so do past failures."""
 
 import dataclasses
 from pathlib import Path

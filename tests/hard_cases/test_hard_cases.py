@@ -1,4 +1,4 @@
-"""Every hard case comes out as physics says; the table of them is benchmarks/hard_cases.py."""
+"""Every hard case has the outcome that physics demands; benchmarks/hard_cases.py prints them."""
 
 import pytest
 

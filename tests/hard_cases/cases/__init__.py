@@ -1,4 +1,4 @@
-"""All hard cases, in the order of the table; what a new file of cases has is added here."""
+"""All hard cases, in the order of the table; a new file of cases is added here."""
 
 from tests.hard_cases.cases import clusters, drops, extremes, meshes, narrow, refusals
 from tests.hard_cases.outcome import Case

@@ -1,4 +1,4 @@
-"""Sizes, places, speeds, accelerations, swings and losses at the ends of what they can be."""
+"""Sizes, positions, speeds, accelerations, amplitudes and losses at the ends of their ranges."""
 
 import math
 from functools import partial

@@ -1,4 +1,4 @@
-"""Meshes that are legal but ugly, and such as are no closed surface."""
+"""Meshes that are legal but difficult, and some that are not a closed surface."""
 
 import math
 

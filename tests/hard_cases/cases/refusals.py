@@ -1,6 +1,4 @@
-"""What cannot be simulated is refused at the door, with the ball, the triangle or the field
-named.
-"""
+"""Scenes that cannot be simulated are refused, with ball, triangle or field named."""
 
 import math
 from collections.abc import Iterator

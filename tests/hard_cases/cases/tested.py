@@ -1,7 +1,6 @@
-"""Hard cases that are tests of their own, with what closed forms say in their asserts, as lines of
-the table.
+"""Hard cases that are tests of their own, as lines of the table.
 
-What is counted is what the runs of the test counted; the overlap is that at their ends.
+Counts are those of the runs of the test; the overlap is that at their ends.
 """
 
 import functools

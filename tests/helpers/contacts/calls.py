@@ -1,5 +1,4 @@
-"""The contact searches under test, each called for many cases at once: the only door from these
-tests to them.
+"""The contact searches under test, each called for many cases at once.
 
 Flights (n, 9): position [m], velocity [m/s] and acceleration [m/s²] of a ball's centre. All return
 delays (n,) [s], infinite where there is no contact.

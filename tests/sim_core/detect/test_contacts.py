@@ -1,4 +1,4 @@
-"""Each exact contact search alone, against checks in extended precision (tests/helpers/contacts/reference.py).
+"""Each exact contact search alone, against checks in extended precision.
 
 A contact is never reported early, never missed, and never from behind, wherever the ball starts and
 however it

@@ -1,4 +1,4 @@
-"""A ball of no size without gravity is a ray of light: what it hits first, embree must say too."""
+"""A ball of no size without gravity is a ray of light: embree must find the same first hit."""
 
 import numpy as np
 import pytest

@@ -1,6 +1,4 @@
-"""An effect that a scene does not ask for is in none of its arrays and in none of the machine code
-it runs.
-"""
+"""An absent effect is in none of the arrays and in none of the machine code of a scene."""
 
 import json
 import os

@@ -1,6 +1,4 @@
-"""A shaking floor that each ball meets at a phase of its own: what the phase is, and what comes of
-it.
-"""
+"""A shaking floor that each ball meets at a random phase: the draws, and their effect."""
 
 import math
 from concurrent.futures import ThreadPoolExecutor

@@ -1,6 +1,4 @@
-"""Several sonotrodes: what one alone, or one that keeps still, must not change; phases over many
-windows; refusals.
-"""
+"""Several sonotrodes: bits that must not change, phases over many windows, and refusals."""
 
 import math
 from fractions import Fraction

@@ -1,6 +1,4 @@
-"""Exact planes and cylinders in place of a mesh: where both can say it they agree; the round side
-is never missed.
-"""
+"""Exact planes and cylinders agree with a mesh, and a cylinder wall is never missed."""
 
 from collections.abc import Callable
 from decimal import Decimal, getcontext

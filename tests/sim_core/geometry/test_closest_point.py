@@ -1,4 +1,4 @@
-"""The nearest surface point, against every triangle asked in turn and against closed forms."""
+"""The closest surface point, against every triangle in turn and against closed forms."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,6 @@
-"""Fine triangles on a flat are one face to the ball: contacts are those of the fine mesh, hits are
-booked on its triangles.
+"""Fine triangles on a flat face are one face to the ball.
+
+Contacts are those of the fine mesh, and impacts are recorded on its triangles.
 """
 
 import numpy as np

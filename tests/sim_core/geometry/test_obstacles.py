@@ -1,4 +1,4 @@
-"""Which edges can be touched, and on which triangle a hit on an edge is booked."""
+"""Which edges can be touched, and on which triangle an impact on an edge is recorded."""
 
 import numpy as np
 import trimesh

@@ -1,6 +1,4 @@
-"""A part that turns: contacts against references made without the code under test, and what turning
-must keep.
-"""
+"""A part that turns: contacts against independent references, and conserved quantities."""
 
 import os
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""The independent checks, checked themselves against libraries."""
+"""The independent checks are themselves checked against libraries."""
 
 import numpy as np
 import trimesh

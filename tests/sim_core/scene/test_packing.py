@@ -1,4 +1,4 @@
-"""Shot is placed inside, apart, clear of surfaces and low; what does not fit is refused."""
+"""Shot is placed inside, apart, clear of surfaces and low; shot that does not fit is refused."""
 
 import numpy as np
 import pytest

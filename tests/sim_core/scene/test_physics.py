@@ -1,4 +1,4 @@
-"""Balls that do not collide fly through each other: each is alone in the room, to the last bit."""
+"""Balls that do not collide fly through each other, each as if it were alone, bit for bit."""
 
 import numpy as np
 import pytest

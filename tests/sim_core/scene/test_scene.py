@@ -1,4 +1,4 @@
-"""Scenes that cannot be simulated are refused at the door, with the ball, triangle or field
+"""Scenes that cannot be simulated are refused, with the ball, triangle or field
 named.
 """
 
