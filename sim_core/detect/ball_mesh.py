@@ -31,19 +31,12 @@ TINY = 1e-30  # stands for a chord component of zero, whose inverse would be inf
 
 
 class Scratch(NamedTuple):
-    """Working space of one simulation, made once.
+    """Working space of one simulation, made once."""
 
-    Args:
-        ray: chord of a flight, see aim_ray, shape (9,) float32.
-        enter: entry times of a node's boxes [s], shape (8,) float32.
-        nodes: stack of nodes still to visit, int64.
-        times: their entry times [s], float32.
-    """
-
-    ray: np.ndarray
-    enter: np.ndarray
-    nodes: np.ndarray
-    times: np.ndarray
+    ray: np.ndarray  # chord of a flight, see aim_ray, shape (9,) float32
+    enter: np.ndarray  # entry times of a node's boxes [s], shape (8,) float32
+    nodes: np.ndarray  # stack of nodes still to visit, int64
+    times: np.ndarray  # their entry times [s], float32
 
 
 def new_scratch() -> Scratch:

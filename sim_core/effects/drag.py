@@ -54,21 +54,14 @@ class Drag(NamedTuple):
 
 
 class DragState(NamedTuple):
-    """Drag as compiled code needs it, for n balls.
+    """Drag as compiled code needs it, for n balls."""
 
-    Args:
-        acted_until: time up to which the air has acted [s on the window's clock], shape (n,).
-        stokes: c [1/s], shape (n,).
-        reynolds: Re at 1 m/s [s/m], shape (n,).
-        quadratic: k [1/m], shape (n,).
-        half: half a piece [s].
-    """
-
+    # time up to which the air has acted [s on the window's clock], shape (n,)
     acted_until: np.ndarray
-    stokes: np.ndarray
-    reynolds: np.ndarray
-    quadratic: np.ndarray
-    half: float
+    stokes: np.ndarray  # c [1/s], shape (n,)
+    reynolds: np.ndarray  # Re at 1 m/s [s/m], shape (n,)
+    quadratic: np.ndarray  # k [1/m], shape (n,)
+    half: float  # half a piece [s]
 
 
 def checked_drag(drag: Drag | None) -> Drag | None:

@@ -42,28 +42,17 @@ class Friction(NamedTuple):
 
 
 class FrictionState(NamedTuple):
-    """Friction as compiled code needs it, for n balls; times are on the window's clock.
+    """Friction as compiled code needs it, for n balls; times are on the window's clock."""
 
-    Args:
-        surfaces: (mu, beta0) of each surface, shape (tags, 2).
-        mu: of ball on ball.
-        beta0: of ball on ball.
-        radius: of the balls [m].
-        mu_of_rows: mu of each obstacle that a ball can stand on, shape (obstacles,).
-        spins: at time 0 [rad/s], shape (n, 3).
-        twists: constant change of the spin while in contact [rad/s²], shape (n, 3).
-        slips: velocity [m/s] at time 0 and acceleration [m/s²] of the touching points of a ball
-        that
-            slips in contact, zero for one that rolls, lies or flies, shape (n, 6).
-    """
-
-    surfaces: np.ndarray
-    mu: float
-    beta0: float
-    radius: float
-    mu_of_rows: np.ndarray
-    spins: np.ndarray
-    twists: np.ndarray
+    surfaces: np.ndarray  # (mu, beta0) of each surface, shape (tags, 2)
+    mu: float  # of ball on ball
+    beta0: float  # of ball on ball
+    radius: float  # of the balls [m]
+    mu_of_rows: np.ndarray  # mu of each obstacle that a ball can stand on, shape (obstacles,)
+    spins: np.ndarray  # at time 0 [rad/s], shape (n, 3)
+    twists: np.ndarray  # constant change of the spin while in contact [rad/s²], shape (n, 3)
+    # velocity [m/s] at time 0 and acceleration [m/s²] of the touching points of a ball that slips
+    # in contact, zero for one that rolls, lies or flies, shape (n, 6)
     slips: np.ndarray
 
 

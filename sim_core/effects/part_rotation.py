@@ -57,45 +57,27 @@ class PartRotation(NamedTuple):
 
 
 class RotationAxis(NamedTuple):
-    """What the obstacles of the part depend on; hashable.
+    """What the obstacles of the part depend on; hashable."""
 
-    Args:
-        tag: surface tag of the part.
-        point: a point of the axis [m].
-        axis: unit vector.
-        amplitude: largest angle to each side [rad]; infinite for a steady rotation.
-    """
-
-    tag: int
-    point: tuple[float, float, float]
-    axis: tuple[float, float, float]
-    amplitude: float
+    tag: int  # surface tag of the part
+    point: tuple[float, float, float]  # a point of the axis [m]
+    axis: tuple[float, float, float]  # unit vector
+    amplitude: float  # largest angle to each side [rad]; infinite for a steady rotation
 
 
 class RotationState(NamedTuple):
-    """PartRotation as compiled code needs it.
+    """PartRotation as compiled code needs it."""
 
-    Args:
-        axis: unit vector.
-        point: of the axis, relative to the mesh's middle [m].
-        rate: growth of the argument [rad/s].
-        amplitude: of a rotation to and fro [rad].
-        to_and_fro: whether the angle is ``amplitude`` times the sine of the argument.
-        speed: bound on the angle's first derivative [rad/s].
-        acceleration: bound on its second derivative [rad/s²].
-        jerk: bound on its third derivative [rad/s³].
-        argument: at the window's start [rad], shape (1,); carried from window to window, so that
-            the angle has no step there however long the simulation is.
-    """
-
-    axis: Vec3
-    point: Vec3
-    rate: float
-    amplitude: float
-    to_and_fro: bool
-    speed: float
-    acceleration: float
-    jerk: float
+    axis: Vec3  # unit vector
+    point: Vec3  # of the axis, relative to the mesh's middle [m]
+    rate: float  # growth of the argument [rad/s]
+    amplitude: float  # of a rotation to and fro [rad]
+    to_and_fro: bool  # whether the angle is ``amplitude`` times the sine of the argument
+    speed: float  # bound on the angle's first derivative [rad/s]
+    acceleration: float  # bound on its second derivative [rad/s²]
+    jerk: float  # bound on its third derivative [rad/s³]
+    # at the window's start [rad], shape (1,); carried from window to window, so that the angle
+    # has no step there however long the simulation is
     argument: np.ndarray
 
 

@@ -39,22 +39,15 @@ class RandomPhase(NamedTuple):
 
 
 class RandomPhaseState(NamedTuple):
-    """RandomPhase as compiled code needs it, for n balls.
+    """RandomPhase as compiled code needs it, for n balls."""
 
-    Args:
-        phase: of the face as each ball finds it [rad], shape (n,).
-        draws: how often it was drawn, shape (n,) int64.
-        top: a ball whose centre is further along ``up`` is out of the band that the face moves in
-            [m], shape (n,).
-        up: unit vector along the vibration, towards the shot.
-        seed: of the draws.
-    """
-
-    phase: np.ndarray
-    draws: np.ndarray
+    phase: np.ndarray  # of the face as each ball finds it [rad], shape (n,)
+    draws: np.ndarray  # how often it was drawn, shape (n,) int64
+    # a ball whose centre is further along ``up`` is out of the band that the face moves in [m],
+    # shape (n,)
     top: np.ndarray
-    up: Vec3
-    seed: int
+    up: Vec3  # unit vector along the vibration, towards the shot
+    seed: int  # of the draws
 
 
 def checked_random_phase(random_phase: RandomPhase | None, sonotrodes: int) -> RandomPhase | None:

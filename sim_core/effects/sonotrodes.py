@@ -23,22 +23,15 @@ TURN = 2.0 * np.pi
 
 
 class SonotrodeWaves(NamedTuple):
-    """The waves of k sonotrodes.
+    """The waves of k sonotrodes."""
 
-    Args:
-        numbers: amplitude [m], omega [rad/s], phase [rad] at the window's start, and axis of each,
-            shape (k, 6).
-        first: phase at the scene's start [rad], shape (k,).
-        gone: phase since then without whole turns, in PARTS of a turn, shape (k,) int64.
-        step: growth of ``gone`` each window, shape (k,) int64.
-        faces: the sonotrode of each obstacle, shape (obstacles,) int64.
-    """
-
+    # amplitude [m], omega [rad/s], phase [rad] at the window's start, and axis of each, shape (k,
+    # 6)
     numbers: np.ndarray
-    first: np.ndarray
-    gone: np.ndarray
-    step: np.ndarray
-    faces: np.ndarray
+    first: np.ndarray  # phase at the scene's start [rad], shape (k,)
+    gone: np.ndarray  # phase since then without whole turns, in PARTS of a turn, shape (k,) int64
+    step: np.ndarray  # growth of ``gone`` each window, shape (k,) int64
+    faces: np.ndarray  # the sonotrode of each obstacle, shape (obstacles,) int64
 
 
 def whole_period_window(vibrations: tuple[Vibration, ...], window: float) -> float:

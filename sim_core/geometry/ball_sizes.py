@@ -15,21 +15,13 @@ from sim_core.numerics.vec3 import Vec3, scaled
 
 
 class BallSizes(NamedTuple):
-    """Sizes and masses of n balls of k sizes.
+    """Sizes and masses of n balls of k sizes."""
 
-    Args:
-        size: which of the sizes each ball has, shape (n,) int32.
-        root: node of the tree where each size's obstacles begin, shape (k,) int64.
-        radius: of each size [m], shape (k,).
-        face_overlap: of each size [m], shape (k,).
-        mass: of each ball [kg], shape (n,).
-    """
-
-    size: np.ndarray
-    root: np.ndarray
-    radius: np.ndarray
-    face_overlap: np.ndarray
-    mass: np.ndarray
+    size: np.ndarray  # which of the sizes each ball has, shape (n,) int32
+    root: np.ndarray  # node of the tree where each size's obstacles begin, shape (k,) int64
+    radius: np.ndarray  # of each size [m], shape (k,)
+    face_overlap: np.ndarray  # of each size [m], shape (k,)
+    mass: np.ndarray  # of each ball [kg], shape (n,)
 
 
 def new_ball_sizes(balls: Balls, roots: np.ndarray) -> BallSizes | None:

@@ -27,40 +27,27 @@ EMPTY = -(2**31)
 
 
 class _Boxes(NamedTuple):
-    """Bounding boxes of the obstacles, and their order in the tree.
+    """Bounding boxes of the obstacles, and their order in the tree."""
 
-    Args:
-        low: lowest corners [m], shape (k, 3).
-        high: highest corners [m], shape (k, 3).
-        order: the obstacle of each leaf, shape (k,); sorted as the tree grows.
-    """
-
-    low: np.ndarray
-    high: np.ndarray
-    order: np.ndarray
+    low: np.ndarray  # lowest corners [m], shape (k, 3)
+    high: np.ndarray  # highest corners [m], shape (k, 3)
+    order: np.ndarray  # the obstacle of each leaf, shape (k,); sorted as the tree grows
 
 
 class Tree(NamedTuple):
     """Obstacles and their boxes, ready for compiled code, relative to the scene's centre.
 
     Obstacles that are neighbours in space are near each other in memory.
-
-    Args:
-        bounds: low x, y, z and high x, y, z of each node's children, shape (nodes, 6, 8) float32,
-            padded outward.
-        children: a node where >= 0, else obstacle -1 - child, shape (nodes, 8) int32.
-        numbers: as in ObstacleTable, shape (k, 20).
-        kinds: as in ObstacleTable, shape (k,).
-        triangles: as in ObstacleTable, shape (k, 2).
-        radius: of the balls that the obstacles are for [m].
     """
 
+    # low x, y, z and high x, y, z of each node's children, shape (nodes, 6, 8) float32, padded
+    # outward
     bounds: np.ndarray
-    children: np.ndarray
-    numbers: np.ndarray
-    kinds: np.ndarray
-    triangles: np.ndarray
-    radius: float
+    children: np.ndarray  # a node where >= 0, else obstacle -1 - child, shape (nodes, 8) int32
+    numbers: np.ndarray  # as in ObstacleTable, shape (k, 20)
+    kinds: np.ndarray  # as in ObstacleTable, shape (k,)
+    triangles: np.ndarray  # as in ObstacleTable, shape (k, 2)
+    radius: float  # of the balls that the obstacles are for [m]
 
 
 def build_tree(table: ObstacleTable, radius: float) -> Tree:

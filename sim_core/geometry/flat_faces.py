@@ -33,38 +33,24 @@ STRAIGHT = 1e-10
 
 
 class FlatFaces(NamedTuple):
-    """The k flat faces of a mesh of m triangles.
+    """The k flat faces of a mesh of m triangles."""
 
-    Args:
-        of_triangle: the flat face of each triangle, LONE if none, shape (m,) int32.
-        seed: the triangle whose plane each flat face has, shape (k,) int32.
-        frames: a corner [m] and two unit vectors in the plane, shape (k, 3, 3); the first vector
-            runs along the longest edge of the outline, their cross product points towards the shot.
-        outlines: directed edges (3 triangle + corner) that border each flat face.
-    """
-
-    of_triangle: np.ndarray
-    seed: np.ndarray
+    of_triangle: np.ndarray  # the flat face of each triangle, LONE if none, shape (m,) int32
+    seed: np.ndarray  # the triangle whose plane each flat face has, shape (k,) int32
+    # a corner [m] and two unit vectors in the plane, shape (k, 3, 3); the first vector runs along
+    # the longest edge of the outline, their cross product points towards the shot
     frames: np.ndarray
-    outlines: list[np.ndarray]
+    outlines: list[np.ndarray]  # directed edges (3 triangle + corner) that border each flat face
 
 
 class _Triangles(NamedTuple):
-    """What the search for flat faces reads of each triangle.
+    """What the search for flat faces reads of each triangle."""
 
-    Args:
-        corners: corner positions [m], shape (m, 3, 3).
-        normals: unit normals, shape (m, 3), zero where a triangle has no area.
-        doubled: doubled areas [m²], shape (m,).
-        partners: opposite of each directed edge, shape (3 m,).
-        surface: only triangles of the same number join, shape (m,).
-    """
-
-    corners: np.ndarray
-    normals: np.ndarray
-    doubled: np.ndarray
-    partners: np.ndarray
-    surface: np.ndarray
+    corners: np.ndarray  # corner positions [m], shape (m, 3, 3)
+    normals: np.ndarray  # unit normals, shape (m, 3), zero where a triangle has no area
+    doubled: np.ndarray  # doubled areas [m²], shape (m,)
+    partners: np.ndarray  # opposite of each directed edge, shape (3 m,)
+    surface: np.ndarray  # only triangles of the same number join, shape (m,)
 
 
 def in_plane_tolerance(vertices: np.ndarray) -> float:
@@ -252,25 +238,16 @@ def _quadrangles(polygon: shapely.Geometry) -> np.ndarray:
 
 
 class SurfaceTriangles(NamedTuple):
-    """The m triangles of a mesh with all that obstacles are made from.
+    """The m triangles of a mesh with all that obstacles are made from."""
 
-    Args:
-        mesh: the mesh.
-        corners: corner positions relative to the mesh's middle [m], shape (m, 3, 3).
-        normals: unit normals towards the shot, shape (m, 3), zero where a triangle has no area.
-        doubled: doubled areas [m²], shape (m,).
-        vibrating: whether each triangle vibrates, shape (m,) bool.
-        amplitude: zero-to-peak [m], 0 for triangles that stand still, shape (m,).
-        flat_faces: the flat faces of the mesh.
-    """
-
-    mesh: TriangleMesh
-    corners: np.ndarray
+    mesh: TriangleMesh  # the mesh
+    corners: np.ndarray  # corner positions relative to the mesh's middle [m], shape (m, 3, 3)
+    # unit normals towards the shot, shape (m, 3), zero where a triangle has no area
     normals: np.ndarray
-    doubled: np.ndarray
-    vibrating: np.ndarray
-    amplitude: np.ndarray
-    flat_faces: FlatFaces
+    doubled: np.ndarray  # doubled areas [m²], shape (m,)
+    vibrating: np.ndarray  # whether each triangle vibrates, shape (m,) bool
+    amplitude: np.ndarray  # zero-to-peak [m], 0 for triangles that stand still, shape (m,)
+    flat_faces: FlatFaces  # the flat faces of the mesh
 
 
 def surface_triangles(

@@ -18,24 +18,15 @@ class ObstacleSet(NamedTuple):
     """What balls can hit; coordinates are relative to the middle of the mesh or cavity.
 
     In an analytical cavity the "triangles" are its surfaces.
-
-    Args:
-        tree: obstacles that do not turn.
-        lookup: finds the triangle of a flat face at a point.
-        tags: surface tag of each triangle, shape (m,).
-        face_overlap: how far faces overlap, for the largest balls [m].
-        part: the part, if it turns; its obstacles are not in ``tree``.
-        roots: nodes of the tree where the obstacles of each radius begin, shape (radii,).
-        cylinder: axis of an analytical cylinder.
     """
 
-    tree: Tree
-    lookup: TriangleLookup
-    tags: np.ndarray
-    face_overlap: float
-    part: PartTree | None
-    roots: np.ndarray
-    cylinder: CylinderAxis | None
+    tree: Tree  # obstacles that do not turn
+    lookup: TriangleLookup  # finds the triangle of a flat face at a point
+    tags: np.ndarray  # surface tag of each triangle, shape (m,)
+    face_overlap: float  # how far faces overlap, for the largest balls [m]
+    part: PartTree | None  # the part, if it turns; its obstacles are not in ``tree``
+    roots: np.ndarray  # nodes of the tree where the obstacles of each radius begin, shape (radii,)
+    cylinder: CylinderAxis | None  # axis of an analytical cylinder
 
 
 def build_obstacle_set(

@@ -45,27 +45,20 @@ MAX_CORNER_OVERLAPS = 3.0
 
 
 class ObstacleTable(NamedTuple):
-    """What the centre of a ball can hit, one row an obstacle; k = faces + capsules.
+    """What the centre of a ball can hit, one row an obstacle; k = faces + capsules."""
 
-    Args:
-        numbers: geometry [m], shape (k, 20).
-            A face holds its unit normal towards the shot (0:3), the offset of its moved plane (3),
-            and four inward in-plane border normals with their offsets (4:20); the fourth of a
-            triangle is zero. A capsule holds its start (0:3), unit direction (3:6), length (6), and
-            the normal of its first neighbour minus that of its second (7:10). A cylinder wall holds
-            how far from the axis the centre gets (3).
-        kinds: FACE, CAPSULE, VIBRATING_FACE or CYLINDER_WALL, shape (k,) uint8.
-        triangles: mesh triangles on which an impact is recorded, shape (k, 2) int32: a capsule's
-            two neighbours, or a face twice.
-        low: lowest corner of the bounding box [m], shape (k, 3).
-        high: highest corner of the bounding box [m], shape (k, 3).
-    """
-
+    # geometry [m], shape (k, 20). A face holds its unit normal towards the shot (0:3), the offset
+    # of its moved plane (3), and four inward in-plane border normals with their offsets (4:20);
+    # the fourth of a triangle is zero. A capsule holds its start (0:3), unit direction (3:6),
+    # length (6), and the normal of its first neighbour minus that of its second (7:10). A
+    # cylinder wall holds how far from the axis the centre gets (3)
     numbers: np.ndarray
-    kinds: np.ndarray
+    kinds: np.ndarray  # FACE, CAPSULE, VIBRATING_FACE or CYLINDER_WALL, shape (k,) uint8
+    # mesh triangles on which an impact is recorded, shape (k, 2) int32: a capsule's two
+    # neighbours, or a face twice
     triangles: np.ndarray
-    low: np.ndarray
-    high: np.ndarray
+    low: np.ndarray  # lowest corner of the bounding box [m], shape (k, 3)
+    high: np.ndarray  # highest corner of the bounding box [m], shape (k, 3)
 
 
 def face_overlap_of(radius: float) -> float:

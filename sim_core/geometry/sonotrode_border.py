@@ -21,19 +21,12 @@ SAME_LINE = 1e-9  # [-] and m: a face's border that runs along the edge, up to r
 
 
 class SonotrodeBorder(NamedTuple):
-    """The k gentle edges between vibrating faces and still ones.
+    """The k gentle edges between vibrating faces and still ones."""
 
-    Args:
-        overhang: how far the vibrating faces are extended [m].
-        slopes: the still triangle beside each edge, shape (k,).
-        lines: inward border normal and offset [m] of that triangle, shape (k, 4).
-        beyond: how far that triangle is extended [m], shape (k,).
-    """
-
-    overhang: float
-    slopes: np.ndarray
-    lines: np.ndarray
-    beyond: np.ndarray
+    overhang: float  # how far the vibrating faces are extended [m]
+    slopes: np.ndarray  # the still triangle beside each edge, shape (k,)
+    lines: np.ndarray  # inward border normal and offset [m] of that triangle, shape (k, 4)
+    beyond: np.ndarray  # how far that triangle is extended [m], shape (k,)
 
 
 def find_border(surface: SurfaceTriangles, radius: float) -> SonotrodeBorder:

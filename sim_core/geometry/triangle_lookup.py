@@ -13,29 +13,17 @@ TRIANGLES_PER_SQUARE = 2.0
 
 
 class TriangleLookup(NamedTuple):
-    """The grids over k flat faces of a mesh of m triangles.
+    """The grids over k flat faces of a mesh of m triangles."""
 
-    Args:
-        of_triangle: flat face of each triangle, shape (m,) int32, as in FlatFaces.
-        frames: frames of the flat faces, shape (k, 3, 3), as in FlatFaces.
-        origin: lower corner of each grid [m], shape (k, 2).
-        squares_per_metre: of each grid along both axes [1/m], shape (k, 2).
-        shape: squares of each grid along both axes, shape (k, 2) int32.
-        first: number of each grid's first square, shape (k,) int32.
-        starts: first entry of each square in ``members``, shape (squares + 1,) int32.
-        members: the triangles that reach each square, int32.
-        corners: corners of the triangles in their flat face's frame [m], shape (m, 6).
-    """
-
-    of_triangle: np.ndarray
-    frames: np.ndarray
-    origin: np.ndarray
-    squares_per_metre: np.ndarray
-    shape: np.ndarray
-    first: np.ndarray
-    starts: np.ndarray
-    members: np.ndarray
-    corners: np.ndarray
+    of_triangle: np.ndarray  # flat face of each triangle, shape (m,) int32, as in FlatFaces
+    frames: np.ndarray  # frames of the flat faces, shape (k, 3, 3), as in FlatFaces
+    origin: np.ndarray  # lower corner of each grid [m], shape (k, 2)
+    squares_per_metre: np.ndarray  # of each grid along both axes [1/m], shape (k, 2)
+    shape: np.ndarray  # squares of each grid along both axes, shape (k, 2) int32
+    first: np.ndarray  # number of each grid's first square, shape (k,) int32
+    starts: np.ndarray  # first entry of each square in ``members``, shape (squares + 1,) int32
+    members: np.ndarray  # the triangles that reach each square, int32
+    corners: np.ndarray  # corners of the triangles in their flat face's frame [m], shape (m, 6)
 
 
 def build_lookup(corners: np.ndarray, flat_faces: FlatFaces, face_overlap: float) -> TriangleLookup:

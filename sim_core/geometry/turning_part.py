@@ -22,19 +22,13 @@ TOUCH = 1e-9  # m: a corner's path this near a triangle's border touches it and 
 
 
 class PartTree(NamedTuple):
-    """Obstacles of the part, relative to the mesh's middle, where the part is at angle 0.
+    """Obstacles of the part, relative to the mesh's middle, where the part is at angle 0."""
 
-    Args:
-        tree: the obstacles.
-        low: least distance along the axis, from its point, at which a ball's centre can touch [m].
-        high: largest such distance [m].
-        reach: largest distance across the axis at which a ball's centre can touch [m].
-    """
-
-    tree: Tree
+    tree: Tree  # the obstacles
+    # least distance along the axis, from its point, at which a ball's centre can touch [m]
     low: float
-    high: float
-    reach: float
+    high: float  # largest such distance [m]
+    reach: float  # largest distance across the axis at which a ball's centre can touch [m]
 
 
 def part_rows(
@@ -146,17 +140,11 @@ def _require_round_joint(
 
 
 class _Sweep(NamedTuple):
-    """How far corners turn, and where they may pass through triangles.
+    """How far corners turn, and where they may pass through triangles."""
 
-    Args:
-        joint: edges in the frame of the axis [m], shape (n, 2, 3).
-        amplitude: largest angle to each side [rad].
-        beside: crossings this near the joint do not count [m].
-    """
-
-    joint: np.ndarray
-    amplitude: float
-    beside: float
+    joint: np.ndarray  # edges in the frame of the axis [m], shape (n, 2, 3)
+    amplitude: float  # largest angle to each side [rad]
+    beside: float  # crossings this near the joint do not count [m]
 
 
 def _require_free_corners(

@@ -12,15 +12,10 @@ PARTS = ("next event", "resolve", "pairs", "walls", "event queue")
 
 
 class Profiler(NamedTuple):
-    """Clock readings [ticks of the processor].
+    """Clock readings [ticks of the processor]."""
 
-    Args:
-        spent: time in each of PARTS, shape (parts,) int64.
-        last: when the last part ended, shape (1,) int64.
-    """
-
-    spent: np.ndarray
-    last: np.ndarray
+    spent: np.ndarray  # time in each of PARTS, shape (parts,) int64
+    last: np.ndarray  # when the last part ended, shape (1,) int64
 
 
 def new_profiler() -> Profiler:

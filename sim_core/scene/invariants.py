@@ -30,19 +30,12 @@ BORDER = 1e-12  # of the mesh's size squared: a ray that passes an edge by less 
 
 
 class _Projection(NamedTuple):
-    """The triangles projected along a ray.
+    """The triangles projected along a ray."""
 
-    Args:
-        corners: corner positions with the ray as third axis [m], shape (m, 3, 3).
-        boxes: low and high of the first axis and of the second [m], shape (m, 4).
-        axes: of the projection, shape (3, 3), one a row.
-        border: a doubled area smaller than this is undecided [m²].
-    """
-
-    corners: np.ndarray
-    boxes: np.ndarray
-    axes: np.ndarray
-    border: float
+    corners: np.ndarray  # corner positions with the ray as third axis [m], shape (m, 3, 3)
+    boxes: np.ndarray  # low and high of the first axis and of the second [m], shape (m, 4)
+    axes: np.ndarray  # of the projection, shape (3, 3), one a row
+    border: float  # a doubled area smaller than this is undecided [m²]
 
 
 @lru_cache(maxsize=32)

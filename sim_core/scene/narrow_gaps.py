@@ -21,21 +21,13 @@ OPPOSED = -1.0 + 1e-9
 
 
 class NarrowGap(NamedTuple):
-    """A ball that does not fit.
+    """A ball that does not fit."""
 
-    Args:
-        ball: number of the ball.
-        one: triangle on one side.
-        two: triangle on the other side.
-        narrower: how much narrower than the ball the gap is [m].
-        vibrates: whether that is so when the vibrating surfaces come nearest, not at the start.
-    """
-
-    ball: int
-    one: int
-    two: int
-    narrower: float
-    vibrates: bool
+    ball: int  # number of the ball
+    one: int  # triangle on one side
+    two: int  # triangle on the other side
+    narrower: float  # how much narrower than the ball the gap is [m]
+    vibrates: bool  # whether that is so when the vibrating surfaces come nearest, not at the start
 
 
 def find_narrow_gap(

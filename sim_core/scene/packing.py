@@ -89,21 +89,14 @@ def _free_selector(
 
 
 class _Layer(NamedTuple):
-    """Where balls of one size are placed.
+    """Where balls of one size are placed."""
 
-    Args:
-        mesh: the cavity.
-        select_free: selects points that are inside and far enough from every surface.
-        diameter: of the balls [m].
-        clear: distance from every surface [m].
-        floor: nothing is placed lower than this [m].
-    """
-
-    mesh: TriangleMesh | AnalyticCavity
+    mesh: TriangleMesh | AnalyticCavity  # the cavity
+    # selects points that are inside and far enough from every surface
     select_free: Callable[[np.ndarray, float], np.ndarray]
-    diameter: float
-    clear: float
-    floor: float
+    diameter: float  # of the balls [m]
+    clear: float  # distance from every surface [m]
+    floor: float  # nothing is placed lower than this [m]
 
 
 def _place(placed: "_PlacedBalls", layer: _Layer, count: int, rng: np.random.Generator) -> None:
