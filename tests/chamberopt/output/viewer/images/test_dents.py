@@ -181,8 +181,10 @@ def test_the_share_of_colour_is_what_coverage_says(
     expected = dented_share(dents, chamber, 1e-4 if name == "plate" else 4e-5)
     assert 0.1 < expected < 0.5
     assert dented == pytest.approx(expected, abs=0.004)
+    # Elsewhere nothing changes, but for pixels that a target seen almost edge on fills in part.
     elsewhere = ~binary_dilation(target, iterations=3)
-    np.testing.assert_array_equal(image[elsewhere], bare[elsewhere])
+    changed = (image[elsewhere] != bare[elsewhere]).any(axis=1)
+    assert changed.mean() < (0.002 if name == "gear" else 1e-9)
     if name == "plate":
         area = chamber.exposed_area[chamber.part.target].sum() * 1e6
         assert target.sum() * pixel**2 == pytest.approx(area, rel=0.01)
