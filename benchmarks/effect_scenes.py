@@ -35,7 +35,7 @@ EFFECTS = {
         PHYSICS, PHYSICS._replace(random_phase=RandomPhase(1)), ("random_phase",)
     ),
     "ball_collisions": Effect(
-        PHYSICS._replace(ball_collisions=None), PHYSICS, ("neighbours", "pair_time")
+        PHYSICS._replace(ball_collisions=None), PHYSICS, ("neighbours", "meetings")
     ),
     "friction": Effect(
         PHYSICS,

@@ -78,9 +78,9 @@ def play(effect: str, on: bool) -> None:
     import sim_core
     from benchmarks.events import advance
     from benchmarks.table import array_bytes
-    from sim_core.loop.simulate import _Run
+    from sim_core.loop.simulate import Simulation
 
-    run = _Run(effect_scene(effect, on))
+    run = Simulation(effect_scene(effect, on))
     start = time.process_time()
     advance(run, 1e-6)
     compiled = time.process_time() - start
@@ -88,16 +88,16 @@ def play(effect: str, on: bool) -> None:
     collisions, spent = advance(run, 0.02)
     piece = 0.02 * TARGET / max(spent, 1e-6)
     kept = (
-        run.motion,
-        run.queue,
-        run.neighbours,
-        run.contact,
-        run.friction_state,
-        run.random_phase,
-        run.drag,
-        run.sizes,
+        run.state.motion,
+        run.state.queue,
+        run.state.neighbours,
+        run.state.contact,
+        run.state.friction_state,
+        run.state.random_phase,
+        run.state.drag,
+        run.state.sizes,
     )
-    size = sum(map(array_bytes, kept)) / len(run.motion)
+    size = sum(map(array_bytes, kept)) / len(run.state.motion)
     print(
         json.dumps({"simulator": sim_core.__file__, "compile_s": compiled, "bytes_per_ball": size}),
         flush=True,

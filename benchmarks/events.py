@@ -31,9 +31,7 @@ from benchmarks.table import print_table, write_csv
 from sim_core import compile_simulator
 from sim_core.detect.ball_mesh import first_contact
 from sim_core.effects.gravity import gravity_acceleration
-from sim_core.geometry.mesh import MAX_TAGS
-from sim_core.loop.impact_log import new_impact_buffer
-from sim_core.loop.simulate import Clock, _Run
+from sim_core.loop.simulate import Simulation
 from sim_core.motion import state_under
 from sim_core.numerics.jit import jit
 from sim_core.numerics.vec3 import Flight
@@ -45,23 +43,21 @@ ROUNDS = 9
 SPAN = 8.0  # s each thread plays: a third of a CPU second; handing out shorter work is what would be measured
 
 
-def steady(name: str, seed: int = 1) -> _Run:
+def steady(name: str, seed: int = 1) -> Simulation:
     """The scene, played to its steady state."""
-    run = _Run(scene(name, seed=seed))
+    run = Simulation(scene(name, seed=seed))
     advance(run, STEADY)
     return run
 
 
-def advance(run: _Run, seconds: float) -> tuple[int, float]:
+def advance(run: Simulation, seconds: float) -> tuple[int, float]:
     """Collisions and CPU seconds of so many simulated seconds, nothing recorded."""
-    page = new_impact_buffer(np.zeros(MAX_TAGS, dtype=np.bool_))
-    now = float(run.now[0] + run.now[1] * run.window)
-    before, start = int(run.count[:3].sum()), time.process_time()
-    run._advance(Clock(run.now, run.window, now + seconds, 0.0), page)
-    return int(run.count[:3].sum()) - before, time.process_time() - start
+    before, start = int(run.state.counts[:3].sum()), time.process_time()
+    run.advance_to(run.time + seconds)
+    return int(run.state.counts[:3].sum()) - before, time.process_time() - start
 
 
-def rate(run: _Run, windows: int) -> list[float]:
+def rate(run: Simulation, windows: int) -> list[float]:
     """Collisions a CPU second in each window."""
     _, spent = advance(run, 0.01)
     piece = 0.01 * TARGET / max(spent, 1e-6)
@@ -85,34 +81,37 @@ def _queries(tree, scratch, motion, gravity, wave, overlap, time, length, repeat
     return total
 
 
-def query_ns(run: _Run, repeats: int = 50) -> float:
+def query_ns(run: Simulation, repeats: int = 50) -> float:
     """Our wall query [ns]: first contact of every ball along its next FLIGHT, walls held still."""
     arguments = (
-        run.obstacles.tree,
-        run.scratch,
-        run.motion,
-        run.gravity,
-        run.wave,
-        run.obstacles.face_overlap,
-        run.now[0],
+        run.state.obstacles.tree,
+        run.state.scratch,
+        run.state.motion,
+        run.state.gravity,
+        run.state.wave,
+        run.state.obstacles.face_overlap,
+        run.state.clock.now[0],
         FLIGHT,
     )
     _queries(*arguments, 1)
     start = time.process_time()
     _queries(*arguments, repeats)
-    return (time.process_time() - start) / (repeats * len(run.motion)) * 1e9
+    return (time.process_time() - start) / (repeats * len(run.state.motion)) * 1e9
 
 
-def flights(run: _Run) -> tuple[np.ndarray, np.ndarray]:
+def flights(run: Simulation) -> tuple[np.ndarray, np.ndarray]:
     """Positions [m] and velocities [m/s] of the balls now, (n, 3) each."""
-    pull = gravity_acceleration(run.gravity)
-    points = [state_under(run.motion, i, run.now[0], pull) for i in range(len(run.motion))]
+    pull = gravity_acceleration(run.state.gravity)
+    points = [
+        state_under(run.state.motion, i, run.state.clock.now[0], pull)
+        for i in range(len(run.state.motion))
+    ]
     return np.array([p.position for p in points]) + run.centre, np.array(
         [p.velocity for p in points]
     )
 
 
-def ray_ns(rays: Any, run: _Run, repeats: int = 50) -> float:
+def ray_ns(rays: Any, run: Simulation, repeats: int = 50) -> float:
     """One of embree's rays [ns], from the same places in the same directions as our wall query."""
     position, velocity = (np.tile(array, (repeats, 1)).astype(np.float32) for array in flights(run))
     start = time.process_time()
@@ -154,7 +153,7 @@ class Contestant:
         """One round."""
         collisions, spent = advance(self.run, self.piece)
         self.rates.append(collisions / spent)
-        repeats = max(1, 10_000 // len(self.run.motion))
+        repeats = max(1, 10_000 // len(self.run.state.motion))
         self.queries.append(query_ns(self.run, repeats))
         if self.embree is not None:
             self.rays.append(ray_ns(self.embree, self.run, repeats))
@@ -162,13 +161,13 @@ class Contestant:
     def row(self) -> dict[str, Any]:
         """One row of the table."""
         run = self.run
-        balls = len(run.motion)
-        shares = run.count / run.count[:3].sum()
-        walls = [*run.obstacles.tree[:-1], *run.obstacles.lookup]
+        balls = len(run.state.motion)
+        shares = run.state.counts / run.state.counts[:3].sum()
+        walls = [*run.state.obstacles.tree[:-1], *run.state.obstacles.lookup]
         columns = [
-            run.motion,
-            *run.queue,
-            *(a for a in run.neighbours if isinstance(a, np.ndarray)),
+            run.state.motion,
+            run.state.queue,
+            *(a for a in run.state.neighbours if isinstance(a, np.ndarray)),
         ]
         return {
             "scene": self.name,

@@ -23,19 +23,19 @@ WINDOW = 0.4  # CPU s a measurement
 def profile(name: str, repeats: int = 5) -> tuple[list[float], dict[str, float], float]:
     """ns a collision in each part (medians), events and searches a collision, and how much the profiler slows."""
     bare, watched = steady(name), steady(name)
-    watched.profiler = new_profiler()
+    watched.state = watched.state._replace(profiler=new_profiler())
     advance(watched, 0.01)
     piece = 0.01 * WINDOW / max(advance(bare, 0.01)[1], 1e-6)
     parts, ratios = [], []
-    watched.count[:] = 0
+    watched.state.counts[:] = 0
     for _ in range(repeats):
         collisions, spent = advance(bare, piece)
-        watched.profiler.spent[:] = 0
+        watched.state.profiler.spent[:] = 0
         seen, longer = advance(watched, piece)
-        ticks = watched.profiler.spent
+        ticks = watched.state.profiler.spent
         parts.append(ticks / ticks.sum() * longer / seen * 1e9)
         ratios.append((longer / seen) / (spent / collisions))
-    count = watched.count / watched.count[:3].sum()
+    count = watched.state.counts / watched.state.counts[:3].sum()
     calls = {
         "walls": count[0],
         "balls": count[1],

@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from benchmarks.events import STEADY, TARGET, advance
 from benchmarks.scenes import PART, PHYSICS, scene
 from sim_core import PartRotation, Scene, compile_simulator
-from sim_core.loop.simulate import _Run
+from sim_core.loop.simulate import Simulation
 
 NAME = "gear-200-10k"
 MOTIONS: dict[str, PartRotation | None] = {
@@ -32,10 +32,12 @@ MOTIONS: dict[str, PartRotation | None] = {
 }
 
 
-def steady(turn: PartRotation | None) -> _Run:
+def steady(turn: PartRotation | None) -> Simulation:
     """The gear's chamber with this motion, played to its steady state."""
     still = scene(NAME)
-    run = _Run(Scene(still.mesh, still.balls, PHYSICS._replace(part_rotation=turn), still.duration))
+    run = Simulation(
+        Scene(still.mesh, still.balls, PHYSICS._replace(part_rotation=turn), still.duration)
+    )
     advance(run, STEADY)
     return run
 

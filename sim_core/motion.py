@@ -25,6 +25,19 @@ from sim_core.numerics.vec3 import Vec3, add_scaled
 WINDOW = 0.02
 
 
+class BallEvent(NamedTuple):
+    """A ball, and the time at which something happens to it.
+
+    Args:
+        time: on the window's clock [s].
+        time_since_start: the same since the start of the scene [s].
+    """
+
+    ball: int
+    time: float
+    time_since_start: float
+
+
 class BallState(NamedTuple):
     """Position of a ball's centre [m] and velocity [m/s] at some time."""
 

@@ -15,7 +15,7 @@ from benchmarks.gas import sample_gas
 from benchmarks.scenes import DIAMETER
 from benchmarks.structures.shell import build_shell
 from chamberopt.coverage.statistics.confidence_interval import Estimate
-from sim_core.loop.spatial_blocks import MANY
+from sim_core.loop.spatial_blocks import MIN_BALLS
 from tests.helpers.scenes.cavities import box_around
 
 FLIGHTS = 100
@@ -42,7 +42,7 @@ def test_all_structures_find_the_same_contacts() -> None:
 
 
 def test_all_structures_find_the_same_meetings() -> None:
-    gas = sample_gas(MANY, np.random.default_rng(3))
+    gas = sample_gas(MIN_BALLS, np.random.default_rng(3))
     answers = who_meets_whom.answers(gas)
     assert (answers[who_meets_whom.PRODUCT][1] >= 0).sum() > 100
     assert len(answers) == 4

@@ -1,112 +1,82 @@
-"""A ball whose small hops lead nowhere is held where it is; at one place again and again for longer each time."""
+"""Freeze a ball that keeps bouncing in place; the time doubles each time at the same place."""
 
 import numpy as np
 
-from sim_core.contact.constrained_impulse import place
-from sim_core.contact.pushed_by_part import PRESSED, TOUCHING
+from sim_core.contact.pushed_by_part import TOUCHING
 from sim_core.contact.support_changes import move_on
-from sim_core.effects.contact_mode import (
-    ASLEEP,
-    COUNTS_SINCE,
-    DRIVEN,
-    HELD_AT,
-    HOLDS,
-    HOPS,
-    JAMMED,
-    MODE,
-    ROLLING,
-    SLOW_HITS,
-    STAYS_UNTIL,
-    TOUCHED,
-    ContactState,
-)
-from sim_core.motion import BallState
+from sim_core.contact.supports import forget_left_support
+from sim_core.effects.contact_mode import ASLEEP, JAMMED, PRESSED, TOUCHED, UNTOUCHED, ContactState
+from sim_core.motion import BallEvent, BallState, state_under
 from sim_core.numerics.jit import jit
-from sim_core.numerics.vec3 import Vec3, dot, sub
+from sim_core.numerics.vec3 import Vec3, dot, set_vec3, sub, vec3_at
 
-JAM_HITS = (
-    64  # slow hits in a row within HELD: a ball sliding off another is further along after a few
-)
-HELD = 0.01  # of a radius
-PRESS = 1e-4  # s: so many in so short a time are no hops under weight (SHORTEST_HOP): a turning part closes the gap
-WAIT = 1e-3  # s: what is held a second time at one place is not called up for so long, and each time twice as long
-MOST_HOLDS = 40  # after which that is for ever
+# Slow hits in a row at one place that are a jam. A ball that slides off another is further along
+# after a few.
+JAM_HITS = 64
+SAME_PLACE = 0.01  # of a radius
+# s. So many hits in a shorter time are no hops under weight (see SHORTEST_HOP): a turning part
+# closes the gap.
+PRESS_TIME = 1e-4
+# s. What is held a second time at one place is not woken for this time, then for twice as long, ...
+HOLD_TIME = 1e-3
+MAX_REPEATS = 40  # after which a ball is held for ever
 
 
 @jit
-def hold(
-    contact: ContactState,
-    motion: np.ndarray,
-    ball: int,
-    time: float,
-    time_since_start: float,
-    position: Vec3,
-    radius: float,
-) -> None:
+def hold_still(contact: ContactState, motion: np.ndarray, event: BallEvent, position: Vec3) -> None:
     """Hold a ball still where it is; one that was held there before is left alone for longer."""
-    nothing = Vec3(0.0, 0.0, 0.0)
-    if _has_gone(contact, ball, HELD_AT, position, radius):
-        _mark(contact, ball, HELD_AT, position)
-        contact.marks[ball, HOLDS] = 0
+    ball, jams = event.ball, contact.jams
+    if _is_elsewhere(contact, jams.position, ball, position):
+        set_vec3(jams.position, ball, position)
+        jams.repeats[ball] = 0
     else:
-        contact.marks[ball, HOLDS] = min(contact.marks[ball, HOLDS] + 1, MOST_HOLDS)
-    move_on(
-        contact, motion, ball, time, time_since_start, BallState(position, nothing), nothing, JAMMED
-    )
-    holds = contact.marks[ball, HOLDS]
-    contact.memory[ball, STAYS_UNTIL] = time_since_start + WAIT * (2.0**holds - 1.0)
+        jams.repeats[ball] = min(jams.repeats[ball] + 1, MAX_REPEATS)
+    zero = Vec3(0.0, 0.0, 0.0)
+    move_on(contact, motion, event, BallState(position, zero), zero, JAMMED)
+    wait = HOLD_TIME * (2.0 ** jams.repeats[ball] - 1.0)
+    contact.stays_until[ball] = event.time_since_start + wait
 
 
 @jit
-def watch(
-    contact: ContactState,
-    motion: np.ndarray,
-    ball: int,
-    time: float,
-    time_since_start: float,
-    position: Vec3,
-    slow: bool,
-    radius: float,
+def count_slow_hit(
+    contact: ContactState, motion: np.ndarray, event: BallEvent, position: Vec3, slow: bool
 ) -> None:
-    """Count a ball's small hops, and hold it still when they lead nowhere."""
-    marks = contact.marks
-    marks[ball, ROLLING] = 0
-    if _has_gone(contact, ball, HOPS, position, radius) or (not slow and marks[ball, DRIVEN] == 0):
-        _mark(contact, ball, HOPS, position)
-        marks[ball, SLOW_HITS] = 0
-        marks[ball, DRIVEN] = 0
-        contact.memory[ball, COUNTS_SINCE] = time_since_start
+    """Count a ball's hits at one place, and hold it still when they lead nowhere.
+
+    ``slow``: whether this hit is slower than ContactState.elastic_below.
+    """
+    ball, now, hits = event.ball, event.time_since_start, contact.slow_hits
+    forget_left_support(contact, ball)
+    fast = not slow and hits.part_contact[ball] == UNTOUCHED
+    if _is_elsewhere(contact, hits.position, ball, position) or fast:
+        set_vec3(hits.position, ball, position)
+        hits.number[ball] = 0
+        hits.part_contact[ball] = UNTOUCHED
+        hits.began[ball] = now
         return
-    marks[ball, SLOW_HITS] += 1
-    if marks[ball, SLOW_HITS] < JAM_HITS:
+    hits.number[ball] += 1
+    if hits.number[ball] < JAM_HITS:
         return
-    if marks[ball, DRIVEN] != 0:
-        if time_since_start - contact.memory[ball, COUNTS_SINCE] < PRESS:
-            marks[ball, DRIVEN] = PRESSED
+    if hits.part_contact[ball] != UNTOUCHED:
+        if now - hits.began[ball] < PRESS_TIME:
+            hits.part_contact[ball] = PRESSED
         else:
-            marks[ball, DRIVEN] = (
-                1 if time_since_start - contact.memory[ball, TOUCHED] < TOUCHING else 0
-            )
-        marks[ball, SLOW_HITS] = 0
-        contact.memory[ball, COUNTS_SINCE] = time_since_start
+            recent = now - hits.touched_at[ball] < TOUCHING
+            hits.part_contact[ball] = TOUCHED if recent else UNTOUCHED
+        hits.number[ball] = 0
+        hits.began[ball] = now
         return
-    if marks[ball, MODE] >= ASLEEP:
+    if contact.mode[ball] >= ASLEEP:
         return
-    velocity = place(contact, motion, ball, time).velocity
-    if dot(velocity, velocity) < contact.slow * contact.slow:
-        marks[ball, SLOW_HITS] = 0
-        hold(contact, motion, ball, time, time_since_start, position, radius)
+    acceleration = vec3_at(contact.acceleration, ball)
+    velocity = state_under(motion, ball, event.time, acceleration).velocity
+    if dot(velocity, velocity) < contact.elastic_below * contact.elastic_below:
+        hits.number[ball] = 0
+        hold_still(contact, motion, event, position)
 
 
 @jit
-def _has_gone(contact: ContactState, ball: int, mark: int, position: Vec3, radius: float) -> bool:
-    """True when a ball is further than HELD from the place in those columns of its memory."""
-    memory = contact.memory
-    gone = sub(position, Vec3(memory[ball, mark], memory[ball, mark + 1], memory[ball, mark + 2]))
-    return dot(gone, gone) > (HELD * radius) ** 2
-
-
-@jit
-def _mark(contact: ContactState, ball: int, mark: int, position: Vec3) -> None:
-    for axis in range(3):
-        contact.memory[ball, mark + axis] = position[axis]
+def _is_elsewhere(contact: ContactState, places: np.ndarray, ball: int, position: Vec3) -> bool:
+    """True when a position is further than SAME_PLACE from the ball's row of ``places``."""
+    gone = sub(position, vec3_at(places, ball))
+    return dot(gone, gone) > (SAME_PLACE * contact.radius) ** 2

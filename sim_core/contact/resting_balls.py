@@ -1,19 +1,10 @@
-"""Where balls can lie still, and which do: what a designer wants to know of pockets, slots and dead corners."""
+"""Where balls can lie still, and which ones do: in pockets, slots and dead corners."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from sim_core.effects.contact_mode import (
-    ASLEEP,
-    JAMMED,
-    LIES_SINCE,
-    MAX_SUPPORTS,
-    MODE,
-    ON_BALL,
-    SUPPORTS,
-    ContactState,
-)
+from sim_core.effects.contact_mode import ASLEEP, JAMMED, MAX_SUPPORTS, ON_BALL, ContactState
 from sim_core.effects.gravity import Gravity
 from sim_core.geometry.analytic import AnalyticCavity
 from sim_core.geometry.mesh import TriangleMesh, normals_towards_shot
@@ -28,11 +19,14 @@ NONE = -1
 
 @dataclass(frozen=True)
 class Resting:
-    """The k balls that lie still at the end, by number.
+    """The k balls that lie still at the end.
 
-    ``ball`` (k,): which; ``position`` (k, 3) [m]; ``since`` (k,) [s]: when each came to lie still, on the clock of the
-    impacts, so negative when it was during the warm-up; ``triangles`` (k, 4) and ``balls`` (k, 4): what each stands
-    on, -1 where there is no more; ``jammed`` (k,) bool: held by balls around it, not by what it stands on alone.
+    ball: their numbers, (k,).
+    position: centres [m], (k, 3).
+    since: when each came to lie still [s], (k,), on the clock of the impacts, so negative when it
+        was during the warm-up.
+    triangles, balls: what each stands on, (k, 4), -1 where there is no more.
+    jammed: held by the balls around it, not only by what it stands on, (k,) bool.
     """
 
     ball: np.ndarray
@@ -53,50 +47,44 @@ def resting(
     middle: np.ndarray,
     origin: float,
 ) -> Resting:
-    """Who lies still now; ``positions`` (n, 3) [m], ``middle`` (3,) of the mesh, ``origin`` [s] of their clock."""
-    if contact is None:
-        return Resting(*(np.zeros(shape, kind) for shape, kind in _EMPTY))
-    still = np.flatnonzero(contact.marks[:, MODE] >= ASLEEP)
+    """The balls that lie still now.
+
+    Args:
+        positions: centres of all balls [m], (n, 3).
+        middle: of the mesh [m], (3,).
+        origin: end of the warm-up [s since the start].
+    """
+    still = np.zeros(0, np.int64)
+    if contact is not None:
+        still = np.flatnonzero(contact.mode >= ASLEEP)
     triangles = np.full((len(still), MAX_SUPPORTS), NONE)
     balls = triangles.copy()
+    if contact is None:
+        no_time, no_ball = np.zeros(0), np.zeros(0, np.bool_)
+        return Resting(still, positions[still], no_time, triangles, balls, no_ball)
     for i, ball in enumerate(still):
-        for support in range(contact.marks[ball, SUPPORTS]):
-            row = int(contact.rows[ball, support])
-            if row <= ON_BALL:
-                balls[i, support] = ON_BALL - row
+        for support in range(contact.supports.number[ball]):
+            obstacle = int(contact.supports.obstacles[ball, support])
+            if obstacle <= ON_BALL:
+                balls[i, support] = ON_BALL - obstacle
             else:
-                seed = int(obstacles.tree.triangles[row, 0])
+                seed = int(obstacles.tree.triangles[obstacle, 0])
                 at = Vec3(*(float(x) for x in positions[ball] - middle))
-                lone = obstacles.tree.kinds[row] == CAPSULE
+                lone = obstacles.tree.kinds[obstacle] == CAPSULE
                 triangles[i, support] = seed if lone else find_triangle(obstacles.lookup, seed, at)
-    return Resting(
-        still,
-        positions[still],
-        contact.memory[still, LIES_SINCE] - origin,
-        triangles,
-        balls,
-        contact.marks[still, MODE] == JAMMED,
-    )
-
-
-_EMPTY = (
-    ((0,), np.int64),
-    ((0, 3), np.float64),
-    ((0,), np.float64),
-    ((0, MAX_SUPPORTS), np.int64),
-    ((0, MAX_SUPPORTS), np.int64),
-    ((0,), np.bool_),
-)
+    since = contact.still_since[still] - origin
+    jammed = contact.mode[still] == JAMMED
+    return Resting(still, positions[still], since, triangles, balls, jammed)
 
 
 def can_rest(mesh: TriangleMesh | AnalyticCavity, gravity: Gravity | None, *moving: int) -> bool:
-    """True when a ball can lie still in the chamber: gravity presses it onto some triangle that keeps still.
+    """True when gravity can press a ball onto some triangle of the chamber that keeps still.
 
-    ``moving``: the tags of the surfaces that vibrate or turn.
+    ``moving``: tags of the surfaces that vibrate or turn.
     """
     if gravity is None:
         return False
-    acceleration = np.array(gravity, dtype=np.float64)
+    weight = np.array(gravity, dtype=np.float64)
     normals, doubled = normals_towards_shot(mesh.corners)
     still = (doubled > 0.0) & ~np.isin(mesh.tags, moving)
-    return bool((normals[still] @ acceleration < -UPWARD * np.linalg.norm(acceleration)).any())
+    return bool((normals[still] @ weight < -UPWARD * np.linalg.norm(weight)).any())

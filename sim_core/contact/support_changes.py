@@ -1,196 +1,164 @@
-"""What a ball in contact mode does next: which feet it keeps, and so how it moves on."""
+"""Capture by a surface, and which supports a ball keeps as it moves on.
+
+Notation: b: ball. n: unit normal of a surface, towards the ball. v: velocity of the ball [m/s].
+The approach speed is -n v. A ball is captured by a still surface when this is below
+ContactState.capture and gravity or its own acceleration presses it on.
+"""
 
 import math
 
 import numpy as np
 
-from sim_core.contact.rolling import braked, crept, reset_spin
-from sim_core.effects.contact_mode import (
-    ASLEEP,
-    DETACH_TOLERANCE,
-    FLYING,
-    JAMMED,
-    LEAVES,
-    LIES_SINCE,
-    MODE,
-    NEIGHBOURS_HOLDING_JAM,
-    ON_BALL,
-    ROLLING,
+from sim_core.contact.rolling import braked, reset_spin, stopped_if_creeping
+from sim_core.contact.supports import (
     ROUNDING,
-    STAYS_UNTIL,
-    STOPS,
-    SUPPORTS,
-    WAKE_PENDING,
-    WAKES,
-    ContactState,
     add_support,
     drop_support,
+    drop_supports_along,
+    forget_left_support,
     onto_cone,
     set_mode,
     support_normal,
 )
+from sim_core.effects.contact_mode import ASLEEP, FLYING, JAMMED, ON_BALL, ContactState
 from sim_core.geometry.bvh import Tree
 from sim_core.geometry.obstacles import CAPSULE
-from sim_core.motion import BallState, change_velocity, set_path
+from sim_core.motion import BallEvent, BallState, change_velocity, set_path
 from sim_core.numerics.jit import inlined, jit
-from sim_core.numerics.vec3 import Vec3, add_scaled, cross, dot
+from sim_core.numerics.vec3 import Vec3, add_scaled, cross, dot, set_vec3, vec3_at
 
-# how a hit on a still surface ends
+# results of a hit on a still surface
 BOUNCES, ROLLS, CAUGHT = 0, 1, 2
 
-ONE_SURFACE = math.cos(
-    math.radians(25.0)
-)  # faces that meet at less than 25 degrees stand for a smooth surface
-SAME_HOP = 1.05  # of the speed a facet's turn gives: landing on the next facet, not from a height
-SHARE = 0.5  # of capture: how fast a ball may come down again when the plane under it has left what is round
-NO_WAY_OUT = 0.01  # wedged between its feet and an edge a ball would have to go ten times as far as it is deep
+# what ends a path in contact, in place of an obstacle's number (event_queue.py has -1 and -2)
+PATH_GOES_ON = -1
+BRAKE_ENDS = -3  # the ball stops, or the direction of its brake is set again
+WAKES = -4
+LIES_STILL = -5
+RECHECK = -6  # a jammed ball looks whether the balls around it are still there
+LEAVES_SUPPORT = -10  # minus the number of the support
+
+# Faces that meet at less than this angle stand for a smooth surface (cosine).
+ONE_SURFACE = math.cos(math.radians(25.0))
+# A hit up to this multiple of the speed that a facet's turn gives is a landing on the next facet.
+FACET_HOP = 1.05
+# of capture: how fast a ball may come down again when its plane has left what is round under it
+COMES_DOWN = 0.5
+# A ball wedged between its supports and an edge, which would have to move more than ten times as
+# far as it is deep, has no way out.
+NO_WAY_OUT = 0.01
+# of capture: a support from which the ball moves as slowly as this, against gravity, is kept
+DETACH_TOLERANCE = 0.01
 NO_SUPPORT = -1
 LAST_LEFT = -2
 
 
 @jit
-def settle(
-    contact: ContactState,
-    motion: np.ndarray,
-    ball: int,
-    time: float,
-    time_since_start: float,
-    at: BallState,
-) -> None:
-    """Let a ball go on from ``at`` on those of its feet that hold it. ``time``, ``time_since_start`` [s]: on the window's clock,
-    and since the start.
+def settle(contact: ContactState, motion: np.ndarray, event: BallEvent, at: BallState) -> None:
+    """Let a ball go on from ``at`` on those of its supports that hold it.
 
-    A foot hit faster than capture is taken away: the search finds it again at once, as the wall it then is. One on a
-    ball that has begun to move is none: the two are a pair like others again.
+    A support that is hit faster than capture is dropped, and the search finds it again at once as
+    the wall that it then is. So is a support on a ball that has begun to move: the two are an
+    ordinary pair again.
     """
-    contact.marks[ball, WAKE_PENDING] = 0
-    support = 0
-    while support < contact.marks[ball, SUPPORTS]:
-        other = ON_BALL - contact.rows[ball, support]
-        if other >= 0 and contact.marks[other, MODE] < ASLEEP:
-            drop_support(contact, ball, support)
-        else:
-            support += 1
-    velocity = crept(contact.friction_state, contact, ball, at.velocity)
-    support = 0
-    while support < contact.marks[ball, SUPPORTS]:
-        normal = support_normal(contact, ball, support)
-        out = dot(normal, velocity)
-        if out < -contact.capture or out > DETACH_TOLERANCE * contact.capture:
-            drop_support(contact, ball, support)
-        else:
-            if out > 0.0:
-                velocity = add_scaled(velocity, -out, normal)
-            support += 1
-    velocity = onto_cone(contact, ball, velocity)
-    speed = math.sqrt(dot(velocity, velocity))
-    support = 0
-    while support < contact.marks[ball, SUPPORTS]:
-        if dot(support_normal(contact, ball, support), velocity) > ROUNDING * (1.0 + speed):
-            drop_support(contact, ball, support)
-        else:
-            support += 1
-    acceleration = onto_cone(contact, ball, contact.gravity)
-    mode = FLYING
-    if contact.marks[ball, SUPPORTS] > 0:
-        velocity, acceleration, mode = braked(
-            contact.friction_state, contact, ball, time, velocity, acceleration
-        )
-    move_on(
-        contact,
-        motion,
-        ball,
-        time,
-        time_since_start,
-        BallState(at.position, velocity),
-        acceleration,
-        mode,
+    ball, supports = event.ball, contact.supports
+    contact.wake_pending[ball] = 0
+    for support in range(supports.number[ball] - 1, -1, -1):
+        other = ON_BALL - supports.obstacles[ball, support]
+        if other >= 0 and contact.mode[other] < ASLEEP:
+            drop_support(supports, ball, support)
+    velocity = stopped_if_creeping(
+        contact.friction_state, contact, ball, at.velocity, DETACH_TOLERANCE * contact.capture
     )
+    support = 0
+    while support < supports.number[ball]:
+        normal = support_normal(supports, ball, support)
+        departure = dot(normal, velocity)
+        if departure < -contact.capture or departure > DETACH_TOLERANCE * contact.capture:
+            drop_support(supports, ball, support)
+        else:
+            if departure > 0.0:
+                velocity = add_scaled(velocity, -departure, normal)
+            support += 1
+    velocity = onto_cone(supports, ball, velocity)
+    speed = math.sqrt(dot(velocity, velocity))
+    drop_supports_along(supports, ball, velocity, ROUNDING * (1.0 + speed))
+    acceleration = onto_cone(supports, ball, contact.gravity)
+    mode = FLYING
+    if supports.number[ball] > 0:
+        velocity, acceleration, mode = braked(
+            contact.friction_state, contact, event, velocity, acceleration
+        )
+    move_on(contact, motion, event, BallState(at.position, velocity), acceleration, mode)
 
 
 @jit
 def move_on(
     contact: ContactState,
     motion: np.ndarray,
-    ball: int,
-    time: float,
-    time_since_start: float,
+    event: BallEvent,
     at: BallState,
     acceleration: Vec3,
     mode: int,
 ) -> None:
-    """Give a ball its path and its place on the roster."""
-    if mode >= ASLEEP and contact.marks[ball, MODE] < ASLEEP:
-        contact.memory[ball, LIES_SINCE] = time_since_start
+    """Give a ball its path and its mode."""
+    ball = event.ball
+    if mode >= ASLEEP and contact.mode[ball] < ASLEEP:
+        contact.still_since[ball] = event.time_since_start
     if mode != JAMMED:
-        contact.memory[ball, STAYS_UNTIL] = 0.0
-        contact.marks[ball, NEIGHBOURS_HOLDING_JAM] = 0
+        contact.stays_until[ball] = 0.0
+        contact.jams.neighbour_count[ball] = 0
     set_mode(contact, ball, mode)
-    reset_spin(contact.friction_state, ball, time, mode)
-    for axis in range(3):
-        contact.acceleration[ball, axis] = acceleration[axis]
-    set_path(motion, ball, time, at, acceleration)
+    reset_spin(contact.friction_state, ball, event.time, mode)
+    set_vec3(contact.acceleration, ball, acceleration)
+    set_path(motion, ball, event.time, at, acceleration)
+
+
+@jit
+def impart(
+    contact: ContactState, motion: np.ndarray, event: BallEvent, at: BallState, change: Vec3
+) -> None:
+    """Change a ball's velocity by ``change`` [m/s]; on supports it keeps what they leave of it."""
+    if contact.mode[event.ball] == FLYING:
+        change_velocity(motion, event.ball, event.time, change)
+    else:
+        settle(contact, motion, event, BallState(at.position, add_scaled(at.velocity, 1.0, change)))
 
 
 @inlined
 def deflect(
-    contact: ContactState | None,
-    motion: np.ndarray,
-    ball: int,
-    time: float,
-    time_since_start: float,
-    here: BallState,
-    change: Vec3,
+    contact: ContactState | None, motion: np.ndarray, event: BallEvent, at: BallState, change: Vec3
 ) -> None:
-    """Change a ball's velocity by ``change`` [m/s]."""
+    """The same after a hit on a surface, with contact mode or without."""
     if contact is None:
-        change_velocity(motion, ball, time, change)
+        change_velocity(motion, event.ball, event.time, change)
         return
-    contact.marks[ball, ROLLING] = 0
-    if contact.marks[ball, MODE] == FLYING:
-        change_velocity(motion, ball, time, change)
-    else:
-        settle(
-            contact,
-            motion,
-            ball,
-            time,
-            time_since_start,
-            BallState(here.position, add_scaled(here.velocity, 1.0, change)),
-        )
+    forget_left_support(contact, event.ball)
+    impart(contact, motion, event, at, change)
 
 
 @inlined
-def set_out(
-    contact: ContactState | None,
-    motion: np.ndarray,
-    ball: int,
-    time: float,
-    here: BallState,
-    away: Vec3,
-    radius: float,
+def moved_off_edge(
+    contact: ContactState | None, motion: np.ndarray, event: BallEvent, at: BallState, away: Vec3
 ) -> BallState:
-    """Put a ball that meets an edge back to ``radius`` [m] from it: contact is up to 1e-13 m deep there, and thousands
-    of small hops on one edge would add up. It goes out along the planes of its feet, not into them.
+    """The ball, put back to one radius from an edge that it meets.
+
+    Contact is up to 1e-13 m deep there, and thousands of small hops on one edge would add up. The
+    ball goes out along the planes of its supports, not into them. ``away``: from the edge to it.
     """
     if contact is None:
-        return here
+        return at
+    ball = event.ball
     distance = math.sqrt(dot(away, away))
-    if distance >= radius:
-        return here
-    free = onto_cone(contact, ball, away)
-    share = dot(free, free) / (
-        distance * distance
-    )  # of a step along ``free``: how far it leads out
+    if distance >= contact.radius:
+        return at
+    free = onto_cone(contact.supports, ball, away)
+    share = dot(free, free) / (distance * distance)  # of a step along ``free`` that leads out
     if share < NO_WAY_OUT:
-        return here
-    acceleration = Vec3(
-        contact.acceleration[ball, 0], contact.acceleration[ball, 1], contact.acceleration[ball, 2]
-    )
-    there = BallState(
-        add_scaled(here.position, (radius - distance) / (distance * share), free), here.velocity
-    )
-    set_path(motion, ball, time, there, acceleration)
+        return at
+    step = (contact.radius - distance) / (distance * share)
+    there = BallState(add_scaled(at.position, step, free), at.velocity)
+    set_path(motion, ball, event.time, there, vec3_at(contact.acceleration, ball))
     return there
 
 
@@ -199,157 +167,123 @@ def land(
     contact: ContactState | None,
     tree: Tree,
     motion: np.ndarray,
-    ball: int,
-    row: int,
-    time: float,
-    time_since_start: float,
-    here: BallState,
+    event: BallEvent,
+    obstacle: int,
+    at: BallState,
     away: Vec3,
 ) -> int:
-    """A ball meets a still surface: does it bounce, roll on as if the surface were one, or stay in contact?"""
+    """Result of a hit on a still surface: BOUNCES, ROLLS (as if both were one), or CAUGHT."""
     if contact is None:
         return BOUNCES
     scale = 1.0 / math.sqrt(dot(away, away))
     normal = Vec3(scale * away.x, scale * away.y, scale * away.z)
-    round_over = tree.radius if tree.kinds[row] == CAPSULE else math.inf
-    return touch_down(contact, motion, ball, row, round_over, time, time_since_start, here, normal)
+    bend = tree.radius if tree.kinds[obstacle] == CAPSULE else math.inf
+    return touch_down(contact, motion, event, obstacle, bend, at, normal)
 
 
 @jit
 def touch_down(
     contact: ContactState,
     motion: np.ndarray,
-    ball: int,
-    row: int,
-    round_over: float,
-    time: float,
-    time_since_start: float,
-    here: BallState,
+    event: BallEvent,
+    obstacle: int,
+    bend: float,
+    at: BallState,
     normal: Vec3,
 ) -> int:
-    """The same for anything that stands still, with the radius [m] on which the centre goes round it."""
-    velocity = here.velocity
+    """Result of a hit on anything still; ``bend``: radius [m] on which the centre goes round it."""
+    ball, supports, velocity = event.ball, contact.supports, at.velocity
     speed = math.sqrt(dot(velocity, velocity))
-    into = max(0.0, -dot(normal, velocity))
+    approach = max(0.0, -dot(normal, velocity))
     presses = dot(normal, contact.gravity) < 0.0
-    scope = math.inf
-    if round_over < math.inf:  # so far, that coming down on the round again is slower than capture
+    reach = math.inf
+    if bend < math.inf:  # so far that the ball comes down again more slowly than capture
         weight = math.sqrt(dot(contact.gravity, contact.gravity))
-        scope = (
-            SHARE
-            * round_over
+        reach = (
+            COMES_DOWN
+            * bend
             * contact.capture
-            / max(speed, math.sqrt(weight * round_over), contact.capture)
+            / max(speed, math.sqrt(weight * bend), contact.capture)
         )
-    came_from, last = _smooth_neighbour(contact, ball, normal)
-    contact.marks[ball, ROLLING] = 0
-    if came_from != NO_SUPPORT and presses:
+    neighbour, last = _smooth_neighbour(contact, ball, normal)
+    forget_left_support(contact, ball)
+    if neighbour != NO_SUPPORT and presses:
         crease = cross(last, normal)
         sine = math.sqrt(dot(crease, crease))
-        if into <= SAME_HOP * speed * sine + contact.capture:
-            stays = came_from >= 0 and _lies_in_valley(
-                contact, last, normal, velocity, crease, sine
-            )
-            if came_from >= 0 and not stays:
-                drop_support(contact, ball, came_from)
-            flat = add_scaled(velocity, into, normal)
+        if approach <= FACET_HOP * speed * sine + contact.capture:
+            stays = neighbour >= 0 and _lies_in_valley(contact, last, normal, velocity)
+            if neighbour >= 0 and not stays:
+                drop_support(supports, ball, neighbour)
+            flat = add_scaled(velocity, approach, normal)
             size = math.sqrt(dot(flat, flat))
             if not stays and size > 0.5 * speed:  # turned into the new face's plane, not slowed
                 velocity = Vec3(flat.x * speed / size, flat.y * speed / size, flat.z * speed / size)
-            add_support(contact, ball, row, normal, here.position, scope)
-            settle(
-                contact, motion, ball, time, time_since_start, BallState(here.position, velocity)
-            )
+            add_support(supports, ball, obstacle, normal, at.position, reach)
+            settle(contact, motion, event, BallState(at.position, velocity))
             return ROLLS
-    acceleration = Vec3(
-        contact.acceleration[ball, 0], contact.acceleration[ball, 1], contact.acceleration[ball, 2]
-    )
-    contact_count = (
-        contact.marks[ball, SUPPORTS] > 0
-    )  # between two surfaces it would bounce without end
-    if into < contact.capture and (presses or contact_count or dot(normal, acceleration) < 0.0):
-        add_support(contact, ball, row, normal, here.position, scope)
-        settle(contact, motion, ball, time, time_since_start, here)
+    acceleration = vec3_at(contact.acceleration, ball)
+    supported = supports.number[ball] > 0  # between two surfaces it would bounce without end
+    if approach < contact.capture and (presses or supported or dot(normal, acceleration) < 0.0):
+        add_support(supports, ball, obstacle, normal, at.position, reach)
+        settle(contact, motion, event, at)
         return CAUGHT
     return BOUNCES
 
 
 @jit
 def _smooth_neighbour(contact: ContactState, ball: int, normal: Vec3) -> tuple[int, Vec3]:
-    """Which foot, or the one just left, is most nearly in the plane with this normal; NO_FOOT if none is nearly so."""
+    """The support, or the one just left, that is most nearly in the plane with this normal.
+
+    Returns: its number, LAST_LEFT, or NO_SUPPORT if none is nearly in the plane; its normal.
+    """
     found, best, last = NO_SUPPORT, ONE_SURFACE, normal
-    for support in range(contact.marks[ball, SUPPORTS]):
-        other = support_normal(contact, ball, support)
+    for support in range(contact.supports.number[ball]):
+        other = support_normal(contact.supports, ball, support)
         if dot(normal, other) > best:
             found, best, last = support, dot(normal, other), other
-    if contact.marks[ball, ROLLING] != 0:
-        other = Vec3(contact.memory[ball, 0], contact.memory[ball, 1], contact.memory[ball, 2])
-        if dot(normal, other) > best:
-            found, last = LAST_LEFT, other
+    left = vec3_at(contact.left_normal, ball)  # zero, and so never better, if none was just left
+    if dot(normal, left) > best:
+        found, last = LAST_LEFT, left
     return found, last
 
 
 @jit
-def _lies_in_valley(
-    contact: ContactState, one: Vec3, two: Vec3, velocity: Vec3, crease: Vec3, sine: float
-) -> bool:
-    """True when both faces run down to their crease and the ball hardly moves across it: it stays on both."""
-    acceleration = contact.gravity
-    down_one = add_scaled(acceleration, -dot(acceleration, one), one)
-    down_two = add_scaled(acceleration, -dot(acceleration, two), two)
+def _lies_in_valley(contact: ContactState, one: Vec3, two: Vec3, velocity: Vec3) -> bool:
+    """True when both faces run down to their crease and the ball hardly moves across it.
+
+    Such a ball stays on both faces. ``one``, ``two``: their unit normals.
+    """
+    gravity = contact.gravity
+    down_one = add_scaled(gravity, -dot(gravity, one), one)
+    down_two = add_scaled(gravity, -dot(gravity, two), two)
+    crease = cross(one, two)
+    sine = math.sqrt(dot(crease, crease))
     if dot(two, down_one) >= 0.0 or dot(one, down_two) >= 0.0 or sine == 0.0:
         return False
     across = add_scaled(velocity, -dot(velocity, crease) / (sine * sine), crease)
     return dot(across, across) < contact.capture * contact.capture
 
 
-@inlined
-def step(
-    contact: ContactState | None,
-    motion: np.ndarray,
-    ball: int,
-    what: int,
-    time: float,
-    time_since_start: float,
-    here: BallState,
-) -> bool:
-    """A ball comes to the end of its path in contact (see end_of_path); False if it does not."""
-    if contact is None:
-        return False
-    return _step(contact, motion, ball, what, time, time_since_start, here)
-
-
 @jit
-def _step(
-    contact: ContactState,
-    motion: np.ndarray,
-    ball: int,
-    what: int,
-    time: float,
-    time_since_start: float,
-    here: BallState,
+def end_path(
+    contact: ContactState, motion: np.ndarray, event: BallEvent, reason: int, at: BallState
 ) -> bool:
-    if what <= LEAVES:
-        support = LEAVES - what
-        for axis in range(3):
-            contact.memory[ball, axis] = contact.normals[ball, support, axis]
-        drop_support(contact, ball, support)
-        settle(contact, motion, ball, time, time_since_start, here)
-        contact.marks[ball, ROLLING] = 1
+    """Let a ball go on at the end of its path in contact; False if ``reason`` is no such end."""
+    ball = event.ball
+    if reason <= LEAVES_SUPPORT:
+        support = LEAVES_SUPPORT - reason
+        set_vec3(contact.left_normal, ball, support_normal(contact.supports, ball, support))
+        drop_support(contact.supports, ball, support)
+        settle(contact, motion, event, at)
         return True
-    if what == STOPS:
-        velocity = here.velocity
-        acceleration = Vec3(
-            contact.acceleration[ball, 0],
-            contact.acceleration[ball, 1],
-            contact.acceleration[ball, 2],
-        )
-        # the brake has used up what was left of the speed, and not merely been set anew
+    if reason == BRAKE_ENDS:
+        velocity, acceleration = at.velocity, vec3_at(contact.acceleration, ball)
+        # The brake has used up what was left of the speed, and was not merely set again.
         if dot(velocity, velocity) <= 1e-18 * max(1.0, dot(acceleration, acceleration)):
             velocity = Vec3(0.0, 0.0, 0.0)
-        settle(contact, motion, ball, time, time_since_start, BallState(here.position, velocity))
+        settle(contact, motion, event, BallState(at.position, velocity))
         return True
-    if what == WAKES:
-        settle(contact, motion, ball, time, time_since_start, here)
+    if reason == WAKES:
+        settle(contact, motion, event, at)
         return True
     return False

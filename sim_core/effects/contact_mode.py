@@ -1,18 +1,6 @@
-"""Contact mode: a ball that gravity holds against still surfaces slides on them, or lies still.
+"""Contact mode: what a user chooses (Rest), and what the simulator stores of it (ContactState).
 
-A hit slower than ``capture`` on a still surface into which gravity presses is plastic, and from then on the ball
-keeps the surface's normal n as a *foot*: its velocity and its acceleration are the projections of what they would be
-on the cone {n_k x >= 0} of its feet (Moreau, J. Math. Pures Appl. 56 (1977) 65: the constrained acceleration is the
-one nearest to the free one), so its motion is a parabola again, its own. ``resistance`` slows it by that share of the
-load on its feet: sliding friction without rotation, or, where balls rub (friction.py), what rolling resists. What is
-neglected at a capture is below capture²/2 of energy per mass.
-
-Nothing rests on the vibrating surface or on a turning part: hits there keep their law. A ball that lies still is
-itself such a surface to hits slower than Restitution.elastic_below, as if friction held it, so heaps come to rest
-from below. Two balls that lean on each other while they move go on in small hops; one that has made many without
-getting anywhere is held where it is (jammed) until one of the balls around it has gone; held at one place again and
-again, for twice as long each time. A faster hit wakes a ball, and with it what stands on it. The turning part moves
-what it touches, slow or not, and what is pressed between it and a ball that lies still moves that one.
+The package sim_core.contact explains contact mode and holds everything that acts on this state.
 """
 
 import math
@@ -24,86 +12,135 @@ from sim_core.effects.friction import FrictionState
 from sim_core.effects.gravity import Gravity, gravity_acceleration
 from sim_core.effects.restitution import ELASTIC_BELOW, Restitution
 from sim_core.errors import SceneError, number
-from sim_core.numerics.jit import inlined, jit
-from sim_core.numerics.vec3 import Vec3, add_scaled, cross, dot
+from sim_core.numerics.jit import inlined
+from sim_core.numerics.vec3 import Vec3, vec3_at
 
-CAPTURE = 1e-3  # m/s: drops from 50 nm; a ten-thousandth of the shot's speed. Lower costs bounces: 22 a decade at e 0.9
-RESISTANCE = 0.005  # [-]: of steel balls on steel, the order of magnitude (assumed); slower than that they lie still
+# m/s. A drop from 50 nm is as fast, and the shot is ten thousand times faster. A lower value costs
+# bounces: 22 for each decade at a restitution of 0.9.
+CAPTURE = 1e-3
+# Steel balls on steel have about this rolling resistance (assumed). Slower ones lie still.
+RESISTANCE = 0.005
 
-MAX_SUPPORTS = 4  # three hold a ball; a fourth while it is decided which
+MAX_SUPPORTS = 4  # three hold a ball; a fourth is needed until it is decided which three
 
-# how a ball moves
+# values of ContactState.mode: how a ball moves
 FLYING, SLIDING, ASLEEP, JAMMED = 0, 1, 2, 3
+# values of SlowHits.part_contact: what the turning part does to a ball
+UNTOUCHED, TOUCHED, PRESSED = 0, 1, 2
 
-# columns of Footing.marks
-MODE, SUPPORTS, ROLLING, SLOW_HITS = 0, 1, 2, 3
-WAKE_PENDING = 4  # what it leans on has begun to move, and it has not seen to that yet
-DRIVEN = 5  # 1: the turning part has touched it, or a pressed one; 2: pressed, it is pushed and gets nowhere
-NEIGHBOURS_HOLDING_JAM = 6  # balls about a jammed one, while some of them move
-HOLDS = 7  # how often it was held where it is
-
-# columns of Footing.memory; times [s] since the start
-LEFT = 0  # normal of the foot left last
-HOPS = 3  # where its small hops began [m]
-LIES_SINCE = 6
-HELD_AT = 7  # where it was held last [m]
-STAYS_UNTIL = 10  # a call does not wake it before
-NEIGHBOUR_SUM = 11  # sum of the numbers of its PROPS
-COUNTS_SINCE = 12  # when its SLOW_HITS were 0
-TOUCHED = 13  # when it was last driven
-
-# what ends a path in contact, in place of an obstacle's number (calendar.py has -1 and -2)
-GOES_ON = -1
-STOPS = -3  # or turns: the resistance is set anew
-WAKES = -4
-STILL = -5
-RECHECK = -6  # a jammed ball looks whether those about it are still there
-LEAVES = -10  # minus the foot's place
-
-ON_BALL = -2  # minus the ball's number: the row of a foot on a ball that lies still
-
-DETACH_TOLERANCE = 0.01  # of capture: a foot left so slowly, against gravity, is not left
-ROUNDING = 1e-12  # [-]: of a projection
-STILL_BELOW = 1e-9  # of gravity: an acceleration this small is rounding
+# A support on a ball that lies still has the obstacle number ON_BALL minus the number of that ball.
+ON_BALL = -2
 
 
 class Rest(NamedTuple):
-    """``capture`` [m/s]: normal speed below which a hit on a still surface ends in contact; ``resistance`` [-]: the
-    deceleration of a ball in contact, as a share of its load.
+    """Options of contact mode.
+
+    capture: normal speed [m/s] below which a hit on a still surface ends in contact.
+    resistance: deceleration of a ball in contact, as a share of the load on its supports.
     """
 
     capture: float = CAPTURE
     resistance: float = RESISTANCE
 
 
-class ContactState(NamedTuple):
-    """What contact mode keeps of n balls.
+class Supports(NamedTuple):
+    """The planes on which each of n balls stands, at most MAX_SUPPORTS of them.
 
-    ``acceleration`` (n, 3): each ball's own acceleration [m/s²]; ``normals`` (n, 4, 3) of its feet; ``spots`` (n, 4, 4): where
-    [m] a foot was set and how far the ball may go from there on what is round; ``rows`` (n, 4) int32: the obstacles it
-    stands on, or see ON_BALL; ``marks`` (n, 8) int32, see MODE; ``memory`` (n, 14), see LEFT; ``contact_list``, ``contact_index``
-    (n,) int32 and ``contact_count`` (1,): the balls not in flight, each one's place among them, and how many. ``capture``,
-    ``resistance`` as in Rest; ``slow`` [m/s]: pair hits below lose nothing; ``friction_state``: friction, if there is any.
+    number: how many a ball has, (n,) int32.
+    obstacles: number of the obstacle under each, or see ON_BALL, (n, 4) int32.
+    normals: unit normals towards the ball, (n, 4, 3).
+    origins: where the ball was when it came onto the support [m], (n, 4, 3).
+    ranges: how far from there a plane stands for something round [m], (n, 4).
     """
 
-    acceleration: np.ndarray
+    number: np.ndarray
+    obstacles: np.ndarray
     normals: np.ndarray
-    spots: np.ndarray
-    rows: np.ndarray
-    marks: np.ndarray
-    memory: np.ndarray
-    contact_list: np.ndarray
-    contact_index: np.ndarray
-    contact_count: np.ndarray
+    origins: np.ndarray
+    ranges: np.ndarray
+
+
+class SlowHits(NamedTuple):
+    """Slow hits in a row of each of n balls, from which a jam is recognised.
+
+    number: hits in the row, (n,) int32.
+    position: where the row began [m], (n, 3).
+    began: when it began [s since the start], (n,).
+    part_contact: UNTOUCHED, TOUCHED or PRESSED by the turning part, (n,) int32.
+    touched_at: when the part, or a ball that it presses, touched the ball last [s], (n,).
+    """
+
+    number: np.ndarray
+    position: np.ndarray
+    began: np.ndarray
+    part_contact: np.ndarray
+    touched_at: np.ndarray
+
+
+class Jams(NamedTuple):
+    """Jams of each of n balls.
+
+    position: where the ball was held last [m], (n, 3).
+    repeats: how often it was held there again, (n,) int32.
+    neighbour_count: balls around it while some of them move, else 0, (n,) int32.
+    neighbour_sum: sum of the numbers of these balls, which tells whether they are the same, (n,).
+    """
+
+    position: np.ndarray
+    repeats: np.ndarray
+    neighbour_count: np.ndarray
+    neighbour_sum: np.ndarray
+
+
+class ContactList(NamedTuple):
+    """The balls that are not in flight.
+
+    balls: their numbers, (n,) int32, of which the first length[0] are in use.
+    places: place of each ball in the list, -1 for a ball in flight, (n,) int32.
+    length: (1,) int64.
+    """
+
+    balls: np.ndarray
+    places: np.ndarray
+    length: np.ndarray
+
+
+class ContactState(NamedTuple):
+    """State of contact mode for n balls.
+
+    mode: FLYING, SLIDING, ASLEEP or JAMMED, (n,) int32.
+    acceleration: each ball's own [m/s²], (n, 3).
+    left_normal: normal of the support left last, 0 unless the ball has just left it, (n, 3).
+    still_since: when the ball came to lie still [s since the start], (n,).
+    wake_pending: 1 where something under the ball has begun to move and the ball has not yet
+        reacted, (n,) int32.
+    stays_until: the ball is not woken before this time [s since the start], (n,).
+    capture, resistance: as in Rest.
+    elastic_below: balls that hit each other more slowly lose no speed [m/s].
+    radius: of every ball [m]. reach: distance at which two balls touch [m], 0 where they never do.
+    """
+
+    mode: np.ndarray
+    acceleration: np.ndarray
+    left_normal: np.ndarray
+    still_since: np.ndarray
+    wake_pending: np.ndarray
+    stays_until: np.ndarray
+    supports: Supports
+    slow_hits: SlowHits
+    jams: Jams
+    contact_list: ContactList
     capture: float
     resistance: float
-    slow: float
+    elastic_below: float
+    radius: float
+    reach: float
     gravity: Vec3
     friction_state: FrictionState | None
 
 
 def checked_rest(rest: Rest | None) -> Rest | None:
-    """The same as plain floats; raises SceneError for numbers out of range."""
+    """The same with plain floats; raises SceneError for numbers out of range."""
     if rest is None:
         return None
     plain = Rest(number("rest.capture", rest.capture), number("rest.resistance", rest.resistance))
@@ -117,158 +154,76 @@ def checked_rest(rest: Rest | None) -> Rest | None:
 def new_contact_state(
     rest: Rest | None,
     balls: int,
+    radius: float,
+    reach: float,
     gravity: Gravity | None,
     restitution: Restitution | None,
     friction_state: FrictionState | None,
 ) -> ContactState | None:
-    """All balls in flight; None without the effect."""
+    """The state with all balls in flight; None without the effect."""
     if rest is None:
         return None
-    acceleration = gravity_acceleration(gravity)
+    own = gravity_acceleration(gravity)
+
+    def whole(*shape: int, value: int = 0) -> np.ndarray:
+        return np.full((balls, *shape), value, dtype=np.int32)
+
+    def real(*shape: int) -> np.ndarray:
+        return np.zeros((balls, *shape))
+
+    size = MAX_SUPPORTS
     return ContactState(
-        np.tile(np.array(acceleration), (balls, 1)),
-        np.zeros((balls, MAX_SUPPORTS, 3)),
-        np.zeros((balls, MAX_SUPPORTS, 4)),
-        np.full((balls, MAX_SUPPORTS), -1, dtype=np.int32),
-        np.zeros((balls, 8), dtype=np.int32),
-        np.zeros((balls, 14)),
-        np.zeros(balls, dtype=np.int32),
-        np.full(balls, -1, dtype=np.int32),
-        np.zeros(1, dtype=np.int64),
-        rest.capture,
-        rest.resistance,
-        ELASTIC_BELOW if restitution is None else restitution.elastic_below,
-        Vec3(*(float(x) for x in acceleration)),
-        friction_state,
+        mode=whole(),
+        acceleration=np.tile(np.array(own), (balls, 1)),
+        left_normal=real(3),
+        still_since=real(),
+        wake_pending=whole(),
+        stays_until=real(),
+        supports=Supports(whole(), whole(size, value=-1), real(size, 3), real(size, 3), real(size)),
+        slow_hits=SlowHits(whole(), real(3), real(), whole(), real()),
+        jams=Jams(real(3), whole(), whole(), real()),
+        contact_list=ContactList(whole(), whole(value=-1), np.zeros(1, dtype=np.int64)),
+        capture=rest.capture,
+        resistance=rest.resistance,
+        elastic_below=ELASTIC_BELOW if restitution is None else restitution.elastic_below,
+        radius=radius,
+        reach=reach,
+        gravity=Vec3(*(float(x) for x in own)),
+        friction_state=friction_state,
     )
 
 
 @inlined
 def ball_acceleration(contact: ContactState | None, ball: int, gravity: Gravity | None) -> Vec3:
-    """A ball's acceleration [m/s²]: gravity, or what its feet leave of it."""
+    """A ball's acceleration [m/s²]: gravity, or what its supports leave of it."""
     if contact is None:
         return gravity_acceleration(gravity)
-    return Vec3(
-        contact.acceleration[ball, 0], contact.acceleration[ball, 1], contact.acceleration[ball, 2]
-    )
+    return vec3_at(contact.acceleration, ball)
 
 
 @inlined
-def static_law(contact: ContactState | None, restitution: Restitution | None) -> Restitution | None:
-    """The law of hits on still surfaces: with contact mode, hits lose energy at all speeds."""
+def is_flying(contact: ContactState | None, ball: int) -> bool:
+    """True for a ball that is not in contact."""
+    if contact is None:
+        return True
+    return contact.mode[ball] == FLYING
+
+
+@inlined
+def is_still(contact: ContactState | None, ball: int) -> bool:
+    """True for a ball that sleeps or is jammed."""
+    if contact is None:
+        return False
+    return contact.mode[ball] >= ASLEEP
+
+
+@inlined
+def still_surface_restitution(
+    contact: ContactState | None, restitution: Restitution | None
+) -> Restitution | None:
+    """The law for hits on still surfaces: with contact mode they lose energy at all speeds."""
     if contact is None:
         return restitution
     if restitution is None:
         return restitution
     return Restitution(restitution.surfaces, restitution.balls, 0.0)
-
-
-@jit
-def support_normal(contact: ContactState, ball: int, support: int) -> Vec3:
-    """Unit normal of a foot, towards the ball."""
-    return Vec3(
-        contact.normals[ball, support, 0],
-        contact.normals[ball, support, 1],
-        contact.normals[ball, support, 2],
-    )
-
-
-@jit
-def stands_on_ball(contact: ContactState, ball: int, other: int) -> bool:
-    """True when a ball has a foot on another."""
-    stands = False
-    for support in range(contact.marks[ball, SUPPORTS]):
-        stands |= contact.rows[ball, support] == ON_BALL - other
-    return stands
-
-
-@jit
-def _fits(contact: ContactState, ball: int, x: Vec3, slack: float) -> bool:
-    fits = True
-    for support in range(contact.marks[ball, SUPPORTS]):
-        fits &= dot(support_normal(contact, ball, support), x) >= -slack
-    return fits
-
-
-@jit
-def onto_cone(contact: ContactState, ball: int, x: Vec3) -> Vec3:
-    """The vector nearest to x in the cone that the ball's feet leave: x itself, or on one foot's plane, or on two.
-
-    The nearest one is unique; it is told by its multipliers, all of which push (Kuhn-Tucker).
-    """
-    supports = contact.marks[ball, SUPPORTS]
-    size = np.sqrt(dot(x, x))
-    slack = ROUNDING * size
-    if _fits(contact, ball, x, slack):
-        return x
-    for one in range(supports):
-        n = support_normal(contact, ball, one)
-        push = -dot(n, x)
-        y = add_scaled(x, push, n)
-        if push >= -slack and _fits(contact, ball, y, slack):
-            return y
-    for one in range(supports):
-        n = support_normal(contact, ball, one)
-        for two in range(one + 1, supports):
-            m = support_normal(contact, ball, two)
-            line = cross(n, m)
-            square = dot(line, line)
-            if square < 1e-20:
-                continue
-            c = dot(n, m)
-            a, b = -dot(n, x), -dot(m, x)
-            loose = slack + 1e-15 * size / square
-            if (a - c * b) / square < -loose or (b - c * a) / square < -loose:
-                continue
-            share = dot(line, x) / square
-            y = Vec3(share * line.x, share * line.y, share * line.z)
-            if _fits(contact, ball, y, slack):
-                return y
-    return Vec3(0.0, 0.0, 0.0)
-
-
-@jit
-def drop_support(contact: ContactState, ball: int, support: int) -> None:
-    """Take a foot away; those after it move up."""
-    last = contact.marks[ball, SUPPORTS] - 1
-    for k in range(support, last):
-        contact.rows[ball, k] = contact.rows[ball, k + 1]
-        for axis in range(3):
-            contact.normals[ball, k, axis] = contact.normals[ball, k + 1, axis]
-        for axis in range(4):
-            contact.spots[ball, k, axis] = contact.spots[ball, k + 1, axis]
-    contact.rows[ball, last] = -1
-    contact.marks[ball, SUPPORTS] = last
-
-
-@jit
-def add_support(
-    contact: ContactState, ball: int, row: int, normal: Vec3, position: Vec3, scope: float
-) -> None:
-    """Stand on an obstacle too, good up to ``scope`` [m] from here; the oldest foot gives way to a fifth."""
-    if contact.marks[ball, SUPPORTS] == MAX_SUPPORTS:
-        drop_support(contact, ball, 0)
-    support = contact.marks[ball, SUPPORTS]
-    contact.rows[ball, support] = row
-    for axis in range(3):
-        contact.normals[ball, support, axis] = normal[axis]
-        contact.spots[ball, support, axis] = position[axis]
-    contact.spots[ball, support, 3] = scope
-    contact.marks[ball, SUPPORTS] = support + 1
-
-
-@jit
-def set_mode(contact: ContactState, ball: int, mode: int) -> None:
-    """Write down how a ball moves, and keep the roster of those not in flight."""
-    contact.marks[ball, MODE] = mode
-    contact_index = contact.contact_index[ball]
-    if mode == FLYING and contact_index >= 0:
-        contact.contact_count[0] -= 1
-        last = contact.contact_list[contact.contact_count[0]]
-        contact.contact_list[contact_index] = last
-        contact.contact_index[last] = contact_index
-        contact.contact_index[ball] = -1
-    elif mode != FLYING and contact_index < 0:
-        contact.contact_list[contact.contact_count[0]] = ball
-        contact.contact_index[ball] = contact.contact_count[0]
-        contact.contact_count[0] += 1

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from sim_core.effects.contact_mode import FLYING, MODE, ContactState, ball_acceleration
+from sim_core.effects.contact_mode import ContactState, ball_acceleration, is_flying
 from sim_core.effects.drag import DragState, remaining_speed
 from sim_core.effects.gravity import Gravity
 from sim_core.motion import change_velocity, state_under
@@ -20,14 +20,6 @@ from sim_core.numerics.roots import NEVER
 from sim_core.numerics.vec3 import Vec3, dot, scaled
 
 ON_TIME = 1.999  # half pieces: an impulse that rounding makes early is on time
-
-
-@inlined
-def is_flying(contact: ContactState | None, ball: int) -> bool:
-    """True for a ball that is not in contact mode."""
-    if contact is None:
-        return True
-    return contact.marks[ball, MODE] == FLYING
 
 
 @inlined

@@ -1,4 +1,4 @@
-"""Compiling ahead of time, so that a program can say what takes so long the first time."""
+"""Compile the simulator ahead of time, so that a program can say why its first start takes long."""
 
 import contextlib
 import math
@@ -11,33 +11,39 @@ from sim_core.balls import Balls
 from sim_core.geometry.analytic import cylinder_cavity
 from sim_core.geometry.mesh import TriangleMesh
 from sim_core.loop.simulate import simulate
-from sim_core.loop.spatial_blocks import MANY
+from sim_core.loop.spatial_blocks import MIN_BALLS
 from sim_core.numerics.jit import CACHE_FOLDER
 from sim_core.scene.physics import Physics
 from sim_core.scene.scene import Scene
 
 
-def _mark(physics: Physics, balls: int, alike: bool, cylinder: bool) -> Path:
-    """A file that says that this set of effects has been compiled: what is absent is not in the machine code."""
+def _marker(physics: Physics, balls: int, alike: bool, cylinder: bool) -> Path:
+    """File that marks a set of effects as compiled: each set has machine code of its own."""
     present = [
         name for name, effect in zip(physics._fields, physics, strict=True) if effect is not None
     ]
-    kind = ["many" if balls >= MANY else "few", "alike" if alike else "mixed"]
+    kind = ["many" if balls >= MIN_BALLS else "few", "alike" if alike else "mixed"]
     if len(physics.vibrations) > 1:
         kind.append("sonotrodes")
     return CACHE_FOLDER / "-".join(["compiled", *present, *kind, *["bore"] * cylinder])
 
 
 def is_compiled(physics: Physics, balls: int, alike: bool = True, cylinder: bool = False) -> bool:
-    """True when compile_simulator has done this before, with this version of the sources."""
-    return _mark(physics, balls, alike, cylinder).exists()
+    """True when compile_simulator has compiled this before, with this version of the sources."""
+    return _marker(physics, balls, alike, cylinder).exists()
 
 
 def compile_simulator(
     physics: Physics, balls: int = 1, alike: bool = True, cylinder: bool = False
 ) -> float:
-    """Compiles (or loads from the cache) what a scene with these effects and so many balls, ``alike`` or of several
-    sizes, needs, in a mesh or a prism, or in the ``bore`` of an analytical cylinder; returns the seconds it took.
+    """Compile what a scene with these effects needs, or load it from the cache.
+
+    Args:
+        balls: their number. alike: of one size and density.
+        cylinder: in an analytical cylinder, not in a mesh or a prism.
+
+    Returns:
+        The time that it took [s].
     """
     start = time.perf_counter()
     if len(physics.vibrations) > 2:
@@ -56,7 +62,7 @@ def compile_simulator(
             tags = np.minimum(tags, len(law.surfaces) - 1)
     if physics.part_rotation is not None:
         physics, vertices, triangles, tags = _with_a_turning_box(physics, vertices, triangles, tags)
-    side = math.ceil(MANY ** (1 / 3)) if balls >= MANY else 2
+    side = math.ceil(MIN_BALLS ** (1 / 3)) if balls >= MIN_BALLS else 2
     places = np.stack(np.meshgrid(*[np.linspace(0.1, 0.9, side)] * 3), axis=-1).reshape(-1, 3)
     diameter = 0.05 if alike else np.linspace(0.04, 0.05, len(places)).round(2)
     shot = Balls(places, np.random.default_rng(1).normal(size=places.shape), diameter)
@@ -69,10 +75,9 @@ def compile_simulator(
         else mesh
     )
     simulate(Scene(room, shot, physics, duration=0.01))
-    with contextlib.suppress(
-        OSError
-    ):  # a cache that cannot be written: every process compiles for itself
-        _mark(physics, balls, alike, cylinder).touch()
+    # Where the cache cannot be written, every process compiles for itself.
+    with contextlib.suppress(OSError):
+        _marker(physics, balls, alike, cylinder).touch()
     return time.perf_counter() - start
 
 

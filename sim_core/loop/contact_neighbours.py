@@ -1,54 +1,44 @@
-"""Who meets whom when some balls are in contact mode: those fly no straight lines in the free-fall frame.
+"""Pairs with a ball in contact, and waking the neighbours of a ball that begins to move.
 
-The filter of neighbours.py does not see them; they are looked at one by one, exactly.
+Balls in contact fly no straight lines in the free-fall frame, so the filter of neighbours.py leaves
+them out, and they are examined here one by one, exactly.
 """
 
 import numpy as np
 
-from sim_core.contact.constrained_impulse import acceleration_of, place
+from sim_core.contact.ball_on_ball import place
+from sim_core.contact.support_changes import WAKES
+from sim_core.contact.supports import drop_support, stands_on_ball
 from sim_core.detect.ball_ball import accelerated_pair_delay
-from sim_core.effects.contact_mode import (
-    ASLEEP,
-    FLYING,
-    JAMMED,
-    MODE,
-    NEIGHBOUR_SUM,
-    NEIGHBOURS_HOLDING_JAM,
-    ON_BALL,
-    STAYS_UNTIL,
-    SUPPORTS,
-    WAKE_PENDING,
-    WAKES,
-    ContactState,
-    drop_support,
-    stands_on_ball,
-)
-from sim_core.loop.event_queue import EventQueue, call_up, look_again
+from sim_core.effects.contact_mode import ASLEEP, FLYING, JAMMED, ON_BALL, ContactState
+from sim_core.loop.event_queue import EventQueue, schedule_now, search_wall_again
 from sim_core.loop.neighbours import NeighbourFilter, next_meeting
-from sim_core.loop.spatial_blocks import slot_of
+from sim_core.loop.spatial_blocks import column_of
+from sim_core.motion import BallEvent
 from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.roots import NEVER
-from sim_core.numerics.vec3 import Flight, dot, sub
+from sim_core.numerics.vec3 import Flight, Vec3, dot, sub, vec3_at
 
-LEANING = 2e-5  # m: a ball held still is this near to what holds it, or nearer: hops at 10 mm/s are 5 um high
+# m. A ball held still is this near to what holds it, or nearer: hops at 10 mm/s are 5 um high.
+MAX_JAM_GAP = 2e-5
 
 
 @inlined
 def hide(contact: ContactState | None, neighbours: NeighbourFilter | None, ball: int) -> None:
-    """Take a ball in contact mode out of the filter's sight."""
+    """Leave a ball in contact out of the filter: as NaN it meets no other."""
     if contact is None or neighbours is None:
         return
-    if contact.marks[ball, MODE] != FLYING:
-        neighbours.lanes[0, slot_of(neighbours.blocks, ball)] = np.float32(np.nan)
+    if contact.mode[ball] != FLYING:
+        neighbours.paths[0, column_of(neighbours.blocks, ball)] = np.float32(np.nan)
 
 
 @jit
 def hide_all(contact: ContactState | None, neighbours: NeighbourFilter | None) -> None:
-    """The same for all of them, at a window's start."""
+    """Leave all balls in contact out of the filter, at a window's start."""
     if contact is None or neighbours is None:
         return
-    for k in range(contact.contact_count[0]):
-        hide(contact, neighbours, contact.contact_list[k])
+    for k in range(contact.contact_list.length[0]):
+        hide(contact, neighbours, contact.contact_list.balls[k])
 
 
 @inlined
@@ -60,19 +50,19 @@ def first_meeting(
     time: float,
     before: float,
 ) -> tuple[float, int]:
-    """next_meeting among all balls, whether in flight or in contact."""
+    """What next_meeting returns, among all balls, whether in flight or in contact."""
     if contact is None:
         return next_meeting(neighbours, motion, ball, time, before)
     meeting, partner = NEVER, -1
-    if contact.marks[ball, MODE] == FLYING:
+    if contact.mode[ball] == FLYING:
         meeting, partner = next_meeting(neighbours, motion, ball, time, before)
-        if contact.contact_count[0] == 0:
+        if contact.contact_list.length[0] == 0:
             return meeting, partner
-    return _with_grounded(contact, motion, ball, time, before, meeting, partner, neighbours.reach)
+    return _with_contact(contact, motion, ball, time, before, meeting, partner)
 
 
 @jit
-def _with_grounded(
+def _with_contact(
     contact: ContactState,
     motion: np.ndarray,
     ball: int,
@@ -80,26 +70,27 @@ def _with_grounded(
     before: float,
     meeting: float,
     partner: int,
-    reach: float,
 ) -> tuple[float, int]:
-    """The earlier of a meeting found among the balls in flight and those with balls in contact; for a ball in contact
-    itself those with all balls.
+    """The earlier of a meeting with a ball in flight and those with balls in contact.
+
+    For a ball that is in contact itself: the earliest meeting with any ball.
     """
     best = min(meeting, before) - time
     here = place(contact, motion, ball, time)
-    flying = contact.marks[ball, MODE] == FLYING
-    still = contact.marks[ball, MODE] >= ASLEEP
-    own = acceleration_of(contact, ball)
-    for k in range(contact.contact_count[0] if flying else len(motion)):
-        other = contact.contact_list[k] if flying else k
-        if other == ball or (still and contact.marks[other, MODE] >= ASLEEP):
+    flying, still = contact.mode[ball] == FLYING, contact.mode[ball] >= ASLEEP
+    own = vec3_at(contact.acceleration, ball)
+    in_contact = contact.contact_list
+    for k in range(in_contact.length[0] if flying else len(motion)):
+        other = int(np.int64(in_contact.balls[k])) if flying else k
+        if other == ball or (still and contact.mode[other] >= ASLEEP):
             continue
-        if stands_on_ball(contact, ball, other) or stands_on_ball(contact, other, ball):
+        supports = contact.supports
+        if stands_on_ball(supports, ball, other) or stands_on_ball(supports, other, ball):
             continue
         there = place(contact, motion, other, time)
         apart, closing = sub(there.position, here.position), sub(there.velocity, here.velocity)
-        pull = sub(acceleration_of(contact, other), own)
-        delay = accelerated_pair_delay(Flight(apart, closing, pull), reach, best)
+        relative = sub(vec3_at(contact.acceleration, other), own)
+        delay = accelerated_pair_delay(Flight(apart, closing, relative), contact.reach, best)
         if delay < best or (delay == best and partner >= 0 and other < partner):
             best = delay
             partner = other
@@ -109,91 +100,75 @@ def _with_grounded(
 
 
 @inlined
-def lies_still(contact: ContactState | None, ball: int) -> bool:
-    """True for a ball that sleeps or is jammed."""
-    if contact is None:
-        return False
-    return contact.marks[ball, MODE] >= ASLEEP
-
-
-@inlined
 def wake_if_it_moves(
-    contact: ContactState | None,
-    queue: EventQueue,
-    motion: np.ndarray,
-    ball: int,
-    time: float,
-    time_since_start: float,
-    reach: float,
+    contact: ContactState | None, queue: EventQueue, motion: np.ndarray, event: BallEvent
 ) -> None:
-    """What leans on a ball that lay still is woken when it no longer does."""
+    """Wake what leans on a ball that lay still, if it has begun to move."""
     if contact is None:
         return
-    if contact.marks[ball, MODE] < ASLEEP:
-        wake_neighbours(contact, queue, motion, ball, time, time_since_start, reach)
+    if contact.mode[event.ball] < ASLEEP:
+        wake_neighbours(contact, queue, motion, event)
 
 
 @jit
 def wake_neighbours(
-    contact: ContactState,
-    queue: EventQueue,
-    motion: np.ndarray,
-    ball: int,
-    time: float,
-    time_since_start: float,
-    reach: float,
+    contact: ContactState, queue: EventQueue, motion: np.ndarray, event: BallEvent
 ) -> None:
-    """Call up the balls that stand on one that has begun to move, and those held still beside it.
+    """Wake the balls that stand on one that has begun to move, and those held still beside it.
 
-    Marked besides: what meets one of them at this very time has its events predicted anew, and the call must not be
-    lost with the old ones.
+    They are marked besides: what meets one of them at this very time has its events predicted
+    again, and the wake-up must not be lost with the old ones.
     """
+    ball, time = event.ball, event.time
     here = place(contact, motion, ball, time).position
-    for k in range(contact.contact_count[0]):
-        other = contact.contact_list[k]
-        leans = stands_on_ball(contact, other, ball)
-        if not leans and other != ball and contact.marks[other, MODE] == JAMMED:
-            apart = sub(place(contact, motion, other, time).position, here)
-            leans = dot(apart, apart) < (reach + LEANING) ** 2
+    for k in range(contact.contact_list.length[0]):
+        other = int(np.int64(contact.contact_list.balls[k]))
+        leans = stands_on_ball(contact.supports, other, ball)
+        if not leans and other != ball and contact.mode[other] == JAMMED:
+            leans = _is_near(contact, motion, other, time, here)
         if leans:
-            contact.marks[other, WAKE_PENDING] = 1
-            if contact.memory[other, STAYS_UNTIL] > time_since_start:
-                _step_off(contact, other, ball)  # until then they are a pair like others
-                look_again(queue, other, time)
+            contact.wake_pending[other] = 1
+            if contact.stays_until[other] > event.time_since_start:
+                _drop_supports_on(contact, other, ball)  # until then they are an ordinary pair
+                search_wall_again(queue, other, time)
             else:
-                call_up(queue, other, time, WAKES)
+                schedule_now(queue, other, time, WAKES)
 
 
 @jit
-def _step_off(contact: ContactState, ball: int, other: int) -> None:
-    support = 0
-    while support < contact.marks[ball, SUPPORTS]:
-        if contact.rows[ball, support] == ON_BALL - other:
-            drop_support(contact, ball, support)
-        else:
-            support += 1
-
-
-@jit
-def count_neighbours(
-    contact: ContactState, motion: np.ndarray, ball: int, time: float, reach: float
+def _is_near(
+    contact: ContactState, motion: np.ndarray, ball: int, time: float, position: Vec3
 ) -> bool:
-    """Note which balls are about a jammed one, if any of them moves: it may not be held any more once one has gone.
+    """True when a ball is so near to another at ``position`` [m] that it may hold it."""
+    apart = sub(place(contact, motion, ball, time).position, position)
+    return dot(apart, apart) < (contact.reach + MAX_JAM_GAP) ** 2
 
-    True when they are not those noted before.
+
+@jit
+def _drop_supports_on(contact: ContactState, ball: int, other: int) -> None:
+    supports = contact.supports
+    for support in range(supports.number[ball] - 1, -1, -1):
+        if supports.obstacles[ball, support] == ON_BALL - other:
+            drop_support(supports, ball, support)
+
+
+@jit
+def count_neighbours(contact: ContactState, motion: np.ndarray, event: BallEvent) -> bool:
+    """Note which balls are around a jammed one, if any of them moves.
+
+    Once one of them has gone, the ball may not be held any more.
+
+    Returns: True when they are not the ones noted before.
     """
-    here = place(contact, motion, ball, time).position
+    ball, jams = event.ball, contact.jams
+    here = place(contact, motion, ball, event.time).position
     count, numbers, moves = 0, 0, False
     for other in range(len(motion)):
-        apart = sub(place(contact, motion, other, time).position, here)
-        if other != ball and dot(apart, apart) < (reach + LEANING) ** 2:
+        if other != ball and _is_near(contact, motion, other, event.time, here):
             count += 1
             numbers += other
-            moves |= contact.marks[other, MODE] < ASLEEP
-    others = (
-        count != contact.marks[ball, NEIGHBOURS_HOLDING_JAM]
-        or numbers != contact.memory[ball, NEIGHBOUR_SUM]
-    )
-    contact.marks[ball, NEIGHBOURS_HOLDING_JAM] = count if moves else 0
-    contact.memory[ball, NEIGHBOUR_SUM] = numbers
-    return others
+            moves |= contact.mode[other] < ASLEEP
+    changed = count != jams.neighbour_count[ball] or numbers != jams.neighbour_sum[ball]
+    jams.neighbour_count[ball] = count if moves else 0
+    jams.neighbour_sum[ball] = numbers
+    return changed

@@ -1,25 +1,36 @@
-"""What an event does: a ball meets a surface, the turning part or another ball, or takes a step in contact mode."""
+"""What an event does: a ball meets a surface or another ball, or its path in contact ends.
+
+Every hit on a surface, still, vibrating or turning, is resolved in _resolve_contact. A new effect
+of the contact between a ball and a surface is one more step there.
+"""
 
 import math
+from typing import NamedTuple
+
+import numpy as np
 
 from sim_core.contact.ball_on_ball import meet
-from sim_core.contact.jamming import hold
-from sim_core.contact.pushed_by_part import drive, taken_from_part
-from sim_core.contact.support_changes import BOUNCES, ROLLS, deflect, land, set_out, step
+from sim_core.contact.jamming import hold_still
+from sim_core.contact.pushed_by_part import constrained_change, push_ball
+from sim_core.contact.support_changes import (
+    BOUNCES,
+    RECHECK,
+    ROLLS,
+    deflect,
+    end_path,
+    land,
+    moved_off_edge,
+)
 from sim_core.detect.ball_cylinder import normal_at
 from sim_core.detect.ball_triangle import away_from_capsule, face_normal, nearer_neighbour
 from sim_core.effects.contact_mode import (
     ASLEEP,
-    DRIVEN,
     JAMMED,
-    MODE,
-    RECHECK,
-    WAKE_PENDING,
+    UNTOUCHED,
     ContactState,
     ball_acceleration,
-    static_law,
+    still_surface_restitution,
 )
-from sim_core.effects.friction import FrictionState
 from sim_core.effects.part_rotation import (
     RotationState,
     relative_flight,
@@ -27,44 +38,102 @@ from sim_core.effects.part_rotation import (
     to_room_frame,
 )
 from sim_core.effects.random_phase import wave_of_ball
+from sim_core.effects.restitution import Restitution
 from sim_core.effects.sonotrodes import wave_of_face
 from sim_core.effects.vibration import surface_velocity
 from sim_core.geometry.ball_sizes import share_by_mass
 from sim_core.geometry.obstacles import CAPSULE, VIBRATING_FACE
-from sim_core.geometry.triangle_lookup import find_triangle
 from sim_core.geometry.turning_part import PartTree
 from sim_core.impulses.collision import (
     leave_cylinder_wall,
     pair_velocity_change,
     surface_velocity_change,
 )
-from sim_core.impulses.drag import apply_drag_piece, apply_drag_until, is_flying
 from sim_core.impulses.friction import add_pair_friction, add_surface_friction
-from sim_core.loop.contact_neighbours import count_neighbours, hide, lies_still, wake_if_it_moves
-from sim_core.loop.event_queue import EVENTS
-from sim_core.loop.impact_log import note_impact
-from sim_core.loop.neighbours import follow, reach_of
-from sim_core.loop.state import SONOTRODE, WALLS, SimulationState
-from sim_core.motion import change_velocity, free_fall_position, state_under
+from sim_core.loop.contact_neighbours import count_neighbours, wake_if_it_moves
+from sim_core.loop.event_queue import EventQueue
+from sim_core.loop.impact_log import Impact, no_impact
+from sim_core.loop.state import BALLS, SONOTRODE, WALLS, SimulationState
+from sim_core.motion import BallEvent, BallState, change_velocity, free_fall_position, state_under
 from sim_core.numerics.jit import inlined
 from sim_core.numerics.vec3 import Flight, Vec3, dot, sub
 
-JAM_EVENTS = 5_000  # of one ball in one window: with contact mode it is held still then, and each time as many later
+# Events of one ball in one window after which contact mode holds it still, and again after as many.
+JAM_EVENTS = 5_000
+
+
+class Touch(NamedTuple):
+    """A ball touches a surface, as seen in the frame of the surface.
+
+    away: any vector along the normal, from the surface to the ball. relative: velocity of the ball
+    minus that of the surface [m/s]. tag: of the surface. kind: of the obstacle.
+    """
+
+    away: Vec3
+    relative: Vec3
+    tag: int
+    kind: int
 
 
 @inlined
-def hit_surface(state: SimulationState, ball: int, obstacle: int, time: float) -> None:
-    """The ball meets the obstacle now: change its velocity, count the impact, write it down if it is on a recorded
-    surface.
+def _resolve_contact(
+    rotation: RotationState | None,
+    state: SimulationState,
+    event: BallEvent,
+    touch: Touch,
+    law: Restitution | None,
+    approach: float,
+) -> Vec3:
+    """Velocity change [m/s] of a ball that hits a surface at ``approach`` [m/s] and bounces.
+
+    ``turning``: of the part, if the surface is the turning part's; the change is in the room's
+    frame. ``law``: the restitution that holds there.
     """
-    obstacles, clock, buffer = state.obstacles, state.clock, state.buffer
-    tree = obstacles.tree
-    apply_drag_until(state.drag, state.contact, state.motion, ball, time, state.gravity)
-    here = state_under(
-        state.motion, ball, time, ball_acceleration(state.contact, ball, state.gravity)
+    change = surface_velocity_change(touch.away, touch.relative, law, touch.tag)
+    change = _in_room(rotation, change, event.time)
+    change = _constrained(rotation, state, event, touch, approach, change)
+    away = _in_room(rotation, touch.away, event.time)
+    relative = _in_room(rotation, touch.relative, event.time)
+    change = add_surface_friction(
+        state.friction_state, event.ball, event.time, away, relative, change, touch.tag
     )
-    time_since_start = clock.now[1] * clock.window + time
-    lay_still = lies_still(state.contact, ball)
+    return leave_cylinder_wall(state.obstacles.cylinder, touch.kind, away, relative, change)
+
+
+@inlined
+def _in_room(rotation: RotationState | None, vector: Vec3, time: float) -> Vec3:
+    """A vector of the surface's frame in the room's."""
+    if rotation is None:
+        return vector
+    return to_room_frame(rotation, vector, time)
+
+
+@inlined
+def _constrained(
+    rotation: RotationState | None,
+    state: SimulationState,
+    event: BallEvent,
+    touch: Touch,
+    approach: float,
+    change: Vec3,
+) -> Vec3:
+    if rotation is None:
+        return change
+    return constrained_change(state.contact, rotation, event, touch.away, approach, change)
+
+
+@inlined
+def _here(state: SimulationState, event: BallEvent) -> BallState:
+    acceleration = ball_acceleration(state.contact, event.ball, state.gravity)
+    return state_under(state.motion, event.ball, event.time, acceleration)
+
+
+@inlined
+def hit_surface(state: SimulationState, event: BallEvent) -> Impact:
+    """The ball meets a still or vibrating surface now: change its velocity, count the hit."""
+    obstacles, ball = state.obstacles, event.ball
+    tree, obstacle = obstacles.tree, int(np.int64(state.queue.obstacle[ball]))
+    here = _here(state, event)
     kind = tree.kinds[obstacle]
     side = 0
     touched = here.position  # or where the ball's centre is seen in the face's plane
@@ -72,7 +141,7 @@ def hit_surface(state: SimulationState, ball: int, obstacle: int, time: float) -
         away = away_from_capsule(tree.numbers, obstacle, here.position)
         side = nearer_neighbour(tree.numbers, obstacle, away)
         touched = sub(here.position, away)
-        here = set_out(state.contact, state.motion, ball, time, here, away, tree.radius)
+        here = moved_off_edge(state.contact, state.motion, event, here, away)
     else:
         away = normal_at(obstacles.cylinder, tree.numbers, obstacle, kind, here.position)
     relative = here.velocity
@@ -82,74 +151,35 @@ def hit_surface(state: SimulationState, ball: int, obstacle: int, time: float) -
         wave = wave_of_face(
             state.waves, wave_of_ball(state.random_phase, state.wave, ball), obstacle
         )
-        relative = sub(relative, surface_velocity(wave, time))
+        relative = sub(relative, surface_velocity(wave, event.time))
     else:
-        landed = land(
-            state.contact, tree, state.motion, ball, obstacle, time, time_since_start, here, away
-        )
-        law = static_law(state.contact, state.restitution)
-    triangle = tree.triangles[obstacle, side]
-    tag = obstacles.tags[triangle]
+        landed = land(state.contact, tree, state.motion, event, obstacle, here, away)
+        law = still_surface_restitution(state.contact, state.restitution)
+    triangle = int(np.int64(tree.triangles[obstacle, side]))
+    tag = int(np.int64(obstacles.tags[triangle]))
+    approach = -dot(away, relative) / math.sqrt(dot(away, away))
     if landed == BOUNCES:
-        change = surface_velocity_change(away, relative, law, tag)
-        change = add_surface_friction(state.friction_state, ball, time, away, relative, change, tag)
-        change = leave_cylinder_wall(obstacles.cylinder, kind, away, relative, change)
-        deflect(state.contact, state.motion, ball, time, time_since_start, here, change)
-    follow(state.neighbours, state.motion, ball, time)
-    hide(state.contact, state.neighbours, ball)
-    if lay_still:
-        wake_if_it_moves(
-            state.contact,
-            state.queue,
-            state.motion,
-            ball,
-            time,
-            time_since_start,
-            reach_of(state.neighbours),
-        )
+        touch = Touch(away, relative, tag, kind)
+        change = _resolve_contact(None, state, event, touch, law, approach)
+        deflect(state.contact, state.motion, event, here, change)
     if landed == ROLLS:
-        return
-    if kind == VIBRATING_FACE:
-        state.tally[SONOTRODE] += 1
-    else:
-        state.tally[WALLS] += 1
-    speed = -dot(away, relative) / math.sqrt(dot(away, away))
-    if buffer.record[tag] and speed > 0.0:
-        when = clock.now[1] * clock.window + time - clock.origin
-        note_impact(
-            buffer,
-            when,
-            ball,
-            find_triangle(obstacles.lookup, triangle, touched),
-            here.position,
-            relative,
-            speed,
-        )
+        return no_impact()
+    state.counts[SONOTRODE if kind == VIBRATING_FACE else WALLS] += 1
+    return Impact(tag, triangle, touched, here.position, relative, approach)
 
 
 @inlined
 def hit_part(
-    rotation: RotationState | None,
-    part: PartTree | None,
-    state: SimulationState,
-    ball: int,
-    obstacle: int,
-    time: float,
-) -> bool:
-    """The same for an obstacle of the turning part, seen and written down in the part's frame; False if it is none."""
+    rotation: RotationState | None, part: PartTree | None, state: SimulationState, event: BallEvent
+) -> Impact:
+    """The same for the turning part; the impact is seen in the part's frame."""
     if rotation is None or part is None:
-        return False
-    row = obstacle - len(state.obstacles.tree.kinds)
-    if row < 0:
-        return False
-    clock, buffer, tree = state.clock, state.buffer, part.tree
-    apply_drag_until(state.drag, state.contact, state.motion, ball, time, state.gravity)
-    acceleration = ball_acceleration(state.contact, ball, state.gravity)
-    here = state_under(state.motion, ball, time, acceleration)
-    time_since_start = clock.now[1] * clock.window + time
-    lay_still = lies_still(state.contact, ball)
-    flight = Flight(here.position, here.velocity, acceleration)
-    seen = relative_flight(rotation, flight, time)
+        return no_impact()
+    tree = part.tree
+    row = state.queue.obstacle[event.ball] - len(state.obstacles.tree.kinds)
+    here = _here(state, event)
+    acceleration = ball_acceleration(state.contact, event.ball, state.gravity)
+    seen = relative_flight(rotation, Flight(here.position, here.velocity, acceleration), event.time)
     side = 0
     if tree.kinds[row] == CAPSULE:
         away = away_from_capsule(tree.numbers, row, seen.position)
@@ -157,169 +187,84 @@ def hit_part(
     else:
         normal = face_normal(tree.numbers, row)
         away = Vec3(tree.radius * normal.x, tree.radius * normal.y, tree.radius * normal.z)
-    relative = slip_velocity(rotation, seen, away, time)
-    state.tally[WALLS] += 1
-    triangle = tree.triangles[row, side]
-    tag = state.obstacles.tags[triangle]
-    change = to_room_frame(
-        rotation, surface_velocity_change(away, relative, state.restitution, tag), time
-    )
-    speed = -dot(away, relative) / math.sqrt(dot(away, away))
-    change = taken_from_part(state.contact, rotation, ball, time, away, speed, change)
-    change = _rub_part(state.friction_state, rotation, ball, time, away, relative, change, tag)
-    drive(state.contact, state.motion, ball, time, time_since_start, here, change)
-    follow(state.neighbours, state.motion, ball, time)
-    hide(state.contact, state.neighbours, ball)
-    if lay_still:
-        wake_if_it_moves(
-            state.contact,
-            state.queue,
-            state.motion,
-            ball,
-            time,
-            time_since_start,
-            reach_of(state.neighbours),
-        )
-    if buffer.record[tag] and speed > 0.0:
-        when = clock.now[1] * clock.window + time - clock.origin
-        touched = find_triangle(state.obstacles.lookup, triangle, sub(seen.position, away))
-        note_impact(buffer, when, ball, touched, seen.position, relative, speed)
-    return True
+    relative = slip_velocity(rotation, seen, away, event.time)
+    triangle = int(np.int64(tree.triangles[row, side]))
+    tag = int(np.int64(state.obstacles.tags[triangle]))
+    approach = -dot(away, relative) / math.sqrt(dot(away, away))
+    touch = Touch(away, relative, tag, tree.kinds[row])
+    change = _resolve_contact(rotation, state, event, touch, state.restitution, approach)
+    push_ball(state.contact, state.motion, event, here, change)
+    state.counts[WALLS] += 1
+    return Impact(tag, triangle, sub(seen.position, away), seen.position, relative, approach)
 
 
 @inlined
-def _rub_part(
-    friction_state: FrictionState | None,
-    rotation: RotationState,
-    ball: int,
-    time: float,
-    away: Vec3,
-    relative: Vec3,
-    change: Vec3,
-    tag: int,
-) -> Vec3:
-    """rub_surface for ``away`` and ``relative`` in the part's frame; spins are those of the room."""
-    if friction_state is None:
-        return change
-    there, slip = to_room_frame(rotation, away, time), to_room_frame(rotation, relative, time)
-    return add_surface_friction(friction_state, ball, time, there, slip, change, tag)
-
-
-@inlined
-def collide(state: SimulationState, one: int, two: int, time: float) -> None:
-    """Two balls meet now."""
-    motion = state.motion
-    for ball in (one, two):
-        apply_drag_until(state.drag, state.contact, motion, ball, time, state.gravity)
-    _kick_both(state.contact, state, one, two, time)
-    follow(state.neighbours, motion, one, time)
-    follow(state.neighbours, motion, two, time)
-    hide(state.contact, state.neighbours, one)
-    hide(state.contact, state.neighbours, two)
-
-
-@inlined
-def _kick_both(
-    contact: ContactState | None, state: SimulationState, one: int, two: int, time: float
+def collide(
+    contact: ContactState | None, state: SimulationState, one: BallEvent, partner: int
 ) -> None:
-    motion = state.motion
+    """Two balls meet now."""
+    motion, queue, time = state.motion, state.queue, one.time
+    two = BallEvent(partner, time, one.time_since_start)
+    state.counts[BALLS] += 1
     if contact is not None:
-        time_since_start = state.clock.now[1] * state.clock.window + time
-        reach = reach_of(state.neighbours)
-        jammed = contact.marks[one, MODE] == JAMMED, contact.marks[two, MODE] == JAMMED
-        if meet(
-            contact,
-            motion,
-            one,
-            two,
-            time,
-            time_since_start,
-            state.restitution,
-            state.obstacles.tree.radius,
-        ):
-            wake_if_it_moves(contact, state.queue, motion, one, time, time_since_start, reach)
-            wake_if_it_moves(contact, state.queue, motion, two, time, time_since_start, reach)
-        if contact.marks[one, MODE] == JAMMED and not jammed[0]:
-            count_neighbours(contact, motion, one, time, reach)
-        if contact.marks[two, MODE] == JAMMED and not jammed[1]:
-            count_neighbours(contact, motion, two, time, reach)
+        jammed_one = contact.mode[one.ball] == JAMMED
+        jammed_two = contact.mode[two.ball] == JAMMED
+        if meet(contact, motion, one, two, state.restitution):
+            wake_if_it_moves(contact, queue, motion, one)
+            wake_if_it_moves(contact, queue, motion, two)
+        if contact.mode[one.ball] == JAMMED and not jammed_one:
+            count_neighbours(contact, motion, one)
+        if contact.mode[two.ball] == JAMMED and not jammed_two:
+            count_neighbours(contact, motion, two)
         return
-    apart = sub(free_fall_position(motion, two, time), free_fall_position(motion, one, time))
+    apart = sub(
+        free_fall_position(motion, two.ball, time), free_fall_position(motion, one.ball, time)
+    )
     closing = Vec3(
-        motion[two, 3] - motion[one, 3],
-        motion[two, 4] - motion[one, 4],
-        motion[two, 5] - motion[one, 5],
+        motion[two.ball, 3] - motion[one.ball, 3],
+        motion[two.ball, 4] - motion[one.ball, 4],
+        motion[two.ball, 5] - motion[one.ball, 5],
     )
     change = pair_velocity_change(apart, closing, state.restitution)
-    change = add_pair_friction(state.friction_state, one, two, time, apart, closing, change)
-    change_velocity(motion, one, time, share_by_mass(state.sizes, one, two, change))
-    change_velocity(
-        motion,
-        two,
-        time,
-        share_by_mass(state.sizes, two, one, Vec3(-change.x, -change.y, -change.z)),
+    change = add_pair_friction(
+        state.friction_state, one.ball, two.ball, time, apart, closing, change
     )
+    back = Vec3(-change.x, -change.y, -change.z)
+    change_velocity(motion, one.ball, time, share_by_mass(state.sizes, one.ball, two.ball, change))
+    change_velocity(motion, two.ball, time, share_by_mass(state.sizes, two.ball, one.ball, back))
 
 
 @inlined
-def take_step(
-    contact: ContactState | None, state: SimulationState, ball: int, what: int, time: float
+def end_contact_path(
+    contact: ContactState | None, state: SimulationState, event: BallEvent
 ) -> bool:
-    """A ball in contact mode comes to a border or a stop, or is woken; False if it is none of these."""
+    """A ball in contact comes to a border or a stop, or is woken; False if its path goes on."""
     if contact is None:
         return False
-    motion = state.motion
-    lay_still = lies_still(contact, ball)
-    if not is_flying(contact, ball):
-        apply_drag_until(state.drag, contact, motion, ball, time, state.gravity)
-    here = state_under(motion, ball, time, ball_acceleration(contact, ball, state.gravity))
-    time_since_start = state.clock.now[1] * state.clock.window + time
-    if what == RECHECK:
-        if count_neighbours(contact, motion, ball, time, reach_of(state.neighbours)):
-            contact.marks[ball, WAKE_PENDING] = 1
+    reason = int(np.int64(state.queue.obstacle[event.ball]))
+    if reason == RECHECK:
+        if count_neighbours(contact, state.motion, event):
+            contact.wake_pending[event.ball] = 1
         return False
-    if not step(contact, motion, ball, what, time, time_since_start, here):
-        return False
-    follow(state.neighbours, motion, ball, time)
-    hide(contact, state.neighbours, ball)
-    if lay_still:
-        wake_if_it_moves(
-            contact, state.queue, motion, ball, time, time_since_start, reach_of(state.neighbours)
-        )
-    return True
+    return end_path(contact, state.motion, event, reason, _here(state, event))
 
 
 @inlined
-def fly_on(state: SimulationState, ball: int, time: float) -> bool:
-    """The ball flies on; True when the air has changed its path."""
-    motion = state.motion
-    if not apply_drag_piece(state.drag, state.contact, motion, ball, time, state.gravity):
+def gives_up(contact: ContactState | None, queue: EventQueue, ball: int) -> bool:
+    """True for a ball in a jam that contact mode cannot resolve; it is to be held still."""
+    if contact is None:
         return False
-    follow(state.neighbours, motion, ball, time)
-    return True
+    if queue.events[ball] % JAM_EVENTS != 0 or contact.mode[ball] >= ASLEEP:
+        return False
+    return contact.slow_hits.part_contact[ball] == UNTOUCHED  # else the part would go through it
 
 
 @inlined
-def gives_up(contact: ContactState | None, state: SimulationState, ball: int, time: float) -> bool:
-    """True when a ball in a jam that contact mode cannot resolve is held still for it."""
+def hold_jammed_ball(
+    contact: ContactState | None, state: SimulationState, event: BallEvent
+) -> None:
+    """Hold a ball that gives up still where it is."""
     if contact is None:
-        return False
-    if state.queue.marks[ball, EVENTS] % JAM_EVENTS != 0 or contact.marks[ball, MODE] >= ASLEEP:
-        return False
-    if contact.marks[ball, DRIVEN] != 0:  # the part would go through it
-        return False
-    here = state_under(state.motion, ball, time, ball_acceleration(contact, ball, state.gravity))
-    time_since_start = state.clock.now[1] * state.clock.window + time
-    hold(
-        contact,
-        state.motion,
-        ball,
-        time,
-        time_since_start,
-        here.position,
-        state.obstacles.tree.radius,
-    )
-    count_neighbours(contact, state.motion, ball, time, reach_of(state.neighbours))
-    follow(state.neighbours, state.motion, ball, time)
-    hide(contact, state.neighbours, ball)
-    return True
+        return
+    hold_still(contact, state.motion, event, _here(state, event).position)
+    count_neighbours(contact, state.motion, event)

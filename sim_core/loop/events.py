@@ -1,240 +1,302 @@
-"""The event loop, compiled: take the next event, let it change velocities, predict anew for the balls it touched.
+"""The event loop, compiled: next event, move, resolve, log, predict.
 
-One prediction site; an event whose partner has been hit since is not an event, and only its pair is looked for
-again: the ball's own path, and so its wall contact, still stands.
+All predictions are made in _predict. If the partner of a meeting has collided with something since
+the meeting was found, the meeting is stale: it is dropped and only the search among balls is
+repeated, because the ball's own path, and with it its wall contact, still stands.
 """
+
+import math
 
 import numpy as np
 
 from sim_core.contact.path_end import end_of_path
+from sim_core.contact.support_changes import LIES_STILL
 from sim_core.detect.ball_mesh import first_contact
 from sim_core.detect.ball_turning_part import first_part_contact
-from sim_core.effects.contact_mode import STILL, ball_acceleration
+from sim_core.effects.contact_mode import ball_acceleration, is_flying, is_still
 from sim_core.effects.drag import shift_drag
 from sim_core.effects.friction import shift_spins
 from sim_core.effects.part_rotation import shift_rotation, time_of_one_turn
 from sim_core.effects.random_phase import update_phase, wave_of_ball
 from sim_core.effects.sonotrodes import shift_phases
+from sim_core.effects.vibration import Wave
 from sim_core.geometry.ball_sizes import face_overlap_of_ball
-from sim_core.impulses.drag import time_to_next_drag
-from sim_core.loop.contact_neighbours import first_meeting, hide_all
-from sim_core.loop.event_handlers import collide, fly_on, gives_up, hit_part, hit_surface, take_step
-from sim_core.loop.event_queue import (
-    EVENTS,
-    HITS,
-    OBSTACLE,
-    PARTNER,
-    PARTNER_HITS,
-    SEARCH_ON,
-    forget,
-    meeting_time,
-    reschedule,
-    shift_queue,
+from sim_core.impulses.drag import apply_drag_piece, apply_drag_until, time_to_next_drag
+from sim_core.loop.contact_neighbours import first_meeting, hide, hide_all, wake_if_it_moves
+from sim_core.loop.event_handlers import (
+    collide,
+    end_contact_path,
+    gives_up,
+    hit_part,
+    hit_surface,
+    hold_jammed_ball,
 )
-from sim_core.loop.neighbours import NeighbourFilter, refresh_neighbours, speed_limit
-from sim_core.loop.state import BALLS, SEARCHES, STALE, SimulationState
-from sim_core.motion import shift_motion, state_under
+from sim_core.loop.event_queue import SEARCH_ON, Meetings, forget_events, reschedule, shift_queue
+from sim_core.loop.impact_log import log_impact, no_impact
+from sim_core.loop.neighbours import NeighbourFilter, follow, refresh_neighbours, speed_limit
+from sim_core.loop.state import SEARCHES, STALE, SimulationState
+from sim_core.motion import BallEvent, shift_motion, state_under
 from sim_core.numerics import profiler
 from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.profiler import add_time
 from sim_core.numerics.roots import NEVER
 from sim_core.numerics.vec3 import Flight
 
-# status
-DONE = 0
-BUFFER_FULL = 1
-TOO_MANY_EVENTS = 2
-TOO_FAST = 3
+# status of advance(): why it has stopped
+DONE = 0  # the clock has come to clock.stop
+BUFFER_FULL = 1  # the impact buffer must be emptied
+TOO_MANY_EVENTS = 2  # of one ball in one window: it is jammed
+TOO_FAST = 3  # a ball is faster than the neighbour filter allows for
 
-PIECE = 0.01  # s: longest arc searched at once; its chord is off by g PIECE²/8 = 0.12 mm, so boxes stay tight
-EVENT_LIMIT = 200_000  # of one ball in one window (20 ms): ten million a second is no gas but a jam
+# s. Longest arc searched at once. Its chord is off by g PIECE²/8 = 0.12 mm, so boxes stay tight.
+PIECE = 0.01
+# of one ball in one window (20 ms): ten million a second is no gas but a jam
+EVENT_LIMIT = 200_000
+
+# kinds of event
+HOLD = 0  # a ball in a jam that contact mode cannot resolve is held still
+MEETING = 1  # two balls meet
+STALE_MEETING = 2  # a meeting whose partner has another path by now
+SURFACE = 3  # a ball meets a surface
+PIECE_ENDS = 4  # nothing happens: the search goes on from here
+PATH_ENDS = 5  # a path in contact ends, or nothing is known of the ball yet
 
 # what to predict
 ALL, PAIRS, WALL = 0, 1, 2
-
-
-@jit
-def _speed_squared(motion: np.ndarray, ball: int) -> float:
-    return motion[ball, 3] ** 2 + motion[ball, 4] ** 2 + motion[ball, 5] ** 2
-
-
-@inlined
-def _predict_meeting(
-    neighbours: NeighbourFilter | None,
-    pair_time: np.ndarray | None,
-    state: SimulationState,
-    ball: int,
-    time: float,
-    what: int,
-) -> None:
-    """Find the ball it meets next, if balls meet."""
-    if neighbours is None or pair_time is None:
-        return
-    queue = state.queue
-    marks = queue.marks
-    before = NEVER_BEFORE if what == ALL or marks[ball, OBSTACLE] < 0 else queue.wall_time[ball]
-    meeting, partner = first_meeting(state.contact, neighbours, state.motion, ball, time, before)
-    pair_time[ball] = meeting
-    marks[ball, PARTNER] = partner
-    if partner >= 0:
-        marks[ball, PARTNER_HITS] = marks[partner, HITS]
-
-
-@inlined
-def _until_meeting(
-    pair_time: np.ndarray | None, marks: np.ndarray, ball: int, time: float
-) -> float:
-    """How far [s] a wall is looked for: no further than the ball is known to get, until its meeting, or one piece."""
-    if pair_time is None:
-        return PIECE
-    return min(PIECE, pair_time[ball] - time) if marks[ball, PARTNER] >= 0 else PIECE
-
-
-@inlined
-def _meet(
-    neighbours: NeighbourFilter | None, state: SimulationState, ball: int, time: float
-) -> tuple[int, int]:
-    """The ball meets its partner, if that one has not been hit since: what to predict, and for whom besides (or -1)."""
-    if neighbours is None:
-        return PAIRS, -1
-    marks = state.queue.marks
-    other = marks[ball, PARTNER]
-    if other < 0:
-        return PAIRS, -1
-    if marks[other, HITS] != marks[ball, PARTNER_HITS]:
-        state.tally[STALE] += 1
-        return PAIRS, -1
-    collide(state, ball, other, time)
-    marks[ball, HITS] += 1
-    marks[other, HITS] += 1
-    state.tally[BALLS] += 1
-    return ALL, other
-
-
-@inlined
-def _predict(state: SimulationState, ball: int, time: float, what: int) -> None:
-    """Find the ball's next events from ``time`` on and put the earlier on the calendar."""
-    queue = state.queue
-    marks = queue.marks
-    if what != WALL:
-        _predict_meeting(state.neighbours, queue.pair_time, state, ball, time, what)
-        add_time(state.profiler, profiler.PAIRS)
-    if what != PAIRS or (marks[ball, OBSTACLE] < 0 and queue.wall_time[ball] <= time):
-        length = _until_meeting(queue.pair_time, marks, ball, time)
-        obstacles, tree = state.obstacles, state.obstacles.tree
-        face_overlap = face_overlap_of_ball(state.sizes, obstacles.face_overlap, ball)
-        acceleration = ball_acceleration(state.contact, ball, state.gravity)
-        here = state_under(state.motion, ball, time, acceleration)
-        flight = Flight(here.position, here.velocity, acceleration)
-        length = min(length, time_to_next_drag(state.drag, state.contact, ball, time))
-        length = update_phase(state.random_phase, flight, ball, length)
-        wave = wave_of_ball(state.random_phase, state.wave, ball)
-        time_since_start = state.clock.now[1] * state.clock.window + time
-        length, end = end_of_path(
-            state.contact,
-            tree,
-            face_overlap,
-            wave,
-            here,
-            acceleration,
-            ball,
-            time,
-            time_since_start,
-            length,
-        )
-        look = time_of_one_turn(state.rotation, length) if end == STILL else length
-        delay, obstacle = first_contact(
-            state.contact,
-            state.sizes,
-            obstacles.cylinder,
-            ball,
-            tree,
-            state.scratch,
-            flight,
-            wave,
-            state.waves,
-            face_overlap,
-            time,
-            length,
-        )
-        delay, obstacle = first_part_contact(
-            obstacles.part,
-            state.rotation,
-            state.scratch,
-            flight,
-            face_overlap,
-            time,
-            delay if obstacle >= 0 else look,
-            obstacle,
-            len(tree.kinds),
-        )
-        if obstacle < 0 and delay >= look:  # and not a search that gave up before
-            delay, obstacle = (NEVER if end == STILL else length), end
-        queue.wall_time[ball] = time + delay
-        marks[ball, OBSTACLE] = obstacle
-        state.tally[SEARCHES] += 1
-        add_time(state.profiler, profiler.WALLS)
-    reschedule(queue, ball)
-    add_time(state.profiler, profiler.SCHEDULE)
-
 
 NEVER_BEFORE = 1e300  # finite, so that differences with it stay numbers
 
 
 @jit
 def advance(state: SimulationState) -> tuple[int, int]:
-    """Play events until ``clock.stop``; returns (status, ball): DONE, or why it had to pause and at which ball."""
+    """Simulate until ``clock.stop``, or until something stops the loop.
+
+    Returns: the status DONE, BUFFER_FULL, TOO_MANY_EVENTS or TOO_FAST, and the ball concerned.
+    """
     queue, clock, buffer = state.queue, state.clock, state.buffer
-    marks = queue.marks
     add_time(state.profiler, -1)
     while True:
+        # 1 next event
         left = clock.stop - clock.now[1] * clock.window
-        ball = queue.winners[1]
+        ball = int(np.int64(queue.winners[1]))  # one integer type: functions compile once
         time = queue.next_time[ball]
         if time >= min(left, clock.window):
             if left <= clock.window:
                 clock.now[0] = left
                 return DONE, -1
-            shift_motion(state.motion, clock.window, state.gravity, state.contact)
-            refresh_neighbours(state.neighbours, state.motion)
-            hide_all(state.contact, state.neighbours)
-            shift_queue(queue, clock.window)
-            shift_rotation(state.rotation, clock.window)
-            shift_phases(state.waves)
-            shift_spins(state.friction_state, clock.window)
-            shift_drag(state.drag, clock.window)
-            clock.now[1] += 1.0
+            _begin_window(state)
             continue
-        if buffer.filled[0] == len(buffer.numbers):
+        if buffer.filled[0] == len(buffer.time):
             return BUFFER_FULL, -1
         clock.now[0] = time
-        marks[ball, EVENTS] += 1
-        if marks[ball, EVENTS] > EVENT_LIMIT:
+        queue.events[ball] += 1
+        if queue.events[ball] > EVENT_LIMIT:
             return TOO_MANY_EVENTS, ball
+        event = BallEvent(ball, time, clock.now[1] * clock.window + time)
+        kind, partner = _kind_of_event(queue.meetings, state, ball)
         add_time(state.profiler, profiler.NEXT)
-        second = -1
-        what = ALL
-        obstacle = marks[ball, OBSTACLE]
-        if gives_up(state.contact, state, ball, time):
-            marks[ball, HITS] += 1
-        elif meeting_time(queue.pair_time, ball) <= queue.wall_time[ball]:
-            what, second = _meet(state.neighbours, state, ball, time)
-        elif obstacle >= 0:
-            if not hit_part(state.rotation, state.obstacles.part, state, ball, obstacle, time):
-                hit_surface(state, ball, obstacle, time)
-            marks[ball, HITS] += 1
-            if not _speed_squared(state.motion, ball) <= speed_limit(state.neighbours) ** 2:
-                forget(queue, ball, time)
-                return TOO_FAST, ball
-        elif obstacle == SEARCH_ON:
-            what = WALL
-            if fly_on(state, ball, time):
-                what = ALL
-                marks[ball, HITS] += 1
-        elif take_step(state.contact, state, ball, obstacle, time):
-            marks[ball, HITS] += 1
+        # 2 move
+        was_still = is_still(state.contact, ball)
+        _move(state, event, kind, partner)
+        # 3 resolve
+        path_changes, impact = True, no_impact()
+        if kind == HOLD:
+            hold_jammed_ball(state.contact, state, event)
+        elif kind == MEETING:
+            collide(state.contact, state, event, partner)
+        elif kind == SURFACE:
+            if queue.obstacle[ball] < len(state.obstacles.tree.kinds):
+                impact = hit_surface(state, event)
+            else:
+                impact = hit_part(state.rotation, state.obstacles.part, state, event)
+        elif kind == PIECE_ENDS:
+            drag = state.drag
+            path_changes = apply_drag_piece(
+                drag, state.contact, state.motion, ball, time, state.gravity
+            )
+        elif kind == PATH_ENDS:
+            path_changes = end_contact_path(state.contact, state, event)
+        else:
+            path_changes = False
+            state.counts[STALE] += partner >= 0
+        if path_changes:
+            _note_path(state, ball, time)
+            if kind == MEETING:
+                _note_path(state, partner, time)
+            elif was_still:
+                wake_if_it_moves(state.contact, queue, state.motion, event)
+        # 4 log
+        log_impact(buffer, event, clock.origin, impact, state.obstacles.lookup)
+        if kind == SURFACE and not (
+            _speed_squared(state, ball) <= speed_limit(state.neighbours) ** 2
+        ):
+            forget_events(queue, ball, time)
+            return TOO_FAST, ball
         add_time(state.profiler, profiler.RESOLVE)
-        todo = ball
+        # 5 predict
+        what = ALL
+        if kind == STALE_MEETING:
+            what = PAIRS
+        elif kind == PIECE_ENDS and not path_changes:
+            what = WALL
+        todo, second = ball, partner if kind == MEETING else -1
         while todo >= 0:
             _predict(state, todo, time, what)
             todo = second if todo == ball else -1
+
+
+@inlined
+def _begin_window(state: SimulationState) -> None:
+    """Move the clock's zero forward by one window."""
+    window = state.clock.window
+    shift_motion(state.motion, window, state.gravity, state.contact)
+    refresh_neighbours(state.neighbours, state.motion)
+    hide_all(state.contact, state.neighbours)
+    shift_queue(state.queue, window)
+    shift_rotation(state.rotation, window)
+    shift_phases(state.waves)
+    shift_spins(state.friction_state, window)
+    shift_drag(state.drag, window)
+    state.clock.now[1] += 1.0
+
+
+@inlined
+def _kind_of_event(meetings: Meetings | None, state: SimulationState, ball: int) -> tuple[int, int]:
+    """What happens to the ball next, and the ball that it meets (or -1)."""
+    queue = state.queue
+    if gives_up(state.contact, queue, ball):
+        return HOLD, -1
+    if meetings is not None and meetings.time[ball] <= queue.wall_time[ball]:
+        partner = int(np.int64(meetings.partner[ball]))
+        fresh = partner >= 0 and queue.path_number[partner] == meetings.partner_path[ball]
+        return (MEETING if fresh else STALE_MEETING), partner
+    if queue.obstacle[ball] >= 0:
+        return SURFACE, -1
+    return (PIECE_ENDS, -1) if queue.obstacle[ball] == SEARCH_ON else (PATH_ENDS, -1)
+
+
+@inlined
+def _move(state: SimulationState, event: BallEvent, kind: int, partner: int) -> None:
+    """Take the balls of an event to its time: paths need no step, but drag is to be caught up."""
+    in_contact = kind == PATH_ENDS and not is_flying(state.contact, event.ball)
+    moves = kind in (MEETING, SURFACE) or in_contact
+    ball = event.ball if moves else -1
+    while ball >= 0:
+        apply_drag_until(state.drag, state.contact, state.motion, ball, event.time, state.gravity)
+        ball = partner if kind == MEETING and ball != partner else -1
+
+
+@inlined
+def _note_path(state: SimulationState, ball: int, time: float) -> None:
+    """Tell the neighbour filter and the queue that a ball has another path."""
+    follow(state.neighbours, state.motion, ball, time)
+    hide(state.contact, state.neighbours, ball)
+    state.queue.path_number[ball] += 1
+
+
+@inlined
+def _speed_squared(state: SimulationState, ball: int) -> float:
+    motion = state.motion
+    return motion[ball, 3] ** 2 + motion[ball, 4] ** 2 + motion[ball, 5] ** 2
+
+
+@inlined
+def _predict(state: SimulationState, ball: int, time: float, what: int) -> None:
+    """Find the ball's next events from ``time`` on and enter the earlier one in the queue."""
+    queue = state.queue
+    if what != WALL:
+        _predict_meeting(state.neighbours, queue.meetings, state, ball, time, what)
+        add_time(state.profiler, profiler.PAIRS)
+    if what != PAIRS or (queue.obstacle[ball] < 0 and queue.wall_time[ball] <= time):
+        _predict_wall(state, ball, time)
+        state.counts[SEARCHES] += 1
+        add_time(state.profiler, profiler.WALLS)
+    reschedule(queue, ball)
+    add_time(state.profiler, profiler.SCHEDULE)
+
+
+@inlined
+def _predict_meeting(
+    neighbours: NeighbourFilter | None,
+    meetings: Meetings | None,
+    state: SimulationState,
+    ball: int,
+    time: float,
+    what: int,
+) -> None:
+    """Find the ball that it meets next, if balls meet."""
+    if neighbours is None or meetings is None:
+        return
+    queue = state.queue
+    before = NEVER_BEFORE if what == ALL or queue.obstacle[ball] < 0 else queue.wall_time[ball]
+    meeting, partner = first_meeting(state.contact, neighbours, state.motion, ball, time, before)
+    meetings.time[ball] = meeting
+    meetings.partner[ball] = partner
+    if partner >= 0:
+        meetings.partner_path[ball] = queue.path_number[partner]
+
+
+@inlined
+def _until_meeting(meetings: Meetings | None, ball: int, time: float) -> float:
+    """How far [s] to search for a wall: until the ball's known meeting, or for one piece."""
+    if meetings is None:
+        return PIECE
+    return min(PIECE, meetings.time[ball] - time) if meetings.partner[ball] >= 0 else PIECE
+
+
+@inlined
+def _predict_wall(state: SimulationState, ball: int, time: float) -> None:
+    """Find the obstacle that the ball meets next, or what else ends its path."""
+    queue, clock, obstacles = state.queue, state.clock, state.obstacles
+    face_overlap = face_overlap_of_ball(state.sizes, obstacles.face_overlap, ball)
+    event = BallEvent(ball, time, clock.now[1] * clock.window + time)
+    acceleration = ball_acceleration(state.contact, ball, state.gravity)
+    here = state_under(state.motion, ball, time, acceleration)
+    flight = Flight(here.position, here.velocity, acceleration)
+    length = _until_meeting(queue.meetings, ball, time)
+    length = min(length, time_to_next_drag(state.drag, state.contact, ball, time))
+    length = update_phase(state.random_phase, flight, ball, length)
+    wave = wave_of_ball(state.random_phase, state.wave, ball)
+    length, end = end_of_path(state.contact, obstacles.tree, face_overlap, event, flight, length)
+    look = length  # how long to search for what moves towards the ball
+    if end == LIES_STILL:
+        # What does not touch it in one oscillation, or one turn of the part, never will.
+        length = _oscillation_time(wave)
+        look = time_of_one_turn(state.rotation, length)
+    delay, obstacle = first_contact(
+        state.contact,
+        state.sizes,
+        obstacles.cylinder,
+        ball,
+        obstacles.tree,
+        state.scratch,
+        flight,
+        wave,
+        state.waves,
+        face_overlap,
+        time,
+        length,
+    )
+    delay, obstacle = first_part_contact(
+        obstacles.part,
+        state.rotation,
+        state.scratch,
+        flight,
+        face_overlap,
+        time,
+        delay if obstacle >= 0 else look,
+        obstacle,
+        len(obstacles.tree.kinds),
+    )
+    if obstacle < 0 and delay >= look:  # and not a search that gave up before
+        delay, obstacle = (NEVER if end == LIES_STILL else length), end
+    queue.wall_time[ball] = time + delay
+    queue.obstacle[ball] = obstacle
+
+
+@jit
+def _oscillation_time(wave: Wave | None) -> float:
+    """A little more than a period [s] of the slowest sonotrode; 0 without one."""
+    if wave is None:
+        return 0.0
+    return 2.02 * math.pi / wave.omega

@@ -1,58 +1,85 @@
-"""What happened: the impacts of the shot on the recorded surfaces, as columns."""
+"""The impacts of the shot on the recorded surfaces, one array a quantity."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from sim_core.geometry.triangle_lookup import TriangleLookup, find_triangle
+from sim_core.motion import BallEvent
 from sim_core.numerics.jit import inlined
-from sim_core.numerics.vec3 import Vec3
+from sim_core.numerics.vec3 import Vec3, set_vec3
 
-CHUNK = 65_536  # impacts the compiled loop writes before handing them over
+BUFFER_SIZE = 65_536  # impacts that the compiled loop writes before handing them over
+
+
+class Impact(NamedTuple):
+    """A hit on a surface, in the frame of that surface; without a speed it is none.
+
+    tag: of the surface. triangle: one of the flat face that was hit; ``touched``, a point [m] of
+    the face, tells which. position: of the ball's centre [m]. velocity: of the ball relative to
+    the surface, before [m/s]. normal_speed [m/s].
+    """
+
+    tag: int
+    triangle: int
+    touched: Vec3
+    position: Vec3
+    velocity: Vec3
+    normal_speed: float
 
 
 class ImpactBuffer(NamedTuple):
-    """What the compiled loop writes.
+    """What the compiled loop writes: arrays of BUFFER_SIZE rows, see ImpactLog.
 
-    ``numbers`` (CHUNK, 8): time, position, velocity, normal speed; ``names`` (CHUNK, 2) int32: ball, triangle;
-    ``filled`` (1,): rows written; ``record`` (MAX_TAGS,) bool: surfaces to record.
+    filled: rows written, (1,). record: whether the surface of a tag is recorded, (MAX_TAGS,) bool.
     """
 
-    numbers: np.ndarray
-    names: np.ndarray
+    time: np.ndarray
+    ball: np.ndarray
+    triangle: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+    normal_speed: np.ndarray
     filled: np.ndarray
     record: np.ndarray
 
 
 def new_impact_buffer(record: np.ndarray) -> ImpactBuffer:
-    """An empty page recording the tags marked in ``record`` (256,) bool."""
+    """An empty buffer for the tags marked in ``record`` (MAX_TAGS,) bool."""
     return ImpactBuffer(
-        np.zeros((CHUNK, 8)),
-        np.zeros((CHUNK, 2), dtype=np.int32),
-        np.zeros(1, dtype=np.int64),
-        record,
+        time=np.zeros(BUFFER_SIZE),
+        ball=np.zeros(BUFFER_SIZE, dtype=np.int32),
+        triangle=np.zeros(BUFFER_SIZE, dtype=np.int32),
+        position=np.zeros((BUFFER_SIZE, 3)),
+        velocity=np.zeros((BUFFER_SIZE, 3)),
+        normal_speed=np.zeros(BUFFER_SIZE),
+        filled=np.zeros(1, dtype=np.int64),
+        record=record,
     )
 
 
 @inlined
-def note_impact(
-    buffer: ImpactBuffer,
-    time: float,
-    ball: int,
-    triangle: int,
-    position: Vec3,
-    velocity: Vec3,
-    speed: float,
+def no_impact() -> Impact:
+    """What an event leaves in the log that is no hit on a surface."""
+    zero = Vec3(0.0, 0.0, 0.0)
+    return Impact(0, 0, zero, zero, zero, 0.0)
+
+
+@inlined
+def log_impact(
+    buffer: ImpactBuffer, event: BallEvent, origin: float, impact: Impact, lookup: TriangleLookup
 ) -> None:
-    """Write one impact down."""
+    """Write an impact down if its surface is recorded; ``origin`` [s]: zero of the impact times."""
+    if not (impact.normal_speed > 0.0 and buffer.record[impact.tag]):
+        return
     row = buffer.filled[0]
-    buffer.numbers[row, 0] = time
-    for axis in range(3):
-        buffer.numbers[row, 1 + axis] = position[axis]
-        buffer.numbers[row, 4 + axis] = velocity[axis]
-    buffer.numbers[row, 7] = speed
-    buffer.names[row, 0] = ball
-    buffer.names[row, 1] = triangle
+    buffer.time[row] = event.time_since_start - origin
+    buffer.ball[row] = event.ball
+    buffer.triangle[row] = find_triangle(lookup, impact.triangle, impact.touched)
+    set_vec3(buffer.position, row, impact.position)
+    set_vec3(buffer.velocity, row, impact.velocity)
+    buffer.normal_speed[row] = impact.normal_speed
     buffer.filled[0] = row + 1
 
 
@@ -60,11 +87,15 @@ def note_impact(
 class ImpactLog:
     """One row an impact, in order of time.
 
-    ``time`` (n,) [s] since the end of the warm-up; ``ball``, ``triangle`` (n,) int32, indices into the scene's
-    balls and mesh; ``position`` (n, 3) [m] of the ball's centre; ``velocity`` (n, 3) [m/s] before the impact,
-    relative to the surface; ``normal_speed`` (n,) [m/s], positive. An impact on an edge is booked on the
-    neighbour that faces the ball more. On a turning part position and velocity are in its own frame: where the part,
-    as the mesh has it, was hit, and how.
+    time: [s] since the end of the warm-up, (n,).
+    ball, triangle: indices into the scene's balls and mesh, (n,) int32. An impact on an edge counts
+        for the neighbour that faces the ball more.
+    position: of the ball's centre [m], (n, 3).
+    velocity: before the impact, relative to the surface [m/s], (n, 3).
+    normal_speed: positive [m/s], (n,).
+
+    On a turning part position and velocity are in its own frame: where the part, as the mesh has
+    it, was hit, and how.
     """
 
     time: np.ndarray
@@ -82,24 +113,16 @@ class ImpactLog:
         return ImpactLog(**{name: column[rows] for name, column in vars(self).items()})
 
 
-def impact_log(chunks: list[tuple[np.ndarray, np.ndarray]], centre: np.ndarray) -> ImpactLog:
-    """Joins pages of (numbers, names) into one log, positions in the user's coordinates again."""
-    numbers, names = [buffer[0] for buffer in chunks], [buffer[1] for buffer in chunks]
-    numbers = numbers or [np.zeros((0, 8))]
-    names = names or [np.zeros((0, 2), dtype=np.int32)]
+def empty_buffer(buffer: ImpactBuffer) -> ImpactLog:
+    """Copy the impacts out of a buffer, which is empty then."""
+    rows = int(buffer.filled[0])
+    buffer.filled[0] = 0
+    return ImpactLog(*(column[:rows].copy() for column in buffer[:6]))
 
-    def column(
-        of: list[np.ndarray], part: int | slice
-    ) -> np.ndarray:  # one by one: ten million impacts are a gigabyte
-        return np.concatenate([buffer[:, part] for buffer in of])
 
-    position = column(numbers, slice(1, 4))
-    position += centre
-    return ImpactLog(
-        time=column(numbers, 0),
-        ball=column(names, 0),
-        triangle=column(names, 1),
-        position=position,
-        velocity=column(numbers, slice(4, 7)),
-        normal_speed=column(numbers, 7),
-    )
+def joined(logs: list[ImpactLog], centre: np.ndarray) -> ImpactLog:
+    """Several logs as one, in order; ``centre`` [m] is added to the positions."""
+    names = ImpactLog.__dataclass_fields__
+    whole = ImpactLog(**{name: np.concatenate([vars(log)[name] for log in logs]) for name in names})
+    whole.position[:] += centre
+    return whole

@@ -1,9 +1,12 @@
-"""Who can meet whom: all balls, sixteen at a time through a float32 filter, then exactly.
+"""Which balls can meet: all balls, sixteen at a time through a float32 filter, then exactly.
 
-In the free-fall frame two balls' paths are straight lines, so how near they come does not depend on the time asked:
-with b the difference of their bases and w that of their velocities the miss distance² is b² - (b w)² / w², and they
-still approach while b w + t w² < 0. The filter keeps every pair whose paths could come within reach, rounding
-included; what it lets through is decided in float64, so results do not depend on it.
+Notation: in the free-fall frame the paths of two balls are straight lines, whatever gravity is.
+b: difference of their base positions [m]. w: difference of their velocities [m/s]. Then the square
+of the distance at which they pass each other is b² - (b w)² / w², at any time, and they still
+approach each other at time t while b w + t w² < 0.
+
+The filter keeps every pair whose paths could come within reach, rounding included. What it lets
+through is decided in float64, so results do not depend on it.
 """
 
 from typing import NamedTuple
@@ -12,11 +15,11 @@ import numpy as np
 
 from sim_core.detect.ball_ball import pair_delay
 from sim_core.loop.spatial_blocks import (
-    MANY,
+    MIN_BALLS,
     Blocks,
-    ball_in,
+    ball_in_column,
+    column_of,
     new_blocks,
-    slot_of,
     sort_blocks,
     widen,
 )
@@ -28,28 +31,28 @@ from sim_core.numerics.vec3 import Vec3, sub
 
 FAR_SHARE = np.float32(1.0 - 1e-6)  # of distance²: float32 loses 2e-7 of it in the miss distance
 SLACK = np.float32(1.000001)  # on float32 times: ten times their rounding
-ROUNDINGS = 16.0 * float(
-    np.finfo(np.float32).eps
-)  # of the largest number in a sum of three products, and to spare
-
-
-FINITE = 1e150  # m/s: its square is finite
+# of the largest number in a sum of three products, with a reserve
+ROUNDINGS = 16.0 * float(np.finfo(np.float32).eps)
+MAX_FINITE_SPEED = 1e150  # m/s: its square is finite
 TINY = 1e-30  # stands for a velocity component of zero, whose inverse would be infinite
 
 
 class NeighbourFilter(NamedTuple):
-    """The balls as the filter sees them.
+    """The paths of the balls in the precision of the filter.
 
-    ``lanes`` (6, m) float32: base and velocity, a column a ball, padded with NaN, which meets no one; ``probe`` (10,)
-    float32: the column of the ball that asks, its time, and what the filter allows for rounding, good for speeds up
-    to ``fastest`` [m/s]; ``reach`` [m], the sum of two radii; ``window`` [s]; ``blocks``: only for many balls;
-    ``radii`` (n,) [m]: only for several sizes, whose ``reach`` is that of the largest.
+    paths: base position and velocity, a column a ball, (6, m) float32, padded with NaN, which meets
+        nothing.
+    probe: the column of the ball whose meetings are searched, its time, and what the filter allows
+        for rounding, (10,) float32.
+    reach: sum of two radii [m]; of several sizes that of the largest.
+    max_speed: speed up to which the margins for rounding are good [m/s].
+    window: [s]. blocks: only for many balls. radii: only for several sizes [m], (n,).
     """
 
-    lanes: np.ndarray
+    paths: np.ndarray
     probe: np.ndarray
     reach: float
-    fastest: float
+    max_speed: float
     window: float
     blocks: Blocks | None
     radii: np.ndarray | None = None
@@ -60,46 +63,43 @@ def new_neighbour_filter(
     low: np.ndarray,
     high: np.ndarray,
     reach: float,
-    fastest: float,
+    max_speed: float,
     window: float,
     radii: np.ndarray | None = None,
 ) -> NeighbourFilter:
-    """The crowd of balls with this motion (n, 6) in a room from ``low`` to ``high`` (3,) [m]."""
-    furthest = (
-        float(np.max(high - low)) + fastest * window
-    )  # a base lies up to a window's flight outside the room
-    margin = ROUNDINGS * furthest
+    """The filter for balls with this motion (n, 6) in a room from ``low`` to ``high`` (3,) [m]."""
+    # A base position lies up to one window's flight outside the room.
+    margin = ROUNDINGS * (float(np.max(high - low)) + max_speed * window)
     probe = np.zeros(10, dtype=np.float32)
-    probe[7:] = (
-        FAR_SHARE,
-        -((reach + margin) ** 2),
-        margin * fastest,
-    )  # the last: b w + t w² of one that still approaches
-    lanes = np.full((6, -(-len(motion) // LANES) * LANES), np.nan, dtype=np.float32)
+    # the last: up to this b w + t w² may be of a ball that still approaches
+    probe[7:] = (FAR_SHARE, -((reach + margin) ** 2), margin * max_speed)
+    paths = np.full((6, -(-len(motion) // LANES) * LANES), np.nan, dtype=np.float32)
     blocks = (
-        new_blocks(len(motion), low, high, reach + 2.0 * margin) if len(motion) >= MANY else None
+        new_blocks(len(motion), low, high, reach + 2.0 * margin)
+        if len(motion) >= MIN_BALLS
+        else None
     )
-    neighbours = NeighbourFilter(lanes, probe, reach, fastest, window, blocks, radii)
+    neighbours = NeighbourFilter(paths, probe, reach, max_speed, window, blocks, radii)
     refresh_neighbours(neighbours, motion)
     return neighbours
 
 
 @jit
 def refresh_neighbours(neighbours: NeighbourFilter | None, motion: np.ndarray) -> None:
-    """See all balls anew, at a window's start."""
+    """Read the paths of all balls again, at a window's start."""
     if neighbours is None:
         return
     sort_blocks(neighbours.blocks, motion, neighbours.window)
     for ball in range(len(motion)):
-        _see(neighbours, motion, ball)
+        _write_path(neighbours, motion, ball)
 
 
 @inlined
 def follow(neighbours: NeighbourFilter | None, motion: np.ndarray, ball: int, time: float) -> None:
-    """See the new path of a ball hit at ``time`` [s]."""
+    """Read the new path of a ball that was hit at ``time`` [s]."""
     if neighbours is None:
         return
-    _see(neighbours, motion, ball)
+    _write_path(neighbours, motion, ball)
     widen(neighbours.blocks, motion, ball, time, neighbours.window)
 
 
@@ -107,8 +107,8 @@ def follow(neighbours: NeighbourFilter | None, motion: np.ndarray, ball: int, ti
 def speed_limit(neighbours: NeighbourFilter | None) -> float:
     """Speed [m/s] up to which the filter's margins are good; every finite one without it."""
     if neighbours is None:
-        return FINITE
-    return neighbours.fastest
+        return MAX_FINITE_SPEED
+    return neighbours.max_speed
 
 
 @inlined
@@ -120,23 +120,15 @@ def _pair_reach(radii: np.ndarray | None, reach: float, one: int, two: int) -> f
 
 
 @inlined
-def reach_of(neighbours: NeighbourFilter | None) -> float:
-    """Distance [m] at which two balls touch; 0 where they never do."""
-    if neighbours is None:
-        return 0.0
-    return neighbours.reach
-
-
-@inlined
-def _see(neighbours: NeighbourFilter, motion: np.ndarray, ball: int) -> None:
-    slot = slot_of(neighbours.blocks, ball)
-    lanes = neighbours.lanes
-    lanes[0, slot] = np.float32(motion[ball, 0])
-    lanes[1, slot] = np.float32(motion[ball, 1])
-    lanes[2, slot] = np.float32(motion[ball, 2])
-    lanes[3, slot] = np.float32(motion[ball, 3])
-    lanes[4, slot] = np.float32(motion[ball, 4])
-    lanes[5, slot] = np.float32(motion[ball, 5])
+def _write_path(neighbours: NeighbourFilter, motion: np.ndarray, ball: int) -> None:
+    column = column_of(neighbours.blocks, ball)
+    paths = neighbours.paths
+    paths[0, column] = np.float32(motion[ball, 0])
+    paths[1, column] = np.float32(motion[ball, 1])
+    paths[2, column] = np.float32(motion[ball, 2])
+    paths[3, column] = np.float32(motion[ball, 3])
+    paths[4, column] = np.float32(motion[ball, 4])
+    paths[5, column] = np.float32(motion[ball, 5])
 
 
 @inlined
@@ -145,12 +137,13 @@ def next_meeting(
 ) -> tuple[float, int]:
     """Time [s] and partner of the ball's first meeting after ``time`` and before ``before``.
 
-    If there is none: -1, and the time up to which that is known, NEVER for few balls and the window's end for many.
+    If there is none, the partner is -1 and the time is that up to which this is known: NEVER for
+    few balls, the end of the window for many.
     """
     probe = neighbours.probe
-    slot = slot_of(neighbours.blocks, ball)
+    column = column_of(neighbours.blocks, ball)
     for k in range(6):
-        probe[k] = neighbours.lanes[k, slot]
+        probe[k] = neighbours.paths[k, column]
     probe[6] = np.float32(time)
     return _search(neighbours.blocks, neighbours, motion, ball, time, before)
 
@@ -164,14 +157,14 @@ def _search(
     time: float,
     before: float,
 ) -> tuple[float, int]:
-    """What next_meeting returns, from all lanes, or from the blocks that the ball's path enters."""
+    """What next_meeting returns, from all columns or the blocks that the ball's path enters."""
     if blocks is None:
         here = free_fall_position(motion, ball, time)
         velocity = Vec3(motion[ball, 3], motion[ball, 4], motion[ball, 5])
         best = before - time
         partner = -1
         for first in range(0, len(motion), LANES):
-            near = _without(balls_near(neighbours.lanes, first, neighbours.probe), ball - first)
+            near = _without(balls_near(neighbours.paths, first, neighbours.probe), ball - first)
             while near != 0:
                 other = first + lowest_bit(near)
                 near &= near - 1
@@ -188,14 +181,15 @@ def _search(
         return time + best, partner
     best, partner = min(before, neighbours.window) - time, -1
     _aim(blocks.ray, motion, ball, time)
-    slot = slot_of(blocks, ball)
+    column = column_of(blocks, ball)
     for node in range(len(blocks.boxes)):
         entered = boxes_hit(blocks.boxes, node, blocks.ray, np.float32(best) * SLACK, blocks.enter)
         while entered != 0:
             block = BOXES * node + lowest_bit(entered)
             entered &= entered - 1
             near = _without(
-                balls_near(neighbours.lanes, LANES * block, neighbours.probe), slot - LANES * block
+                balls_near(neighbours.paths, LANES * block, neighbours.probe),
+                column - LANES * block,
             )
             if near != 0:
                 best, partner = _nearest(
@@ -206,13 +200,13 @@ def _search(
 
 @inlined
 def _without(near: int, lane: int) -> int:
-    """The marks of the lanes without the ball's own, if it is among them."""
+    """The bits of the columns without the ball's own, if it is among them."""
     return near & ~(1 << lane) if 0 <= lane < LANES else near
 
 
 @inlined
 def _aim(ray: np.ndarray, motion: np.ndarray, ball: int, time: float) -> None:
-    """The ball's straight path from now on, as boxes_hit wants it."""
+    """Set ``ray`` to the ball's straight path from now on, as boxes_hit takes it."""
     here = free_fall_position(motion, ball, time)
     for axis in range(3):
         speed = motion[ball, 3 + axis]
@@ -231,14 +225,14 @@ def _nearest(
     best: float,
     partner: int,
 ) -> tuple[float, int]:
-    """The earlier of the best meeting so far (a delay [s]) and those with the balls in the lanes that ``near`` marks.
+    """The earlier of the best meeting so far (a delay [s]) and those in the columns of ``near``.
 
-    Ties go to the lower ball, so that the order of the lanes does not matter.
+    Ties go to the lower ball, so that the order of the columns does not matter.
     """
     here = free_fall_position(motion, ball, time)
     velocity = Vec3(motion[ball, 3], motion[ball, 4], motion[ball, 5])
     while near != 0:
-        other = ball_in(neighbours.blocks, first + lowest_bit(near))
+        other = ball_in_column(neighbours.blocks, first + lowest_bit(near))
         near &= near - 1
         closing = sub(Vec3(motion[other, 3], motion[other, 4], motion[other, 5]), velocity)
         reach = _pair_reach(neighbours.radii, neighbours.reach, ball, other)

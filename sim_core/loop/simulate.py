@@ -1,4 +1,4 @@
-"""Scene in, SimulationResult out: sets up the columns, runs the compiled event loop, checks what must never break."""
+"""Simulate a scene: set up its arrays, run the compiled event loop, check what must never break."""
 
 import math
 from collections.abc import Sequence
@@ -9,41 +9,35 @@ import numpy as np
 
 from sim_core.balls import Balls
 from sim_core.contact.resting_balls import Resting, resting
-from sim_core.detect.ball_mesh import Scratch, new_scratch
-from sim_core.effects.contact_mode import ContactState, checked_rest, new_contact_state
-from sim_core.effects.drag import DragState, checked_drag, new_drag_state
+from sim_core.detect.ball_mesh import new_scratch
+from sim_core.effects.contact_mode import checked_rest, new_contact_state
+from sim_core.effects.drag import checked_drag, new_drag_state
 from sim_core.effects.friction import FrictionState, checked_friction, new_friction_state
 from sim_core.effects.gravity import checked_gravity, gravity_acceleration
-from sim_core.effects.part_rotation import RotationState, angle_at, checked_axis, new_rotation_state
-from sim_core.effects.random_phase import (
-    RandomPhaseState,
-    checked_random_phase,
-    new_random_phase_state,
-)
-from sim_core.effects.restitution import Restitution, checked_restitution
-from sim_core.effects.sonotrodes import SonotrodeWaves, new_waves, whole_period_window
-from sim_core.effects.vibration import Wave, checked_waves
+from sim_core.effects.part_rotation import angle_at, checked_axis, new_rotation_state
+from sim_core.effects.random_phase import checked_random_phase, new_random_phase_state
+from sim_core.effects.restitution import checked_restitution
+from sim_core.effects.sonotrodes import new_waves, whole_period_window
+from sim_core.effects.vibration import checked_waves
 from sim_core.errors import SceneError, SimulationError
 from sim_core.geometry.analytic import AnalyticCavity
-from sim_core.geometry.ball_sizes import BallSizes, new_ball_sizes
+from sim_core.geometry.ball_sizes import new_ball_sizes
 from sim_core.geometry.mesh import MAX_TAGS
 from sim_core.geometry.obstacle_set import build_obstacle_set
 from sim_core.impulses.drag import apply_drag_to_all
 from sim_core.loop.contact_neighbours import hide_all
-from sim_core.loop.event_queue import EventQueue, new_event_queue
+from sim_core.loop.event_queue import new_event_queue
 from sim_core.loop.events import BUFFER_FULL, DONE, TOO_FAST, TOO_MANY_EVENTS, advance
-from sim_core.loop.impact_log import ImpactBuffer, ImpactLog, impact_log, new_impact_buffer
-from sim_core.loop.jam_message import touching
+from sim_core.loop.impact_log import ImpactLog, empty_buffer, joined, new_impact_buffer
+from sim_core.loop.jam_message import jam_message
 from sim_core.loop.neighbours import NeighbourFilter, new_neighbour_filter
 from sim_core.loop.state import Clock, SimulationState
 from sim_core.motion import WINDOW
-from sim_core.numerics.profiler import Profiler
 from sim_core.scene.invariants import contained, narrowest_gap, turned_corners
 from sim_core.scene.scene import TOUCH, Scene
 
-CHECK_EVERY = (
-    1.0  # s simulated between checks that every ball is still inside; one check costs about a ms
-)
+# s simulated between checks that every ball is still inside; one check costs about a ms
+CHECK_EVERY = 1.0
 
 
 @dataclass(frozen=True)
@@ -64,9 +58,11 @@ class Collisions:
 
 @dataclass(frozen=True)
 class SimulationResult:
-    """The recorded impacts, the balls at the end, counts of the collisions, and who lies still at the end.
+    """What a simulation gives.
 
-    ``frames`` (f, n, 3) [m]: where the balls' centres were at the times asked for.
+    impacts: on the recorded surfaces. balls: at the end. collisions: their numbers.
+    resting: the balls that lie still at the end.
+    frames: centres of the balls at the requested times [m], (f, n, 3).
     """
 
     impacts: ImpactLog
@@ -77,36 +73,40 @@ class SimulationResult:
 
 
 def simulate(scene: Scene, frames: Sequence[float] | np.ndarray = ()) -> SimulationResult:
-    """Plays the scene from its start to the end of its duration.
+    """Simulate the scene from its start to the end of its duration.
 
-    ``frames`` (f,) [s since the end of the warm-up], ascending: when to note where the balls are, each on its flight at
-    that very time. It changes no bit of the rest. Releases the GIL while it runs; the same scene gives the same bits
-    on any thread. Raises SimulationError when a ball is lost, jams, or stops being a number.
+    The GIL is released meanwhile. The same scene gives the same bits on any thread.
+
+    Args:
+        frames: times, ascending [s since the end of the warm-up], (f,), at which the positions of
+            the balls are noted, each on its flight at that very time. They change no bit of the
+            rest.
+
+    Raises:
+        SimulationError: when a ball is lost, jams, or stops being a number.
     """
-    run = _Run(scene)
+    run = Simulation(scene)
     run.play(scene.warmup, record=False)
-    seen = run.play(
-        scene.warmup + scene.duration, record=True, frames=_checked_frames(frames, scene)
-    )
-    balls = run.balls()
-    still = resting(run.contact, run.obstacles, balls.positions, run.centre, scene.warmup)
-    return SimulationResult(
-        impact_log(run.chunks, run.centre),
-        balls,
-        Collisions(*(int(n) for n in run.count)),
-        still,
-        seen,
-    )
+    end = scene.warmup + scene.duration
+    noted = run.play(end, record=True, frames=_checked_frames(frames, scene))
+    balls, state = run.balls(), run.state
+    still = resting(state.contact, state.obstacles, balls.positions, run.centre, scene.warmup)
+    counts = Collisions(*(int(n) for n in state.counts))
+    return SimulationResult(joined(run.logs, run.centre), balls, counts, still, noted)
 
 
 def _checked_frames(frames: Sequence[float] | np.ndarray, scene: Scene) -> np.ndarray:
-    """Frame times on the scene's clock [s]. SceneError for what is not in its duration, or in no order."""
+    """Frame times [s since the start].
+
+    Raises SceneError for times that are not ascending or not within the duration.
+    """
     times = np.asarray(frames, dtype=float).reshape(-1)
     if not np.isfinite(times).all() or (np.diff(times) <= 0.0).any():
         raise SceneError("frames: not ascending times; give each once, in order")
     if len(times) and not 0.0 <= times[0] <= times[-1] <= scene.duration:
         raise SceneError(
-            f"frames: from {times[0]:g} to {times[-1]:g} s; allowed: 0 to the duration, {scene.duration:g} s"
+            f"frames: from {times[0]:g} to {times[-1]:g} s; "
+            f"allowed: 0 to the duration, {scene.duration:g} s"
         )
     return scene.warmup + times
 
@@ -114,200 +114,161 @@ def _checked_frames(frames: Sequence[float] | np.ndarray, scene: Scene) -> np.nd
 _obstacle_set = lru_cache(maxsize=8)(build_obstacle_set)  # replicas of one chamber share it
 
 
-class _Run:
-    """A scene being played: the columns the loop works on, and what it has written so far."""
+class Simulation:
+    """A scene being simulated: the state that the loop works on, and the impacts so far."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        self.gravity = checked_gravity(scene.physics.gravity)
-        vibrations, waves = scene.physics.vibrations, checked_waves(scene.physics.vibration)
-        self.wave: Wave | None = min(waves, key=lambda wave: wave.omega, default=None)
-        self.restitution: Restitution | None = None
-        tags = int(scene.mesh.tags.max()) + 1
-        if scene.physics.restitution is not None:
-            self.restitution = checked_restitution(scene.physics.restitution, tags)
         self.centre = scene.mesh.middle
-        self.window = whole_period_window(vibrations, WINDOW)
-        tags_vibrating = tuple(one.tag for one in vibrations)
-        amplitudes = tuple(float(one.amplitude) for one in vibrations)
-        vibrating = scene.mesh.corners[np.isin(scene.mesh.tags, tags_vibrating)] - self.centre
-        random_phase = checked_random_phase(scene.physics.random_phase, len(vibrations))
-        self.random_phase: RandomPhaseState | None = new_random_phase_state(
-            random_phase, self.wave, vibrating, 0.5 * scene.balls.diameters
-        )
-        self.rotation: RotationState | None = new_rotation_state(
-            scene.physics.part_rotation, self.centre
-        )
-        radii = tuple(float(r) for r in 0.5 * scene.balls.sizes)
-        self.obstacles = _obstacle_set(
-            scene.mesh, radii, tags_vibrating, amplitudes, checked_axis(scene.physics.part_rotation)
-        )
-        self.waves: SonotrodeWaves | None = new_waves(
-            vibrations, waves, self.window, self._tags_of_obstacles()
-        )
-        self.sizes: BallSizes | None = new_ball_sizes(scene.balls, self.obstacles.roots)
-        self.collide = scene.physics.ball_collisions is not None
-        self.motion = np.concatenate(
-            [scene.balls.positions - self.centre, scene.balls.velocities], axis=1
-        )
-        self.queue: EventQueue = new_event_queue(len(self.motion), self.collide)
-        self.scratch: Scratch = new_scratch()
-        self.friction_state = self._friction_state(tags)
-        self.contact: ContactState | None = new_contact_state(
-            checked_rest(scene.physics.rest),
-            len(self.motion),
-            self.gravity,
-            self.restitution,
-            self.friction_state,
-        )
-        drag = checked_drag(scene.physics.drag)
-        self.drag: DragState | None = new_drag_state(
-            drag, scene.balls.diameters, scene.balls.densities
-        )
-        self.neighbours = self._new_filter(
-            2.0 * max(1.0, float(np.abs(scene.balls.velocities).max()))
-        )
-        self.profiler: Profiler | None = None
-        self.now = np.zeros(2)
-        self.count = np.zeros(5, dtype=np.int64)
-        self.chunks: list[tuple[np.ndarray, np.ndarray]] = []
+        self.logs: list[ImpactLog] = []
+        self.state = self._new_state()
 
-    def _friction_state(self, tags: int) -> FrictionState | None:
+    def _new_state(self) -> SimulationState:
+        scene, physics, balls = self.scene, self.scene.physics, self.scene.balls
+        gravity = checked_gravity(physics.gravity)
+        vibrations, waves = physics.vibrations, checked_waves(physics.vibration)
+        wave = min(waves, key=lambda one: one.omega, default=None)
+        tags = int(scene.mesh.tags.max()) + 1
+        restitution = physics.restitution
+        if restitution is not None:
+            restitution = checked_restitution(restitution, tags)
+        window = whole_period_window(vibrations, WINDOW)
+        vibrating_tags = tuple(one.tag for one in vibrations)
+        amplitudes = tuple(float(one.amplitude) for one in vibrations)
+        vibrating = scene.mesh.corners[np.isin(scene.mesh.tags, vibrating_tags)] - self.centre
+        random_phase = checked_random_phase(physics.random_phase, len(vibrations))
+        radii = tuple(float(r) for r in 0.5 * balls.sizes)
+        axle = checked_axis(physics.part_rotation)
+        obstacles = _obstacle_set(scene.mesh, radii, vibrating_tags, amplitudes, axle)
+        obstacle_tags = np.asarray(obstacles.tags[obstacles.tree.triangles[:, 0]])
+        collide = physics.ball_collisions is not None
+        motion = np.concatenate([balls.positions - self.centre, balls.velocities], axis=1)
+        friction_state = self._friction_state(tags, obstacle_tags)
+        contact = new_contact_state(
+            checked_rest(physics.rest),
+            len(motion),
+            balls.radius,
+            2.0 * balls.radius if collide else 0.0,
+            gravity,
+            restitution,
+            friction_state,
+        )
+        state = SimulationState(
+            motion=motion,
+            neighbours=None,
+            obstacles=obstacles,
+            queue=new_event_queue(len(motion), collide),
+            scratch=new_scratch(),
+            gravity=gravity,
+            restitution=restitution,
+            wave=wave,
+            rotation=new_rotation_state(physics.part_rotation, self.centre),
+            clock=Clock(np.zeros(2), window, 0.0, scene.warmup),
+            buffer=new_impact_buffer(np.zeros(MAX_TAGS, dtype=np.bool_)),
+            counts=np.zeros(5, dtype=np.int64),
+            profiler=None,
+            contact=contact,
+            friction_state=friction_state,
+            random_phase=new_random_phase_state(
+                random_phase, wave, vibrating, 0.5 * balls.diameters
+            ),
+            drag=new_drag_state(checked_drag(physics.drag), balls.diameters, balls.densities),
+            sizes=new_ball_sizes(balls, obstacles.roots),
+            waves=new_waves(vibrations, waves, window, obstacle_tags),
+        )
+        max_speed = 2.0 * max(1.0, float(np.abs(balls.velocities).max()))
+        return state._replace(neighbours=self._new_filter(state, max_speed))
+
+    def _friction_state(self, tags: int, obstacle_tags: np.ndarray) -> FrictionState | None:
         friction, balls = self.scene.physics.friction, self.scene.balls
         if friction is None:
             return None
         spins = np.zeros_like(balls.positions) if balls.spins is None else balls.spins
         return new_friction_state(
-            checked_friction(friction, tags), spins, balls.radius, self._tags_of_obstacles()
+            checked_friction(friction, tags), spins, balls.radius, obstacle_tags
         )
 
-    def _tags_of_obstacles(self) -> np.ndarray:
-        return np.asarray(self.obstacles.tags[self.obstacles.tree.triangles[:, 0]])
-
-    def _new_filter(self, fastest: float) -> NeighbourFilter | None:
-        if not self.collide:
+    def _new_filter(self, state: SimulationState, max_speed: float) -> NeighbourFilter | None:
+        if self.scene.physics.ball_collisions is None:
             return None
         low, high = self.scene.mesh.bounds - self.centre
-        balls = self.scene.balls
+        balls, window = self.scene.balls, state.clock.window
         radii = None if balls.alike else 0.5 * balls.diameters
         neighbours = new_neighbour_filter(
-            self.motion, low, high, 2.0 * balls.radius, fastest, self.window, radii
+            state.motion, low, high, 2.0 * balls.radius, max_speed, window, radii
         )
-        hide_all(self.contact, neighbours)
+        hide_all(state.contact, neighbours)
         return neighbours
+
+    @property
+    def time(self) -> float:
+        """Time since the start [s]."""
+        clock = self.state.clock
+        return float(clock.now[0] + clock.now[1] * clock.window)
 
     def play(
         self, until: float, record: bool, frames: Sequence[float] | np.ndarray = ()
     ) -> np.ndarray:
-        """Advance to ``until`` [s], checking containment on the way; positions (f, n, 3) [m] at ``frames`` [s]."""
-        buffer = new_impact_buffer(
-            self._recorded_tags() if record else np.zeros(MAX_TAGS, dtype=np.bool_)
-        )
-        origin = self.scene.warmup
-        start = self.now[0] + self.now[1] * self.window
+        """Simulate until a time [s], with a check of containment every CHECK_EVERY.
+
+        Returns: the positions [m], (f, n, 3), at the times ``frames`` [s].
+        """
+        recorded = self.scene.record
+        self.state.buffer.record[:] = record and recorded is None
+        if record and recorded is not None:
+            self.state.buffer.record[list(recorded)] = True
+        start = self.time
         checks = np.linspace(start, until, 1 + max(1, math.ceil((until - start) / CHECK_EVERY)))[1:]
-        due, noted, seen = set(checks), set(frames), []
+        due, requested, noted = set(checks), set(frames), []
         for stop in sorted({*checks, *frames}):
-            self._advance(Clock(self.now, self.window, float(stop), origin), buffer)
-            if stop in noted:
-                seen.append(self._states()[0])
+            self.advance_to(float(stop))
+            if stop in requested:
+                noted.append(self._positions_and_velocities()[0])
             if stop in due:
                 self._require_sound()
-        self._turn(buffer)
-        return np.array(seen).reshape(-1, len(self.motion), 3)
+        self.logs.append(empty_buffer(self.state.buffer))
+        return np.array(noted).reshape(-1, len(self.state.motion), 3)
 
-    def _recorded_tags(self) -> np.ndarray:
-        record = np.zeros(MAX_TAGS, dtype=np.bool_)
-        record[np.arange(MAX_TAGS) if self.scene.record is None else list(self.scene.record)] = True
-        return record
-
-    def _advance(self, clock: Clock, buffer: ImpactBuffer) -> None:
+    def advance_to(self, stop: float) -> None:
+        """Run the event loop until a time [s], and attend to what makes it pause."""
+        self.state = self.state._replace(clock=self.state.clock._replace(stop=stop))
         while True:
-            status, ball = advance(
-                SimulationState(
-                    self.motion,
-                    self.neighbours,
-                    self.obstacles,
-                    self.queue,
-                    self.scratch,
-                    self.gravity,
-                    self.restitution,
-                    self.wave,
-                    self.rotation,
-                    clock,
-                    buffer,
-                    self.count,
-                    self.profiler,
-                    self.contact,
-                    self.friction_state,
-                    self.random_phase,
-                    self.drag,
-                    self.sizes,
-                    self.waves,
-                )
-            )
+            status, ball = advance(self.state)
             if status == DONE:
                 return
             if status == BUFFER_FULL:
-                self._turn(buffer)
+                self.logs.append(empty_buffer(self.state.buffer))
             elif status == TOO_FAST:
-                speed = float(np.abs(self.motion[ball, 3:]).max())
+                speed = float(np.abs(self.state.motion[ball, 3:]).max())
                 if not math.isfinite(speed):
                     raise SimulationError(
                         f"ball {ball}: its velocity is not a number any more; {self._when()}"
                     )
-                self.neighbours = self._new_filter(4.0 * speed)
+                neighbours = self._new_filter(self.state, 4.0 * speed)
+                self.state = self.state._replace(neighbours=neighbours)
             elif status == TOO_MANY_EVENTS:
-                raise SimulationError(self._jam(ball))
-
-    def _jam(self, ball: int) -> str:
-        positions = self._states()[0]
-        where = np.round(positions[ball], 6).tolist()
-        between, by_part = touching(self.scene, self._corners(), positions, ball)
-        if self.rotation is not None and (by_part or self.contact is not None):
-            through = "" if by_part else ", and the turning part presses on it through other balls"
-            return (
-                f"ball {ball} is caught between {between}{through}, at {where} m, {self._when()}; make room there for "
-                "a ball between the part and what it turns past, or so little that none gets in"
-            )
-        return (
-            f"ball {ball} jams at {where} m{f', between {between}' if between else ''}: more than ten million events "
-            f"a second; {self._when()}. Look for a gap just as wide as the ball there"
-            + (
-                ""
-                if self.contact is not None
-                else "; if balls can lie still there, switch contact mode on"
-            )
-        )
-
-    def _turn(self, buffer: ImpactBuffer) -> None:
-        """Put away what the loop has written, and give it the empty page."""
-        rows = int(buffer.filled[0])
-        if rows:
-            self.chunks.append((buffer.numbers[:rows].copy(), buffer.names[:rows].copy()))
-            buffer.filled[0] = 0
+                positions = self._positions_and_velocities()[0]
+                raise SimulationError(
+                    jam_message(self.scene, self._corners(), positions, ball, self._when())
+                )
 
     def _when(self) -> str:
-        return f"{self.now[0] + self.now[1] * self.window:.6f} s after the start"
+        return f"{self.time:.6f} s after the start"
 
-    def _states(self) -> tuple[np.ndarray, np.ndarray]:
+    def _positions_and_velocities(self) -> tuple[np.ndarray, np.ndarray]:
         """Positions [m] and velocities [m/s] now, (n, 3) each: point_at for all balls at once."""
-        now = self.now[0]
-        acceleration = (
-            np.array(gravity_acceleration(self.gravity))
-            if self.contact is None
-            else self.contact.acceleration
-        )
-        base, velocities = self.motion[:, :3], self.motion[:, 3:]
+        state, now = self.state, self.state.clock.now[0]
+        acceleration = np.array(gravity_acceleration(state.gravity))
+        if state.contact is not None:
+            acceleration = state.contact.acceleration
+        base, velocities = state.motion[:, :3], state.motion[:, 3:]
         velocities_now = velocities + now * acceleration
-        apply_drag_to_all(self.drag, self.contact, velocities_now, now)
-        return (
-            base + velocities * now + 0.5 * now * now * acceleration + self.centre,
-            velocities_now,
-        )
+        apply_drag_to_all(state.drag, state.contact, velocities_now, now)
+        positions = base + velocities * now + 0.5 * now * now * acceleration + self.centre
+        return positions, velocities_now
 
     def _require_sound(self) -> None:
-        points, _ = self._states()
+        points, _ = self._positions_and_velocities()
         bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
         if len(bad):
             raise SimulationError(
@@ -316,45 +277,48 @@ class _Run:
         outside = np.flatnonzero(~self._inside(points))
         if len(outside):
             raise SimulationError(
-                f"ball {outside[0]} has left the mesh at {np.round(points[outside[0]], 6).tolist()} m, {self._when()}. "
-                "Look for surfaces that overlap or cross there; if there are none, please report the scene"
+                f"ball {outside[0]} has left the mesh at "
+                f"{np.round(points[outside[0]], 6).tolist()} m, {self._when()}. Look for surfaces "
+                "that overlap or cross there; if there are none, please report the scene"
             )
-        if not self.collide:
+        if self.state.neighbours is None:
             return
         gap, one, two = narrowest_gap(self.balls())
         if gap < -TOUCH:
             raise SimulationError(
-                f"balls {one} and {two} overlap by {-gap:.3g} m, {self._when()}; please report the scene"
+                f"balls {one} and {two} overlap by {-gap:.3g} m, {self._when()}; "
+                "please report the scene"
             )
 
     def _inside(self, points: np.ndarray) -> np.ndarray:
-        """Which points (n, 3) [m] are in the chamber; also down to where a face that swings wider than a ball is."""
+        """Which points (n, 3) [m] are in the chamber.
+
+        A face that swings wider than a ball is counts where it is at either end of its stroke too.
+        """
         mesh, corners = self.scene.mesh, self._corners()
+        vibrations = self.scene.physics.vibrations
         if isinstance(mesh, AnalyticCavity):
-            return mesh.contains(
-                points, max((one.amplitude for one in self.scene.physics.vibrations), default=0.0)
-            )
+            return mesh.contains(points, max((one.amplitude for one in vibrations), default=0.0))
         inside = contained(mesh, points, corners)
-        for one in self.scene.physics.vibrations:
+        for one in vibrations:
             if one.amplitude >= 0.5 * self.scene.balls.sizes[0] and not inside.all():
-                inside |= contained(mesh, points + one.peak, corners) | contained(
-                    mesh, points - one.peak, corners
-                )
+                inside |= contained(mesh, points + one.peak, corners)
+                inside |= contained(mesh, points - one.peak, corners)
         return inside
 
     def _corners(self) -> np.ndarray | None:
         """The triangles where they are now, if some of them turn."""
-        turn = self.scene.physics.part_rotation
-        mesh = self.scene.mesh
-        if turn is None or self.rotation is None or isinstance(mesh, AnalyticCavity):
+        part_rotation, mesh = self.scene.physics.part_rotation, self.scene.mesh
+        state = self.state
+        if part_rotation is None or state.rotation is None or isinstance(mesh, AnalyticCavity):
             return None
-        return turned_corners(mesh, turn, angle_at(self.rotation, float(self.now[0])))
+        angle = angle_at(state.rotation, float(state.clock.now[0]))
+        return turned_corners(mesh, part_rotation, angle)
 
     def balls(self) -> Balls:
         """The balls as they are now."""
-        spins = (
-            None
-            if self.friction_state is None
-            else self.friction_state.spins + self.now[0] * self.friction_state.twists
-        )
-        return Balls(*self._states(), self.scene.balls.diameter, self.scene.balls.density, spins)
+        friction_state, spins = self.state.friction_state, None
+        if friction_state is not None:
+            spins = friction_state.spins + self.state.clock.now[0] * friction_state.twists
+        diameter, density = self.scene.balls.diameter, self.scene.balls.density
+        return Balls(*self._positions_and_velocities(), diameter, density, spins)

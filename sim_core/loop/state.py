@@ -1,4 +1,4 @@
-"""What the event loop works on: every column of a scene being played, in one tuple."""
+"""What the event loop works on: every array of a scene being simulated, in one tuple."""
 
 from typing import NamedTuple
 
@@ -21,15 +21,18 @@ from sim_core.loop.impact_log import ImpactBuffer
 from sim_core.loop.neighbours import NeighbourFilter
 from sim_core.numerics.profiler import Profiler
 
-# columns of SimulationState.tally
+# places in SimulationState.counts: hits on walls, on balls and on the sonotrode, searches for a
+# surface, and meetings that were stale
 WALLS, BALLS, SONOTRODE, SEARCHES, STALE = 0, 1, 2, 3, 4
 
 
 class Clock(NamedTuple):
-    """``now`` (2,): time on the window's clock [s], and windows gone by; ``window`` [s]; ``stop`` [s] and ``origin``
-    [s]
+    """Time in a scene.
 
-    on the scene's clock: where to stop, and what impact times count from.
+    now: time on the window's clock [s], and the number of windows gone by, (2,).
+    window: length of a window [s].
+    stop: when to pause [s since the start].
+    origin: zero of the impact times [s since the start].
     """
 
     now: np.ndarray
@@ -39,11 +42,12 @@ class Clock(NamedTuple):
 
 
 class SimulationState(NamedTuple):
-    """Everything that the event loop works on.
+    """Everything that the event loop works on; an effect that is absent is None.
 
-    ``motion`` (n, 6): base position [m] and velocity [m/s] of each ball in the free-fall frame. ``neighbours``: the
-    filter made of it, if balls collide with one another. ``tally`` (5,) int64: counts of events, see WALLS. ``profiler``:
-    only where the loop is measured. An effect that is absent is None.
+    motion: base position [m] and velocity [m/s] of each ball in the free-fall frame, (n, 6).
+    neighbours: the filter made of it, None where balls do not collide with one another.
+    counts: of events, (5,) int64, see WALLS.
+    profiler: None unless the loop is measured.
     """
 
     motion: np.ndarray
@@ -57,7 +61,7 @@ class SimulationState(NamedTuple):
     rotation: RotationState | None
     clock: Clock
     buffer: ImpactBuffer
-    tally: np.ndarray
+    counts: np.ndarray
     profiler: Profiler | None
     contact: ContactState | None
     friction_state: FrictionState | None

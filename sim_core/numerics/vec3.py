@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+import numpy as np
+
 from sim_core.numerics.jit import jit
 
 
@@ -49,6 +51,19 @@ def cross(a: Vec3, b: Vec3) -> Vec3:
 def dot(a: Vec3, b: Vec3) -> float:
     """Scalar product."""
     return a.x * b.x + a.y * b.y + a.z * b.z
+
+
+@jit
+def vec3_at(array: np.ndarray, row: int) -> Vec3:
+    """The first three numbers of a row of an array (n, 3) or wider."""
+    return Vec3(array[row, 0], array[row, 1], array[row, 2])
+
+
+@jit
+def set_vec3(array: np.ndarray, row: int, a: Vec3) -> None:
+    """Write a vector into the first three numbers of a row."""
+    for axis in range(3):
+        array[row, axis] = a[axis]
 
 
 @jit

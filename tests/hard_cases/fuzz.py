@@ -11,7 +11,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from sim_core import Balls, Physics, Scene, SceneError, SimulationError, TriangleMesh, pack_balls
-from sim_core.contact.constrained_impulse import SHORTEST_HOP
+from sim_core.contact.supports import SHORTEST_HOP
 from tests.hard_cases.fuzzed_effects import (
     LID,
     SIZES,
@@ -198,7 +198,7 @@ def _falls_through_air(physics: Physics) -> bool:
 
 def _given_back(physics: Physics) -> float:
     """Energy [J/kg] that captures and hops of balls pressed together may bring in
-    (contact/constrained_impulse.py).
+    (contact/supports.py).
     """
     if physics.rest is None:
         return 0.0

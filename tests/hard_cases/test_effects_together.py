@@ -24,14 +24,14 @@ from sim_core import (
     TriangleMesh,
     Vibration,
 )
-from sim_core.effects.contact_mode import ASLEEP, MODE, SLIDING
+from sim_core.effects.contact_mode import ASLEEP, SLIDING
 from sim_core.effects.gravity import STANDARD as G
-from sim_core.loop.simulate import _Run
+from sim_core.loop.simulate import Simulation
 from sim_core.scene.invariants import energy
 from tests.hard_cases.outcome import LOSSLESS
 from tests.helpers.scenes.cavities import FLOOR, box_around
 from tests.helpers.scenes.turning_parts import PART
-from tests.sim_core.contact.test_beside_turning_part import HALF, WIDE, arrival, paddle
+from tests.sim_core.contact.test_pushed_by_part import HALF, WIDE, arrival, paddle
 
 R = 1.5e-3
 STICKS = 1e9  # mu
@@ -79,14 +79,14 @@ def test_a_ball_dropped_on_a_turntable_goes_round_with_two_sevenths_of_its_speed
     )
     first = math.sqrt(2.0 * drop / G)
     start = shot([0.015, 0.0, 0.002 + R + drop])
-    run = _Run(Scene(room(box_around(disk, 0.04)), start, physics, 2.0))
+    run = Simulation(Scene(room(box_around(disk, 0.04)), start, physics, 2.0))
     for k in (0, 1, 7, hops):
         run.play((2 * k + 1) * first + 1e-9, record=False)
         x, y, _ = run.balls().positions[0]
         expected = 0.015 * (1.0 + 2j / 7.0 * omega * 2.0 * first) ** k
         np.testing.assert_allclose([x, y], [expected.real, expected.imag], atol=2e-9)
     assert np.angle(complex(x, y)) > 2.0  # carried along, not against
-    assert run.count[0] == hops + 1
+    assert run.state.counts[0] == hops + 1
 
 
 @pytest.mark.parametrize("mu", [0.1, 0.4])
@@ -109,10 +109,10 @@ def test_a_ball_that_a_rough_paddle_pushes_slips_on_the_floor_until_it_rolls(mu:
     )  # along the face, which moves inwards
     kicked = 2.0 * speed * out - rub * along
     rolls = 2.0 / 7.0 * np.linalg.norm(kicked) / (mu * G)
-    run = _Run(Scene(room(paddle()), shot([x, y, R - HALF]), physics, 1.0))
+    run = Simulation(Scene(room(paddle()), shot([x, y, R - HALF]), physics, 1.0))
     run.play(angle / omega * (1.0 - 1e-9), record=False)
-    assert run.contact is not None
-    assert run.contact.marks[0, MODE] == ASLEEP
+    assert run.state.contact is not None
+    assert run.state.contact.mode[0] == ASLEEP
     run.play(angle / omega * (1.0 + 1e-9), record=False)
     np.testing.assert_allclose(run.balls().velocities[0], kicked, atol=1e-6)
     np.testing.assert_allclose(
@@ -134,13 +134,13 @@ def test_air_does_not_wake_nor_slow_what_lies_or_rolls_on_the_floor() -> None:
     speed = 0.05
     places = [[-0.018, 0.015, R - HALF], [0.0, 0.01, R - HALF]]
     start = shot(places, [[speed, 0.0, 0.0], [0.0] * 3], [[0.0, speed / R, 0.0], [0.0] * 3])
-    run = _Run(Scene(room(paddle()), start, physics, 1.0))
+    run = Simulation(Scene(room(paddle()), start, physics, 1.0))
     run.play(0.01, record=False)
-    before, events = run.balls(), run.count.copy()
+    before, events = run.balls(), run.state.counts.copy()
     run.play(0.5, record=False)
-    assert run.contact is not None
-    assert run.contact.marks[:, MODE].tolist() == [SLIDING, ASLEEP]
-    assert (run.count[:3] == events[:3]).all()
+    assert run.state.contact is not None
+    assert run.state.contact.mode.tolist() == [SLIDING, ASLEEP]
+    assert (run.state.counts[:3] == events[:3]).all()
     np.testing.assert_allclose(run.balls().velocities[0], [speed, 0.0, 0.0], atol=1e-9)
     np.testing.assert_allclose(
         run.balls().positions[0, 0] - before.positions[0, 0], 0.49 * speed, atol=1e-9
@@ -163,7 +163,9 @@ def test_balls_that_do_not_meet_rub_roll_and_rest_as_each_does_alone() -> None:
     mesh, duration = room(paddle()), 1.0
 
     def end(which: slice) -> Balls:
-        run = _Run(Scene(mesh, shot(places[which], speeds[which], turns[which]), physics, duration))
+        run = Simulation(
+            Scene(mesh, shot(places[which], speeds[which], turns[which]), physics, duration)
+        )
         run.play(duration, record=False)
         return run.balls()
 

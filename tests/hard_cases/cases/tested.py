@@ -11,30 +11,33 @@ from unittest import mock
 
 import numpy as np
 
-from sim_core.loop.simulate import _Run
+from sim_core.loop.simulate import Simulation
 from sim_core.scene.invariants import clearance, closest_pair
 from tests.hard_cases.outcome import Case, Outcome
-from tests.sim_core.contact import test_beside_turning_part as beside
-from tests.sim_core.contact import test_resting as resting
+from tests.sim_core.contact import test_ball_on_ball as ball_on_ball
+from tests.sim_core.contact import test_path_end as path_end
+from tests.sim_core.contact import test_pushed_by_part as pushed_by_part
+from tests.sim_core.contact import test_resting_balls as resting_balls
 from tests.sim_core.contact import test_rolling as rolling
+from tests.sim_core.contact import test_support_changes as support_changes
 from tests.sim_core.geometry import test_turning_part as turning
 
 
 @contextmanager
-def runs_seen() -> Iterator[list[_Run]]:
+def runs_seen() -> Iterator[list[Simulation]]:
     """Every run that begins meanwhile."""
-    seen: list[_Run] = []
-    begin = _Run.__init__
+    seen: list[Simulation] = []
+    begin = Simulation.__init__
 
-    def begin_seen(run: _Run, *scene: object) -> None:
+    def begin_seen(run: Simulation, *scene: object) -> None:
         begin(run, *scene)  # type: ignore[arg-type]
         seen.append(run)
 
-    with mock.patch.object(_Run, "__init__", begin_seen):
+    with mock.patch.object(Simulation, "__init__", begin_seen):
         yield seen
 
 
-def overlap(run: _Run) -> float:
+def overlap(run: Simulation) -> float:
     """How deep a ball lies in another ball, or in a surface that neither vibrates nor turns [m]."""
     balls, physics, mesh = run.balls(), run.scene.physics, run.scene.mesh
     moving = [
@@ -58,9 +61,9 @@ def outcome_of_test(test: Callable[..., None], *arguments: object) -> Outcome:
             said = f"not as physics demands: {str(error).splitlines()[0] if str(error) else test.__name__}"
         else:
             said = ""
-    collisions = sum(int(run.count[:3].sum()) for run in runs)
-    seconds = sum(float(run.now[0] + run.now[1] * run.window) for run in runs)
-    events = collisions + sum(int(run.count[4]) for run in runs)
+    collisions = sum(int(run.state.counts[:3].sum()) for run in runs)
+    seconds = sum(run.time for run in runs)
+    events = collisions + sum(int(run.state.counts[4]) for run in runs)
     return Outcome(
         "",
         not said,
@@ -82,30 +85,30 @@ def tested(name: str, test: Callable[..., None], *arguments: object) -> Case:
 CASES = [
     tested(
         "bouncing to rest, e = 0.5",
-        resting.test_a_dropped_ball_stops_when_the_series_of_its_bounces_ends,
+        support_changes.test_a_dropped_ball_stops_when_the_series_of_its_bounces_ends,
         0.5,
     ),
     tested(
         "bouncing to rest, e = 0.9",
-        resting.test_a_dropped_ball_stops_when_the_series_of_its_bounces_ends,
+        support_changes.test_a_dropped_ball_stops_when_the_series_of_its_bounces_ends,
         0.9,
     ),
-    tested("at rest", resting.test_a_ball_at_rest_costs_nothing),
+    tested("at rest", support_changes.test_a_ball_at_rest_costs_nothing),
     tested(
         "down a ramp of triangles",
-        resting.test_down_a_ramp_of_many_triangles_it_slides_as_on_one,
+        support_changes.test_down_a_ramp_of_many_triangles_it_slides_as_on_one,
         6,
         0.0,
     ),
     tested(
         "down a ramp with resistance",
-        resting.test_down_a_ramp_of_many_triangles_it_slides_as_on_one,
+        support_changes.test_down_a_ramp_of_many_triangles_it_slides_as_on_one,
         6,
         0.1,
     ),
     tested(
         "held on a gentle slope",
-        resting.test_resistance_stops_a_sliding_ball_and_holds_it_on_a_gentle_slope,
+        path_end.test_resistance_stops_a_sliding_ball_and_holds_it_on_a_gentle_slope,
     ),
     *(
         tested(
@@ -144,29 +147,34 @@ CASES = [
         0.27,
         True,
     ),
-    tested("lift-off at a ramp's end", resting.test_it_lifts_off_at_the_ramps_end),
+    tested("lift-off at a ramp's end", path_end.test_it_lifts_off_at_the_ramps_end),
     tested(
-        "slowly over an edge", resting.test_slowly_over_an_edge_it_rolls_until_it_leaves_it, 0.05
+        "slowly over an edge", path_end.test_slowly_over_an_edge_it_rolls_until_it_leaves_it, 0.05
     ),
     tested(
-        "change of slope", resting.test_over_a_gentle_change_of_slope_it_keeps_its_energy, 20.0, 8.0
+        "change of slope",
+        support_changes.test_over_a_gentle_change_of_slope_it_keeps_its_energy,
+        20.0,
+        8.0,
     ),
-    tested("trough of 2 degree facets", resting.test_a_trough_of_facets_is_a_pendulum, 2.0),
-    tested("trough of 0.5 degree facets", resting.test_a_trough_of_facets_is_a_pendulum, 0.5),
-    tested("bowl of triangles", resting.test_a_bowl_of_triangles_keeps_the_energy),
-    tested("down a valley", resting.test_down_a_valley_it_is_led_by_both_faces, 0.0),
-    tested("wedged against three", resting.test_wedged_against_three_faces_it_sleeps),
+    tested("trough of 2 degree facets", support_changes.test_a_trough_of_facets_is_a_pendulum, 2.0),
+    tested(
+        "trough of 0.5 degree facets", support_changes.test_a_trough_of_facets_is_a_pendulum, 0.5
+    ),
+    tested("bowl of triangles", support_changes.test_a_bowl_of_triangles_keeps_the_energy),
+    tested("down a valley", support_changes.test_down_a_valley_it_is_led_by_both_faces, 0.0),
+    tested("wedged against three", support_changes.test_wedged_against_three_faces_it_sleeps),
     *(
         tested(
             f"into a slot 2r + {gap:g} m",
-            resting.test_in_a_slot_just_wider_than_itself_it_costs_a_bounded_number_of_events,
+            support_changes.test_in_a_slot_just_wider_than_itself_it_costs_a_bounded_number_of_events,
             gap,
         )
         for gap in (1e-9, 1e-7, 1e-5, 1e-3)
     ),
-    tested("heap falls still", resting.test_a_settling_heap_falls_still_and_is_reported),
-    tested("woken by a hit", resting.test_another_balls_hit_wakes_it),
-    tested("no rest on the sonotrode", resting.test_on_the_sonotrode_nothing_rests),
+    tested("heap falls still", resting_balls.test_a_settling_heap_falls_still_and_is_reported),
+    tested("woken by a hit", ball_on_ball.test_another_balls_hit_wakes_it),
+    tested("no rest on the sonotrode", resting_balls.test_on_the_sonotrode_nothing_rests),
     *(
         tested(
             f"falls on a bar at {rpm:g} rpm",
@@ -192,30 +200,31 @@ CASES = [
     *(
         tested(
             f"woken by a paddle at {rpm:g} rpm",
-            beside.test_a_sleeping_ball_is_woken_when_the_paddle_arrives,
+            pushed_by_part.test_a_sleeping_ball_is_woken_when_the_paddle_arrives,
             rpm,
         )
         for rpm in (0.1, 10.0)
     ),
     tested(
         "pushed by a paddle at 0.05 rpm",
-        beside.test_what_it_pushes_pushes_others_however_slowly,
+        pushed_by_part.test_what_it_pushes_pushes_others_however_slowly,
         0.05,
     ),
     tested(
         "pile swept at 1 rpm",
-        beside.test_a_pile_swept_by_a_slow_paddle_gets_no_more_speed_than_that_gives,
+        pushed_by_part.test_a_pile_swept_by_a_slow_paddle_gets_no_more_speed_than_that_gives,
         1.0,
     ),
     tested(
         "at rest below a turning gear",
-        beside.test_balls_rest_below_a_gear_that_turns_and_nothing_overlaps,
+        pushed_by_part.test_balls_rest_below_a_gear_that_turns_and_nothing_overlaps,
     ),
     tested(
-        "hops on a turning slab", beside.test_on_the_turning_part_nothing_rests_and_hops_are_bounded
+        "hops on a turning slab",
+        pushed_by_part.test_on_the_turning_part_nothing_rests_and_hops_are_bounded,
     ),
     tested(
         "crushed by a cam",
-        beside.test_a_ball_that_the_part_crushes_stops_the_run_and_the_part_is_named,
+        pushed_by_part.test_a_ball_that_the_part_crushes_stops_the_run_and_the_part_is_named,
     ),
 ]

@@ -9,25 +9,25 @@ import numpy as np
 import pytest
 
 from sim_core import Balls, Friction, Physics, Scene, pack_balls, simulate
-from sim_core.contact.path_end import TURN
+from sim_core.contact.path_end import MAX_TURN
 from sim_core.effects.contact_mode import SLIDING
 from sim_core.effects.gravity import STANDARD as G
 from tests.helpers.jit_on_and_off import with_and_without_jit
+from tests.helpers.scenes import contact_mode as contact_scenes
 from tests.helpers.scenes.cavities import box
-from tests.helpers.scenes.terrain import profile, terrain
-from tests.sim_core.contact import test_resting as resting
-from tests.sim_core.contact.test_resting import (
+from tests.helpers.scenes.contact_mode import (
     CAPTURE,
     DIAMETER,
     TAGS,
     TOUCH,
     R,
     energies,
-    feet,
     film,
     mode,
     slope,
+    supports,
 )
+from tests.helpers.scenes.terrain import profile, terrain
 from tests.sim_core.loop.test_determinism import fingerprint
 
 ALLEY = box((0.6, 0.1, 0.02))
@@ -36,7 +36,7 @@ ON_A_PLANE = 2.0 / 5.0  # moment of inertia of a solid sphere over m R²
 
 def physics(mu: float, e: float = 0.8, resistance: float = 0.0, beta0: float = 0.2) -> Physics:
     """As for balls without friction, and the same friction everywhere."""
-    return resting.physics(e, resistance)._replace(
+    return contact_scenes.physics(e, resistance)._replace(
         friction=Friction(((mu, beta0),) * TAGS, (mu, beta0))
     )
 
@@ -58,7 +58,7 @@ def spin(balls: Balls) -> np.ndarray:
 def downhill(mu: float, degrees: float, inertia: float, load: float = 1.0) -> float:
     """Acceleration [m/s²] of a body that rolls, or slips if mu does not hold it: I/(m h²) is ``inertia``.
 
-    ``load``: on its feet, over that on a plane.
+    ``load``: on its supports, over that on a plane.
     """
     push, press = (
         G * math.sin(math.radians(degrees)),
@@ -97,7 +97,7 @@ def test_down_a_ramp_of_many_triangles_it_rolls_or_slips(
     np.testing.assert_allclose(
         spin(frames[-1]), [0.0, turns * until / R, 0.0], rtol=1e-7, atol=1e-6
     )
-    assert run.count[0] == 1
+    assert run.state.counts[0] == 1
     if resistance == 0.0:
         assert (np.diff(energies(frames)) < 1e-14).all()
         if mu in (0.0, 10.0):
@@ -137,13 +137,13 @@ def test_a_ball_that_spins_askew_goes_along_a_parabola_and_then_straight_on() ->
         np.testing.assert_allclose(frame.positions[0], here, atol=1e-12)
     np.testing.assert_allclose(frames[-1].velocities[0], v - 2.0 / 7.0 * slip, atol=1e-12)
     assert spin(frames[-1])[2] == pytest.approx(40.0, abs=1e-9)
-    assert run.count[0] == 1
+    assert run.state.counts[0] == 1
     assert (np.diff(energies(frames)) < 1e-15).all()
 
 
 @pytest.mark.parametrize(
     "speed", [0.4, 4.0]
-)  # the faster turns by less than TURN while it is searched in one piece
+)  # the faster turns by less than MAX_TURN while it is searched in one piece
 def test_on_a_slope_a_slip_that_turns_is_followed(speed: float) -> None:
     """Thrown across a slope: against small steps of the equations of motion, v' = g + f, w' = -5/(2R) n x f."""
     mu, degrees, until = 0.15, 20.0, 0.25
@@ -170,8 +170,8 @@ def test_on_a_slope_a_slip_that_turns_is_followed(speed: float) -> None:
         v = v + step * (pull + rub)
         w = w - step * 2.5 / R * np.cross(normal, rub)
     lag = (
-        0.5 * TURN * mu * G * math.cos(math.radians(degrees))
-    )  # the force's direction is old by TURN at most
+        0.5 * MAX_TURN * mu * G * math.cos(math.radians(degrees))
+    )  # the force's direction is old by MAX_TURN at most
     np.testing.assert_allclose(frames[-1].positions[0], place, atol=0.5 * lag * until**2)
     np.testing.assert_allclose(frames[-1].velocities[0], v, atol=lag * until)
     assert (np.diff(energies(frames)) < 1e-14).all()
@@ -195,7 +195,7 @@ def test_down_a_valley_it_rolls_on_both_faces(mu: float) -> None:
     gone = frames[-1].positions[0] - start
     assert gone @ crease == pytest.approx(0.5 * push * until**2, rel=1e-6)
     assert abs(gone[1]) < 1e-12
-    assert feet(run) == 2
+    assert supports(run) == 2
     if mu == 10.0:
         assert spin(frames[-1])[1] == pytest.approx(push * until / height, rel=1e-6)
     assert (np.diff(energies(frames)) < 1e-14).all()
@@ -235,7 +235,7 @@ def test_a_trough_of_facets_is_a_rolling_pendulum() -> None:
     spent = energies(frames)
     assert (np.diff(spent) < 1e-12).all()
     assert spent[100] - spent[-1] < 0.05 * (spent[100] + G * length)
-    assert run.count[3] < 20_000
+    assert run.state.counts[3] < 20_000
 
 
 @pytest.mark.parametrize(
@@ -287,7 +287,7 @@ def test_landing_it_rolls_in_the_end_with_what_the_floor_leaves_it(mu: float) ->
 
 
 def test_without_grip_it_moves_as_without_friction_to_the_last_bit() -> None:
-    scene = resting.small_scene()
+    scene = contact_scenes.small_scene()
     smooth = scene.physics._replace(
         rest=scene.physics.rest._replace(resistance=0.0),  # type: ignore[union-attr]
         friction=Friction(((0.0, 0.2),) * TAGS, (0.0, 0.2)),
@@ -306,7 +306,7 @@ def test_in_a_settling_pile_of_rough_balls_nothing_overlaps_and_no_energy_comes_
     floor: str, seed: int, mu: float
 ) -> None:
     rng = np.random.default_rng(seed)
-    room = box((0.012, 0.012, 0.06)) if floor == "flat" else resting.rough_floor(rng)
+    room = box((0.012, 0.012, 0.06)) if floor == "flat" else contact_scenes.rough_floor(rng)
     places = pack_balls(room, 50, DIAMETER, rng)
     balls = Balls(
         places,
@@ -317,14 +317,14 @@ def test_in_a_settling_pile_of_rough_balls_nothing_overlaps_and_no_energy_comes_
     for _ in range(5):
         run, frames = film(room, balls, physics(mu, 0.7, 0.005), 0.1)
         balls = frames[-1]
-        assert run.count[:3].sum() < 200_000
+        assert run.state.counts[:3].sum() < 200_000
         assert (np.diff(energies(frames)) < 50 * CAPTURE**2).all()
     assert np.abs(balls.velocities).max() < 0.1
 
 
 def small_scene() -> Scene:
-    """The six balls of test_resting, which come down spinning."""
-    scene = resting.small_scene()
+    """The six balls of small_scene, which come down spinning."""
+    scene = contact_scenes.small_scene()
     spins = np.random.default_rng(9).normal(0.0, 200.0, scene.balls.positions.shape)
     balls = Balls(scene.balls.positions, scene.balls.velocities, DIAMETER, spins=spins)
     return Scene(scene.mesh, balls, physics(0.2, 0.5, 0.05), 0.15)
@@ -368,5 +368,5 @@ def test_a_ball_that_spins_itself_against_a_wall_uphill_stays_there_until_it_sli
     push = 5.0 / 7.0 * G * math.sin(math.radians(degrees))
     gone = (frames[-1].positions[0] - start) @ down
     assert gone == pytest.approx(0.5 * push * 0.2**2, rel=1e-2)
-    assert run.count[:3].sum() < 100
+    assert run.state.counts[:3].sum() < 100
     assert (np.diff(energies(frames)) < 1e-12).all()

@@ -24,7 +24,7 @@ from sim_core import (
     Scene,
     Vibration,
 )
-from sim_core.loop.simulate import _Run
+from sim_core.loop.simulate import Simulation
 from tests.helpers.scenes.cavities import box
 
 # what the loop keeps of an effect, by the name of the field and the kind of thing it is when the
@@ -134,12 +134,12 @@ def test_the_machine_code_of_a_bare_scene_knows_no_effect(bare: dict[str, list[s
 @pytest.mark.parametrize("effect", sorted(KEPT))
 def test_the_arrays_of_an_absent_effect_do_not_exist(effect: str) -> None:
     field, _ = KEPT[effect]
-    assert attrgetter(field)(_Run(bare_scene())) is None
+    assert attrgetter(field)(Simulation(bare_scene()).state) is None
 
 
 @pytest.mark.parametrize("effect", sorted(set(KEPT) - {"part_rotation"}))
 def test_the_table_names_what_a_present_effect_keeps(effect: str) -> None:
     field, kind = KEPT[effect]
     needed = {name: PRESENT[name] for name in (effect, NEEDS.get(effect)) if name}
-    run = _Run(bare_scene(BARE._replace(**needed)))  # type: ignore[arg-type]
-    assert type(attrgetter(field)(run)).__name__ == kind
+    run = Simulation(bare_scene(BARE._replace(**needed)))  # type: ignore[arg-type]
+    assert type(attrgetter(field)(run.state)).__name__ == kind

@@ -23,11 +23,11 @@ from sim_core import (
     pack_balls,
     simulate,
 )
-from sim_core.effects.contact_mode import ASLEEP, MODE
+from sim_core.effects.contact_mode import ASLEEP
 from sim_core.effects.sonotrodes import PARTS, new_waves, shift_phases, whole_period_window
 from sim_core.effects.vibration import checked_waves
 from sim_core.loop import compile_ahead
-from sim_core.loop.simulate import _Run
+from sim_core.loop.simulate import Simulation
 from sim_core.motion import WINDOW
 from tests.helpers.scenes.cavities import CEILING, FLOOR, SIDES, balls_at, box
 from tests.sim_core.geometry.test_sonotrode_border import trough
@@ -99,7 +99,10 @@ def test_phases_do_not_drift(windows: int) -> None:
 
 def test_one_vibration_needs_no_table() -> None:
     assert new_waves((LOW,), checked_waves(LOW), 0.02, np.zeros(3)) is None
-    assert _Run(Scene(ROOM, balls_at(MIDDLE), Physics(vibration=(LOW,)), 1.0)).waves is None
+    assert (
+        Simulation(Scene(ROOM, balls_at(MIDDLE), Physics(vibration=(LOW,)), 1.0)).state.waves
+        is None
+    )
 
 
 @pytest.mark.parametrize("wall", [FLOOR, 3])
@@ -132,7 +135,7 @@ def test_a_ball_that_lies_still_waits_for_the_slowest() -> None:
     wall = Vibration(3, 0.5e-3, 5.0, -2.0, (1.0, 0.0, 0.0))
     comes = (math.asin(0.4) - wall.phase) / (math.tau * 5.0)
     for plates in ((HIGH, wall), (wall, HIGH)):
-        run = _Run(
+        run = Simulation(
             Scene(
                 room,
                 balls_at(np.array([[1.7e-3, 0.015, 1.5e-3]])),
@@ -141,11 +144,10 @@ def test_a_ball_that_lies_still_waits_for_the_slowest() -> None:
             )
         )
         run.play(comes - 1e-9, record=False)
-        assert run.contact is not None
-        assert run.contact.marks[0, MODE] == ASLEEP
+        assert run.state.contact is not None
+        assert run.state.contact.mode[0] == ASLEEP
         run.play(comes + 1e-6, record=True)
-        (page,) = run.chunks
-        assert page[0][0, 0] == pytest.approx(comes, abs=1e-12)
+        assert run.logs[-1].time[0] == pytest.approx(comes, abs=1e-12)
         assert run.balls().velocities[0, 0] == pytest.approx(
             (1.0 + 0.9) * wall.peak_speed * math.cos(math.asin(0.4)), rel=1e-3
         )

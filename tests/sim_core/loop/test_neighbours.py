@@ -10,7 +10,7 @@ from sim_core.loop.neighbours import (
     next_meeting,
     refresh_neighbours,
 )
-from sim_core.loop.spatial_blocks import MANY
+from sim_core.loop.spatial_blocks import MIN_BALLS
 
 REACH = 3e-3  # m
 WINDOW = 0.02  # s
@@ -51,7 +51,8 @@ def filter_of(motion: np.ndarray, half: float) -> NeighbourFilter:
 
 
 @pytest.mark.parametrize(
-    ("balls", "half"), [(4, 0.005), (200, 0.03), (MANY - 1, 0.07), (MANY, 0.07), (3000, 0.2)]
+    ("balls", "half"),
+    [(4, 0.005), (200, 0.03), (MIN_BALLS - 1, 0.07), (MIN_BALLS, 0.07), (3000, 0.2)],
 )
 def test_every_meeting_is_found(balls: int, half: float) -> None:
     rng = np.random.default_rng(balls)
@@ -93,7 +94,7 @@ def test_a_graze_within_the_filters_rounding_is_not_lost(balls: int) -> None:
 
 def test_sorting_into_blocks_keeps_every_ball() -> None:
     rng = np.random.default_rng(6)
-    count = MANY + 9
+    count = MIN_BALLS + 9
     motion = gas(count, 0.1, rng)
     neighbours = filter_of(motion, 0.1)
     assert neighbours.blocks is not None
@@ -102,7 +103,7 @@ def test_sorting_into_blocks_keeps_every_ball() -> None:
             -0.12, 0.12, (count, 3)
         )  # some outside the room, as bases may be
         refresh_neighbours(neighbours, motion)
-        slots = neighbours.blocks.slot
+        slots = neighbours.blocks.column
         assert sorted(slots) == list(range(count))
         assert (neighbours.blocks.ball[slots] == np.arange(count)).all()
-        assert (neighbours.lanes[:, slots] == motion.T.astype(np.float32)).all()
+        assert (neighbours.paths[:, slots] == motion.T.astype(np.float32)).all()

@@ -16,7 +16,7 @@ from sim_core import (
     simulate,
 )
 from sim_core.loop.jam_message import touching
-from sim_core.loop.simulate import _Run
+from sim_core.loop.simulate import Simulation
 from tests.helpers.scenes.cavities import FLOOR, box, cylinder, uniform_restitution
 
 DIAMETER = 3e-3
@@ -68,10 +68,10 @@ def test_two_balls_fly_through_each_other() -> None:
 
 def test_nothing_is_kept_of_pairs_and_overlaps_are_no_error() -> None:
     in_one_place = Balls(np.full((3, 3), 0.01) - [0.01, 0.01, 0.0], np.zeros((3, 3)), DIAMETER)
-    run = _Run(Scene(ROOM, in_one_place, Physics(ball_collisions=None), 1.0))
-    assert run.neighbours is None
-    assert run.queue.pair_time is None
-    assert run.queue.marks.shape == (3, 3)
+    run = Simulation(Scene(ROOM, in_one_place, Physics(ball_collisions=None), 1.0))
+    assert run.state.neighbours is None
+    assert run.state.queue.meetings is None
+    assert len(run.state.queue.wall_time) == 3
     run.play(0.1, record=False)
     assert touching(run.scene, ROOM.corners, in_one_place.positions, 0) == (
         "",

@@ -22,7 +22,7 @@ from sim_core import (
     Vibration,
     simulate,
 )
-from sim_core.loop.simulate import _Run
+from sim_core.loop.simulate import Simulation
 from tests.helpers.scenes.cavities import CEILING, FLOOR, box
 
 ROOM = box((0.03, 0.03, 0.03))
@@ -153,7 +153,7 @@ def test_a_diameter_that_is_no_number_is_named() -> None:
 
 def test_balls_that_came_to_overlap_stop_the_run() -> None:
     apart = Balls(np.array([[0.01, 0.01, 0.01], [0.02, 0.01, 0.01]]), np.zeros((2, 3)), 3e-3)
-    run = _Run(Scene(ROOM, apart, Physics(), 1.0))
-    run.motion[1, :3] = run.motion[0, :3] + [0.001, 0.0, 0.0]
+    run = Simulation(Scene(ROOM, apart, Physics(), 1.0))
+    run.state.motion[1, :3] = run.state.motion[0, :3] + [0.001, 0.0, 0.0]
     with pytest.raises(SimulationError, match=r"balls 0 and 1 overlap by 0\.002 m"):
         run.play(0.1, record=False)

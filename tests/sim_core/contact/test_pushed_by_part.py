@@ -22,9 +22,9 @@ from sim_core import (
     pack_balls,
     simulate,
 )
-from sim_core.effects.contact_mode import ASLEEP, MODE
+from sim_core.effects.contact_mode import ASLEEP
 from sim_core.effects.gravity import STANDARD as G
-from sim_core.loop.simulate import _Run
+from sim_core.loop.simulate import Simulation
 from sim_core.scene.invariants import clearance, closest_pair
 from tests.helpers.jit_on_and_off import with_and_without_jit
 from tests.helpers.scenes.cavities import SIDES, box_around
@@ -59,7 +59,7 @@ def on_floor(places: object) -> Balls:
     )
 
 
-def gaps(run: _Run) -> float:
+def gaps(run: Simulation) -> float:
     """The smallest between balls, still surfaces and the part where it is now [m]."""
     balls, corners = run.balls(), run._corners()
     assert corners is not None
@@ -67,9 +67,9 @@ def gaps(run: _Run) -> float:
     return min(float(clearance(corners, balls.positions, 2 * R).min() - R), pairs)
 
 
-def modes(run: _Run) -> np.ndarray:
-    assert run.contact is not None
-    return run.contact.marks[:, MODE]
+def modes(run: Simulation) -> np.ndarray:
+    assert run.state.contact is not None
+    return run.state.contact.mode
 
 
 def arrival(x: float, y: float) -> float:
@@ -81,12 +81,14 @@ def arrival(x: float, y: float) -> float:
 def test_a_sleeping_ball_is_woken_when_the_paddle_arrives(rpm: float) -> None:
     x, y, omega = 0.002, 0.012, 2 * np.pi * rpm / 60
     when = arrival(x, y) / omega
-    run = _Run(Scene(paddle(), on_floor([x, y]), physics(PartRotation(PART, rpm=rpm)), 2 * when))
+    run = Simulation(
+        Scene(paddle(), on_floor([x, y]), physics(PartRotation(PART, rpm=rpm)), 2 * when)
+    )
     run.play(0.5 * when, record=False)
-    before = run.count.copy()
+    before = run.state.counts.copy()
     run.play(when * (1.0 - 1e-9), record=False)
     assert modes(run)[0] == ASLEEP
-    assert (run.count == before).all()  # it costs nothing until then
+    assert (run.state.counts == before).all()  # it costs nothing until then
     np.testing.assert_allclose(run.balls().positions[0], [x, y, R - HALF], atol=TOUCH)
     run.play(when * (1.0 + 1e-9), record=False)
     speed = omega * np.sqrt(x * x + y * y - (WIDE + R) ** 2)
@@ -109,7 +111,7 @@ def test_a_part_that_swings_wakes_a_ball_when_it_gets_there_and_not_one_that_it_
     near, far = (0.009, 0.007), (0.002, 0.012)
     assert arrival(*near) < swing < arrival(*far)
     when = np.arcsin(arrival(*near) / swing) / (2 * np.pi * frequency)
-    run = _Run(Scene(paddle(0.024), on_floor([near, far]), physics(turn), 20.0))
+    run = Simulation(Scene(paddle(0.024), on_floor([near, far]), physics(turn), 20.0))
     run.play(when * (1.0 - 1e-9), record=False)
     assert (modes(run) == ASLEEP).all()
     run.play(when * (1.0 + 1e-9), record=False)
@@ -117,13 +119,13 @@ def test_a_part_that_swings_wakes_a_ball_when_it_gets_there_and_not_one_that_it_
 
 
 def test_what_the_part_never_reaches_is_never_looked_at_again() -> None:
-    run = _Run(
+    run = Simulation(
         Scene(paddle(), on_floor([0.018, 0.018]), physics(PartRotation(PART, rpm=30.0)), 30.0)
     )
     run.play(0.1, record=False)
-    before = run.count.copy()
+    before = run.state.counts.copy()
     run.play(30.0, record=False)
-    assert (run.count == before).all()
+    assert (run.state.counts == before).all()
 
 
 @pytest.mark.parametrize("rpm", [0.05, 1.0, 10.0])
@@ -139,14 +141,14 @@ def test_what_it_pushes_pushes_others_however_slowly(rpm: float) -> None:
         [0.012 + step, first + np.sqrt(3.0) * step],
     ]
     until = 0.1 / omega
-    run = _Run(Scene(paddle(), on_floor(places), physics(PartRotation(PART, rpm=rpm)), until))
+    run = Simulation(Scene(paddle(), on_floor(places), physics(PartRotation(PART, rpm=rpm)), until))
     for stop in np.linspace(0.0, until, 21)[1:]:
         run.play(float(stop), record=False)
         assert gaps(run) > -TOUCH
     moved = np.linalg.norm(run.balls().positions[:, :2] - np.array(places), axis=1)
     assert moved[0] > 0.1 * 0.012 - 2e-4
     assert moved[1:].max() > 2e-4
-    assert run.count.sum() < 100_000
+    assert run.state.counts.sum() < 100_000
 
 
 @pytest.mark.parametrize("rpm", [1.0, 10.0])
@@ -158,7 +160,7 @@ def test_a_pile_swept_by_a_slow_paddle_gets_no_more_speed_than_that_gives(rpm: f
     rng = np.random.default_rng(1)
     places = pack_balls(room, 60, 2 * R, rng, part_rotation=turn)
     balls = Balls(places, rng.normal(0.0, 0.1, places.shape), 2 * R)
-    run = _Run(Scene(room, balls, physics(turn), 4.0))
+    run = Simulation(Scene(room, balls, physics(turn), 4.0))
     tip = np.hypot(0.015, WIDE) * 2 * np.pi * rpm / 60
     asleep = 0
     for stop in np.linspace(0.0, 4.0, 81)[1:]:
@@ -171,7 +173,7 @@ def test_a_pile_swept_by_a_slow_paddle_gets_no_more_speed_than_that_gives(rpm: f
             )
             asleep += int((modes(run) >= ASLEEP).sum())
     assert asleep > 40 * 25
-    assert run.count.sum() < 100_000
+    assert run.state.counts.sum() < 100_000
 
 
 def test_balls_rest_below_a_gear_that_turns_and_nothing_overlaps() -> None:
@@ -182,24 +184,24 @@ def test_balls_rest_below_a_gear_that_turns_and_nothing_overlaps() -> None:
     rng = np.random.default_rng(5)
     places = pack_balls(room, 80, 2 * R, rng, part_rotation=turn)
     balls = Balls(places, rng.normal(0.0, 0.1, places.shape), 2 * R)
-    run = _Run(Scene(room, balls, physics(turn), 2.0))
+    run = Simulation(Scene(room, balls, physics(turn), 2.0))
     for stop in np.linspace(0.0, 2.0, 41)[1:]:
         run.play(float(stop), record=False)
         assert gaps(run) > -TOUCH
     assert (modes(run) >= ASLEEP).sum() > 40
-    assert run.count.sum() < 1_000_000
+    assert run.state.counts.sum() < 1_000_000
 
 
 def test_on_the_turning_part_nothing_rests_and_hops_are_bounded() -> None:
     slab = trimesh.creation.box((0.026, 0.026, 0.01))
     room, turn = box_around(slab, HALF), PartRotation(PART, rpm=2.0)
     ball = Balls(np.array([[0.0, 0.0, 0.005 + R + 1e-3]]), np.zeros((1, 3)), 2 * R)
-    run = _Run(Scene(room, ball, physics(turn, 0.5), 3.0))
+    run = Simulation(Scene(room, ball, physics(turn, 0.5), 3.0))
     run.play(2.0, record=False)
-    before = run.count.copy()
+    before = run.state.counts.copy()
     run.play(3.0, record=False)
     assert modes(run)[0] < ASLEEP
-    assert 0.5 * G / ELASTIC_BELOW < run.count[0] - before[0] < 0.5 / 1e-4
+    assert 0.5 * G / ELASTIC_BELOW < run.state.counts[0] - before[0] < 0.5 / 1e-4
     assert 0.0 <= run.balls().positions[0, 2] - 0.005 - R < 1e-5
     assert not can_rest(room, Gravity(), PART, SIDES)
     assert can_rest(room, Gravity(), PART)
@@ -250,7 +252,7 @@ def any_scene(seed: int) -> Scene:
 def run_or_say_why_not(seed: int) -> str:
     """Nothing overlaps at any of twenty times; a run may stop only for a ball that the part catches."""
     try:
-        run = _Run(any_scene(seed))
+        run = Simulation(any_scene(seed))
         for stop in np.linspace(0.0, 1.0, 21)[1:]:
             run.play(float(stop), record=False)
             assert gaps(run) > -TOUCH
@@ -281,7 +283,7 @@ def small_scene() -> Scene:
 
 def test_the_same_bits_with_the_jit_on_and_off() -> None:
     code = (
-        "from tests.sim_core.contact.test_beside_turning_part import small_scene; from sim_core import simulate;"
+        "from tests.sim_core.contact.test_pushed_by_part import small_scene; from sim_core import simulate;"
         "from tests.sim_core.loop.test_determinism import fingerprint;"
         "r = simulate(small_scene()); print(r.collisions.total, len(r.resting), fingerprint(r))"
     )

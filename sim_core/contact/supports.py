@@ -1,0 +1,148 @@
+"""The supports of a ball, and what they leave of a vector: the projection on their cone.
+
+Notation: n_k: unit normal of support k, towards the ball. The supports leave the cone
+{x: n_k x >= 0 for all k}. The vector of the cone that is nearest to x is x itself, or it lies on
+the plane of one support, or on the planes of two; it is unique, and it is the one whose
+multipliers all push (conditions of Kuhn and Tucker).
+"""
+
+import numpy as np
+
+from sim_core.effects.contact_mode import FLYING, MAX_SUPPORTS, ON_BALL, ContactState, Supports
+from sim_core.numerics.jit import jit
+from sim_core.numerics.vec3 import Vec3, add_scaled, cross, dot, set_vec3
+
+ROUNDING = 1e-12  # [-], of a projection
+# of an inverse mass: an impulse on balls that give way by less than this does not grow any more
+BLOCKED = 0.01
+# s. Balls that are pressed together without any speed would meet again at once. They part for this
+# time, which lifts them by 50 nm.
+SHORTEST_HOP = 1e-4
+
+
+@jit
+def support_normal(supports: Supports, ball: int, support: int) -> Vec3:
+    """Unit normal of a support, towards the ball."""
+    normals = supports.normals
+    return Vec3(normals[ball, support, 0], normals[ball, support, 1], normals[ball, support, 2])
+
+
+@jit
+def stands_on_ball(supports: Supports, ball: int, other: int) -> bool:
+    """True when a ball has a support on another ball."""
+    stands = False
+    for support in range(supports.number[ball]):
+        stands |= supports.obstacles[ball, support] == ON_BALL - other
+    return stands
+
+
+@jit
+def _is_in_cone(supports: Supports, ball: int, x: Vec3, slack: float) -> bool:
+    inside = True
+    for support in range(supports.number[ball]):
+        inside &= dot(support_normal(supports, ball, support), x) >= -slack
+    return inside
+
+
+@jit
+def onto_cone(supports: Supports, ball: int, x: Vec3) -> Vec3:
+    """The vector nearest to x in the cone that the ball's supports leave."""
+    count = supports.number[ball]
+    size = np.sqrt(dot(x, x))
+    slack = ROUNDING * size
+    if _is_in_cone(supports, ball, x, slack):
+        return x
+    for one in range(count):
+        n = support_normal(supports, ball, one)
+        push = -dot(n, x)
+        y = add_scaled(x, push, n)
+        if push >= -slack and _is_in_cone(supports, ball, y, slack):
+            return y
+    for one in range(count):
+        n = support_normal(supports, ball, one)
+        for two in range(one + 1, count):
+            m = support_normal(supports, ball, two)
+            line = cross(n, m)
+            square = dot(line, line)
+            if square < 1e-20:
+                continue
+            c = dot(n, m)
+            a, b = -dot(n, x), -dot(m, x)
+            loose = slack + 1e-15 * size / square
+            if (a - c * b) / square < -loose or (b - c * a) / square < -loose:
+                continue
+            share = dot(line, x) / square
+            y = Vec3(share * line.x, share * line.y, share * line.z)
+            if _is_in_cone(supports, ball, y, slack):
+                return y
+    return Vec3(0.0, 0.0, 0.0)
+
+
+@jit
+def response(contact: ContactState, ball: int, push: Vec3) -> Vec3:
+    """Velocity change of a ball, in flight or on supports, for a unit impulse per mass."""
+    if contact.mode[ball] == FLYING:
+        return push
+    return onto_cone(contact.supports, ball, push)
+
+
+@jit
+def drop_support(supports: Supports, ball: int, support: int) -> None:
+    """Remove a support; those after it move up."""
+    last = supports.number[ball] - 1
+    for k in range(support, last):
+        supports.obstacles[ball, k] = supports.obstacles[ball, k + 1]
+        supports.ranges[ball, k] = supports.ranges[ball, k + 1]
+        for axis in range(3):
+            supports.normals[ball, k, axis] = supports.normals[ball, k + 1, axis]
+            supports.origins[ball, k, axis] = supports.origins[ball, k + 1, axis]
+    supports.obstacles[ball, last] = -1
+    supports.number[ball] = last
+
+
+@jit
+def drop_supports_along(supports: Supports, ball: int, direction: Vec3, least: float) -> None:
+    """Remove the supports whose normal has more than ``least`` along ``direction``."""
+    for support in range(supports.number[ball] - 1, -1, -1):
+        if dot(support_normal(supports, ball, support), direction) > least:
+            drop_support(supports, ball, support)
+
+
+@jit
+def add_support(
+    supports: Supports, ball: int, obstacle: int, normal: Vec3, position: Vec3, reach: float
+) -> None:
+    """Add a support that is good up to ``reach`` [m] from here; the oldest gives way to a fifth."""
+    if supports.number[ball] == MAX_SUPPORTS:
+        drop_support(supports, ball, 0)
+    support = supports.number[ball]
+    supports.obstacles[ball, support] = obstacle
+    for axis in range(3):
+        supports.normals[ball, support, axis] = normal[axis]
+        supports.origins[ball, support, axis] = position[axis]
+    supports.ranges[ball, support] = reach
+    supports.number[ball] = support + 1
+
+
+@jit
+def set_mode(contact: ContactState, ball: int, mode: int) -> None:
+    """Set how a ball moves, and keep the list of the balls that are not in flight."""
+    contact.mode[ball] = mode
+    balls, places, length = contact.contact_list
+    place = places[ball]
+    if mode == FLYING and place >= 0:
+        length[0] -= 1
+        last = balls[length[0]]
+        balls[place] = last
+        places[last] = place
+        places[ball] = -1
+    elif mode != FLYING and place < 0:
+        balls[length[0]] = ball
+        places[ball] = length[0]
+        length[0] += 1
+
+
+@jit
+def forget_left_support(contact: ContactState, ball: int) -> None:
+    """From now on the support that the ball left last does not count any more."""
+    set_vec3(contact.left_normal, ball, Vec3(0.0, 0.0, 0.0))
