@@ -14,7 +14,7 @@ import numpy as np
 
 from chamberopt.chamber.build import TAG_PART
 from chamberopt.chamber.checks.place_names import around, surface_names
-from chamberopt.geometry.triangles import closest_points
+from chamberopt.geometry.triangles import closest_points, connected_pieces
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -166,15 +166,12 @@ def _with_carriers(resting: Resting, kinds: list[str]) -> list[str]:
 
 def _places(resting: Resting, kinds: list[str], diameter: float) -> list[tuple[str, np.ndarray]]:
     """Kind and balls of each place, the one with most balls first."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
     from scipy.spatial import KDTree
 
     pairs = KDTree(resting.position).query_pairs(PLACE_DISTANCE * diameter, output_type="ndarray")
     alike = [kinds[one] == kinds[two] for one, two in pairs]
     one, two = pairs[np.array(alike, dtype=bool)].T
-    links = coo_array((np.ones(len(one), dtype=bool), (one, two)), shape=(len(kinds),) * 2)
-    label = connected_components(links, directed=False)[1]
+    label = connected_pieces(one, two, len(kinds))[1]
     order = sorted(Counter(label.tolist()).items(), key=lambda item: (-item[1], item[0]))
     places = [np.flatnonzero(label == k) for k, _ in order]
     return [(kinds[members[0]], members) for members in places]

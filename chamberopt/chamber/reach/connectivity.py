@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from chamberopt.geometry.triangles import area_vectors
+from chamberopt.geometry.triangles import area_vectors, connected_pieces
 
 if TYPE_CHECKING:
     from chamberopt.chamber.reach.largest_ball import TouchPoints
@@ -95,12 +95,7 @@ def _halved(cells: np.ndarray) -> np.ndarray:
 
 def connected_groups(links: np.ndarray, count: int) -> np.ndarray:
     """Group number (count,) of each node, where links (k, 2) connect the nodes of a group."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    ones = np.ones(len(links), dtype=np.int8)
-    graph = coo_array((ones, (links[:, 0], links[:, 1])), shape=(count, count))
-    return np.asarray(connected_components(graph, directed=False)[1])
+    return connected_pieces(links[:, 0], links[:, 1], count)[1]
 
 
 def find_regions(
