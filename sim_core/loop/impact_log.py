@@ -14,7 +14,7 @@ BUFFER_SIZE = 65_536  # impacts that the compiled loop writes before handing the
 
 
 class Impact(NamedTuple):
-    """A hit on a surface, in the frame of that surface; without a speed it is none.
+    """A hit on a surface, in the frame of that surface; no hit if the speed is 0.
 
     tag: of the surface. triangle: one of the flat face that was hit; ``touched``, a point [m] of
     the face, tells which. position: of the ball's centre [m]. velocity: of the ball relative to

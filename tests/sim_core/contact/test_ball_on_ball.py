@@ -22,7 +22,7 @@ from tests.helpers.scenes.contact_mode import (
 @pytest.mark.parametrize("e", [0.0, 0.5, 0.9])
 @pytest.mark.parametrize(("floor", "seed"), [("flat", 7), ("rough", 3), ("rough", 6)])
 def test_in_a_settling_pile_nothing_overlaps(floor: str, seed: int, e: float) -> None:
-    """Checked every millisecond (see film), and through restarts, which know nothing of who lies still."""
+    """film checks gaps every millisecond, also after restarts in which no ball lies still."""
     rng = np.random.default_rng(seed)
     room = box((0.012, 0.012, 0.06)) if floor == "flat" else rough_floor(rng)
     places = pack_balls(room, 50, DIAMETER, rng)
@@ -40,7 +40,7 @@ def test_in_a_settling_pile_nothing_overlaps(floor: str, seed: int, e: float) ->
 
 
 def test_balls_that_go_on_as_one_in_flight_do_not_jam() -> None:
-    """e = 0: rounding leaves such balls approaching or not, and must not have them meet for ever."""
+    """With e = 0 rounding decides whether such balls approach; they must not meet for ever."""
     rng = np.random.default_rng(6)
     room = box((0.025, 0.025, 0.06))
     places = pack_balls(room, 100, DIAMETER, rng)

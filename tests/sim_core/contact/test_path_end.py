@@ -58,7 +58,7 @@ def test_resistance_is_against_the_motion_of_a_ball_that_turns_downhill(speed: f
 
 
 def test_it_lifts_off_at_the_ramps_end() -> None:
-    """A parabola from the edge with the speed of the slide; the foot reaches 1.5 seams (15 nm) past the edge."""
+    """A parabola from the edge with the speed of the slide, 1.5 overlaps (15 nm) past the edge."""
     normal, down = slope(20.0)
     edge = 0.1 / down[0]
     z = -0.1 * math.tan(math.radians(20.0))
@@ -79,7 +79,9 @@ def test_it_lifts_off_at_the_ramps_end() -> None:
 
 @pytest.mark.parametrize("speed", [0.002, 0.05, 0.1])
 def test_slowly_over_an_edge_it_rolls_until_it_leaves_it(speed: float) -> None:
-    """Round an edge of radius R a point leaves where cos a = (2 + v²/(g R))/3, with v_x = sqrt(g R) cos^(3/2) a.
+    """Round an edge of radius R a point leaves where cos a = (2 + v²/(g R))/3.
+
+    Its speed is then v_x = sqrt(g R) cos^(3/2) a.
 
     The arc is taken in steps of 0.004 rad.
     """

@@ -1,6 +1,7 @@
-"""Balls rest on still surfaces while a part turns: it wakes what it reaches, when it does; nothing rests on it.
+"""Balls rest on still surfaces while a part turns; the part wakes those that it reaches.
 
-Steel balls of 3 mm on the floor of a cube, the part just above it; frictionless but for the resistance to rolling.
+Nothing rests on the part itself. Steel balls of 3 mm lie on the floor of a cube, with the part just
+above it. There is no friction but the resistance to rolling.
 """
 
 import numpy as np
@@ -103,9 +104,7 @@ def test_a_sleeping_ball_is_woken_when_the_paddle_arrives(rpm: float) -> None:
     assert gaps(run) > -TOUCH
 
 
-def test_a_part_that_swings_wakes_a_ball_when_it_gets_there_and_not_one_that_it_does_not_reach() -> (
-    None
-):
+def test_a_part_that_oscillates_wakes_a_ball_that_it_reaches_and_no_other() -> None:
     swing, frequency = 0.9, 0.2
     turn = PartRotation(PART, amplitude=swing, frequency=frequency)
     near, far = (0.009, 0.007), (0.002, 0.012)
@@ -130,8 +129,9 @@ def test_what_the_part_never_reaches_is_never_looked_at_again() -> None:
 
 @pytest.mark.parametrize("rpm", [0.05, 1.0, 10.0])
 def test_what_it_pushes_pushes_others_however_slowly(rpm: float) -> None:
-    """A ball before the paddle and two behind it that it cannot pass, below any speed at which balls that sleep are
-    moved by others.
+    """A ball before the paddle has two behind it that it cannot pass.
+
+    All are slower than what moves sleeping balls otherwise.
     """
     omega = 2 * np.pi * rpm / 60
     first, step = WIDE + R + 1e-4, 1.001 * R
@@ -153,8 +153,10 @@ def test_what_it_pushes_pushes_others_however_slowly(rpm: float) -> None:
 
 @pytest.mark.parametrize("rpm", [1.0, 10.0])
 def test_a_pile_swept_by_a_slow_paddle_gets_no_more_speed_than_that_gives(rpm: float) -> None:
-    """Twice the paddle's; but what is squeezed hops at up to the speed at which hits begin to lose and balls to give
-    way, and is shot out of a wedge at a few times that. What the paddle does not touch falls still.
+    """A ball gets at most twice the speed of the paddle.
+
+    Exceptions: what is squeezed hops at up to the speed at which hits begin to lose energy, and is
+    shot out of a wedge at a few times that. What the paddle does not touch comes to rest.
     """
     room, turn = paddle(), PartRotation(PART, rpm=rpm)
     rng = np.random.default_rng(1)
@@ -249,8 +251,8 @@ def any_scene(seed: int) -> Scene:
     return Scene(room, balls, physics(turn, rng.choice([0.0, 0.5, 0.9])), 1.0)
 
 
-def run_or_say_why_not(seed: int) -> str:
-    """Nothing overlaps at any of twenty times; a run may stop only for a ball that the part catches."""
+def run_or_message(seed: int) -> str:
+    """ "ran" if nothing overlaps at any of twenty times, else why the part catches a ball."""
     try:
         run = Simulation(any_scene(seed))
         for stop in np.linspace(0.0, 1.0, 21)[1:]:
@@ -266,14 +268,14 @@ def run_or_say_why_not(seed: int) -> str:
 
 
 def test_any_part_turns_among_any_balls_or_the_run_says_why_not() -> None:
-    said = [run_or_say_why_not(seed) for seed in range(20)]
-    assert said.count("ran") > 10
+    outcomes = [run_or_message(seed) for seed in range(20)]
+    assert outcomes.count("ran") > 10
 
 
 @pytest.mark.long
 def test_many_parts_turn_among_many_balls_or_the_run_says_why_not() -> None:
-    said = [run_or_say_why_not(seed) for seed in range(20, 500)]
-    assert said.count("ran") > 240
+    outcomes = [run_or_message(seed) for seed in range(20, 500)]
+    assert outcomes.count("ran") > 240
 
 
 def small_scene() -> Scene:
@@ -283,7 +285,8 @@ def small_scene() -> Scene:
 
 def test_the_same_bits_with_the_jit_on_and_off() -> None:
     code = (
-        "from tests.sim_core.contact.test_pushed_by_part import small_scene; from sim_core import simulate;"
+        "from tests.sim_core.contact.test_pushed_by_part import small_scene;"
+        "from sim_core import simulate;"
         "from tests.sim_core.loop.test_determinism import fingerprint;"
         "r = simulate(small_scene()); print(r.collisions.total, len(r.resting), fingerprint(r))"
     )

@@ -45,7 +45,7 @@ def test_on_the_sonotrode_nothing_rests() -> None:
 
 
 def test_every_ball_of_a_settled_heap_is_held_by_what_it_touches() -> None:
-    """Forces of contacts within MAX_JAM_GAP, each within friction of 0.3, can carry all weights: a linear programme."""
+    """A linear programme finds contact forces, with friction 0.3, that carry all weights."""
     for seed in range(6):
         rng = np.random.default_rng(seed)
         room = rough_floor(rng) if seed % 2 else box((0.012, 0.012, 0.06))

@@ -1,6 +1,6 @@
-"""Slipping, rolling, lying still: contact mode with friction against what mechanics says of a solid sphere.
+"""Slipping, rolling and lying still with friction, against the mechanics of a solid sphere.
 
-Steel balls of 3 mm. Rolling resistance only where it is given.
+Steel balls of 3 mm. They have rolling resistance only where it is given.
 """
 
 import math
@@ -56,7 +56,9 @@ def spin(balls: Balls) -> np.ndarray:
 
 
 def downhill(mu: float, degrees: float, inertia: float, load: float = 1.0) -> float:
-    """Acceleration [m/s²] of a body that rolls, or slips if mu does not hold it: I/(m h²) is ``inertia``.
+    """Acceleration [m/s²] of a body that rolls, or slips if mu does not hold it.
+
+    ``inertia`` is I/(m h²).
 
     ``load``: on its supports, over that on a plane.
     """
@@ -75,7 +77,7 @@ def downhill(mu: float, degrees: float, inertia: float, load: float = 1.0) -> fl
 def test_down_a_ramp_of_many_triangles_it_rolls_or_slips(
     mu: float, resistance: float, tags: int
 ) -> None:
-    """At 15 degrees it rolls from mu = 2/7 tan on, with 5/7 of the frictionless acceleration less the resistance."""
+    """At 15 degrees it rolls from mu = 2/7 tan on, with 5/7 of the acceleration."""
     degrees, until = 15.0, 0.35
     rng = np.random.default_rng(3)
     x = np.sort(np.concatenate([[0.0, 0.3], rng.uniform(0.0, 0.3, 30)]))
@@ -145,7 +147,7 @@ def test_a_ball_that_spins_askew_goes_along_a_parabola_and_then_straight_on() ->
     "speed", [0.4, 4.0]
 )  # the faster turns by less than MAX_TURN while it is searched in one piece
 def test_on_a_slope_a_slip_that_turns_is_followed(speed: float) -> None:
-    """Thrown across a slope: against small steps of the equations of motion, v' = g + f, w' = -5/(2R) n x f."""
+    """Against small steps of the equations of motion, v' = g + f and w' = -5/(2R) n x f."""
     mu, degrees, until = 0.15, 20.0, 0.25
     normal, down = slope(degrees)
     x = np.array([0.0, 0.5])
@@ -179,7 +181,10 @@ def test_on_a_slope_a_slip_that_turns_is_followed(speed: float) -> None:
 
 @pytest.mark.parametrize("mu", [0.0, 0.02, 10.0])
 def test_down_a_valley_it_rolls_on_both_faces(mu: float) -> None:
-    """About the line through the two touching points, h below the centre: g sin / (1 + 2/5 R²/h²) along the crease."""
+    """It rolls about the line through its two touching points, h below the centre.
+
+    Along the crease it gains g sin / (1 + 2/5 R²/h²).
+    """
     lift, fall, until = math.tan(math.radians(40.0)), 0.1, 0.5
     y, x = np.array([-0.02, 0.0, 0.02]), np.linspace(0.0, 0.3, 31)
     valley = terrain(
@@ -203,9 +208,10 @@ def test_down_a_valley_it_rolls_on_both_faces(mu: float) -> None:
 
 @pytest.mark.parametrize("speed", [0.002, 0.05, 0.1])
 def test_slowly_over_an_edge_it_rolls_until_it_leaves_it(speed: float) -> None:
-    """A rolling ball leaves an edge where cos a = (10 + 7 v²/(g R))/17; its v is sqrt(g R cos a) there.
+    """A rolling ball leaves an edge where cos a = (10 + 7 v²/(g R))/17, at v = sqrt(g R cos a).
 
-    The arc is taken in steps of 0.004 rad and hops, the longer the less load there is, that do not spin it up.
+    The arc is taken in steps of 0.004 rad and in hops, longer as the load gets less, that do not
+    spin it up.
     """
     x = np.array([0.0, 0.1, 0.1 + 1e-6, 0.4])
     cliff = profile(x, np.array([0.0, 0.0, -0.05, -0.05]), 0.02, 0.05)
@@ -220,7 +226,7 @@ def test_slowly_over_an_edge_it_rolls_until_it_leaves_it(speed: float) -> None:
 
 
 def test_a_trough_of_facets_is_a_rolling_pendulum() -> None:
-    """Slower by sqrt(7/5) than a sliding one, T = 2 pi sqrt(7 L/(5 g)) for small swings; hardly any energy is lost."""
+    """T = 2 pi sqrt(7 L/(5 g)) for small swings, and hardly any energy is lost."""
     radius = 0.05
     angle = np.radians(np.arange(-60.25, 60.5, 0.5))
     trough = profile(radius * np.sin(angle), -radius * np.cos(angle), 0.01, 0.02)
@@ -259,7 +265,7 @@ def test_on_a_slope_it_lies_still_where_neither_slip_nor_roll_moves_it(
 
 
 def test_resistance_stops_a_rolling_ball_and_takes_its_spin() -> None:
-    """v²/(2 resistance g), as without friction: what resists rolling is told by the deceleration."""
+    """It rolls v²/(2 resistance g), as without friction: resistance is the deceleration."""
     v, resistance = 0.2, 0.1
     start = shot([0.01, 0.05, R], [v, 0.0, 0.0], [0.0, v / R, 0.0])
     result = simulate(Scene(ALLEY, start, physics(0.5, resistance=resistance), 1.0))
@@ -272,7 +278,7 @@ def test_resistance_stops_a_rolling_ball_and_takes_its_spin() -> None:
 
 @pytest.mark.parametrize("mu", [0.01, 0.3, 10.0])
 def test_landing_it_rolls_in_the_end_with_what_the_floor_leaves_it(mu: float) -> None:
-    """Nothing turns it about a line in the floor, by bounces and slip alike: v = (5 v0 + 2 R w0)/7 when it rolls."""
+    """Its angular momentum about a line in the floor stays: v = (5 v0 + 2 R w0)/7 when it rolls."""
     v, w = 0.15, -60.0
     start = shot([0.01, 0.05, R + 0.002], [v, 0.0, 0.0], [0.0, w, 0.0])
     run, frames = film(ALLEY, start, physics(mu, 0.5), 2.0, 400)
@@ -332,9 +338,11 @@ def small_scene() -> Scene:
 
 def test_rolling_balls_give_the_same_bits_with_the_jit_off() -> None:
     code = (
-        "from tests.sim_core.contact.test_rolling import small_scene; from sim_core import simulate;"
+        "from tests.sim_core.contact.test_rolling import small_scene;"
+        "from sim_core import simulate;"
         "from tests.sim_core.loop.test_determinism import fingerprint;"
-        "r = simulate(small_scene()); print(r.collisions.total, fingerprint(r), r.balls.spins.tobytes().hex())"
+        "r = simulate(small_scene());"
+        "print(r.collisions.total, fingerprint(r), r.balls.spins.tobytes().hex())"
     )
     answers = with_and_without_jit(code)
     assert int(answers[0].split()[0]) > 50
@@ -344,9 +352,10 @@ def test_rolling_balls_give_the_same_bits_with_the_jit_off() -> None:
 def test_a_ball_that_spins_itself_against_a_wall_uphill_stays_there_until_it_slips_no_more() -> (
     None
 ):
-    """Gravity leads it away from the wall, friction holds it there: u = R w falls at 5/2 mu g cos - all the while.
+    """Friction holds it at the wall while its slip u = R w falls at 5/2 mu g cos.
 
-    Then it rolls down with 5/7 of g sin; the wall itself, which bears only what friction presses, does not rub.
+    Then it rolls down with 5/7 of g sin. The wall, which bears only what friction presses, does not
+    rub.
     """
     mu, degrees, w = 0.3, 5.0, 150.0
     normal, down = slope(degrees)

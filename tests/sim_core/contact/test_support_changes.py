@@ -32,7 +32,7 @@ from tests.sim_core.loop.test_determinism import fingerprint
 
 @pytest.mark.parametrize("e", [0.5, 0.9])
 def test_a_dropped_ball_stops_when_the_series_of_its_bounces_ends(e: float) -> None:
-    """Bounces last 2 e^k v/g: t = (v/g) (1 + 2e/(1-e)); what is cut off below capture is 2 capture/(g (1-e)) long."""
+    """Bounces last 2 e^k v/g, in all (v/g) (1 + 2e/(1-e)); capture cuts off 2 capture/(g (1-e))."""
     height = 0.01
     v = math.sqrt(2.0 * G * height)
     result = simulate(Scene(ROOM, shot([0.01, 0.01, R + height]), physics(e), 2.0))
@@ -107,7 +107,7 @@ def test_over_a_gentle_change_of_slope_it_keeps_its_energy(first: float, second:
 
 @pytest.mark.parametrize("facet", [2.0, 0.5])  # degrees
 def test_a_trough_of_facets_is_a_pendulum(facet: float) -> None:
-    """Length: the trough's radius less the ball's; T = 4 sqrt(L/g) K(sin(amplitude/2)). Energy stays."""
+    """T = 4 sqrt(L/g) K(sin(amplitude/2)) with L the trough's radius less the ball's."""
     radius = 0.05
     angle = np.radians(np.arange(-60.0, 60.0 + 0.5 * facet, facet))
     trough = profile(radius * np.sin(angle), -radius * np.cos(angle), 0.01, 0.02)
@@ -150,7 +150,7 @@ def test_a_bowl_of_triangles_keeps_the_energy() -> None:
 
 @pytest.mark.parametrize("resistance", [0.0, 0.02])
 def test_down_a_valley_it_is_led_by_both_faces(resistance: float) -> None:
-    """Along the crease: g (sin - resistance load) with the load of both faces; cos(crease)/cos(40°) here."""
+    """Along the crease it gains g (sin - resistance load), with a load of cos(crease)/cos(40°)."""
     lift, fall = math.tan(math.radians(40.0)), 0.1
     y, x = np.array([-0.02, 0.0, 0.02]), np.linspace(0.0, 0.3, 31)
     valley = terrain(
@@ -170,7 +170,7 @@ def test_down_a_valley_it_is_led_by_both_faces(resistance: float) -> None:
 
 
 def test_wedged_against_three_faces_it_sleeps() -> None:
-    """In the tip of a tetrahedron that stands on its tip: r over the sine of the faces' slope above it."""
+    """It lies r over the sine of the faces' slope above the tip of an upturned tetrahedron."""
     corner = np.radians([90.0, 210.0, 330.0])
     rim = np.column_stack([0.03 * np.cos(corner), 0.03 * np.sin(corner), np.full(3, 0.03)])
     pit = TriangleMesh(

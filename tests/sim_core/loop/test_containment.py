@@ -1,6 +1,7 @@
-"""In a closed chamber no ball ever leaves, enters a surface or another ball: asked again and again during long runs.
+"""In a closed chamber no ball ever leaves, or enters a surface or another ball.
 
-Asked of invariants.py, which counts ray crossings and measures distances: nothing of what finds the contacts.
+The checks, repeated during long runs, use scene/invariants.py, which counts ray crossings and
+measures distances and shares no code with the search for contacts.
 """
 
 import math
@@ -16,17 +17,18 @@ from sim_core.geometry.sonotrode_border import find_border
 from sim_core.scene.invariants import clearance, closest_pair, contained
 from tests.helpers.scenes.fuzzed_chambers import FAMILIES, Chamber, random_chamber
 
-TOUCH = 2e-13  # m: how far from touching an impact may be: an edge is taken for met at 1e-13, faces at rounding
-ROUNDING = (
-    8 * np.finfo(float).eps
-)  # of the coordinates [m], which answers are rounded to: it matters far away
+# m: how far from touching an impact may be. An edge counts as met at 1e-13, a face at rounding.
+TOUCH = 2e-13
+ROUNDING = 8 * np.finfo(float).eps  # of the coordinates [m]: it matters far from the origin
 REACH = 1.01  # of a radius: where clearance stops measuring
 
 
 @dataclass
 class Record:
-    """What was seen: the deepest overlaps with a ``surface`` and of a ``pair`` [m] at the checks, and the farthest
-    from touching of the ``impacts`` looked at, ``touch`` [m].
+    """Results of the checks.
+
+    surface, pair: deepest overlap with a surface and of a pair [m].
+    touch: largest distance from touching among the impacts checked [m].
     """
 
     collisions: int = 0
@@ -45,8 +47,9 @@ class Record:
 
 
 def height_at(chamber: Chamber, points: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """Height (n,) [m] of points (n, 3) [m] above the nearest sonotrode where it is at time (n,) [s]: here planes with
-    all before them. At its lowest, where each ball sees it at a phase of its own.
+    """Height (n,) [m] of points (n, 3) [m] above the nearest sonotrode at time (n,) [s].
+
+    Sonotrodes are planes here. With a random phase they are taken at their lowest.
     """
     mesh, height = chamber.mesh, np.full(len(points), np.inf)
     for vibration in chamber.physics.vibrations:
@@ -63,8 +66,9 @@ def height_at(chamber: Chamber, points: np.ndarray, time: np.ndarray) -> np.ndar
 
 
 def clearance_at(chamber: Chamber, points: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """Distance (n,) [m] from points (n, 3) [m] to the nearest surface, the sonotrode's where it is at time (n,) [s]; a
-    part that turns is not looked at.
+    """Distance (n,) [m] from points (n, 3) [m] to the nearest surface at time (n,) [s].
+
+    A part that turns is left out.
     """
     mesh, balls, physics = chamber
     reach = REACH * balls.radius
@@ -76,8 +80,10 @@ def clearance_at(chamber: Chamber, points: np.ndarray, time: np.ndarray) -> np.n
 
 
 def has_sharp_rim(chamber: Chamber, points: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """False (n,) for centres of balls so near the sonotrode that a gentle slope beside it, which goes on under it
-    (geometry/sonotrode_border.py), may be met past its end.
+    """False (n,) for balls near a sonotrode whose border has a gentle slope.
+
+    Such a slope goes on under the sonotrode (geometry/sonotrode_border.py), so that it may be met
+    past its end.
     """
     mesh, balls, sharp = chamber.mesh, chamber.balls, np.ones(len(points), dtype=bool)
     for one in chamber.physics.vibrations:
@@ -89,7 +95,7 @@ def has_sharp_rim(chamber: Chamber, points: np.ndarray, time: np.ndarray) -> np.
 
 
 def later(physics: Physics, duration: float) -> Physics:
-    """The same effects, the sonotrode and the turning part where they are ``duration`` [s] later."""
+    """The same effects, with sonotrode and turning part where they are ``duration`` [s] later."""
     turn, moved = physics.part_rotation, []
     for one in physics.vibrations:
         phase = (one.phase + math.tau * one.frequency * duration) % math.tau
@@ -104,8 +110,8 @@ def later(physics: Physics, duration: float) -> Physics:
     return physics
 
 
-def look(before: Chamber, after: Chamber, result: SimulationResult, impacts: int) -> Record:
-    """Is every ball inside and clear of all else, and did the last so many impacts happen where surfaces are?"""
+def check(before: Chamber, after: Chamber, result: SimulationResult, impacts: int) -> Record:
+    """Check that every ball is inside and that the last ``impacts`` lie on surfaces."""
     mesh, balls, _ = after
     outside = np.flatnonzero(~contained(mesh, balls.positions))
     assert len(outside) == 0, (
@@ -113,8 +119,8 @@ def look(before: Chamber, after: Chamber, result: SimulationResult, impacts: int
     )
     log = result.impacts
     where, when = log.position[-impacts:], log.time[-impacts:]
-    judged = has_sharp_rim(before, where, when)
-    hit = clearance_at(before, where[judged], when[judged])
+    sharp = has_sharp_rim(before, where, when)
+    hit = clearance_at(before, where[sharp], when[sharp])
     return Record(
         collisions=result.collisions.total,
         checks=1,
@@ -127,28 +133,31 @@ def look(before: Chamber, after: Chamber, result: SimulationResult, impacts: int
     )
 
 
-def watch(chamber: Chamber, collisions: int, every: int, impacts: int) -> Record:
-    """Plays until there were so many ``collisions``, looks after about ``every`` so many; what was seen."""
+def simulate_with_checks(chamber: Chamber, collisions: int, every: int, impacts: int) -> Record:
+    """Simulate ``collisions``, with a check after about every ``every`` of them."""
     mesh, balls, _ = chamber
     speed = np.linalg.norm(balls.velocities, axis=1).mean()
     duration = float(every * 0.3 * np.ptp(mesh.vertices, axis=0).max() / (speed * len(balls)))
-    seen = Record()
-    while seen.collisions < collisions:
+    record = Record()
+    while record.collisions < collisions:
         result = simulate(Scene(*chamber, duration))
         after = Chamber(mesh, result.balls, later(chamber.physics, duration))
-        seen.add(look(chamber, after, result, impacts))
+        record.add(check(chamber, after, result, impacts))
         allowed = TOUCH + ROUNDING * np.abs(mesh.vertices).max()
-        assert max(seen.surface, seen.pair, seen.touch) <= allowed, seen
+        assert max(record.surface, record.pair, record.touch) <= allowed, record
         chamber = after
         duration *= min(max(every / (result.collisions.total + 1), 0.25), 4.0)
-    return seen
+    return record
 
 
 @pytest.mark.parametrize("family", FAMILIES)
 def test_no_ball_leaves_a_fuzzed_chamber(family: str) -> None:
     for seed in range(2):
         print(
-            family, watch(random_chamber(family, seed), collisions=10_000, every=500, impacts=500)
+            family,
+            simulate_with_checks(
+                random_chamber(family, seed), collisions=10_000, every=500, impacts=500
+            ),
         )
 
 
@@ -161,28 +170,32 @@ def test_no_ball_leaves_a_fuzzed_chamber(family: str) -> None:
     ],
 )
 def test_no_ball_leaves_a_chamber_that_one_once_left(family: str, seed: int) -> None:
-    watch(random_chamber(family, seed), collisions=10_000, every=5_000, impacts=1_000)
+    simulate_with_checks(
+        random_chamber(family, seed), collisions=10_000, every=5_000, impacts=1_000
+    )
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("family", FAMILIES)
 def test_no_ball_leaves_fuzzed_chambers_in_half_a_million_collisions_each(family: str) -> None:
-    seen = Record()
+    record = Record()
     for seed in range(100, 115):
-        seen.add(
-            watch(random_chamber(family, seed), collisions=500_000, every=5_000, impacts=1_000)
+        record.add(
+            simulate_with_checks(
+                random_chamber(family, seed), collisions=500_000, every=5_000, impacts=1_000
+            )
         )
-    print(family, seen)
+    print(family, record)
 
 
 @pytest.mark.long
 def test_no_ball_leaves_the_gears_chamber_in_a_hundred_million_collisions() -> None:
     gear = scene("gear-200-10k")
-    seen = watch(
+    record = simulate_with_checks(
         Chamber(gear.mesh, gear.balls, gear.physics),
         collisions=100_000_000,
         every=50_000,
         impacts=200,
     )
-    print("gear", seen)
-    assert seen.checks > 1_000
+    print("gear", record)
+    assert record.checks > 1_000

@@ -69,7 +69,8 @@ def test_the_same_scene_gives_the_same_bits_alone_and_on_threads() -> None:
 @pytest.mark.parametrize("scene", ["small_scene", "scene_with_everything_else"])
 def test_the_jit_switched_off_gives_the_same_bits(scene: str) -> None:
     code = (
-        f"from tests.sim_core.loop.test_determinism import fingerprint, {scene}; from sim_core import simulate;"
+        f"from tests.sim_core.loop.test_determinism import fingerprint, {scene};"
+        "from sim_core import simulate;"
         f"r = simulate({scene}(0.03, 6)); print(r.collisions.total, fingerprint(r))"
     )
     answers = with_and_without_jit(code)
@@ -78,7 +79,7 @@ def test_the_jit_switched_off_gives_the_same_bits(scene: str) -> None:
 
 
 def test_stopping_and_going_on_changes_nothing() -> None:
-    """A page of the log filling up, a check, a stop: none may touch the trajectory."""
+    """A full impact buffer, a check and a stop change no trajectory."""
     whole = simulate(small_scene(0.5))
     warm = small_scene(0.3)
     warm = simulate(Scene(warm.mesh, warm.balls, PHYSICS, duration=0.3, warmup=0.2))
@@ -89,7 +90,7 @@ def test_stopping_and_going_on_changes_nothing() -> None:
 
 
 def test_frames_show_the_balls_on_their_flights_and_change_nothing() -> None:
-    """A ball that nothing meets falls as a parabola; and every impact of a scene that is watched is the same bits."""
+    """Frames change no bit of the impacts, and show each ball on its flight."""
     scene = small_scene(0.2)
     times = np.linspace(0.0, scene.duration, 301)
     plain, watched = simulate(scene), simulate(scene, frames=times)

@@ -1,4 +1,4 @@
-"""The pair filter loses no meeting: what it finds is what all pairs, one by one in float64, give."""
+"""The neighbour filter loses no meeting: it finds what all pairs in float64 give."""
 
 import numpy as np
 import pytest
@@ -34,7 +34,7 @@ def all_pairs(motion: np.ndarray, ball: int, time: float, before: float) -> tupl
 
 
 def gas(balls: int, half: float, rng: np.random.Generator) -> np.ndarray:
-    """Bases [m] and velocities [m/s] (n, 6): fast, slow and resting balls, some in step with their neighbour."""
+    """Bases [m] and velocities [m/s] (n, 6) of fast, slow and resting balls."""
     motion = np.concatenate(
         [rng.uniform(-half, half, (balls, 3)), rng.normal(0.0, 3.0, (balls, 3))], axis=1
     )
@@ -70,7 +70,7 @@ def test_every_meeting_is_found(balls: int, half: float) -> None:
         met += found >= 0
         change = rng.integers(
             balls
-        )  # a ball gets a new path: the crowd follows it, as the loop has it do
+        )  # a ball gets a new path, and the filter follows it as in the loop
         motion[change, 3:] = rng.normal(0.0, 3.0, 3)
         motion[change, :3] = rng.uniform(-half, half, 3) - motion[change, 3:] * time
         follow(neighbours, motion, int(change), time)
