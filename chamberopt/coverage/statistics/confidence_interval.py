@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -50,17 +50,18 @@ class Estimate:
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Estimate:
-        """The estimate that `to_json` or `interval_json` wrote.
+        """The estimate that `to_json` wrote. Raises KeyError, TypeError or ValueError otherwise."""
+        pseudovalues = tuple(float(x) for x in data["pseudovalues"])
+        bias = float(data.get("bias", 0.0))
+        return replace(cls.from_interval_json(data), pseudovalues=pseudovalues, bias=bias)
 
-        Raises:
-            KeyError, TypeError, ValueError: the data are not an estimate.
-        """
+    @classmethod
+    def from_interval_json(cls, data: Mapping[str, Any]) -> Estimate:
+        """The value and half-width that `interval_json` wrote."""
         value, half_width = data["value"], data["half_width"]
         return cls(
             math.nan if value is None else float(value),
             math.inf if half_width is None else float(half_width),
-            tuple(float(x) for x in data.get("pseudovalues", ())),
-            float(data.get("bias", 0.0)),
         )
 
 

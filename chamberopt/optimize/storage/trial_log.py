@@ -88,7 +88,9 @@ class Trial:
             point=tuple(float(share) for share in row["point"]),
             parameters={name: float(value) for name, value in row["parameters"].items()},
             goals=tuple(Estimate.from_json(one) for one in row["goals"]),
-            metrics={name: Estimate.from_json(metric) for name, metric in row["metrics"].items()},
+            metrics={
+                name: Estimate.from_interval_json(metric) for name, metric in row["metrics"].items()
+            },
             penalty=float(row["penalty"]),
             score=float(row["score"]),
             feasible=bool(row["feasible"]),

@@ -82,9 +82,9 @@ def load_result(path: str | Path) -> Result:
             kind=data["kind"],
             design=validate(Design, data["design"], file, mesh_must_exist=False),
             objective_name=data["objective"]["name"],
-            objective=Estimate.from_json(data["objective"]),
+            objective=_read_estimate(data["objective"]),
             metrics={
-                name: Estimate.from_json(data["metrics"][name])
+                name: _read_estimate(data["metrics"][name])
                 for name, metric in METRICS.items()
                 if name in data["metrics"] or metric.in_version_0_1
             },
@@ -149,6 +149,13 @@ def summary(evaluation: Evaluation | Result) -> str:
 
 def _share(estimate: Estimate) -> str:
     return f"{100.0 * estimate.value:.1f} ± {100.0 * estimate.half_width:.1f} %"
+
+
+def _read_estimate(data: dict[str, Any]) -> Estimate:
+    """An estimate of a result, which always has a value and a half-width."""
+    if data["value"] is None or data["half_width"] is None:
+        raise ValueError("an estimate without a value or half_width")
+    return Estimate.from_json(data)
 
 
 def _refuse_constant(name: str) -> float:

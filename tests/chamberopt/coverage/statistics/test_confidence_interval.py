@@ -49,6 +49,8 @@ def test_an_estimate_comes_back_from_json() -> None:
     one = estimate([0.5, 0.6, 0.8], bias=0.01)
     assert Estimate.from_json(json.loads(json.dumps(one.to_json()))) == one
     interval = json.loads(json.dumps(one.interval_json()))
-    assert Estimate.from_json(interval) == Estimate(one.value, one.half_width)
+    assert Estimate.from_interval_json(interval) == Estimate(one.value, one.half_width)
+    with pytest.raises(KeyError):
+        Estimate.from_json(interval)
     single = json.dumps(estimate([0.5]).to_json(), allow_nan=False)  # its half-width is infinite
     assert Estimate.from_json(json.loads(single)) == estimate([0.5])
