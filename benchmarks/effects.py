@@ -4,7 +4,7 @@
 
 Three programs take turns at the gear's chamber (200 balls, 10,000 triangles), one window each, round after round, so
 that a machine that slows down slows all: the simulator with the effect on, with it off, and a copy of it from which
-the effect was taken out of the source (never_had.py), off as well. All three compile from nothing. Time is CPU time a
+the effect was taken out of the source (simulator_without_effect.py). All three compile from nothing. Time is CPU time a
 collision, medians over the rounds of each round's own ratio. An effect changes what the shot does, so the collisions
 that are timed with it on are not those timed with it off. Rows go to benchmarks/results/effects.csv.
 """
@@ -25,8 +25,8 @@ sys.path.append(
 )  # at the end: the copy that never had the effect comes first, by PYTHONPATH
 
 from benchmarks.effect_scenes import EFFECTS, effect_scene
-from benchmarks.never_had import never_had
 from benchmarks.scenes import ROOT
+from benchmarks.simulator_without_effect import never_had
 from benchmarks.table import print_table, write_csv
 
 STEADY = 0.3  # s

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from benchmarks.structures import product
-from benchmarks.structures.shell import FALL, PIECE, Shell, ask
+from benchmarks.structures import simulator_tree
+from benchmarks.structures.mesh_obstacles import FALL, PIECE, Shell, ask
 from sim_core.numerics.vec3 import Vec3, add_scaled
 
 SPEEDS = (1.5, 8.5)  # m/s, evenly
@@ -16,7 +16,7 @@ def sample(shell: Shell, start: np.ndarray, count: int, rng: np.random.Generator
     A lone ball from ``start`` (3,) [m] flies in every direction, half the time from where it met the wall, half the
     time from somewhere on the way, as after meeting another ball.
     """
-    tree = product.build(shell)
+    tree = simulator_tree.build(shell)
     here = Vec3(*(start - shell.mesh.middle).tolist())
     flights: list[list[float]] = []
     delays, obstacles = np.empty(1), np.empty(1, dtype=np.int64)

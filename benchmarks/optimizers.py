@@ -23,7 +23,7 @@ from benchmarks.noisy_problems import REPLICAS, Problem, chambers, functions
 from benchmarks.table import print_table, write_csv
 from chamberopt.optimize.search.acquisition import recommend_point
 from chamberopt.optimize.search.gaussian_process import GaussianProcess, pool_variances
-from chamberopt.optimize.search.phases import maximise
+from chamberopt.optimize.search.maximise import maximise
 from chamberopt.optimize.study import schema
 
 EVALUATIONS, SEEDS = 40, 10

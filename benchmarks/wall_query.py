@@ -33,8 +33,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from benchmarks import embree, flights, paper_method
 from benchmarks.pictures import IMAGES, lines_picture
 from benchmarks.scenes import DIAMETER, cylinder, gear
-from benchmarks.structures import binary_tree, every_obstacle, product, uniform_grid
-from benchmarks.structures.shell import FALL, Shell, ask, build_shell, gaps, sort_rows
+from benchmarks.structures import binary_tree, every_obstacle, simulator_tree, uniform_grid
+from benchmarks.structures.mesh_obstacles import FALL, Shell, ask, build_shell, gaps, sort_rows
 from benchmarks.table import array_bytes, print_table, write_csv
 from sim_core import TriangleMesh
 
@@ -80,9 +80,9 @@ STRUCTURES = {
     "uniform grid": Structure(uniform_grid.build),
     "binary tree, oriented boxes": Structure(lambda shell: binary_tree.build(shell, oriented=True)),
     "binary tree, boxes": Structure(lambda shell: binary_tree.build(shell, oriented=False)),
-    REFERENCE: Structure(product.build),
+    REFERENCE: Structure(simulator_tree.build),
     PRODUCT: Structure(
-        product.build_product, lambda built, *question: ask(built[0], *question), False
+        simulator_tree.build_product, lambda built, *question: ask(built[0], *question), False
     ),
     "embree, thin ray": Structure(
         lambda shell: embree.build(shell.corners),

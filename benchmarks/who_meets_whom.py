@@ -10,7 +10,7 @@ What it takes to keep a structure true counts too, per event, that is, per fligh
 looking into the nine cells ahead until the flight ends at a ball or at the limit, the time to find later what they
 cannot see yet included. Sweep and prune: sorting the new flight in. The product: seeing the new path and widening its
 block's box, and a flight's share of what happens once a window of 20 ms: sorting all balls into blocks, and one more
-look for each ball, since no look goes past a window's end. Its query is asked in mid window, see product_pairs.py.
+look for each ball, since no look goes past a window's end. Its query is asked in mid window, see simulator_pairs.py.
 
 Not in the table: columns of cells from floor to ceiling, each its balls in eight float32 lanes. Tried before the
 product had blocks, they took 671, 727 and 807 ns with upkeep at 2,000, 5,000 and 10,000 balls: less than blocks, for
@@ -36,7 +36,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from benchmarks.gas import Gas, sample_gas
 from benchmarks.pictures import IMAGES, lines_picture
-from benchmarks.structures import all_pairs, linked_cells, product_pairs, sweep_and_prune
+from benchmarks.structures import all_pairs, linked_cells, simulator_pairs, sweep_and_prune
 from benchmarks.structures.pairs import ask
 from benchmarks.table import array_bytes, print_table, write_csv
 
@@ -56,7 +56,7 @@ STRUCTURES: dict[str, Any] = {
     "all pairs": all_pairs,
     "sweep and prune": sweep_and_prune,
     "linked cells": linked_cells,
-    PRODUCT: product_pairs,
+    PRODUCT: simulator_pairs,
 }
 
 

@@ -14,12 +14,12 @@ ORDER = {
     "chamberopt/geometry": "triangles solids+remesh slivers mesh_io",
     "chamberopt/geometry/mesh_io": "surface_error units+holes+self_intersection readers formats "
     "healing part_mesh",
-    "chamberopt/design": "table materials shapes effects+part+process+shot+sonotrode design load",
+    "chamberopt/design": "table_base materials shapes effects+part+process+shot+sonotrode design load",
     "chamberopt/chamber": "target deflector_meshes bores_and_deflectors reach part build dimensionless scene analytic checks",
     "chamberopt/coverage": "statistics dents coverage_from_impacts part_impacts+metrics dent_marking "
-    "coverage_estimators intensity",
+    "coverage_intervals intensity",
     "chamberopt/simulation": "resting_balls replicas evaluation evaluate "
-    "triangle_fields+time_curve candidate_result effect_pilot convergence",
+    "triangle_fields+time_curve complete_result effect_pilot convergence",
     "chamberopt/optimize": "study+search storage "
     "sensitivity+evaluate_candidate candidates run_study pareto+run_sweep",
     "chamberopt/cli": "interrupt+options console prepare commands",

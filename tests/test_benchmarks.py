@@ -13,7 +13,7 @@ from benchmarks import analytic, flights, wall_query, who_meets_whom
 from benchmarks.analytic_runs import INSCRIBED, Run, fit, hotelling
 from benchmarks.gas import sample_gas
 from benchmarks.scenes import DIAMETER
-from benchmarks.structures.shell import build_shell
+from benchmarks.structures.mesh_obstacles import build_shell
 from chamberopt.coverage.statistics.confidence_interval import Estimate
 from sim_core.loop.spatial_blocks import MIN_BALLS
 from tests.helpers.scenes.cavities import box_around

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.structures.compiled import jit, searches
-from benchmarks.structures.shell import (
+from benchmarks.structures.mesh_obstacles import (
     Rows,
     Shell,
     answer,

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.structures.compiled import searches
-from benchmarks.structures.shell import Rows, Shell, answer, nearer, sort_rows
+from benchmarks.structures.mesh_obstacles import Rows, Shell, answer, nearer, sort_rows
 
 
 class EveryObstacle(NamedTuple):

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.ndimage import distance_transform_cdt
 
 from benchmarks.structures.compiled import jit, searches
-from benchmarks.structures.shell import (
+from benchmarks.structures.mesh_obstacles import (
     FALL,
     PIECE,
     TINY,

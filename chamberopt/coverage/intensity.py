@@ -22,7 +22,7 @@ from chamberopt.coverage.coverage_from_impacts import Tally
 from chamberopt.coverage.statistics.confidence_interval import Estimate, estimate
 
 if TYPE_CHECKING:
-    from chamberopt.coverage.coverage_estimators import TargetPatches
+    from chamberopt.coverage.coverage_intervals import TargetPatches
 
 
 def intensity_uniformity(replicas: Sequence[Tally], target: TargetPatches) -> Estimate:

@@ -7,7 +7,7 @@ from pydantic import Field
 
 from chamberopt.common.toml_errors import Problem
 from chamberopt.common.toml_fields import Triple, list_field, quantity
-from chamberopt.design.table import DesignTable, Metres
+from chamberopt.design.table_base import DesignTable, Metres
 
 
 class PartTurn(DesignTable):

@@ -8,7 +8,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from chamberopt.design.table import SI, DesignTable
+from chamberopt.design.table_base import SI, DesignTable
 
 ShotMaterial = Literal["steel", "tungsten_carbide", "zirconia", "glass"]
 

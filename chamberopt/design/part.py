@@ -8,7 +8,7 @@ from pydantic import Field
 
 from chamberopt.common.toml_errors import Problem
 from chamberopt.common.toml_fields import MeshFile, Names, Pair, Triple, list_field, quantity
-from chamberopt.design.table import DesignTable
+from chamberopt.design.table_base import DesignTable
 from chamberopt.geometry.mesh_io.units import Unit
 
 

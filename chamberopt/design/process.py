@@ -7,7 +7,7 @@ from pydantic import Field
 
 from chamberopt.common.toml_errors import Problem
 from chamberopt.common.toml_fields import quantity
-from chamberopt.design.table import SI, DesignTable
+from chamberopt.design.table_base import SI, DesignTable
 
 # Longest treatment [s] simulated from beginning to end; one replica then takes minutes to compute.
 MAX_SIMULATED_TREATMENT = 600.0

@@ -9,7 +9,7 @@ from pydantic import Field
 from chamberopt.common.toml_errors import Problem
 from chamberopt.common.toml_fields import list_field, quantity
 from chamberopt.design.materials import SHOT_DENSITY, ShotMaterial
-from chamberopt.design.table import SI, DesignTable
+from chamberopt.design.table_base import SI, DesignTable
 
 
 class ShotSize(DesignTable):

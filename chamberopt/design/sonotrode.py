@@ -7,7 +7,7 @@ from pydantic import Field
 
 from chamberopt.common.toml_fields import Direction, Position, list_field, quantity
 from chamberopt.design.shapes.hole_and_deflector_tables import PlacedBore
-from chamberopt.design.table import SI, DesignTable
+from chamberopt.design.table_base import SI, DesignTable
 
 
 class VibratingFace(DesignTable):

@@ -17,7 +17,7 @@ from chamberopt.coverage.statistics.confidence_interval import Estimate, paired_
 from chamberopt.design.load import save_design
 from chamberopt.optimize.candidates import FIRST_OBJECTIVE, Candidates, ConfirmedCandidate, Stop
 from chamberopt.optimize.evaluate_candidate import Simulator
-from chamberopt.optimize.search.phases import PARETO_PHASES, maximise
+from chamberopt.optimize.search.maximise import PARETO_PHASES, maximise
 from chamberopt.optimize.sensitivity import Sensitivity, analyse_sensitivity
 from chamberopt.optimize.storage.study_folder import STUDY, StudyFolder, open_study_folder
 from chamberopt.optimize.storage.trial_log import HISTORY, Trial

@@ -13,7 +13,7 @@ from chamberopt.output.plots.study import convergence_picture, pareto_picture, s
 from chamberopt.output.plots.sweep import sweep_map
 from chamberopt.output.results.load import summary
 from chamberopt.output.results.write import write_result, write_simulation, write_study, write_sweep
-from chamberopt.simulation.candidate_result import complete_result
+from chamberopt.simulation.complete_result import complete_result
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber

@@ -28,14 +28,14 @@ from chamberopt.chamber.analytic import cavity_note
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.parallel.executor import share
 from chamberopt.common.progress import Progress
-from chamberopt.coverage.coverage_estimators import (
+from chamberopt.coverage.coverage_from_impacts import Tally
+from chamberopt.coverage.coverage_intervals import (
     TargetPatches,
     coverage_estimates,
     few_dents_note,
     target_patches,
     time_to_98_estimate,
 )
-from chamberopt.coverage.coverage_from_impacts import Tally
 from chamberopt.coverage.dent_marking import (
     SamplePoints,
     few_points_note,

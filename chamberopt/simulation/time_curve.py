@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.coverage.coverage_estimators import coverage_estimates, target_patches
+from chamberopt.coverage.coverage_intervals import coverage_estimates, target_patches
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber

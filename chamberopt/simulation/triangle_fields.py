@@ -1,4 +1,4 @@
-"""What is known of each part triangle: the fields of coverage.vtp and the quantities to show.
+"""What is known of each part triangle: the fields of coverage.vtp.
 
 Notation
     x   dent density of a triangle at the treatment time: area of its dents over its area
@@ -11,7 +11,6 @@ Notation
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,45 +28,6 @@ if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.design.load import Design
     from chamberopt.simulation.evaluation import Evaluation
-
-# Colour maps with even steps of lightness, which colour-blind readers can tell apart too.
-COLOURS, COUNTS, WIDTHS = "viridis", "cividis", "magma"
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """A number that can be shown on each triangle."""
-
-    name: str
-    label: str
-    unit: str
-    column: str  # its field in coverage.vtp
-    factor: float = 1.0  # from that field to the unit that is shown
-    colours: str = COLOURS
-    grows: bool = False  # whether it is proportional to the peening time
-
-    @property
-    def title(self) -> str:
-        return f"{self.label} [{self.unit}]"
-
-
-QUANTITIES = {
-    one.name: one
-    for one in (
-        Quantity("coverage", "coverage", "%", "coverage", 100.0),
-        Quantity("impacts", "impacts per area", "1/mm²", "impacts_per_mm2", 1.0, COUNTS, True),
-        Quantity("speed", "mean normal speed", "m/s", "mean_normal_speed"),
-        Quantity("p90-speed", "normal speed, 90th percentile", "m/s", "p90_normal_speed"),
-        Quantity("angle", "mean impact angle, 90° is head on", "°", "mean_angle_deg"),
-        Quantity("dent", "mean dent diameter", "µm", "mean_dent_um"),
-        Quantity(
-            "energy", "energy of impacts per area", "mJ/mm²", "energy_per_mm2", 1.0, COUNTS, True
-        ),
-        Quantity(
-            "interval", "width of coverage's 95 % interval", "%", "coverage_interval", 100.0, WIDTHS
-        ),
-    )
-}
 
 
 def compute_triangle_fields(

@@ -41,8 +41,8 @@ twice as long each time. A faster hit wakes a ball, and with it those that stand
 
 - ``effects/contact_mode.py``: the options (Rest) and the state of all balls (ContactState).
 - ``supports.py``: supports of a ball, the projection on their cone, the list of balls in contact.
-- ``support_changes.py``: capture by a surface, and which supports a ball keeps as it moves on.
-- ``rolling.py``: velocity and acceleration on supports, with resistance and friction.
+- ``landing_and_lift_off.py``: capture by a surface, and which supports a ball keeps as it moves on.
+- ``rolling_friction.py``: velocity and acceleration on supports, with resistance and friction.
 - ``path_end.py``: when a path in contact ends: at the border of a face, off an edge, at a stop.
 - ``ball_on_ball.py``: two balls meet, at least one of them not in free flight.
 - ``pushed_by_part.py``: the turning part moves what it touches and what it presses.

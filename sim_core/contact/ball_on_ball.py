@@ -15,8 +15,8 @@ import math
 import numpy as np
 
 from sim_core.contact.jamming import count_slow_hit
+from sim_core.contact.landing_and_lift_off import BOUNCES, impart, touch_down
 from sim_core.contact.pushed_by_part import drop_pressed_balls, is_pressed, note_touch
-from sim_core.contact.support_changes import BOUNCES, impart, touch_down
 from sim_core.contact.supports import BLOCKED, SHORTEST_HOP, response
 from sim_core.effects.contact_mode import ASLEEP, ON_BALL, ContactState
 from sim_core.effects.friction import OF_BALLS, FrictionState

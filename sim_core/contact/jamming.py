@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from sim_core.contact.landing_and_lift_off import move_on
 from sim_core.contact.pushed_by_part import TOUCHING
-from sim_core.contact.support_changes import move_on
 from sim_core.contact.supports import forget_left_support
 from sim_core.effects.contact_mode import ASLEEP, JAMMED, PRESSED, TOUCHED, UNTOUCHED, ContactState
 from sim_core.motion import BallEvent, BallState, state_under

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from sim_core.contact.support_changes import (
+from sim_core.contact.landing_and_lift_off import (
     BRAKE_ENDS,
     LEAVES_SUPPORT,
     LIES_STILL,

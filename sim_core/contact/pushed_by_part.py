@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from sim_core.contact.support_changes import deflect
+from sim_core.contact.landing_and_lift_off import deflect
 from sim_core.contact.supports import BLOCKED, SHORTEST_HOP, drop_support, response, support_normal
 from sim_core.effects.contact_mode import ON_BALL, PRESSED, TOUCHED, ContactState
 from sim_core.effects.part_rotation import RotationState, to_room_frame

@@ -7,7 +7,7 @@ them out, and they are examined here one by one, exactly.
 import numpy as np
 
 from sim_core.contact.ball_on_ball import place
-from sim_core.contact.support_changes import WAKES
+from sim_core.contact.landing_and_lift_off import WAKES
 from sim_core.contact.supports import drop_support, stands_on_ball
 from sim_core.detect.ball_ball import accelerated_pair_delay
 from sim_core.effects.contact_mode import ASLEEP, FLYING, JAMMED, ON_BALL, ContactState

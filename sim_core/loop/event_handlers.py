@@ -11,8 +11,7 @@ import numpy as np
 
 from sim_core.contact.ball_on_ball import meet
 from sim_core.contact.jamming import hold_still
-from sim_core.contact.pushed_by_part import constrained_change, push_ball
-from sim_core.contact.support_changes import (
+from sim_core.contact.landing_and_lift_off import (
     BOUNCES,
     RECHECK,
     ROLLS,
@@ -21,6 +20,7 @@ from sim_core.contact.support_changes import (
     land,
     moved_off_edge,
 )
+from sim_core.contact.pushed_by_part import constrained_change, push_ball
 from sim_core.detect.ball_cylinder import normal_at
 from sim_core.detect.ball_triangle import away_from_capsule, face_normal, nearer_neighbour
 from sim_core.effects.contact_mode import (

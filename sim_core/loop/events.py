@@ -9,8 +9,8 @@ import math
 
 import numpy as np
 
+from sim_core.contact.landing_and_lift_off import LIES_STILL
 from sim_core.contact.path_end import end_of_path
-from sim_core.contact.support_changes import LIES_STILL
 from sim_core.detect.ball_mesh import first_contact
 from sim_core.detect.ball_turning_part import first_part_contact
 from sim_core.effects.contact_mode import ball_acceleration, is_flying, is_still

@@ -26,7 +26,7 @@ from chamberopt.design.shapes.construction.limits import (
 )
 from chamberopt.design.shapes.construction.surface import ShapeSurface, lofted
 from chamberopt.design.shapes.hole_and_deflector_tables import Deflector, Hole
-from chamberopt.design.table import SI, DesignTable
+from chamberopt.design.table_base import SI, DesignTable
 
 
 class ChamberTable(DesignTable):

@@ -21,7 +21,7 @@ from chamberopt.design.shapes.base import ParametricChamber
 from chamberopt.design.shapes.construction.limits import MIN_LENGTH, refuse_meeting_walls
 from chamberopt.design.shapes.construction.outline import corner_arcs
 from chamberopt.design.shapes.construction.surface import TAG_SONOTRODE, TAG_WALL, ShapeSurface
-from chamberopt.design.table import SI
+from chamberopt.design.table_base import SI
 from chamberopt.geometry.solids import Outline, extrude, plan_outline
 
 # Tolerance of the outline [m]: an eighth of the error of 64 facets on a wall 70 mm across.

@@ -19,7 +19,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.design.shapes.base import ChamberTable
 from chamberopt.design.shapes.construction.surface import ShapeSurface
 from chamberopt.design.shapes.construction.surface_check import find_fault, with_array_types
-from chamberopt.design.table import STRICT
+from chamberopt.design.table_base import STRICT
 
 
 class MissingShape(ChamberTable):

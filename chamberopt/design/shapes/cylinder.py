@@ -14,7 +14,7 @@ import numpy as np
 
 from chamberopt.common.toml_fields import quantity
 from chamberopt.design.shapes.base import ParametricChamber, RoundChamber
-from chamberopt.design.table import SI
+from chamberopt.design.table_base import SI
 
 
 class Cylinder(RoundChamber, ParametricChamber):

@@ -16,7 +16,7 @@ from chamberopt.common.toml_fields import (
     quantity,
     unit_vector,
 )
-from chamberopt.design.table import SI, DesignTable, Metres
+from chamberopt.design.table_base import SI, DesignTable, Metres
 from chamberopt.geometry.mesh_io.units import Unit
 
 SIZE_KEYS = {

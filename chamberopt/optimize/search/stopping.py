@@ -5,7 +5,7 @@ A search ends for one of these reasons:
 1. The budget is spent: `optimizer.evaluations` different points have scores (BudgetSpentError).
 2. It has converged: the last phase ends because the steps of its local algorithm are below
    `optimizer.tolerance` (nlopt_search.py), or rounds of local searches find no new point
-   (phases.py).
+   (maximise.py).
 3. The user stops it: Candidates asks `stop()` before each evaluation and raises KeyboardInterrupt.
    The study can be resumed.
 4. An error ends it: the start cannot be simulated, an algorithm cannot take the parameters, the

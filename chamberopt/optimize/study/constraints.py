@@ -12,7 +12,7 @@ from chamberopt.common.toml_errors import CrossCheckError, Problem
 from chamberopt.coverage.metrics import METRICS
 from chamberopt.coverage.statistics.confidence_interval import Estimate, student_quantile
 from chamberopt.design.design import Design
-from chamberopt.design.table import STRICT
+from chamberopt.design.table_base import STRICT
 
 FEASIBLE, NOT_KNOWN, INFEASIBLE = "feasible", "not known", "infeasible"
 

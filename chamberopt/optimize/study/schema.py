@@ -10,7 +10,7 @@ from chamberopt.common.toml_errors import CrossCheckError, Problem
 from chamberopt.common.toml_fields import list_field, quantity
 from chamberopt.coverage.metrics import METRICS, OBJECTIVES, RENAMED_OBJECTIVES, renamed_objective
 from chamberopt.design.design import Design
-from chamberopt.design.table import STRICT
+from chamberopt.design.table_base import STRICT
 from chamberopt.optimize.study.constraints import Limits, limit_problems
 from chamberopt.optimize.study.parameters import Bounds, bound_problems
 

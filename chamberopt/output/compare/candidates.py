@@ -15,13 +15,13 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.common.progress import progress_bar
 from chamberopt.design.design import Design
 from chamberopt.design.load import load_design
-from chamberopt.output.compare.comparison import labels, part_unit
-from chamberopt.output.compare.inputs import (
+from chamberopt.output.compare.comparability import (
     require_same_part,
     require_same_time,
     require_same_triangles,
     require_several,
 )
+from chamberopt.output.compare.comparison import labels, part_unit
 from chamberopt.output.results.load import Result, load_result
 from chamberopt.output.save_run import save_simulation
 from chamberopt.output.vtp_files import COVERAGE, read_surface

@@ -10,8 +10,12 @@ from typing import Any
 from chamberopt.coverage.metrics import NEVER, parse_objective
 from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.design.shapes.base import is_custom
+from chamberopt.output.compare.comparability import (
+    require_same_part,
+    require_same_time,
+    require_several,
+)
 from chamberopt.output.compare.difference import Difference, confidence_of_each, difference
-from chamberopt.output.compare.inputs import require_same_part, require_same_time, require_several
 from chamberopt.output.results.load import Result, load_result
 
 TIME = "time_to_98_s"

@@ -8,9 +8,9 @@ from typing import Any
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import write_text
+from chamberopt.output.compare.comparability import require_same_triangles
 from chamberopt.output.compare.comparison import Comparison
 from chamberopt.output.compare.distributions import distributions
-from chamberopt.output.compare.inputs import require_same_triangles
 from chamberopt.output.compare.local_difference import LocalDifference, local_difference
 from chamberopt.output.compare.pictures import draw_distributions
 from chamberopt.output.compare.table import as_text

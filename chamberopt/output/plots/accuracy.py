@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.output.plots.colours import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, YELLOW
-from chamberopt.output.plots.figures import new_figure, save_picture, style_axes
+from chamberopt.output.plots.figure_style import new_figure, save_picture, style_axes
 from chamberopt.simulation.convergence.error_law import NORMAL
 from chamberopt.simulation.convergence.parameters import DESIGNED, TIME, short_name
 from chamberopt.simulation.convergence.recommendation import ACCURACIES, BIAS_SHARE, recommend

@@ -9,9 +9,10 @@ BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#9aa3ab"
 PURPLE, SKY, YELLOW, BLACK = "#CC79A7", "#56B4E9", "#E69F00", "#000000"
 DARK_GREY = "#555555"  # text and reference lines
 
-COLOUR_MAP = (
-    "viridis"  # of an objective in a map; the part's maps are in triangle_fields.QUANTITIES
-)
+# Colour maps of the part in viewer and report, and of an objective in a map. Their lightness grows
+# in even steps, which colour-blind readers see too.
+COVERAGE_MAP, COUNT_MAP, WIDTH_MAP = "viridis", "cividis", "magma"
+DIFFERENCE_MAP = "PuOr"
 
 # Each compared result has a colour and a line style of its own.
 _COLOURS = (BLUE, ORANGE, GREEN, PURPLE, BLACK, YELLOW, SKY, GREY)

@@ -13,7 +13,7 @@ import numpy as np
 
 from chamberopt.coverage.metrics import FULL_COVERAGE, NEVER
 from chamberopt.output.plots.colours import DARK_GREY, GREY
-from chamberopt.output.plots.figures import new_figure, save_picture, style_axes
+from chamberopt.output.plots.figure_style import new_figure, save_picture, style_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

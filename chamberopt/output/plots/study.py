@@ -10,7 +10,7 @@ import numpy as np
 
 from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.output.plots.colours import BLUE, GREEN, GREY, ORANGE
-from chamberopt.output.plots.figures import (
+from chamberopt.output.plots.figure_style import (
     new_figure,
     readable,
     save_picture,

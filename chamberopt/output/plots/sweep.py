@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chamberopt.output.plots.colours import BLUE, COLOUR_MAP, GREY, ORANGE
-from chamberopt.output.plots.figures import new_figure, readable, save_picture, style_axes
+from chamberopt.output.plots.colours import BLUE, COVERAGE_MAP, GREY, ORANGE
+from chamberopt.output.plots.figure_style import new_figure, readable, save_picture, style_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -109,7 +109,7 @@ def _draw_squares(axes: Axes, sweep: SweepResult, pair: tuple[str, str]) -> Any:
     objective = [trial.objective.value if trial.objective else np.nan for trial in sweep.trials]
     values = np.array(objective).reshape(count, count)  # the second parameter runs fastest
     x, y = (np.linspace(*sweep.study.vary[name], count) for name in pair)
-    return axes.pcolormesh(x, y, values.T, cmap=COLOUR_MAP, shading="nearest")
+    return axes.pcolormesh(x, y, values.T, cmap=COVERAGE_MAP, shading="nearest")
 
 
 def _draw_points(axes: Axes, sweep: SweepResult, pair: tuple[str, str]) -> Any:
@@ -120,7 +120,7 @@ def _draw_points(axes: Axes, sweep: SweepResult, pair: tuple[str, str]) -> Any:
     )
     x, y = ([trial.parameters[name] for _, trial in evaluated] for name in pair)
     colours = [value for value, _ in evaluated]
-    return axes.scatter(x, y, c=colours, cmap=COLOUR_MAP, s=34, edgecolors="none")
+    return axes.scatter(x, y, c=colours, cmap=COVERAGE_MAP, s=34, edgecolors="none")
 
 
 def _draw_marks(axes: Axes, sweep: SweepResult, pair: tuple[str, str]) -> None:

@@ -16,7 +16,7 @@ from chamberopt.output.plots.coverage import (
     draw_coverage_over_time,
     draw_histogram,
 )
-from chamberopt.output.plots.figures import new_figure, svg_text
+from chamberopt.output.plots.figure_style import new_figure, svg_text
 from chamberopt.output.plots.study import EvaluatedCandidate, draw_convergence, slices_figure
 
 WIDE, NARROW = (11.0, 3.8), (5.5, 4.0)  # inch

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from chamberopt.coverage.metrics import NEVER
 from chamberopt.optimize.candidates import POINTS_PER_PARAMETER
-from chamberopt.output.report.numbers import (
+from chamberopt.output.report.number_text import (
     Label,
     metric_label,
     objective_label,

@@ -15,8 +15,8 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.files import write_text
 from chamberopt.output.plots.colours import hex_colours
 from chamberopt.output.report import html
-from chamberopt.output.report.contents import START, read_design_file, report_contents
 from chamberopt.output.report.part3d import Scene, common_quantities, part_scene
+from chamberopt.output.report.report_data import START, read_design_file, report_contents
 from chamberopt.output.report.sections import sections
 from chamberopt.output.results.load import load_result, summary
 

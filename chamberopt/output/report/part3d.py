@@ -19,9 +19,9 @@ from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
 from chamberopt.design.shapes import TAG_PART, TAG_WALL, is_sonotrode
 from chamberopt.geometry.triangles import area_vectors
 from chamberopt.output.disc_averages import average_over_discs
+from chamberopt.output.plots.quantities import QUANTITIES
 from chamberopt.output.results.load import Result, load_coverage
 from chamberopt.output.vtp_files import CHAMBER, read_coverage_model, read_surface
-from chamberopt.simulation.triangle_fields import QUANTITIES
 
 # A triangle takes about 80 bytes of the page: up to this number it stays below 60 MB and opens.
 MAX_TRIANGLES = 600_000

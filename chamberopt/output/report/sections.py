@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from chamberopt.output.report import charts, html
-from chamberopt.output.report.numbers import plain, share, with_interval, with_unit
+from chamberopt.output.report.number_text import plain, share, with_interval, with_unit
 from chamberopt.output.report.part3d import Scene
 
 Contents = Mapping[str, Any]  # of report_contents, or a part of it

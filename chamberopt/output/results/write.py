@@ -17,7 +17,7 @@ from chamberopt.optimize.storage.study_folder import RESULT
 from chamberopt.optimize.storage.trial_log import read_trials, trials_as_csv
 from chamberopt.output.results.load import FORMAT
 from chamberopt.output.vtp_files import COVERAGE, write_chamber, write_coverage
-from chamberopt.simulation.candidate_result import CandidateResult
+from chamberopt.simulation.complete_result import CandidateResult
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

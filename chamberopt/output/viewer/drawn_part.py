@@ -10,8 +10,8 @@ import numpy as np
 from chamberopt.common.errors import InputError
 from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
 from chamberopt.output.disc_averages import average_over_discs
+from chamberopt.output.plots.quantities import QUANTITIES, Quantity
 from chamberopt.output.vtp_files import Surface, read_coverage_model
-from chamberopt.simulation.triangle_fields import QUANTITIES, Quantity
 
 
 class DrawnPart:

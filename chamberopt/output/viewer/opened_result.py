@@ -12,11 +12,11 @@ import numpy as np
 from chamberopt.common.errors import InputError
 from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
 from chamberopt.coverage.part_impacts import HitsByTriangle, load_matching_hits
+from chamberopt.output.plots.quantities import QUANTITIES
 from chamberopt.output.results.load import Result, require_matching_coverage, summary
 from chamberopt.output.viewer.drawn_part import DrawnPart, colour_range
 from chamberopt.output.viewer.view_state import ViewState
 from chamberopt.output.vtp_files import CHAMBER, COVERAGE, Surface, read_surface
-from chamberopt.simulation.triangle_fields import QUANTITIES
 
 COVERAGE_COLUMNS = (
     "coverage",

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from chamberopt.geometry.triangles import unit_normals
+from chamberopt.output.plots.quantities import Quantity
 from chamberopt.output.viewer.actors import DARK, NO_RENDER, colour_bar_ticks, escape_dollars
 from chamberopt.output.vtp_files import pyvista
-from chamberopt.simulation.triangle_fields import Quantity
 
 SMALL_FONT, LARGE_FONT = 8, 10  # in views of at least FULL_WIDTH pixels
 FULL_WIDTH = 750

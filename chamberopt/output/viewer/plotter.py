@@ -10,6 +10,7 @@ import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.geometry.triangles import unit_normals
+from chamberopt.output.plots.quantities import QUANTITIES
 from chamberopt.output.viewer import overlay
 from chamberopt.output.viewer.actors import GREY, PALE, SONOTRODE, add_chamber, add_part, light
 from chamberopt.output.viewer.opened_result import (
@@ -20,7 +21,6 @@ from chamberopt.output.viewer.opened_result import (
 )
 from chamberopt.output.viewer.view_state import DEFAULT_VIEW, KEYS, Plane, ViewState
 from chamberopt.output.vtp_files import Surface, pyvista
-from chamberopt.simulation.triangle_fields import QUANTITIES
 
 MAX_RESULTS = 6
 VIEW_SIZES = {1: (1400, 900), 2: (1000, 900), 3: (800, 800), 4: (900, 700)}  # by number of results

@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from chamberopt.common.errors import InputError
-from chamberopt.simulation.triangle_fields import QUANTITIES
+from chamberopt.output.plots.quantities import QUANTITIES
 
 Vector = tuple[float, float, float]
 Plane = tuple[Vector, Vector | None]

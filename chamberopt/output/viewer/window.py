@@ -11,12 +11,12 @@ from typing import Any
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import atomic_write
+from chamberopt.output.plots.quantities import QUANTITIES
 from chamberopt.output.viewer.actors import DARK
 from chamberopt.output.viewer.opened_result import OpenedResult, ResultInfo
 from chamberopt.output.viewer.plotter import ResultPlotter
 from chamberopt.output.viewer.subprocess_drawing import draw_in_subprocess, picture_path
 from chamberopt.output.viewer.view_state import ViewState, state_after_key
-from chamberopt.simulation.triangle_fields import QUANTITIES
 
 HANDLED_KEYS = "12345678bcxgurh"
 MAX_CLICK_MOTION = 4  # pixels that the mouse may move between press and release

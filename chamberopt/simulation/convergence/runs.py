@@ -10,8 +10,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from chamberopt.chamber.scene import replica_seed
-from chamberopt.coverage.coverage_estimators import coverage_estimates, target_patches
 from chamberopt.coverage.coverage_from_impacts import Tally
+from chamberopt.coverage.coverage_intervals import coverage_estimates, target_patches
 from chamberopt.coverage.dent_marking import marked_share
 from chamberopt.coverage.metrics import parse_objective
 from chamberopt.coverage.statistics.confidence_interval import Estimate, estimate, paired_difference

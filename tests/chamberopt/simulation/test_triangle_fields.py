@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from chamberopt.coverage.part_impacts import Hits, sort_hits_by_triangle
+from chamberopt.output.plots.quantities import QUANTITIES
 from chamberopt.simulation.triangle_fields import (
-    QUANTITIES,
     _speed_quantile,
     compute_triangle_fields,
     coverage_bounds,

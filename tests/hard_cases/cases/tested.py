@@ -15,11 +15,11 @@ from sim_core.loop.simulate import Simulation
 from sim_core.scene.invariants import clearance, closest_pair
 from tests.hard_cases.outcome import Case, Outcome
 from tests.sim_core.contact import test_ball_on_ball as ball_on_ball
+from tests.sim_core.contact import test_landing_and_lift_off as support_changes
 from tests.sim_core.contact import test_path_end as path_end
 from tests.sim_core.contact import test_pushed_by_part as pushed_by_part
 from tests.sim_core.contact import test_resting_balls as resting_balls
-from tests.sim_core.contact import test_rolling as rolling
-from tests.sim_core.contact import test_support_changes as support_changes
+from tests.sim_core.contact import test_rolling_friction as rolling
 from tests.sim_core.geometry import test_turning_part as turning
 
 

@@ -11,9 +11,9 @@ import numpy as np
 import trimesh
 
 from chamberopt.coverage.part_impacts import Hits, save_hits, sort_hits_by_triangle
+from chamberopt.output.plots.quantities import QUANTITIES
 from chamberopt.output.viewer import ResultInfo, ViewState
 from chamberopt.output.vtp_files import pyvista, write_chamber, write_coverage
-from chamberopt.simulation.triangle_fields import QUANTITIES
 
 TREATMENT = 10.0  # s
 SIZE = 480, 340  # pixels

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from chamberopt.common.files import atomic_write
+from chamberopt.output.plots.colours import DIFFERENCE_MAP
 from chamberopt.output.viewer.actors import DARK, light
 from chamberopt.output.viewer.images.coverage import panels
 from chamberopt.output.viewer.subprocess_drawing import draw_in_subprocess
 from chamberopt.output.vtp_files import read_surface
 
 # Brown (less) over white to violet (more), for colour-blind readers too, and unlike either grey.
-COLOURS = "PuOr"
 PALE, NO_TARGET = "#e6e9ec", "#a9b0b7"
 LEGEND = "violet: more coverage   orange: less   pale: within the noise   grey: not in the target"
 
@@ -88,7 +88,7 @@ def _add_difference(plotter: Any, surface: Any, k: int, limit: float, bar: bool)
         "title_font_size": 20, "label_font_size": 20,
     }  # fmt: skip
     plotter.add_mesh(
-        surface.extract_cells(target), scalars="shown", cmap=COLOURS, clim=(-limit, limit),
+        surface.extract_cells(target), scalars="shown", cmap=DIFFERENCE_MAP, clim=(-limit, limit),
         nan_color=PALE, ambient=0.6, diffuse=0.4, show_scalar_bar=bar,
         scalar_bar_args=style if bar else None,
     )  # fmt: skip

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 
 from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.output.plots.coverage import HistogramData, draw_histogram
-from chamberopt.output.plots.figures import SVG, new_figure
+from chamberopt.output.plots.figure_style import SVG, new_figure
 from chamberopt.output.plots.study import EvaluatedCandidate, draw_convergence
 from chamberopt.output.report import charts
 

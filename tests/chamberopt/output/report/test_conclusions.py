@@ -5,7 +5,7 @@ import math
 import pytest
 
 from chamberopt.output.report.conclusions import influence
-from chamberopt.output.report.numbers import Label, objective_label
+from chamberopt.output.report.number_text import Label, objective_label
 
 
 def a_model(mean: list, half_width: list, **other: object) -> dict:

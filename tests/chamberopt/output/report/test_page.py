@@ -14,7 +14,7 @@ from chamberopt.cli import main
 from chamberopt.common.errors import InputError
 from chamberopt.output import viewer
 from chamberopt.output.report import report_contents, write_part_page, write_report
-from chamberopt.output.report.numbers import with_interval
+from chamberopt.output.report.number_text import with_interval
 from chamberopt.output.report.part3d import part_scene
 from chamberopt.output.results.load import load_result
 from chamberopt.output.vtp_files import read_surface

@@ -7,9 +7,9 @@ import pytest
 
 from chamberopt.common.errors import InputError
 from chamberopt.coverage.part_impacts import save_hits, sort_hits_by_triangle
+from chamberopt.output.plots.quantities import QUANTITIES
 from chamberopt.output.viewer import ResultInfo, ViewState
 from chamberopt.output.viewer.opened_result import OpenedResult, colour_limits, same_part
-from chamberopt.simulation.triangle_fields import QUANTITIES
 from tests.helpers.results.sphere_in_sphere import TREATMENT, ball_result
 
 

@@ -5,9 +5,9 @@ from typing import Any
 import pytest
 
 from chamberopt.common.errors import InputError
+from chamberopt.output.plots.quantities import QUANTITIES
 from chamberopt.output.viewer import ViewState, parse_clip, parse_view
 from chamberopt.output.viewer.view_state import state_after_key
-from chamberopt.simulation.triangle_fields import QUANTITIES
 
 ALL = list(QUANTITIES)
 

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from sim_core.contact.rolling import braked, reset_spin, stopped_if_creeping
+from sim_core.contact.rolling_friction import braked, reset_spin, stopped_if_creeping
 from sim_core.contact.supports import (
     ROUNDING,
     add_support,

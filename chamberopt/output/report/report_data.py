@@ -18,7 +18,7 @@ from chamberopt.coverage.statistics.confidence_interval import (
 from chamberopt.optimize.storage.study_folder import STUDY
 from chamberopt.optimize.storage.trial_log import HISTORY, read_trials
 from chamberopt.output.report.conclusions import accuracy_rows, answer, cost_rows, influence
-from chamberopt.output.report.numbers import metric_label, objective_label
+from chamberopt.output.report.number_text import metric_label, objective_label
 from chamberopt.output.results.load import load_result
 
 if TYPE_CHECKING:

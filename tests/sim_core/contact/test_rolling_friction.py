@@ -338,7 +338,7 @@ def small_scene() -> Scene:
 
 def test_rolling_balls_give_the_same_bits_with_the_jit_off() -> None:
     code = (
-        "from tests.sim_core.contact.test_rolling import small_scene;"
+        "from tests.sim_core.contact.test_rolling_friction import small_scene;"
         "from sim_core import simulate;"
         "from tests.sim_core.loop.test_determinism import fingerprint;"
         "r = simulate(small_scene());"

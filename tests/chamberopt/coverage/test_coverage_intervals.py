@@ -5,12 +5,12 @@ import pytest
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.parallel.executor import local_executor
-from chamberopt.coverage.coverage_estimators import (
+from chamberopt.coverage.coverage_from_impacts import Tally
+from chamberopt.coverage.coverage_intervals import (
     _max_effect_of_variance,
     few_dents_note,
     target_patches,
 )
-from chamberopt.coverage.coverage_from_impacts import Tally
 from chamberopt.coverage.metrics import METRICS, OBJECTIVES
 from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.simulation.evaluate import ReplicaPlan, estimate_metrics, evaluate, weighted_sum

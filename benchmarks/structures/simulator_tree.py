@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.structures.compiled import searches
-from benchmarks.structures.shell import Shell
+from benchmarks.structures.mesh_obstacles import Shell
 from sim_core.detect.ball_mesh import Scratch, first_contact, new_scratch
 from sim_core.geometry.bvh import Tree, build_tree
 from sim_core.geometry.obstacle_set import build_obstacle_set

@@ -1,6 +1,6 @@
 """How long a chamber round a part takes to build: the gear in ever finer triangles, and VTK's boolean beside it.
 
-    python benchmarks/building.py [--quick] [--json]
+    python benchmarks/chamber_build_time.py [--quick] [--json]
 
 Of each mesh, medians of a few runs in seconds of wall clock: `read` the file, heal it and look for self-crossings (once
 a file); `chamber` round it (once a candidate of a study): pose, CSG, slivers, tags; `mesh` for the simulator; `tree`

@@ -3,7 +3,7 @@
 import numpy as np
 
 from chamberopt.coverage.statistics.confidence_interval import Estimate
-from chamberopt.output.plots.figures import value_range
+from chamberopt.output.plots.figure_style import value_range
 
 
 def test_an_interval_without_information_does_not_spoil_the_axis() -> None:

@@ -1,6 +1,6 @@
 """How long a large result takes to open: 10^7 impacts on a gear of 10^5 triangles.
 
-    python benchmarks/opening.py [--quick] [--json]
+    python benchmarks/load_large_result.py [--quick] [--json]
 
 Impacts are drawn at random, not simulated; all files are written by the product. `picture`: `chamberopt inspect
 --screenshot`, the result coloured by coverage; `pick`: with a triangle's numbers and the histogram of its impact speeds
@@ -32,7 +32,7 @@ RUNS = 3
 
 def written(folder: Path, size: str, impacts: int) -> tuple[int, int]:
     """A results folder of so many impacts at random; its part's triangles, and one of them that was hit."""
-    from benchmarks.building import gear_file
+    from benchmarks.chamber_build_time import gear_file
     from chamberopt.chamber.build import build_chamber
     from chamberopt.design.design import validate
     from chamberopt.design.load import load_design

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from chamberopt.common.errors import InputError
-from chamberopt.optimize.search.phases import maximise
+from chamberopt.optimize.search.maximise import maximise
 from chamberopt.optimize.study.schema import Optimizer
 from tests.helpers.known_optima import bowl, hill
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from chamberopt.output.report.numbers import Label, objective_label, plain, with_interval
+from chamberopt.output.report.number_text import Label, objective_label, plain, with_interval
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,48 @@
+"""The quantities that viewer and report show on the part's triangles, with their colour maps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from chamberopt.output.plots.colours import COUNT_MAP, COVERAGE_MAP, WIDTH_MAP
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number that can be shown on each triangle."""
+
+    name: str
+    label: str
+    unit: str
+    column: str  # its field in coverage.vtp
+    factor: float = 1.0  # from that field to the unit that is shown
+    colours: str = COVERAGE_MAP
+    grows: bool = False  # whether it is proportional to the peening time
+
+    @property
+    def title(self) -> str:
+        return f"{self.label} [{self.unit}]"
+
+
+QUANTITIES = {
+    one.name: one
+    for one in (
+        Quantity("coverage", "coverage", "%", "coverage", 100.0),
+        Quantity("impacts", "impacts per area", "1/mm²", "impacts_per_mm2", 1.0, COUNT_MAP, True),
+        Quantity("speed", "mean normal speed", "m/s", "mean_normal_speed"),
+        Quantity("p90-speed", "normal speed, 90th percentile", "m/s", "p90_normal_speed"),
+        Quantity("angle", "mean impact angle, 90° is head on", "°", "mean_angle_deg"),
+        Quantity("dent", "mean dent diameter", "µm", "mean_dent_um"),
+        Quantity(
+            "energy", "energy of impacts per area", "mJ/mm²", "energy_per_mm2", 1.0, COUNT_MAP, True
+        ),
+        Quantity(
+            "interval",
+            "width of coverage's 95 % interval",
+            "%",
+            "coverage_interval",
+            100.0,
+            WIDTH_MAP,
+        ),
+    )
+}
