@@ -119,7 +119,7 @@ CLUMPED = np.where(np.arange(400) < 100, 0.0, np.linspace(0.1, 0.5, 400))  # a q
 
 
 def of_all_sizes(rng: np.random.Generator, seconds: float) -> list[Tally]:
-    """Eight replicas of the clumped surface, its dents as unequal as real ones, larger where there are more."""
+    """Eight replicas of the clumped surface, with dents as unequal as real ones."""
     tallies = []
     for _ in range(8):
         dents = rng.poisson(CLUMPED * seconds)
@@ -194,9 +194,10 @@ def test_real_simulations_hold_their_long_run_value() -> None:
 
 
 def test_a_ball_that_bounces_on_its_spot_does_not_empty_the_mean() -> None:
-    """Few dents, and in each replica forty on one triangle, another each time: what one ball did says nothing
-    of how coverage varies, and the figures stay where Poisson dents alone would have them, or say
-    that they may not.
+    """Few dents, and in each replica forty more on one triangle, another each time.
+
+    These forty tell nothing of how coverage varies: the estimates stay near those of the Poisson
+    dents alone, or their intervals are wide.
     """
     rng, chamber = np.random.default_rng(3), patchwork(np.full(700, 1e-6))
     rate = 0.6 / (
@@ -217,7 +218,7 @@ def test_a_ball_that_bounces_on_its_spot_does_not_empty_the_mean() -> None:
 
 
 def test_what_variance_can_take_off_the_mean_is_bounded() -> None:
-    """exp(-x) of any x >= 0 has no larger mean than that of 0 or one other value with its mean and variance."""
+    """Of all x >= 0 with one mean and variance, two values, one of them 0, maximise mean exp(-x)."""
     rng = np.random.default_rng(5)
     for _ in range(200):
         x = rng.gamma(rng.uniform(0.05, 5.0), rng.uniform(0.1, 2.0), 20)

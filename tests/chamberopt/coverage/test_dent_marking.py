@@ -1,4 +1,4 @@
-"""Discs on a surface: alone, overlapping, across triangles and round edges; areas that can be worked out by hand."""
+"""Areas of discs on a surface, known by hand: alone, overlapping, across triangles, round edges."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ UP = np.array([0.0, 0.0, 1.0])
 def square(
     side: float, spacing: float, normal: np.ndarray = UP, corner: tuple[float, ...] = (0, 0, 0)
 ) -> SamplePoints:
-    """Points on a square whose sides leave `corner` along y and across y and the normal, in 100 patches."""
+    """Points on a square with a side along y, in 100 patches."""
     along = np.arange(0.5 * spacing, side, spacing)
     u, v = (grid.ravel() for grid in np.meshgrid(along, along))
     across = np.cross([0.0, 1.0, 0.0], normal)
@@ -167,8 +167,8 @@ def test_both_models_agree_on_the_mean_and_the_marks_grow_with_time() -> None:
     chamber = build_chamber(design)
     marked = evaluate(design, chamber, SerialExecutor())
     assert marked.total.simulated_time == pytest.approx(4 * 0.5)  # all of the treatment
-    rates = evaluate(plate_design(process__treatment_time_s=0.5, process__accuracy__simulated_time_s=0.5,
-                                  process__accuracy__warmup_time_s=0.1), chamber, SerialExecutor())  # fmt: skip
+    avrami = design.changed({"process.accuracy.coverage_model": "avrami"})
+    rates = evaluate(avrami, chamber, SerialExecutor())
     one, other = marked.metrics["mean_coverage"], rates.metrics["mean_coverage"]
     assert one.value > 0.0
     assert abs(one.value - other.value) < 2 * np.hypot(one.half_width, other.half_width)

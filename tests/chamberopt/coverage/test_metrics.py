@@ -16,7 +16,7 @@ MM2 = 1e-6
 
 
 def coverage(share: np.ndarray, area: np.ndarray, treatment_time: float) -> np.ndarray:
-    """The dented area that covers these shares of these areas at the treatment time, simulated for 1 s."""
+    """Dented area in 1 s that gives these coverages at the treatment time."""
     return -np.log1p(-np.asarray(share)) * area / treatment_time
 
 
@@ -153,7 +153,7 @@ def test_time_to_98_is_when_the_poorest_twentieth_is_covered() -> None:
 
 
 def test_intensity_uniformity_knows_places_from_scatter() -> None:
-    """Half the surface hit at 1 m/s and half at 3: mean 2, spread 1. Scatter from hit to hit is no unevenness."""
+    """Half the surface is hit at 1 m/s and half at 3 m/s: the mean is 2, the deviation 1."""
     rng, area = np.random.default_rng(2), np.full(200, MM2)
     design, chamber = plate_design(), patchwork(area)
 

@@ -1,4 +1,4 @@
-"""Advice on effects: the groups, what is made of a pilot's figures, and what effects = "auto" chooses of it."""
+"""Dimensionless groups, advice from pilot runs, and the choice of effects = "auto"."""
 
 import math
 from concurrent.futures import Executor
@@ -72,7 +72,7 @@ def test_a_verdict_follows_from_the_largest_change_and_its_interval(
 
 
 def pretend(strength: dict[str, float], monkeypatch: pytest.MonkeyPatch) -> list[Design]:
-    """Stands in for the simulation: each effect that is on multiplies speeds and dents; returns the designs asked."""
+    """Replace the simulation: each effect that is on multiplies speeds and dents."""
     asked: list[Design] = []
 
     def evaluate(design: Design, chamber: Any, executor: Executor) -> Any:

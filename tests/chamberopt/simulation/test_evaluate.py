@@ -43,7 +43,7 @@ def test_pseudovalues_of_a_mean_are_the_sample() -> None:
 
 
 def test_what_is_made_of_a_clipped_value_agrees_with_its_interval() -> None:
-    """A correction that overshoots is clipped; objective and gain must not keep the overshoot in their intervals."""
+    """Objective and gain do not keep the overshoot of a clipped correction in their intervals."""
     metrics = {
         "mean_coverage": estimate([0.7, 0.8, 0.75]),
         "std_coverage": estimate([0.6, 0.7, 0.62], 0.0, 0.5),
@@ -85,7 +85,7 @@ def test_evaluate_gives_the_same_numbers_on_any_number_of_workers() -> None:
 
 
 def accurate(coverage: float, most: int) -> Design:
-    """The plate in short replicas, as many as make the objective known to within this, or at most so many."""
+    """The plate in short replicas, with a wanted half-width and a maximum number."""
     design = plate_design(
         process__accuracy__simulated_time_s=0.05, process__accuracy__warmup_time_s=0.02
     )

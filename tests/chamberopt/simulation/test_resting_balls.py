@@ -1,4 +1,4 @@
-"""Balls at rest in a designer's words: a part in the middle of a room, and balls put where one knows what to say."""
+"""Notes on balls at rest: a part in the middle of a room, and balls at known places."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ NOBODY = [-1, -1, -1, -1]
 
 @pytest.fixture(scope="module")
 def chamber() -> Chamber:
-    """A room of 20 mm, and in its middle a part of 14 x 8 x 8 mm: 3 mm from the walls at x = -10 and x = 10 mm."""
+    """A room of 20 mm with a part of 14 x 8 x 8 mm in its middle: 3 mm of space at both ends."""
     mesh = box_around(trimesh.creation.box((14e-3, 8e-3, 8e-3)), 10e-3)
     part = Part(
         mesh.vertices, mesh.triangles, np.ones(len(mesh.triangles)), np.ones(1, dtype=bool), "box"
@@ -42,7 +42,7 @@ def triangle(chamber: Chamber, tag: int, axis: int, at: float) -> int:
 
 
 def resting(*balls: tuple[list[float], float, int, int, bool]) -> Resting:
-    """Balls given by place [mm], since when [s], the triangle and the ball under them, and whether jammed."""
+    """Balls by place [mm], start of rest [s], triangle and ball under them, and whether jammed."""
     place, since, under, on, jammed = zip(*balls, strict=True)
     return Resting(
         np.arange(len(balls)),
@@ -120,8 +120,8 @@ def test_one_note_on_all_replicas() -> None:
         [RestingBalls(0.1, "few"), RestingBalls(0.3, "many"), RestingBalls(0.2, "some")], 8
     )
     assert notes == (
-        "balls came to rest in 3 of 8 replicas and no longer peen: at the end 7.5 % of the shot, on "
-        "average over all replicas; in the worst one, many",
+        "balls came to rest in 3 of 8 replicas and no longer peen: at the end 7.5 % of the shot, "
+        "on average over all replicas; in the worst one, many",
     )
 
 

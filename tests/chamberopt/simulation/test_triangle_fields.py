@@ -1,4 +1,4 @@
-"""What each triangle got, against counts by hand; intervals that hold the truth as often as they say."""
+"""Fields of triangles against counts by hand, and intervals that hold the truth in 95 %."""
 
 import numpy as np
 import pytest
@@ -49,7 +49,7 @@ def test_per_triangle_columns_add_up() -> None:
 
 @pytest.mark.parametrize("dents", [0.3, 2.0, 20.0])
 def test_the_interval_of_a_triangles_coverage_holds_the_truth(dents: float) -> None:
-    """400 triangles with dents at one rate, sizes scattered by half: 95 % of the intervals, and more for few dents."""
+    """On 400 triangles 95 % of the intervals hold the truth, and more where dents are few."""
     rng = np.random.default_rng(4)
     area, m, times = 1e-6, 400, 5.0
     count = rng.poisson(dents, m)
