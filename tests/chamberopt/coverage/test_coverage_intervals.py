@@ -218,7 +218,7 @@ def test_a_ball_that_bounces_on_its_spot_does_not_empty_the_mean() -> None:
 
 
 def test_what_variance_can_take_off_the_mean_is_bounded() -> None:
-    """Of all x >= 0 with one mean and variance, two values, one of them 0, maximise mean exp(-x)."""
+    """Of all x >= 0 of one mean and variance, two values, one of them 0, maximise mean exp(-x)."""
     rng = np.random.default_rng(5)
     for _ in range(200):
         x = rng.gamma(rng.uniform(0.05, 5.0), rng.uniform(0.1, 2.0), 20)
