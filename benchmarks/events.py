@@ -164,10 +164,10 @@ class Contestant:
         balls = len(run.state.motion)
         shares = run.state.counts / run.state.counts[:3].sum()
         walls = [*run.state.obstacles.tree[:-1], *run.state.obstacles.lookup]
+        records = (run.state.queue, run.state.queue.meetings, run.state.neighbours)
         columns = [
             run.state.motion,
-            run.state.queue,
-            *(a for a in run.state.neighbours if isinstance(a, np.ndarray)),
+            *(a for record in records for a in record if isinstance(a, np.ndarray)),
         ]
         return {
             "scene": self.name,
