@@ -13,6 +13,7 @@ from sim_core.effects.gravity import Gravity
 from sim_core.effects.part_rotation import PartRotation
 from sim_core.effects.random_phase import RandomPhase
 from sim_core.effects.restitution import Restitution, restitution_at
+from sim_core.effects.surface_effects import SurfaceEffects, surface_effects
 from sim_core.effects.vibration import Vibration
 from sim_core.errors import SceneError, SimulationError
 from sim_core.geometry.analytic import AnalyticCavity, cylinder_cavity, prism_cavity
@@ -46,6 +47,7 @@ __all__ = [
     "SceneError",
     "SimulationError",
     "SimulationResult",
+    "SurfaceEffects",
     "TriangleMesh",
     "Vibration",
     "can_rest",
@@ -60,4 +62,5 @@ __all__ = [
     "require_free_rotation",
     "restitution_at",
     "simulate",
+    "surface_effects",
 ]

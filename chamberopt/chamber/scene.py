@@ -136,6 +136,7 @@ def scene_physics(
         RandomPhase,
         Rest,
         Restitution,
+        surface_effects,
     )
 
     sonotrode, effects, materials = design.sonotrode, design.effects, design.materials
@@ -163,6 +164,7 @@ def scene_physics(
         if friction is not None
         else None,
         drag=Drag(piece=accuracy.drag_step) if effects.drag else None,
+        surface=surface_effects(**effects.of_surfaces),
         ball_collisions=BallCollisions() if effects.ball_collisions else None,
         random_phase=RandomPhase(phase_seed) if sonotrode.motion == "random_phase" else None,
     )

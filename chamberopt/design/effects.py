@@ -90,6 +90,15 @@ class FrictionTable(DesignTable):
         )
 
 
+class SurfaceEffectTable(DesignTable):
+    """A table of [effects] for one of the simulator's further effects of hits on surfaces."""
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """The numbers that the simulator's effect of the same name takes, in SI units."""
+        raise NotImplementedError
+
+
 class Effects(DesignTable):
     """Which effects act on the shot. An effect that is not listed here is not simulated."""
 
@@ -117,6 +126,12 @@ class Effects(DesignTable):
     ball_collisions: bool = Field(
         default=True, description="false: balls fly through each other; for very little shot"
     )
+
+    @property
+    def of_surfaces(self) -> dict[str, dict[str, float]]:
+        """Parameters of the further effects of hits on surfaces, by name of the effect."""
+        tables = {name: getattr(self, name) for name in type(self).model_fields}
+        return {k: v.parameters for k, v in tables.items() if isinstance(v, SurfaceEffectTable)}
 
     def _problems(self) -> Iterator[Problem]:
         if self.rest and not self.gravity:

@@ -19,9 +19,8 @@ from sim_core.scene.scene import Scene
 
 def _marker(physics: Physics, balls: int, alike: bool, cylinder: bool) -> Path:
     """File that marks a set of effects as compiled: each set has machine code of its own."""
-    present = [
-        name for name, effect in zip(physics._fields, physics, strict=True) if effect is not None
-    ]
+    effects = {**physics._asdict(), **physics.surface._asdict()}
+    present = [name for name, effect in effects.items() if effect is not None]
     kind = ["many" if balls >= MIN_BALLS else "few", "alike" if alike else "mixed"]
     if len(physics.vibrations) > 1:
         kind.append("sonotrodes")

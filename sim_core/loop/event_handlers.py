@@ -1,11 +1,10 @@
 """What an event does: a ball meets a surface or another ball, or its path in contact ends.
 
-Every hit on a surface, still, vibrating or turning, is resolved in _resolve_contact. A new effect
-of the contact between a ball and a surface is one more step there.
+Every hit on a surface, still, vibrating or turning, is resolved in _resolve_contact. New effects of
+the contact between a ball and a surface are added in effects/surface_effects.py.
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -40,6 +39,7 @@ from sim_core.effects.part_rotation import (
 from sim_core.effects.random_phase import wave_of_ball
 from sim_core.effects.restitution import Restitution
 from sim_core.effects.sonotrodes import wave_of_face
+from sim_core.effects.surface_effects import Touch, apply_surface_effects
 from sim_core.effects.vibration import surface_velocity
 from sim_core.geometry.ball_sizes import share_by_mass
 from sim_core.geometry.obstacles import CAPSULE, VIBRATING_FACE
@@ -62,19 +62,6 @@ from sim_core.numerics.vec3 import Flight, Vec3, dot, sub
 JAM_EVENTS = 5_000
 
 
-class Touch(NamedTuple):
-    """A ball touches a surface, as seen in the frame of the surface.
-
-    away: any vector along the normal, from the surface to the ball. relative: velocity of the ball
-    minus that of the surface [m/s]. tag: of the surface. kind: of the obstacle.
-    """
-
-    away: Vec3
-    relative: Vec3
-    tag: int
-    kind: int
-
-
 @inlined
 def _resolve_contact(
     rotation: RotationState | None,
@@ -84,10 +71,13 @@ def _resolve_contact(
     law: Restitution | None,
     approach: float,
 ) -> Vec3:
-    """Velocity change [m/s] of a ball that hits a surface at ``approach`` [m/s] and bounces.
+    """Velocity change [m/s], in the room's frame, of a ball that hits a surface and bounces.
 
-    ``turning``: of the part, if the surface is the turning part's; the change is in the room's
-    frame. ``law``: the restitution that holds there.
+    Args:
+        rotation: of the part, if the surface belongs to a turning part.
+        touch: in the frame of the surface.
+        law: the restitution that holds there.
+        approach: normal speed before the hit [m/s].
     """
     change = surface_velocity_change(touch.away, touch.relative, law, touch.tag)
     change = _in_room(rotation, change, event.time)
@@ -96,6 +86,10 @@ def _resolve_contact(
     relative = _in_room(rotation, touch.relative, event.time)
     change = add_surface_friction(
         state.friction_state, event.ball, event.time, away, relative, change, touch.tag
+    )
+    in_room = Touch(away, relative, touch.tag, touch.kind)
+    change = apply_surface_effects(
+        state.surface_effects, event.ball, event.time_since_start, in_room, change
     )
     return leave_cylinder_wall(state.obstacles.cylinder, touch.kind, away, relative, change)
 

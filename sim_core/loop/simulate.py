@@ -169,6 +169,7 @@ class Simulation:
             profiler=None,
             contact=contact,
             friction_state=friction_state,
+            surface_effects=physics.surface,
             random_phase=new_random_phase_state(
                 random_phase, wave, vibrating, 0.5 * balls.diameters
             ),

@@ -12,6 +12,7 @@ from sim_core.effects.gravity import Gravity
 from sim_core.effects.part_rotation import PartRotation
 from sim_core.effects.random_phase import RandomPhase
 from sim_core.effects.restitution import Restitution
+from sim_core.effects.surface_effects import SurfaceEffects
 from sim_core.effects.vibration import Vibration
 
 
@@ -37,6 +38,7 @@ class Physics(NamedTuple):
         random_phase: of the vibration, for each ball.
         ball_collisions: present unless it is None; balls then fly through each other.
         drag: of still air.
+        surface: further effects of hits on surfaces.
     """
 
     gravity: Gravity | None = None
@@ -48,6 +50,7 @@ class Physics(NamedTuple):
     random_phase: RandomPhase | None = None
     ball_collisions: BallCollisions | None = BallCollisions()
     drag: Drag | None = None
+    surface: SurfaceEffects = SurfaceEffects()
 
     @property
     def vibrations(self) -> tuple[Vibration, ...]:

@@ -24,6 +24,7 @@ from sim_core import (
     Scene,
     Vibration,
 )
+from sim_core.effects.surface_effects import MAKERS, SurfaceEffects, surface_effects
 from sim_core.loop.simulate import Simulation
 from tests.helpers.scenes.cavities import box
 
@@ -82,7 +83,14 @@ def compiled_functions() -> dict[str, list[str]]:
 
 
 def test_every_effect_is_in_the_table() -> None:
-    assert set(KEPT) == set(Physics._fields) == set(PRESENT)
+    assert set(KEPT) == set(PRESENT) == set(Physics._fields) - {"surface"}
+
+
+def test_further_effects_of_surfaces_are_absent_unless_given() -> None:
+    """Each is a field of one record, so the loop keeps it under its own name."""
+    assert set(SurfaceEffects._fields) == set(MAKERS)
+    assert all(effect is None for effect in Physics().surface)
+    assert surface_effects() == SurfaceEffects()
 
 
 @pytest.fixture(scope="module")
@@ -117,7 +125,7 @@ def test_the_machine_code_of_a_bare_scene_knows_no_effect(bare: dict[str, list[s
     # what only an effect calls was never compiled, so it cannot be in what was
     for function in (
         "numerics.roots.first_wave_approach",
-        "contact.support_changes.touch_down",
+        "contact.landing_and_lift_off.touch_down",
         "contact.ball_on_ball.meet",
         "effects.part_rotation.relative_flight",
         "effects.restitution.restitution_law",
