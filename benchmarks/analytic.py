@@ -1,11 +1,14 @@
-"""The paper's two systems side by side: one chamber analytical and meshed, and the mesh as its facets shrink.
+"""The two systems of the paper side by side: one chamber, once analytical and once meshed.
+
+It also shows what changes as the facets of the mesh shrink.
 
     python benchmarks/analytic.py [--quick] [--out FOLDER]
 
-The chamber is that of designs/plate.toml: a cylinder, 30 balls of 3 mm, a plate 15 mm from the sonotrode for its lid.
-One number is fitted: the amplitude at which the analytical chamber covers 39 % in 50 s, as the paper measured. The rest
-is prediction. Writes docs/analytic.md, docs/images/analytic.png and benchmarks/results/analytic.csv: one CPU
-minute; --quick is rough, takes seconds and writes to --out alone.
+The chamber is that of designs/plate.toml: a cylinder with 30 balls of 3 mm, closed by a plate 15 mm
+from the sonotrode. One number is fitted: the amplitude at which the analytical chamber covers 39 %
+in 50 s, as the paper measured. The rest is prediction. The run writes docs/analytic.md,
+docs/images/analytic.png and benchmarks/results/analytic.csv and takes one CPU minute. With --quick
+it is rough, takes seconds and writes to --out alone.
 """
 
 import argparse

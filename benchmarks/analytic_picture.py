@@ -18,7 +18,10 @@ if TYPE_CHECKING:
 def picture(
     path: Path, exact: Run, meshed: dict[int, Run], facets: int, edges: dict[str, np.ndarray]
 ) -> None:
-    """The three profiles, analytical and meshed, with their ratio below; and how the mesh's figures converge."""
+    """Draws the three profiles and how the figures of the mesh converge.
+
+    Below each profile stands the ratio of meshed to analytical.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -45,7 +48,10 @@ def picture(
 
 
 def _profile(axes: Axes, below: Axes, exact: Run, mesh: Run, name: str, edges: np.ndarray) -> None:
-    """Impacts per bin width (of distances: per area) above; meshed over analytical below, with 95 % intervals."""
+    """Impacts per bin width above, meshed over analytical with 95 % intervals below.
+
+    Impacts by distance are given per area instead.
+    """
     area = name == "distance from the axis"
     size = np.pi * np.diff(edges**2) / 100.0 if area else np.diff(edges)
     middle = 0.5 * (edges[1:] + edges[:-1])
@@ -84,7 +90,10 @@ def _profile(axes: Axes, below: Axes, exact: Run, mesh: Run, name: str, edges: n
 
 
 def _converges(axes: Axes, exact: Run, meshed: dict[int, Run]) -> None:
-    """How far volume and figures are off, without sign, against the number of facets; open where it may be nothing."""
+    """How far volume and figures are off, without sign, against the number of facets.
+
+    Marks are open where the difference may be zero.
+    """
     facets = np.array(list(meshed))
     off = np.array([1.0 - run.volume / exact.volume for run in meshed.values()])
     axes.loglog(facets, off, color="#000000", marker="o", label="volume (too small)")

@@ -31,7 +31,11 @@ PAPER = {"measured": 0.39, "analytical": 0.41, "meshed": 0.40}  # coverage
 
 
 def report(design: Design, effort: Effort, exact: Run, meshed: dict[int, Run]) -> str:
-    """The page: what was assumed, the paper's three numbers beside ours, do the two agree, how the mesh converges."""
+    """The page with the assumptions and the results.
+
+    It sets the paper's three numbers beside ours, says whether meshed and analytical agree, and
+    shows how the mesh converges.
+    """
     n = design.chamber.facets
     return "\n".join(
         [
@@ -49,39 +53,45 @@ def report(design: Design, effort: Effort, exact: Run, meshed: dict[int, Run]) -
 def _opening(design: Design, effort: Effort) -> list[str]:
     sonotrode, materials = design.sonotrode, design.materials
     laws = ", ".join(
-        f"{name} {getattr(materials, name).restitution:g} / {getattr(materials, name).yield_speed:g}"
+        f"{name} {getattr(materials, name).restitution:g} / "
+        f"{getattr(materials, name).yield_speed:g}"
         for name in ("shot", "wall", "sonotrode", "part")
     )
     return [
         "# The analytical chamber beside the meshed one",
         "",
         *_paragraph(
-            "Written by `python benchmarks/analytic.py`; every figure on this page is from that run. Intervals are "
-            f"95 %, over {effort.replicas} replicas of {effort.seconds:g} s each. Simulate a chamber so yourself: "
-            "`chamberopt simulate designs/plate.toml --analytic`, wherever the cavity is a cylinder, box or prism."
+            "Written by `python benchmarks/analytic.py`; every figure on this page is from that "
+            f"run. Intervals are 95 %, over {effort.replicas} replicas of {effort.seconds:g} s "
+            "each. Simulate a chamber so yourself: `chamberopt simulate designs/plate.toml "
+            "--analytic`, wherever the cavity is a cylinder, box or prism."
         ),
         *_paragraph(
-            "The paper this project starts from computes one chamber twice, with analytical surfaces and with the CAD "
-            "mesh, and sets both beside an experiment: an aluminium plate 15 mm over the sonotrode, peened for 50 s. "
-            "It does not give the amplitude, the chamber's diameter, C0 or v0. **Assumed here** (`designs/plate.toml`):"
+            "The paper this project starts from computes one chamber twice, with analytical "
+            "surfaces and with the CAD mesh, and sets both beside an experiment: an aluminium "
+            "plate 15 mm over the sonotrode, peened for 50 s. It does not give the amplitude, the "
+            "chamber's diameter, C0 or v0. **Assumed here** (`designs/plate.toml`):"
         ),
         *_item(
-            f"a cylinder of {1e3 * design.chamber.diameter:g} mm, closed by the plate; {design.shot.count} balls of "
-            f"{1e3 * design.shot.diameter:g} mm (the paper's figure 4); {1e-3 * sonotrode.frequency:g} kHz;"
+            f"a cylinder of {1e3 * design.chamber.diameter:g} mm, closed by the plate; "
+            f"{design.shot.count} balls of {1e3 * design.shot.diameter:g} mm (the paper's figure "
+            f"4); {1e-3 * sonotrode.frequency:g} kHz;"
         ),
         *_item(
-            f"restitution C0 / v0 [m/s], v0 by Johnson's yield speed: {laws}; no friction and no rotation, as in the "
-            "paper;"
+            f"restitution C0 / v0 [m/s], v0 by Johnson's yield speed: {laws}; no friction and no "
+            "rotation, as in the paper;"
         ),
         *_item(
-            "dents by Kirk's energy balance at 120 HB, where the paper only says that their size goes with the normal "
-            "speed; coverage is Avrami's, of the middle 26 x 26 mm of the plate;"
+            "dents by Kirk's energy balance at 120 HB, where the paper only says that their size "
+            "goes with the normal speed; coverage is Avrami's, of the middle 26 x 26 mm of the "
+            "plate;"
         ),
         *_item(
-            f"the amplitude **fitted**, {1e6 * sonotrode.amplitude:.2f} µm zero to peak, so that the analytical "
-            f"chamber covers {100.0 * MEASURED:g} % in {PEENED:g} s. It stands for all that is not known, and is no "
-            "finding about the experiment. Machines are set to 25 to 40 µm, with which this chamber is covered over "
-            "99 %: something else assumed here must be off too, such as the diameter, and would give another amplitude."
+            f"the amplitude **fitted**, {1e6 * sonotrode.amplitude:.2f} µm zero to peak, so that "
+            f"the analytical chamber covers {100.0 * MEASURED:g} % in {PEENED:g} s. It stands for "
+            "all that is not known, and is no finding about the experiment. Machines are set to 25 "
+            "to 40 µm, with which this chamber is covered over 99 %: something else assumed here "
+            "must be off too, such as the diameter, and would give another amplitude."
         ),
         "",
     ]
@@ -99,9 +109,9 @@ def _paper(design: Design, exact: Run, mesh: Run) -> list[str]:
         "",
         *_paragraph(
             f"Meshed less analytical: {_signed(100.0 * (b.value - a.value))} ± "
-            f"{100.0 * np.hypot(a.half_width, b.half_width):.2f} points of coverage ({design.chamber.facets} facets), "
-            "against −1 in the paper, which gives no intervals. The analytical figure is from seeds other than those "
-            "of the fit."
+            f"{100.0 * np.hypot(a.half_width, b.half_width):.2f} points of coverage "
+            f"({design.chamber.facets} facets), against −1 in the paper, which gives no intervals. "
+            "The analytical figure is from seeds other than those of the fit."
         ),
     ]
 
@@ -137,10 +147,11 @@ def _agreement(design: Design, exact: Run, mesh: Run) -> list[str]:
         *lines,
         "",
         *_paragraph(
-            "p is the probability of differences as large as these between two sets of replicas of one and the same "
-            "chamber (Hotelling's T², which allows for bins that move together); one in twenty is below 0.05. The "
-            f"polygon takes {100.0 * _ring_lost(design):.1f} % of the outermost ring away, a tenth of the area that "
-            "balls reach: impacts by distance must differ there, by the facets and not by the method."
+            "p is the probability of differences as large as these between two sets of replicas of "
+            "one and the same chamber (Hotelling's T², which allows for bins that move together); "
+            f"one in twenty is below 0.05. The polygon takes {100.0 * _ring_lost(design):.1f} % of "
+            "the outermost ring away, a tenth of the area that balls reach: impacts by distance "
+            "must differ there, by the facets and not by the method."
         ),
     ]
 
@@ -151,9 +162,10 @@ def _convergence(exact: Run, meshed: dict[int, Run]) -> list[str]:
         "## As the facets shrink",
         "",
         *_paragraph(
-            "The polygon has its corners on the circle: its area, and so the chamber's volume, is short by "
-            f"{-INSCRIBED:.2f}/n² (n facets, first order), and as much shot in less room hits more often. The expected "
-            "order is 1/n²; the last two rows are a least-squares fit of k/n² to all of a column, and its p."
+            "The polygon has its corners on the circle: its area, and so the chamber's volume, is "
+            f"short by {-INSCRIBED:.2f}/n² (n facets, first order), and as much shot in less room "
+            "hits more often. The expected order is 1/n²; the last two rows are a least-squares "
+            "fit of k/n² to all of a column, and its p."
         ),
         "| facets | volume | " + " | ".join(names) + " |",
         "|--:|--:|" + "--:|" * len(names),
@@ -174,7 +186,10 @@ def _convergence(exact: Run, meshed: dict[int, Run]) -> list[str]:
 
 
 def _ring_lost(design: Design) -> float:
-    """Share of the outermost of BINS rings of one area that the centre of a ball does not reach in the polygon."""
+    """Share of the outermost ring that the centre of a ball does not reach in the polygon.
+
+    The ring is the outermost of BINS rings of equal area.
+    """
     n, radius = design.chamber.facets, 0.5 * design.chamber.diameter
     ball = 0.5 * design.shot.diameter
     circle = np.pi * (radius - ball) ** 2

@@ -1,4 +1,4 @@
-"""The runs of benchmarks/analytic.py: one chamber, analytical or meshed, and how far two of them are apart."""
+"""The runs of benchmarks/analytic.py: one chamber, analytical or meshed, and their differences."""
 
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -41,7 +41,7 @@ PROFILES = {  # of the impacts on the plate: name, unit
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is simulated: replicas of so many seconds each, of facets the numbers in ``facets``."""
+    """How much is simulated: replicas, the seconds of each, and the numbers of facets to try."""
 
     replicas: int
     seconds: float
@@ -50,8 +50,9 @@ class Effort:
 
 @dataclass(frozen=True)
 class Run:
-    """One chamber, simulated: its figures with their intervals, and of each profile the share of impacts in each bin,
-    a row a replica.
+    """One simulated chamber: its figures with their intervals, and its profiles.
+
+    Of each profile ``shares`` holds the share of impacts in each bin, one row for each replica.
     """
 
     volume: float
@@ -113,9 +114,10 @@ def run(
 
 
 def calibrated(design: Design, effort: Effort, executor: Executor) -> Design:
-    """The design at the amplitude [µm, to 0.01] that covers what was measured, in the analytical chamber.
+    """The design at the amplitude that covers what was measured, in the analytical chamber.
 
-    By secants: the logarithm of coverage's exponent is nearly straight in that of the amplitude.
+    The amplitude [µm] is rounded to 0.01. It is found by secants, because the logarithm of
+    coverage's exponent is nearly straight in the logarithm of the amplitude.
     """
     wanted, slope, amplitude = np.log(-np.log1p(-MEASURED)), SLOPE, GUESS
     before: tuple[float, float] | None = None
@@ -130,8 +132,10 @@ def calibrated(design: Design, effort: Effort, executor: Executor) -> Design:
 
 
 def bin_edges(design: Design) -> dict[str, np.ndarray]:
-    """Bins with as many impacts each in one replica of the analytical chamber; of distances, of one area each. What
-    lies beyond them is counted in the first and last.
+    """Edges of the bins of each profile.
+
+    The bins hold equally many impacts in one replica of the analytical chamber, except that those
+    of distances have equal areas. What lies beyond the edges is counted in the first and last bin.
     """
     chamber = build_chamber(design)
     log = replica(design, chamber, analytic_cavity(design, chamber), replica_seed(0, 0))[1]
@@ -145,10 +149,11 @@ def bin_edges(design: Design) -> dict[str, np.ndarray]:
 
 
 def hotelling(one: np.ndarray, two: np.ndarray) -> float:
-    """The probability that two sets of replicas (n, bins) differ by as much if their means are the same.
+    """The probability that two sets of replicas (n, bins) with equal means differ by as much.
 
-    Hotelling's two-sample T² (T. W. Anderson, An Introduction to Multivariate Statistical Analysis, 3rd ed. 2003,
-    section 5.3), which allows for bins that move together; shares add up to 1, so that the last bin says nothing new.
+    This is Hotelling's two-sample T² (T. W. Anderson, An Introduction to Multivariate Statistical
+    Analysis, 3rd ed. 2003, section 5.3), which allows for bins that move together. Shares add up to
+    1, so the last bin adds no information and is left out.
     """
     from scipy.stats import f
 
@@ -172,7 +177,10 @@ def relative(run: Run, exact: Run, name: str) -> tuple[float, float]:
 
 
 def fit(exact: Run, meshed: dict[int, Run], name: str) -> tuple[float, float, float]:
-    """k of the relative difference k/n² by least squares, its 95 % half-width, and the fit's p-value."""
+    """Fits k of the relative difference k/n² by least squares.
+
+    Returns k, its 95 % half-width and the p-value of the fit.
+    """
     from scipy.stats import chi2
 
     square = np.array([1.0 / n**2 for n in meshed])
@@ -186,7 +194,10 @@ def fit(exact: Run, meshed: dict[int, Run], name: str) -> tuple[float, float, fl
 def rows(
     exact: Run, meshed: dict[int, Run], facets: int, edges: dict[str, np.ndarray]
 ) -> list[dict[str, Any]]:
-    """For the CSV: figures of every mesh, bins of the design's own, each beside the analytical chamber's."""
+    """The rows of the CSV: the figures of every mesh and the bins of the design's own mesh.
+
+    Each stands beside the value of the analytical chamber.
+    """
     found = [
         (f"{name}, {n} facets", "", exact.figures[name], run.figures[name])
         for n, run in meshed.items()

@@ -1,12 +1,19 @@
-"""How long a chamber round a part takes to build: the gear in ever finer triangles, and VTK's boolean beside it.
+"""How long a chamber around a part takes to build: the gear in ever finer triangles.
+
+VTK's boolean is measured beside it.
 
     python benchmarks/chamber_build_time.py [--quick] [--json]
 
-Of each mesh, medians of a few runs in seconds of wall clock: `read` the file, heal it and look for self-crossings (once
-a file); `chamber` round it (once a candidate of a study): pose, CSG, slivers, tags; `mesh` for the simulator; `tree`
-that the balls' paths are searched in (once a candidate). `vtk`: vtkBooleanOperationPolyDataFilter on the same shape
-and part, and by how much its volume is off; it is what PyVista offers, and keeps no record of which triangle a piece
-lies on. Rows go to benchmarks/results/building.csv with the machine named.
+For each mesh the table holds medians of a few runs in seconds of wall clock:
+
+    read     read the file, heal it and look for self-crossings (once for each file)
+    chamber  build the chamber around it: pose, CSG, slivers, tags (once for each candidate)
+    mesh     prepare the mesh for the simulator
+    tree     build the tree that the paths of balls are searched in (once for each candidate)
+    vtk      vtkBooleanOperationPolyDataFilter on the same shape and part, and its volume error
+
+VTK's filter is what PyVista offers. It keeps no record of which triangle a piece lies on. Rows go
+to benchmarks/results/building.csv with the name of the machine.
 """
 
 import argparse
@@ -78,7 +85,7 @@ def row(path: Path, runs: int) -> dict[str, Any]:
 
 
 def vtk_columns(design: Any, runs: int) -> dict[str, Any]:
-    """The same cut by VTK: seconds, and its volume's relative error; empty where it is not tried."""
+    """The same cut by VTK: its seconds and its relative volume error, empty if not tried."""
     import numpy as np
     import pyvista
 

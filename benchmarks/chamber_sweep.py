@@ -1,12 +1,17 @@
-"""A fine sweep of a real chamber over two parameters: the truth that optimizers.py holds its searches against.
+"""A fine sweep of a real chamber over two parameters.
 
-    python benchmarks/chamber_sweep.py plate               8 by 8 designs, 8 replicas of 0.4 s: one or two CPU minutes
+It is the truth that optimizers.py compares its searches with.
+
+    python benchmarks/chamber_sweep.py plate
     python benchmarks/chamber_sweep.py gear --steps 15 --seconds 1.5
 
-Writes results/sweep_NAME.csv after each design; what is there already is not simulated again, so that a sweep can be
-ended and taken up; one with other steps, replicas or seconds wants the table deleted first. One row a design: u, v are
-the parameters in shares of their bounds; standard_error that of this sweep, search_error that of an evaluation in a
-search at the design's own accuracy.
+The first command sweeps 8 by 8 designs with 8 replicas of 0.4 s and takes one or two CPU minutes.
+
+Each design adds its row to results/sweep_NAME.csv as soon as it is simulated. Rows that are already
+there are not simulated again, so a sweep can be stopped and continued. Delete the table before a
+sweep with other steps, replicas or seconds. In each row u and v are the parameters in shares of
+their bounds, standard_error is the error of this sweep, and search_error is the error of one
+evaluation in a search at the design's own accuracy.
 """
 
 import argparse
@@ -30,7 +35,8 @@ VARY = {
     "gear": {"chamber.sonotrode_distance_mm": (4.0, 27.0), "chamber.height_mm": (28.0, 60.0)},
 }
 
-# Peened this long [s]: as long as the plate's file has it, the better half of the designs would all be at 100 %.
+# Treatment time [s]. With the time in the plate's own file the better half of the designs would
+# reach 100 %.
 TREATMENT = {"plate": 1.0, "gear": 120.0}
 
 
@@ -78,7 +84,7 @@ def row(
 
 
 def usual_seconds(design: Design) -> float:
-    """Simulated seconds of an evaluation at the shipped design's accuracy, all replicas together."""
+    """Simulated seconds of all replicas of one evaluation at the shipped design's accuracy."""
     shipped = load_design(ROOT / "designs" / f"{design.part.mesh_path.stem}.toml").process.accuracy
     return shipped.replicas * shipped.simulated_time_s
 

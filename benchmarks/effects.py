@@ -1,12 +1,14 @@
-"""What each effect costs: the same scene with it and without, and without it in a build that never had it.
+"""What each effect costs: with it, with it off, and in a simulator that never had it.
 
     python benchmarks/effects.py [--quick] [--json] [--effects NAME ...]
 
-Three programs take turns at the gear's chamber (200 balls, 10,000 triangles), one window each, round after round, so
-that a machine that slows down slows all: the simulator with the effect on, with it off, and a copy of it from which
-the effect was taken out of the source (simulator_without_effect.py). All three compile from nothing. Time is CPU time a
-collision, medians over the rounds of each round's own ratio. An effect changes what the shot does, so the collisions
-that are timed with it on are not those timed with it off. Rows go to benchmarks/results/effects.csv.
+Three programs simulate the gear's chamber (200 balls, 10,000 triangles): the simulator with the
+effect on, the simulator with it off, and a copy of the simulator from whose source the effect was
+removed (simulator_without_effect.py). They take turns of one window each, round after round, so
+that a machine that slows down slows all of them. All three compile with an empty cache. The figures
+are CPU time per collision and medians over the rounds of each round's own ratio. An effect changes
+how the shot moves, so the collisions timed with it on differ from those timed with it off. Rows go
+to benchmarks/results/effects.csv.
 """
 
 import argparse
@@ -74,7 +76,10 @@ class Program:
 
 
 def play(effect: str, on: bool) -> None:
-    """What one of the programs does: compile, say what that took, then a window for every line it is sent."""
+    """What one of the programs does: it compiles and reports the time that took.
+
+    Then it plays one window for every line that it is sent.
+    """
     import sim_core
     from benchmarks.events import advance
     from benchmarks.table import array_bytes

@@ -1,12 +1,15 @@
-"""One honest evaluation: the gear's chamber with 200 balls to ± 0.01 on the objective, in a process of its own.
+"""One full evaluation: the gear's chamber with 200 balls to ± 0.01 on the objective.
 
     python benchmarks/evaluation.py [--quick] [--json]
 
-Two threads; once with an empty cache of compiled code, once with what that left. Wall and CPU seconds from before the
-first import to the figure, and the shares of CPU seconds: imports, compiling (or loading compiled code), building the
-chamber (CSG), and of the replicas what is fixed (packing the shot, counting dents), warm-up and
-recorded time, told apart by replicas cut short that are timed afterwards; coverage with its intervals. Rows go to
-benchmarks/results/evaluation.csv with the machine named; --quick asks for ± 0.03, uses your cache, writes none.
+It runs in a process of its own on two threads, once with an empty cache of compiled code and once
+with the cache that the first run left. The table gives wall and CPU seconds from before the first
+import to the figure, and coverage with its intervals. It also gives the shares of CPU seconds:
+imports, compiling (or loading compiled code), building the chamber (CSG), and of the replicas the
+fixed part (packing the shot, counting dents), the warm-up and the recorded time. The parts of a
+replica are told apart by timing shortened replicas afterwards. Rows go to
+benchmarks/results/evaluation.csv with the name of the machine. With --quick the accuracy is ± 0.03,
+your own cache is used and no row is written.
 """
 
 import argparse

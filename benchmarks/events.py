@@ -1,12 +1,14 @@
-"""How many real collisions a CPU second, scene by scene, with yardsticks in the same run.
+"""How many real collisions a CPU second the simulator plays, scene by scene.
 
     python benchmarks/events.py [--quick] [--json] [--scenes NAME ...]
 
-Steady state after 0.3 s; process CPU time. The scenes take turns, one window each, round after round, so that a
-machine that slows down slows them all: figures are medians over the rounds, ratios are medians of each round's own.
-Yardsticks on the same meshes and flights: embree's batch ray (straight, no thickness: less than is asked of us), and
-the paper's own method (every triangle a plane, faces only). Rows go to benchmarks/results/events.csv with the machine
-named; --quick writes none.
+Each scene is measured in its steady state, after 0.3 s, in CPU time of the process. The scenes take
+turns of one window each, round after round, so that a machine that slows down slows them all.
+Figures are medians over the rounds, and ratios are medians of each round's own ratio. Two
+yardsticks are measured in the same run on the same meshes and flights: embree's batch of rays
+(straight and without thickness, less than our query does), and the paper's own method (every
+triangle a plane, faces only). Rows go to benchmarks/results/events.csv with the name of the
+machine, except with --quick.
 """
 
 import argparse
@@ -40,7 +42,9 @@ STEADY = 0.3  # s
 FLIGHT = 0.01  # s: the length of arc that the wall queries search
 TARGET = 0.4  # CPU s a window
 ROUNDS = 9
-SPAN = 8.0  # s each thread plays: a third of a CPU second; handing out shorter work is what would be measured
+# Each thread plays so many seconds, a third of a CPU second. With shorter work the
+# measurement would show the cost of handing it out.
+SPAN = 8.0
 
 
 def steady(name: str, seed: int = 1) -> Simulation:
@@ -201,8 +205,14 @@ def ratios(by_name: dict[str, Contestant]) -> dict[str, Any]:
 
 
 def compile_seconds() -> dict[str, float]:
-    """Seconds the simulator takes to be ready on a machine that has never run it, and every time after."""
-    code = "from benchmarks.scenes import PHYSICS as p; from sim_core import compile_simulator as c; print(c(p))"
+    """Seconds until the simulator is ready.
+
+    The first figure is for a machine that has never run it, the other for every later time.
+    """
+    code = (
+        "from benchmarks.scenes import PHYSICS as p; from sim_core import compile_simulator as c; "
+        "print(c(p))"
+    )
     with tempfile.TemporaryDirectory() as folder:
         setting = {**os.environ, "NUMBA_CACHE_DIR": folder}
         spent = [

@@ -1,15 +1,19 @@
-"""What workers cost and how busy they are: threads, processes, and a Dask scheduler with workers of its own.
+"""What workers cost and how busy they are: threads, processes, and a Dask scheduler with workers.
 
     python benchmarks/executors.py [--quick] [--rounds 3] [--kinds threads processes dask]
 
-Efficiency: a sweep of the gear by one worker and by two, in turns; seconds of one over twice the seconds of two, the
-median of the rounds, workers started and their code loaded beforehand (that is `start_s`). The machine must have two
-cores to spare: `others_cores` says how many were taken by other programs meanwhile, which is no fault of the workers;
-`busy`, the seconds inside candidates over twice the clock's, says how long two workers had work, whoever else had, and
-`cpu_ratio` is the CPU seconds of one worker over those of two, for the same candidates.
-Overhead: seconds of tasks that do nothing, by number. Bytes: what goes to a worker with a task, and comes back.
-The last lines put these on paper for 1,000 workers. Rows go to benchmarks/results/executors.csv with the machine named;
---quick takes short candidates, one round, and writes none.
+Efficiency is measured on a sweep of the gear, by one worker and by two in turns. It is the time of
+one worker over twice the time of two, the median of the rounds. Workers are started and their code
+is loaded beforehand, which takes `start_s`. The machine must have two cores to spare.
+`others_cores` is the number of cores that other programs took meanwhile, which the workers cannot
+help. `busy` is the seconds inside candidates over twice the clock's seconds: how long two workers
+had work, whatever other programs did. `cpu_ratio` is the CPU seconds of one worker over those of
+two for the same candidates.
+
+Overhead is the time of tasks that do nothing, divided by their number. Bytes are what goes to a
+worker with a task and what comes back. The last lines scale these figures to 1,000 workers. Rows go
+to benchmarks/results/executors.csv with the name of the machine. With --quick the candidates are
+short, there is one round, and no row is written.
 """
 
 import argparse
@@ -76,7 +80,10 @@ def timed(study: Study, number: int, point: np.ndarray) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Played:
-    """A sweep: seconds by the clock, inside its candidates, of their CPU time; cores that other programs took."""
+    """A sweep: its seconds by the clock, those inside its candidates, and their CPU seconds.
+
+    ``others`` is the number of cores that other programs took.
+    """
 
     wall: float
     inside: float
@@ -172,7 +179,10 @@ def overhead(executor: Executor) -> float:
 
 
 def sizes(study: Study) -> dict[str, int]:
-    """Bytes of a task and its answer: a candidate of a sweep; a replica, whose chamber is shared."""
+    """Bytes of a task and of its answer, for a candidate of a sweep and for a replica.
+
+    The chamber of a replica is shared between tasks.
+    """
     from chamberopt.chamber.build import build_chamber
     from chamberopt.chamber.scene import chamber_mesh
     from chamberopt.simulation.replicas import ReplicaSetting, simulate_replica
@@ -200,13 +210,15 @@ def on_paper(overhead_s: float, candidate_s: float, size: dict[str, int]) -> lis
     traffic = MANY_WORKERS / candidate_s * (size["candidate"] + size["row"]) / 1e6
     replicas = MANY_WORKERS / candidate_s * 8 * (size["replica"] + size["replica_left"]) / 1e6
     return [
-        f"on paper, {MANY_WORKERS:,} workers: {1.0 / overhead_s:,.0f} tasks a second can be handed out, so that all "
-        f"have work if a candidate takes {MANY_WORKERS * overhead_s:.2g} s; one of {candidate_s:.2g} s, as here, is "
-        f"enough for {candidate_s / overhead_s:,.0f} workers",
-        f"the last tasks leave workers idle: {ASKED:.0%} of the time busy takes {ends} candidates a worker, "
-        f"{ends * MANY_WORKERS:,} in all (fewer the more alike they are)",
-        f"a candidate's {size['candidate']:,} bytes out and {size['row']:,} back make {traffic:.2g} MB/s; replicas as "
-        f"tasks would make {replicas:,.0f} MB/s, {size['replica_left']:,} bytes back each",
+        f"on paper, {MANY_WORKERS:,} workers: {1.0 / overhead_s:,.0f} tasks a second can be "
+        f"handed out, so that all have work if a candidate takes {MANY_WORKERS * overhead_s:.2g} "
+        f"s; one of {candidate_s:.2g} s, as here, is enough for {candidate_s / overhead_s:,.0f} "
+        "workers",
+        f"the last tasks leave workers idle: {ASKED:.0%} of the time busy takes {ends} candidates "
+        f"a worker, {ends * MANY_WORKERS:,} in all (fewer the more alike they are)",
+        f"a candidate's {size['candidate']:,} bytes out and {size['row']:,} back make "
+        f"{traffic:.2g} MB/s; replicas as tasks would make {replicas:,.0f} MB/s, "
+        f"{size['replica_left']:,} bytes back each",
     ]
 
 

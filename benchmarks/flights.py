@@ -1,4 +1,4 @@
-"""Flights to ask the structures about: where the balls of a gas start from, on the very mesh that is asked."""
+"""Flights to ask the structures about, started by a gas of balls on the very mesh that is asked."""
 
 import numpy as np
 
@@ -13,8 +13,8 @@ AT_ONCE = 1e-7  # s: a flight this short leads into the wall it starts from
 def sample(shell: Shell, start: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
     """Positions [m] about the shell's centre and velocities [m/s], shape (count, 6).
 
-    A lone ball from ``start`` (3,) [m] flies in every direction, half the time from where it met the wall, half the
-    time from somewhere on the way, as after meeting another ball.
+    A lone ball from ``start`` (3,) [m] flies in every direction. Half of the flights begin where it
+    met the wall, the other half somewhere on the way, as after meeting another ball.
     """
     tree = simulator_tree.build(shell)
     here = Vec3(*(start - shell.mesh.middle).tolist())

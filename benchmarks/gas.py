@@ -15,8 +15,11 @@ SPREAD = 2.0  # m/s, standard deviation of each velocity component
 
 
 class Gas(NamedTuple):
-    """``motion`` (n, 6) in the free-fall frame, time 0 being now; ``reach`` [m] of two balls; ``width`` [m] of the
-    chamber; ``limit`` [s]: how far ahead is asked, the median ball's time to the wall.
+    """The balls of a gas at one moment.
+
+    ``motion`` (n, 6) is in the free-fall frame with time 0 being now, ``reach`` [m] is the distance
+    of the centres of two balls that touch, and ``width`` [m] is that of the chamber. ``limit`` [s]
+    is how far ahead a search looks: the median ball's time to the wall.
     """
 
     motion: np.ndarray

@@ -1,9 +1,11 @@
-"""The hard cases, and what became of each: collisions, events a simulated second, worst overlap, energy drift.
+"""The hard cases and the result of each.
 
     python benchmarks/hard_cases.py [--json] [--long] [--cases WORD ...]
 
-The cases and what physics expects of them are in tests/hard_cases. A case that needs what the simulator does not have
-yet is listed as "not supported yet", never as ok. It needs what the tests need: pip install -e '.[test]'.
+The table gives collisions, events a simulated second, worst overlap and energy drift. The cases and
+what physics expects of them are in tests/hard_cases. A case that needs what the simulator does not
+have yet is listed as "not supported yet", never as ok. The benchmark needs what the tests need: pip
+install -e '.[test]'.
 """
 
 import argparse
@@ -33,7 +35,10 @@ def chosen(words: list[str], with_long: bool) -> list[Case]:
 
 
 def row(case: Case) -> dict[str, Any]:
-    """The outcome as it goes into the table; ``ok`` is None where the simulator does not support the case."""
+    """The outcome as a row of the table.
+
+    ``ok`` is None where the simulator does not support the case.
+    """
     if not case.supported:
         return {**asdict(Outcome(case.name, False, NOT_YET)), "ok": None}
     return asdict(case.outcome())

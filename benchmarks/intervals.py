@@ -1,12 +1,17 @@
-"""How honest the figures of a candidate are: bias and calibration against simulated time, on models and on a gear.
+"""How honest the figures of a candidate are: bias and calibration against simulated time.
 
-    python benchmarks/intervals.py            Poisson models whose truth is known: two CPU minutes
-    python benchmarks/intervals.py --gear     the shipped gear's chamber instead: the same again
-    python benchmarks/intervals.py --stopping what adding replicas until it looks good does to an interval: seconds
-    python benchmarks/intervals.py --json     rows as JSON on stdout instead of a table
+    python benchmarks/intervals.py
+    python benchmarks/intervals.py --gear
+    python benchmarks/intervals.py --stopping
+    python benchmarks/intervals.py --json
 
-Each row: eight replicas of the simulated time [s] together, repeated; the mean of the value and of the half-width, the
-truth, the bias, and how often the 95 % interval held the truth.
+The first command uses Poisson models whose truth is known, --gear the shipped gear's chamber; each
+takes two CPU minutes. --stopping shows within seconds what happens to an interval if replicas are
+added until it looks narrow enough. --json prints the rows as JSON on stdout instead of a table.
+
+Each row stands for many candidates of eight replicas that simulate the given time [s] together. It
+gives the mean of the value and of the half-width, the truth, the bias, and how often the 95 %
+interval held the truth.
 """
 
 import argparse
@@ -34,7 +39,10 @@ TREATMENT = 120.0
 
 
 def models() -> dict[str, np.ndarray]:
-    """Dented area over area at the treatment time, x, of each triangle of a square surface; smooth over it."""
+    """Dented area over area at the treatment time, called x, of each triangle of a square surface.
+
+    In every model x varies smoothly over the surface.
+    """
     along = (np.arange(TRIANGLES) % 50) / 49.0
     return {
         "even": np.full(TRIANGLES, 1.0),
@@ -59,7 +67,7 @@ def model_chamber() -> Chamber:
 
 
 def poisson_replicas(rng: np.random.Generator, x: np.ndarray, seconds: float) -> list[Tally]:
-    """Dents at random, their areas as unequal as in a real chamber (standard deviation 0.75 of the mean)."""
+    """Random dents whose areas vary as in a real chamber (standard deviation 0.75 of the mean)."""
     shape = 1.0 / 0.75**2
     tallies = []
     for _ in range(REPLICAS):
@@ -129,7 +137,10 @@ def model_rows(runs: int) -> Iterator[dict[str, Any]]:
 
 
 def gear_rows(runs: int, replicas: int) -> Iterator[dict[str, Any]]:
-    """Replicas of the shipped gear, simulated once; runs draw eight of them and a window of time in each."""
+    """Rows from replicas of the shipped gear that are simulated once.
+
+    Each run draws eight of the replicas and a window of time in each.
+    """
     from chamberopt.chamber.scene import build_scene, chamber_mesh, replica_seed
     from chamberopt.common.parallel.executor import local_executor
     from chamberopt.coverage.dents import dent_diameter
@@ -158,7 +169,8 @@ def gear_rows(runs: int, replicas: int) -> Iterator[dict[str, Any]]:
     with local_executor() as executor:
         logs = list(executor.map(dents, range(replicas)))
     everything = [tally_of(whole, triangle, area, count) for _, triangle, area in logs]
-    # What all of them together say, whose own error is sqrt(8 / replicas) of a run's over the whole time.
+    # The figures of all replicas together. Their own error is sqrt(8 / replicas) of the error of a
+    # run over the whole time.
     truth = {name: one.value for name, one in figures(everything, chamber, design).items()}
     rng = np.random.default_rng(2)
     for seconds in (0.1, 0.375, whole):
@@ -175,7 +187,11 @@ def gear_rows(runs: int, replicas: int) -> Iterator[dict[str, Any]]:
 
 
 def stopping_rows(runs: int) -> Iterator[dict[str, Any]]:
-    """Normal replicas of truth 0, added by the rule of evaluate() from so many on, until ± 1.96/sqrt(wanted)."""
+    """Rows from normally distributed replicas whose truth is 0.
+
+    The rule of evaluate() adds replicas, from several first numbers on, until the half-width is at
+    most 1.96/sqrt(wanted).
+    """
     for first in (3, 5, MIN_REPLICAS_TO_STOP):
         for wanted in (8, 16, 30, 60):
             rng = np.random.default_rng(3)

@@ -2,11 +2,12 @@
 
     python benchmarks/load_large_result.py [--quick] [--json]
 
-Impacts are drawn at random, not simulated; all files are written by the product. `picture`: `chamberopt inspect
---screenshot`, the result coloured by coverage; `pick`: with a triangle's numbers and the histogram of its impact speeds
-too, for which the single impacts are read. Each in a fresh process: medians of a few runs in seconds of wall clock, and
-the peak of its memory (the larger of the command's and of the process that draws for it). Rows go to
-benchmarks/results/opening.csv with the machine named.
+Impacts are drawn at random, not simulated. All files are written by the product. `picture` is
+`chamberopt inspect --screenshot` with the result coloured by coverage. `pick` adds the numbers of
+one triangle and the histogram of its impact speeds, which needs the single impacts. Each runs in a
+fresh process. The table gives medians of a few runs in seconds of wall clock, and the peak of
+memory (the larger of the command's and of the process that draws for it). Rows go to
+benchmarks/results/opening.csv with the name of the machine.
 """
 
 import argparse
@@ -31,7 +32,10 @@ RUNS = 3
 
 
 def written(folder: Path, size: str, impacts: int) -> tuple[int, int]:
-    """A results folder of so many impacts at random; its part's triangles, and one of them that was hit."""
+    """Writes a results folder of so many random impacts.
+
+    Returns it with the number of the part's triangles and one triangle that was hit.
+    """
     from benchmarks.chamber_build_time import gear_file
     from chamberopt.chamber.build import build_chamber
     from chamberopt.design.design import validate
@@ -87,7 +91,8 @@ def opened(result: Path, *options: str) -> tuple[float, float]:
     """Seconds, and peak of memory [MB], of one `inspect --screenshot`."""
     code = "import sys; from chamberopt.cli import main; sys.exit(main(sys.argv[1:]))"
     watch = (
-        "import resource, subprocess, sys; subprocess.run(sys.argv[1:], check=True, stdout=subprocess.DEVNULL);"
+        "import resource, subprocess, sys; subprocess.run(sys.argv[1:], check=True, "
+        "stdout=subprocess.DEVNULL);"
         "print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)"
     )
     picture = str(result.parent / "picture.png")

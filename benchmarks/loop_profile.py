@@ -2,8 +2,8 @@
 
     python benchmarks/loop_profile.py [scene ...]
 
-The loop is compiled once more with a profiler in it (sim_core/numerics/profiler.py); the last column says how much slower it
-is for that. What limits it is said in docs/core.md.
+The loop is compiled once more with a profiler in it (sim_core/numerics/profiler.py). The last
+column says how much slower that makes it. What limits the loop is described in docs/core.md.
 """
 
 import argparse
@@ -21,7 +21,10 @@ WINDOW = 0.4  # CPU s a measurement
 
 
 def profile(name: str, repeats: int = 5) -> tuple[list[float], dict[str, float], float]:
-    """ns a collision in each part (medians), events and searches a collision, and how much the profiler slows."""
+    """Median ns a collision in each part, events and searches a collision, and the slowdown.
+
+    The slowdown is that caused by the profiler.
+    """
     bare, watched = steady(name), steady(name)
     watched.state = watched.state._replace(profiler=new_profiler())
     advance(watched, 0.01)
@@ -68,7 +71,8 @@ def main() -> None:
         parts, calls, ratio = profile(name)
         cells = [f"{part:.0f}" for part in parts]
         print(
-            f"{name} | {' | '.join(cells)} | {sum(parts):.0f} | {calls['searches']:.2f} | {ratio:.2f}",
+            f"{name} | {' | '.join(cells)} | {sum(parts):.0f} | {calls['searches']:.2f} | "
+            f"{ratio:.2f}",
             flush=True,
         )
 

@@ -1,8 +1,9 @@
-"""Noisy functions of three parameters whose best is known, and chambers whose best a fine sweep told: what
-optimizers.py searches.
+"""The problems that optimizers.py searches: noisy functions and chambers.
 
-A problem is maximised over the unit cube. Its scores are of the size of uniform_coverage, 0..0.8, and come as the mean
-of four replicas, so that each has its own, badly known, error.
+The functions have three parameters and a known best value. The best of a chamber is known from a
+fine sweep. A problem is maximised over the unit cube. Its scores are of the size of
+uniform_coverage, from 0 to 0.8, and are means of four replicas, so that each score has its own,
+badly known, error.
 """
 
 from __future__ import annotations
@@ -18,8 +19,8 @@ RESULTS = Path(__file__).parent / "results"
 REPLICAS = 4
 NOISES = (0.02, 0.1)
 
-# L. C. W. Dixon and G. P. Szegö, "Towards Global Optimization 2", North-Holland 1978: Hartmann's function of three
-# parameters, four local maxima, the best 3.86278.
+# Hartmann's function of three parameters, with four local maxima, the best 3.86278: L. C. W. Dixon
+# and G. P. Szegö, "Towards Global Optimization 2", North-Holland 1978.
 HARTMANN_HEIGHT = np.array([1.0, 1.2, 3.0, 3.2])
 HARTMANN_STEEP = np.array([[3.0, 10, 30], [0.1, 10, 35], [3.0, 10, 30], [0.1, 10, 35]])
 HARTMANN_PLACE = 1e-4 * np.array(
@@ -29,9 +30,11 @@ HARTMANN_PLACE = 1e-4 * np.array(
 
 @dataclass(frozen=True)
 class Problem:
-    """truth(point (d,)) is its true score, `best` the highest there is, noise the standard error of a measured one.
+    """A function to maximise, measured with noise.
 
-    start: where the design stands, None: somewhere in the middle, another place each seed.
+    ``truth(point (d,))`` is the true score of a point, ``best`` is the highest true score, and
+    ``noise`` is the standard error of a measured one. ``start`` is where the design stands. If it
+    is None, each seed starts at another place near the middle.
     """
 
     name: str
@@ -42,7 +45,10 @@ class Problem:
     start: tuple[float, ...] | None = None
 
     def measured(self, seed: int) -> Callable[[np.ndarray], tuple[float, float]]:
-        """score(point) -> mean of the replicas and its squared standard error; the same point, the same answer."""
+        """Returns score(point) -> mean of the replicas and its squared standard error.
+
+        The same point always gets the same answer.
+        """
 
         def score(point: np.ndarray) -> tuple[float, float]:
             bits = np.frombuffer(
@@ -77,7 +83,10 @@ def hartmann(x: np.ndarray) -> float:
 
 
 def corner(x: np.ndarray) -> float:
-    """Best on two bounds, 0.8 at (1, 0, 0.6): it saturates in one parameter and has a kink in another."""
+    """Best on two bounds, with 0.8 at (1, 0, 0.6).
+
+    It saturates in one parameter and has a kink in another.
+    """
     return float(
         0.8 * np.expm1(-3.0 * x[0]) / np.expm1(-3.0) - 0.4 * x[1] ** 1.5 - 0.6 * (x[2] - 0.6) ** 2
     )
@@ -96,7 +105,10 @@ def functions() -> list[Problem]:
 
 
 def chamber(name: str) -> Problem:
-    """A swept chamber (chamber_sweep.py): linear between its points, for there are cliffs; noise as measured."""
+    """A swept chamber (chamber_sweep.py) with the noise that was measured.
+
+    It is interpolated linearly between the points of the sweep, because there are cliffs.
+    """
     from scipy.interpolate import RegularGridInterpolator
 
     with (RESULTS / f"sweep_{name}.csv").open(encoding="utf-8", newline="") as file:

@@ -1,13 +1,18 @@
-"""The default study's search against other optimisers: true regret of what each recommends, same evaluations for all.
+"""The default study's search against other optimisers, with the same number of evaluations for all.
 
-    python benchmarks/optimizers.py               10 seeds of 40 evaluations: some five CPU minutes
+    python benchmarks/optimizers.py
     python benchmarks/optimizers.py --only ours,random --seeds 3
-    python benchmarks/optimizers.py --json        rows as JSON on stdout instead of a table
+    python benchmarks/optimizers.py --json
 
-Set OMP_NUM_THREADS=1: on matrices so small more threads only cost. The others need the extra "bench" (pip install
-chamberopt[bench]), Optuna's GP torch besides. Problems: noisy_problems.py.
-Each recommends as it does by itself: ours and CMA-ES by their model, the others the best they saw. mean_regret_fit is
-the regret of what our surrogate recommends from the same evaluations: what is left of the difference is the search.
+The first command runs 10 seeds of 40 evaluations and takes about five CPU minutes. --json prints
+the rows as JSON on stdout instead of a table. Set OMP_NUM_THREADS=1: with such small matrices more
+threads only cost time. The other optimisers need the extra "bench" (pip install chamberopt[bench]),
+and Optuna's GP also needs torch. The problems are those of noisy_problems.py.
+
+The figure is the true regret of what each optimiser recommends by its own rule: ours and CMA-ES
+recommend by their model, the others the best point they saw. mean_regret_fit is the regret of what
+our surrogate recommends from the same evaluations. The difference that remains comes from the
+search.
 """
 
 import argparse
@@ -187,7 +192,10 @@ def rows(
 
 
 def verdict(made: list[dict[str, Any]]) -> str:
-    """On how many problems ours has the lowest mean regret, our own other algorithm left out, and the worst."""
+    """Says on how many problems ours has the lowest mean regret, and how it does on the worst one.
+
+    Our own other algorithm is left out of the comparison.
+    """
     by_problem: dict[str, dict[str, float]] = {}
     for one in made:
         if one["optimizer"] != "nlopt-mlsl":
@@ -196,7 +204,10 @@ def verdict(made: list[dict[str, Any]]) -> str:
     worst = max(
         regrets["ours"] / max(min(regrets.values()), 1e-9) for regrets in by_problem.values()
     )
-    return f"ours has the lowest mean regret on {first} of {len(by_problem)} problems; at worst {worst:.2f} times the best"
+    return (
+        f"ours has the lowest mean regret on {first} of {len(by_problem)} problems; at worst "
+        f"{worst:.2f} times the best"
+    )
 
 
 def main() -> None:
@@ -221,7 +232,8 @@ def main() -> None:
         made = list(rows(asked.problem, names, asked.seeds, asked.evaluations, asked.first_seed))
     except ImportError as error:
         parser.error(
-            f"{error}; pip install chamberopt[bench] (and torch for optuna-gp), or leave it out with --only"
+            f"{error}; pip install chamberopt[bench] (and torch for optuna-gp), or leave it out "
+            "with --only"
         )
     if asked.json:
         print(json.dumps(made, indent=1))

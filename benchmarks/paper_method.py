@@ -1,7 +1,9 @@
-"""The wall query of the paper this project starts from: every triangle a plane, the ball a point, faces only.
+"""The wall query of the paper this project starts from.
 
-Badreddine et al., "CAD based simulation of ultrasonic shot peening", section 3.1, equations 3 and 4: solve the
-quadratic for each plane, keep the smallest positive root whose point lies in the triangle. Compiled as ours is.
+Every triangle is a plane, the ball is a point, and only faces are tested. Badreddine et al., "CAD
+based simulation of ultrasonic shot peening", section 3.1, equations 3 and 4: solve the quadratic
+for each plane and keep the smallest positive root whose point lies in the triangle. It is compiled
+as our own query is.
 """
 
 import math

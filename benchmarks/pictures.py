@@ -1,4 +1,4 @@
-"""Benchmark lines on logarithmic axes, in colours and marks that colour-blind readers tell apart."""
+"""Benchmark lines on logarithmic axes, in colours and marks that suit colour-blind readers."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -22,7 +22,10 @@ def lines_picture(
     product: str,
     title: str,
 ) -> None:
-    """Column ``up`` [ns] against column ``across``, a line for each structure, a panel for each value of ``panel``."""
+    """Plots column ``up`` [ns] against column ``across``.
+
+    There is a line for each structure and a panel for each value of ``panel``.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -1,4 +1,7 @@
-"""Named scenes: the paper's cylinder at any fineness, and the shipped gear's chamber. Tags as a chamber has them."""
+"""Named scenes: the paper's cylinder at any fineness, and the shipped gear's chamber.
+
+Surfaces carry the tags that a chamber gives them.
+"""
 
 from functools import lru_cache
 from itertools import pairwise
@@ -29,7 +32,10 @@ ROOT = Path(__file__).parents[1]
 
 
 def cylinder(radius: float, height: float, triangles: int) -> TriangleMesh:
-    """An upright cylinder [m] of about so many even triangles: rings on the ends, rows round the side."""
+    """An upright cylinder [m] of about so many even triangles.
+
+    They form rings on the ends and rows around the side.
+    """
     area = 2.0 * np.pi * radius * (radius + height)
     edge = np.sqrt(2.0 * area / triangles)
     around = max(12, round(2.0 * np.pi * radius / edge))

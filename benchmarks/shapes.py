@@ -55,7 +55,10 @@ def main() -> None:
 
 
 def _made(title: str, keys: dict[str, Any]) -> tuple[ShapeSurface, np.ndarray]:
-    """The cavity of a shape round the blade, and the blade's triangles (m, 3, 3) m below the ceiling."""
+    """The cavity of a shape around the blade, and the blade's triangles (m, 3, 3).
+
+    Both are in metres and lie below the ceiling.
+    """
     from chamberopt import load_design
 
     data = load_design(IMAGES.parents[1] / "designs" / "blade_oblong.toml").model_dump()

@@ -1,8 +1,8 @@
 """A copy of the simulator that never had an effect, to compare the cost of the real one with.
 
-The compiled functions test whether an effect is absent by ``name is None``. In the copy the result is
-written into the source, and code that cannot be reached is removed: nothing of the effect is left for
-the compiler to prune.
+The compiled functions test whether an effect is absent by ``name is None``. In the copy the result
+is written into the source, and code that cannot be reached is removed: nothing of the effect is
+left for the compiler to prune.
 """
 
 import ast

@@ -1,4 +1,4 @@
-"""A benchmark's rows: what goes into them, and where they go, a CSV in results/ that names the machine."""
+"""The rows of a benchmark and where they go: a CSV in results/ that names the machine."""
 
 import csv
 import platform
@@ -13,7 +13,10 @@ RESULTS = Path(__file__).parent / "results"
 
 def machine() -> str:
     """Operating system, processor and Python."""
-    return f"{platform.system()} {platform.machine()} {_processor()}, Python {platform.python_version()}"
+    return (
+        f"{platform.system()} {platform.machine()} {_processor()}, Python "
+        f"{platform.python_version()}"
+    )
 
 
 def write_csv(name: str, rows: Sequence[dict[str, Any]]) -> Path:

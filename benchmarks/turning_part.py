@@ -1,11 +1,12 @@
-"""What a turning part costs: collisions a CPU second of the gear's chamber, still and at several speeds.
+"""What a turning part costs: collisions a CPU second of the gear's chamber, still and turning.
 
     python benchmarks/turning_part.py [--quick] [--json]
 
-Steady state after 0.3 s; process CPU time; the runs take turns, window by window, so that a busy machine slows all
-alike; the median of several windows, with the best and the worst, and how many times the still scene a collision and a
-simulated second cost. A slow turn (100 rpm and less) is to cost at most twice the still scene. A fast one heats the
-shot, which then collides more.
+Each speed is measured in its steady state, after 0.3 s, in CPU time of the process. The runs take
+turns, window by window, so that a busy machine slows all alike. The table gives the median of
+several windows with the best and the worst, and the cost of a collision and of a simulated second
+as multiples of the still scene. A slow turn (100 rpm and less) should cost at most twice the still
+scene. A fast one heats the shot, which then collides more.
 """
 
 import argparse

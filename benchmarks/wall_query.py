@@ -1,20 +1,26 @@
-"""Which spatial structure finds a ball's first contact with the mesh soonest, and how each grows with the mesh.
+"""Which spatial structure finds a ball's first contact with the mesh soonest.
+
+It also shows how the time of each structure grows with the mesh.
 
     python benchmarks/wall_query.py [--quick] [--json] [--picture]
 
-The question of Badreddine et al., "CAD based simulation of ultrasonic shot peening", whose computing time grows with
-the mesh. The same flights, parabolas of a 3 mm ball up to the wall, on the same meshes. All structures but three hold
-the same obstacles, one for every triangle and convex edge, and run the same exact tests; the run fails unless they
-agree on every contact, bit for bit. The three: the product, its eight-wide tree over flats merged into few faces, which
-must touch what the others touch to within 1e-12 m, and whose build and memory include the search for the triangle that
-was hit; the paper's method, faces only, the ball a point; and embree's ray, straight and thin.
+The question is that of Badreddine et al., "CAD based simulation of ultrasonic shot peening", whose
+computing time grows with the mesh. All structures get the same flights on the same meshes:
+parabolas of a 3 mm ball up to the wall. All but three hold the same obstacles, one for every
+triangle and convex edge, and run the same exact tests. The run fails unless they agree on every
+contact, bit for bit. The first of the three is the product, its eight-wide tree over flats merged
+into few faces. It must touch what the others touch to within 1e-12 m, and its build and memory
+include the search for the triangle that was hit. The second is the paper's method, with faces only
+and the ball as a point. The third is embree's ray, straight and thin.
 
-What the two that test everything take is not the same. The paper's tests the borders of a triangle only where its
-plane is met before the best so far, and reads 96 bytes of it; the exact test asks for the borders of every plane met
-and reads 160 bytes, and on convex edges a capsule is to be met. With 10^6 triangles neither fits into a cache.
+The two structures that test everything take different times. The paper's method tests the borders
+of a triangle only if its plane is met before the best so far, and reads 96 bytes of it. The exact
+test computes the borders of every plane met and reads 160 bytes, and on convex edges it must test a
+capsule. With 10^6 triangles neither fits into a cache.
 
-CPU time, the structures taking turns; median, best and worst. Where a query is slow fewer are asked: see the column.
-Rows go to benchmarks/results/wall_query.csv, the picture to docs/images/wall_query.png; --quick writes no CSV.
+Figures are CPU times with the structures taking turns: median, best and worst. Where a query is
+slow fewer are asked, as the column says. Rows go to benchmarks/results/wall_query.csv and the
+picture to docs/images/wall_query.png. With --quick no CSV is written.
 """
 
 import argparse
@@ -39,7 +45,9 @@ from benchmarks.table import array_bytes, print_table, write_csv
 from sim_core import TriangleMesh
 
 PICTURE = IMAGES / "wall_query.png"
-FLIGHTS = 10_000  # of 2,000 asked again and again the processor learns branches by heart: up to 10 % less time
+# If only 2,000 are asked again and again, the processor learns the branches by heart and takes
+# up to 10 % less time.
+FLIGHTS = 10_000
 TURNS = 7
 TURN = 0.1  # CPU s: shorter turns ask the same flights again, longer ones ask fewer
 LEAST = 20  # flights
@@ -59,8 +67,10 @@ MESHES: dict[
 
 
 class Structure(NamedTuple):
-    """``build(shell)`` and ``ask(built, flights (n, 6), delays (n,) out, obstacles (n,) out)``; whether its answers
-    must be the others', bit for bit.
+    """How a structure is built and asked.
+
+    ``build(shell)`` makes it. ``ask(built, flights (n, 6), delays (n,), obstacles (n,))`` fills the
+    last two arrays. ``exact`` says whether its answers must equal those of the others, bit for bit.
     """
 
     build: Callable[[Shell], Any]
@@ -90,11 +100,16 @@ STRUCTURES = {
         False,
     ),
 }
-SAME_CONTACT = 1e-12  # m between ball and surface; along a path that grazes an edge it is any number of times that
+# Largest gap [m] between ball and surface at a contact. Along a path that grazes an edge the
+# contacts themselves may lie much further apart.
+SAME_CONTACT = 1e-12
 
 
 class Contest(NamedTuple):
-    """A structure over one mesh, the flights it is asked, how often a turn asks them, and what it answers."""
+    """A structure over one mesh, the flights it is asked, and its answers.
+
+    A turn asks the flights ``passes`` times.
+    """
 
     structure: Structure
     built: Any
@@ -169,7 +184,8 @@ def measure(name: str, mesh: TriangleMesh, start: np.ndarray) -> list[dict[str, 
         row["best"], row["worst"] = round(min(times)), round(max(times))
     off = require_agreement(shell, contests)
     print(
-        f"{name}, {len(mesh.triangles)} triangles: contacts agree bit for bit, the product's within {off:.1e} m",
+        f"{name}, {len(mesh.triangles)} triangles: contacts agree bit for bit, the product's "
+        f"within {off:.1e} m",
         file=sys.stderr,
         flush=True,
     )
@@ -177,8 +193,10 @@ def measure(name: str, mesh: TriangleMesh, start: np.ndarray) -> list[dict[str, 
 
 
 def require_agreement(shell: Shell, contests: dict[str, Contest]) -> float:
-    """Exits unless every exact structure found the same contacts: the same time, bit for bit, and the same obstacle or
-    another that is met at that very time. Returns how far from those the product's contacts are at most [m].
+    """Exits unless every exact structure found the same contacts.
+
+    The times must be equal bit for bit, and the obstacle must be the same or one that is met at
+    that very time. Returns the largest distance [m] of the product's contacts from those.
     """
     reference = contests[REFERENCE]
     for label, contest in contests.items():
@@ -189,7 +207,8 @@ def require_agreement(shell: Shell, contests: dict[str, Contest]) -> float:
         if len(wrong):
             i = wrong[0]
             raise SystemExit(
-                f"{label} and {REFERENCE} disagree on {len(wrong)} of {count} flights, the first number {i}: "
+                f"{label} and {REFERENCE} disagree on {len(wrong)} of {count} flights, the first "
+                f"number {i}: "
                 f"{contest.delays[i]} and {reference.delays[i]} s"
             )
         for i in np.flatnonzero(contest.obstacles[:count] != reference.obstacles[:count]):
@@ -198,7 +217,8 @@ def require_agreement(shell: Shell, contests: dict[str, Contest]) -> float:
             )
             if one != two:
                 raise SystemExit(
-                    f"{label} and {REFERENCE} meet different obstacles at different times on flight {i}"
+                    f"{label} and {REFERENCE} meet different obstacles at different times on "
+                    f"flight {i}"
                 )
     merged = contests[PRODUCT]
     count = min(len(merged.asked), len(reference.asked))

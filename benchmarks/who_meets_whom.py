@@ -1,24 +1,31 @@
-"""Which spatial structure finds a ball's next meeting with another soonest, and how each grows with the shot.
+"""Which spatial structure finds a ball's next meeting with another soonest.
+
+It also shows how the time of each structure grows with the number of balls.
 
     python benchmarks/who_meets_whom.py [--quick] [--json] [--picture]
 
-Moments of a gas of 3 mm balls, always as dense, in a chamber 40 mm high and as wide as it takes (10,000 balls: half a
-metre). Asked of every ball in turn: when and whom it meets first, before the median ball's time to the wall. Of few
-balls many moments are asked, 10,000 balls in all.
+The structures are asked at moments of a gas of 3 mm balls. Its density is always the same: the
+chamber is 40 mm high and as wide as it must be (half a metre for 10,000 balls). The question, put
+to every ball in turn, is when and whom it meets first before the median ball's time to the wall.
+With few balls many moments are asked, 10,000 balls in all.
 
-What it takes to keep a structure true counts too, per event, that is, per flight begun. Cells: crossing borders and
-looking into the nine cells ahead until the flight ends at a ball or at the limit, the time to find later what they
-cannot see yet included. Sweep and prune: sorting the new flight in. The product: seeing the new path and widening its
-block's box, and a flight's share of what happens once a window of 20 ms: sorting all balls into blocks, and one more
-look for each ball, since no look goes past a window's end. Its query is asked in mid window, see simulator_pairs.py.
+The work that keeps a structure up to date counts too. It is given per event, that is, per flight
+begun. For cells it is crossing borders and looking into the nine cells ahead until the flight ends
+at a ball or at the limit, so that it includes the time to find later what the cells cannot see yet.
+For sweep and prune it is sorting the new flight in. For the product it is registering the new path
+and widening the box of its block, and the share of a flight in what happens once in a window of 20
+ms: sorting all balls into blocks, and one more search for each ball, because no search goes past
+the end of a window. The product's query is asked in mid window, see simulator_pairs.py.
 
-Not in the table: columns of cells from floor to ceiling, each its balls in eight float32 lanes. Tried before the
-product had blocks, they took 671, 727 and 807 ns with upkeep at 2,000, 5,000 and 10,000 balls: less than blocks, for
-an event at every border that a ball crosses.
+One structure is not in the table: columns of cells from floor to ceiling, each with its balls in
+eight float32 lanes. It was tried before the product had blocks and took 671, 727 and 807 ns with
+upkeep at 2,000, 5,000 and 10,000 balls. That is less than blocks, but costs an event at every
+border that a ball crosses.
 
-The run fails unless all agree on every partner, and on every time to within rounding: not all measure from now. CPU
-time, the structures taking turns; median, best and worst of the sum. Rows go to benchmarks/results/who_meets_whom.csv,
-the picture to docs/images/who_meets_whom.png; --quick writes no CSV.
+The run fails unless all agree on every partner, and on every time to within rounding, because not
+all of them measure times from now. Figures are CPU times with the structures taking turns: median,
+best and worst of the sum. Rows go to benchmarks/results/who_meets_whom.csv and the picture to
+docs/images/who_meets_whom.png. With --quick no CSV is written.
 """
 
 import argparse
@@ -45,8 +52,9 @@ BALLS = [30, 100, 200, 500, 1_000, 2_000, 5_000, 10_000]
 QUICK = [30, 200, 1_000]
 TURNS = 7
 TURN = 0.05  # CPU s: a shorter turn asks all balls again
-# Balls in all moments of one size. Of a few hundred alone the processor learns every branch by heart: a lone moment of
-# 100 balls took all pairs 390 ns a ball, and a hundred such moments 980, as a simulation would, which never asks again.
+# Balls in all moments of one size. If only a few hundred are asked, the processor learns every
+# branch by heart: with a lone moment of 100 balls all pairs took 390 ns a ball, and with a hundred
+# such moments 980. A simulation never asks the same again, so that its cost is like the latter.
 ASKED = 10_000
 CLOSE = 1e-12  # s: what rounding may change of a time
 
@@ -82,7 +90,8 @@ def require_agreement(found: dict[str, Answers]) -> None:
         if len(wrong):
             i = wrong[0]
             raise SystemExit(
-                f"{label} and all pairs disagree on {len(wrong)} of {len(times)} balls, the first number {i}: "
+                f"{label} and all pairs disagree on {len(wrong)} of {len(times)} balls, the first "
+                f"number {i}: "
                 f"{others[i]} s with {mates[i]}, {times[i]} s with {partners[i]}"
             )
 
@@ -126,7 +135,10 @@ def measure(gases: Sequence[Gas]) -> list[dict[str, Any]]:
 
 
 def query_ns(module: Any, moments: Sequence[Moment]) -> float:
-    """CPU time of one query [ns], the mean of a turn; what calling compiled code takes is not in it."""
+    """CPU time of one query [ns], the mean of a turn.
+
+    The overhead of calling compiled code is not included.
+    """
     balls = len(moments[0].ends)
     times, partners = np.empty(balls), np.empty(balls, dtype=np.int64)
     built = [(module.build(moment.gas), moment.gas.limit) for moment in moments]
@@ -144,7 +156,10 @@ def query_ns(module: Any, moments: Sequence[Moment]) -> float:
 
 
 def upkeep_ns(module: Any, moments: Sequence[Moment]) -> float:
-    """CPU time of one event's upkeep [ns], the mean of a turn; what calling compiled code takes is not in it."""
+    """CPU time of one event's upkeep [ns], the mean of a turn.
+
+    The overhead of calling compiled code is not included.
+    """
     balls = len(moments[0].ends)
     times, partners = np.empty(balls), np.empty(balls, dtype=np.int64)
     events, spent, begin = 0.0, 0.0, time.process_time()

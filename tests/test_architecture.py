@@ -1,4 +1,7 @@
-"""The structure, read from the sources: imports point one way, each heavy library has one importer."""
+"""The structure, read from the sources.
+
+Imports point one way, and each heavy library has one importer.
+"""
 
 import ast
 from collections.abc import Iterator
@@ -10,14 +13,21 @@ ROOT = Path(__file__).resolve().parents[1]
 
 # Who may import whom: each package from those before it in its row, and from itself.
 ORDER = {
-    "chamberopt": "common geometry design chamber coverage simulation optimize output api cli __main__",
+    "chamberopt": (
+        "common geometry design chamber coverage simulation optimize output api cli __main__"
+    ),
     "chamberopt/geometry": "triangles solids+remesh slivers mesh_io",
     "chamberopt/geometry/mesh_io": "surface_error units+holes+self_intersection readers formats "
     "healing part_mesh",
-    "chamberopt/design": "table_base materials shapes effects+part+process+shot+sonotrode design load",
-    "chamberopt/chamber": "target deflector_meshes bores_and_deflectors reach part build dimensionless scene analytic checks",
-    "chamberopt/coverage": "statistics dents coverage_from_impacts part_impacts+metrics dent_marking "
-    "coverage_intervals intensity",
+    "chamberopt/design": (
+        "table_base materials shapes effects+part+process+shot+sonotrode design load"
+    ),
+    "chamberopt/chamber": (
+        "target deflector_meshes bores_and_deflectors reach part build dimensionless scene "
+        "analytic checks"
+    ),
+    "chamberopt/coverage": "statistics dents coverage_from_impacts part_impacts+metrics "
+    "dent_marking coverage_intervals intensity",
     "chamberopt/simulation": "resting_balls replicas evaluation evaluate "
     "triangle_fields+time_curve complete_result effect_pilot convergence",
     "chamberopt/optimize": "study+search storage "
@@ -37,7 +47,8 @@ ONE_IMPORTER = {
     "distributed": "common/parallel/dask_cluster.py",
     "dask": "common/parallel/dask_cluster.py",
     "plotly": "output/report/",
-    "vtkmodules": "geometry/mesh_io/readers/vtk.py",  # VTK's file readers alone, which need no OpenGL
+    # VTK's file readers alone, which need no OpenGL
+    "vtkmodules": "geometry/mesh_io/readers/vtk.py",
 }
 MOST_ENTRIES = 12
 
@@ -47,7 +58,7 @@ def sources(package: str) -> list[Path]:
 
 
 def imports(path: Path) -> Iterator[tuple[str, tuple[str, ...], int]]:
-    """(module, names taken from it, line) of every import statement, wherever in the file it stands."""
+    """(module, names taken from it, line) of every import statement anywhere in the file."""
     tree = ast.parse(path.read_text(encoding="utf-8"), filename=str(path))
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
@@ -201,7 +212,10 @@ def test_heavy_libraries_have_one_importer(library: str) -> None:
 
 
 def test_the_only_compiler_of_sim_core_is_one_file() -> None:
-    """A stray @njit would use numba's own cache, which misses edits in other files and answers wrongly."""
+    """A stray @njit would use numba's own cache.
+
+    That cache misses edits in other files and then gives wrong results.
+    """
     wrong = [
         relative(path)
         for path in sources("sim_core")
@@ -213,7 +227,10 @@ def test_the_only_compiler_of_sim_core_is_one_file() -> None:
 
 
 def _run_time_imports(path: Path) -> Iterator[tuple[str, tuple[str, ...], int]]:
-    """The imports that happen when the file is loaded: not under TYPE_CHECKING, not inside a function."""
+    """The imports that happen when the file is loaded.
+
+    Those under TYPE_CHECKING and inside functions are left out.
+    """
     tree = ast.parse(path.read_text(encoding="utf-8"), filename=str(path))
     for node in tree.body:
         if isinstance(node, ast.Import):

@@ -1,5 +1,6 @@
-"""The structures that the benchmarks compare answer alike; how fast they are is not asked here. The comparison of the
-analytical chamber with the meshed one is made, roughly.
+"""The structures that the benchmarks compare give equal answers. Their speed is not tested here.
+
+The comparison of the analytical chamber with the meshed one is made roughly.
 """
 
 import csv
@@ -50,7 +51,10 @@ def test_all_structures_find_the_same_meetings() -> None:
 
 
 def test_the_analytical_chamber_beside_the_meshed_one(tmp_path: Path) -> None:
-    """Rough, but whole: 95 % intervals of half-width 1 hold the difference twice as wide all but once in 10,000."""
+    """A rough run still gives the whole page.
+
+    The 95 % intervals have half-width 1. A difference twice as wide happens once in 10,000 runs.
+    """
     analytic.main(["--quick", "--out", str(tmp_path)])
     page = (tmp_path / "analytic.md").read_text(encoding="utf-8")
     assert "| volume, cm³ | 29.4524 | 29.4051 | −1.6 ‰ |" in page

@@ -1,8 +1,9 @@
-"""Binary trees of boxes, built top down by the surface area heuristic; what kind of box is the caller's choice.
+"""Binary trees of boxes, built top down by the surface area heuristic.
 
-One builder for both kinds, so that they differ in nothing else: a group's frame is the world's axes, or the principal
-axes of its points (Gottschalk, Lin & Manocha, SIGGRAPH 1996, 171). The group is cut along an axis of its frame, at
-the cheapest of 15 places.
+The caller chooses the kind of box. One builder makes both kinds, so that they differ only in that.
+The frame of a group is either the world's axes or the principal axes of its points (Gottschalk, Lin
+& Manocha, SIGGRAPH 1996, 171). The group is cut along an axis of its frame, at the cheapest of 15
+places.
 """
 
 from functools import partial
@@ -30,10 +31,12 @@ _builder = partial(jit, arrays=True)
 
 
 class BinaryTree(NamedTuple):
-    """``frames`` (nodes, 3, 3) float32, rows the axes of a node's box, None the world's; ``slabs`` (nodes, 6) float32
-    [m]: low and high along each.
+    """The arrays of a tree.
 
-    ``links`` (nodes, 2) int32: first child (the second follows it) and 0, or first row and number of rows.
+    ``frames`` (nodes, 3, 3) float32 has the axes of a node's box as rows, or is None for the
+    world's axes. ``slabs`` (nodes, 6) float32 [m] gives the low and high bound along each axis.
+    ``links`` (nodes, 2) int32 holds the first child (the second follows it) and 0, or the first row
+    and the number of rows.
     """
 
     frames: np.ndarray | None
@@ -111,7 +114,10 @@ def _enter(frames, slabs, node, chord, longest):  # type: ignore[no-untyped-def]
 
 @_builder
 def _grow(points, grow, order, oriented, frames, slabs, links):  # type: ignore[no-untyped-def]
-    """Fill the tree, sorting ``order`` so that a leaf's obstacles are its rows; returns the number of nodes."""
+    """Fills the tree and returns the number of nodes.
+
+    ``order`` is sorted so that the obstacles of a leaf are consecutive rows.
+    """
     boxes = np.empty((len(order), 6))  # of each obstacle, in its group's frame
     links[0, 1] = len(order)
     nodes, node = 1, 0

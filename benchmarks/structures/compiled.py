@@ -1,6 +1,7 @@
-"""How the structures are compiled: as the product is, kept on disk, and one loop for all of them.
+"""How the structures are compiled: like the product, kept on disk, with one loop for all of them.
 
-A structure is a NamedTuple; ``search(structure, *question)`` is the function that ``@searches(ItsType)`` names.
+A structure is a NamedTuple. ``search(structure, *question)`` calls the function that is marked with
+``@searches(ItsType)``.
 """
 
 import hashlib

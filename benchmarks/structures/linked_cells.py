@@ -1,8 +1,10 @@
-"""Linked cells: each cell a chain of balls (Rapaport, Journal of Computational Physics 34 (1980) 184).
+"""Linked cells: each cell is a chain of balls.
 
-Cells are wider than a ball and lie in the free-fall frame, where flights are straight. They repeat from wall to wall,
-so that a ball is never outside. Two balls that meet are then in the same or in neighbouring cells: a ball looks into
-27 cells when its flight begins, and into the 9 new ones whenever it or the other has crossed a border.
+The method is from Rapaport, Journal of Computational Physics 34 (1980) 184. Cells are wider than a
+ball and lie in the free-fall frame, where flights are straight. They repeat from wall to wall, so
+that a ball is never outside. Two balls that meet are then in the same or in neighbouring cells. A
+ball therefore looks into 27 cells when its flight begins, and into the 9 new ones whenever it or
+the other ball has crossed a border.
 """
 
 from typing import NamedTuple
@@ -19,9 +21,12 @@ HELD = 0.3  # balls a cell on average; 0.7 and 1.5 measured 15 and 30 % slower
 
 
 class LinkedCells(NamedTuple):
-    """``edge`` [m]; ``shape`` (3,) cells until they repeat; ``where`` (n, 3) int32, counted on without repeating;
-    ``queue``: when each ball crosses a border next; ``first`` (cells,) and ``after``, ``before`` (n,) int32: the
-    chains, -1 at their ends.
+    """The balls in their cells.
+
+    ``edge`` [m] is the width of a cell, ``shape`` (3,) the number of cells until they repeat, and
+    ``where`` (n, 3) int32 the cell of each ball, counted without repeating. ``queue`` knows when
+    each ball crosses a border next. ``first`` (cells,) int32 and ``after`` and ``before`` (n,)
+    int32 are the chains, with -1 at their ends.
     """
 
     motion: np.ndarray

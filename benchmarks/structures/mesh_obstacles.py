@@ -1,4 +1,7 @@
-"""What every structure over a mesh starts from: the obstacles of one radius of ball, and the exact test of one."""
+"""What every structure over a mesh starts from.
+
+These are the obstacles for one radius of ball, and the exact test of one obstacle.
+"""
 
 from typing import Any, NamedTuple
 
@@ -38,8 +41,9 @@ class Shell(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """Obstacles in a structure's own order, neighbours near each other in memory; ``names`` are their rows in the
-    shell.
+    """Obstacles in a structure's own order, with neighbours near each other in memory.
+
+    ``names`` are their rows in the shell.
     """
 
     numbers: np.ndarray
@@ -50,7 +54,10 @@ class Rows(NamedTuple):
 
 
 class Chord(NamedTuple):
-    """The straight line under an arc: ``origin`` [m], ``velocity`` [m/s]; the arc lies up to ``bulge`` [m] off it."""
+    """The straight line under an arc: ``origin`` [m] and ``velocity`` [m/s].
+
+    The arc lies up to ``bulge`` [m] away from it.
+    """
 
     origin: Vec3
     velocity: Vec3
@@ -82,7 +89,10 @@ def sort_rows(shell: Shell, order: np.ndarray) -> Rows:
 
 
 def gaps(shell: Shell, obstacles: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """How far centres (n, 3) [m] are from the planes of faces and from the round of capsules (n,) [m]; signed."""
+    """Signed distances [m] of centres ``at`` (n, 3) from obstacles (n,).
+
+    They are measured from the planes of faces and from the rounded surfaces of capsules.
+    """
     numbers = shell.numbers[obstacles]
     plane = np.einsum("ij,ij->i", numbers[:, 0:3], at) - numbers[:, 3]
     offset = at - numbers[:, 0:3]  # a capsule's first three numbers are its start
@@ -107,7 +117,10 @@ def delay_to(rows, row, ball, fall, limit):  # type: ignore[no-untyped-def]
 
 @jit
 def nearer(rows, row, ball, fall, best, found):  # type: ignore[no-untyped-def]
-    """The first contact known and its row, once this obstacle has been looked at; ties go to the lowest name."""
+    """The first contact known and its row, after a look at this obstacle.
+
+    Ties go to the lowest name.
+    """
     delay = delay_to(rows, row, ball, fall, best)
     if delay < best or (delay == best and (found < 0 or rows.names[row] < rows.names[found])):
         return delay, row

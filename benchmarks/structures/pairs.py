@@ -1,8 +1,10 @@
-"""What every structure over the balls shares: the exact test of a pair, and the loop in which it is timed.
+"""What every structure over the balls shares: the exact test of a pair and the timed loop.
 
-Such a structure offers ``build(gas)``; a search ``(structure, ball, time, before)``: time [s] and partner of the
-ball's first meeting that it can see; and ``upkeep(structure, ends, before, times, partners)``: keeps up with the
-balls, enters among the answers what it sees later, and returns how many flights, each until its end, that was worth.
+Such a structure offers three functions. ``build(gas)`` makes it. A search ``(structure, ball, time,
+before)`` gives the time [s] and partner of the first meeting of the ball that the structure can
+see. ``upkeep(structure, ends, before, times, partners)`` follows the balls, enters among the
+answers what the structure sees only later, and returns how many flights, each to its end, that work
+covers.
 """
 
 from benchmarks.structures.compiled import jit, search
@@ -13,8 +15,9 @@ from sim_core.numerics.vec3 import Vec3, sub
 
 @jit
 def sooner(motion, reach, ball, other, time, best, partner):  # type: ignore[no-untyped-def]
-    """The first meeting known, after ``best`` [s] from ``time``, and its partner, once this other has been looked
-    at.
+    """The first meeting known and its partner, after a look at this other ball.
+
+    ``best`` [s] is counted from ``time``.
     """
     here, there = free_fall_position(motion, ball, time), free_fall_position(motion, other, time)
     closing = Vec3(

@@ -1,6 +1,7 @@
-"""The product's own search, asked in mid window, when its blocks' boxes are as wide as they are on average.
+"""The product's own search, asked in mid window.
 
-When the window began every ball flew another way, and its block was drawn for that; since then each was hit once.
+At that time the boxes of its blocks are as wide as they are on average. When the window began every
+ball flew another way, and its block was drawn for that flight. Since then each ball was hit once.
 """
 
 from typing import NamedTuple
@@ -21,8 +22,10 @@ from sim_core.numerics.roots import NEVER
 
 
 class ProductPairs(NamedTuple):
-    """``motion`` (n, 6) in the free-fall frame, time 0 being the window's start; ``neighbours``: what is made of it;
-    ``now`` [s] on the window's clock.
+    """The balls and the product's search structure for them.
+
+    ``motion`` (n, 6) is in the free-fall frame with time 0 at the start of the window,
+    ``neighbours`` is built from it, and ``now`` [s] is on the window's clock.
     """
 
     motion: np.ndarray
@@ -64,8 +67,11 @@ def search(pairs, ball, time, before):  # type: ignore[no-untyped-def]
 
 @jit
 def upkeep(pairs, ends, before, times, partners):  # type: ignore[no-untyped-def]
-    """A whole window: all balls are seen anew and, if in blocks, sorted and asked for once more, since no search goes
-    past a window's end; and every flight begun in it is followed.
+    """The work of a whole window.
+
+    All balls are registered again. If they are in blocks, they are sorted and searched for once
+    more, because no search goes past the end of a window. Then every flight begun in the window is
+    followed.
     """
     balls = len(ends)
     if balls == 0:

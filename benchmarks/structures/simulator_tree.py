@@ -1,4 +1,7 @@
-"""The product's own search, eight boxes in one instruction: as it is, and over the obstacles that the others hold."""
+"""The product's own search, which tests eight boxes in one instruction.
+
+It is measured as it is, and over the same obstacles that the other structures hold.
+"""
 
 from typing import NamedTuple
 
@@ -30,14 +33,20 @@ def build(shell: Shell) -> EightWide:
 
 
 def build_product(shell: Shell) -> tuple[EightWide, TriangleLookup]:
-    """What the product makes of the mesh, flat faces merged, and how it then finds the triangle that was hit."""
+    """What the product makes of the mesh, with flat faces merged.
+
+    The second item finds the triangle that was hit.
+    """
     surfaces = build_obstacle_set(shell.mesh, (shell.radius,))
     return EightWide(surfaces.tree, new_scratch(), surfaces.face_overlap), surfaces.lookup
 
 
 @searches(EightWide)
 def nearest(eight, ball, fall, length):  # type: ignore[no-untyped-def]
-    """Delay [s] and name of the first contact within ``length`` [s]: the shell's row, or the product's triangle."""
+    """Delay [s] and name of the first contact within ``length`` [s].
+
+    The name is the row of the shell or the triangle of the product.
+    """
     flight = Flight(ball.position, ball.velocity, fall)
     delay, row = first_contact(
         None, None, None, -1, eight.tree, eight.scratch, flight, None, None, eight.seam, 0.0, length

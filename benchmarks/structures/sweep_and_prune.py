@@ -1,4 +1,7 @@
-"""Sweep and prune: the stretches of one axis that the balls' flights cover, sorted (Baraff 1992; I-COLLIDE 1995)."""
+"""Sweep and prune: the intervals of one axis that the flights of balls cover, kept sorted.
+
+The method is from Baraff 1992 and I-COLLIDE 1995.
+"""
 
 from typing import NamedTuple
 
@@ -13,8 +16,11 @@ MARGIN = 1e-9  # m: more than rounding of a coordinate
 
 
 class SweepAndPrune(NamedTuple):
-    """``low``, ``high`` (n,) [m] of the stretches, sorted by ``low``; ``names`` (n,) whose they are; ``place`` (n,)
-    where a ball's is; ``longest`` (1,) [m].
+    """The intervals that the flights cover on the axis.
+
+    ``low`` and ``high`` (n,) [m] are their ends, sorted by ``low``. ``names`` (n,) is the ball of
+    each interval, ``place`` (n,) the interval of each ball, and ``longest`` (1,) [m] the longest
+    interval.
     """
 
     motion: np.ndarray
@@ -60,7 +66,10 @@ def search(sweep, ball, time, before):  # type: ignore[no-untyped-def]
 
 @jit
 def upkeep(sweep, ends, before, times, partners):  # type: ignore[no-untyped-def]
-    """Every ball flies off the other way when its flight ends: a new stretch, moved to its place."""
+    """Gives every ball a new interval and moves it to its place.
+
+    Every ball flies off the other way when its flight ends.
+    """
     for ball in range(len(ends)):
         turn = sweep.motion[ball, 0] + ends[ball] * sweep.motion[ball, 3]
         end = turn - before * sweep.motion[ball, 3]

@@ -1,7 +1,8 @@
-"""A uniform grid of cells, walked along the arc's chord; each empty cell knows how far around it all is empty.
+"""A uniform grid of cells, walked along the arc's chord.
 
-Amanatides & Woo, Eurographics 1987, 3, with the leaps of a distance field. Cells are entered by the chord, so each
-obstacle is listed also in those below it by the arc's bulge.
+Each empty cell knows how far around it all cells are empty (Amanatides & Woo, Eurographics 1987, 3,
+with the leaps of a distance field). Cells are entered by the chord, so each obstacle is listed also
+in the cells that lie below it by the arc's bulge.
 """
 
 from typing import NamedTuple
@@ -35,8 +36,11 @@ BATCH = (
 
 
 class UniformGrid(NamedTuple):
-    """``low`` (3,) and ``edge`` [m]; ``shape`` (3,) cells; ``empty`` (cells,) uint8: no obstacle is nearer than so
-    many cells, 0 where there is one; cell c lists ``items``[``starts``[c] : ``starts``[c + 1]].
+    """The arrays of a grid.
+
+    ``low`` (3,) [m] is its corner, ``edge`` [m] the width of a cell, and ``shape`` (3,) the number
+    of cells. ``empty`` (cells,) uint8 says within how many cells there is no obstacle; it is 0
+    where there is one. Cell c lists ``items``[``starts``[c] : ``starts``[c + 1]].
     """
 
     low: np.ndarray
@@ -97,7 +101,11 @@ def _overlaps(
 def _touches(
     shell: Shell, item: np.ndarray, middle: np.ndarray, edge: float, pad: float, bulge: np.ndarray
 ) -> np.ndarray:
-    """Which of these pairs stay: a face's plane crosses the cell, a capsule's surface comes within its corners."""
+    """Which of these pairs stay.
+
+    The plane of a face must cross the cell. The surface of a capsule must come within reach of the
+    corners of the cell.
+    """
     normal = shell.numbers[item, 0:3]
     plane = 0.5 * edge * np.abs(normal).sum(axis=1) + pad + np.abs(normal @ bulge)
     ball = 0.5 * np.sqrt(3.0) * edge + pad + np.linalg.norm(bulge)

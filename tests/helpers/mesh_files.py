@@ -103,7 +103,10 @@ def step_of_a_box(unit: str) -> str:
     definition = put(f"PRODUCT_DEFINITION('design','',#{formation},#{stage})")
     form = put(f"PRODUCT_DEFINITION_SHAPE('','',#{definition})")
     put(f"SHAPE_DEFINITION_REPRESENTATION(#{form},#{shape})")
-    head = "FILE_DESCRIPTION((''),'2;1');\nFILE_NAME('','',(''),(''),'','','');\nFILE_SCHEMA(('AUTOMOTIVE_DESIGN'));"
+    head = (
+        "FILE_DESCRIPTION((''),'2;1');\nFILE_NAME('','',(''),(''),'','','');\n"
+        "FILE_SCHEMA(('AUTOMOTIVE_DESIGN'));"
+    )
     data = "\n".join(lines)
     return f"ISO-10303-21;\nHEADER;\n{head}\nENDSEC;\nDATA;\n{data}\nENDSEC;\nEND-ISO-10303-21;\n"
 

@@ -27,7 +27,10 @@ def plate_design(**values: float) -> Design:
 def patchwork(
     area: np.ndarray, exposed: np.ndarray | None = None, target: np.ndarray | None = None
 ) -> Chamber:
-    """A chamber whose part is m separate triangles of the given areas [m²], each its own cavity triangle."""
+    """A chamber whose part is m separate triangles of the given areas [m²].
+
+    Each of them is also a triangle of the cavity.
+    """
     m = len(area)
     corner = np.stack([np.arange(m) * 1.0, np.zeros(m), np.zeros(m)], axis=1)
     side = np.sqrt(2.0 * area)[:, None]
@@ -93,7 +96,7 @@ def judged(objective: np.ndarray, **metrics: float) -> Evaluation:
 def poisson_evaluation(
     design: Design, chamber: Chamber, per_mm2: float = 20.0, replicas: int = 4, seed: int = 0
 ) -> Evaluation:
-    """An evaluation of a real chamber whose dents fell at random, `per_mm2` in all, without a simulation."""
+    """An evaluation of a real chamber with random dents, ``per_mm2`` in all, not simulated."""
     rng = np.random.default_rng(seed)
     mean = per_mm2 * 1e6 * chamber.exposed_area / replicas
     seconds = design.process.accuracy.simulated_time
@@ -120,7 +123,7 @@ def evaluation_of(design: Design, chamber: Chamber, tallies: list[Tally]) -> Eva
 
 
 def hits_of(tally: Tally) -> Hits:
-    """The dents of a replica as hits, with the mean speed and angle of their triangle, 1 µJ each."""
+    """The dents of a replica as hits of 1 µJ, with the mean speed and angle of their triangle."""
     triangle = tally.dent_triangle.astype(np.int32)
     speed, angle = (
         sums[triangle] / tally.impacts[triangle] for sums in (tally.speed_sum, tally.angle_sum)

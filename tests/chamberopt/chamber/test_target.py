@@ -59,7 +59,8 @@ def test_names_choose_and_the_other_conditions_narrow(
     [
         (
             "botom",
-            r"part\.target\.surface: 'botom' is not a name in the part's file; did you mean 'bottom'\?",
+            r"part\.target\.surface: 'botom' is not a name in the part's file; did you mean "
+            r"'bottom'\?",
         ),
         (["left", "xyz"], r"'xyz' is not a name .*allowed: all, .*bottom"),
     ],
@@ -126,7 +127,10 @@ def with_reachable(reachable: bool, **values: float) -> Design:
 
 
 def test_what_the_shot_cannot_touch_can_be_left_out_of_the_target() -> None:
-    """Sharp tooth roots are left out, more of them for larger balls; other conditions still hold."""
+    """Sharp tooth roots are left out, and more of them for larger balls.
+
+    The other conditions on the target still hold.
+    """
     whole = build_chamber(with_reachable(False))
     small, large = (build_chamber(with_reachable(True, shot__diameter_mm=d)) for d in (1.5, 3.0))
     assert (small.part.target <= whole.part.target).all()

@@ -1,4 +1,7 @@
-"""The command line as a user meets it: a wrong file is one message on stderr, status 2, no traceback."""
+"""The command line as a user meets it.
+
+A wrong file gives one message on stderr and status 2, without a traceback.
+"""
 
 import io
 import json
@@ -241,8 +244,8 @@ class TestWrongCalls:
         status, _, err = chamberopt("check", copies / "designs")
         assert status == 2
         assert (
-            "is a folder; give a design or study file (.toml); files in it: blade.toml, blade_conformal.toml"
-            in err
+            "is a folder; give a design or study file (.toml); files in it: blade.toml, "
+            "blade_conformal.toml" in err
         )
 
     def test_study_to_simulate_and_design_to_run(self, copies: Path, chamberopt: Said) -> None:
@@ -402,7 +405,10 @@ def test_help_loads_nothing_heavy() -> None:
         "matplotlib",
         "numpy",
     }
-    code = f"import sys; from chamberopt.cli import main; main(['--help']); print({heavy} & set(sys.modules))"
+    code = (
+        f"import sys; from chamberopt.cli import main; main(['--help']); print({heavy} & "
+        "set(sys.modules))"
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "set()"
 
@@ -468,7 +474,8 @@ class TestWhole:
         assert compared["differences_to_first"]["impacts_per_mm2_s"][0]["paired"]
         assert "heavier: seed = 1 instead of 5, as the first candidate" in err
 
-        # The folders that it left are results: simulated so by themselves, and compared again to the same figures.
+        # The folders that it left are results. Simulating one of them alone and comparing them
+        # again gives the same figures.
         status, out, _ = chamberopt("simulate", "results/compare/heavier/design.toml", "--json")
         alone = json.loads(out)["metrics"]["mean_coverage"]["value"]
         assert alone == compared["metrics"]["mean_coverage"][1]["value"]
@@ -575,7 +582,10 @@ class TestWhole:
             assert err.count(": shot.mass_g = ") == 1
 
     def test_shot_that_does_not_fit(self, small: Path, chamberopt: Said) -> None:
-        """45 % of the cylinder passes the file's check, but the plate takes a quarter of that: no room."""
+        """A filling of 45 % of the cylinder passes the check of the file.
+
+        The plate takes a quarter of the cylinder, so that the shot does not fit.
+        """
         path = Path("designs/plate.toml")
         path.write_text(
             path.read_text(encoding="utf-8").replace("mass_g = 3.308", "mass_g = 140"),

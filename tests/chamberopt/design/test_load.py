@@ -277,7 +277,8 @@ class TestWrongDesigns:
             ("mass_g = 3.308", "mass_g = -1"),
         ).splitlines()
         assert said == [
-            f'{design_file}:4: part.unit: given \'mmm\'; allowed: "um", "mm", "cm", "m", "in", "guess" '
+            f'{design_file}:4: part.unit: given \'mmm\'; allowed: "um", "mm", "cm", "m", "in", '
+            '"guess" '
             "(of the numbers in the mesh file); did you mean 'mm'?",
             f"{design_file}:5: chamber.height_mm: missing; give a number from 2 to 2000 mm "
             "(inner height, sonotrode to ceiling)",
@@ -381,7 +382,8 @@ class TestWrongDesigns:
         [
             (
                 "",
-                "shot.diameter_mm: missing; a number from 0.1 to 20 mm (of one ball), or several sizes: mix",
+                "shot.diameter_mm: missing; a number from 0.1 to 20 mm (of one ball), or several "
+                "sizes: mix",
             ),
             ("diameter_mm = 3\nmix = [[2, 0.5], [3, 0.5]]", "shot.mix"),
             ("diameter_mm = 3\nMIX", "shot.diameter_mm: given 3 beside mix"),
@@ -477,8 +479,8 @@ class TestWrongDesigns:
     def test_missing_mesh_names_its_neighbours(self, design_file: Path) -> None:
         said = edited(design_file, ("part.stl", "prat.stl"), ("height_mm = 40", "height_mm = 0"))
         assert (
-            f":3: part.mesh: given 'prat.stl': {design_file.parent.resolve() / 'prat.stl'}: no such mesh file"
-            in said
+            f":3: part.mesh: given 'prat.stl': {design_file.parent.resolve() / 'prat.stl'}: no "
+            "such mesh file" in said
         )
         assert "did you mean" in said
         assert "height_mm: given 0" in said
@@ -559,7 +561,8 @@ class TestStudies:
             ),
             (
                 ("[vary]", "[constraints]\nmean_coverage = { min = 1.1 }\n[vary]"),
-                "mean_coverage: given min = 1.1, but it is from 0 to 1 in every candidate; change the limit",
+                "mean_coverage: given min = 1.1, but it is from 0 to 1 in every candidate; change "
+                "the limit",
             ),
             (
                 ("[vary]", "[constraints]\ntime_to_98_s = { max = -1 }\n[vary]"),
@@ -567,7 +570,8 @@ class TestStudies:
             ),
             (
                 ("[vary]", '[constraints]\n"chamber.height_mm" = { min = 61 }\n[vary]'),
-                "given min = 61, but it is from 35 to 60 in every candidate; change the limit or [vary]",
+                "given min = 61, but it is from 35 to 60 in every candidate; change the limit or "
+                "[vary]",
             ),
             (
                 ("[vary]", '[constraints]\n"shot.density_kg_m3" = { min = 61 }\n[vary]'),
@@ -638,7 +642,8 @@ class TestStudies:
     def test_phases(self, study_file: Path) -> None:
         with study_file.open("a") as file:
             file.write(
-                "[optimizer]\nphases = [{ algorithm = 'sobol', share = 0.3 }, { algorithm = 'LN_BOBYQA' }]\n"
+                "[optimizer]\nphases = [{ algorithm = 'sobol', share = 0.3 }, { algorithm = "
+                "'LN_BOBYQA' }]\n"
             )
         phases = load_study(study_file).optimizer.phases
         assert [(phase.algorithm, phase.share) for phase in phases] == [
@@ -672,7 +677,7 @@ class TestStudies:
 
 
 def test_lines_of_keys() -> None:
-    """The scan points at headers, dotted and quoted keys, and is not fooled by text that looks like keys."""
+    """The scan finds headers, dotted keys and quoted keys and ignores text that looks like keys."""
     source = '# a = 1\na = 1\n[t.u]\n"b.c" = 2\nd . e = 3 # x = 1\nlong = """\nnot = 1\n"""\n'
     source += "[ v ]\nw = [\n 1,\n]\n"
     assert toml_errors.key_lines(source) == {

@@ -10,7 +10,11 @@ from chamberopt.geometry.triangles import heights
 
 
 def split_box(apex: float) -> SolidSurface:
-    """A box of 1 cm; one triangle is split in three around a point `apex` [m] off its longest edge."""
+    """A box of 1 cm with one of its triangles split in three.
+
+    The common corner of the three is a point ``apex`` [m] away from the longest edge of the
+    triangle.
+    """
     mesh = trimesh.creation.box((0.01, 0.01, 0.01))
     triangles = np.asarray(mesh.faces)
     a, b, c = triangles[0]

@@ -1,4 +1,7 @@
-"""A sweep is the whole map, the same whatever works on it; a candidate that fails is a row, not the end."""
+"""A sweep gives the whole map, the same with every executor.
+
+A candidate that fails becomes a row and does not end the sweep.
+"""
 
 import json
 from pathlib import Path

@@ -1,4 +1,7 @@
-"""What can go wrong while a study runs: nothing on record is lost, the message says what happened, and it goes on."""
+"""What can go wrong while a study runs.
+
+Nothing on record is lost, the message says what happened, and the study can continue.
+"""
 
 import errno
 import math
@@ -142,7 +145,7 @@ def _die() -> None:
 
 
 class TestWorkerThatDies:
-    """A worker process killed from outside: a real one, in a pool that is made anew as a pool must be."""
+    """A real worker process is killed from outside, in a pool that must then be replaced."""
 
     def simulator(self, folder: Path, deaths: list[int]):
         good = logged(folder.with_name(f"{folder.name}-calls.log"))
@@ -191,7 +194,10 @@ class TestCommandLine:
 
     @pytest.fixture
     def evaluated(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list:
-        """Every evaluation there was, as (stream, mass); a function under "at" + its number is called in it."""
+        """Every evaluation, as (stream, mass).
+
+        A function under the key "at" + its number is called during that evaluation.
+        """
         monkeypatch.chdir(tmp_path)
         Path("small.toml").write_text(STUDY)
         chamber = build_chamber(plate_design())
@@ -259,7 +265,10 @@ class TestCommandLine:
     def test_ctrl_c_before_the_first_evaluation_leaves_nothing(
         self, evaluated: list, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        """Wherever it comes: an exception would be dropped in an import, and crash in the compiler."""
+        """The signal may come at any moment.
+
+        An exception would be dropped during an import, and would crash the compiler.
+        """
         monkeypatch.setattr(
             "chamberopt.cli.commands.run.compile_simulator",
             lambda *_: os.kill(os.getpid(), signal.SIGINT),
@@ -281,9 +290,9 @@ class TestCommandLine:
         self.at[4] = lambda: monkeypatch.setattr("os.fsync", full)
         assert main(["run", "small.toml", "--out", "out"]) == 1
         *_, what, how = capfd.readouterr().err.splitlines()
-        assert (
-            what
-            == f"{Path('out/history.jsonl')}: No space left on device; what had been finished stays on disk"
+        assert what == (
+            f"{Path('out/history.jsonl')}: No space left on device; what had been finished "
+            "stays on disk"
         )
         assert how == "to resume: chamberopt run small.toml --out out"
         assert self.rows() == 3
@@ -344,8 +353,8 @@ class TestCommandLine:
         assert main(["run", "small.toml", "--out", "out"]) == 0
         out, err = capfd.readouterr()
         assert (
-            "out: this study is finished, nothing was run; to run it again, give another folder (--out)"
-            in err
+            "out: this study is finished, nothing was run; to run it again, give another folder "
+            "(--out)" in err
         )
         assert "uniform coverage" in out
         assert len(evaluated) == ROWS

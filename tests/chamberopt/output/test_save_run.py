@@ -90,9 +90,9 @@ def test_a_study_leaves_everything_and_its_best_design_can_be_used(tmp_path: Pat
     save_study(folder, outcome)
     names = {path.name for path in folder.iterdir()}
     assert names == {
-        "design.toml", "study.toml", "history.jsonl", "history.csv", "best.toml", "result.json", "coverage.vtp",
-        "chamber.stl", "chamber.vtp", "convergence.png", "slices.png", "start", "inputs.json", "timings.jsonl",
-        "confirm", ".lock", "hits.npz",
+        "design.toml", "study.toml", "history.jsonl", "history.csv", "best.toml", "result.json",
+        "coverage.vtp", "chamber.stl", "chamber.vtp", "convergence.png", "slices.png", "start",
+        "inputs.json", "timings.jsonl", "confirm", ".lock", "hits.npz",
     }  # fmt: skip
     result = load_result(folder)
     assert result.kind == "study"

@@ -75,7 +75,8 @@ def slot_narrower_by(less: float) -> Outcome:
     room, ball = slot(-less)
     return refusal(
         lambda: Scene(room, ball, Physics(), 1.0),
-        r"ball 0 at .* (overlaps a surface|does not fit between triangle \d+ and triangle \d+: .* by \S+ m; widen it)",
+        r"ball 0 at .* (overlaps a surface|does not fit between triangle \d+ and triangle \d+: .* "
+        r"by \S+ m; widen it)",
         SceneError,
     )
 
@@ -166,7 +167,8 @@ def ball_crushed_by_the_sonotrode() -> Outcome:
     )
     return refusal(
         lambda: Scene(_low_room(0.5 * AMPLITUDE), ball, _swinging(-0.5), 0.1),
-        r"ball 0 .* the vibrating surface \(triangle \d+\).* narrower .* by 1.25e-05 m at the end of its swing",
+        r"ball 0 .* the vibrating surface \(triangle \d+\).* narrower .* by 1.25e-05 m at the end "
+        "of its swing",
         SceneError,
     )
 

@@ -58,7 +58,10 @@ def outcome_of_test(test: Callable[..., None], *arguments: object) -> Outcome:
         try:
             test(*arguments)
         except AssertionError as error:
-            said = f"not as physics demands: {str(error).splitlines()[0] if str(error) else test.__name__}"
+            said = (
+                "not as physics demands: "
+                f"{str(error).splitlines()[0] if str(error) else test.__name__}"
+            )
         else:
             said = ""
     collisions = sum(int(run.state.counts[:3].sum()) for run in runs)

@@ -1,26 +1,27 @@
 """Checks in extended precision: is a reported contact too early, too late, or while receding?
 
-No contact is computed here. A check takes the contact that the code under test reports and proves or
-refutes it from the gap between ball and obstacle as a function of time:
+No contact is computed here. A check takes the contact that the code under test reports and proves
+or refutes it from the gap between ball and obstacle as a function of time:
 
     early     the gap [m] at the reported contact: it must not be open
-    receding  if the gap is rising there, how far open [m] it gets before it falls again: it must not
+    receding  if the gap is rising there, how far it opens [m] before it falls again: it must not
+              open at all
     late      how much deeper [m] than touching, and than at its start, the ball got before the
-              reported contact, or before the end of the flight if none is reported: a contact was
-              missed
+              reported contact, or before the end of the flight if no contact is reported: a
+              contact was missed
 
-      gap \\               /   A ball that starts in overlap may come out of it: no contact. One that
-       0 --\\-------------/--  starts deeper than half a radius is behind the surface, and can be late
-            \\_  late  _ /     only after it has come out in front.
+      gap \\               /   A ball that starts in overlap may come out of it without a contact.
+       0 --\\-------------/--  One that starts deeper than half a radius is behind the surface and
+            \\_  late  _ /     can be late only after it has come out in front.
               \\______/
 
-Between the marks on a flight the gap only rises or only falls, so that nothing is missed between them.
-Each check finds its marks by other means than the code under test (that solves quadratics, steps from
-plane to plane, and splits sine waves). Numbers are numpy's longdouble: 64 bits of mantissa on x86,
-where a gap is known to about 1e-18 m; on machines where longdouble is plain float64 the same tests run
-with about 1e-16 m, still far below the required 1e-12 m.
+Between the marks on a flight the gap only rises or only falls, so that nothing is missed between
+them. Each check finds its marks by other means than the code under test, which solves quadratics,
+steps from plane to plane, and splits sine waves. Numbers are numpy's longdouble. On x86 it has 64
+bits of mantissa and a gap is known to about 1e-18 m. On machines where longdouble is plain float64
+the same tests run with about 1e-16 m, still far below the required 1e-12 m.
 
-Arrays of vectors have shape (3, n) here: columns are quick to compute with.
+Arrays of vectors have shape (3, n) here, because columns are quick to compute with.
 """
 
 from collections.abc import Callable

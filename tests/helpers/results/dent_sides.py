@@ -1,4 +1,7 @@
-"""Sides of a dent map, rendered in a process of its own: a missing driver must not end the tests."""
+"""Sides of a dent map, rendered in a separate process.
+
+A missing graphics driver therefore cannot end the tests.
+"""
 
 import subprocess
 import sys

@@ -1,4 +1,7 @@
-"""A study of milliseconds that can be stopped anywhere: its simulator logs every call, and its answer is known."""
+"""A study of milliseconds that can be stopped anywhere.
+
+Its simulator logs every call, and its answer is known.
+"""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A result that is a ball in a ball, without a simulation: what it shows is known in closed form."""
+"""A result that is a ball in a ball, without a simulation; its fields are known in closed form."""
 
 import json
 import sys
@@ -22,9 +22,11 @@ SIZE = 480, 340  # pixels
 def ball_result(
     folder: Path, marked: bool = False, moved: float = 0.0, lost: int = 0
 ) -> ResultInfo:
-    """A results folder: coverage rises from pole to pole, the target is all but a cap.
+    """A results folder whose coverage rises from pole to pole and whose target is all but a cap.
 
-    Triangle k has k % 5 simulated impacts, of 1 ... 4 m/s. moved: by so many mm · lost: each so-manyth triangle.
+    Triangle k has k % 5 simulated impacts with speeds from 1 to 4 m/s. The part is shifted by
+    ``moved`` [mm]. If ``lost`` is not 0, every triangle whose number is a multiple of it is
+    missing.
     """
     folder.mkdir(parents=True, exist_ok=True)
     ball, room = (
@@ -97,7 +99,7 @@ LOOKS = {
 
 
 def right_and_wrong(folder: Path) -> dict[str, np.ndarray]:
-    """The pictures as they are, and as they must not be: other colours, another scale, another mesh."""
+    """The right pictures, and wrong ones in other colours, on another scale or of another mesh."""
     from chamberopt.output.viewer import plotter
 
     right = ball_result(folder / "ball")
@@ -136,12 +138,17 @@ def driven(folder: Path) -> list[dict[str, Any]]:
             views.append({
                 "drawn": np.nan_to_num(mesh["drawn"], nan=-1.0, posinf=-2.0).tolist(),
                 "words": [a.GetInput() for a in actors.values() if a.IsA("vtkTextActor")],
-                "planes": [_planes(a) for a in actors.values() if hasattr(a, "mapper") and a.mapper is not None],
+                "planes": [
+                    _planes(a)
+                    for a in actors.values()
+                    if hasattr(a, "mapper") and a.mapper is not None
+                ],
                 "charts": len(renderer.get_charts()), "eye": list(renderer.camera.position),
             })  # fmt: skip
         steps.append({
             "step": name, "look": asdict(window.state), "views": views,
-            "slider": bool(window.slider is not None and window.slider.GetEnabled()), "plane": window.plane is not None,
+            "slider": bool(window.slider is not None and window.slider.GetEnabled()),
+            "plane": window.plane is not None,
         })  # fmt: skip
 
     step("opened")

@@ -97,7 +97,8 @@ def compare_with_reference(family: str, bodies: int, shots: int, seed: int) -> N
         for i in missed:
             # unless it is a graze shallower than the tolerance
             assert lowest[i] > -EARLY or found[i] - expected[i] < 1e-12, (
-                f"{family}: contact at {found[i]!r} s, but the reference touches at {expected[i]!r} s, "
+                f"{family}: contact at {found[i]!r} s, but the reference touches at "
+                f"{expected[i]!r} s, "
                 f"{-lowest[i]:.3g} m deep"
             )
         assert lowest[~np.isfinite(found)].min() > -EARLY, (

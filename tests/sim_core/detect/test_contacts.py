@@ -59,7 +59,8 @@ def require(errors: ContactErrors, found: np.ndarray, family: str, hits: float =
         column = getattr(errors, said)
         bad = np.flatnonzero(~(column <= TOLERANCE))
         assert not len(bad), (
-            f"{family}: {len(bad)} of {len(found)} contacts {said}, by up to {column.max():.3g}; the first is case "
+            f"{family}: {len(bad)} of {len(found)} contacts {said}, by up to {column.max():.3g}; "
+            "the first is case "
             f"{bad[0]}, reported at {found[bad[0]]!r} s"
         )
     assert np.isfinite(found).mean() >= hits, f"{family}: too few hits to test much"

@@ -97,7 +97,8 @@ def test_further_effects_of_surfaces_are_absent_unless_given() -> None:
 def bare(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
     """What a scene without any effect compiles, from nothing."""
     code = (
-        "import json; from sim_core import simulate; from tests.sim_core.effects.test_absent_effects import *;"
+        "import json; from sim_core import simulate; from "
+        "tests.sim_core.effects.test_absent_effects import *;"
         "simulate(bare_scene()); print(json.dumps(compiled_functions()))"
     )
     answer = subprocess.run(

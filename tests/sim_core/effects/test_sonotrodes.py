@@ -227,8 +227,10 @@ def test_both_of_two_narrow_the_gap_between_them() -> None:
     for one in at_rest:
         Scene(tight, ball, Physics(vibration=one), 1.0)
     said = (
-        r"does not fit between the vibrating surface of tag [01] \(triangle \d+\) and the vibrating surface of tag "
-        r"[01] \(triangle \d+\): the gap is narrower than the ball by 1e-05 m at the end of its swing"
+        r"does not fit between the vibrating surface of tag [01] \(triangle \d+\) and the "
+        "vibrating surface of tag "
+        r"[01] \(triangle \d+\): the gap is narrower than the ball by 1e-05 m at the end of its "
+        "swing"
     )
     with pytest.raises(SceneError, match=said):
         Scene(tight, ball, Physics(vibration=at_rest), 1.0)

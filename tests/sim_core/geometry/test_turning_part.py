@@ -340,8 +340,10 @@ def test_impacts_lie_on_the_part_in_its_own_frame_and_balls_stay_outside_it(
 def test_the_same_scene_gives_the_same_bits_with_the_jit_on_and_off() -> None:
     code = (
         "from tests.sim_core.loop.test_determinism import fingerprint;"
-        "from tests.sim_core.geometry.test_turning_part import crowd, PartRotation, PART; from sim_core import simulate;"
-        "r = simulate(crowd(PartRotation(PART, rpm=400.0), 0.06, 8)); print(r.collisions.total, fingerprint(r))"
+        "from tests.sim_core.geometry.test_turning_part import crowd, PartRotation, PART; from "
+        "sim_core import simulate;"
+        "r = simulate(crowd(PartRotation(PART, rpm=400.0), 0.06, 8)); print(r.collisions.total, "
+        "fingerprint(r))"
     )
     answers = with_and_without_jit(code)
     assert int(answers[0].split()[0]) > 20

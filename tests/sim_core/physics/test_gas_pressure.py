@@ -91,7 +91,8 @@ def compare_with_theory(packing: float, effort: int) -> None:
     ):
         ratio, error = without_edges(ratios[name], sizes)
         print(
-            f"packing {packing}: {name} over theory {ratio:.4f} +- {error:.4f}; N = {SMALL**3}, {LARGE**3}: ",
+            f"packing {packing}: {name} over theory {ratio:.4f} +- {error:.4f}; N = {SMALL**3}, "
+            f"{LARGE**3}: ",
             end="",
         )
         print(", ".join(f"{one:.4f} +- {its_error:.4f}" for one, its_error in ratios[name]))

@@ -174,7 +174,8 @@ def compare_statistics(law: str, per_side: int, duration: float) -> None:
         two, two_error = jackknife(estimate, np.array(rows, dtype=float))
         error = float(np.hypot(one_error, two_error))
         print(
-            f"{law}: {name} {one:.4g} simulated, {two:.4g} marched, ratio {one / two:.4f} +- {error / two:.4f}"
+            f"{law}: {name} {one:.4g} simulated, {two:.4g} marched, ratio {one / two:.4f} +- "
+            f"{error / two:.4f}"
         )
         assert abs(one - two) < SURE * error, name
 

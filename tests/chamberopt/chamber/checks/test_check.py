@@ -184,8 +184,8 @@ def test_a_gap_too_low_for_a_ball_is_warned_of_with_its_place_and_width() -> Non
     assert "the gap between the ceiling and the part's upper side at (" in said
     assert ", 25.5) mm is 1 to 1.0" in said
     assert (
-        "narrower than a ball of 1.5 mm: no ball gets in there; raise chamber.height_mm or close the gap"
-        in said
+        "narrower than a ball of 1.5 mm: no ball gets in there; raise chamber.height_mm or close "
+        "the gap" in said
     )
     (said,) = (
         text for text in warned(*made("gear", chamber__diameter_mm=46.0)) if "gaps between" in text

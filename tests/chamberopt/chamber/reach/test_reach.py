@@ -35,7 +35,10 @@ ROOM = block((-10, 0, 0), (10, 20, 10))
 
 
 def cavity(*pieces: trimesh.Trimesh, above_mm: float = 10.0) -> Chamber:
-    """The pieces as one cavity over a sonotrode at z = 0; all of it above a height is the target."""
+    """The pieces as one cavity over a sonotrode at z = 0.
+
+    All of its surface above a height is the target.
+    """
     whole = trimesh.boolean.union(pieces, engine="manifold")
     vertices, triangles = 1e-3 * np.asarray(whole.vertices), np.asarray(whole.faces)
     z = vertices[triangles][..., 2]
@@ -101,7 +104,8 @@ def test_a_groove_is_touched_down_to_where_the_ball_lies_on_both_flanks(half_ang
     flanks = (found.mesh.tags[found.touches.triangle] == TAG_PART) & (
         np.abs(found.touches.normal[:, 1]) < 0.5
     )
-    # a reach into the other flank of TOLERATED_OVERLAP r lets the ball that much / sin(2a) further down
+    # A reach of TOLERATED_OVERLAP r into the other flank lets the ball sink further by that much /
+    # sin(2a).
     first = 1.5 / np.tan(a) - TOLERATED_OVERLAP * 1.5 / np.sin(2 * a)
     wide = 20.0 - 2 * 1.5 * (1.0 - TOLERATED_OVERLAP)
     assert reached_area_mm2(found, flanks) == pytest.approx(2 * wide * (flank - first), rel=0.02)

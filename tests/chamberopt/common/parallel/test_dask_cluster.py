@@ -152,7 +152,7 @@ def test_a_sweep_goes_on_when_a_worker_is_killed(dask: Dask, tmp_path: Path) -> 
 
 
 def test_the_same_bits_as_on_this_machine(dask: Dask, tmp_path: Path) -> None:
-    """Tasks are candidates, which build their chamber on the worker, and replicas, which receive it."""
+    """Tasks are candidates, which build their own chamber, and replicas, which receive one."""
     study = small_study()
     plan = plan_sweep(study, None, 4)
     chamber = build_chamber(study.design)

@@ -189,8 +189,8 @@ def test_a_file_that_is_not_there(folder: Path) -> None:
     )
 
     assert (
-        f"d.toml:8: chamber.shape: given 'pyramids.py': {folder / 'pyramids.py'}: no such shape file"
-        in said
+        f"d.toml:8: chamber.shape: given 'pyramids.py': {folder / 'pyramids.py'}: no such shape "
+        "file" in said
     )
     assert f"did you mean {folder / 'pyramid.py'}?" in said
     assert "shot.mass_g: given -5" in said
@@ -242,10 +242,13 @@ def test_what_its_surface_may_not_do(folder: Path, line: str, said: str) -> None
 
 def test_a_surface_that_crosses_itself_is_refused(folder: Path) -> None:
     """The tip of a tall notch in one side goes through the other side."""
-    notched = """
-        n = np.array([[-s, -s, 0], [s, -s, 0], [s, s, 0], [-s, s, 0], [0, 0, h], [0, 2 * s, 0.1 * h]])
-        faces = np.array([[0, 2, 1], [0, 3, 2], [5, 0, 1], [5, 1, 4], [5, 4, 0], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
-        return ShapeSurface(n, faces, np.array([1, 1, 2, 2, 2, 2, 2, 2]))"""
+    notched = (
+        "\n        n = np.array([[-s, -s, 0], [s, -s, 0], [s, s, 0], [-s, s, 0], [0, 0, h], "
+        "[0, 2 * s, 0.1 * h]])"
+        "\n        faces = np.array([[0, 2, 1], [0, 3, 2], [5, 0, 1], [5, 1, 4], [5, 4, 0], "
+        "[1, 2, 4], [2, 3, 4], [3, 0, 4]])"
+        "\n        return ShapeSurface(n, faces, np.array([1, 1, 2, 2, 2, 2, 2, 2]))"
+    )
 
     assert re.search(
         r"surface\(\) of Pyramid crosses itself, near \(",
@@ -294,7 +297,10 @@ def test_what_its_other_methods_must_give(folder: Path, method: str, said: str) 
     ],
 )
 def test_what_its_validators_raise_is_said(folder: Path, error: str, said: str) -> None:
-    check = f"    @pydantic.model_validator(mode='after')\n    def _agree(self): raise {error}\n\n    def surface"
+    check = (
+        f"    @pydantic.model_validator(mode='after')\n    def _agree(self): raise {error}\n\n"
+        "    def surface"
+    )
     assert re.search(
         said,
         said_of(

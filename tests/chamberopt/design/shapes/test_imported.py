@@ -1,6 +1,7 @@
-"""Set-ups from CAD give the same room however they are drawn; bad ones are refused.
+"""Set-ups from CAD give the same room however they are drawn, and bad ones are refused.
 
-The room is a box of 40 x 40 x 20 mm with a block of 20 x 20 mm that hangs 8 mm down from its ceiling.
+The room is a box of 40 x 40 x 20 mm with a block of 20 x 20 mm that hangs 8 mm down from its
+ceiling.
 """
 
 from pathlib import Path
@@ -49,7 +50,10 @@ def box(half: float, low: float, high: float) -> np.ndarray:
 
 
 def as_pieces(top: float = 20.0, block: float = DRAWN) -> Drawing:
-    """One closed surface with only the bounding faces of the block; ``top``: half the ceiling [mm]."""
+    """One closed surface with only the bounding faces of the block.
+
+    ``top`` is half the width of the ceiling [mm].
+    """
     inner, outer = square(10, 20), square(top, 20)
     ring = [
         np.array([outer[k], outer[(k + 1) % 4], inner[(k + 1) % 4], inner[k]]) for k in range(4)

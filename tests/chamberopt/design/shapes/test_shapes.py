@@ -423,7 +423,8 @@ def volume_between(shape: str, keys: dict[str, Any]) -> tuple[float, float]:
             height,
         )
 
-    # arcs between inscribed and, of one side alone, mitred; a corner radius spans some of a silhouette's hollow
+    # Arcs lie between inscribed ones and, on one side only, mitred ones. A corner radius spans part
+    # of the hollows of a silhouette.
     return in_flats(keys["facets"]) * grown(narrow), 1.01 * grown(ELL_PLAN.convex_hull)
 
 

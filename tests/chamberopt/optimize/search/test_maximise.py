@@ -40,8 +40,9 @@ def test_first_step_and_tolerance_are_in_units_of_the_bounds() -> None:
 
 
 @pytest.mark.parametrize("algorithm", [
-    "GN_DIRECT_L", "GN_DIRECT_L_RAND", "GN_ORIG_DIRECT_L", "GN_MLSL_LDS", "GN_CRS2_LM", "GN_ISRES", "GN_ESCH",
-    "GN_AGS", "LN_BOBYQA", "LN_COBYLA", "LN_SBPLX", "LN_NELDERMEAD", "LN_PRAXIS", "sobol", "surrogate",
+    "GN_DIRECT_L", "GN_DIRECT_L_RAND", "GN_ORIG_DIRECT_L", "GN_MLSL_LDS", "GN_CRS2_LM",
+    "GN_ISRES", "GN_ESCH", "GN_AGS", "LN_BOBYQA", "LN_COBYLA", "LN_SBPLX", "LN_NELDERMEAD",
+    "LN_PRAXIS", "sobol", "surrogate",
 ])  # fmt: skip
 def test_every_algorithm_improves_and_keeps_its_budget(algorithm: str) -> None:
     points: list[np.ndarray] = []

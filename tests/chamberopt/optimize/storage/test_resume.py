@@ -1,4 +1,7 @@
-"""A study stopped at any moment, by anything, ends as if it had never been: the same bytes, nothing done twice."""
+"""A study that was stopped at any moment, by anything, ends as if it had not been stopped.
+
+Its files have the same bytes, and no evaluation is done twice.
+"""
 
 import json
 import multiprocessing
@@ -29,8 +32,9 @@ from tests.helpers.results.resumable_study import GEAR, calls, history, logged, 
 from tests.helpers.synthetic import DESIGNS, plate_design, poisson_evaluation
 
 ALGORITHMS = [
-    "auto", "GN_DIRECT_L", "GN_DIRECT_L_RAND", "GN_ORIG_DIRECT_L", "GN_MLSL_LDS", "GN_CRS2_LM", "GN_ISRES", "GN_ESCH",
-    "GN_AGS", "LN_BOBYQA", "LN_COBYLA", "LN_SBPLX", "LN_NELDERMEAD", "LN_PRAXIS",
+    "auto", "GN_DIRECT_L", "GN_DIRECT_L_RAND", "GN_ORIG_DIRECT_L", "GN_MLSL_LDS", "GN_CRS2_LM",
+    "GN_ISRES", "GN_ESCH", "GN_AGS", "LN_BOBYQA", "LN_COBYLA", "LN_SBPLX", "LN_NELDERMEAD",
+    "LN_PRAXIS",
 ]  # fmt: skip
 
 
@@ -68,7 +72,11 @@ def test_every_algorithm_goes_on_from_any_row(algorithm: str, tmp_path: Path) ->
 @pytest.mark.usefixtures("quick_disk")
 @pytest.mark.parametrize("objective", [{}, {"pareto": ["uniform_coverage", "p05_coverage"]}])
 def test_what_is_learnt_from_few_replicas_is_learnt_again(objective: dict, tmp_path: Path) -> None:
-    """Candidates given up after a few replicas, confirmations repeated with more, two objectives: all from the rows."""
+    """Everything that a resumed study needs is read from the rows.
+
+    That includes candidates given up after a few replicas, confirmations repeated with more, and
+    two objectives.
+    """
     question = study(first_replicas=4, confirm_rounds=3).model_copy(
         update={"objective": Objective(**objective)}
     )
@@ -172,7 +180,10 @@ def assert_same(one: object, other: object) -> None:
 
 
 class TestEvaluationFile:
-    """A confirmation is kept whole: the results are made from it as from the one that was simulated."""
+    """A confirmation is stored whole.
+
+    Results made from it equal those made from the simulated one.
+    """
 
     @pytest.fixture
     def evaluation(self) -> Evaluation:
@@ -207,7 +218,10 @@ class TestEvaluationFile:
 
 @pytest.mark.usefixtures("quick_disk")
 class TestDamage:
-    """What a crash cannot do is not repaired but said, with file and line; nothing is written then."""
+    """Damage that a crash cannot do is reported with file and line, not repaired.
+
+    No file is written then.
+    """
 
     @pytest.fixture
     def folder(self, tmp_path: Path) -> Path:
@@ -345,7 +359,10 @@ class TestChanges:
 
     @pytest.mark.parametrize("gone", [True, False])
     def test_of_the_part_while_it_runs(self, gone: bool, tmp_path: Path) -> None:
-        """A file written anew, or gone, spoils no row: neither as another part nor as a candidate that failed."""
+        """A file that is rewritten or removed spoils no row.
+
+        It is recorded neither as another part nor as a candidate that failed.
+        """
         mesh = tmp_path / "gear.stl"
         shutil.copy(GEAR.part.mesh_path, mesh)
         part = GEAR.part.model_copy(update={"mesh": str(mesh)})
@@ -450,7 +467,10 @@ class TestTwoProcesses:
 
 @pytest.mark.long
 def test_the_real_thing_killed_from_a_shell(tmp_path: Path) -> None:
-    """`chamberopt run` with real simulations: the history is the undisturbed one's, the answer too."""
+    """`chamberopt run` with real simulations ends like an undisturbed run.
+
+    Its history and its answer are the same.
+    """
     text = (
         (DESIGNS / "plate.toml")
         .read_text(encoding="utf-8")

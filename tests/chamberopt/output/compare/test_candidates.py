@@ -1,5 +1,8 @@
-"""Designs and results mixed: what is missing is simulated, on the draws of the first, and nothing that cannot be
-compared is."""
+"""Designs and results are compared together.
+
+What is missing is simulated with the random draws of the first candidate. What cannot be compared
+is refused before anything is simulated.
+"""
 
 import shutil
 from collections.abc import Callable

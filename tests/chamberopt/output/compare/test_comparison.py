@@ -1,4 +1,7 @@
-"""Results side by side: what differs is named, differences have intervals, what it takes to know is right."""
+"""Results side by side: differing parameters are named and differences have intervals.
+
+The number of replicas that would make a difference clear is foretold correctly.
+"""
 
 import json
 from dataclasses import replace
@@ -82,7 +85,10 @@ def test_what_differs_is_named_and_measured(tmp_path: Path) -> None:
 
 
 def test_pairs_by_hand() -> None:
-    """Six differences 1 ... 6: mean 3.5, deviation sqrt(3.5), Student's t of 5 at 97.5 % is 2.5706."""
+    """Six differences from 1 to 6 have mean 3.5 and variance 3.5.
+
+    The 97.5 % quantile of Student's t with 5 degrees of freedom is 2.5706.
+    """
     before = estimate([10.0, 20.0, 30.0, 40.0, 50.0, 60.0])
     after = estimate([11.0, 22.0, 33.0, 44.0, 55.0, 66.0])
     gap = difference(after, before, same_seeds=True)
@@ -120,7 +126,8 @@ def test_simulated_so_much_longer_the_difference_shows_in_half_of_the_cases(pair
     assert not gap.real
     assert gap.replicas is not None
     assert gap.time_ratio == pytest.approx(gap.replicas / count)
-    # 1.96 standard errors in the limit: the foretold number is not far above (Student's t of more replicas is near it).
+    # With many replicas the limit is 1.96 standard errors. The foretold number is not far above it,
+    # because Student's t of more replicas is close to 1.96.
     limit = (1.96 * spread / true_gap) ** 2 * (1 if paired else 2)
     assert limit < gap.replicas < 1.2 * limit
     drawn = (
@@ -174,7 +181,8 @@ def test_three_results_and_what_is_written(tmp_path: Path) -> None:
         for shares in histogram["shares"]:
             assert len(shares) == len(histogram["edges"]) - 1
             assert sum(shares) == pytest.approx(1.0)
-    # All synthetic impacts come at 3 m/s and 70 degrees; the mean of the coverage's histogram is the mean coverage.
+    # All synthetic impacts have 3 m/s and 70 degrees. The mean of the coverage's histogram is the
+    # mean coverage.
     assert about["distributions"]["mean_normal_speed_m_s"] == pytest.approx([3.0] * 3)
     assert about["distributions"]["mean_angle_deg"] == pytest.approx([70.0] * 3)
     edges = np.array(about["distributions"]["coverage"]["edges"])

@@ -1,4 +1,8 @@
-"""Where one candidate covers more: found where it was put, seldom where it was not, and shown in its colour."""
+"""Where one candidate covers more than another.
+
+The place is found where the difference was put, seldom where there is no difference, and is shown
+in the colour of that candidate.
+"""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,6 +1,7 @@
-"""What is handed on, read back with the libraries that others read it with: impacts, chamber, study.
+"""Exported impacts, chambers and studies, read back with the libraries that others use.
 
-The part's file is the plate's in inches, lying on its side, far from its origin: nothing like the chamber's frame.
+The part's file is the plate in inches, lying on its side far from its origin, so that its frame
+differs from the chamber's in every respect.
 """
 
 import gzip
@@ -445,7 +446,10 @@ def test_the_whole_chamber_as_stl_and_3mf(study: Path, tmp_path: Path) -> None:
 
 
 def test_each_surface_as_stl_by_its_name(place: Path, tmp_path: Path) -> None:
-    """Every triangle is in one file, and those of two sonotrodes, a hole and a deflector are what the design says."""
+    """Every triangle is in one of the files.
+
+    The surfaces of two sonotrodes, a hole and a deflector are as the design says.
+    """
     data = plate_design().model_dump()
     well = {
         "frequency_khz": 20,
@@ -481,7 +485,8 @@ def test_each_surface_as_stl_by_its_name(place: Path, tmp_path: Path) -> None:
         -6 * 4 * 2, rel=1e-5
     )  # normals point out of the cavity, into the block
     bore = read["chamber.holes.0"].bounds
-    # The bore goes 12 mm beyond the wall, which a flat side of the chamber's polygon is nearer than its radius.
+    # The bore goes 12 mm beyond the wall. A flat side of the chamber's polygon is nearer than its
+    # radius.
     assert bore[1] == pytest.approx([2.0, 25.0 + 12.0, 10.0], abs=0.05)
     assert bore[0] == pytest.approx([-2.0, 25.0, 6.0], abs=0.2)
 

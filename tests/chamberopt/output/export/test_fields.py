@@ -1,4 +1,7 @@
-"""Fields handed on: read back by other programs' libraries or by a reader of its own, in the part file's numbers."""
+"""Exported fields, in the numbers of the part's file.
+
+They are read back by libraries of other programs or by a reader in this file.
+"""
 
 import re
 from pathlib import Path
@@ -24,8 +27,10 @@ TOP = 5  # squares along each side of the large faces
 
 
 def plate_quads() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A plate's corners [mm], its quadrilaterals facing outward, the lower face first, and their numbers: with gaps,
-    not rising.
+    """A plate's corners [mm], its quadrilaterals and their numbers.
+
+    The quadrilaterals face outward and begin with the lower face. Their numbers have gaps and do
+    not rise.
     """
     line = np.linspace(0.0, SIDES[0], TOP + 1)
     points = np.array([(x, y, z) for z in (0.0, SIDES[2]) for y in line for x in line])
@@ -101,7 +106,10 @@ def design_with(mesh: Path, **target: float) -> Design:
 
 
 def simulated(mesh: Path, **target: float) -> tuple[Path, Chamber]:
-    """A results folder of that part, without a simulation: dents by lot, their speeds, angles and sizes too."""
+    """A results folder of that part, made without a simulation.
+
+    Dents, speeds, angles and dent sizes are random.
+    """
     design = design_with(mesh, **target)
     chamber = build_chamber(design)
     folder = mesh.parent / "result"
@@ -120,7 +128,10 @@ def _no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def distributions(text: str) -> dict[str, dict[str, float]]:
-    """*Distribution blocks by name: label as written -> value; the default is checked and left out."""
+    """The *Distribution blocks by name, each a map from the label as written to the value.
+
+    The default value is checked and left out.
+    """
     found: dict[str, dict[str, float]] = {}
     for block in re.split(r"(?m)^(?=\*[A-Za-z])", text):
         head, *rows = [line for line in block.splitlines() if not line.startswith("**")] or [""]
@@ -290,7 +301,10 @@ def test_a_part_without_element_numbers_is_written_along(
 def test_where_the_target_was_meshed_anew_elements_get_what_lies_on_them(
     tmp_path: Path, element_mm: float
 ) -> None:
-    """Squares of 4 mm in triangles finer and coarser than they are; coverage that rises along x tells them apart."""
+    """Square elements of 4 mm are covered with triangles finer and coarser than themselves.
+
+    Coverage that rises along x tells the elements apart.
+    """
     numbers = nastran_plate(tmp_path / "plate.bdf")
     folder, _ = simulated(tmp_path / "plate.bdf", element_mm=element_mm)
     surface = pyvista.read(folder / "coverage.vtp")

@@ -30,7 +30,10 @@ def replica(result: Result) -> Replica:
 
 
 def test_a_ball_alone_is_where_the_closed_form_has_it(replica: Replica) -> None:
-    """Dropped on a floor that gives all back, drifting sideways: z = r + h - g τ²/2, τ from the nearest apex."""
+    """A ball is dropped on a floor that returns all energy, and drifts sideways.
+
+    Its height is z = r + h - g τ²/2, where τ is the time from the nearest apex.
+    """
     r, h, drift = 1.5e-3, 6.5e-3, 0.05
     ball = Balls(np.array([[0.0, 0.0, r + h]]), np.array([[drift, 0.0, 0.0]]), 2 * r)
     scene = Scene(
@@ -59,7 +62,10 @@ def test_a_ball_alone_is_where_the_closed_form_has_it(replica: Replica) -> None:
 
 
 def test_what_is_shown_is_the_run_itself(replica: Replica) -> None:
-    """The scene cut short where the film ends gives the same bits as the whole; at an impact the ball is on the part"""
+    """A scene cut short where the film ends gives the same bits as the whole scene.
+
+    At an impact the ball is on the part.
+    """
     whole = simulate(replica.scene).impacts
     seen = simulate_flight(replica, 0.05, 0.1, 11)
     shown = (whole.time >= 0.05) & (whole.time <= seen.time[-1])

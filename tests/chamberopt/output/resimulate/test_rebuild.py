@@ -20,7 +20,7 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> Result:
 
 
 def test_a_target_chosen_by_a_study_is_the_results_own(result: Result) -> None:
-    """With target.reachable the target is that of coverage.vtp, not what this chamber would give."""
+    """With target.reachable the target is read from coverage.vtp, not derived from this chamber."""
     target = result.design.part.target.model_copy(update={"reachable": True})
     part = result.design.part.model_copy(update={"target": target})
     design = result.design.model_copy(update={"part": part})

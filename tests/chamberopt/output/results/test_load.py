@@ -25,7 +25,7 @@ def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def wrong_figures(text: str) -> list[str]:
-    """The same result.json, well formed, with an objective that is no figure and a metric missing."""
+    """Well-formed variants of result.json whose objective is no number or that lack a metric."""
     wrong = []
     for value in ("x", None, float("nan"), []):
         data = json.loads(text)

@@ -1,9 +1,13 @@
-"""Views of a fixed result compared with committed pictures: other colours, scales or meshes are noticed.
+"""Views of a fixed result compared with committed pictures.
 
-Compared are means over blocks of 20 by 20 pixels, which hardly depend on how a driver smooths edges.
-TOLERANCE is a share of 1: softening every edge over three pixels changes a block by 0.011, losing one
-triangle in ten by 0.035 and more. To draw the pictures again, after a change that is wanted and has
-been looked at: python -m tests.chamberopt.output.viewer.test_plotter
+Other colours, scales or meshes are noticed.
+
+Compared are means over blocks of 20 by 20 pixels, which hardly depend on how a driver smooths
+edges. TOLERANCE is a share of 1: softening every edge over three pixels changes a block by 0.011,
+losing one triangle in ten by 0.035 and more. To draw the pictures again, after a change that is
+wanted and has been looked at:
+
+    python -m tests.chamberopt.output.viewer.test_plotter
 """
 
 import subprocess

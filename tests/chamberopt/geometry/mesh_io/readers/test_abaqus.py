@@ -23,7 +23,10 @@ def test_abaqus_shells_with_sets_of_elements_and_nodes(tmp_path: Path) -> None:
     text += "".join(
         f"{n + 2}, {', '.join(str(k + 1) for k in quad)}\n" for n, quad in enumerate(QUADS[1:])
     )
-    text += "*ELSET, ELSET=both, GENERATE\n1, 2, 1\n*ELSET, ELSET=again\ncrown,\n*NSET, NSET=upper\n5, 6, 7, 8\n"
+    text += (
+        "*ELSET, ELSET=both, GENERATE\n1, 2, 1\n*ELSET, ELSET=again\ncrown,\n*NSET, NSET=upper\n"
+        "5, 6, 7, 8\n"
+    )
     text += "*ELEMENT, TYPE=T3D2, ELSET=wire\n90, 1, 2\n"
 
     part = read_part(written(tmp_path / "box.inp", text), "mm")
@@ -44,9 +47,15 @@ def test_abaqus_instances_are_put_where_they_stand_and_their_surfaces_named(tmp_
         ", ".join(str(k + 1) for k in range(8))
         + "\n*Surface, type=ELEMENT, name=crown\nbody, S2\n*End Part\n"
     )
-    text += "*Assembly, name=A\n*Instance, name=one, part=Block\n*End Instance\n*Instance, name=two, part=Block\n"
+    text += (
+        "*Assembly, name=A\n*Instance, name=one, part=Block\n*End Instance\n"
+        "*Instance, name=two, part=Block\n"
+    )
     text += "50., 0., 0.\n0., 0., 0., 0., 0., 1., 90.\n*End Instance\n"
-    text += "*Elset, elset=_s, internal, instance=two\n1,\n*Surface, type=ELEMENT, name=second\n_s, S1\n*End Assembly\n"
+    text += (
+        "*Elset, elset=_s, internal, instance=two\n1,\n*Surface, type=ELEMENT, name=second\n"
+        "_s, S1\n*End Assembly\n"
+    )
 
     part = read_part(written(tmp_path / "two.inp", text), "mm")
 

@@ -197,8 +197,11 @@ def test_numbers_stay_with_their_triangles_through_healing(tmp_path: Path) -> No
 
 def test_one_body_of_several_keeps_its_numbers(tmp_path: Path) -> None:
     points = np.concatenate([CORNERS, CORNERS + np.array([100.0, 0.0, 0.0])])
-    cards = [f"CQUAD4,{n + shift},{1 + shift // 2000},{node_list(tuple(k + shift // 250 for k in quad))}"
-             for shift in (0, 2000) for n, quad in zip(NUMBERS, QUADS, strict=True)]  # fmt: skip
+    cards = [
+        f"CQUAD4,{n + shift},{1 + shift // 2000},{node_list(tuple(k + shift // 250 for k in quad))}"
+        for shift in (0, 2000)
+        for n, quad in zip(NUMBERS, QUADS, strict=True)
+    ]
     read = read_triangles(written(tmp_path / "two.bdf", nastran_text(cards, points)), "mm")
 
     part = close_surface(read, read.groups["PID 2"])
