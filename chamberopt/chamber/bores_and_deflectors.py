@@ -36,7 +36,7 @@ from chamberopt.geometry.solids import (
     overlap_volume,
     split_bodies,
     subtract,
-    sweep,
+    sweep_face,
     unite,
 )
 from chamberopt.geometry.triangles import area_vectors, areas
@@ -174,7 +174,10 @@ def swept_faces(design: Design, cavity: CavitySolid) -> list[tuple[str, Solid]]:
         for k, s in enumerate(design.sonotrodes)
     ]
     return [
-        (name, sweep(surface.select(tags == tag), np.array(axis) * amplitude, f"sweep of {name}"))
+        (
+            name,
+            sweep_face(surface.select(tags == tag), np.array(axis) * amplitude, f"sweep of {name}"),
+        )
         for name, tag, axis, amplitude in faces
     ]
 

@@ -11,13 +11,13 @@ if TYPE_CHECKING:
 
     from chamberopt.chamber.build import Chamber
     from chamberopt.design.load import Design
-    from chamberopt.output.resimulate.rebuild import Replica
+    from chamberopt.output.resimulate.rebuild import RebuiltReplica
     from chamberopt.output.results.load import Result
     from chamberopt.simulation.effect_pilot import Advice
     from sim_core import AnalyticCavity
 
 
-def compile_simulator(
+def compile_with_message(
     design: Design, chamber: Chamber, cavity: AnalyticCavity | None = None
 ) -> None:
     """Compile with a message before the progress bar starts.
@@ -48,7 +48,11 @@ def resolve_effects(
 
     with progress_bar("pilot runs") as progress:
         return with_effects_resolved(
-            design, chamber, executor, progress, lambda variant: compile_simulator(variant, chamber)
+            design,
+            chamber,
+            executor,
+            progress,
+            lambda variant: compile_with_message(variant, chamber),
         )
 
 
@@ -59,7 +63,7 @@ def advise_effects(design: Design, chamber: Chamber) -> list[dict[str, Any]]:
     from chamberopt.simulation.effect_pilot import advise, with_effects_resolved
 
     def prepare(variant: Design) -> None:
-        compile_simulator(variant, chamber)
+        compile_with_message(variant, chamber)
 
     print(
         "pilot runs with each effect switched on and off (--no-pilot skips them) ...",
@@ -72,12 +76,12 @@ def advise_effects(design: Design, chamber: Chamber) -> list[dict[str, Any]]:
     return [one.as_json() for one in advice]
 
 
-def load_replica(folder: Path, number: int) -> tuple[Result, Replica]:
+def load_replica(folder: Path, number: int) -> tuple[Result, RebuiltReplica]:
     """A result and one of its replicas, compiled to be simulated again."""
     from chamberopt.output.resimulate.rebuild import rebuild_replica
     from chamberopt.output.results.load import load_result
 
     loaded = load_result(folder)
     replica = rebuild_replica(loaded, number)
-    compile_simulator(replica.design, replica.chamber, replica.cavity)
+    compile_with_message(replica.design, replica.chamber, replica.cavity)
     return loaded, replica

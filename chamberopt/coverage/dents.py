@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.geometry.triangles import closest_points, unit_normals
+from chamberopt.geometry.triangles import closest_on_each, unit_normals
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -42,7 +42,7 @@ def dents_on_part(impacts: ImpactLog, chamber: Chamber, design: Design) -> Dents
     diameter = dent_diameters(impacts, design)
     dents = np.flatnonzero((diameter > 0.0) & (chamber.source[impacts.triangle] >= 0))
     corners = chamber.vertices[chamber.triangles[impacts.triangle[dents]]]
-    place = closest_points(corners, impacts.position[dents])
+    place = closest_on_each(corners, impacts.position[dents])
     return Dents(place, unit_normals(corners), 0.5 * diameter[dents], impacts.time[dents])
 
 

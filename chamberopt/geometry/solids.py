@@ -125,7 +125,7 @@ def split_bodies(vertices: np.ndarray, triangles: np.ndarray, name: str) -> tupl
     return solids, int((volumes < 0.0).sum())
 
 
-def sweep(face: SolidSurface, way: np.ndarray, name: str) -> Solid:
+def sweep_face(face: SolidSurface, way: np.ndarray, name: str) -> Solid:
     """The prism over a flat face, whose normals point away from it, up to the face moved by `way`.
 
     Args:

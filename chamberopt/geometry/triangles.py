@@ -174,7 +174,7 @@ def unit_vectors(vectors: np.ndarray) -> np.ndarray:
     return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0)
 
 
-def closest_points(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
+def closest_on_each(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
     """The point of each triangle (n, 3, 3) that is closest to the matching point (n, 3), (n, 3)."""
     from trimesh.triangles import closest_point
 

@@ -83,7 +83,7 @@ def as_csv(result: StudyResult) -> str:
     return text.getvalue()
 
 
-def as_json(result: StudyResult) -> list[dict[str, Any]]:
+def front_json(result: StudyResult) -> list[dict[str, Any]]:
     """The confirmed front, from the best by the first objective to the best by the second."""
     front = [one for one in pareto_points(result) if one.on_front and one.stage == "confirm"]
     return [

@@ -14,7 +14,7 @@ import numpy as np
 
 from chamberopt.chamber.build import TAG_PART
 from chamberopt.chamber.checks.place_names import around, surface_names
-from chamberopt.geometry.triangles import closest_points, connected_pieces
+from chamberopt.geometry.triangles import closest_on_each, connected_pieces
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -148,7 +148,7 @@ def _triangles_near(
     corners = chamber.vertices[chamber.triangles[triangles]]
     low, high = corners.min(axis=1), corners.max(axis=1)
     near = (np.abs(position - np.clip(position, low, high)) <= reach).all(axis=1)
-    closest = closest_points(corners[near], np.broadcast_to(position, (near.sum(), 3)))
+    closest = closest_on_each(corners[near], np.broadcast_to(position, (near.sum(), 3)))
     return np.asarray(triangles[near][np.linalg.norm(closest - position, axis=1) <= reach])
 
 

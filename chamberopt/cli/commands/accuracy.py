@@ -6,7 +6,7 @@ from pathlib import Path
 
 from chamberopt.cli.console import print_result, results_folder
 from chamberopt.cli.options import Json, Out, app
-from chamberopt.cli.prepare import compile_simulator
+from chamberopt.cli.prepare import compile_with_message
 
 
 @app.command
@@ -27,7 +27,7 @@ def accuracy(
     from chamberopt.common.parallel.executor import local_executor
     from chamberopt.common.progress import progress_bar
     from chamberopt.design.load import load_design
-    from chamberopt.output.results.accuracy_results import as_text, write_accuracy_results
+    from chamberopt.output.results.accuracy_results import accuracy_text, write_accuracy_results
     from chamberopt.simulation.convergence.study import require_budget, run_convergence_study
 
     require_budget(budget_s)
@@ -35,7 +35,7 @@ def accuracy(
     with results_folder(out, f"{design.stem}-accuracy") as folder:
         with local_executor() as executor, progress_bar("CPU seconds") as progress:
             convergence = run_convergence_study(
-                candidate, budget_s, executor, progress, compile_simulator
+                candidate, budget_s, executor, progress, compile_with_message
             )
         write_accuracy_results(folder, convergence)
-    print_result(as_text(convergence), folder, json, "accuracy.json")
+    print_result(accuracy_text(convergence), folder, json, "accuracy.json")

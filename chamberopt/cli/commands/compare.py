@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from chamberopt.cli.console import print_remarks, print_result, print_warnings, results_folder
 from chamberopt.cli.options import Cluster, Json, Out, Workers, app
-from chamberopt.cli.prepare import compile_simulator, resolve_effects
+from chamberopt.cli.prepare import compile_with_message, resolve_effects
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -41,14 +41,14 @@ def compare(
     from chamberopt.output.compare.candidates import read_candidates
     from chamberopt.output.compare.comparison import comparison_of
     from chamberopt.output.compare.comparison_folder import COMPARE, write_comparison
-    from chamberopt.output.compare.table import as_text
+    from chamberopt.output.compare.table import comparison_text
 
     gathered_candidates = read_candidates(candidates, treatment_time_s)
     with results_folder(out, "compare") as folder:
         results = _results(gathered_candidates, folder, workers, cluster)
         comparison = comparison_of(results, [one.label for one in gathered_candidates])
         print_remarks(write_comparison(folder, comparison))
-    print_result([as_text(comparison)], folder, json, COMPARE)
+    print_result([comparison_text(comparison)], folder, json, COMPARE)
 
 
 def _results(
@@ -67,7 +67,7 @@ def _results(
         ) -> tuple[Design, list[Advice]]:
             print_warnings(design, chamber)
             design, advice = resolve_effects(design, chamber, executor)
-            compile_simulator(design, chamber, cavity)
+            compile_with_message(design, chamber, cavity)
             return design, advice
 
         results, remarks = simulate_missing(candidates, folder, executor, prepare)

@@ -11,7 +11,7 @@ from cyclopts import Parameter
 
 from chamberopt.cli.console import print_json, print_remarks, results_folder
 from chamberopt.cli.options import Json, Workers, app
-from chamberopt.cli.prepare import compile_simulator
+from chamberopt.cli.prepare import compile_with_message
 from chamberopt.common.errors import InputError
 from chamberopt.output.export.formats import (
     FORMATS,
@@ -120,7 +120,7 @@ def _write_impacts(
     recorded = result.data["replicas"]
     fewer = replica_count(result, replicas) < recorded
     ground = rebuild_chamber(result)
-    compile_simulator(result.design, ground.chamber, ground.cavity)
+    compile_with_message(result.design, ground.chamber, ground.cavity)
     with open_executor(workers, None) as executor, progress_bar("replicas") as progress:
         impacts = write_impacts(
             files, result, ground, executor, frame=frame, replicas=replicas, progress=progress

@@ -19,7 +19,7 @@ from chamberopt.cli.console import (
 )
 from chamberopt.cli.interrupt import Interrupt
 from chamberopt.cli.options import Cluster, Json, Resumable, Workers, app
-from chamberopt.cli.prepare import compile_simulator, resolve_effects
+from chamberopt.cli.prepare import compile_with_message, resolve_effects
 from chamberopt.common.errors import InputError
 
 if TYPE_CHECKING:
@@ -101,7 +101,7 @@ def _search(
     study, advice = folder.with_effects_resolved(
         lambda design: resolve_effects(design, chamber, executor)
     )
-    compile_simulator(study.design, chamber)
+    compile_with_message(study.design, chamber)
     if folder.recorded.trials:
         print_remarks([f"{folder.path}: resuming after {len(folder.recorded.trials)} evaluations"])
     with progress_bar("evaluations") as progress:

@@ -13,7 +13,7 @@ from chamberopt.cli.console import (
     results_folder,
 )
 from chamberopt.cli.options import Cluster, Json, Out, Workers, app
-from chamberopt.cli.prepare import compile_simulator, resolve_effects
+from chamberopt.cli.prepare import compile_with_message, resolve_effects
 
 
 @app.command
@@ -50,7 +50,7 @@ def simulate(
     warnings = print_warnings(candidate, chamber)
     with results_folder(out, design.stem) as folder, open_executor(workers, cluster) as executor:
         candidate, advice = resolve_effects(candidate, chamber, executor)
-        compile_simulator(candidate, chamber, cavity)
+        compile_with_message(candidate, chamber, cavity)
         with progress_bar("replicas") as progress:
             evaluation = evaluate(candidate, chamber, executor, progress, cavity=cavity)
         print_remarks(save_simulation(folder, candidate, chamber, evaluation, advice, warnings))

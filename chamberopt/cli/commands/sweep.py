@@ -14,7 +14,7 @@ from chamberopt.cli.console import (
     results_folder,
 )
 from chamberopt.cli.options import Cluster, Json, Resumable, Workers, app
-from chamberopt.cli.prepare import compile_simulator, resolve_effects
+from chamberopt.cli.prepare import compile_with_message, resolve_effects
 
 
 @app.command
@@ -60,7 +60,7 @@ def sweep(
     with place as folder, open_executor(workers, cluster, "processes") as executor:
         design, advice = resolve_effects(loaded.design, chamber, executor)
         loaded = loaded.model_copy(update={"design": design})
-        compile_simulator(design, chamber)
+        compile_with_message(design, chamber)
         with progress_bar("candidates") as progress:
             result = run_sweep(loaded, plan, folder, executor, progress)
         print_remarks(save_sweep(folder, result))

@@ -239,7 +239,7 @@ class RoundChamber(WalledChamber):
 
     def room(self) -> float:
         """Volume [m³] of the round cavity."""
-        return profile.enclosed_volume(self._rounded())
+        return profile.revolved_volume(self._rounded())
 
     def _rounded(self) -> np.ndarray:
         return profile.round_corners(self.profile(), 1e-3 * self.corner_radius_mm, self.facets)

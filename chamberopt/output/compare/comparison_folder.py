@@ -13,7 +13,7 @@ from chamberopt.output.compare.comparison import Comparison
 from chamberopt.output.compare.distributions import distributions
 from chamberopt.output.compare.local_difference import LocalDifference, local_difference
 from chamberopt.output.compare.pictures import draw_distributions
-from chamberopt.output.compare.table import as_text
+from chamberopt.output.compare.table import comparison_text
 from chamberopt.output.compare.target_surface import read_target_surface
 from chamberopt.output.results.load import summary
 from chamberopt.output.viewer import draw_coverage, draw_difference, write_differences
@@ -40,7 +40,7 @@ def write_comparison(folder: str | Path, comparison: Comparison) -> list[str]:
             result.folder, one.target, comparison.results[0].folder, surfaces[0].target
         )
     folder.mkdir(parents=True, exist_ok=True)
-    write_text(folder / "compare.txt", as_text(comparison) + "\n")
+    write_text(folder / "compare.txt", comparison_text(comparison) + "\n")
     spread = distributions(surfaces)
     draw_distributions(folder / "distributions.png", comparison, spread)
     remarks = [comparison_picture(folder / "compare.png", comparison)]

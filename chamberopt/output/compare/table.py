@@ -15,7 +15,7 @@ COVERAGE_MODEL = "process.accuracy.coverage_model"
 HEADER = ("difference", "real", "to know: simulate")
 
 
-def as_text(comparison: Comparison) -> str:
+def comparison_text(comparison: Comparison) -> str:
     """Return one table for two candidates; for more, one of figures and then one of differences."""
     first, *later = comparison.labels
     rows = [

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from chamberopt.coverage.dents import dent_diameters, impact_angle_deg
-from chamberopt.geometry.triangles import closest_points
+from chamberopt.geometry.triangles import closest_on_each
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -137,7 +137,7 @@ def impact_rows(
             impacts.number,
             log,
             triangle,
-            frame.positions(closest_points(corners, log.position)),
+            frame.positions(closest_on_each(corners, log.position)),
             frame.directions(log.velocity),
             dents[piece],
             ball[log.ball],

@@ -12,8 +12,8 @@ from chamberopt.output.report.number_text import (
     Label,
     metric_label,
     objective_label,
+    per_cent,
     plain,
-    share,
     with_interval,
     with_unit,
 )
@@ -202,12 +202,12 @@ def influence(study: Mapping[str, Any], label: Label) -> dict[str, Any]:
             )
         sentences.append(
             "The effects of single parameters are "
-            f"{share(shares)} of the variance over the bounds{rest}."
+            f"{per_cent(shares)} of the variance over the bounds{rest}."
         )
     noise = with_unit(abs(label.factor) * model["noise"], label.unit)
     sentences.append(
         f"In its shaded range, each parameter alone loses no more than the noise, {noise}. "
-        f"Of all designs with every parameter in its range, {share(model['together'])} lose no "
+        f"Of all designs with every parameter in its range, {per_cent(model['together'])} lose no "
         "more than that."
     )
     return {"parameters": rows, "said": sentences}

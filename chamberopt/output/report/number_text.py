@@ -116,7 +116,7 @@ def with_interval(value: float, half_width: float, unit: str = "", sign: bool = 
     return f"{plus}{_rounded(shown, value_decimals)} ± {_rounded(half_width, decimals)}{unit}"
 
 
-def share(value: float) -> str:
+def per_cent(value: float) -> str:
     """A share in whole per cent."""
     return f"{100.0 * value:.0f} %"
 

@@ -15,7 +15,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.files import write_text
 from chamberopt.output.plots.colours import hex_colours
 from chamberopt.output.report import html
-from chamberopt.output.report.part3d import Scene, common_quantities, part_scene
+from chamberopt.output.report.part3d import PartScene, part_scene, quantities_in_all
 from chamberopt.output.report.report_data import START, read_design_file, report_contents
 from chamberopt.output.report.sections import sections
 from chamberopt.output.results.load import load_result, summary
@@ -127,7 +127,7 @@ def require_free_page(path: str | Path) -> Path:
     return path
 
 
-def viewer(scenes: Sequence[Scene]) -> str:
+def viewer(scenes: Sequence[PartScene]) -> str:
     """HTML for the parts in 3D and their controls, which part.js fills."""
     drawn = [scene.data for scene in scenes if scene.data]
     remarks = "".join(
@@ -136,7 +136,7 @@ def viewer(scenes: Sequence[Scene]) -> str:
     if not drawn:
         return remarks
     options = "".join(
-        f"<option>{html.text(one['label'])}</option>" for one in common_quantities(drawn)
+        f"<option>{html.text(one['label'])}</option>" for one in quantities_in_all(drawn)
     )
     last = max(
         max((time for time, _ in one["curve"]), default=3.0 * one["treatment"]) for one in drawn
@@ -166,13 +166,13 @@ def viewer(scenes: Sequence[Scene]) -> str:
     )
 
 
-def write_page(path: Path, title: str, body: str, scenes: Sequence[Scene]) -> None:
+def write_page(path: Path, title: str, body: str, scenes: Sequence[PartScene]) -> None:
     """Put a page together and write it atomically; raise InputError if it cannot be written."""
     from plotly.offline import get_plotlyjs
 
     data = ""
     if drawn := [scene.data for scene in scenes if scene.data]:
-        quantities = common_quantities(drawn)
+        quantities = quantities_in_all(drawn)
         colour_maps = {name: hex_colours(name) for name in {one["colours"] for one in quantities}}
         content = {"quantities": quantities, "scenes": drawn, "scales": colour_maps}
         data = html.embedded_json(content, "parts")

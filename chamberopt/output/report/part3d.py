@@ -33,7 +33,7 @@ PART_GREY, SONOTRODE, GLASS, EDGES = "#b9bec4", "#c58b52", "#9fc3dd", "#6f8796"
 
 
 @dataclass(frozen=True)
-class Scene:
+class PartScene:
     """One result for the page.
 
     Args:
@@ -49,7 +49,7 @@ class Scene:
     area: np.ndarray
 
 
-def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -> Scene:
+def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -> PartScene:
     """Part and chamber of a result.
 
     Args:
@@ -95,7 +95,7 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
             f"The target has {count:,} {too_many} can draw, so there is no picture here; "
             "chamberopt inspect shows it."
         )
-        return Scene(None, tuple(remarks), coverage[target], area[target])
+        return PartScene(None, tuple(remarks), coverage[target], area[target])
     rest = triangles[~shown]
     if len(triangles) > max_triangles:
         remarks.append(
@@ -125,10 +125,10 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
         "figure": _traces(points, triangles[shown], rest, chamber, eye),
         "view": _view(points, chamber, eye),
     }
-    return Scene(data, tuple(remarks), coverage[target], area[target])
+    return PartScene(data, tuple(remarks), coverage[target], area[target])
 
 
-def common_quantities(scenes: Sequence[dict[str, Any]]) -> list[dict[str, str]]:
+def quantities_in_all(scenes: Sequence[dict[str, Any]]) -> list[dict[str, str]]:
     """The quantities that all of the scenes have."""
     keys = ("name", "label", "unit", "title", "colours")
     return [

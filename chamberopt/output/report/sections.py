@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from chamberopt.output.report import charts, html
-from chamberopt.output.report.number_text import plain, share, with_interval, with_unit
-from chamberopt.output.report.part3d import Scene
+from chamberopt.output.report.number_text import per_cent, plain, with_interval, with_unit
+from chamberopt.output.report.part3d import PartScene
 
 Contents = Mapping[str, Any]  # of report_contents, or a part of it
 LIMITS_OF_INTERVALS = (
@@ -19,7 +19,7 @@ TILES = ("mean_coverage", "p05_coverage", "time_to_98_s")  # shown beside the ob
 
 
 def sections(
-    contents: Contents, viewer: str, scenes: Mapping[str, Scene], design_file: tuple[str, str]
+    contents: Contents, viewer: str, scenes: Mapping[str, PartScene], design_file: tuple[str, str]
 ) -> str:
     """HTML of the page below its title.
 
@@ -178,7 +178,7 @@ def _influence(contents: Contents) -> str:
                 row["name"],
                 with_interval(row["loss"], row["loss_half_width"], objective["unit"]),
                 with_unit(row["surely"], objective["unit"]) if row["surely"] else "not known",
-                share(row["share"]),
+                per_cent(row["share"]),
                 " to ".join(map(plain, row["flat"])),
             )
             for row in parameters
@@ -193,7 +193,7 @@ def _influence(contents: Contents) -> str:
     return html.section("Which parameters mattered", *content)
 
 
-def _coverage(contents: Contents, scenes: Mapping[str, Scene]) -> str:
+def _coverage(contents: Contents, scenes: Mapping[str, PartScene]) -> str:
     has_start = "start" in contents["coverage_against_time"]
     head: tuple[str, ...] = ("", "with 95 % interval")
     rows: list[tuple[str, ...]] = [

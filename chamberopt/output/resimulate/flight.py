@@ -15,7 +15,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.coverage.dents import Dents, dents_on_part
 
 if TYPE_CHECKING:
-    from chamberopt.output.resimulate.rebuild import Replica
+    from chamberopt.output.resimulate.rebuild import RebuiltReplica
     from sim_core import ImpactLog, PartRotation, Vibration
 
 MIN_SPAN = 1e-6  # s
@@ -24,7 +24,7 @@ MAX_POSITIONS = 10_000_000  # of all balls in all frames and their trails: 240 M
 
 
 @dataclass(frozen=True)
-class Flight:
+class FlightFrames:
     """Frames of one replica; times count from the end of its warm-up, as in its impact log.
 
     time: of the frames [s], shape (f,).
@@ -54,8 +54,8 @@ class Flight:
 
 
 def simulate_flight(
-    replica: Replica, start: float, span: float, frames: int, trail: int = 4
-) -> Flight:
+    replica: RebuiltReplica, start: float, span: float, frames: int, trail: int = 4
+) -> FlightFrames:
     """Simulate a replica again and record evenly spaced frames, the first and last at its ends.
 
     Args:
@@ -89,7 +89,7 @@ def simulate_flight(
     if rotation is not None:
         direction = np.array(rotation.axis)
         axis = np.array(rotation.axis_point), direction / np.linalg.norm(direction)
-    return Flight(
+    return FlightFrames(
         time=time,
         balls=positions[::trail],
         trail=np.concatenate([before, later]),

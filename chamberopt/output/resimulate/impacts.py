@@ -25,7 +25,7 @@ from chamberopt.coverage.dent_marking import first_marked_times, marked_share, s
 from chamberopt.coverage.dents import Dents, dents_on_part
 from chamberopt.coverage.metrics import target_coverage
 from chamberopt.design.process import MAX_SIMULATED_TREATMENT
-from chamberopt.output.resimulate.rebuild import REMEDY, RebuiltChamber, Replica, made_by
+from chamberopt.output.resimulate.rebuild import REMEDY, RebuiltChamber, RebuiltReplica, made_by
 from chamberopt.output.vtp_files import COVERAGE, read_surface
 from chamberopt.simulation.replicas import run_in_order, simulate_seed
 
@@ -100,7 +100,7 @@ def replica_count(result: Result, replicas: int | None) -> int:
     return replicas or there
 
 
-def simulate_dents(replica: Replica, time: float) -> Dents:
+def simulate_dents(replica: RebuiltReplica, time: float) -> Dents:
     """Return the dents of a replica simulated for a time [s], even longer than the result's.
 
     Raises:

@@ -35,7 +35,7 @@ class RebuiltChamber:
 
 
 @dataclass(frozen=True)
-class Replica:
+class RebuiltReplica:
     """One replica of a result, ready to be simulated again; cavity as in RebuiltChamber."""
 
     design: Design
@@ -78,7 +78,7 @@ def rebuild_chamber(result: Result) -> RebuiltChamber:
     return RebuiltChamber(chamber, analytic_cavity(result.design, chamber) if analytic else None)
 
 
-def rebuild_replica(result: Result, number: int = 0) -> Replica:
+def rebuild_replica(result: Result, number: int = 0) -> RebuiltReplica:
     """Build one replica of a result again, numbered from 0.
 
     Raises:
@@ -92,7 +92,7 @@ def rebuild_replica(result: Result, number: int = 0) -> Replica:
     rebuilt, (seed, stream) = rebuild_chamber(result), result.seeds
     mesh = rebuilt.cavity or chamber_mesh(rebuilt.chamber)
     scene = build_scene(result.design, mesh, replica_seed(seed, number, stream))
-    return Replica(result.design, rebuilt.chamber, rebuilt.cavity, scene)
+    return RebuiltReplica(result.design, rebuilt.chamber, rebuilt.cavity, scene)
 
 
 def made_by(result: Result) -> str:

@@ -31,7 +31,7 @@ def write_accuracy_results(folder: Path, study: ConvergenceStudy) -> None:
     writer.writerows(rows(study))
     write_text(folder / "accuracy.csv", table.getvalue())
     write_text(
-        folder / "accuracy.json", json.dumps(as_json(study), indent=2, allow_nan=False) + "\n"
+        folder / "accuracy.json", json.dumps(accuracy_json(study), indent=2, allow_nan=False) + "\n"
     )
     accuracy_picture(folder / "accuracy.png", study)
 
@@ -79,7 +79,7 @@ def _run_row(run: Run, reference: Run) -> dict[str, Any]:
     return row
 
 
-def as_text(study: ConvergenceStudy) -> list[str]:
+def accuracy_text(study: ConvergenceStudy) -> list[str]:
     """The lines that the command prints."""
     lines = [describe_reference(study), ""]
     lines.append(
@@ -120,7 +120,7 @@ def _signed(bias: Estimate) -> str:
     return "0" if exact else f"{bias.value:+.4f} ± {bias.half_width:.4f}"
 
 
-def as_json(study: ConvergenceStudy) -> dict[str, Any]:
+def accuracy_json(study: ConvergenceStudy) -> dict[str, Any]:
     """Everything, for accuracy.json."""
     law = study.law
     middle, low, high = law.halving

@@ -169,7 +169,7 @@ def _about_study(result: StudyResult) -> dict[str, Any]:
         "improved": result.improved,
         "at_bounds": list(result.at_bounds),
         **({"model": result.sensitivity.as_json()} if result.sensitivity else {}),
-        **({"front": pareto.as_json(result)} if result.study.objective.pareto else {}),
+        **({"front": pareto.front_json(result)} if result.study.objective.pareto else {}),
         "best": {"searched_as": result.best.searched, "parameters": result.best.parameters},
         "start": {
             "parameters": result.start.parameters,

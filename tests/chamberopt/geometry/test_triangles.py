@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from chamberopt.geometry.triangles import closest_points, find_shells, winding_number
+from chamberopt.geometry.triangles import closest_on_each, find_shells, winding_number
 
 
 @pytest.mark.parametrize("size", [1.0, 5e-4, 5e-5])
@@ -14,7 +14,7 @@ def test_contact_is_the_nearest_point_of_the_triangle(size: float) -> None:
     balls = np.array([[0.2, 0.2, 0.5], [0.5, -0.3, 0.4], [-1.0, -1.0, 0.1], [0.7, 0.01, 1.0]])
     contacts = np.array([[0.2, 0.2, 0], [0.5, 0, 0], [0, 0, 0], [0.7, 0.01, 0]])
     np.testing.assert_allclose(
-        closest_points(size * corners, size * balls), size * contacts, atol=1e-12 * size
+        closest_on_each(size * corners, size * balls), size * contacts, atol=1e-12 * size
     )
 
 

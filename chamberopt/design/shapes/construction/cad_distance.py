@@ -15,7 +15,7 @@ from chamberopt.geometry.solids import (
     overlap_volume,
     snap_to_grid,
     subtract,
-    sweep,
+    sweep_face,
 )
 from chamberopt.geometry.triangles import border_edges
 
@@ -46,7 +46,7 @@ def _extend_down(room: ShapeSurface, setup: Setup) -> ShapeSurface:
     below = SolidSurface(
         floor, numbers.reshape(-1, 3).astype(np.int32), on_face[on_face], on_face[on_face]
     )
-    shaft = sweep(
+    shaft = sweep_face(
         below,
         np.array([0.0, 0.0, room.vertices[used[0], 2]]),
         "the room under the sonotrode as drawn",
@@ -75,9 +75,9 @@ def _cut_off(room: ShapeSurface, height: float, setup: Setup) -> ShapeSurface:
     """The room without its lowest ``height`` [m], below z = 0, where the walls rise straight."""
     whole = make_solid(room.vertices, room.triangles, "the set-up")
     face = whole.surface().select(room.tags[whole.surface().source] == TAG_SONOTRODE)
-    shaft = sweep(face, np.array([0.0, 0.0, height]), "the room over the sonotrode as drawn")
+    shaft = sweep_face(face, np.array([0.0, 0.0, height]), "the room over the sonotrode as drawn")
     low, high = room.vertices.min(axis=0) - height, room.vertices.max(axis=0) + height
-    bottom = sweep(
+    bottom = sweep_face(
         _rectangle(low, high), np.array([0.0, 0.0, -low[2]]), "what lies under the sonotrode"
     )
     rest = subtract(whole, bottom)

@@ -15,7 +15,7 @@ from chamberopt.design.shapes.construction.limits import MIN_LENGTH
 from chamberopt.design.shapes.construction.surface import ShapeSurface, lofted
 
 
-def corner_angles(line: np.ndarray) -> np.ndarray:
+def turn_angles(line: np.ndarray) -> np.ndarray:
     """Angle [rad] by which the line turns left at each of its points, (n,); 0 at both ends."""
     along = np.diff(line, axis=0)
     before, after = along[:-1], along[1:]
@@ -28,7 +28,7 @@ def largest_corner_radius(line: np.ndarray) -> float:
 
     The arc of radius r begins r tan(angle / 2) from its corner; two arcs must not meet.
     """
-    tangent = np.tan(np.abs(corner_angles(line)) / 2.0)
+    tangent = np.tan(np.abs(turn_angles(line)) / 2.0)
     length = np.hypot(*np.diff(line, axis=0).T)
     with np.errstate(divide="ignore"):
         return max(0.0, float(((length - MIN_LENGTH) / (tangent[:-1] + tangent[1:])).min()))
@@ -43,7 +43,7 @@ def round_corners(line: np.ndarray, radius: float, facets: int) -> np.ndarray:
         return line
     points = [line[:1]]
     for corner, before, after, turn in zip(
-        line[1:-1], line[:-2], line[2:], corner_angles(line)[1:-1], strict=True
+        line[1:-1], line[:-2], line[2:], turn_angles(line)[1:-1], strict=True
     ):
         steps = facets * abs(turn) / (2.0 * np.pi)
         if steps < 0.5:
@@ -64,7 +64,7 @@ def round_corners(line: np.ndarray, radius: float, facets: int) -> np.ndarray:
 
 def find_contact(line: np.ndarray) -> np.ndarray | None:
     """A point (2,) [m] where the line folds back or comes nearer to itself than MIN_LENGTH."""
-    sharp = np.abs(corner_angles(line)) > np.pi - 1e-3
+    sharp = np.abs(turn_angles(line)) > np.pi - 1e-3
     if sharp.any():
         return line[np.argmax(sharp)]
     start, end = line[:-1], line[1:]
@@ -84,7 +84,7 @@ def crosses_itself(line: np.ndarray) -> bool:
     return bool(_cross(start[i], end[i], start[j], end[j]).any())
 
 
-def enclosed_volume(line: np.ndarray) -> float:
+def revolved_volume(line: np.ndarray) -> float:
     """Volume [m³] inside the line turned about the axis: a sum of truncated cones."""
     (r0, r1), rise = (line[:-1, 0], line[1:, 0]), np.diff(line[:, 1])
     return float(np.pi / 3.0 * (rise * (r0 * r0 + r0 * r1 + r1 * r1)).sum())

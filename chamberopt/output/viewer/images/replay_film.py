@@ -26,7 +26,7 @@ from chamberopt.output.viewer.view_state import Vector
 from chamberopt.output.vtp_files import CHAMBER, COVERAGE, MM, pyvista, read_surface
 
 if TYPE_CHECKING:
-    from chamberopt.output.resimulate.flight import Flight
+    from chamberopt.output.resimulate.flight import FlightFrames
 
 # Blue of Okabe and Ito and a magenta, beside greys: colour-blind readers tell them from one another
 # and from the orange sonotrode.
@@ -42,7 +42,7 @@ MAX_ROUND_BALLS = 2000  # above it balls have fewer sides
 
 def draw_replay(
     result: Path,
-    flight: Flight,
+    flight: FlightFrames,
     film: Path,
     fps: int,
     size: tuple[int, int],
@@ -74,7 +74,7 @@ def draw_replay(
     point, axis = (np.zeros(3), np.zeros(3)) if flight.part_axis is None else flight.part_axis
     with tempfile.TemporaryDirectory() as folder:
         data = Path(folder) / "flight.npz"
-        poses = [rotation_matrix(point * MM, axis, float(angle)) for angle in flight.part_angle]
+        poses = [rotation_about_line(point * MM, axis, float(angle)) for angle in flight.part_angle]
         np.savez(
             data,
             time=flight.time,
@@ -200,7 +200,7 @@ class _ReplayScene:
             )
 
 
-def rotation_matrix(point: np.ndarray, axis: np.ndarray, angle: float) -> np.ndarray:
+def rotation_about_line(point: np.ndarray, axis: np.ndarray, angle: float) -> np.ndarray:
     """Rotation (4, 4) about the line through a point along a unit vector, by Rodrigues' formula.
 
     A zero vector gives no rotation.

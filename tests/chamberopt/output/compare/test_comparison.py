@@ -22,7 +22,7 @@ from chamberopt.output.compare import comparison_folder
 from chamberopt.output.compare.comparison import compare
 from chamberopt.output.compare.comparison_folder import write_comparison
 from chamberopt.output.compare.difference import MAX_TIME_RATIO, confidence_of_each, difference
-from chamberopt.output.compare.table import as_text
+from chamberopt.output.compare.table import comparison_text
 from chamberopt.output.save_run import save_simulation
 from chamberopt.output.vtp_files import read_surface
 from tests.helpers.synthetic import DESIGNS, plate_design, poisson_evaluation
@@ -61,7 +61,7 @@ def test_the_same_twice(tmp_path: Path) -> None:
             "time_to_98_s",
         ):  # their intervals hold a bias that knows nothing of pairs
             assert gap.half_width == 0.0
-    text = as_text(both)
+    text = comparison_text(both)
     assert "the designs do not differ" in text
     assert row(text, "mean_coverage").endswith("no")
     assert "b - a: paired" in text
@@ -80,8 +80,8 @@ def test_what_differs_is_named_and_measured(tmp_path: Path) -> None:
     # Other seeds: independent, so the variances add.
     assert not gap.paired
     assert gap.half_width == pytest.approx(np.hypot(first.half_width, second.half_width), rel=0.3)
-    assert row(as_text(both), "mean_coverage").endswith("yes")
-    assert "heavy - light: independent, on other seeds" in as_text(both)
+    assert row(comparison_text(both), "mean_coverage").endswith("yes")
+    assert "heavy - light: independent, on other seeds" in comparison_text(both)
 
 
 def test_pairs_by_hand() -> None:
@@ -145,7 +145,7 @@ def test_what_would_take_for_ever_is_not_foretold(tmp_path: Path) -> None:
     tiny = difference(estimate(values[::-1] + 1e-4), estimate(values), same_seeds=True)
     assert (tiny.real, tiny.time_ratio, tiny.replicas) == (False, None, None)
     both = compare([left(tmp_path / "a", 20), left(tmp_path / "b", 20)])
-    text = as_text(replace(both, differences={name: (tiny,) for name in both.differences}))
+    text = comparison_text(replace(both, differences={name: (tiny,) for name in both.differences}))
     assert row(text, "mean_coverage").endswith(f"more than {MAX_TIME_RATIO} × as long")
 
 
@@ -160,7 +160,7 @@ def test_never_is_not_told_from_late(tmp_path: Path) -> None:
     both = compare(folders)
     (gap,) = both.differences["time_to_98_s"]
     assert not gap.real
-    assert "never " in row(as_text(both), "time_to_98_s")
+    assert "never " in row(comparison_text(both), "time_to_98_s")
 
 
 def test_three_results_and_what_is_written(tmp_path: Path) -> None:
@@ -169,9 +169,9 @@ def test_three_results_and_what_is_written(tmp_path: Path) -> None:
     assert three.labels == ("a/result", "b/result", "c/result")
     assert len(three.differences["mean_coverage"]) == 2
     assert three.confidence == pytest.approx(0.975)
-    assert "hold together with 95 % (Bonferroni)" in as_text(three)
+    assert "hold together with 95 % (Bonferroni)" in comparison_text(three)
     assert write_comparison(tmp_path / "out", three) == ["skipped"] * 2
-    assert (tmp_path / "out" / "compare.txt").read_text() == as_text(three) + "\n"
+    assert (tmp_path / "out" / "compare.txt").read_text() == comparison_text(three) + "\n"
     about = json.loads((tmp_path / "out" / "compare.json").read_text())
     assert [gap["real"] for gap in about["differences_to_first"]["mean_coverage"]] == [True, True]
     assert len(about["coverage_against_time"][2]) > 5
@@ -215,9 +215,9 @@ def test_two_ways_of_counting_are_said(tmp_path: Path) -> None:
     data = PLATE.model_dump()
     data["process"]["accuracy"] |= {"coverage_model": "dents"}
     dents = validate(Design, data)
-    text = as_text(compare([left(tmp_path / "a", 20), left(tmp_path / "b", 20, 0, dents)]))
+    text = comparison_text(compare([left(tmp_path / "a", 20), left(tmp_path / "b", 20, 0, dents)]))
     assert "counted in two ways (process.accuracy.coverage_model)" in text
-    assert "two ways" not in as_text(compare([tmp_path / "a", left(tmp_path / "c", 20)]))
+    assert "two ways" not in comparison_text(compare([tmp_path / "a", left(tmp_path / "c", 20)]))
 
 
 def test_single_impacts_of_another_result_are_refused(tmp_path: Path) -> None:

@@ -8,9 +8,9 @@ import pytest
 from chamberopt.chamber.build import TAG_PART, TAG_SONOTRODE
 from chamberopt.common.errors import InputError
 from chamberopt.output.resimulate.flight import face_displacement, rotation_angle, simulate_flight
-from chamberopt.output.resimulate.rebuild import Replica, rebuild_replica
+from chamberopt.output.resimulate.rebuild import RebuiltReplica, rebuild_replica
 from chamberopt.output.results.load import Result
-from chamberopt.output.viewer.images.replay_film import rotation_matrix
+from chamberopt.output.viewer.images.replay_film import rotation_about_line
 from sim_core import Balls, Gravity, PartRotation, Physics, Scene, simulate
 from sim_core.effects.part_rotation import angle_at, new_rotation_state, rotate_points
 from tests.helpers.results.short_plate import plate_result
@@ -25,11 +25,11 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> Result:
 
 
 @pytest.fixture(scope="module")
-def replica(result: Result) -> Replica:
+def replica(result: Result) -> RebuiltReplica:
     return rebuild_replica(result, 1)
 
 
-def test_a_ball_alone_is_where_the_closed_form_has_it(replica: Replica) -> None:
+def test_a_ball_alone_is_where_the_closed_form_has_it(replica: RebuiltReplica) -> None:
     """A ball is dropped on a floor that returns all energy, and drifts sideways.
 
     Its height is z = r + h - g τ²/2, where τ is the time from the nearest apex.
@@ -61,7 +61,7 @@ def test_a_ball_alone_is_where_the_closed_form_has_it(replica: Replica) -> None:
     assert len(seen.impacts) == len(seen.dents) == 0
 
 
-def test_what_is_shown_is_the_run_itself(replica: Replica) -> None:
+def test_what_is_shown_is_the_run_itself(replica: RebuiltReplica) -> None:
     """A scene cut short where the film ends gives the same bits as the whole scene.
 
     At an impact the ball is on the part.
@@ -78,7 +78,7 @@ def test_what_is_shown_is_the_run_itself(replica: Replica) -> None:
         np.testing.assert_allclose(at.balls[0, whole.ball[row]], whole.position[row], atol=1e-12)
 
 
-def test_the_sonotrode_is_where_the_shot_met_it(replica: Replica) -> None:
+def test_the_sonotrode_is_where_the_shot_met_it(replica: RebuiltReplica) -> None:
     scene = replace(replica.scene, record=(TAG_SONOTRODE,), duration=0.1)
     met = simulate(scene).impacts
     face = face_displacement(scene.physics.vibrations[0], scene.warmup + met.time)
@@ -105,7 +105,7 @@ def test_a_turning_part_is_drawn_as_the_simulator_has_it(motion: dict[str, float
     )
     np.testing.assert_array_equal(rotation_angle(None, times), 0.0)
     corners = np.random.default_rng(0).normal(size=(5, 3))
-    matrix = rotation_matrix(np.array(point), np.array(axis), expected[1])
+    matrix = rotation_about_line(np.array(point), np.array(axis), expected[1])
     there = rotate_points(corners, np.array(point), np.array(axis), expected[1])
     np.testing.assert_allclose(corners @ matrix[:3, :3].T + matrix[:3, 3], there, atol=1e-14)
 
@@ -121,7 +121,7 @@ def test_a_turning_part_is_drawn_as_the_simulator_has_it(motion: dict[str, float
     ],
 )
 def test_what_was_not_simulated_is_not_shown(
-    replica: Replica, start: float, span: float, frames: int, said: str
+    replica: RebuiltReplica, start: float, span: float, frames: int, said: str
 ) -> None:
     with pytest.raises(InputError, match=said):
         simulate_flight(replica, start, span, frames)

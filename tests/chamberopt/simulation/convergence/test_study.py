@@ -43,7 +43,7 @@ def made_up_replica(setting: ReplicaSetting, number: int) -> tuple:
 @pytest.fixture
 def no_simulator(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("chamberopt.simulation.convergence.runs.simulate_timed", made_up_replica)
-    monkeypatch.setattr("chamberopt.cli.commands.accuracy.compile_simulator", lambda *_: None)
+    monkeypatch.setattr("chamberopt.cli.commands.accuracy.compile_with_message", lambda *_: None)
 
 
 def accuracy(folder: Path, budget: str, *options: str) -> int:
