@@ -87,7 +87,7 @@ def _next_border(cells, ball):  # type: ignore[no-untyped-def]
 
 @jit
 def _join(cells, ball):  # type: ignore[no-untyped-def]
-    """Put the ball into its cell's chain, and its next crossing on the calendar."""
+    """Put the ball into its cell's chain, and its next crossing of a border into the queue."""
     cell = _cell_of(cells, ball)
     head = cells.first[cell]
     cells.first[cell], cells.after[ball], cells.before[ball] = ball, head, -1

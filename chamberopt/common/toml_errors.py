@@ -106,7 +106,8 @@ def explain_missing_file(path: Path, what: str, pattern: str) -> str:
     if likely:
         return f"{path}: no such {what}; did you mean {' or '.join(likely)}?"
     found = ", ".join(names[:MAX_CHOICES]) or "none"
-    return f"{path}: no such {what}; in {folder} there is {found}"
+    place = "this folder" if folder == Path() else folder
+    return f"{path}: no such {what}; in {place} there is {found}"
 
 
 def numeric_fields(

@@ -87,7 +87,8 @@ def plan_sweep(
     if (grid is None) == (sobol is None):
         given = "neither" if grid is None else "both"
         raise InputError(
-            f"--grid, --sobol: {given} given; give one: values of each parameter, or points in all"
+            f"--grid, --sobol: {given} given; give one: --grid for the number of values of each "
+            "parameter, or --sobol for the number of candidates"
         )
     if grid is not None:
         if seed is not None:

@@ -6,7 +6,7 @@ Notation
     y_j   pseudo-value of replica j: n S(all) - (n - 1) S(all but j)
 
 Coverage, the time to full coverage and the intensity uniformity have estimators of their own
-(coverage/coverage_estimators.py, coverage/intensity.py). The other metrics are ratios of sums: the
+(coverage/coverage_intervals.py, coverage/intensity.py). The other metrics are ratios of sums: the
 delete-one jackknife over replicas corrects their bias of order 1/n and gives the standard error (B.
 Efron and R. J. Tibshirani, "An Introduction to the Bootstrap", Chapman & Hall 1993, chapter 11).
 """

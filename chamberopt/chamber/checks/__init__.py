@@ -1,1 +1,1 @@
-"""What is said of a design before anything runs."""
+"""Checks of a design before anything runs."""

@@ -76,7 +76,7 @@ def objective_label(name: str) -> Label:
 
 
 def plain(value: float, digits: int = 4) -> str:
-    """The number to so many significant digits, without an exponent if it is of usual size."""
+    """The number to a number of significant digits, without an exponent if it is of usual size."""
     if not math.isfinite(value):
         return "not known"
     if abs(value) < ZERO_TOLERANCE:
