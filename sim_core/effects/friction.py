@@ -11,7 +11,7 @@ Notation:
 The tangential impulse opposes v_t and is the smaller of mu J_n, when the points slip throughout,
 and 2/7 (1 + beta0) m_eff |v_t|, when they stick and v_t turns into -beta0 v_t; 2/7 is that of solid
 spheres. In contact mode mu is also Coulomb's coefficient of a ball that slips, rolls or lies on a
-surface; see contact/rolling.py.
+surface; see contact/rolling_friction.py.
 
 Sources: O. R. Walton, in Particulate Two-Phase Flow (ed. Roco, 1993) ch. 25; Foerster, Louge, Chang
 & Allia, Phys. Fluids 6 (1994) 1108.

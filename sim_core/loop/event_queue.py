@@ -7,7 +7,7 @@ import numpy as np
 from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.roots import NEVER
 
-# in place of the obstacle that a ball meets next (contact/support_changes.py has more)
+# in place of the obstacle that a ball meets next (contact/landing_and_lift_off.py has more)
 SEARCH_ON = -1  # none until wall_time: search on from there
 UNKNOWN = -2  # nothing has been predicted for this ball yet
 
