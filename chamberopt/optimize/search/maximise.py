@@ -15,7 +15,7 @@ from chamberopt.optimize.study.schema import Optimizer, Phase
 # Two phases are not algorithms of NLopt: evenly spread points, and the model of the scores.
 SPREAD, MODEL = "sobol", "surrogate"
 AUTO = (SPREAD, MODEL, LOCAL)
-# For two objectives there is no single score to climb; each step of the model weights them differently.
+# Two objectives have no single score to climb. Each step of the model weights them differently.
 PARETO_PHASES = (Phase(algorithm="sobol", share=0.3), Phase(algorithm="surrogate", share=0.7))
 # "auto" spreads this share of the budget, or two points per parameter plus two if that is more,
 # and then follows the model. BOBYQA takes over where there are more points than the model can
