@@ -13,7 +13,7 @@ from sim_core.effects.gravity import Gravity
 from sim_core.effects.part_rotation import PartRotation
 from sim_core.effects.random_phase import RandomPhase
 from sim_core.effects.restitution import Restitution, restitution_at
-from sim_core.effects.surface_effects import SurfaceEffects, surface_effects
+from sim_core.effects.surface.surface_effects import SurfaceEffects, surface_effects
 from sim_core.effects.vibration import Vibration
 from sim_core.errors import SceneError, SimulationError
 from sim_core.geometry.analytic import AnalyticCavity, cylinder_cavity, prism_cavity

@@ -42,7 +42,7 @@ class Metric:
     of_coverage: Callable[[np.ndarray, np.ndarray], float] | None = None
     # Function of the impacts of replicas.
     of_impacts: Callable[[Tally, Chamber, Design], float] | None = None
-    in_version_0_1: bool = True  # whether result folders of version 0.1.0 have it
+    required: bool = False  # whether a results folder without it is damaged
 
     def value(self, total: Tally, chamber: Chamber, design: Design) -> float:
         """The metric of these impacts, without correction for a short simulation."""
@@ -142,7 +142,15 @@ def _shot_count(total: Tally, chamber: Chamber, design: Design) -> float:
 METRICS = {
     metric.name: metric
     for metric in (
-        Metric("mean_coverage", "", "mean coverage of the target", 0.0, 1.0, mean_coverage),
+        Metric(
+            "mean_coverage",
+            "",
+            "mean coverage of the target",
+            0.0,
+            1.0,
+            mean_coverage,
+            required=True,
+        ),
         Metric(
             "std_coverage",
             "",
@@ -150,6 +158,7 @@ METRICS = {
             0.0,
             0.5,
             std_coverage,
+            required=True,
         ),
         Metric(
             "p05_coverage",
@@ -158,27 +167,19 @@ METRICS = {
             0.0,
             1.0,
             p05_coverage,
+            required=True,
         ),
         Metric(
-            "time_to_98_s",
-            "s",
-            "time until 95 % of the target's area is 98 % covered",
-            0.0,
-            NEVER,
-            in_version_0_1=False,
+            "time_to_98_s", "s", "time until 95 % of the target's area is 98 % covered", 0.0, NEVER
         ),
-        Metric(
-            "intensity_uniformity",
-            "",
-            "1 - relative spread of the local impact speed",
-            in_version_0_1=False,
-        ),
+        Metric("intensity_uniformity", "", "1 - relative spread of the local impact speed"),
         Metric(
             "mean_normal_speed_m_s",
             "m/s",
             "mean normal speed of the impacts",
             0.0,
             of_impacts=_mean_normal_speed,
+            required=True,
         ),
         Metric(
             "impacts_per_mm2_s",
@@ -186,8 +187,11 @@ METRICS = {
             "impacts per area and second",
             0.0,
             of_impacts=_impacts_per_mm2_s,
+            required=True,
         ),
-        Metric("shot_count", "balls", "number of balls", 0.0, of_impacts=_shot_count),
+        Metric(
+            "shot_count", "balls", "number of balls", 0.0, of_impacts=_shot_count, required=True
+        ),
     )
 }
 

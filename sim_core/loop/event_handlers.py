@@ -1,7 +1,7 @@
 """What an event does: a ball meets a surface or another ball, or its path in contact ends.
 
 Every hit on a surface, still, vibrating or turning, is resolved in _resolve_contact. New effects of
-the contact between a ball and a surface are added in effects/surface_effects.py.
+the contact between a ball and a surface are added in effects/surface/surface_effects.py.
 """
 
 import math
@@ -39,7 +39,7 @@ from sim_core.effects.part_rotation import (
 from sim_core.effects.random_phase import wave_of_ball
 from sim_core.effects.restitution import Restitution
 from sim_core.effects.sonotrodes import wave_of_face
-from sim_core.effects.surface_effects import Touch, apply_surface_effects
+from sim_core.effects.surface.surface_effects import apply_surface_effects
 from sim_core.effects.vibration import surface_velocity
 from sim_core.geometry.ball_sizes import share_by_mass
 from sim_core.geometry.obstacles import CAPSULE, VIBRATING_FACE
@@ -56,7 +56,7 @@ from sim_core.loop.impact_log import Impact, no_impact
 from sim_core.loop.state import BALLS, SONOTRODE, WALLS, SimulationState
 from sim_core.motion import BallEvent, BallState, change_velocity, free_fall_position, state_under
 from sim_core.numerics.jit import inlined
-from sim_core.numerics.vec3 import Flight, Vec3, dot, sub
+from sim_core.numerics.vec3 import Flight, Touch, Vec3, dot, sub
 
 # Events of one ball in one window after which contact mode holds it still, and again after as many.
 JAM_EVENTS = 5_000

@@ -13,7 +13,7 @@ from sim_core.effects.part_rotation import RotationState
 from sim_core.effects.random_phase import RandomPhaseState
 from sim_core.effects.restitution import Restitution
 from sim_core.effects.sonotrodes import SonotrodeWaves
-from sim_core.effects.surface_effects import SurfaceEffects
+from sim_core.effects.surface.surface_effects import SurfaceEffects
 from sim_core.effects.vibration import Wave
 from sim_core.geometry.ball_sizes import BallSizes
 from sim_core.geometry.obstacle_set import ObstacleSet

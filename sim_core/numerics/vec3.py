@@ -23,6 +23,21 @@ class Flight(NamedTuple):
     acceleration: Vec3
 
 
+class Touch(NamedTuple):
+    """A ball touches a surface.
+
+    away: any vector along the normal, from the surface to the ball.
+    relative: velocity of the ball minus that of the surface, before the hit [m/s].
+    tag: of the surface.
+    kind: of the obstacle.
+    """
+
+    away: Vec3
+    relative: Vec3
+    tag: int
+    kind: int
+
+
 @jit
 def sub(a: Vec3, b: Vec3) -> Vec3:
     """a - b."""

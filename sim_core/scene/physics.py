@@ -12,7 +12,7 @@ from sim_core.effects.gravity import Gravity
 from sim_core.effects.part_rotation import PartRotation
 from sim_core.effects.random_phase import RandomPhase
 from sim_core.effects.restitution import Restitution
-from sim_core.effects.surface_effects import SurfaceEffects
+from sim_core.effects.surface.surface_effects import SurfaceEffects
 from sim_core.effects.vibration import Vibration
 
 

@@ -86,7 +86,7 @@ def load_result(path: str | Path) -> Result:
             metrics={
                 name: _read_estimate(data["metrics"][name])
                 for name, metric in METRICS.items()
-                if name in data["metrics"] or metric.in_version_0_1
+                if name in data["metrics"] or metric.required
             },
             part_sha256=data["part_sha256"],
             seeds=(data["seed"], data["stream"]),

@@ -1,15 +1,17 @@
 """The scene of a replica is reproducible, packed low, and has the sonotrode's speed scale."""
 
+from typing import get_args
+
 import numpy as np
 import pytest
 
 from chamberopt.chamber.build import TAG_PART, TAG_SONOTRODE, build_chamber
 from chamberopt.chamber.scene import build_scene, chamber_mesh, replica_seed, start_velocities
 from chamberopt.common.errors import InputError
-from chamberopt.design.effects import FrictionTable
+from chamberopt.design.effects import Effects, FrictionTable, SurfaceEffectTable
 from chamberopt.design.load import load_design
 from chamberopt.design.shot import ShotSize
-from sim_core import Drag, Rest
+from sim_core import Drag, Rest, SurfaceEffects
 from sim_core.effects.restitution import ELASTIC_BELOW
 from tests.helpers.synthetic import DESIGNS, plate_design
 
@@ -156,3 +158,13 @@ def test_shot_that_cannot_be_placed_is_refused_by_its_fields(shot: dict, said: s
     crowded = plate_design(**{f"shot__{name}": value for name, value in shot.items()})
     with pytest.raises(InputError, match=said):
         build_scene(crowded, chamber_mesh(build_chamber(crowded)), 1)
+
+
+def test_each_table_of_a_surface_effect_has_its_effect_in_the_simulator() -> None:
+    tables = {
+        name
+        for name, field in Effects.model_fields.items()
+        for table in get_args(field.annotation)
+        if isinstance(table, type) and issubclass(table, SurfaceEffectTable)
+    }
+    assert tables == set(SurfaceEffects._fields)

@@ -24,7 +24,7 @@ from sim_core import (
     Scene,
     Vibration,
 )
-from sim_core.effects.surface_effects import MAKERS, SurfaceEffects, surface_effects
+from sim_core.effects.surface.surface_effects import MAKERS, SurfaceEffects, surface_effects
 from sim_core.loop.simulate import Simulation
 from tests.helpers.scenes.cavities import box
 

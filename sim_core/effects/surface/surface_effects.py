@@ -9,22 +9,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from sim_core.numerics.jit import inlined
-from sim_core.numerics.vec3 import Vec3
-
-
-class Touch(NamedTuple):
-    """A ball touches a surface.
-
-    away: any vector along the normal, from the surface to the ball.
-    relative: velocity of the ball minus that of the surface, before the hit [m/s].
-    tag: of the surface.
-    kind: of the obstacle.
-    """
-
-    away: Vec3
-    relative: Vec3
-    tag: int
-    kind: int
+from sim_core.numerics.vec3 import Touch, Vec3
 
 
 class SurfaceEffects(NamedTuple):
@@ -47,8 +32,11 @@ def apply_surface_effects(
 ) -> Vec3:
     """Apply the effects to a hit, after restitution and friction and in the frame of the room.
 
+    The velocity after the hit, relative to the surface, is ``touch.relative`` plus the change.
+    Effects act on hits that bounce: contact mode has decided before whether a ball lands.
+
     Args:
-        effects: of the scene. Hand each field on to its function, which begins with
+        effects: of the scene. Each field goes to its function, which begins with
             ``if effect is None: return change``.
         ball: number of the ball.
         time_since_start: of the hit [s].
