@@ -99,19 +99,6 @@ class SurfaceEffectTable(DesignTable):
         raise NotImplementedError
 
 
-class TangentialLossTable(SurfaceEffectTable):
-    """Each hit on a surface takes a constant share of the tangential velocity."""
-
-    share: float = Field(
-        ge=0.0, le=1.0, description="taken by a hit; 0 is none, 1 leaves along the normal"
-    )
-
-    @property
-    def parameters(self) -> dict[str, float]:
-        """The share."""
-        return {"share": self.share}
-
-
 class Effects(DesignTable):
     """Which effects act on the shot. An effect that is not listed here is not simulated."""
 
@@ -138,11 +125,6 @@ class Effects(DesignTable):
     )
     ball_collisions: bool = Field(
         default=True, description="false: balls fly through each other; for very little shot"
-    )
-
-    tangential_loss: TangentialLossTable | None = Field(
-        default=None,
-        description="hits on surfaces take a share of the tangential velocity: { share = 0.1 }",
     )
 
     @property

@@ -8,11 +8,6 @@ one. Restitution, friction and contact mode have files of their own, because the
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from sim_core.effects.surface.tangential_loss import (
-    TangentialLoss,
-    lose_tangential,
-    tangential_loss,
-)
 from sim_core.numerics.jit import inlined
 from sim_core.numerics.vec3 import Touch, Vec3
 
@@ -20,12 +15,10 @@ from sim_core.numerics.vec3 import Touch, Vec3
 class SurfaceEffects(NamedTuple):
     """The further effects of a scene, a field each; None is absent from the compiled code."""
 
-    tangential_loss: TangentialLoss | None = None
-
 
 # By the name of the field: makes the effect from its parameters, and raises SceneError if they are
 # wrong.
-MAKERS: dict[str, Callable[..., Any]] = {"tangential_loss": tangential_loss}
+MAKERS: dict[str, Callable[..., Any]] = {}
 
 
 def surface_effects(**parameters: dict[str, float]) -> SurfaceEffects:
@@ -53,4 +46,4 @@ def apply_surface_effects(
     Returns:
         The velocity change [m/s].
     """
-    return lose_tangential(effects.tangential_loss, touch, change)
+    return change
