@@ -15,6 +15,8 @@ import numpy as np
 from sim_core import Balls, Physics, Scene, TriangleMesh
 
 FOLDER = Path(__file__).parent / "saved"
+# Names in files saved before they were renamed.
+RENAMED = {"turn": "part_rotation", "swing": "amplitude"}
 
 
 def save_scene(path: Path, scene: Scene) -> None:
@@ -44,7 +46,10 @@ def load_scene(path: Path) -> Scene:
         effects = json.loads(str(file["physics"]))
         kinds = get_type_hints(Physics)
         physics = Physics(
-            **{name: _effect(kinds[name], numbers) for name, numbers in effects.items()}
+            **{
+                RENAMED.get(name, name): _effect(kinds[RENAMED.get(name, name)], numbers)
+                for name, numbers in effects.items()
+            }
         )
         mesh = TriangleMesh(file["vertices"], file["triangles"], file["tags"])
         sizes = file["each"].T if "each" in file else (diameter, density)
@@ -66,7 +71,7 @@ def _effect(hint: Any, numbers: dict[str, Any] | list[dict[str, Any]] | None) ->
     if isinstance(numbers, list):
         return tuple(_effect(hint, one) for one in numbers)
     kind = next(one for one in (*get_args(hint), hint) if hasattr(one, "_fields"))
-    return kind(**{name: _tuples(value) for name, value in numbers.items()})
+    return kind(**{RENAMED.get(name, name): _tuples(value) for name, value in numbers.items()})
 
 
 def _tuples(value: Any) -> Any:

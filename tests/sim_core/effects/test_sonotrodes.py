@@ -166,10 +166,13 @@ def two_faced(angle: float) -> TriangleMesh:
 @pytest.mark.parametrize(
     ("vibration", "said"),
     [
-        ((), r"physics.vibration is \(\): give a Vibration, several"),
-        ((LOW, 3), r"physics.vibration is .*: give a Vibration, several"),
-        (0.5, "physics.vibration is 0.5: give a Vibration, several"),
-        ((LOW, HIGH._replace(tag=FLOOR)), r"vibration\[1\].tag is 1, as vibration\[0\].tag"),
+        ((), r"physics.vibration is \(\): give a Vibration, a tuple of several"),
+        ((LOW, 3), r"physics.vibration is .*: give a Vibration, a tuple of several"),
+        (0.5, "physics.vibration is 0.5: give a Vibration, a tuple of several"),
+        (
+            (LOW, HIGH._replace(tag=FLOOR)),
+            r"vibration\[1\].tag is 1, the same as vibration\[0\].tag",
+        ),
         ((LOW, HIGH._replace(tag=7)), r"vibration.tag is 7, but the mesh has tags \[0, 1, 2\]"),
         ((LOW, HIGH._replace(amplitude=-1e-6)), r"vibration\[1\].amplitude is -1e-06"),
         ((LOW, HIGH._replace(frequency="high")), r"vibration\[1\].frequency is 'high'"),

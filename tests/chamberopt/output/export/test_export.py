@@ -516,7 +516,10 @@ def test_an_unfinished_study_and_a_sweep(study: Path, chamberopt: Said, tmp_path
     shutil.copytree(study, unfinished)
     (unfinished / "result.json").unlink()
     sweep = altered(study, tmp_path / "sweep", lambda data: data.update(kind="sweep"))
-    for folder, said in ((unfinished, "has not finished"), (sweep, "a sweep, a map of candidates")):
+    for folder, said in (
+        (unfinished, "has not finished"),
+        (sweep, "a sweep is a map of many candidates"),
+    ):
         for name in ("impacts-csv", "chamber-stl"):
             status, _, err = chamberopt("export", folder, "--to", name)
             assert (status, said in err) == (2, True)
