@@ -2,6 +2,8 @@
 
 import os
 import tempfile
+import zipfile
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -10,6 +12,16 @@ from chamberopt.common.errors import InputError
 
 # A run that was killed may leave these in its folder: a file half written, and its lock (lock.py).
 LEFTOVER_PREFIXES = (".writing-", ".lock")
+# What reading a damaged .npz file can raise.
+UNREADABLE_NPZ = (
+    OSError,
+    ValueError,
+    KeyError,
+    TypeError,
+    EOFError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
 
 
 def is_new_or_empty(folder: Path) -> bool:

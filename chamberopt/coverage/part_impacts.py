@@ -5,8 +5,6 @@ An impact takes 20 bytes here, against a hundred in the simulator's log.
 
 from __future__ import annotations
 
-import zipfile
-import zlib
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import atomic_write
+from chamberopt.common.files import UNREADABLE_NPZ, atomic_write
 from chamberopt.coverage.dents import ball_diameters, dent_diameters, impact_angle_deg
 
 if TYPE_CHECKING:
@@ -112,15 +110,7 @@ def load_hits(path: Path) -> HitsByTriangle:
         raise InputError(
             f"{path}: not there; an older version did not keep single impacts: simulate again"
         ) from None
-    except (
-        OSError,
-        ValueError,
-        KeyError,
-        TypeError,
-        EOFError,
-        zipfile.BadZipFile,
-        zlib.error,
-    ) as error:
+    except UNREADABLE_NPZ as error:
         raise InputError(f"{path}: damaged ({error}); simulate again") from None
     if any(len(column) != first[-1] for column in columns.values()):
         raise InputError(f"{path}: damaged (columns of different lengths); simulate again")

@@ -10,8 +10,6 @@ from __future__ import annotations
 
 import io
 import json
-import zipfile
-import zlib
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cached_property
 from pathlib import Path
@@ -20,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import atomic_write
+from chamberopt.common.files import UNREADABLE_NPZ, atomic_write
 from chamberopt.coverage.coverage_from_impacts import Tally
 from chamberopt.coverage.part_impacts import Hits, HitsByTriangle, sort_hits_by_triangle
 from chamberopt.coverage.statistics.confidence_interval import Estimate
@@ -88,15 +86,7 @@ def load_evaluation(path: Path) -> Evaluation:
         evaluation = _from_tree(json.loads(arrays.pop("tree").tobytes()), arrays)
         if not isinstance(evaluation, Evaluation):
             raise TypeError("another kind of file")
-    except (
-        OSError,
-        ValueError,
-        KeyError,
-        TypeError,
-        EOFError,
-        zipfile.BadZipFile,
-        zlib.error,
-    ) as error:
+    except UNREADABLE_NPZ as error:
         why = getattr(error, "strerror", None) or f"damaged ({error})"
         raise InputError(
             f"{path}: {why}; restore the file or run the study in a new folder"
