@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.analytic_runs import BINS, FIGURES, INSCRIBED, PROFILES, Run, relative
 from benchmarks.pictures import COLOURS
-from chamberopt.coverage.statistics.confidence_interval import estimate
+from chamberopt.common.estimate import estimate
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

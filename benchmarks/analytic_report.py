@@ -20,7 +20,7 @@ from benchmarks.analytic_runs import (
     hotelling,
     relative,
 )
-from chamberopt.coverage.statistics.confidence_interval import Estimate, estimate
+from chamberopt.common.estimate import Estimate, estimate
 
 if TYPE_CHECKING:
     from chamberopt.design.load import Design

@@ -9,9 +9,9 @@ import numpy as np
 from chamberopt.chamber.analytic import analytic_cavity, impacts_on_chamber
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.scene import build_scene, chamber_mesh, replica_seed
+from chamberopt.common.estimate import Estimate, estimate
 from chamberopt.coverage.coverage_from_impacts import Tally, tally_impacts
 from chamberopt.coverage.dents import impact_angle_deg
-from chamberopt.coverage.statistics.confidence_interval import Estimate, estimate
 from chamberopt.design.load import Design
 from chamberopt.simulation.evaluate import estimate_metrics
 from sim_core import AnalyticCavity, ImpactLog, TriangleMesh, simulate

@@ -24,9 +24,9 @@ import numpy as np
 
 from benchmarks.table import print_table, write_csv
 from chamberopt.chamber.build import Chamber, Part, build_chamber
+from chamberopt.common.estimate import estimate
 from chamberopt.coverage.coverage_from_impacts import Tally
 from chamberopt.coverage.metrics import METRICS, OBJECTIVES
-from chamberopt.coverage.statistics.confidence_interval import estimate
 from chamberopt.design.load import Design, load_design
 from chamberopt.simulation.evaluate import estimate_metrics, weighted_sum
 from chamberopt.simulation.replicas import MIN_REPLICAS_TO_STOP, next_replica_count

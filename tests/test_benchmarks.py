@@ -15,7 +15,7 @@ from benchmarks.analytic_runs import INSCRIBED, Run, fit, hotelling
 from benchmarks.gas import sample_gas
 from benchmarks.scenes import DIAMETER
 from benchmarks.structures.mesh_obstacles import build_shell
-from chamberopt.coverage.statistics.confidence_interval import Estimate
+from chamberopt.common.estimate import Estimate
 from sim_core.loop.spatial_blocks import MIN_BALLS
 from tests.helpers.scenes.cavities import box_around
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
-    from chamberopt.coverage.statistics.confidence_interval import Estimate
+    from chamberopt.common.estimate import Estimate
     from chamberopt.design.load import Design
     from chamberopt.simulation.evaluation import Evaluation
 
@@ -91,7 +91,7 @@ def print_result(
 
 
 def estimate_line(name: str, estimate: Estimate) -> str:
-    from chamberopt.coverage.statistics.confidence_interval import ZERO_TOLERANCE
+    from chamberopt.common.estimate import ZERO_TOLERANCE
 
     value, half_width = (
         0.0 if abs(x) < ZERO_TOLERANCE else x for x in (estimate.value, estimate.half_width)

@@ -27,9 +27,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from chamberopt.common.estimate import Estimate, estimate
 from chamberopt.coverage.coverage_from_impacts import Tally
 from chamberopt.coverage.metrics import NEVER, P05, exposed_target, require_target, seconds_to_98
-from chamberopt.coverage.statistics.confidence_interval import Estimate, estimate
 from chamberopt.coverage.statistics.poisson_survival import PatchDents, UncoveredFraction
 from chamberopt.coverage.statistics.rate_mixture import MANY_STEPS, RateMixture
 from chamberopt.coverage.statistics.triangle_patches import patches

@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from chamberopt.common.estimate import Estimate, estimate
 from chamberopt.coverage.coverage_from_impacts import Tally
-from chamberopt.coverage.statistics.confidence_interval import Estimate, estimate
 
 if TYPE_CHECKING:
     from chamberopt.coverage.coverage_intervals import TargetPatches

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from chamberopt.common.estimate import Estimate, paired_difference
 from chamberopt.common.progress import Progress
-from chamberopt.coverage.statistics.confidence_interval import Estimate, paired_difference
 from chamberopt.optimize.evaluate_candidate import (
     CandidateEvaluator,
     Reference,

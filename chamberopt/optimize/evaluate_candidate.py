@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from chamberopt.common.errors import InputError, WorkerLostError
+from chamberopt.common.estimate import Estimate
 from chamberopt.coverage.metrics import METRICS, parse_objective
-from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.optimize.storage.trial_log import Trial
 from chamberopt.optimize.study.constraints import describe_violations, expected_violation
 from chamberopt.optimize.study.parameters import ParameterSpace

@@ -12,7 +12,7 @@ import numpy as np
 from chamberopt.optimize.study.constraints import FEASIBLE, INFEASIBLE
 
 if TYPE_CHECKING:
-    from chamberopt.coverage.statistics.confidence_interval import Estimate
+    from chamberopt.common.estimate import Estimate
     from chamberopt.optimize.run_study import StudyResult
 
 

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.common.errors import InputError
+from chamberopt.common.estimate import Estimate, paired_difference
 from chamberopt.common.files import write_text
 from chamberopt.common.progress import Progress
-from chamberopt.coverage.statistics.confidence_interval import Estimate, paired_difference
 from chamberopt.design.load import save_design
 from chamberopt.optimize.candidates import FIRST_OBJECTIVE, Candidates, ConfirmedCandidate, Stop
 from chamberopt.optimize.evaluate_candidate import Simulator

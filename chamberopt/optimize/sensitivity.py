@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from chamberopt.coverage.statistics.confidence_interval import Estimate
+from chamberopt.common.estimate import Estimate
 from chamberopt.optimize.search.gaussian_process import GaussianProcess, one_thread
 
 NORMAL_95 = 1.96  # standard deviations of a 95 % interval

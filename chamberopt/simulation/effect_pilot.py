@@ -21,9 +21,9 @@ import numpy as np
 
 from chamberopt.chamber import dimensionless
 from chamberopt.chamber.scene import balls_can_rest, chamber_mesh
+from chamberopt.common.estimate import Estimate, estimate
 from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
 from chamberopt.coverage.metrics import exposed_target
-from chamberopt.coverage.statistics.confidence_interval import Estimate, estimate
 from chamberopt.simulation.evaluate import evaluate
 
 if TYPE_CHECKING:

@@ -26,6 +26,7 @@ import numpy as np
 
 from chamberopt.chamber.analytic import cavity_note
 from chamberopt.chamber.scene import chamber_mesh
+from chamberopt.common.estimate import Estimate, estimate, student_quantile
 from chamberopt.common.parallel.executor import share
 from chamberopt.common.progress import Progress
 from chamberopt.coverage.coverage_from_impacts import Tally
@@ -44,7 +45,6 @@ from chamberopt.coverage.dent_marking import (
 )
 from chamberopt.coverage.intensity import intensity_uniformity
 from chamberopt.coverage.metrics import METRICS, ObjectiveFunction, parse_objective, target_coverage
-from chamberopt.coverage.statistics.confidence_interval import Estimate, estimate, student_quantile
 from chamberopt.simulation.evaluation import Evaluation, MarkedCoverage
 from chamberopt.simulation.replicas import (
     MIN_REPLICAS_TO_STOP,

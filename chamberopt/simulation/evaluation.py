@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 
 from chamberopt.common.errors import InputError
+from chamberopt.common.estimate import Estimate
 from chamberopt.common.files import UNREADABLE_NPZ, atomic_write
 from chamberopt.coverage.coverage_from_impacts import Tally
 from chamberopt.coverage.part_impacts import Hits, HitsByTriangle, sort_hits_by_triangle
-from chamberopt.coverage.statistics.confidence_interval import Estimate
 
 
 @dataclass(frozen=True)

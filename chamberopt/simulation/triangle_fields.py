@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from chamberopt.common.estimate import CONFIDENCE
 from chamberopt.coverage.coverage_from_impacts import (
     coverage_at,
     coverage_from_dent_density,
@@ -22,7 +23,6 @@ from chamberopt.coverage.coverage_from_impacts import (
     mean_speed_per_triangle,
 )
 from chamberopt.coverage.part_impacts import HitsByTriangle
-from chamberopt.coverage.statistics.confidence_interval import CONFIDENCE
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber

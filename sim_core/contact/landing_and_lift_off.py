@@ -1,5 +1,7 @@
 """Capture by a surface, and which supports a ball keeps as it moves on.
 
+When a rolling ball leaves its support is computed in path_end.py.
+
 Notation: b: ball. n: unit normal of a surface, towards the ball. v: velocity of the ball [m/s].
 The approach speed is -n v. A ball is captured by a still surface when this is below
 ContactState.capture and gravity or its own acceleration presses it on.

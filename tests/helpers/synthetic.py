@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from chamberopt.chamber.build import Chamber, Part
+from chamberopt.common.estimate import Estimate, estimate
 from chamberopt.coverage.coverage_from_impacts import Tally
 from chamberopt.coverage.metrics import METRICS, OBJECTIVES
 from chamberopt.coverage.part_impacts import Hits
-from chamberopt.coverage.statistics.confidence_interval import Estimate, estimate
 from chamberopt.design.load import Design, load_design
 from chamberopt.simulation.evaluate import estimate_metrics, weighted_sum
 from chamberopt.simulation.evaluation import Evaluation

@@ -1,13 +1,11 @@
 """Shapes of chambers: one file each, and the name by which a design chooses it.
 
-To add a shape, write a file with a subclass of ChamberTable and enter it in SHAPES below.
+The names a shape of one's own may import from here are below; registry.py lists the shapes.
 """
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.toml_fields import quantity
 from chamberopt.design.shapes.base import ChamberTable, ParametricChamber, WalledChamber
-from chamberopt.design.shapes.box import Box
-from chamberopt.design.shapes.conformal import Conformal
 from chamberopt.design.shapes.construction.surface import (
     TAG_PART,
     TAG_SONOTRODE,
@@ -17,10 +15,7 @@ from chamberopt.design.shapes.construction.surface import (
     is_sonotrode,
     lofted,
 )
-from chamberopt.design.shapes.cylinder import Cylinder
-from chamberopt.design.shapes.imported import Imported
-from chamberopt.design.shapes.prism import Prism
-from chamberopt.design.shapes.revolve import Revolve
+from chamberopt.design.shapes.registry import SHAPES
 
 __all__ = [
     "SHAPES",
@@ -37,12 +32,3 @@ __all__ = [
     "lofted",
     "quantity",
 ]
-
-SHAPES: dict[str, type[ChamberTable]] = {
-    "cylinder": Cylinder,
-    "box": Box,
-    "prism": Prism,
-    "revolve": Revolve,
-    "conformal": Conformal,
-    "imported": Imported,
-}

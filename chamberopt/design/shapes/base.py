@@ -1,4 +1,6 @@
-"""What chambers of several shapes have in common; each shape is a file of its own beside this one.
+"""What chambers of several shapes have in common.
+
+Each shape is a file of its own beside this one, entered in registry.py.
 
 ChamberTable          keys of every chamber: shape, sonotrode distance, holes, deflectors
   WalledChamber       + side walls all round, which may lean

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from chamberopt.common.errors import InputError
+from chamberopt.common.estimate import Estimate
 from chamberopt.common.files import make_output_folder, write_text
-from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.design.design import Design
 from chamberopt.optimize.storage.lock import only_writer
 from chamberopt.optimize.storage.resume import RecordedTrials

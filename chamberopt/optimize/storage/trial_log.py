@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any, Self
 
 from chamberopt.common.errors import InputError
+from chamberopt.common.estimate import Estimate
 from chamberopt.common.files import sync_folder
-from chamberopt.coverage.statistics.confidence_interval import Estimate
 
 HISTORY = "history.jsonl"
 TIMINGS = "timings.jsonl"

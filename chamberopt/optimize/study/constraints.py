@@ -8,9 +8,9 @@ from pydantic import BaseModel, Field, model_validator
 
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
+from chamberopt.common.estimate import Estimate, student_quantile
 from chamberopt.common.toml_errors import CrossCheckError, Problem
 from chamberopt.coverage.metrics import METRICS
-from chamberopt.coverage.statistics.confidence_interval import Estimate, student_quantile
 from chamberopt.design.design import Design
 from chamberopt.design.table_base import STRICT
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from chamberopt.common.estimate import Estimate
 from chamberopt.coverage.metrics import NEVER, parse_objective
-from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.design.shapes.base import is_custom
 from chamberopt.output.compare.comparability import (
     require_same_part,

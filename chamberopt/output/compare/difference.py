@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from chamberopt.coverage.statistics.confidence_interval import (
+from chamberopt.common.estimate import (
     CONFIDENCE,
     ZERO_TOLERANCE,
     Estimate,

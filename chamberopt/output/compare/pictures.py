@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from chamberopt.common.estimate import Estimate
 from chamberopt.coverage.metrics import NEVER
-from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.output.compare.comparison import TIME, Comparison
 from chamberopt.output.compare.distributions import Distributions, Histogram
 from chamberopt.output.compare.table import two_digits

@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from chamberopt.common.estimate import CONFIDENCE, Estimate
 from chamberopt.coverage.metrics import NEVER
-from chamberopt.coverage.statistics.confidence_interval import CONFIDENCE, Estimate
 from chamberopt.output.compare.comparison import TIME, Comparison
 from chamberopt.output.compare.difference import MAX_TIME_RATIO, ZERO_TOLERANCE, Difference
 

@@ -18,7 +18,7 @@ from chamberopt.output.plots.figure_style import new_figure, save_picture, style
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from chamberopt.coverage.statistics.confidence_interval import Estimate
+    from chamberopt.common.estimate import Estimate
 
 MAX_HALF_WIDTH = 0.15  # a curve ends where its coverage is known no better than that
 MAX_BANDS = 3  # results with a band around the 5th percentile; more bands would hide each other

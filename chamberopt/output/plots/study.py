@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chamberopt.coverage.statistics.confidence_interval import Estimate
+from chamberopt.common.estimate import Estimate
 from chamberopt.output.plots.colours import BLUE, GREEN, GREY, ORANGE
 from chamberopt.output.plots.figure_style import (
     new_figure,

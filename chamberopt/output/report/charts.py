@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from chamberopt.coverage.statistics.confidence_interval import Estimate
+from chamberopt.common.estimate import Estimate
 from chamberopt.optimize.sensitivity import Slice
 from chamberopt.output.plots.colours import BLUE, GREEN, ORANGE
 from chamberopt.output.plots.coverage import (

@@ -19,7 +19,7 @@ from chamberopt.output.report.number_text import (
 )
 
 if TYPE_CHECKING:
-    from chamberopt.coverage.statistics.confidence_interval import Estimate
+    from chamberopt.common.estimate import Estimate
     from chamberopt.output.results.load import Result
 
 STEPS = {

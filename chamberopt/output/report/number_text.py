@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from chamberopt.common.errors import InputError
+from chamberopt.common.estimate import ZERO_TOLERANCE
 from chamberopt.coverage.metrics import METRICS, parse_objective
-from chamberopt.coverage.statistics.confidence_interval import ZERO_TOLERANCE
 
 if TYPE_CHECKING:
-    from chamberopt.coverage.statistics.confidence_interval import Estimate
+    from chamberopt.common.estimate import Estimate
 
 THIN_SPACE = "\u202f"  # between thousands; no line breaks there
 

@@ -10,11 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from chamberopt.common.errors import InputError
-from chamberopt.coverage.statistics.confidence_interval import (
-    Estimate,
-    independent_difference,
-    paired_difference,
-)
+from chamberopt.common.estimate import Estimate, independent_difference, paired_difference
 from chamberopt.optimize.storage.study_folder import STUDY
 from chamberopt.optimize.storage.trial_log import HISTORY, read_trials
 from chamberopt.output.report.conclusions import accuracy_rows, answer, cost_rows, influence

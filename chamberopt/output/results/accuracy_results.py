@@ -9,9 +9,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from chamberopt.common.estimate import Estimate
 from chamberopt.common.files import write_text
 from chamberopt.common.versions import versions
-from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.design.load import save_design
 from chamberopt.output.plots.accuracy import accuracy_picture
 from chamberopt.simulation.convergence.parameters import FACETS, setting_text, short_name

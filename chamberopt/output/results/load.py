@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.common.errors import InputError
+from chamberopt.common.estimate import Estimate
 from chamberopt.coverage.metrics import METRICS
-from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.design.design import validate
 from chamberopt.design.load import Design
 from chamberopt.optimize.storage.study_folder import RESULT, is_study_folder

@@ -22,7 +22,7 @@ from chamberopt.simulation.complete_result import CandidateResult
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from chamberopt.coverage.statistics.confidence_interval import Estimate
+    from chamberopt.common.estimate import Estimate
     from chamberopt.optimize.run_study import StudyResult
     from chamberopt.optimize.run_sweep import SweepResult
     from chamberopt.simulation.effect_pilot import Advice

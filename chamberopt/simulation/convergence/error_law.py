@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chamberopt.coverage.statistics.confidence_interval import CONFIDENCE
+from chamberopt.common.estimate import CONFIDENCE
 
 NORMAL = 1.96  # half-width of a 95 % interval, in standard errors
 

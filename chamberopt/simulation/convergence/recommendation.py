@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from chamberopt.coverage.statistics.confidence_interval import student_quantile
+from chamberopt.common.estimate import student_quantile
 from chamberopt.simulation.convergence.parameters import REFERENCE, TIME, WARM_UP, setting_text
 from chamberopt.simulation.convergence.runs import Run
 from chamberopt.simulation.convergence.study import ConvergenceStudy

@@ -10,11 +10,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from chamberopt.chamber.scene import replica_seed
+from chamberopt.common.estimate import Estimate, estimate, paired_difference
 from chamberopt.coverage.coverage_from_impacts import Tally
 from chamberopt.coverage.coverage_intervals import coverage_estimates, target_patches
 from chamberopt.coverage.dent_marking import marked_share
 from chamberopt.coverage.metrics import parse_objective
-from chamberopt.coverage.statistics.confidence_interval import Estimate, estimate, paired_difference
 from chamberopt.simulation.evaluate import marked_coverage_estimates, weighted_sum
 from chamberopt.simulation.replicas import ReplicaSetting, simulate_replica
 

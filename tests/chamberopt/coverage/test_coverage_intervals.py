@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from chamberopt.chamber.build import build_chamber
+from chamberopt.common.estimate import Estimate
 from chamberopt.common.parallel.executor import local_executor
 from chamberopt.coverage.coverage_from_impacts import Tally
 from chamberopt.coverage.coverage_intervals import (
@@ -12,7 +13,6 @@ from chamberopt.coverage.coverage_intervals import (
     target_patches,
 )
 from chamberopt.coverage.metrics import METRICS, OBJECTIVES
-from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.simulation.evaluate import ReplicaPlan, estimate_metrics, evaluate, weighted_sum
 from tests.helpers.synthetic import equal_dents, patchwork, plate_design
 

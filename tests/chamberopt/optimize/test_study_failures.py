@@ -19,7 +19,7 @@ import chamberopt
 from chamberopt.chamber.build import build_chamber
 from chamberopt.cli import main
 from chamberopt.cli.interrupt import EARLY, FIRST, SECOND
-from chamberopt.coverage.statistics.confidence_interval import Estimate
+from chamberopt.common.estimate import Estimate
 from chamberopt.optimize.evaluate_candidate import FAILURE_PENALTY
 from chamberopt.optimize.study import load_study
 from chamberopt.output.results.load import load_result

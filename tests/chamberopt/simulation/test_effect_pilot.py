@@ -14,9 +14,9 @@ from chamberopt.chamber import dimensionless
 from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.scene import chamber_mesh, scene_physics
 from chamberopt.common.errors import InputError
+from chamberopt.common.estimate import Estimate
 from chamberopt.common.parallel.executor import SerialExecutor, local_executor
 from chamberopt.coverage.metrics import exposed_target
-from chamberopt.coverage.statistics.confidence_interval import Estimate
 from chamberopt.design.design import validate
 from chamberopt.design.load import Design
 from chamberopt.simulation import effect_pilot

@@ -5,10 +5,10 @@ import pytest
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
+from chamberopt.common.estimate import estimate, paired_difference
 from chamberopt.common.parallel.executor import SerialExecutor, local_executor
 from chamberopt.coverage.coverage_from_impacts import Tally
 from chamberopt.coverage.metrics import METRICS, OBJECTIVES
-from chamberopt.coverage.statistics.confidence_interval import estimate, paired_difference
 from chamberopt.design.design import validate
 from chamberopt.design.load import Design
 from chamberopt.simulation.evaluate import ReplicaPlan, estimate_metrics, evaluate, weighted_sum

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from chamberopt.coverage.statistics.confidence_interval import estimate
+from chamberopt.common.estimate import estimate
 from chamberopt.simulation.replicas import MIN_REPLICAS_TO_STOP, next_replica_count
 
 

@@ -16,7 +16,7 @@ import pytest
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
-from chamberopt.coverage.statistics.confidence_interval import Estimate
+from chamberopt.common.estimate import Estimate
 from chamberopt.design.load import Design
 from chamberopt.optimize.storage.study_folder import StudyFolder, open_study_folder
 from chamberopt.optimize.study import Objective, Study

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from chamberopt.coverage.statistics.confidence_interval import Estimate, estimate
+from chamberopt.common.estimate import Estimate, estimate
 from chamberopt.optimize.study import Limits
 from chamberopt.optimize.study.constraints import assess_feasibility, expected_violation
 from tests.helpers.known_optima import bowl, bowl_shares, run_bowl

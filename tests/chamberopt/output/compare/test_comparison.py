@@ -13,8 +13,8 @@ from scipy import stats
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
+from chamberopt.common.estimate import Estimate, estimate
 from chamberopt.coverage.metrics import NEVER
-from chamberopt.coverage.statistics.confidence_interval import Estimate, estimate
 from chamberopt.design.design import validate
 from chamberopt.design.load import Design, load_design
 from chamberopt.output import viewer

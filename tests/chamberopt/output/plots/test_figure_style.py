@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from chamberopt.coverage.statistics.confidence_interval import Estimate
+from chamberopt.common.estimate import Estimate
 from chamberopt.output.plots.figure_style import value_range
 
 

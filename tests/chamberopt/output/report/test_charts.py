@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 
-from chamberopt.coverage.statistics.confidence_interval import Estimate
+from chamberopt.common.estimate import Estimate
 from chamberopt.output.plots.coverage import HistogramData, draw_histogram
 from chamberopt.output.plots.figure_style import SVG, new_figure
 from chamberopt.output.plots.study import EvaluatedCandidate, draw_convergence

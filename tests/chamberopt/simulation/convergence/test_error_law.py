@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from chamberopt.coverage.statistics.confidence_interval import student_quantile
+from chamberopt.common.estimate import student_quantile
 from chamberopt.simulation.convergence.error_law import (
     NORMAL,
     BatchSize,

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from chamberopt.coverage.statistics.confidence_interval import Estimate, estimate, student_quantile
+from chamberopt.common.estimate import Estimate, estimate, student_quantile
 from chamberopt.design.load import load_design
 from chamberopt.output.results.accuracy_results import describe_error_law
 from chamberopt.simulation.convergence.error_law import BatchSize, ErrorLaw

@@ -1,4 +1,4 @@
-"""Estimates with 95 % confidence intervals from independent replicas.
+"""Estimates of any quantity with 95 % confidence intervals from independent replicas.
 
 Notation
     n       number of replicas

@@ -5,12 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from chamberopt.coverage.statistics.confidence_interval import (
-    Estimate,
-    estimate,
-    independent_difference,
-    paired_difference,
-)
+from chamberopt.common.estimate import Estimate, estimate, independent_difference, paired_difference
 
 
 def test_differences() -> None:

@@ -1,0 +1,21 @@
+"""The shapes of chambers by the name with which a design chooses one.
+
+To add a shape, write a file with a subclass of ChamberTable and enter it here.
+"""
+
+from chamberopt.design.shapes.base import ChamberTable
+from chamberopt.design.shapes.box import Box
+from chamberopt.design.shapes.conformal import Conformal
+from chamberopt.design.shapes.cylinder import Cylinder
+from chamberopt.design.shapes.imported import Imported
+from chamberopt.design.shapes.prism import Prism
+from chamberopt.design.shapes.revolve import Revolve
+
+SHAPES: dict[str, type[ChamberTable]] = {
+    "cylinder": Cylinder,
+    "box": Box,
+    "prism": Prism,
+    "revolve": Revolve,
+    "conformal": Conformal,
+    "imported": Imported,
+}
