@@ -23,7 +23,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.table import print_table, write_csv
-from chamberopt.chamber.build import Chamber, Part, build_chamber
+from chamberopt.chamber.build import Chamber, build_chamber
+from chamberopt.chamber.part import Part
 from chamberopt.common.estimate import estimate
 from chamberopt.coverage.coverage_from_impacts import Tally
 from chamberopt.coverage.metrics import METRICS, OBJECTIVES

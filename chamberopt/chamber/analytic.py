@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.chamber.build import TAG_PART, TAG_SONOTRODE, TAG_WALL
 from chamberopt.common.errors import InputError
+from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL
 from chamberopt.design.shapes.cylinder import Cylinder
 from chamberopt.geometry.triangles import area_vectors, areas, tetrahedron_volumes
 

@@ -28,7 +28,7 @@ from chamberopt.design.shapes import (
     is_sonotrode,
     lofted,
 )
-from chamberopt.geometry.mesh_io import format_point
+from chamberopt.geometry.mesh_io.surface_error import format_point
 from chamberopt.geometry.solids import (
     Solid,
     SolidSurface,

@@ -23,17 +23,11 @@ from chamberopt.chamber.bores_and_deflectors import (
     triangle_properties,
 )
 from chamberopt.chamber.deflector_meshes import read_deflectors
-from chamberopt.chamber.part import Part, posed_part, turning_axis
+from chamberopt.chamber.part import Part, posed_part
 from chamberopt.chamber.reach.reach import find_reach, reached_part_share
 from chamberopt.common.errors import InputError
-from chamberopt.design.shapes import (
-    TAG_PART,
-    TAG_SONOTRODE,
-    TAG_WALL,
-    further_sonotrode_tag,
-    is_sonotrode,
-)
-from chamberopt.geometry.mesh_io import format_box, format_point
+from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, further_sonotrode_tag, is_sonotrode
+from chamberopt.geometry.mesh_io.surface_error import format_box, format_point
 from chamberopt.geometry.slivers import MIN_HEIGHT, remove_slivers
 from chamberopt.geometry.solids import (
     Solid,
@@ -58,16 +52,6 @@ if TYPE_CHECKING:
 # Rotation of a triangle by rounding [rad] that is worth a note; the facets of a round wall turn a
 # ball's path a hundred times as much.
 MAX_ROTATION = 1e-3
-
-__all__ = [
-    "TAG_PART",
-    "TAG_SONOTRODE",
-    "TAG_WALL",
-    "Chamber",
-    "Part",
-    "build_chamber",
-    "turning_axis",
-]
 
 
 @dataclass(frozen=True)

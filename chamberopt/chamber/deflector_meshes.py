@@ -8,7 +8,8 @@ import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.design.shapes import lofted
-from chamberopt.geometry.mesh_io import SurfaceError, read_part_cached
+from chamberopt.geometry.mesh_io.part_mesh import read_part_cached
+from chamberopt.geometry.mesh_io.surface_error import SurfaceError
 from chamberopt.geometry.triangles import rotation_matrix
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ import numpy as np
 
 from chamberopt.chamber.target import chosen_triangles
 from chamberopt.common.errors import InputError
-from chamberopt.geometry.mesh_io import PartMesh, read_part_cached
+from chamberopt.geometry.mesh_io.part_mesh import PartMesh, read_part_cached
 from chamberopt.geometry.remesh import remesh, triangle_quality
 from chamberopt.geometry.solids import snap_to_grid
 from chamberopt.geometry.triangles import areas, rotation_matrix

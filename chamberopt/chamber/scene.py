@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.chamber.build import TAG_PART, TAG_SONOTRODE, turning_axis
+from chamberopt.chamber.part import turning_axis
 from chamberopt.common.errors import InputError
-from chamberopt.design.shapes import further_sonotrode_tag
+from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, further_sonotrode_tag
 
 # A prediction compares one ball with every other. For 20,000 balls it takes about 40 µs, and every
 # ball needs about a thousand predictions a simulated second.

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.geometry.mesh_io import PartMesh, select_triangles
+from chamberopt.geometry.mesh_io.part_mesh import PartMesh, select_triangles
 from chamberopt.geometry.triangles import area_vectors
 
 if TYPE_CHECKING:

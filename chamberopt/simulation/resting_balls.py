@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.chamber.build import TAG_PART
 from chamberopt.chamber.checks.place_names import around, surface_names
+from chamberopt.design.shapes import TAG_PART
 from chamberopt.geometry.triangles import closest_on_each, connected_pieces
 
 if TYPE_CHECKING:

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from chamberopt.chamber.build import Chamber, Part
+from chamberopt.chamber.build import Chamber
+from chamberopt.chamber.part import Part
 from chamberopt.common.estimate import Estimate, estimate
 from chamberopt.coverage.coverage_from_impacts import Tally
 from chamberopt.coverage.metrics import METRICS, OBJECTIVES

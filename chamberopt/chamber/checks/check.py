@@ -6,14 +6,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chamberopt.chamber.build import TAG_PART, TAG_SONOTRODE, TAG_WALL, hidden_share, turning_axis
+from chamberopt.chamber.build import hidden_share
 from chamberopt.chamber.checks.gaps import gap_warnings, pocket_warnings, target_warnings
 from chamberopt.chamber.checks.ledges import find_ledges
 from chamberopt.chamber.checks.place_names import CEILING, SIDE_WALL, on_target, surface_names
 from chamberopt.chamber.dimensionless import free_path
+from chamberopt.chamber.part import turning_axis
 from chamberopt.chamber.reach.reach import Reach, find_reach
 from chamberopt.chamber.scene import chamber_mesh, require_ball_count, require_turnable
-from chamberopt.design.shapes import is_sonotrode
+from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL, is_sonotrode
 from chamberopt.geometry.triangles import areas, tetrahedron_volumes
 
 if TYPE_CHECKING:

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from chamberopt.chamber.build import TAG_PART, TAG_SONOTRODE, TAG_WALL
 from chamberopt.chamber.checks.place_names import around, mm2
 from chamberopt.chamber.reach.connectivity import connected_groups
+from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL
 from chamberopt.geometry.triangles import area_vectors
 
 if TYPE_CHECKING:

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.chamber.build import TAG_PART, TAG_SONOTRODE, TAG_WALL
-from chamberopt.design.shapes import further_sonotrode_tag
+from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL, further_sonotrode_tag
 from chamberopt.geometry.triangles import area_vectors
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from chamberopt.cli.prepare import advise_effects
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.chamber.reach.reach import Reach
-    from chamberopt.geometry.mesh_io import SurfaceError
+    from chamberopt.geometry.mesh_io.surface_error import SurfaceError
 
 
 @app.command
@@ -43,7 +43,7 @@ def check(
     from chamberopt.chamber.build import build_chamber
     from chamberopt.chamber.checks.check import describe, shot_reach
     from chamberopt.common.files import make_output_folder, write_text
-    from chamberopt.geometry.mesh_io import SurfaceError
+    from chamberopt.geometry.mesh_io.surface_error import SurfaceError
     from chamberopt.optimize.study import Study, load
     from chamberopt.output.vtp_files import write_chamber
 

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from chamberopt.geometry.mesh_io import PartMesh
+from chamberopt.geometry.mesh_io.part_mesh import PartMesh
 from chamberopt.geometry.mesh_io.units import METRES_PER
 from chamberopt.output.export.element_fields import ElementFields
 

@@ -10,7 +10,7 @@ import numpy as np
 from chamberopt.geometry.triangles import areas
 
 if TYPE_CHECKING:
-    from chamberopt.geometry.mesh_io import PartMesh
+    from chamberopt.geometry.mesh_io.part_mesh import PartMesh
 
 # Meaning of each column of coverage.vtp, and how the triangles of an element are combined: their
 # sum, their largest, or a mean weighted with exposed area, impacts or dents.

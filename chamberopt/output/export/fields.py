@@ -11,7 +11,7 @@ import numpy as np
 from chamberopt.chamber.part import part_meshes
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import atomic_write, write_text
-from chamberopt.geometry.mesh_io import PartMesh
+from chamberopt.geometry.mesh_io.part_mesh import PartMesh
 from chamberopt.output.export.abaqus_deck import abaqus_deck
 from chamberopt.output.export.element_fields import (
     COLUMNS,

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.geometry.mesh_io import PartMesh
+from chamberopt.geometry.mesh_io.part_mesh import PartMesh
 from chamberopt.geometry.mesh_io.units import METRES_PER
 from chamberopt.output.export.element_fields import ElementFields
 

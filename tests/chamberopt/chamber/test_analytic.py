@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from chamberopt.chamber.analytic import analytic_cavity, impacts_on_chamber
-from chamberopt.chamber.build import Chamber, Part, build_chamber
+from chamberopt.chamber.build import Chamber, build_chamber
+from chamberopt.chamber.part import Part
 from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import local_executor
 from chamberopt.design.design import validate

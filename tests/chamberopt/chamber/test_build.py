@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 import trimesh
 
-from chamberopt.chamber.build import TAG_PART, TAG_SONOTRODE, TAG_WALL, Chamber, Part, build_chamber
+from chamberopt.chamber.build import Chamber, build_chamber
+from chamberopt.chamber.part import Part
 from chamberopt.common.errors import InputError
 from chamberopt.design.load import Design, load_design
+from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL
 from chamberopt.geometry.solids import make_solid
 from chamberopt.geometry.triangles import area_vectors, areas, heights
 

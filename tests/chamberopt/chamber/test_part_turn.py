@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from chamberopt.chamber.build import build_chamber, turning_axis
+from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.checks.check import describe
+from chamberopt.chamber.part import turning_axis
 from chamberopt.chamber.scene import build_scene, chamber_mesh, require_turnable
 from chamberopt.common.errors import InputError
 from chamberopt.design.design import Design

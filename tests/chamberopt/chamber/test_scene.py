@@ -5,11 +5,12 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from chamberopt.chamber.build import TAG_PART, TAG_SONOTRODE, build_chamber
+from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.scene import build_scene, chamber_mesh, replica_seed, start_velocities
 from chamberopt.common.errors import InputError
 from chamberopt.design.effects import Effects, FrictionTable, SurfaceEffectTable
 from chamberopt.design.load import load_design
+from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE
 from chamberopt.design.shot import ShotSize
 from sim_core import Drag, Rest, SurfaceEffects
 from sim_core.effects.restitution import ELASTIC_BELOW

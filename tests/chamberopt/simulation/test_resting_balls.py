@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from chamberopt.chamber.build import Chamber, Part, build_chamber
+from chamberopt.chamber.build import Chamber, build_chamber
+from chamberopt.chamber.part import Part
 from chamberopt.chamber.scene import build_scene, chamber_mesh, replica_seed
 from chamberopt.design.effects import FrictionTable
 from chamberopt.simulation.resting_balls import (

@@ -20,15 +20,14 @@ from chamberopt.design.shapes.construction.surface import (
     TAG_WALL,
     ShapeSurface,
 )
-from chamberopt.geometry.mesh_io import (
-    OpenSurfaceError,
+from chamberopt.geometry.mesh_io.part_mesh import (
     PartMesh,
     TriangleSoup,
     close_surface,
-    format_point,
     read_triangles,
     select_triangles,
 )
+from chamberopt.geometry.mesh_io.surface_error import OpenSurfaceError, format_point
 from chamberopt.geometry.solids import Solid, make_solid, overlap_volume, snap_to_grid, unite
 from chamberopt.geometry.triangles import area_vectors, find_shells, find_unwalled_border
 

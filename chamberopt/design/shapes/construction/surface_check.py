@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 
 from chamberopt.design.shapes.construction.surface import TAG_SONOTRODE, TAG_WALL, ShapeSurface
-from chamberopt.geometry.mesh_io import SurfaceError, format_point
 from chamberopt.geometry.mesh_io.self_intersection import refuse_self_intersection
+from chamberopt.geometry.mesh_io.surface_error import SurfaceError, format_point
 from chamberopt.geometry.triangles import area_vectors, find_shells
 
 MAX_WIDTH = 10.0  # m: shipped shapes are smaller; a chamber with mm taken for m is larger

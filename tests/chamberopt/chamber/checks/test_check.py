@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from chamberopt.chamber.build import TAG_SONOTRODE, Chamber, build_chamber
+from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.check import describe, shot_reach, warnings
 from chamberopt.chamber.checks.ledges import find_ledges
 from chamberopt.chamber.reach.reach import Reach
 from chamberopt.design.design import Design, validate
 from chamberopt.design.load import load_design
+from chamberopt.design.shapes import TAG_SONOTRODE
 from sim_core import SceneError
 
 DESIGNS = Path(__file__).resolve().parents[4] / "designs"

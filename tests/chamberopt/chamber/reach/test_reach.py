@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 import trimesh
 
-from chamberopt.chamber.build import TAG_PART, TAG_SONOTRODE, TAG_WALL, Chamber, Part, build_chamber
+from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.gaps import gap_warnings, pocket_warnings, target_warnings
+from chamberopt.chamber.part import Part
 from chamberopt.chamber.reach.largest_ball import largest_balls
 from chamberopt.chamber.reach.reach import TOLERATED_OVERLAP, Reach, find_reach, reached_part_share
 from chamberopt.chamber.scene import build_scene, chamber_mesh
 from chamberopt.design.load import load_design
+from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL
 from chamberopt.geometry.triangles import area_vectors, areas
 from sim_core import simulate
 

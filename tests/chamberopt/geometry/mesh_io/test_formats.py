@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from chamberopt.common.errors import InputError
-from chamberopt.geometry.mesh_io import MESH_FORMATS, read_part
+from chamberopt.geometry.mesh_io.formats import MESH_FORMATS
+from chamberopt.geometry.mesh_io.part_mesh import read_part
 from tests.helpers.mesh_files import (
     CORNERS,
     GMSH_4,

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from chamberopt.geometry.mesh_io import read_part
+from chamberopt.geometry.mesh_io.part_mesh import read_part
 from chamberopt.geometry.triangles import tetrahedron_volumes
 from tests.helpers.mesh_files import box_corners, write_ascii_stl, write_stl
 

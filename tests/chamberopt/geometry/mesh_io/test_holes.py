@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from chamberopt.geometry.mesh_io import SurfaceError, read_part
+from chamberopt.geometry.mesh_io.part_mesh import read_part
+from chamberopt.geometry.mesh_io.surface_error import SurfaceError
 from chamberopt.geometry.triangles import tetrahedron_volumes
 from tests.helpers.mesh_files import ball_corners, box_corners, write_ascii_stl, write_stl
 

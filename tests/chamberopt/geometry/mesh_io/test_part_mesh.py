@@ -8,7 +8,7 @@ import pytest
 import trimesh
 
 from chamberopt.common.errors import InputError
-from chamberopt.geometry.mesh_io import read_part
+from chamberopt.geometry.mesh_io.part_mesh import read_part
 from chamberopt.geometry.triangles import tetrahedron_volumes
 from tests.helpers.mesh_files import ball_corners, box_corners, write_ascii_stl, write_stl
 

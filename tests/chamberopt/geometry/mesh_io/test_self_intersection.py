@@ -6,7 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from chamberopt.geometry.mesh_io import SurfaceError, read_part, self_intersection
+from chamberopt.geometry.mesh_io import self_intersection
+from chamberopt.geometry.mesh_io.part_mesh import read_part
+from chamberopt.geometry.mesh_io.surface_error import SurfaceError
 from tests.helpers.mesh_files import ball_corners, box_corners, write_stl
 
 

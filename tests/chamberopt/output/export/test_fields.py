@@ -15,7 +15,7 @@ import tomli_w
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.design.load import Design, load_design
-from chamberopt.geometry.mesh_io import read_part
+from chamberopt.geometry.mesh_io.part_mesh import read_part
 from chamberopt.output import viewer
 from chamberopt.output.export.element_fields import COLUMNS
 from chamberopt.output.export.fields import write_fields

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chamberopt.chamber.build import TAG_PART, TAG_SONOTRODE
 from chamberopt.common.errors import InputError
+from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE
 from chamberopt.output.resimulate.flight import face_displacement, rotation_angle, simulate_flight
 from chamberopt.output.resimulate.rebuild import RebuiltReplica, rebuild_replica
 from chamberopt.output.results.load import Result

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from chamberopt.geometry.mesh_io import read_part
+from chamberopt.geometry.mesh_io.part_mesh import read_part
 from tests.helpers.mesh_files import SIDES, TOP_AREA, assert_box, named_area
 
 

@@ -9,7 +9,7 @@ import pyvista
 import trimesh
 
 from chamberopt.design.shapes.construction.cad_setup import read_setup
-from chamberopt.geometry.mesh_io import PartMesh, close_surface, read_part, read_triangles
+from chamberopt.geometry.mesh_io.part_mesh import PartMesh, close_surface, read_part, read_triangles
 from tests.helpers.mesh_files import (
     CORNERS,
     GMSH_4,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chamberopt.common.errors import InputError
-from chamberopt.geometry.mesh_io import read_part
+from chamberopt.geometry.mesh_io.part_mesh import read_part
 from tests.helpers.mesh_files import SIDES, step_of_a_box, written
 
 

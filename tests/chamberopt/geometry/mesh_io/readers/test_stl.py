@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 import trimesh
 
-from chamberopt.geometry.mesh_io import read_part
+from chamberopt.geometry.mesh_io.part_mesh import read_part
 from tests.helpers.mesh_files import (
     CORNERS,
     QUADS,

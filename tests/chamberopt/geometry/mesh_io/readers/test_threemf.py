@@ -8,7 +8,7 @@ import pytest
 import trimesh
 
 from chamberopt.common.errors import InputError
-from chamberopt.geometry.mesh_io import read_part
+from chamberopt.geometry.mesh_io.part_mesh import read_part
 from tests.helpers.mesh_files import SIDES, named_area, volume
 
 
