@@ -36,7 +36,7 @@ def _draw_errors(axes: Axes, study: ConvergenceStudy) -> None:
         axes.axhline(accuracy, color=GREY, lw=0.8, ls=":")
     sizes, law = study.sizes, study.law
     cost, error, low, high = np.array(
-        [[one.cpu_s, one.error, NORMAL * one.low, NORMAL * one.high] for one in sizes]
+        [[one.cpu_s, one.error, *np.multiply(NORMAL, one.interval)] for one in sizes]
     ).T
     axes.errorbar(cost, error, yerr=[error - low, high - error], fmt="o", ms=6, lw=1, color=BLUE,
                   zorder=4, label="4, 8, 16 … replicas of the reference: 95 % error")  # fmt: skip

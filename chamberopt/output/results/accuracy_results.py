@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from chamberopt.common.estimate import Estimate
-from chamberopt.common.files import write_text
+from chamberopt.common.files import write_csv, write_text
 from chamberopt.common.versions import versions
 from chamberopt.design.load import save_design
 from chamberopt.output.plots.accuracy import accuracy_picture
 from chamberopt.simulation.convergence.parameters import FACETS, setting_text, short_name
 from chamberopt.simulation.convergence.recommendation import ACCURACIES, recommend
-from chamberopt.simulation.convergence.runs import Run
 from chamberopt.simulation.convergence.study import ConvergenceStudy
 
 FORMAT = 2
@@ -25,82 +22,68 @@ FORMAT = 2
 def write_accuracy_results(folder: Path, study: ConvergenceStudy) -> None:
     """Leave accuracy.json, accuracy.csv, accuracy.png and the design in an empty folder."""
     save_design(study.design, folder / "design.toml")
-    table = io.StringIO()
-    writer = csv.DictWriter(table, list(rows(study)[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows(study))
-    write_text(folder / "accuracy.csv", table.getvalue())
-    write_text(
-        folder / "accuracy.json", json.dumps(accuracy_json(study), indent=2, allow_nan=False) + "\n"
-    )
+    write_csv(folder / "accuracy.csv", rows(study))
+    text = json.dumps(accuracy_json(study), indent=2, allow_nan=False)
+    write_text(folder / "accuracy.json", text + "\n")
     accuracy_picture(folder / "accuracy.png", study)
 
 
 def rows(study: ConvergenceStudy) -> list[dict[str, Any]]:
     """One row a run and a batch size, with the same columns; None where a column does not apply."""
-    columns = ("rms_error", "rms_low", "rms_high", "mean_half_width", "batches")
-    runs = [
-        _run_row(run, study.reference) | dict.fromkeys(columns)
-        for run in (study.reference, *study.runs, *study.models)
-    ]
+    runs = []
+    for run in (study.reference, *study.runs, *study.models):
+        row: dict[str, Any] = {
+            "parameter": run.parameter,
+            "setting": run.setting,
+            "replicas": run.replicas,
+            "cpu_times_reference": run.cpu.value / study.reference.cpu.value,
+        }
+        names = ("cpu_s", "objective", "mean_coverage", "bias", "bias_mean_coverage")
+        values = (run.cpu, run.objective, run.mean, run.bias, run.mean_bias)
+        for name, value in zip(names, values, strict=True):
+            row |= {name: value.value, f"{name}_half_width": value.half_width}
+        runs.append(row)
     sizes = [
-        dict.fromkeys(runs[0])
-        | {
+        {
             "parameter": "replicas",
             "setting": str(size.replicas),
             "replicas": size.replicas,
             "cpu_s": size.cpu_s,
             "rms_error": size.rms,
-            "rms_low": size.low,
-            "rms_high": size.high,
+            "rms_low": size.interval[0],
+            "rms_high": size.interval[1],
             "mean_half_width": size.half_width,
             "batches": size.batches,
         }
         for size in study.sizes
     ]
-    return [*runs, *sizes]
-
-
-def _run_row(run: Run, reference: Run) -> dict[str, Any]:
-    row: dict[str, Any] = {
-        "parameter": run.parameter,
-        "setting": run.setting,
-        "replicas": run.replicas,
-        "cpu_times_reference": run.cpu.value / reference.cpu.value,
-    }
-    for name, value in (
-        ("cpu_s", run.cpu),
-        ("objective", run.objective),
-        ("mean_coverage", run.mean),
-        ("bias", run.bias),
-        ("bias_mean_coverage", run.mean_bias),
-    ):
-        row |= {name: value.value, f"{name}_half_width": value.half_width}
-    return row
+    columns = dict.fromkeys((*runs[0], *sizes[0]))
+    return [columns | row for row in (*runs, *sizes)]
 
 
 def accuracy_text(study: ConvergenceStudy) -> list[str]:
     """The lines that the command prints."""
-    lines = [describe_reference(study), ""]
-    lines.append(
-        f"{'replicas':>10}{'CPU s':>9}{'RMS error':>12}{'95 % interval':>20}{'own interval':>15}"
-    )
-    lines += [
-        f"{size.replicas:10}{size.cpu_s:9.2f}{size.rms:12.4f}{size.low:11.4f} .. {size.high:.4f}"
-        f"{f'± {size.half_width:.4f}':>15}"
-        for size in study.sizes
+    lines = [
+        describe_reference(study),
+        "",
+        f"{'replicas':>10}{'CPU s':>9}{'RMS error':>12}{'95 % interval':>20}{'own interval':>15}",
     ]
-    lines += [describe_error_law(study), ""]
-    lines.append(
+    for size in study.sizes:
+        low, high = size.interval
+        lines.append(
+            f"{size.replicas:10}{size.cpu_s:9.2f}{size.rms:12.4f}{low:11.4f} .. {high:.4f}"
+            f"{f'± {size.half_width:.4f}':>15}"
+        )
+    lines += [
+        describe_error_law(study),
+        "",
         f"{'parameter':24}{'setting':>24}{'CPU s a replica':>19}"
-        f"{'bias of objective':>21}{'of mean coverage':>21}"
-    )
+        f"{'bias of objective':>21}{'of mean coverage':>21}",
+    ]
     for run in (*study.runs, *study.models):
         cpu = f"{run.cpu.value:.3f} ± {run.cpu.half_width:.3f}"
-        lines.append(
-            f"{short_name(run.parameter):24}{run.setting:>24}{cpu:>19}"
-            f"{_signed(run.bias):>21}{_signed(run.mean_bias):>21}"
-        )
+        biases = "".join(f"{_signed(bias):>21}" for bias in (run.bias, run.mean_bias))
+        lines.append(f"{short_name(run.parameter):24}{run.setting:>24}{cpu:>19}{biases}")
     if study.models:
         lines.append(
             f"the last {len(study.models)}: from the same impacts of {study.model_time:.3g} s of "
@@ -127,8 +110,8 @@ def accuracy_json(study: ConvergenceStudy) -> dict[str, Any]:
     recommendations = []
     for accuracy in ACCURACIES:
         advice = recommend(study, accuracy)
-        row = {**asdict(advice), "lines": advice.lines}
-        recommendations.append(row if advice.replicas else row | {"cpu_s": None})
+        cpu_s = advice.cpu_s if advice.replicas else None
+        recommendations.append({**asdict(advice), "cpu_s": cpu_s, "lines": advice.lines})
     return {
         "format": FORMAT,
         "reference": {"text": describe_reference(study), "settings": study.settings},

@@ -24,25 +24,14 @@ NORMAL = 1.96  # half-width of a 95 % interval, in standard errors
 
 @dataclass(frozen=True)
 class BatchSize:
-    """Errors of batches of one size.
+    """Errors of batches of one size."""
 
-    Args:
-        replicas: of a batch.
-        batches: number of batches.
-        rms, low, high: root mean square error of the objective, and its 95 % interval.
-        half_width: mean half-width of the intervals that the batches themselves estimate.
-        cpu_s: CPU seconds of a batch, simulation and estimate.
-        are_merged: whether some batches had so few dents that triangles were merged, which causes
-            errors of its own.
-    """
-
-    replicas: int
+    replicas: int  # of a batch
     batches: int
-    rms: float
-    low: float
-    high: float
-    half_width: float
-    cpu_s: float
+    rms: float  # root mean square error of the objective
+    half_width: float  # mean half-width of the intervals that the batches themselves estimate
+    cpu_s: float  # of a batch, simulation and estimate
+    # Whether some batches had so few dents that triangles were merged, which causes errors too.
     are_merged: bool = False
 
     @property
@@ -50,18 +39,19 @@ class BatchSize:
         """Half-width of a 95 % interval that is as wide as the errors are."""
         return NORMAL * self.rms
 
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % interval of the root mean square error."""
+        return rms_interval(self.rms, self.batches)
+
 
 @dataclass(frozen=True)
 class ErrorLaw:
-    """error = scale · cost^(-power).
-
-    Args:
-        half_width: of the 95 % interval of the power.
-    """
+    """error = scale · cost^(-power)."""
 
     scale: float
     power: float
-    half_width: float = math.inf
+    half_width: float = math.inf  # of the 95 % interval of the power
 
     @property
     def halving(self) -> tuple[float, float, float]:

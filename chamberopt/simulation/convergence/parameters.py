@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable
 from typing import Any
 
 from chamberopt.design.design import Design
@@ -17,25 +19,24 @@ REFERENCE, DESIGNED = "reference", "as designed"
 def numerical_parameters(design: Design) -> dict[str, tuple[Any, ...]]:
     """Settings of every numerical parameter by dotted name; the last is the reference's."""
     accuracy = design.process.accuracy
-    settings: dict[str, tuple[Any, ...]] = {}
+    settings: dict[str, Iterable[Any]] = {}
     if design.chamber.is_round:
         facets = design.value(FACETS)
-        settings[FACETS] = tuple(sorted({16, facets, min(1024, max(256, 4 * facets))}))
+        settings[FACETS] = sorted({16, facets, min(1024, max(256, 4 * facets))})
     if not design.sonotrodes:
-        settings[MOTION] = ("random_phase", "sinusoidal")
-    warm_up, speed = accuracy.warmup_time_s, accuracy.elastic_below_mm_s
-    settings[WARM_UP] = tuple(sorted({0.0, warm_up / 4, warm_up, min(1e4, 4 * max(warm_up, 0.05))}))
-    settings[ELASTIC_SPEED] = tuple(
-        sorted({min(1e3, 10 * speed), speed, max(0.1, speed / 10)}, reverse=True)
-    )
+        settings[MOTION] = "random_phase", "sinusoidal"
+    warm_up, time_s = accuracy.warmup_time_s, accuracy.simulated_time_s
+    settings[WARM_UP] = sorted({0.0, warm_up / 4, warm_up, min(1e4, 4 * max(warm_up, 0.05))})
+    settings[ELASTIC_SPEED] = _falling(accuracy.elastic_below_mm_s, 10)
     if design.effects.drag:
-        step = accuracy.drag_step_ms
-        settings[DRAG_STEP] = tuple(
-            sorted({min(1e3, 4 * step), step, max(0.1, step / 4)}, reverse=True)
-        )
-    time_s = accuracy.simulated_time_s
+        settings[DRAG_STEP] = _falling(accuracy.drag_step_ms, 4)
     settings[TIME] = max(1e-4, time_s / 4), min(1e4, 4 * time_s), time_s
-    return settings
+    return {name: tuple(values) for name, values in settings.items()}
+
+
+def _falling(value: float, factor: float) -> list[float]:
+    """A value between a larger and a smaller one, all from 0.1 to 1000, as both fields allow."""
+    return sorted({min(1e3, factor * value), value, max(0.1, value / factor)}, reverse=True)
 
 
 def study_designs(design: Design) -> tuple[dict[str, Any], dict[tuple[str, str], Design]]:
@@ -49,11 +50,12 @@ def study_designs(design: Design) -> tuple[dict[str, Any], dict[tuple[str, str],
     parameters = numerical_parameters(own)
     settings = {name: values[-1] for name, values in parameters.items()}
     reference = own.changed(settings)
-    designs = {(REFERENCE, ""): reference}
-    for name, values in parameters.items():
-        for value in values[:-1]:
-            designs[name, setting_text(value)] = reference.changed({name: value})
-    return settings, designs | {(DESIGNED, ""): own}
+    others = {
+        (name, setting_text(value)): reference.changed({name: value})
+        for name, values in parameters.items()
+        for value in values[:-1]
+    }
+    return settings, {(REFERENCE, ""): reference, **others, (DESIGNED, ""): own}
 
 
 def setting_text(value: Any) -> str:
@@ -63,7 +65,4 @@ def setting_text(value: Any) -> str:
 
 def short_name(parameter: str) -> str:
     """The key of a parameter without table and unit."""
-    key = parameter.rsplit(".", 1)[-1]
-    for unit in ("_mm_s", "_ms", "_s"):
-        key = key.removesuffix(unit)
-    return key.replace("_", " ")
+    return re.sub("_(mm_s|ms|s)$", "", parameter.rsplit(".", 1)[-1]).replace("_", " ")

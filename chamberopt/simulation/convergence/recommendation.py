@@ -12,7 +12,6 @@ import numpy as np
 
 from chamberopt.common.estimate import student_quantile
 from chamberopt.simulation.convergence.parameters import REFERENCE, TIME, WARM_UP, setting_text
-from chamberopt.simulation.convergence.runs import Run
 from chamberopt.simulation.convergence.study import ConvergenceStudy
 
 ACCURACIES = (0.05, 0.01, 0.001)  # half-width of the objective, absolute
@@ -23,20 +22,13 @@ TABLE = "process.accuracy."
 
 @dataclass(frozen=True)
 class Recommendation:
-    """Settings for one accuracy.
-
-    Args:
-        settings: by numerical parameter.
-        replicas: 0 if the accuracy is out of reach.
-        cpu_s: predicted CPU seconds.
-        remarks: sentences on what limits the recommendation.
-    """
+    """Settings for one accuracy."""
 
     accuracy: float
-    settings: dict[str, Any]
-    replicas: int
-    cpu_s: float
-    remarks: tuple[str, ...]
+    settings: dict[str, Any]  # by numerical parameter
+    replicas: int  # 0 if the accuracy is out of reach
+    cpu_s: float  # predicted
+    remarks: tuple[str, ...]  # sentences on what limits the recommendation
 
     @property
     def lines(self) -> tuple[str, ...]:
@@ -45,21 +37,16 @@ class Recommendation:
         if not self.replicas:
             return f"# ± {self.accuracy:g}: not reachable with these settings", *remarks
         seconds = f"{self.cpu_s:,.0f}" if self.cpu_s >= 10.0 else f"{self.cpu_s:.2g}"
-        others = [
+        lines = [
             f'{name} = "{value}"' if isinstance(value, str) else f"{name} = {setting_text(value)}"
             for name, value in self.settings.items()
-            if not name.startswith(TABLE)
         ]
         return (
             f"# ± {self.accuracy:g}: about {seconds} CPU seconds",
-            f"# with {', '.join(others)}",
+            f"# with {', '.join(line for line in lines if not line.startswith(TABLE))}",
             "[process.accuracy]",
             f"replicas = {self.replicas}",
-            *(
-                f"{name.removeprefix(TABLE)} = {setting_text(value)}"
-                for name, value in self.settings.items()
-                if name.startswith(TABLE)
-            ),
+            *(line.removeprefix(TABLE) for line in lines if line.startswith(TABLE)),
             *remarks,
         )
 
@@ -76,7 +63,12 @@ def recommend(study: ConvergenceStudy, accuracy: float) -> Recommendation:
     for name in settings:
         if name == TIME:
             continue
-        cheaper = [run for run in study.runs if run.parameter == name and saves_time(study, run)]
+        # Cheaper than the reference by more than the intervals.
+        cheaper = [
+            run
+            for run in study.runs
+            if run.parameter == name and run.cpu.high < study.reference.cpu.low
+        ]
         if good := [run for run in cheaper if run.max_bias <= BIAS_SHARE * accuracy]:
             best = min(good, key=lambda run: run.cpu.value)
             settings[name] = type(study.settings[name])(best.setting)
@@ -99,13 +91,8 @@ def recommend(study: ConvergenceStudy, accuracy: float) -> Recommendation:
     cpu_s, replicas, settings[TIME] = min(options)
     if replicas > MAX_REPLICAS:
         remarks.append(f"this would need more than {MAX_REPLICAS:,} replicas, the largest number")
-        return Recommendation(accuracy, settings, 0, math.inf, tuple(remarks))
+        replicas, cpu_s = 0, math.inf
     return Recommendation(accuracy, settings, replicas, cpu_s, tuple(remarks))
-
-
-def saves_time(study: ConvergenceStudy, run: Run) -> bool:
-    """Whether a run is cheaper than the reference by more than the intervals."""
-    return run.cpu.high < study.reference.cpu.low
 
 
 def replicas_for(study: ConvergenceStudy, accuracy: float, seconds: float) -> int:
@@ -136,18 +123,23 @@ def _model_remarks(study: ConvergenceStudy, accuracy: float) -> Iterator[str]:
     """
     if not study.models:
         yield (
-            "marked dents were not tried, because process.accuracy.sample_mm takes too many "
-            "points; raise it"
+            "marked dents were not tried, because process.accuracy.sample_mm takes too many points; "
+            "raise it"
         )
         return
-    rates, *marked = study.models
-    if rates.max_mean_bias <= BIAS_SHARE * accuracy:
-        return
     # The last one has no bias, because it is the reference.
-    good = [run for run in marked if run.max_mean_bias <= BIAS_SHARE * accuracy]
+    largest = BIAS_SHARE * accuracy
+    rates = study.models[0].mean_bias
+    good = [
+        run
+        for run in study.models
+        if -largest <= run.mean_bias.low <= run.mean_bias.high <= largest
+    ]
+    if good[0] is study.models[0]:
+        return
     cheapest = min(good, key=lambda run: run.cpu.value)
     yield (
-        f"dent rates differ by {rates.mean_bias.value:+.4f} ± {rates.mean_bias.half_width:.2g} in "
+        f"dent rates differ by {rates.value:+.4f} ± {rates.half_width:.2g} in "
         f"mean coverage from marked dents after {study.model_time:.3g} s; to mark them: "
         f'coverage_model = "dents", sample_mm = {cheapest.setting.split()[-1]}, '
         f"{cheapest.cpu.value / study.model_time:.2g} CPU seconds a replica and second of treatment"

@@ -11,17 +11,21 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from chamberopt.chamber.scene import chamber_mesh
+from chamberopt.chamber.scene import chamber_mesh, replica_seed
 from chamberopt.common.errors import InputError
+from chamberopt.common.estimate import Estimate, estimate, paired_difference
 from chamberopt.common.progress import Progress
-from chamberopt.coverage.dent_marking import sample_points
+from chamberopt.coverage.coverage_from_impacts import Tally
+from chamberopt.coverage.coverage_intervals import coverage_estimates, target_patches
+from chamberopt.coverage.dent_marking import marked_share, sample_points
+from chamberopt.coverage.metrics import parse_objective
 from chamberopt.design.design import Design
 from chamberopt.design.process import MAX_SIMULATED_TREATMENT
 from chamberopt.simulation.convergence.error_law import (
@@ -29,11 +33,10 @@ from chamberopt.simulation.convergence.error_law import (
     ErrorLaw,
     fit_error_law,
     rms_error,
-    rms_interval,
 )
 from chamberopt.simulation.convergence.parameters import MODEL, study_designs
-from chamberopt.simulation.convergence.runs import Replicas, Run, add_replicas
-from chamberopt.simulation.replicas import ReplicaSetting
+from chamberopt.simulation.evaluate import marked_coverage_estimates, weighted_sum
+from chamberopt.simulation.replicas import ReplicaSetting, simulate_replica
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -49,32 +52,95 @@ MODEL_REPLICAS = 3
 # simulations, and about 7 for marking at three spacings.
 MODEL_LOAD = 11.0
 ZERO_ERROR = 1e-12  # of a share of area: rounding
+ZERO = Estimate(0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Run:
+    """Result of one setting."""
+
+    parameter: str  # dotted name of the numerical parameter that differs from the reference
+    setting: str  # its value as text
+    replicas: int
+    cpu: Estimate  # CPU seconds of a replica
+    objective: Estimate
+    mean: Estimate  # mean coverage
+    bias: Estimate = ZERO  # of the objective: its difference from the reference
+    mean_bias: Estimate = ZERO  # of the mean coverage
+
+    @property
+    def is_biased(self) -> bool:
+        """Whether the bias differs from 0 by more than its interval."""
+        return abs(self.bias.value) > self.bias.half_width
+
+    @property
+    def max_bias(self) -> float:
+        """Absolute bias at the far end of its interval."""
+        return max(self.bias.high, -self.bias.low)
 
 
 @dataclass(frozen=True)
 class ConvergenceStudy:
-    """Everything that was simulated.
-
-    Args:
-        settings: of the reference, by parameter.
-        runs: one parameter coarser each, and the design as it is.
-        sizes, law: error against CPU seconds of batches of the reference.
-        models: dent rates, then marked dents from coarse to fine, all from the same impacts of
-            model_time seconds of treatment; biases are against the last. Empty if the points do
-            not fit into memory.
-        cpu_s, wall_s: CPU seconds of the simulations, and time the study took.
-    """
+    """Everything that was simulated."""
 
     design: Design
-    settings: dict[str, Any]
+    settings: dict[str, Any]  # of the reference, by parameter
     reference: Run
-    runs: tuple[Run, ...]
-    sizes: tuple[BatchSize, ...]
-    law: ErrorLaw
+    runs: tuple[Run, ...]  # one parameter coarser each, and the design as it is
+    sizes: tuple[BatchSize, ...]  # error against CPU seconds of batches of the reference
+    law: ErrorLaw  # through the sizes
+    # Dent rates, then marked dents from coarse to fine, all from the same impacts of `model_time`
+    # seconds of treatment; biases are against the last. Empty if the points exceed the memory.
     models: tuple[Run, ...]
     model_time: float
+    cpu_s: float  # of the simulations
+    wall_s: float  # that the study took
+
+
+class TimedReplica(NamedTuple):
+    """Dents of one replica, marked share of each triangle, and CPU seconds."""
+
+    tally: Tally
+    share: np.ndarray | None  # None where coverage is estimated from dent rates
     cpu_s: float
-    wall_s: float
+
+
+@dataclass
+class Replicas:
+    """The replicas of one design."""
+
+    setting: ReplicaSetting  # without sample points coverage is estimated from dent rates
+    skipped: int = 1  # first replicas whose time does not count, because they build a search tree
+    started: int = 0  # number of replicas that are simulated or under way
+    done: list[TimedReplica] = field(default_factory=list)
+
+    @property
+    def cpu(self) -> Estimate:
+        """CPU seconds of a replica."""
+        return estimate([one.cpu_s for one in self.done[self.skipped :]], 0.0)
+
+    def estimates(self, part: slice = slice(None)) -> tuple[Estimate, Estimate, bool]:
+        """Objective, mean coverage, and whether triangles were merged for lack of dents."""
+        design, chamber, _, samples = self.setting
+        are_merged = False
+        if samples is None:
+            tallies = [one.tally for one in self.done[part]]
+            patches = target_patches(tallies, chamber, design.process.treatment_time)
+            metrics, are_merged = coverage_estimates(tallies, chamber, patches), patches.are_merged
+        else:
+            shares = [one.share for one in self.done[part] if one.share is not None]
+            metrics = marked_coverage_estimates(shares, chamber)
+        objective = weighted_sum(parse_objective("uniform_coverage"), metrics)
+        return objective, metrics["mean_coverage"], are_merged
+
+    def run(self, parameter: str, setting: str, reference: Run | None = None) -> Run:
+        """The result of these replicas, compared with a reference unless they are its own."""
+        objective, mean, _ = self.estimates()
+        run = Run(parameter, setting, len(self.done), self.cpu, objective, mean)
+        if reference is None:
+            return run
+        bias = paired_difference(objective, reference.objective)
+        return replace(run, bias=bias, mean_bias=paired_difference(mean, reference.mean))
 
 
 def require_budget(budget_s: float) -> None:
@@ -118,21 +184,22 @@ def run_convergence_study(
         prepare(one, replicas[key].setting.chamber)
     (reference_key, reference), *others = replicas.items()
     rounds, spent = 0, 0.0
-    while len(reference.tallies) < MAX_REPLICAS:
-        enough = rounds >= MIN_ROUNDS and len(reference.tallies) >= MIN_REPLICAS
+    while len(reference.done) < MAX_REPLICAS:
+        enough = rounds >= MIN_ROUNDS and len(reference.done) >= MIN_REPLICAS
         if enough and spent >= (1.0 - MODEL_SHARE) * budget_s:
             break
-        spent += add_replicas([*(one for _, one in others), *[reference] * len(others)], executor)
+        spent += _add_replicas([*(one for _, one in others), *[reference] * len(others)], executor)
         rounds += 1
         if progress:
             progress(min(round(spent), round(budget_s)), round(budget_s), None)
     models, model_time, models_spent = _run_coverage_models(reference, budget_s - spent, executor)
-    sizes = _batch_sizes(reference)
+    reference_run = reference.run(*reference_key)
+    sizes = _batch_sizes(reference, reference_run)
     return ConvergenceStudy(
         design=design,
         settings=settings,
-        reference=reference.run(*reference_key, reference),
-        runs=tuple(one.run(*key, reference) for key, one in others),
+        reference=reference_run,
+        runs=tuple(one.run(*key, reference_run) for key, one in others),
         sizes=sizes,
         law=fit_error_law(sizes),
         models=models,
@@ -140,6 +207,35 @@ def run_convergence_study(
         cpu_s=spent + models_spent,
         wall_s=time.perf_counter() - started,
     )
+
+
+def _add_replicas(designs: Sequence[Replicas], executor: Executor) -> float:
+    """Simulate one more replica of each design for each time that it is listed; CPU seconds."""
+    futures = []
+    for one in designs:
+        futures.append(executor.submit(simulate_timed, one.setting, one.started))
+        one.started += 1
+    try:
+        for one, future in zip(designs, futures, strict=True):
+            one.done.append(future.result())
+    finally:
+        for future in futures:
+            future.cancel()
+    return sum(future.result()[-1] for future in futures)
+
+
+def simulate_timed(setting: ReplicaSetting, number: int) -> TimedReplica:
+    """Simulate one replica; of its dents what coverage needs is kept, for hundreds of replicas."""
+    begin = time.thread_time()
+    process, samples = setting.design.process, setting.samples
+    replica = simulate_replica(setting, replica_seed(process.seed, number))
+    share = None
+    if samples is not None and replica.first_marked is not None:
+        triangles = len(setting.chamber.part.triangles)
+        share = marked_share(samples, replica.first_marked, process.treatment_time, triangles)
+    unused = ("impacts", "dents", "dented_area", "speed_sum", "angle_sum")
+    tally = replace(replica.tally, **dict.fromkeys(unused, np.zeros(0)))
+    return TimedReplica(tally, share, time.thread_time() - begin)
 
 
 def _run_coverage_models(
@@ -150,53 +246,44 @@ def _run_coverage_models(
     Returns:
         The runs, seconds of treatment that the budget allows, and CPU seconds.
     """
-    design, chamber, mesh, _ = reference.setting
+    design, chamber = reference.setting.design, reference.setting.chamber
     accuracy = design.process.accuracy
-    cpu_per_second = reference.cost.value / (accuracy.warmup_time + accuracy.simulated_time)
+    cpu_per_second = reference.cpu.value / (accuracy.warmup_time + accuracy.simulated_time)
     affordable = budget_s / MODEL_REPLICAS / MODEL_LOAD / cpu_per_second - accuracy.warmup_time
-    seconds = float(
-        min(
-            design.process.treatment_time,
-            MAX_SIMULATED_TREATMENT,
-            max(affordable, accuracy.simulated_time),
-        )
-    )
+    longest = min(design.process.treatment_time, MAX_SIMULATED_TREATMENT)
+    seconds = float(min(longest, max(affordable, accuracy.simulated_time)))
     treated = design.changed({"process.treatment_time_s": seconds, MODEL: "dents"})
-    setting = ReplicaSetting(treated, chamber, mesh, None)
+    setting = reference.setting._replace(design=treated)
     models = {"avrami": Replicas(setting, skipped=0)}
     try:
         for spacing in (2 * accuracy.sample_mm, accuracy.sample_mm, accuracy.sample_mm / 2):
-            samples = sample_points(chamber, 1e-3 * spacing)
-            models[f"dents, sample_mm {spacing:g}"] = Replicas(
-                setting._replace(samples=samples), skipped=0
-            )
+            marked = setting._replace(samples=sample_points(chamber, 1e-3 * spacing))
+            models[f"dents, sample_mm {spacing:g}"] = Replicas(marked, skipped=0)
     except InputError:  # too many points for the memory
         return (), seconds, 0.0
-    spent = sum(add_replicas(list(models.values()), executor) for _ in range(MODEL_REPLICAS))
-    *_, finest = models.values()
-    return tuple(one.run(MODEL, name, finest) for name, one in models.items()), seconds, spent
+    spent = sum(_add_replicas(list(models.values()), executor) for _ in range(MODEL_REPLICAS))
+    *others, (name, finest) = models.items()
+    best = finest.run(MODEL, name)
+    return (*(one.run(MODEL, other, best) for other, one in others), best), seconds, spent
 
 
-def _batch_sizes(reference: Replicas) -> tuple[BatchSize, ...]:
+def _batch_sizes(reference: Replicas, whole: Run) -> tuple[BatchSize, ...]:
     """Errors of batches of 4, 8, 16 ... replicas."""
-    whole, total = reference.estimates()[0].value, len(reference.tallies)
     sizes, count = [], 4
-    while total // count >= MIN_BATCHES:
-        batches = total // count
+    while (batches := whole.replicas // count) >= MIN_BATCHES:
         begin = time.thread_time()
         estimates = [reference.estimates(slice(b * count, (b + 1) * count)) for b in range(batches)]
         estimating = (time.thread_time() - begin) / batches
         values = np.array([objective.value for objective, _, _ in estimates])
-        rms = rms_error(values, whole, count / total)
+        rms = rms_error(values, whole.objective.value, count / whole.replicas)
         half_width = float(np.mean([objective.half_width for objective, _, _ in estimates]))
         if min(rms, half_width) < ZERO_ERROR:
             raise InputError(
                 "process.accuracy.simulated_time_s: no dent on the target was simulated, so there "
                 "is no error to measure; raise it, or see chamberopt check"
             )
-        cpu_s = count * reference.cost.value + estimating
+        cpu_s = count * whole.cpu.value + estimating
         are_merged = any(merged for _, _, merged in estimates)
-        interval = rms_interval(rms, batches)
-        sizes.append(BatchSize(count, batches, rms, *interval, half_width, cpu_s, are_merged))
+        sizes.append(BatchSize(count, batches, rms, half_width, cpu_s, are_merged))
         count *= 2
     return tuple(sizes)

@@ -48,15 +48,14 @@ def batch_sizes(pool: np.ndarray) -> list[BatchSize]:
         parts = pool[: len(pool) // count * count].reshape(-1, count).mean(axis=1)
         rms = rms_error(parts, pool.mean(), count / len(pool))
         half_width = student_quantile(count - 1) / np.sqrt(count)
-        interval = rms_interval(rms, len(parts))
-        sizes.append(BatchSize(count, len(parts), rms, *interval, half_width, float(count)))
+        sizes.append(BatchSize(count, len(parts), rms, half_width, float(count)))
     return sizes
 
 
 def test_law_is_found_exactly_and_its_interval_contains_the_truth() -> None:
     exact = fit_error_law(
         [
-            BatchSize(1, batches, 3.0 * cost**-0.5 / NORMAL, 0.0, 0.0, 0.0, cost)
+            BatchSize(1, batches, 3.0 * cost**-0.5 / NORMAL, 0.0, cost)
             for cost, batches in ((1.0, 9), (2.0, 5), (5.0, 4))
         ]
     )
@@ -71,5 +70,5 @@ def test_law_is_found_exactly_and_its_interval_contains_the_truth() -> None:
 
 def test_batches_with_merged_triangles_are_left_out_of_the_law() -> None:
     first, *others = batch_sizes(np.random.default_rng(3).normal(size=256))
-    merged = BatchSize(4, first.batches, 30.0, 20.0, 40.0, 30.0, 4.0, are_merged=True)
+    merged = BatchSize(4, first.batches, 30.0, 30.0, 4.0, are_merged=True)
     assert fit_error_law([merged, *others]) == fit_error_law(others)

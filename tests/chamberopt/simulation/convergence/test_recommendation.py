@@ -18,8 +18,7 @@ from chamberopt.simulation.convergence.parameters import (
     WARM_UP,
 )
 from chamberopt.simulation.convergence.recommendation import recommend, replicas_for
-from chamberopt.simulation.convergence.runs import Run
-from chamberopt.simulation.convergence.study import ConvergenceStudy
+from chamberopt.simulation.convergence.study import ConvergenceStudy, Run
 from tests.helpers.synthetic import DESIGNS
 
 
@@ -52,9 +51,7 @@ def study_of(*runs: Run, models: tuple[Run, ...] = ()) -> ConvergenceStudy:
     settings = {FACETS: 256, MOTION: "sinusoidal", WARM_UP: 0.8, ELASTIC_SPEED: 1.0, TIME: 1.5}
     times = [run(TIME, 0.375, 0.1675), run(TIME, 6, 0.73), run(WARM_UP, 0.2, 0.22, 0.0, 0.03)]
     sizes = tuple(
-        BatchSize(
-            k, 400 // k, 0.02 / k**0.5, 0.01, 0.1, student_quantile(k - 1) * 0.02 / k**0.5, 0.28 * k
-        )
+        BatchSize(k, 400 // k, 0.02 / k**0.5, student_quantile(k - 1) * 0.02 / k**0.5, 0.28 * k)
         for k in (4, 8, 16, 32)
     )
     return ConvergenceStudy(

@@ -19,11 +19,12 @@ from chamberopt.simulation.convergence.parameters import (
     TIME,
     WARM_UP,
 )
+from chamberopt.simulation.convergence.study import TimedReplica
 from chamberopt.simulation.replicas import ReplicaSetting
 from tests.helpers.synthetic import DESIGNS, equal_dents
 
 
-def made_up_replica(setting: ReplicaSetting, number: int) -> tuple:
+def made_up_replica(setting: ReplicaSetting, number: int) -> TimedReplica:
     """Random dents, a quarter more per second on later triangles; fewer facets give fewer."""
     design, chamber, _, samples = setting
     seconds = design.process.recorded_time
@@ -35,14 +36,14 @@ def made_up_replica(setting: ReplicaSetting, number: int) -> tuple:
     tally = equal_dents(seconds, dents, 2e-7)
     cpu = 0.002 + 0.01 * (seconds + design.process.accuracy.warmup_time)
     if samples is None:
-        return tally, None, cpu
+        return TimedReplica(tally, None, cpu)
     share = -np.expm1(-tally.dented_area / np.maximum(chamber.exposed_area, 1e-12))
-    return tally, share, 2.0 * cpu
+    return TimedReplica(tally, share, 2.0 * cpu)
 
 
 @pytest.fixture
 def no_simulator(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("chamberopt.simulation.convergence.runs.simulate_timed", made_up_replica)
+    monkeypatch.setattr("chamberopt.simulation.convergence.study.simulate_timed", made_up_replica)
     monkeypatch.setattr("chamberopt.cli.commands.accuracy.compile_with_message", lambda *_: None)
 
 
@@ -108,12 +109,12 @@ def test_command_prints_its_findings(tmp_path: Path, capsys: pytest.CaptureFixtu
 def test_without_dents_there_is_no_error_to_measure(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: Any
 ) -> None:
-    def no_dents(setting: ReplicaSetting, number: int) -> tuple:
+    def no_dents(setting: ReplicaSetting, number: int) -> TimedReplica:
         triangles = len(setting.chamber.exposed_area)
         share = None if setting.samples is None else np.zeros(triangles)
-        return equal_dents(1.0, np.zeros(triangles, int), 1e-7), share, 0.01
+        return TimedReplica(equal_dents(1.0, np.zeros(triangles, int), 1e-7), share, 0.01)
 
-    monkeypatch.setattr("chamberopt.simulation.convergence.runs.simulate_timed", no_dents)
+    monkeypatch.setattr("chamberopt.simulation.convergence.study.simulate_timed", no_dents)
     assert accuracy(tmp_path / "out", "0.01") == 2
     assert "no dent on the target was simulated" in capsys.readouterr().err
 
