@@ -123,8 +123,8 @@ def _model_remarks(study: ConvergenceStudy, accuracy: float) -> Iterator[str]:
     """
     if not study.models:
         yield (
-            "marked dents were not tried, because process.accuracy.sample_mm takes too many points; "
-            "raise it"
+            "marked dents were not tried, because process.accuracy.sample_mm takes too many "
+            "points; raise it"
         )
         return
     # The last one has no bias, because it is the reference.
