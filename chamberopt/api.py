@@ -84,7 +84,7 @@ def optimise(
     """
     from chamberopt.chamber.build import build_chamber
     from chamberopt.common.parallel.executor import local_executor
-    from chamberopt.optimize.run_study import search_and_confirm
+    from chamberopt.optimize.run_study import run_study
     from chamberopt.optimize.storage.study_folder import open_study_folder
     from chamberopt.output.results.load import load_result
     from chamberopt.output.save_run import save_study
@@ -97,7 +97,7 @@ def optimise(
             study, advice = folder.with_effects_resolved(
                 lambda design: with_effects_resolved(design, start, executor)
             )
-            result = search_and_confirm(study, folder, executor, progress)
+            result = run_study(study, folder, executor, progress)
             remarks = save_study(out, result, advice)
             _warn([*map(str, advice), *result.best.evaluation.notes, *remarks])
     return load_result(out)

@@ -39,13 +39,13 @@ from chamberopt.design.shapes.custom import MissingShape, load_custom_shape
 from chamberopt.design.shapes.imported import IMPORTED, Imported
 from chamberopt.design.shot import ShotTable
 from chamberopt.design.sonotrode import FurtherSonotrode, Sonotrode
-from chamberopt.design.table_base import STRICT, DesignTable
+from chamberopt.design.table_base import STRICT, FileTable
 
 # Each further sonotrode has a tag below 255 and needs a cut through all walls that come before it.
 MAX_SONOTRODES = 50
 
 
-class Design(DesignTable):
+class Design(FileTable):
     """One complete candidate: part, chamber, sonotrode, shot, materials, effects, process."""
 
     part: PartTable

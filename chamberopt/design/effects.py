@@ -7,10 +7,10 @@ from pydantic import Field
 
 from chamberopt.common.toml_errors import Problem
 from chamberopt.common.toml_fields import Triple, list_field, quantity
-from chamberopt.design.table_base import DesignTable, Metres
+from chamberopt.design.table_base import FileTable, Metres
 
 
-class PartTurn(DesignTable):
+class PartTurn(FileTable):
     """The part turns about an axis: steadily (rpm), or to and fro (angle_deg and frequency_hz)."""
 
     rpm: float | None = quantity(
@@ -57,7 +57,7 @@ class PartTurn(DesignTable):
         return 60.0 / abs(self.rpm) if self.rpm else math.inf
 
 
-class FrictionTable(DesignTable):
+class FrictionTable(FileTable):
     """Walton's mu and beta0 of balls on surfaces and, unless given separately, of ball on ball."""
 
     mu: float = Field(
@@ -90,7 +90,7 @@ class FrictionTable(DesignTable):
         )
 
 
-class SurfaceEffectTable(DesignTable):
+class SurfaceEffectTable(FileTable):
     """A table of [effects] for one of the simulator's further effects of hits on surfaces."""
 
     @property
@@ -99,7 +99,7 @@ class SurfaceEffectTable(DesignTable):
         raise NotImplementedError
 
 
-class Effects(DesignTable):
+class Effects(FileTable):
     """Which effects act on the shot. An effect that is not listed here is not simulated."""
 
     auto: bool = Field(

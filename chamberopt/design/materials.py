@@ -8,7 +8,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from chamberopt.design.table_base import SI, DesignTable
+from chamberopt.design.table_base import SI, FileTable
 
 ShotMaterial = Literal["steel", "tungsten_carbide", "zirconia", "glass"]
 
@@ -23,7 +23,7 @@ SHOT_DENSITY: dict[str, float] = {
 BRINELL_TO_PASCAL = 9.81e6  # HB is kgf/mm²
 
 
-class RestitutionTable(DesignTable):
+class RestitutionTable(FileTable):
     """C0 and v0 of the restitution law of one surface, or of two balls."""
 
     C0: float = Field(ge=0.05, le=1.0, description="restitution below v0")
@@ -54,7 +54,7 @@ class PartMaterial(RestitutionTable):
         return self.hardness_HB * BRINELL_TO_PASCAL
 
 
-class Materials(DesignTable):
+class Materials(FileTable):
     """One restitution law for each thing that a ball can hit."""
 
     shot: RestitutionTable = Field(description="ball against ball")

@@ -8,11 +8,11 @@ from pydantic import Field
 
 from chamberopt.common.toml_errors import Problem
 from chamberopt.common.toml_fields import MeshFile, Names, Pair, Triple, list_field, quantity
-from chamberopt.design.table_base import DesignTable
+from chamberopt.design.table_base import FileTable
 from chamberopt.geometry.mesh_io.units import Unit
 
 
-class Target(DesignTable):
+class Target(FileTable):
     """Which triangles of the part must be covered; they meet all given conditions."""
 
     surface: Names = list_field(
@@ -62,7 +62,7 @@ class Target(DesignTable):
             yield Problem("box_mm", text)
 
 
-class PartTable(DesignTable):
+class PartTable(FileTable):
     """The part's mesh and its place in the chamber."""
 
     mesh: MeshFile = Field(description="mesh file, path relative to the design file")

@@ -7,13 +7,13 @@ from pydantic import Field
 
 from chamberopt.common.toml_errors import Problem
 from chamberopt.common.toml_fields import quantity
-from chamberopt.design.table_base import SI, DesignTable
+from chamberopt.design.table_base import SI, FileTable
 
 # Longest treatment [s] simulated from beginning to end; one replica then takes minutes to compute.
 MAX_SIMULATED_TREATMENT = 600.0
 
 
-class Accuracy(DesignTable):
+class Accuracy(FileTable):
     """Number and length of the independent replicas; each has its own start and warm-up."""
 
     RENAMED: ClassVar[dict[str, str]] = {
@@ -60,7 +60,7 @@ class Accuracy(DesignTable):
     drag_step = SI("drag_step_ms", 1e-3, "Longest time [s] between two drag impulses")
 
 
-class Process(DesignTable):
+class Process(FileTable):
     """How long the part is peened, and how accurately that is simulated."""
 
     treatment_time_s: float = quantity(0.01, 1e6, "s", "peening time the coverage is predicted for")

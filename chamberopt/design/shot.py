@@ -9,17 +9,17 @@ from pydantic import Field
 from chamberopt.common.toml_errors import Problem
 from chamberopt.common.toml_fields import list_field, quantity
 from chamberopt.design.materials import SHOT_DENSITY, ShotMaterial
-from chamberopt.design.table_base import SI, DesignTable
+from chamberopt.design.table_base import SI, FileTable
 
 
-class ShotSize(DesignTable):
+class ShotSize(FileTable):
     """One of several sizes of balls."""
 
     diameter_mm: float = quantity(0.1, 20, "mm", "of one ball of this size")
     share: float = quantity(1e-6, 1, "of the charge's mass", "the shares of all sizes add up to 1")
 
 
-class ShotTable(DesignTable):
+class ShotTable(FileTable):
     """The charge: exactly one of diameter_mm and mix, and one of material and density_kg_m3."""
 
     mass_g: float = quantity(1e-4, 10000, "g", "of all balls together")

@@ -7,10 +7,10 @@ from pydantic import Field
 
 from chamberopt.common.toml_fields import Direction, Position, list_field, quantity
 from chamberopt.design.shapes.hole_and_deflector_tables import PlacedBore
-from chamberopt.design.table_base import SI, DesignTable
+from chamberopt.design.table_base import SI, FileTable
 
 
-class VibratingFace(DesignTable):
+class VibratingFace(FileTable):
     """A face that vibrates. Amplitude is ZERO-TO-PEAK: half of a peak-to-valley figure."""
 
     frequency_khz: float = quantity(0.01, 200, "kHz", "usually 20")

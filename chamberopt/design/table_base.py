@@ -1,4 +1,4 @@
-"""What every table of a design file has in common, and values in SI units."""
+"""What every table of a design or study file has in common, and values in SI units."""
 
 from collections.abc import Iterable
 from typing import Any, ClassVar, Self
@@ -34,7 +34,7 @@ STRICT = ConfigDict(
 )
 
 
-class DesignTable(BaseModel):
+class FileTable(BaseModel):
     """A frozen table without unknown keys, whose values are also checked against each other."""
 
     model_config = STRICT

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from chamberopt.common.files import csv_text
 from chamberopt.optimize.study.constraints import FEASIBLE, INFEASIBLE
 
 if TYPE_CHECKING:
@@ -18,18 +17,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ParetoPoint:
-    """One candidate in the plane of the two objectives.
+    """One candidate in the plane of the two objectives."""
 
-    Attributes:
-        stage: "search" or "confirm".
-        on_front: no other candidate of its stage is better in one objective and as good in the
-            other.
-    """
-
-    stage: str
+    stage: str  # "search" or "confirm"
     parameters: dict[str, float]
     goals: tuple[Estimate, ...]
     feasibility: str
+    # No other candidate of its stage is better in one objective and as good in the other.
     on_front: bool
 
 
@@ -71,16 +65,13 @@ def pareto_points(result: StudyResult) -> list[ParetoPoint]:
 
 def as_csv(result: StudyResult) -> str:
     """The points as a table; NAME_pm is the half-width of the objective NAME."""
-    text, names = io.StringIO(), result.study.objective.goals
-    goals = [column for name in names for column in (name, f"{name}_pm")]
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(["stage", "on_front", "standing", *goals, *result.study.vary])
+    lines = []
     for one in pareto_points(result):
-        figures = [number for goal in one.goals for number in (goal.value, goal.half_width)]
-        table.writerow(
-            [one.stage, one.on_front, one.feasibility, *figures, *one.parameters.values()]
-        )
-    return text.getvalue()
+        line = {"stage": one.stage, "on_front": one.on_front, "standing": one.feasibility}
+        for name, goal in zip(result.study.objective.goals, one.goals, strict=True):
+            line |= {name: goal.value, f"{name}_pm": goal.half_width}
+        lines.append({**line, **one.parameters})
+    return csv_text(lines)
 
 
 def front_json(result: StudyResult) -> list[dict[str, Any]]:

@@ -19,7 +19,7 @@ from chamberopt.optimize.candidates import FIRST_OBJECTIVE, Candidates, Confirme
 from chamberopt.optimize.evaluate_candidate import Simulator
 from chamberopt.optimize.search.maximise import PARETO_PHASES, maximise
 from chamberopt.optimize.sensitivity import Sensitivity, analyse_sensitivity
-from chamberopt.optimize.storage.study_folder import STUDY, StudyFolder, open_study_folder
+from chamberopt.optimize.storage.study_folder import STUDY, StudyFolder
 from chamberopt.optimize.storage.trial_log import HISTORY, Trial
 from chamberopt.optimize.study.constraints import NOT_KNOWN
 from chamberopt.simulation.evaluate import ReplicaPlan, evaluate
@@ -34,31 +34,23 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class StudyResult:
-    """The result of a study.
-
-    Attributes:
-        algorithm: the phases of the search that ran.
-        trials: of search and confirmation, in order.
-        start, confirmed, best: confirmed with the same new seeds; confirmed begins with the start.
-            With two objectives, best is the best by the first.
-        gain: objective of best minus start, from these paired replicas.
-        seconds: wall-clock time of all evaluations, earlier runs included [s].
-        target: target of all candidates, shape (m,) bool, if the start determines it; None if each
-            design has its own.
-        sensitivity: by a model of the whole search; None if there are too few points.
-    """
+    """The result of a study."""
 
     study: Study
     folder: Path
-    algorithm: str
-    trials: tuple[Trial, ...]
+    algorithm: str  # the phases of the search that ran
+    trials: tuple[Trial, ...]  # of search and confirmation, in order
+    # Start, confirmed and best are confirmed with the same new seeds; confirmed begins with the
+    # start. With two objectives, best is the best by the first.
     start: ConfirmedCandidate
     confirmed: tuple[ConfirmedCandidate, ...]
     best: ConfirmedCandidate
-    gain: Estimate
-    seconds: float
+    gain: Estimate  # objective of best minus start, from these paired replicas
+    seconds: float  # wall-clock time of all evaluations, earlier runs included
+    # Target of all candidates, shape (m,) bool, if the start determines it; None if each design
+    # has its own.
     target: np.ndarray | None = None
-    sensitivity: Sensitivity | None = None
+    sensitivity: Sensitivity | None = None  # None if there are too few points for a model
 
     @property
     def at_bounds(self) -> tuple[str, ...]:
@@ -89,7 +81,7 @@ class StudyResult:
 
 def run_study(
     study: Study,
-    folder: str | Path,
+    folder: StudyFolder,
     executor: Executor,
     progress: Progress | None = None,
     simulator: Simulator | None = None,
@@ -103,32 +95,15 @@ def run_study(
     it a little, too.)
 
     Args:
-        folder: new, empty, or where this very study was interrupted; then it is resumed, and the
-            result is the same, bit for bit, as without the interruption.
+        study: the study of the folder, with its effects resolved.
+        folder: if this very study was interrupted in it, it is resumed, and the result is the same,
+            bit for bit, as without the interruption.
         progress: called as progress(done, total, best) after each evaluation.
         simulator: replaces the simulation, e.g. in tests.
         stop: called before each evaluation; the study stops with KeyboardInterrupt if it is True.
     Raises:
-        InputError: the folder holds something else or another study, the start cannot be
-            simulated, or no candidate meets the constraints.
+        InputError: the start cannot be simulated, or no candidate meets the constraints.
         OSError: a trial cannot be written.
-    """
-    with open_study_folder(study, folder) as opened:
-        return search_and_confirm(study, opened, executor, progress, simulator, stop)
-
-
-def search_and_confirm(
-    study: Study,
-    folder: StudyFolder,
-    executor: Executor,
-    progress: Progress | None = None,
-    simulator: Simulator | None = None,
-    stop: Stop | None = None,
-) -> StudyResult:
-    """Run or resume a study in an open folder, see run_study.
-
-    Args:
-        study: the study of the folder, with its effects resolved.
     """
     folder.begin()
     save_inputs(study, folder.path)
@@ -157,10 +132,10 @@ def search_and_confirm(
             f"{folder.path / HISTORY}"
         )
     best = max(winners, key=lambda candidate: candidate.evaluation.objective.value)
-    gain = Estimate(0.0, 0.0)
-    if best is not start:
-        gain = paired_difference(best.goals[0], start.goals[0])
+    is_gain = best is not start
+    gain = paired_difference(best.goals[0], start.goals[0]) if is_gain else Estimate(0.0, 0.0)
     model, noise = candidates.model(FIRST_OBJECTIVE), best.evaluation.objective.half_width
+    sensitivity = analyse_sensitivity(model, study.vary, best.parameters, noise) if model else None
     return StudyResult(
         study=study,
         folder=folder.path,
@@ -172,9 +147,7 @@ def search_and_confirm(
         gain=gain,
         seconds=folder.seconds,
         target=target,
-        sensitivity=analyse_sensitivity(model, study.vary, best.parameters, noise)
-        if model
-        else None,
+        sensitivity=sensitivity,
     )
 
 
@@ -182,10 +155,7 @@ def fixed_target(study: Study) -> np.ndarray | None:
     """The target of all candidates, shape (m,) bool, if it is what the shot reaches; else None.
 
     It is found once, in the chamber of the start. Otherwise a search could shrink the area that it
-    has to cover.
-
-    Raises:
-        InputError: the study varies the target itself.
+    has to cover. InputError if the study varies the target itself.
     """
     from chamberopt.chamber.build import build_chamber
 

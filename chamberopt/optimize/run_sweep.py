@@ -22,7 +22,7 @@ from chamberopt.common.parallel.executor import SerialExecutor, share
 from chamberopt.common.progress import Progress
 from chamberopt.optimize.evaluate_candidate import CandidateEvaluator, Simulator
 from chamberopt.optimize.run_study import chamber_simulator, fixed_target, save_inputs
-from chamberopt.optimize.storage.study_folder import StudyFolder, open_study_folder
+from chamberopt.optimize.storage.study_folder import open_study_folder
 from chamberopt.optimize.storage.trial_log import HISTORY, Trial
 
 if TYPE_CHECKING:
@@ -34,19 +34,12 @@ MAX_CANDIDATES = 100_000
 
 @dataclass(frozen=True)
 class SweepPlan:
-    """The candidates of a sweep.
+    """The candidates of a sweep."""
 
-    Attributes:
-        method: "grid" or "sobol".
-        count: values of each parameter, or number of points.
-        points: in the unit cube, shape (n, d).
-        seed: of the points; None for a grid.
-    """
-
-    method: str
-    count: int
-    points: np.ndarray
-    seed: int | None
+    method: str  # "grid" or "sobol"
+    count: int  # values of each parameter, or number of points
+    points: np.ndarray  # in the unit cube, shape (n, d)
+    seed: int | None  # of the points; None for a grid
 
     def as_json(self) -> dict[str, Any]:
         """Plain JSON values; the points follow from them."""
@@ -83,6 +76,8 @@ def plan_sweep(
     Raises:
         InputError: not exactly one of grid and sobol is given, or a number is out of range.
     """
+    from scipy.stats.qmc import Sobol
+
     dimensions = len(study.vary)
     if (grid is None) == (sobol is None):
         given = "neither" if grid is None else "both"
@@ -107,7 +102,11 @@ def plan_sweep(
     seed = study.optimizer.seed if seed is None else seed
     if seed < 0:
         raise InputError(f"--seed: given {seed}; give 0 or more")
-    return SweepPlan("sobol", sobol, _sobol_points(dimensions, sobol, seed), seed)
+    with warnings.catch_warnings():
+        # A count that is not a power of 2 is spread a little less evenly, which is no error.
+        warnings.simplefilter("ignore", UserWarning)
+        points = np.asarray(Sobol(dimensions, scramble=True, seed=seed).random(sobol))
+    return SweepPlan("sobol", sobol, points, seed)
 
 
 def run_sweep(
@@ -136,40 +135,27 @@ def run_sweep(
                 f"{folder}: this sweep is finished, nothing was run; to run it again, give another "
                 "folder (--out)"
             )
-        return _run(study, plan, opened, executor, progress, simulator)
-
-
-def _run(
-    study: Study,
-    plan: SweepPlan,
-    folder: StudyFolder,
-    executor: Executor,
-    progress: Progress | None,
-    simulator: Simulator | None,
-) -> SweepResult:
-    folder.begin()
-    save_inputs(study, folder.path)
-    trials: list[Trial] = []
-    for number, point in enumerate(plan.points):
-        trial = folder.recorded.find(number, "sweep", point.tolist())
-        if trial is None:
-            break
-        trials.append(trial)
-    best = max((trial.score for trial in trials if trial.feasible), default=None)
-    for trial, seconds in _evaluate_from(study, plan, len(trials), executor, simulator):
-        folder.append(trial, None, seconds)
-        trials.append(trial)
-        if trial.feasible:
-            best = trial.score if best is None else max(best, trial.score)
-        if progress:
-            progress(len(trials), len(plan.points), best)
-    if all(trial.objective is None for trial in trials):
-        raise InputError(
-            "no candidate of the sweep could be simulated, the first because: "
-            f"{trials[0].reason}; change [vary] or the design; every candidate is in "
-            f"{folder.path / HISTORY}"
-        )
-    return SweepResult(study, plan, folder.path, tuple(trials), folder.seconds)
+        opened.begin()
+        save_inputs(study, opened.path)
+        trials: list[Trial] = []
+        for number, point in enumerate(plan.points):
+            recorded = opened.recorded.find(number, "sweep", point.tolist())
+            if recorded is None:
+                break
+            trials.append(recorded)
+        for trial, seconds in _evaluate_from(study, plan, len(trials), executor, simulator):
+            opened.append(trial, None, seconds)
+            trials.append(trial)
+            if progress:
+                best = max((one.score for one in trials if one.feasible), default=None)
+                progress(len(trials), len(plan.points), best)
+        if all(trial.objective is None for trial in trials):
+            raise InputError(
+                "no candidate of the sweep could be simulated, the first because: "
+                f"{trials[0].reason}; change [vary] or the design; every candidate is in "
+                f"{opened.path / HISTORY}"
+            )
+        return SweepResult(study, plan, opened.path, tuple(trials), opened.seconds)
 
 
 def _evaluate_from(
@@ -189,8 +175,9 @@ def _evaluate_from(
         for number, future in zip(numbers, futures, strict=True):
             try:
                 yield future.result()
-            except WorkerLostError as error:
-                yield _lost_trial(study, number, plan.points[number], error), 0.0
+            except WorkerLostError as error:  # a row with this reason
+                lost = _failing_simulator(str(error))
+                yield evaluate_point(study, number, plan.points[number], None, lost)[0], 0.0
     finally:
         for future in futures:
             future.cancel()
@@ -210,22 +197,11 @@ def evaluate_point(
     return trial, time.perf_counter() - began
 
 
-def _lost_trial(study: Study, number: int, point: np.ndarray, error: WorkerLostError) -> Trial:
-    """The row of a candidate whose workers died."""
-
+def _failing_simulator(reason: str) -> Simulator:
     def fail(*_: object) -> Evaluation:
-        raise InputError(str(error))
+        raise InputError(reason)
 
-    return CandidateEvaluator(study, fail).trial(number, point, "sweep")[0]
-
-
-def _sobol_points(dimensions: int, count: int, seed: int) -> np.ndarray:
-    from scipy.stats import qmc
-
-    with warnings.catch_warnings():
-        # A count that is not a power of 2 is spread a little less evenly, which is no error.
-        warnings.simplefilter("ignore", UserWarning)
-        return np.asarray(qmc.Sobol(dimensions, scramble=True, seed=seed).random(count))
+    return fail
 
 
 def _require_few(count: int, what: str) -> None:

@@ -6,8 +6,8 @@ import numpy as np
 
 from chamberopt.common.parallel.executor import SerialExecutor
 from chamberopt.design.load import load_design
-from chamberopt.optimize.run_study import run_study
 from chamberopt.optimize.study import Study
+from tests.helpers.studies import run_in_folder
 from tests.helpers.synthetic import DESIGNS
 
 GEAR = load_design(DESIGNS / "gear.toml")
@@ -28,7 +28,7 @@ def run_bowl(folder: Path, simulator, optimizer: dict | None = None, **tables):
         **NO_FRILLS,
         **(optimizer or {}),
     }
-    return run_study(
+    return run_in_folder(
         Study(design=GEAR, vary=VARY, optimizer=settings, **tables),
         folder,
         SerialExecutor(),

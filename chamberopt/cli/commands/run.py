@@ -95,7 +95,7 @@ def _search(
     """
     from chamberopt.chamber.build import build_chamber
     from chamberopt.common.progress import progress_bar
-    from chamberopt.optimize.run_study import search_and_confirm
+    from chamberopt.optimize.run_study import run_study
     from chamberopt.output.save_run import save_study
 
     study, advice = folder.with_effects_resolved(
@@ -106,9 +106,7 @@ def _search(
         print_remarks([f"{folder.path}: resuming after {len(folder.recorded.trials)} evaluations"])
     with progress_bar("evaluations") as progress:
         interrupt.wait_for_evaluation(how_to_resume)
-        result = search_and_confirm(
-            study, folder, executor, progress, stop=lambda: interrupt.requested
-        )
+        result = run_study(study, folder, executor, progress, stop=lambda: interrupt.requested)
     best = result.best.design
     warnings = print_warnings(best, build_chamber(best, result.target), " of the best design")
     print_remarks(save_study(folder.path, result, advice, warnings))

@@ -28,10 +28,10 @@ from chamberopt.design.shapes.construction.limits import (
 )
 from chamberopt.design.shapes.construction.surface import ShapeSurface, lofted
 from chamberopt.design.shapes.hole_and_deflector_tables import Deflector, Hole
-from chamberopt.design.table_base import SI, DesignTable
+from chamberopt.design.table_base import SI, FileTable
 
 
-class ChamberTable(DesignTable):
+class ChamberTable(FileTable):
     """A cavity before the part is taken out of it; its floor is the sonotrode, at z = 0.
 
     A shape is a subclass with keys of its own, in the file's units, and ``surface``.

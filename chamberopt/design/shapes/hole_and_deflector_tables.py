@@ -16,7 +16,7 @@ from chamberopt.common.toml_fields import (
     quantity,
     unit_vector,
 )
-from chamberopt.design.table_base import SI, DesignTable, Metres
+from chamberopt.design.table_base import SI, FileTable, Metres
 from chamberopt.geometry.mesh_io.units import Unit
 
 SIZE_KEYS = {
@@ -27,7 +27,7 @@ SIZE_KEYS = {
 }
 
 
-class Deflector(DesignTable):
+class Deflector(FileTable):
     """A body that stands still in the chamber and is wall to the shot.
 
     It is a plate (a box), a rod along its z, a ball, or any closed mesh.
@@ -72,7 +72,7 @@ class Deflector(DesignTable):
         return Path(self.mesh)  # type: ignore[arg-type]
 
 
-class PlacedBore(DesignTable):
+class PlacedBore(FileTable):
     """A round bore in the chamber's frame: of a hole, or of a further sonotrode's well."""
 
     at_mm: Position

@@ -4,8 +4,6 @@ Two runs of one study write the same history.jsonl, byte for byte; run times are
 file, timings.jsonl.
 """
 
-import csv
-import io
 import json
 import math
 import os
@@ -17,7 +15,7 @@ from typing import Any, Self
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
-from chamberopt.common.files import sync_folder
+from chamberopt.common.files import csv_text, sync_folder
 
 HISTORY = "history.jsonl"
 TIMINGS = "timings.jsonl"
@@ -25,29 +23,18 @@ TIMINGS = "timings.jsonl"
 
 @dataclass(frozen=True)
 class Trial:
-    """One evaluated candidate.
-
-    Attributes:
-        stage: "search", "confirm" or "sweep".
-        point: place in the unit cube, see study/parameters.py.
-        parameters: values in the units of the file, by dotted name.
-        goals: estimate of each objective of the study; empty when the evaluation failed.
-        metrics: estimates without their pseudo-values.
-        penalty: violation of the constraints, relative to their limits.
-        score: what the search maximises: the first objective less penalties.
-        reason: why the candidate is not feasible, else "".
-    """
+    """One evaluated candidate."""
 
     number: int
-    stage: str
-    point: tuple[float, ...]
-    parameters: dict[str, float]
-    goals: tuple[Estimate, ...]
-    metrics: dict[str, Estimate]
-    penalty: float
-    score: float
+    stage: str  # "search", "confirm" or "sweep"
+    point: tuple[float, ...]  # place in the unit cube, see study/parameters.py
+    parameters: dict[str, float]  # values in the units of the file, by dotted name
+    goals: tuple[Estimate, ...]  # of each objective of the study; empty when the evaluation failed
+    metrics: dict[str, Estimate]  # without their pseudo-values
+    penalty: float  # violation of the constraints, relative to their limits
+    score: float  # what the search maximises: the first objective less penalties
     feasible: bool
-    reason: str
+    reason: str  # why the candidate is not feasible, else ""
 
     @property
     def objective(self) -> Estimate | None:
@@ -77,11 +64,7 @@ class Trial:
 
     @classmethod
     def from_row(cls, row: Mapping[str, Any]) -> Self:
-        """The trial of a row.
-
-        Raises:
-            KeyError, TypeError, ValueError or AttributeError: the row is not a trial.
-        """
+        """The trial of a row, or KeyError, TypeError, ValueError or AttributeError."""
         return cls(
             number=int(row["number"]),
             stage=str(row["stage"]),
@@ -109,11 +92,7 @@ class JsonLines:
         self.path, self._survives_power_cut = path, survives_power_cut
 
     def append(self, row: Mapping[str, Any]) -> None:
-        """Write a row.
-
-        Raises:
-            OSError: the row cannot be written, e.g. to a full disk; the file is unchanged.
-        """
+        """Write a row; if OSError is raised, e.g. by a full disk, the file is unchanged."""
         line = (json.dumps(row, allow_nan=False) + "\n").encode()
         created = not self.path.exists()
         with open(self.path, "ab", buffering=0) as file:
@@ -131,11 +110,7 @@ class JsonLines:
             sync_folder(self.path.parent)
 
     def rows(self) -> list[dict[str, Any]]:
-        """All rows in order, without a last line that a crash cut off.
-
-        Raises:
-            InputError: a row is damaged, or the file cannot be read.
-        """
+        """All rows in order, without a last line that a crash cut off; InputError if damaged."""
         return self._read()[0]
 
     def repair(self) -> None:
@@ -166,7 +141,7 @@ class JsonLines:
             try:
                 row = json.loads(line)
             except ValueError:
-                raise self.damaged(number) from None
+                row = None
             if not isinstance(row, dict):
                 raise self.damaged(number)
             rows.append(row)
@@ -192,7 +167,8 @@ def read_seconds(folder: Path) -> dict[int, float]:
 def trials_as_csv(rows: list[dict[str, Any]]) -> str:
     """The trial log as a table.
 
-    It has a column for each parameter and metric; NAME_pm is the half-width of NAME.
+    It has a column for each parameter and metric; NAME_pm is the half-width of NAME. A failed
+    evaluation has no metrics.
     """
     lines = []
     for row in rows:
@@ -203,10 +179,4 @@ def trials_as_csv(rows: list[dict[str, Any]]) -> str:
         for name, metric in row["metrics"].items():
             line |= {name: metric["value"], f"{name}_pm": metric["half_width"]}
         lines.append(line)
-    # A failed evaluation has no metrics, so the columns are those of all rows together.
-    columns = list(dict.fromkeys(name for line in lines for name in line))
-    text = io.StringIO()
-    table = csv.DictWriter(text, columns, lineterminator="\n")
-    table.writeheader()
-    table.writerows(lines)
-    return text.getvalue()
+    return csv_text(lines)

@@ -1,37 +1,32 @@
 """Constraints: what the file may ask for, and whether a candidate's estimates meet it."""
 
 import math
-from collections.abc import Mapping
-from typing import Self
+from collections.abc import Iterator, Mapping
 
-from pydantic import BaseModel, Field, model_validator
+from pydantic import Field
 
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate, student_quantile
-from chamberopt.common.toml_errors import CrossCheckError, Problem
+from chamberopt.common.toml_errors import Problem
 from chamberopt.coverage.metrics import METRICS
 from chamberopt.design.design import Design
-from chamberopt.design.table_base import STRICT
+from chamberopt.design.table_base import FileTable
 
 FEASIBLE, NOT_KNOWN, INFEASIBLE = "feasible", "not known", "infeasible"
 
 
-class Limits(BaseModel):
+class Limits(FileTable):
     """Range that a metric, or a number of the design, must stay within."""
-
-    model_config = STRICT
 
     min: float | None = Field(default=None, description="least value allowed")
     max: float | None = Field(default=None, description="largest value allowed")
 
-    @model_validator(mode="after")
-    def _agree(self) -> Self:
+    def _problems(self) -> Iterator[Problem]:
         if self.min is None and self.max is None:
-            raise CrossCheckError([Problem("", "empty; give min, max or both, e.g. { min = 0.9 }")])
+            yield Problem("", "empty; give min, max or both, e.g. { min = 0.9 }")
         if self.min is not None and self.max is not None and self.min > self.max:
-            raise CrossCheckError([Problem("min", f"given {self.min:g}, above max = {self.max:g}")])
-        return self
+            yield Problem("min", f"given {self.min:g}, above max = {self.max:g}")
 
 
 def limit_problems(
@@ -69,9 +64,8 @@ def expected_violation(figure: Estimate, limits: Limits) -> float:
     within its limit has a small penalty if it is uncertain, which keeps the search away from the
     limit by about its own uncertainty. For an exact number it is the plain excess.
     """
-    violation = 0.0
+    violation, error = 0.0, standard_error(figure)
     for limit, excess, _ in _excesses(figure, limits):
-        error = standard_error(figure)
         if error > 0.0:
             z = excess / error
             excess = 0.5 * excess * math.erfc(-z / math.sqrt(2.0)) + error * math.exp(
@@ -95,8 +89,7 @@ def assess_feasibility(
 ) -> tuple[str, str]:
     """Whether the estimates meet all limits, judged by their whole 95 % intervals.
 
-    Returns:
-        FEASIBLE, NOT_KNOWN or INFEASIBLE, and the limits that are, or may be, violated.
+    The second text names the limits that are, or may be, violated.
     """
     feasibility, reasons = FEASIBLE, []
     for name, limits in constraints.items():

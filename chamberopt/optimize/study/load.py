@@ -16,11 +16,7 @@ from chamberopt.optimize.study.schema import Study
 
 
 def load_study(path: str | Path) -> Study:
-    """Load a study file and the design that it names.
-
-    Raises:
-        InputError: names every problem with its file and line.
-    """
+    """Load a study file and its design; InputError names every problem with file and line."""
     path = Path(path)
     source, data = read_toml(path, "study")
     if not is_study(data):
@@ -69,8 +65,6 @@ def _flatten(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     """Dotted names, however they are written: as quoted keys, dotted keys or nested tables."""
     flat: dict[str, Any] = {}
     for name, value in table.items():
-        if isinstance(value, Mapping):
-            flat.update(_flatten(value, f"{prefix}{name}."))
-        else:
-            flat[prefix + name] = value
+        is_table = isinstance(value, Mapping)
+        flat |= _flatten(value, f"{prefix}{name}.") if is_table else {prefix + name: value}
     return flat

@@ -51,16 +51,12 @@ class ParameterSpace:
     """The varied parameters of a design, mapped to the unit cube.
 
     Args:
-        design: the start of the search.
-        vary: bounds (low, high) in the units of the file, by dotted name.
-    Attributes:
-        names: dotted names, in the order of the cube's axes.
-        start: the design as a point of the cube, shape (d,).
+        design: the start of the search, which is the point `start` of the cube, shape (d,).
+        vary: bounds (low, high) in the units of the file, by dotted name, in the cube's order.
     """
 
     def __init__(self, design: Design, vary: Mapping[str, tuple[float, float]]) -> None:
-        self.names = tuple(vary)
-        self._design = design
+        self.names, self._design = tuple(vary), design
         self._low, self._high = np.array(list(vary.values()), dtype=float).T
         values = np.array([design.value(name) for name in vary], dtype=float)
         self.start: np.ndarray = (values - self._low) / (self._high - self._low)

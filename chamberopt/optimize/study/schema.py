@@ -1,8 +1,9 @@
 """The tables of a study file: what varies, what is maximised, what must hold, and the budget."""
 
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from pydantic import BaseModel, BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field
 
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
@@ -10,7 +11,7 @@ from chamberopt.common.toml_errors import CrossCheckError, Problem
 from chamberopt.common.toml_fields import list_field, quantity
 from chamberopt.coverage.metrics import METRICS, OBJECTIVES, RENAMED_OBJECTIVES, renamed_objective
 from chamberopt.design.design import Design
-from chamberopt.design.table_base import STRICT
+from chamberopt.design.table_base import FileTable
 from chamberopt.optimize.study.constraints import Limits, limit_problems
 from chamberopt.optimize.study.parameters import Bounds, bound_problems
 
@@ -28,30 +29,18 @@ else:
 
 # NLopt's names without the prefix "NLOPT_", and three of our own: evenly spread points, the model
 # of the scores, and "auto", which is these two one after the other.
+# fmt: off
 Algorithm = Literal[
-    "auto",
-    "sobol",
-    "surrogate",
-    "GN_DIRECT_L",
-    "GN_DIRECT_L_RAND",
-    "GN_ORIG_DIRECT_L",
-    "GN_MLSL_LDS",
-    "GN_CRS2_LM",
-    "GN_ISRES",
-    "GN_ESCH",
-    "GN_AGS",
-    "LN_BOBYQA",
-    "LN_COBYLA",
-    "LN_SBPLX",
-    "LN_NELDERMEAD",
-    "LN_PRAXIS",
+    "auto", "sobol", "surrogate",
+    "GN_DIRECT_L", "GN_DIRECT_L_RAND", "GN_ORIG_DIRECT_L", "GN_MLSL_LDS", "GN_CRS2_LM",
+    "GN_ISRES", "GN_ESCH", "GN_AGS",
+    "LN_BOBYQA", "LN_COBYLA", "LN_SBPLX", "LN_NELDERMEAD", "LN_PRAXIS",
 ]
+# fmt: on
 
 
-class Objective(BaseModel):
+class Objective(FileTable):
     """What is maximised: one objective by name, a weighted sum, or two at once."""
-
-    model_config = STRICT
 
     name: ObjectiveName = Field(default="uniform_coverage", description="what is maximised")
     sum: dict[str, float] = Field(
@@ -67,31 +56,22 @@ class Objective(BaseModel):
         None,
     )
 
-    @model_validator(mode="after")
-    def _agree(self) -> Self:
+    def _problems(self) -> Iterator[Problem]:
         names = (*OBJECTIVES, *METRICS)
-        problems = [
-            Problem(
-                f"sum.{name}",
-                renamed_objective(name)
-                if name in RENAMED_OBJECTIVES
-                else f"not an objective or a metric; {toml_errors.did_you_mean(name, names)}",
-            )
-            for name in self.sum
-            if name not in names
-        ]
+        for name in self.sum:
+            if name in RENAMED_OBJECTIVES:
+                yield Problem(f"sum.{name}", renamed_objective(name))
+            elif name not in names:
+                text = f"not an objective or a metric; {toml_errors.did_you_mean(name, names)}"
+                yield Problem(f"sum.{name}", text)
         if self.sum and not any(self.sum.values()):
-            problems.append(Problem("sum", "all weights are 0; give one another value"))
+            yield Problem("sum", "all weights are 0; give one another value")
         if self.pareto and self.pareto[0] == self.pareto[1]:
-            problems.append(
-                Problem("pareto", f"given {self.pareto[0]} twice; give two different objectives")
-            )
+            text = f"given {self.pareto[0]} twice; give two different objectives"
+            yield Problem("pareto", text)
         given = [self.name != "uniform_coverage", bool(self.sum), self.pareto is not None]
         if given.count(True) > 1:
-            problems.append(Problem("", "more than one of name, sum and pareto; give one"))
-        if problems:
-            raise CrossCheckError(problems)
-        return self
+            yield Problem("", "more than one of name, sum and pareto; give one")
 
     @property
     def goals(self) -> tuple[str, ...]:
@@ -101,10 +81,8 @@ class Objective(BaseModel):
         return self.pareto or (self.name,)
 
 
-class Phase(BaseModel):
+class Phase(FileTable):
     """A part of a search with one algorithm."""
-
-    model_config = STRICT
 
     algorithm: Algorithm = Field(
         description='"sobol", "surrogate" or an NLopt name without its prefix'
@@ -113,18 +91,14 @@ class Phase(BaseModel):
         0.001, 1, "of the evaluations", "the last phase gets what the others leave", 1.0
     )
 
-    @model_validator(mode="after")
-    def _agree(self) -> Self:
+    def _problems(self) -> Iterator[Problem]:
         if self.algorithm == "auto":
             text = 'given "auto", which has phases of its own; leave phases out'
-            raise CrossCheckError([Problem("algorithm", text)])
-        return self
+            yield Problem("algorithm", text)
 
 
-class Optimizer(BaseModel):
+class Optimizer(FileTable):
     """How the best design is searched for, and with which budget."""
-
-    model_config = STRICT
 
     algorithm: Algorithm = Field(
         default="auto", description="auto, sobol, surrogate, or an NLopt name without prefix"
@@ -140,55 +114,39 @@ class Optimizer(BaseModel):
     tolerance: float = quantity(
         1e-6, 0.5, "of the bounds", "step below which local algorithms stop", 0.02
     )
-    evaluations: int = Field(
-        default=40, ge=2, le=1000000, description="candidates that the search simulates"
+    evaluations: int = quantity(2, 1000000, "", "candidates that the search simulates", 40)
+    seed: int = quantity(0, 2**31 - 1, "", "seed of the search's own random numbers", 1)
+    confirm: int = quantity(1, 1000, "", "best candidates simulated again with new seeds", 3)
+    confirm_replicas: int = quantity(3, 100000, "", "replicas of each confirmation", 16)
+    first_replicas: int = quantity(
+        0, 100000, "", "replicas after which a clearly worse candidate gets no more; 0: never", 4
     )
-    seed: int = Field(
-        default=1, ge=0, le=2**31 - 1, description="seed of the search's own random numbers"
-    )
-    confirm: int = Field(
-        default=3, ge=1, le=1000, description="best candidates simulated again with new seeds"
-    )
-    confirm_replicas: int = Field(
-        default=16, ge=3, le=100000, description="replicas of each confirmation"
-    )
-    first_replicas: int = Field(
-        default=4,
-        ge=0,
-        le=100000,
-        description="replicas after which a clearly worse candidate gets no more; 0: never",
-    )
-    confirm_rounds: int = Field(
-        default=2,
-        ge=1,
-        le=10,
-        description="rounds of confirmation while the best are close, each with twice the replicas",
+    confirm_rounds: int = quantity(
+        1,
+        10,
+        "",
+        "rounds of confirmation while the best are close, each with twice the replicas",
+        2,
     )
 
-    @model_validator(mode="after")
-    def _agree(self) -> Self:
-        problems = []
+    def _problems(self) -> Iterator[Problem]:
         if 0 < self.first_replicas < 3:
             text = f"given {self.first_replicas}; 3 is the least that gives an interval, 0 gives "
-            problems.append(Problem("first_replicas", f"{text}all replicas to each candidate"))
+            yield Problem("first_replicas", f"{text}all replicas to each candidate")
         if self.phases and self.algorithm != "auto":
             text = f"given beside algorithm = {self.algorithm!r}; give one of the two"
-            problems.append(Problem("phases", text))
+            yield Problem("phases", text)
         if sum(phase.share for phase in self.phases[:-1]) >= 1.0:
             text = "the shares before the last phase add up to 1 or more; lower them"
-            problems.append(Problem("phases", text))
-        if problems:
-            raise CrossCheckError(problems)
-        return self
+            yield Problem("phases", text)
 
 
-class Study(BaseModel):
+class Study(FileTable):
     """A design, what may vary in it, what is maximised, what must hold, and the budget.
 
     `vary` maps a dotted parameter of the design to (low, high) in the units of the file.
     """
 
-    model_config = STRICT
     RENAMED: ClassVar[dict[str, str]] = {"draft": "search_accuracy"}  # former names of keys
 
     design: Design = Field(description="design that the search starts from")
@@ -213,8 +171,7 @@ class Study(BaseModel):
     def at_search_accuracy(self, design: Design) -> Design:
         """A candidate at the accuracy of the search, which is usually coarser than its own.
 
-        Raises:
-            InputError: [search_accuracy] does not fit the design.
+        Raises InputError if [search_accuracy] does not fit the design.
         """
         return design.changed(
             {
@@ -223,24 +180,17 @@ class Study(BaseModel):
             }
         )
 
-    @model_validator(mode="after")
-    def _agree(self) -> Self:
-        problems = [
-            problem
-            for name, bounds in self.vary.items()
-            for problem in bound_problems(self.design, name, bounds)
-        ]
+    def _problems(self) -> Iterator[Problem]:
+        for name, bounds in self.vary.items():
+            yield from bound_problems(self.design, name, bounds)
         for name, limits in self.constraints.items():
-            problems += limit_problems(self.design, self.vary, name, limits)
+            yield from limit_problems(self.design, self.vary, name, limits)
         phases = [phase.algorithm for phase in self.optimizer.phases] or [self.optimizer.algorithm]
         if self.objective.pareto and not {"auto", "sobol", "surrogate"}.issuperset(phases):
             text = "given two objectives, which only auto, sobol and surrogate can search"
-            problems.append(Problem("objective.pareto", text))
+            yield Problem("objective.pareto", text)
         try:
             self.at_search_accuracy(self.design)
         except InputError as error:
             text = str(error).replace("process.accuracy.", "").replace("chamber.", "")
-            problems.append(Problem("search_accuracy", text))
-        if problems:
-            raise CrossCheckError(problems)
-        return self
+            yield Problem("search_accuracy", text)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from chamberopt.common.estimate import Estimate
-from chamberopt.common.files import write_csv, write_text
+from chamberopt.common.files import csv_text, write_text
 from chamberopt.common.versions import versions
 from chamberopt.design.load import save_design
 from chamberopt.output.plots.accuracy import accuracy_picture
@@ -22,7 +22,7 @@ FORMAT = 2
 def write_accuracy_results(folder: Path, study: ConvergenceStudy) -> None:
     """Leave accuracy.json, accuracy.csv, accuracy.png and the design in an empty folder."""
     save_design(study.design, folder / "design.toml")
-    write_csv(folder / "accuracy.csv", rows(study))
+    write_text(folder / "accuracy.csv", csv_text(rows(study)))
     text = json.dumps(accuracy_json(study), indent=2, allow_nan=False)
     write_text(folder / "accuracy.json", text + "\n")
     accuracy_picture(folder / "accuracy.png", study)

@@ -233,8 +233,10 @@ def simulate_timed(setting: ReplicaSetting, number: int) -> TimedReplica:
     if samples is not None and replica.first_marked is not None:
         triangles = len(setting.chamber.part.triangles)
         share = marked_share(samples, replica.first_marked, process.treatment_time, triangles)
-    unused = ("impacts", "dents", "dented_area", "speed_sum", "angle_sum")
-    tally = replace(replica.tally, **dict.fromkeys(unused, np.zeros(0)))
+    none = np.zeros(0)
+    tally = replace(
+        replica.tally, impacts=none, dents=none, dented_area=none, speed_sum=none, angle_sum=none
+    )
     return TimedReplica(tally, share, time.thread_time() - begin)
 
 

@@ -14,13 +14,14 @@ from chamberopt.common.parallel.executor import SerialExecutor, local_executor
 from chamberopt.coverage.metrics import METRICS
 from chamberopt.design.load import load_design
 from chamberopt.optimize.evaluate_candidate import FAILURE_PENALTY
-from chamberopt.optimize.run_study import fixed_target, run_study
+from chamberopt.optimize.run_study import fixed_target
 from chamberopt.optimize.storage.trial_log import read_trials, trials_as_csv
 from chamberopt.optimize.study import Limits, Study, load_study
 from chamberopt.output import viewer
 from chamberopt.output.results.load import load_result
 from chamberopt.output.save_run import save_study
 from tests.helpers.known_optima import OPTIMUM, PEAK, hill
+from tests.helpers.studies import run_in_folder
 from tests.helpers.synthetic import DESIGNS, judged, plate_design
 
 GEAR = load_design(DESIGNS / "gear.toml")
@@ -60,7 +61,7 @@ def study(**optimizer) -> Study:
 
 
 def run(question: Study, folder: Path, simulator, progress=None):
-    return run_study(question, folder, SerialExecutor(), progress, simulator)
+    return run_in_folder(question, folder, SerialExecutor(), progress, simulator)
 
 
 def test_finds_a_known_optimum(tmp_path: Path) -> None:
@@ -237,7 +238,7 @@ def test_the_real_thing_end_to_end(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     results = []
     for workers in (1, 2):
         with local_executor(workers) as executor:
-            results.append(run_study(question, tmp_path / str(workers), executor))
+            results.append(run_in_folder(question, tmp_path / str(workers), executor))
         assert save_study(tmp_path / str(workers), results[-1]) == []
     one, two = results
     assert [t.score for t in one.trials] == [

@@ -10,12 +10,12 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import SerialExecutor
 from chamberopt.design.load import load_design
-from chamberopt.optimize.run_study import run_study
 from chamberopt.optimize.study import Study
 from chamberopt.output import viewer
 from chamberopt.output.compare.comparison import compare
 from chamberopt.output.results.load import load_result, summary
 from chamberopt.output.save_run import save_simulation, save_study
+from tests.helpers.studies import run_in_folder
 from tests.helpers.synthetic import plate_design, poisson_evaluation
 
 DESIGN = plate_design()
@@ -86,7 +86,7 @@ def test_a_study_leaves_everything_and_its_best_design_can_be_used(tmp_path: Pat
         )
 
     folder = tmp_path / "study"
-    outcome = run_study(question, folder, SerialExecutor(), simulator=simulator)
+    outcome = run_in_folder(question, folder, SerialExecutor(), simulator=simulator)
     save_study(folder, outcome)
     names = {path.name for path in folder.iterdir()}
     assert names == {

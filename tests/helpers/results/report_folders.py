@@ -9,10 +9,10 @@ from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import SerialExecutor
 from chamberopt.coverage.part_impacts import Hits
-from chamberopt.optimize.run_study import run_study
 from chamberopt.optimize.study import Study
 from chamberopt.output.save_run import save_simulation, save_study
 from chamberopt.simulation.evaluation import Evaluation
+from tests.helpers.studies import run_in_folder
 from tests.helpers.synthetic import plate_design, poisson_evaluation
 
 DESIGN = plate_design()
@@ -60,5 +60,5 @@ def studied(folder: Path, evaluations: int = 12) -> Path:
             design, chamber, 80.0 * design.shot.mass_g, replicas or 4, seed=len(stream)
         )
 
-    save_study(folder, run_study(question, folder, SerialExecutor(), simulator=simulator))
+    save_study(folder, run_in_folder(question, folder, SerialExecutor(), simulator=simulator))
     return folder

@@ -11,10 +11,11 @@ import numpy as np
 from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import SerialExecutor
 from chamberopt.design.load import Design, load_design
-from chamberopt.optimize.run_study import StudyResult, run_study
+from chamberopt.optimize.run_study import StudyResult
 from chamberopt.optimize.storage.trial_log import JsonLines
 from chamberopt.optimize.study import Study
 from chamberopt.simulation.evaluation import Evaluation
+from tests.helpers.studies import run_in_folder
 from tests.helpers.synthetic import DESIGNS, judged
 
 GEAR = load_design(DESIGNS / "gear.toml")
@@ -63,7 +64,7 @@ def logged(log: Path) -> Callable:
 def run(question: Study, folder: Path, **more: object) -> StudyResult:
     """In `folder`, with the log of the simulator's calls beside it."""
     more.setdefault("simulator", logged(folder.with_name(f"{folder.name}-{CALLS}")))
-    return run_study(question, folder, SerialExecutor(), **more)
+    return run_in_folder(question, folder, SerialExecutor(), **more)
 
 
 def calls(folder: Path) -> list[dict]:

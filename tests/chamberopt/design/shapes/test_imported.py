@@ -19,8 +19,8 @@ from chamberopt.design.design import Design, validate
 from chamberopt.design.load import load_design, save_design
 from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL
 from chamberopt.geometry.triangles import area_vectors, areas
-from chamberopt.optimize.run_study import run_study
 from chamberopt.optimize.study import Study
+from tests.helpers.studies import run_in_folder
 from tests.helpers.synthetic import judged
 
 DESIGNS = Path(__file__).resolve().parents[4] / "designs"
@@ -452,7 +452,7 @@ def test_a_study_moves_the_sonotrode_of_a_drawn_set_up(tmp_path: Path) -> None:
         off = 1e9 * build_chamber(made).volume / (ROOM - BLOCK) - 4 / 3
         return judged(-abs(np.full(3, off)))
 
-    result = run_study(question, tmp_path / "study", SerialExecutor(), None, volume_off)
+    result = run_in_folder(question, tmp_path / "study", SerialExecutor(), None, volume_off)
 
     assert result.best.design.value("chamber.sonotrode_distance_mm") == pytest.approx(best, abs=0.3)
 

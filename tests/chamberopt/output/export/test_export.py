@@ -24,7 +24,6 @@ from chamberopt.cli import main
 from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import SerialExecutor, local_executor
 from chamberopt.design.load import Design
-from chamberopt.optimize.run_study import run_study
 from chamberopt.optimize.study import Study
 from chamberopt.output.export.chamber_files import (
     read_cavity,
@@ -40,6 +39,7 @@ from chamberopt.output.results.load import load_result
 from chamberopt.output.save_run import save_simulation, save_study
 from chamberopt.output.vtp_files import read_surface
 from chamberopt.simulation.evaluate import evaluate
+from tests.helpers.studies import run_in_folder
 from tests.helpers.synthetic import DESIGNS, plate_design, poisson_evaluation
 
 INCH = 25.4  # mm
@@ -90,7 +90,7 @@ def study(place: Path, design: Design) -> Path:
         vary={"shot.mass_g": (3.0, 6.5), "chamber.diameter_mm": (40.0, 55.0)},
         optimizer={"evaluations": 4, "confirm": 1, "confirm_replicas": 4},
     )
-    save_study(place / "study", run_study(question, place / "study", SerialExecutor()))
+    save_study(place / "study", run_in_folder(question, place / "study", SerialExecutor()))
     return place / "study"
 
 

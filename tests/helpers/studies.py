@@ -1,0 +1,15 @@
+"""A study from a new or interrupted folder to its result."""
+
+from pathlib import Path
+
+from chamberopt.common.parallel.executor import SerialExecutor
+from chamberopt.optimize.run_study import StudyResult, run_study
+from chamberopt.optimize.storage.study_folder import open_study_folder
+from chamberopt.optimize.study import Study
+
+
+def run_in_folder(
+    study: Study, path: Path, executor=None, progress=None, simulator=None, stop=None
+) -> StudyResult:
+    with open_study_folder(study, path) as folder:
+        return run_study(study, folder, executor or SerialExecutor(), progress, simulator, stop)
