@@ -23,6 +23,7 @@ from sim_core.geometry.triangle_lookup import find_triangles
 from sim_core.loop.compile_ahead import compile_simulator, is_compiled
 from sim_core.loop.impact_log import ImpactLog
 from sim_core.loop.simulate import Collisions, SimulationResult, simulate
+from sim_core.numerics.jit import jit
 from sim_core.scene.packing import pack_balls
 from sim_core.scene.physics import BallCollisions, Physics
 from sim_core.scene.scene import Scene, require_free_rotation
@@ -57,6 +58,7 @@ __all__ = [
     "drag_coefficient",
     "find_triangles",
     "is_compiled",
+    "jit",
     "pack_balls",
     "prism_cavity",
     "require_free_rotation",
