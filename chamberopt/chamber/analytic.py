@@ -14,7 +14,7 @@ import numpy as np
 from chamberopt.common.errors import InputError
 from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL
 from chamberopt.design.shapes.cylinder import Cylinder
-from chamberopt.geometry.triangles import area_vectors, areas, tetrahedron_volumes
+from chamberopt.geometry.triangles import area_vectors, tetrahedron_volumes
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -41,11 +41,9 @@ def analytic_cavity(design: Design, chamber: Chamber) -> AnalyticCavity:
 
     for name in ("part_turn", "rest"):
         if getattr(design.effects, name):
-            raise InputError(
-                f"effects.{name}: not supported with an analytical cavity; leave it out, or "
-                f"{REMEDY}"
-            )
-    bottom, top = (float(z) for z in (chamber.vertices[:, 2].min(), chamber.vertices[:, 2].max()))
+            why = "not supported with an analytical cavity"
+            raise InputError(f"effects.{name}: {why}; leave it out, or {REMEDY}")
+    bottom, top = float(chamber.vertices[:, 2].min()), chamber.height
     _require_flat_or_upright(chamber, bottom, top)
     outline = _outline(chamber, bottom, top)
     tags = (TAG_SONOTRODE, TAG_PART, TAG_WALL)
@@ -69,10 +67,8 @@ def impacts_on_chamber(impacts: ImpactLog, chamber: Chamber) -> ImpactLog:
     from sim_core import find_triangles
 
     ceiling = np.flatnonzero(chamber.tags == TAG_PART)
-    corners = chamber.vertices[chamber.triangles[ceiling]]
-    return replace(
-        impacts, triangle=ceiling[find_triangles(corners, impacts.position)].astype(np.int32)
-    )
+    found = find_triangles(chamber.vertices[chamber.triangles[ceiling]], impacts.position)
+    return replace(impacts, triangle=ceiling[found].astype(np.int32))
 
 
 def _refused(why: str) -> InputError:
@@ -81,13 +77,11 @@ def _refused(why: str) -> InputError:
 
 def _require_flat_or_upright(chamber: Chamber, bottom: float, top: float) -> None:
     """Raise InputError unless sonotrode and part are flat, and the wall between them upright."""
-    area = areas(chamber.vertices, chamber.triangles)
+    vectors = area_vectors(chamber.vertices, chamber.triangles)
+    area = np.linalg.norm(vectors, axis=1)
     heights = chamber.vertices[chamber.triangles][:, :, 2]
-    along = area_vectors(chamber.vertices, chamber.triangles)[:, 2]
     floor, ceiling = heights.max(axis=1) < bottom + FLATNESS, heights.min(axis=1) > top - FLATNESS
-    upright = np.abs(along) <= MAX_NORMAL_Z * np.linalg.norm(
-        area_vectors(chamber.vertices, chamber.triangles), axis=1
-    )
+    upright = np.abs(vectors[:, 2]) <= MAX_NORMAL_Z * area
     checked = area > MIN_AREA
     for tag, own, name, wanted in (
         (TAG_PART, ceiling, "the part reaches into the cavity", "a flat ceiling"),
@@ -110,21 +104,15 @@ def _outline(chamber: Chamber, bottom: float, top: float) -> np.ndarray:
 
     floor = np.unique(chamber.triangles[chamber.tags == TAG_SONOTRODE])
     hull = ConvexHull(chamber.vertices[floor, :2])
-    outline = _without_straight_corners(hull.points[hull.vertices])
-    missing = 1.0 - float(tetrahedron_volumes(chamber.vertices, chamber.triangles).sum()) / (
-        hull.volume * (top - bottom)
-    )
+    volume = float(tetrahedron_volumes(chamber.vertices, chamber.triangles).sum())
+    missing = 1.0 - volume / (hull.volume * (top - bottom))
     if abs(missing) > VOLUME_TOLERANCE:
         raise _refused(
             f"its sides are not convex: it lacks {missing:.2g} of the volume between its floor and "
             "ceiling"
         )
-    return outline
-
-
-def _without_straight_corners(outline: np.ndarray) -> np.ndarray:
-    """The corners (n, 2) at which the outline turns; cutting leaves others within a side."""
+    outline = hull.points[hull.vertices]
     before, after = np.roll(outline, 1, axis=0), np.roll(outline, -1, axis=0)
-    chord = after - before
-    off = chord[:, 0] * (outline - before)[:, 1] - chord[:, 1] * (outline - before)[:, 0]
-    return np.asarray(outline[np.abs(off) > FLATNESS * np.hypot(*chord.T)])
+    chord, arm = (after - before).T, (outline - before).T
+    turns = np.abs(chord[0] * arm[1] - chord[1] * arm[0]) > FLATNESS * np.hypot(*chord)
+    return np.asarray(outline[turns])  # cutting leaves corners within a straight side too

@@ -53,94 +53,67 @@ TAG_END = 255  # tag of a bore's end, which must vanish
 
 
 class TriangleProperties(NamedTuple):
-    """What is known of each triangle of a surface, shape (k,) unless stated.
+    """What is known of each triangle of a surface."""
 
-    Attributes:
-        tags: uint8.
-        facing: area vector out of the cavity [m²], shape (k, 3).
-        source: part triangle that it lies on, else -1.
-        fitting: hole or deflector that it belongs to, by its place in `fitting_names`, else -1.
-    """
-
-    tags: np.ndarray
-    facing: np.ndarray
-    source: np.ndarray
-    fitting: np.ndarray
+    tags: np.ndarray  # (k,), uint8
+    facing: np.ndarray  # area vector out of the cavity [m²], (k, 3)
+    source: np.ndarray  # part triangle that it lies on, else -1; (k,)
+    fitting: np.ndarray  # its hole or deflector by the place in `fitting_names`, else -1; (k,)
 
 
 def triangle_properties(
     facing: np.ndarray, tags: np.ndarray | int, source: np.ndarray | None = None, fitting: int = -1
 ) -> TriangleProperties:
     """Properties of triangles that have one tag or one each (k,), and belong to one fitting."""
-    none = np.full(len(facing), -1, dtype=np.int32)
-    each = np.broadcast_to(np.asarray(tags, dtype=np.uint8), len(facing))
+    count = len(facing)
     return TriangleProperties(
-        each, facing, none if source is None else source, np.full_like(none, fitting)
+        np.broadcast_to(np.asarray(tags, dtype=np.uint8), count),
+        facing,
+        np.full(count, -1) if source is None else np.asarray(source, dtype=np.int64),
+        np.full(count, fitting, dtype=np.int32),
     )
-
-
-NO_TRIANGLES = triangle_properties(np.zeros((0, 3)), 0)
 
 
 def fitting_names(design: Design) -> list[str]:
     """The holes of a chamber, then its deflectors, as the design names them."""
-    holes, deflectors = len(design.chamber.holes), len(design.chamber.deflectors)
-    return [
-        *(f"chamber.holes.{k}" for k in range(holes)),
-        *(f"chamber.deflectors.{k}" for k in range(deflectors)),
-    ]
+    counts = {"holes": len(design.chamber.holes), "deflectors": len(design.chamber.deflectors)}
+    return [f"chamber.{kind}.{k}" for kind, count in counts.items() for k in range(count)]
 
 
 @dataclass(frozen=True)
 class CavitySolid:
-    """The room before the part is cut out, with the properties of the solids that bound it.
-
-    Attributes:
-        pieces: properties of each solid's triangles by its label.
-    """
+    """The room, and by their labels the properties of the triangles of the solids that bound it."""
 
     body: Solid
     pieces: Mapping[int, TriangleProperties]
 
-    def trace(self, surface: SolidSurface, part: TriangleProperties) -> TriangleProperties:
-        """Properties of each triangle of a surface cut from these solids.
-
-        A triangle that comes from none of them belongs to the part.
-        """
+    def trace(self, surface: SolidSurface) -> TriangleProperties:
+        """Properties of each triangle of a surface cut from these solids."""
+        some = next(iter(self.pieces.values()))
         traced = TriangleProperties(
-            *(np.zeros((len(surface.solid), *one.shape[1:]), one.dtype) for one in part)
+            *(np.zeros((len(surface.solid), *one.shape[1:]), one.dtype) for one in some)
         )
-        in_part = np.ones(len(surface.solid), dtype=bool)
         for label, piece in self.pieces.items():
             rows = surface.solid == label
-            in_part &= ~rows
             for one, values in zip(traced, piece, strict=True):
                 one[rows] = values[surface.source[rows]]
-        for one, values in zip(traced, part, strict=True):
-            one[in_part] = values[surface.source[in_part]]
         return traced
+
+    def without(self, body: Solid, pieces: Mapping[int, TriangleProperties]) -> CavitySolid:
+        """What is left when a body, with the properties of its own solids, is cut out."""
+        return CavitySolid(subtract(self.body, body), {**self.pieces, **pieces})
 
 
 class Bore(NamedTuple):
-    """A round bore from its bottom into the room.
+    """A round bore from its bottom into the room."""
 
-    Attributes:
-        name: in the design.
-        bottom: middle of its bottom [m], shape (3,).
-        axis: unit vector into the room, shape (3,).
-        diameter: [m].
-        tag: of its bottom.
-        amplitude: of its bottom if that is a sonotrode [m].
-        fitting: its place in `fitting_names` if it is a hole, else -1.
-    """
-
-    name: str
-    bottom: np.ndarray
-    axis: np.ndarray
-    diameter: float
-    tag: int
-    amplitude: float = 0.0
-    fitting: int = -1
+    name: str  # in the design
+    bottom: np.ndarray  # middle of its bottom [m], shape (3,)
+    axis: np.ndarray  # unit vector into the room, shape (3,)
+    diameter: float  # [m]
+    tag: int  # of its bottom
+    amplitude: float = 0.0  # of its bottom if that is a sonotrode [m]
+    fitting: int = -1  # its place in `fitting_names` if it is a hole
 
 
 def cavity_solid(
@@ -167,19 +140,17 @@ def cavity_solid(
 def swept_faces(design: Design, cavity: CavitySolid) -> list[tuple[str, Solid]]:
     """The room that each sonotrode's vibration sweeps, by the sonotrode's name in the design."""
     surface = cavity.body.surface()
-    tags = cavity.trace(surface, NO_TRIANGLES).tags
-    faces = [("sonotrode", TAG_SONOTRODE, (0.0, 0.0, 1.0), design.sonotrode.amplitude)]
-    faces += [
-        (f"sonotrodes.{k}", further_sonotrode_tag(k), s.direction, s.amplitude)
-        for k, s in enumerate(design.sonotrodes)
-    ]
-    return [
-        (
-            name,
-            sweep_face(surface.select(tags == tag), np.array(axis) * amplitude, f"sweep of {name}"),
-        )
-        for name, tag, axis, amplitude in faces
-    ]
+    tags, sweeps = cavity.trace(surface).tags, []
+    for name, tag, axis, amplitude in (
+        ("sonotrode", TAG_SONOTRODE, (0.0, 0.0, 1.0), design.sonotrode.amplitude),
+        *(
+            (f"sonotrodes.{k}", further_sonotrode_tag(k), one.direction, one.amplitude)
+            for k, one in enumerate(design.sonotrodes)
+        ),
+    ):
+        way = np.array(axis) * amplitude
+        sweeps.append((name, sweep_face(surface.select(tags == tag), way, f"sweep of {name}")))
+    return sweeps
 
 
 def _bore_of_hole(cavity: CavitySolid, hole: Hole, k: int) -> Bore:
@@ -254,32 +225,29 @@ def _length_to_room(cavity: CavitySolid, bore: Bore, rim: np.ndarray) -> float:
 def _without_deflectors(
     cavity: CavitySolid, design: Design, deflectors: Sequence[DeflectorMesh]
 ) -> CavitySolid:
-    """The cavity without all deflectors at once: cutting them one by one refines the surface."""
-    sweeps, solids, pieces = swept_faces(design, cavity), [], dict(cavity.pieces)
-    first = len(design.chamber.holes)
-    for k, deflector in enumerate(deflectors):
-        vertices, triangles = deflector.vertices, deflector.triangles
-        own = split_bodies(vertices, triangles, deflector.name)[0]
-        _refuse_out_of_place(deflector, unite(own, own[0].name), cavity, sweeps)
-        facing = -area_vectors(vertices, triangles)
+    """The cavity without all deflectors at once: cutting them one by one refines the surface.
+
+    Raises:
+        InputError: a deflector is out of place.
+    """
+    sweeps, solids, pieces = swept_faces(design, cavity), [], {}
+    for k, deflector in enumerate(deflectors, start=len(design.chamber.holes)):
+        own = split_bodies(deflector.vertices, deflector.triangles, deflector.name)[0]
+        body = unite(own, own[0].name)
+        given = f"{deflector.name}.at_mm: given {list(deflector.at_mm)}"
+        if overlap_volume(cavity.body, body) <= 0.0:
+            raise InputError(
+                f"{given}, where none of it is in the room; positions count from the middle of the "
+                "sonotrode's face (z = 0)"
+            )
+        for sonotrode, swept in sweeps:
+            if overlap_volume(swept, body) > 0.0:
+                raise InputError(f"{given}, where the face of [{sonotrode}] hits it; move it away")
+        facing = -area_vectors(deflector.vertices, deflector.triangles)
+        properties = triangle_properties(facing, TAG_WALL, fitting=k)
         solids += own
-        for solid in own:
-            pieces[solid.label] = triangle_properties(facing, TAG_WALL, fitting=first + k)
-    return CavitySolid(subtract(cavity.body, unite(solids, "the deflectors")), pieces)
-
-
-def _refuse_out_of_place(
-    deflector: DeflectorMesh, body: Solid, cavity: CavitySolid, sweeps: Sequence[tuple[str, Solid]]
-) -> None:
-    given = f"{deflector.name}.at_mm: given {list(deflector.at_mm)}"
-    if overlap_volume(cavity.body, body) <= 0.0:
-        raise InputError(
-            f"{given}, where none of it is in the room; positions count from the middle of the "
-            "sonotrode's face (z = 0)"
-        )
-    for sonotrode, swept in sweeps:
-        if overlap_volume(swept, body) > 0.0:
-            raise InputError(f"{given}, where the face of [{sonotrode}] hits it; move it away")
+        pieces.update({solid.label: properties for solid in own})
+    return cavity.without(unite(solids, "the deflectors"), pieces)
 
 
 def _first_crossings(
@@ -316,5 +284,5 @@ def _first_crossings(
 def _area_by_tag(cavity: CavitySolid) -> np.ndarray:
     """Area [m²] of the surface with each tag from 0 to TAG_END."""
     surface = cavity.body.surface()
-    tags = cavity.trace(surface, NO_TRIANGLES).tags
+    tags = cavity.trace(surface).tags
     return np.bincount(tags, areas(surface.vertices, surface.triangles), TAG_END + 1)

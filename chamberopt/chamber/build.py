@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.chamber.bores_and_deflectors import (
-    CavitySolid,
     TriangleProperties,
     cavity_solid,
     swept_faces,
@@ -30,12 +29,10 @@ from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, further_sonotrode_
 from chamberopt.geometry.mesh_io.surface_error import format_box, format_point
 from chamberopt.geometry.slivers import MIN_HEIGHT, remove_slivers
 from chamberopt.geometry.solids import (
-    Solid,
     SolidSurface,
     find_cavities,
     overlap_volume,
     split_bodies,
-    subtract,
     unite,
 )
 from chamberopt.geometry.triangles import (
@@ -56,29 +53,18 @@ MAX_ROTATION = 1e-3
 
 @dataclass(frozen=True)
 class Chamber:
-    """The cavity of one design.
+    """The cavity of one design."""
 
-    Attributes:
-        vertices: [m], shape (n, 3), float64.
-        triangles: shape (k, 3), int32; closed, normals pointing out of the cavity.
-        tags: shape (k,), uint8.
-        source: part triangle that a TAG_PART triangle lies on, else -1; shape (k,).
-        volume: [m³].
-        part: in the chamber's frame, shape of its arrays (m,).
-        exposed_area: of each part triangle, the area that bounds the cavity [m²], shape (m,).
-        notes: what was assumed, repaired or left out.
-        fitting: hole or deflector that a TAG_WALL triangle belongs to, by its place in
-            `bores_and_deflectors.fitting_names`, else -1; shape (k,). None where it is not known.
-    """
-
-    vertices: np.ndarray
-    triangles: np.ndarray
-    tags: np.ndarray
-    source: np.ndarray
-    volume: float
-    part: Part
-    exposed_area: np.ndarray
-    notes: tuple[str, ...]
+    vertices: np.ndarray  # [m], shape (n, 3), float64
+    triangles: np.ndarray  # (k, 3) int32; closed, normals pointing out of the cavity
+    tags: np.ndarray  # (k,) uint8
+    source: np.ndarray  # (k,), part triangle that a TAG_PART triangle lies on, else -1
+    volume: float  # [m³]
+    part: Part  # in the chamber's frame, with m triangles
+    exposed_area: np.ndarray  # (m,), area of each part triangle that bounds the cavity [m²]
+    notes: tuple[str, ...]  # what was assumed, repaired or left out
+    # (k,), hole or deflector that a TAG_WALL triangle belongs to, by its place in
+    # `bores_and_deflectors.fitting_names`, else -1. None where it is not known.
     fitting: np.ndarray | None = None
 
     @property
@@ -91,8 +77,8 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
     """The chamber of a design.
 
     Args:
-        target: the part triangles to cover, shape (m,) bool, in place of those that the design
-            chooses: a study keeps the target of its start.
+        target: the part triangles to cover (m,), in place of those that the design chooses: a
+            study keeps the target of its start.
     Raises:
         InputError: the part's mesh cannot be used, the part is outside the cavity or touches the
             sonotrode, none of the target faces the shot, or there is no room over the sonotrode.
@@ -106,25 +92,27 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
 
     cavity = cavity_solid(design, shape, deflectors)
     notes += [note for one in deflectors for note in one.notes]
-    own = triangle_properties(
-        -area_vectors(part.vertices, part.triangles), TAG_PART, np.arange(len(part.triangles))
-    )
-    whole = cavity.body.surface()
     if shape.source is None:  # otherwise the part is a piece of the cavity's surface already
         solids, voids = split_bodies(part.vertices, part.triangles, part.name)
         body = unite(solids, part.name)
         if voids:
             notes.append(f"{part.name}: {voids} closed voids inside the part are left out")
-        _refuse_part_in_sweep(design, cavity, body)
-        whole = subtract(cavity.body, body).surface()
+        # The distance to the first sonotrode is checked in `_refuse_misplaced_part`.
+        for name, swept in swept_faces(design, cavity)[1:] if design.sonotrodes else ():
+            if overlap_volume(swept, body) > 0.0:
+                raise InputError(
+                    f"{name}.at_mm: its face would hit the part; move it back along its axis, or "
+                    "the part"
+                )
+        facing = -area_vectors(part.vertices, part.triangles)
+        own = triangle_properties(facing, TAG_PART, np.arange(len(facing)))
+        cavity = cavity.without(body, {solid.label: own for solid in solids})
     is_drawn = design.chamber.setup() is not None
-    tags = cavity.trace(whole, own).tags
+    whole = cavity.body.surface()
+    tags = cavity.trace(whole).tags
     if not (tags == TAG_PART).any():
-        remedy = (
-            "check the groups in [chamber]"
-            if is_drawn
-            else "change part.offset_mm or the sizes in [chamber]"
-        )
+        drawn, posed = "check the groups", "change part.offset_mm or the sizes"
+        remedy = f"{drawn if is_drawn else posed} in [chamber]"
         raise InputError(f"{part.name}: no part of it is inside the chamber; {remedy}")
 
     room, room_notes = _room_over_sonotrode(whole, tags)
@@ -132,7 +120,7 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
         ceiling = float(shape.vertices[:, 2].max())
         room_notes += _ceiling_notes(room, ceiling, design.chamber.ceiling_key)
     room = remove_slivers(room)[0]
-    traced = cavity.trace(room, own)
+    traced = cavity.trace(room)
     on_part = traced.tags == TAG_PART
     _refuse_free_edges(design, room, traced.tags)
     area = areas(room.vertices, room.triangles)
@@ -146,25 +134,12 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
     notes += room_notes + _rotation_notes(room, traced.facing)
     notes += _floating_part_notes(room, on_part, part.name)
     volume = float(tetrahedron_volumes(room.vertices, room.triangles).sum())
-    return Chamber(
-        room.vertices,
-        room.triangles,
-        traced.tags,
-        traced.source,
-        volume,
-        part,
-        exposed,
-        tuple(notes),
-        traced.fitting,
-    )
+    surface = room.vertices, room.triangles, traced.tags, traced.source
+    return Chamber(*surface, volume, part, exposed, tuple(notes), traced.fitting)
 
 
 def _refuse_misplaced_part(part: Part, shape: np.ndarray, design: Design) -> None:
-    """Raise InputError for a part that is outside, or too low, before anything is cut.
-
-    Args:
-        shape: vertices of the shape's surface [m], shape (n, 3).
-    """
+    """Raise InputError for a part outside a shape's vertices (n, 3) [m], or too low."""
     distance, amplitude = design.chamber.sonotrode_distance, design.sonotrode.amplitude
     if distance <= amplitude:
         drawn = design.chamber.sonotrode_distance_mm is None
@@ -196,19 +171,6 @@ def _refuse_misplaced_part(part: Part, shape: np.ndarray, design: Design) -> Non
             f"({format_box(high - low)}) is beside the chamber "
             f"({format_box(wall_high - wall_low)}); bring it nearer to the axis"
         )
-
-
-def _refuse_part_in_sweep(design: Design, cavity: CavitySolid, body: Solid) -> None:
-    """Raise InputError for a part in the way of a further sonotrode's vibration.
-
-    The distance to the first sonotrode is checked in `_refuse_misplaced_part`.
-    """
-    for name, swept in swept_faces(design, cavity)[1:] if design.sonotrodes else ():
-        if overlap_volume(swept, body) > 0.0:
-            raise InputError(
-                f"{name}.at_mm: its face would hit the part; move it back along its axis, or the "
-                "part"
-            )
 
 
 def _refuse_free_edges(design: Design, room: SolidSurface, tags: np.ndarray) -> None:
@@ -265,11 +227,7 @@ def _ceiling_notes(room: SolidSurface, ceiling: float, key: str) -> list[str]:
 def _only_reachable(
     part: Part, room: SolidSurface, traced: TriangleProperties, design: Design
 ) -> tuple[Part, str]:
-    """The part with the reachable share of its target, and a note on the rest.
-
-    Raises:
-        InputError: the shot reaches nothing of the target.
-    """
+    """The part with the reachable share of its target, or InputError; and a note on the rest."""
     from sim_core import TriangleMesh
 
     ball = min(design.shot.diameters)
@@ -291,11 +249,7 @@ def _only_reachable(
 
 
 def hidden_share(part: Part, exposed: np.ndarray) -> float:
-    """The share of the target's area outside the cavity.
-
-    Args:
-        exposed: of each part triangle, the area that bounds the cavity [m²], shape (m,).
-    """
+    """The share of the target outside the cavity, by each part triangle's area in it (m,) [m²]."""
     return float(1.0 - exposed[part.target].sum() / part.area[part.target].sum())
 
 
@@ -317,11 +271,7 @@ def _hidden_target_notes(part: Part, exposed: np.ndarray) -> list[str]:
 
 
 def _rotation_notes(room: SolidSurface, facing: np.ndarray) -> list[str]:
-    """A note on triangles that rounding has turned.
-
-    Args:
-        facing: area vectors (k, 3) [m²] of the triangles that those of the room were cut from.
-    """
+    """A note on triangles that rounding has turned away from their area vectors (k, 3) [m²]."""
     own = area_vectors(room.vertices, room.triangles)
     across = np.linalg.norm(np.cross(own, facing), axis=1)
     turned = np.arctan2(across, np.einsum("ij,ij->i", own, facing)) > MAX_ROTATION

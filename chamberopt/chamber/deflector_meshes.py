@@ -20,35 +20,24 @@ SIDES = 64  # flat sides of a round rod, their corners on the circle
 
 
 class DeflectorMesh(NamedTuple):
-    """A deflector as it stands in the chamber.
+    """A deflector as it stands in the chamber."""
 
-    Attributes:
-        name: in the design.
-        at_mm: its middle in the design [mm], for messages.
-        vertices: [m], shape (n, 3).
-        triangles: shape (m, 3), normals outward.
-        notes: what was assumed and repaired in its file.
-    """
-
-    name: str
-    at_mm: tuple[float, float, float]
-    vertices: np.ndarray
-    triangles: np.ndarray
-    notes: list[str]
+    name: str  # in the design
+    at_mm: tuple[float, float, float]  # its middle in the design, for messages
+    vertices: np.ndarray  # [m], (n, 3)
+    triangles: np.ndarray  # (m, 3), normals outward
+    notes: list[str]  # what was assumed and repaired in its file
 
 
 def read_deflectors(design: Design) -> list[DeflectorMesh]:
     """All deflectors of a design; InputError for a file that cannot be used."""
-    return [
-        _read(deflector, f"chamber.deflectors.{k}")
-        for k, deflector in enumerate(design.chamber.deflectors)
-    ]
-
-
-def _read(deflector: Deflector, name: str) -> DeflectorMesh:
-    vertices, triangles, notes = _mesh_about_its_middle(deflector, name)
-    vertices = vertices @ rotation_matrix(deflector.rotate_deg).T + np.array(deflector.at)
-    return DeflectorMesh(name, deflector.at_mm, vertices, triangles, notes)
+    deflectors = []
+    for k, one in enumerate(design.chamber.deflectors):
+        name = f"chamber.deflectors.{k}"
+        vertices, triangles, notes = _mesh_about_its_middle(one, name)
+        vertices = vertices @ rotation_matrix(one.rotate_deg).T + np.array(one.at)
+        deflectors.append(DeflectorMesh(name, one.at_mm, vertices, triangles, notes))
+    return deflectors
 
 
 def _mesh_about_its_middle(

@@ -29,27 +29,18 @@ class Part:
 
     It has the user's own triangles in the file's order, unless target.element_mm asks for others.
     It is closed, unless its file draws it as the piece that bounds the room of a whole set-up.
-
-    Attributes:
-        vertices: [m], shape (n, 3).
-        triangles: shape (m, 3), int32.
-        area: [m²], shape (m,).
-        target: whether a triangle must be covered, shape (m,).
-        sha256: of the mesh file as it was read.
-        unit: of the numbers in the file.
-        names: of the file's groups.
-        elements: number of the file's element that each triangle belongs to
-            (`mesh_io.ElementNumbers`), shape (m,), int64; from 1 on if not given.
     """
 
-    vertices: np.ndarray
-    triangles: np.ndarray
-    area: np.ndarray
-    target: np.ndarray
+    vertices: np.ndarray  # [m], (n, 3)
+    triangles: np.ndarray  # (m, 3) int32
+    area: np.ndarray  # [m²], (m,)
+    target: np.ndarray  # (m,), whether a triangle must be covered
     name: str
-    sha256: str = ""
-    unit: str = ""
-    names: tuple[str, ...] = ()
+    sha256: str = ""  # of the mesh file as it was read
+    unit: str = ""  # of the numbers in the file
+    names: tuple[str, ...] = ()  # of the file's groups
+    # (m,) int64, the file's element that a triangle belongs to, as in ElementNumbers; from 1 on if
+    # not given
     elements: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def __post_init__(self) -> None:
@@ -71,10 +62,8 @@ def posed_part(design: Design) -> tuple[Part, list[str]]:
     turn, shift = _pose(mesh, design)
     vertices = snap_to_grid(mesh.vertices @ turn.T + shift)
     area = areas(vertices, mesh.triangles)
-    name, names = design.part.mesh_path.name, tuple(mesh.groups)
-    part = Part(
-        vertices, mesh.triangles, area, target, name, mesh.sha256, mesh.unit, names, mesh.elements
-    )
+    of_file = mesh.sha256, mesh.unit, tuple(mesh.groups), mesh.elements
+    part = Part(vertices, mesh.triangles, area, target, design.part.mesh_path.name, *of_file)
     return part, list(mesh.notes)
 
 
@@ -103,10 +92,8 @@ def part_pose(design: Design) -> tuple[np.ndarray, np.ndarray]:
 
 def _part_of_file(design: Design) -> PartMesh:
     """The part as its file has it; a file is read once, also if many chambers are built from it."""
-    setup = design.chamber.setup()
-    return (
-        read_part_cached(design.part.mesh_path, design.part.unit) if setup is None else setup.part
-    )
+    part, setup = design.part, design.chamber.setup()
+    return read_part_cached(part.mesh_path, part.unit) if setup is None else setup.part
 
 
 def _meshed_part(design: Design) -> tuple[PartMesh, np.ndarray]:
@@ -147,18 +134,14 @@ def _remesh_target(mesh: PartMesh, target: np.ndarray, size: float) -> tuple[Par
         f"{chosen.sum()}, longest sides {1e3 * np.median(longest):.3g} mm in the middle and "
         f"{1e3 * longest.max():.3g} mm at most, shape {shape.min():.2f} at worst (1: equilateral)"
     )
-    triangles = triangles.astype(np.int32)
     origin = _find_origin(mesh, vertices[triangles], source)
-    groups = {name: mask[origin] for name, mask in mesh.groups.items()}
-    numbering = mesh.numbering.select(origin)
-    notes = (*mesh.notes, note)
     meshed = replace(
         mesh,
         vertices=vertices,
-        triangles=triangles,
-        numbering=numbering,
-        groups=groups,
-        notes=notes,
+        triangles=triangles.astype(np.int32),
+        numbering=mesh.numbering.select(origin),
+        groups={name: mask[origin] for name, mask in mesh.groups.items()},
+        notes=(*mesh.notes, note),
     )
     return meshed, chosen
 
@@ -174,28 +157,21 @@ def _find_origin(mesh: PartMesh, corners: np.ndarray, source: np.ndarray) -> np.
     from sim_core import TriangleMesh, closest_points
 
     moved = np.flatnonzero((corners != mesh.vertices[mesh.triangles[source]]).any(axis=(1, 2)))
-    surface = TriangleMesh(
-        mesh.vertices, mesh.triangles, np.zeros(len(mesh.triangles), dtype=np.uint8)
-    )
+    tags = np.zeros(len(mesh.triangles), dtype=np.uint8)
+    surface, far = TriangleMesh(mesh.vertices, mesh.triangles, tags), float(np.ptp(mesh.vertices))
     origin = source.copy()
-    origin[moved] = closest_points(
-        surface, corners[moved].mean(axis=1), float(np.ptp(mesh.vertices))
-    ).triangle
+    origin[moved] = closest_points(surface, corners[moved].mean(axis=1), far).triangle
     return origin
 
 
 def _pose(mesh: PartMesh, design: Design) -> tuple[np.ndarray, np.ndarray]:
     """From the part file's frame to the chamber's: rotation (3, 3), then shift (3,) [m]."""
-    setup = design.chamber.setup()
+    setup, distance = design.chamber.setup(), design.chamber.sonotrode_distance
     if setup is not None:
-        return setup.turn, setup.shift + np.array(
-            [0.0, 0.0, design.chamber.sonotrode_distance - setup.distance]
-        )
+        return setup.turn, setup.shift + np.array([0.0, 0.0, distance - setup.distance])
     turn = rotation_matrix(design.part.rotate_deg)
     vertices = mesh.vertices @ turn.T
     low, high = vertices.min(axis=0), vertices.max(axis=0)
-    centre = (low + high) / 2.0
     x, y = design.part.offset
-    return turn, np.array(
-        [x - centre[0], y - centre[1], design.chamber.sonotrode_distance - low[2]]
-    )
+    foot = np.r_[(low[:2] + high[:2]) / 2.0, low[2]]
+    return turn, np.array([x, y, distance]) - foot

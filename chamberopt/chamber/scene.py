@@ -74,11 +74,11 @@ def require_turnable(design: Design, mesh: TriangleMesh) -> None:
     from sim_core import SceneError, require_free_rotation
 
     turn = part_rotation(design)
-    try:
-        if turn is not None:
+    if turn is not None:
+        try:
             require_free_rotation(mesh, turn, design.shot.diameter)
-    except SceneError as error:
-        raise InputError(f"effects.part_turn: {error}") from None
+        except SceneError as error:
+            raise InputError(f"effects.part_turn: {error}") from None
 
 
 def balls_can_rest(design: Design, mesh: TriangleMesh | AnalyticCavity) -> bool:
@@ -104,12 +104,10 @@ def vibrations(design: Design, phase: float) -> Vibration | tuple[Vibration, ...
     from sim_core import Vibration
 
     first = Vibration(TAG_SONOTRODE, design.sonotrode.amplitude, design.sonotrode.frequency, phase)
-    further = tuple(
-        Vibration(
-            further_sonotrode_tag(k), one.amplitude, one.frequency, phase + one.phase, one.direction
-        )
-        for k, one in enumerate(design.sonotrodes)
-    )
+    further = []
+    for k, one in enumerate(design.sonotrodes):
+        motion = one.amplitude, one.frequency, phase + one.phase, one.direction
+        further.append(Vibration(further_sonotrode_tag(k), *motion))
     return (first, *further) if further else first
 
 
@@ -123,8 +121,7 @@ def scene_physics(
     """The effects of a design in its chamber's mesh or analytical cavity.
 
     Args:
-        phase: of the sonotrode at the start [rad].
-        turn_phase: of a turning part at the start [rad].
+        phase, turn_phase: of the sonotrode and of a turning part at the start [rad].
         phase_seed: for motion = "random_phase", the seed of each ball's phase.
     """
     from sim_core import (
@@ -145,24 +142,21 @@ def scene_physics(
             'effects: still "auto"; resolve them first with a pilot run, as simulate and run do'
         )
     # One (C0, v0) a tag, in the order TAG_PART, TAG_SONOTRODE, TAG_WALL, further sonotrodes.
-    laws = (
-        materials.part,
-        materials.sonotrode,
-        materials.wall,
-        *(materials.sonotrode for _ in design.sonotrodes),
-    )
+    laws = [materials.part, materials.sonotrode, materials.wall]
+    laws += [materials.sonotrode] * len(design.sonotrodes)
     surfaces = tuple((law.restitution, law.yield_speed) for law in laws)
     balls = (materials.shot.restitution, materials.shot.yield_speed)
-    friction, accuracy = effects.friction, design.process.accuracy
+    accuracy, friction = design.process.accuracy, None
+    if effects.friction is not None:
+        of_surfaces = (effects.friction.surfaces,) * len(surfaces)
+        friction = Friction(of_surfaces, effects.friction.balls)
     return Physics(
         gravity=Gravity() if effects.gravity else None,
         restitution=Restitution(surfaces, balls, accuracy.elastic_below),
         vibration=vibrations(design, phase),
         part_rotation=part_rotation(design, turn_phase),
         rest=Rest() if balls_can_rest(design, mesh) else None,
-        friction=Friction((friction.surfaces,) * len(surfaces), friction.balls)
-        if friction is not None
-        else None,
+        friction=friction,
         drag=Drag(piece=accuracy.drag_step) if effects.drag else None,
         surface=surface_effects(**effects.of_surfaces),
         ball_collisions=BallCollisions() if effects.ball_collisions else None,
@@ -178,9 +172,6 @@ def build_scene(design: Design, mesh: TriangleMesh | AnalyticCavity, seed: int) 
     orders of magnitude. The phases of the sonotrode and of a turning part are random, because a
     part may take longer for one turn than a replica lasts.
 
-    Args:
-        mesh: from `chamber_mesh` or `analytic.analytic_cavity`.
-        seed: from `replica_seed`.
     Raises:
         InputError: the shot does not fit or has too many balls, or the part cannot turn.
     """
@@ -194,25 +185,22 @@ def build_scene(design: Design, mesh: TriangleMesh | AnalyticCavity, seed: int) 
     phase = rng.uniform(0.0, 2.0 * np.pi)
     turn_phase = 0.0 if design.effects.part_turn is None else rng.uniform(0.0, 2.0 * np.pi)
     clearance = max(one.amplitude for one in (sonotrode, *design.sonotrodes))
+    diameter, turn = np.array(shot.diameters), part_rotation(design, turn_phase)
     try:
-        diameter = np.array(shot.diameters)
-        turn = part_rotation(design, turn_phase)
         # floor = 0: no balls in a well below the sonotrode's face
         positions = pack_balls(
             mesh, shot.count, diameter, rng, clear=clearance, part_rotation=turn, floor=0.0
         )
     except SceneError as error:
-        raise InputError(
-            f"shot: {error}; see shot.mass_g, shot.diameter_mm and [chamber]"
-        ) from None
+        remedy = "see shot.mass_g, shot.diameter_mm and [chamber]"
+        raise InputError(f"shot: {error}; {remedy}") from None
     velocities = start_velocities(rng, len(positions), sonotrode.peak_speed)
     phase_seed = int(rng.integers(2**32)) if sonotrode.motion == "random_phase" else 0
-    accuracy = design.process.accuracy
     return Scene(
         mesh=mesh,
         balls=Balls(positions, velocities, diameter, shot.density),
         physics=scene_physics(design, mesh, phase, turn_phase, phase_seed),
         duration=design.process.recorded_time,
-        warmup=accuracy.warmup_time,
+        warmup=design.process.accuracy.warmup_time,
         record=(TAG_PART,),
     )
