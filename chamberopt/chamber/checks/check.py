@@ -15,7 +15,7 @@ from chamberopt.chamber.part import turning_axis
 from chamberopt.chamber.reach.reach import Reach, find_reach
 from chamberopt.chamber.scene import chamber_mesh, require_ball_count, require_turnable
 from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL, is_sonotrode
-from chamberopt.geometry.triangles import areas, tetrahedron_volumes
+from chamberopt.geometry.triangles import areas, edge_keys, sides_of, tetrahedron_volumes
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -45,8 +45,9 @@ def describe(design: Design, chamber: Chamber, reach: Reach | None = None) -> di
         require_turnable(design, reach.mesh)
     part, shot, process = chamber.part, design.shot, design.process
     exposed = chamber.exposed_area > 0.0
-    box = part.vertices.max(axis=0) - part.vertices.min(axis=0)
+    box = np.ptp(part.vertices, axis=0)
     shape = design.chamber.surface(part.vertices, part.triangles)  # without the part
+    shape_volume = float(tetrahedron_volumes(shape.vertices, shape.triangles).sum())
     simulated = process.accuracy.replicas * (process.recorded_time + process.accuracy.warmup_time)
     return {
         "part": {
@@ -66,9 +67,7 @@ def describe(design: Design, chamber: Chamber, reach: Reach | None = None) -> di
         },
         "chamber": {
             "shape": design.chamber.shape,
-            "shape_volume_cm3": _rounded(
-                float(tetrahedron_volumes(shape.vertices, shape.triangles).sum()) * 1e6
-            ),
+            "shape_volume_cm3": _rounded(shape_volume * 1e6),
             "free_volume_cm3": _rounded(chamber.volume * 1e6),
             "closed": "yes",  # otherwise SceneError was raised above
             "sonotrode_clearance_mm": _rounded(sonotrode_clearance(reach.mesh) * 1e3),
@@ -100,11 +99,7 @@ def shot_reach(design: Design, chamber: Chamber) -> Reach:
 
 
 def warnings(design: Design, chamber: Chamber, reach: Reach | None = None) -> list[str]:
-    """Sentences about values that are allowed but probably not intended, each with a remedy.
-
-    Args:
-        reach: the chamber's `shot_reach`, if it is known already.
-    """
+    """Sentences about values that are allowed but probably not intended, each with a remedy."""
     reach = shot_reach(design, chamber) if reach is None else reach
     shot, texts = design.shot, []
     filled = shot.volume / chamber.volume
@@ -155,10 +150,9 @@ def warnings(design: Design, chamber: Chamber, reach: Reach | None = None) -> li
 
 def _reach_facts(reach: Reach, chamber: Chamber) -> dict[str, Any]:
     """The area of target and part in the chamber that the smallest balls can touch."""
-    own = {"target": on_target(chamber), "part": chamber.tags == TAG_PART}
     size = areas(chamber.vertices, chamber.triangles)
     facts: dict[str, Any] = {"ball_mm": _rounded(reach.diameter * 1e3)}
-    for name, rows in own.items():
+    for name, rows in (("target", on_target(chamber)), ("part", chamber.tags == TAG_PART)):
         touched = float((reach.share * size)[rows].sum())
         facts[f"{name}_reachable_mm2"] = _rounded(touched * 1e6)
         facts[f"{name}_reachable_share"] = _rounded(touched / size[rows].sum())
@@ -171,18 +165,12 @@ def _turn_facts(design: Design) -> dict[str, Any]:
     if turn is None:
         return {}
     point, axis = turning_axis(design)
-    motion = (
-        {"rpm": turn.rpm}
-        if turn.rpm is not None
-        else {"angle_deg": turn.angle_deg, "frequency_hz": turn.frequency_hz}
-    )
-    return {
-        "part_turn": {
-            **motion,
-            "through_mm": [_rounded(x * 1e3) for x in point],
-            "axis": [_rounded(x) for x in axis / np.linalg.norm(axis)],
-        }
+    swing = {"angle_deg": turn.angle_deg, "frequency_hz": turn.frequency_hz}
+    pose = {
+        "through_mm": [_rounded(x * 1e3) for x in point],
+        "axis": [_rounded(x) for x in axis / np.linalg.norm(axis)],
     }
+    return {"part_turn": {**(swing if turn.rpm is None else {"rpm": turn.rpm}), **pose}}
 
 
 def _heights_in_side_wall(design: Design, chamber: Chamber) -> tuple[float, float] | None:
@@ -191,22 +179,13 @@ def _heights_in_side_wall(design: Design, chamber: Chamber) -> tuple[float, floa
     None also for a part that closes the chamber like a lid, turns (its joint is a round shaft), has
     a hole for its fixture, or is drawn with its chamber.
     """
-    if (
-        design.chamber.holes
-        or design.effects.part_turn is not None
-        or design.chamber.setup() is not None
-    ):
-        return None
+    turns, drawn = design.effects.part_turn is not None, design.chamber.setup() is not None
     names = surface_names(chamber)
-    if not (names == CEILING).any():
+    if design.chamber.holes or turns or drawn or not (names == CEILING).any():
         return None
-    edges = chamber.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    own = np.repeat(chamber.tags == TAG_PART, 3)
-    beside = np.repeat(names == SIDE_WALL, 3)
-    of_part, of_wall = (
-        {tuple(edge) for edge in np.sort(edges[rows]).tolist()} for rows in (own, beside)
-    )
-    height = chamber.vertices[np.array(sorted(of_part & of_wall), dtype=int).reshape(-1, 2), 2]
+    edges, of_part = edge_keys(chamber.triangles), np.repeat(chamber.tags == TAG_PART, 3)
+    joint = np.repeat(names == SIDE_WALL, 3) & np.isin(edges, edges[of_part])
+    height = chamber.vertices[sides_of(chamber.triangles)[joint], 2]
     return (float(height.min()), float(height.max())) if height.size else None
 
 
@@ -238,13 +217,11 @@ def sonotrode_clearance(mesh: TriangleMesh) -> float:
 
     if not ((mesh.tags == TAG_PART).any() and (mesh.tags == TAG_SONOTRODE).any()):
         return float("inf")
-    whole = float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
-    ways = ((TAG_PART, TAG_SONOTRODE), (TAG_SONOTRODE, TAG_PART))
-    corners = (np.unique(mesh.triangles[mesh.tags == one]) for one, _ in ways)
-    return min(
-        float(closest_points(mesh, mesh.vertices[these], whole, other).distance.min())
-        for these, (_, other) in zip(corners, ways, strict=True)
-    )
+    whole, least = float(np.linalg.norm(np.ptp(mesh.vertices, axis=0))), []
+    for one, other in ((TAG_PART, TAG_SONOTRODE), (TAG_SONOTRODE, TAG_PART)):
+        corners = mesh.vertices[np.unique(mesh.triangles[mesh.tags == one])]
+        least.append(float(closest_points(mesh, corners, whole, other).distance.min()))
+    return min(least)
 
 
 def _lowest_height(design: Design, points: np.ndarray, amplitude: float | None) -> float:
@@ -261,9 +238,8 @@ def _lowest_height(design: Design, points: np.ndarray, amplitude: float | None) 
     offset = points - point
     along = (offset @ axis)[:, None] * axis
     across, ahead = (offset - along)[:, 2], np.cross(axis, offset)[:, 2]
-    furthest = np.minimum(
-        np.abs(np.arctan2(ahead, across)) + (np.pi if amplitude is None else amplitude), np.pi
-    )
+    largest = np.pi if amplitude is None else amplitude
+    furthest = np.minimum(np.abs(np.arctan2(ahead, across)) + largest, np.pi)
     return float((point[2] + along[:, 2] + np.hypot(across, ahead) * np.cos(furthest)).min())
 
 

@@ -19,9 +19,9 @@ from chamberopt.chamber.checks.place_names import (
     one_of,
     surface_names,
 )
-from chamberopt.chamber.reach.connectivity import connected_groups
 from chamberopt.chamber.reach.largest_ball import TouchPoints
 from chamberopt.chamber.reach.reach import TOLERATED_OVERLAP
+from chamberopt.geometry.triangles import connected_pieces
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -46,12 +46,7 @@ class GapKind(NamedTuple):
 
 
 def gap_warnings(reach: Reach, chamber: Chamber, largest: float, turns: bool = False) -> list[str]:
-    """Warnings about gaps narrower than a ball, those with the largest area first.
-
-    Args:
-        largest: diameter of the largest ball [m].
-        turns: whether the part does.
-    """
+    """Warnings about gaps narrower than the largest ball [m], those with the largest area first."""
     touches = reach.touches
     facing = (touches.obstacle >= 0) & (touches.cosine < MAX_COSINE)
     narrow = facing & (touches.radius < 0.5 * largest)
@@ -62,42 +57,36 @@ def gap_warnings(reach: Reach, chamber: Chamber, largest: float, turns: bool = F
     for members in _clusters(inside.centre, 2.0 * reach.spacing):
         gap = inside.select(members)
         if gap.area.sum() > (0.5 * largest) ** 2:
+            pairs = np.sort(np.c_[names[gap.triangle], names[gap.obstacle]].astype(str), axis=1)
+            sides, counts = np.unique(pairs, axis=0, return_counts=True)
+            one, two = map(str, sides[counts.argmax()])  # what most of the gap lies between
             wedge = _is_wedge(gap, entrance, largest, 2.0 * reach.spacing)
-            gaps.setdefault(GapKind(*_sides(gap, names), wedge), []).append(gap)
-    kinds = sorted(gaps, key=lambda kind: -sum(gap.area.sum() for gap in gaps[kind]))
-    return [
-        _gap_warning(kind, gaps[kind], reach.diameter, largest, turns)
-        for kind in kinds[:MAX_WARNINGS]
-    ]
+            gaps.setdefault(GapKind(one, two, wedge), []).append(gap)
+    kinds = sorted(gaps, key=lambda kind: -sum(gap.area.sum() for gap in gaps[kind]))[:MAX_WARNINGS]
+    return [_gap_warning(kind, gaps[kind], reach.diameter, largest, turns) for kind in kinds]
 
 
 def pocket_warnings(reach: Reach, chamber: Chamber) -> list[str]:
     """Warnings about pockets that would hold a ball that cannot get in, the largest area first."""
     touches, closed = reach.touches, reach.fits & ~reach.reached
     target = on_target(chamber)[touches.triangle]
-    warnings = []
+    found: list[tuple[float, str]] = []
     for region in np.unique(reach.region[closed]):
         own = closed & (reach.region == region)
         if region < len(reach.region_volume) and reach.region_volume[region] > 0.0:
             in_target = float(touches.area[own & target].sum())
             loss = f", though {mm2(in_target)} of the target are in it" if in_target else ""
-            warnings.append(
-                (
-                    float(touches.area[own].sum()),
-                    f"a pocket around {around(touches.point[own], touches.area[own])} would hold a "
-                    f"ball of {1e3 * reach.diameter:g} mm but has no way in for one{loss}; widen "
-                    "its mouth, close it, or use smaller balls",
-                )
+            text = (
+                f"a pocket around {around(touches.point[own], touches.area[own])} would hold a "
+                f"ball of {1e3 * reach.diameter:g} mm but has no way in for one{loss}; widen its "
+                "mouth, close it, or use smaller balls"
             )
-    return [text for _, text in sorted(warnings, key=lambda one: -one[0])[:MAX_WARNINGS]]
+            found.append((float(touches.area[own].sum()), text))
+    return [text for _, text in sorted(found, key=lambda one: -one[0])[:MAX_WARNINGS]]
 
 
 def target_warnings(reach: Reach, chamber: Chamber, only_reachable: bool = False) -> list[str]:
-    """A warning about the share of the target that no ball can touch, for any peening time.
-
-    Args:
-        only_reachable: part.target.reachable of the design.
-    """
+    """A warning about the share of the target that no ball can touch, for any peening time."""
     touches = reach.touches
     own = on_target(chamber)[touches.triangle]
     whole, missed = float(touches.area[own].sum()), own & ~reach.reached
@@ -106,9 +95,8 @@ def target_warnings(reach: Reach, chamber: Chamber, only_reachable: bool = False
         return []
     sharp = own & ~reach.fits
     place = one_of(touches.point[missed], touches.area[missed])
-    remedy = "narrow [part.target]" + (
-        "" if only_reachable else ", or set part.target.reachable = true"
-    )
+    or_set = "" if only_reachable else ", or set part.target.reachable = true"
+    remedy = f"narrow [part.target]{or_set}"
     if touches.area[sharp].sum() > 0.5 * left:
         order = np.argsort(touches.radius[own])
         second_half = np.cumsum(touches.area[own][order]) > 0.5 * left
@@ -126,8 +114,8 @@ def _clusters(centre: np.ndarray, near: float) -> list[np.ndarray]:
 
     if not len(centre):
         return []
-    pairs = KDTree(centre).query_pairs(near, output_type="ndarray")
-    label = connected_groups(pairs, len(centre))
+    one, two = KDTree(centre).query_pairs(near, output_type="ndarray").T
+    label = connected_pieces(one, two, len(centre))[1]
     order = np.argsort(label, kind="stable")
     return np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
 
@@ -136,22 +124,13 @@ def _is_wedge(gap: TouchPoints, entrance: np.ndarray, largest: float, near: floa
     """Whether a gap narrows steadily from an entrance that balls reach, as wide as a ball.
 
     Args:
-        entrance: centres of reached balls in gaps slightly wider than a ball [m], shape (n, 3).
-        largest: diameter of the ball [m].
+        entrance: centres (n, 3) [m] of reached balls in gaps slightly wider than the largest ball.
         near: distance from the gap to its entrance [m].
     """
     from scipy.spatial import KDTree
 
     begins = gap.centre[gap.radius > 0.5 * (1.0 - WIDTH_TOLERANCE) * largest]
     return bool(len(begins) and len(entrance) and KDTree(entrance).query(begins)[0].min() < near)
-
-
-def _sides(gap: TouchPoints, names: np.ndarray) -> tuple[str, str]:
-    """The two surfaces that most of a gap lies between."""
-    pairs = np.sort(np.c_[names[gap.triangle], names[gap.obstacle]].astype(str), axis=1)
-    sides, counts = np.unique(pairs, axis=0, return_counts=True)
-    one, two = sides[counts.argmax()]
-    return str(one), str(two)
 
 
 def _gap_warning(
@@ -188,13 +167,12 @@ def _gap_warning(
 
 
 def _remedy(sides: set[str]) -> str:
-    of_part = any("part" in side for side in sides)
-    if of_part and SONOTRODE in sides:
+    if not any("part" in side for side in sides):
+        return "change the chamber's shape, or use smaller balls"
+    if SONOTRODE in sides:
         return "raise chamber.sonotrode_distance_mm"
-    if of_part and CEILING in sides:
+    if CEILING in sides:
         return "raise chamber.height_mm or close the gap"
     if all("part" in side for side in sides):
         return "use smaller balls, or close it where it is not to be peened"
-    if of_part:
-        return "enlarge the chamber, check part.offset_mm, or close the gap"
-    return "change the chamber's shape, or use smaller balls"
+    return "enlarge the chamber, check part.offset_mm, or close the gap"

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from chamberopt.chamber.checks.place_names import around, mm2
-from chamberopt.chamber.reach.connectivity import connected_groups
 from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL
-from chamberopt.geometry.triangles import area_vectors
+from chamberopt.geometry.triangles import area_vectors, connected_pieces, sides_of
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -25,15 +24,10 @@ REMEDY = {
 
 
 class Ledge(NamedTuple):
-    """Surfaces of part or wall that face up.
-
-    Attributes:
-        message: one sentence.
-        level: whether enough of them is level for a ball to lie on.
-    """
+    """Surfaces of part or wall that face up."""
 
     message: str
-    level: bool
+    level: bool  # whether enough of them is level for a ball to lie on
 
 
 def find_ledges(design: Design, chamber: Chamber) -> list[Ledge]:
@@ -58,14 +52,15 @@ def find_ledges(design: Design, chamber: Chamber) -> list[Ledge]:
         shown = faces & flat if level else faces & _in_hollows(chamber, upward, downward)
         if not shown.any():
             continue
-        size = mm2(area[shown].sum())
-        if level:
-            where, extent = "on", f"{size} of it are level"
-        else:
-            where, extent = "in hollows of", f"{size} face up, none level"
+        where = "on" if level else "in hollows of"
+        extent = "of it are level" if level else "face up, none level"
+        corners = chamber.vertices[chamber.triangles[shown]]
+        low, high = 1e3 * corners[..., 2].min(), 1e3 * corners[..., 2].max()
+        heights = f"{low:.4g} mm" if high - low < 0.01 else f"{low:.4g} to {high:.4g} mm"
         message = (
             f"balls can come to rest {where} the {name}, which neither vibrates nor turns: "
-            f"{extent}, {_place(chamber, shown, area)}; "
+            f"{mm2(area[shown].sum())} {extent}, around "
+            f"{around(corners.mean(axis=1), area[shown])}, at z = {heights}; "
             f"{REMEDY[tag].format(key=design.chamber.ceiling_key)}"
         )
         found.append(Ledge(message, level))
@@ -77,26 +72,13 @@ def _in_hollows(chamber: Chamber, upward: np.ndarray, downward: np.ndarray) -> n
 
     A wall that leans out is not a hollow: its lowest points are on the sonotrode. A face beside one
     that faces down is not one either, because a ball falls off there.
-
-    Args:
-        upward: which faces face up, shape (k,).
-        downward: which face down, shape (k,).
     """
     count, height = len(chamber.vertices), chamber.vertices[:, 2]
-    one, two = (
-        chamber.triangles[:, [0, 1, 2, 1, 2, 0]].reshape(-1, 2, 3).transpose(1, 0, 2).reshape(2, -1)
-    )
+    one, two = sides_of(chamber.triangles).T
     level = np.abs(height[one] - height[two]) <= HEIGHT_TOLERANCE
-    plateau = connected_groups(np.c_[one[level], two[level]], count)
+    plateau = connected_pieces(one[level], two[level], count)[1]
     bottom = np.ones(plateau.max() + 1, dtype=bool)
     # Every edge occurs in both directions, so one comparison finds all lower neighbours.
     bottom[plateau[one[height[two] < height[one] - HEIGHT_TOLERANCE]]] = False
     bottom[plateau[chamber.triangles[downward | (chamber.tags == TAG_SONOTRODE)]]] = False
     return np.asarray(upward & bottom[plateau[chamber.triangles]].any(axis=1))
-
-
-def _place(chamber: Chamber, faces: np.ndarray, area: np.ndarray) -> str:
-    corners = chamber.vertices[chamber.triangles[faces]]
-    low, high = 1e3 * corners[..., 2].min(), 1e3 * corners[..., 2].max()
-    heights = f"z = {low:.4g} mm" if high - low < 0.01 else f"z = {low:.4g} to {high:.4g} mm"
-    return f"around {around(corners.mean(axis=1), area[faces])}, at {heights}"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL, further_sonotrode_tag
-from chamberopt.geometry.triangles import area_vectors
+from chamberopt.geometry.triangles import area_vectors, unit_vectors
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -18,17 +18,11 @@ CEILING, SIDE_WALL, SONOTRODE = "the ceiling", "the wall", "the sonotrode"
 
 def surface_names(chamber: Chamber) -> np.ndarray:
     """The name of the surface that each triangle belongs to, (k,) of str."""
-    normal = -area_vectors(chamber.vertices, chamber.triangles)  # towards the shot
-    size = np.linalg.norm(normal, axis=1)
-    up = np.divide(normal[:, 2], size, out=np.zeros_like(size), where=size > 0.0)
-    on_part = np.select(
-        [up > MIN_UPWARD, up < -MIN_UPWARD],
-        ["the part's upper side", "the part's underside"],
-        "the part's side",
-    )
-    on_wall = np.select(
-        [up > MIN_UPWARD, up < -MIN_UPWARD], ["a ledge of the wall", CEILING], SIDE_WALL
-    )
+    up = -unit_vectors(area_vectors(chamber.vertices, chamber.triangles))[:, 2]
+    faces = [up > MIN_UPWARD, up < -MIN_UPWARD]
+    sides = ["the part's upper side", "the part's underside"]
+    on_part = np.select(faces, sides, "the part's side")
+    on_wall = np.select(faces, ["a ledge of the wall", CEILING], SIDE_WALL)
     words = np.where(chamber.tags == TAG_PART, on_part, on_wall).astype(object)
     words[chamber.tags == TAG_SONOTRODE] = SONOTRODE
     for tag in np.unique(chamber.tags[chamber.tags > TAG_WALL]):
@@ -55,6 +49,5 @@ def one_of(points: np.ndarray, weights: np.ndarray) -> str:
 
 def on_target(chamber: Chamber) -> np.ndarray:
     """Which of the cavity's triangles (k,) lie on the target."""
-    return np.asarray(
-        (chamber.tags == TAG_PART) & chamber.part.target[np.maximum(chamber.source, 0)]
-    )
+    in_target = chamber.part.target[np.maximum(chamber.source, 0)]
+    return np.asarray((chamber.tags == TAG_PART) & in_target)

@@ -29,20 +29,13 @@ STEP = 0.25  # of the radius: steps in which a straight way is checked
 
 
 class Cells(NamedTuple):
-    """A grid of cubic cells over the cavity.
+    """A grid of cubic cells over the cavity, shape (nx, ny, nz)."""
 
-    Attributes:
-        low: lowest corner [m], shape (3,).
-        edge: of a cell [m].
-        space: number of the open space that a cell belongs to, from 1 on, shape (nx, ny, nz);
-            0 where the centre of a ball may not lie anywhere in the cell.
-        unsure: whether the centre may lie in some of the cell, shape (nx, ny, nz).
-    """
-
-    low: np.ndarray
-    edge: float
+    low: np.ndarray  # lowest corner [m], (3,)
+    edge: float  # of a cell [m]
+    # The open space that a cell belongs to, from 1 on; 0 where a centre may not lie anywhere in it.
     space: np.ndarray
-    unsure: np.ndarray
+    unsure: np.ndarray  # whether a ball's centre may lie in some of the cell
 
     def middles(self, chosen: np.ndarray) -> np.ndarray:
         """Middles (n, 3) [m] of the cells that are true in (nx, ny, nz)."""
@@ -79,23 +72,13 @@ def open_cells(mesh: TriangleMesh, radius: float) -> Cells:
         half = 0.5 * DIAGONAL * side
         index = np.argwhere(unsure)
         found = closest_points(mesh, low + side * (index + 0.5), radius + half)
-        away = found.distance
         free[tuple(index.T)] = found.triangle < 0
-        unsure[tuple(index.T)] = (found.triangle >= 0) & (away > radius - half)
+        unsure[tuple(index.T)] = (found.triangle >= 0) & (found.distance > radius - half)
         if halvings:
-            free, unsure = _halved(free), _halved(unsure)
+            free, unsure = (
+                np.kron(cells, np.ones((2, 2, 2), dtype=bool)) for cells in (free, unsure)
+            )
     return Cells(low, edge, label(free, structure=np.ones((3, 3, 3)))[0], unsure)
-
-
-def _halved(cells: np.ndarray) -> np.ndarray:
-    for axis in range(3):
-        cells = np.repeat(cells, 2, axis=axis)
-    return cells
-
-
-def connected_groups(links: np.ndarray, count: int) -> np.ndarray:
-    """Group number (count,) of each node, where links (k, 2) connect the nodes of a group."""
-    return connected_pieces(links[:, 0], links[:, 1], count)[1]
 
 
 def find_regions(
@@ -122,9 +105,10 @@ def find_regions(
     narrow = np.concatenate([centre[tight], _midway_points(mesh, cells, radius)])
     count = spaces + len(narrow)
     links = _links_to_spaces(mesh, cells, narrow, radius, spacing) + np.array([spaces, 0])
-    region = connected_groups(links, count)
+    region = connected_pieces(links[:, 0], links[:, 1], count)[1]
     more = _links_between(mesh, narrow, region[spaces:], radius, spacing) + spaces
-    region = connected_groups(np.concatenate([links, more]), count)
+    links = np.concatenate([links, more])
+    region = connected_pieces(links[:, 0], links[:, 1], count)[1]
     of_touch = np.full(len(touches.point), -1)
     of_touch[fits] = region[node]
     size = np.bincount(cells.space.ravel(), minlength=spaces + 1)[1:]
@@ -143,9 +127,8 @@ def _midway_points(mesh: TriangleMesh, cells: Cells, radius: float) -> np.ndarra
     from sim_core import closest_points
 
     highest = maximum_filter(cells.space, size=NEARBY)
-    lowest = minimum_filter(
-        np.where(cells.space > 0, cells.space, np.iinfo(np.int32).max), size=NEARBY
-    )
+    numbers = np.where(cells.space > 0, cells.space, np.iinfo(np.int32).max)
+    lowest = minimum_filter(numbers, size=NEARBY)
     place = cells.middles(cells.unsure & ((highest == 0) | (highest != lowest)))
     beside = closest_points(mesh, place, radius + DIAGONAL * cells.edge)
     outward = area_vectors(mesh.vertices, mesh.triangles)[beside.triangle]
@@ -215,9 +198,8 @@ def _is_way_clear(
     from sim_core import closest_points
 
     clear = np.ones(len(start), dtype=bool)
-    if not len(start):
-        return clear
-    steps = int(np.ceil(np.linalg.norm(end - start, axis=1).max() / (STEP * radius))) + 1
+    longest = np.linalg.norm(end - start, axis=1).max(initial=0.0)
+    steps = int(np.ceil(longest / (STEP * radius))) + 1
     for share in np.linspace(0.0, 1.0, steps + 1)[1:-1]:
         rows = np.flatnonzero(clear)
         found = closest_points(mesh, start[rows] + share * (end - start)[rows], radius)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from chamberopt.geometry.triangles import area_vectors
+from chamberopt.geometry.triangles import area_vectors, areas, unit_vectors
 
 if TYPE_CHECKING:
     from sim_core import TriangleMesh
@@ -23,25 +23,16 @@ SEQUENCE_STEP = np.array([0.7548776662466927, 0.5698402909980532])
 
 
 class TouchPoints(NamedTuple):
-    """Points of the surface, and the largest ball that touches at each.
+    """Points of the surface, and the largest ball that touches at each."""
 
-    Attributes:
-        triangle: that the point lies on, shape (p,), int.
-        point: [m], shape (p, 3).
-        normal: unit vector into the cavity, shape (p, 3).
-        area: that the point stands for [m²], shape (p,).
-        radius: of the largest ball, up to a limit [m], shape (p,).
-        obstacle: triangle that limits the ball, else -1; shape (p,).
-        cosine: between the normal and that of the obstacle as the ball meets it, -1 where they
-            face each other, 0 without an obstacle; shape (p,).
-    """
-
-    triangle: np.ndarray
-    point: np.ndarray
-    normal: np.ndarray
-    area: np.ndarray
-    radius: np.ndarray
-    obstacle: np.ndarray
+    triangle: np.ndarray  # (p,), that the point lies on
+    point: np.ndarray  # [m], (p, 3)
+    normal: np.ndarray  # unit vector into the cavity, (p, 3)
+    area: np.ndarray  # that the point stands for [m²], (p,)
+    radius: np.ndarray  # of the largest ball, up to a limit [m], (p,)
+    obstacle: np.ndarray  # triangle that limits the ball, else -1; (p,)
+    # Between the normal and that of the obstacle as the ball meets it, -1 where they face each
+    # other, 0 without an obstacle; (p,).
     cosine: np.ndarray
 
     @property
@@ -65,21 +56,16 @@ def find_touch_points(
         overlap: how far a ball may reach into a surface [m].
     """
     triangle, point, area = spread_points(mesh.vertices, mesh.triangles, spacing)
-    outward = area_vectors(mesh.vertices, mesh.triangles)
-    size = np.linalg.norm(outward, axis=1)
-    normal = -np.divide(
-        outward, size[:, None], out=np.zeros_like(outward), where=size[:, None] > 0.0
-    )[triangle]
-    return TouchPoints(
-        triangle, point, normal, area, *largest_balls(mesh, point, normal, max_radius, overlap)
-    )
+    normal = -unit_vectors(area_vectors(mesh.vertices, mesh.triangles))[triangle]
+    balls = largest_balls(mesh, point, normal, max_radius, overlap)
+    return TouchPoints(triangle, point, normal, area, *balls)
 
 
 def spread_points(
     vertices: np.ndarray, triangles: np.ndarray, spacing: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Points spread evenly over triangles: triangle (p,), point (p, 3) [m], and area (p,) [m²]."""
-    size = np.linalg.norm(area_vectors(vertices, triangles), axis=1)
+    size = areas(vertices, triangles)
     count = np.where(size > 0.0, np.maximum(np.ceil(size / spacing**2), 1.0), 0.0).astype(np.int64)
     triangle = np.repeat(np.arange(len(triangles)), count)
     # One sequence over all triangles: if it began again on each, the points of a row of similar
@@ -88,11 +74,8 @@ def spread_points(
     fold = u + v > 1.0  # the square's other half falls onto the triangle
     u, v = np.where(fold, 1.0 - u, u), np.where(fold, 1.0 - v, v)
     a, b, c = (vertices[triangles[triangle, k]] for k in range(3))
-    return (
-        triangle,
-        a + u[:, None] * (b - a) + v[:, None] * (c - a),
-        (size / np.maximum(count, 1))[triangle],
-    )
+    point = a + u[:, None] * (b - a) + v[:, None] * (c - a)
+    return triangle, point, (size / np.maximum(count, 1))[triangle]
 
 
 def largest_balls(

@@ -27,28 +27,17 @@ MEASURED_WIDTH = 1.25  # of the largest ball: wider gaps are not measured
 
 @dataclass(frozen=True)
 class Reach:
-    """What a ball reaches in a cavity.
+    """What a ball reaches in a cavity."""
 
-    Attributes:
-        diameter: of the ball [m].
-        touches: the p points that were checked.
-        fits: whether no wall is in the ball's way at the point, shape (p,).
-        reached: whether it fits and gets there from the sonotrode, shape (p,).
-        region: number of the region that its centre can move in, -1 where it does not fit; (p,).
-        region_volume: of the open space in each region [m³].
-        spacing: largest distance between touch points [m].
-        share: of each triangle of the cavity, the share that the ball can touch, shape (k,).
-    """
-
-    mesh: TriangleMesh
-    diameter: float
-    touches: TouchPoints
-    fits: np.ndarray
-    reached: np.ndarray
-    region: np.ndarray
-    region_volume: np.ndarray
-    spacing: float
-    share: np.ndarray
+    mesh: TriangleMesh  # with k triangles
+    diameter: float  # of the ball [m]
+    touches: TouchPoints  # the p points that were checked
+    fits: np.ndarray  # (p,), whether no wall is in the ball's way at the point
+    reached: np.ndarray  # (p,), whether it fits and gets there from the sonotrode
+    region: np.ndarray  # (p,), number of the region of its centre, -1 where it does not fit
+    region_volume: np.ndarray  # of the open space in each region [m³]
+    spacing: float  # largest distance between touch points [m]
+    share: np.ndarray  # (k,), of each triangle of the cavity, the share that the ball can touch
 
 
 def find_reach(mesh: TriangleMesh, diameter: float, largest: float | None = None) -> Reach:
@@ -64,24 +53,18 @@ def find_reach(mesh: TriangleMesh, diameter: float, largest: float | None = None
     """
     radius = 0.5 * diameter
     overlap = TOLERATED_OVERLAP * radius
-    max_radius = max(
-        radius + 1.01 * np.sqrt(3.0) * cell_edge(mesh, radius),
-        MEASURED_WIDTH * 0.5 * (largest or diameter),
-    )
+    near_cell = radius + 1.01 * np.sqrt(3.0) * cell_edge(mesh, radius)
+    max_radius = max(near_cell, MEASURED_WIDTH * 0.5 * (largest or diameter))
     spacing = _spacing(mesh, SPACING * radius)
+    widest = float(spacing.max())
     touches = find_touch_points(mesh, spacing, max_radius, overlap)
-    region, volume = find_regions(mesh, touches, radius - overlap, float(spacing.max()))
+    region, volume = find_regions(mesh, touches, radius - overlap, widest)
     fits = touches.radius >= radius
     region = np.where(fits, region, -1)
     start = np.unique(region[fits & (mesh.tags[touches.triangle] == TAG_SONOTRODE)])
     reached = fits & np.isin(region, start)
-    count = len(mesh.triangles)
-    whole = np.bincount(touches.triangle, touches.area, count)
-    touched = np.bincount(touches.triangle[reached], touches.area[reached], count)
-    share = np.divide(touched, whole, out=np.zeros(count), where=whole > 0.0)
-    return Reach(
-        mesh, diameter, touches, fits, reached, region, volume, float(spacing.max()), share
-    )
+    share = _share(touches.triangle, touches.area, reached, len(mesh.triangles))
+    return Reach(mesh, diameter, touches, fits, reached, region, volume, widest, share)
 
 
 def reached_part_share(reach: Reach, source: np.ndarray, count: int) -> np.ndarray:
@@ -93,11 +76,20 @@ def reached_part_share(reach: Reach, source: np.ndarray, count: int) -> np.ndarr
     Returns:
         Shape (count,); 0 for triangles outside the cavity.
     """
-    size, own = areas(reach.mesh.vertices, reach.mesh.triangles), source >= 0
-    touched, whole = (
-        np.bincount(source[own], weights[own], count) for weights in (reach.share * size, size)
-    )
-    return np.divide(touched, whole, out=np.zeros(count), where=whole > 0.0)
+    own = source >= 0
+    size = areas(reach.mesh.vertices, reach.mesh.triangles)[own]
+    return _share(source[own], size, reach.share[own], count)
+
+
+def _share(triangle: np.ndarray, area: np.ndarray, touched: np.ndarray, count: int) -> np.ndarray:
+    """Share (count,) of each triangle that is touched, from pieces of it, each touched by a share.
+
+    Args:
+        triangle, area, touched: of each piece, shape (p,).
+    """
+    whole = np.bincount(triangle, area, count)
+    part = np.bincount(triangle, touched * area, count)
+    return np.divide(part, whole, out=np.zeros(count), where=whole > 0.0)
 
 
 def _spacing(mesh: TriangleMesh, wanted: float) -> np.ndarray:
