@@ -11,12 +11,7 @@ import numpy as np
 
 from chamberopt.common.estimate import Estimate, paired_difference
 from chamberopt.common.progress import Progress
-from chamberopt.optimize.evaluate_candidate import (
-    CandidateEvaluator,
-    Reference,
-    Simulator,
-    objective_unit,
-)
+from chamberopt.optimize.evaluate_candidate import CandidateEvaluator, Reference, Simulator
 from chamberopt.optimize.search.acquisition import recommend_point
 from chamberopt.optimize.search.gaussian_process import GaussianProcess, pool_variances
 from chamberopt.optimize.search.scalarisation import draw_weights, scalarise
@@ -42,23 +37,17 @@ Stop = Callable[[], bool]
 
 @dataclass(frozen=True)
 class ConfirmedCandidate:
-    """A candidate simulated with new seeds.
+    """A candidate simulated with new seeds."""
 
-    Attributes:
-        searched: number of its trial in the search; None if the model recommended it.
-        goals: estimate of each objective of the study.
-        feasibility: "feasible" if the whole intervals of the constrained figures are within their
-            limits, "infeasible" if one is outside, else "not known".
-        reason: the limits that are, or may be, violated.
-    """
-
-    searched: int | None
+    searched: int | None  # number of its trial in the search; None if the model recommended it
     parameters: dict[str, float]
     design: Design
     evaluation: Evaluation
+    # FEASIBLE if the whole intervals of the constrained figures are within their limits, INFEASIBLE
+    # if one is outside, else NOT_KNOWN.
     feasibility: str
-    reason: str
-    goals: tuple[Estimate, ...]
+    reason: str  # the limits that are, or may be, violated
+    goals: tuple[Estimate, ...]  # of each objective of the study
 
     @property
     def feasible(self) -> bool:
@@ -195,10 +184,8 @@ class Candidates:
         best_first = [int(i) for i in np.argsort(-scores, kind="stable") if self.trials[i].feasible]
         # A recommendation takes one place, but never the only one; for two objectives, all.
         places = count
-        if recommended and has_two_objectives:
-            places = 0
-        elif recommended and count > 1:
-            places = count - 1
+        if recommended and (has_two_objectives or count > 1):
+            places = 0 if has_two_objectives else count - 1
         for i in best_first:
             if len(chosen) <= places and is_new(self._points[i]):
                 chosen.append((i, self._points[i]))
@@ -224,8 +211,7 @@ class Candidates:
         elif stage == "confirm" and trial.objective is not None:
             evaluation = self._folder.evaluation(number)
         if number == 0:
-            unit = objective_unit(self._study.objective.goals[0], trial.metrics)
-            self._evaluator.reference = Reference(trial.score, unit)
+            self._evaluator.reference = Reference(trial.score, self._evaluator.unit(trial.metrics))
         self.trials.append(trial)
         # Trials from the record but the last one are not shown.
         if self._progress and number + 1 >= len(self._folder.recorded.trials):
@@ -251,9 +237,6 @@ def close_to_best(confirmed: list[ConfirmedCandidate]) -> list[ConfirmedCandidat
     if not feasible:
         return []
     best = max(feasible, key=lambda one: one.goals[0].value)
-    close = [
-        one
-        for one in feasible
-        if one is not best and paired_difference(best.goals[0], one.goals[0]).low <= 0.0
-    ]
+    others = [one for one in feasible if one is not best]
+    close = [one for one in others if paired_difference(best.goals[0], one.goals[0]).low <= 0.0]
     return [best, *close] if close else []

@@ -36,16 +36,11 @@ class Reference(NamedTuple):
     """What scores are measured by, known once the start is evaluated."""
 
     score: float = 0.0  # of the start
-    unit: float = 1.0  # of the objective, see objective_unit
+    unit: float = 1.0  # of the objective, see CandidateEvaluator.unit
 
 
 class CandidateEvaluator:
-    """Evaluates the candidates of a study.
-
-    Attributes:
-        space: the parameters of the study and the unit cube.
-        reference: set by a search when it has evaluated the start.
-    """
+    """Evaluates the candidates of a study; a search sets `reference` once it has the start."""
 
     def __init__(self, study: Study, simulator: Simulator) -> None:
         self._study, self._simulator = study, simulator
@@ -54,11 +49,8 @@ class CandidateEvaluator:
 
     def goals(self, evaluation: Evaluation) -> tuple[Estimate, ...]:
         """Estimate of each objective of the study."""
-        others = self._study.objective.goals[1:]
-        return (
-            evaluation.objective,
-            *(weighted_sum(parse_objective(name), evaluation.metrics) for name in others),
-        )
+        metrics, (_, *others) = evaluation.metrics, self._study.objective.goals
+        return evaluation.objective, *(weighted_sum(parse_objective(x), metrics) for x in others)
 
     def constrained(
         self, parameters: Mapping[str, float], evaluation: Evaluation
@@ -97,9 +89,8 @@ class CandidateEvaluator:
         parameters = self.space.values_at(point)
         is_start = stage == "search" and number == 0
         worst = self.reference.score - FAILURE_PENALTY * self.reference.unit
-        failed = Trial(
-            number, stage, tuple(point.tolist()), parameters, (), {}, 0.0, worst, False, ""
-        )
+        at = tuple(point.tolist())
+        failed = Trial(number, stage, at, parameters, (), {}, 0.0, worst, False, "")
         try:
             evaluation = self._evaluate(self.space.design_at(point), stage, replicas, best_low)
             goals = self.goals(evaluation)
@@ -116,25 +107,19 @@ class CandidateEvaluator:
             raise
         unit = self.reference.unit
         if is_start:
-            unit = objective_unit(self._study.objective.goals[0], evaluation.metrics)
+            unit = self.unit(evaluation.metrics)
         figures, constraints = self.constrained(parameters, evaluation), self._study.constraints
-        penalty = sum(
-            expected_violation(figures[name], limits) for name, limits in constraints.items()
-        )
-        violations = [
-            text
-            for name, limits in constraints.items()
-            for text in describe_violations(name, figures[name], limits)
-        ]
-        # Without pseudo-values, which a confirmation has in a file of its own.
-        metrics = {
-            name: Estimate(metric.value, metric.half_width)
-            for name, metric in evaluation.metrics.items()
-        }
+        penalty = sum(expected_violation(figures[k], limits) for k, limits in constraints.items())
+        violations: list[str] = []
+        for name, limits in constraints.items():
+            violations += describe_violations(name, figures[name], limits)
         trial = replace(
             failed,
             goals=goals,
-            metrics=metrics,
+            # Without pseudo-values, which a confirmation has in a file of its own.
+            metrics={
+                k: Estimate(one.value, one.half_width) for k, one in evaluation.metrics.items()
+            },
             penalty=penalty,
             score=goals[0].value - unit * penalty,
             feasible=not violations,
@@ -164,14 +149,14 @@ class CandidateEvaluator:
         except BrokenExecutor:  # the executor may have recovered from a lost worker
             return self._simulator(design, stream, replicas)
 
+    def unit(self, metrics: Mapping[str, Estimate]) -> float:
+        """Size of one unit of the first objective: that of its largest term.
 
-def objective_unit(goal: str, metrics: Mapping[str, Estimate]) -> float:
-    """Size of one unit of an objective: that of its largest term.
-
-    For a metric between 0 and 1 this is its weight, for another also the size of the metric.
-    """
-    sizes = [
-        abs(weight) * (1.0 if METRICS[name].highest <= 1.0 else abs(metrics[name].value))
-        for name, weight in parse_objective(goal).terms.items()
-    ]
-    return max(sizes) or 1.0
+        For a metric between 0 and 1 this is its weight, for another also the size of the metric.
+        """
+        terms = parse_objective(self._study.objective.goals[0]).terms.items()
+        sizes = [
+            abs(weight) * (1.0 if METRICS[name].highest <= 1.0 else abs(metrics[name].value))
+            for name, weight in terms
+        ]
+        return max(sizes) or 1.0

@@ -68,13 +68,11 @@ def plan_sweep(
 ) -> SweepPlan:
     """Plan a sweep of `grid` values of each parameter, bounds included, or `sobol` points in all.
 
+    `seed` is that of the Sobol points, by default the study's optimizer's. InputError if not one of
+    grid and sobol is given, or a number is out of range.
+
     Source: the Sobol points are scrambled as in A. B. Owen, "Scrambling Sobol' and
     Niederreiter-Xing points", J. Complexity 14, 1998 (scipy.stats.qmc.Sobol).
-
-    Args:
-        seed: of the Sobol points, by default that of the study's optimizer.
-    Raises:
-        InputError: not exactly one of grid and sobol is given, or a number is out of range.
     """
     from scipy.stats.qmc import Sobol
 

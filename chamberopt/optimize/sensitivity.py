@@ -23,42 +23,26 @@ RANGE_POINTS = 201
 
 @dataclass(frozen=True)
 class Slice:
-    """The score over one parameter, by the model.
-
-    Attributes:
-        values: values of the parameter in the unit of the file, shape (k,).
-        mean: score with the other parameters as in the best design, shape (k,).
-        half_width: half-width of its 95 % interval, shape (k,).
-        effect: score averaged over all values of the other parameters, shape (k,).
-        share: share of this effect in the variance of the score over the bounds.
-        flat: range of values in which the best design, with this parameter alone changed, loses no
-            more than the noise.
-    """
+    """The score over one parameter, by the model; arrays have the shape (k,)."""
 
     name: str
-    values: np.ndarray
-    mean: np.ndarray
-    half_width: np.ndarray
-    effect: np.ndarray
-    share: float
+    values: np.ndarray  # of the parameter in the unit of the file
+    mean: np.ndarray  # score with the other parameters as in the best design
+    half_width: np.ndarray  # half-width of its 95 % interval
+    effect: np.ndarray  # score averaged over all values of the other parameters
+    share: float  # of this effect in the variance of the score over the bounds
+    # Values for which the best design, with this parameter alone changed, loses no more than noise.
     flat: tuple[float, float]
 
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """One slice for each parameter.
-
-    Attributes:
-        noise: loss that counts as none.
-        expected: the model's score of the best design.
-        together: share of the designs with all parameters in their flat ranges that lose no more
-            than the noise.
-    """
+    """One slice for each parameter."""
 
     slices: tuple[Slice, ...]
-    noise: float
-    expected: Estimate
-    together: float
+    noise: float  # loss that counts as none
+    expected: Estimate  # the model's score of the best design
+    together: float  # share of the designs within all flat ranges that lose no more than the noise
 
     def sentences(self) -> list[str]:
         """What a designer may change: one sentence for each parameter, and one for all."""
@@ -120,19 +104,12 @@ def analyse_sensitivity(
             effect = _main_effect(model, sample, i, steps)
             share = float(effect.var()) / whole_variance if whole_variance > 0.0 else 0.0
             ranges.append(_flat_range(model, at, i, top - noise))
-            slices.append(
-                Slice(
-                    name=name,
-                    values=low[i] + steps * (high[i] - low[i]),
-                    mean=mean,
-                    half_width=NORMAL_95 * deviation,
-                    effect=effect,
-                    share=min(1.0, share),
-                    flat=tuple((low[i] + np.array(ranges[-1]) * (high[i] - low[i])).tolist()),
-                )
-            )
-        ends = np.array(ranges)
-        within = ends[:, 0] + sample * (ends[:, 1] - ends[:, 0])
+            values, flat = (low[i] + np.array(k) * (high[i] - low[i]) for k in (steps, ranges[-1]))
+            width = NORMAL_95 * deviation
+            ends_of_flat = tuple(flat.tolist())
+            slices.append(Slice(name, values, mean, width, effect, min(1.0, share), ends_of_flat))
+        begin, end = np.array(ranges).T
+        within = begin + sample * (end - begin)
         together = float((model(within)[0] >= top - noise).mean())
     expected = Estimate(top, NORMAL_95 * deviation_at_top)
     return Sensitivity(tuple(slices), noise, expected, together)
@@ -142,9 +119,8 @@ def _main_effect(
     model: GaussianProcess, sample: np.ndarray, i: int, steps: np.ndarray
 ) -> np.ndarray:
     """Mean score over the other parameters at each step of parameter i."""
-    means = []
+    moved, means = sample.copy(), []
     for step in steps:
-        moved = sample.copy()
         moved[:, i] = step
         means.append(float(model(moved)[0].mean()))
     return np.array(means)

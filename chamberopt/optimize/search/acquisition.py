@@ -103,9 +103,8 @@ def _expected_improvement(mean: np.ndarray, deviation: np.ndarray, best: float) 
     from scipy.special import ndtr
 
     z = (mean - best) / deviation
-    improvement: np.ndarray = (mean - best) * ndtr(z) + deviation * np.exp(-0.5 * z * z) / np.sqrt(
-        2.0 * np.pi
-    )
+    density = deviation * np.exp(-0.5 * z * z) / np.sqrt(2.0 * np.pi)
+    improvement: np.ndarray = (mean - best) * ndtr(z) + density
     return improvement
 
 

@@ -43,19 +43,19 @@ OUTLIER_RATIO = 9.0
 SIGNAL, LENGTH, NOISE = (1.0, 1.5), (0.3, 0.6), (0.01, 1.5)
 SIGNAL_BOUNDS, LENGTH_BOUNDS, NOISE_BOUNDS = (0.02, 50.0), (0.05, 5.0), (1e-6, 7.0)
 
+Misfit = Callable[[np.ndarray], tuple[float, np.ndarray]]  # and its gradient
+
 
 class GaussianProcess:
     """Scores as a smooth function of points of the unit cube, fitted when it is made.
 
+    Its attribute `noise` is the variance of one evaluation's score.
+
     Args:
-        points: points with scores, shape (n, d); only the best MAX_POINTS are used.
-        scores: shape (n,).
-        variances: squared standard errors of the scores, shape (n,), see pool_variances; 0 where
-            unknown.
+        points: points with scores (n,), shape (n, d); only the best MAX_POINTS are used.
+        variances: squared standard errors of the scores, (n,), see pool_variances; 0 where unknown.
         length_factor: multiplies the fitted length scales. Below 1 the model is less certain away
             from its points.
-    Attributes:
-        noise: variance of one evaluation's score.
     """
 
     def __init__(
@@ -134,9 +134,7 @@ def _fit(points: np.ndarray, values: np.ndarray, noise: np.ndarray, length_facto
     width = np.array([deviation for _, deviation in priors])
 
     def most_probable(
-        misfit: Callable[[np.ndarray], tuple[float, np.ndarray]],
-        begin: np.ndarray,
-        bounds: np.ndarray,
+        misfit: Misfit, begin: np.ndarray, bounds: np.ndarray
     ) -> tuple[np.ndarray, float]:
         from scipy.optimize import minimize
 
@@ -161,9 +159,9 @@ def _fit(points: np.ndarray, values: np.ndarray, noise: np.ndarray, length_facto
         if length_factor == 1.0:
             return process
         logs = process.kernel_.theta + np.log([1.0, *[length_factor] * dimensions, 1.0])
-        return GaussianProcessRegressor(
-            kernel.clone_with_theta(logs), alpha=process.alpha, optimizer=None
-        ).fit(points, values)
+        kernel = kernel.clone_with_theta(logs)
+        process = GaussianProcessRegressor(kernel, alpha=process.alpha, optimizer=None)
+        return process.fit(points, values)
 
 
 def one_thread() -> Any:

@@ -41,7 +41,6 @@ def maximise(
 
     Args:
         start: first point, shape (d,).
-        settings: algorithm or phases, budget and seed, as in the study file.
         model_data: what the model learns; by default the scores, with unknown noise.
     Returns:
         The phases that ran, e.g. "sobol, then surrogate".

@@ -82,12 +82,11 @@ def _make_optimizer(algorithm: str, count: int, step: float, tolerance: float) -
     optimizer = nlopt.opt(getattr(nlopt, name), count)
     optimizer.set_lower_bounds(np.zeros(count))
     optimizer.set_upper_bounds(np.ones(count))
-    local = optimizer
-    if name.startswith("G_MLSL"):
-        local = nlopt.opt(getattr(nlopt, LOCAL), count)
-    if local is not optimizer or name.startswith("LN_"):
+    is_global = name.startswith("G_MLSL")
+    local = nlopt.opt(getattr(nlopt, LOCAL), count) if is_global else optimizer
+    if is_global or name.startswith("LN_"):
         local.set_initial_step(step)
         local.set_xtol_abs(tolerance)
-    if local is not optimizer:
+    if is_global:
         optimizer.set_local_optimizer(local)
     return optimizer

@@ -37,6 +37,5 @@ def scalarise(
     size = np.ptp(known, axis=0)
     size = np.where(size > 0.0, size, 1.0)
     missing = weight * (known.max(axis=0) - values) / size
-    return -(missing.max(axis=1) + SUM_WEIGHT * missing.sum(axis=1)), variances @ (
-        weight / size
-    ) ** 2
+    scores = -(missing.max(axis=1) + SUM_WEIGHT * missing.sum(axis=1))
+    return scores, variances @ (weight / size) ** 2

@@ -31,9 +31,7 @@ class BudgetSpentError(Exception):
 class ScoredPoints:
     """The points that a search has scored; each is scored once and counts once in the budget.
 
-    Attributes:
-        points: in the order of evaluation, each (d,).
-        best: the point with the highest score so far, or the start.
+    `points` (d,) are in the order of evaluation; `best` is the highest so far, or the start.
     """
 
     def __init__(self, score: Score, start: np.ndarray, budget: int) -> None:
@@ -53,10 +51,7 @@ class ScoredPoints:
     def score(self, point: np.ndarray, limit: int | None = None) -> float:
         """The score of a point.
 
-        Args:
-            limit: number of points at which the phase ends; by default the budget.
-        Raises:
-            BudgetSpentError: the point is new and there are that many points already.
+        BudgetSpentError if it is new, and there are `limit` points, or as many as the budget.
         """
         key = point.tobytes()
         if key not in self._scores:

@@ -19,9 +19,7 @@ def only_writer(folder: Path) -> Iterator[None]:
 
     The lock belongs to the operating system and ends with its process, however that ends, so no
     lock is left behind. A forked child would share it until both have ended; workers are spawned.
-
-    Raises:
-        InputError: another process holds the folder.
+    InputError if another process holds the folder.
     """
     from filelock import FileLock, Timeout
 
@@ -40,9 +38,8 @@ def only_writer(folder: Path) -> Iterator[None]:
     try:
         since = datetime.now().astimezone().isoformat(sep=" ", timespec="seconds")
         with suppress(OSError):  # a full disk is reported by the files that matter
-            holder.write_text(
-                f"process {os.getpid()} on {platform.node()} since {since}", encoding="utf-8"
-            )
+            name = f"process {os.getpid()} on {platform.node()} since {since}"
+            holder.write_text(name, encoding="utf-8")
         yield
     finally:
         with suppress(OSError):

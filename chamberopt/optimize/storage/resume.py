@@ -15,11 +15,7 @@ from chamberopt.optimize.storage.trial_log import JsonLines, Trial
 
 
 class RecordedTrials:
-    """The trials of a log, read once; a last line cut off by a crash is removed.
-
-    Raises:
-        InputError: a row is damaged.
-    """
+    """The trials of a log, read once; a last line cut off by a crash is removed."""
 
     def __init__(self, log: JsonLines) -> None:
         self._log = log
@@ -29,8 +25,7 @@ class RecordedTrials:
     def find(self, number: int, stage: str, point: Sequence[float]) -> Trial | None:
         """The recorded trial of a candidate, or None if the record has ended.
 
-        Raises:
-            InputError: the record has another candidate at this number, by as little as a bit.
+        InputError if the record has another candidate at this number, by as little as a bit.
         """
         if number >= len(self.trials):
             return None

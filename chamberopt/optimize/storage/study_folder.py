@@ -13,13 +13,9 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.files import make_output_folder, write_text
 from chamberopt.design.design import Design
+from chamberopt.optimize.storage import study_inputs
 from chamberopt.optimize.storage.lock import only_writer
 from chamberopt.optimize.storage.resume import RecordedTrials
-from chamberopt.optimize.storage.study_inputs import (
-    require_same_files,
-    require_same_inputs,
-    study_inputs,
-)
 from chamberopt.optimize.storage.trial_log import HISTORY, TIMINGS, JsonLines, Trial, read_seconds
 from chamberopt.simulation.effect_pilot import Advice
 from chamberopt.simulation.evaluation import Evaluation, load_evaluation, save_evaluation
@@ -70,14 +66,10 @@ def is_finished(folder: Path) -> bool:
 
 
 class StudyFolder:
-    """An open study folder, see open_study_folder.
-
-    Attributes:
-        recorded: the trials that were in the folder when it was opened.
-    """
+    """An open study folder, see open_study_folder; `recorded` are the trials that it held then."""
 
     def __init__(self, study: Study, path: Path, plan: Mapping[str, Any] | None = None) -> None:
-        self.path, self._study, self._inputs = path, study, study_inputs(study, plan)
+        self.path, self._study, self._inputs = path, study, study_inputs.study_inputs(study, plan)
         self._history = JsonLines(path / HISTORY)
         self._timings = JsonLines(path / TIMINGS, survives_power_cut=False)
         self._require_same_study()
@@ -121,10 +113,8 @@ class StudyFolder:
         path = self.path / EFFECTS
         if not path.is_file():
             resolved, advice = resolve(design)
-            values = {
-                "effects": resolved.effects.model_dump(mode="json"),
-                "advice": [asdict(one) for one in advice],
-            }
+            effects = resolved.effects.model_dump(mode="json")
+            values = {"effects": effects, "advice": [asdict(one) for one in advice]}
             write_text(path, json.dumps(values, indent=2) + "\n")
         stored = _read_json(path)
         try:
@@ -135,21 +125,15 @@ class StudyFolder:
         return self._study.model_copy(update={"design": resolved}), advice
 
     def evaluation(self, number: int) -> Evaluation:
-        """The evaluation of a recorded confirmation.
-
-        Raises:
-            InputError: its file is missing or damaged.
-        """
+        """The evaluation of a recorded confirmation; InputError if its file is not usable."""
         return load_evaluation(self._evaluation_path(number))
 
     def append(self, trial: Trial, evaluation: Evaluation | None, seconds: float) -> None:
         """Store a trial, and the whole evaluation of a confirmation; both are then on the disk.
 
-        Raises:
-            OSError: they cannot be written.
-            InputError: a file that the design names has changed since the study began.
+        OSError if they cannot be written, InputError if a file that the design names has changed.
         """
-        require_same_files(self._study.design, self._inputs, self.path)
+        study_inputs.require_same_files(self._study.design, self._inputs, self.path)
         if trial.stage == "confirm" and evaluation is not None:
             path = self._evaluation_path(trial.number)
             path.parent.mkdir(exist_ok=True)
@@ -165,10 +149,8 @@ class StudyFolder:
             return
         before, now = _read_json(self.path / INPUTS), self._inputs
         if self.finished:  # a result stays valid when the program changes
-            before, now = (
-                {key: one.get(key) for key in ("study", "sweep")} for one in (before, now)
-            )
-        require_same_inputs(self.path, before, now)
+            before, now = ({k: one.get(k) for k in ("study", "sweep")} for one in (before, now))
+        study_inputs.require_same_inputs(self.path, before, now)
 
 
 def _read_json(path: Path) -> dict[str, Any]:

@@ -38,36 +38,34 @@ def study_inputs(study: Study, plan: Mapping[str, Any] | None = None) -> dict[st
 
 def require_same_inputs(folder: Path, before: Mapping[str, Any], now: Mapping[str, Any]) -> None:
     """Raise InputError if the study in the folder was begun with other inputs."""
-    changed = _differences(before, now)
-    if not changed:
-        return
-    if len(changed) > MAX_DIFFERENCES:
-        hidden = len(changed) - MAX_DIFFERENCES
-        changed = [*changed[:MAX_DIFFERENCES], f"and {hidden} more"]
-    lines = [f"{folder}: the study in this folder began otherwise:", *changed]
+    title = f"{folder}: the study in this folder began otherwise:"
     remedy = "to resume it, restore these inputs; to run the new study, give another folder (--out)"
-    raise InputError("\n  ".join(lines) + f"\n{remedy}")
+    _require_same(before, now, title, remedy)
 
 
 def require_same_files(design: Design, before: Mapping[str, Any], folder: Path) -> None:
     """Raise InputError if a file that the design names has changed since the study began."""
+    title = f"{folder}: changed while the study ran, so the running evaluation is not kept:"
+    remedy = "to resume, restore the file and run the study again on this folder"
     now = _with_digests(design.model_dump(mode="json"))
-    changed = _differences(before["study"]["design"], now)
-    if changed:
-        title = f"{folder}: changed while the study ran, so the running evaluation is not kept:"
-        lines = [title, *changed[:MAX_DIFFERENCES]]
-        remedy = "to resume, restore the file and run the study again on this folder"
-        raise InputError("\n  ".join(lines) + f"\n{remedy}")
+    _require_same(before["study"]["design"], now, title, remedy)
 
 
-def _differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
-    """A line for each value that differs: `study.design.shot.mass_g: was 5.0, is 6.0`."""
+def _require_same(
+    before: Mapping[str, Any], now: Mapping[str, Any], title: str, remedy: str
+) -> None:
+    """Raise InputError that lists differences: `study.design.shot.mass_g: was 5.0, is 6.0`."""
     old, new = _flatten(before), _flatten(now)
-    return [
+    changed = [
         f"{name}: was {_format(old, name)}, is {_format(new, name)}"
         for name in {**old, **new}
         if name not in old or name not in new or old[name] != new[name]
     ]
+    if len(changed) > MAX_DIFFERENCES:
+        hidden = len(changed) - MAX_DIFFERENCES
+        changed = [*changed[:MAX_DIFFERENCES], f"and {hidden} more"]
+    if changed:
+        raise InputError("\n  ".join([title, *changed]) + f"\n{remedy}")
 
 
 def _with_digests(value: Any) -> Any:
