@@ -13,17 +13,8 @@ from numbers import Integral, Real
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, cast
 
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    ModelWrapValidatorHandler,
-    ValidationError,
-    ValidationInfo,
-    create_model,
-    field_validator,
-    model_validator,
-)
+import pydantic
+from pydantic import BaseModel, Field, ValidationError, ValidationInfo
 
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
@@ -63,35 +54,31 @@ class Design(FileTable):
     effects: Effects = Field(default_factory=Effects)
     process: Process
 
-    @model_validator(mode="wrap")
+    @pydantic.model_validator(mode="wrap")
     @classmethod
     def _use_class_of_its_shape(
-        cls, data: Any, validate_here: ModelWrapValidatorHandler["Design"], info: ValidationInfo
+        cls, data: Any, handler: pydantic.ModelWrapValidatorHandler["Design"], info: ValidationInfo
     ) -> "Design":
         """Validate with the subclass whose chamber table has the keys of the design's shape."""
         if cls is not Design or not isinstance(data, Mapping):
-            return validate_here(data)
+            return handler(data)
         return design_class(data, info.context).model_validate(data, context=info.context)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the values: a worker process creates the class of a shape's designs itself."""
         return validate, (Design, self.model_dump())
 
-    @model_validator(mode="before")
+    @pydantic.model_validator(mode="before")
     @classmethod
     def _name_the_setup_file_once(cls, data: Any) -> Any:
         """Copy mesh and unit of [part] to a chamber that is drawn in the same file."""
-        if not isinstance(data, Mapping):
-            return data
-        part, chamber = data.get("part"), data.get("chamber")
-        if not isinstance(part, Mapping) or not isinstance(chamber, Mapping):
-            return data
-        if chamber.get("shape") != IMPORTED:
+        part, chamber = (_table(data, name) for name in ("part", "chamber"))
+        if part is None or chamber is None or chamber.get("shape") != IMPORTED:
             return data
         file = {key: part[key] for key in ("mesh", "unit") if key in part}
         return {**data, "chamber": {**file, **chamber}}
 
-    @field_validator("effects", mode="before")
+    @pydantic.field_validator("effects", mode="before")
     @classmethod
     def _accept_auto(cls, effects: Any) -> Any:
         if isinstance(effects, (str, int, float, list)) and effects != "auto":
@@ -165,21 +152,15 @@ class Design(FileTable):
 
     def numbers(self) -> tuple[str, ...]:
         """Dotted names of every continuous number, which a study may vary."""
-        return tuple(
-            name for name, field in toml_errors.numeric_fields(self) if field.annotation is not int
-        )
+        fields = toml_errors.numeric_fields(self)
+        return tuple(name for name, field in fields if field.annotation is not int)
 
     def value(self, name: str) -> float:
-        """The number at a dotted name, in the file's unit.
-
-        Raises:
-            InputError: the name is not that of a number, or it is not set in this design.
-        """
+        """The number at a dotted name, in the file's unit; InputError if none is set there."""
         known = [known for known, _ in toml_errors.numeric_fields(self)]
         if name not in known:
-            raise InputError(
-                f"{name}: not a number of a design; {toml_errors.did_you_mean(name, known)}"
-            )
+            hint = toml_errors.did_you_mean(name, known)
+            raise InputError(f"{name}: not a number of a design; {hint}")
         value: Any = self
         for step in name.split("."):
             value = value[int(step)] if isinstance(value, tuple) else getattr(value, step)
@@ -213,35 +194,30 @@ def _replaced(old: Any, name: str, steps: Sequence[str], value: Any) -> Any:
     if isinstance(old, tuple) and step.isdecimal() and int(step) < len(old):
         k = int(step)
         return (*old[:k], _replaced(old[k], name, rest, value), *old[k + 1 :])
-    why = (
-        "not set in this design; give it a value there first"
-        if old is None
-        else "not a key of a design"
-    )
-    raise InputError(f"{name}: {why}")
+    lacking = "not set in this design; give it a value there first"
+    raise InputError(f"{name}: {lacking if old is None else 'not a key of a design'}")
 
 
 def _of_the_same_kind(old: Any, value: Any) -> Any:
     """The value, as a whole number or not like the old one: numpy's numbers are accepted too."""
-    is_number = isinstance(value, Real) and not isinstance(value, bool)
-    if not is_number:
+    if isinstance(value, bool) or not isinstance(value, Real):
         return value
-    if isinstance(old, int):
-        return int(value) if float(value).is_integer() else float(value)
     whole = isinstance(value, Integral) and not isinstance(old, float)
+    if isinstance(old, int):
+        whole = float(value).is_integer()
     return int(value) if whole else float(value)
 
 
 class AnyShape(ChamberTable):
     """Replaces a chamber of an unknown shape, so that other problems are reported too."""
 
-    model_config = ConfigDict(**{**STRICT, "extra": "ignore"})
+    model_config = pydantic.ConfigDict(**{**STRICT, "extra": "ignore"})
 
     shape: Literal[tuple(SHAPES)] = Field(  # type: ignore[valid-type]
         description="form of the cavity, or a Python file with one of your own"
     )
 
-    @field_validator("shape", mode="before")
+    @pydantic.field_validator("shape", mode="before")
     @classmethod
     def _load_custom_shape(cls, shape: Any, info: ValidationInfo) -> Any:
         if is_custom(shape):
@@ -253,12 +229,7 @@ class AnyShape(ChamberTable):
 
 
 def design_class(data: Mapping[str, Any], context: Mapping[str, Any] | None = None) -> type[Design]:
-    """The class of designs whose chamber has the shape named in the data.
-
-    Args:
-        data: a design's values.
-        context: of the validation, as ``validate`` makes it.
-    """
+    """The class of designs whose chamber has the shape named in a design's values."""
     chamber = data.get("chamber")
     name = chamber.get("shape") if isinstance(chamber, Mapping) else getattr(chamber, "shape", None)
     if not is_custom(name):
@@ -269,15 +240,15 @@ def design_class(data: Mapping[str, Any], context: Mapping[str, Any] | None = No
         return _designs_with(AnyShape if (context or {}).get("needs_mesh") else MissingShape)
 
 
-def _has_custom_shape(data: Mapping[str, Any]) -> bool:
-    chamber = data.get("chamber")
-    return isinstance(chamber, Mapping) and is_custom(chamber.get("shape"))
+def _table(data: Any, name: str) -> Mapping[str, Any] | None:
+    table = data.get(name) if isinstance(data, Mapping) else None
+    return table if isinstance(table, Mapping) else None
 
 
 @cache
 def _designs_with(table: type[ChamberTable]) -> type[Design]:
     chamber = (table, Field(description="the cavity before the part is taken out of it"))
-    return create_model("Design", __base__=Design, __doc__=Design.__doc__, chamber=chamber)
+    return pydantic.create_model("Design", __base__=Design, __doc__=Design.__doc__, chamber=chamber)
 
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -303,7 +274,8 @@ def validate(
     try:
         return model.model_validate(data, context=context)
     except ValidationError as error:
-        if model is Design and not mesh_must_exist and _has_custom_shape(data):
+        custom = is_custom((_table(data, "chamber") or {}).get("shape"))
+        if model is Design and not mesh_must_exist and custom:
             with suppress(ValidationError):  # the shape's file may have changed since
                 missing = _designs_with(MissingShape)
                 return cast(Model, missing.model_validate(data, context=context))

@@ -60,21 +60,15 @@ class PartTurn(FileTable):
 class FrictionTable(FileTable):
     """Walton's mu and beta0 of balls on surfaces and, unless given separately, of ball on ball."""
 
-    mu: float = Field(
-        ge=0.0, le=10.0, description="coefficient of friction; 0 is smooth, metals: tenths"
+    mu: float = quantity(0, 10, "", "coefficient of friction; 0 is smooth, metals: tenths")
+    beta0: float = quantity(
+        -1,
+        1,
+        "",
+        "tangential restitution of a sticking impact: minus the slip after over the slip before",
     )
-    beta0: float = Field(
-        ge=-1.0,
-        le=1.0,
-        description="tangential restitution of a sticking impact: minus the slip after over the "
-        "slip before",
-    )
-    mu_balls: float | None = Field(
-        default=None, ge=0.0, le=10.0, description="mu of ball on ball, if not the same"
-    )
-    beta0_balls: float | None = Field(
-        default=None, ge=-1.0, le=1.0, description="beta0 of ball on ball, if not the same"
-    )
+    mu_balls: float | None = quantity(0, 10, "", "mu of ball on ball, if not the same", None)
+    beta0_balls: float | None = quantity(-1, 1, "", "beta0 of ball on ball, if not the same", None)
 
     @property
     def surfaces(self) -> tuple[float, float]:

@@ -17,11 +17,7 @@ __all__ = ["Design", "load_design", "save_design"]
 
 
 def load_design(path: str | Path) -> Design:
-    """The design in a file.
-
-    Raises:
-        InputError: names every problem, with file and line.
-    """
+    """The design in a file; InputError names every problem, with file and line."""
     path = Path(path)
     source, data = read_toml(path, "design")
     if is_study(data):
@@ -63,13 +59,7 @@ def _relative(path: str, folder: Path) -> str:
 
 
 def read_toml(path: Path, kind: str) -> tuple[str, dict[str, Any]]:
-    """Text and content of a TOML file.
-
-    Args:
-        kind: "design" or "study", for messages.
-    Raises:
-        InputError: the file is missing, unreadable, not UTF-8, empty, or not valid TOML.
-    """
+    """Text and content of a TOML file of a kind, "design" or "study"; InputError if unusable."""
     if path.is_dir():
         inside = sorted(p.name for p in path.glob("*.toml"))
         hint = f"; files in it: {', '.join(inside[:8])}" if inside else ""
@@ -108,19 +98,13 @@ def read_toml(path: Path, kind: str) -> tuple[str, dict[str, Any]]:
 
 def is_study(data: Mapping[str, Any]) -> bool:
     """Whether these are the values of a study file."""
-    return isinstance(data.get("design"), str) or any(
-        name in data for name in ("vary", "optimizer")
-    )
+    return isinstance(data.get("design"), str) or not {"vary", "optimizer"}.isdisjoint(data)
 
 
 def _without_none(value: Any) -> Any:
     """The values without keys that are not set or hold an empty list."""
     if isinstance(value, Mapping):
-        return {
-            name: _without_none(inner)
-            for name, inner in value.items()
-            if inner is not None and inner != ()
-        }
+        return {k: _without_none(v) for k, v in value.items() if v is not None and v != ()}
     return [_without_none(inner) for inner in value] if isinstance(value, tuple) else value
 
 
@@ -135,8 +119,5 @@ def _lists_on_one_line(toml: str) -> str:
             lines.append(line)
         if opened or line.endswith("= ["):
             opened += line.count("[") - line.count("]")
-    joined = (
-        re.sub(r",\s*\]", "]", re.sub(r"= \[.*", lambda m: m[0].replace("[ ", "["), line)).rstrip()
-        for line in lines
-    )
-    return "\n".join(joined) + "\n"
+    joined = (re.sub(r"= \[.*", lambda m: m[0].replace("[ ", "["), line) for line in lines)
+    return "\n".join(re.sub(r",\s*\]", "]", line).rstrip() for line in joined) + "\n"

@@ -8,6 +8,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from chamberopt.common.toml_fields import quantity
 from chamberopt.design.table_base import SI, FileTable
 
 ShotMaterial = Literal["steel", "tungsten_carbide", "zirconia", "glass"]
@@ -26,13 +27,8 @@ BRINELL_TO_PASCAL = 9.81e6  # HB is kgf/mm²
 class RestitutionTable(FileTable):
     """C0 and v0 of the restitution law of one surface, or of two balls."""
 
-    C0: float = Field(ge=0.05, le=1.0, description="restitution below v0")
-    v0_m_s: float = Field(
-        ge=1e-4,
-        le=100.0,
-        description="normal speed where yielding starts",
-        json_schema_extra={"unit": "m/s"},
-    )
+    C0: float = quantity(0.05, 1, "", "restitution below v0")
+    v0_m_s: float = quantity(1e-4, 100, "m/s", "normal speed where yielding starts")
 
     restitution = SI("C0", 1.0, "C0, dimensionless")
     yield_speed = SI("v0_m_s", 1.0, "v0 [m/s]: slower impacts rebound with C0 and leave no dent")
@@ -41,12 +37,8 @@ class RestitutionTable(FileTable):
 class PartMaterial(RestitutionTable):
     """The part's restitution law, and its hardness, which sets the size of a dent."""
 
-    hardness_HB: float = Field(  # noqa: N815 -- HB is how hardness is written
-        ge=5.0,
-        le=1000.0,
-        description="Brinell hardness of the part",
-        json_schema_extra={"unit": "HB"},
-    )
+    # HB is how hardness is written.
+    hardness_HB: float = quantity(5, 1000, "HB", "Brinell hardness of the part")  # noqa: N815
 
     @property
     def hardness(self) -> float:

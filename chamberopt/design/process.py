@@ -22,17 +22,13 @@ class Accuracy(FileTable):
         "drag_piece_ms": "drag_step_ms",
     }
 
-    replicas: int = Field(
-        default=8, ge=3, le=100000, description="3 is the least that gives a confidence interval"
-    )
+    replicas: int = quantity(3, 100000, "", "3 is the least that gives a confidence interval", 8)
     simulated_time_s: float = quantity(1e-4, 10000, "s", "of each replica, after warm-up", 1.0)
     warmup_time_s: float = quantity(0, 10000, "s", "simulated first and not counted", 0.2)
     objective_half_width: float | None = quantity(
         1e-4, 0.5, "", "wanted half-width of the objective's 95 % interval", None
     )
-    max_replicas: int = Field(
-        default=200, ge=3, le=100000, description="limit for objective_half_width"
-    )
+    max_replicas: int = quantity(3, 100000, "", "limit for objective_half_width", 200)
     coverage_model: Literal["avrami", "dents"] = Field(
         default="avrami", description="from dent rates, or dent by dent over the whole treatment"
     )
@@ -54,9 +50,7 @@ class Accuracy(FileTable):
     simulated_time = SI("simulated_time_s", 1.0, "Recorded time of each replica [s]")
     warmup_time = SI("warmup_time_s", 1.0, "Time of each replica before recording starts [s]")
     sample_spacing = SI("sample_mm", 1e-3, "Spacing of the points that dents mark [m]")
-    elastic_below = SI(
-        "elastic_below_mm_s", 1e-3, "Normal speed [m/s] below which impacts lose no energy"
-    )
+    elastic_below = SI("elastic_below_mm_s", 1e-3, "Impacts of less normal speed [m/s] are elastic")
     drag_step = SI("drag_step_ms", 1e-3, "Longest time [s] between two drag impulses")
 
 
@@ -64,7 +58,7 @@ class Process(FileTable):
     """How long the part is peened, and how accurately that is simulated."""
 
     treatment_time_s: float = quantity(0.01, 1e6, "s", "peening time the coverage is predicted for")
-    seed: int = Field(default=1, ge=0, le=2**63 - 1, description="same seed, same result")
+    seed: int = quantity(0, 2**63 - 1, "", "same seed, same result", 1)
     accuracy: Accuracy = Field(default_factory=Accuracy, description="replicas and their length")
 
     def _problems(self) -> Iterator[Problem]:
@@ -85,6 +79,4 @@ class Process(FileTable):
         """Recorded time of each replica [s]; the whole treatment where every dent is marked."""
         return self.treatment_time_s if self._simulates_all else self.accuracy.simulated_time
 
-    treatment_time = SI(
-        "treatment_time_s", 1.0, "Peening time [s] that the coverage is predicted for"
-    )
+    treatment_time = SI("treatment_time_s", 1.0, "Peening time [s] of the predicted coverage")

@@ -65,13 +65,11 @@ class ShotTable(FileTable):
         The mass of a size is rounded to whole balls, at least one.
         """
         if self.mix is not None:
-            shares = tuple((size.diameter_mm * 1e-3, size.share) for size in self.mix)
+            shares = [(size.diameter_mm * 1e-3, size.share) for size in self.mix]
         else:
-            shares = () if self.diameter_mm is None else ((self.diameter_mm * 1e-3, 1.0),)
+            shares = [] if self.diameter_mm is None else [(self.diameter_mm * 1e-3, 1.0)]
         whole = self.mass / (self.density * math.pi / 6.0)
-        return tuple(
-            (diameter, max(1, round(share * whole / diameter**3))) for diameter, share in shares
-        )
+        return tuple((size, max(1, round(share * whole / size**3))) for size, share in shares)
 
     @property
     def diameter(self) -> float:

@@ -57,19 +57,13 @@ class ChamberTable(FileTable):
         """Make the path of a user's own shape absolute, like that of the part's mesh."""
         return str(from_file(shape, info.context)) if is_custom(shape) else shape
 
-    sonotrode_distance = SI(
-        "sonotrode_distance_mm", 1e-3, "Mean sonotrode face to lowest point of the part [m]"
-    )
+    sonotrode_distance = SI("sonotrode_distance_mm", 1e-3, "Sonotrode to lowest point of part [m]")
 
     @abstractmethod
     def surface(self, vertices: np.ndarray, triangles: np.ndarray) -> ShapeSurface:
-        """The closed surface of the cavity, without the part.
+        """The closed surface of the cavity, without the part; InputError if the values make none.
 
-        Args:
-            vertices: the part in the chamber's frame [m], shape (n, 3), for shapes that follow it.
-            triangles: of the part, shape (m, 3).
-        Raises:
-            InputError: the values do not make a cavity.
+        Shapes that follow the part get its vertices (n, 3) [m] and triangles (m, 3) in the chamber.
         """
 
     def setup(self) -> Setup | None:
@@ -100,12 +94,7 @@ class WalledChamber(ChamberTable):
     inclination_deg: float = quantity(
         -45, 45, "degrees", "of the side walls: above 0 wider at the ceiling", 0.0
     )
-    facets: int = Field(
-        default=64,
-        ge=8,
-        le=1024,
-        description="flat sides that stand for a full turn of a round wall",
-    )
+    facets: int = quantity(8, 1024, "", "flat sides that stand for a full turn of a round wall", 64)
 
     @property
     def slope(self) -> float:
@@ -129,9 +118,8 @@ class ParametricChamber(WalledChamber):
 
     def lofted_over(self, floor: np.ndarray, ceiling: np.ndarray) -> ShapeSurface:
         """The surface between outlines (n, 2) [m] at the floor and at the ceiling."""
-        return lofted(
-            [np.c_[floor, np.zeros(len(floor))], np.c_[ceiling, np.full(len(ceiling), self.height)]]
-        )
+        rings = ((floor, 0.0), (ceiling, self.height))
+        return lofted([np.c_[ring, np.full(len(ring), z)] for ring, z in rings])
 
 
 class PolygonChamber(ParametricChamber):

@@ -47,9 +47,7 @@ class Conformal(ParametricChamber):
         0.0,
     )
 
-    gap = SI(
-        "gap_mm", 1e-3, "Distance between the part's outline and the wall, at the sonotrode [m]"
-    )
+    gap = SI("gap_mm", 1e-3, "From the part's outline to the wall, at the sonotrode [m]")
 
     @property
     def is_round(self) -> bool:
@@ -71,11 +69,7 @@ class Conformal(ParametricChamber):
         return self
 
     def surface(self, vertices: np.ndarray, triangles: np.ndarray) -> ShapeSurface:
-        """The wall round the part in the chamber's frame.
-
-        Raises:
-            InputError: the part is not below the ceiling, or its outline is in several pieces.
-        """
+        """The wall round the part; InputError if it is above the ceiling or in several pieces."""
         if not len(vertices) or vertices[:, 2].min() >= self.height:
             raise InputError(
                 f"chamber.height_mm: given {self.height_mm:g}: no part below that ceiling, whose "
@@ -102,9 +96,8 @@ class Conformal(ParametricChamber):
             )
         vertices, triangles = extrude(around[0], self.height)
         low = (vertices[triangles][..., 2] == 0.0).all(axis=1)
-        return ShapeSurface(
-            vertices, triangles, np.where(low, TAG_SONOTRODE, TAG_WALL).astype(np.uint8)
-        )
+        tags = np.where(low, TAG_SONOTRODE, TAG_WALL).astype(np.uint8)
+        return ShapeSurface(vertices, triangles, tags)
 
     def widths_mm(self) -> dict[str, float]:
         """The height; in plan the chamber is wider than the part."""

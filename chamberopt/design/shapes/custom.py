@@ -54,8 +54,7 @@ OPTIONAL_METHODS: dict[str, tuple[str, Callable[[Any], bool]]] = {
 def load_custom_shape(path: Path) -> type[ChamberTable]:
     """The shape in a file; the same class as long as the file's content is the same.
 
-    Raises:
-        InputError: the file cannot be read or run, or does not hold exactly one shape.
+    InputError if the file cannot be read or run, or does not hold exactly one shape.
     """
     try:
         source = path.read_bytes()
@@ -76,11 +75,8 @@ def _run(path: Path, source: bytes) -> type[ChamberTable]:
     sys.modules[module.__name__] = module  # where pydantic looks up the names in annotations
     with _errors_of_the_file(path, "cannot be run"):
         exec(compile(source, str(path), "exec"), vars(module))
-    tables = [
-        cls
-        for cls in vars(module).values()
-        if isinstance(cls, type) and issubclass(cls, ChamberTable)
-    ]
+    classes = [value for value in vars(module).values() if isinstance(value, type)]
+    tables = [cls for cls in classes if issubclass(cls, ChamberTable)]
     bases = {base for cls in tables for base in cls.__bases__}
     shapes = [cls for cls in tables if cls.__module__ == module.__name__ and cls not in bases]
     names = " and ".join(cls.__name__ for cls in shapes) or "none"
@@ -113,7 +109,10 @@ def _with_checks(path: Path, shape: type[ChamberTable], digest: str) -> type[Cha
 
     def surface(self: ChamberTable, vertices: np.ndarray, triangles: np.ndarray) -> ShapeSurface:
         """The surface that the file makes, if it is closed and has a sonotrode."""
-        cavity = unchecked_surface(self, _read_only(vertices), _read_only(triangles))
+        views = vertices.view(), triangles.view()  # of the part, not to be changed by the shape
+        for view in views:
+            view.flags.writeable = False
+        cavity = unchecked_surface(self, *views)
         fault = find_fault(cavity)
         if fault:
             raise InputError(f"chamber.shape: {path}: surface() of {shape.__name__} {fault}")
@@ -130,13 +129,6 @@ def _with_checks(path: Path, shape: type[ChamberTable], digest: str) -> type[Cha
     about = {"__module__": shape.__module__, "__doc__": shape.__doc__, "sha256": digest}
     metaclass: Any = type(shape)
     return metaclass(shape.__name__, (shape,), {**methods, **about})
-
-
-def _read_only(array: np.ndarray) -> np.ndarray:
-    """A view of the part that a shape can read but not change."""
-    view = array.view()
-    view.flags.writeable = False
-    return view
 
 
 @contextmanager

@@ -6,6 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from chamberopt.common import toml_fields
 from chamberopt.common.toml_errors import Problem
 from chamberopt.common.toml_fields import (
     Direction,
@@ -14,7 +15,6 @@ from chamberopt.common.toml_fields import (
     Triple,
     list_field,
     quantity,
-    unit_vector,
 )
 from chamberopt.design.table_base import SI, FileTable, Metres
 from chamberopt.geometry.mesh_io.units import Unit
@@ -84,7 +84,7 @@ class PlacedBore(FileTable):
     @property
     def direction(self) -> tuple[float, float, float]:
         """Its axis, a unit vector."""
-        return unit_vector(self.axis)
+        return toml_fields.unit_vector(self.axis)
 
     diameter = SI("diameter_mm", 1e-3, "Its diameter [m]")
 

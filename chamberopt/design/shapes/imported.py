@@ -47,11 +47,7 @@ class Imported(ChamberTable):
         return self.setup().distance if given is None else given * 1e-3
 
     def setup(self) -> Setup:
-        """The set-up as drawn; its file is read only once.
-
-        Raises:
-            InputError: the file does not hold a closed room with a flat sonotrode.
-        """
+        """The set-up as drawn, read once; InputError if it is no closed room with a sonotrode."""
         return read_setup(Path(self.mesh), self.unit, self.part, self.sonotrode)
 
     def surface(self, vertices: np.ndarray, triangles: np.ndarray) -> ShapeSurface:

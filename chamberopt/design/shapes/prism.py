@@ -3,7 +3,6 @@
 from typing import Literal
 
 import numpy as np
-from pydantic import Field
 
 from chamberopt.common.toml_fields import quantity
 from chamberopt.design.shapes.base import PolygonChamber
@@ -13,7 +12,7 @@ class Prism(PolygonChamber):
     """A prism measured across flats: by the widest round bar that fits in."""
 
     shape: Literal["prism"]
-    sides: int = Field(ge=3, le=64, description="flat walls")
+    sides: int = quantity(3, 64, "", "flat walls")
     across_mm: float = quantity(
         2, 2000, "mm", "diameter of the circle that touches all sides, at the sonotrode"
     )

@@ -64,17 +64,15 @@ def _find_fault(points: tuple[Pair, ...]) -> str | None:
         is_first, is_last = number == 0, number == len(points) - 1
         r_allowed = MIN_LENGTH_MM <= r <= 2000 or (is_last and r == 0)
         if not (r_allowed and (MIN_LENGTH_MM <= z <= 2000 or is_first)):
-            allowed = (
-                f"[r, z] from {MIN_LENGTH_MM:g} to 2000 mm, z = 0 for the first alone, "
-                "r = 0 for the last alone"
+            return (
+                f"given {[r, z]} as point {number}; allowed: [r, z] from {MIN_LENGTH_MM:g} to "
+                "2000 mm, z = 0 for the first alone, r = 0 for the last alone"
             )
-            return f"given {[r, z]} as point {number}; allowed: {allowed}"
     line = _to_the_axis(points)
     short = np.flatnonzero(np.hypot(*np.diff(line, axis=0).T) < MIN_LENGTH)
     if short.size:
-        k = short[0]
-        count = "the first being point 0"
-        return f"point {k + 1} is on or next to point {k}, {count}; leave it out"
+        next_to = f"is on or next to point {short[0]}, the first being point 0"
+        return f"point {short[0] + 1} {next_to}; leave it out"
     contact = find_contact(line)
     if contact is not None:
         place = np.round(1e3 * contact, 6).tolist()

@@ -26,9 +26,8 @@ SAME_DISTANCE = 1e-9  # m
 def move_sonotrode(setup: Setup, distance: float) -> ShapeSurface:
     """The room with its sonotrode at another distance [m] from the lowest point of the part.
 
-    Raises:
-        InputError: the sonotrode is to come nearer than the walls rise straight from it, or farther
-            where another part of the room is in the way.
+    InputError if the sonotrode is to come nearer than the walls rise straight from it, or farther
+    where another part of the room is in the way.
     """
     room, farther = setup.room, distance - setup.distance
     if abs(farther) < SAME_DISTANCE:
@@ -43,31 +42,24 @@ def _extend_down(room: ShapeSurface, setup: Setup) -> ShapeSurface:
     face, count = room.triangles[on_face], len(room.vertices)
     used, numbers = np.unique(face, return_inverse=True)
     floor = room.vertices[used] * [1.0, 1.0, 0.0]
-    below = SolidSurface(
-        floor, numbers.reshape(-1, 3).astype(np.int32), on_face[on_face], on_face[on_face]
-    )
-    shaft = sweep_face(
-        below,
-        np.array([0.0, 0.0, room.vertices[used[0], 2]]),
-        "the room under the sonotrode as drawn",
-    )
-    if (
-        overlap_volume(make_solid(room.vertices, room.triangles, "the set-up"), shaft)
-        > VOLUME_TOLERANCE * shaft.volume
-    ):
+    numbers, marks = numbers.reshape(-1, 3), on_face[on_face]
+    up = np.array([0.0, 0.0, room.vertices[used[0], 2]])
+    below = SolidSurface(floor, numbers.astype(np.int32), marks, marks)
+    shaft = sweep_face(below, up, "the room under the sonotrode as drawn")
+    whole = make_solid(room.vertices, room.triangles, "the set-up")
+    if overlap_volume(whole, shaft) > VOLUME_TOLERANCE * shaft.volume:
         raise _refused(setup, "farther", "another part of the room is in the way under it")
     a, b = border_edges(face).T
     c, d = (count + np.searchsorted(used, side) for side in (b, a))
     walls = np.concatenate([np.c_[a, b, c], np.c_[a, c, d]])
     triangles = room.triangles.copy()
-    triangles[on_face] = count + numbers.reshape(-1, 3)
+    triangles[on_face] = count + numbers
+    source, none = room.source, np.full(len(walls), -1, dtype=np.int32)
     return ShapeSurface(
         np.concatenate([room.vertices, floor]),
         np.concatenate([triangles, walls]).astype(np.int32),
         np.r_[room.tags, np.full(len(walls), TAG_WALL, dtype=np.uint8)],
-        None
-        if room.source is None
-        else np.r_[room.source, np.full(len(walls), -1, dtype=np.int32)],
+        None if source is None else np.r_[source, none],
     )
 
 
@@ -77,15 +69,17 @@ def _cut_off(room: ShapeSurface, height: float, setup: Setup) -> ShapeSurface:
     face = whole.surface().select(room.tags[whole.surface().source] == TAG_SONOTRODE)
     shaft = sweep_face(face, np.array([0.0, 0.0, height]), "the room over the sonotrode as drawn")
     low, high = room.vertices.min(axis=0) - height, room.vertices.max(axis=0) + height
-    bottom = sweep_face(
-        _rectangle(low, high), np.array([0.0, 0.0, -low[2]]), "what lies under the sonotrode"
-    )
-    rest = subtract(whole, bottom)
+    # The underside of a box around the room.
+    x, y = np.array([low, high])[:, :2].T
+    corners = np.c_[x[[0, 1, 1, 0]], y[[0, 0, 1, 1]], np.full(4, low[2])]
+    triangles = np.array([[0, 2, 1], [0, 3, 2]], dtype=np.int32)
+    underside = SolidSurface(corners, triangles, np.zeros(2), np.zeros(2))
+    up = np.array([0.0, 0.0, -low[2]])
+    rest = subtract(whole, sweep_face(underside, up, "what lies under the sonotrode"))
     straight = overlap_volume(whole, shaft) > (1.0 - VOLUME_TOLERANCE) * shaft.volume
     if not straight or whole.volume - rest.volume > (1.0 + VOLUME_TOLERANCE) * shaft.volume:
-        raise _refused(
-            setup, "nearer", "its walls do not rise straight from the sonotrode's outline so far"
-        )
+        why = "its walls do not rise straight from the sonotrode's outline so far"
+        raise _refused(setup, "nearer", why)
     cut = rest.surface()
     kept = cut.solid == whole.label
     rows = np.where(kept, cut.source, 0)
@@ -94,19 +88,6 @@ def _cut_off(room: ShapeSurface, height: float, setup: Setup) -> ShapeSurface:
         cut.triangles,
         np.where(kept, room.tags[rows], TAG_SONOTRODE).astype(np.uint8),
         None if room.source is None else np.where(kept, room.source[rows], -1).astype(np.int32),
-    )
-
-
-def _rectangle(low: np.ndarray, high: np.ndarray) -> SolidSurface:
-    """The underside of a box with these corners (3,) [m]."""
-    corners = np.array(
-        [
-            [x, y, low[2]]
-            for x, y in ((low[0], low[1]), (high[0], low[1]), high[:2], (low[0], high[1]))
-        ]
-    )
-    return SolidSurface(
-        corners, np.array([[0, 2, 1], [0, 3, 2]], dtype=np.int32), np.zeros(2), np.zeros(2)
     )
 
 

@@ -39,32 +39,22 @@ FACING_TOLERANCE = 1e-3  # share of the area that triangles facing another way m
 
 @dataclass(frozen=True)
 class Setup:
-    """The set-up as drawn, with the face of its sonotrode at z = 0 and facing up.
+    """The set-up as drawn, with the face of its sonotrode at z = 0 and facing up."""
 
-    Attributes:
-        room: without the part if that is a separate body.
-        part: in the file's frame, normals out of the part, with the notes on the whole set-up. It
-            is a piece of the room's surface unless it is a separate body.
-        turn: rotation from the file's frame, shape (3, 3), before the shift.
-        shift: [m], shape (3,).
-        distance: from the sonotrode to the lowest point of the part [m].
-    """
-
-    room: ShapeSurface
+    room: ShapeSurface  # without the part if that is a separate body
+    # In the file's frame, normals out of the part, with the notes on the whole set-up. It is a
+    # piece of the room's surface unless it is a separate body.
     part: PartMesh
-    turn: np.ndarray
-    shift: np.ndarray
-    distance: float
+    turn: np.ndarray  # rotation from the file's frame, shape (3, 3), before the shift
+    shift: np.ndarray  # [m], shape (3,)
+    distance: float  # from the sonotrode to the lowest point of the part [m]
 
 
 def read_setup(path: Path, unit: str, part: tuple[str, ...], sonotrode: tuple[str, ...]) -> Setup:
     """The set-up in a file, which is read again only after it has changed.
 
-    Args:
-        part: names of the file's groups that are the part.
-        sonotrode: names of the groups that are the sonotrode's face.
-    Raises:
-        InputError: a name is not in the file, the room is not closed, or the face is not flat.
+    `part` and `sonotrode` (its face) are names of the file's groups. InputError if a name is not in
+    the file, the room is not closed, or the face is not flat.
     """
     try:
         stamp = path.stat()
@@ -86,8 +76,7 @@ def _read_once(
     read = read_triangles(path, unit)
     in_part = _select_some(read, part, "chamber.part")
     in_face = _select_some(read, sonotrode, "chamber.sonotrode")
-    if (in_part & in_face).any():
-        count = (in_part & in_face).sum()
+    if count := (in_part & in_face).sum():
         raise InputError(f"chamber.part: {count} of its triangles are the sonotrode's too")
     body, whole = _separate_part(read, in_part)
     mesh, room_notes = _room_over_sonotrode(whole, sonotrode)
@@ -188,21 +177,14 @@ def _room_over_sonotrode(mesh: PartMesh, sonotrode: tuple[str, ...]) -> tuple[Pa
             "name the one flat face that is the floor of the room"
         )
     outward = np.where((volumes < 0.0)[shells][:, None], mesh.triangles[:, ::-1], mesh.triangles)
-    bodies = [
-        make_solid(
-            mesh.vertices,
-            outward,
-            f"closed surface {k + 1} of the set-up",
-            only=np.flatnonzero(shells == k),
-        )
-        for k in range(len(volumes))
-    ]
+    bodies = []
+    for k in range(len(volumes)):
+        name, only = f"closed surface {k + 1} of the set-up", np.flatnonzero(shells == k)
+        bodies.append(make_solid(mesh.vertices, outward, name, only=only))
     first = int(face_shells[0])
     inside = [k for k in range(len(volumes)) if k != first and _is_inside(bodies[k], bodies[first])]
-    total_volume = sum(bodies[k].volume for k in inside)
-    if inside and unite([bodies[k] for k in inside], "").volume < (
-        (1.0 - VOLUME_TOLERANCE) * total_volume
-    ):
+    least = (1.0 - VOLUME_TOLERANCE) * sum(bodies[k].volume for k in inside)
+    if inside and unite([bodies[k] for k in inside], "").volume < least:
         raise InputError(
             "the set-up: closed surfaces that stand in its room overlap; unite them in the CAD "
             "program"
@@ -215,11 +197,7 @@ def _room_over_sonotrode(mesh: PartMesh, sonotrode: tuple[str, ...]) -> tuple[Pa
 
 
 def _is_inside(body: Solid, room: Solid) -> bool:
-    """Whether a body stands in the room, rather than beside or around it.
-
-    Raises:
-        InputError: the body crosses the wall of the room.
-    """
+    """Whether a body stands in the room, not beside or around it; InputError if it crosses it."""
     common = overlap_volume(body, room)
     smaller = min(body.volume, room.volume)
     if VOLUME_TOLERANCE * body.volume < common < (1.0 - VOLUME_TOLERANCE) * smaller:

@@ -25,10 +25,8 @@ def refuse_meeting_walls(slope: float, limits: Iterable[float], inclination_deg:
     Args:
         slope: tangent of the inclination, outward.
         limits: least slope that each wall allows.
-        inclination_deg: the inclination, for the message.
     """
     least = max(limits, default=-math.inf)
     if slope < least:
-        limit_deg = math.degrees(math.atan(least))
-        why = "with which walls meet below the ceiling"
+        why, limit_deg = "with which walls meet below the ceiling", math.degrees(math.atan(least))
         refuse_above("inclination_deg", inclination_deg, limit_deg, why)

@@ -11,10 +11,8 @@ from chamberopt.design.shapes.construction.limits import MIN_LENGTH
 def corner_angles(outline: np.ndarray) -> np.ndarray:
     """Angle [rad] by which the outline turns left at each corner, (n,)."""
     before, after = _directions(outline)
-    return np.arctan2(
-        before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0],
-        np.einsum("ij,ij->i", before, after),
-    )
+    cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    return np.arctan2(cross, np.einsum("ij,ij->i", before, after))
 
 
 def move_sides(outline: np.ndarray, distance: float) -> np.ndarray:
@@ -35,11 +33,9 @@ def area_inside(outline: np.ndarray, distance: float = 0.0) -> float:
     """Area [m²] of the outline whose sides are moved outward by a distance [m]."""
     (x, y), (xn, yn) = outline.T, np.roll(outline, -1, axis=0).T
     around = np.hypot(xn - x, yn - y).sum()
-    return float(
-        0.5 * (x * yn - y * xn).sum()
-        + distance * around
-        + distance * distance * np.tan(corner_angles(outline) / 2.0).sum()
-    )
+    corners = np.tan(corner_angles(outline) / 2.0).sum()
+    area = 0.5 * (x * yn - y * xn).sum() + distance * around + distance * distance * corners
+    return float(area)
 
 
 def corner_arcs(outline: np.ndarray, facets: int) -> tuple[np.ndarray, np.ndarray]:

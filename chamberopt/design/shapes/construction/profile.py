@@ -56,9 +56,8 @@ def round_corners(line: np.ndarray, radius: float, facets: int) -> np.ndarray:
         centre = corner + radius / np.cos(turn / 2.0) * _unit(leaving - arriving)
         begin = corner - radius * np.tan(abs(turn) / 2.0) * arriving - centre
         angle = turn * np.linspace(0.0, 1.0, int(np.ceil(steps - 1e-9)) + 1)[:, None]
-        points.append(
-            centre + np.cos(angle) * begin + np.sin(angle) * np.array([-begin[1], begin[0]])
-        )
+        across = np.array([-begin[1], begin[0]])
+        points.append(centre + np.cos(angle) * begin + np.sin(angle) * across)
     return np.concatenate([*points, line[-1:]])
 
 
@@ -69,10 +68,8 @@ def find_contact(line: np.ndarray) -> np.ndarray | None:
         return line[np.argmax(sharp)]
     start, end = line[:-1], line[1:]
     i, j = np.triu_indices(len(start), 2)
-    apart = np.min(
-        [_distance(line[k], start[m], end[m]) for k, m in ((i, j), (i + 1, j), (j, i), (j + 1, i))],
-        axis=0,
-    )
+    ends = ((i, j), (i + 1, j), (j, i), (j + 1, i))
+    apart = np.min([_distance(line[k], start[m], end[m]) for k, m in ends], axis=0)
     near = (apart < MIN_LENGTH) | _cross(start[i], end[i], start[j], end[j])
     return start[i[np.argmax(near)]] if near.any() else None
 

@@ -21,19 +21,13 @@ def is_sonotrode(tags: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class ShapeSurface:
-    """The cavity before the part is taken out of it.
+    """The cavity before the part is taken out of it."""
 
-    Attributes:
-        vertices: [m], shape (n, 3), float64.
-        triangles: shape (k, 3), int32; closed, normals pointing out of the cavity.
-        tags: shape (k,), uint8.
-        source: shape (k,), int32: the part triangle that each TAG_PART triangle lies on, else -1.
-            None where the part is a separate body that still has to be cut out.
-    """
-
-    vertices: np.ndarray
-    triangles: np.ndarray
-    tags: np.ndarray
+    vertices: np.ndarray  # [m], shape (n, 3), float64
+    triangles: np.ndarray  # shape (k, 3), int32; closed, normals pointing out of the cavity
+    tags: np.ndarray  # shape (k,), uint8
+    # Shape (k,), int32: the part triangle that each TAG_PART triangle lies on, else -1. None where
+    # the part is a separate body that still has to be cut out.
     source: np.ndarray | None = None
 
 
@@ -44,12 +38,8 @@ def lofted(rings: Sequence[np.ndarray], peak: np.ndarray | None = None) -> Shape
            /____\\
            |    | ring 0     floor: a fan about its middle
 
-    Args:
-        rings: points [m], each (n, 3) with the same n, round a convex outline, counter-clockwise
-            seen from above.
-        peak: [m], shape (3,).
-    Returns:
-        2 n triangles a ring.
+    Rings are points [m], each (n, 3) with the same n, round a convex outline, counter-clockwise
+    from above; the peak is [m], (3,). There are 2 n triangles a ring.
     """
     n, k = len(rings[0]), len(rings)
     middle = rings[-1].mean(axis=0) if peak is None else peak
@@ -59,10 +49,8 @@ def lofted(rings: Sequence[np.ndarray], peak: np.ndarray | None = None) -> Shape
     sides = []
     for ring in range(k - 1):
         low, high = ring * n, (ring + 1) * n
-        sides += [
-            np.c_[low + here, low + beside, high + beside],
-            np.c_[low + here, high + beside, high + here],
-        ]
+        sides.append(np.c_[low + here, low + beside, high + beside])
+        sides.append(np.c_[low + here, high + beside, high + here])
     top = (k - 1) * n
     ceiling = np.c_[np.full(n, k * n + 1), top + here, top + beside]
     triangles = np.concatenate([floor, *sides, ceiling]).astype(np.int32)
