@@ -200,7 +200,8 @@ def _replaced(old: Any, name: str, steps: Sequence[str], value: Any) -> Any:
 
 def _of_the_same_kind(old: Any, value: Any) -> Any:
     """The value, as a whole number or not like the old one: numpy's numbers are accepted too."""
-    if isinstance(value, bool) or not isinstance(value, Real):
+    is_number = isinstance(value, Real) and not isinstance(value, bool)
+    if not is_number:
         return value
     whole = isinstance(value, Integral) and not isinstance(old, float)
     if isinstance(old, int):
