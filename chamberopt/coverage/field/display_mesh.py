@@ -1,0 +1,231 @@
+r"""A mesh to draw the field on: fine where the field changes, coarse where it does not.
+
+The part's triangles are divided round by round. An edge is split at its middle where the field
+changes along it, and always where it is longer than MAX_EDGE. A triangle is divided by the number
+of its split edges, so that neighbours always meet at whole edges:
+
+      /|\            /\            /\
+     / | \          /__\          /__\
+    /  |  \        / .-'\        /\  /\
+    ---+---        -------        -------
+
+A triangle with a split edge splits its longest edge too, which keeps triangles from becoming ever
+thinner (M. C. Rivara, Int. J. Numer. Methods Eng. 20 (1984) 745).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from chamberopt.coverage.field.windows import Places
+from chamberopt.geometry.triangles import area_vectors, sides_of, unit_vectors
+
+MIN_EDGE, MAX_EDGE = 0.5, 4.0  # diameters of the gauge
+# An edge is split where coverage at its middle is off the mean of its ends by more than BEND, or
+# where its ends differ by more than STEP.
+BEND, STEP = 0.02, 0.05
+MAX_TRIANGLES = 400_000  # a part that has more itself keeps its own
+Values = Callable[[Places], np.ndarray]
+"""Coverage at some places, (p,); NaN where there is none."""
+
+
+class DisplayMesh(NamedTuple):
+    """A mesh whose vertices belong to one smooth face each: at creases there are several.
+
+    Attributes:
+        vertices: [m], shape (v, 3).
+        triangles: normals out of the part, shape (c, 3).
+        normal: unit vectors out of the part, shape (v, 3).
+        face: smooth face of each vertex, shape (v,).
+        part_triangle: the part's triangle in which each triangle lies, shape (c,).
+    """
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+    normal: np.ndarray
+    face: np.ndarray
+    part_triangle: np.ndarray
+
+    @property
+    def places(self) -> Places:
+        """The places at which fields of the vertices are read.
+
+        Dents on creases make a band as narrow as they are. Fields of vertices should leave it out,
+        because the drawing would smear it over whole triangles.
+        """
+        return Places(self.vertices, self.normal, self.face)
+
+
+@dataclass(frozen=True)
+class DisplayField:
+    """Fields at the vertices of a display mesh."""
+
+    mesh: DisplayMesh
+    fields: dict[str, np.ndarray]  # by name, (v,) each
+
+
+def display_mesh(
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    shown: np.ndarray,
+    face: np.ndarray,
+    gauge: float,
+    coverage: Values,
+) -> DisplayMesh:
+    """Divide a part's triangles until the field can be drawn by interpolation between vertices.
+
+    Args:
+        vertices: [m], shape (n, 3).
+        triangles: shape (m, 3).
+        shown: marks the triangles on which the field is drawn, shape (m,); others are divided only
+            where they meet those.
+        face: smooth face of each triangle, shape (m,).
+        gauge: area of a window [m²].
+        coverage: called once a round, with all places of the round.
+    """
+    diameter = 2.0 * float(np.sqrt(gauge / np.pi))
+    # point: of the part's surface that each vertex is, the same for all vertices at a crease.
+    mesh, point = _with_vertices_of_faces(vertices, triangles, face)
+    value = np.zeros(0)  # of the vertices, as far as it has been read
+    settled = np.zeros(0, dtype=np.int64)  # edges that need not be split
+    while True:
+        edges, of_side = _edges_of(mesh.triangles)
+        a, b = edges.T
+        key = (a << 32) + b
+        length = np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1)
+        drawn = np.zeros(len(edges), dtype=bool)
+        drawn[of_side[shown[mesh.part_triangle]]] = True
+        asked = np.flatnonzero(
+            drawn & (length > MIN_EDGE * diameter) & ~np.isin(key, settled, assume_unique=True)
+        )
+        new, middle = np.arange(len(value), len(mesh.vertices)), _middles(mesh, edges[asked])
+        read = coverage(_joined(mesh.places.select(new), middle.places))
+        read = np.where(np.isfinite(read), read, -1.0)  # no value stands out from all values
+        value = np.concatenate([value, read[: len(new)]])
+        one, two = value[a[asked]], value[b[asked]]
+        bend = np.abs(read[len(new) :] - 0.5 * (one + two))
+        wanted = (bend > BEND) | (np.abs(one - two) > STEP)
+        wanted |= length[asked] > MAX_EDGE * diameter
+        settled = np.concatenate([settled, key[asked[~wanted]]])
+        split = np.zeros(len(edges), dtype=bool)
+        split[asked[wanted]] = True
+        split = _spread_split(split, point[edges], of_side, length)
+        count = len(mesh.triangles) + int(split[of_side].sum())
+        if not split.any() or count > max(MAX_TRIANGLES, len(triangles)):
+            order = np.argsort(mesh.part_triangle, kind="stable")
+            return mesh._replace(
+                triangles=mesh.triangles[order], part_triangle=mesh.part_triangle[order]
+            )
+        point = np.concatenate([point, len(point) + _same_edge(point[edges[split]])])
+        mesh = _divide(mesh, edges, of_side, split)
+
+
+def _with_vertices_of_faces(
+    vertices: np.ndarray, triangles: np.ndarray, face: np.ndarray
+) -> tuple[DisplayMesh, np.ndarray]:
+    """The part with a vertex of its own for each face, and the part's vertex of each."""
+    faces = int(face.max()) + 1
+    own, corner = np.unique(triangles * np.int64(faces) + face[:, None], return_inverse=True)
+    corner = corner.reshape(-1, 3)
+    vertex, face_of = np.divmod(own, faces)
+    area = area_vectors(vertices, triangles)
+    normal = np.zeros((len(own), 3))
+    for k in range(3):  # by area: a plane beside a rounded edge stays as it is
+        np.add.at(normal, corner[:, k], area)
+    part_triangle = np.arange(len(triangles))
+    return DisplayMesh(
+        vertices[vertex], corner, unit_vectors(normal), face_of, part_triangle
+    ), vertex
+
+
+def _edges_of(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Edges (e, 2), the lower vertex first, and the edge at each side of each triangle (c, 3)."""
+    sides = np.sort(sides_of(triangles), axis=1).astype(np.int64)
+    key, of_side = np.unique((sides[:, 0] << 32) + sides[:, 1], return_inverse=True)
+    return np.column_stack([key >> 32, key & 0xFFFFFFFF]), of_side.reshape(-1, 3)
+
+
+def _same_edge(ends: np.ndarray) -> np.ndarray:
+    """A number for each edge between points (e, 2), the same where the points are, shape (e,)."""
+    low, high = np.sort(ends, axis=1).astype(np.int64).T
+    return np.unique((low << 32) + high, return_inverse=True)[1].reshape(-1)
+
+
+def _spread_split(
+    split: np.ndarray, ends: np.ndarray, of_side: np.ndarray, length: np.ndarray
+) -> np.ndarray:
+    """Also split the same edges of neighbouring faces, and longest edges of divided triangles.
+
+    Args:
+        split: marks the edges to split, shape (e,).
+        ends: points at the ends of the edges, shape (e, 2).
+        of_side: edges of the triangles, shape (c, 3).
+        length: of the edges [m], shape (e,).
+    """
+    same = _same_edge(ends)
+    longest = of_side[np.arange(len(of_side)), length[of_side].argmax(axis=1)]
+    while True:
+        split = np.isin(same, same[split])
+        more = longest[split[of_side].any(axis=1)]
+        if split[more].all():
+            return split
+        split[more] = True
+
+
+def _middles(mesh: DisplayMesh, edges: np.ndarray) -> DisplayMesh:
+    """Vertices in the middle of edges (e, 2); the mesh has no triangles."""
+    a, b = edges.T
+    return DisplayMesh(
+        vertices=0.5 * (mesh.vertices[a] + mesh.vertices[b]),
+        triangles=mesh.triangles[:0],
+        normal=unit_vectors(mesh.normal[a] + mesh.normal[b]),
+        face=mesh.face[a],
+        part_triangle=mesh.part_triangle[:0],
+    )
+
+
+def _joined(one: Places, other: Places) -> Places:
+    return Places(*(np.concatenate(pair) for pair in zip(one, other, strict=True)))
+
+
+def _divide(
+    mesh: DisplayMesh, edges: np.ndarray, of_side: np.ndarray, split: np.ndarray
+) -> DisplayMesh:
+    """Divide the triangles whose edges are split, by the number of these edges."""
+    added = _middles(mesh, edges[split])
+    middle = np.full(len(edges), -1)
+    middle[split] = len(mesh.vertices) + np.arange(len(added.vertices))
+    new = middle[of_side]
+    count = (new >= 0).sum(axis=1)
+    vertices = np.concatenate([mesh.vertices, added.vertices])
+    # Turned so that of one split side it is the first, and of two the first two.
+    first = np.where(count == 2, (new < 0).argmax(axis=1) + 1, (new >= 0).argmax(axis=1))
+    turned = (first[:, None] + np.arange(3)) % 3
+    corners, new = (np.take_along_axis(one, turned, axis=1) for one in (mesh.triangles, new))
+    pieces, origin = [mesh.triangles[count == 0]], [mesh.part_triangle[count == 0]]
+
+    def add(rows: np.ndarray, *triangles: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
+        for columns in triangles:
+            pieces.append(np.column_stack(columns)[rows])
+            origin.append(mesh.part_triangle[rows])
+
+    (a, b, c), (ab, bc, ca) = corners.T, new.T
+    add(count == 1, (a, ab, c), (ab, b, c))
+    add(count == 2, (ab, b, bc))
+    shorter = np.linalg.norm(vertices[a] - vertices[bc], axis=1) < np.linalg.norm(
+        vertices[ab] - vertices[c], axis=1
+    )
+    add((count == 2) & shorter, (a, ab, bc), (a, bc, c))
+    add((count == 2) & ~shorter, (a, ab, c), (ab, bc, c))
+    add(count == 3, (a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
+    return DisplayMesh(
+        vertices=vertices,
+        triangles=np.concatenate(pieces),
+        normal=np.concatenate([mesh.normal, added.normal]),
+        face=np.concatenate([mesh.face, added.face]),
+        part_triangle=np.concatenate(origin),
+    )
