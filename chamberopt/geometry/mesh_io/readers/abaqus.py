@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import re
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,8 +30,8 @@ UNSUPPORTED = (
     "INCLUDE", "SYSTEM", "NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY",
     "SUBSTRUCTURE GENERATE",
 )  # fmt: skip
+# STRI65 has six nodes: the last 5 of a name are its degrees of freedom.
 SHELL = re.compile(r"(?:STRI|SFM3D|M3D|R3D|CPS|CPE|DS|S)(3|4|6|8|9)\D*5?$")
-STRI65 = re.compile(r"STRI65$")  # six nodes, five degrees of freedom
 SOLID = re.compile(r"(?:AC3D|DC3D|C3D)(4|5|6|8|10|13|15|20)\D*$")
 WITHOUT_SURFACE = re.compile(
     r"(B\d|PIPE|T[23]D|MASS|ROTARYI|SPRING|DASHPOT|CONN|GAP|JOINT|DCOUP|RB3D|RAX)"
@@ -45,7 +45,6 @@ Options = dict[str, str]
 Member = tuple[str, int]  # instance that a set names ("" for any), and a number in it
 Place = tuple[int, int]  # position of a placed scope, and the file's number in it
 NO_ROWS = np.zeros(0, dtype=np.int64)
-_FindRows = Callable[[list[Member], bool], np.ndarray]
 
 
 @dataclass
@@ -59,8 +58,7 @@ class _Scope:
     surfaces: dict[str, list[tuple[str, str]]] = field(default_factory=lambda: defaultdict(list))
 
 
-@dataclass
-class _Instance:
+class _Instance(NamedTuple):
     part: str
     lines: list[list[float]]
 
@@ -93,32 +91,27 @@ def read_abaqus(path: Path, content: bytes) -> RawMesh:
         ) from None
 
 
-def _keywords(text: str) -> Iterator[tuple[str, Options, list[str], int]]:
+def _keywords(text: str) -> list[tuple[str, Options, list[str], int]]:
     """Keyword, options, data lines and line number of each block, without comments."""
-    keyword, first = "", 0
-    options: Options = {}
-    data: list[str] = []
+    blocks: list[tuple[str, Options, list[str], int]] = []
     continued = False
     for number, line in enumerate(text.splitlines(), start=1):
         line = line.strip()
         if not line or line.startswith("**"):
             continue
-        if line.startswith("*") or continued:
-            if not continued:
-                if keyword:
-                    yield keyword, options, data, first
-                keyword, options, data, first = "", {}, [], number
-            for index, word in enumerate(line.split(",")):
-                name, _, value = word.partition("=")
-                if index == 0 and not continued:
-                    keyword = re.sub(r"\s+", " ", name[1:].strip().upper())
-                elif word.strip():
-                    options[name.strip().upper()] = value.strip().strip('"')
-            continued = line.endswith(",")
-        else:
-            data.append(line)
-    if keyword:
-        yield keyword, options, data, first
+        words = line.split(",")
+        if line.startswith("*") and not continued:
+            keyword = words.pop(0)[1:].partition("=")[0].strip().upper()
+            blocks.append((re.sub(r"\s+", " ", keyword), {}, [], number))
+        elif not continued:
+            if blocks:
+                blocks[-1][2].append(line)
+            continue
+        for word in filter(str.strip, words):
+            name, _, value = word.partition("=")
+            blocks[-1][1][name.strip().upper()] = value.strip().strip('"')
+        continued = line.endswith(",")
+    return blocks
 
 
 def _read_scopes(
@@ -176,22 +169,18 @@ def _add_nodes(scope: _Scope, options: Options, data: list[str]) -> None:
 
 def _add_elements(scope: _Scope, options: Options, data: list[str], left_out: Counter[str]) -> None:
     name = options["TYPE"].upper()
-    shell, solid = SHELL.match(name), SOLID.match(name)
     if WITHOUT_SURFACE.match(name):
         left_out[name] += len(data)
         return
-    if STRI65.match(name):
-        count, kind = 6, "triangle"
-    elif shell:
-        count = int(shell[1])
-        kind = SHELL_KIND[count]
-    elif solid:
-        count = int(solid[1])
-        kind = SOLID_KIND[count]
+    if found := SHELL.match(name):
+        kind = SHELL_KIND[int(found[1])]
+    elif found := SOLID.match(name):
+        kind = SOLID_KIND[int(found[1])]
     else:
         raise ValueError(
             f"type={name} is not supported; use S3, S4, S8R, C3D4, C3D8, C3D10 or similar"
         )
+    count = int(found[1])
     flat = [int(value) for row in data for value in row.split(",") if value.strip()]
     if len(flat) % (count + 1):
         raise ValueError(
@@ -227,14 +216,16 @@ def _members(options: Options, data: list[str], sets: dict[str, list[Member]]) -
 def _assemble(
     scopes: dict[str, _Scope], instances: dict[str, _Instance], notes: list[str]
 ) -> ElementMesh:
-    """All instances in one mesh; if there are none, everything in the file."""
+    """All instances in one mesh; if there are none, everything in the file.
+
+    Elements have the file's numbers, or positions if several instances number their own.
+    """
     placed = [(scopes[instance.part], instance) for instance in instances.values()]
     placed += [
         (scope, _Instance("", [])) for name, scope in scopes.items() if not (name and instances)
     ]
     points: list[np.ndarray] = [np.zeros((0, 3))]
-    blocks: dict[tuple[str, int], list[list[int]]] = defaultdict(list)
-    block_of: dict[Place, tuple[tuple[str, int], int]] = {}  # block and row of each element
+    blocks: dict[tuple[str, int], dict[Place, list[int]]] = defaultdict(dict)
     row_of: dict[Place, int] = {}  # row of each node in the points
     for at, (scope, instance) in enumerate(placed):
         before = len(row_of)
@@ -245,64 +236,50 @@ def _assemble(
             for node in nodes:
                 if (at, node) not in row_of:
                     raise KeyError(f"node {node} in element {number}")
-            rows = blocks[kind, len(nodes)]
-            block_of[at, number] = (kind, len(nodes)), len(rows)
-            rows.append([row_of[at, node] for node in nodes])
-    first, total = {}, 0
-    for key, rows in blocks.items():
-        first[key], total = total, total + len(rows)
-    elements = [Block(kind, np.array(rows)) for (kind, _), rows in blocks.items()]
-    mesh = ElementMesh(np.concatenate(points), elements, notes=notes)
-    element_of = {place: first[key] + row for place, (key, row) in block_of.items()}
-    _number_elements(mesh, element_of, list(instances))
+            blocks[kind, len(nodes)][at, number] = [row_of[at, node] for node in nodes]
+    places = [place for rows in blocks.values() for place in rows]
+    element_of = {place: k for k, place in enumerate(places)}
     names = list(instances)
+    own = len({at for at, _ in places}) < 2 and len(names) < 2
+    mesh = ElementMesh(
+        np.concatenate(points),
+        [Block(kind, np.array(list(rows.values()))) for (kind, _), rows in blocks.items()],
+        np.array([n for _, n in places] if own else range(1, len(places) + 1), dtype=np.int64),
+        own,
+        instance=names[0] if len(names) == 1 else "",
+        notes=notes,
+    )
     for at, (scope, _) in enumerate(placed):
         # Sets outside of parts mean the instance that they name, or every instance.
-        own = [at] if scope.elements or scope.nodes else list(range(len(names) + 1))
+        anywhere = [at] if scope.elements or scope.nodes else list(range(len(names) + 1))
 
-        def find(members: list[Member], elements: bool, own: list[int] = own) -> np.ndarray:
-            rows = element_of if elements else row_of
-            places = (
+        def find(
+            members: list[Member], row: dict[Place, int], anywhere: list[int] = anywhere
+        ) -> np.ndarray:
+            found = (
                 (which, number)
                 for name, number in members
-                for which in ([names.index(name)] if name in names else own)
+                for which in ([names.index(name)] if name in names else anywhere)
             )
-            return np.array([rows[place] for place in places if place in rows], dtype=np.int64)
+            return np.array([row[place] for place in found if place in row], dtype=np.int64)
 
-        _add_groups(mesh, scope, find)
+        for name, members in scope.element_sets.items():
+            old = mesh.element_sets.get(name, NO_ROWS)
+            mesh.element_sets[name] = np.r_[old, find(members, element_of)]
+        for name, members in scope.node_sets.items():
+            mesh.node_sets[name] = np.r_[mesh.node_sets.get(name, NO_ROWS), find(members, row_of)]
+        for name, faces in scope.surfaces.items():
+            elements, sides = mesh.face_sets.get(name, (NO_ROWS, NO_ROWS))
+            for of, face in faces:
+                if of.isdigit() or of in scope.element_sets:
+                    listed = [("", int(of))] if of.isdigit() else scope.element_sets[of]
+                    more = find(listed, element_of)
+                elif of in mesh.element_sets:
+                    more = mesh.element_sets[of]
+                else:
+                    raise KeyError(f"the element set {of}")
+                # SPOS, SNEG and "" are the shell itself.
+                side = int(face[1:]) - 1 if re.fullmatch(r"S\d", face) else 0
+                elements, sides = np.r_[elements, more], np.r_[sides, np.full(len(more), side)]
+            mesh.face_sets[name] = elements, sides
     return mesh
-
-
-def _number_elements(mesh: ElementMesh, element_of: dict[Place, int], instances: list[str]) -> None:
-    """Give elements the file's numbers, or positions if several instances number their own."""
-    mesh.own = len({at for at, _ in element_of}) < 2 and len(instances) < 2
-    mesh.instance = instances[0] if len(instances) == 1 else ""
-    mesh.numbers = np.arange(1, len(element_of) + 1)
-    for (_, number), row in element_of.items() if mesh.own else ():
-        mesh.numbers[row] = number
-
-
-def _add_groups(mesh: ElementMesh, scope: _Scope, find: _FindRows) -> None:
-    """Add the sets and surfaces of a scope; `find` gives the rows of elements or nodes."""
-    for of_mesh, sets in (
-        (mesh.element_sets, scope.element_sets),
-        (mesh.node_sets, scope.node_sets),
-    ):
-        for name, members in sets.items():
-            rows = find(members, sets is scope.element_sets)
-            of_mesh[name] = np.concatenate([of_mesh.get(name, NO_ROWS), rows])
-    for name, faces in scope.surfaces.items():
-        elements, sides = mesh.face_sets.get(name, (NO_ROWS, NO_ROWS))
-        for of, face in faces:
-            if of.isdigit():
-                more = find([("", int(of))], True)
-            elif of in scope.element_sets:
-                more = find(scope.element_sets[of], True)
-            elif of in mesh.element_sets:
-                more = mesh.element_sets[of]
-            else:
-                raise KeyError(f"the element set {of}")
-            # SPOS, SNEG and "" are the shell itself.
-            side = int(face[1:]) - 1 if re.fullmatch(r"S\d", face) else 0
-            elements, sides = np.r_[elements, more], np.r_[sides, np.full(len(more), side)]
-        mesh.face_sets[name] = elements, sides
