@@ -86,9 +86,8 @@ def read_abaqus(path: Path, content: bytes) -> RawMesh:
     try:
         return extract_surface(_assemble(scopes, instances, notes))
     except KeyError as error:
-        raise InputError(
-            f"{path}: names {error.args[0]}, which is not there; export the whole model"
-        ) from None
+        why = f"names {error.args[0]}, which is not there"
+        raise InputError(f"{path}: {why}; export the whole model") from None
 
 
 def _keywords(text: str) -> list[tuple[str, Options, list[str], int]]:
@@ -147,9 +146,8 @@ def _read_scopes(
                     scope.surfaces[options["NAME"]].append((member, face.strip().upper()))
         except (ValueError, KeyError, IndexError) as error:
             reason = f"lacks {error.args[0]}=" if isinstance(error, KeyError) else str(error)
-            raise InputError(
-                f"{path}: line {line}: *{keyword}: {reason}; export it again"
-            ) from None
+            where = f"line {line}: *{keyword}"
+            raise InputError(f"{path}: {where}: {reason}; export it again") from None
     notes = [f"left out {count} {kind}: it has no surface" for kind, count in left_out.items()]
     return scopes, instances, notes
 

@@ -12,6 +12,7 @@ mid-edge node, the edge is straight.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -46,8 +47,7 @@ SOLIDS = ("tetra", "pyramid", "wedge", "hexahedron")
 NONE = -1
 
 
-@dataclass(frozen=True)
-class Block:
+class Block(NamedTuple):
     """Elements of one kind.
 
     Nodes are corners first, then mid-edge nodes (or NONE). Further nodes are ignored.
@@ -76,8 +76,7 @@ class ElementMesh:
     notes: list[str] = field(default_factory=list)
 
 
-@dataclass(frozen=True)
-class _Polygons:
+class _Polygons(NamedTuple):
     """Faces with n corners."""
 
     corners: np.ndarray  # (k, n) points
@@ -87,7 +86,7 @@ class _Polygons:
     shell: np.ndarray  # (k,), the shell element that lies on the face, or NONE
 
     def select(self, keep: np.ndarray) -> _Polygons:
-        return _Polygons(*(column[keep] for column in vars(self).values()))
+        return _Polygons(*(column[keep] for column in self))
 
 
 def extract_surface(mesh: ElementMesh) -> RawMesh:
@@ -100,10 +99,8 @@ def extract_surface(mesh: ElementMesh) -> RawMesh:
             skin = _skin(_polygons(mesh, n, SOLIDS), mesh.points, mesh.blocks)
             faces, inside = _with_shells(skin, faces)
             if inside:
-                notes.append(
-                    f"left out {inside} shell elements that are not on the skin of the solid "
-                    "elements"
-                )
+                where = "that are not on the skin of the solid elements"
+                notes.append(f"left out {inside} shell elements {where}")
         triangles, of_face = _triangulate(faces, mesh.points)
         corners.append(mesh.points[triangles])
         owners.append(faces.owner[of_face])
@@ -134,8 +131,8 @@ def _origin(mesh: ElementMesh, faces: _Polygons) -> tuple[np.ndarray, np.ndarray
 
 def _polygons(mesh: ElementMesh, n: int, kinds: tuple[str, ...]) -> _Polygons:
     """All faces with n corners of the elements of some kinds."""
-    empty = np.zeros((0, n), dtype=np.int64), np.zeros(0, dtype=np.int64)
-    rows = [(empty[0], empty[0], empty[1], empty[1], empty[1])]
+    none = np.zeros(0, dtype=np.int64)
+    rows = [(none.reshape(0, n), none.reshape(0, n), none, none, none)]
     first = 0
     for block in mesh.blocks:
         number = np.arange(first, first + len(block.nodes))
@@ -163,15 +160,14 @@ def _skin(faces: _Polygons, points: np.ndarray, blocks: list[Block]) -> _Polygon
     faces = faces.select(times[same.reshape(-1)] == 1)
     if not len(faces.corners):
         return faces
-    middle = np.concatenate(
-        [points[block.nodes[:, : CORNERS[block.kind]]].mean(axis=1) for block in blocks]
-    )
+    corners_of = [block.nodes[:, : CORNERS[block.kind]] for block in blocks]
+    middle = np.concatenate([points[nodes].mean(axis=1) for nodes in corners_of])
     at = points[faces.corners]
     normal = np.cross(at[:, 1] - at[:, 0], at[:, -1] - at[:, 0])
     inward = np.einsum("ij,ij->i", normal, at.mean(axis=1) - middle[faces.owner]) < 0.0
     corners = np.where(inward[:, None], faces.corners[:, ::-1], faces.corners)
     mids = np.where(inward[:, None], np.roll(faces.mids[:, ::-1], -1, axis=1), faces.mids)
-    return _Polygons(corners, mids, faces.owner, faces.side, faces.shell)
+    return faces._replace(corners=corners, mids=mids)
 
 
 def _with_shells(skin: _Polygons, shells: _Polygons) -> tuple[_Polygons, int]:
@@ -184,25 +180,21 @@ def _with_shells(skin: _Polygons, shells: _Polygons) -> tuple[_Polygons, int]:
     shell_of_key = np.full(int(key.max()) + 1, NONE)
     shell_of_key[on_shell] = shells.owner
     inside = int((~np.isin(on_shell, on_skin)).sum())
-    shell = shell_of_key[on_skin]
-    return _Polygons(skin.corners, skin.mids, skin.owner, skin.side, shell), inside
+    return skin._replace(shell=shell_of_key[on_skin]), inside
 
 
 def _groups(mesh: ElementMesh, faces: _Polygons) -> dict[str, np.ndarray]:
     """Name -> its faces, (k,) bool. A node set and an element set may share a name."""
-    groups: dict[str, np.ndarray] = {}
-
-    def add(name: str, mask: np.ndarray) -> None:
-        groups[name] = groups[name] | mask if name in groups else mask
-
-    for name, elements in mesh.element_sets.items():
-        add(name, np.isin(faces.owner, elements) | np.isin(faces.shell, elements))
+    groups: dict[str, np.ndarray] = {
+        name: np.isin(faces.owner, elements) | np.isin(faces.shell, elements)
+        for name, elements in mesh.element_sets.items()
+    }
     for name, (elements, sides) in mesh.face_sets.items():
-        add(name, np.isin(faces.owner * 8 + faces.side, elements * 8 + sides))
+        chosen = np.isin(faces.owner * 8 + faces.side, elements * 8 + sides)
+        groups[name] = groups.get(name, False) | chosen
     for name, nodes in mesh.node_sets.items():
-        inside = np.zeros(len(mesh.points), dtype=bool)
-        inside[nodes] = True
-        add(name, inside[faces.corners].all(axis=1))
+        inside = np.asarray(np.isin(faces.corners, nodes).all(axis=1))
+        groups[name] = groups.get(name, False) | inside
     return groups
 
 
@@ -220,8 +212,7 @@ def _triangulate(faces: _Polygons, points: np.ndarray) -> tuple[np.ndarray, np.n
             for k in range(corners.shape[1])
         ]
         pieces.append(_split(mids, bent, points))
-    triangles = np.concatenate([piece for piece, _ in pieces])
-    of_face = np.concatenate([face for _, face in pieces])
+    triangles, of_face = (np.concatenate(column) for column in zip(*pieces, strict=True))
     a, b, c = triangles.T
     whole = (a != b) & (b != c) & (c != a)
     return triangles[whole], of_face[whole]

@@ -100,13 +100,11 @@ class _Stream:
 
 
 class _GmshMesh(NamedTuple):
-    """Nodes and elements by Gmsh's numbers.
-
-    Batches of elements are Gmsh's type, rows (k, 1 + p) of number and nodes, and physical groups.
-    """
+    """Nodes and elements by Gmsh's numbers."""
 
     numbers: list[np.ndarray]
     points: list[np.ndarray]
+    # Gmsh's type of elements, rows (k, 1 + p) of their numbers and nodes, and physical groups
     batches: list[tuple[int, np.ndarray, tuple[int, ...]]]
 
 
@@ -120,12 +118,9 @@ def read_gmsh(path: Path, content: bytes) -> RawMesh:
         rb"\s*\$MeshFormat\s+([\d.]+)\s+([01])\s+(\d+)[ \t]*\r?\n?(.{0,4})", content, re.S
     )
     if not found or found[1] not in (b"2.2", b"2", b"4.1"):
-        version = found[1].decode() if found else "?"
-        raise InputError(
-            f"{path}: version {version} of Gmsh's format is not supported; save as 4.1 or 2.2"
-        )
-    text = found[2] == b"0"
-    order = "<" if found[4][:1] == b"\x01" else ">"
+        version = f"version {found[1].decode() if found else '?'} of Gmsh's format"
+        raise InputError(f"{path}: {version} is not supported; save as 4.1 or 2.2")
+    text, order = found[2] == b"0", "<" if found[4][:1] == b"\x01" else ">"
     streams = {
         name: _Stream(path, body, text, order) for name, body in _sections(path, content).items()
     }
@@ -144,9 +139,8 @@ def _sections(path: Path, content: bytes) -> dict[str, bytes]:
         start = content.find(f"${name}".encode())
         end = content.rfind(f"$End{name}".encode())
         if start >= 0 and end < 0:
-            raise InputError(
-                f"{path}: truncated: ${name} has no $End{name}; export or copy it again"
-            )
+            why = f"${name} has no $End{name}"
+            raise InputError(f"{path}: truncated: {why}; export or copy it again")
         if start >= 0:
             sections[name] = content[start:end].partition(b"\n")[2]
         elif name != "Entities":
@@ -206,11 +200,10 @@ def _read_version_4(streams: dict[str, _Stream]) -> _GmshMesh:
 def _node_count(path: Path, kind: int) -> int:
     if kind in WITHOUT_SURFACE:
         return WITHOUT_SURFACE[kind]
-    if kind not in TYPES:
-        raise InputError(
-            f"{path}: elements of Gmsh's type {kind} are not supported; mesh with order 1 or 2"
-        )
-    return TYPES[kind][1]
+    if kind in TYPES:
+        return TYPES[kind][1]
+    what = f"elements of Gmsh's type {kind}"
+    raise InputError(f"{path}: {what} are not supported; mesh with order 1 or 2")
 
 
 def _element_mesh(path: Path, mesh: _GmshMesh, name_of: dict[tuple[int, int], str]) -> ElementMesh:
@@ -218,13 +211,13 @@ def _element_mesh(path: Path, mesh: _GmshMesh, name_of: dict[tuple[int, int], st
     numbers = np.concatenate([np.zeros(0, dtype=np.int64), *mesh.numbers])
     points = np.concatenate([np.zeros((0, 3)), *(point.reshape(-1, 3) for point in mesh.points)])
     by_number = np.argsort(numbers, kind="stable")
-    result, first = ElementMesh(points, []), 0
-    members: dict[str, list[np.ndarray]] = {}
+    result = ElementMesh(points, [])
     own = [np.zeros(0, dtype=np.int64)]
+    members: dict[str, list[np.ndarray]] = {}
     for kind, rows, groups in mesh.batches:
         if kind in WITHOUT_SURFACE or not len(rows):
             continue
-        nodes = rows[:, 1:]
+        nodes, first = rows[:, 1:], sum(map(len, own))
         own.append(rows[:, 0])
         place = np.searchsorted(numbers, nodes, sorter=by_number)
         at = by_number[np.minimum(place, len(numbers) - 1)]
@@ -233,10 +226,8 @@ def _element_mesh(path: Path, mesh: _GmshMesh, name_of: dict[tuple[int, int], st
         name = TYPES[kind][0]
         result.blocks.append(Block(name, _reorder(name, at)))
         for group in filter(None, groups):
-            dimension = 2 if name in SHELLS else 3
-            group_name = name_of.get((dimension, group), f"physical {group}")
-            members.setdefault(group_name, []).append(np.arange(first, first + len(rows)))
-        first += len(rows)
+            group_name = name_of.get((2 if name in SHELLS else 3, group), f"physical {group}")
+            members.setdefault(group_name, []).append(first + np.arange(len(rows)))
     result.numbers = np.concatenate(own)
     result.element_sets = {name: np.concatenate(parts) for name, parts in members.items()}
     return result

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import re
 from collections import Counter, defaultdict
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -72,38 +71,33 @@ def read_nastran(path: Path, content: bytes) -> RawMesh:
     try:
         points, row_of = _points(cards)
         mesh = ElementMesh(points, [])
-        numbers, properties = _add_blocks(mesh, cards, row_of)
+        properties = _add_blocks(mesh, cards, row_of)
     except (ValueError, IndexError) as error:
-        raise InputError(
-            f"{path}: cannot be read as Nastran bulk data: {error}; export it again"
-        ) from None
-    _add_groups(mesh, numbers, properties, text)
+        why = f"cannot be read as Nastran bulk data: {error}"
+        raise InputError(f"{path}: {why}; export it again") from None
+    _add_groups(mesh, properties, text)
     mesh.notes += [f"left out {n} {name}: it has no surface" for name, n in left_out.items()]
     return extract_surface(mesh)
 
 
-def _cards(text: str) -> Iterator[Card]:
+def _cards(text: str) -> list[Card]:
     """Name, further fields and line number of each card; continuation lines are joined."""
     lines = text.splitlines()
-    start = next(
-        (k + 1 for k, line in enumerate(lines) if re.match(r"\s*BEGIN\s+BULK", line, re.I)), 0
-    )
-    name, fields, first = "", [], 0
+    starts = (k + 1 for k, line in enumerate(lines) if re.match(r"\s*BEGIN\s+BULK", line, re.I))
+    start = next(starts, 0)
+    cards: list[Card] = []
     for number, line in enumerate(lines[start:], start=start + 1):
         line = line.split("$")[0].rstrip()
-        if not line.strip():
-            continue
         if line.upper().startswith("ENDDATA"):
             break
-        head, values = _fields(line)
-        if head[:1] in ("", "+", "*"):
-            fields += values
+        if not line.strip():
             continue
-        if name:
-            yield name, fields, first
-        name, fields, first = head, values, number
-    if name:
-        yield name, fields, first
+        head, values = _fields(line)
+        if head[:1] not in ("", "+", "*"):
+            cards.append((head, values, number))
+        elif cards:
+            cards[-1][1].extend(values)
+    return cards
 
 
 def _fields(line: str) -> tuple[str, list[str]]:
@@ -149,8 +143,7 @@ def _points(cards: dict[str, list[Card]]) -> tuple[np.ndarray, dict[int, int]]:
                 f"line {line}: GRID {number} is given twice, at two places; give each number once"
             )
         if fields[1] not in ("", "0"):
-            system = _whole(fields[1], line, "GRID's coordinate system")
-            rows_of_system[system].append(row)
+            rows_of_system[_whole(fields[1], line, "GRID's coordinate system")].append(row)
     for system, rows in rows_of_system.items():
         points[rows] = systems.to_basic(system, points[rows])
     return points, row_of
@@ -184,9 +177,8 @@ class _CoordinateSystems:
     def _frame(self, number: int, above: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
         """Origin (3,) and axes (3, 3) of a system; `above` are the systems that refer to it."""
         if number in above or (number != 0 and number not in self.cards):
-            raise ValueError(
-                f"coordinate system {number} is not defined; export it along with the mesh"
-            )
+            remedy = "export it along with the mesh"
+            raise ValueError(f"coordinate system {number} is not defined; {remedy}")
         if number not in self.frames:
             _, fields, line = self.cards[number]
             parent = _whole(fields[1], line, "the reference system")
@@ -202,12 +194,8 @@ class _CoordinateSystems:
 
 def _add_blocks(
     mesh: ElementMesh, cards: dict[str, list[Card]], row_of: dict[int, int]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Add blocks of elements, in the file's order within each card.
-
-    Returns:
-        Number and property of each element, (e,).
-    """
+) -> np.ndarray:
+    """Add blocks of elements, in the file's order within each card; return properties (e,)."""
     numbers: list[int] = []
     properties: list[int] = []
     for card, kind in KINDS.items():
@@ -230,10 +218,10 @@ def _add_blocks(
         if len(nodes):
             mesh.blocks.append(Block(kind, nodes[:, REORDERED.get(kind, range(size))]))
     mesh.numbers = np.array(numbers, dtype=np.int64)
-    return mesh.numbers, np.array(properties, dtype=np.int64)
+    return np.array(properties, dtype=np.int64)
 
 
-def _add_groups(mesh: ElementMesh, numbers: np.ndarray, properties: np.ndarray, text: str) -> None:
+def _add_groups(mesh: ElementMesh, properties: np.ndarray, text: str) -> None:
     """Add a group for each property, by number and name, and for each set."""
     names = _property_names(text)
     for number in np.unique(properties).tolist():
@@ -242,8 +230,7 @@ def _add_groups(mesh: ElementMesh, numbers: np.ndarray, properties: np.ndarray, 
         if number in names:
             mesh.element_sets[names[number]] = members
     for number, elements in _sets(text).items():
-        members = np.flatnonzero(np.isin(numbers, list(elements)))
-        mesh.element_sets[f"SET {number}"] = members
+        mesh.element_sets[f"SET {number}"] = np.flatnonzero(np.isin(mesh.numbers, list(elements)))
 
 
 def _property_names(text: str) -> dict[int, str]:

@@ -29,10 +29,8 @@ def read_obj(path: Path, content: bytes) -> RawMesh:
                 ring = [int(word.split("/")[0]) for word in words]
                 ring = [k - 1 if k > 0 else len(points) + k for k in ring]
                 if len(ring) < 3 or min(ring) < 0:
-                    raise InputError(
-                        f"{path}: line {number}: a face of {len(ring)} corners that are not there; "
-                        "export it again"
-                    )
+                    why = f"a face of {len(ring)} corners that are not there"
+                    raise InputError(f"{path}: line {number}: {why}; export it again")
                 triangles += [(ring[0], ring[k], ring[k + 1]) for k in range(1, len(ring) - 1)]
                 fan_sizes.append(len(ring) - 2)
             elif keyword in ("o", "g", "usemtl"):
@@ -43,9 +41,8 @@ def read_obj(path: Path, content: bytes) -> RawMesh:
             text = f"line {number}: {keyword!r} with no number; export it again"
             raise InputError(f"{path}: {text}") from None
     if triangles and max(map(max, triangles)) >= len(points):
-        raise InputError(
-            f"{path}: truncated: a face names a vertex that is not there; export or copy it again"
-        )
+        why = "a face names a vertex that is not there"
+        raise InputError(f"{path}: truncated: {why}; export or copy it again")
     count = len(triangles)
     corners = np.array(points)[np.array(triangles)] if count else np.zeros((0, 3, 3))
     groups: dict[str, np.ndarray] = {}

@@ -44,14 +44,11 @@ def _require_all_lines(path: Path, content: bytes) -> None:
     header, end, body = content.partition(b"end_header")
     if not end or not re.search(rb"^format\s+ascii", header, re.MULTILINE):
         return
-    counts = re.findall(rb"^element\s+\S+\s+(\d+)", header, re.MULTILINE)
-    declared = sum(map(int, counts))
+    declared = sum(map(int, re.findall(rb"^element\s+\S+\s+(\d+)", header, re.MULTILINE)))
     held = sum(1 for line in body.splitlines() if line.strip())
     if held < declared:
-        raise InputError(
-            f"{path}: truncated: its header counts {declared} lines and {held} are there; "
-            "export it again"
-        )
+        why = f"its header counts {declared} lines and {held} are there"
+        raise InputError(f"{path}: truncated: {why}; export it again")
 
 
 def _triangle_colours(mesh: Any) -> np.ndarray | None:

@@ -30,9 +30,8 @@ def _complete_stl(path: Path, content: bytes) -> bytes:
     """
     if _is_text_stl(content):
         if not content.rstrip().splitlines()[-1].strip().lower().startswith(b"endsolid"):
-            raise InputError(
-                f"{path}: truncated, the last line is not 'endsolid'; export or copy it again"
-            )
+            why = "truncated, the last line is not 'endsolid'"
+            raise InputError(f"{path}: {why}; export or copy it again")
         return content
     declared = _declared_triangles(content)
     if len(content) < HEADER:

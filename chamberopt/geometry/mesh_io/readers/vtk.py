@@ -53,10 +53,8 @@ def read_vtk(path: Path, content: bytes) -> RawMesh:
         if kind in WITHOUT_SURFACE:
             continue
         if kind not in KINDS:
-            raise InputError(
-                f"{path}: cell {before + rows[0] + 1} is of VTK's type {kind} with {size} corners, "
-                "which is not supported; make triangles of it"
-            )
+            cell = f"cell {before + rows[0] + 1} is of VTK's type {kind} with {size} corners"
+            raise InputError(f"{path}: {cell}, which is not supported; make triangles of it")
         columns = offsets[rows][:, None] + np.arange(size)
         mesh.blocks.append(Block(KINDS[kind], nodes[columns].astype(np.int64)))
         numbers.append(before + rows)
@@ -68,10 +66,7 @@ def read_vtk(path: Path, content: bytes) -> RawMesh:
 
 
 def _read_data(path: Path, content: bytes) -> Any:
-    """VTK's data object.
-
-    VTK reports errors and continues with less. Here they raise InputError.
-    """
+    """VTK's data object; InputError for what VTK only reports, to continue with less."""
     from vtkmodules.vtkCommonCore import vtkLogger
     from vtkmodules.vtkIOLegacy import vtkPolyDataReader, vtkUnstructuredGridReader
     from vtkmodules.vtkIOXML import vtkXMLPolyDataReader, vtkXMLUnstructuredGridReader
@@ -82,13 +77,13 @@ def _read_data(path: Path, content: bytes) -> Any:
     holds = found[1].decode().upper().replace("_", "") if found else "nothing that is known"
     if holds not in ("POLYDATA", "UNSTRUCTUREDGRID"):
         raise InputError(f"{path}: holds {holds}; save a PolyData or an UnstructuredGrid")
+    poly = holds == "POLYDATA"
+    reader: Any
     if xml:
-        reader: Any = (
-            vtkXMLPolyDataReader() if holds == "POLYDATA" else vtkXMLUnstructuredGridReader()
-        )
+        reader = vtkXMLPolyDataReader() if poly else vtkXMLUnstructuredGridReader()
         reader.SetFileName(str(path))
     else:
-        reader = vtkPolyDataReader() if holds == "POLYDATA" else vtkUnstructuredGridReader()
+        reader = vtkPolyDataReader() if poly else vtkUnstructuredGridReader()
         reader.ReadFromInputStringOn()
         reader.SetBinaryInputString(content, len(content))
     troubles: list[str] = []
@@ -102,18 +97,13 @@ def _read_data(path: Path, content: bytes) -> Any:
     finally:
         vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_WARNING)
     if troubles or reader.GetErrorCode():
-        raise InputError(
-            f"{path}: cannot be read as VTK, it is damaged or truncated; export it again"
-        )
+        why = "cannot be read as VTK, it is damaged or truncated"
+        raise InputError(f"{path}: {why}; export it again")
     return reader.GetOutputDataObject(0)
 
 
 def _groups_of_fields(fields: Any, cells: np.ndarray) -> dict[str, np.ndarray]:
-    """Sets of elements by the values of integer cell fields.
-
-    Args:
-        cells: the cell of each element.
-    """
+    """Sets of elements by the values of integer fields of their cells (e,)."""
     from vtkmodules.util.numpy_support import vtk_to_numpy
 
     groups: dict[str, np.ndarray] = {}
