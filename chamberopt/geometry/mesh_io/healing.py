@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.geometry.mesh_io.holes import close_holes, count_holes
+from chamberopt.geometry.mesh_io.holes import close_holes, edge_pieces
 from chamberopt.geometry.mesh_io.surface_error import OpenSurfaceError, SurfaceError, format_point
 from chamberopt.geometry.triangles import (
     connected_pieces,
@@ -70,31 +70,27 @@ def _require_closed(path: Path, points: np.ndarray, triangles: np.ndarray) -> No
     """Raise SurfaceError unless each edge belongs to exactly two triangles."""
     open_edges = _edges(triangles, count=1)
     if len(open_edges):
-        holes = count_holes(open_edges)
+        holes = edge_pieces(open_edges)[0]
         a, b = map(format_point, points[open_edges[0]])
-        where = f"{len(open_edges)} open edges in {holes} hole{'s' * (holes > 1)}"
-        raise OpenSurfaceError(
-            f"{path}: the surface is not closed: {where}, the first from {a} to {b}; "
-            "close it in the CAD program",
-            points[triangles],
-            points[open_edges],
+        message = (
+            f"{path}: the surface is not closed: {len(open_edges)} open edges in {holes} "
+            f"hole{'s' * (holes > 1)}, the first from {a} to {b}; close it in the CAD program"
         )
+        raise OpenSurfaceError(message, points[triangles], points[open_edges])
     crowded = _edges(triangles, count=3)
     if len(crowded):
         a, b = map(format_point, points[crowded[0]])
-        raise SurfaceError(
+        message = (
             f"{path}: not manifold: {len(crowded)} edges belong to more than two triangles, "
-            f"the first from {a} to {b}; make the bodies overlap or leave a gap there",
-            points[triangles],
-            points[crowded],
+            f"the first from {a} to {b}; make the bodies overlap or leave a gap there"
         )
+        raise SurfaceError(message, points[triangles], points[crowded])
 
 
 def _drop_useless(points: np.ndarray, triangles: np.ndarray, source: np.ndarray) -> SewnSurface:
     """Drop triangles with two corners in one place, and second copies; the order stays."""
     notes = []
-    a, b, c = triangles.T
-    flat = (a == b) | (b == c) | (c == a)
+    flat = (triangles == np.roll(triangles, 1, axis=1)).any(axis=1)
     if flat.any():
         first = source[flat][0] + 1
         notes.append(f"dropped {flat.sum()} triangles without area, the first is triangle {first}")
@@ -110,11 +106,7 @@ def _drop_useless(points: np.ndarray, triangles: np.ndarray, source: np.ndarray)
 
 
 def _weld(points: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
-    """Merge points within a tolerance [m].
-
-    Returns:
-        The remaining points, and the new number of each old point.
-    """
+    """The points that remain if those within a tolerance [m] are merged, and each one's number."""
     from scipy.spatial import cKDTree
 
     a, b = cKDTree(points).query_pairs(tolerance, output_type="ndarray").T
@@ -133,11 +125,7 @@ def _edges(triangles: np.ndarray, count: int) -> np.ndarray:
 def turn_outward(
     path: Path, vertices: np.ndarray, triangles: np.ndarray
 ) -> tuple[np.ndarray, list[str]]:
-    """Turn closed triangles (m, 3) so that neighbours agree and each body has a positive volume.
-
-    Returns:
-        The triangles, and notes on what was turned.
-    """
+    """Turn triangles (m, 3) so that neighbours agree and bodies have positive volumes; notes."""
     notes = []
     wrong = _against_neighbours(path, triangles)
     if wrong.any():

@@ -20,14 +20,11 @@ MAX_RIM_EDGES = 64  # the time for a rim grows with the cube of its edges
 def close_holes(
     points: np.ndarray, triangles: np.ndarray, open_edges: np.ndarray, tolerance: float
 ) -> tuple[np.ndarray, list[str]]:
-    """Make triangles (k, 3) that close the small holes, facing as their neighbours do.
+    """Triangles (k, 3) that close the small holes, facing as their neighbours do, and notes.
 
     Args:
         open_edges: edges (j, 2) that belong to one triangle only.
         tolerance: a crack no wider than this [m] is closed however long it is.
-
-    Returns:
-        The triangles, and notes on what was closed.
     """
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
     more: list[tuple[int, int, int]] = []
@@ -54,12 +51,7 @@ def close_holes(
     return np.array(more, dtype=np.int64).reshape(-1, 3), notes
 
 
-def count_holes(edges: np.ndarray) -> int:
-    """Number of connected pieces that open edges (k, 2) form."""
-    return _pieces(edges)[0]
-
-
-def _pieces(edges: np.ndarray) -> tuple[int, np.ndarray]:
+def edge_pieces(edges: np.ndarray) -> tuple[int, np.ndarray]:
     """Number of connected pieces that edges (k, 2) form, and the piece of each edge."""
     used, numbers = np.unique(edges, return_inverse=True)
     a, b = numbers.reshape(-1, 2).T
@@ -73,7 +65,7 @@ def _simple_rims(triangles: np.ndarray, edges: np.ndarray) -> list[list[int]]:
     That is against the side of the triangle beside its first edge. Holes that touch in a corner
     are left out.
     """
-    count, piece = _pieces(edges)
+    count, piece = edge_pieces(edges)
     sides = sides_of(triangles)
     rims = []
     for k in np.flatnonzero(np.bincount(piece, minlength=count) <= MAX_RIM_EDGES):

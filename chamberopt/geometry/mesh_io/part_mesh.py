@@ -67,10 +67,7 @@ class TriangleSoup:
 
 
 def read_part(path: Path, unit: str = "guess") -> PartMesh:
-    """Read a part.
-
-    Args:
-        unit: of the file's numbers: um, mm, cm, m, in or guess.
+    """Read a part whose numbers are in um, mm, cm, m or in; or guess the unit.
 
     Raises:
         InputError: the file is missing, empty, truncated or not finite; its surface is open, not
@@ -112,15 +109,9 @@ def read_triangles(path: Path, unit: str = "guess") -> TriangleSoup:
         )
     unit, unit_notes = find_unit(path, content, corners, unit, raw.unit)
     corners = corners * METRES_PER[unit] + 0.0  # + 0.0 turns -0 into 0, to be one place
-    return TriangleSoup(
-        path,
-        corners,
-        raw.numbering or number_by_position(len(corners)),
-        raw.groups,
-        (*raw.notes, *unit_notes),
-        hashlib.sha256(content).hexdigest(),
-        unit,
-    )
+    numbering, notes = raw.numbering or number_by_position(len(corners)), (*raw.notes, *unit_notes)
+    sha256 = hashlib.sha256(content).hexdigest()
+    return TriangleSoup(path, corners, numbering, raw.groups, notes, sha256, unit)
 
 
 def close_surface(soup: TriangleSoup, only: np.ndarray | None = None) -> PartMesh:
@@ -149,19 +140,12 @@ def close_surface(soup: TriangleSoup, only: np.ndarray | None = None) -> PartMes
 def select_triangles(
     groups: Mapping[str, np.ndarray], names: Iterable[str], count: int, field: str
 ) -> np.ndarray:
-    """Mark the triangles of the named groups; "all" means every triangle.
+    """Mark (count,) the triangles of the named groups; "all" means every triangle.
 
     Case matters only if the file has names that differ in nothing else.
 
-    Args:
-        count: number of triangles.
-        field: the design's field that holds the names, for messages.
-
-    Returns:
-        Mask (count,).
-
     Raises:
-        InputError: the file has no group of that name.
+        InputError: the file has no group of that name; names the design's field that holds it.
     """
     by_lower = {name.lower(): name for name in groups}
     chosen = np.zeros(count, dtype=bool)
@@ -170,11 +154,9 @@ def select_triangles(
         if name == "all" and known is None:
             chosen[:] = True
         elif known is None:
-            hint = (
-                toml_errors.did_you_mean(name, ["all", *groups])
-                if groups
-                else "its file names none: 'all'"
-            )
+            hint = "its file names none: 'all'"
+            if groups:
+                hint = toml_errors.did_you_mean(name, ["all", *groups])
             raise InputError(f"{field}: {name!r} is not a name in the part's file; {hint}")
         else:
             chosen |= groups[known]
@@ -186,15 +168,13 @@ def _read_content(path: Path) -> bytes:
     if path.is_dir():
         raise InputError(f"{path}: is a folder; give a mesh file")
     if not path.is_file():
-        raise InputError(
-            f"{path}: no such mesh file; "
-            "check part.mesh, which is relative to the design file's folder"
-        )
+        remedy = "check part.mesh, which is relative to the design file's folder"
+        raise InputError(f"{path}: no such mesh file; {remedy}")
     try:
         content = path.read_bytes()
     except OSError as error:
-        text = f"cannot be read: {error.strerror}; check its permissions"
-        raise InputError(f"{path}: {text}") from None
+        why = f"cannot be read: {error.strerror}"
+        raise InputError(f"{path}: {why}; check its permissions") from None
     if not content.strip():
         raise InputError(f"{path}: the file is empty; export the mesh again")
     return content

@@ -25,11 +25,6 @@ def refuse_self_intersection(path: Path, vertices: np.ndarray, triangles: np.nda
     """Raise SurfaceError with the place if a body's closed surface crosses itself.
 
     Several bodies may overlap: they are united where the chamber is made.
-
-    Args:
-        path: the surface's file, for the message.
-        vertices: (n, 3) [m].
-        triangles: (m, 3).
     """
     corners = vertices[triangles]
     touch = TOUCH * float(np.linalg.norm(np.ptp(vertices, axis=0)))
@@ -46,13 +41,12 @@ def refuse_self_intersection(path: Path, vertices: np.ndarray, triangles: np.nda
     first = pairs[:, int(np.argmin(pairs[0]))]
     middle = corners[first].reshape(-1, 3).mean(axis=0)
     sides = corners[np.unique(pairs)][:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2, 3)
-    raise SurfaceError(
+    message = (
         f"{path}: the surface crosses itself: {pairs.shape[1]} pairs of triangles, "
         f"the first near {format_point(middle)} (triangles {first.min() + 1} and "
-        f"{first.max() + 1}); heal it in the CAD program, or make its pieces separate bodies",
-        corners,
-        sides,
+        f"{first.max() + 1}); heal it in the CAD program, or make its pieces separate bodies"
     )
+    raise SurfaceError(message, corners, sides)
 
 
 def _close_pairs(corners: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -92,10 +86,7 @@ def _close_pairs(corners: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]
 
 
 def _morton_order(points: np.ndarray) -> np.ndarray:
-    """Order (m,) of points along a curve that keeps neighbours together.
-
-    The bits of x, y and z are interleaved.
-    """
+    """Order (m,) of points along a curve that keeps neighbours together: x, y, z interleaved."""
     low, size = points.min(axis=0), np.ptp(points, axis=0).max()
     cells = ((points - low) / (size or 1.0) * (2**20 - 1)).astype(np.uint64)
     code = np.zeros(len(points), dtype=np.uint64)
@@ -109,11 +100,10 @@ def _crossing(
     corners: np.ndarray, a: np.ndarray, b: np.ndarray, touch: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """The pairs of triangles a, b (k,) that pass through each other by more than `touch` [m]."""
-    for one, other in ((0, 1), (1, 0)):  # each must have corners on both sides of the other's plane
-        pair = (a, b)
-        distance = _distances(corners[pair[one]], corners[pair[other]])
+    for _ in range(2):  # each must have corners on both sides of the other's plane
+        distance = _distances(corners[a], corners[b])
         through = (distance.min(axis=1) < -touch) & (distance.max(axis=1) > touch)
-        a, b = a[through], b[through]
+        a, b = b[through], a[through]
     if not len(a):
         return a, b
     of_a, of_b = corners[a], corners[b]

@@ -53,23 +53,19 @@ def find_unit(
             f"{path}: part.unit is {given!r}, but the file says that its numbers are in "
             f"{stated!r}; leave part.unit out, or export in the unit that is meant"
         )
-    notes = []
-    if stated is not None:
-        unit = stated
-        if given != stated:
-            box = format_box(sides * METRES_PER[stated])
-            notes = [f"unit stated by the file: the part measures {box}"]
-    elif given != "guess":
-        unit = given
-    else:
+    unit, why, wrong = stated or given, "stated by the file", ""
+    if unit == "guess":
         unit, reason = _guess(path, content, sides)
-        notes = [
-            f"unit guessed as {unit!r} ({reason}): "
-            f"the part measures {format_box(sides * METRES_PER[unit])}; "
-            "give part.unit if that is wrong"
-        ]
-    _require_plausible_size(path, sides, unit)
-    return unit, notes
+        why, wrong = f"guessed as {unit!r} ({reason})", "; give part.unit if that is wrong"
+    box = format_box(sides * METRES_PER[unit])
+    if not MIN_SIZE <= sides.max() * METRES_PER[unit] <= MAX_SIZE:
+        fits = [repr(u) for u, m in METRES_PER.items() if MIN_SIZE <= sides.max() * m <= MAX_SIZE]
+        raise InputError(
+            f"{path}: with part.unit = {unit!r} the part measures {box}; allowed: longest side "
+            f"{1e3 * MIN_SIZE:g} to {1e3 * MAX_SIZE:g} mm"
+            + (f"; unit = {' or '.join(fits)} would be plausible" if fits else "")
+        )
+    return unit, [] if unit == given else [f"unit {why}: the part measures {box}{wrong}"]
 
 
 def _guess(path: Path, content: bytes, sides: np.ndarray) -> tuple[str, str]:
@@ -84,17 +80,4 @@ def _guess(path: Path, content: bytes, sides: np.ndarray) -> tuple[str, str]:
     raise InputError(
         f"{path}: the unit cannot be guessed from a longest side of {sides.max():.5g}; "
         "give part.unit, one of " + ", ".join(f'"{unit}"' for unit in METRES_PER)
-    )
-
-
-def _require_plausible_size(path: Path, sides: np.ndarray, unit: str) -> None:
-    """Raise InputError unless a part can be so large."""
-    if MIN_SIZE <= sides.max() * METRES_PER[unit] <= MAX_SIZE:
-        return
-    fitting = [u for u, m in METRES_PER.items() if MIN_SIZE <= sides.max() * m <= MAX_SIZE]
-    hint = f"; unit = {' or '.join(repr(u) for u in fitting)} would be plausible" if fitting else ""
-    raise InputError(
-        f"{path}: with part.unit = {unit!r} the part measures "
-        f"{format_box(sides * METRES_PER[unit])}; allowed: longest side {1e3 * MIN_SIZE:g} to "
-        f"{1e3 * MAX_SIZE:g} mm{hint}"
     )
