@@ -17,9 +17,11 @@ import numpy as np
 
 from chamberopt.geometry.triangles import (
     area_vectors,
+    areas,
     connected_pieces,
     edge_keys,
     side_pairs,
+    sides_of,
     unit_vectors,
 )
 
@@ -61,9 +63,8 @@ def triangle_quality(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """4 √3 area / sum of squared sides, (m,): 1 for an equilateral triangle, 0 without area."""
     corners = vertices[triangles]
     squares = ((corners - np.roll(corners, 1, axis=1)) ** 2).sum(axis=(1, 2))
-    area = np.linalg.norm(area_vectors(vertices, triangles), axis=1)
-    top = 4.0 * np.sqrt(3.0) * area
-    return np.divide(top, squares, out=np.zeros_like(area), where=squares > 0.0)
+    top = 4.0 * np.sqrt(3.0) * areas(vertices, triangles)
+    return np.divide(top, squares, out=np.zeros_like(top), where=squares > 0.0)
 
 
 def _flat_faces(vertices: np.ndarray, triangles: np.ndarray, kinds: np.ndarray) -> np.ndarray:
@@ -123,13 +124,14 @@ class _TargetMesh:
 
     def _split_once(self) -> bool:
         """Halve one side that is too long in each triangle that has one."""
-        edges, sides = self._edges()
+        edges, sides, _ = self._edges()
         length = self._lengths(edges)
         beside = self.target[sides // 3].any(axis=1)
         # Random order within a class of lengths: ranked by length, a row of equal strips would be
         # split one by one.
         rank = self.rng.random(len(length)) - np.floor(4.0 * np.log2(length))
-        chosen = self._independent(sides // 3, rank, (length > LONG * self.size) & beside)
+        edge, wanted = np.repeat(np.arange(len(sides)), 2), (length > LONG * self.size) & beside
+        chosen = self._independent(sides.ravel() // 3, edge, rank, wanted)
         middle = len(self.vertices) + np.arange(len(chosen))
         self.vertices = np.concatenate([self.vertices, self.vertices[edges[chosen]].mean(axis=1)])
         old, halves = sides[chosen].T.ravel() // 3, []
@@ -162,7 +164,8 @@ class _TargetMesh:
             wanted = (c != d) & ~self._are_linked(c, d)
             for new in (one, two):  # else the two are no convex quadrilateral
                 wanted &= np.einsum("ij,ij->i", self._area_vectors(new), normal) > 0.0
-            chosen = self._independent(np.stack([t, u], axis=1), -excess, wanted)
+            edge = np.tile(np.arange(len(t)), 2)
+            chosen = self._independent(np.r_[t, u], edge, -excess, wanted)
             # Two edges turned at once could become the same edge. Only the first one is turned.
             new_edges = np.sort(np.stack([c, d], axis=1)[chosen], axis=1)
             chosen = chosen[np.unique(new_edges, axis=0, return_index=True)[1]]
@@ -171,14 +174,10 @@ class _TargetMesh:
             self.triangles[t[chosen]], self.triangles[u[chosen]] = one[chosen], two[chosen]
 
     def collapse(self) -> bool:
-        """Collapse short sides by moving a point that shapes nothing onto its neighbour.
-
-        Returns:
-            Whether any was collapsed.
-        """
+        """Move points that shape nothing along short sides onto neighbours; return whether any was."""
         changed = False
         for _ in range(MAX_CHANGES):
-            edges, sides, crease = self._edges_and_creases()
+            edges, sides, crease = self._edges()
             free, along = self._movable(edges, crease)
             length = self._lengths(edges)
             touched = self.touched[sides // 3].all(axis=1)
@@ -190,15 +189,16 @@ class _TargetMesh:
             moved, kept, length = moved[usable], kept[usable], length[short][usable]
             if not len(moved):
                 return changed
-            chosen = self._apart(moved, kept, length, self._collapses_well(moved, kept))
+            rings = [self._rings(end) for end in (moved, kept)]
+            ring, point = (np.concatenate(column) for column in zip(*rings, strict=True))
+            chosen = self._independent(ring, point, length, self._collapses_well(moved, kept))
             if not len(chosen):
                 return changed
             changed = True
             onto = np.arange(len(self.vertices))
             onto[moved[chosen]] = kept[chosen]
             self.triangles = onto[self.triangles]
-            a, b, c = self.triangles.T
-            whole = (a != b) & (b != c) & (c != a)
+            whole = (self.triangles != np.roll(self.triangles, 1, axis=1)).all(axis=1)
             for name in ("triangles", "target", "face", "source", "touched"):
                 setattr(self, name, getattr(self, name)[whole])
             self.turn()
@@ -209,7 +209,7 @@ class _TargetMesh:
 
         Points stay where a triangle would get worse.
         """
-        edges, _, crease = self._edges_and_creases()
+        edges, _, crease = self._edges()
         free, _ = self._movable(edges, crease)
         ends, others = np.r_[edges[:, 0], edges[:, 1]], np.r_[edges[:, 1], edges[:, 0]]
         sums = np.zeros_like(self.vertices)
@@ -233,19 +233,13 @@ class _TargetMesh:
         self.vertices = moved
         self.turn()
 
-    def _edges(self) -> tuple[np.ndarray, np.ndarray]:
-        """Edges (e, 2), and the two sides (e, 2) at each."""
+    def _edges(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Edges (e, 2), the two sides (e, 2) at each, and which edges are creases (e,)."""
         keys = edge_keys(self.triangles)
         sides = np.argsort(keys, kind="stable").reshape(-1, 2)
         self.edge_order = keys[sides[:, 0]]
-        t, k = sides[:, 0] // 3, sides[:, 0] % 3
-        return np.stack([self.triangles[t, k], self.triangles[t, (k + 1) % 3]], axis=1), sides
-
-    def _edges_and_creases(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Edges (e, 2), their sides (e, 2), and which edges are creases (e,)."""
-        edges, sides = self._edges()
         face = self.face[sides // 3]
-        return edges, sides, face[:, 0] != face[:, 1]
+        return sides_of(self.triangles)[sides[:, 0]], sides, face[:, 0] != face[:, 1]
 
     def _are_linked(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Whether points a and b (e,) are the ends of an edge, as `_edges` found them last."""
@@ -268,13 +262,21 @@ class _TargetMesh:
         return np.arctan2(sine, np.einsum("ij,ij->i", to_a, to_b))
 
     def _independent(
-        self, touching: np.ndarray, rank: np.ndarray, wanted: np.ndarray
+        self, triangle: np.ndarray, change: np.ndarray, rank: np.ndarray, wanted: np.ndarray
     ) -> np.ndarray:
-        """Indices of wanted edges (e,) that come first, by rank, in both triangles (e, 2)."""
-        at, place = _places_by_rank(rank, wanted)
+        """Indices of the wanted changes that come first by rank in every triangle that they touch.
+
+        Args:
+            triangle, change: a triangle, and the change that touches it; shape (k,).
+            rank, wanted: of each change, shape (c,).
+        """
+        at = np.flatnonzero(wanted)
+        place = np.full(len(rank), len(at))
+        place[at[np.argsort(rank[at], kind="stable")]] = np.arange(len(at))
         best = np.full(len(self.triangles), len(at))
-        np.minimum.at(best, touching[at], place[:, None])
-        return at[(best[touching[at]] == place[:, None]).all(axis=1)]
+        np.minimum.at(best, triangle, place[change])
+        beaten = best[triangle] < place[change]
+        return at[~np.isin(at, change[beaten])]
 
     def _movable(self, edges: np.ndarray, crease: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Points (n,) inside a flat face, and points on a straight crease, all around touched."""
@@ -321,25 +323,3 @@ class _TargetMesh:
         who, other = np.divmod(np.unique(np.repeat(point, 3) * n + old.ravel()), n)
         shared = (other != moved[who]) & (other != kept[who]) & self._are_linked(other, kept[who])
         return ~bad & (np.bincount(who[shared], minlength=len(moved)) == 2)
-
-    def _apart(
-        self, moved: np.ndarray, kept: np.ndarray, rank: np.ndarray, wanted: np.ndarray
-    ) -> np.ndarray:
-        """Indices of wanted points (p,) that come first in every triangle around both ends."""
-        at, place = _places_by_rank(rank, wanted)
-        best = np.full(len(self.triangles), len(at))
-        rings = [self._rings(end[at]) for end in (moved, kept)]
-        for ring, point in rings:
-            np.minimum.at(best, ring, place[point])
-        first = np.ones(len(at), dtype=bool)
-        for ring, point in rings:
-            np.logical_and.at(first, point, best[ring] == place[point])
-        return at[first]
-
-
-def _places_by_rank(rank: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Indices of the wanted, and the place of each among them by rank."""
-    at = np.flatnonzero(wanted)
-    place = np.empty(len(at), dtype=np.int64)
-    place[np.argsort(rank[at], kind="stable")] = np.arange(len(at))
-    return at, place
