@@ -174,7 +174,7 @@ class _TargetMesh:
             self.triangles[t[chosen]], self.triangles[u[chosen]] = one[chosen], two[chosen]
 
     def collapse(self) -> bool:
-        """Move points that shape nothing along short sides onto neighbours; return whether any was."""
+        """Move points that shape nothing along short sides onto neighbours; return if any was."""
         changed = False
         for _ in range(MAX_CHANGES):
             edges, sides, crease = self._edges()

@@ -75,11 +75,9 @@ def snap_to_grid(vertices: np.ndarray) -> np.ndarray:
 def make_solid(
     vertices: np.ndarray, triangles: np.ndarray, name: str, only: np.ndarray | None = None
 ) -> Solid:
-    """Make a solid of a closed surface.
+    """Make a solid of a closed surface (n, 3) [m], (m, 3) whose normals point outward.
 
     Args:
-        vertices: (n, 3) [m].
-        triangles: (m, 3), normals outward.
         only: indices of the triangles to use, such as one body of several. The sources of the
             solid's triangles still count in the whole list.
 
@@ -100,20 +98,16 @@ def make_solid(
     )
     solid = Solid(_checked(Manifold(mesh), f"{name}: cannot be made a solid"), label, name)
     if solid.volume <= 0.0:  # subtracting it would ADD material, without an error
-        raise InputError(
-            f"{name}: the surface is inside out or encloses nothing; make its normals point outward"
-        )
+        why = "the surface is inside out or encloses nothing"
+        raise InputError(f"{name}: {why}; make its normals point outward")
     return solid
 
 
 def split_bodies(vertices: np.ndarray, triangles: np.ndarray, name: str) -> tuple[list[Solid], int]:
-    """Make solids of a surface (n, 3) [m], (m, 3) of one or several bodies.
+    """Solids of a surface of one or several bodies, and the number of voids that were filled.
 
     Unite them before use: a mesh of bodies that overlap would be subtracted wrongly, without an
     error. Sources count in the whole list of triangles.
-
-    Returns:
-        The solids, and the number of closed voids in them that were filled.
     """
     shells, volumes = find_shells(vertices, triangles)
     if len(volumes) == 1:
@@ -126,11 +120,7 @@ def split_bodies(vertices: np.ndarray, triangles: np.ndarray, name: str) -> tupl
 
 
 def sweep_face(face: SolidSurface, way: np.ndarray, name: str) -> Solid:
-    """The prism over a flat face, whose normals point away from it, up to the face moved by `way`.
-
-    Args:
-        way: displacement (3,) [m].
-    """
+    """The prism over a flat face, its normals pointing away, up to the face moved by a way [m]."""
     count, (a, b) = len(face.vertices), border_edges(face.triangles).T
     walls = np.concatenate([np.c_[b, a, a + count], np.c_[b, a + count, b + count]])
     triangles = np.concatenate([face.triangles, face.triangles[:, ::-1] + count, walls])
@@ -177,8 +167,7 @@ class Outline:
     def offset(self, by: float, facets: int) -> Outline:
         """The area within a distance `by` [m] of this one; smaller than it if `by` is negative.
 
-        Args:
-            facets: straight sides of a full circle, of which the round corners are parts.
+        Its round corners are parts of circles with that many facets.
         """
         from manifold3d import JoinType
 
@@ -200,12 +189,7 @@ class Outline:
 
 
 def plan_outline(vertices: np.ndarray, triangles: np.ndarray, below: float) -> Outline:
-    """The area in plan of what a closed surface has below a height [m].
-
-    Args:
-        vertices: (n, 3) [m].
-        triangles: (m, 3), normals outward.
-    """
+    """The area in plan of what a closed surface, its normals outward, has below a height [m]."""
     from manifold3d import CrossSection, OpType
 
     sections = [
@@ -216,11 +200,7 @@ def plan_outline(vertices: np.ndarray, triangles: np.ndarray, below: float) -> O
 
 
 def extrude(outline: np.ndarray, height: float) -> tuple[np.ndarray, np.ndarray]:
-    """Make the prism from z = 0 to a height [m] over an outline (n, 2) [m], convex or not.
-
-    Returns:
-        Vertices (k, 3) [m] and triangles (m, 3).
-    """
+    """Vertices [m] and triangles of the prism from z = 0 to a height [m] over an outline (n, 2)."""
     from manifold3d import CrossSection
 
     mesh = CrossSection([1e3 * outline]).extrude(1e3 * height).to_mesh64()
@@ -236,18 +216,14 @@ def overlap_volume(one: Solid, two: Solid) -> float:
 
 
 def find_cavities(surface: SolidSurface) -> list[np.ndarray]:
-    """The separate cavities of a surface, the largest first.
-
-    Returns:
-        For each a mask (k,) of its outer shell and of the islands that stand in it.
-    """
+    """Masks (k,) of the separate cavities, the largest first: outer shell and islands in it."""
     shells, volumes = find_shells(surface.vertices, surface.triangles)
-    outer = sorted(np.flatnonzero(volumes > 0.0), key=lambda shell: -volumes[shell])
-    cavities = {int(shell): shells == shell for shell in outer}
-    for island in np.flatnonzero(volumes <= 0.0):
+    outer = sorted(np.flatnonzero(volumes > 0.0).tolist(), key=lambda shell: -volumes[shell])
+    cavities = {shell: shells == shell for shell in outer}
+    for island in np.flatnonzero(volumes <= 0.0).tolist():
         for shell in reversed(outer):  # an island stands in the smallest shell around it
             if shell_winding(surface.vertices, surface.triangles, shells, shell, island) > 0.5:
-                cavities[int(shell)] |= shells == island
+                cavities[shell] |= shells == island
                 break
     return list(cavities.values())
 

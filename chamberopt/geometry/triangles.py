@@ -11,12 +11,7 @@ MAX_SAMPLES = 8  # points of a shell that are tested for lying in another
 
 
 def unique_rows(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Distinct rows of an array (n, 3), as np.unique(axis=0) finds them but six times faster.
-
-    Returns:
-        Index of the first of each distinct row, in rising order of rows, and for each row which
-        distinct row it is, shape (n,).
-    """
+    """First index and inverse of the distinct rows, as np.unique(axis=0), but six times faster."""
     order = np.lexsort(rows.T[::-1])
     ordered = rows[order]
     is_new = np.ones(len(rows), dtype=bool)
@@ -27,11 +22,7 @@ def unique_rows(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def connected_pieces(a: np.ndarray, b: np.ndarray, count: int) -> tuple[int, np.ndarray]:
-    """Connected pieces of a graph of `count` nodes with links from a (k,) to b (k,).
-
-    Returns:
-        Number of pieces, and the piece of each node, shape (count,).
-    """
+    """Connected pieces of a graph with links a (k,) to b (k,): number, and piece of each node."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -65,11 +56,7 @@ def border_edges(triangles: np.ndarray) -> np.ndarray:
 
 
 def find_shells(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Connected pieces of a closed surface.
-
-    Returns:
-        The piece of each triangle, shape (m,), and the volume that each piece encloses [m³].
-    """
+    """The connected piece of each triangle (m,), and the volume that each piece encloses [m³]."""
     a, b = triangles[:, [0, 1]].T.ravel(), triangles[:, [1, 2]].T.ravel()
     _, piece = connected_pieces(a, b, len(vertices))
     shells = np.unique(piece[triangles[:, 0]], return_inverse=True)[1].reshape(-1)
@@ -77,10 +64,7 @@ def find_shells(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray
 
 
 def tetrahedron_volumes(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Signed volumes (m,) [m³] between each triangle and the mean of all vertices.
-
-    Their sum is the enclosed volume.
-    """
+    """Signed volumes (m,) [m³] over the mean of all vertices; their sum is the enclosed volume."""
     a, b, c = (vertices[triangles[:, k]] - vertices.mean(axis=0) for k in range(3))
     return np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0
 
@@ -101,17 +85,9 @@ def winding_number(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
 
 
 def shell_winding(
-    vertices: np.ndarray,
-    triangles: np.ndarray,
-    shells: np.ndarray,
-    outer: int | np.integer,
-    inner: int | np.integer,
+    vertices: np.ndarray, triangles: np.ndarray, shells: np.ndarray, outer: int, inner: int
 ) -> float:
-    """How often one shell of a surface winds around another: 1 if that lies in it, 0 if beside it.
-
-    Args:
-        shells: the shell of each triangle, shape (m,).
-    """
+    """How often one of the shells (m,) winds around another: 1 if that is in it, 0 if beside it."""
     points = vertices[triangles[shells == inner]].mean(axis=1)
     points = points[:: max(1, len(points) // MAX_SAMPLES)]
     return float(np.median(winding_number(points, vertices[triangles[shells == outer]])))
@@ -122,13 +98,8 @@ def find_unwalled_border(
 ) -> np.ndarray | None:
     """A point (3,) at the border of flat triangles beside which the surface does not rise.
 
-    Normals point out of the room: a floor's neighbours should rise into the room as walls.
-
-    Args:
-        face: marks the flat triangles, shape (m,).
-
-    Returns:
-        None if the surface rises everywhere beside the face.
+    Normals point out of the room: a floor's neighbours should rise into the room as walls. None if
+    they do all round the flat triangles, which `face` (m,) marks.
     """
     sides, pairs = sides_of(triangles), side_pairs(triangles)
     one, two = pairs[face[pairs[:, 0] // 3] != face[pairs[:, 1] // 3]].T

@@ -132,7 +132,7 @@ def turn_outward(
         notes.append(f"turned {wrong.sum()} triangles that faced against their neighbours")
         triangles = np.where(wrong[:, None], triangles[:, ::-1], triangles)
     shells, volumes = find_shells(vertices, triangles)
-    for k in np.flatnonzero(volumes < 0.0):
+    for k in np.flatnonzero(volumes < 0.0).tolist():
         others = (other for other in range(len(volumes)) if other != k)
         if any(abs(shell_winding(vertices, triangles, shells, one, k)) > 0.5 for one in others):
             continue  # the wall of a void in another piece, whichever way that one faces
