@@ -34,12 +34,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             # A terminal that cannot show ± must not end the command before its results are printed.
             stream.reconfigure(errors="backslashreplace")
     try:
-        app(
-            list(sys.argv[1:] if arguments is None else arguments),
-            exit_on_error=False,
-            print_error=False,
-            result_action="return_value",
-        )
+        given = list(sys.argv[1:] if arguments is None else arguments)
+        app(given, exit_on_error=False, print_error=False, result_action="return_value")
     except CycloptsError as error:
         return _fail(f"{str(error).rstrip()} (chamberopt --help lists commands and options)", 2)
     except InputError as error:
@@ -59,19 +55,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         what = str(error) or "a worker process died, twice"
         return _fail(f"{what} ({cause}); {KEPT}", 1, error)
     except (ValueError, RuntimeError) as error:
-        return _fail_in_simulator(error)
+        import sim_core
+
+        if isinstance(error, sim_core.SceneError):
+            return _fail(str(error), 2, error)
+        if isinstance(error, sim_core.SimulationError):
+            return _fail(f"the simulation stopped: {error}", 1, error)
+        raise  # a fault of ours
     return 0
-
-
-def _fail_in_simulator(error: Exception) -> int:
-    """Report the two errors of sim_core; raise any other again, because it is a fault of ours."""
-    import sim_core
-
-    if isinstance(error, sim_core.SceneError):
-        return _fail(str(error), 2, error)
-    if isinstance(error, sim_core.SimulationError):
-        return _fail(f"the simulation stopped: {error}", 1, error)
-    raise error
 
 
 def _fail(message: str, status: int, error: BaseException | None = None) -> int:

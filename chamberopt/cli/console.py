@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from itertools import count
 from pathlib import Path
@@ -59,14 +59,13 @@ def _first_free_folder(name: str) -> Path:
 def print_remarks(remarks: Sequence[str]) -> None:
     """Print remarks, such as a skipped picture, to stderr, so that --json stays clean."""
     for remark in remarks:
-        print(remark, file=sys.stderr)
+        print(remark, file=sys.stderr, flush=True)
 
 
 def print_warnings(design: Design, chamber: Chamber, which: str = "") -> list[str]:
     """Print the warnings of `check` to stderr, and return them for result.json.
 
-    Args:
-        which: names the design where there are several, e.g. " of the best design".
+    `which` names the design where there are several, e.g. " of the best design".
     """
     from chamberopt.chamber.checks.check import warnings
 
@@ -93,9 +92,8 @@ def print_result(
 def estimate_line(name: str, estimate: Estimate) -> str:
     from chamberopt.common.estimate import ZERO_TOLERANCE
 
-    value, half_width = (
-        0.0 if abs(x) < ZERO_TOLERANCE else x for x in (estimate.value, estimate.half_width)
-    )
+    numbers = estimate.value, estimate.half_width
+    value, half_width = (0.0 if abs(x) < ZERO_TOLERANCE else x for x in numbers)
     return f"{name:34}{value:12.5g} ± {half_width:.2g}"
 
 
@@ -105,7 +103,7 @@ def evaluation_lines(evaluation: Evaluation) -> list[str]:
     return [estimate_line(name, estimate) for name, estimate in rows.items()]
 
 
-def note_lines(notes: Sequence[str]) -> list[str]:
+def note_lines(notes: Iterable[str]) -> list[str]:
     return [f"note: {note}" for note in notes]
 
 
@@ -129,9 +127,8 @@ def table_lines(table: Mapping[str, Any], prefix: str = "") -> list[str]:
         elif name in ("notes", "warnings"):
             lines += [f"{name.removesuffix('s')}: {text}" for text in value]
         else:
-            lines.append(
-                label + (_list_text(value, name) if isinstance(value, list) else f"{value}")
-            )
+            text = _list_text(value, name) if isinstance(value, list) else f"{value}"
+            lines.append(label + text)
     return lines
 
 

@@ -16,31 +16,14 @@ app = App(
 Json = Annotated[
     bool, Parameter(name="--json", negative="", help="Print JSON on stdout instead of text.")
 ]
-Workers = Annotated[
-    int | None,
-    Parameter(
-        name="--workers",
-        help="Number of workers on this machine, by default one per core. Does not change results.",
-    ),
-]
-Cluster = Annotated[
-    str | None,
-    Parameter(
-        name="--cluster",
-        help="Dask scheduler to use: tcp://HOST:PORT, or its scheduler file. "
-        "Does not change results.",
-    ),
-]
+_WORKERS = "Number of workers on this machine, by default one per core. Does not change results."
+Workers = Annotated[int | None, Parameter(name="--workers", help=_WORKERS)]
+_CLUSTER = "Dask scheduler to use: tcp://HOST:PORT, or its scheduler file. Does not change results."
+Cluster = Annotated[str | None, Parameter(name="--cluster", help=_CLUSTER)]
 Out = Annotated[
     Path | None, Parameter(name="--out", help="Folder for the results; it must be new or empty.")
 ]
-Resumable = Annotated[
-    Path | None,
-    Parameter(
-        name="--out", help="Folder for the results: new, empty, or that of this study to resume it."
-    ),
-]
-View = Annotated[
-    str | None,
-    Parameter(help="Direction to the eye, X,Y,Z; by default one that shows what is drawn."),
-]
+_RESUMABLE = "Folder for the results: new, empty, or that of this study to resume it."
+Resumable = Annotated[Path | None, Parameter(name="--out", help=_RESUMABLE)]
+_VIEW = "Direction to the eye, X,Y,Z; by default one that shows what is drawn."
+View = Annotated[str | None, Parameter(help=_VIEW)]

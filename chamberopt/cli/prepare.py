@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import sys
 from typing import TYPE_CHECKING, Any
+
+from chamberopt.cli.console import print_remarks
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -20,10 +21,7 @@ if TYPE_CHECKING:
 def compile_with_message(
     design: Design, chamber: Chamber, cavity: AnalyticCavity | None = None
 ) -> None:
-    """Compile with a message before the progress bar starts.
-
-    Otherwise the first minute would look like a hang.
-    """
+    """Compile with a message, not behind a progress bar, where a minute would look like a hang."""
     import sim_core
     from chamberopt.chamber.scene import chamber_mesh, require_ball_count, scene_physics
 
@@ -34,9 +32,9 @@ def compile_with_message(
     variant = physics, shot.count, shot.mix is None, is_cylinder
     if sim_core.is_compiled(*variant):
         return
-    print("compiling the simulator (once per set of effects) ...", file=sys.stderr, flush=True)
+    print_remarks(["compiling the simulator (once per set of effects) ..."])
     seconds = sim_core.compile_simulator(*variant)
-    print(f"compiled in {seconds:.0f} s", file=sys.stderr, flush=True)
+    print_remarks([f"compiled in {seconds:.0f} s"])
 
 
 def resolve_effects(
@@ -48,11 +46,7 @@ def resolve_effects(
 
     with progress_bar("pilot runs") as progress:
         return with_effects_resolved(
-            design,
-            chamber,
-            executor,
-            progress,
-            lambda variant: compile_with_message(variant, chamber),
+            design, chamber, executor, progress, lambda one: compile_with_message(one, chamber)
         )
 
 
@@ -65,11 +59,7 @@ def advise_effects(design: Design, chamber: Chamber) -> list[dict[str, Any]]:
     def prepare(variant: Design) -> None:
         compile_with_message(variant, chamber)
 
-    print(
-        "pilot runs with each effect switched on and off (--no-pilot skips them) ...",
-        file=sys.stderr,
-        flush=True,
-    )
+    print_remarks(["pilot runs with each effect switched on and off (--no-pilot skips them) ..."])
     with local_executor() as executor, progress_bar("pilot runs") as progress:
         advice = with_effects_resolved(design, chamber, executor, progress, prepare)[1]
         advice = advice or advise(design, chamber, executor, progress, prepare)

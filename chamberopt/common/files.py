@@ -16,15 +16,7 @@ from chamberopt.common.errors import InputError
 # A run that was killed may leave these in its folder: a file half written, and its lock (lock.py).
 LEFTOVER_PREFIXES = (".writing-", ".lock")
 # What reading a damaged .npz file can raise.
-UNREADABLE_NPZ = (
-    OSError,
-    ValueError,
-    KeyError,
-    TypeError,
-    EOFError,
-    zipfile.BadZipFile,
-    zlib.error,
-)
+UNREADABLE_NPZ = OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, zlib.error
 
 
 def is_new_or_empty(folder: Path) -> bool:
@@ -37,20 +29,14 @@ def is_new_or_empty(folder: Path) -> bool:
 
 
 def make_output_folder(path: str | Path) -> Path:
-    """Make a folder for results.
-
-    Raises:
-        InputError: the folder holds files, which are never overwritten, or cannot be written.
-    """
+    """Make a folder for results; InputError if it holds files or cannot be written."""
     folder, remedy = Path(path), "choose another folder (out, or --out)"
     if os.path.lexists(folder) and not os.path.isdir(folder):
         raise InputError(f"{folder}: is a file; results need a folder: {remedy}")
     try:
         if not is_new_or_empty(folder):
-            raise InputError(
-                f"{folder}: already holds files, and results are never overwritten: {remedy} or "
-                "remove this one"
-            )
+            text = "already holds files, and results are never overwritten"
+            raise InputError(f"{folder}: {text}: {remedy} or remove this one")
         folder.mkdir(parents=True, exist_ok=True)
         _require_writable(folder)
     except OSError as error:
@@ -59,16 +45,10 @@ def make_output_folder(path: str | Path) -> Path:
 
 
 def check_new_file(path: Path) -> Path:
-    """Return the path, where a new file can be written.
-
-    Raises:
-        InputError: the file exists and would be overwritten, or cannot be written.
-    """
+    """Return the path of a new file; InputError if it exists or cannot be written."""
     if os.path.lexists(path):
-        raise InputError(
-            f"{path}: already exists, and nothing is ever overwritten: choose another name or "
-            "remove it"
-        )
+        text = "already exists, and nothing is ever overwritten: choose another name or remove it"
+        raise InputError(f"{path}: {text}")
     if not path.parent.is_dir():
         raise InputError(f"{path}: the folder {path.parent} does not exist; make it first")
     try:

@@ -22,28 +22,22 @@ def progress_bar(what: str, stream: TextIO | None = None) -> Iterator[Progress]:
     if not stream.isatty():
         yield lambda done, total, best: None
         return
+    from rich import progress as rich
     from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
-    from rich.progress import Progress as Bar
 
     columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[best]}", style="bold"),
-        TimeElapsedColumn(),
-        TextColumn("left", style="dim"),
-        TimeRemainingColumn(),
+        "{task.description}",
+        rich.BarColumn(),
+        rich.MofNCompleteColumn(),
+        "[bold]{task.fields[best]}",
+        rich.TimeElapsedColumn(),
+        "[dim]left",
+        rich.TimeRemainingColumn(),
     )
     # An evaluation can take seconds. The time left is estimated from all of the last hour's.
-    with Bar(
-        *columns, console=Console(file=stream), speed_estimate_period=3600, transient=True
+    console = Console(file=stream)
+    with rich.Progress(
+        *columns, console=console, speed_estimate_period=3600, transient=True
     ) as bar:
         task = bar.add_task(what, total=None, best="")
 

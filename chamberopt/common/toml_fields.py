@@ -48,14 +48,24 @@ def _as_tuple(names: Any) -> Any:
     return (names,) if isinstance(names, str) else names
 
 
-Direction = Annotated[Triple, AfterValidator(_nonzero)]
-Position = Annotated[Triple, AfterValidator(_within_limits)]
+def _form(form: str) -> Any:
+    return Field(json_schema_extra={"form": form})
+
+
+# The form is what error messages show.
+Direction = Annotated[Triple, AfterValidator(_nonzero), _form("three numbers [x, y, z], not all 0")]
+Position = Annotated[Triple, AfterValidator(_within_limits), _form("three numbers [x, y, z] in mm")]
+Turns = Annotated[Triple, _form("three numbers [x, y, z] in degrees")]  # about x, then y, then z
 # Paths are relative to the file that names them, and absolute once read: the design stays valid
 # wherever it is saved.
 File = Annotated[str, Field(min_length=1), AfterValidator(_absolute)]
 MeshFile = Annotated[str, Field(min_length=1), AfterValidator(_existing)]
-# One name or a list of names.
-Names = Annotated[tuple[str, ...], Field(strict=False, min_length=1), BeforeValidator(_as_tuple)]
+Names = Annotated[
+    tuple[str, ...],
+    Field(strict=False, min_length=1),
+    BeforeValidator(_as_tuple),
+    _form("a name in quotes, or a list of names"),
+]
 
 
 def quantity(low: float, high: float, unit: str, what: str, default: Any = ...) -> Any:
@@ -71,8 +81,7 @@ def list_field(form: str, what: str, default: Any = ...) -> Any:
 def from_file(path: str, context: Mapping[str, Any] | None) -> Path:
     """Absolute path of a file that a design file names relative to its own folder.
 
-    Args:
-        context: the context of the pydantic validation, as `checked` in design/design.py makes it.
+    `context` is that of the pydantic validation, as `validate` in design/design.py makes it.
     """
     return ((context or {}).get("folder", Path()) / path).resolve()
 

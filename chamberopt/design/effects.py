@@ -78,10 +78,8 @@ class FrictionTable(FileTable):
     @property
     def balls(self) -> tuple[float, float]:
         """mu and beta0 of ball on ball."""
-        return (
-            self.mu if self.mu_balls is None else self.mu_balls,
-            self.beta0 if self.beta0_balls is None else self.beta0_balls,
-        )
+        mu, beta0 = self.mu_balls, self.beta0_balls
+        return self.mu if mu is None else mu, self.beta0 if beta0 is None else beta0
 
 
 class SurfaceEffectTable(FileTable):

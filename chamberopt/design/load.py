@@ -72,15 +72,13 @@ def read_toml(path: Path, kind: str) -> tuple[str, dict[str, Any]]:
         message = f"{path}: cannot be read: {error.strerror}; check its permissions"
         raise InputError(message) from None
     except UnicodeDecodeError as error:
-        raise InputError(
-            f"{path}: not UTF-8 text (byte {error.start}); a {kind} file is TOML, save it as UTF-8"
-        ) from None
+        text = f"not UTF-8 text (byte {error.start}); a {kind} file is TOML, save it as UTF-8"
+        raise InputError(f"{path}: {text}") from None
     except ValueError:  # a null character in the name
         raise InputError(f"{str(path)!r}: not a file name; check the path") from None
     if not source.strip():
-        raise InputError(
-            f"{path}: the file is empty; a {kind} file is TOML, start from a copy of a shipped one"
-        )
+        text = f"the file is empty; a {kind} file is TOML, start from a copy of a shipped one"
+        raise InputError(f"{path}: {text}")
     try:
         return source, tomllib.loads(source)
     except tomllib.TOMLDecodeError as error:

@@ -5,7 +5,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from chamberopt.common.toml_fields import Direction, Position, list_field, quantity
+from chamberopt.common.toml_fields import Direction, Position, quantity
 from chamberopt.design.shapes.hole_and_deflector_tables import PlacedBore
 from chamberopt.design.table_base import SI, FileTable
 
@@ -37,12 +37,8 @@ class Sonotrode(VibratingFace):
 class FurtherSonotrode(PlacedBore, VibratingFace):
     """A further sonotrode: a round face at the bottom of a well that opens into the room."""
 
-    at_mm: Position = list_field(
-        "three numbers [x, y, z] in mm", "middle of the face, in the chamber's frame"
-    )
-    axis: Direction = list_field(
-        "three numbers [x, y, z], not all 0", "the way the face looks, into the room"
-    )
+    at_mm: Position = Field(description="middle of the face, in the chamber's frame")
+    axis: Direction = Field(description="the way the face looks, into the room")
     diameter_mm: float = quantity(0.5, 2000, "mm", "of the face")
     phase_deg: float = quantity(
         -360, 360, "degrees", "ahead of the first sonotrode, at the same frequency", 0.0

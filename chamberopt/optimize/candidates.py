@@ -57,11 +57,8 @@ class ConfirmedCandidate:
 class Candidates:
     """Scores points of the unit cube; candidates on record are not evaluated again.
 
-    Args:
-        stop: called before each evaluation; KeyboardInterrupt is raised when it returns True.
-    Attributes:
-        start: the design of the study as a point, shape (d,).
-        trials: in order, those of the search first.
+    `start` is the design of the study as a point (d,); `trials` has those of the search first.
+    KeyboardInterrupt is raised when `stop`, called before each evaluation, returns True.
     """
 
     def __init__(
@@ -82,8 +79,7 @@ class Candidates:
     def score(self, point: np.ndarray) -> float:
         """Evaluate a point of the search: the objective less penalties.
 
-        Raises:
-            InputError or an error of sim_core: the start, which comes first, cannot be simulated.
+        InputError or an error of sim_core if the start, which comes first, cannot be simulated.
         """
         trial, _ = self._evaluate(point, "search", None)
         self._points.append(point)
@@ -93,10 +89,8 @@ class Candidates:
         """Scores (n,) of the search and their variances (n,), as a model learns them.
 
         A candidate that could not be simulated gets the worst score of the others: how bad it is
-        nobody knows, and a cliff would bend the model far around it.
-
-        Args:
-            weight: weights of two objectives; by default random ones for this step.
+        nobody knows, and a cliff would bend the model far around it. The weights of two objectives
+        are by default random ones for this step.
         """
         searched = [trial.goals for trial in self.trials[: len(self._points)]]
         failed = np.array([not goals for goals in searched])
@@ -151,17 +145,11 @@ class Candidates:
         trial, evaluation = self._evaluate(point, "confirm", replicas)
         if evaluation is None or not trial.goals:
             return None
-        figures = self._evaluator.constrained(trial.parameters, evaluation)
-        feasibility, reason = assess_feasibility(self._study.constraints, figures)
-        return ConfirmedCandidate(
-            searched=searched,
-            parameters=trial.parameters,
-            design=self._evaluator.space.design_at(point),
-            evaluation=evaluation,
-            feasibility=feasibility,
-            reason=reason,
-            goals=self._evaluator.goals(evaluation),
-        )
+        parameters, goals = trial.parameters, self._evaluator.goals(evaluation)
+        figures = self._evaluator.constrained(parameters, evaluation)
+        standing = assess_feasibility(self._study.constraints, figures)
+        design = self._evaluator.space.design_at(point)
+        return ConfirmedCandidate(searched, parameters, design, evaluation, *standing, goals)
 
     def _promising(self, count: int) -> list[tuple[int | None, np.ndarray]]:
         """The start and up to `count` distinct others, each with its trial number.
@@ -225,9 +213,8 @@ class Candidates:
 def _variances(goals: list[Estimate]) -> np.ndarray:
     """Squared standard errors (n,) of one objective, pooled over the candidates."""
     replicas = np.array([max(1, len(goal.pseudovalues)) for goal in goals])
-    spreads = [
-        float(np.var(g.pseudovalues, ddof=1)) if len(g.pseudovalues) > 1 else np.nan for g in goals
-    ]
+    samples = [goal.pseudovalues for goal in goals]
+    spreads = [float(np.var(one, ddof=1)) if len(one) > 1 else np.nan for one in samples]
     return pool_variances(np.array(spreads), replicas)
 
 

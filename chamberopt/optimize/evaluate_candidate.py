@@ -72,15 +72,13 @@ class CandidateEvaluator:
         replicas: int | None = None,
         best_low: float | None = None,
     ) -> tuple[Trial, Evaluation | None]:
-        """Evaluate the candidate at a point (d,).
+        """Evaluate the candidate at a point (d,): the trial, and the evaluation unless it failed.
 
         Args:
             stage: "search", "confirm" or "sweep"; all but "confirm" are evaluated at the accuracy
                 and with the seeds of a search.
             best_low: lower end of the best objective's interval so far. A candidate of a search
                 that is clearly below it gets only a few replicas.
-        Returns:
-            The trial, and the evaluation unless it failed.
         Raises:
             InputError or an error of sim_core: the start of a search cannot be simulated.
         """
@@ -155,8 +153,5 @@ class CandidateEvaluator:
         For a metric between 0 and 1 this is its weight, for another also the size of the metric.
         """
         terms = parse_objective(self._study.objective.goals[0]).terms.items()
-        sizes = [
-            abs(weight) * (1.0 if METRICS[name].highest <= 1.0 else abs(metrics[name].value))
-            for name, weight in terms
-        ]
-        return max(sizes) or 1.0
+        sizes = {k: 1.0 if METRICS[k].highest <= 1.0 else abs(metrics[k].value) for k, _ in terms}
+        return max(abs(weight) * sizes[name] for name, weight in terms) or 1.0

@@ -56,10 +56,8 @@ def pareto_points(result: StudyResult) -> list[ParetoPoint]:
         values = np.array([[goal.value for goal in goals] for _, goals, _ in rows])
         values = values.reshape(-1, len(result.study.objective.goals))
         feasible = np.array([feasibility != INFEASIBLE for *_, feasibility in rows], dtype=bool)
-        front = on_front(values, feasible)
-        points += [
-            ParetoPoint(stage, *row, bool(there)) for row, there in zip(rows, front, strict=True)
-        ]
+        front = zip(rows, on_front(values, feasible).tolist(), strict=True)
+        points += [ParetoPoint(stage, *row, there) for row, there in front]
     return points
 
 

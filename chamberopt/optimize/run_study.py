@@ -60,10 +60,8 @@ class StudyResult:
             value = self.best.design.value(name)
             for bound, side in ((low, "lower"), (high, "upper")):
                 if abs(value - bound) < 1e-3 * (high - low):
-                    sentences.append(
-                        f"{name} = {value:g} lies on its {side} bound: a better design may lie "
-                        "beyond; widen [vary]"
-                    )
+                    place = f"{name} = {value:g} lies on its {side} bound"
+                    sentences.append(f"{place}: a better design may lie beyond; widen [vary]")
         return tuple(sentences)
 
     @property
@@ -117,14 +115,12 @@ def run_study(
     confirmed = candidates.confirm()
     folder.recorded.require_end(len(candidates.trials))
     if not confirmed or confirmed[0].searched != 0:
-        first = next(trial for trial in candidates.trials if trial.stage == "confirm")
-        raise InputError(
-            "the start could not be simulated with the seeds of the confirmation: " + first.reason
-        )
+        reason = next(one.reason for one in candidates.trials if one.stage == "confirm")
+        text = "the start could not be simulated with the seeds of the confirmation"
+        raise InputError(f"{text}: {reason}")
     start = confirmed[0]
-    winners = [one for one in confirmed if one.feasible] or [
-        one for one in confirmed if one.feasibility == NOT_KNOWN
-    ]
+    unknown = [one for one in confirmed if one.feasibility == NOT_KNOWN]
+    winners = [one for one in confirmed if one.feasible] or unknown
     if not winners:
         raise InputError(
             f"constraints: no candidate meets them (the start: {start.reason}); loosen them, "
@@ -161,11 +157,10 @@ def fixed_target(study: Study) -> np.ndarray | None:
 
     if not study.design.part.target.reachable:
         return None
-    varied = [name for name in study.vary if name.startswith("part.target.")]
-    if varied:
-        raise InputError(
-            f"vary: {varied[0]} with part.target.reachable: not supported; leave one of the two out"
-        )
+    for name in study.vary:
+        if name.startswith("part.target."):
+            text = "not supported; leave one of the two out"
+            raise InputError(f"vary: {name} with part.target.reachable: {text}")
     return build_chamber(study.design).part.target
 
 

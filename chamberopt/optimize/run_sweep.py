@@ -85,9 +85,8 @@ def plan_sweep(
         )
     if grid is not None:
         if seed is not None:
-            raise InputError(
-                f"--seed: given {seed}, but a grid is not random; remove it, or use --sobol"
-            )
+            text = "but a grid is not random; remove it, or use --sobol"
+            raise InputError(f"--seed: given {seed}, {text}")
         if grid < 2:
             raise InputError(f"--grid: given {grid}; give at least 2 values of each parameter")
         _require_few(grid**dimensions, f"--grid: {grid} values of {dimensions} parameters")
@@ -129,10 +128,8 @@ def run_sweep(
     """
     with open_study_folder(study, folder, plan.as_json()) as opened:
         if opened.finished:
-            raise InputError(
-                f"{folder}: this sweep is finished, nothing was run; to run it again, give another "
-                "folder (--out)"
-            )
+            again = "to run it again, give another folder (--out)"
+            raise InputError(f"{folder}: this sweep is finished, nothing was run; {again}")
         opened.begin()
         save_inputs(study, opened.path)
         trials: list[Trial] = []
@@ -164,18 +161,15 @@ def _evaluate_from(
     All tasks are submitted at once, so that no worker waits for another.
     """
     target = share(executor, fixed_target(study) if simulator is None else None)
-    numbers = range(first, len(plan.points))
-    futures = [
-        executor.submit(evaluate_point, study, number, plan.points[number], target, simulator)
-        for number in numbers
-    ]
+    tasks = list(enumerate(plan.points))[first:]
+    futures = [executor.submit(evaluate_point, study, *one, target, simulator) for one in tasks]
     try:
-        for number, future in zip(numbers, futures, strict=True):
+        for task, future in zip(tasks, futures, strict=True):
             try:
                 yield future.result()
             except WorkerLostError as error:  # a row with this reason
                 lost = _failing_simulator(str(error))
-                yield evaluate_point(study, number, plan.points[number], None, lost)[0], 0.0
+                yield evaluate_point(study, *task, None, lost)[0], 0.0
     finally:
         for future in futures:
             future.cancel()

@@ -60,10 +60,8 @@ def check(
     if screenshot is not None:
         _draw_target(chamber, reach, screenshot)
     if isinstance(loaded, Study):
-        facts["vary"] = {
-            name: {"low": low, "start": design.value(name), "high": high}
-            for name, (low, high) in loaded.vary.items()
-        }
+        bounds = loaded.vary.items()
+        facts["vary"] = {k: {"low": a, "start": design.value(k), "high": b} for k, (a, b) in bounds}
         facts["evaluations"] = loaded.optimizer.evaluations
     if out is not None:
         facts["folder"] = str(make_output_folder(out))

@@ -13,14 +13,8 @@ from chamberopt.cli.console import print_json, print_remarks, results_folder
 from chamberopt.cli.options import Json, Workers, app
 from chamberopt.cli.prepare import compile_with_message
 from chamberopt.common.errors import InputError
-from chamberopt.output.export.formats import (
-    FORMATS,
-    STUDY,
-    ExportFormat,
-    FrameName,
-    formats_by_name,
-    is_file,
-)
+from chamberopt.output.export import formats as export_formats
+from chamberopt.output.export.formats import FORMATS, ExportFormat, FrameName
 
 if TYPE_CHECKING:
     from chamberopt.output.results.load import Result
@@ -66,14 +60,13 @@ def export(
     """
     from chamberopt.output.results.load import load_result
 
-    formats = formats_by_name(to)
+    formats = export_formats.formats_by_name(to)
     from_impacts = [name for name, one in formats.items() if one.writer is None]
     for name, given in (("frame", frame), ("replicas", replicas)):
         if given is not None and not from_impacts:
-            raise InputError(
-                f"--{name}: applies only to impact exports; remove it or add --to impacts-parquet"
-            )
-    loaded = None if set(formats) == {STUDY} else load_result(result)
+            text = "applies only to impact exports; remove it or add --to impacts-parquet"
+            raise InputError(f"--{name}: {text}")
+    loaded = None if set(formats) == {export_formats.STUDY} else load_result(result)
     folder = loaded.folder if loaded else result
     counts: dict[str, int] = {}
     with _files(formats, out, f"{folder.resolve().name}-export") as files:
@@ -99,7 +92,7 @@ def _files(
     """The file of each format: --out itself if it is a file, else one in a new folder."""
     from chamberopt.common.files import check_new_file
 
-    if out is not None and is_file(out, formats):
+    if out is not None and export_formats.is_file(out, formats):
         yield {only: check_new_file(out) for only in formats}
         return
     with results_folder(out, name) as folder:

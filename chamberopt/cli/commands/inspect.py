@@ -72,9 +72,8 @@ def inspect(
     if not results:
         raise InputError("inspect: requires an argument: one or more results folders")
     if screenshot is not None and out is not None:
-        raise InputError(
-            "inspect: --screenshot and --out both name the place of the image; give one of them"
-        )
+        text = "--screenshot and --out both name the place of the image; give one of them"
+        raise InputError(f"inspect: {text}")
     loaded = [load_result(path) for path in results]
     if not json:
         print("\n".join(summary(one) for one in loaded))
@@ -95,14 +94,9 @@ def inspect(
         viewer.inspect([viewer.result_info(one) for one in loaded], look, screenshot)
     if json:
         first = {**loaded[0].data, "folder": str(loaded[0].folder)} if len(loaded) == 1 else {}
-        print_json(
-            {
-                **first,
-                "folders": [str(one.folder) for one in loaded],
-                "screenshot": screenshot and str(screenshot),
-                "page": html and str(html),
-            }
-        )
+        folders = [str(one.folder) for one in loaded]
+        image, page = screenshot and str(screenshot), html and str(html)
+        print_json({**first, "folders": folders, "screenshot": image, "page": page})
         return
     for kind, path in (("page", html), ("picture", screenshot)):
         if path is not None:

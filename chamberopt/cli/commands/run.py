@@ -7,16 +7,7 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from chamberopt.cli.console import (
-    estimate_line,
-    evaluation_lines,
-    note_lines,
-    print_remarks,
-    print_result,
-    print_warnings,
-    replicas_text,
-    results_folder,
-)
+from chamberopt.cli import console
 from chamberopt.cli.interrupt import Interrupt
 from chamberopt.cli.options import Cluster, Json, Resumable, Workers, app
 from chamberopt.cli.prepare import compile_with_message, resolve_effects
@@ -59,8 +50,8 @@ def run(
         loaded = load_study(study)
         chamber = build_chamber(loaded.design)
         if out is None:
-            print_remarks(_unfinished_runs(study))
-        place = results_folder(None, study.stem) if out is None else nullcontext(out)
+            console.print_remarks(_unfinished_runs(study))
+        place = console.results_folder(None, study.stem) if out is None else nullcontext(out)
         with place as path, open_study_folder(loaded, path) as folder:
             if folder.finished:
                 _print_finished(folder.path, json)
@@ -75,7 +66,9 @@ def run(
                 if folder.begun:
                     error.add_note(how_to_resume)
                 raise
-            print_result([*_result_lines(result), *note_lines(notes)], folder.path, json)
+            console.print_result(
+                [*_result_lines(result), *console.note_lines(notes)], folder.path, json
+            )
             if not json:
                 show, best = _command("report", folder.path), folder.path / "best.toml"
                 print(f"to see it: {show}; the design: {best}")
@@ -103,13 +96,17 @@ def _search(
     )
     compile_with_message(study.design, chamber)
     if folder.recorded.trials:
-        print_remarks([f"{folder.path}: resuming after {len(folder.recorded.trials)} evaluations"])
+        console.print_remarks(
+            [f"{folder.path}: resuming after {len(folder.recorded.trials)} evaluations"]
+        )
     with progress_bar("evaluations") as progress:
         interrupt.wait_for_evaluation(how_to_resume)
         result = run_study(study, folder, executor, progress, stop=lambda: interrupt.requested)
     best = result.best.design
-    warnings = print_warnings(best, build_chamber(best, result.target), " of the best design")
-    print_remarks(save_study(folder.path, result, advice, warnings))
+    warnings = console.print_warnings(
+        best, build_chamber(best, result.target), " of the best design"
+    )
+    console.print_remarks(save_study(folder.path, result, advice, warnings))
     notes = [*map(str, advice), *result.warnings, *result.at_bounds, *chamber.notes]
     return result, [*notes, *result.best.evaluation.notes]
 
@@ -117,21 +114,20 @@ def _search(
 def _result_lines(result: StudyResult) -> list[str]:
     study, start, best = result.study, result.start, result.best
     lines = [f"{'parameter':34}{'start':>12}{'best':>12}"]
-    lines += [
-        f"{name:34}{study.design.value(name):12.5g}{best.design.value(name):12.5g}"
-        for name in study.vary
-    ]
-    lines += ["", "start", *evaluation_lines(start.evaluation)]
-    lines += ["", "best", *evaluation_lines(best.evaluation)]
+    for name in study.vary:
+        values = (f"{design.value(name):12.5g}" for design in (study.design, best.design))
+        lines.append(f"{name:34}{''.join(values)}")
+    lines += ["", "start", *console.evaluation_lines(start.evaluation)]
+    lines += ["", "best", *console.evaluation_lines(best.evaluation)]
     verdict = "better than the start" if result.improved else "within the noise of the start"
-    lines += ["", f"{estimate_line('gain', result.gain)}: {verdict}"]
+    lines += ["", f"{console.estimate_line('gain', result.gain)}: {verdict}"]
     if result.sensitivity:
         lines += ["", *result.sensitivity.sentences(), ""]
     if study.objective.pareto:
         names = " and ".join(study.objective.pareto)
         lines += [f"the Pareto front of {names}: pareto.csv, pareto.png", ""]
     replicas, seconds = len(best.evaluation.replicas), study.design.process.recorded_time
-    effort = replicas_text(study.at_search_accuracy(study.design))
+    effort = console.replicas_text(study.at_search_accuracy(study.design))
     return [
         *lines,
         f"± 95 % intervals; start and best: {replicas} replicas of {seconds:g} s with seeds of "
@@ -144,8 +140,8 @@ def _print_finished(folder: Path, as_json: bool) -> None:
     from chamberopt.output.results.load import load_result, summary
 
     again = "to run it again, give another folder (--out)"
-    print_remarks([f"{folder}: this study is finished, nothing was run; {again}"])
-    print_result([f"best design: {summary(load_result(folder))}"], folder, as_json)
+    console.print_remarks([f"{folder}: this study is finished, nothing was run; {again}"])
+    console.print_result([f"best design: {summary(load_result(folder))}"], folder, as_json)
 
 
 def _unfinished_runs(study: Path) -> list[str]:

@@ -4,14 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from chamberopt.cli.console import (
-    evaluation_lines,
-    note_lines,
-    print_remarks,
-    print_result,
-    print_warnings,
-    results_folder,
-)
+from chamberopt.cli import console
 from chamberopt.cli.options import Cluster, Json, Out, Workers, app
 from chamberopt.cli.prepare import compile_with_message, resolve_effects
 
@@ -47,12 +40,16 @@ def simulate(
     candidate = load_design(design)
     chamber = build_chamber(candidate)
     cavity = analytic_cavity(candidate, chamber) if analytic else None
-    warnings = print_warnings(candidate, chamber)
-    with results_folder(out, design.stem) as folder, open_executor(workers, cluster) as executor:
+    warnings = console.print_warnings(candidate, chamber)
+    with (
+        console.results_folder(out, design.stem) as folder,
+        open_executor(workers, cluster) as executor,
+    ):
         candidate, advice = resolve_effects(candidate, chamber, executor)
         compile_with_message(candidate, chamber, cavity)
         with progress_bar("replicas") as progress:
             evaluation = evaluate(candidate, chamber, executor, progress, cavity=cavity)
-        print_remarks(save_simulation(folder, candidate, chamber, evaluation, advice, warnings))
-    notes = note_lines([*map(str, advice), *chamber.notes, *evaluation.notes])
-    print_result([*evaluation_lines(evaluation), *notes], folder, json)
+        remarks = save_simulation(folder, candidate, chamber, evaluation, advice, warnings)
+    console.print_remarks(remarks)
+    notes = console.note_lines([*map(str, advice), *chamber.notes, *evaluation.notes])
+    console.print_result([*console.evaluation_lines(evaluation), *notes], folder, json)

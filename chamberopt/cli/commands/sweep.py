@@ -5,14 +5,7 @@ from __future__ import annotations
 from contextlib import nullcontext
 from pathlib import Path
 
-from chamberopt.cli.console import (
-    estimate_line,
-    note_lines,
-    print_remarks,
-    print_result,
-    replicas_text,
-    results_folder,
-)
+from chamberopt.cli import console
 from chamberopt.cli.options import Cluster, Json, Resumable, Workers, app
 from chamberopt.cli.prepare import compile_with_message, resolve_effects
 
@@ -56,25 +49,25 @@ def sweep(
     loaded = load_study(study)
     plan = plan_sweep(loaded, grid, sobol, seed)
     chamber = build_chamber(loaded.design)
-    place = results_folder(None, f"{study.stem}-sweep") if out is None else nullcontext(out)
+    place = console.results_folder(None, f"{study.stem}-sweep") if out is None else nullcontext(out)
     with place as folder, open_executor(workers, cluster, "processes") as executor:
         design, advice = resolve_effects(loaded.design, chamber, executor)
         loaded = loaded.model_copy(update={"design": design})
         compile_with_message(design, chamber)
         with progress_bar("candidates") as progress:
             result = run_sweep(loaded, plan, folder, executor, progress)
-        print_remarks(save_sweep(folder, result))
-    effort = replicas_text(loaded.at_search_accuracy(design))
+        console.print_remarks(save_sweep(folder, result))
+    effort = console.replicas_text(loaded.at_search_accuracy(design))
     lines = [f"{len(result.trials)} candidates in {result.seconds:.0f} s, {effort} each"]
     best = result.best
     if best is not None and best.objective is not None:
         lines += ["", f"best, number {best.number}"]
         lines += [f"{name:34}{value:12.5g}" for name, value in best.parameters.items()]
         estimates = {loaded.objective.goals[0]: best.objective, **best.metrics}
-        lines += [estimate_line(name, estimate) for name, estimate in estimates.items()]
+        lines += [console.estimate_line(name, estimate) for name, estimate in estimates.items()]
     notes = [*map(str, advice)]
     failed = [trial for trial in result.trials if trial.objective is None]
     if failed:
         notes.append(f"{len(failed)} candidates failed, the first because: {failed[0].reason}")
     notes.append(best_row_note(result))
-    print_result([*lines, *note_lines(notes)], folder, json)
+    console.print_result([*lines, *console.note_lines(notes)], folder, json)

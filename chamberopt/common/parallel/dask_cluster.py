@@ -63,9 +63,8 @@ class DaskExecutor(Executor):
     def share(self, value: Any) -> Any:
         # As a task's result rather than as scattered data: the scheduler can compute a result
         # again if the workers that hold it die.
-        return self._client.submit(
-            pickle.loads, pickle.dumps(value, pickle.HIGHEST_PROTOCOL), pure=False
-        )
+        pickled = pickle.dumps(value, pickle.HIGHEST_PROTOCOL)
+        return self._client.submit(pickle.loads, pickled, pure=False)
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         """Queue a task; its future raises this package's errors instead of Dask's."""
@@ -89,26 +88,20 @@ class DaskExecutor(Executor):
         try:
             self._client.wait_for_workers(1, timeout=timeout)
         except TimeoutError:
-            raise InputError(
-                f"--cluster: the scheduler at {address} has no workers; "
-                f"start some with `dask worker {address}`"
-            ) from None
+            text = f"has no workers; start some with `dask worker {address}`"
+            raise InputError(f"--cluster: the scheduler at {address} {text}") from None
         here = package_versions(SIMULATION_PACKAGES)
         try:
             of_workers = self._client.run(package_versions, SIMULATION_PACKAGES)
         except Exception as error:
-            raise InputError(
-                f"--cluster: a worker of {address} cannot import chamberopt ({error}); "
-                "install the same version there"
-            ) from None
+            text = f"cannot import chamberopt ({error}); install the same version there"
+            raise InputError(f"--cluster: a worker of {address} {text}") from None
         for worker, there in of_workers.items():
             names = [name for name in here if there[name] != here[name]]
             if names:
                 different = ", ".join(f"{name} {there[name]} ({here[name]} here)" for name in names)
-                raise InputError(
-                    f"--cluster: worker {worker} has {different}: figures could differ; "
-                    "install the same there"
-                )
+                remedy = "figures could differ; install the same there"
+                raise InputError(f"--cluster: worker {worker} has {different}: {remedy}")
 
 
 def _scheduler_address(cluster: str) -> str:
@@ -117,10 +110,8 @@ def _scheduler_address(cluster: str) -> str:
         return cluster
     path = Path(cluster)
     if not path.is_file():
-        raise InputError(
-            f"--cluster: given {cluster!r}, neither an address nor a file; "
-            f"give tcp://HOST:PORT, or {SCHEDULER_FILE}"
-        )
+        text = f"neither an address nor a file; give tcp://HOST:PORT, or {SCHEDULER_FILE}"
+        raise InputError(f"--cluster: given {cluster!r}, {text}")
     try:
         return str(json.loads(path.read_text(encoding="utf-8"))["address"])
     except (OSError, ValueError, KeyError, TypeError):

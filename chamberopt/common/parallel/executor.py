@@ -20,10 +20,7 @@ MAX_THREADS = 8
 
 
 def core_count() -> int:
-    """Number of cores that this process may use.
-
-    An affinity mask or a batch system can leave fewer than the machine has.
-    """
+    """Cores that this process may use; an affinity mask or a batch system can leave fewer."""
     if hasattr(os, "sched_getaffinity"):
         return max(1, len(os.sched_getaffinity(0)))
     return max(1, os.cpu_count() or 1)
@@ -33,18 +30,11 @@ def local_executor(workers: int | None = None, kind: WorkerKind = "threads") -> 
     """Make workers on this machine, for use in a `with` block.
 
     Threads share the chamber and start at once, and the simulator releases Python's lock. Processes
-    also run in parallel what needs the lock.
-
-    Args:
-        workers: their number; one per core if None.
-
-    Raises:
-        InputError: fewer than one worker.
+    also run in parallel what needs the lock. There is one worker per core if their number is None.
     """
     if workers is not None and workers < 1:
-        raise InputError(
-            f"--workers: given {workers}; give at least 1, or leave it out for one per core"
-        )
+        remedy = "give at least 1, or leave it out for one per core"
+        raise InputError(f"--workers: given {workers}; {remedy}")
     count = workers or core_count()
     if kind == "threads":
         return ThreadPoolExecutor(count, thread_name_prefix="replica")
@@ -58,20 +48,14 @@ def open_executor(
 ) -> Executor:
     """Make the workers of --workers, or connect to those of --cluster.
 
-    Args:
-        kind: of workers on this machine; if None, processes where there are too many for threads.
-
-    Raises:
-        InputError: both options are given, or one cannot be used.
+    `kind` is that of workers on this machine; if None, processes where threads would be too many.
     """
     if cluster is None:
         few = (workers or core_count()) <= MAX_THREADS
         return local_executor(workers, kind or ("threads" if few else "processes"))
     if workers is not None:
-        raise InputError(
-            f"--workers: given {workers}, but --cluster has workers of its own; "
-            "leave one of the two out"
-        )
+        text = "but --cluster has workers of its own; leave one of the two out"
+        raise InputError(f"--workers: given {workers}, {text}")
     from chamberopt.common.parallel.dask_cluster import DaskExecutor
 
     return DaskExecutor(cluster)

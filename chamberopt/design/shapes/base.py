@@ -169,17 +169,14 @@ class PolygonChamber(ParametricChamber):
             corner, direction = outline.corner_arcs(floor, self.facets)
         else:
             corner, direction = np.arange(len(floor)), np.zeros((len(floor), 2))
-        low, high = (
-            outline.move_sides(floor, lean - self.radius)[corner] + self.radius * direction
-            for lean in (0.0, self.lean)
-        )
-        return self.lofted_over(low, high)
+        moves = (0.0 - self.radius, self.lean - self.radius)
+        rings = [outline.move_sides(floor, x)[corner] + self.radius * direction for x in moves]
+        return self.lofted_over(*rings)
 
     def room(self) -> float:
         """Volume [m³] of the cavity with sharp edges, by Simpson's rule, which is exact here."""
-        low, middle, high = (
-            outline.area_inside(self.floor(), share * self.lean) for share in (0.0, 0.5, 1.0)
-        )
+        moves = (share * self.lean for share in (0.0, 0.5, 1.0))
+        low, middle, high = (outline.area_inside(self.floor(), move) for move in moves)
         return self.height / 6.0 * (1.0 * low + 4.0 * middle + 1.0 * high)
 
 

@@ -13,6 +13,7 @@ from chamberopt.common.toml_fields import (
     MeshFile,
     Position,
     Triple,
+    Turns,
     list_field,
     quantity,
 )
@@ -34,12 +35,8 @@ class Deflector(FileTable):
     """
 
     kind: Literal["plate", "rod", "ball", "mesh"] = Field(description="what it is")
-    at_mm: Position = list_field(
-        "three numbers [x, y, z] in mm", "its middle (of a mesh: its box's), in the chamber's frame"
-    )
-    rotate_deg: Triple = list_field(
-        "three numbers [x, y, z] in degrees", "turns about x, then y, then z", (0.0, 0.0, 0.0)
-    )
+    at_mm: Position = Field(description="its middle (of a mesh: its box's), in the chamber's frame")
+    rotate_deg: Turns = Field(default=(0.0, 0.0, 0.0), description="turns about x, then y, then z")
     size_mm: Triple | None = list_field(
         "three numbers [x, y, z] in mm, above 0", "sides of a plate", None
     )
@@ -92,10 +89,8 @@ class PlacedBore(FileTable):
 class Hole(PlacedBore):
     """A round blind bore from the room into its wall, e.g. for the shaft that holds the part."""
 
-    at_mm: Position = list_field(
-        "three numbers [x, y, z] in mm", "in the room, on the bore's axis; in the chamber's frame"
-    )
-    axis: Direction = list_field("three numbers [x, y, z], not all 0", "the way out of the room")
+    at_mm: Position = Field(description="in the room, on the bore's axis; in the chamber's frame")
+    axis: Direction = Field(description="the way out of the room")
     diameter_mm: float = quantity(0.1, 2000, "mm", "of the bore")
     depth_mm: float = quantity(0.1, 2000, "mm", "beyond the wall, along the axis")
 

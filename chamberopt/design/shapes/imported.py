@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from chamberopt.common.toml_fields import File, Names, list_field, quantity
+from chamberopt.common.toml_fields import File, Names, quantity
 from chamberopt.design.shapes.base import ChamberTable
 from chamberopt.design.shapes.construction.cad_distance import move_sonotrode
 from chamberopt.design.shapes.construction.cad_setup import Setup, read_setup
@@ -31,10 +31,8 @@ class Imported(ChamberTable):
     sonotrode_distance_mm: float | None = quantity(  # type: ignore[assignment]
         0.1, 2000, "mm", "mean sonotrode face to lowest point of the part; absent: as drawn", None
     )
-    part: Names = list_field("a name in quotes, or a list of names", "groups of the file: the part")
-    sonotrode: Names = list_field(
-        "a name in quotes, or a list of names", "groups of the file: the sonotrode's flat face"
-    )
+    part: Names = Field(description="groups of the file: the part")
+    sonotrode: Names = Field(description="groups of the file: the sonotrode's flat face")
     mesh: File = Field(description="the set-up's file: that of [part], so leave it out")
     unit: Unit = Field(
         default="guess", description="of its numbers: that of [part], so leave it out"

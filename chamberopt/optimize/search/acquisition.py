@@ -56,10 +56,8 @@ def propose_point(model: GaussianProcess, rng: np.random.Generator) -> np.ndarra
         point = np.round(_climb(gradient, best_first[:2]), DECIMALS)
         if not _is_new(point, model.points):
             rounded = (np.round(other, DECIMALS) for other in best_first)
-            point = next(
-                (other for other in rounded if _is_new(other, model.points)),
-                np.round(rng.random(len(point)), 4),
-            )
+            new = (other for other in rounded if _is_new(other, model.points))
+            point = next(new, np.round(rng.random(len(point)), 4))
     return point
 
 

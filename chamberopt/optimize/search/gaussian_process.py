@@ -90,9 +90,8 @@ class GaussianProcess:
 
     def covariance(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Covariance of the true scores at points a (k, d) and b (m, d), shape (k, m)."""
-        explained = (self._kernel(a, self.points) @ self._inverse.T) @ (
-            self._kernel(b, self.points) @ self._inverse.T
-        ).T
+        from_a, from_b = (self._kernel(x, self.points) @ self._inverse.T for x in (a, b))
+        explained = from_a @ from_b.T
         covariance: np.ndarray = self._spread**2 * (self._kernel(a, b) - explained)
         return covariance
 
@@ -149,9 +148,8 @@ def _fit(points: np.ndarray, values: np.ndarray, noise: np.ndarray, length_facto
     lengths = Matern(np.full(dimensions, LENGTH[0]), LENGTH_BOUNDS, nu=2.5)
     kernel = ConstantKernel(SIGNAL[0], SIGNAL_BOUNDS) * lengths
     kernel = kernel + WhiteKernel(NOISE[0], NOISE_BOUNDS)
-    process = GaussianProcessRegressor(
-        kernel, alpha=np.maximum(noise, 1e-8), optimizer=most_probable
-    )
+    alpha = np.maximum(noise, 1e-8)
+    process = GaussianProcessRegressor(kernel, alpha=alpha, optimizer=most_probable)
     with warnings.catch_warnings():
         # A length scale at its bound belongs to a parameter without effect.
         warnings.simplefilter("ignore", ConvergenceWarning)
@@ -160,7 +158,7 @@ def _fit(points: np.ndarray, values: np.ndarray, noise: np.ndarray, length_facto
             return process
         logs = process.kernel_.theta + np.log([1.0, *[length_factor] * dimensions, 1.0])
         kernel = kernel.clone_with_theta(logs)
-        process = GaussianProcessRegressor(kernel, alpha=process.alpha, optimizer=None)
+        process = GaussianProcessRegressor(kernel, alpha=alpha, optimizer=None)
         return process.fit(points, values)
 
 

@@ -31,10 +31,8 @@ def only_writer(folder: Path) -> Iterator[None]:
             name = holder.read_text(encoding="utf-8")
         except (OSError, ValueError):
             name = "another process"
-        raise InputError(
-            f"{folder}: is being written by {name}; wait until it ends, or give another folder "
-            "(--out)"
-        ) from None
+        remedy = "wait until it ends, or give another folder (--out)"
+        raise InputError(f"{folder}: is being written by {name}; {remedy}") from None
     try:
         since = datetime.now().astimezone().isoformat(sep=" ", timespec="seconds")
         with suppress(OSError):  # a full disk is reported by the files that matter

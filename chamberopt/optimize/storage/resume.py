@@ -32,9 +32,8 @@ class RecordedTrials:
         trial = self.trials[number]
         wanted, recorded = f"{stage} of {_exact(point)}", f"{trial.stage} of {_exact(trial.point)}"
         if wanted != recorded:
-            raise self._mismatch(
-                number, f"recorded is the {recorded}, but the search now asks for the {wanted}"
-            )
+            what = f"recorded is the {recorded}, but the search now asks for the {wanted}"
+            raise self._mismatch(number, what)
         return trial
 
     def require_end(self, number: int) -> None:

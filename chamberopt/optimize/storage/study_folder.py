@@ -45,10 +45,8 @@ def open_study_folder(
     """
     folder = Path(folder)
     if (folder / INPUTS_0_1).is_file():
-        raise InputError(
-            f"{folder}: this study was run by version 0.1, which cannot be resumed; "
-            "give another folder (--out)"
-        )
+        text = "this study was run by version 0.1, which cannot be resumed"
+        raise InputError(f"{folder}: {text}; give another folder (--out)")
     if not is_study_folder(folder):
         folder = make_output_folder(folder)
     with only_writer(folder):
@@ -159,18 +157,16 @@ def _read_json(path: Path) -> dict[str, Any]:
         if not isinstance(data, dict):
             raise TypeError("not a table")
     except OSError as error:
-        raise InputError(
-            f"{path}: cannot be read: {error.strerror}; check its permissions"
-        ) from None
+        text = f"cannot be read: {error.strerror}; check its permissions"
+        raise InputError(f"{path}: {text}") from None
     except (ValueError, TypeError) as error:
         raise _damaged(path, error) from None
     return data
 
 
 def _damaged(path: Path, error: Exception) -> InputError:
-    return InputError(
-        f"{path}: damaged ({error}); restore the file or run the study in a new folder (--out)"
-    )
+    remedy = "restore the file or run the study in a new folder (--out)"
+    return InputError(f"{path}: damaged ({error}); {remedy}")
 
 
 def _advice(changes: dict[str, dict[str, Any]], **others: Any) -> Advice:

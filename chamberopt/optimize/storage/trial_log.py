@@ -121,9 +121,8 @@ class JsonLines:
 
     def damaged(self, line: int) -> InputError:
         """The error for a damaged line; lines are counted from 1."""
-        return InputError(
-            f"{self.path}:{line}: damaged row; restore the file or run the study in a new folder"
-        )
+        text = "damaged row; restore the file or run the study in a new folder"
+        return InputError(f"{self.path}:{line}: {text}")
 
     def _read(self) -> tuple[list[dict[str, Any]], int]:
         """The rows, and their length in bytes."""
@@ -132,9 +131,8 @@ class JsonLines:
         except FileNotFoundError:
             return [], 0
         except OSError as error:
-            raise InputError(
-                f"{self.path}: cannot be read: {error.strerror}; check its permissions"
-            ) from None
+            text = f"cannot be read: {error.strerror}; check its permissions"
+            raise InputError(f"{self.path}: {text}") from None
         *lines, incomplete = content.split(b"\n")  # a row counts once its line has ended
         rows = []
         for number, line in enumerate(lines, start=1):

@@ -68,20 +68,16 @@ def expected_violation(figure: Estimate, limits: Limits) -> float:
     for limit, excess, _ in _excesses(figure, limits):
         if error > 0.0:
             z = excess / error
-            excess = 0.5 * excess * math.erfc(-z / math.sqrt(2.0)) + error * math.exp(
-                -0.5 * z * z
-            ) / math.sqrt(2.0 * math.pi)
+            tail = error * math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi)
+            excess = 0.5 * excess * math.erfc(-z / math.sqrt(2.0)) + tail
         violation += max(0.0, excess) / (abs(limit) or 1.0)
     return violation
 
 
 def describe_violations(name: str, figure: Estimate, limits: Limits) -> list[str]:
     """The limits that the estimate itself violates, one text for each."""
-    return [
-        f"{name} {figure.value:.4g} {comparison}"
-        for _, excess, comparison in _excesses(figure, limits)
-        if excess > 0.0
-    ]
+    violated = (text for _, excess, text in _excesses(figure, limits) if excess > 0.0)
+    return [f"{name} {figure.value:.4g} {text}" for text in violated]
 
 
 def assess_feasibility(

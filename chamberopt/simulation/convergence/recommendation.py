@@ -64,11 +64,8 @@ def recommend(study: ConvergenceStudy, accuracy: float) -> Recommendation:
         if name == TIME:
             continue
         # Cheaper than the reference by more than the intervals.
-        cheaper = [
-            run
-            for run in study.runs
-            if run.parameter == name and run.cpu.high < study.reference.cpu.low
-        ]
+        tried = [run for run in study.runs if run.parameter == name]
+        cheaper = [run for run in tried if run.cpu.high < study.reference.cpu.low]
         if good := [run for run in cheaper if run.max_bias <= BIAS_SHARE * accuracy]:
             best = min(good, key=lambda run: run.cpu.value)
             settings[name] = type(study.settings[name])(best.setting)
@@ -77,10 +74,8 @@ def recommend(study: ConvergenceStudy, accuracy: float) -> Recommendation:
             else:
                 factor *= best.cpu.value / reference
         elif not all(run.is_biased for run in cheaper):
-            remarks.append(
-                f"{name}: cheaper settings may do, but their bias is not known well enough; "
-                "raise --budget-s"
-            )
+            text = "cheaper settings may do, but their bias is not known well enough"
+            remarks.append(f"{name}: {text}; raise --budget-s")
     remarks += _model_remarks(study, accuracy)
     options = []
     for run in (study.reference, *study.runs):
@@ -122,19 +117,14 @@ def _model_remarks(study: ConvergenceStudy, accuracy: float) -> Iterator[str]:
     The spread over the part is another quantity where single dents are marked.
     """
     if not study.models:
-        yield (
-            "marked dents were not tried, because process.accuracy.sample_mm takes too many "
-            "points; raise it"
-        )
+        why = "process.accuracy.sample_mm takes too many points; raise it"
+        yield f"marked dents were not tried, because {why}"
         return
     # The last one has no bias, because it is the reference.
     largest = BIAS_SHARE * accuracy
     rates = study.models[0].mean_bias
-    good = [
-        run
-        for run in study.models
-        if -largest <= run.mean_bias.low <= run.mean_bias.high <= largest
-    ]
+    biases = ((run, run.mean_bias) for run in study.models)
+    good = [run for run, bias in biases if -largest <= bias.low and bias.high <= largest]
     if good[0] is study.models[0]:
         return
     cheapest = min(good, key=lambda run: run.cpu.value)

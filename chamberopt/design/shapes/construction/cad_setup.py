@@ -148,10 +148,8 @@ def _pick(mesh: PartMesh, triangles: np.ndarray, rows: np.ndarray) -> PartMesh:
 def _piece_of_part(mesh: PartMesh, in_part: np.ndarray) -> PartMesh:
     """The part as the piece of the room's surface that it bounds, in the order of the room."""
     if not in_part.any():
-        raise InputError(
-            "chamber.part: none of it bounds the room over the sonotrode; check the groups of the "
-            "file"
-        )
+        text = "none of it bounds the room over the sonotrode; check the groups of the file"
+        raise InputError(f"chamber.part: {text}")
     piece = _pick(mesh, mesh.triangles[:, ::-1], in_part)
     return replace(piece, groups={name: own for name, own in piece.groups.items() if own.any()})
 
@@ -165,10 +163,8 @@ def _room_over_sonotrode(mesh: PartMesh, sonotrode: tuple[str, ...]) -> tuple[Pa
     facing = area_vectors(mesh.vertices, mesh.triangles[face])
     total_area = np.linalg.norm(facing, axis=1).sum()
     if np.linalg.norm(facing.sum(axis=0)) < (1.0 - FACING_TOLERANCE) * total_area:
-        raise InputError(
-            "chamber.sonotrode: its triangles are not flat, they face different ways; name one "
-            "flat face"
-        )
+        text = "its triangles are not flat, they face different ways; name one flat face"
+        raise InputError(f"chamber.sonotrode: {text}")
     shells, volumes = find_shells(mesh.vertices, mesh.triangles)
     face_shells = np.unique(shells[face])
     if len(face_shells) != 1:
@@ -185,10 +181,8 @@ def _room_over_sonotrode(mesh: PartMesh, sonotrode: tuple[str, ...]) -> tuple[Pa
     inside = [k for k in range(len(volumes)) if k != first and _is_inside(bodies[k], bodies[first])]
     least = (1.0 - VOLUME_TOLERANCE) * sum(bodies[k].volume for k in inside)
     if inside and unite([bodies[k] for k in inside], "").volume < least:
-        raise InputError(
-            "the set-up: closed surfaces that stand in its room overlap; unite them in the CAD "
-            "program"
-        )
+        text = "closed surfaces that stand in its room overlap; unite them in the CAD program"
+        raise InputError(f"the set-up: {text}")
     triangles = np.where(np.isin(shells, inside)[:, None], outward[:, ::-1], outward)
     room = _pick(mesh, triangles, np.isin(shells, [first, *inside]))
     left = len(volumes) - 1 - len(inside)

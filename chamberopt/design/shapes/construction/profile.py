@@ -49,10 +49,7 @@ def round_corners(line: np.ndarray, radius: float, facets: int) -> np.ndarray:
         if steps < 0.5:
             points.append(corner[None])
             continue
-        arriving, leaving = (
-            (end - start) / np.hypot(*(end - start))
-            for start, end in ((before, corner), (corner, after))
-        )
+        arriving, leaving = _unit(corner - before), _unit(after - corner)
         centre = corner + radius / np.cos(turn / 2.0) * _unit(leaving - arriving)
         begin = corner - radius * np.tan(abs(turn) / 2.0) * arriving - centre
         angle = turn * np.linspace(0.0, 1.0, int(np.ceil(steps - 1e-9)) + 1)[:, None]
