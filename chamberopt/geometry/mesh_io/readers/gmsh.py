@@ -63,9 +63,6 @@ class _Stream:
     def reals(self, count: int) -> np.ndarray:
         return self._take(count, "f8")
 
-    def one_int(self) -> int:
-        return int(self.ints(1)[0])
-
     def one_size(self) -> int:
         return int(self.sizes(1)[0])
 
@@ -161,7 +158,7 @@ def _read_version_2(streams: dict[str, _Stream]) -> _GmshMesh:
             kind, count, tags = elements.ints(3).tolist()
         for _ in range(count):
             if not elements.text:
-                number = elements.one_int()
+                number = int(elements.ints(1)[0])
             physical = tuple(elements.ints(tags)[:1].tolist())
             nodes_of = elements.ints(_node_count(elements.path, kind))
             rows.setdefault((kind, physical), []).append(np.r_[number, nodes_of])
@@ -177,7 +174,7 @@ def _read_version_4(streams: dict[str, _Stream]) -> _GmshMesh:
         entities = streams["Entities"]
         for dimension, count in enumerate(entities.sizes(4).tolist()):
             for _ in range(count):
-                tag = entities.one_int()
+                tag = int(entities.ints(1)[0])
                 entities.reals(3 if dimension == 0 else 6)  # bounding box
                 physical[dimension, tag] = tuple(entities.ints(entities.one_size()).tolist())
                 if dimension > 0:

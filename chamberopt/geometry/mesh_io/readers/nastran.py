@@ -131,7 +131,11 @@ def _whole(text: str, line: int, what: str) -> int:
 
 def _points(cards: dict[str, list[Card]]) -> tuple[np.ndarray, dict[int, int]]:
     """Points (n, 3) in the basic coordinate system, and the row of each grid number."""
-    systems = _CoordinateSystems([card for name in SYSTEMS for card in cards[name]])
+    systems = {
+        _whole(fields[0], line, f"{name}'s number"): (name, fields, line)
+        for system in SYSTEMS
+        for name, fields, line in cards[system]
+    }
     row_of: dict[int, int] = {}
     points = np.zeros((len(cards["GRID"]), 3))
     rows_of_system: dict[int, list[int]] = defaultdict(list)
@@ -145,51 +149,37 @@ def _points(cards: dict[str, list[Card]]) -> tuple[np.ndarray, dict[int, int]]:
         if fields[1] not in ("", "0"):
             rows_of_system[_whole(fields[1], line, "GRID's coordinate system")].append(row)
     for system, rows in rows_of_system.items():
-        points[rows] = systems.to_basic(system, points[rows])
+        points[rows] = _to_basic(systems, system, points[rows])
     return points, row_of
 
 
-class _CoordinateSystems:
-    """Coordinate systems CORD2R, CORD2C, CORD2S, each perhaps given in another.
+def _to_basic(
+    systems: dict[int, Card], number: int, points: np.ndarray, above: tuple[int, ...] = ()
+) -> np.ndarray:
+    """Points (n, 3) given in a coordinate system CORD2R, CORD2C or CORD2S, in the basic one.
 
-    Each card has the origin A, a point B on the z axis and a point C in the xz plane.
+    A card has the origin A, a point B on the z axis and a point C in the xz plane, perhaps given in
+    another system; `above` are those that refer to this one.
     """
-
-    def __init__(self, cards: list[Card]) -> None:
-        self.cards = {
-            _whole(fields[0], line, f"{name}'s number"): (name, fields, line)
-            for name, fields, line in cards
-        }
-        self.frames: dict[int, tuple[np.ndarray, np.ndarray]] = {0: (np.zeros(3), np.eye(3))}
-
-    def to_basic(self, number: int, points: np.ndarray) -> np.ndarray:
-        """Points (n, 3) given in a coordinate system, in the basic one."""
-        origin, axes = self._frame(number, ())
-        name = "CORD2R" if number == 0 else self.cards[number][0]
-        if name != "CORD2R":
-            radius, theta, z = points[:, 0], np.radians(points[:, 1]), points[:, 2]
-            if name == "CORD2S":  # r, theta from z, phi
-                phi, r = np.radians(points[:, 2]), points[:, 0]
-                radius, theta, z = r * np.sin(theta), phi, r * np.cos(theta)
-            points = np.stack([radius * np.cos(theta), radius * np.sin(theta), z], axis=1)
-        return origin + points @ axes
-
-    def _frame(self, number: int, above: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
-        """Origin (3,) and axes (3, 3) of a system; `above` are the systems that refer to it."""
-        if number in above or (number != 0 and number not in self.cards):
-            remedy = "export it along with the mesh"
-            raise ValueError(f"coordinate system {number} is not defined; {remedy}")
-        if number not in self.frames:
-            _, fields, line = self.cards[number]
-            parent = _whole(fields[1], line, "the reference system")
-            self._frame(parent, (*above, number))
-            numbers = [_number(text, line, "a coordinate") for text in fields[2:11]]
-            a, b, c = self.to_basic(parent, np.array(numbers).reshape(3, 3))
-            z = (b - a) / np.linalg.norm(b - a)
-            y = np.cross(z, c - a)
-            y /= np.linalg.norm(y)
-            self.frames[number] = a, np.array([np.cross(y, z), y, z])
-        return self.frames[number]
+    if number == 0:
+        return points
+    if number in above or number not in systems:
+        remedy = "export it along with the mesh"
+        raise ValueError(f"coordinate system {number} is not defined; {remedy}")
+    name, fields, line = systems[number]
+    parent = _whole(fields[1], line, "the reference system")
+    frame = np.array([_number(text, line, "a coordinate") for text in fields[2:11]]).reshape(3, 3)
+    a, b, c = _to_basic(systems, parent, frame, (*above, number))
+    z = (b - a) / np.linalg.norm(b - a)
+    y = np.cross(z, c - a)
+    y /= np.linalg.norm(y)
+    if name != "CORD2R":
+        radius, theta, height = points[:, 0], np.radians(points[:, 1]), points[:, 2]
+        if name == "CORD2S":  # r, theta from z, phi
+            radius, height = radius * np.sin(theta), radius * np.cos(theta)
+            theta = np.radians(points[:, 2])
+        points = np.stack([radius * np.cos(theta), radius * np.sin(theta), height], axis=1)
+    return a + points @ np.array([np.cross(y, z), y, z])
 
 
 def _add_blocks(
