@@ -95,11 +95,7 @@ def _require_flat_or_upright(chamber: Chamber, bottom: float, top: float) -> Non
 
 
 def _outline(chamber: Chamber, bottom: float, top: float) -> np.ndarray:
-    """The convex outline (n, 2) [m] of the floor, counter-clockwise.
-
-    Raises:
-        InputError: the chamber does not fill the prism over it.
-    """
+    """The convex outline (n, 2) [m] of a floor whose prism the chamber fills, or InputError."""
     from scipy.spatial import ConvexHull
 
     floor = np.unique(chamber.triangles[chamber.tags == TAG_SONOTRODE])

@@ -119,11 +119,7 @@ class Bore(NamedTuple):
 def cavity_solid(
     design: Design, shape: ShapeSurface, deflectors: Sequence[DeflectorMesh]
 ) -> CavitySolid:
-    """The shape with its holes, wells and deflectors, but without the part.
-
-    Raises:
-        InputError: names a hole, sonotrode or deflector that is out of place.
-    """
+    """The shape with its holes, wells and deflectors; InputError for one that is out of place."""
     shell = make_solid(shape.vertices, shape.triangles, "the chamber")
     facing = area_vectors(shape.vertices, shape.triangles)
     own = triangle_properties(facing, shape.tags, shape.source)
@@ -225,11 +221,7 @@ def _length_to_room(cavity: CavitySolid, bore: Bore, rim: np.ndarray) -> float:
 def _without_deflectors(
     cavity: CavitySolid, design: Design, deflectors: Sequence[DeflectorMesh]
 ) -> CavitySolid:
-    """The cavity without all deflectors at once: cutting them one by one refines the surface.
-
-    Raises:
-        InputError: a deflector is out of place.
-    """
+    """The cavity without all deflectors at once: one by one would refine its surface."""
     sweeps, solids, pieces = swept_faces(design, cavity), [], {}
     for k, deflector in enumerate(deflectors, start=len(design.chamber.holes)):
         own = split_bodies(deflector.vertices, deflector.triangles, deflector.name)[0]

@@ -22,10 +22,7 @@ MAX_SPIN_SHARE = 2.0 / 7.0
 
 
 def gravity_speed_change(design: Design, chamber: Chamber) -> float:
-    """g H / V²: relative change of a ball's speed over the chamber's height.
-
-    This is half the relative change of its kinetic energy.
-    """
+    """g H / V²: relative change of a ball's speed over H, half that of its kinetic energy."""
     return STANDARD_GRAVITY * chamber.height / design.sonotrode.peak_speed**2
 
 

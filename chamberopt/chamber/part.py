@@ -68,11 +68,7 @@ def posed_part(design: Design) -> tuple[Part, list[str]]:
 
 
 def part_meshes(design: Design) -> tuple[PartMesh, PartMesh]:
-    """The part as its file has it and as it is simulated, both in the file's frame.
-
-    They differ where target.element_mm asks for other triangles. The second has the triangles of
-    `posed_part`.
-    """
+    """The part as its file has it, and as it is simulated (`posed_part`), in the file's frame."""
     return _part_of_file(design), _meshed_part(design)[0]
 
 

@@ -15,11 +15,7 @@ if TYPE_CHECKING:
 
 
 def chosen_triangles(mesh: PartMesh, wanted: Target) -> np.ndarray:
-    """Which triangles meet all conditions of the target, (m,) bool, in the file's own frame.
-
-    Raises:
-        InputError: the file does not have one of the names, or nothing is chosen.
-    """
+    """Which triangles (m,) meet all conditions of the target; InputError if none does."""
     chosen = select_triangles(
         mesh.groups, wanted.surface, len(mesh.triangles), "part.target.surface"
     )

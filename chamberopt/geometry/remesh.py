@@ -40,11 +40,8 @@ def remesh(
     """Remesh the target of a closed surface with triangles whose sides are about `size` [m] long.
 
     Args:
-        vertices: (n, 3) [m].
-        triangles: (m, 3).
-        target: marks the triangles to remesh, (m,) bool.
+        target: (m,) bool.
         kinds: (m,); triangles of different kinds are never mixed.
-
     Returns:
         Vertices, triangles (k, 3), and for each of these one given triangle of the same flat face
         and kind, (k,).
@@ -264,12 +261,7 @@ class _TargetMesh:
     def _independent(
         self, triangle: np.ndarray, change: np.ndarray, rank: np.ndarray, wanted: np.ndarray
     ) -> np.ndarray:
-        """Indices of the wanted changes that come first by rank in every triangle that they touch.
-
-        Args:
-            triangle, change: a triangle, and the change that touches it; shape (k,).
-            rank, wanted: of each change, shape (c,).
-        """
+        """The wanted changes (c,) that are first by rank in every triangle (k,) they touch."""
         at = np.flatnonzero(wanted)
         place = np.full(len(rank), len(at))
         place[at[np.argsort(rank[at], kind="stable")]] = np.arange(len(at))

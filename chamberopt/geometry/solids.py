@@ -141,8 +141,7 @@ def subtract(whole: Solid, taken: Solid) -> Solid:
     """Cut `taken` out of `whole`.
 
     Raises:
-        InputError: the volumes of the result, of `whole` and of their intersection do not add up,
-            because a surface crosses itself.
+        InputError: the volumes do not add up, because a surface crosses itself.
     """
     rest = _checked(whole.body - taken.body, f"{taken.name}: cannot be cut out of {whole.name}")
     common = _checked(
@@ -174,10 +173,7 @@ class Outline:
         return Outline(self.section.offset(1e3 * by, JoinType.Round, circular_segments=facets))
 
     def hull(self, tolerance: float) -> np.ndarray:
-        """Corners (n, 2) [m] of the convex hull, counter-clockwise.
-
-        Corners within the tolerance [m] of a straight line are left out.
-        """
+        """Corners (n, 2) [m] of the convex hull, counter-clockwise, but for a tolerance [m]."""
         return _corners(self.section.hull().simplify(1e3 * tolerance))[0]
 
     def without_holes(self, tolerance: float) -> list[np.ndarray]:

@@ -84,10 +84,9 @@ def open_cells(mesh: TriangleMesh, radius: float) -> Cells:
 def find_regions(
     mesh: TriangleMesh, touches: TouchPoints, radius: float, spacing: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The regions in which the centre of a ball can move.
+    """The regions in which the centre of a ball of a radius [m] can move.
 
     Args:
-        radius: of the ball [m].
         spacing: largest distance between neighbouring touch points [m].
     Returns:
         Region of each touch point, -1 where the ball does not fit, (p,) int; and the volume [m³] of

@@ -68,13 +68,10 @@ def find_reach(mesh: TriangleMesh, diameter: float, largest: float | None = None
 
 
 def reached_part_share(reach: Reach, source: np.ndarray, count: int) -> np.ndarray:
-    """Of each part triangle in the cavity, the share that the ball can touch.
+    """Share (count,) that the ball can touch of each part triangle in the cavity, else 0.
 
     Args:
         source: part triangle that each triangle of the cavity lies on, else -1; shape (k,).
-        count: of the part's triangles.
-    Returns:
-        Shape (count,); 0 for triangles outside the cavity.
     """
     own = source >= 0
     size = areas(reach.mesh.vertices, reach.mesh.triangles)[own]
@@ -82,11 +79,7 @@ def reached_part_share(reach: Reach, source: np.ndarray, count: int) -> np.ndarr
 
 
 def _share(triangle: np.ndarray, area: np.ndarray, touched: np.ndarray, count: int) -> np.ndarray:
-    """Share (count,) of each triangle that is touched, from pieces of it, each touched by a share.
-
-    Args:
-        triangle, area, touched: of each piece, shape (p,).
-    """
+    """Share (count,) of each triangle that is touched, from its pieces (p,) and their shares."""
     whole = np.bincount(triangle, area, count)
     part = np.bincount(triangle, touched * area, count)
     return np.divide(part, whole, out=np.zeros(count), where=whole > 0.0)

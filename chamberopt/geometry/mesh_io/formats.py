@@ -56,11 +56,7 @@ BINARY_HEAD = 1 << 10
 
 
 def read_raw_mesh(path: Path, content: bytes) -> RawMesh:
-    """Read the triangles of a file.
-
-    Raises:
-        InputError: its format is not known, or it is damaged or truncated.
-    """
+    """Read a file; InputError if its format is not known, or it is damaged or truncated."""
     found = _find_format(path, content)
     try:
         return found.read(path, content)

@@ -36,11 +36,7 @@ class SewnSurface(NamedTuple):
 
 
 def sew(path: Path, corners: np.ndarray) -> SewnSurface:
-    """Join triangles with corners (m, 3, 3) [m] into a surface with two triangles at each edge.
-
-    Raises:
-        SurfaceError: the surface stays open or is not manifold.
-    """
+    """Join triangles (m, 3, 3) [m] into a surface with two at each edge, or raise SurfaceError."""
     first, numbers = unique_rows(corners.reshape(-1, 3))
     surface = _drop_useless(
         corners.reshape(-1, 3)[first], numbers.reshape(-1, 3), np.arange(len(corners))

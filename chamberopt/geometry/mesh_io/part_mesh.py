@@ -91,11 +91,7 @@ def _read_part_cached(path: Path, unit: str, _changed: int, _size: int) -> PartM
 
 
 def read_triangles(path: Path, unit: str = "guess") -> TriangleSoup:
-    """Read the triangles of a mesh file without making a surface of them.
-
-    Raises:
-        InputError: as read_part, except for what is wrong with the surface.
-    """
+    """Read a mesh file without making a surface of it; raises InputError as read_part."""
     content = _read_content(path)
     raw = read_raw_mesh(path, content)
     corners = raw.corners

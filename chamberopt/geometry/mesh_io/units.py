@@ -33,15 +33,11 @@ MIN_GUESSED_SIZE, MAX_GUESSED_SIZE = 3e-3, 1.5
 def find_unit(
     path: Path, content: bytes, corners: np.ndarray, given: str, stated: str | None
 ) -> tuple[str, list[str]]:
-    """Find the unit of the corners (m, 3, 3) of a file.
+    """The unit of the corners (m, 3, 3) of a file, and a note if a person should check it.
 
     Args:
         given: the design's part.unit, or "guess".
         stated: the unit that the file's format states, if any.
-
-    Returns:
-        The unit, and a note if a person should check it.
-
     Raises:
         InputError: the two contradict each other, the unit cannot be guessed, or no part can be
             so large or so small.

@@ -77,11 +77,7 @@ class _Instance(NamedTuple):
 
 
 def read_abaqus(path: Path, content: bytes) -> RawMesh:
-    """Read the surface in an input file.
-
-    Raises:
-        InputError: with keyword and line, for what is not supported.
-    """
+    """Read the surface in an input file; InputError names keyword and line that are refused."""
     scopes, instances, notes = _read_scopes(path, content.decode("utf-8", errors="replace"))
     try:
         return extract_surface(_assemble(scopes, instances, notes))

@@ -106,11 +106,7 @@ class _GmshMesh(NamedTuple):
 
 
 def read_gmsh(path: Path, content: bytes) -> RawMesh:
-    """Read the surface in a .msh.
-
-    Raises:
-        InputError: other versions, and elements that are not supported.
-    """
+    """Read the surface in a .msh; InputError for other versions and unsupported elements."""
     found = re.match(
         rb"\s*\$MeshFormat\s+([\d.]+)\s+([01])\s+(\d+)[ \t]*\r?\n?(.{0,4})", content, re.S
     )

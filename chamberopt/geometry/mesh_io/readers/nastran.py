@@ -52,11 +52,7 @@ Card = tuple[str, list[str], int]
 
 
 def read_nastran(path: Path, content: bytes) -> RawMesh:
-    """Read the surface in bulk data.
-
-    Raises:
-        InputError: with card and line, for what is missing or not supported.
-    """
+    """Read the surface in bulk data; InputError names card and line of what is refused."""
     text = content.decode("latin-1")
     cards: dict[str, list[Card]] = defaultdict(list)
     left_out: Counter[str] = Counter()

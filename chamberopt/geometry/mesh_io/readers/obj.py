@@ -11,10 +11,7 @@ from chamberopt.geometry.mesh_io.readers.raw_mesh import ElementNumbers, RawMesh
 
 
 def read_obj(path: Path, content: bytes) -> RawMesh:
-    """Read an OBJ; objects (o), groups (g) and materials (usemtl) give names.
-
-    Faces with more than three corners become fans of triangles.
-    """
+    """Read an OBJ; o, g and usemtl give names. Faces with more corners become fans."""
     points: list[list[float]] = []
     triangles: list[tuple[int, int, int]] = []
     fan_sizes: list[int] = []  # triangles of each face

@@ -22,11 +22,9 @@ def is_binary_stl(content: bytes) -> bool:
 
 
 def _complete_stl(path: Path, content: bytes) -> bytes:
-    """The STL without what some exporters append to it.
+    """The STL without what some exporters append to it; InputError if it is truncated.
 
-    Raises:
-        InputError: it is truncated. A binary STL states its number of triangles, a text STL ends
-            with "endsolid".
+    A binary STL states its number of triangles, a text STL ends with "endsolid".
     """
     if _is_text_stl(content):
         if not content.rstrip().splitlines()[-1].strip().lower().startswith(b"endsolid"):
