@@ -26,10 +26,10 @@ ORDER = {
         "target deflector_meshes bores_and_deflectors reach part build dimensionless scene "
         "analytic checks"
     ),
-    "chamberopt/coverage": "statistics dents coverage_from_impacts part_impacts+metrics "
-    "dent_marking coverage_intervals intensity",
+    "chamberopt/coverage": "dents part_impacts+metrics field coverage_from_impacts "
+    "coverage_intervals strength",
     "chamberopt/simulation": "resting_balls replicas evaluation evaluate "
-    "triangle_fields+time_curve complete_result effect_pilot convergence",
+    "field_values time_curve complete_result effect_pilot convergence",
     "chamberopt/optimize": "study+search storage "
     "sensitivity+evaluate_candidate candidates run_study pareto+run_sweep",
     "chamberopt/cli": "interrupt+options console prepare commands",

@@ -31,6 +31,7 @@ class Estimate:
     pseudovalues: tuple[float, ...] = field(default=(), repr=False)
     # Bound on the error that more replicas would not remove; included in half_width.
     bias: float = 0.0
+    in_words: str = ""  # what stands in the place of the number where there is none, such as never
 
     @property
     def low(self) -> float:
@@ -46,14 +47,22 @@ class Estimate:
 
     def to_json(self) -> dict[str, Any]:
         """As JSON values, with the pseudo-values by which results can be compared later."""
-        return {**self.interval_json(), "pseudovalues": list(self.pseudovalues), "bias": self.bias}
+        words = {"in_words": self.in_words} if self.in_words else {}
+        pseudovalues = {"pseudovalues": list(self.pseudovalues), "bias": self.bias}
+        return {**self.interval_json(), **pseudovalues, **words}
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Estimate:
         """The estimate that `to_json` wrote. Raises KeyError, TypeError or ValueError otherwise."""
         pseudovalues = tuple(float(x) for x in data["pseudovalues"])
         bias = float(data.get("bias", 0.0))
-        return replace(cls.from_interval_json(data), pseudovalues=pseudovalues, bias=bias)
+        words = str(data.get("in_words", ""))
+        found = cls.from_interval_json(data)
+        return replace(found, pseudovalues=pseudovalues, bias=bias, in_words=words)
+
+    def not_known(self, in_words: str) -> Estimate:
+        """The same value without an interval, and the words that stand in its place."""
+        return replace(self, half_width=math.inf, in_words=in_words)
 
     @classmethod
     def from_interval_json(cls, data: Mapping[str, Any]) -> Estimate:

@@ -293,11 +293,13 @@ def _explain(detail: ErrorDetails, model: type[BaseModel]) -> Problem:
 def _explain_unknown_key(key: str, table: type[BaseModel], model: type[BaseModel]) -> str:
     """Hint for an unknown key: its new name, a similar key, its place, or the allowed keys.
 
-    A model lists former names of its keys in RENAMED.
+    A model lists former names of its keys in RENAMED, and in REMOVED what became of others.
     """
-    renamed = getattr(table, "RENAMED", {})
+    renamed, removed = getattr(table, "RENAMED", {}), getattr(table, "REMOVED", {})
     if key in renamed:
         return f"is now called {renamed[key]!r}; rename it"
+    if key in removed:
+        return f"{removed[key]}; leave it out"
     close = closest_name(key, table.model_fields)
     if close:
         return f"unknown key; did you mean {close!r}?"

@@ -1,81 +1,61 @@
-"""From impacts to the coverage of each part triangle by Avrami's equation.
+"""From impacts to the coverage of windows round points of the target.
 
 Notation
-    C  coverage: share of an area that lies inside dents, 0..1
-    x  dent density: area of all dents over the area they lie on      (dent_density)
-    C = 1 - exp(-x) for dents that fall independently of one another (Avrami's equation)
+    A  area of a window that a ball can touch [m²]                       (gauge.area, (p,))
+    s  area of a dent, pi a², a its radius [m]                           (radius)
+    w  footprint: share of the window of a point that one dent takes     (weight)
+    x  dent density: sum of w of all dents that fall within a time
+    C  coverage, 1 - exp(-x) for dents that fall independently of one another (Avrami's equation)
+
+A dent on a smooth face takes w = s / A of every window that it lies in. Convex creases collect many
+dents, in a band as narrow as a dent: spread over a window they would count as if they covered all
+of it. So a dent on a crease is spread along the crease alone. At a distance h < a from the crease
+
+    w = 2 sqrt(a² - h²) / (length of the crease in its window)
+
+on both sides of it, which is exact across the crease.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
-from chamberopt.coverage.dents import dent_diameters, impact_angle_deg
-
 if TYPE_CHECKING:
-    from chamberopt.chamber.build import Chamber
-    from chamberopt.design.load import Design
-    from sim_core import ImpactLog
+    from chamberopt.coverage.field.target_field import Gauge, TargetField
+    from chamberopt.coverage.part_impacts import Hits
+
+T = TypeVar("T")
+
+ON_CREASE = 1e-6  # m: contacts nearer to a crease than this are on it
+MAX_BATCHES = 40  # of replicas; more would make the intervals no better
 
 
-@dataclass(frozen=True)
-class Tally:
-    """Sums of the impacts on each part triangle, over one or more replicas.
+class Footprints(NamedTuple):
+    """Dents in windows: pairs of a point and the share of its window that a dent takes.
 
-    Every column is a plain sum, so tallies add: `a + b`. The tally of one replica also has its
-    single dents, which sums of tallies do not keep.
+    Attributes:
+        point, weight: of each pair, shape (k,).
+        area: of all dents on the target [m²].
+        area_on_creases: of those on creases [m²].
+        squares: sum of the squares of their areas [m⁴].
     """
 
-    simulated_time: float  # recorded time of all replicas together [s]
-    impacts: np.ndarray  # number of impacts, (m,)
-    dents: np.ndarray  # number of dents, (m,)
-    dented_area: np.ndarray  # area of the dents [m²], (m,)
-    speed_sum: np.ndarray  # sum of normal speeds [m/s], (m,)
-    angle_sum: np.ndarray  # sum of impact angles [degrees], (m,)
-    # Part triangle of each dent, (k,) int.
-    dent_triangle: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int32))
-    # Area of each dent [m²], (k,).
-    dent_area: np.ndarray = field(default_factory=lambda: np.zeros(0))
-
-    def __add__(self, other: Tally) -> Tally:
-        return Tally(*(getattr(self, name) + getattr(other, name) for name in _SUMS))
-
-    def __sub__(self, other: Tally) -> Tally:
-        """This tally without one of its replicas. Rounding errors below zero become zero."""
-        return Tally(*(np.maximum(getattr(self, name) - getattr(other, name), 0) for name in _SUMS))
+    point: np.ndarray
+    weight: np.ndarray
+    area: float
+    area_on_creases: float
+    squares: float
 
 
-_SUMS = tuple(column.name for column in fields(Tally) if not column.name.startswith("dent_"))
+class Batch(NamedTuple):
+    """Footprints of one or more replicas."""
 
-
-def tally_impacts(impacts: ImpactLog, chamber: Chamber, design: Design) -> Tally:
-    """Sum the impacts of one replica on each part triangle.
-
-    A dent counts whole for the triangle under its contact point, even if it reaches over the edge.
-    Neighbours trade what they lose, so sums over an area are unbiased, while a triangle much
-    smaller than a dent is noisy. Impacts below the yield speed count as impacts without dents.
-    """
-    source = chamber.source[impacts.triangle]
-    on_part = source >= 0
-    triangle = source[on_part]
-    speed = np.asarray(impacts.normal_speed)[on_part]
-    dent = dent_diameters(impacts, design)[on_part]
-    angle = impact_angle_deg(np.asarray(impacts.velocity)[on_part], speed)
-    dented, area = dent > 0.0, np.pi / 4.0 * dent * dent
-    count = len(chamber.part.triangles)
-    return Tally(
-        simulated_time=design.process.recorded_time,
-        impacts=np.bincount(triangle, minlength=count),
-        dents=np.bincount(triangle[dented], minlength=count),
-        dented_area=np.bincount(triangle, area, count),
-        speed_sum=np.bincount(triangle, speed, count),
-        angle_sum=np.bincount(triangle, angle, count),
-        dent_triangle=triangle[dented],
-        dent_area=area[dented],
-    )
+    replicas: int
+    footprints: Footprints
 
 
 def coverage_from_dent_density(dent_density: np.ndarray) -> np.ndarray:
@@ -83,33 +63,76 @@ def coverage_from_dent_density(dent_density: np.ndarray) -> np.ndarray:
     return np.asarray(-np.expm1(-dent_density))
 
 
-def coverage_at(total: Tally, chamber: Chamber, time: float) -> np.ndarray:
-    """Coverage of each part triangle after a peening time, dents falling at the simulated rate.
+def in_batches(replicas: Sequence[T]) -> list[Sequence[T]]:
+    """Divide replicas into at most MAX_BATCHES batches, which differ by one replica at most."""
+    count = len(replicas)
+    ends = np.linspace(0, count, min(count, MAX_BATCHES) + 1).astype(int)
+    return [replicas[a:b] for a, b in pairwise(ends)]
 
-    Args:
-        time: peening time [s].
 
-    Returns:
-        Coverage of the exposed area, (m,); NaN for triangles that are not exposed.
-    """
-    exposed = chamber.exposed_area > 0.0
-    rate = np.full(len(exposed), np.nan)
-    np.divide(
-        total.dented_area, chamber.exposed_area * total.simulated_time, out=rate, where=exposed
+def joined(replicas: Sequence[Footprints]) -> Footprints:
+    """The footprints of several replicas together."""
+    return Footprints(
+        np.concatenate([one.point for one in replicas]),
+        np.concatenate([one.weight for one in replicas]),
+        sum(one.area for one in replicas),
+        sum(one.area_on_creases for one in replicas),
+        sum(one.squares for one in replicas),
     )
-    return coverage_from_dent_density(rate * time)
 
 
-def mean_speed_per_triangle(total: Tally) -> np.ndarray:
-    """Mean normal speed of the impacts on each part triangle [m/s], (m,); NaN if nothing hit it."""
-    return _per_impact(total.speed_sum, total.impacts)
+def find_footprints(field: TargetField, gauge: Gauge, hits: Hits) -> Footprints:
+    """The dents of one replica in windows of one size; dents off the target count nothing."""
+    from chamberopt.coverage.field.windows import Places
+
+    dents = np.flatnonzero(hits.dent > 0.0)
+    contacts = field.places_of(hits, dents)
+    radius = 0.5 * hits.dent[dents].astype(float)
+    edge = _crease_of_contacts(field, contacts.place, hits.triangle[dents])
+    on_face = edge < 0
+    size = np.pi * radius**2
+    size_on_face = size[on_face]
+    points, weights = [], []
+    for point, contact in gauge.windows.pairs(contacts.select(on_face)):
+        points.append(point)
+        weights.append(size_on_face[contact] / gauge.area[point])
+    band = gauge.band
+    if band is not None and not on_face.all():
+        own = np.flatnonzero(~on_face)
+        line = Places(contacts.place[own], np.zeros((len(own), 3)), field.creases.line[edge[own]])
+        for row, contact in band.windows.pairs(line):
+            half = radius[own[contact]] ** 2 - band.height[row] ** 2
+            covered = half > 0.0
+            row, half = row[covered], half[covered]
+            points.append(band.point[row])
+            weights.append(2.0 * np.sqrt(half) / band.length[row])
+    own = field.on_target[hits.triangle[dents]]
+    return Footprints(
+        np.concatenate(points) if points else np.zeros(0, dtype=int),
+        np.concatenate(weights) if weights else np.zeros(0),
+        area=float(size[own].sum()),
+        area_on_creases=float(size[own & ~on_face].sum()),
+        squares=float((size[own] ** 2).sum()),
+    )
 
 
-def mean_angle_per_triangle(total: Tally) -> np.ndarray:
-    """Mean angle of the impacts on each part triangle [degrees], (m,); NaN if nothing hit it."""
-    return _per_impact(total.angle_sum, total.impacts)
-
-
-def _per_impact(sums: np.ndarray, impacts: np.ndarray) -> np.ndarray:
-    mean = np.full(len(impacts), np.nan)
-    return np.divide(sums, impacts, out=mean, where=impacts > 0)
+def _crease_of_contacts(field: TargetField, place: np.ndarray, triangle: np.ndarray) -> np.ndarray:
+    """The crease on which each contact lies, (k,); -1 for contacts on a smooth face."""
+    creases = field.creases
+    found = np.full(len(place), -1)
+    near = np.flatnonzero((creases.at_corner[triangle] >= 0).any(axis=1))
+    at, own = place[near], triangle[near]
+    corners = field.corners[own]
+    for side in range(3):
+        corner = creases.at_corner[own, side]
+        touches = (corner >= 0) & (np.linalg.norm(at - corners[:, side], axis=1) < ON_CREASE)
+        found[near[touches]] = corner[touches]
+    for side in range(3):
+        crease = creases.of_triangle[own, side]
+        start, along = corners[:, side], corners[:, (side + 1) % 3] - corners[:, side]
+        away = np.linalg.norm(np.cross(at - start, along), axis=1) / np.maximum(
+            np.linalg.norm(along, axis=1), 1e-12
+        )
+        touches = (crease >= 0) & (away < ON_CREASE)
+        found[near[touches]] = crease[touches]
+    return found

@@ -1,8 +1,7 @@
 """The registry of metrics of a candidate, and of objectives that a study can maximise.
 
 A new metric is one entry of `METRICS`, a new objective one of `OBJECTIVES`. Study files, tables,
-reports and result folders take names, units and ranges from here. All metrics are over the exposed
-target.
+reports and result folders take names, units and ranges from here. All metrics are over the target.
 """
 
 from __future__ import annotations
@@ -15,10 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.coverage.coverage_from_impacts import Tally, coverage_at
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
+    from chamberopt.coverage.part_impacts import ImpactSums
     from chamberopt.design.load import Design
 
 FULL_COVERAGE = 0.98  # SAE J2277: coverage that counts as complete
@@ -28,9 +27,9 @@ P05 = 0.05  # share of the target's area that may be covered less than p05_cover
 
 @dataclass(frozen=True)
 class Metric:
-    """A named number of a candidate, as a function of coverage or of impacts.
+    """A named number of a candidate.
 
-    A metric with neither function has an estimator of its own, see simulation/evaluate.py.
+    Those of coverage and intensity have estimators of their own, see simulation/evaluate.py.
     """
 
     name: str
@@ -38,19 +37,10 @@ class Metric:
     summary: str
     lowest: float = -math.inf
     highest: float = math.inf
-    # Function of the coverage of target triangles and their shares of its area, (m,) each.
-    of_coverage: Callable[[np.ndarray, np.ndarray], float] | None = None
-    # Function of the impacts of replicas.
-    of_impacts: Callable[[Tally, Chamber, Design], float] | None = None
+    # Function of the impacts on the target, and of the design; None for those with estimators.
+    of_impacts: Callable[[ImpactSums, Design], float] | None = None
     required: bool = False  # whether a results folder without it is damaged
-
-    def value(self, total: Tally, chamber: Chamber, design: Design) -> float:
-        """The metric of these impacts, without correction for a short simulation."""
-        if self.of_impacts is not None:
-            return self.of_impacts(total, chamber, design)
-        assert self.of_coverage is not None
-        coverage = coverage_at(total, chamber, design.process.treatment_time)
-        return self.of_coverage(*target_coverage(coverage, chamber))
+    of_places: bool = False  # whether it tells of single places, which takes more dents
 
 
 @dataclass(frozen=True)
@@ -76,88 +66,28 @@ def require_target(chamber: Chamber) -> None:
         )
 
 
-def target_coverage(coverage: np.ndarray, chamber: Chamber) -> tuple[np.ndarray, np.ndarray]:
-    """Coverage of every target triangle and its share of the target's area.
-
-    Area outside the cavity counts as not covered. If it were left out, an optimiser would hide
-    places that are hard to reach behind a lower ceiling.
-
-    Args:
-        coverage: coverage of the exposed area of each part triangle, (m,).
-    """
-    target = chamber.part.target
-    require_target(chamber)
-    area = chamber.part.area[target]
-    exposed = np.minimum(chamber.exposed_area[target] / area, 1.0)
-    return np.where(exposed > 0.0, coverage[target], 0.0) * exposed, area / area.sum()
+def _mean_normal_speed(sums: ImpactSums, design: Design) -> float:
+    return sums.speed / sums.impacts if sums.impacts else 0.0
 
 
-def mean_coverage(coverage: np.ndarray, weight: np.ndarray) -> float:
-    """Area-weighted mean of the coverage, 0..1."""
-    return float(weight @ coverage)
+def _impacts_per_mm2_s(sums: ImpactSums, design: Design) -> float:
+    return sums.impacts / (1e6 * sums.area * sums.time)
 
 
-def std_coverage(coverage: np.ndarray, weight: np.ndarray) -> float:
-    """Area-weighted standard deviation of the coverage over the triangles, 0..0.5."""
-    return float(np.sqrt(weight @ (coverage - weight @ coverage) ** 2))
-
-
-def p05_coverage(coverage: np.ndarray, weight: np.ndarray) -> float:
-    """5th percentile of the coverage: 95 % of the target's area has more, 0..1."""
-    order = np.argsort(coverage, kind="stable")
-    # Mid-point rule: each triangle stands at the middle of its share of the area.
-    share = np.cumsum(weight[order]) - 0.5 * weight[order]
-    return float(np.interp(P05, share, coverage[order]))
-
-
-def seconds_to_98(p05: float, seconds: float) -> float:
-    """Peening time until the 5th percentile of the coverage is FULL_COVERAGE, by Avrami's equation.
-
-    Args:
-        p05: 5th percentile of the coverage after `seconds` of peening.
-
-    Returns:
-        Time [s], at most NEVER.
-    """
-    rate = -math.log(min(max(1.0 - p05, 1e-12), 1.0)) / seconds
-    return min(NEVER, -math.log(1.0 - FULL_COVERAGE) / rate) if rate > 0.0 else NEVER
-
-
-def _mean_normal_speed(total: Tally, chamber: Chamber, design: Design) -> float:
-    target = exposed_target(chamber)
-    impacts = total.impacts[target].sum()
-    return float(total.speed_sum[target].sum() / impacts) if impacts else 0.0
-
-
-def _impacts_per_mm2_s(total: Tally, chamber: Chamber, design: Design) -> float:
-    target = exposed_target(chamber)
-    area_mm2 = chamber.exposed_area[target].sum() * 1e6
-    return float(total.impacts[target].sum() / (area_mm2 * total.simulated_time))
-
-
-def _shot_count(total: Tally, chamber: Chamber, design: Design) -> float:
+def _shot_count(sums: ImpactSums, design: Design) -> float:
     return float(design.shot.count)
 
 
 METRICS = {
     metric.name: metric
     for metric in (
-        Metric(
-            "mean_coverage",
-            "",
-            "mean coverage of the target",
-            0.0,
-            1.0,
-            mean_coverage,
-            required=True,
-        ),
+        Metric("mean_coverage", "", "mean coverage of the target", 0.0, 1.0, required=True),
         Metric(
             "std_coverage",
             "",
             "standard deviation of coverage over the target",
             0.0,
             0.5,
-            std_coverage,
             required=True,
         ),
         Metric(
@@ -166,13 +96,23 @@ METRICS = {
             "coverage that 95 % of the target's area exceeds",
             0.0,
             1.0,
-            p05_coverage,
             required=True,
+            of_places=True,
         ),
         Metric(
-            "time_to_98_s", "s", "time until 95 % of the target's area is 98 % covered", 0.0, NEVER
+            "time_to_98_s",
+            "s",
+            "time until 95 % of the target's area is 98 % covered",
+            0.0,
+            NEVER,
+            of_places=True,
         ),
-        Metric("intensity_uniformity", "", "1 - relative spread of the local impact speed"),
+        Metric(
+            "intensity_uniformity",
+            "",
+            "1 - relative spread of the local peening strength",
+            of_places=True,
+        ),
         Metric(
             "mean_normal_speed_m_s",
             "m/s",

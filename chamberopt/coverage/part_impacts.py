@@ -5,7 +5,8 @@ An impact takes 32 bytes here, against a hundred in the simulator's log.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,8 +18,6 @@ from chamberopt.coverage.dents import ball_diameters, dent_diameters, impact_ang
 from chamberopt.geometry.triangles import closest_on_each
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from chamberopt.chamber.build import Chamber
     from chamberopt.design.load import Design
     from sim_core import ImpactLog
@@ -41,6 +40,37 @@ class Hits:
 
     def __len__(self) -> int:
         return len(self.triangle)
+
+
+@dataclass(frozen=True)
+class ImpactSums:
+    """Sums over the impacts on the exposed target."""
+
+    impacts: int
+    speed: float  # sum of normal speeds [m/s]
+    time: float  # in which they fell [s]
+    area: float  # of the target [m²]
+
+    def __add__(self, other: ImpactSums) -> ImpactSums:
+        return replace(
+            self,
+            impacts=self.impacts + other.impacts,
+            speed=self.speed + other.speed,
+            time=self.time + other.time,
+        )
+
+
+def sum_impacts(hits: Sequence[Hits], exposed: np.ndarray, area: float, time: float) -> ImpactSums:
+    """Add up the impacts of some replicas on a target.
+
+    Args:
+        exposed: marks its triangles in the cavity, (m,).
+        area: of these [m²].
+        time: simulated by each replica [s].
+    """
+    speeds = [one.speed[exposed[one.triangle]].astype(float) for one in hits]
+    speed = float(sum(one.sum() for one in speeds))
+    return ImpactSums(sum(len(one) for one in speeds), speed, time * len(hits), area)
 
 
 @dataclass(frozen=True)

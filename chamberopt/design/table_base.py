@@ -39,6 +39,7 @@ class FileTable(BaseModel):
 
     model_config = STRICT
     RENAMED: ClassVar[dict[str, str]] = {}  # former names of keys: an error names the new one
+    REMOVED: ClassVar[dict[str, str]] = {}  # former keys, and why they are no longer there
 
     def _problems(self) -> Iterable[Problem]:
         """Problems of values that are each in range but contradict each other."""

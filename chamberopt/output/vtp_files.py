@@ -37,7 +37,7 @@ def pyvista() -> Any:
 
 
 def write_coverage(
-    path: Path, chamber: Chamber, fields: dict[str, np.ndarray], coverage_model: str
+    path: Path, chamber: Chamber, fields: dict[str, np.ndarray], coverage_model: str = "avrami"
 ) -> None:
     """Write the part, posed in the chamber [mm].
 

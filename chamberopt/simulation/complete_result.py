@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from chamberopt.simulation.field_values import PartField
 from chamberopt.simulation.time_curve import coverage_against_time
-from chamberopt.simulation.triangle_fields import compute_triangle_fields
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -23,16 +23,17 @@ class CandidateResult:
     design: Design
     chamber: Chamber
     evaluation: Evaluation
-    triangle_fields: dict[str, np.ndarray]  # cell data of coverage.vtp, by name, (m,) each
+    element_values: dict[str, np.ndarray]  # of each triangle of the part, by name, (m,) each
     time_curve: list[dict[str, float]]  # coverage against peening time, a row a time
 
 
 def complete_result(design: Design, chamber: Chamber, evaluation: Evaluation) -> CandidateResult:
     """Compute what only a final result needs; a search does without it."""
+    seen = PartField(design, chamber, evaluation)
     return CandidateResult(
         design=design,
         chamber=chamber,
         evaluation=evaluation,
-        triangle_fields=compute_triangle_fields(design, chamber, evaluation),
-        time_curve=coverage_against_time(design, chamber, evaluation),
+        element_values=seen.element_values(),
+        time_curve=coverage_against_time(design, seen.target, evaluation),
     )

@@ -29,7 +29,6 @@ from chamberopt.simulation.evaluate import evaluate
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.common.progress import Progress
-    from chamberopt.coverage.coverage_from_impacts import Tally
     from chamberopt.design.load import Design
 
 Prepare = Callable[["Design"], None]
@@ -180,7 +179,8 @@ class _Pilot:
         self.design, self.chamber = design, chamber
         self._executor, self._prepare = executor, prepare
         first = evaluate(self._variant({}, FIRST_TIME), chamber, executor)
-        hits = first.total.impacts[exposed_target(chamber)].sum()
+        target = exposed_target(chamber)
+        hits = sum(int(target[one.triangle].sum()) for one in first.hits)
         self._time = float(np.clip(FIRST_TIME * IMPACTS / max(hits, 1), FIRST_TIME, MAX_TIME))
         self.unchanged = self.measure({})
 
@@ -194,7 +194,6 @@ class _Pilot:
                 "process.accuracy.replicas": REPLICAS,
                 "process.accuracy.simulated_time_s": time,
                 "process.accuracy.objective_half_width": None,
-                "process.accuracy.coverage_model": "avrami",
             }
         )
         if self._prepare is not None:
@@ -264,27 +263,23 @@ def _switched(design: Design, effects: Mapping[str, bool]) -> Design:
 
 def _measure(design: Design, chamber: Chamber, executor: Executor) -> dict[str, np.ndarray]:
     """Each of MEASURED in every replica of a design."""
-    replicas = evaluate(design, chamber, executor).replicas
+    replicas = evaluate(design, chamber, executor).hits
     target = exposed_target(chamber)
     centres = chamber.part.vertices[chamber.part.triangles].mean(axis=1)
     distance = np.linalg.norm(centres, axis=1)  # from the middle of the sonotrode
     near = target & (distance <= _median(distance[target], chamber.exposed_area[target]))
 
-    def in_each(value: Callable[[Tally], float]) -> np.ndarray:
-        return np.array([value(replica) for replica in replicas])
-
     def coverage(half: np.ndarray) -> np.ndarray:
         if not half.any():  # a target of a triangle or two may be all on one side
             return np.zeros(len(replicas))
-        rate = in_each(lambda tally: tally.dented_area[half].sum() / tally.simulated_time)
-        return coverage_from_dent_density(
-            rate * (design.process.treatment_time / chamber.exposed_area[half].sum())
-        )
+        dents = [one.dent[half[one.triangle]].astype(float) for one in replicas]
+        rate = np.pi / 4.0 * np.array([(dent**2).sum() for dent in dents])
+        time_ratio = design.process.treatment_time / design.process.recorded_time
+        return coverage_from_dent_density(rate * time_ratio / chamber.exposed_area[half].sum())
 
+    speeds = [one.speed[target[one.triangle]].astype(float) for one in replicas]
     return {
-        SPEED: in_each(
-            lambda tally: tally.speed_sum[target].sum() / max(1, tally.impacts[target].sum())
-        ),
+        SPEED: np.array([one.mean() if len(one) else 0.0 for one in speeds]),
         NEARER: coverage(near),
         FARTHER: coverage(target & ~near),
     }

@@ -1,13 +1,13 @@
 """Evaluate a candidate: simulate independent replicas and estimate its metrics with intervals.
 
 Notation
-    n     number of replicas
-    S     a metric as a function of the impacts of some replicas
-    y_j   pseudo-value of replica j: n S(all) - (n - 1) S(all but j)
+    g     number of batches of replicas; a batch is one replica unless there are many
+    S     a metric as a function of the impacts of some batches
+    y_j   pseudo-value of batch j: g S(all) - (g - 1) S(all but j)
 
 Coverage, the time to full coverage and the intensity uniformity have estimators of their own
-(coverage/coverage_intervals.py, coverage/intensity.py). The other metrics are ratios of sums: the
-delete-one jackknife over replicas corrects their bias of order 1/n and gives the standard error (B.
+(coverage/coverage_intervals.py, coverage/strength.py). The other metrics are ratios of sums: the
+delete-one jackknife over batches corrects their bias of order 1/g and gives the standard error (B.
 Efron and R. J. Tibshirani, "An Introduction to the Bootstrap", Chapman & Hall 1993, chapter 11).
 """
 
@@ -20,32 +20,46 @@ from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import reduce
 from operator import add
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from chamberopt.chamber.analytic import cavity_note
 from chamberopt.chamber.scene import chamber_mesh
-from chamberopt.common.estimate import Estimate, estimate, student_quantile
+from chamberopt.common.estimate import Estimate, estimate
 from chamberopt.common.parallel.executor import share
 from chamberopt.common.progress import Progress
-from chamberopt.coverage.coverage_from_impacts import Tally
+from chamberopt.coverage.coverage_from_impacts import (
+    Batch,
+    Footprints,
+    find_footprints,
+    in_batches,
+    joined,
+)
 from chamberopt.coverage.coverage_intervals import (
-    TargetPatches,
+    NOT_RESOLVED,
+    Resolution,
     coverage_estimates,
-    few_dents_note,
-    target_patches,
+    find_resolution,
     time_to_98_estimate,
 )
-from chamberopt.coverage.dent_marking import (
-    SamplePoints,
-    few_points_note,
-    marked_share,
-    sample_points,
+from chamberopt.coverage.dents import dent_diameter
+from chamberopt.coverage.field.target_field import (
+    Gauge,
+    TargetField,
+    WindowSetting,
+    find_target_field,
 )
-from chamberopt.coverage.intensity import intensity_uniformity
-from chamberopt.coverage.metrics import METRICS, ObjectiveFunction, parse_objective, target_coverage
-from chamberopt.simulation.evaluation import Evaluation, MarkedCoverage
+from chamberopt.coverage.metrics import (
+    METRICS,
+    ObjectiveFunction,
+    exposed_target,
+    parse_objective,
+    require_target,
+)
+from chamberopt.coverage.part_impacts import Hits, ImpactSums, sum_impacts
+from chamberopt.coverage.strength import intensity_uniformity
+from chamberopt.simulation.evaluation import Evaluation
 from chamberopt.simulation.replicas import (
     MIN_REPLICAS_TO_STOP,
     Replica,
@@ -58,9 +72,11 @@ from chamberopt.simulation.resting_balls import bouncing_notes, resting_notes
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.design.load import Design
-    from sim_core import AnalyticCavity
+    from sim_core import AnalyticCavity, TriangleMesh
 
-MARKED_CURVE_POINTS = 50
+# Of the sonotrode's peak speed: faster impacts, which balls would have to drive one another to,
+# leave dents as wide as this one on creases.
+MAX_SPEED = 4.0
 
 
 @dataclass(frozen=True)
@@ -102,17 +118,13 @@ def evaluate(
     count = plan.count or accuracy.replicas
     if wanted is not None:
         count = min(max(count, MIN_REPLICAS_TO_STOP), accuracy.max_replicas)
-    samples = (
-        sample_points(chamber, accuracy.sample_spacing)
-        if accuracy.coverage_model == "dents"
-        else None
-    )
-    setting = share(
-        executor, ReplicaSetting(design, chamber, cavity or chamber_mesh(chamber), samples)
-    )
-    objective = parse_objective(plan.objective_name)
-    done = [] if done is None else done
+    mesh = chamber_mesh(chamber)
+    setting = share(executor, ReplicaSetting(design, chamber, cavity or mesh))
     timings = {"simulate": 0.0, "coverage": 0.0}
+    started = time.perf_counter()
+    seen = _SeenDents(prepare_target(design, chamber, mesh), [], [])
+    timings["coverage"] += time.perf_counter() - started
+    done = [] if done is None else done
     while True:
         started = time.perf_counter()
         for replica in simulate_replicas(
@@ -122,14 +134,10 @@ def evaluate(
             if progress:
                 progress(len(done), count, None)
         simulated = time.perf_counter()
-        tallies = [replica.tally for replica in done]
-        patches = target_patches(tallies, chamber, design.process.treatment_time)
-        metrics = estimate_metrics(tallies, chamber, design, patches)
-        if samples is not None:
-            metrics |= marked_coverage_estimates(
-                _marked_shares(done, samples, chamber, design.process.treatment_time), chamber
-            )
-        value = weighted_sum(objective, metrics)
+        hits = [replica.hits for replica in done]
+        seen.add(hits)
+        found = _estimate_all(seen, hits, chamber, design)
+        value = weighted_sum(parse_objective(plan.objective_name), found.metrics)
         timings["simulate"] += simulated - started
         timings["coverage"] += time.perf_counter() - simulated
         if wanted is None:
@@ -142,9 +150,14 @@ def evaluate(
     return Evaluation(
         objective_name=plan.objective_name,
         objective=value,
-        metrics=metrics,
-        total=reduce(add, tallies),
-        replicas=tuple(tallies),
+        metrics=found.metrics,
+        metrics_of_wide=found.metrics_of_wide,
+        resolution=found.resolution,
+        reachable=seen.field.reachable,
+        crease_share=seen.crease_share,
+        replicas=len(done),
+        simulated_time=len(done) * design.process.recorded_time,
+        hits=tuple(hits),
         timings=timings,
         collisions={
             kind: sum(replica.collisions[kind] for replica in done) for kind in done[0].collisions
@@ -152,51 +165,146 @@ def evaluate(
         notes=(
             *((cavity_note(cavity),) if cavity else ()),
             *_accuracy_note(stopped_by, len(done), value, wanted),
-            *(
-                few_dents_note(tallies, patches)
-                if samples is None
-                else few_points_note(samples, chamber)
-            ),
+            *resolution_notes(found.resolution),
             *resting_notes([replica.resting for replica in done if replica.resting], len(done)),
             *bouncing_notes([replica.bouncing_share for replica in done]),
         ),
         stream=plan.stream,
         stopped_by=stopped_by,
         analytic=cavity is not None,
-        hits=tuple(replica.hits for replica in done),
-        marked=None if samples is None else _marked_coverage(done, samples, chamber, design),
     )
 
 
-def estimate_metrics(
-    replicas: Sequence[Tally],
-    chamber: Chamber,
-    design: Design,
-    patches: TargetPatches | None = None,
-) -> dict[str, Estimate]:
-    """Estimate all metrics from replicas; with a single one the half-widths are infinite.
+def prepare_target(design: Design, chamber: Chamber, mesh: TriangleMesh) -> TargetField:
+    """The target of a chamber, ready to be looked at through windows.
 
-    Args:
-        patches: the target in patches for these replicas, if it was made already.
+    Raises:
+        InputError: no triangle of it bounds the cavity, or the gauge is too small for it.
     """
-    n = len(replicas)
-    treatment_time = design.process.treatment_time
-    patches = patches or target_patches(replicas, chamber, treatment_time)
-    special = coverage_estimates(replicas, chamber, patches)
-    special["time_to_98_s"] = time_to_98_estimate(special["p05_coverage"], treatment_time)
-    special["intensity_uniformity"] = intensity_uniformity(replicas, patches)
-    total = reduce(add, replicas)
-    without_each = [total - replica for replica in replicas] if n > 1 else []
+    require_target(chamber)
+    material, shot = design.materials.part, design.shot
+    fastest = max(one.peak_speed for one in (design.sonotrode, *design.sonotrodes)) * MAX_SPEED
+    largest_dent = dent_diameter(
+        np.array([max(fastest, 2.0 * material.yield_speed)]),
+        max(shot.diameters),
+        shot.density,
+        material.hardness,
+        material.restitution,
+        material.yield_speed,
+    )
+    accuracy = design.process.accuracy
+    setting = WindowSetting(
+        accuracy.gauge, accuracy.points, min(shot.diameters), float(largest_dent[0])
+    )
+    return find_target_field(chamber, mesh, setting)
+
+
+@dataclass
+class _SeenDents:
+    """The dents of the replicas so far, in windows of both sizes."""
+
+    field: TargetField
+    gauge: list[Footprints]
+    wide: list[Footprints]
+
+    def add(self, hits: Sequence[Hits]) -> None:
+        """Look at the replicas that are new."""
+        for one in hits[len(self.gauge) :]:
+            self.gauge.append(find_footprints(self.field, self.field.gauge, one))
+            self.wide.append(find_footprints(self.field, self.field.wide, one))
+
+    @property
+    def crease_share(self) -> float:
+        """Share of the dented area of the target that is on creases."""
+        area = sum(one.area for one in self.gauge)
+        return sum(one.area_on_creases for one in self.gauge) / area if area else 0.0
+
+
+class _Estimates(NamedTuple):
+    metrics: dict[str, Estimate]
+    metrics_of_wide: dict[str, Estimate]
+    resolution: Resolution
+
+
+def _estimate_all(
+    seen: _SeenDents, hits: Sequence[Hits], chamber: Chamber, design: Design
+) -> _Estimates:
+    """Estimate all metrics from replicas; with a single one the half-widths are infinite."""
+    process, field = design.process, seen.field
+    time_ratio = process.treatment_time / process.recorded_time
+
+    def of_windows(
+        gauge: Gauge, prints: list[Footprints]
+    ) -> tuple[dict[str, Estimate], Resolution]:
+        batches = [Batch(len(part), joined(part)) for part in in_batches(prints)]
+        found = coverage_estimates(batches, len(gauge.area), field.reachable, time_ratio)
+        found["time_to_98_s"] = time_to_98_estimate(found["p05_coverage"], process.treatment_time)
+        return found, find_resolution(batches, gauge, time_ratio, process.recorded_time)
+
+    of_gauge, resolution = of_windows(field.gauge, seen.gauge)
+    of_wide, resolution_of_wide = of_windows(field.wide, seen.wide)
+    batches = in_batches(hits)
+    of_gauge["intensity_uniformity"] = intensity_uniformity(field, batches, design.shot.density)
+    found = of_gauge | _ratios(batches, chamber, design)
+    return _Estimates(
+        {name: as_resolved(name, found[name], resolution) for name in METRICS},
+        {name: as_resolved(name, one, resolution_of_wide) for name, one in of_wide.items()},
+        resolution,
+    )
+
+
+def as_resolved(name: str, value: Estimate, resolution: Resolution) -> Estimate:
+    """The estimate of a metric, without an interval if there are too few dents for one."""
+    metric = METRICS[name]
+    enough = resolution.has_places if metric.of_places else resolution.has_mean
+    is_exact = value.half_width == 0.0  # such as what follows from places out of reach
+    if metric.of_impacts is not None or enough or is_exact or value.in_words == "never":
+        return value
+    return value.not_known(NOT_RESOLVED)
+
+
+def _ratios(
+    batches: Sequence[Sequence[Hits]], chamber: Chamber, design: Design
+) -> dict[str, Estimate]:
+    """Estimates of the metrics that are ratios of sums over impacts."""
+    exposed, count = exposed_target(chamber), len(batches)
+    area = float(chamber.exposed_area[exposed].sum())
+    sums = [sum_impacts(hits, exposed, area, design.process.recorded_time) for hits in batches]
+    total: ImpactSums = reduce(add, sums)
     estimates = {}
     for name, metric in METRICS.items():
-        if name in special:
-            estimates[name] = special[name]
+        if metric.of_impacts is None:
             continue
-        plain = metric.value(total, chamber, design)
-        without = np.array([metric.value(part, chamber, design) for part in without_each])
-        pseudovalues = n * plain - (n - 1) * without if n > 1 else np.array([plain])
+        plain = metric.of_impacts(total, design)
+        rests = [reduce(add, sums[:j] + sums[j + 1 :]) for j in range(count)] if count > 1 else []
+        without = np.array([metric.of_impacts(rest, design) for rest in rests])
+        pseudovalues = count * plain - (count - 1) * without if count > 1 else np.array([plain])
         estimates[name] = estimate(pseudovalues, metric.lowest, metric.highest)
     return estimates
+
+
+def resolution_notes(found: Resolution) -> tuple[str, ...]:
+    """What is not resolved, and the simulated time that would do."""
+    if found.has_mean and found.has_places:
+        return ()
+    if not found.dents:
+        return (
+            "fewer than half of the target's windows were hit: no figure of it is resolved; raise "
+            "process.accuracy.simulated_time_s or replicas, or process.accuracy.gauge_mm2",
+        )
+    needs = [
+        f"{what} {needed:.0f} ({found.time_for(needed):.3g} s of simulation)"
+        for what, needed, there in (
+            ("mean and standard deviation take", found.needed_for_mean, found.has_mean),
+            ("5th percentile, times and intensity take", found.needed_for_places, found.has_places),
+        )
+        if not there
+    ]
+    return (
+        f"the median window has {found.dents:.1f} dents after {found.simulated_time:.3g} s: "
+        f"{', '.join(needs)}; raise process.accuracy.simulated_time_s or replicas, or "
+        "process.accuracy.gauge_mm2",
+    )
 
 
 def weighted_sum(objective: ObjectiveFunction, metrics: dict[str, Estimate]) -> Estimate:
@@ -204,53 +312,10 @@ def weighted_sum(objective: ObjectiveFunction, metrics: dict[str, Estimate]) -> 
     terms = [(weight, metrics[name]) for name, weight in objective.terms.items()]
     value = sum(weight * metric.value for weight, metric in terms)
     columns = [weight * np.array(metric.pseudovalues) for weight, metric in terms]
-    bias = sum(abs(weight) * metric.bias for weight, metric in terms)
-    spread = estimate(np.sum(columns, axis=0), bias=bias)
-    return Estimate(value, spread.half_width, spread.pseudovalues, bias)
-
-
-def marked_coverage_estimates(
-    shares: Sequence[np.ndarray], chamber: Chamber
-) -> dict[str, Estimate]:
-    """Coverage metrics of parts on which every dent is marked: plain means over the replicas.
-
-    Such a part shows the grain of its dents. Its std_coverage is larger and its p05_coverage lower
-    than those of the expected coverage, the more so the smaller the triangles are.
-
-    Args:
-        shares: marked share of each part triangle, (m,), a replica each.
-    """
-    replicas = [target_coverage(share, chamber) for share in shares]
-    return {
-        name: estimate(
-            [metric.of_coverage(*one) for one in replicas], metric.lowest, metric.highest
-        )
-        for name, metric in METRICS.items()
-        if metric.of_coverage
-    }
-
-
-def _marked_coverage(
-    done: Sequence[Replica], samples: SamplePoints, chamber: Chamber, design: Design
-) -> MarkedCoverage:
-    treatment_time, n = design.process.treatment_time, len(done)
-    shares = _marked_shares(done, samples, chamber, treatment_time)
-    width = np.full(len(shares[0]), np.nan)
-    if n > 1:
-        width = 2.0 * student_quantile(n - 1) * np.std(shares, axis=0, ddof=1) / math.sqrt(n)
-    curve = []
-    for at in np.linspace(0.0, treatment_time, MARKED_CURVE_POINTS + 1)[1:]:
-        then = marked_coverage_estimates(_marked_shares(done, samples, chamber, at), chamber)
-        curve.append((float(at), then["mean_coverage"]))
-    return MarkedCoverage(np.mean(shares, axis=0), width, tuple(curve))
-
-
-def _marked_shares(
-    done: Sequence[Replica], samples: SamplePoints, chamber: Chamber, time: float
-) -> list[np.ndarray]:
-    """Marked share of each part triangle after a peening time [s], (m,), a replica each."""
-    firsts = [replica.first_marked for replica in done if replica.first_marked is not None]
-    return [marked_share(samples, first, time, len(chamber.part.triangles)) for first in firsts]
+    spread = estimate(np.sum(columns, axis=0))
+    words = next((metric.in_words for _, metric in terms if metric.in_words), "")
+    half_width = math.inf if words == NOT_RESOLVED else spread.half_width
+    return Estimate(value, half_width, spread.pseudovalues, in_words=words)
 
 
 def _accuracy_note(

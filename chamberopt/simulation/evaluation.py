@@ -11,7 +11,6 @@ from __future__ import annotations
 import io
 import json
 from dataclasses import dataclass, fields, is_dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -20,18 +19,8 @@ import numpy as np
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.files import UNREADABLE_NPZ, atomic_write
-from chamberopt.coverage.coverage_from_impacts import Tally
-from chamberopt.coverage.part_impacts import Hits, HitsByTriangle, sort_hits_by_triangle
-
-
-@dataclass(frozen=True)
-class MarkedCoverage:
-    """Coverage by the model "dents", which marks every single dent on the surface."""
-
-    share: np.ndarray  # share of each part triangle inside dents, (m,); NaN where not exposed
-    interval_width: np.ndarray  # width of its 95 % interval, (m,); NaN with a single replica
-    # Peening time [s] and mean coverage of the target then, a pair a time.
-    curve: tuple[tuple[float, Estimate], ...]
+from chamberopt.coverage.coverage_intervals import Resolution
+from chamberopt.coverage.part_impacts import Hits
 
 
 @dataclass(frozen=True)
@@ -40,9 +29,14 @@ class Evaluation:
 
     objective_name: str
     objective: Estimate  # the weighted sum of metrics that a study maximises
-    metrics: dict[str, Estimate]  # estimate of each metric, by its name
-    total: Tally  # sum of the replicas' tallies
-    replicas: tuple[Tally, ...]  # tally of each replica
+    metrics: dict[str, Estimate]  # estimate of each metric at the gauge, by its name
+    metrics_of_wide: dict[str, Estimate]  # those of coverage in windows of twice the radius
+    resolution: Resolution
+    reachable: float  # share of the target that a ball can touch
+    crease_share: float  # share of the dented area that is on creases
+    replicas: int
+    simulated_time: float  # recorded time of all replicas together [s]
+    hits: tuple[Hits, ...]  # single impacts of each replica on the part
     timings: dict[str, float]  # wall-clock time of each step [s]
     collisions: dict[str, int]  # number of simulated collisions of each kind, warm-up included
     notes: tuple[str, ...] = ()  # what to know before trusting the result
@@ -50,18 +44,9 @@ class Evaluation:
     # What ended it: "replicas" (their number was given), "accuracy" or "max_replicas".
     stopped_by: str = "replicas"
     analytic: bool = False  # whether it ran in an exact cavity instead of the chamber's mesh
-    # Single impacts of each replica on the part; empty if they were not kept.
-    hits: tuple[Hits, ...] = ()
-    # Coverage by the model "dents"; None for the model "avrami".
-    marked: MarkedCoverage | None = None
-
-    @cached_property
-    def hits_by_triangle(self) -> HitsByTriangle | None:
-        """The single impacts of all replicas; None if they were not kept."""
-        return sort_hits_by_triangle(self.hits, len(self.total.impacts)) if self.hits else None
 
 
-CLASSES = {kind.__name__: kind for kind in (Evaluation, Estimate, Hits, MarkedCoverage, Tally)}
+CLASSES = {kind.__name__: kind for kind in (Evaluation, Estimate, Hits, Resolution)}
 
 
 def save_evaluation(path: Path, evaluation: Evaluation) -> None:

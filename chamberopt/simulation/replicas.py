@@ -9,14 +9,9 @@ from concurrent.futures import Executor, Future
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
-import numpy as np
-
 from chamberopt.chamber.analytic import impacts_on_chamber
 from chamberopt.chamber.scene import build_scene, replica_seed
 from chamberopt.common.errors import WorkerLostError
-from chamberopt.coverage.coverage_from_impacts import Tally, tally_impacts
-from chamberopt.coverage.dent_marking import SamplePoints, first_marked_times
-from chamberopt.coverage.dents import dents_on_part
 from chamberopt.coverage.part_impacts import Hits, hits_on_part
 from chamberopt.simulation.resting_balls import RestingBalls, bouncing_share, find_resting_balls
 
@@ -40,20 +35,15 @@ class ReplicaSetting(NamedTuple):
     design: Design
     chamber: Chamber
     mesh: TriangleMesh | AnalyticCavity
-    # Points for the coverage model "dents"; None for the model "avrami".
-    samples: SamplePoints | None
 
 
 @dataclass(frozen=True)
 class Replica:
     """What is kept of one replica; its impact log is not."""
 
-    tally: Tally
     collisions: dict[str, int]  # number of collisions of each kind
     resting: RestingBalls | None  # the balls at rest at its end; None if there are none
     bouncing_share: float  # share of the balls that bounce on one spot at its end
-    # First time at which each sample point is inside a dent [s], (p,); None without sample points.
-    first_marked: np.ndarray | None
     hits: Hits
 
 
@@ -128,11 +118,10 @@ def next_replica_count(done: int, half_width: float, wanted: float, maximum: int
 
 def simulate_replica(setting: ReplicaSetting, seed: int) -> Replica:
     """Simulate one replica; this runs on a worker."""
-    design, chamber, mesh, samples = setting
+    design, chamber, mesh = setting
     result = simulate_seed(design, chamber, mesh, seed)
     impacts, part_turns = result.impacts, design.effects.part_turn is not None
     return Replica(
-        tally=tally_impacts(impacts, chamber, design),
         collisions={
             kind: int(getattr(result.collisions, kind))
             for kind in ("walls", "balls", "sonotrode", "total")
@@ -141,9 +130,6 @@ def simulate_replica(setting: ReplicaSetting, seed: int) -> Replica:
             result.resting, len(result.balls), design.shot.diameter, chamber, part_turns
         ),
         bouncing_share=bouncing_share(result.balls.velocities),
-        first_marked=None
-        if samples is None
-        else first_marked_times(samples, dents_on_part(impacts, chamber, design)),
         hits=hits_on_part(impacts, chamber, design),
     )
 

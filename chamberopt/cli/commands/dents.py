@@ -35,7 +35,7 @@ def dents(
     pixels
         Longer side of one view in pixels.
     """
-    from chamberopt.output.resimulate.impacts import dented_share, simulate_dents
+    from chamberopt.output.resimulate.impacts import simulate_dents
     from chamberopt.output.viewer import parse_view
     from chamberopt.output.viewer.images.dents import draw_dents, require_pixels
     from chamberopt.output.viewer.subprocess_drawing import picture_path
@@ -47,10 +47,8 @@ def dents(
     design, recorded = resimulated.design, resimulated.scene.duration
     time = design.process.treatment_time if at_s is None else at_s
     found = simulate_dents(resimulated, time)
-    share = dented_share(found, resimulated.chamber, design.process.accuracy.sample_spacing)
     beyond = f", simulated on from {recorded:g} s" if time > recorded else ""
     title = f"{len(found):,} dents after {time:g} s in replica {replica}{beyond}"
-    title += f": {share:.1%} of the target"
     heading = f"{loaded.folder.resolve().name}: {title}"
     failure = draw_dents(loaded.folder, found, heading, path, eye, pixels)
     if failure:

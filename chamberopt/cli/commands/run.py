@@ -126,7 +126,7 @@ def _result_lines(result: StudyResult) -> list[str]:
     if study.objective.pareto:
         names = " and ".join(study.objective.pareto)
         lines += [f"the Pareto front of {names}: pareto.csv, pareto.png", ""]
-    replicas, seconds = len(best.evaluation.replicas), study.design.process.recorded_time
+    replicas, seconds = best.evaluation.replicas, study.design.process.recorded_time
     effort = console.replicas_text(study.at_search_accuracy(study.design))
     return [
         *lines,

@@ -57,7 +57,7 @@ def metric_label(name: str) -> Label:
     metric = METRICS.get(name)
     if metric is None:
         return Label(name.replace("_", " "))
-    if metric.of_coverage:
+    if metric.highest <= 1.0:
         return Label(metric.summary, "%", 100.0)
     return Label(metric.summary, "" if metric.unit == "balls" else metric.unit)  # "number of balls"
 

@@ -10,8 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
-from functools import reduce
-from operator import add
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,11 +18,7 @@ from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import core_count, share
 from chamberopt.common.progress import Progress
-from chamberopt.coverage.coverage_from_impacts import Tally, mean_speed_per_triangle, tally_impacts
-from chamberopt.coverage.dent_marking import first_marked_times, marked_share, sample_points
-from chamberopt.coverage.dents import Dents, dents_on_part
-from chamberopt.coverage.metrics import target_coverage
-from chamberopt.design.process import MAX_SIMULATED_TREATMENT
+from chamberopt.coverage.dents import Dents, dent_diameters, dents_on_part
 from chamberopt.output.resimulate.rebuild import REMEDY, RebuiltChamber, RebuiltReplica, made_by
 from chamberopt.output.vtp_files import COVERAGE, read_surface
 from chamberopt.simulation.replicas import run_in_order, simulate_seed
@@ -34,6 +28,7 @@ if TYPE_CHECKING:
     from chamberopt.output.results.load import Result
     from sim_core import ImpactLog
 
+MAX_SIMULATED_TREATMENT = 600.0  # s; a dent map of more takes minutes to compute
 MAX_IMPACTS_IN_MEMORY = 4e6  # of all replicas being simulated; each takes about 200 bytes
 
 
@@ -70,8 +65,8 @@ def simulate_impacts(
         progress: called after each replica.
 
     Raises:
-        InputError: after the last of all replicas, unless they gave the result's dents, impacts and
-            speeds on every triangle to the last bit. Fewer replicas cannot be compared.
+        InputError: after the last of all replicas, unless they gave the result's dents and impacts
+            on every triangle. Fewer replicas cannot be compared.
     """
     design, chamber = result.design, rebuilt.chamber
     count = replica_count(result, replicas)
@@ -79,17 +74,17 @@ def simulate_impacts(
     setting = share(executor, (design, chamber, rebuilt.cavity or chamber_mesh(chamber)))
     ahead = _replicas_ahead(result)
     logs = run_in_order(_impact_log, setting, seed, executor, stream, range(count), ahead)
-    tallies = []
+    impacts, dents = np.zeros((2, len(chamber.part.triangles)), dtype=np.int64)
     for number, log in enumerate(logs):
-        counted = tally_impacts(log, chamber, design)
-        tallies.append(
-            replace(counted, dent_triangle=np.zeros(0, dtype=np.int32), dent_area=np.zeros(0))
-        )
-        yield _on_part(number, log, chamber)
+        one = _on_part(number, log, chamber)
+        dented = dent_diameters(one.log, design) > 0.0
+        impacts += np.bincount(one.part_triangle, minlength=len(impacts))
+        dents += np.bincount(one.part_triangle[dented], minlength=len(dents))
+        yield one
         if progress:
             progress(number + 1, count, None)
     if count == result.data["replicas"]:
-        _require_same_figures(result, reduce(add, tallies))
+        _require_same_figures(result, {"impacts": impacts, "dents": dents})
 
 
 def replica_count(result: Result, replicas: int | None) -> int:
@@ -118,19 +113,6 @@ def simulate_dents(replica: RebuiltReplica, time: float) -> Dents:
     return dents_on_part(replica.on_chamber(impacts), replica.chamber, replica.design)
 
 
-def dented_share(dents: Dents, chamber: Chamber, spacing: float) -> float:
-    """Share of the target inside dents; what lies outside the cavity counts as not peened.
-
-    spacing: of the sample points on the surface [m].
-    """
-    samples = sample_points(chamber, spacing)
-    first = first_marked_times(samples, dents)
-    end = dents.time.max(initial=0.0)
-    marked = marked_share(samples, first, end, len(chamber.part.triangles))
-    coverage, weight = target_coverage(marked, chamber)
-    return float(coverage @ weight)
-
-
 def _replicas_ahead(result: Result) -> int:
     """Replicas to begin before the one that is yielded: one a core, unless their logs are long."""
     surface, seconds = read_surface(result.folder / COVERAGE), result.design.process.treatment_time
@@ -153,13 +135,8 @@ def _on_part(number: int, log: ImpactLog, chamber: Chamber) -> ReplicaImpacts:
     return ReplicaImpacts(number, log, source)
 
 
-def _require_same_figures(result: Result, total: Tally) -> None:
+def _require_same_figures(result: Result, simulated: dict[str, np.ndarray]) -> None:
     surface = read_surface(result.folder / COVERAGE)
-    simulated = {
-        "dents": total.dents,
-        "impacts": total.impacts,
-        "mean_normal_speed": mean_speed_per_triangle(total),
-    }
     for name, values in simulated.items():
         if name not in surface.array_names:
             continue

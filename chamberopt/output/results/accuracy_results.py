@@ -16,7 +16,7 @@ from chamberopt.simulation.convergence.parameters import FACETS, setting_text, s
 from chamberopt.simulation.convergence.recommendation import ACCURACIES, recommend
 from chamberopt.simulation.convergence.study import ConvergenceStudy
 
-FORMAT = 2
+FORMAT = 3
 
 
 def write_accuracy_results(folder: Path, study: ConvergenceStudy) -> None:
@@ -31,7 +31,7 @@ def write_accuracy_results(folder: Path, study: ConvergenceStudy) -> None:
 def rows(study: ConvergenceStudy) -> list[dict[str, Any]]:
     """One row a run and a batch size, with the same columns; None where a column does not apply."""
     runs = []
-    for run in (study.reference, *study.runs, *study.models):
+    for run in (study.reference, *study.runs):
         row: dict[str, Any] = {
             "parameter": run.parameter,
             "setting": run.setting,
@@ -80,15 +80,10 @@ def accuracy_text(study: ConvergenceStudy) -> list[str]:
         f"{'parameter':24}{'setting':>24}{'CPU s a replica':>19}"
         f"{'bias of objective':>21}{'of mean coverage':>21}",
     ]
-    for run in (*study.runs, *study.models):
+    for run in study.runs:
         cpu = f"{run.cpu.value:.3f} ± {run.cpu.half_width:.3f}"
         biases = "".join(f"{_signed(bias):>21}" for bias in (run.bias, run.mean_bias))
         lines.append(f"{short_name(run.parameter):24}{run.setting:>24}{cpu:>19}{biases}")
-    if study.models:
-        lines.append(
-            f"the last {len(study.models)}: from the same impacts of {study.model_time:.3g} s of "
-            "treatment"
-        )
     for accuracy in ACCURACIES:
         lines += ["", *recommend(study, accuracy).lines]
     return [
@@ -123,7 +118,6 @@ def accuracy_json(study: ConvergenceStudy) -> dict[str, Any]:
             "high": min(high, 1e9),  # JSON has no infinity
             "text": describe_error_law(study),
         },
-        "dent_time_s": study.model_time,
         "recommendations": recommendations,
         "cpu_s": study.cpu_s,
         "wall_s": study.wall_s,
@@ -156,13 +150,13 @@ def describe_error_law(study: ConvergenceStudy) -> str:
     """The cost of halving the error, and the reason if it is not 4."""
     law, sizes = study.law, study.sizes
     middle, low, high = law.halving
-    merged = [str(size.replicas) for size in sizes if size.are_merged]
-    left_out = len(merged) <= len(sizes) - 2
+    unresolved = [str(size.replicas) for size in sizes if not size.is_resolved]
+    left_out = len(unresolved) <= len(sizes) - 2
     reason = "as independent replicas should: 4"
     if high < 4.0:
         reason = "less than the 4 of independent replicas"
         if not left_out:
-            reason += ", because triangles are merged where dents are few, and more replicas end it"
+            reason += ", because the windows have too few dents, and more replicas end it"
     elif low > 4.0:
         estimating = 1.0 - sizes[-1].replicas * study.reference.cpu.value / sizes[-1].cpu_s
         reason = (
@@ -174,9 +168,9 @@ def describe_error_law(study: ConvergenceStudy) -> str:
         f"({low:.2f} to {high:.2f}), {reason} "
         f"(error ~ cost^-{law.power:.2f} ± {law.half_width:.2f})"
     )
-    if merged and left_out:
+    if unresolved and left_out:
         text += (
-            f"; {', '.join(merged)} replicas are left out, because triangles are merged where "
-            "dents are few"
+            f"; {', '.join(unresolved)} replicas are left out, because their windows have too few "
+            "dents"
         )
     return text

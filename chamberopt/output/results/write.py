@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from chamberopt.common.files import write_text
 from chamberopt.common.versions import versions
 from chamberopt.coverage.metrics import METRICS, exposed_target
-from chamberopt.coverage.part_impacts import HITS_FILE, save_hits
+from chamberopt.coverage.part_impacts import HITS_FILE, save_hits, sort_hits_by_triangle
 from chamberopt.design.load import Design, save_design, with_paths_from
 from chamberopt.optimize import pareto
 from chamberopt.optimize.storage.study_folder import RESULT
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from chamberopt.optimize.run_study import StudyResult
     from chamberopt.optimize.run_sweep import SweepResult
     from chamberopt.simulation.effect_pilot import Advice
+    from chamberopt.simulation.evaluation import Evaluation
 
 
 def write_simulation(folder: Path, candidate: CandidateResult) -> dict[str, Any]:
@@ -107,14 +109,10 @@ def write_result(
 def _write_candidate(folder: Path, candidate: CandidateResult) -> dict[str, Any]:
     """Write the surfaces and impacts of one candidate; return its part of result.json."""
     design, chamber, evaluation = candidate.design, candidate.chamber, candidate.evaluation
-    write_coverage(
-        folder / COVERAGE,
-        chamber,
-        candidate.triangle_fields,
-        design.process.accuracy.coverage_model,
+    write_coverage(folder / COVERAGE, chamber, candidate.element_values)
+    save_hits(
+        folder / HITS_FILE, sort_hits_by_triangle(evaluation.hits, len(chamber.part.triangles))
     )
-    if evaluation.hits_by_triangle is not None:
-        save_hits(folder / HITS_FILE, evaluation.hits_by_triangle)
     write_chamber(folder, chamber)
     target = exposed_target(chamber)
     return {
@@ -125,13 +123,14 @@ def _write_candidate(folder: Path, candidate: CandidateResult) -> dict[str, Any]
             name: _with_unit(value, METRICS[name].unit)
             for name, value in evaluation.metrics.items()
         },
+        "field": _about_field(design, evaluation),
         "coverage_against_time": candidate.time_curve,
         "seed": design.process.seed,
         "stream": evaluation.stream,
-        "replicas": len(evaluation.replicas),
+        "replicas": evaluation.replicas,
         "stopped_by": evaluation.stopped_by,
         "analytic": evaluation.analytic,
-        "simulated_time_s": evaluation.total.simulated_time,
+        "simulated_time_s": evaluation.simulated_time,
         "collisions": evaluation.collisions,
         "timings_s": {step: round(seconds, 3) for step, seconds in evaluation.timings.items()},
         "chamber": {
@@ -148,6 +147,35 @@ def _write_candidate(folder: Path, candidate: CandidateResult) -> dict[str, Any]
     }
 
 
+def _about_field(design: Design, evaluation: Evaluation) -> dict[str, Any]:
+    """The windows that the figures of coverage belong to, and the figures of twice the radius."""
+    found = evaluation.resolution
+    return {
+        "gauge_mm2": design.process.accuracy.gauge_mm2,
+        "points": design.process.accuracy.points,
+        "dents_in_median_window": found.dents,
+        "dents_needed": {
+            "mean_and_std": found.needed_for_mean,
+            "p05_times_intensity": found.needed_for_places,
+        },
+        "simulated_s_needed": {
+            "mean_and_std": _number(found.time_for(found.needed_for_mean)),
+            "p05_times_intensity": _number(found.time_for(found.needed_for_places)),
+        },
+        "reachable_share": evaluation.reachable,
+        "crease_share": evaluation.crease_share,
+        "double_gauge": {
+            name: _with_unit(value, METRICS[name].unit)
+            for name, value in evaluation.metrics_of_wide.items()
+        },
+    }
+
+
+def _number(value: float) -> float | None:
+    """None in the place of infinity, which JSON does not have."""
+    return value if math.isfinite(value) else None
+
+
 def _about_study(result: StudyResult) -> dict[str, Any]:
     search = [trial for trial in result.trials if trial.stage == "search"]
     return {
@@ -159,7 +187,7 @@ def _about_study(result: StudyResult) -> dict[str, Any]:
                 result.study.design
             ).process.accuracy.model_dump(exclude_none=True),
             "confirm": result.study.design.process.accuracy.model_dump(exclude_none=True)
-            | {"replicas": len(result.best.evaluation.replicas)},
+            | {"replicas": result.best.evaluation.replicas},
         },
         "failed": sum(trial.objective is None for trial in search),
         "missing_a_constraint": sum(

@@ -31,8 +31,7 @@ class BatchSize:
     rms: float  # root mean square error of the objective
     half_width: float  # mean half-width of the intervals that the batches themselves estimate
     cpu_s: float  # of a batch, simulation and estimate
-    # Whether some batches had so few dents that triangles were merged, which causes errors too.
-    are_merged: bool = False
+    is_resolved: bool = True  # whether all batches had enough dents for their figures
 
     @property
     def error(self) -> float:
@@ -85,12 +84,12 @@ def rms_interval(rms: float, batches: int) -> tuple[float, float]:
 
 
 def fit_error_law(sizes: Sequence[BatchSize]) -> ErrorLaw:
-    """Weighted least squares in logarithms, from sizes without merged triangles if two have none.
+    """Weighted least squares in logarithms, from the sizes that are resolved if there are two.
 
     The logarithm of an RMS error of m batches has the standard deviation 1 / sqrt(2 (m - 1)).
     """
-    unmerged = [size for size in sizes if not size.are_merged]
-    sizes = unmerged if len(unmerged) > 1 else sizes
+    resolved = [size for size in sizes if size.is_resolved]
+    sizes = resolved if len(resolved) > 1 else sizes
     (slope, intercept), covariance = np.polyfit(
         np.log([size.cpu_s for size in sizes]),
         np.log([size.error for size in sizes]),

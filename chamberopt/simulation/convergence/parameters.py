@@ -7,12 +7,13 @@ from collections.abc import Iterable
 from typing import Any
 
 from chamberopt.design.design import Design
+from chamberopt.design.process import MAX_POINTS, MIN_POINTS
 
 FACETS, MOTION = "chamber.facets", "sonotrode.motion"
 TIME, WARM_UP = "process.accuracy.simulated_time_s", "process.accuracy.warmup_time_s"
 ELASTIC_SPEED = "process.accuracy.elastic_below_mm_s"
 DRAG_STEP = "process.accuracy.drag_step_ms"
-MODEL = "process.accuracy.coverage_model"
+POINTS, GAUGE = "process.accuracy.points", "process.accuracy.gauge_mm2"
 REFERENCE, DESIGNED = "reference", "as designed"
 
 
@@ -30,6 +31,10 @@ def numerical_parameters(design: Design) -> dict[str, tuple[Any, ...]]:
     settings[ELASTIC_SPEED] = _falling(accuracy.elastic_below_mm_s, 10)
     if design.effects.drag:
         settings[DRAG_STEP] = _falling(accuracy.drag_step_ms, 4)
+    points = accuracy.points
+    settings[POINTS] = sorted({max(MIN_POINTS, points // 4), points, min(MAX_POINTS, 4 * points)})
+    gauge = accuracy.gauge_mm2
+    settings[GAUGE] = min(1e4, 4 * gauge), gauge
     settings[TIME] = max(1e-4, time_s / 4), min(1e4, 4 * time_s), time_s
     return {name: tuple(values) for name, values in settings.items()}
 
@@ -46,16 +51,15 @@ def study_designs(design: Design) -> tuple[dict[str, Any], dict[tuple[str, str],
         The reference's settings by parameter, and the designs by parameter and setting: the
         reference, one for each other setting of each parameter, and the design as it is.
     """
-    own = design.changed({MODEL: "avrami"})
-    parameters = numerical_parameters(own)
+    parameters = numerical_parameters(design)
     settings = {name: values[-1] for name, values in parameters.items()}
-    reference = own.changed(settings)
+    reference = design.changed(settings)
     others = {
         (name, setting_text(value)): reference.changed({name: value})
         for name, values in parameters.items()
         for value in values[:-1]
     }
-    return settings, {(REFERENCE, ""): reference, **others, (DESIGNED, ""): own}
+    return settings, {(REFERENCE, ""): reference, **others, (DESIGNED, ""): design}
 
 
 def setting_text(value: Any) -> str:
@@ -65,4 +69,4 @@ def setting_text(value: Any) -> str:
 
 def short_name(parameter: str) -> str:
     """The key of a parameter without table and unit."""
-    return re.sub("_(mm_s|ms|s)$", "", parameter.rsplit(".", 1)[-1]).replace("_", " ")
+    return re.sub("_(mm_s|mm2|ms|s)$", "", parameter.rsplit(".", 1)[-1]).replace("_", " ")

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from chamberopt.common.estimate import student_quantile
-from chamberopt.simulation.convergence.parameters import REFERENCE, TIME, WARM_UP, setting_text
+from chamberopt.simulation.convergence.parameters import (
+    GAUGE,
+    REFERENCE,
+    TIME,
+    WARM_UP,
+    setting_text,
+)
 from chamberopt.simulation.convergence.study import ConvergenceStudy
 
 ACCURACIES = (0.05, 0.01, 0.001)  # half-width of the objective, absolute
@@ -61,7 +66,7 @@ def recommend(study: ConvergenceStudy, accuracy: float) -> Recommendation:
     reference = study.reference.cpu.value
     factor, warm_up_saving = 1.0, 0.0
     for name in settings:
-        if name == TIME:
+        if name in (TIME, GAUGE):  # the gauge is what is measured, not how well
             continue
         # Cheaper than the reference by more than the intervals.
         tried = [run for run in study.runs if run.parameter == name]
@@ -76,7 +81,6 @@ def recommend(study: ConvergenceStudy, accuracy: float) -> Recommendation:
         elif not all(run.is_biased for run in cheaper):
             text = "cheaper settings may do, but their bias is not known well enough"
             remarks.append(f"{name}: {text}; raise --budget-s")
-    remarks += _model_remarks(study, accuracy)
     options = []
     for run in (study.reference, *study.runs):
         if run.parameter in (REFERENCE, TIME):
@@ -94,7 +98,7 @@ def replicas_for(study: ConvergenceStudy, accuracy: float, seconds: float) -> in
     """Number of replicas of this simulated time whose interval is within the accuracy.
 
     Their variance is proportional to 1/seconds. With few replicas the intervals are wider than
-    that, because triangles are merged; so the intervals of the batches count as well.
+    that; so the intervals of the batches count as well.
     """
     time_ratio = float(study.settings[TIME]) / seconds
     variance = np.var(study.reference.objective.pseudovalues, ddof=1) * time_ratio
@@ -109,28 +113,3 @@ def replicas_for(study: ConvergenceStudy, accuracy: float, seconds: float) -> in
     logs = [math.log(size.replicas) for size in sizes]
     batch = math.exp(np.interp(-math.log(accuracy), negative_logs, logs))
     return max(needed, math.ceil(round(batch * time_ratio, 6)))
-
-
-def _model_remarks(study: ConvergenceStudy, accuracy: float) -> Iterator[str]:
-    """Whether dent rates are accurate enough, by the mean coverage.
-
-    The spread over the part is another quantity where single dents are marked.
-    """
-    if not study.models:
-        why = "process.accuracy.sample_mm takes too many points; raise it"
-        yield f"marked dents were not tried, because {why}"
-        return
-    # The last one has no bias, because it is the reference.
-    largest = BIAS_SHARE * accuracy
-    rates = study.models[0].mean_bias
-    biases = ((run, run.mean_bias) for run in study.models)
-    good = [run for run, bias in biases if -largest <= bias.low and bias.high <= largest]
-    if good[0] is study.models[0]:
-        return
-    cheapest = min(good, key=lambda run: run.cpu.value)
-    yield (
-        f"dent rates differ by {rates.value:+.4f} ± {rates.half_width:.2g} in "
-        f"mean coverage from marked dents after {study.model_time:.3g} s; to mark them: "
-        f'coverage_model = "dents", sample_mm = {cheapest.setting.split()[-1]}, '
-        f"{cheapest.cpu.value / study.model_time:.2g} CPU seconds a replica and second of treatment"
-    )

@@ -1,0 +1,108 @@
+"""Windows along creases: points that dents on a crease reach, and the lengths of their windows."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from chamberopt.coverage.field.surface_points import ball_fits
+
+if TYPE_CHECKING:
+    from chamberopt.coverage.field.smooth_faces import Creases
+    from chamberopt.coverage.field.windows import Places, Windows
+    from sim_core import TriangleMesh
+
+# Radii of a window. A dent takes more of a line than of an area: along creases the windows are
+# longer, so that as many dents are in them.
+CREASE_LENGTH = 3.0
+PIECES_PER_WINDOW = 32  # of a crease, by which its length is measured
+
+
+class CreasePieces(NamedTuple):
+    """Short pieces of creases that a ball can touch: their places on lines, edges and lengths."""
+
+    places: Places
+    edge: np.ndarray
+    length: np.ndarray
+
+
+def crease_pieces(
+    creases: Creases, mesh: TriangleMesh, ball_radius: float, radius: float
+) -> CreasePieces:
+    """Divide creases into pieces and keep those that a ball can touch.
+
+    Args:
+        mesh: of the chamber.
+        ball_radius: [m].
+        radius: of the windows [m].
+    """
+    from chamberopt.coverage.field.windows import Places
+
+    start, end = creases.ends[:, 0], creases.ends[:, 1]
+    length = np.linalg.norm(end - start, axis=1)
+    count = np.maximum(
+        1, np.ceil(length / (2.0 * CREASE_LENGTH * radius) * PIECES_PER_WINDOW)
+    ).astype(int)
+    edge = np.repeat(np.arange(len(count)), count)
+    number = np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)
+    place = start[edge] + ((number + 0.5) / count[edge])[:, None] * (end - start)[edge]
+    fits = ball_fits(mesh, place, creases.outward[edge], ball_radius)
+    edge, place = edge[fits], place[fits]
+    lines = Places(place, np.zeros((len(place), 3)), creases.line[edge])
+    return CreasePieces(lines, edge, (length / count)[edge])
+
+
+class CreaseBand(NamedTuple):
+    """Points near creases, a row for each point and each line that it is near.
+
+    Attributes:
+        point: index of the point, shape (b,).
+        height: distance from the crease [m], shape (b,).
+        length: of the crease in the window round the point's foot on it [m], shape (b,).
+        windows: along the lines, round the feet.
+    """
+
+    point: np.ndarray
+    height: np.ndarray
+    length: np.ndarray
+    windows: Windows
+
+
+def find_band(
+    windows: Windows, creases: Creases, pieces: CreasePieces, dent_radius: float
+) -> CreaseBand | None:
+    """The points that dents on creases reach, with radii of at most dent_radius [m]."""
+    from scipy.spatial import cKDTree
+
+    from chamberopt.coverage.field.windows import Places, Windows
+
+    points = windows.points
+    if not len(pieces.edge) or not len(points.place):
+        return None
+    far = dent_radius + 0.5 * float(pieces.length.max())
+    near = cKDTree(points.place).sparse_distance_matrix(
+        cKDTree(pieces.places.place), far, output_type="ndarray"
+    )
+    point, edge = near["i"], pieces.edge[near["j"]]
+    beside = (creases.faces[edge] == points.face[point][:, None]).any(axis=1)
+    point, edge = np.unique(np.column_stack([point, edge])[beside], axis=0).T
+    start, end = creases.ends[edge, 0], creases.ends[edge, 1]
+    along = end - start
+    share = ((points.place[point] - start) * along).sum(axis=1) / (along**2).sum(axis=1)
+    foot = start + np.clip(share, 0.0, 1.0)[:, None] * along
+    height = np.linalg.norm(points.place[point] - foot, axis=1)
+    # Of several edges of one line the nearest counts.
+    order = np.lexsort([height, creases.line[edge], point])
+    key = np.column_stack([point, creases.line[edge]])[order]
+    first = np.ones(len(key), dtype=bool)
+    first[1:] = (key[1:] != key[:-1]).any(axis=1)
+    rows = order[first]
+    rows = rows[height[rows] < dent_radius]
+    if not len(rows):
+        return None
+    line = creases.line[edge[rows]]
+    feet = Places(foot[rows], np.zeros((len(rows), 3)), line)
+    round_feet = Windows(feet, CREASE_LENGTH * windows.radius)
+    length = round_feet.sums(pieces.places, pieces.length)
+    return CreaseBand(point[rows], height[rows], np.maximum(length, dent_radius), round_feet)

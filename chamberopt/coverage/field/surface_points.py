@@ -1,0 +1,110 @@
+"""Points spread evenly over a surface, and whether a ball can touch it there."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from chamberopt.geometry.triangles import unit_normals
+
+if TYPE_CHECKING:
+    from sim_core import TriangleMesh
+
+PLASTIC_NUMBER = 1.32471795724474602596  # real root of x³ = x + 1
+# Share of its radius that a ball may reach into a surface, as in chamber/reach.
+OVERLAP = 0.01
+
+
+class SurfacePoints(NamedTuple):
+    """Points spread evenly over some triangles.
+
+    Attributes:
+        place: [m], shape (p, 3).
+        normal: unit vectors out of the part, shape (p, 3).
+        triangle: shape (p,).
+    """
+
+    place: np.ndarray
+    normal: np.ndarray
+    triangle: np.ndarray
+
+
+def spread_points(
+    vertices: np.ndarray, triangles: np.ndarray, area: np.ndarray, count: int
+) -> SurfacePoints:
+    """Spread points evenly over the triangles that have an area, the same ones every time.
+
+    The triangles are taken along a Morton curve through space, and every 1/count of their area
+    gets a point. Within a triangle the points follow the additive recurrence of the plastic number.
+
+    Args:
+        area: of the triangles [m²], shape (m,); 0 where no points are wanted.
+
+    Sources: G. M. Morton, "A computer oriented geodetic data base", IBM 1966. M. Roberts, "The
+    unreasonable effectiveness of quasirandom sequences", 2018.
+    """
+    chosen = np.flatnonzero(area > 0.0)
+    chosen = chosen[np.argsort(_morton(vertices[triangles[chosen]].mean(axis=1)), kind="stable")]
+    upto = np.cumsum(area[chosen])
+    owner = np.searchsorted(upto, (np.arange(count) + 0.5) / count * upto[-1])
+    triangle = chosen[np.minimum(owner, len(chosen) - 1)]
+    return _within(vertices, triangles, triangle, np.arange(count))
+
+
+def spread_within(
+    vertices: np.ndarray, triangles: np.ndarray, area: np.ndarray, share: float, most: int
+) -> SurfacePoints:
+    """Spread points over each triangle that has an area, at least one on each.
+
+    Args:
+        area: of the triangles [m²], shape (m,); 0 where no points are wanted.
+        share: area for each further point [m²].
+        most: limit of the number of further points.
+    """
+    share = max(share, float(area.sum()) / most)
+    count = np.where(area > 0.0, 1 + (area / share).astype(int), 0)
+    triangle = np.repeat(np.arange(len(area)), count)
+    number = np.arange(len(triangle)) - np.repeat(np.cumsum(count) - count, count)
+    return _within(vertices, triangles, triangle, number)
+
+
+def _within(
+    vertices: np.ndarray, triangles: np.ndarray, triangle: np.ndarray, number: np.ndarray
+) -> SurfacePoints:
+    """Points on triangles (p,) by their numbers (p,) in the sequence of the plastic number."""
+    # The first point is the middle of a triangle.
+    u, v = ((number / PLASTIC_NUMBER**power + 1.0 / 3.0) % 1.0 for power in (1, 2))
+    folded = u + v > 1.0
+    u, v = np.where(folded, 1.0 - u, u), np.where(folded, 1.0 - v, v)
+    a, b, c = (vertices[triangles[triangle, k]] for k in range(3))
+    place = a + u[:, None] * (b - a) + v[:, None] * (c - a)
+    return SurfacePoints(place, unit_normals(np.stack([a, b, c], axis=1)), triangle)
+
+
+def _morton(places: np.ndarray) -> np.ndarray:
+    """Position of places (n, 3) along a Morton curve: the bits of their coordinates in turn."""
+    low = places.min(axis=0)
+    cells = ((places - low) / max(float(np.ptp(places, axis=0).max()), 1e-12) * 1023).astype(int)
+    code = np.zeros(len(places), dtype=np.int64)
+    for bit in range(10):
+        for axis in range(3):
+            code |= ((cells[:, axis] >> bit) & 1) << (3 * bit + axis)
+    return code
+
+
+def ball_fits(
+    mesh: TriangleMesh, place: np.ndarray, normal: np.ndarray, radius: float
+) -> np.ndarray:
+    """Whether a ball fits at places on the surface of the cavity, (p,) bool.
+
+    Args:
+        mesh: the surface of the cavity.
+        place: [m], shape (p, 3); where they are not on the surface, no ball fits.
+        normal: unit vectors into the cavity, shape (p, 3).
+        radius: of the ball [m].
+    """
+    from sim_core import closest_points
+
+    found = closest_points(mesh, place + radius * normal, radius * (1.0 + 1e-6))
+    return (found.triangle >= 0) & (found.distance >= radius * (1.0 - OVERLAP))

@@ -1,1 +1,0 @@
-"""Estimators of a covered share and their confidence intervals."""

@@ -1,0 +1,201 @@
+"""Peening strength of a place, and how evenly it is spread over the target.
+
+Notation
+    d, D    diameters of a dent and of its ball [m]
+    s       strength of one impact, d² / D: eight times dent volume over dent area [m]
+    L(s)    dents of more than s in a window, as a rate: sum of their areas over the window's and
+            over the time [1/s]
+    h(t)    strength that a place has after a time t, each spot keeping its strongest dent [m]
+    T       saturation time: the largest for which h(2 T) = 1.1 h(T) [s]
+    S       peening strength, h(T) [m]
+
+    h(t) = integral over s of 1 - exp(-L(s) t)
+
+An Almen strip's arc height saturates like h, and 10 % more in twice the time is what SAE J443
+calls saturated. The arc height goes with d²/D as long as the strip's in-plane stretch, and not its
+yielding, limits it. For equal impacts h is the curve a (1 - exp(-b t)) of D. Kirk, "Almen
+saturation curve solver program", The Shot Peener, 2005. Intensity is S times a constant that a set
+of strips calibrates, here 1. The strip's hardness is part of it: all dents grow alike with it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from chamberopt.common.estimate import Estimate, estimate
+from chamberopt.coverage.coverage_intervals import jackknife, root_of_variance
+
+if TYPE_CHECKING:
+    from chamberopt.coverage.field.target_field import TargetField
+    from chamberopt.coverage.field.windows import Places, Windows
+    from chamberopt.coverage.part_impacts import Hits
+
+LEVELS = 32  # of s; twice as many change S by less than 0.3 %
+WINDOWS = 2_500  # of the target's; S varies little from one to the next
+SATURATED = 1.1  # SAE J443
+NEWTON_STEPS = 3  # S moves by a quarter of what the saturation time is wrong by
+HALVINGS = 40
+MIN_BATCHES = 3  # leave one out, and two are left to compare
+
+
+def impact_strength(hits: Hits, density: float) -> np.ndarray:
+    """Strength s of each impact [m], (k,); 0 where it leaves no dent.
+
+    Args:
+        density: of the balls [kg/m³].
+    """
+    speed = np.maximum(hits.speed.astype(float), 1e-12)
+    ball = (6.0 / np.pi * 2.0 * hits.energy / speed**2 / density) ** (1.0 / 3.0)
+    return np.asarray(hits.dent.astype(float) ** 2 / ball)
+
+
+def strength_histogram(
+    windows: Windows, area: np.ndarray, contacts: Places, dent: np.ndarray, level: np.ndarray
+) -> np.ndarray:
+    """Dented area over area of each window, by level of strength, (p, LEVELS).
+
+    Args:
+        area: of the windows [m²], (p,).
+        contacts: where the dents are.
+        dent: their diameters [m], (k,).
+        level: their levels, (k,).
+    """
+    points = len(area)
+    sums = np.zeros(points * LEVELS)
+    size = np.pi / 4.0 * dent**2
+    for point, contact in windows.pairs(contacts):
+        at = point.astype(np.int64) * LEVELS + level[contact]
+        sums += np.bincount(at, size[contact], len(sums))
+    return sums.reshape(points, LEVELS) / area[:, None]
+
+
+def saturated_strength(histogram: np.ndarray, highest: float) -> tuple[np.ndarray, np.ndarray]:
+    """S [m] and T, in units of the time of the dents, of each window, (p,); 0 where there are none.
+
+    Args:
+        histogram: dented area over area of each window by level, (p, LEVELS).
+        highest: strength at the upper end of the levels [m].
+    """
+    rate = _rates(histogram)
+    # Between these times lies T: where all dents are alike, ln 10 over their rate.
+    top = rate.max(axis=1)
+    some = top > 0.0
+    low = np.divide(0.1, top, out=np.zeros_like(top), where=some)
+    weakest = np.where(rate > 0.0, rate, np.inf).min(axis=1)
+    high = np.where(some, 5.0 / weakest, 0.0)
+    for _ in range(HALVINGS):
+        middle = np.sqrt(low * high)
+        grows = _gain(rate, middle)[0] > 0.0
+        low, high = np.where(grows, middle, low), np.where(grows, high, middle)
+    return _strength(rate, high, highest), high
+
+
+def strength_near(histogram: np.ndarray, highest: float, time: np.ndarray) -> np.ndarray:
+    """S [m] of each window (p,) where the saturation time is known to be near `time` (p,)."""
+    rate = _rates(histogram)
+    for _ in range(NEWTON_STEPS):
+        gain, slope = _gain(rate, time)
+        step = np.divide(gain, slope, out=np.zeros_like(gain), where=slope < 0.0)
+        time = np.clip(time - step, 0.5 * time, 2.0 * time)
+    return _strength(rate, time, highest)
+
+
+def _rates(histogram: np.ndarray) -> np.ndarray:
+    """Rate of dents stronger than the middle of each level, (p, LEVELS)."""
+    down = np.cumsum(histogram[:, ::-1], axis=1)[:, ::-1]
+    return np.asarray(down - 0.5 * histogram)
+
+
+def _gain(rate: np.ndarray, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """h(2 T) - 1.1 h(T), in levels, and its slope over T."""
+    left = np.exp(-rate * time[:, None])
+    gain = (1.0 - left**2).sum(axis=1) - SATURATED * (1.0 - left).sum(axis=1)
+    slope = (rate * (2.0 * left**2 - SATURATED * left)).sum(axis=1)
+    return gain, slope
+
+
+def _strength(rate: np.ndarray, time: np.ndarray, highest: float) -> np.ndarray:
+    return np.asarray(-np.expm1(-rate * time[:, None]).sum(axis=1) * highest / LEVELS)
+
+
+def intensity_uniformity(
+    field: TargetField, replicas: Sequence[Sequence[Hits]], density: float
+) -> Estimate:
+    """Estimate 1 - (standard deviation of S) / (mean of S) over the target: 1 is even.
+
+    A place out of reach has S = 0. The pseudo-values of S in each window scatter by what counts
+    scatter, but independently from one batch of replicas to another. So the mean of their products
+    over all pairs of batches has the true mean square for its mean, without what scatter adds.
+
+    Args:
+        replicas: impacts of the replicas of each batch.
+        density: of the balls [kg/m³].
+    """
+    from chamberopt.coverage.field.windows import Windows
+
+    gauge = field.gauge
+    rows = np.linspace(0, len(gauge.area) - 1, min(WINDOWS, len(gauge.area))).astype(int)
+    windows = Windows(gauge.windows.points.select(rows), gauge.windows.radius)
+    area = gauge.area[rows]
+    of_hits = [[impact_strength(hits, density) for hits in batch] for batch in replicas]
+    highest = max(float(s.max(initial=0.0)) for batch in of_hits for s in batch)
+    if highest == 0.0:
+        return estimate(np.zeros(len(replicas)), highest=1.0)
+    parts = np.zeros((len(replicas), len(rows), LEVELS))
+    for number, (batch, strengths) in enumerate(zip(replicas, of_hits, strict=True)):
+        for hits, s in zip(batch, strengths, strict=True):
+            dents = np.flatnonzero(s > 0.0)
+            level = np.minimum(LEVELS * s[dents] / highest, LEVELS - 1).astype(np.int64)
+            contacts = field.places_of(hits, dents)
+            parts[number] += strength_histogram(
+                windows, area, contacts, hits.dent[dents].astype(float), level
+            )
+    return uniformity_of(parts, highest, field.reachable)
+
+
+def uniformity_of(parts: np.ndarray, highest: float, reachable: float) -> Estimate:
+    """The uniformity from histograms of batches, (g, p, LEVELS), by the delete-one jackknife."""
+    batches, whole = len(parts), parts.sum(axis=0)
+    strength, time = saturated_strength(whole, highest)
+    values = np.array(
+        [
+            batches * strength - (batches - 1) * strength_near(whole - part, highest, time)
+            for part in parts
+        ]
+    )
+    if batches == 1:
+        values = strength[None]
+    squares, means = values @ values.T / values.shape[1], values.mean(axis=1)
+    everything = _relative_variance(squares, means, reachable)
+    if batches < MIN_BATCHES:
+        value = 1.0 - math.sqrt(max(0.0, everything))
+        return Estimate(value, math.inf, (value,) * batches)
+    without = [
+        _relative_variance(squares[np.ix_(rest, rest)], means[rest], reachable)
+        for rest in ~np.eye(batches, dtype=bool)
+    ]
+    spread = root_of_variance(estimate(jackknife(np.array([everything, *without])), 0.0))
+    return estimate(1.0 - np.array(spread.pseudovalues), highest=1.0)
+
+
+def _relative_variance(squares: np.ndarray, means: np.ndarray, reachable: float) -> float:
+    """Variance of S over the target over the square of its mean.
+
+    Args:
+        squares: means over the windows of products of two batches, (g, g).
+        means: of the batches, (g,).
+    """
+    batches, mean = len(means), float(means.mean())
+    if mean <= 0.0:
+        return 1.0
+    pairs = max(batches * (batches - 1), 1)
+    if batches == 1:
+        square, square_of_mean = float(squares[0, 0]), mean**2
+    else:
+        square = float(squares.sum() - np.trace(squares)) / pairs
+        square_of_mean = float(means.sum() ** 2 - (means**2).sum()) / pairs
+    return (reachable * square - reachable**2 * square_of_mean) / (reachable * mean) ** 2

@@ -1,0 +1,251 @@
+"""What is known at places of the part, in windows round them, and of each of its triangles.
+
+Notation
+    x   dent density of a window at the treatment time: expected dents, by their share of it
+    y   x of the simulated dents, sum of k w_j; v the sum of (k w_j)², see coverage_intervals.py
+    C   coverage, 1 - exp(-x)
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from chamberopt.chamber.scene import chamber_mesh
+from chamberopt.common.estimate import CONFIDENCE
+from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density, find_footprints
+from chamberopt.coverage.coverage_intervals import DENTS_FOR_PLACES
+from chamberopt.coverage.field.surface_points import ball_fits, spread_within
+from chamberopt.coverage.field.target_field import Gauge, with_whole_part
+from chamberopt.coverage.strength import (
+    LEVELS,
+    impact_strength,
+    saturated_strength,
+    strength_histogram,
+)
+from chamberopt.simulation.evaluate import prepare_target
+
+if TYPE_CHECKING:
+    from chamberopt.chamber.build import Chamber
+    from chamberopt.coverage.field.windows import Places
+    from chamberopt.design.load import Design
+    from chamberopt.simulation.evaluation import Evaluation
+
+POINTS_PER_WINDOW = 4  # by which a triangle's own values are measured, one at least
+MAX_POINTS = 300_000
+HIGH_SPEED = 0.9  # share of the impacts that are not faster than p90_normal_speed
+
+
+class PartField:
+    """The impacts of an evaluation, in windows round any places of the part."""
+
+    def __init__(self, design: Design, chamber: Chamber, evaluation: Evaluation) -> None:
+        self._design, self._chamber = design, chamber
+        self._mesh = chamber_mesh(chamber)
+        self.target = prepare_target(design, chamber, self._mesh)
+        self.field = with_whole_part(self.target, chamber, self._mesh)
+        self._hits = evaluation.hits
+        # Treatment time over simulated time.
+        self._scale = design.process.treatment_time / evaluation.simulated_time
+
+    def reachable(self, places: Places) -> np.ndarray:
+        """Whether a ball fits at each place, (p,) bool."""
+        return ball_fits(
+            self._mesh, places.place, places.normal, 0.5 * min(self._design.shot.diameters)
+        )
+
+    def coverage(self, places: Places) -> np.ndarray:
+        """Coverage at the treatment time in the window round each place, (p,); 0 out of reach."""
+        gauge = self.field.gauge_round(places, self.field.radius)
+        coverage = coverage_from_dent_density(self._dents(gauge)["dent_density"])
+        return np.where(self.reachable(places), coverage, 0.0)
+
+    def values(self, places: Places) -> dict[str, np.ndarray]:
+        """Everything that is known in the windows round some places.
+
+        Returns:
+            Arrays (p,) by name; NaN where nothing was hit, and but for the first two out of reach.
+
+            coverage: at the treatment time, 0..1; 0 out of reach.
+            reachable: 1 where a ball fits, else 0.
+            dent_density: x.
+            coverage_interval: width of the 95 % interval of the coverage.
+            dents_in_window: simulated dents.
+            resolved: 1 where they are enough for the coverage of a single place, else 0.
+            impacts_per_mm2, energy_per_mm2: impacts and energy [mJ] at the treatment time.
+            mean_normal_speed, p90_normal_speed: mean and 90th percentile [m/s].
+            mean_angle_deg: mean angle of the impacts [degrees]; 90 is head on.
+            mean_dent_um: mean diameter of the dents [µm].
+            strength_um: peening strength S [µm], see coverage/strength.py.
+        """
+        gauge = self.field.gauge_round(places, self.field.radius)
+        fits = self.reachable(places) & np.isfinite(gauge.area)
+        found = self._dents(gauge) | self._impacts(gauge)
+        known = {name: np.where(fits, column, np.nan) for name, column in found.items()}
+        coverage = coverage_from_dent_density(found["dent_density"])
+        enough = fits & (found["dents_in_window"] >= DENTS_FOR_PLACES)
+        return {
+            "coverage": np.where(fits, coverage, 0.0),
+            "reachable": fits.astype(float),
+            **known,
+            "resolved": enough.astype(float),
+        }
+
+    def element_values(self) -> dict[str, np.ndarray]:
+        """Means of the values over each triangle of the part, and what is its own.
+
+        Returns:
+            Arrays (m,) by name: those of `values`, NaN where the triangle is not exposed, and
+
+            impacts, dents: simulated numbers on the triangle itself.
+            exposed_area_mm2, reachable_area_mm2: its areas in the cavity, and where a ball fits.
+            target, element: of the triangle; its number in the part's file.
+        """
+        from chamberopt.coverage.field.windows import Places
+
+        part, exposed = self._chamber.part, self._chamber.exposed_area > 0.0
+        count = len(part.triangles)
+        spread = spread_within(
+            part.vertices,
+            part.triangles,
+            np.where(exposed, part.area, 0.0),
+            self.field.setting.gauge / POINTS_PER_WINDOW,
+            MAX_POINTS,
+        )
+        owner = spread.triangle
+        values = self.values(Places(spread.place, spread.normal, self.field.face[owner]))
+        points = np.bincount(owner, minlength=count)
+        means = {}
+        for name, column in values.items():
+            known = ~np.isnan(column)
+            sums = np.bincount(owner[known], column[known], count)
+            there = np.bincount(owner[known], minlength=count)
+            means[name] = np.divide(sums, there, out=np.full(count, np.nan), where=there > 0)
+        on = [np.bincount(hits.triangle, minlength=count) for hits in self._hits]
+        dents = [
+            np.bincount(hits.triangle[hits.dent > 0.0], minlength=count) for hits in self._hits
+        ]
+        reached = np.divide(
+            np.bincount(owner, values["reachable"], count), points, out=np.zeros(count),
+            where=points > 0,
+        )  # fmt: skip
+        return means | {
+            "impacts": np.sum(on, axis=0),
+            "dents": np.sum(dents, axis=0),
+            "exposed_area_mm2": self._chamber.exposed_area * 1e6,
+            "reachable_area_mm2": reached * part.area * 1e6,
+            "target": part.target.astype(np.uint8),
+            "element": part.elements,
+        }
+
+    def _dents(self, gauge: Gauge) -> dict[str, np.ndarray]:
+        """Coverage and its interval, by the footprints of the dents."""
+        points = len(gauge.area)
+        share, squares, dents = np.zeros((3, points))
+        largest = 0.0
+        for hits in self._hits:
+            found = find_footprints(self.field, gauge, hits)
+            share += np.bincount(found.point, found.weight, points)
+            squares += np.bincount(found.point, found.weight**2, points)
+            dents += np.bincount(found.point, minlength=points)
+            largest = max(largest, float(hits.dent.max(initial=0.0)))
+        one_more = np.pi / 4.0 * largest**2 / gauge.area
+        low, high = density_bounds(
+            self._scale * share, self._scale**2 * squares, self._scale * one_more
+        )
+        return {
+            "dent_density": self._scale * share,
+            "coverage_interval": coverage_from_dent_density(high) - coverage_from_dent_density(low),
+            "dents_in_window": dents,
+        }
+
+    def _impacts(self, gauge: Gauge) -> dict[str, np.ndarray]:
+        """Means and percentiles over the impacts in the windows, dents on creases included."""
+        points, windows = len(gauge.area), gauge.windows
+        density = self._design.shot.density
+        sums = np.zeros((6, points))
+        fastest = max(float(hits.speed.max(initial=0.0)) for hits in self._hits)
+        strengths = [impact_strength(hits, density) for hits in self._hits]
+        strongest = max(float(one.max(initial=0.0)) for one in strengths)
+        by_speed, by_strength = np.zeros((points, LEVELS)), np.zeros((points, LEVELS))
+        for hits, strength in zip(self._hits, strengths, strict=True):
+            places = self.field.places_of(hits, np.arange(len(hits)))
+            ones = np.ones(len(hits))
+            is_dent = (hits.dent > 0.0).astype(float)
+            columns = (ones, hits.speed, hits.angle, hits.energy, hits.dent, is_dent)
+            level = _levels(hits.speed, fastest)
+            for point, contact in windows.pairs(places):
+                for row, column in zip(sums, columns, strict=True):
+                    row += np.bincount(point, column[contact], points)
+                at = point.astype(np.int64) * LEVELS + level[contact]
+                by_speed += np.bincount(at, minlength=points * LEVELS).reshape(points, LEVELS)
+            dented = np.flatnonzero(strength > 0.0)
+            by_strength += strength_histogram(
+                windows,
+                gauge.area,
+                places.select(dented),
+                hits.dent[dented].astype(float),
+                _levels(strength[dented], strongest),
+            )
+        impacts, speed, angle, energy, dent, dents = sums
+        return {
+            "impacts_per_mm2": self._scale * 1e-6 * _ratio(impacts, gauge.area),
+            "energy_per_mm2": self._scale * 1e-3 * _ratio(energy, gauge.area),
+            "mean_normal_speed": _ratio(speed, impacts),
+            "p90_normal_speed": _quantile(by_speed, HIGH_SPEED) * fastest,
+            "mean_angle_deg": _ratio(angle, impacts),
+            "mean_dent_um": 1e6 * _ratio(dent, dents),
+            "strength_um": 1e6 * saturated_strength(by_strength, strongest)[0],
+        }
+
+
+def density_bounds(
+    y: np.ndarray, v: np.ndarray, one_more: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Ends of the 95 % interval of the dent density of each window.
+
+    y is a sum of dents that fall as a Poisson process, each with a weight of its own. The gamma
+    interval for such sums holds for few dents and for none. It does not know dents that come in
+    series from a ball that bounces on its spot.
+
+    Args:
+        y: sum of the weights of the dents, (p,).
+        v: sum of their squares, (p,).
+        one_more: weight of a dent of the largest size, (p,).
+
+    Source: M. P. Fay and E. J. Feuer, "Confidence intervals for directly standardized rates",
+    Statistics in Medicine 16 (1997) 791.
+    """
+    from scipy.special import gammaincinv
+
+    tail = 0.5 * (1.0 - CONFIDENCE)
+    low = np.zeros(len(y))
+    some = v > 0.0
+    low[some] = v[some] / y[some] * gammaincinv(y[some] ** 2 / v[some], tail)
+    # The upper end belongs to one more dent of the largest size.
+    y, v = y + one_more, v + one_more**2
+    high = np.full(len(y), np.inf)
+    some = v > 0.0
+    high[some] = v[some] / y[some] * gammaincinv(y[some] ** 2 / v[some], 1.0 - tail)
+    return low, high
+
+
+def _levels(values: np.ndarray, highest: float) -> np.ndarray:
+    """The level of each value, 0 to LEVELS - 1."""
+    return np.minimum(LEVELS * values / max(highest, 1e-300), LEVELS - 1).astype(np.int64)
+
+
+def _ratio(top: np.ndarray, bottom: np.ndarray) -> np.ndarray:
+    return np.divide(top, bottom, out=np.full(len(top), np.nan), where=bottom > 0.0)
+
+
+def _quantile(counts: np.ndarray, share: float) -> np.ndarray:
+    """Quantile of each row of counts by level (p, LEVELS), as a share of the highest, (p,)."""
+    upto = np.cumsum(counts, axis=1)
+    wanted = share * upto[:, -1]
+    level = np.minimum((upto < wanted[:, None]).sum(axis=1), LEVELS - 1)
+    rows = np.arange(len(counts))
+    before = upto[rows, level] - counts[rows, level]
+    inside = _ratio(wanted - before, counts[rows, level])
+    return np.asarray((level + inside) / LEVELS)
