@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
@@ -13,7 +13,9 @@ from chamberopt.common.toml_errors import CrossCheckError, Problem
 MAX_COORDINATE_MM = 10000  # from the middle of the sonotrode: no chamber is larger
 
 Vector = tuple[float, float, float]
-# TOML has lists only. These two become tuples when they are read; their numbers stay strict.
+T = TypeVar("T")
+# TOML has lists only. These become tuples when they are read; what is in them stays strict.
+Several = Annotated[tuple[T, ...], Field(strict=False)]
 Pair = Annotated[tuple[float, float], Field(strict=False)]
 Triple = Annotated[Vector, Field(strict=False)]
 
@@ -30,10 +32,6 @@ def _within_limits(position: Vector) -> Vector:
         allowed = f"each must be from -{MAX_COORDINATE_MM} to {MAX_COORDINATE_MM} mm"
         raise CrossCheckError([Problem("", f"given {list(position)}; {allowed}")])
     return position
-
-
-def _absolute(path: str, info: ValidationInfo) -> str:
-    return str(from_file(path, info.context))
 
 
 def _existing(mesh: str, info: ValidationInfo) -> str:
@@ -58,7 +56,9 @@ Position = Annotated[Triple, AfterValidator(_within_limits), _form("three number
 Turns = Annotated[Triple, _form("three numbers [x, y, z] in degrees")]  # about x, then y, then z
 # Paths are relative to the file that names them, and absolute once read: the design stays valid
 # wherever it is saved.
-File = Annotated[str, Field(min_length=1), AfterValidator(_absolute)]
+File = Annotated[
+    str, Field(min_length=1), AfterValidator(lambda path, info: str(from_file(path, info.context)))
+]
 MeshFile = Annotated[str, Field(min_length=1), AfterValidator(_existing)]
 Names = Annotated[
     tuple[str, ...],

@@ -19,7 +19,7 @@ from pydantic import BaseModel, Field, ValidationError, ValidationInfo
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
 from chamberopt.common.toml_errors import CrossCheckError, Problem
-from chamberopt.common.toml_fields import from_file, list_field
+from chamberopt.common.toml_fields import Several, from_file, list_field
 from chamberopt.design.effects import Effects
 from chamberopt.design.materials import Materials
 from chamberopt.design.part import PartTable
@@ -42,9 +42,7 @@ class Design(FileTable):
     part: PartTable
     chamber: ChamberTable
     sonotrode: Sonotrode
-    sonotrodes: Annotated[
-        tuple[FurtherSonotrode, ...], Field(strict=False, max_length=MAX_SONOTRODES)
-    ] = list_field(
+    sonotrodes: Annotated[Several[FurtherSonotrode], Field(max_length=MAX_SONOTRODES)] = list_field(
         f"a list of at most {MAX_SONOTRODES} tables, [[sonotrodes]]",
         "further ones beside the floor",
         (),
@@ -98,11 +96,9 @@ class Design(FileTable):
             yield Problem("sonotrode.motion", text)
         filled = self.shot.mass / self.shot.density / self.chamber.room()
         if filled > 0.5:
-            yield Problem(
-                "shot.mass_g",
-                f"given {self.shot.mass_g:g}, whose balls fill {filled:.0%} of the chamber; at "
-                "most 50 % is allowed, usual are a few",
-            )
+            why = f"whose balls fill {filled:.0%} of the chamber"
+            text = f"given {self.shot.mass_g:g}, {why}; at most 50 % is allowed, usual are a few"
+            yield Problem("shot.mass_g", text)
 
     def _size_problems(self) -> Iterator[Problem]:
         """Problems of part, balls and sonotrode that do not fit into the chamber."""
@@ -126,12 +122,9 @@ class Design(FileTable):
             why = f"which does not fit a chamber with {' and '.join(narrow)}"
             yield Problem(ball_field, f"given {ball:g}, {why}; use a smaller ball")
         elif ball >= distance - 1e-3 * amplitude_um:
-            yield Problem(
-                ball_field,
-                f"given {ball:g}, not below {distance_field} = {distance:g} less the amplitude of "
-                f"{amplitude_um:g} µm: no ball fits under the part; use a smaller ball or raise "
-                "the distance",
-            )
+            less = f"{distance_field} = {distance:g} less the amplitude of {amplitude_um:g} µm"
+            remedy = "no ball fits under the part; use a smaller ball or raise the distance"
+            yield Problem(ball_field, f"given {ball:g}, not below {less}: {remedy}")
 
     def _setup_problems(self) -> Iterator[Problem]:
         """Problems of keys that a set-up drawn as a whole already decides."""

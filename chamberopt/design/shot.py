@@ -2,12 +2,11 @@
 
 import math
 from collections.abc import Iterator
-from typing import Annotated
 
 from pydantic import Field
 
 from chamberopt.common.toml_errors import Problem
-from chamberopt.common.toml_fields import list_field, quantity
+from chamberopt.common.toml_fields import Several, list_field, quantity
 from chamberopt.design.materials import SHOT_DENSITY, ShotMaterial
 from chamberopt.design.table_base import SI, FileTable
 
@@ -24,7 +23,7 @@ class ShotTable(FileTable):
 
     mass_g: float = quantity(1e-4, 10000, "g", "of all balls together")
     diameter_mm: float | None = quantity(0.1, 20, "mm", "of one ball", None)
-    mix: Annotated[tuple[ShotSize, ...], Field(strict=False)] | None = list_field(
+    mix: Several[ShotSize] | None = list_field(
         "a list of { diameter_mm = ..., share = ... }",
         "2 to 8 sizes and their shares of the mass",
         None,

@@ -55,14 +55,12 @@ class CandidateEvaluator:
     def constrained(
         self, parameters: Mapping[str, float], evaluation: Evaluation
     ) -> dict[str, Estimate]:
-        """The figures that have limits: metrics, and numbers of the design, which are exact."""
+        """The figures that may have limits: metrics, and numbers of the design, which are exact."""
+        figures = {name: Estimate(value, 0.0) for name, value in parameters.items()}
+        figures |= evaluation.metrics
         design = self._study.design
-        return {
-            name: evaluation.metrics[name]
-            if name in evaluation.metrics
-            else Estimate(parameters[name] if name in parameters else design.value(name), 0.0)
-            for name in self._study.constraints
-        }
+        others = (name for name in self._study.constraints if name not in figures)
+        return figures | {name: Estimate(design.value(name), 0.0) for name in others}
 
     def trial(
         self,

@@ -46,9 +46,9 @@ class Sensitivity:
 
     def sentences(self) -> list[str]:
         """What a designer may change: one sentence for each parameter, and one for all."""
+        loss = f"without losing more than the noise, {self.noise:.2g}"
         ranges = [
-            f"{one.name} may go from {one.flat[0]:.4g} to {one.flat[1]:.4g} without losing more "
-            f"than the noise, {self.noise:.2g}"
+            f"{one.name} may go from {one.flat[0]:.4g} to {one.flat[1]:.4g} {loss}"
             for one in self.slices
         ]
         share = f"{self.together:.0%}"

@@ -31,11 +31,9 @@ def accuracy(
     from chamberopt.simulation.convergence.study import require_budget, run_convergence_study
 
     require_budget(budget_s)
-    candidate = load_design(design)
+    one = load_design(design)
     with results_folder(out, f"{design.stem}-accuracy") as folder:
         with local_executor() as executor, progress_bar("CPU seconds") as progress:
-            convergence = run_convergence_study(
-                candidate, budget_s, executor, progress, compile_with_message
-            )
-        write_accuracy_results(folder, convergence)
-    print_result(accuracy_text(convergence), folder, json, "accuracy.json")
+            study = run_convergence_study(one, budget_s, executor, progress, compile_with_message)
+        write_accuracy_results(folder, study)
+    print_result(accuracy_text(study), folder, json, "accuracy.json")

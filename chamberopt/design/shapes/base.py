@@ -11,13 +11,13 @@ ChamberTable          keys of every chamber: shape, sonotrode distance, holes, d
 
 import math
 from abc import abstractmethod
-from typing import Annotated, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from chamberopt.common.toml_errors import CrossCheckError, Problem
-from chamberopt.common.toml_fields import from_file, list_field, quantity
+from chamberopt.common.toml_fields import Several, from_file, list_field, quantity
 from chamberopt.design.shapes.construction import outline, profile
 from chamberopt.design.shapes.construction.cad_setup import Setup
 from chamberopt.design.shapes.construction.limits import (
@@ -44,10 +44,10 @@ class ChamberTable(FileTable):
     sonotrode_distance_mm: float = quantity(
         0.1, 2000, "mm", "mean sonotrode face to lowest point of the part"
     )
-    deflectors: Annotated[tuple[Deflector, ...], Field(strict=False)] = list_field(
+    deflectors: Several[Deflector] = list_field(
         "a list of tables, [[chamber.deflectors]]", "bodies that stand in the chamber", ()
     )
-    holes: Annotated[tuple[Hole, ...], Field(strict=False)] = list_field(
+    holes: Several[Hole] = list_field(
         "a list of tables, [[chamber.holes]]", "blind bores in its wall", ()
     )
 

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from chamberopt.common.toml_errors import CrossCheckError, Problem
-from chamberopt.common.toml_fields import Pair, list_field
+from chamberopt.common.toml_fields import Pair, Several, list_field
 from chamberopt.design.shapes.base import RoundChamber
 from chamberopt.design.shapes.construction.limits import MIN_LENGTH, MIN_LENGTH_MM
 from chamberopt.design.shapes.construction.profile import find_contact
@@ -25,11 +25,9 @@ class Revolve(RoundChamber):
     ceiling_key: ClassVar[str] = "profile_mm"
 
     shape: Literal["revolve"]
-    profile_mm: Annotated[tuple[Pair, ...], Field(strict=False, min_length=2, max_length=200)] = (
-        list_field(
-            "2 to 200 points [[r, z], ...] in mm, the first at z = 0, none beyond 2000",
-            "the wall from the sonotrode's rim up to the ceiling; r = 0 at its end: on the axis",
-        )
+    profile_mm: Annotated[Several[Pair], Field(min_length=2, max_length=200)] = list_field(
+        "2 to 200 points [[r, z], ...] in mm, the first at z = 0, none beyond 2000",
+        "the wall from the sonotrode's rim up to the ceiling; r = 0 at its end: on the axis",
     )
 
     @field_validator("profile_mm")

@@ -70,7 +70,11 @@ class StudyFolder:
         self.path, self._study, self._inputs = path, study, study_inputs.study_inputs(study, plan)
         self._history = JsonLines(path / HISTORY)
         self._timings = JsonLines(path / TIMINGS, survives_power_cut=False)
-        self._require_same_study()
+        if self.begun:
+            before, now = _read_json(path / INPUTS), self._inputs
+            if self.finished:  # a result stays valid when the program changes
+                before, now = ({k: one.get(k) for k in ("study", "sweep")} for one in (before, now))
+            study_inputs.require_same_inputs(path, before, now)
         self.recorded = RecordedTrials(self._history)
         self._timings.repair()
 
@@ -141,14 +145,6 @@ class StudyFolder:
 
     def _evaluation_path(self, number: int) -> Path:
         return self.path / CONFIRMED / f"{number:03d}.npz"
-
-    def _require_same_study(self) -> None:
-        if not self.begun:
-            return
-        before, now = _read_json(self.path / INPUTS), self._inputs
-        if self.finished:  # a result stays valid when the program changes
-            before, now = ({k: one.get(k) for k in ("study", "sweep")} for one in (before, now))
-        study_inputs.require_same_inputs(self.path, before, now)
 
 
 def _read_json(path: Path) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from pydantic import BeforeValidator, Field
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
 from chamberopt.common.toml_errors import CrossCheckError, Problem
-from chamberopt.common.toml_fields import list_field, quantity
+from chamberopt.common.toml_fields import Several, list_field, quantity
 from chamberopt.coverage.metrics import METRICS, OBJECTIVES, RENAMED_OBJECTIVES, renamed_objective
 from chamberopt.design.design import Design
 from chamberopt.design.table_base import FileTable
@@ -103,7 +103,7 @@ class Optimizer(FileTable):
     algorithm: Algorithm = Field(
         default="auto", description="auto, sobol, surrogate, or an NLopt name without prefix"
     )
-    phases: Annotated[tuple[Phase, ...], Field(strict=False)] = list_field(
+    phases: Several[Phase] = list_field(
         "a table [[optimizer.phases]] each",
         "several algorithms one after another, instead of one",
         (),
@@ -173,12 +173,9 @@ class Study(FileTable):
 
         Raises InputError if [search_accuracy] does not fit the design.
         """
-        return design.changed(
-            {
-                "chamber.facets" if name == "facets" else f"process.accuracy.{name}": value
-                for name, value in self.search_accuracy.items()
-            }
-        )
+        tables = {"facets": "chamber"}
+        values = self.search_accuracy.items()
+        return design.changed({f"{tables.get(k, 'process.accuracy')}.{k}": v for k, v in values})
 
     def _problems(self) -> Iterator[Problem]:
         for name, bounds in self.vary.items():

@@ -90,12 +90,8 @@ def fit_error_law(sizes: Sequence[BatchSize]) -> ErrorLaw:
     """
     resolved = [size for size in sizes if size.is_resolved]
     sizes = resolved if len(resolved) > 1 else sizes
-    (slope, intercept), covariance = np.polyfit(
-        np.log([size.cpu_s for size in sizes]),
-        np.log([size.error for size in sizes]),
-        deg=1,
-        w=[math.sqrt(2.0 * (size.batches - 1)) for size in sizes],
-        cov="unscaled",
-    )
+    cost, error = np.log([(size.cpu_s, size.error) for size in sizes]).T
+    weights = [math.sqrt(2.0 * (size.batches - 1)) for size in sizes]
+    (slope, intercept), covariance = np.polyfit(cost, error, 1, w=weights, cov="unscaled")
     half_width = NORMAL * math.sqrt(covariance[0, 0])
     return ErrorLaw(float(np.exp(intercept)), float(-slope), half_width)

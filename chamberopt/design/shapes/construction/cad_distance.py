@@ -83,12 +83,10 @@ def _cut_off(room: ShapeSurface, height: float, setup: Setup) -> ShapeSurface:
     cut = rest.surface()
     kept = cut.solid == whole.label
     rows = np.where(kept, cut.source, 0)
-    return ShapeSurface(
-        cut.vertices,
-        cut.triangles,
-        np.where(kept, room.tags[rows], TAG_SONOTRODE).astype(np.uint8),
-        None if room.source is None else np.where(kept, room.source[rows], -1).astype(np.int32),
-    )
+    tags = np.where(kept, room.tags[rows], TAG_SONOTRODE).astype(np.uint8)
+    source = room.source
+    source = None if source is None else np.where(kept, source[rows], -1).astype(np.int32)
+    return ShapeSurface(cut.vertices, cut.triangles, tags, source)
 
 
 def _refused(setup: Setup, way: str, why: str) -> InputError:

@@ -87,11 +87,9 @@ def _read_once(
     vertices[np.unique(mesh.triangles[in_face]), 2] = 0.0
     border = find_unwalled_border(vertices, mesh.triangles, in_face)
     if border is not None:
-        raise InputError(
-            "chamber.sonotrode: its face has a free edge at "
-            f"{format_point(turn.T @ (border - shift))}: walls must rise from it all round, as a "
-            "moving edge is not supported"
-        )
+        place = format_point(turn.T @ (border - shift))
+        why = "walls must rise from it all round, as a moving edge is not supported"
+        raise InputError(f"chamber.sonotrode: its face has a free edge at {place}: {why}")
     tags = np.select([in_face, in_part], [TAG_SONOTRODE, TAG_PART], TAG_WALL).astype(np.uint8)
     source = None
     if body is None:
@@ -168,10 +166,9 @@ def _room_over_sonotrode(mesh: PartMesh, sonotrode: tuple[str, ...]) -> tuple[Pa
     shells, volumes = find_shells(mesh.vertices, mesh.triangles)
     face_shells = np.unique(shells[face])
     if len(face_shells) != 1:
-        raise InputError(
-            f"chamber.sonotrode: its triangles are on {len(face_shells)} separate closed surfaces; "
-            "name the one flat face that is the floor of the room"
-        )
+        where = f"on {len(face_shells)} separate closed surfaces"
+        remedy = "name the one flat face that is the floor of the room"
+        raise InputError(f"chamber.sonotrode: its triangles are {where}; {remedy}")
     outward = np.where((volumes < 0.0)[shells][:, None], mesh.triangles[:, ::-1], mesh.triangles)
     bodies = []
     for k in range(len(volumes)):

@@ -35,20 +35,14 @@ def find_fault(cavity: object) -> str | None:
     if width > MAX_WIDTH:
         limit = f"at most {MAX_WIDTH:g} m is allowed"
         return f"is {width:.4g} m wide; {limit}; its vertices are in metres, not mm"
-    return (
-        _closure_fault(vertices, triangles)
-        or _floor_fault(vertices, triangles, tags)
-        or _crossing_fault(vertices, triangles)
-    )
+    fault = _closure_fault(vertices, triangles) or _floor_fault(vertices, triangles, tags)
+    return fault or _crossing_fault(vertices, triangles)
 
 
 def with_array_types(cavity: ShapeSurface) -> ShapeSurface:
     """A surface without a fault, with the array types that a ShapeSurface promises and no part."""
-    return ShapeSurface(
-        np.asarray(cavity.vertices, dtype=np.float64),
-        np.asarray(cavity.triangles, dtype=np.int32),
-        np.asarray(cavity.tags, dtype=np.uint8),
-    )
+    arrays = (cavity.vertices, np.float64), (cavity.triangles, np.int32), (cavity.tags, np.uint8)
+    return ShapeSurface(*(np.asarray(array, dtype=kind) for array, kind in arrays))
 
 
 def _closure_fault(vertices: np.ndarray, triangles: np.ndarray) -> str | None:
