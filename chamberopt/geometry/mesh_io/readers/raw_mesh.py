@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import io
 from dataclasses import dataclass, field, replace
-from typing import Any
+from pathlib import Path
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -51,36 +51,23 @@ class RawMesh:
     numbering: ElementNumbers | None = None  # None if the file has only triangles
 
 
-def join_pieces(pieces: list[tuple[str, np.ndarray]]) -> RawMesh:
-    """Join pieces (name, corners (k, 3, 3)); pieces of one name make one group, "" makes none."""
-    pieces = [(name, corners) for name, corners in pieces if len(corners)]
-    if not pieces:
-        return RawMesh(np.zeros((0, 3, 3)))
-    piece_of = np.repeat(np.arange(len(pieces)), [len(corners) for _, corners in pieces])
-    groups: dict[str, np.ndarray] = {}
-    for index, (name, _) in enumerate(pieces):
-        if name:
-            groups[name] = groups.get(name, False) | (piece_of == index)
-    return RawMesh(np.concatenate([corners for _, corners in pieces]), groups)
-
-
-def load_pieces(kind: str, content: bytes) -> list[tuple[str, np.ndarray]]:
-    """Read a file of some kind ("stl", "3mf") with trimesh; pieces as `scene_pieces` gives them."""
+def read_scene(file: BinaryIO | Path, kind: str) -> RawMesh:
+    """Read a file of a kind ("stl", "3mf", "glb") with trimesh; meshes of one name are a group."""
     import trimesh
 
-    return scene_pieces(trimesh.load_scene(io.BytesIO(content), file_type=kind, process=False))
-
-
-def scene_pieces(scene: Any) -> list[tuple[str, np.ndarray]]:
-    """Name and corners (k, 3, 3) of each mesh of a trimesh scene, placed as in the scene."""
-    pieces = []
+    scene = trimesh.load_scene(file, file_type=kind, process=False)
+    names, corners = [""], [np.zeros((0, 3, 3))]
     for node in scene.graph.nodes_geometry:
         transform, key = scene.graph[node]
-        mesh = scene.geometry[key]
-        if not hasattr(mesh, "faces"):
-            continue  # lines and points
-        points = np.asarray(mesh.vertices, dtype=np.float64)
-        points = points @ transform[:3, :3].T + transform[:3, 3]
-        name = str(mesh.metadata.get("name") or node)
-        pieces.append(("" if name.startswith("geometry_") else name, points[mesh.faces]))
-    return pieces
+        mesh: Any = scene.geometry[key]
+        if hasattr(mesh, "faces") and len(mesh.faces):  # no lines and points
+            points = np.asarray(mesh.vertices, dtype=np.float64)
+            points = points @ transform[:3, :3].T + transform[:3, 3]
+            names.append(str(mesh.metadata.get("name") or node))
+            corners.append(points[mesh.faces])
+    mesh_of = np.repeat(np.arange(len(corners)), list(map(len, corners)))
+    groups: dict[str, np.ndarray] = {}
+    for k, name in enumerate(names):
+        if name and not name.startswith("geometry_"):
+            groups[name] = groups.get(name, False) | (mesh_of == k)
+    return RawMesh(np.concatenate(corners), groups)

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.geometry.mesh_io.readers.raw_mesh import RawMesh, join_pieces, scene_pieces
+from chamberopt.geometry.mesh_io.readers.raw_mesh import RawMesh, read_scene
 
 # Largest distance from the true surface, and angle between neighbours. A facet of a 10 mm cylinder
 # then turns a ball by less than the scatter of rough steel does.
@@ -27,8 +27,6 @@ def read_step(path: Path, content: bytes) -> RawMesh:
     An assembly's parts are placed as in the assembly. OpenCASCADE runs in a process of its own,
     because a damaged file can crash it.
     """
-    import trimesh
-
     if find_spec("cascadio") is None:
         raise InputError(f"{path}: STEP needs the package cascadio: pip install 'chamberopt[cad]'")
     with tempfile.TemporaryDirectory() as folder:
@@ -37,12 +35,12 @@ def read_step(path: Path, content: bytes) -> RawMesh:
         limits = str(MAX_DISTANCE_MM), str(MAX_ANGLE_RAD)
         command = [sys.executable, "-c", CONVERT, str(step), str(glb), *limits]
         subprocess.run(command, capture_output=True, timeout=TIMEOUT_S, check=False)
-        pieces = scene_pieces(trimesh.load_scene(glb, process=False)) if glb.is_file() else []
-    if not pieces:
+        mesh = read_scene(glb, "glb") if glb.is_file() else None
+    if mesh is None or not len(mesh.corners):
         raise InputError(
             f"{path}: holds no solid that could be meshed, or is damaged; "
             "export it again as AP214 or AP242"
         )
     angle = np.degrees(MAX_ANGLE_RAD)
     note = f"STEP: meshed to {1e3 * MAX_DISTANCE_MM:g} µm and {angle:.1f} degrees"
-    return replace(join_pieces(pieces), unit="m", notes=(note,))
+    return replace(mesh, unit="m", notes=(note,))

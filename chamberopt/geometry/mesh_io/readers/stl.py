@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 from chamberopt.common.errors import InputError
-from chamberopt.geometry.mesh_io.readers.raw_mesh import RawMesh, join_pieces, load_pieces
+from chamberopt.geometry.mesh_io.readers.raw_mesh import RawMesh, read_scene
 
 HEADER, RECORD = 84, 50  # bytes of a binary STL: before the triangles, and of each triangle
 
 
 def read_stl(path: Path, content: bytes) -> RawMesh:
     """Read an STL; the solids of a text file give names."""
-    return join_pieces(load_pieces("stl", _complete_stl(path, content)))
+    return read_scene(io.BytesIO(_complete_stl(path, content)), "stl")
 
 
 def is_binary_stl(content: bytes) -> bool:
