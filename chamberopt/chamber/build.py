@@ -10,6 +10,7 @@ Frame: metres, z up, mean sonotrode face at z = 0, chamber axis at x = y = 0.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -131,8 +132,7 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
     elif design.part.target.reachable:
         notes.append("target.reachable: the target is what the shot reaches in the study's start")
     notes += _hidden_target_notes(part, exposed)
-    notes += room_notes + _rotation_notes(room, traced.facing)
-    notes += _floating_part_notes(room, on_part, part.name)
+    notes += [*room_notes, *_notes_on_room(room, traced, part.name)]
     volume = float(tetrahedron_volumes(room.vertices, room.triangles).sum())
     surface = room.vertices, room.triangles, traced.tags, traced.source
     return Chamber(*surface, volume, part, exposed, tuple(notes), traced.fitting)
@@ -270,26 +270,21 @@ def _hidden_target_notes(part: Part, exposed: np.ndarray) -> list[str]:
     ]
 
 
-def _rotation_notes(room: SolidSurface, facing: np.ndarray) -> list[str]:
-    """A note on triangles that rounding has turned away from their area vectors (k, 3) [m²]."""
+def _notes_on_room(room: SolidSurface, traced: TriangleProperties, part_name: str) -> Iterator[str]:
+    """Notes on triangles that rounding has turned, and on pieces of the part without a holder."""
     own = area_vectors(room.vertices, room.triangles)
-    across = np.linalg.norm(np.cross(own, facing), axis=1)
-    turned = np.arctan2(across, np.einsum("ij,ij->i", own, facing)) > MAX_ROTATION
-    if not turned.any():
-        return []
-    area_mm2 = 1e6 * np.linalg.norm(own[turned], axis=1).sum()
-    return [
-        f"{turned.sum()} triangles ({area_mm2:.2g} mm² together) are so thin that rounding turned "
-        "them: the part nearly touches a wall there; a slightly different diameter or offset "
-        "avoids it"
-    ]
-
-
-def _floating_part_notes(room: SolidSurface, on_part: np.ndarray, name: str) -> list[str]:
-    """A note on pieces of the part that reach no wall: their holder is not simulated."""
+    across = np.linalg.norm(np.cross(own, traced.facing), axis=1)
+    turned = np.arctan2(across, np.einsum("ij,ij->i", own, traced.facing)) > MAX_ROTATION
+    if turned.any():
+        area_mm2 = 1e6 * np.linalg.norm(own[turned], axis=1).sum()
+        yield (
+            f"{turned.sum()} triangles ({area_mm2:.2g} mm² together) are so thin that rounding "
+            "turned them: the part nearly touches a wall there; a slightly different diameter or "
+            "offset avoids it"
+        )
     shells, volumes = find_shells(room.vertices, room.triangles)
+    on_part = traced.tags == TAG_PART
     count = sum(bool(on_part[shells == k].all()) for k in range(len(volumes)))
-    if not count:
-        return []
-    what = "the part reaches" if count == 1 else f"{count} pieces of the part reach"
-    return [f"{name}: {what} no wall: simulated as held in the air, without a holder"]
+    if count:
+        what = "the part reaches" if count == 1 else f"{count} pieces of the part reach"
+        yield f"{part_name}: {what} no wall: simulated as held in the air, without a holder"

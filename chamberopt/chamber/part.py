@@ -97,19 +97,16 @@ def _meshed_part(design: Design) -> tuple[PartMesh, np.ndarray]:
     part, mesh = design.part, _part_of_file(design)
     if part.target.element is None:
         return mesh, chosen_triangles(mesh, part.target)
-    return _remeshed_once(part.mesh_path, part.unit, part.target, mesh.sha256)
+    return _remeshed(part.mesh_path, part.unit, part.target, part.target.element, mesh.sha256)
 
 
 @lru_cache(maxsize=4)
-def _remeshed_once(
-    path: Path, unit: str, target: Target, _sha256: str
+def _remeshed(
+    path: Path, unit: str, wanted: Target, size: float, _sha256: str
 ) -> tuple[PartMesh, np.ndarray]:
-    mesh = read_part_cached(path, unit)
-    return _remesh_target(mesh, chosen_triangles(mesh, target), target.element)  # type: ignore[arg-type]
-
-
-def _remesh_target(mesh: PartMesh, target: np.ndarray, size: float) -> tuple[PartMesh, np.ndarray]:
     """The part with its target in triangles with sides of about a size [m], and that target."""
+    mesh = read_part_cached(path, unit)
+    target = chosen_triangles(mesh, wanted)
     area = float(areas(mesh.vertices, mesh.triangles)[target].sum())
     count = area / (np.sqrt(3.0) / 4.0 * size * size)
     if count > MAX_ELEMENTS:

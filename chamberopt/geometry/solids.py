@@ -180,7 +180,11 @@ class Outline:
         """Corners of each piece, as those of the hull; holes are left out."""
         from manifold3d import CrossSection
 
-        outer = [piece for piece in self.section.to_polygons() if _signed_area(piece) > 0.0]
+        outer = []
+        for piece in self.section.to_polygons():
+            (x, y), (xn, yn) = piece.T, np.roll(piece, -1, axis=0).T
+            if (x * yn - y * xn).sum() > 0.0:  # counter-clockwise; holes run the other way
+                outer.append(piece)
         return _corners(CrossSection(outer).simplify(1e3 * tolerance))
 
 
@@ -226,11 +230,6 @@ def find_cavities(surface: SolidSurface) -> list[np.ndarray]:
 
 def _corners(section: CrossSection) -> list[np.ndarray]:
     return [1e-3 * np.asarray(polygon) for polygon in section.to_polygons()]
-
-
-def _signed_area(polygon: np.ndarray) -> float:
-    (x, y), (xn, yn) = polygon.T, np.roll(polygon, -1, axis=0).T
-    return float(0.5 * (x * yn - y * xn).sum())
 
 
 def _grid_mm(vertices: np.ndarray) -> np.ndarray:

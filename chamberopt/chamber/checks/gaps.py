@@ -6,7 +6,7 @@ hollows sharper than a ball.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -37,12 +37,8 @@ MAX_WARNINGS = 4  # of one kind
 MIN_MISSED_SHARE = 0.005  # share of the target that is worth a warning
 
 
-class GapKind(NamedTuple):
-    """The two surfaces that a gap lies between, and whether a ball can wedge in it."""
-
-    one: str
-    two: str
-    wedge: bool
+# The two surfaces that a gap lies between, and whether a ball can wedge in it.
+GapKind = tuple[str, str, bool]
 
 
 def gap_warnings(reach: Reach, chamber: Chamber, largest: float, turns: bool = False) -> list[str]:
@@ -61,7 +57,7 @@ def gap_warnings(reach: Reach, chamber: Chamber, largest: float, turns: bool = F
             sides, counts = np.unique(pairs, axis=0, return_counts=True)
             one, two = map(str, sides[counts.argmax()])  # what most of the gap lies between
             wedge = _is_wedge(gap, entrance, largest, 2.0 * reach.spacing)
-            gaps.setdefault(GapKind(one, two, wedge), []).append(gap)
+            gaps.setdefault((one, two, wedge), []).append(gap)
     kinds = sorted(gaps, key=lambda kind: -sum(gap.area.sum() for gap in gaps[kind]))[:MAX_WARNINGS]
     return [_gap_warning(kind, gaps[kind], reach.diameter, largest, turns) for kind in kinds]
 
@@ -137,7 +133,7 @@ def _gap_warning(
     kind: GapKind, gaps: list[TouchPoints], smallest: float, largest: float, turns: bool
 ) -> str:
     """One sentence on gaps of a kind, for balls from a smallest to a largest diameter [m]."""
-    one, two = kind.one, kind.two
+    one, two, wedge = kind
     biggest = max(gaps, key=lambda gap: gap.area.sum())
     radius = np.concatenate([gap.radius for gap in gaps])
     low, high = (
@@ -152,7 +148,7 @@ def _gap_warning(
         else f"each of {len(gaps)} gaps {between}, one {where},"
     )
     ball = f"a ball of {1e3 * largest:g} mm"
-    if kind.wedge:
+    if wedge:
         fault = (
             f"narrows from more than {ball} to {low:.3g} mm, so gently that friction holds it: it "
             "can wedge there"
