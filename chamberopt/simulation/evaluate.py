@@ -122,7 +122,7 @@ def evaluate(
     setting = share(executor, ReplicaSetting(design, chamber, cavity or mesh))
     timings = {"simulate": 0.0, "coverage": 0.0}
     started = time.perf_counter()
-    seen = _SeenDents(prepare_target(design, chamber, mesh), [], [])
+    seen = SeenDents(prepare_target(design, chamber, mesh), [], [])
     timings["coverage"] += time.perf_counter() - started
     done = [] if done is None else done
     while True:
@@ -136,7 +136,7 @@ def evaluate(
         simulated = time.perf_counter()
         hits = [replica.hits for replica in done]
         seen.add(hits)
-        found = _estimate_all(seen, hits, chamber, design)
+        found = estimate_metrics(seen, hits, chamber, design)
         value = weighted_sum(parse_objective(plan.objective_name), found.metrics)
         timings["simulate"] += simulated - started
         timings["coverage"] += time.perf_counter() - simulated
@@ -200,7 +200,7 @@ def prepare_target(design: Design, chamber: Chamber, mesh: TriangleMesh) -> Targ
 
 
 @dataclass
-class _SeenDents:
+class SeenDents:
     """The dents of the replicas so far, in windows of both sizes."""
 
     field: TargetField
@@ -220,37 +220,47 @@ class _SeenDents:
         return sum(one.area_on_creases for one in self.gauge) / area if area else 0.0
 
 
-class _Estimates(NamedTuple):
+class Estimates(NamedTuple):
+    """The metrics of some replicas, and how well they are resolved."""
+
     metrics: dict[str, Estimate]
     metrics_of_wide: dict[str, Estimate]
     resolution: Resolution
 
 
-def _estimate_all(
-    seen: _SeenDents, hits: Sequence[Hits], chamber: Chamber, design: Design
-) -> _Estimates:
+def estimate_metrics(
+    seen: SeenDents, hits: Sequence[Hits], chamber: Chamber, design: Design
+) -> Estimates:
     """Estimate all metrics from replicas; with a single one the half-widths are infinite."""
-    process, field = design.process, seen.field
-    time_ratio = process.treatment_time / process.recorded_time
-
-    def of_windows(
-        gauge: Gauge, prints: list[Footprints]
-    ) -> tuple[dict[str, Estimate], Resolution]:
-        batches = [Batch(len(part), joined(part)) for part in in_batches(prints)]
-        found = coverage_estimates(batches, len(gauge.area), field.reachable, time_ratio)
-        found["time_to_98_s"] = time_to_98_estimate(found["p05_coverage"], process.treatment_time)
-        return found, find_resolution(batches, gauge, time_ratio, process.recorded_time)
-
-    of_gauge, resolution = of_windows(field.gauge, seen.gauge)
-    of_wide, resolution_of_wide = of_windows(field.wide, seen.wide)
-    batches = in_batches(hits)
-    of_gauge["intensity_uniformity"] = intensity_uniformity(field, batches, design.shot.density)
-    found = of_gauge | _ratios(batches, chamber, design)
-    return _Estimates(
+    found, resolution = raw_estimates(seen, hits, design)
+    found |= _ratios(in_batches(hits), chamber, design)
+    of_wide, resolution_of_wide = _of_windows(seen.field, seen.field.wide, seen.wide, design)
+    return Estimates(
         {name: as_resolved(name, found[name], resolution) for name in METRICS},
         {name: as_resolved(name, one, resolution_of_wide) for name, one in of_wide.items()},
         resolution,
     )
+
+
+def raw_estimates(
+    seen: SeenDents, hits: Sequence[Hits], design: Design
+) -> tuple[dict[str, Estimate], Resolution]:
+    """Metrics of coverage and intensity at the gauge, with intervals even where not resolved."""
+    found, resolution = _of_windows(seen.field, seen.field.gauge, seen.gauge, design)
+    uniformity = intensity_uniformity(seen.field, in_batches(hits), design.shot.density)
+    return found | {"intensity_uniformity": uniformity}, resolution
+
+
+def _of_windows(
+    field: TargetField, gauge: Gauge, prints: list[Footprints], design: Design
+) -> tuple[dict[str, Estimate], Resolution]:
+    """Metrics of coverage in windows of one size."""
+    process = design.process
+    time_ratio = process.treatment_time / process.recorded_time
+    batches = [Batch(len(part), joined(part)) for part in in_batches(prints)]
+    found = coverage_estimates(batches, len(gauge.area), field.reachable, time_ratio)
+    found["time_to_98_s"] = time_to_98_estimate(found["p05_coverage"], process.treatment_time)
+    return found, find_resolution(batches, gauge, time_ratio, process.recorded_time)
 
 
 def as_resolved(name: str, value: Estimate, resolution: Resolution) -> Estimate:

@@ -1,0 +1,163 @@
+"""Do the 95 % intervals of the coverage's figures hold, and from how many dents on?
+
+    python benchmarks/coverage_calibration.py [--case NAME ...] [--replicas N] [--csv FILE]
+
+For each case a pool of replicas is simulated once. Groups of eight are drawn from it at random, 200
+a row, and their figures are compared with those of the whole pool, which is many times as large.
+Rows are for groups with all, a half, a quarter ... of the time of each replica. A row gives the
+share of the intervals that held, the bias, the ratio of the median half-width to 1.96 standard
+deviations of the figure, and in how many groups the figure was resolved. Rows are printed also for
+figures that were not: their intervals are those that the program does not show.
+"""
+
+import argparse
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from benchmarks.table import print_table, write_csv
+from chamberopt.chamber.build import Chamber, build_chamber
+from chamberopt.chamber.scene import chamber_mesh, replica_seed
+from chamberopt.common.parallel.executor import core_count
+from chamberopt.coverage.coverage_from_impacts import find_footprints
+from chamberopt.coverage.part_impacts import Hits, hits_on_part
+from chamberopt.design.design import Design
+from chamberopt.design.load import load_design
+from chamberopt.simulation import evaluate as evaluation
+from chamberopt.simulation.replicas import simulate_seed
+
+ROOT = Path(__file__).parents[1]
+GROUPS, GROUP = 200, 8
+PARTS = (1.0, 0.5, 0.25)  # of each replica's time
+
+
+class Case(NamedTuple):
+    """A design and what is changed in it; replicas simulate `seconds`."""
+
+    design: str
+    changes: dict[str, Any]
+    seconds: float
+
+
+SIZES = [{"diameter_mm": 2.0, "mass_percent": 50.0}, {"diameter_mm": 3.0, "mass_percent": 50.0}]
+CASES = {
+    "plate": Case("plate", {}, 4.0),
+    "plate, two ball sizes": Case("plate", {"shot.diameter_mm": None, "shot.mix": SIZES}, 4.0),
+    "blade": Case("blade", {}, 10.0),
+    "gear, 15 % out of reach": Case("gear", {}, 4.5),
+    "gear, reachable": Case("gear", {"part.target.reachable": True}, 4.5),
+    "gear, turning": Case("gear_turning", {}, 4.0),
+}
+
+
+def simulate_pool(case: Case, count: int) -> tuple[Design, Chamber, list[tuple[Hits, np.ndarray]]]:
+    """The impacts of many replicas, each with the times [s] at which they fell."""
+    design = load_design(ROOT / "designs" / f"{case.design}.toml")
+    seconds = {"process.accuracy.simulated_time_s": case.seconds}
+    design = design.changed(case.changes | seconds)
+    chamber = build_chamber(design)
+    mesh = chamber_mesh(chamber)
+
+    def one(number: int) -> tuple[Hits, np.ndarray]:
+        seed = replica_seed(design.process.seed, number)
+        impacts = simulate_seed(design, chamber, mesh, seed).impacts
+        on_part = chamber.source[impacts.triangle] >= 0
+        return hits_on_part(impacts, chamber, design), np.asarray(impacts.time)[on_part]
+
+    with ThreadPoolExecutor(core_count()) as workers:
+        return design, chamber, list(workers.map(one, range(count)))
+
+
+def until(hits: Hits, rows: np.ndarray) -> Hits:
+    """Some of the impacts."""
+    return replace(hits, **{name: column[rows] for name, column in vars(hits).items()})
+
+
+def rows_of(name: str, case: Case, replicas: int) -> Iterator[dict[str, Any]]:
+    """Calibration of all figures of a case, a row each for each part of the time."""
+    whole, chamber, pool = simulate_pool(case, replicas)
+    field = evaluation.prepare_target(whole, chamber, chamber_mesh(chamber))
+    rng = np.random.default_rng(1)
+    truth: dict[str, float] = {}
+    for part in PARTS:
+        seconds = part * case.seconds
+        design = whole.changed({"process.accuracy.simulated_time_s": seconds})
+        hits = [until(one, times < seconds) for one, times in pool]
+        seen = [[find_footprints(field, gauge, one) for one in hits] for gauge in (field.gauge, field.wide)]  # fmt: skip
+        if not truth:
+            truth = {key: one.value for key, one in figures(field, seen, hits, chamber, design)[0].items()}  # fmt: skip
+        groups = [
+            figures(
+                field, [[kind[i] for i in some] for kind in seen], [hits[i] for i in some],
+                chamber, design,
+            )
+            for some in drawn(rng, replicas)
+        ]  # fmt: skip
+        for key, true in truth.items():
+            found = [estimates[key] for estimates, _, _ in groups]
+            resolved = np.mean([key in known for _, known, _ in groups])
+            values = np.array([one.value for one in found])
+            widths = np.array([one.half_width for one in found])
+            spread = float(values.std())
+            if spread == 0.0:
+                continue
+            yield {
+                "case": name,
+                "seconds": GROUP * seconds,
+                "dents": float(np.median([dents for _, _, dents in groups])),
+                "figure": key,
+                "truth": true,
+                "bias": float(values.mean()) - true,
+                "half_width": float(np.median(widths)),
+                "width_ratio": float(np.median(widths)) / spread / 1.96,
+                "held": float(np.mean(np.abs(values - true) <= widths)),
+                "resolved": float(resolved),
+            }
+
+
+def drawn(rng: np.random.Generator, replicas: int) -> Iterator[np.ndarray]:
+    """Groups of replicas; no replica is in two groups until all have been in one."""
+    count = 0
+    while True:
+        for some in rng.permutation(replicas)[: replicas // GROUP * GROUP].reshape(-1, GROUP):
+            yield some
+            count += 1
+            if count == GROUPS:
+                return
+
+
+def figures(
+    field: Any, seen: list[Any], hits: list[Hits], chamber: Chamber, design: Design
+) -> tuple[dict[str, Any], set[str], float]:
+    """Estimates, which of them are resolved, and the dents in the median window."""
+    dents = evaluation.SeenDents(field, *seen)
+    raw, resolution = evaluation.raw_estimates(dents, hits, design)
+    uniform = evaluation.weighted_sum(evaluation.parse_objective("uniform_coverage"), raw)
+    raw["uniform_coverage"] = uniform
+    known = {key for key in raw if key != "uniform_coverage" and not evaluation.as_resolved(key, raw[key], resolution).in_words}  # fmt: skip
+    if resolution.has_mean:
+        known.add("uniform_coverage")
+    return raw, known, resolution.dents
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--case", action="append", choices=list(CASES))
+    parser.add_argument("--replicas", type=int, default=320)
+    parser.add_argument("--csv", type=Path)
+    arguments = parser.parse_args()
+    found = []
+    for name in arguments.case or CASES:
+        rows = list(rows_of(name, CASES[name], arguments.replicas))
+        print_table(rows)
+        found += rows
+    if arguments.csv:
+        write_csv(arguments.csv, found)
+
+
+if __name__ == "__main__":
+    main()
