@@ -87,9 +87,11 @@ def rows_of(name: str, case: Case, replicas: int) -> Iterator[dict[str, Any]]:
         seconds = part * case.seconds
         design = whole.changed({"process.accuracy.simulated_time_s": seconds})
         hits = [until(one, times < seconds) for one, times in pool]
-        seen = [[find_footprints(field, gauge, one) for one in hits] for gauge in (field.gauge, field.wide)]  # fmt: skip
+        sizes = field.gauge, field.wide
+        seen = [[find_footprints(field, gauge, one) for one in hits] for gauge in sizes]
         if not truth:
-            truth = {key: one.value for key, one in figures(field, seen, hits, chamber, design)[0].items()}  # fmt: skip
+            of_pool = figures(field, seen, hits, chamber, design)[0]
+            truth = {key: one.value for key, one in of_pool.items()}
         groups = [
             figures(
                 field, [[kind[i] for i in some] for kind in seen], [hits[i] for i in some],
@@ -136,11 +138,13 @@ def figures(
     """Estimates, which of them are resolved, and the dents in the median window."""
     dents = evaluation.SeenDents(field, *seen)
     raw, resolution = evaluation.raw_estimates(dents, hits, design)
-    uniform = evaluation.weighted_sum(evaluation.parse_objective("uniform_coverage"), raw)
-    raw["uniform_coverage"] = uniform
-    known = {key for key in raw if key != "uniform_coverage" and not evaluation.as_resolved(key, raw[key], resolution).in_words}  # fmt: skip
-    if resolution.has_mean:
-        known.add("uniform_coverage")
+    known = {
+        key for key, one in raw.items() if not evaluation.as_resolved(key, one, resolution).in_words
+    }
+    raw["uniform_coverage"] = evaluation.weighted_sum(
+        evaluation.parse_objective("uniform_coverage"), raw
+    )
+    known |= {"uniform_coverage"} if resolution.has_mean else set()
     return raw, known, resolution.dents
 
 
@@ -148,7 +152,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--case", action="append", choices=list(CASES))
     parser.add_argument("--replicas", type=int, default=320)
-    parser.add_argument("--csv", type=Path)
+    parser.add_argument("--csv", help="name of a file in benchmarks/results")
     arguments = parser.parse_args()
     found = []
     for name in arguments.case or CASES:

@@ -194,14 +194,13 @@ def jackknife(values: np.ndarray) -> np.ndarray:
 def root_of_variance(variance: Estimate) -> Estimate:
     """Standard deviation from a variance.
 
-    The square root is steep at 0: the chord over the interval of the variance takes the place of
-    the tangent. If that interval reaches 0, so does the one of the standard deviation, and the
-    length of its upper side serves for both sides.
+    The square root is steep at 0: the ends of the interval of the variance give those of the
+    standard deviation, and its longer side serves for both.
     """
     value, reach, slope = math.sqrt(variance.value), variance.half_width, 0.0
     if 0.0 < reach < math.inf:
         low, high = (math.sqrt(max(0.0, variance.value + side * reach)) for side in (-1.0, 1.0))
-        slope = (high - low) / (2.0 * reach) if low > 0.0 else high / reach
+        slope = max(value - low, high - value) / reach
     return estimate(value + slope * (np.array(variance.pseudovalues) - variance.value), 0.0)
 
 
