@@ -120,7 +120,7 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
     if not is_drawn:
         ceiling = float(shape.vertices[:, 2].max())
         room_notes += _ceiling_notes(room, ceiling, design.chamber.ceiling_key)
-    room = remove_slivers(room)[0]
+    room = remove_slivers(room)
     traced = cavity.trace(room)
     on_part = traced.tags == TAG_PART
     _refuse_free_edges(design, room, traced.tags)

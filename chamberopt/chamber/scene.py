@@ -124,19 +124,10 @@ def scene_physics(
         phase, turn_phase: of the sonotrode and of a turning part at the start [rad].
         phase_seed: for motion = "random_phase", the seed of each ball's phase.
     """
-    from sim_core import (
-        BallCollisions,
-        Drag,
-        Friction,
-        Gravity,
-        Physics,
-        RandomPhase,
-        Rest,
-        Restitution,
-        surface_effects,
-    )
+    import sim_core
 
-    sonotrode, effects, materials = design.sonotrode, design.effects, design.materials
+    effects, materials = design.effects, design.materials
+    is_random = design.sonotrode.motion == "random_phase"
     if effects.auto:
         raise InputError(
             'effects: still "auto"; resolve them first with a pilot run, as simulate and run do'
@@ -149,18 +140,18 @@ def scene_physics(
     accuracy, friction = design.process.accuracy, None
     if effects.friction is not None:
         of_surfaces = (effects.friction.surfaces,) * len(surfaces)
-        friction = Friction(of_surfaces, effects.friction.balls)
-    return Physics(
-        gravity=Gravity() if effects.gravity else None,
-        restitution=Restitution(surfaces, balls, accuracy.elastic_below),
+        friction = sim_core.Friction(of_surfaces, effects.friction.balls)
+    return sim_core.Physics(
+        gravity=sim_core.Gravity() if effects.gravity else None,
+        restitution=sim_core.Restitution(surfaces, balls, accuracy.elastic_below),
         vibration=vibrations(design, phase),
         part_rotation=part_rotation(design, turn_phase),
-        rest=Rest() if balls_can_rest(design, mesh) else None,
+        rest=sim_core.Rest() if balls_can_rest(design, mesh) else None,
         friction=friction,
-        drag=Drag(piece=accuracy.drag_step) if effects.drag else None,
-        surface=surface_effects(**effects.of_surfaces),
-        ball_collisions=BallCollisions() if effects.ball_collisions else None,
-        random_phase=RandomPhase(phase_seed) if sonotrode.motion == "random_phase" else None,
+        drag=sim_core.Drag(piece=accuracy.drag_step) if effects.drag else None,
+        surface=sim_core.surface_effects(**effects.of_surfaces),
+        ball_collisions=sim_core.BallCollisions() if effects.ball_collisions else None,
+        random_phase=sim_core.RandomPhase(phase_seed) if is_random else None,
     )
 
 

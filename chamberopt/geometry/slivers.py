@@ -19,28 +19,23 @@ MAX_PASSES = 20  # a change can make the next one possible; two or three passes 
 Triangle = tuple[int, int, int]
 
 
-def remove_slivers(surface: SolidSurface) -> tuple[SolidSurface, int, int]:
-    """Remove triangles lower than MIN_HEIGHT.
+def remove_slivers(surface: SolidSurface) -> SolidSurface:
+    """The surface without triangles lower than MIN_HEIGHT, where they need not stay.
 
     A needle (one edge shorter than MIN_HEIGHT) is removed by merging that edge's ends. Any other
     sliver gets one edge turned. Within one source triangle this is done if the thinner of the two
     triangles becomes thicker. Across two source triangles it is done only where the sliver's apex
     lies on the edge, and then both halves belong to the neighbour.
-
-    Returns:
-        The surface, how many slivers it had, and how many had to stay.
     """
     found = np.flatnonzero(heights(surface.vertices, surface.triangles) < MIN_HEIGHT)
     if not len(found):
-        return surface, 0, 0
+        return surface
     mesh = _EditableMesh(surface, found.tolist())
     for _ in range(MAX_PASSES):
         changes = [mesh.merge(k) or mesh.turn(k) for k in mesh.slivers() if k in mesh.triangles]
         if not any(changes):
             break
-    cleaned = mesh.surface()
-    left = heights(cleaned.vertices, cleaned.triangles) < MIN_HEIGHT
-    return cleaned, len(found), int(left.sum())
+    return mesh.surface()
 
 
 class _EditableMesh:
