@@ -10,7 +10,7 @@ import numpy as np
 from chamberopt.output.plots.colours import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, YELLOW
 from chamberopt.output.plots.figure_style import new_figure, save_picture, style_axes
 from chamberopt.simulation.convergence.error_law import NORMAL
-from chamberopt.simulation.convergence.parameters import DESIGNED, TIME, short_name
+from chamberopt.simulation.convergence.parameters import DESIGNED, GAUGE, TIME, short_name
 from chamberopt.simulation.convergence.recommendation import ACCURACIES, BIAS_SHARE, recommend
 
 if TYPE_CHECKING:
@@ -35,9 +35,8 @@ def _draw_errors(axes: Axes, study: ConvergenceStudy) -> None:
     for accuracy in ACCURACIES:
         axes.axhline(accuracy, color=GREY, lw=0.8, ls=":")
     sizes, law = study.sizes, study.law
-    cost, error, low, high = np.array(
-        [[one.cpu_s, one.error, *np.multiply(NORMAL, one.interval)] for one in sizes]
-    ).T
+    rows = [[one.cpu_s, one.error, *np.multiply(NORMAL, one.interval)] for one in sizes]
+    cost, error, low, high = np.array(rows).T
     axes.errorbar(cost, error, yerr=[error - low, high - error], fmt="o", ms=6, lw=1, color=BLUE,
                   zorder=4, label="4, 8, 16 … replicas of the reference: 95 % error")  # fmt: skip
     line = np.geomspace(0.6 * cost[0], 2.0 * cost[-1], 20)
@@ -49,29 +48,23 @@ def _draw_errors(axes: Axes, study: ConvergenceStudy) -> None:
     if reached:
         axes.plot(*zip(*reached, strict=True), "*", ms=14, color=BLACK, zorder=6,
                   label="recommended for 5 %, 1 %, 0.1 %: predicted cost")  # fmt: skip
-    axes.set_title(
-        f"more replicas alone: half the error for {law.halving[0]:.1f} times the CPU time",
-        loc="left",
-        fontsize=11,
-    )
-    style_axes(
-        axes, "CPU seconds of an evaluation", "error of the objective (half-width of 95 % interval)"
-    )
+    title = f"more replicas alone: half the error for {law.halving[0]:.1f} times the CPU time"
+    axes.set_title(title, loc="left", fontsize=11)
+    error_label = "error of the objective (half-width of 95 % interval)"
+    style_axes(axes, "CPU seconds of an evaluation", error_label)
     axes.legend(fontsize=8, frameon=False, loc="best")
 
 
 def _draw_bias_marks(axes: Axes, study: ConvergenceStudy) -> None:
     """Draw a filled mark for a significant bias, else an open one at its upper limit."""
-    others = (run.parameter for run in study.runs if run.parameter not in (DESIGNED, TIME))
-    names = list(dict.fromkeys(others))
-    for name, colour, marker in zip(
-        names, (ORANGE, GREEN, PURPLE, SKY, YELLOW), "sD^vP", strict=False
-    ):
+    # The gauge is what is measured, not how well.
+    names = dict.fromkeys(run.parameter for run in study.runs)
+    others = (name for name in names if name not in (DESIGNED, GAUGE, TIME))
+    colours = (ORANGE, GREEN, PURPLE, SKY, YELLOW, GREY)
+    for name, colour, marker in zip(others, colours, "sD^vPX", strict=False):
         label = f"bias of {short_name(name)}; open: at most"
         axes.plot([], [], marker, color=colour, mfc="white", label=label)
-        for run in study.runs:
-            if run.parameter != name:
-                continue
+        for run in (run for run in study.runs if run.parameter == name):
             cost = study.design.process.accuracy.replicas * run.cpu.value
             bias, half_width = abs(run.bias.value), run.bias.half_width
             if run.is_biased:

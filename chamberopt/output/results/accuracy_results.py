@@ -30,7 +30,7 @@ def write_accuracy_results(folder: Path, study: ConvergenceStudy) -> None:
 
 def rows(study: ConvergenceStudy) -> list[dict[str, Any]]:
     """One row a run and a batch size, with the same columns; None where a column does not apply."""
-    runs = []
+    runs, sizes = [], []
     for run in (study.reference, *study.runs):
         row: dict[str, Any] = {
             "parameter": run.parameter,
@@ -43,20 +43,11 @@ def rows(study: ConvergenceStudy) -> list[dict[str, Any]]:
         for name, value in zip(names, values, strict=True):
             row |= {name: value.value, f"{name}_half_width": value.half_width}
         runs.append(row)
-    sizes = [
-        {
-            "parameter": "replicas",
-            "setting": str(size.replicas),
-            "replicas": size.replicas,
-            "cpu_s": size.cpu_s,
-            "rms_error": size.rms,
-            "rms_low": size.interval[0],
-            "rms_high": size.interval[1],
-            "mean_half_width": size.half_width,
-            "batches": size.batches,
-        }
-        for size in study.sizes
-    ]
+    for size in study.sizes:
+        row = {"parameter": "replicas", "setting": str(size.replicas), "replicas": size.replicas}
+        row |= {"cpu_s": size.cpu_s, "rms_error": size.rms}
+        row |= dict(zip(("rms_low", "rms_high"), size.interval, strict=True))
+        sizes.append(row | {"mean_half_width": size.half_width, "batches": size.batches})
     columns = dict.fromkeys((*runs[0], *sizes[0]))
     return [columns | row for row in (*runs, *sizes)]
 
@@ -86,11 +77,8 @@ def accuracy_text(study: ConvergenceStudy) -> list[str]:
         lines.append(f"{short_name(run.parameter):24}{run.setting:>24}{cpu:>19}{biases}")
     for accuracy in ACCURACIES:
         lines += ["", *recommend(study, accuracy).lines]
-    return [
-        *lines,
-        "",
-        f"{study.cpu_s:.0f} CPU s of simulation, {study.wall_s:.0f} s in all with compiling",
-    ]
+    total = f"{study.cpu_s:.0f} CPU s of simulation, {study.wall_s:.0f} s in all with compiling"
+    return [*lines, "", total]
 
 
 def _signed(bias: Estimate) -> str:
@@ -100,30 +88,25 @@ def _signed(bias: Estimate) -> str:
 
 def accuracy_json(study: ConvergenceStudy) -> dict[str, Any]:
     """Everything, for accuracy.json."""
-    law = study.law
+    law, law_text = study.law, describe_error_law(study)
     middle, low, high = law.halving
     recommendations = []
     for accuracy in ACCURACIES:
         advice = recommend(study, accuracy)
         cpu_s = advice.cpu_s if advice.replicas else None
         recommendations.append({**asdict(advice), "cpu_s": cpu_s, "lines": advice.lines})
+    design = study.design.model_dump(mode="json", exclude_none=True, exclude={"part": {"mesh"}})
     return {
         "format": FORMAT,
         "reference": {"text": describe_reference(study), "settings": study.settings},
         "rows": rows(study),
         "law": {"scale": law.scale, "power": law.power, "power_half_width": law.half_width},
-        "halving": {
-            "times": middle,
-            "low": low,
-            "high": min(high, 1e9),  # JSON has no infinity
-            "text": describe_error_law(study),
-        },
+        # JSON has no infinity.
+        "halving": {"times": middle, "low": low, "high": min(high, 1e9), "text": law_text},
         "recommendations": recommendations,
         "cpu_s": study.cpu_s,
         "wall_s": study.wall_s,
-        "design": study.design.model_dump(
-            mode="json", exclude_none=True, exclude={"part": {"mesh"}}
-        ),
+        "design": design,
         "versions": versions(),
     }
 
@@ -134,15 +117,12 @@ def describe_reference(study: ConvergenceStudy) -> str:
     settings = ", ".join(
         f"{short_name(name)} {setting_text(value)}" for name, value in study.settings.items()
     )
-    walls = ""
-    if FACETS in study.settings:
-        walls = (
-            f"; no chamber here has a round wall, so {FACETS} can only be compared with the finest"
-        )
+    walls = f"; no chamber here has a round wall, so {FACETS} can only be compared with the finest"
+    remark = walls if FACETS in study.settings else ""
     return (
         f"reference: {run.replicas} replicas with {settings}: objective {run.objective.value:.4f} "
         f"± {run.objective.half_width:.2g}, mean coverage {run.mean.value:.4f} ± "
-        f"{run.mean.half_width:.2g}, in {run.replicas * run.cpu.value:.0f} CPU s{walls}"
+        f"{run.mean.half_width:.2g}, in {run.replicas * run.cpu.value:.0f} CPU s{remark}"
     )
 
 

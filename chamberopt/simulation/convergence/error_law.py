@@ -64,12 +64,8 @@ def rms_error(values: np.ndarray, whole: float, share: float) -> float:
     """Root mean square error of batches against infinitely many replicas.
 
     A batch is part of the pool that it is compared with. Independent replicas of variance s² have
-    the mean square difference s²/k - s²/R = s²/k (1 - k/R).
-
-    Args:
-        values: estimates of the batches, shape (m,).
-        whole: estimate of all replicas.
-        share: of a batch in the pool, k/R.
+    the mean square difference s²/k - s²/R = s²/k (1 - k/R). The values (m,) are the estimates of
+    the batches, `whole` is that of all replicas, and `share` is k/R.
     """
     return math.sqrt(float(np.mean((np.asarray(values) - whole) ** 2)) / (1.0 - share))
 

@@ -32,12 +32,8 @@ from chamberopt.coverage.coverage_intervals import coverage_estimates, find_reso
 from chamberopt.coverage.field.target_field import TargetField
 from chamberopt.coverage.metrics import parse_objective
 from chamberopt.design.design import Design
-from chamberopt.simulation.convergence.error_law import (
-    BatchSize,
-    ErrorLaw,
-    fit_error_law,
-    rms_error,
-)
+from chamberopt.simulation.convergence import error_law
+from chamberopt.simulation.convergence.error_law import BatchSize, ErrorLaw
 from chamberopt.simulation.convergence.parameters import study_designs
 from chamberopt.simulation.evaluate import prepare_target, weighted_sum
 from chamberopt.simulation.replicas import ReplicaSetting, simulate_replica
@@ -138,9 +134,8 @@ class Replicas:
 def require_budget(budget_s: float) -> None:
     """Raise InputError unless the budget is a positive, finite number."""
     if not 0.0 < budget_s < math.inf:
-        raise InputError(
-            f"--budget-s: given {budget_s:g}; give the CPU seconds to spend, more than 0"
-        )
+        remedy = "give the CPU seconds to spend, more than 0"
+        raise InputError(f"--budget-s: given {budget_s:g}; {remedy}")
 
 
 def run_convergence_study(
@@ -153,12 +148,8 @@ def run_convergence_study(
     """Simulate all runs for about the budgeted CPU seconds, at least three replicas of each.
 
     Each round adds one replica to every run, and as many to the reference as there are runs.
-
-    Args:
-        prepare: called for each design before any is simulated, to compile.
-
-    Raises:
-        InputError: the budget is not positive, or evaluate() raises it.
+    `prepare` is called for each design before any is simulated, to compile. InputError if the
+    budget is not positive, or evaluate() raises it.
     """
     from chamberopt.chamber.build import build_chamber
 
@@ -176,13 +167,11 @@ def run_convergence_study(
         replicas[key] = Replicas(setting, prepare_target(one, *chambers[one.chamber]))
         prepare(one, replicas[key].setting.chamber)
     (reference_key, reference), *others = replicas.items()
-    rounds, spent = 0, 0.0
-    while len(reference.done) < MAX_REPLICAS:
-        enough = rounds >= MIN_ROUNDS and len(reference.done) >= MIN_REPLICAS
-        if enough and spent >= budget_s:
-            break
-        spent += _add_replicas([*(one for _, one in others), *[reference] * len(others)], executor)
-        rounds += 1
+    a_round = [*(one for _, one in others), *[reference] * len(others)]
+    enough = max(MIN_REPLICAS, MIN_ROUNDS * len(others))
+    spent = 0.0
+    while (count := len(reference.done)) < MAX_REPLICAS and (count < enough or spent < budget_s):
+        spent += _add_replicas(a_round, executor)
         if progress:
             progress(min(round(spent), round(budget_s)), round(budget_s), None)
     reference_run = reference.run(*reference_key)
@@ -193,7 +182,7 @@ def run_convergence_study(
         reference=reference_run,
         runs=tuple(one.run(*key, reference_run) for key, one in others),
         sizes=sizes,
-        law=fit_error_law(sizes),
+        law=error_law.fit_error_law(sizes),
         cpu_s=spent,
         wall_s=time.perf_counter() - started,
     )
@@ -230,7 +219,7 @@ def _batch_sizes(reference: Replicas, whole: Run) -> tuple[BatchSize, ...]:
         estimates = [reference.estimates(slice(b * count, (b + 1) * count)) for b in range(batches)]
         estimating = (time.thread_time() - begin) / batches
         values = np.array([objective.value for objective, _, _ in estimates])
-        rms = rms_error(values, whole.objective.value, count / whole.replicas)
+        rms = error_law.rms_error(values, whole.objective.value, count / whole.replicas)
         half_width = float(np.mean([objective.half_width for objective, _, _ in estimates]))
         if min(rms, half_width) < ZERO_ERROR:
             raise InputError(
