@@ -68,10 +68,8 @@ class Estimate:
     def from_interval_json(cls, data: Mapping[str, Any]) -> Estimate:
         """The value and half-width that `interval_json` wrote."""
         value, half_width = data["value"], data["half_width"]
-        return cls(
-            math.nan if value is None else float(value),
-            math.inf if half_width is None else float(half_width),
-        )
+        value = math.nan if value is None else float(value)
+        return cls(value, math.inf if half_width is None else float(half_width))
 
 
 def _finite(number: float) -> float | None:

@@ -7,7 +7,7 @@ files: a field's bounds, unit and description are stated once, in its model.
 import difflib
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin
@@ -68,7 +68,10 @@ def format_problems(problems: Iterable[Problem], path: Path | None = None, sourc
     line_of = key_lines(source)
     texts = []
     for problem in problems:
-        line = _find_line(problem.field, line_of)
+        # The line of the field, or of the innermost table around it that the file has.
+        steps = problem.field.split(".")
+        names = (".".join(steps[:n]) for n in range(len(steps), 0, -1))
+        line = next((line_of[name] for name in names if name in line_of), None)
         place = "" if path is None else f"{path}:{line}: " if line else f"{path}: "
         texts.append(place + (f"{problem.field}: " if problem.field else "") + problem.text)
     return "\n".join(texts)
@@ -80,15 +83,14 @@ def explain_validation_error(error: ValidationError, model: type[BaseModel]) -> 
     details = error.errors()
     for detail in details:
         loc = detail["loc"]
-        inner_errors = (other for other in details if other["loc"][: len(loc)] == loc)
-        if detail["type"] == "too_short" and any(other["loc"] != loc for other in inner_errors):
+        inner = any(one["loc"] != loc and one["loc"][: len(loc)] == loc for one in details)
+        if detail["type"] == "too_short" and inner:
             continue  # the list is only too short because its wrong items do not count
         cause = detail.get("ctx", {}).get("error")
         if isinstance(cause, CrossCheckError):
-            problems += [
-                Problem(".".join(filter(None, (_dotted(loc), p.field))), p.text)
-                for p in cause.problems
-            ]
+            place = _dotted(loc)
+            inside = ((".".join(filter(None, (place, p.field))), p.text) for p in cause.problems)
+            problems += [Problem(*one) for one in inside]
         else:
             problems.append(_explain(detail, model))
     return list(dict.fromkeys(problems))  # a union reports the same error for each alternative
@@ -148,8 +150,7 @@ def key_lines(source: str) -> dict[str, int]:
     """
     lines: dict[str, int] = {}
     rows: Counter[str] = Counter()
-    table = ""
-    in_string = ""
+    table = in_string = ""
     word = r"""(?:[\w-]+|"[^"]*"|'[^']*')"""
     for number, line in enumerate(source.splitlines(), start=1):
         if in_string:
@@ -175,12 +176,10 @@ def key_lines(source: str) -> dict[str, int]:
 
 def describe_allowed(field: FieldInfo) -> str:
     """What a field accepts: 'a number from 2 to 2000 mm (inner height of the chamber)'."""
-    bounds = {
-        name: getattr(constraint, name)
-        for constraint in field.metadata
-        for name in ("ge", "le")
-        if hasattr(constraint, name)
-    }
+    bounds: dict[str, str] = {}
+    for constraint in field.metadata:
+        found = ((k, getattr(constraint, k, None)) for k in ("ge", "le"))
+        bounds |= {k: str(n) if isinstance(n, int) else f"{n:g}" for k, n in found if n is not None}
     extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
     kind = _alternatives(field.annotation)[0]
     if "form" in extra:
@@ -190,9 +189,9 @@ def describe_allowed(field: FieldInfo) -> str:
     else:
         text = TYPE_NAMES.get(kind) or ", ".join(f'"{choice}"' for choice in get_args(kind))
     if "ge" in bounds and "le" in bounds:
-        text += f" from {_format_bound(bounds['ge'])} to {_format_bound(bounds['le'])}"
+        text += f" from {bounds['ge']} to {bounds['le']}"
     elif "ge" in bounds:
-        text += f" of at least {_format_bound(bounds['ge'])}"
+        text += f" of at least {bounds['ge']}"
     text += f" {extra['unit']}" if extra.get("unit") else ""
     return text + (f" ({field.description})" if field.description else "")
 
@@ -205,13 +204,6 @@ def _without_quotes(key: str) -> str:
     return ".".join(step.strip().strip("\"'") for step in key.split("."))
 
 
-def _find_line(field: str, line_of: Mapping[str, int]) -> int | None:
-    """Line of a field, or of the innermost table around it that the file has."""
-    steps = field.split(".")
-    names = (".".join(steps[:n]) for n in range(len(steps), 0, -1))
-    return next((line_of[name] for name in names if name in line_of), None)
-
-
 def _alternatives(annotation: Any) -> tuple[Any, ...]:
     """The types of an optional field, without None and annotations; otherwise the type itself."""
     types = get_args(annotation)
@@ -219,19 +211,13 @@ def _alternatives(annotation: Any) -> tuple[Any, ...]:
     return tuple(get_args(t)[0] if get_origin(t) is Annotated else t for t in types)
 
 
-def _first_model(types: Iterable[Any]) -> type[BaseModel] | None:
+def _table_of(field: FieldInfo, of_rows: bool = False) -> type[BaseModel] | None:
+    """Model of a field that is a table, or of the rows of a list of tables."""
+    types = (*_alternatives(field.annotation), *get_args(field.annotation)[1:])
+    if of_rows:
+        lists = (t for t in _alternatives(field.annotation) if get_origin(t) is tuple)
+        types = tuple(item for one in lists for item in get_args(one)[:1])
     return next((t for t in types if isinstance(t, type) and issubclass(t, BaseModel)), None)
-
-
-def _table_of(field: FieldInfo) -> type[BaseModel] | None:
-    """Model of a field that is a table."""
-    return _first_model((*_alternatives(field.annotation), *get_args(field.annotation)[1:]))
-
-
-def _row_of(field: FieldInfo) -> type[BaseModel] | None:
-    """Model of each item of a field that is a list of tables."""
-    lists = (t for t in _alternatives(field.annotation) if get_origin(t) is tuple)
-    return _first_model(item for one in lists for item in get_args(one)[:1])
 
 
 def _find_field(
@@ -244,7 +230,7 @@ def _find_field(
         if isinstance(step, int) or free_name:
             free_name = False
             continue
-        table = model if field is None else _table_of(field) or _row_of(field)
+        table = model if field is None else _table_of(field) or _table_of(field, of_rows=True)
         if table is None:
             break
         model, field = table, table.model_fields.get(step)
@@ -252,10 +238,6 @@ def _find_field(
             break
         free_name = get_origin(field.annotation) is dict
     return model, field
-
-
-def _format_bound(number: float) -> str:
-    return str(number) if isinstance(number, int) else f"{number:g}"
 
 
 def _format_value(value: Any) -> str:

@@ -14,7 +14,6 @@ from chamberopt.cli.prepare import advise_effects
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.chamber.reach.reach import Reach
-    from chamberopt.geometry.mesh_io.surface_error import SurfaceError
 
 
 @app.command
@@ -52,8 +51,12 @@ def check(
     try:
         chamber = build_chamber(design)
     except SurfaceError as error:
-        if screenshot is not None:
-            _draw_fault(error, screenshot)
+        if screenshot is not None:  # the faults in red; the message itself follows on stderr
+            from chamberopt.output.viewer import draw_part
+
+            text = fill(str(error), 110)
+            remark = draw_part(error.corners, text, screenshot, edges=error.edges)
+            print_remarks([remark or f"picture in {screenshot}"])
         raise
     reach = shot_reach(design, chamber)
     facts = describe(design, chamber, reach)
@@ -76,15 +79,6 @@ def check(
         write_chamber(out, chamber)
     if json:
         print_json(facts)
-
-
-def _draw_fault(error: SurfaceError, screenshot: Path) -> None:
-    """Draw the faults of a part's surface in red; the message itself follows on stderr."""
-    from chamberopt.output.viewer import draw_part
-
-    text = fill(str(error), 110)
-    remark = draw_part(error.corners, text, screenshot, edges=error.edges)
-    print_remarks([remark or f"picture in {screenshot}"])
 
 
 def _draw_target(chamber: Chamber, reach: Reach, screenshot: Path) -> None:

@@ -111,9 +111,8 @@ class _Search:
         from scipy.stats.qmc import Sobol
 
         wanted = limit - len(self.scored)
-        exponent = max(1, (wanted - 1).bit_length())
         sobol = Sobol(len(self._start), seed=self._settings.seed)
-        for point in sobol.random_base2(exponent)[:wanted]:
+        for point in sobol.random_base2(max(1, (wanted - 1).bit_length()))[:wanted]:
             self.scored.score(point)
 
     def _follow_model(self, limit: int) -> None:
