@@ -145,8 +145,7 @@ def welch_half_width(
 ) -> float:
     """Half-width of the interval of a difference of two means.
 
-    Args:
-        times: as if each sample had this many times as many values of the same scatter.
+    It is for samples as if each had `times` as many values of the same scatter.
 
     Source: B. L. Welch, "The generalization of 'Student's' problem when several different
     population variances are involved", Biometrika 34 (1947) 28.

@@ -164,12 +164,9 @@ class Design(FileTable):
     def changed(self, values: Mapping[str, Any]) -> "Design":
         """A copy with other values, checked again as a whole.
 
-        Args:
-            values: new values in the file's units by dotted name, e.g. {"chamber.height_mm": 45}.
-                An entry of a list goes by its position: part.offset_mm.0.
-        Raises:
-            InputError: a name is not a key of a design, or the new values are out of range or
-                contradict each other.
+        They are in the file's units by dotted name, e.g. {"chamber.height_mm": 45}; an entry of a
+        list goes by its position: part.offset_mm.0. InputError if a name is not a key of a design,
+        or the new values are out of range or contradict each other.
         """
         data = self.model_dump()
         for name, value in values.items():

@@ -212,10 +212,9 @@ class Candidates:
 
 def _variances(goals: list[Estimate]) -> np.ndarray:
     """Squared standard errors (n,) of one objective, pooled over the candidates."""
-    replicas = np.array([max(1, len(goal.pseudovalues)) for goal in goals])
     samples = [goal.pseudovalues for goal in goals]
     spreads = [float(np.var(one, ddof=1)) if len(one) > 1 else np.nan for one in samples]
-    return pool_variances(np.array(spreads), replicas)
+    return pool_variances(np.array(spreads), np.array([max(1, len(one)) for one in samples]))
 
 
 def close_to_best(confirmed: list[ConfirmedCandidate]) -> list[ConfirmedCandidate]:

@@ -138,12 +138,13 @@ def run_sweep(
             if recorded is None:
                 break
             trials.append(recorded)
+        best = max((one.score for one in trials if one.feasible), default=-np.inf)
         for trial, seconds in _evaluate_from(study, plan, len(trials), executor, simulator):
             opened.append(trial, None, seconds)
             trials.append(trial)
+            best = max(best, trial.score) if trial.feasible else best
             if progress:
-                best = max((one.score for one in trials if one.feasible), default=None)
-                progress(len(trials), len(plan.points), best)
+                progress(len(trials), len(plan.points), best if best > -np.inf else None)
         if all(trial.objective is None for trial in trials):
             raise InputError(
                 "no candidate of the sweep could be simulated, the first because: "

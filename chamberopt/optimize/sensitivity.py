@@ -82,10 +82,7 @@ def analyse_sensitivity(
 ) -> Sensitivity:
     """Sensitivity of the model's score near the best design.
 
-    Args:
-        vary: bounds (low, high) of each parameter, by dotted name, in the units of the file.
-        best: parameters of the best design, in the same units.
-        noise: loss that counts as none.
+    Bounds (low, high) and best values are in the units of the file; a loss below `noise` is none.
     """
     from scipy.stats.qmc import Sobol
 

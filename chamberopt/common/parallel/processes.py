@@ -19,7 +19,6 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import suppress
 from functools import lru_cache
 from multiprocessing import get_context
-from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from chamberopt.common.errors import WorkerLostError
@@ -82,13 +81,8 @@ class ProcessExecutor(Executor):
         if wait:
             self._end()
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        if kind is not None:
+    def __exit__(self, *error: Any) -> None:
+        if error[0] is not None:
             self._feeders.shutdown(wait=False, cancel_futures=True)
             self._end()
         self.shutdown()

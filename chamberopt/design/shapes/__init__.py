@@ -18,17 +18,7 @@ from chamberopt.design.shapes.construction.surface import (
 from chamberopt.design.shapes.registry import SHAPES
 
 __all__ = [
-    "SHAPES",
-    "TAG_PART",
-    "TAG_SONOTRODE",
-    "TAG_WALL",
-    "ChamberTable",
-    "InputError",
-    "ParametricChamber",
-    "ShapeSurface",
-    "WalledChamber",
-    "further_sonotrode_tag",
-    "is_sonotrode",
-    "lofted",
-    "quantity",
-]
+    "SHAPES", "TAG_PART", "TAG_SONOTRODE", "TAG_WALL", "ChamberTable", "InputError",
+    "ParametricChamber", "ShapeSurface", "WalledChamber", "further_sonotrode_tag", "is_sonotrode",
+    "lofted", "quantity",
+]  # fmt: skip

@@ -23,10 +23,7 @@ def study_inputs(study: Study, plan: Mapping[str, Any] | None = None) -> dict[st
     """Everything that the trials depend on, as plain JSON: values, not the text of the files.
 
     A file that the design names, such as the part's mesh, is stored as its name and the sha256 of
-    its content, so that it may be moved.
-
-    Args:
-        plan: the plan of a sweep.
+    its content, so that it may be moved. The plan is that of a sweep.
     """
     values = study.model_dump(mode="json", exclude={"design"})
     values["design"] = _with_digests(study.design.model_dump(mode="json"))

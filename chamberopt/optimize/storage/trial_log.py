@@ -84,8 +84,7 @@ class Trial:
 class JsonLines:
     """A file of JSON rows, one in each line, that only grows.
 
-    Args:
-        survives_power_cut: force each row to the disk, which takes milliseconds.
+    Surviving a power cut means that each row is forced to the disk, which takes milliseconds.
     """
 
     def __init__(self, path: Path, survives_power_cut: bool = True) -> None:
@@ -163,10 +162,9 @@ def read_seconds(folder: Path) -> dict[int, float]:
 
 
 def trials_as_csv(rows: list[dict[str, Any]]) -> str:
-    """The trial log as a table.
+    """The trial log as a table with a column for each parameter and metric.
 
-    It has a column for each parameter and metric; NAME_pm is the half-width of NAME. A failed
-    evaluation has no metrics.
+    NAME_pm is the half-width of NAME. A failed evaluation has no metrics.
     """
     lines = []
     for row in rows:

@@ -45,11 +45,9 @@ def _falling(value: float, factor: float) -> list[float]:
 
 
 def study_designs(design: Design) -> tuple[dict[str, Any], dict[tuple[str, str], Design]]:
-    """The designs of a convergence study.
+    """The reference's settings by parameter, and the designs by parameter and setting.
 
-    Returns:
-        The reference's settings by parameter, and the designs by parameter and setting: the
-        reference, one for each other setting of each parameter, and the design as it is.
+    They are the reference, one for each other setting of each parameter, and the design as it is.
     """
     parameters = numerical_parameters(design)
     settings = {name: values[-1] for name, values in parameters.items()}

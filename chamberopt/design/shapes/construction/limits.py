@@ -22,9 +22,7 @@ def refuse_above(key: str, given: float, limit: float, why: str) -> None:
 def refuse_meeting_walls(slope: float, limits: Iterable[float], inclination_deg: float) -> None:
     """Raise CrossCheckError if walls lean in so far that they meet below the ceiling.
 
-    Args:
-        slope: tangent of the inclination, outward.
-        limits: least slope that each wall allows.
+    Slope is the tangent of the inclination, outward; `limits` has the least that each wall allows.
     """
     least = max(limits, default=-math.inf)
     if slope < least:
