@@ -23,9 +23,8 @@ def is_new_or_empty(folder: Path) -> bool:
     """Whether results can be written to a folder: it does not exist, or holds nothing."""
     if not os.path.lexists(folder):
         return True
-    return folder.is_dir() and all(
-        file.name.startswith(LEFTOVER_PREFIXES) for file in folder.iterdir()
-    )
+    is_folder = folder.is_dir()
+    return is_folder and all(one.name.startswith(LEFTOVER_PREFIXES) for one in folder.iterdir())
 
 
 def make_output_folder(path: str | Path) -> Path:

@@ -19,12 +19,8 @@ PACKAGES = (*SIMULATION_PACKAGES, "nlopt", "scikit-learn")
 
 def versions() -> dict[str, str]:
     """Python, system, number of cores and packages: what a result states it was made with."""
-    return {
-        "python": platform.python_version(),
-        "system": platform.platform(),
-        "cores": str(core_count()),
-        **package_versions(),
-    }
+    machine = {"system": platform.platform(), "cores": str(core_count())}
+    return {"python": platform.python_version(), **machine, **package_versions()}
 
 
 def program_versions() -> dict[str, str]:

@@ -31,10 +31,8 @@ def save_design(design: Design, path: str | Path) -> None:
 
     path = Path(path)
     data = with_paths_from(path.resolve().parent, _without_none(design.model_dump()))
-    header = (
-        "# A complete candidate chamber, written by chamberopt.\n"
-        "# Units are in the names; amplitude_um is zero-to-peak.\n\n"
-    )
+    header = "# A complete candidate chamber, written by chamberopt.\n"
+    header += "# Units are in the names; amplitude_um is zero-to-peak.\n\n"
     write_text(path, header + _lists_on_one_line(tomli_w.dumps(data)))
 
 

@@ -47,10 +47,8 @@ class Sensitivity:
     def sentences(self) -> list[str]:
         """What a designer may change: one sentence for each parameter, and one for all."""
         loss = f"without losing more than the noise, {self.noise:.2g}"
-        ranges = [
-            f"{one.name} may go from {one.flat[0]:.4g} to {one.flat[1]:.4g} {loss}"
-            for one in self.slices
-        ]
+        flat = ((one.name, *one.flat) for one in self.slices)
+        ranges = [f"{name} may go from {low:.4g} to {high:.4g} {loss}" for name, low, high in flat]
         share = f"{self.together:.0%}"
         return [*ranges, f"of all designs within these ranges {share} lose no more than that"]
 

@@ -81,10 +81,8 @@ def inspect(
         from chamberopt.output.report import write_part_page
 
         if look != viewer.ViewState():
-            raise InputError(
-                "inspect: the page of --html sets the view in the browser; "
-                "remove the options that set the initial view"
-            )
+            remedy = "remove the options that set the initial view"
+            raise InputError(f"inspect: the page of --html sets the view in the browser; {remedy}")
         print_remarks(write_part_page([one.folder for one in loaded], html))
     if screenshot is None and (off_screen or out is not None):
         with results_folder(out, "inspect") as folder:

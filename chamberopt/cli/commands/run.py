@@ -66,9 +66,8 @@ def run(
                 if folder.begun:
                     error.add_note(how_to_resume)
                 raise
-            console.print_result(
-                [*_result_lines(result), *console.note_lines(notes)], folder.path, json
-            )
+            lines = [*_result_lines(result), *console.note_lines(notes)]
+            console.print_result(lines, folder.path, json)
             if not json:
                 show, best = _command("report", folder.path), folder.path / "best.toml"
                 print(f"to see it: {show}; the design: {best}")
@@ -95,17 +94,14 @@ def _search(
         lambda design: resolve_effects(design, chamber, executor)
     )
     compile_with_message(study.design, chamber)
-    if folder.recorded.trials:
-        console.print_remarks(
-            [f"{folder.path}: resuming after {len(folder.recorded.trials)} evaluations"]
-        )
+    if done := len(folder.recorded.trials):
+        console.print_remarks([f"{folder.path}: resuming after {done} evaluations"])
     with progress_bar("evaluations") as progress:
         interrupt.wait_for_evaluation(how_to_resume)
         result = run_study(study, folder, executor, progress, stop=lambda: interrupt.requested)
     best = result.best.design
-    warnings = console.print_warnings(
-        best, build_chamber(best, result.target), " of the best design"
-    )
+    found = build_chamber(best, result.target)
+    warnings = console.print_warnings(best, found, " of the best design")
     console.print_remarks(save_study(folder.path, result, advice, warnings))
     notes = [*map(str, advice), *result.warnings, *result.at_bounds, *chamber.notes]
     return result, [*notes, *result.best.evaluation.notes]

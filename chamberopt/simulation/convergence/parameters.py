@@ -52,11 +52,9 @@ def study_designs(design: Design) -> tuple[dict[str, Any], dict[tuple[str, str],
     parameters = numerical_parameters(design)
     settings = {name: values[-1] for name, values in parameters.items()}
     reference = design.changed(settings)
-    others = {
-        (name, setting_text(value)): reference.changed({name: value})
-        for name, values in parameters.items()
-        for value in values[:-1]
-    }
+    others: dict[tuple[str, str], Design] = {}
+    for name, values in parameters.items():
+        others |= {(name, setting_text(x)): reference.changed({name: x}) for x in values[:-1]}
     return settings, {(REFERENCE, ""): reference, **others, (DESIGNED, ""): design}
 
 

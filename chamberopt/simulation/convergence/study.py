@@ -222,10 +222,9 @@ def _batch_sizes(reference: Replicas, whole: Run) -> tuple[BatchSize, ...]:
         rms = error_law.rms_error(values, whole.objective.value, count / whole.replicas)
         half_width = float(np.mean([objective.half_width for objective, _, _ in estimates]))
         if min(rms, half_width) < ZERO_ERROR:
-            raise InputError(
-                "process.accuracy.simulated_time_s: no dent on the target was simulated, so there "
-                "is no error to measure; raise it, or see chamberopt check"
-            )
+            why = "no dent on the target was simulated, so there is no error to measure"
+            remedy = "raise it, or see chamberopt check"
+            raise InputError(f"process.accuracy.simulated_time_s: {why}; {remedy}")
         cpu_s = count * whole.cpu.value + estimating
         is_resolved = all(resolved for _, _, resolved in estimates)
         sizes.append(BatchSize(count, batches, rms, half_width, cpu_s, is_resolved))
