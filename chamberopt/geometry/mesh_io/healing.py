@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.geometry.mesh_io.holes import close_holes, edge_pieces
+from chamberopt.geometry.mesh_io.holes import close_holes, count_holes
 from chamberopt.geometry.mesh_io.surface_error import OpenSurfaceError, SurfaceError, format_point
 from chamberopt.geometry.triangles import (
     connected_pieces,
@@ -66,7 +66,7 @@ def _require_closed(path: Path, points: np.ndarray, triangles: np.ndarray) -> No
     """Raise SurfaceError unless each edge belongs to exactly two triangles."""
     open_edges = _edges(triangles, count=1)
     if len(open_edges):
-        holes = edge_pieces(open_edges)[0]
+        holes = count_holes(open_edges)
         a, b = map(format_point, points[open_edges[0]])
         message = (
             f"{path}: the surface is not closed: {len(open_edges)} open edges in {holes} "

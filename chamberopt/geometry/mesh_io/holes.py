@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from chamberopt.geometry.mesh_io.surface_error import format_point
-from chamberopt.geometry.triangles import connected_pieces, sides_of
+from chamberopt.geometry.triangles import sides_of
 
 MAX_WIDTH = 0.03  # of the part's diagonal: the widest hole that is closed automatically
 MAX_RIM_EDGES = 64  # the time for a rim grows with the cube of its edges
@@ -51,12 +51,11 @@ def close_holes(
     return np.array(more, dtype=np.int64).reshape(-1, 3), notes
 
 
-def edge_pieces(edges: np.ndarray) -> tuple[int, np.ndarray]:
-    """Number of connected pieces that edges (k, 2) form, and the piece of each edge."""
-    used, numbers = np.unique(edges, return_inverse=True)
-    a, b = numbers.reshape(-1, 2).T
-    count, piece = connected_pieces(a, b, len(used))
-    return count, piece[a]
+def count_holes(edges: np.ndarray) -> int:
+    """Number of connected pieces that open edges (k, 2) form."""
+    import networkx
+
+    return int(networkx.number_connected_components(networkx.Graph(edges.tolist())))
 
 
 def _simple_rims(triangles: np.ndarray, edges: np.ndarray) -> list[list[int]]:
@@ -65,23 +64,14 @@ def _simple_rims(triangles: np.ndarray, edges: np.ndarray) -> list[list[int]]:
     That is against the side of the triangle beside its first edge. Holes that touch in a corner
     are left out.
     """
-    count, piece = edge_pieces(edges)
-    sides = sides_of(triangles)
-    rims = []
-    for k in np.flatnonzero(np.bincount(piece, minlength=count) <= MAX_RIM_EDGES):
-        beside: dict[int, list[int]] = {}
-        for a, b in edges[piece == k].tolist():
-            beside.setdefault(a, []).append(b)
-            beside.setdefault(b, []).append(a)
-        if len(beside) < 3 or any(len(ends) != 2 for ends in beside.values()):
-            continue
-        rim = [min(beside)]
-        rim.append(beside[rim[0]][0])
-        while len(rim) < len(beside):
-            a, b = beside[rim[-1]]
-            rim.append(b if a == rim[-2] else a)
-        against = (sides == (rim[1], rim[0])).all(axis=1).any()
-        rims.append(rim if against else rim[::-1])
+    import networkx
+
+    graph, sides, rims = networkx.Graph(edges.tolist()), sides_of(triangles), []
+    for piece in sorted(networkx.connected_components(graph), key=min):
+        if 3 <= len(piece) <= MAX_RIM_EDGES and all(graph.degree[end] == 2 for end in piece):
+            rim = [start for start, _ in networkx.find_cycle(graph, min(piece))]
+            against = (sides == (rim[1], rim[0])).all(axis=1).any()
+            rims.append(rim if against else rim[::-1])
     return rims
 
 
