@@ -1,7 +1,7 @@
 """Refuse surfaces that cross themselves: cutting such a part out of a chamber fails silently.
 
-Candidate pairs come from a tree of boxes over the triangles in Morton order, which is compared with
-itself level by level. Each pair is then tested exactly.
+Candidate pairs come from a tree of boxes over the triangles, in the order of a k-d tree, which is
+compared with itself level by level. Each pair is then tested exactly.
 
 Source: T. Möller, "A fast triangle-triangle intersection test", J. Graphics Tools 2 (1997) 25.
 """
@@ -38,20 +38,23 @@ def refuse_self_intersection(path: Path, vertices: np.ndarray, triangles: np.nda
     pairs = np.concatenate(found, axis=1) if found else np.zeros((2, 0), dtype=np.int64)
     if not pairs.shape[1]:
         return
-    first = pairs[:, int(np.argmin(pairs[0]))]
+    pairs = np.sort(pairs, axis=0)
+    first = pairs[:, np.lexsort(pairs[::-1])[0]]
     middle = corners[first].reshape(-1, 3).mean(axis=0)
     sides = corners[np.unique(pairs)][:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2, 3)
     message = (
         f"{path}: the surface crosses itself: {pairs.shape[1]} pairs of triangles, "
-        f"the first near {format_point(middle)} (triangles {first.min() + 1} and "
-        f"{first.max() + 1}); heal it in the CAD program, or make its pieces separate bodies"
+        f"the first near {format_point(middle)} (triangles {first[0] + 1} and "
+        f"{first[1] + 1}); heal it in the CAD program, or make its pieces separate bodies"
     )
     raise SurfaceError(message, corners, sides)
 
 
 def _close_pairs(corners: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Pairs of triangles (m, 3, 3) whose boxes overlap, each pair once, in chunks."""
-    order = _morton_order(corners.mean(axis=1))
+    from scipy.spatial import cKDTree
+
+    order = cKDTree(corners.mean(axis=1), leafsize=1).indices  # keeps neighbours together
     low, high = corners.min(axis=1)[order].T.copy(), corners.max(axis=1)[order].T.copy()
     levels = [(low, high)]  # of boxes, each (3, count); the next level joins boxes in pairs
     while levels[-1][0].shape[1] > 1:
@@ -83,17 +86,6 @@ def _close_pairs(corners: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]
         waiting += [
             (level - 1, i[at : at + CHUNK], j[at : at + CHUNK]) for at in range(0, len(i), CHUNK)
         ]
-
-
-def _morton_order(points: np.ndarray) -> np.ndarray:
-    """Order (m,) of points along a curve that keeps neighbours together: x, y, z interleaved."""
-    low, size = points.min(axis=0), np.ptp(points, axis=0).max()
-    cells = ((points - low) / (size or 1.0) * (2**20 - 1)).astype(np.uint64)
-    code = np.zeros(len(points), dtype=np.uint64)
-    for bit in range(20):
-        for axis in range(3):
-            code |= ((cells[:, axis] >> np.uint64(bit)) & np.uint64(1)) << np.uint64(3 * bit + axis)
-    return np.argsort(code, kind="stable")
 
 
 def _crossing(
