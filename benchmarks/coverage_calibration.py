@@ -43,7 +43,7 @@ class Case(NamedTuple):
     seconds: float
 
 
-SIZES = [{"diameter_mm": 2.0, "mass_percent": 50.0}, {"diameter_mm": 3.0, "mass_percent": 50.0}]
+SIZES = [{"diameter_mm": 2.0, "share": 0.5}, {"diameter_mm": 3.0, "share": 0.5}]
 CASES = {
     "plate": Case("plate", {}, 4.0),
     "plate, two ball sizes": Case("plate", {"shot.diameter_mm": None, "shot.mix": SIZES}, 4.0),

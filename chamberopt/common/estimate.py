@@ -5,7 +5,8 @@ Notation
     y_j     pseudo-value of replica j; their mean is the estimate     (pseudovalues, (n,))
     s       standard deviation of the pseudo-values
     t       quantile of Student's distribution                        (student_quantile)
-    half-width = t s / sqrt(n) + bias
+    u       standard error by anything but replicas                  (sampling)
+    half-width = sqrt((t s)² / n + (1.96 u)²) + bias
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from typing import Any
 import numpy as np
 
 CONFIDENCE = 0.95
+NORMAL_95 = 1.96  # half-width of a 95 % interval in standard errors
 ZERO_TOLERANCE = 1e-12  # a value below is a rounding error of zero
 
 
@@ -83,12 +85,15 @@ def estimate(
     highest: float = math.inf,
     bias: float = 0.0,
     confidence: float = CONFIDENCE,
+    sampling: float = 0.0,
 ) -> Estimate:
     """Mean of the pseudo-values with its Student-t interval.
 
     Args:
         lowest, highest: range of the quantity; the mean is clipped to it.
         bias: bound on the error that more replicas would not remove.
+        sampling: standard error that replicas do not show, and that estimates of the same part
+            have in common, so that their differences are free of it.
     """
     values = np.asarray(pseudovalues, dtype=float)
     mean = float(np.clip(values.mean(), lowest, highest))
@@ -99,7 +104,8 @@ def estimate(
     half_width, bias = float("inf"), float(bias)
     if n > 1:
         spread = float(values.std(ddof=1))
-        half_width = student_quantile(n - 1, confidence) * spread / math.sqrt(n) + bias
+        of_replicas = student_quantile(n - 1, confidence) * spread / math.sqrt(n)
+        half_width = math.hypot(of_replicas, NORMAL_95 * sampling) + bias
     return Estimate(mean, half_width, tuple(values.tolist()), bias)
 
 

@@ -26,14 +26,15 @@ their mean until they vary over the target as the true ones do: the variance of 
 shows from replica to replica, is taken away. This asks for about 25 dents in a window.
 
 Intervals are those of the delete-one jackknife over replicas (B. Efron and R. J. Tibshirani, "An
-Introduction to the Bootstrap", Chapman & Hall 1993, chapter 11).
+Introduction to the Bootstrap", Chapman & Hall 1993, chapter 11), and of the choice of the points,
+from figures of every tenth of them.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -47,6 +48,7 @@ from chamberopt.coverage.metrics import FULL_COVERAGE, NEVER, P05
 # but LEAST_RESOLVED of them, and dents in the median window for the figures of single places.
 DENTS_FOR_MEAN, DENTS_FOR_PLACES = 3.0, 25.0
 LEAST_RESOLVED = 0.05
+SPARSE = 10
 NOT_RESOLVED = "not resolved"
 
 
@@ -153,14 +155,28 @@ def coverage_estimates(
         return [whole, 2.0 * whole, rest, 2.0 * rest]
 
     sums = sum_dents(batches, points, scales)
-    of_all = sums.products[:, :, :2].prod(axis=0).mean(axis=0)
+    of_all = sums.products[:, :, :2].prod(axis=0)
     of_rest = products_without_each(sums.products[:, :, 2:]).mean(axis=1)
-    mean, variance = mean_and_variance(np.vstack([of_all, of_rest]), reachable)
+    mean, variance = mean_and_variance(np.vstack([of_all.mean(axis=0), of_rest]), reachable)
+    of_some = np.array([some.mean(axis=0) for some in sparse_points(of_all)])
+    means, variances = mean_and_variance(of_some, reachable)
+    of_mean = estimate(jackknife(mean), 0.0, 1.0, sampling=sampling_error(means))
+    of_variance = estimate(jackknife(variance), 0.0, 0.25, sampling=sampling_error(variances))
     return {
-        "mean_coverage": estimate(jackknife(mean), 0.0, 1.0),
-        "std_coverage": root_of_variance(estimate(jackknife(variance), 0.0, 0.25)),
+        "mean_coverage": of_mean,
+        "std_coverage": root_of_variance(of_variance),
         "p05_coverage": _p05(sums, reachable, time_ratio),
     }
+
+
+def sparse_points(values: np.ndarray) -> list[np.ndarray]:
+    """Every tenth of the points (p, ...), ten times; each time they are as even over the target."""
+    return [values[start::SPARSE] for start in range(SPARSE)]
+
+
+def sampling_error(of_some: np.ndarray) -> float:
+    """Standard error by the choice of points, from figures of `sparse_points`."""
+    return float(np.std(of_some, ddof=1)) / math.sqrt(len(of_some))
 
 
 def products_without_each(products: np.ndarray) -> np.ndarray:
@@ -201,7 +217,8 @@ def root_of_variance(variance: Estimate) -> Estimate:
     if 0.0 < reach < math.inf:
         low, high = (math.sqrt(max(0.0, variance.value + side * reach)) for side in (-1.0, 1.0))
         slope = max(value - low, high - value) / reach
-    return estimate(value + slope * (np.array(variance.pseudovalues) - variance.value), 0.0)
+    found = estimate(value + slope * (np.array(variance.pseudovalues) - variance.value), 0.0)
+    return replace(found, half_width=slope * reach if slope else reach)
 
 
 def _p05(sums: DentSums, reachable: float, time_ratio: float) -> Estimate:
@@ -213,11 +230,16 @@ def _p05(sums: DentSums, reachable: float, time_ratio: float) -> Estimate:
     whole = _low_density(sums.share, sums.replicas, share) * time_ratio
     if batches == 1:
         return estimate([-math.expm1(-whole)], 0.0, 1.0)
+    of_some = [
+        _low_density(some.T, sums.replicas, share) * time_ratio
+        for some in sparse_points(sums.share.T)
+    ]
     others = ~np.eye(batches, dtype=bool)
     without = [
         _low_density(sums.share[rest], sums.replicas[rest], share) * time_ratio for rest in others
     ]
-    return estimate(jackknife(-np.expm1(-np.array([whole, *without]))), 0.0, 1.0)
+    coverage = jackknife(-np.expm1(-np.array([whole, *without])))
+    return estimate(coverage, 0.0, 1.0, sampling=sampling_error(-np.expm1(-np.array(of_some))))
 
 
 def _low_density(shares: np.ndarray, replicas: np.ndarray, share: float) -> float:
@@ -263,5 +285,6 @@ def time_to_98_estimate(p05: Estimate, seconds: float) -> Estimate:
         words = f"more than {soonest:,.0f} s" if math.isfinite(p05.half_width) else ""
         return Estimate(value, math.inf, (value,) * len(p05.pseudovalues), in_words=words)
     deviations = np.array(p05.pseudovalues) - p05.value
-    slope = max(latest - value, value - soonest) / p05.half_width if p05.half_width else 0.0
-    return estimate(value - slope * deviations, 0.0, NEVER)
+    reach = max(latest - value, value - soonest)
+    slope = reach / p05.half_width if p05.half_width else 0.0
+    return replace(estimate(value - slope * deviations, 0.0, NEVER), half_width=reach)

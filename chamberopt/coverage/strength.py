@@ -27,7 +27,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.common.estimate import Estimate, estimate
-from chamberopt.coverage.coverage_intervals import jackknife, root_of_variance
+from chamberopt.coverage.coverage_intervals import (
+    jackknife,
+    root_of_variance,
+    sampling_error,
+    sparse_points,
+)
 
 if TYPE_CHECKING:
     from chamberopt.coverage.field.target_field import TargetField
@@ -35,11 +40,12 @@ if TYPE_CHECKING:
     from chamberopt.coverage.part_impacts import Hits
 
 LEVELS = 32  # of s; twice as many change S by less than 0.3 %
-WINDOWS = 2_500  # of the target's; S varies little from one to the next
+WINDOWS = 2_000  # of the target's; S varies little from one to the next
 SATURATED = 1.1  # SAE J443
 NEWTON_STEPS = 3  # S moves by a quarter of what the saturation time is wrong by
-HALVINGS = 40
-MIN_BATCHES = 3  # leave one out, and two are left to compare
+HALVINGS = 16
+MIN_BATCHES = 4  # for two quarters
+SPLITS = 3  # into halves, and into quarters
 
 
 def impact_strength(hits: Hits, density: float) -> np.ndarray:
@@ -127,9 +133,11 @@ def intensity_uniformity(
 ) -> Estimate:
     """Estimate 1 - (standard deviation of S) / (mean of S) over the target: 1 is even.
 
-    A place out of reach has S = 0. The pseudo-values of S in each window scatter by what counts
-    scatter, but independently from one batch of replicas to another. So the mean of their products
-    over all pairs of batches has the true mean square for its mean, without what scatter adds.
+    A place out of reach has S = 0. S scatters as counts do, which would add to its variance. So the
+    mean square comes from products of S in two disjoint halves of the replicas, whose scatter is
+    independent. S is also too small where there are few dents, because the strongest are missing.
+    Quarters of the replicas show by how much that changes the result; the step from them to the
+    halves is made once more, and the interval includes it.
 
     Args:
         replicas: impacts of the replicas of each batch.
@@ -158,28 +166,66 @@ def intensity_uniformity(
 
 
 def uniformity_of(parts: np.ndarray, highest: float, reachable: float) -> Estimate:
-    """The uniformity from histograms of batches, (g, p, LEVELS), by the delete-one jackknife."""
+    """The uniformity from histograms of batches, (g, p, LEVELS)."""
     batches, whole = len(parts), parts.sum(axis=0)
     strength, time = saturated_strength(whole, highest)
+    if batches < MIN_BATCHES:
+        value = _uniformity(_spread(strength, strength), reachable)
+        return Estimate(value, math.inf, (value,) * batches)
+    rng = np.random.default_rng(0)
+    by_halves = _spread_of_pairs(parts, highest, batches // 2, rng)
+    by_quarters = _spread_of_pairs(parts, highest, batches // 4, rng)
+    # With half the dents, the error of S is about twice as large.
+    value = _uniformity(2.0 * by_halves - by_quarters, reachable)
+    bias = abs(value - _uniformity(by_halves, reachable))
+    of_some = [_uniformity(_spread(some, some), reachable) for some in sparse_points(strength)]
     values = np.array(
         [
             batches * strength - (batches - 1) * strength_near(whole - part, highest, time)
             for part in parts
         ]
     )
-    if batches == 1:
-        values = strength[None]
     squares, means = values @ values.T / values.shape[1], values.mean(axis=1)
-    everything = _relative_variance(squares, means, reachable)
-    if batches < MIN_BATCHES:
-        value = 1.0 - math.sqrt(max(0.0, everything))
-        return Estimate(value, math.inf, (value,) * batches)
     without = [
         _relative_variance(squares[np.ix_(rest, rest)], means[rest], reachable)
         for rest in ~np.eye(batches, dtype=bool)
     ]
+    everything = _relative_variance(squares, means, reachable)
     spread = root_of_variance(estimate(jackknife(np.array([everything, *without])), 0.0))
-    return estimate(1.0 - np.array(spread.pseudovalues), highest=1.0)
+    deviations = np.array(spread.pseudovalues) - spread.value
+    return estimate(
+        value - deviations, highest=1.0, bias=bias, sampling=sampling_error(np.array(of_some))
+    )
+
+
+def _spread_of_pairs(
+    parts: np.ndarray, highest: float, size: int, rng: np.random.Generator
+) -> float:
+    """Mean square of S over the square of its mean, from pairs of disjoint sets of batches.
+
+    Args:
+        size: number of batches in each set.
+    """
+    spreads = []
+    for _ in range(SPLITS):
+        order = rng.permutation(len(parts))
+        one, two = (
+            saturated_strength(parts[order[k * size : (k + 1) * size]].sum(axis=0), highest)[0]
+            for k in (0, 1)
+        )
+        spreads.append(_spread(one, two))
+    return float(np.mean(spreads))
+
+
+def _spread(one: np.ndarray, two: np.ndarray) -> float:
+    """Mean product of two estimates of S, (p,) each, over the product of their means."""
+    means = float(one.mean() * two.mean())
+    return float((one * two).mean()) / means if means > 0.0 else 2.0
+
+
+def _uniformity(spread: float, reachable: float) -> float:
+    """The uniformity over the whole target; places out of reach have S = 0."""
+    return 1.0 - math.sqrt(max(0.0, spread / reachable - 1.0))
 
 
 def _relative_variance(squares: np.ndarray, means: np.ndarray, reachable: float) -> float:
