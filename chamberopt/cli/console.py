@@ -90,11 +90,9 @@ def print_result(
 
 
 def estimate_line(name: str, estimate: Estimate) -> str:
-    from chamberopt.common.estimate import ZERO_TOLERANCE
+    from chamberopt.common.number_text import estimate_text
 
-    numbers = estimate.value, estimate.half_width
-    value, half_width = (0.0 if abs(x) < ZERO_TOLERANCE else x for x in numbers)
-    return f"{name:34}{value:12.5g} ± {half_width:.2g}"
+    return f"{name:34}{estimate_text(estimate)}"
 
 
 def evaluation_lines(evaluation: Evaluation) -> list[str]:

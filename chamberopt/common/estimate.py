@@ -43,24 +43,21 @@ class Estimate:
     def high(self) -> float:
         return self.value + self.half_width
 
-    def interval_json(self) -> dict[str, float | None]:
-        """Value and half-width as JSON values; null where they are not finite."""
-        return {"value": _finite(self.value), "half_width": _finite(self.half_width)}
+    def interval_json(self) -> dict[str, Any]:
+        """Value and half-width as JSON values, null where they are not finite, and the words."""
+        interval = {"value": _finite(self.value), "half_width": _finite(self.half_width)}
+        return interval | ({"in_words": self.in_words} if self.in_words else {})
 
     def to_json(self) -> dict[str, Any]:
         """As JSON values, with the pseudo-values by which results can be compared later."""
-        words = {"in_words": self.in_words} if self.in_words else {}
-        pseudovalues = {"pseudovalues": list(self.pseudovalues), "bias": self.bias}
-        return {**self.interval_json(), **pseudovalues, **words}
+        return {**self.interval_json(), "pseudovalues": list(self.pseudovalues), "bias": self.bias}
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Estimate:
         """The estimate that `to_json` wrote. Raises KeyError, TypeError or ValueError otherwise."""
         pseudovalues = tuple(float(x) for x in data["pseudovalues"])
         bias = float(data.get("bias", 0.0))
-        words = str(data.get("in_words", ""))
-        found = cls.from_interval_json(data)
-        return replace(found, pseudovalues=pseudovalues, bias=bias, in_words=words)
+        return replace(cls.from_interval_json(data), pseudovalues=pseudovalues, bias=bias)
 
     def not_known(self, in_words: str) -> Estimate:
         """The same value without an interval, and the words that stand in its place."""
@@ -68,10 +65,11 @@ class Estimate:
 
     @classmethod
     def from_interval_json(cls, data: Mapping[str, Any]) -> Estimate:
-        """The value and half-width that `interval_json` wrote."""
+        """The value, half-width and words that `interval_json` wrote."""
         value, half_width = data["value"], data["half_width"]
         value = math.nan if value is None else float(value)
-        return cls(value, math.inf if half_width is None else float(half_width))
+        half_width = math.inf if half_width is None else float(half_width)
+        return cls(value, half_width, in_words=str(data.get("in_words", "")))
 
 
 def _finite(number: float) -> float | None:

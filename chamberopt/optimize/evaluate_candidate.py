@@ -114,7 +114,7 @@ class CandidateEvaluator:
             goals=goals,
             # Without pseudo-values, which a confirmation has in a file of its own.
             metrics={
-                k: Estimate(one.value, one.half_width) for k, one in evaluation.metrics.items()
+                k: replace(one, pseudovalues=(), bias=0.0) for k, one in evaluation.metrics.items()
             },
             penalty=penalty,
             score=goals[0].value - unit * penalty,

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from chamberopt.common.estimate import Estimate
-from chamberopt.coverage.metrics import NEVER, parse_objective
 from chamberopt.design.shapes.base import is_custom
 from chamberopt.output.compare.comparability import (
     require_same_part,
@@ -116,15 +115,7 @@ def part_unit(result: Result) -> str:
 def _difference(name: str, first: Result, other: Result, confidence: float) -> Difference:
     of_goal = name == first.objective_name
     after, before = (one.objective if of_goal else one.metrics[name] for one in (other, first))
-    gap = difference(after, before, other.seeds == first.seeds, confidence)
-    terms = parse_objective(name).terms if of_goal else {name: 1.0}
-    if TIME in terms and any(
-        one.metrics[TIME].value >= NEVER for one in (first, other) if TIME in one.metrics
-    ):
-        return replace(
-            gap, half_width=NEVER, time_ratio=None, replicas=None
-        )  # "never" does not scatter
-    return gap
+    return difference(after, before, other.seeds == first.seeds, confidence)
 
 
 def labels(paths: Sequence[Path]) -> tuple[str, ...]:

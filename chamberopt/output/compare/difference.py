@@ -36,6 +36,7 @@ class Difference:
         replicas: number of replicas of the later candidate that would show the difference if it is
             as large as it looks. None, as is time_ratio, where the difference is real or 0, or
             beyond MAX_TIME_RATIO.
+        in_words: what stands in the place of the number where one of the figures is not a number.
     """
 
     value: float
@@ -43,17 +44,17 @@ class Difference:
     paired: bool
     time_ratio: float | None = None
     replicas: int | None = None
+    in_words: str = ""
 
     @property
     def real(self) -> bool:
         """Whether the difference is larger than its half-width."""
-        return abs(self.value) > self.half_width
+        return not self.in_words and abs(self.value) > self.half_width
 
     def as_json(self) -> dict[str, Any]:
         """Return plain JSON values."""
         return {
-            "value": self.value,
-            "half_width": self.half_width,
+            **Estimate(self.value, self.half_width, in_words=self.in_words).interval_json(),
             "paired": self.paired,
             "real": self.real,
             "times_as_long": self.time_ratio,
@@ -83,6 +84,8 @@ def difference(
     found = Difference(
         0.0 if abs(gap.value) < ZERO_TOLERANCE else gap.value, gap.half_width, paired
     )
+    if after.in_words or before.in_words:
+        return replace(found, half_width=math.inf, in_words="not known")
     if found.real or found.value == 0.0 or min(count, len(before.pseudovalues)) < 2:
         return found
     if paired:

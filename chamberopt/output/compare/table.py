@@ -7,11 +7,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from chamberopt.common.estimate import CONFIDENCE, Estimate
-from chamberopt.coverage.metrics import NEVER
-from chamberopt.output.compare.comparison import TIME, Comparison
-from chamberopt.output.compare.difference import MAX_TIME_RATIO, ZERO_TOLERANCE, Difference
+from chamberopt.common.number_text import estimate_text
+from chamberopt.output.compare.comparison import Comparison
+from chamberopt.output.compare.difference import MAX_TIME_RATIO, Difference
 
-COVERAGE_MODEL = "process.accuracy.coverage_model"
 HEADER = ("difference", "real", "to know: simulate")
 
 
@@ -25,7 +24,7 @@ def comparison_text(comparison: Comparison) -> str:
     if not rows:
         rows = [["the designs do not differ"]]
     figures = {
-        name: [_figure(name, estimate) for estimate in estimates]
+        name: [estimate_text(estimate) for estimate in estimates]
         for name, estimates in comparison.metrics.items()
     }
     gaps = {
@@ -71,23 +70,18 @@ def _legend(comparison: Comparison) -> list[str]:
             )
         else:
             lines.append(f"{label} - {first}: independent, on other seeds.")
-    if COVERAGE_MODEL in comparison.parameters:
+    if any(gap.in_words for several in comparison.differences.values() for gap in several):
         lines.append(
-            f"Coverage is counted in two ways ({COVERAGE_MODEL}): differences may come from that, "
-            "not from the chambers."
+            "not resolved: too few dents were simulated for this figure; notes of the results say "
+            "how many it takes."
         )
     return [*lines[:-1], lines[-1] + ")"]
 
 
-def two_digits(half_width: float) -> str:
-    """Format a half-width with two digits and no exponent if that is short: 1300, 0.0048."""
-    return f"{float(f'{half_width:.2g}'):g}"
-
-
 def _cells(gap: Difference) -> list[str]:
     """Cells of a difference: its value, whether it is real, and what it takes to know."""
-    shown = _value(gap.value, "+.4g" if gap.value else "g", gap.half_width)
-    if gap.value == 0.0:
+    shown = estimate_text(Estimate(gap.value, gap.half_width, in_words=gap.in_words), sign=True)
+    if gap.value == 0.0 or gap.in_words:
         return [shown, "no", ""]
     if gap.real:
         return [shown, "yes", ""]
@@ -98,18 +92,6 @@ def _cells(gap: Difference) -> list[str]:
 
 def _times(times: float) -> str:
     return f"{times:.1f}" if times < 10.0 else f"{math.ceil(times)}"
-
-
-def _figure(name: str, estimate: Estimate) -> str:
-    if name == TIME and estimate.value >= NEVER:
-        return "never"
-    return _value(estimate.value, ".4g", estimate.half_width)
-
-
-def _value(value: float, form: str, half_width: float) -> str:
-    """Format a number and its half-width; numbers below ZERO_TOLERANCE are shown as 0."""
-    value, half_width = (0.0 if abs(x) < ZERO_TOLERANCE else x for x in (value, half_width))
-    return f"{value:{form}}" + (f" ± {two_digits(half_width)}" if half_width else "")
 
 
 def _shown(value: Any) -> str:

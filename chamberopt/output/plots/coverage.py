@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chamberopt.coverage.metrics import FULL_COVERAGE, NEVER
+from chamberopt.coverage.metrics import FULL_COVERAGE
 from chamberopt.output.plots.colours import DARK_GREY, GREY
 from chamberopt.output.plots.figure_style import new_figure, save_picture, style_axes
 
@@ -123,7 +123,7 @@ def draw_coverage_over_time(
     end = max([treatment_time, *last])
     for k, (curve, pair) in enumerate(zip(curves, lines, strict=True)):
         axes.plot([], [], label=curve.label, **curve.style)
-        if curve.time_to_98 is not None and curve.time_to_98.value < NEVER:
+        if curve.time_to_98 is not None and not curve.time_to_98.in_words:
             _draw_time_to_98(axes, curve, end, 100.0 * FULL_COVERAGE - 0.9 * k)
         for (times, value, half_width), width in zip(pair, (1.8, 0.9), strict=True):
             axes.plot([0.0, *times], [0.0, *(100.0 * value)], lw=width, **curve.style)

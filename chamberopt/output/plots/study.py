@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.common.estimate import Estimate
+from chamberopt.common.number_text import estimate_text
 from chamberopt.output.plots.colours import BLUE, GREEN, GREY, ORANGE
 from chamberopt.output.plots.figure_style import (
     new_figure,
@@ -63,11 +64,11 @@ def convergence_picture(path: Path, result: StudyResult) -> None:
     grid = figure.add_gridspec(rows + 1, columns, height_ratios=[1.35, *[1.0] * rows])
     axes = figure.add_subplot(grid[0, :])
     draw_convergence(axes, candidates, y_label)
-    start, gain = result.start.evaluation.objective.value, result.gain
-    axes.axhline(start, color=ORANGE, lw=1.2, ls="--", label="start, confirmed")
+    start, best = (one.evaluation.objective for one in (result.start, result.best))
+    axes.axhline(start.value, color=ORANGE, lw=1.2, ls="--", label="start, confirmed")
     axes.set_title(
-        f"best {result.best.evaluation.objective.value:.3f}, start {start:.3f}: "
-        f"gain {gain.value:+.3f} ± {gain.half_width:.3f}   ({result.algorithm})",
+        f"best {estimate_text(best)}, start {estimate_text(start)}: "
+        f"gain {estimate_text(result.gain, sign=True)}   ({result.algorithm})",
         loc="left",
         fontsize=11,
     )
@@ -140,9 +141,10 @@ def _point(candidate: EvaluatedCandidate) -> tuple[int, float, float]:
 
 
 def _tooltip(candidate: EvaluatedCandidate) -> str:
-    number, value, half_width = _point(candidate)
+    assert candidate.objective is not None
     rows = [f"{name} = {one:.4g}" for name, one in candidate.parameters.items()]
-    return "\n".join([f"evaluation {number}: {value:.4g} ± {half_width:.2g}", *rows])
+    first = f"evaluation {candidate.number}: {estimate_text(candidate.objective)}"
+    return "\n".join([first, *rows])
 
 
 def _draw_parameter(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from chamberopt.common.number_text import estimate_text
 from chamberopt.output.plots.colours import BLUE, COVERAGE_MAP, GREY, ORANGE
 from chamberopt.output.plots.figure_style import new_figure, readable, save_picture, style_axes
 
@@ -55,8 +56,7 @@ def _title(sweep: SweepResult) -> str:
     count, best = f"{len(sweep.trials)} candidates", sweep.best
     if best is None or best.objective is None:
         return f"{count}, none of them feasible"
-    value, half_width = best.objective.value, best.objective.half_width
-    return f"{count}; the best as simulated: {value:.3f} ± {half_width:.2g}, luck included"
+    return f"{count}; the best as simulated: {estimate_text(best.objective)}, luck included"
 
 
 def _draw_curve(axes: Axes, sweep: SweepResult, name: str) -> None:

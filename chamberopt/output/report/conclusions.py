@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from chamberopt.coverage.metrics import NEVER
+from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
 from chamberopt.optimize.candidates import POINTS_PER_PARAMETER
 from chamberopt.output.report.number_text import (
     Label,
@@ -82,10 +82,10 @@ def full_coverage(result: Result) -> str:
     time = result.metrics.get("time_to_98_s")
     if time is None:
         return "this older result does not say when it would be covered to 98 %"
-    if time.value >= NEVER:
+    if time.in_words == "never":
         return "at this rate 95 % of its area would never be covered to 98 %"
-    if time.half_width >= time.value:
-        return "how long it takes until 95 % of its area is covered to 98 % is not known yet"
+    if time.in_words == NOT_RESOLVED:
+        return "too few dents were simulated to tell when 95 % of its area is covered to 98 %"
     return f"95 % of its area is covered to 98 % after {Label('', 's').format(time)}"
 
 
@@ -93,11 +93,15 @@ def accuracy_rows(result: Result, study: Mapping[str, Any] | None) -> dict[str, 
     """The intervals of the answer, and the replicas behind them."""
     objective, mean = objective_label(result.objective_name), metric_label("mean_coverage")
     stop_reason = result.data.get("stopped_by", "")
+    field = result.data["field"]
+    needed = field["simulated_s_needed"]["p05_times_intensity"]
     rows = {
         f"95 % interval of the {objective.text}": objective.format(result.objective),
         f"95 % interval of the {mean.text}": mean.format(result.metrics["mean_coverage"]),
         "replicas, each with its own seed": f"{result.data['replicas']}",
         "number of replicas": STOP_REASONS.get(stop_reason, stop_reason),
+        "dents in the median window": plain(field["dents_in_median_window"], 3),
+        "simulation that resolves every figure": f"{plain(needed, 2)} s" if needed else "",
     }
     if study and "accuracy" in study:
         search = study["accuracy"]["search"]

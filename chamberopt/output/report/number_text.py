@@ -1,20 +1,16 @@
-"""Numbers of the report as text, and the label and unit of each metric and objective.
-
-An interval is given to one or two digits, and its value to the same decimals.
-"""
+"""Numbers of the report as text, and the label and unit of each metric and objective."""
 
 from __future__ import annotations
 
-import math
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Any
 
+from chamberopt.common import number_text
 from chamberopt.common.errors import InputError
-from chamberopt.common.estimate import ZERO_TOLERANCE
+from chamberopt.common.estimate import Estimate
 from chamberopt.coverage.metrics import METRICS, parse_objective
-
-if TYPE_CHECKING:
-    from chamberopt.common.estimate import Estimate
 
 THIN_SPACE = "\u202f"  # between thousands; no line breaks there
 
@@ -42,14 +38,12 @@ class Label:
 
     def format(self, estimate: Estimate, sign: bool = False) -> str:
         """The estimate with its interval, in the unit shown."""
-        return with_interval(**self.scale(estimate), unit=self.unit, sign=sign)
+        return typeset(number_text.estimate_text(estimate, self.factor, self.unit, sign))
 
-    def scale(self, estimate: Estimate) -> dict[str, float]:
-        """Value and half-width in the unit shown."""
-        return {
-            "value": self.factor * estimate.value,
-            "half_width": abs(self.factor) * estimate.half_width,
-        }
+    def scale(self, estimate: Estimate) -> dict[str, Any]:
+        """The estimate as JSON values in the unit shown."""
+        value, half_width = self.factor * estimate.value, abs(self.factor) * estimate.half_width
+        return Estimate(value, half_width, in_words=estimate.in_words).interval_json()
 
 
 def metric_label(name: str) -> Label:
@@ -57,7 +51,7 @@ def metric_label(name: str) -> Label:
     metric = METRICS.get(name)
     if metric is None:
         return Label(name.replace("_", " "))
-    if metric.highest <= 1.0:
+    if name.endswith("_coverage"):
         return Label(metric.summary, "%", 100.0)
     return Label(metric.summary, "" if metric.unit == "balls" else metric.unit)  # "number of balls"
 
@@ -77,14 +71,7 @@ def objective_label(name: str) -> Label:
 
 def plain(value: float, digits: int = 4) -> str:
     """The number to a number of significant digits, without an exponent if it is of usual size."""
-    if not math.isfinite(value):
-        return "not known"
-    if abs(value) < ZERO_TOLERANCE:
-        return "0"
-    if not 1e-4 <= abs(value) < 1e9:
-        return f"{value:.{digits - 1}g}"
-    text = f"{value:.{max(0, digits - 1 - math.floor(math.log10(abs(value))))}f}"
-    return _grouped(text.rstrip("0").rstrip(".") if "." in text else text)
+    return typeset(number_text.plain(value, digits))
 
 
 def with_unit(value: float, unit: str = "") -> str:
@@ -93,27 +80,14 @@ def with_unit(value: float, unit: str = "") -> str:
 
 
 def with_interval(value: float, half_width: float, unit: str = "", sign: bool = False) -> str:
-    """Such as "0.809 ± 0.004 mm": both to the decimals of the half-width; exact values stand alone.
+    """Such as "0.809 ± 0.004 mm"; exact values stand alone."""
+    return typeset(number_text.with_interval(value, half_width, unit, sign))
 
-    Args:
-        sign: put a plus before positive values.
-    """
-    unit = f"{THIN_SPACE if unit == '°' else ' '}{unit}" if unit else ""
-    if not math.isfinite(value):
-        return "not known"
-    plus = "+" if sign and value > ZERO_TOLERANCE else ""
-    if abs(half_width) < ZERO_TOLERANCE:
-        return f"{plus}{plain(value)}{unit}"
-    if not math.isfinite(half_width):
-        return f"{plus}{plain(value)} ± not known{unit}"
-    # Two digits for half-widths from 1.0 to 2.9, one from 3 to 9; negative: tens, hundreds.
-    magnitude = math.floor(math.log10(half_width))
-    decimals = value_decimals = (1 if half_width / 10.0**magnitude < 2.95 else 0) - magnitude
-    shown = 0.0 if abs(value) < ZERO_TOLERANCE else value
-    if decimals < 0 and 0.0 < abs(shown) < 0.5 * 10.0**-decimals:
-        # 4000 ± 500 000 says more than 0 ± 500 000.
-        value_decimals = -math.floor(math.log10(abs(shown)))
-    return f"{plus}{_rounded(shown, value_decimals)} ± {_rounded(half_width, decimals)}{unit}"
+
+def interval_text(row: Mapping[str, Any], unit: str = "", sign: bool = False) -> str:
+    """What Label.scale returned, as text."""
+    shown = Estimate.from_interval_json(row)
+    return typeset(number_text.estimate_text(shown, unit=unit, sign=sign))
 
 
 def per_cent(value: float) -> str:
@@ -121,14 +95,11 @@ def per_cent(value: float) -> str:
     return f"{100.0 * value:.0f} %"
 
 
-def _rounded(value: float, decimals: int) -> str:
-    text = f"{round(value, decimals):.{max(0, decimals)}f}"
-    return _grouped(text.removeprefix("-") if not float(text) else text)
+def typeset(text: str) -> str:
+    """Text with gaps between thousands from 10 000 on, and a minus as long as a plus."""
 
+    def grouped(number: re.Match[str]) -> str:
+        return f"{int(number[0]):,}".replace(",", THIN_SPACE)
 
-def _grouped(text: str) -> str:
-    """The number with gaps between thousands from 10 000 on, and a minus as long as a plus."""
-    whole, point, decimals = text.partition(".")
-    if len(whole.lstrip("-")) > 4:
-        whole = f"{int(whole):,}".replace(",", THIN_SPACE)
-    return (whole + point + decimals).replace("-", "−")
+    text = re.sub(r"(?<![\d.,e])\d{5,}(?!e)", grouped, text).replace(" °", f"{THIN_SPACE}°")
+    return re.sub(r"(?<!\w)-(?=\d)", "−", text)

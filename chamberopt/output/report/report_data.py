@@ -44,6 +44,7 @@ def report_contents(folder: str | Path) -> dict[str, Any]:
         "answer": answer(result, start, gain),
         "question": _question(result, study),
         "metrics": _metrics(result, start),
+        "field": _field(result),
         "front": [_pareto_row(row) for row in study.get("front", [])] if study else [],
         "evaluations": [_evaluation(row, label.factor) for row in rows],
         "influence": influence(study, label) if study and start else None,
@@ -67,7 +68,8 @@ def report_contents(folder: str | Path) -> dict[str, Any]:
 def _change(after: Estimate, before: Estimate, result: Result, start: Result) -> Estimate:
     """The difference, from pairs of replicas where both ran on the same seeds."""
     same_seeds = result.seeds == start.seeds
-    return (paired_difference if same_seeds else independent_difference)(after, before)
+    change = (paired_difference if same_seeds else independent_difference)(after, before)
+    return change.not_known("not known") if after.in_words or before.in_words else change
 
 
 def _question(result: Result, study: Mapping[str, Any] | None) -> dict[str, Any]:
@@ -140,6 +142,25 @@ def _metrics(result: Result, start: Result | None) -> list[dict[str, Any]]:
     return rows
 
 
+def _field(result: Result) -> dict[str, Any]:
+    """The windows in which coverage is measured."""
+    field = result.data["field"]
+    labels = {name: metric_label(name) for name in field["double_gauge"]}
+    shown = ("gauge_mm2", "reachable_share", "crease_share")
+    return {
+        **{name: field[name] for name in shown},
+        "dents": field["dents_in_median_window"],
+        "double_gauge": [
+            {
+                "label": labels[name].text,
+                "unit": labels[name].unit,
+                "result": labels[name].scale(Estimate.from_json(one)),
+            }
+            for name, one in field["double_gauge"].items()
+        ],
+    }
+
+
 def _evaluation(row: Mapping[str, Any], factor: float) -> dict[str, Any]:
     value, half_width = row["objective"], row["half_width"]
     return {
@@ -158,7 +179,7 @@ def _pareto_row(row: Mapping[str, Any]) -> dict[str, Any]:
     objectives = []
     for name, value in row["objectives"].items():
         label = objective_label(name)
-        scaled = label.scale(Estimate(value["value"], value["half_width"]))
+        scaled = label.scale(Estimate.from_interval_json(value))
         objectives.append({"label": label.text, "unit": label.unit, "result": scaled})
     return {"parameters": row["parameters"], "objectives": objectives}
 

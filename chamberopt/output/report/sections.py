@@ -6,8 +6,17 @@ import base64
 from collections.abc import Mapping
 from typing import Any
 
+from chamberopt.common.estimate import Estimate
+from chamberopt.common.number_text import estimate_text
 from chamberopt.output.report import charts, html
-from chamberopt.output.report.number_text import per_cent, plain, with_interval, with_unit
+from chamberopt.output.report.number_text import (
+    interval_text,
+    per_cent,
+    plain,
+    typeset,
+    with_interval,
+    with_unit,
+)
 from chamberopt.output.report.part3d import PartScene
 
 Contents = Mapping[str, Any]  # of report_contents, or a part of it
@@ -25,7 +34,7 @@ def sections(
 
     Args:
         viewer: HTML of the part in 3D.
-        scenes: by name of the result, for the coverage of its triangles.
+        scenes: by name of the result, for the coverage over the area.
         design_file: name and text.
     """
     is_study = contents["kind"] == "study"
@@ -52,8 +61,11 @@ def _question(contents: Contents) -> str:
     part, target = question["part"], question["target"]
     reach = ""
     if area := target.get("target_exposed_area_mm2"):
-        triangles = target["target_triangles"]
-        reach = f" (the shot can reach {plain(area)} mm² of it, in {triangles} triangles)"
+        field = contents["field"]
+        reach = (
+            f" ({plain(area)} mm² in the chamber; the shot can reach "
+            f"{per_cent(field['reachable_share'])} of it)"
+        )
     peening = (
         f"for {plain(question['treatment_time_s'])} s in a chamber of shape “{question['shape']}”"
     )
@@ -103,14 +115,11 @@ def _answer(contents: Contents) -> str:
 
 
 def _tile_value(row: Contents, which: str) -> str:
-    value, half_width = row[which]["value"], row[which]["half_width"]
-    if row["name"] == "time_to_98_s" and half_width >= value:
-        return "not known yet"
-    return with_interval(value, half_width, row["unit"])
+    return interval_text(row[which], row["unit"])
 
 
 def _interval(row: Contents, which: str, sign: bool = False) -> str:
-    return with_interval(row[which]["value"], row[which]["half_width"], sign=sign)
+    return interval_text(row[which], sign=sign)
 
 
 def _label(row: Contents) -> str:
@@ -225,7 +234,20 @@ def _coverage(contents: Contents, scenes: Mapping[str, PartScene]) -> str:
         pair.append(html.chart("against-time", svg, caption))
     table = html.table("± 95 % intervals", head, rows)
     title = "Compared with the start" if has_start else "Coverage"
-    return html.section(title, table, html.pair(*pair))
+    return html.section(title, table, _windows(contents), html.pair(*pair))
+
+
+def _windows(contents: Contents) -> str:
+    """The windows in which coverage is measured, and its figures in windows of twice the radius."""
+    field = contents["field"]
+    text = (
+        f"Coverage is the share dented in a window of {plain(field['gauge_mm2'])} mm² round each "
+        f"point of the target. The median window has {plain(field['dents'], 2)} simulated dents. "
+        f"{per_cent(field['crease_share'])} of the dented area is on sharp edges."
+    )
+    wide = [(_label(row), _interval(row, "result")) for row in field["double_gauge"]]
+    caption = f"In windows of {plain(4.0 * field['gauge_mm2'])} mm², twice as wide"
+    return html.paragraph(text) + html.fold(caption, html.table("", ("", "± 95 %"), wide))
 
 
 def _accuracy_and_cost(contents: Contents) -> str:
@@ -270,7 +292,7 @@ def _effects(contents: Contents) -> str:
 
 
 def _percentage(change: Contents) -> str:
-    return with_interval(100.0 * change["value"], 100.0 * change["half_width"], "%", sign=True)
+    return typeset(estimate_text(Estimate.from_interval_json(change), 100.0, "%", sign=True))
 
 
 def _notes(contents: Contents) -> str:

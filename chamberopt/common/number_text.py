@@ -1,0 +1,66 @@
+"""Numbers and estimates as text: the same digits in console, pictures, tables and reports.
+
+An interval is given to one or two digits, and its value to the same decimals.
+"""
+
+from __future__ import annotations
+
+import math
+
+from chamberopt.common.estimate import ZERO_TOLERANCE, Estimate
+
+
+def estimate_text(
+    estimate: Estimate, factor: float = 1.0, unit: str = "", sign: bool = False
+) -> str:
+    """The estimate with its interval, or the words that stand in its place.
+
+    Args:
+        factor: number shown over number stored.
+        unit: of the number shown.
+        sign: put a plus before positive values.
+    """
+    if estimate.in_words:
+        return estimate.in_words
+    return with_interval(factor * estimate.value, abs(factor) * estimate.half_width, unit, sign)
+
+
+def plain(value: float, digits: int = 4) -> str:
+    """The number to a number of significant digits, without an exponent if it is of usual size."""
+    if not math.isfinite(value):
+        return "not known"
+    if abs(value) < ZERO_TOLERANCE:
+        return "0"
+    if not 1e-4 <= abs(value) < 1e9:
+        return f"{value:.{digits - 1}g}"
+    text = f"{value:.{max(0, digits - 1 - math.floor(math.log10(abs(value))))}f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def with_interval(value: float, half_width: float, unit: str = "", sign: bool = False) -> str:
+    """Such as "0.809 ± 0.004 mm": both to the decimals of the half-width; exact values stand alone.
+
+    Args:
+        sign: put a plus before positive values.
+    """
+    unit = f" {unit}" if unit else ""
+    if not math.isfinite(value):
+        return "not known"
+    plus = "+" if sign and value > ZERO_TOLERANCE else ""
+    if abs(half_width) < ZERO_TOLERANCE:
+        return f"{plus}{plain(value)}{unit}"
+    if not math.isfinite(half_width):
+        return f"{plus}{plain(value)} ± not known{unit}"
+    # Two digits for half-widths from 1.0 to 2.9, one from 3 to 9; negative: tens, hundreds.
+    magnitude = math.floor(math.log10(half_width))
+    decimals = value_decimals = (1 if half_width / 10.0**magnitude < 2.95 else 0) - magnitude
+    shown = 0.0 if abs(value) < ZERO_TOLERANCE else value
+    if decimals < 0 and 0.0 < abs(shown) < 0.5 * 10.0**-decimals:
+        # 4000 ± 500 000 says more than 0 ± 500 000.
+        value_decimals = -math.floor(math.log10(abs(shown)))
+    return f"{plus}{_rounded(shown, value_decimals)} ± {_rounded(half_width, decimals)}{unit}"
+
+
+def _rounded(value: float, decimals: int) -> str:
+    text = f"{round(value, decimals):.{max(0, decimals)}f}"
+    return text if float(text) else text.removeprefix("-")
