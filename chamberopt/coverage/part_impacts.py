@@ -147,9 +147,7 @@ def load_hits(path: Path) -> HitsByTriangle:
         triangle = np.repeat(np.arange(len(first) - 1, dtype=np.int32), np.diff(first))
         found = HitsByTriangle(first, Hits(triangle, **columns))
     except FileNotFoundError:
-        raise InputError(
-            f"{path}: not there; an older version did not keep single impacts: simulate again"
-        ) from None
+        raise InputError(f"{path}: not there; restore it, or simulate again") from None
     except UNREADABLE_NPZ as error:
         raise InputError(f"{path}: damaged ({error}); simulate again") from None
     if any(len(column) != first[-1] for column in columns.values()):
@@ -157,25 +155,20 @@ def load_hits(path: Path) -> HitsByTriangle:
     return found
 
 
-def load_matching_hits(folder: Path, impacts: np.ndarray) -> HitsByTriangle | None:
-    """The single impacts of a results folder, checked to belong to its coverage.vtp.
+def load_matching_hits(folder: Path, impacts: np.ndarray) -> HitsByTriangle:
+    """The single impacts of a results folder, checked to belong to its part.vtp.
 
     Args:
-        impacts: number of impacts of each triangle by coverage.vtp, (m,).
-
-    Returns:
-        The impacts; None for an older result, which has no such file.
+        impacts: number of impacts of each triangle by part.vtp, (m,).
 
     Raises:
-        InputError: the file is damaged or belongs to another result.
+        InputError: the file is missing, damaged or belongs to another result.
     """
     path = folder / HITS_FILE
-    if not path.is_file():
-        return None
     found = load_hits(path)
     if not np.array_equal(np.diff(found.first), impacts):
         raise InputError(
-            f"{path}: its impacts are not those of the coverage.vtp beside it but of another "
+            f"{path}: its impacts are not those of the part.vtp beside it but of another "
             "result; simulate again"
         )
     return found

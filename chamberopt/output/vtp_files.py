@@ -1,13 +1,14 @@
 """Write and read the surfaces of a results folder, which also open in ParaView.
 
-coverage.vtp is the part with the fields of its triangles, chamber.vtp the closed cavity.
+part.vtp is the part in its own triangles with their values, coverage.vtp the same surface in
+triangles that suit the field, with its values at their corners, chamber.vtp the closed cavity.
 """
 
 from __future__ import annotations
 
 import logging
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,13 +17,23 @@ import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import atomic_write
-from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
+    from chamberopt.coverage.field.display_mesh import DisplayField
 
-COVERAGE, CHAMBER = "coverage.vtp", "chamber.vtp"
-COVERAGE_MODEL = "coverage_model"  # field data of coverage.vtp
+PART, COVERAGE, CHAMBER = "part.vtp", "coverage.vtp", "chamber.vtp"
+# Cell data of coverage.vtp, and their columns in part.vtp.
+OF_ELEMENT = {
+    "element": "element",
+    "target": "target",
+    "element_coverage": "coverage",
+    "element_interval": "coverage_interval",
+    "element_impacts": "impacts",
+}
+# Columns without which files cannot be used: cell data of part.vtp, point data of coverage.vtp.
+ELEMENT_COLUMNS = ("coverage", "impacts", "dents", "exposed_area_mm2", "target", "element")
+FIELD_COLUMNS = ("coverage", "dent_density", "coverage_interval", "reachable", "resolved")
 MM = 1e3
 
 Surface = Any
@@ -37,26 +48,27 @@ def pyvista() -> Any:
 
 
 def write_coverage(
-    path: Path, chamber: Chamber, fields: dict[str, np.ndarray], coverage_model: str = "avrami"
+    folder: Path, chamber: Chamber, values: dict[str, np.ndarray], display: DisplayField
 ) -> None:
-    """Write the part, posed in the chamber [mm].
+    """Write the part, posed in the chamber [mm], as part.vtp and as coverage.vtp.
 
     Args:
-        fields: cell data by name, (m,) each, from simulation.triangle_fields.
-        coverage_model: how its coverage was computed, "avrami" or "dents".
+        values: of each triangle of the part, by name, (m,) each: the cell data of part.vtp.
+        display: fields at the vertices of a mesh to draw: the point data of coverage.vtp. Its
+            triangles have the number of the part's triangle in which they lie (triangle), and of
+            that its element, target, element_coverage, element_interval and element_impacts.
     """
-    part = chamber.part
-    _write_surface(path, part.vertices, part.triangles, fields, {COVERAGE_MODEL: [coverage_model]})
-
-
-def read_coverage_model(surface: Surface) -> str:
-    """How the coverage of a coverage.vtp was computed, "avrami" or "dents"."""
-    if COVERAGE_MODEL in surface.field_data:
-        return str(surface.field_data[COVERAGE_MODEL][0])
-    # Files of version 0.1.0 do not record the model, but only Avrami's follows from the density.
-    expected = coverage_from_dent_density(np.asarray(surface["dent_density"]))
-    same = np.allclose(surface["coverage"], expected, atol=1e-9, equal_nan=True)
-    return "avrami" if same else "dents"
+    part, mesh = chamber.part, display.mesh
+    _write_surface(folder / PART, part.vertices, part.triangles, values)
+    own = {name: values[column][mesh.part_triangle] for name, column in OF_ELEMENT.items()}
+    _write_surface(
+        folder / COVERAGE,
+        mesh.vertices,
+        mesh.triangles,
+        {"triangle": mesh.part_triangle, **own},
+        {name: column.astype(np.float32) for name, column in display.fields.items()},
+        mesh.normal,
+    )
 
 
 def write_chamber(folder: Path, chamber: Chamber) -> None:
@@ -77,20 +89,25 @@ def _write_surface(
     path: Path,
     vertices: np.ndarray,
     triangles: np.ndarray,
-    fields: dict[str, np.ndarray],
-    properties: dict[str, list[str]] | None = None,
+    cells: dict[str, np.ndarray],
+    points: dict[str, np.ndarray] | None = None,
+    normal: np.ndarray | None = None,
 ) -> None:
     surface = pyvista().PolyData.from_regular_faces(vertices * MM, triangles)
-    for name, values in fields.items():
-        surface.cell_data[name] = values
-    for name, texts in (properties or {}).items():
-        surface.field_data[name] = texts
+    surface.cell_data.update(cells)
+    surface.point_data.update(points or {})
+    if normal is not None:
+        surface.point_data.active_normals = normal.astype(np.float32)
     with atomic_write(path) as temporary:
         surface.save(temporary)
 
 
-def read_surface(path: Path) -> Surface:
-    """Read a .vtp of a results folder; InputError if it is missing or damaged."""
+def read_surface(path: Path, cells: Sequence[str] = (), points: Sequence[str] = ()) -> Surface:
+    """Read a .vtp of a results folder.
+
+    Raises:
+        InputError: it is missing or damaged, or lacks one of these columns.
+    """
     if not path.is_file():
         raise InputError(
             f"{path}: not there; give a results folder that simulate or run has finished"
@@ -100,6 +117,12 @@ def read_surface(path: Path) -> Surface:
     # VTK reads a damaged file as an empty mesh.
     if not isinstance(surface, pyvista().PolyData) or surface.n_cells == 0:
         raise InputError(f"{path}: damaged, no triangles could be read; simulate again")
+    for names, there in ((cells, surface.cell_data), (points, surface.point_data)):
+        if missing := [name for name in names if name not in there]:
+            raise InputError(
+                f"{path}: has no {missing[0]}, so it is not the file that was written here; "
+                "simulate again"
+            )
     return surface
 
 

@@ -12,6 +12,7 @@ from chamberopt.simulation.time_curve import coverage_against_time
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
+    from chamberopt.coverage.field.display_mesh import DisplayField
     from chamberopt.design.load import Design
     from chamberopt.simulation.evaluation import Evaluation
 
@@ -24,6 +25,7 @@ class CandidateResult:
     chamber: Chamber
     evaluation: Evaluation
     element_values: dict[str, np.ndarray]  # of each triangle of the part, by name, (m,) each
+    display: DisplayField  # fields at the vertices of a mesh to draw
     time_curve: list[dict[str, float]]  # coverage against peening time, a row a time
 
 
@@ -35,5 +37,6 @@ def complete_result(design: Design, chamber: Chamber, evaluation: Evaluation) ->
         chamber=chamber,
         evaluation=evaluation,
         element_values=seen.element_values(),
+        display=seen.display(),
         time_curve=coverage_against_time(design, seen.target, evaluation),
     )

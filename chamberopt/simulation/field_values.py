@@ -8,6 +8,7 @@ Notation
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,7 +16,6 @@ import numpy as np
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.estimate import CONFIDENCE
 from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density, find_footprints
-from chamberopt.coverage.coverage_intervals import DENTS_FOR_PLACES
 from chamberopt.coverage.field.surface_points import ball_fits, spread_within
 from chamberopt.coverage.field.target_field import Gauge, with_whole_part
 from chamberopt.coverage.strength import (
@@ -28,12 +28,14 @@ from chamberopt.simulation.evaluate import prepare_target
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
+    from chamberopt.coverage.field.display_mesh import DisplayField
     from chamberopt.coverage.field.windows import Places
     from chamberopt.design.load import Design
     from chamberopt.simulation.evaluation import Evaluation
 
 POINTS_PER_WINDOW = 4  # by which a triangle's own values are measured, one at least
 MAX_POINTS = 300_000
+WIDEST = 0.5  # interval of a coverage that is worth a colour: about ± 25 %
 HIGH_SPEED = 0.9  # share of the impacts that are not faster than p90_normal_speed
 
 
@@ -56,12 +58,30 @@ class PartField:
         )
 
     def coverage(self, places: Places) -> np.ndarray:
-        """Coverage at the treatment time in the window round each place, (p,); 0 out of reach."""
-        gauge = self.field.gauge_round(places, self.field.radius)
+        """Coverage at the treatment time in the window round each place, (p,), without the bands of
+        dents on creases; NaN out of reach.
+        """
+        gauge = self._gauge_off_creases(places)
         coverage = coverage_from_dent_density(self._dents(gauge)["dent_density"])
-        return np.where(self.reachable(places), coverage, 0.0)
+        return np.where(self.reachable(places), coverage, np.nan)
 
-    def values(self, places: Places) -> dict[str, np.ndarray]:
+    def display(self) -> DisplayField:
+        """The values at the vertices of a mesh to draw, without the bands of dents on creases.
+
+        These bands are as narrow as a dent, and a drawing would smear them over whole triangles.
+        """
+        from chamberopt.coverage.field.display_mesh import DisplayField, display_mesh
+
+        part, gauge = self._chamber.part, self.field.setting.gauge
+        mesh = display_mesh(
+            part.vertices, part.triangles, part.target, self.field.face, gauge, self.coverage
+        )
+        return DisplayField(mesh, self.values(mesh.places, self._gauge_off_creases(mesh.places)))
+
+    def _gauge_off_creases(self, places: Places) -> Gauge:
+        return replace(self.field.gauge_round(places, self.field.radius), band=None)
+
+    def values(self, places: Places, gauge: Gauge | None = None) -> dict[str, np.ndarray]:
         """Everything that is known in the windows round some places.
 
         Returns:
@@ -72,19 +92,19 @@ class PartField:
             dent_density: x.
             coverage_interval: width of the 95 % interval of the coverage.
             dents_in_window: simulated dents.
-            resolved: 1 where they are enough for the coverage of a single place, else 0.
+            resolved: 1 where that interval is no wider than WIDEST, else 0.
             impacts_per_mm2, energy_per_mm2: impacts and energy [mJ] at the treatment time.
             mean_normal_speed, p90_normal_speed: mean and 90th percentile [m/s].
             mean_angle_deg: mean angle of the impacts [degrees]; 90 is head on.
             mean_dent_um: mean diameter of the dents [µm].
             strength_um: peening strength S [µm], see coverage/strength.py.
         """
-        gauge = self.field.gauge_round(places, self.field.radius)
+        gauge = gauge or self.field.gauge_round(places, self.field.radius)
         fits = self.reachable(places) & np.isfinite(gauge.area)
         found = self._dents(gauge) | self._impacts(gauge)
         known = {name: np.where(fits, column, np.nan) for name, column in found.items()}
         coverage = coverage_from_dent_density(found["dent_density"])
-        enough = fits & (found["dents_in_window"] >= DENTS_FOR_PLACES)
+        enough = fits & (found["coverage_interval"] <= WIDEST)
         return {
             "coverage": np.where(fits, coverage, 0.0),
             "reachable": fits.astype(float),

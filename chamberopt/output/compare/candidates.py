@@ -24,7 +24,7 @@ from chamberopt.output.compare.comparability import (
 from chamberopt.output.compare.comparison import labels, part_unit
 from chamberopt.output.results.load import Result, load_result
 from chamberopt.output.save_run import save_simulation
-from chamberopt.output.vtp_files import COVERAGE, read_surface
+from chamberopt.output.vtp_files import ELEMENT_COLUMNS, PART, read_surface
 from chamberopt.simulation.evaluate import ReplicaPlan, evaluate
 
 if TYPE_CHECKING:
@@ -208,7 +208,7 @@ def _mesh(one: Candidate) -> tuple[str, str]:
 
 
 def _target(result: Result) -> np.ndarray:
-    return np.asarray(read_surface(result.folder / COVERAGE)["target"]) > 0
+    return np.asarray(read_surface(result.folder / PART, ELEMENT_COLUMNS)["target"]) > 0
 
 
 def _seed_settings(result: Result) -> SeedSettings:

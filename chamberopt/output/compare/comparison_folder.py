@@ -44,19 +44,10 @@ def write_comparison(folder: str | Path, comparison: Comparison) -> list[str]:
     spread = distributions(surfaces)
     draw_distributions(folder / "distributions.png", comparison, spread)
     remarks = [comparison_picture(folder / "compare.png", comparison)]
-    local: list[LocalDifference] | None = None
-    if older := [
-        label for label, one in zip(comparison.labels, surfaces, strict=True) if one.hits is None
-    ]:
-        remarks.append(
-            f"difference.png skipped: {', '.join(older)}: results of an older version, without "
-            "single impacts (hits.npz); simulate again"
-        )
-    else:
-        local = [local_difference(surfaces[0], other) for other in surfaces[1:]]
-        remarks.append(_draw_differences(folder, comparison, local))
+    local = [local_difference(surfaces[0], other) for other in surfaces[1:]]
+    remarks.append(_draw_differences(folder, comparison, local))
     data: dict[str, Any] = comparison.as_json() | {"distributions": spread.as_json()}
-    data["local_differences_to_first"] = None if local is None else [one.as_json() for one in local]
+    data["local_differences_to_first"] = [one.as_json() for one in local]
     write_text(folder / COMPARE, json.dumps(data, indent=2, allow_nan=False) + "\n")
     return [text for text in remarks if text]
 
@@ -79,9 +70,6 @@ def _draw_differences(
     write_differences(folder / DIFFERENCE, comparison.results[0].folder / COVERAGE, columns)
     titles = []
     for label, one in zip(later, local, strict=True):
-        over = f"; averaged over {one.radius:.1f} mm" if one.radius else ""
-        shares = f"more on {one.more:.0%}, less on {one.less:.0%} of the target{over}".replace(
-            "%", " %"
-        )
+        shares = f"more on {one.more:.0%}, less on {one.less:.0%} of the target".replace("%", " %")
         titles.append(f"{label} minus {first}\n{shares}")
     return draw_difference(folder / DIFFERENCE, titles, folder / "difference.png")

@@ -7,28 +7,29 @@ from dataclasses import replace
 from pathlib import Path
 
 from chamberopt.common.estimate import Estimate
-from chamberopt.coverage.metrics import NEVER
+from chamberopt.common.number_text import estimate_text
 from chamberopt.output.compare.comparison import TIME, Comparison
 from chamberopt.output.compare.distributions import Distributions, Histogram
-from chamberopt.output.compare.table import two_digits
-from chamberopt.output.disc_averages import DENTS_PER_DISC
 from chamberopt.output.plots.colours import line_style
 from chamberopt.output.plots.coverage import CoverageCurve, HistogramData, distributions_picture
 
 
 def draw_distributions(path: Path, comparison: Comparison, found: Distributions) -> None:
     """Write the four panels as .png; their legends hold the numbers."""
-    means = comparison.metrics["mean_coverage"]
     coverage_labels = [
-        f"{label}: mean {100.0 * mean.value:.1f} ± {two_digits(100.0 * mean.half_width)} %, "
-        f"{_mean_count(dents)} dents each"
-        for label, mean, dents in zip(comparison.labels, means, found.dents, strict=True)
+        f"{label}: mean {estimate_text(mean, 100.0, '%')}"
+        for label, mean in zip(comparison.labels, comparison.metrics["mean_coverage"], strict=True)
     ]
-    coverage = _histogram(
-        found.coverage, coverage_labels, "coverage of a triangle [%]", "target area"
-    )
-    if min(found.dents) < DENTS_PER_DISC:
-        title = "few dents were simulated: their random scatter widens this histogram"
+    gauge = comparison.results[0].design.process.accuracy.gauge_mm2
+    x_label = f"coverage in windows of {gauge:g} mm² [%]"
+    coverage = _histogram(found.coverage, coverage_labels, x_label, "target area")
+    few = [
+        label
+        for label, result in zip(comparison.labels, comparison.results, strict=True)
+        if result.metrics["p05_coverage"].in_words
+    ]
+    if few:
+        title = f"few dents, whose random scatter widens the histogram: {', '.join(few)}"
         coverage = replace(coverage, title=title)
     times = [result.metrics.get(TIME) for result in comparison.results]
     curves = [
@@ -62,18 +63,10 @@ def _histogram(
     return HistogramData(histogram.edges, histogram.shares, labels, styles, x_label, y_label)
 
 
-def _mean_count(dents: float) -> str:
-    """A mean number of dents: without decimals from 10 on, else to two digits."""
-    return f"{dents:.0f}" if dents >= 10.0 else f"{dents:.2g}"
-
-
 def _time_to_98(time: Estimate) -> str:
-    if time.value >= NEVER:
+    if time.in_words == "never":
         return "98 % are never reached"
-    accuracy = f" ± {two_digits(time.half_width)} s"
-    return f"98 % after {time.value:.4g} s" + (
-        " or far from it" if time.half_width > time.value else accuracy
-    )
+    return f"98 % after {estimate_text(time, unit='s')}"
 
 
 def _impact_labels(
@@ -82,7 +75,6 @@ def _impact_labels(
     """Legend of impacts: their number and mean."""
     labels = []
     for label, count, mean in zip(comparison.labels, found.impacts, means, strict=True):
-        number = "no single impacts: an older result" if count is None else f"{count:,} impacts"
         average = "" if mean is None else f", mean {mean:.3g} {unit}"
-        labels.append(f"{label}: {number.replace(',', ' ')}{average}")
+        labels.append(f"{label}: {count:,} impacts".replace(",", " ") + average)
     return labels

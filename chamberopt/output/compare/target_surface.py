@@ -1,4 +1,4 @@
-"""The target of one result, triangle by triangle, as stored in its folder."""
+"""The target of one result as stored in its folder: its field, and the impacts on it."""
 
 from __future__ import annotations
 
@@ -6,62 +6,93 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chamberopt.coverage.part_impacts import Hits, HitsByTriangle, load_matching_hits
-from chamberopt.geometry.triangles import area_vectors
-from chamberopt.output.results.load import Result, load_coverage
+from chamberopt.coverage.part_impacts import Hits, load_matching_hits
+from chamberopt.geometry.triangles import areas
+from chamberopt.output.results.load import Result, load_part, read_field
+
+MIN_COSINE = 0.7  # between normals of places that count as near each other
+NEIGHBOURS = 8  # vertices that are looked at for a place
+NEAREST = 3  # of these, facing the same way, give its value
 
 
 @dataclass(frozen=True)
 class TargetSurface:
-    """The triangles of a part; only those of the target are compared.
+    """The field of a result on the target.
 
     Args:
-        centre: in the chamber [mm], shape (m, 3).
-        normal: unit vectors, shape (m, 3).
-        target: which triangles belong to the target, shape (m,) bool.
-        area: [mm²], shape (m,).
-        exposed: exposed area [mm²], shape (m,).
-        coverage: 0 to 1, 0 outside the cavity, shape (m,).
-        dents: number of simulated dents, shape (m,).
-        time_ratio: treatment time over simulated time.
-        hits: single impacts; None in results of older versions.
+        corners: of the part's triangles in the chamber [mm], shape (m, 3, 3).
+        target: which triangles of the part belong to the target, shape (m,) bool.
+        place: vertices of the display mesh on the target [mm], shape (v, 3).
+        normal: unit vectors there, shape (v, 3).
+        area: share of the target's area that each vertex stands for, shape (v,).
+        coverage: 0 to 1, 0 out of reach, shape (v,).
+        interval: width of its 95 % interval, 0 out of reach, shape (v,).
+        resolved: whether the dents there are enough to tell; so they are out of reach, shape (v,).
+        hits: single impacts on the target.
     """
 
-    centre: np.ndarray
-    normal: np.ndarray
+    corners: np.ndarray
     target: np.ndarray
+    place: np.ndarray
+    normal: np.ndarray
     area: np.ndarray
-    exposed: np.ndarray
     coverage: np.ndarray
-    dents: np.ndarray
-    time_ratio: float
-    hits: HitsByTriangle | None
+    interval: np.ndarray
+    resolved: np.ndarray
+    hits: Hits
 
-    @property
-    def hits_on_target(self) -> Hits | None:
-        """The single impacts on the exposed target."""
-        return None if self.hits is None else self.hits.on(self.target & (self.exposed > 0.0))
+    def at(self, other: TargetSurface) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Coverage, interval and whether it is resolved at the vertices of another result."""
+        from scipy.spatial import cKDTree
 
-    @property
-    def dents_per_triangle(self) -> float:
-        """Mean number of dents over the triangles of the target."""
-        return float(self.dents[self.target].mean())
+        place, normal = self._moved(other)
+        count = min(NEIGHBOURS, len(self.place))
+        distance, vertex = cKDTree(self.place).query(place, k=count)
+        distance, vertex = distance.reshape(-1, count), vertex.reshape(-1, count)
+        cosine = np.einsum("ij,ikj->ik", normal, self.normal[vertex])
+        weight = np.where(cosine > MIN_COSINE, 1.0 / np.maximum(distance, 1e-9), 0.0)
+        weight *= np.cumsum(weight > 0.0, axis=1) <= NEAREST
+        weight[weight.sum(axis=1) == 0.0, 0] = 1.0
+        weight /= weight.sum(axis=1, keepdims=True)
+        coverage, interval, resolved = (
+            (weight * column[vertex]).sum(axis=1)
+            for column in (self.coverage, self.interval, self.resolved)
+        )
+        return coverage, interval, resolved > 0.5
+
+    def _moved(self, other: TargetSurface) -> tuple[np.ndarray, np.ndarray]:
+        """Vertices and normals of another result as its part stands here.
+
+        The rotation fits its triangles to those here (W. Kabsch, Acta Cryst. A32 (1976) 922).
+        """
+        here, there = (one.corners.reshape(-1, 3) for one in (self, other))
+        u, _, v = np.linalg.svd((there - there.mean(axis=0)).T @ (here - here.mean(axis=0)))
+        u[:, 2] *= np.sign(np.linalg.det(u @ v))
+        rotation = u @ v
+        place = (other.place - there.mean(axis=0)) @ rotation + here.mean(axis=0)
+        return place, other.normal @ rotation
 
 
 def read_target_surface(result: Result) -> TargetSurface:
     """Read the target of a results folder; InputError if files are missing or damaged."""
-    surface = load_coverage(result)
-    points, triangles = np.asarray(surface.points, dtype=float), np.asarray(surface.regular_faces)
-    vectors = area_vectors(points, triangles)
-    area = np.linalg.norm(vectors, axis=1)
+    part = load_part(result)
+    field = read_field(result.folder, part)
+    triangles = np.asarray(field.regular_faces)[np.asarray(field["target"]) > 0]
+    used, corner = np.unique(triangles, return_inverse=True)
+    points = np.asarray(field.points, dtype=float)
+    area = np.repeat(areas(points, triangles) / 3.0, 3)
+    share = np.bincount(corner.ravel(), area, len(used)) / area.sum()
+    reached = np.asarray(field["reachable"])[used] > 0.5
+    target = np.asarray(part["target"]) > 0
+    hits = load_matching_hits(result.folder, np.asarray(part["impacts"]))
     return TargetSurface(
-        centre=points[triangles].mean(axis=1),
-        normal=vectors / np.maximum(area, 1e-300)[:, None],
-        target=np.asarray(surface["target"]) > 0,
-        area=area,
-        exposed=np.asarray(surface["exposed_area_mm2"], dtype=float),
-        coverage=np.nan_to_num(np.asarray(surface["coverage"], dtype=float)),
-        dents=np.asarray(surface["dents"], dtype=float),
-        time_ratio=result.design.process.treatment_time_s / float(result.data["simulated_time_s"]),
-        hits=load_matching_hits(result.folder, np.asarray(surface["impacts"])),
+        corners=np.asarray(part.points, dtype=float)[np.asarray(part.regular_faces)],
+        target=target,
+        place=points[used],
+        normal=np.asarray(field.point_data.active_normals, dtype=float)[used],
+        area=share,
+        coverage=np.where(reached, field["coverage"][used], 0.0).astype(float),
+        interval=np.where(reached, field["coverage_interval"][used], 0.0).astype(float),
+        resolved=~reached | (np.asarray(field["resolved"])[used] > 0.5),
+        hits=hits.on(target & (np.asarray(part["exposed_area_mm2"]) > 0.0)),
     )

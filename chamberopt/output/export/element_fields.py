@@ -12,27 +12,27 @@ from chamberopt.geometry.triangles import areas
 if TYPE_CHECKING:
     from chamberopt.geometry.mesh_io.part_mesh import PartMesh
 
-# Meaning of each column of coverage.vtp, and how the triangles of an element are combined: their
-# sum, their largest, or a mean weighted with exposed area, impacts or dents.
+# Meaning of each column of part.vtp, and how the triangles of an element are combined: their sum,
+# or a mean weighted with exposed area, impacts or dents. Values are those of the field, which are
+# measured in windows round each place, as means over the triangle.
 COLUMNS = {
     "coverage": ("share of the surface that is dented after the treatment, 0 to 1", "area"),
-    "coverage_interval": (
-        "width of the 95 % interval of coverage; mean over the element's triangles",
-        "area",
-    ),
+    "coverage_interval": ("width of the 95 % interval of coverage at a place", "area"),
     "dent_density": ("dented area per area after the treatment", "area"),
+    "dents_in_window": ("number of simulated dents in the window round a place", "area"),
+    "reachable": ("share of the surface that a ball can touch, 0 to 1", "area"),
+    "resolved": ("share of the surface with dents enough for its coverage, 0 to 1", "area"),
     "impacts_per_mm2": ("impacts per mm2 in the treatment", "area"),
     "energy_per_mm2": ("energy of impacts in the treatment, mJ/mm2", "area"),
     "mean_normal_speed": ("mean normal speed of impacts, m/s", "impacts"),
-    "p90_normal_speed": (
-        "90th percentile of the normal speed, m/s; mean over the element's triangles",
-        "impacts",
-    ),
+    "p90_normal_speed": ("90th percentile of the normal speed, m/s", "impacts"),
     "mean_angle_deg": ("mean angle of impacts to the surface, degrees, 90 is head on", "impacts"),
     "mean_dent_um": ("mean diameter of dents, micrometres", "dents"),
+    "strength_um": ("peening strength, micrometres", "dents"),
     "impacts": ("number of simulated impacts", "sum"),
     "dents": ("number of simulated dents", "sum"),
     "exposed_area_mm2": ("area inside the chamber, mm2", "sum"),
+    "reachable_area_mm2": ("area that a ball can touch, mm2", "sum"),
     "target": ("1: must be covered", "any"),
 }
 WEIGHTS = {"area": "exposed_area_mm2", "impacts": "impacts", "dents": "dents"}
@@ -52,10 +52,10 @@ class ElementFields:
 
 
 def fields_of_elements(surface: Any, number: np.ndarray) -> ElementFields:
-    """Combine the columns of coverage.vtp for each element.
+    """Combine the columns of part.vtp for each element.
 
     Args:
-        surface: coverage.vtp as PyVista reads it.
+        surface: part.vtp as PyVista reads it.
         number: element number of each triangle, shape (m,); 0 for triangles in no element.
     """
     cells = np.flatnonzero(number > 0)

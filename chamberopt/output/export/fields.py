@@ -20,8 +20,7 @@ from chamberopt.output.export.element_fields import (
     fields_of_remeshed_elements,
 )
 from chamberopt.output.export.nastran_deck import nastran_deck
-from chamberopt.output.results.load import Result, load_coverage, load_result
-from chamberopt.output.vtp_files import COVERAGE
+from chamberopt.output.results.load import Result, load_part, load_result
 
 DECKS: dict[str, Callable[[list[str], PartMesh, ElementFields], dict[str, str]]] = {
     "abaqus": abaqus_deck,
@@ -30,20 +29,19 @@ DECKS: dict[str, Callable[[list[str], PartMesh, ElementFields], dict[str, str]]]
 FIELD_FORMATS = ("vtp", "vtkhdf", *DECKS)
 
 
-def write_fields(folder: str | Path, to: str, path: str | Path) -> list[str]:
+def write_fields(folder: str | Path, path: str | Path, to: str) -> list[str]:
     """Write the fields of a results folder to a file and return remarks for the user.
 
     Args:
         folder: the results folder.
-        to: "vtp" or "vtkhdf" writes the surface of coverage.vtp, posed in the chamber [mm], with
-            its cell data. "abaqus" or "nastran" writes values by the element numbers of the
+        path: the file to write; it is replaced.
+        to: "vtp" or "vtkhdf" writes the part's triangles, posed in the chamber [mm], with their
+            values. "abaqus" or "nastran" writes values by the element numbers of the
             part's file, to be included in its deck. Where that file numbers no elements, the
             triangles are written too, in the file's frame and unit, numbered from 1.
-        path: the file to write; it is replaced.
 
     Raises:
-        InputError: the folder is not a result, stores no element numbers, or the part's file has
-            changed since.
+        InputError: the folder is not a result, or the part's file has changed since.
     """
     path = Path(path)
     if to not in FIELD_FORMATS:
@@ -57,12 +55,7 @@ def write_fields(folder: str | Path, to: str, path: str | Path) -> list[str]:
             f"{path}: is not a file in an existing folder; make the folder, or give a file name"
         )
     result = load_result(folder)
-    surface = load_coverage(result)
-    if "element" not in surface.cell_data:
-        raise InputError(
-            f"{result.folder / COVERAGE}: written by a version without element numbers; "
-            "simulate again"
-        )
+    surface = load_part(result)
     try:
         if to not in DECKS:
             with atomic_write(path) as temporary:

@@ -78,12 +78,12 @@ def columns_of(frame: Frame) -> tuple[Column, ...]:
         ),
         Column(
             "triangle", "int32", "%d",
-            "the part's triangle that was hit, from 0, in the order of coverage.vtp",
+            "the part's triangle that was hit, from 0, in the order of part.vtp",
             lambda rows: rows.triangle,
         ),
         Column(
             "element", "int64", "%d",
-            "the element of the part's file that was hit, as in coverage.vtp",
+            "the element of the part's file that was hit, as in part.vtp",
             lambda rows: rows.element,
         ),
         *(

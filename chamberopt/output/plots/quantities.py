@@ -1,4 +1,4 @@
-"""The quantities that viewer and report show on the part's triangles, with their colour maps."""
+"""The quantities that viewer and report show on the part, with their colour maps."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from chamberopt.output.plots.colours import COUNT_MAP, COVERAGE_MAP, WIDTH_MAP
 
 @dataclass(frozen=True)
 class Quantity:
-    """A number that can be shown on each triangle."""
+    """A number that can be shown at each place of the part."""
 
     name: str
     label: str
     unit: str
-    column: str  # its field in coverage.vtp
+    column: str  # its field in coverage.vtp and part.vtp
     factor: float = 1.0  # from that field to the unit that is shown
     colours: str = COVERAGE_MAP
     grows: bool = False  # whether it is proportional to the peening time
@@ -44,5 +44,6 @@ QUANTITIES = {
             100.0,
             WIDTH_MAP,
         ),
+        Quantity("strength", "peening strength", "µm", "strength_um"),
     )
 }

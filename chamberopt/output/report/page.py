@@ -13,7 +13,7 @@ from typing import Any
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import write_text
-from chamberopt.output.plots.colours import hex_colours
+from chamberopt.output.plots.colours import hex_colours, muted
 from chamberopt.output.report import html
 from chamberopt.output.report.part3d import PartScene, part_scene, quantities_in_all
 from chamberopt.output.report.report_data import START, read_design_file, report_contents
@@ -28,8 +28,9 @@ POLICY = (
     "img-src data: blob:; worker-src blob:; font-src data:; base-uri 'none'; form-action 'none'"
 )
 HELP = (
-    "Drag to turn, use the wheel to zoom, point at a triangle to see its numbers. "
-    "Grey: not in the target, or out of reach. Light grey: never hit."
+    "Drag to turn, use the wheel to zoom, point at the target to see its numbers there. "
+    "Grey: not in the target. Brown: out of the reach of the shot. "
+    "Greyed colours: too few dents were simulated to tell."
 )
 SUBTITLES = {
     "study": "Report of a study: the best chamber found",
@@ -173,7 +174,8 @@ def write_page(path: Path, title: str, body: str, scenes: Sequence[PartScene]) -
     data = ""
     if drawn := [scene.data for scene in scenes if scene.data]:
         quantities = quantities_in_all(drawn)
-        colour_maps = {name: hex_colours(name) for name in {one["colours"] for one in quantities}}
+        names = {one["colours"] for one in quantities}
+        colour_maps = {name: [hex_colours(name), hex_colours(muted(name))] for name in names}
         content = {"quantities": quantities, "scenes": drawn, "scales": colour_maps}
         data = html.embedded_json(content, "parts")
     page = (

@@ -1,4 +1,4 @@
-// The part in 3D: colours it by a quantity or by the coverage at a time, and shows a triangle's numbers.
+// The part in 3D: colours it by a quantity or by the coverage at a time, and shows the numbers at a point.
 "use strict";
 addEventListener("beforeprint", () => {
   for (const fold of document.querySelectorAll("details.print")) fold.open = true;
@@ -7,15 +7,18 @@ addEventListener("beforeprint", () => {
   const element = document.getElementById("parts");
   if (!element) return;
   const { quantities, scenes, scales } = JSON.parse(element.textContent);
-  const NEVER_HIT = "#d9d9d9", SLIVER = 1 / 64; // share of the colour bar, at its lower end, for triangles without a value
   const find = (id) => document.getElementById(id);
   const controls = { quantity: find("quantity"), time: find("time"), fit: find("fit"), glass: find("glass") };
   const label = find("label");
+  const SOLID = ["part", "few", "unreached", "rest"];
 
   const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
   for (const scene of scenes) {
-    for (const name of Object.keys(scene.columns)) scene.columns[name] = new Float32Array(bytes(scene.columns[name]));
-    for (const name of ["number", "element"]) if (scene[name]) scene[name] = new Int32Array(bytes(scene[name]));
+    for (const table of [scene.columns, scene.own])
+      for (const name of Object.keys(table)) table[name] = new Float32Array(bytes(table[name]));
+    for (const name of ["triangle", "number", "element", "impacts"]) scene[name] = new Int32Array(bytes(scene[name]));
+    const [part, few] = scene.figure; // few dents: the same points, in greyed colours
+    for (const axis of ["x", "y", "z"]) few[axis] = part[axis];
   }
 
   // Three significant digits; rounding errors around 0 are shown as 0.
@@ -23,11 +26,11 @@ addEventListener("beforeprint", () => {
     ? Math.round(x).toString() : String(Number(x.toPrecision(3)));
   const seconds = () => Number(controls.time.value);
   const chosen = () => quantities[controls.quantity.selectedIndex];
-  const moves = (scene) => chosen().name === "coverage" && scene.columns["shown-density"];
+  const moves = () => chosen().name === "coverage";
   const covered = (density, scene) => -100 * Math.expm1(-density * seconds() / scene.treatment);
 
   function values(scene) {
-    return moves(scene) ? scene.columns["shown-density"].map((d) => covered(d, scene)) : scene.columns[chosen().name];
+    return moves() ? scene.columns.density.map((d) => covered(d, scene)) : scene.columns[chosen().name];
   }
 
   // Range of the colours: 1st to 99th percentile of all results, widened to round numbers.
@@ -44,18 +47,17 @@ addEventListener("beforeprint", () => {
     return [low, chosen().unit === "%" ? Math.min(high, 100) : high];
   }
 
-  function withSliver(scale) {
-    const step = (1 - SLIVER) / (scale.length - 1);
-    return [[0, NEVER_HIT], [SLIVER / 2, NEVER_HIT], ...scale.map((c, i) => [i ? SLIVER + i * step : SLIVER, c])];
-  }
-
+  // Styles of the two traces of each scene: by many dents, and by few.
   function colouring() {
-    const all = scenes.map(values), [low, high] = range(all), under = low - (high - low) * SLIVER / (1 - SLIVER);
-    return scenes.map((scene, i) => ({
-      intensity: [all[i].map((x) => Number.isFinite(x) ? Math.min(Math.max(x, low), high) : under)],
-      cmin: under, cmax: high, colorscale: [withSliver(scales[chosen().colours])], showscale: true,
-      colorbar: { title: { text: chosen().title, side: "right" }, thickness: 16, len: 0.8, outlinewidth: 0 },
-    }));
+    const all = scenes.map(values), [low, high] = range(all);
+    const steps = (colours) => colours.map((c, i) => [i / (colours.length - 1), c]);
+    const [clear, greyed] = scales[chosen().colours].map(steps);
+    const colorbar = { title: { text: chosen().title, side: "right" }, thickness: 16, len: 0.8, outlinewidth: 0 };
+    return all.map((one) => {
+      const intensity = one.map((x) => Number.isFinite(x) ? Math.min(Math.max(x, low), high) : low);
+      return { intensity: [intensity, intensity], cmin: low, cmax: high, colorscale: [clear, greyed],
+        showscale: [true, false], colorbar };
+    });
   }
 
   function mean(scene) {
@@ -71,7 +73,7 @@ addEventListener("beforeprint", () => {
     const named = (scene) => mean(scene) && (scenes.length > 1 ? `${mean(scene)} (${scene.title})` : mean(scene));
     const means = scenes.map(named).filter(Boolean).join(", ");
     find("at").textContent = `${number(seconds())} s${means ? `: the target is covered to ${means} on average` : ""}`;
-    find("times").hidden = !scenes.some(moves);
+    find("times").hidden = !moves();
   }
 
   const plots = scenes.map((scene, i) => find(`part-${i}`));
@@ -82,7 +84,7 @@ addEventListener("beforeprint", () => {
     waiting = true;
     requestAnimationFrame(() => {
       waiting = false;
-      colouring().forEach((style, i) => Plotly.restyle(plots[i], style, [0]));
+      colouring().forEach((style, i) => Plotly.restyle(plots[i], style, [0, 1]));
     });
   }
 
@@ -91,16 +93,19 @@ addEventListener("beforeprint", () => {
 
   function show(event, i) {
     const point = event.points[0], scene = scenes[i], k = point.pointNumber;
-    if (point.curveNumber !== 0) return;
+    if (point.curveNumber > 1) return;
     const rows = quantities.map((one) => {
-      const now = one.name === "coverage" && scene.columns.density;
+      const now = one.name === "coverage";
       const value = now ? covered(scene.columns.density[k], scene) : scene.columns[one.name][k];
       return [now ? `coverage after ${number(seconds())} s` : one.label, `${number(value)} ${one.unit}`];
     });
-    const own = scene.element ? `element ${scene.element[k]}, ` : "";
+    const t = scene.triangle[k];
+    rows.push([`coverage of the triangle after ${number(scene.treatment)} s`, `${number(scene.own.coverage[t])} %`],
+      ["width of its 95 % interval", `${number(scene.own.interval[t])} %`],
+      ["simulated impacts on the triangle", String(scene.impacts[t])]);
     const table = document.createElement("table");
     const caption = table.createCaption();
-    caption.textContent = `${own}triangle ${scene.number[k]} of the part`;
+    caption.textContent = `element ${scene.element[t]}, triangle ${scene.number[t]} of the part`;
     for (const [name, value] of rows) {
       const row = table.insertRow();
       row.insertCell().textContent = name;
@@ -120,7 +125,7 @@ addEventListener("beforeprint", () => {
   function pickThePartOnly(plot) {
     const inside = plot._fullLayout.scene._scene;
     for (const trace of Object.values(inside.traces))
-      if (!["part", "rest"].includes(trace.data.name))
+      if (!SOLID.includes(trace.data.name))
         for (const drawn of [trace.mesh, trace.linePlot]) if (drawn) drawn.drawPick = () => {};
     inside.glplot.update();
   }
@@ -141,10 +146,11 @@ addEventListener("beforeprint", () => {
   const buttons = [["toImage", "resetCameraLastSave3d"]];
   const styles = colouring();
   const drawn = scenes.map((scene, i) => {
-    const [part, ...others] = scene.figure, style = styles[i];
-    const first = { ...part, ...style, intensity: style.intensity[0], colorscale: style.colorscale[0] };
+    const [part, few, ...others] = scene.figure, style = styles[i];
+    const coloured = [part, few].map((trace, k) => ({ ...trace, ...style,
+      intensity: style.intensity[k], colorscale: style.colorscale[k], showscale: style.showscale[k] }));
     const config = { displaylogo: false, responsive: true, modeBarButtons: buttons };
-    return Plotly.newPlot(plots[i], [first, ...others], { ...layout, scene: scene.view }, config).then((plot) => {
+    return Plotly.newPlot(plots[i], [...coloured, ...others], { ...layout, scene: scene.view }, config).then((plot) => {
       pickThePartOnly(plot);
       plot.on("plotly_hover", (event) => show(event, i));
       plot.on("plotly_unhover", () => { label.hidden = true; });
@@ -172,7 +178,7 @@ addEventListener("beforeprint", () => {
   controls.time.addEventListener("input", recolour);
   controls.glass.addEventListener("change", () => {
     for (const plot of plots) {
-      const around = plot.data.flatMap((trace, k) => ["part", "rest"].includes(trace.name) ? [] : [k]);
+      const around = plot.data.flatMap((trace, k) => SOLID.includes(trace.name) ? [] : [k]);
       Plotly.restyle(plot, { visible: controls.glass.checked }, around).then(() => pickThePartOnly(plot));
     }
   });

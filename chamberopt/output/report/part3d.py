@@ -1,6 +1,6 @@
 """The part in its chamber in 3D: meshes for plotly, and the numbers by which the page colours it.
 
-Colours are made in the browser (part.js). The page carries the numbers of each target triangle
+Colours are made in the browser (part.js). The page carries the numbers at each point of the target
 once, in single precision, and shows any of them, or the coverage at any time:
 1 - exp(-dent density · time / treatment time).
 """
@@ -15,21 +15,19 @@ from typing import Any
 
 import numpy as np
 
-from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
 from chamberopt.design.shapes import TAG_PART, TAG_WALL, is_sonotrode
-from chamberopt.geometry.triangles import area_vectors
-from chamberopt.output.disc_averages import average_over_discs
+from chamberopt.output.plots.colours import UNREACHED
 from chamberopt.output.plots.quantities import QUANTITIES
-from chamberopt.output.results.load import Result, load_coverage
-from chamberopt.output.vtp_files import CHAMBER, read_coverage_model, read_surface
+from chamberopt.output.results.load import Result, load_part, read_field
+from chamberopt.output.viewer.drawn_part import DrawnPart, point_areas
+from chamberopt.output.vtp_files import CHAMBER, Surface, read_surface
 
 # A triangle takes about 80 bytes of the page: up to this number it stays below 60 MB and opens.
 MAX_TRIANGLES = 600_000
-ELEMENT = "element"  # column of coverage.vtp: number of a triangle in the part's file, if known
 # Places of the camera, from the middle of the cavity, in lengths of its diagonal.
 ABOVE, BELOW = np.array([0.55, -0.9, 0.62]), np.array([0.55, -0.9, -0.62])
 EDGE_ANGLE = 30.0  # degrees; edges of the chamber that are sharper are drawn
-PART_GREY, SONOTRODE, GLASS, EDGES = "#b9bec4", "#c58b52", "#9fc3dd", "#6f8796"
+PART_GREY, SONOTRODE, GLASS, EDGES = "#c5cad0", "#c58b52", "#9fc3dd", "#6f8796"
 
 
 @dataclass(frozen=True)
@@ -39,8 +37,8 @@ class PartScene:
     Args:
         data: for part.js; None for a part that is too large.
         remarks: sentences on what is not shown.
-        coverage: of the target's triangles as shown, 0..1, shape (k,).
-        area: of the target's triangles [mm²], shape (k,).
+        coverage: at points of the target, 0..1, 0 out of reach, shape (k,).
+        area: that each point stands for [mm²], shape (k,).
     """
 
     data: dict[str, Any] | None
@@ -59,59 +57,33 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
     Raises:
         InputError: a surface is missing, damaged or of another result.
     """
-    surface = load_coverage(result)
-    points, triangles = np.asarray(surface.points, dtype=float), np.asarray(surface.regular_faces)
-    fields = {name: np.asarray(surface.cell_data[name]) for name in surface.cell_data}
-    vectors = area_vectors(points, triangles)
-    area = np.linalg.norm(vectors, axis=1)
-    target = fields["target"] > 0
-    shown = target & (fields["exposed_area_mm2"] > 0.0)
-    exposed = fields["exposed_area_mm2"][shown]
-    is_marked = read_coverage_model(surface) == "dents"
-    density, radius = average_over_discs(
-        points[triangles[shown]].mean(axis=1),
-        vectors[shown] / np.maximum(area[shown], 1e-300)[:, None],
-        fields["dent_density"][shown],
-        exposed,
-        fields["dents"][shown],
-    )
-    coverage = np.zeros(len(area))
-    on_exposed = fields["coverage"][shown] if is_marked else coverage_from_dent_density(density)
-    coverage[shown] = on_exposed * np.minimum(exposed / area[shown], 1.0)
+    own = load_part(result)
+    part = DrawnPart(read_field(result.folder, own))
+    whole, target = part.whole, part.target
+    reached = np.asarray(whole["reachable"]) > 0.5
+    coverage, area = np.where(reached, whole["coverage"], 0.0), point_areas(whole)
     remarks = []
-    if is_marked:
-        remarks.append(
-            "This simulation marked every dent until the end of the treatment, "
-            "so it knows the coverage at no other time."
-        )
-    elif radius > 0.0:
-        remarks.append(
-            f"Colours of the coverage are averages over {radius:.2g} mm around each triangle, "
-            "because single triangles got too few dents. The numbers of a triangle are its own."
-        )
-    count, too_many = int(shown.sum()), f"triangles, more than the {max_triangles:,} that a page"
+    count = whole.n_cells
+    too_many = f"triangles, more than the {max_triangles:,} that a page"
     if count > max_triangles:
         remarks.append(
-            f"The target has {count:,} {too_many} can draw, so there is no picture here; "
+            f"The target is drawn with {count:,} {too_many} can draw, so there is no picture here; "
             "chamberopt inspect shows it."
         )
-        return PartScene(None, tuple(remarks), coverage[target], area[target])
-    rest = triangles[~shown]
-    if len(triangles) > max_triangles:
+        return PartScene(None, tuple(remarks), coverage, area)
+    rest = part.rest
+    if count + rest.n_cells > max_triangles:
         remarks.append(
-            f"The part has {len(triangles):,} {too_many} can draw: only its target is drawn."
+            f"The part is drawn with {count + rest.n_cells:,} {too_many} can draw: only its target "
+            "is drawn."
         )
-        rest = triangles[:0]
-    columns = {
-        one.name: _packed(one.factor * fields[one.column][shown])
-        for one in QUANTITIES.values()
-        if one.column in fields
-    }
-    if not is_marked:  # from these the page computes the coverage at any time
-        columns["shown-density"] = _packed(density)
-        columns["density"] = _packed(fields["dent_density"][shown])
+        rest = None
     chamber = read_surface(result.folder / CHAMBER)
-    eye = _eye(vectors[shown])
+    eye = _eye(np.asarray(whole.face_normals) * np.asarray(whole["area"])[:, None])
+    # Of the part's triangles: the one in which each point lies, and what is known of each of them.
+    triangles, row = np.unique(target["triangle"], return_inverse=True)
+    of_point = np.zeros(target.n_points, dtype=int)
+    of_point[np.asarray(target.regular_faces)] = row.reshape(-1, 1)
     data = {
         "title": title,
         "treatment": result.design.process.treatment_time,
@@ -119,13 +91,26 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
             [row["time_s"], row["mean_coverage"]]
             for row in result.data.get("coverage_against_time", [])
         ],
-        "columns": columns,
-        "number": _packed(np.flatnonzero(shown), "<i4"),
-        **({ELEMENT: _packed(fields[ELEMENT][shown], "<i4")} if ELEMENT in fields else {}),
-        "figure": _traces(points, triangles[shown], rest, chamber, eye),
-        "view": _view(points, chamber, eye),
+        "columns": {
+            **{
+                one.name: _packed(one.factor * target[one.column])
+                for one in QUANTITIES.values()
+                if one.column in target.point_data
+            },
+            "density": _packed(target["dent_density"]),  # gives the coverage at any time
+        },
+        "own": {
+            "coverage": _packed(100.0 * own["coverage"][triangles]),
+            "interval": _packed(100.0 * own["coverage_interval"][triangles]),
+        },
+        "triangle": _packed(of_point, "<i4"),
+        "number": _packed(triangles, "<i4"),
+        "element": _packed(own["element"][triangles], "<i4"),
+        "impacts": _packed(own["impacts"][triangles], "<i4"),
+        "figure": _traces(part, rest, chamber, eye),
+        "view": _view(np.asarray(own.points, dtype=float), chamber, eye),
     }
-    return PartScene(data, tuple(remarks), coverage[target], area[target])
+    return PartScene(data, tuple(remarks), coverage, area)
 
 
 def quantities_in_all(scenes: Sequence[dict[str, Any]]) -> list[dict[str, str]]:
@@ -138,31 +123,36 @@ def quantities_in_all(scenes: Sequence[dict[str, Any]]) -> list[dict[str, str]]:
     ]
 
 
-def _traces(
-    points: np.ndarray, target: np.ndarray, rest: np.ndarray, chamber: Any, eye: np.ndarray
-) -> Any:
-    """Traces of plotly by name: part, rest, sonotrode, glass, edges."""
+def _traces(part: DrawnPart, rest: Surface | None, chamber: Any, eye: np.ndarray) -> Any:
+    """Traces of plotly by name: part, few, unreached, rest, sonotrode, glass, edges."""
     import plotly.graph_objects as go
 
     tags = np.asarray(chamber["tag"])
-    walls, faces = np.asarray(chamber.points, dtype=float), np.asarray(chamber.regular_faces)
     # Flat colours that match the colour bar: little shading, no shine. With both epsilons at 0
     # slivers are shaded as their neighbours.
     soft = {"ambient": 0.85, "diffuse": 0.25, "specular": 0.0, "roughness": 1.0, "fresnel": 0.0}
     soft |= {"facenormalsepsilon": 0.0, "vertexnormalsepsilon": 0.0}
-    common = {"flatshading": True, "lighting": soft, "showscale": False}
-    traces = [
-        go.Mesh3d(
-            name="part", **_mesh(points, target), intensitymode="cell", hoverinfo="none", **common
-        ),
-        go.Mesh3d(name="rest", **_mesh(points, rest), color=PART_GREY, hoverinfo="skip", **common),
+    common = {"lighting": soft, "showscale": False}
+    target, resolved = _mesh(part.target), np.asarray(part.target["resolved"])
+    traces = []
+    for name, cells in (("part", resolved), ("few", ~resolved)):
+        mesh = target | {side: target[side][cells] for side in "ijk"}
+        if name == "few":  # on the same points, which the page takes from the first
+            mesh = {side: mesh[side] for side in "ijk"}
+        traces.append(go.Mesh3d(name=name, **mesh, hoverinfo="none", **common))
+    walls = {
+        "sonotrode": (is_sonotrode(tags), SONOTRODE, 0.55 if eye is ABOVE else 0.08),
+        "glass": (tags == TAG_WALL, GLASS, 0.13),
+    }
+    surfaces = [("unreached", part.unreached, UNREACHED, 1.0), ("rest", rest, PART_GREY, 1.0)]
+    surfaces += [
+        (name, chamber.extract_cells(here).extract_surface(algorithm="dataset_surface"), *look)
+        for name, (here, *look) in walls.items()
     ]
-    for name, here, colour, opacity in (
-        ("sonotrode", is_sonotrode(tags), SONOTRODE, 0.55 if eye is ABOVE else 0.08),
-        ("glass", tags == TAG_WALL, GLASS, 0.13),
-    ):
-        look = {"color": colour, "opacity": opacity, "hoverinfo": "skip"}
-        traces.append(go.Mesh3d(name=name, **_mesh(walls, faces[here]), **look, **common))
+    for name, surface, colour, opacity in surfaces:
+        mesh = {} if surface is None else _mesh(surface)
+        look = {"color": colour, "opacity": opacity, "hoverinfo": "skip", "flatshading": True}
+        traces.append(go.Mesh3d(name=name, **mesh, **look, **common))
     line = {"color": EDGES, "width": 2}
     traces.append(
         go.Scatter3d(
@@ -206,11 +196,10 @@ def _view(points: np.ndarray, chamber: Any, eye: np.ndarray) -> dict[str, Any]:
     }
 
 
-def _mesh(points: np.ndarray, triangles: np.ndarray) -> dict[str, np.ndarray]:
-    """The mesh without unused points, in single precision (about 1e-5 mm)."""
-    used, faces = np.unique(triangles, return_inverse=True)
-    x, y, z = points[used].astype(np.float32).T
-    i, j, k = faces.reshape(-1, 3).astype(np.int32).T
+def _mesh(surface: Surface) -> dict[str, np.ndarray]:
+    """Points and triangles in single precision (about 1e-5 mm)."""
+    x, y, z = np.asarray(surface.points, dtype=np.float32).T
+    i, j, k = np.asarray(surface.regular_faces, dtype=np.int32).T
     return {
         name: np.ascontiguousarray(a) for name, a in zip("xyzijk", (x, y, z, i, j, k), strict=True)
     }

@@ -1,8 +1,8 @@
 """Impacts of a result, simulated again.
 
 Results keep figures, not impact logs. The same design, chamber and seed give the same impacts to
-the last bit, so replicas are simulated again when their impacts are wanted, and what they add up to
-is compared with the result.
+the last bit, so replicas are simulated again when their impacts are wanted, and compared with what
+the result keeps of them: their triangles and speeds.
 """
 
 from __future__ import annotations
@@ -18,9 +18,11 @@ from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import core_count, share
 from chamberopt.common.progress import Progress
-from chamberopt.coverage.dents import Dents, dent_diameters, dents_on_part
+from chamberopt.coverage.dents import Dents, dents_on_part
+from chamberopt.coverage.part_impacts import load_matching_hits
 from chamberopt.output.resimulate.rebuild import REMEDY, RebuiltChamber, RebuiltReplica, made_by
-from chamberopt.output.vtp_files import COVERAGE, read_surface
+from chamberopt.output.results.load import load_part
+from chamberopt.output.vtp_files import ELEMENT_COLUMNS, PART, read_surface
 from chamberopt.simulation.replicas import run_in_order, simulate_seed
 
 if TYPE_CHECKING:
@@ -38,7 +40,7 @@ class ReplicaImpacts:
 
     number: of the replica, from 0.
     log: as the simulator wrote it; its triangles are those of the chamber.
-    part_triangle: triangle that was hit, numbered as in coverage.vtp, int32, shape (n,).
+    part_triangle: triangle that was hit, numbered as in part.vtp, int32, shape (n,).
     """
 
     number: int
@@ -65,8 +67,8 @@ def simulate_impacts(
         progress: called after each replica.
 
     Raises:
-        InputError: after the last of all replicas, unless they gave the result's dents and impacts
-            on every triangle. Fewer replicas cannot be compared.
+        InputError: after the last of all replicas, unless they gave the result's own impacts with
+            the same speeds. Fewer replicas cannot be compared.
     """
     design, chamber = result.design, rebuilt.chamber
     count = replica_count(result, replicas)
@@ -74,17 +76,16 @@ def simulate_impacts(
     setting = share(executor, (design, chamber, rebuilt.cavity or chamber_mesh(chamber)))
     ahead = _replicas_ahead(result)
     logs = run_in_order(_impact_log, setting, seed, executor, stream, range(count), ahead)
-    impacts, dents = np.zeros((2, len(chamber.part.triangles)), dtype=np.int64)
+    triangles, speeds = [], []
     for number, log in enumerate(logs):
         one = _on_part(number, log, chamber)
-        dented = dent_diameters(one.log, design) > 0.0
-        impacts += np.bincount(one.part_triangle, minlength=len(impacts))
-        dents += np.bincount(one.part_triangle[dented], minlength=len(dents))
+        triangles.append(one.part_triangle)
+        speeds.append(one.log.normal_speed.astype(np.float32))
         yield one
         if progress:
             progress(number + 1, count, None)
     if count == result.data["replicas"]:
-        _require_same_figures(result, {"impacts": impacts, "dents": dents})
+        _require_same_impacts(result, np.concatenate(triangles), np.concatenate(speeds))
 
 
 def replica_count(result: Result, replicas: int | None) -> int:
@@ -115,9 +116,8 @@ def simulate_dents(replica: RebuiltReplica, time: float) -> Dents:
 
 def _replicas_ahead(result: Result) -> int:
     """Replicas to begin before the one that is yielded: one a core, unless their logs are long."""
-    surface, seconds = read_surface(result.folder / COVERAGE), result.design.process.treatment_time
-    times = result.data["simulated_time_s"] / seconds / result.data["replicas"]
-    impacts = float(np.nansum(surface["impacts_per_mm2"] * surface["exposed_area_mm2"])) * times
+    part = read_surface(result.folder / PART, ELEMENT_COLUMNS)
+    impacts = float(part["impacts"].sum()) / result.data["replicas"]
     return max(0, min(core_count(), int(MAX_IMPACTS_IN_MEMORY / max(impacts, 1.0)) - 1))
 
 
@@ -135,15 +135,18 @@ def _on_part(number: int, log: ImpactLog, chamber: Chamber) -> ReplicaImpacts:
     return ReplicaImpacts(number, log, source)
 
 
-def _require_same_figures(result: Result, simulated: dict[str, np.ndarray]) -> None:
-    surface = read_surface(result.folder / COVERAGE)
-    for name, values in simulated.items():
-        if name not in surface.array_names:
-            continue
-        wrong = ~np.isclose(surface[name], values, rtol=0.0, atol=0.0, equal_nan=True)
-        if wrong.any():
-            raise InputError(
-                f"{result.folder}: this program on this machine does not simulate it again bit for "
-                f"bit: {name} of {wrong.sum()} of {len(wrong)} triangles differ, the first is "
-                f"triangle {np.flatnonzero(wrong)[0]} (made by {made_by(result)}); {REMEDY}"
-            )
+def _require_same_impacts(result: Result, triangle: np.ndarray, speed: np.ndarray) -> None:
+    part = load_part(result)
+    stored = load_matching_hits(result.folder, np.asarray(part["impacts"])).hits
+    order = np.argsort(triangle, kind="stable")
+    triangle, speed = triangle[order], speed[order]
+    count = np.bincount(triangle, minlength=part.n_cells)
+    wrong = count != part["impacts"]
+    if not wrong.any():
+        wrong[triangle[speed != stored.speed]] = True
+    if wrong.any():
+        raise InputError(
+            f"{result.folder}: this program on this machine does not simulate it again bit for "
+            f"bit: the impacts on {wrong.sum()} of {len(wrong)} triangles differ, the first is "
+            f"triangle {np.flatnonzero(wrong)[0]} (made by {made_by(result)}); {REMEDY}"
+        )

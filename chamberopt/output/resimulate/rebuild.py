@@ -12,7 +12,7 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.part import posed_part
 from chamberopt.chamber.scene import build_scene, chamber_mesh, replica_seed
 from chamberopt.common.errors import InputError
-from chamberopt.output.vtp_files import CHAMBER, COVERAGE, MM, read_surface
+from chamberopt.output.vtp_files import CHAMBER, ELEMENT_COLUMNS, MM, PART, read_surface
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -56,7 +56,7 @@ def rebuild_chamber(result: Result) -> RebuiltChamber:
             builds another chamber.
     """
     part = posed_part(result.design)[0]
-    surface = read_surface(result.folder / COVERAGE)
+    surface = read_surface(result.folder / PART, ELEMENT_COLUMNS)
     if part.sha256 != result.part_sha256 or surface.n_cells != len(part.triangles):
         _refuse_changed_file(result, "part.mesh", result.design.part.mesh_path)
     if result.design.chamber.sha256 != result.data.get("shape_sha256", ""):

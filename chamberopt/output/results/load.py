@@ -12,17 +12,26 @@ import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
+from chamberopt.common.number_text import estimate_text
 from chamberopt.coverage.metrics import METRICS
 from chamberopt.design.design import validate
 from chamberopt.design.load import Design
 from chamberopt.optimize.storage.study_folder import RESULT, is_study_folder
 from chamberopt.optimize.storage.trial_log import HISTORY
-from chamberopt.output.vtp_files import COVERAGE, Surface, read_surface
+from chamberopt.output.vtp_files import (
+    COVERAGE,
+    ELEMENT_COLUMNS,
+    FIELD_COLUMNS,
+    OF_ELEMENT,
+    PART,
+    Surface,
+    read_surface,
+)
 
 if TYPE_CHECKING:
     from chamberopt.simulation.evaluation import Evaluation
 
-FORMAT = 1
+FORMAT = 2
 
 
 @dataclass(frozen=True)
@@ -103,59 +112,61 @@ def load_result(path: str | Path) -> Result:
         ) from None
 
 
-def load_coverage(result: Result) -> Surface:
-    """Read the coverage.vtp of a result; InputError if missing, damaged or another result's."""
-    surface = read_surface(result.folder / COVERAGE)
-    require_matching_coverage(
+def load_part(result: Result) -> Surface:
+    """Read the part.vtp of a result; InputError if missing, damaged or another result's."""
+    return read_part(
         result.folder,
-        surface,
         result.data["chamber"]["target_triangles"],
-        result.metrics["impacts_per_mm2_s"].value * result.design.process.treatment_time,
+        result.metrics["impacts_per_mm2_s"].value * result.data["simulated_time_s"],
     )
-    return surface
 
 
-def require_matching_coverage(
-    folder: Path, surface: Surface, target_triangles: int, impacts_per_mm2: float
-) -> None:
-    """Raise InputError unless coverage.vtp has the target and impacts that result.json records.
+def read_part(folder: Path, target_triangles: int, impacts_per_mm2: float) -> Surface:
+    """Read part.vtp; InputError unless it has the target and impacts that result.json records.
 
     Args:
         folder: of the result.
-        surface: read from its coverage.vtp.
         target_triangles: exposed triangles of the target, by result.json.
-        impacts_per_mm2: mean over the target at the treatment time, by result.json.
+        impacts_per_mm2: simulated, mean over the target, by result.json.
     """
-    target = (np.asarray(surface["target"]) > 0) & (np.asarray(surface["exposed_area_mm2"]) > 0.0)
-    area = np.asarray(surface["exposed_area_mm2"])[target]
-    impacts = np.asarray(surface["impacts_per_mm2"])[target]
-    mean = float((area * impacts).sum() / area.sum()) if len(area) else 0.0
-    if len(area) != target_triangles or not np.isclose(mean, impacts_per_mm2, rtol=1e-6):
+    part = read_surface(folder / PART, ELEMENT_COLUMNS)
+    target = (part["target"] > 0) & (part["exposed_area_mm2"] > 0.0)
+    mean = part["impacts"][target].sum() / max(part["exposed_area_mm2"][target].sum(), 1e-300)
+    if target.sum() != target_triangles or not np.isclose(mean, impacts_per_mm2, rtol=1e-6):
         raise InputError(
-            f"{folder / COVERAGE}: of another result than result.json: a target of {len(area)} "
+            f"{folder / PART}: of another result than result.json: a target of {target.sum()} "
             f"triangles with {mean:.6g} impacts per mm², not {target_triangles} with "
             f"{impacts_per_mm2:.6g}; simulate again"
         )
+    return part
+
+
+def read_field(folder: Path, part: Surface) -> Surface:
+    """Read coverage.vtp; InputError unless it belongs to the part.vtp beside it."""
+    field = read_surface(folder / COVERAGE, ("triangle", *OF_ELEMENT), FIELD_COLUMNS)
+    triangle = np.asarray(field["triangle"])
+    within = triangle.min() >= 0 and triangle.max() < part.n_cells
+    if not within or (part["impacts"][triangle] != field["element_impacts"]).any():
+        raise InputError(
+            f"{folder / COVERAGE}: of another result than the part.vtp beside it; simulate again"
+        )
+    return field
 
 
 def summary(evaluation: Evaluation | Result) -> str:
     """Return one line with the objective and its interval, and mean and spread of coverage."""
-    goal = evaluation.objective
     mean, spread = (evaluation.metrics[name] for name in ("mean_coverage", "std_coverage"))
     name = evaluation.objective_name.replace("_", " ")
-    figures = f"mean {_share(mean)}   std {_share(spread)}"
-    return f"{name} {goal.value:.3f} ± {goal.half_width:.3f}   {figures}"
-
-
-def _share(estimate: Estimate) -> str:
-    return f"{100.0 * estimate.value:.1f} ± {100.0 * estimate.half_width:.1f} %"
+    shares = f"mean {estimate_text(mean, 100.0, '%')}   std {estimate_text(spread, 100.0, '%')}"
+    return f"{name} {estimate_text(evaluation.objective)}   {shares}"
 
 
 def _read_estimate(data: dict[str, Any]) -> Estimate:
-    """An estimate of a result, which always has a value and a half-width."""
-    if data["value"] is None or data["half_width"] is None:
+    """An estimate of a result: a value with a half-width, or words."""
+    found = Estimate.from_json(data)
+    if data["value"] is None or (data["half_width"] is None and not found.in_words):
         raise ValueError("an estimate without a value or half_width")
-    return Estimate.from_json(data)
+    return found
 
 
 def _refuse_constant(name: str) -> float:

@@ -17,7 +17,7 @@ from chamberopt.optimize import pareto
 from chamberopt.optimize.storage.study_folder import RESULT
 from chamberopt.optimize.storage.trial_log import read_trials, trials_as_csv
 from chamberopt.output.results.load import FORMAT
-from chamberopt.output.vtp_files import COVERAGE, write_chamber, write_coverage
+from chamberopt.output.vtp_files import write_chamber, write_coverage
 from chamberopt.simulation.complete_result import CandidateResult
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def write_study(
     """Add the data files of a study that has ended to its folder.
 
     run_study has written design.toml, study.toml and history.jsonl. This adds best.toml,
-    history.csv, pareto.csv (of two objectives), the best design's coverage.vtp, hits.npz,
+    history.csv, pareto.csv (of two objectives), the best design's coverage.vtp, part.vtp, hits.npz,
     chamber.stl and chamber.vtp, and start/, a results folder of the start as confirmed on the same
     seeds.
 
@@ -109,10 +109,9 @@ def write_result(
 def _write_candidate(folder: Path, candidate: CandidateResult) -> dict[str, Any]:
     """Write the surfaces and impacts of one candidate; return its part of result.json."""
     design, chamber, evaluation = candidate.design, candidate.chamber, candidate.evaluation
-    write_coverage(folder / COVERAGE, chamber, candidate.element_values)
-    save_hits(
-        folder / HITS_FILE, sort_hits_by_triangle(evaluation.hits, len(chamber.part.triangles))
-    )
+    write_coverage(folder, chamber, candidate.element_values, candidate.display)
+    hits = sort_hits_by_triangle(evaluation.hits, len(chamber.part.triangles))
+    save_hits(folder / HITS_FILE, hits)
     write_chamber(folder, chamber)
     target = exposed_target(chamber)
     return {

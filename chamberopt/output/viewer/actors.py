@@ -7,11 +7,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from chamberopt.design.shapes import TAG_WALL, is_sonotrode
+from chamberopt.output.plots.colours import FEW_DENTS, UNREACHED, muted
 from chamberopt.output.viewer.drawn_part import DrawnPart
 from chamberopt.output.viewer.view_state import DEFAULT_VIEW
 from chamberopt.output.vtp_files import Surface, pyvista
 
-GREY, DARK, GLASS, SONOTRODE, BACKGROUND = "#b9bec4", "#2b3440", "#9db7cc", "#e08a2e", "white"
+GREY, DARK, GLASS, SONOTRODE, BACKGROUND = "#c5cad0", "#2b3440", "#9db7cc", "#e08a2e", "white"
 FAULT, PALE = "#d01c1c", "#eceff2"
 VIEW_FROM_BELOW = (1.0, -1.4, -0.8)  # a little below, where the shot comes from
 SHARP_EDGE = 30  # degrees between the triangles at an edge of the chamber that is drawn
@@ -54,16 +55,21 @@ def draw_target(plotter: Any, part: DrawnPart, limits: tuple[float, float], bar:
             n_labels=steps + 1, color=DARK, width=0.06, height=0.55, position_x=0.88,
             position_y=0.2, title_font_size=20, label_font_size=20,
         )  # fmt: skip
-    if part.averaging_radius:
-        text = (
-            f"averaged over {part.averaging_radius:.1f} mm around each triangle: few dents were "
-            "simulated"
-        )
-        plotter.add_text(text, position="lower_left", font_size=9, color=DARK)
+    legend = "   ".join(f"{name}: {meaning}" for _, name, meaning in without_colour(part))
+    plotter.add_text(legend, position="lower_left", font_size=9, color=DARK)
     plotter.camera_position = [VIEW_FROM_BELOW, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
-    plotter.reset_camera(bounds=part.target.bounds)
+    plotter.reset_camera(bounds=part.whole.bounds)
     plotter.camera.SetWindowCenter(0.14 if bar else 0.0, 0.0)  # makes room for the colour bar
     plotter.enable_anti_aliasing("ssaa")
+
+
+def without_colour(part: DrawnPart) -> list[tuple[str, str, str]]:
+    """(colour, its name, meaning) of what tells no value on the target, where there is any."""
+    entries = (
+        (not np.all(part.target["resolved"]), FEW_DENTS, "greyed", "too few dents simulated"),
+        (part.unreached.n_cells > 0, UNREACHED, "brown", "out of the reach of the shot"),
+    )
+    return [(colour, name, meaning) for there, colour, name, meaning in entries if there]
 
 
 def add_part(
@@ -71,24 +77,42 @@ def add_part(
 ) -> list[Any]:
     """Add the target, coloured by its quantity, and the rest of the part in grey, if any.
 
-    pale: triangles of the target, bool, that are drawn pale instead.
+    Colours are greyed where too few dents were simulated.
+
+    Args:
+        pale: triangles of `part.target`, bool, that are drawn pale instead.
 
     Returns:
-        The actors, the target's first.
+        The actors; the mapper of the first has the colours.
     """
-    drawn = np.clip(part.target["shown"], *limits)
-    if pale is not None:
-        drawn[pale] = np.inf
-    part.target["drawn"] = drawn
-    target = plotter.add_mesh(
-        part.target, scalars="drawn", cmap=part.quantity.colours, nan_color=GREY, clim=limits,
-        ambient=0.7, diffuse=0.3, show_scalar_bar=False,
-        above_color=None if pale is None else PALE, **NO_RENDER,
-    )  # fmt: skip
-    if not part.rest.n_cells:
-        return [target]
-    rest = plotter.add_mesh(part.rest, color=GREY, ambient=0.45, diffuse=0.55, **NO_RENDER)
-    return [target, rest]
+    pale = np.zeros(part.target.n_cells, dtype=bool) if pale is None else pale
+    resolved, colours = np.asarray(part.target["resolved"]), part.quantity.colours
+    style = {"ambient": 0.7, "diffuse": 0.3, **NO_RENDER}
+    actors: list[Any] = []
+    for chosen, colour_map in ((resolved, colours), (~resolved, muted(colours))):
+        cells = np.flatnonzero(chosen & ~pale)
+        hidden = not len(cells) and not actors  # the colour bar needs an actor all the same
+        if len(cells) or hidden:
+            actor = plotter.add_mesh(
+                part.target.extract_cells(cells) if len(cells) else part.whole.extract_cells([0]),
+                scalars="shown" if len(cells) else np.zeros(3), cmap=colour_map, clim=limits,
+                nan_color=FEW_DENTS, show_scalar_bar=False, **style,
+            )  # fmt: skip
+            actor.visibility = bool(len(cells))
+            actors.append(actor)
+    flat = (
+        (part.target.extract_cells(np.flatnonzero(pale)), PALE),
+        (part.unreached, UNREACHED),
+        (part.rest, GREY),
+    )
+    actors += [
+        plotter.add_mesh(surface, color=colour, **style)
+        for surface, colour in flat
+        if surface.n_cells
+    ]
+    for actor in actors:
+        actor.prop.interpolation = "Phong"  # by the normals of the surface, not of its triangles
+    return actors
 
 
 def add_chamber(plotter: Any, chamber: Surface) -> tuple[dict[int, Any], list[Any]]:

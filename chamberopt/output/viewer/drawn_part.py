@@ -3,34 +3,55 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
 
 import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
-from chamberopt.output.disc_averages import average_over_discs
+from chamberopt.geometry.triangles import area_vectors
 from chamberopt.output.plots.quantities import QUANTITIES, Quantity
-from chamberopt.output.vtp_files import Surface, read_coverage_model
+from chamberopt.output.vtp_files import Surface
+
+NEARLY_ALL = (0.01, 0.985)  # shares of the area at the ends of the colour scale
+ROUNDS = 12  # of averages over neighbours, before which a place counts as resolved or not
 
 
 class DrawnPart:
     """The target of a part with the values of one quantity, and the rest of the part.
 
-    target: exposed triangles of the target, with cell data "shown" in the quantity's unit.
-    rest: all other triangles.
-    marked: whether dents were marked one by one, so that coverage is known at one time only.
+    whole: the target.
+    target: where a ball can touch it, with point data "shown" in the quantity's unit and cell data
+        "resolved": whether the simulated dents are enough to tell.
+    unreached: where no ball can touch it.
+    rest: the part beside the target.
     quantity: the one in "shown".
 
-    Target and rest have cell data "row", the number of the triangle in coverage.vtp.
+    A triangle belongs to what most of its corners are. All have cell data "triangle", the number of
+    the part's triangle, and "area" [mm²].
     """
 
-    def __init__(self, surface: Surface, quantity: Quantity = QUANTITIES["coverage"]) -> None:
-        on_target = (surface["target"] > 0) & (surface["exposed_area_mm2"] > 0)
-        surface["row"] = np.arange(surface.n_cells)
-        self.target = surface.extract_cells(on_target).extract_surface(algorithm="dataset_surface")
-        self.rest = surface.extract_cells(~on_target)
-        self.marked = read_coverage_model(surface) == "dents"
+    def __init__(self, field: Surface, quantity: Quantity = QUANTITIES["coverage"]) -> None:
+        corners = np.asarray(field.regular_faces)
+        vectors = area_vectors(np.asarray(field.points, dtype=float), corners)
+        field.cell_data["area"] = np.linalg.norm(vectors, axis=1)
+        on_target = np.asarray(field["target"]) > 0
+        is_reached = np.asarray(field["reachable"]) > 0.5
+        is_resolved = _majority(np.asarray(field["resolved"]) > 0.5, is_reached, corners)
+        reached, resolved = (one[corners].sum(axis=1) > 1 for one in (is_reached, is_resolved))
+        for name in [one.column for one in QUANTITIES.values()] + ["dent_density"]:
+            if name in field.point_data:
+                _fill_from_neighbours(field.point_data, name, is_reached, corners)
+
+        def cells(chosen: np.ndarray) -> Surface:
+            if not chosen.any():  # PyVista would drop the columns
+                empty = field.extract_cells([0]).extract_surface(algorithm="dataset_surface")
+                return empty.remove_cells([0])
+            return field.extract_cells(chosen).extract_surface(algorithm="dataset_surface")
+
+        self.whole, self.rest = cells(on_target), cells(~on_target)
+        field.cell_data["resolved"] = resolved
+        self.target = cells(on_target & reached)
+        self.unreached = cells(on_target & ~reached)
         self.show(quantity)
 
     def show(self, quantity: Quantity, times: float = 1.0) -> None:
@@ -42,41 +63,76 @@ class DrawnPart:
         self.target["shown"] = self.values(quantity, times)
 
     def values(self, quantity: Quantity, times: float = 1.0) -> np.ndarray:
-        """Values of the target's triangles in the quantity's unit; `times` as in show."""
-        if quantity.column not in self.target.cell_data:
+        """Values at the points of `target` in the quantity's unit; `times` as in show."""
+        if quantity.name == "coverage":
+            return 100.0 * coverage_from_dent_density(times * self.target["dent_density"])
+        if quantity.column not in self.target.point_data:
             raise InputError(
                 f"coverage.vtp has no {quantity.column}: an older result; simulate again"
             )
-        if quantity.name != "coverage":
-            scale = quantity.factor * (times if quantity.grows else 1.0)
-            return scale * np.asarray(self.target[quantity.column])
-        value = self._averages[0]
-        return 100.0 * (value if self.marked else coverage_from_dent_density(value * times))
+        scale = quantity.factor * (times if quantity.grows else 1.0)
+        return scale * np.asarray(self.target[quantity.column])
 
-    @property
-    def averaging_radius(self) -> float:
-        """Radius of the discs that coverage is averaged over [mm], 0 where it is not."""
-        return self._averages[1]
+    def covered_to(self, share: float, times: float = 1.0) -> np.ndarray:
+        """Which triangles of `target` have at least a coverage [%]; `times` as in show."""
+        values = self.values(QUANTITIES["coverage"], times)
+        return np.asarray(values[self.target.regular_faces].mean(axis=1) >= share)
 
-    @cached_property
-    def _averages(self) -> tuple[np.ndarray, float]:
-        """Averages of the dent density, or of marked coverage, and the radius of their discs."""
-        return average_over_discs(
-            np.asarray(self.target.cell_centers().points),
-            np.asarray(self.target.cell_normals),
-            np.asarray(self.target["coverage" if self.marked else "dent_density"]),
-            np.asarray(self.target["exposed_area_mm2"]),
-            np.asarray(self.target["dents"]),
-        )
+
+def _majority(marked: np.ndarray, among: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """What most neighbours of each point are, so that single dents make no specks.
+
+    Args:
+        marked: (v,) bool.
+        among: points that count, (v,) bool.
+        corners: of the triangles, (c, 3).
+    """
+    of, to = _neighbours(corners)
+    of, to = of[among[to]], to[among[to]]
+    share, weight = marked.astype(float), np.maximum(np.bincount(of, minlength=len(marked)), 1)
+    for _ in range(ROUNDS):
+        share = np.bincount(of, share[to], len(share)) / weight
+    return np.asarray(share > 0.5)
+
+
+def _neighbours(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points and their neighbours along each side of each triangle, both ways, (6 c,) each."""
+    sides = corners[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    return np.concatenate([sides[:, 0], sides[:, 1]]), np.concatenate([sides[:, 1], sides[:, 0]])
+
+
+def _fill_from_neighbours(
+    columns: dict[str, np.ndarray], name: str, known: np.ndarray, corners: np.ndarray
+) -> None:
+    """Give points out of reach the mean of their neighbours, so that colours do not fade there."""
+    values = np.asarray(columns[name])
+    known = known & np.isfinite(values)
+    of, to = _neighbours(corners)
+    use = known[to] & ~known[of]
+    count = np.bincount(of[use], minlength=len(values))
+    sums = np.bincount(of[use], values[to[use]], len(values))
+    columns[name] = np.where(count > 0, sums / np.maximum(count, 1), values)
+
+
+def point_areas(surface: Surface) -> np.ndarray:
+    """Area that each point of a surface stands for [mm²], from the cell data "area"."""
+    corners = np.asarray(surface.regular_faces)
+    return np.bincount(corners.ravel(), np.repeat(surface["area"] / 3.0, 3), surface.n_points)
 
 
 def colour_range(parts: Sequence[DrawnPart]) -> tuple[float, float]:
-    """Return round limits that hold nearly all values shown on all parts."""
+    """Return round limits that hold nearly all of the area of all parts by the values shown."""
     values = np.concatenate([part.target["shown"] for part in parts])
-    values = values[np.isfinite(values)]
-    if parts[0].quantity.unit != "%":
-        return _round_range(*np.percentile(values, [1.0, 99.0])) if len(values) else (0.0, 1.0)
-    low, high = np.percentile(values, [1.0, 99.5]) if len(values) else (0.0, 100.0)
+    area = np.concatenate([point_areas(part.target) for part in parts])
+    known = np.isfinite(values) & (area > 0.0)
+    is_share = parts[0].quantity.unit == "%"
+    if not known.any():
+        return (0.0, 100.0) if is_share else (0.0, 1.0)
+    order = np.argsort(values[known])
+    upto = np.cumsum(area[known][order])
+    low, high = np.interp(np.multiply(NEARLY_ALL, upto[-1]), upto, values[known][order])
+    if not is_share:
+        return _round_range(low, high)
     step = 5.0 if high - low < 20.0 else 10.0
     low = max(0.0, step * np.floor(low / step))
     return low, min(100.0, max(low + step, step * np.ceil(high / step)))

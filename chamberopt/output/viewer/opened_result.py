@@ -13,20 +13,11 @@ from chamberopt.common.errors import InputError
 from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
 from chamberopt.coverage.part_impacts import HitsByTriangle, load_matching_hits
 from chamberopt.output.plots.quantities import QUANTITIES
-from chamberopt.output.results.load import Result, require_matching_coverage, summary
+from chamberopt.output.results.load import Result, read_field, read_part, summary
 from chamberopt.output.viewer.drawn_part import DrawnPart, colour_range
 from chamberopt.output.viewer.view_state import ViewState
-from chamberopt.output.vtp_files import CHAMBER, COVERAGE, Surface, read_surface
+from chamberopt.output.vtp_files import CHAMBER, COVERAGE, PART, read_surface
 
-COVERAGE_COLUMNS = (
-    "coverage",
-    "dent_density",
-    "impacts_per_mm2",
-    "impacts",
-    "dents",
-    "exposed_area_mm2",
-    "target",
-)
 FULL_SCALE = (0.0, 100.0)  # % of coverage: the same at all times
 
 
@@ -37,7 +28,7 @@ class ResultInfo:
     treatment_s: peening time.
     longest_s: end of the time slider.
     triangles: exposed triangles of the target.
-    impacts_per_mm2: mean over the target at the treatment time.
+    impacts_per_mm2: simulated, mean over the target.
     """
 
     folder: str
@@ -58,7 +49,7 @@ def result_info(result: Result) -> ResultInfo:
         treatment_s=treatment,
         longest_s=max([treatment, *times]),
         triangles=result.data["chamber"]["target_triangles"],
-        impacts_per_mm2=result.metrics["impacts_per_mm2_s"].value * treatment,
+        impacts_per_mm2=result.metrics["impacts_per_mm2_s"].value * result.data["simulated_time_s"],
     )
 
 
@@ -68,52 +59,39 @@ class OpenedResult:
     def __init__(self, info: ResultInfo) -> None:
         self.info = info
         self.folder = Path(info.folder)
-        self.surface = _read_with_columns(self.folder / COVERAGE, COVERAGE_COLUMNS)
-        self.chamber = _read_with_columns(self.folder / CHAMBER, ("tag",))
-        self.part = DrawnPart(self.surface)
-        require_matching_coverage(self.folder, self.surface, info.triangles, info.impacts_per_mm2)
+        self.surface = read_part(self.folder, info.triangles, info.impacts_per_mm2)
+        self.chamber = read_surface(self.folder / CHAMBER, ("tag",))
+        self.part = DrawnPart(read_field(self.folder, self.surface))
 
     @property
     def quantities(self) -> list[str]:
         """Names of the quantities that the result has."""
-        return [name for name, one in QUANTITIES.items() if one.column in self.surface.cell_data]
+        there = self.part.whole.point_data
+        return [name for name, one in QUANTITIES.items() if one.column in there]
 
     @cached_property
-    def hits(self) -> HitsByTriangle | None:
-        """Its single impacts, None if it has none. Read only when needed: most of a result."""
+    def hits(self) -> HitsByTriangle:
+        """Its single impacts. Read only when needed: most of a result."""
         return load_matching_hits(self.folder, np.asarray(self.surface["impacts"]))
 
     def time_ratio(self, state: ViewState) -> float:
-        """Return the time shown over the treatment time.
-
-        Raises:
-            InputError: coverage at another time is wanted, but dents were marked one by one.
-        """
-        if state.time_s is None:
-            return 1.0
-        if self.part.marked and state.quantity == "coverage":
-            raise InputError(
-                f"--time-s: not supported for {self.folder}: its dents are marked one by one, at "
-                f"the treatment time of {self.info.treatment_s:g} s; simulate with that treatment "
-                "time"
-            )
-        return state.time_s / self.info.treatment_s
+        """Return the time shown over the treatment time."""
+        return 1.0 if state.time_s is None else state.time_s / self.info.treatment_s
 
     def show(self, state: ViewState) -> None:
         """Colour the part by the state's quantity; InputError if the result does not have it."""
         if state.quantity not in self.quantities:
             raise InputError(
-                f"--quantity {state.quantity}: {self.folder / COVERAGE} does not have it: an older "
-                "result, or an analytic one, which has no single impacts; simulate again"
+                f"--quantity {state.quantity}: {self.folder / COVERAGE} does not have it; "
+                "simulate again"
             )
         self.part.show(QUANTITIES[state.quantity], self.time_ratio(state))
 
-    def above_threshold(self, state: ViewState) -> np.ndarray:
-        """Return which triangles of the target are covered at least to the threshold, bool."""
+    def above_threshold(self, state: ViewState) -> np.ndarray | None:
+        """Return which triangles of the drawn target are covered at least to the threshold."""
         if state.below is None:
-            return np.zeros(self.part.target.n_cells, dtype=bool)
-        times = 1.0 if self.part.marked else self.time_ratio(state)
-        return np.asarray(self.part.values(QUANTITIES["coverage"], times) >= state.below)
+            return None
+        return self.part.covered_to(state.below, self.time_ratio(state))
 
     def describe_triangle(self, triangle: int, state: ViewState) -> list[str]:
         """Return all values of a triangle, a line each; InputError if there is no such triangle."""
@@ -121,12 +99,9 @@ class OpenedResult:
         if not 0 <= triangle < surface.n_cells:
             raise InputError(
                 f"--triangle {triangle}: {self.folder} has triangles 0 to {surface.n_cells - 1}, "
-                f"in the order of {COVERAGE}"
+                f"in the order of {PART}"
             )
-        element = (
-            f", element {surface['element'][triangle]}" if "element" in surface.cell_data else ""
-        )
-        lines = [f"triangle {triangle}{element}"]
+        lines = [f"triangle {triangle}, element {surface['element'][triangle]}"]
         if not surface["exposed_area_mm2"][triangle] > 0.0:
             return [*lines, "outside the chamber or hidden"]
         if not surface["target"][triangle]:
@@ -140,24 +115,13 @@ class OpenedResult:
         return [*lines, f"simulated: {impacts} impacts, {dents} dents"]
 
     def _value(self, name: str, triangle: int, state: ViewState) -> float:
-        """Return the triangle's own value, which is never averaged."""
-        quantity = QUANTITIES[name]
-        if name == "coverage" and not self.part.marked:
-            density = self.surface["dent_density"][triangle] * self.time_ratio(state)
+        """Return the mean over the triangle."""
+        quantity, times = QUANTITIES[name], self.time_ratio(state)
+        if name == "coverage" and state.time_s is not None:
+            density = self.surface["dent_density"][triangle] * times
             return 100.0 * float(coverage_from_dent_density(density))
-        times = self.time_ratio(state) if quantity.grows else 1.0
-        return quantity.factor * float(self.surface[quantity.column][triangle]) * times
-
-
-def _read_with_columns(path: Path, names: Sequence[str]) -> Surface:
-    surface = read_surface(path)
-    missing = [name for name in names if name not in surface.cell_data]
-    if missing:
-        raise InputError(
-            f"{path}: has no {missing[0]}, so it is not the file that was written here; "
-            "simulate again"
-        )
-    return surface
+        scale = quantity.factor * (times if quantity.grows else 1.0)
+        return scale * float(self.surface[quantity.column][triangle])
 
 
 def common_quantities(results: Sequence[OpenedResult]) -> list[str]:

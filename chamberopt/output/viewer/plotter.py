@@ -12,7 +12,15 @@ from chamberopt.common.errors import InputError
 from chamberopt.geometry.triangles import unit_normals
 from chamberopt.output.plots.quantities import QUANTITIES
 from chamberopt.output.viewer import overlay
-from chamberopt.output.viewer.actors import GREY, PALE, SONOTRODE, add_chamber, add_part, light
+from chamberopt.output.viewer.actors import (
+    GREY,
+    PALE,
+    SONOTRODE,
+    add_chamber,
+    add_part,
+    light,
+    without_colour,
+)
 from chamberopt.output.viewer.opened_result import (
     OpenedResult,
     colour_limits,
@@ -115,7 +123,7 @@ class ResultPlotter:
         picker.Pick(x, y, 0.0, renderer)
         if picker.GetCellId() < 0 or number >= len(self.results):
             return None
-        return number, int(pyvista().wrap(picker.GetDataSet())["row"][picker.GetCellId()])
+        return number, int(pyvista().wrap(picker.GetDataSet())["triangle"][picker.GetCellId()])
 
     def view_size(self) -> tuple[int, int]:
         """Width and height of one view [pixels]."""
@@ -147,13 +155,13 @@ class ResultPlotter:
             faces, walls = add_chamber(plotter, result.chamber)
             actors += [*faces.values(), *walls]
         if state.cut is not None:
-            _cut(actors if state.cut_part else actors[2:], state.cut, result)
+            _cut(actors if state.cut_part else actors[len(part_actors) :], state.cut, result)
         lines: list[str] = []
         speed = np.zeros(0)
         if state.triangle is not None and state.view in (None, number):
             lines, speed = _triangle_lines(result, state.triangle, state)
             corners = result.surface.points[result.surface.regular_faces[state.triangle]]
-            overlay.mark_triangle(plotter, corners, PIN_LENGTH * result.part.target.length)
+            overlay.mark_triangle(plotter, corners, PIN_LENGTH * result.part.whole.length)
         title = result.info.title
         if self.menu and number == 0:
             menu = _menu(self.quantities, state)
@@ -186,34 +194,27 @@ def _triangle_lines(
     result: OpenedResult, triangle: int, state: ViewState
 ) -> tuple[list[str], np.ndarray]:
     """Return the lines on a triangle, and its impact speeds (k,) [m/s]."""
-    lines = result.describe_triangle(triangle, state)
-    if result.hits is None:
-        return [*lines, "impact speeds: not kept in this result"], np.zeros(0)
-    return lines, result.hits.of(triangle).speed
+    return result.describe_triangle(triangle, state), result.hits.of(triangle).speed
 
 
-def _remarks(result: OpenedResult, state: ViewState, pale: np.ndarray) -> list[str]:
-    """Return remarks on time, threshold and averaging."""
+def _remarks(result: OpenedResult, state: ViewState, pale: np.ndarray | None) -> list[str]:
+    """Return remarks on time and threshold."""
     quantity, part, remarks = QUANTITIES[state.quantity], result.part, []
     if quantity.name == "coverage" or quantity.grows:
         treatment = result.info.treatment_s
         time = treatment if state.time_s is None else state.time_s
         remarks.append(f"after {time:.4g} s" + (" (the treatment)" if time == treatment else ""))
-    if state.below is not None:
-        area = np.asarray(part.target["exposed_area_mm2"])
-        share = 100.0 * area[~pale].sum() / area.sum()
+    if pale is not None:
+        below = np.asarray(part.target["area"])[~pale].sum() + part.unreached["area"].sum()
+        share = 100.0 * below / part.whole["area"].sum()
         remarks.append(f"below {state.below:g} %: {share:.1f} % of the area")
-    if part.averaging_radius and (quantity.name == "coverage" or state.below is not None):
-        remarks.append(
-            f"coverage averaged over {part.averaging_radius:.1f} mm around each triangle: few dents"
-        )
     return remarks
 
 
 def _legend(result: OpenedResult, state: ViewState) -> list[tuple[str, str]]:
     """Return (colour, meaning) of colours that stand for no value."""
-    no_value = np.isnan(result.part.target["shown"]).any()
-    entries = [(GREY, "not in the target" + (", or no such impact" if no_value else ""))]
+    entries = [(GREY, "not in the target")]
+    entries += [(colour, meaning) for colour, _, meaning in without_colour(result.part)]
     if state.below is not None:
         entries.append((PALE, f"coverage {state.below:g} % or more"))
     return [(SONOTRODE, "sonotrode"), *entries] if state.chamber else entries
@@ -224,7 +225,7 @@ def _eye(result: OpenedResult, state: ViewState) -> np.ndarray:
     if state.eye is not None:
         return np.array(state.eye)
     if state.triangle is None or state.triangle >= result.surface.n_cells:
-        return view_of_target(result.part.target)
+        return view_of_target(result.part.whole)
     corners = result.surface.points[result.surface.regular_faces[state.triangle]]
     return unit_normals(corners) + np.array([0.2, -0.3, 0.1])
 
@@ -236,7 +237,7 @@ def view_of_target(target: Surface) -> np.ndarray:
     seen from below.
     """
     above, below = np.array(DEFAULT_VIEW), np.array(DEFAULT_VIEW) * [1.0, 1.0, -STEEPER_BELOW]
-    area, normal = np.asarray(target["exposed_area_mm2"]), np.asarray(target.cell_normals)
+    area, normal = np.asarray(target["area"]), np.asarray(target.face_normals)
     from_above, from_below = (
         float(area @ np.maximum(normal @ eye, 0.0)) / float(np.linalg.norm(eye))
         for eye in (above, below)
@@ -256,7 +257,7 @@ def _cut(actors: Sequence[Any], cut: Plane, result: OpenedResult) -> None:
 def _bounds(result: OpenedResult, state: ViewState) -> np.ndarray:
     """Return bounds (3, 2) [mm] of what is drawn, or of the target if the chamber is not."""
     if not state.chamber:
-        return np.reshape(result.part.target.bounds, (3, 2))
+        return np.reshape(result.part.whole.bounds, (3, 2))
     boxes = (np.reshape(one.bounds, (3, 2)) for one in (result.surface, result.chamber))
     return _union(*boxes)
 

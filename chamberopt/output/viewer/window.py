@@ -18,7 +18,7 @@ from chamberopt.output.viewer.plotter import ResultPlotter
 from chamberopt.output.viewer.subprocess_drawing import draw_in_subprocess, picture_path
 from chamberopt.output.viewer.view_state import ViewState, state_after_key
 
-HANDLED_KEYS = "12345678bcxgurh"
+HANDLED_KEYS = "123456789bcxgurh"
 MAX_CLICK_MOTION = 4  # pixels that the mouse may move between press and release
 
 
@@ -159,8 +159,7 @@ class Window:
         """Show the slider where time changes what is shown, and the plane where there is a cut."""
         results, plotter = self.view.results, self.view.plotter
         quantity = QUANTITIES[self.state.quantity]
-        marked = any(one.part.marked for one in results)
-        timed = quantity.grows or (quantity.name == "coverage" and not marked)
+        timed = quantity.grows or quantity.name == "coverage"
         if timed and self.slider is None:
             # VTK measures its place from the window's corner, so it belongs to the view there.
             plotter.subplot(self.view.shape[0] - 1, 0)

@@ -131,8 +131,8 @@ def dent_colours() -> Colormap:
 
 def default_views(part: DrawnPart) -> Sequence[Vector]:
     """Directions to the eye: face on for a flat target, else from two opposite sides."""
-    area = np.asarray(part.target.compute_cell_sizes()["Area"])
-    x, y, z = area @ np.asarray(part.target.cell_normals) / area.sum()
+    area = np.asarray(part.whole["area"])
+    x, y, z = area @ np.asarray(part.whole.face_normals) / area.sum()
     return [(x, y, z)] if x * x + y * y + z * z > FLAT * FLAT else OPPOSITE_VIEWS
 
 
@@ -158,7 +158,7 @@ def render_side(
     right = np.cross(upright, towards_eye)
     right /= np.linalg.norm(right)
     frame = np.stack([right, np.cross(towards_eye, right), towards_eye])
-    corners = np.asarray(part.target.points) @ frame.T
+    corners = np.asarray(part.whole.points) @ frame.T
     low, high = corners.min(axis=0), corners.max(axis=0)
     pixel_mm = MARGIN * float((high - low)[:2].max()) / pixels
     columns, rows = (max(1, round(MARGIN * side / pixel_mm)) for side in (high - low)[:2])
@@ -168,13 +168,13 @@ def render_side(
     plotter = pyvista().Plotter(off_screen=True, window_size=[columns, rows])
     plotter.enable_anti_aliasing("ssaa")
     light(plotter)
-    target = plotter.add_mesh(part.target, color="black", lighting=False, **NO_RENDER)
+    target = plotter.add_mesh(part.whole, color="black", lighting=False, **NO_RENDER)
     rest = plotter.add_mesh(
         part.rest if part.rest.n_cells else pyvista().Sphere(radius=0.0),
         color=GREY, ambient=AMBIENT, diffuse=1.0 - AMBIENT, **NO_RENDER,
     )  # fmt: skip
     middle = 0.5 * (low + high) @ frame
-    distance = 2.0 * float(part.target.length)
+    distance = 2.0 * float(part.whole.length)
     plotter.camera_position = [middle + distance * towards_eye, middle, frame[1]]
     plotter.camera.parallel_projection = True
     plotter.camera.parallel_scale = 0.5 * rows * pixel_mm

@@ -21,23 +21,30 @@ LEGEND = "violet: more coverage   orange: less   pale: within the noise   grey: 
 
 
 def write_differences(
-    path: Path, part: Path, columns: Sequence[tuple[np.ndarray, np.ndarray]]
+    path: Path, field: Path, columns: Sequence[tuple[np.ndarray, np.ndarray]]
 ) -> None:
     """Write a part with the differences of later candidates from the first.
 
-    Candidate k = 1, 2, ... has cell data difference_k [percentage points], and real_k.
+    Candidate k = 1, 2, ... has point data difference_k [percentage points] and real_k, and the
+    triangles have cell data target.
 
     Args:
         path: .vtp file to write.
-        part: a coverage.vtp with the part.
-        columns: for each later candidate the difference, -1..1 and NaN off the target, shape (m,),
-            and whether it is real, bool, shape (m,).
+        field: the first candidate's coverage.vtp.
+        columns: for each later candidate the difference, -1..1, at the vertices of the target in
+            their order, shape (v,), and whether it is real, bool, shape (v,).
     """
-    surface = read_surface(part)
+    surface = read_surface(field)
+    target = np.asarray(surface["target"])
+    used = np.unique(np.asarray(surface.regular_faces)[target > 0])
+    normal = np.asarray(surface.point_data.active_normals)
     surface.clear_data()
+    surface.cell_data["target"] = target
+    surface.point_data.active_normals = normal
     for k, (value, real) in enumerate(columns, start=1):
-        surface.cell_data[f"difference_{k}"] = 100.0 * value
-        surface.cell_data[f"real_{k}"] = real.astype(np.uint8)
+        for name, column in ((f"difference_{k}", 100.0 * value), (f"real_{k}", real)):
+            surface.point_data[name] = np.zeros(surface.n_points, dtype=np.float32)
+            surface.point_data[name][used] = column
     with atomic_write(path) as temporary:
         surface.save(temporary)
 
@@ -67,8 +74,7 @@ def render_difference(job: dict[str, Any]) -> None:
                 plotter.add_text(LEGEND, position="lower_left", font_size=9, color=DARK)
             eye = (-side, 1.4 * side, 0.8 * side)
             plotter.camera_position = [eye, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
-            target = surface.extract_cells(np.isfinite(surface[f"difference_{k + 1}"]))
-            plotter.reset_camera(bounds=target.bounds)
+            plotter.reset_camera(bounds=surface.extract_cells(surface["target"] > 0).bounds)
             plotter.enable_anti_aliasing("ssaa")
     with atomic_write(Path(job["picture"])) as temporary:
         plotter.screenshot(temporary)
@@ -76,21 +82,25 @@ def render_difference(job: dict[str, Any]) -> None:
 
 def _add_difference(plotter: Any, surface: Any, k: int, limit: float, bar: bool) -> None:
     light(plotter)
-    value = np.asarray(surface[f"difference_{k}"]).copy()
-    target = np.isfinite(value)
-    value[np.asarray(surface[f"real_{k}"]) == 0] = np.nan
-    surface["shown"] = value
-    if not target.all():
-        plotter.add_mesh(surface.extract_cells(~target), color=NO_TARGET, ambient=0.7, diffuse=0.3)
+    target = np.asarray(surface["target"]) > 0
+    corners = np.asarray(surface.regular_faces)
+    real = (np.asarray(surface[f"real_{k}"])[corners] > 0.0).sum(axis=1) > 1  # of most corners
+    look: dict[str, Any] = {"ambient": 0.7, "diffuse": 0.3}
+    for chosen, colour in ((~target, NO_TARGET), (target & ~real, PALE)):
+        if chosen.any():
+            plotter.add_mesh(surface.extract_cells(chosen), color=colour, **look)
     style = {
         "vertical": True, "title": "difference\n[%-points]\n", "fmt": "%+.1f", "n_labels": 5,
         "color": DARK, "width": 0.06, "height": 0.55, "position_x": 0.84, "position_y": 0.2,
         "title_font_size": 20, "label_font_size": 20,
     }  # fmt: skip
+    chosen = target & real
+    shown = surface.extract_cells(chosen if chosen.any() else [int(np.flatnonzero(target)[0])])
+    if not chosen.any():  # the colour bar needs an actor all the same
+        shown[f"difference_{k}"] = np.full(shown.n_points, np.nan)
     plotter.add_mesh(
-        surface.extract_cells(target), scalars="shown", cmap=DIFFERENCE_MAP, clim=(-limit, limit),
-        nan_color=PALE, ambient=0.6, diffuse=0.4, show_scalar_bar=bar,
-        scalar_bar_args=style if bar else None,
+        shown, scalars=f"difference_{k}", cmap=DIFFERENCE_MAP, clim=(-limit, limit),
+        nan_color=PALE, show_scalar_bar=bar, scalar_bar_args=style if bar else None, **look,
     )  # fmt: skip
 
 

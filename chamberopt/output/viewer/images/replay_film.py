@@ -23,7 +23,7 @@ from chamberopt.output.viewer.actors import (
 from chamberopt.output.viewer.images.film import write_film
 from chamberopt.output.viewer.subprocess_drawing import draw_in_subprocess
 from chamberopt.output.viewer.view_state import Vector
-from chamberopt.output.vtp_files import CHAMBER, COVERAGE, MM, pyvista, read_surface
+from chamberopt.output.vtp_files import CHAMBER, MM, PART, pyvista, read_surface
 
 if TYPE_CHECKING:
     from chamberopt.output.resimulate.flight import FlightFrames
@@ -119,7 +119,7 @@ class _ReplayScene:
         self.plotter, self.flight, self.title = plotter, flight, job["title"]
         self.recent = HIT_FRAMES * float(flight["time"][1] - flight["time"][0])
         light(plotter)
-        chamber, self.surface = read_surface(folder / CHAMBER), read_surface(folder / COVERAGE)
+        chamber, self.surface = read_surface(folder / CHAMBER), read_surface(folder / PART)
         self.sonotrodes, _ = add_chamber(plotter, chamber)
         on_target = np.asarray(self.surface["target"]) > 0
         self.plain = np.where(on_target[:, None], TARGET, REST).astype(np.uint8)

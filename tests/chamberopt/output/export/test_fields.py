@@ -197,7 +197,7 @@ def test_a_nastran_parts_elements_get_their_own_numbers_back(tmp_path: Path) -> 
     folder, chamber = simulated(tmp_path / "plate.bdf")
     assert sorted(set(chamber.part.elements.tolist())) == sorted(numbers.tolist())
 
-    remarks = write_fields(folder, "nastran", tmp_path / "fields.bdf")
+    remarks = write_fields(folder, tmp_path / "fields.bdf", "nastran")
 
     text = (tmp_path / "fields.bdf").read_text()
     found, expected = pressures(text), means_by_hand(folder)
@@ -219,7 +219,7 @@ def test_an_abaqus_parts_elements_get_their_own_numbers_back(tmp_path: Path) -> 
     abaqus_plate(tmp_path / "plate.inp")
     folder, _ = simulated(tmp_path / "plate.inp")
 
-    write_fields(folder, "abaqus", tmp_path / "fields.inp")
+    write_fields(folder, tmp_path / "fields.inp", "abaqus")
 
     text = (tmp_path / "fields.inp").read_text()
     found, expected = distributions(text), means_by_hand(folder)
@@ -246,7 +246,7 @@ def test_labels_of_an_abaqus_instance_carry_its_name_and_sets_are_for_its_assemb
     abaqus_plate(tmp_path / "plate.inp", instance=True)
     folder, _ = simulated(tmp_path / "plate.inp")
 
-    remarks = write_fields(folder, "abaqus", tmp_path / "fields.inp")
+    remarks = write_fields(folder, tmp_path / "fields.inp", "abaqus")
 
     text, sets = (tmp_path / "fields.inp").read_text(), (tmp_path / "fields_sets.inp").read_text()
     assert any("fields_sets.inp" in remark and "*Assembly" in remark for remark in remarks)
@@ -274,7 +274,7 @@ def test_a_part_without_element_numbers_is_written_along(
     stl_plate(tmp_path / "plate.stl")
     folder, _ = simulated(tmp_path / "plate.stl")
 
-    remarks = write_fields(folder, to, tmp_path / f"fields.{suffix}")
+    remarks = write_fields(folder, tmp_path / f"fields.{suffix}", to)
 
     assert any("no unique element numbers" in remark and "in mm" in remark for remark in remarks)
     part, back = (
@@ -315,7 +315,7 @@ def test_where_the_target_was_meshed_anew_elements_get_what_lies_on_them(
     surface["coverage"] = np.where(surface["exposed_area_mm2"] > 0, x / SIDES[0], np.nan)
     surface.save(folder / "coverage.vtp")
 
-    remarks = write_fields(folder, "nastran", tmp_path / "fields.bdf")
+    remarks = write_fields(folder, tmp_path / "fields.bdf", "nastran")
 
     found = pressures((tmp_path / "fields.bdf").read_text())
     assert any("element_mm" in remark for remark in remarks)
@@ -336,7 +336,7 @@ def test_vtkhdf_and_vtp_hold_every_field(tmp_path: Path) -> None:
     given = pyvista.read(folder / "coverage.vtp")
 
     for to in ("vtp", "vtkhdf"):
-        assert write_fields(folder, to, tmp_path / f"fields.{to}") == []
+        assert write_fields(folder, tmp_path / f"fields.{to}", to) == []
         back = pyvista.read(tmp_path / f"fields.{to}")
         np.testing.assert_array_equal(back.points, given.points)
         np.testing.assert_array_equal(back.regular_faces, given.regular_faces)
@@ -363,21 +363,21 @@ def test_what_cannot_be_handed_on_is_said(tmp_path: Path) -> None:
     with pytest.raises(
         InputError, match="not written as 'ansys'; use one of vtp, vtkhdf, abaqus, nastran"
     ):
-        write_fields(folder, "ansys", tmp_path / "a.cdb")
+        write_fields(folder, tmp_path / "a.cdb", "ansys")
     with pytest.raises(InputError, match=r"name it fields\.vtkhdf"):
-        write_fields(folder, "vtkhdf", tmp_path / "fields.h5")
+        write_fields(folder, tmp_path / "fields.h5", "vtkhdf")
     with pytest.raises(InputError, match="make the folder"):
-        write_fields(folder, "abaqus", tmp_path / "nowhere" / "a.inp")
+        write_fields(folder, tmp_path / "nowhere" / "a.inp", "abaqus")
     with pytest.raises(InputError, match="part's own file"):
-        write_fields(folder, "nastran", tmp_path / "plate.bdf")
+        write_fields(folder, tmp_path / "plate.bdf", "nastran")
     with pytest.raises(InputError, match="not a results folder"):
-        write_fields(tmp_path, "nastran", tmp_path / "a.bdf")
+        write_fields(tmp_path, tmp_path / "a.bdf", "nastran")
 
     text = (tmp_path / "plate.bdf").read_text()
     (tmp_path / "plate.bdf").write_text("$ changed\n" + text)
     with pytest.raises(InputError, match=r"plate\.bdf: has changed since .* simulate again"):
-        write_fields(folder, "nastran", tmp_path / "a.bdf")
-    assert write_fields(folder, "vtp", tmp_path / "a.vtp") == []
+        write_fields(folder, tmp_path / "a.bdf", "nastran")
+    assert write_fields(folder, tmp_path / "a.vtp", "vtp") == []
 
     surface = pyvista.read(folder / "coverage.vtp")
     surface.cell_data.remove("element")
@@ -386,7 +386,7 @@ def test_what_cannot_be_handed_on_is_said(tmp_path: Path) -> None:
         with pytest.raises(
             InputError, match=r"coverage\.vtp: .* without element numbers; simulate again"
         ):
-            write_fields(folder, to, tmp_path / f"b.{to}")
+            write_fields(folder, tmp_path / f"b.{to}", to)
 
 
 def test_nastran_takes_no_fields_on_solids(tmp_path: Path) -> None:
@@ -398,7 +398,7 @@ def test_nastran_takes_no_fields_on_solids(tmp_path: Path) -> None:
     folder, _ = simulated(tmp_path / "block.bdf")
 
     with pytest.raises(InputError, match="solid elements are not supported as Nastran loads"):
-        write_fields(folder, "nastran", tmp_path / "a.bdf")
-    write_fields(folder, "abaqus", tmp_path / "a.inp")
+        write_fields(folder, tmp_path / "a.bdf", "nastran")
+    write_fields(folder, tmp_path / "a.inp", "abaqus")
 
     assert list(distributions((tmp_path / "a.inp").read_text())["COVERAGE"]) == ["77"]
