@@ -137,14 +137,7 @@ def warnings(design: Design, chamber: Chamber, reach: Reach | None = None) -> li
     texts += target_warnings(reach, chamber, design.part.target.reachable)
     texts += pocket_warnings(reach, chamber)
     texts += gap_warnings(reach, chamber, shot.diameter, turns=turn is not None)
-    heights = _heights_in_side_wall(design, chamber)
-    if heights is not None:
-        low, high = heights
-        texts.append(
-            f"the part goes out through the side wall between z = {1e3 * low:.4g} and "
-            f"{1e3 * high:.4g} mm: what is outside is not peened; enlarge the chamber "
-            "(chamber.diameter_mm), or check part.offset_mm"
-        )
+    texts += _side_wall_warnings(design, chamber)
     return texts + [ledge.message for ledge in find_ledges(design, chamber) if ledge.level]
 
 
@@ -173,20 +166,26 @@ def _turn_facts(design: Design) -> dict[str, Any]:
     return {"part_turn": {**(swing if turn.rpm is None else {"rpm": turn.rpm}), **pose}}
 
 
-def _heights_in_side_wall(design: Design, chamber: Chamber) -> tuple[float, float] | None:
-    """Lowest and highest point [m] where part and side wall are joined; None where they are not.
+def _side_wall_warnings(design: Design, chamber: Chamber) -> list[str]:
+    """A warning that the part is joined to the side wall.
 
-    None also for a part that closes the chamber like a lid, turns (its joint is a round shaft), has
-    a hole for its fixture, or is drawn with its chamber.
+    None for a part that closes the chamber like a lid, turns (its joint is a round shaft), has a
+    hole for its fixture, or is drawn with its chamber.
     """
     turns, drawn = design.effects.part_turn is not None, design.chamber.setup() is not None
     names = surface_names(chamber)
     if design.chamber.holes or turns or drawn or not (names == CEILING).any():
-        return None
+        return []
     edges, of_part = edge_keys(chamber.triangles), np.repeat(chamber.tags == TAG_PART, 3)
     joint = np.repeat(names == SIDE_WALL, 3) & np.isin(edges, edges[of_part])
-    height = chamber.vertices[sides_of(chamber.triangles)[joint], 2]
-    return (float(height.min()), float(height.max())) if height.size else None
+    height = 1e3 * chamber.vertices[sides_of(chamber.triangles)[joint], 2]
+    if not height.size:
+        return []
+    return [
+        f"the part goes out through the side wall between z = {height.min():.4g} and "
+        f"{height.max():.4g} mm: what is outside is not peened; enlarge the chamber "
+        "(chamber.diameter_mm), or check part.offset_mm"
+    ]
 
 
 def _sonotrode_warnings(design: Design, mesh: TriangleMesh) -> list[str]:

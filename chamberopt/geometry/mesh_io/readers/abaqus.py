@@ -10,7 +10,9 @@ from __future__ import annotations
 
 import re
 from collections import Counter, defaultdict
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -45,6 +47,7 @@ Options = dict[str, str]
 Member = tuple[str, int]  # instance that a set names ("" for any), and a number in it
 Place = tuple[int, int]  # position of a placed scope, and the file's number in it
 NO_ROWS = np.zeros(0, dtype=np.int64)
+_FindRows = Callable[[list[Member]], np.ndarray]
 
 
 @dataclass
@@ -248,32 +251,35 @@ def _assemble(
         anywhere = [at] if scope.elements or scope.nodes else list(range(len(names) + 1))
 
         def find(
-            members: list[Member], row: dict[Place, int], anywhere: list[int] = anywhere
+            row_of: dict[Place, int], members: list[Member], anywhere: list[int] = anywhere
         ) -> np.ndarray:
             found = (
                 (which, number)
                 for name, number in members
                 for which in ([names.index(name)] if name in names else anywhere)
             )
-            return np.array([row[place] for place in found if place in row], dtype=np.int64)
+            return np.array([row_of[place] for place in found if place in row_of], dtype=np.int64)
 
-        for name, members in scope.element_sets.items():
-            old = mesh.element_sets.get(name, NO_ROWS)
-            mesh.element_sets[name] = np.r_[old, find(members, element_of)]
-        for name, members in scope.node_sets.items():
-            mesh.node_sets[name] = np.r_[mesh.node_sets.get(name, NO_ROWS), find(members, row_of)]
-        for name, faces in scope.surfaces.items():
-            elements, sides = mesh.face_sets.get(name, (NO_ROWS, NO_ROWS))
-            for of, face in faces:
-                if of.isdigit() or of in scope.element_sets:
-                    listed = [("", int(of))] if of.isdigit() else scope.element_sets[of]
-                    more = find(listed, element_of)
-                elif of in mesh.element_sets:
-                    more = mesh.element_sets[of]
-                else:
-                    raise KeyError(f"the element set {of}")
-                # SPOS, SNEG and "" are the shell itself.
-                side = int(face[1:]) - 1 if re.fullmatch(r"S\d", face) else 0
-                elements, sides = np.r_[elements, more], np.r_[sides, np.full(len(more), side)]
-            mesh.face_sets[name] = elements, sides
+        _add_groups(mesh, scope, partial(find, element_of), partial(find, row_of))
     return mesh
+
+
+def _add_groups(mesh: ElementMesh, scope: _Scope, elements: _FindRows, nodes: _FindRows) -> None:
+    """Add the sets and surfaces of a scope, with the rows of elements and nodes that it lists."""
+    for name, members in scope.element_sets.items():
+        mesh.element_sets[name] = np.r_[mesh.element_sets.get(name, NO_ROWS), elements(members)]
+    for name, members in scope.node_sets.items():
+        mesh.node_sets[name] = np.r_[mesh.node_sets.get(name, NO_ROWS), nodes(members)]
+    for name, faces in scope.surfaces.items():
+        rows, sides = mesh.face_sets.get(name, (NO_ROWS, NO_ROWS))
+        for of, face in faces:
+            if of.isdigit() or of in scope.element_sets:
+                more = elements([("", int(of))] if of.isdigit() else scope.element_sets[of])
+            elif of in mesh.element_sets:
+                more = mesh.element_sets[of]
+            else:
+                raise KeyError(f"the element set {of}")
+            # SPOS, SNEG and "" are the shell itself.
+            side = int(face[1:]) - 1 if re.fullmatch(r"S\d", face) else 0
+            rows, sides = np.r_[rows, more], np.r_[sides, np.full(len(more), side)]
+        mesh.face_sets[name] = rows, sides
