@@ -1,22 +1,34 @@
-"""Parts without geometry, impacts without a simulation: problems whose answer is known."""
+"""Impacts without a simulation, and parts of which the answer is known."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import trimesh
 
 from chamberopt.chamber.build import Chamber
 from chamberopt.chamber.part import Part
+from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.estimate import Estimate, estimate
-from chamberopt.coverage.coverage_from_impacts import Tally
+from chamberopt.coverage.coverage_intervals import Resolution
 from chamberopt.coverage.metrics import METRICS, OBJECTIVES
 from chamberopt.coverage.part_impacts import Hits
 from chamberopt.design.load import Design, load_design
-from chamberopt.simulation.evaluate import estimate_metrics, weighted_sum
+from chamberopt.geometry.triangles import areas
+from chamberopt.simulation.evaluate import (
+    SeenDents,
+    estimate_metrics,
+    prepare_target,
+    resolution_notes,
+    weighted_sum,
+)
 from chamberopt.simulation.evaluation import Evaluation
 
 DESIGNS = Path(__file__).resolve().parents[2] / "designs"
+SPEED, ANGLE = 3.0, 70.0  # of all made-up impacts [m/s, degrees]
+MANY_DENTS = Resolution(dents=100.0, needed_for_mean=3.0, needed_for_places=25.0, simulated_time=8.0)
 
 
 def plate_design(**values: float) -> Design:
@@ -25,112 +37,146 @@ def plate_design(**values: float) -> Design:
     return load_design(DESIGNS / "plate.toml").changed(changes)
 
 
-def patchwork(
-    area: np.ndarray, exposed: np.ndarray | None = None, target: np.ndarray | None = None
+def chamber_round(
+    mesh: trimesh.Trimesh, target: np.ndarray | None = None, gap: float = 5e-3
 ) -> Chamber:
-    """A chamber whose part is m separate triangles of the given areas [m²].
-
-    Each of them is also a triangle of the cavity.
-    """
-    m = len(area)
-    corner = np.stack([np.arange(m) * 1.0, np.zeros(m), np.zeros(m)], axis=1)
-    side = np.sqrt(2.0 * area)[:, None]
-    vertices = np.concatenate(
-        [corner, corner + side * [1.0, 0.0, 0.0], corner + side * [0.0, 1.0, 0.0]]
-    )
-    triangles = np.stack([np.arange(m), np.arange(m) + m, np.arange(m) + 2 * m], axis=1).astype(
-        np.int32
-    )
-    target = np.ones(m, dtype=bool) if target is None else target
+    """A part that floats in the middle of a box, which is a gap [m] larger on all sides."""
+    vertices, triangles = np.asarray(mesh.vertices), np.asarray(mesh.faces)
+    room = trimesh.creation.box(bounds=mesh.bounds + np.array([[-gap], [gap]]))
+    own, walls = len(triangles), len(room.faces)
+    area = areas(vertices, triangles)
+    wanted = np.ones(own, dtype=bool) if target is None else target
     return Chamber(
-        vertices=vertices,
-        triangles=triangles,
-        tags=np.zeros(m, dtype=np.uint8),
-        source=np.arange(m, dtype=np.int32),
-        volume=1.0,
-        part=Part(vertices, triangles, area, target, "patchwork"),
-        exposed_area=area if exposed is None else exposed,
+        vertices=np.concatenate([vertices, room.vertices]),
+        triangles=np.concatenate([triangles[:, ::-1], room.faces + len(vertices)]).astype(np.int32),
+        tags=np.repeat([0, 2], [own, walls]).astype(np.uint8),
+        source=np.concatenate([np.arange(own), np.full(walls, -1)]).astype(np.int32),
+        volume=float(room.volume - mesh.volume),
+        part=Part(vertices, triangles.astype(np.int32), area, wanted, "synthetic"),
+        exposed_area=area,
         notes=(),
     )
 
 
-def impact_log(triangle: Any, velocity: Any, normal_speed: Any, ball: Any = 0) -> Any:
+def plane_chamber(splits: int = 4, side: float = 0.02, margin: float = 2e-3) -> Chamber:
+    """A slab whose target is the plane z = 0 up to a margin [m] from the sides of its square.
+
+    Args:
+        splits: how often the two triangles of the square are each split in four.
+        side: of the square [m].
+    """
+    slab = trimesh.creation.box((side, side, 2e-3))
+    for _ in range(splits):
+        slab = slab.subdivide()
+    slab.apply_translation((0.0, 0.0, -1e-3))
+    middle = slab.triangles_center
+    inside = (np.abs(middle[:, :2]).max(axis=1) < 0.5 * side - margin) & (middle[:, 2] > -1e-9)
+    return chamber_round(slab, inside)
+
+
+def impact_log(
+    triangle: Any, velocity: Any, normal_speed: Any, ball: Any = 0, position: Any = (0.0, 0.0, 0.0)
+) -> Any:
     """The columns of a sim_core.ImpactLog that coverage reads."""
     return SimpleNamespace(
         triangle=np.asarray(triangle, dtype=np.int32),
         ball=np.broadcast_to(np.asarray(ball, dtype=np.int32), np.shape(triangle)),
         velocity=np.asarray(velocity, dtype=float).reshape(-1, 3),
         normal_speed=np.asarray(normal_speed, dtype=float),
+        position=np.broadcast_to(np.asarray(position, dtype=float), (len(triangle), 3)),
     )
 
 
-def dented(
-    area: np.ndarray, time: float, dents: np.ndarray | None = None, speed: float = 1.0
-) -> Tally:
-    """A tally of given dented areas [m²]."""
-    count = np.ones(len(area), dtype=int) if dents is None else dents
-    return Tally(time, count, count, np.asarray(area, dtype=float), speed * count, 90.0 * count)
+def dents_at(
+    design: Design, triangle: np.ndarray, place: np.ndarray, diameter: float | np.ndarray
+) -> Hits:
+    """Dents of given diameters [m] at given places, of the design's balls at SPEED."""
+    count, shot = len(triangle), design.shot
+    mass = shot.density * np.pi / 6.0 * max(shot.diameters) ** 3
+    columns = (SPEED, ANGLE, diameter, 0.5 * mass * SPEED**2)
+    return Hits(
+        np.asarray(triangle, dtype=np.int32),
+        np.asarray(place, dtype=np.float32).reshape(-1, 3),
+        *(np.broadcast_to(column, count).astype(np.float32) for column in columns),
+    )
 
 
-def equal_dents(
-    time: float, dents: np.ndarray, size: float, speed: float = 1.0, angle: float = 90.0
-) -> Tally:
-    """One replica's tally: so many dents (m,) of one size [m²]."""
-    triangle = np.repeat(np.arange(len(dents)), dents)
-    each = np.full(len(triangle), size)
-    return Tally(time, dents, dents, size * dents, speed * dents, angle * dents, triangle, each)
+def random_dents(
+    design: Design,
+    chamber: Chamber,
+    mean: np.ndarray,
+    rng: np.random.Generator,
+    diameter: float = np.sqrt(4e-8 / np.pi),
+) -> Hits:
+    """Dents anywhere on each part triangle, in numbers that follow Poisson's law.
+
+    Args:
+        mean: number on each triangle, (m,).
+        diameter: of the dents [m].
+    """
+    triangle = np.repeat(np.arange(len(mean)), rng.poisson(mean))
+    share = rng.random((2, len(triangle), 1))
+    u, v = np.where(share.sum(axis=0) > 1.0, 1.0 - share, share)
+    a, b, c = chamber.part.vertices[chamber.part.triangles[triangle]].transpose(1, 0, 2)
+    return dents_at(design, triangle, a + u * (b - a) + v * (c - a), diameter)
+
+
+def no_hits() -> Hits:
+    """A replica in which nothing reaches the part."""
+    return Hits(np.zeros(0, np.int32), np.zeros((0, 3), np.float32), *np.zeros((4, 0), np.float32))
 
 
 def judged(objective: np.ndarray, **metrics: float) -> Evaluation:
-    """An evaluation whose replicas said these objectives; metrics given are exact, the others 0."""
-    empty = dented(np.zeros(1), 1.0)
+    """An evaluation whose replicas have these objectives; metrics given are exact, the others 0."""
     exact = {
         name: Estimate(metrics.get(name, 0.0), 0.0, (metrics.get(name, 0.0),) * 3)
         for name in METRICS
     }
-    goal = estimate(objective)
+    count = len(objective)
     return Evaluation(
-        "uniform_coverage", goal, exact, empty, (empty,) * len(objective), {"simulate": 0.0}, {}
+        objective_name="uniform_coverage",
+        objective=estimate(objective),
+        metrics=exact,
+        metrics_of_wide={},
+        resolution=MANY_DENTS,
+        reachable=1.0,
+        crease_share=0.0,
+        replicas=count,
+        simulated_time=float(count),
+        hits=(no_hits(),) * count,
+        timings={"simulate": 0.0},
+        collisions={},
     )
 
 
 def poisson_evaluation(
-    design: Design, chamber: Chamber, per_mm2: float = 20.0, replicas: int = 4, seed: int = 0
+    design: Design, chamber: Chamber, per_mm2: float = 60.0, replicas: int = 4, seed: int = 0
 ) -> Evaluation:
     """An evaluation of a real chamber with random dents, ``per_mm2`` in all, not simulated."""
     rng = np.random.default_rng(seed)
     mean = per_mm2 * 1e6 * chamber.exposed_area / replicas
-    seconds = design.process.accuracy.simulated_time
     return evaluation_of(
-        design,
-        chamber,
-        [equal_dents(seconds, rng.poisson(mean), 1e-8, 3.0, 70.0) for _ in range(replicas)],
+        design, chamber, [random_dents(design, chamber, mean, rng) for _ in range(replicas)]
     )
 
 
-def evaluation_of(design: Design, chamber: Chamber, tallies: list[Tally]) -> Evaluation:
-    """The evaluation of replicas whose dents are known, with hits that leave these dents."""
-    metrics = estimate_metrics(tallies, chamber, design)
+def evaluation_of(design: Design, chamber: Chamber, hits: Sequence[Hits]) -> Evaluation:
+    """The evaluation of replicas whose impacts are known."""
+    seen = SeenDents(prepare_target(design, chamber, chamber_mesh(chamber)), [], [])
+    seen.add(hits)
+    found = estimate_metrics(seen, hits, chamber, design)
     return Evaluation(
-        "uniform_coverage",
-        weighted_sum(OBJECTIVES["uniform_coverage"], metrics),
-        metrics,
-        sum(tallies[1:], tallies[0]),
-        tuple(tallies),
-        {"chamber": 0.1, "simulate": 1.0, "coverage": 0.1},
-        {"walls": 5, "balls": 3, "sonotrode": 2, "total": 10},
-        hits=tuple(hits_of(tally) for tally in tallies),
-    )
-
-
-def hits_of(tally: Tally) -> Hits:
-    """The dents of a replica as hits of 1 µJ, with the mean speed and angle of their triangle."""
-    triangle = tally.dent_triangle.astype(np.int32)
-    speed, angle = (
-        sums[triangle] / tally.impacts[triangle] for sums in (tally.speed_sum, tally.angle_sum)
-    )
-    dent = np.sqrt(4.0 / np.pi * tally.dent_area)
-    return Hits(
-        triangle,
-        *(column.astype(np.float32) for column in (speed, angle, dent, np.full(len(dent), 1e-6))),
+        objective_name="uniform_coverage",
+        objective=weighted_sum(OBJECTIVES["uniform_coverage"], found.metrics),
+        metrics=found.metrics,
+        metrics_of_wide=found.metrics_of_wide,
+        resolution=found.resolution,
+        reachable=seen.field.reachable,
+        crease_share=seen.crease_share,
+        replicas=len(hits),
+        simulated_time=len(hits) * design.process.recorded_time,
+        hits=tuple(hits),
+        timings={"chamber": 0.1, "simulate": 1.0, "coverage": 0.1},
+        collisions={"walls": 5, "balls": 3, "sonotrode": 2, "total": 10},
+        notes=resolution_notes(found.resolution),
     )

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 PLASTIC_NUMBER = 1.32471795724474602596  # real root of x³ = x + 1
 # Share of its radius that a ball may reach into a surface, as in chamber/reach.
 OVERLAP = 0.01
+ON_SURFACE = 1e-3  # share of its radius within which a place is on the surface
 
 
 class SurfacePoints(NamedTuple):
@@ -107,4 +108,9 @@ def ball_fits(
     from sim_core import closest_points
 
     found = closest_points(mesh, place + radius * normal, radius * (1.0 + 1e-6))
-    return (found.triangle >= 0) & (found.distance >= radius * (1.0 - OVERLAP))
+    fits = (found.triangle >= 0) & (found.distance >= radius * (1.0 - OVERLAP))
+    # The surface may be nearer elsewhere, also to a place outside the cavity.
+    rows = np.flatnonzero(fits)
+    rows = rows[np.linalg.norm(found.point[rows] - place[rows], axis=1) > ON_SURFACE * radius]
+    fits[rows] = closest_points(mesh, place[rows], ON_SURFACE * radius).triangle >= 0
+    return fits

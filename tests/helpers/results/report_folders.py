@@ -1,42 +1,26 @@
 """Results folders for reports: a simulation and a study of the plate with random dents."""
 
-from dataclasses import replace
 from pathlib import Path
-
-import numpy as np
 
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import SerialExecutor
-from chamberopt.coverage.part_impacts import Hits
+from chamberopt.coverage.part_impacts import HITS_FILE
 from chamberopt.optimize.study import Study
 from chamberopt.output.save_run import save_simulation, save_study
-from chamberopt.simulation.evaluation import Evaluation
 from tests.helpers.studies import run_in_folder
 from tests.helpers.synthetic import plate_design, poisson_evaluation
 
 DESIGN = plate_design()
 
 
-def hits_of(evaluation: Evaluation) -> tuple[Hits, ...]:
-    """Single impacts as the evaluation's tallies have them: all at 3 m/s and 70 degrees."""
-    found = []
-    for tally in evaluation.replicas:
-        triangle = np.repeat(np.arange(len(tally.impacts), dtype=np.int32), tally.impacts)
-        same = [
-            np.full(len(triangle), value, dtype=np.float32) for value in (3.0, 70.0, 1e-4, 1e-5)
-        ]
-        found.append(Hits(triangle, *same))
-    return tuple(found)
-
-
 def simulated(folder: Path, per_mm2: float = 60.0, hits: bool = True) -> tuple[Path, Chamber]:
     """A simulation's folder; hits False: as older versions left it."""
     chamber = build_chamber(DESIGN)
     evaluation = poisson_evaluation(DESIGN, chamber, per_mm2)
-    save_simulation(
-        folder, DESIGN, chamber, replace(evaluation, hits=hits_of(evaluation) if hits else ())
-    )
+    save_simulation(folder, DESIGN, chamber, evaluation)
+    if not hits:
+        (folder / HITS_FILE).unlink()
     return folder, chamber
 
 

@@ -51,6 +51,7 @@ def ball_result(
     impacts = np.arange(count) % 5
     hits = Hits(
         np.repeat(np.arange(count), impacts),
+        np.repeat(middle, impacts, axis=0).astype(np.float32),
         *(np.zeros(impacts.sum(), np.float32) for _ in range(4)),
     )
     hits = replace(
