@@ -25,10 +25,13 @@ from chamberopt.simulation.evaluate import (
     weighted_sum,
 )
 from chamberopt.simulation.evaluation import Evaluation
+from sim_core import closest_points
 
 DESIGNS = Path(__file__).resolve().parents[2] / "designs"
 SPEED, ANGLE = 3.0, 70.0  # of all made-up impacts [m/s, degrees]
-MANY_DENTS = Resolution(dents=100.0, needed_for_mean=3.0, needed_for_places=25.0, simulated_time=8.0)
+MANY_DENTS = Resolution(
+    dents=100.0, needed_for_mean=3.0, needed_for_places=25.0, simulated_time=8.0
+)
 
 
 def plate_design(**values: float) -> Design:
@@ -58,7 +61,7 @@ def chamber_round(
     )
 
 
-def plane_chamber(splits: int = 4, side: float = 0.02, margin: float = 2e-3) -> Chamber:
+def plane_chamber(splits: int = 4, side: float = 0.02, margin: float = 2.5e-3) -> Chamber:
     """A slab whose target is the plane z = 0 up to a margin [m] from the sides of its square.
 
     Args:
@@ -85,6 +88,12 @@ def impact_log(
         normal_speed=np.asarray(normal_speed, dtype=float),
         position=np.broadcast_to(np.asarray(position, dtype=float), (len(triangle), 3)),
     )
+
+
+def triangles_at(chamber: Chamber, place: np.ndarray) -> np.ndarray:
+    """The part triangle on which each place (k, 3) lies, (k,)."""
+    found = closest_points(chamber_mesh(chamber), place, 1e-6)
+    return chamber.source[found.triangle]
 
 
 def dents_at(

@@ -3,11 +3,11 @@
 from pathlib import Path
 
 import pytest
+from chamberopt.simulation.triangle_fields import compute_triangle_fields
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.output.viewer import ResultInfo
 from chamberopt.output.vtp_files import write_chamber, write_coverage
-from chamberopt.simulation.triangle_fields import compute_triangle_fields
 from tests.helpers.results.sphere_in_sphere import ball_result
 from tests.helpers.synthetic import plate_design, poisson_evaluation
 

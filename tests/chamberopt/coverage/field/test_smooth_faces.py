@@ -7,9 +7,7 @@ import trimesh
 from chamberopt.coverage.field.smooth_faces import Creases, find_faces
 
 
-def faces_of(
-    mesh: trimesh.Trimesh, target: np.ndarray | None = None
-) -> tuple[np.ndarray, Creases]:
+def faces_of(mesh: trimesh.Trimesh, target: np.ndarray | None = None) -> tuple[np.ndarray, Creases]:
     wanted = np.ones(len(mesh.faces), dtype=bool) if target is None else target
     return find_faces(np.asarray(mesh.vertices), np.asarray(mesh.faces), wanted)
 

@@ -120,5 +120,7 @@ def test_places_that_are_not_on_the_surface_of_the_cavity_never_fit() -> None:
     ceiling = np.stack([x, np.full_like(x, 0.02), np.full_like(x, 0.02)], axis=1)
     for z in (-1.0, 1.0):
         assert not ball_fits(room, ceiling, np.tile([0.0, 0.0, z], (len(x), 1)), R).any()
-    inside = np.random.default_rng(1).uniform([0.004, 0.004, 0.004], [0.036, 0.036, 0.016], (500, 3))
+    inside = np.random.default_rng(1).uniform(
+        [0.004, 0.004, 0.004], [0.036, 0.036, 0.016], (500, 3)
+    )
     assert not ball_fits(room, inside, np.tile([0.0, 0.0, 1.0], (500, 1)), R).any()
