@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.estimate import Estimate, paired_difference
+from chamberopt.common.estimate import Estimate, estimate, paired_difference
 from chamberopt.common.files import write_text
 from chamberopt.common.progress import Progress
 from chamberopt.design.load import save_design
@@ -130,7 +130,10 @@ def run_study(
     best = max(winners, key=lambda candidate: candidate.evaluation.objective.value)
     is_gain = best is not start
     gain = paired_difference(best.goals[0], start.goals[0]) if is_gain else Estimate(0.0, 0.0)
-    model, noise = candidates.model(FIRST_OBJECTIVE), best.evaluation.objective.half_width
+    model, noise = (
+        candidates.model(FIRST_OBJECTIVE),
+        estimate(best.evaluation.objective.pseudovalues).half_width,
+    )
     sensitivity = analyse_sensitivity(model, study.vary, best.parameters, noise) if model else None
     return StudyResult(
         study=study,
