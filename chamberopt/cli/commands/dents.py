@@ -35,7 +35,7 @@ def dents(
     pixels
         Longer side of one view in pixels.
     """
-    from chamberopt.output.resimulate.impacts import simulate_dents
+    from chamberopt.output.resimulate.impacts import dented_share, simulate_dents
     from chamberopt.output.viewer import parse_view
     from chamberopt.output.viewer.images.dents import draw_dents, require_pixels
     from chamberopt.output.viewer.subprocess_drawing import picture_path
@@ -49,6 +49,7 @@ def dents(
     found = simulate_dents(resimulated, time)
     beyond = f", simulated on from {recorded:g} s" if time > recorded else ""
     title = f"{len(found):,} dents after {time:g} s in replica {replica}{beyond}"
+    title += f": {dented_share(found, resimulated.chamber):.1%} of the target".replace("%", " %")
     heading = f"{loaded.folder.resolve().name}: {title}"
     failure = draw_dents(loaded.folder, found, heading, path, eye, pixels)
     if failure:

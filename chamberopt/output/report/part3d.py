@@ -27,7 +27,7 @@ MAX_TRIANGLES = 600_000
 # Places of the camera, from the middle of the cavity, in lengths of its diagonal.
 ABOVE, BELOW = np.array([0.55, -0.9, 0.62]), np.array([0.55, -0.9, -0.62])
 EDGE_ANGLE = 30.0  # degrees; edges of the chamber that are sharper are drawn
-PART_GREY, SONOTRODE, GLASS, EDGES = "#c5cad0", "#c58b52", "#9fc3dd", "#6f8796"
+PART_GREY, SONOTRODE, GLASS, EDGES = "#b9bec4", "#c58b52", "#9fc3dd", "#6f8796"
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import core_count, share
 from chamberopt.common.progress import Progress
 from chamberopt.coverage.dents import Dents, dents_on_part
+from chamberopt.coverage.field.surface_points import spread_points
 from chamberopt.coverage.part_impacts import load_matching_hits
 from chamberopt.output.resimulate.rebuild import REMEDY, RebuiltChamber, RebuiltReplica, made_by
 from chamberopt.output.results.load import load_part
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from sim_core import ImpactLog
 
 MAX_SIMULATED_TREATMENT = 600.0  # s; a dent map of more takes minutes to compute
+SAMPLES = 200_000  # points of the target, for the share inside dents
 MAX_IMPACTS_IN_MEMORY = 4e6  # of all replicas being simulated; each takes about 200 bytes
 
 
@@ -112,6 +114,25 @@ def simulate_dents(replica: RebuiltReplica, time: float) -> Dents:
         )
     impacts = simulate(replace(replica.scene, duration=time)).impacts
     return dents_on_part(replica.on_chamber(impacts), replica.chamber, replica.design)
+
+
+def dented_share(dents: Dents, chamber: Chamber) -> float:
+    """Share of the target inside dents, by sample points; hidden places are not peened."""
+    from chamberopt.coverage.field.windows import Places, Windows
+
+    if not len(dents):
+        return 0.0
+    part = chamber.part
+    area = np.where(part.target, part.area, 0.0)
+    samples = spread_points(part.vertices, part.triangles, area, SAMPLES)
+    one_face = np.zeros(max(SAMPLES, len(dents)), dtype=int)  # dents reach round edges
+    points = Places(samples.place, samples.normal, one_face[:SAMPLES])
+    contacts = Places(dents.place, -dents.normal, one_face[: len(dents)])
+    dented = np.zeros(SAMPLES, dtype=bool)
+    for point, dent in Windows(points, float(dents.radius.max())).pairs(contacts):
+        away = np.linalg.norm(samples.place[point] - dents.place[dent], axis=1)
+        dented[point[away < dents.radius[dent]]] = True
+    return float(dented.mean())
 
 
 def _replicas_ahead(result: Result) -> int:

@@ -12,7 +12,7 @@ from chamberopt.output.viewer.drawn_part import DrawnPart
 from chamberopt.output.viewer.view_state import DEFAULT_VIEW
 from chamberopt.output.vtp_files import Surface, pyvista
 
-GREY, DARK, GLASS, SONOTRODE, BACKGROUND = "#c5cad0", "#2b3440", "#9db7cc", "#e08a2e", "white"
+GREY, DARK, GLASS, SONOTRODE, BACKGROUND = "#b9bec4", "#2b3440", "#9db7cc", "#e08a2e", "white"
 FAULT, PALE = "#d01c1c", "#eceff2"
 VIEW_FROM_BELOW = (1.0, -1.4, -0.8)  # a little below, where the shot comes from
 SHARP_EDGE = 30  # degrees between the triangles at an edge of the chamber that is drawn
@@ -100,16 +100,14 @@ def add_part(
             )  # fmt: skip
             actor.visibility = bool(len(cells))
             actors.append(actor)
-    flat = (
+    for surface, colour in (
         (part.target.extract_cells(np.flatnonzero(pale)), PALE),
         (part.unreached, UNREACHED),
         (part.rest, GREY),
-    )
-    actors += [
-        plotter.add_mesh(surface, color=colour, **style)
-        for surface, colour in flat
-        if surface.n_cells
-    ]
+    ):
+        if surface.n_cells:
+            style |= {"ambient": 0.45, "diffuse": 0.55} if colour == GREY else {}
+            actors.append(plotter.add_mesh(surface, color=colour, **style))
     for actor in actors:
         actor.prop.interpolation = "Phong"  # by the normals of the surface, not of its triangles
     return actors

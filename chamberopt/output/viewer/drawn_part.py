@@ -10,7 +10,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
 from chamberopt.geometry.triangles import area_vectors
 from chamberopt.output.plots.quantities import QUANTITIES, Quantity
-from chamberopt.output.vtp_files import Surface
+from chamberopt.output.vtp_files import Surface, pyvista
 
 NEARLY_ALL = (0.01, 0.985)  # shares of the area at the ends of the colour scale
 ROUNDS = 12  # of averages over neighbours, before which a place counts as resolved or not
@@ -44,8 +44,13 @@ class DrawnPart:
 
         def cells(chosen: np.ndarray) -> Surface:
             if not chosen.any():  # PyVista would drop the columns
-                empty = field.extract_cells([0]).extract_surface(algorithm="dataset_surface")
-                return empty.remove_cells([0])
+                empty = pyvista().PolyData()
+                for there, columns in (
+                    (empty.point_data, field.point_data),
+                    (empty.cell_data, field.cell_data),
+                ):
+                    there.update({k: one[:0] for k, one in columns.items() if one.ndim == 1})
+                return empty
             return field.extract_cells(chosen).extract_surface(algorithm="dataset_surface")
 
         self.whole, self.rest = cells(on_target), cells(~on_target)

@@ -3,11 +3,11 @@
 from pathlib import Path
 
 import pytest
-from chamberopt.simulation.triangle_fields import compute_triangle_fields
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.output.viewer import ResultInfo
 from chamberopt.output.vtp_files import write_chamber, write_coverage
+from chamberopt.simulation.complete_result import complete_result
 from tests.helpers.results.sphere_in_sphere import ball_result
 from tests.helpers.synthetic import plate_design, poisson_evaluation
 
@@ -16,18 +16,15 @@ DESIGN = plate_design()
 
 @pytest.fixture(scope="module")
 def case(tmp_path_factory: pytest.TempPathFactory) -> tuple:
+    """Folder, chamber, evaluation and complete result of the plate with random dents."""
     folder = tmp_path_factory.mktemp("viewer") / "a plate, simulated"
     folder.mkdir()
     chamber = build_chamber(DESIGN)
     evaluation = poisson_evaluation(DESIGN, chamber)
-    write_coverage(
-        folder / "coverage.vtp",
-        chamber,
-        compute_triangle_fields(DESIGN, chamber, evaluation),
-        "avrami",
-    )
+    found = complete_result(DESIGN, chamber, evaluation)
+    write_coverage(folder, chamber, found.element_values, found.display)
     write_chamber(folder, chamber)
-    return folder, chamber, evaluation
+    return folder, chamber, evaluation, found
 
 
 @pytest.fixture

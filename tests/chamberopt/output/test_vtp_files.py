@@ -10,39 +10,45 @@ import pytest
 import trimesh
 
 from chamberopt.common.errors import InputError
-from chamberopt.coverage.coverage_from_impacts import coverage_at
 from chamberopt.output.viewer import ResultInfo
 from chamberopt.output.vtp_files import read_surface
-from tests.helpers.synthetic import plate_design
-
-DESIGN = plate_design()
 
 
-def test_coverage_file_holds_what_was_computed(case: tuple) -> None:
-    folder, chamber, evaluation = case
-    surface = read_surface(folder / "coverage.vtp")
-    assert surface.n_cells == len(chamber.part.triangles)
+def test_part_file_holds_the_values_of_the_triangles(case: tuple) -> None:
+    folder, chamber, evaluation, found = case
+    surface = read_surface(folder / "part.vtp")
     np.testing.assert_array_equal(surface.points, chamber.part.vertices * 1e3)
     np.testing.assert_array_equal(surface.regular_faces, chamber.part.triangles)
-    expected = coverage_at(evaluation.total, chamber, DESIGN.process.treatment_time)
-    np.testing.assert_array_equal(surface["coverage"], expected)
-    np.testing.assert_allclose(-np.expm1(-surface["dent_density"]), expected, rtol=1e-9)
-    np.testing.assert_array_equal(surface["target"], chamber.part.target)
-    hit = evaluation.total.impacts > 0
-    np.testing.assert_allclose(surface["mean_normal_speed"][hit], 3.0)
-    np.testing.assert_allclose(surface["mean_angle_deg"][hit], 70.0)
+    for name, values in found.element_values.items():
+        np.testing.assert_array_equal(surface[name], values)
+    impacts = sum(np.bincount(one.triangle, minlength=surface.n_cells) for one in evaluation.hits)
+    np.testing.assert_array_equal(surface["impacts"], impacts)
     hidden = chamber.exposed_area == 0
     assert hidden.any()
     assert np.isnan(surface["impacts_per_mm2"][hidden]).all()
-    # 20 dents per mm² in the simulated time, scaled to the treatment time.
-    scale = DESIGN.process.treatment_time / evaluation.total.simulated_time
-    area = surface["exposed_area_mm2"]
-    mean = np.nansum(surface["impacts_per_mm2"] * area) / area.sum()
-    assert mean == pytest.approx(20.0 * scale, rel=0.05)
+
+
+def test_coverage_file_holds_the_field_and_the_triangles_own_values(case: tuple) -> None:
+    folder, chamber, _, found = case
+    surface, mesh = read_surface(folder / "coverage.vtp"), found.display.mesh
+    np.testing.assert_array_equal(surface.points, mesh.vertices * 1e3)
+    np.testing.assert_array_equal(surface.regular_faces, mesh.triangles)
+    np.testing.assert_allclose(surface.point_data.active_normals, mesh.normal, atol=1e-6)
+    for name, values in found.display.fields.items():
+        np.testing.assert_array_equal(surface.point_data[name], values.astype(np.float32))
+    own = surface["triangle"]
+    for name, column in (
+        ("element", chamber.part.elements),
+        ("target", chamber.part.target),
+        ("element_coverage", found.element_values["coverage"]),
+        ("element_interval", found.element_values["coverage_interval"]),
+        ("element_impacts", found.element_values["impacts"]),
+    ):
+        np.testing.assert_array_equal(surface[name], column[own])
 
 
 def test_chamber_files_are_closed_and_tagged(case: tuple) -> None:
-    folder, chamber, _ = case
+    folder, chamber, *_ = case
     solid = trimesh.load(folder / "chamber.stl")
     assert solid.is_watertight
     assert solid.volume * 1e-9 == pytest.approx(

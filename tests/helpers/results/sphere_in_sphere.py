@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import trimesh
 
+from chamberopt.coverage.field.display_mesh import DisplayField, DisplayMesh
 from chamberopt.coverage.part_impacts import Hits, save_hits, sort_hits_by_triangle
 from chamberopt.output.plots.quantities import QUANTITIES
 from chamberopt.output.viewer import ResultInfo, ViewState
@@ -19,12 +20,11 @@ TREATMENT = 10.0  # s
 SIZE = 480, 340  # pixels
 
 
-def ball_result(
-    folder: Path, marked: bool = False, moved: float = 0.0, lost: int = 0
-) -> ResultInfo:
+def ball_result(folder: Path, moved: float = 0.0, lost: int = 0) -> ResultInfo:
     """A results folder whose coverage rises from pole to pole and whose target is all but a cap.
 
-    Triangle k has k % 5 simulated impacts with speeds from 1 to 4 m/s. The part is shifted by
+    Triangle k has k % 5 simulated impacts with speeds from 1 to 4 m/s. No ball reaches the lowest
+    tenth of the ball, and few dents were simulated on the uppermost. The part is shifted by
     ``moved`` [mm]. If ``lost`` is not 0, every triangle whose number is a multiple of it is
     missing.
     """
@@ -36,46 +36,64 @@ def ball_result(
     faces, middle = np.asarray(ball.faces)[kept], ball.triangles_center[kept]
     count = len(faces)
     tags = np.where(room.triangles_center[:, 2] < -0.015, 1, 2).astype(np.uint8)
-    part = SimpleNamespace(
-        vertices=ball.vertices + np.array([moved * 1e-3, 0.0, 0.0]), triangles=faces
-    )
+    vertices = ball.vertices + np.array([moved * 1e-3, 0.0, 0.0])
     chamber: Any = SimpleNamespace(
-        part=part,
+        part=SimpleNamespace(vertices=vertices, triangles=faces),
         vertices=np.asarray(room.vertices),
         triangles=np.asarray(room.faces),
         tags=tags,
         source=tags,
         fitting=None,
     )
-    height = 50.0 + 4500.0 * middle[:, 2]  # % of the way up: 5 to 95
     impacts = np.arange(count) % 5
     hits = Hits(
         np.repeat(np.arange(count), impacts),
-        np.repeat(middle, impacts, axis=0).astype(np.float32),
+        np.zeros((impacts.sum(), 3), np.float32),
         *(np.zeros(impacts.sum(), np.float32) for _ in range(4)),
     )
     hits = replace(
         hits, speed=np.concatenate([np.arange(1, n + 1) for n in impacts]).astype(np.float32)
     )
     target = middle[:, 0] < 0.008
-    fields = {
-        "coverage": height / 100.0,
-        "dent_density": -np.log1p(-height / 100.0) * (2.0 if marked else 1.0),
+    values = {
+        **_fields(middle[:, 2]),
         "impacts": impacts,
         "dents": np.full(count, 20),
-        "impacts_per_mm2": 2.0 * height,
         "exposed_area_mm2": np.ones(count),
         "target": target.astype(np.uint8),
+        "element": np.arange(count) + 1000,
         "mean_normal_speed": np.where(impacts > 0, (1.0 + impacts) / 2.0, np.nan),
-        "p90_normal_speed": np.where(impacts > 0, impacts, np.nan).astype(float),
     }
-    write_coverage(folder / "coverage.vtp", chamber, fields, "dents" if marked else "avrami")
+    fields = _fields(ball.vertices[:, 2])
+    mesh = DisplayMesh(
+        vertices, faces, ball.vertices / 0.01, np.zeros(len(vertices)), np.arange(count)
+    )
+    write_coverage(folder, chamber, values, DisplayField(mesh, fields))
     write_chamber(folder, chamber)
     save_hits(folder / "hits.npz", sort_hits_by_triangle([hits], count))
-    mean = float(fields["impacts_per_mm2"][target].mean())
     return ResultInfo(
-        str(folder), f"{folder.name}\nnot simulated", TREATMENT, 50.0, int(target.sum()), mean
+        folder=str(folder),
+        title=f"{folder.name}\nnot simulated",
+        treatment_s=TREATMENT,
+        longest_s=50.0,
+        triangles=int(target.sum()),
+        impacts_per_mm2=float(impacts[target].mean()),
     )
+
+
+def _fields(z: np.ndarray) -> dict[str, np.ndarray]:
+    """Fields by height [m]: coverage from 5 to 95 %."""
+    height = 0.5 + 45.0 * z
+    return {
+        "coverage": height,
+        "dent_density": -np.log1p(-height),
+        "coverage_interval": np.full(len(z), 0.1),
+        "reachable": (z > -0.008).astype(float),
+        "resolved": (z < 0.008).astype(float),
+        "impacts_per_mm2": 200.0 * height,
+        "mean_normal_speed": 1.0 + height,
+        "p90_normal_speed": 2.0 + height,
+    }
 
 
 def picture(subject: ResultInfo, look: ViewState) -> np.ndarray:
@@ -119,14 +137,11 @@ def right_and_wrong(folder: Path) -> dict[str, np.ndarray]:
 
 def driven(folder: Path) -> list[dict[str, Any]]:
     """What a window shows after each key, click and slide: its look, and what is in its views."""
+    from chamberopt.output.viewer.actors import PALE
     from chamberopt.output.viewer.window import Window, open_results
 
-    subjects = [
-        ball_result(folder / "one"),
-        ball_result(folder / "two"),
-        ball_result(folder / "marked", marked=True),
-    ]
-    window = Window(open_results(subjects[:2], ViewState()), ViewState(), off_screen=True)
+    subjects = [ball_result(folder / "one"), ball_result(folder / "two")]
+    window = Window(open_results(subjects, ViewState()), ViewState(), off_screen=True)
     steps: list[dict[str, Any]] = []
 
     def step(name: str) -> None:
@@ -135,9 +150,14 @@ def driven(folder: Path) -> list[dict[str, Any]]:
         views = []
         for renderer in stage.plotter.renderers:
             actors = renderer.actors
-            mesh = next(a.mapper.dataset for a in actors.values() if "drawn" in _columns(a))
+            coloured = [a.mapper.dataset for a in actors.values() if "shown" in _columns(a)]
             views.append({
-                "drawn": np.nan_to_num(mesh["drawn"], nan=-1.0, posinf=-2.0).tolist(),
+                "shown": np.concatenate([np.asarray(one["shown"]) for one in coloured]).tolist(),
+                "pale": sum(
+                    a.mapper.dataset.n_cells
+                    for a in actors.values()
+                    if _columns(a) and a.prop.color == pyvista().Color(PALE)
+                ),
                 "words": [a.GetInput() for a in actors.values() if a.IsA("vtkTextActor")],
                 "planes": [
                     _planes(a)
@@ -172,14 +192,12 @@ def driven(folder: Path) -> list[dict[str, Any]]:
     window.view.plotter.subplot(0, 1)
     steps[-1]["picked"] = window.view.pick_triangle(int(0.75 * width), 450)
     steps[-1]["beside"] = window.view.pick_triangle(int(0.55 * width), 450)
-    window = Window(open_results(subjects[2:], ViewState()), ViewState(), off_screen=True)
-    step("marked")
     return steps
 
 
 def _columns(actor: Any) -> list[str]:
     data = getattr(getattr(actor, "mapper", None), "dataset", None)
-    return list(data.cell_data) if isinstance(data, pyvista().PolyData) else []
+    return [] if data is None else list(data.point_data)
 
 
 def _planes(actor: Any) -> int:

@@ -89,10 +89,10 @@ def test_a_target_that_looks_down_is_seen_from_below() -> None:
             .Plane(direction=(0.0, 0.0, looks), i_resolution=2, j_resolution=2)
             .triangulate()
         )
-        plate["exposed_area_mm2"] = np.full(plate.n_cells, 0.125)
+        plate["area"] = np.full(plate.n_cells, 0.125)
         assert np.sign(view_of_target(plate)[2]) == side
     ball = pyvista().Sphere()
-    ball["exposed_area_mm2"] = np.ones(ball.n_cells)
+    ball["area"] = np.ones(ball.n_cells)
     assert view_of_target(ball)[2] > 0.0
 
 
