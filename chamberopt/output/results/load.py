@@ -145,8 +145,8 @@ def read_field(folder: Path, part: Surface) -> Surface:
     """Read coverage.vtp; InputError unless it belongs to the part.vtp beside it."""
     field = read_surface(folder / COVERAGE, ("triangle", *OF_ELEMENT), FIELD_COLUMNS)
     triangle = np.asarray(field["triangle"])
-    within = triangle.min() >= 0 and triangle.max() < part.n_cells
-    if not within or (part["impacts"][triangle] != field["element_impacts"]).any():
+    covers_all = np.array_equal(np.unique(triangle), np.arange(part.n_cells))
+    if not covers_all or (part["impacts"][triangle] != field["element_impacts"]).any():
         raise InputError(
             f"{folder / COVERAGE}: of another result than the part.vtp beside it; simulate again"
         )

@@ -20,7 +20,7 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> Result:
 
 
 def test_a_target_chosen_by_a_study_is_the_results_own(result: Result) -> None:
-    """With target.reachable the target is read from coverage.vtp, not derived from this chamber."""
+    """With target.reachable the target is read from part.vtp, not derived from this chamber."""
     target = result.design.part.target.model_copy(update={"reachable": True})
     part = result.design.part.model_copy(update={"target": target})
     design = result.design.model_copy(update={"part": part})
@@ -45,7 +45,7 @@ def test_a_changed_part_ends_with_one_sentence(result: Result, tmp_path: Path, c
     data = json.loads((result.folder / "result.json").read_text(encoding="utf-8"))
     folder = tmp_path / "copy"
     folder.mkdir()
-    for name in ("coverage.vtp", "chamber.vtp"):
+    for name in ("part.vtp", "chamber.vtp"):
         (folder / name).write_bytes((result.folder / name).read_bytes())
     changed = tmp_path / "plate.stl"
     mesh = result.design.part.mesh_path.read_bytes()
