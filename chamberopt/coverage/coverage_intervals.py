@@ -52,6 +52,7 @@ DENTS_FOR_MEAN, DENTS_FOR_PLACES = 3.0, 25.0
 LEAST_RESOLVED = 0.05
 SPARSE = 10
 SPLITS = 6  # of the replicas into halves
+NOT_ONE = 3.0  # expected dents of which with a probability of 5 % there is not one
 NOT_RESOLVED = "not resolved"
 
 
@@ -168,7 +169,7 @@ def coverage_estimates(
     return {
         "mean_coverage": of_mean,
         "std_coverage": root_of_variance(of_variance),
-        "p05_coverage": _p05(sums, reachable, time_ratio),
+        "p05_coverage": _p05(sums, _weight_of_dents(batches), reachable, time_ratio),
     }
 
 
@@ -224,8 +225,19 @@ def root_of_variance(variance: Estimate) -> Estimate:
     return replace(found, half_width=slope * reach if slope else reach)
 
 
-def _p05(sums: DentSums, reachable: float, time_ratio: float) -> Estimate:
-    """The 5th percentile of coverage over the target; what is out of reach is bare."""
+def _weight_of_dents(batches: Sequence[Batch]) -> float:
+    """Mean share of a window that a dent takes; infinite if there are no dents."""
+    weights = [one.footprints.weight for one in batches]
+    count = sum(len(one) for one in weights)
+    return float(sum(one.sum() for one in weights)) / count if count else math.inf
+
+
+def _p05(sums: DentSums, weight: float, reachable: float, time_ratio: float) -> Estimate:
+    """The 5th percentile of coverage over the target; what is out of reach is bare.
+
+    Args:
+        weight: mean share of a window that a dent takes.
+    """
     batches = len(sums.replicas)
     share = (P05 - (1.0 - reachable)) / reachable
     if share <= 0.0:
@@ -238,6 +250,11 @@ def _p05(sums: DentSums, reachable: float, time_ratio: float) -> Estimate:
     whole = coverage_of(slice(None))
     if batches == 1:
         return estimate([whole], 0.0, 1.0)
+    if whole == 0.0:
+        # Where no dent has fallen, at most 3 are to be expected, in 95 % of the cases.
+        density = NOT_ONE * weight * time_ratio / float(sums.replicas.sum())
+        half_width = -math.expm1(-density) if math.isfinite(weight) else math.inf
+        return Estimate(0.0, half_width, (0.0,) * batches)
     rng = np.random.default_rng(0)
     by_halves = np.mean(
         [coverage_of(rng.permutation(batches)[: batches // 2]) for _ in range(SPLITS)]
@@ -267,7 +284,7 @@ def _low_density(shares: np.ndarray, replicas: np.ndarray, share: float) -> floa
     batches, total = len(shares), shares.sum(axis=0)
     root = np.sqrt(total / replicas.sum())
     low, middle = float(np.quantile(root, share)), float(root.mean())
-    if batches == 1:
+    if batches == 1 or low == 0.0:  # counts of nothing do not scatter
         return low**2
     rest = (replicas.sum() - replicas)[:, None]
     without_each = np.sqrt(np.maximum(total - shares, 0.0) / rest)
@@ -291,14 +308,14 @@ def time_to_98_estimate(p05: Estimate, seconds: float) -> Estimate:
         density = -math.log1p(-min(coverage, 1.0 - 1e-12))
         return seconds * -math.log(1.0 - FULL_COVERAGE) / density if density > 0.0 else math.inf
 
-    value = time_from(p05.value)
-    if value >= NEVER:
-        zeros = (NEVER,) * len(p05.pseudovalues)
-        return Estimate(NEVER, p05.half_width and math.inf, zeros, in_words="never")
-    soonest, latest = time_from(p05.high), time_from(p05.low)
+    value, soonest, latest = (time_from(one) for one in (p05.value, p05.high, p05.low))
+    count, is_bound = len(p05.pseudovalues), 0.0 < p05.half_width < math.inf
+    if value >= NEVER and not is_bound:
+        return Estimate(NEVER, p05.half_width, (NEVER,) * count, in_words="never")
     if latest >= NEVER:
-        words = f"more than {soonest:,.0f} s" if math.isfinite(p05.half_width) else ""
-        return Estimate(value, math.inf, (value,) * len(p05.pseudovalues), in_words=words)
+        words = f"more than {soonest:,.0f} s" if is_bound else ""
+        value = min(value, NEVER)
+        return Estimate(value, math.inf, (value,) * count, in_words=words)
     deviations = np.array(p05.pseudovalues) - p05.value
     reach = max(latest - value, value - soonest)
     slope = reach / p05.half_width if p05.half_width else 0.0

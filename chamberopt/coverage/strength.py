@@ -54,9 +54,11 @@ def impact_strength(hits: Hits, density: float) -> np.ndarray:
     Args:
         density: of the balls [kg/m³].
     """
-    speed = np.maximum(hits.speed.astype(float), 1e-12)
-    ball = (6.0 / np.pi * 2.0 * hits.energy / speed**2 / density) ** (1.0 / 3.0)
-    return np.asarray(hits.dent.astype(float) ** 2 / ball)
+    strength, dents = np.zeros(len(hits)), np.flatnonzero(hits.dent > 0.0)
+    speed, dent = hits.speed[dents].astype(float), hits.dent[dents].astype(float)
+    ball = (6.0 / np.pi * 2.0 * hits.energy[dents] / speed**2 / density) ** (1.0 / 3.0)
+    strength[dents] = dent**2 / ball
+    return strength
 
 
 def strength_histogram(
@@ -152,7 +154,7 @@ def intensity_uniformity(
     of_hits = [[impact_strength(hits, density) for hits in batch] for batch in replicas]
     highest = max(float(s.max(initial=0.0)) for batch in of_hits for s in batch)
     if highest == 0.0:
-        return estimate(np.zeros(len(replicas)), highest=1.0)
+        return Estimate(0.0, math.inf, (0.0,) * len(replicas))
     parts = np.zeros((len(replicas), len(rows), LEVELS))
     for number, (batch, strengths) in enumerate(zip(replicas, of_hits, strict=True)):
         for hits, s in zip(batch, strengths, strict=True):

@@ -267,7 +267,7 @@ def as_resolved(name: str, value: Estimate, resolution: Resolution) -> Estimate:
     """The estimate of a metric, without an interval if there are too few dents for one."""
     metric = METRICS[name]
     enough = resolution.has_places if metric.of_places else resolution.has_mean
-    is_exact = value.half_width == 0.0  # such as what follows from places out of reach
+    is_exact = metric.of_places and value.half_width == 0.0  # follows from places out of reach
     if metric.of_impacts is not None or enough or is_exact or value.in_words == "never":
         return value
     return value.not_known(NOT_RESOLVED)

@@ -84,19 +84,19 @@ def plane_gauge(area: float = 1e-6) -> Gauge:
     return Gauge(Windows(points, 0.5e-3), np.full(WINDOWS, area), None)
 
 
-@pytest.mark.parametrize("dents", [4.0, 12.0, 48.0])
+@pytest.mark.parametrize("dents", [5.0, 12.0, 48.0])
 @pytest.mark.parametrize("field", FIELDS)
 def test_mean_and_deviation_have_no_bias_and_their_intervals_hold(field: str, dents: float) -> None:
-    groups = list(groups_of(field, dents, 120))
+    groups = list(groups_of(field, dents, 100))
     for name in ("mean_coverage", "std_coverage"):
         wanted = true_figures(FIELDS[field])[name]
         values = np.array([one[name].value for one in groups])
         held = np.mean([one[name].low <= wanted <= one[name].high for one in groups])
-        noise = values.std(ddof=1) / np.sqrt(len(groups))
-        # A deviation of nothing but noise cannot come out below 0, and so comes out above.
-        if wanted > 0.0:
-            assert abs(values.mean() - wanted) < 3.5 * noise + 1e-3, name
+        bias, noise = abs(values.mean() - wanted), values.std(ddof=1) / np.sqrt(len(groups))
         assert 0.9 <= held <= 1.0, (name, held)
+        # Where a dent takes half a window, single products end at 0; and no deviation is below 0.
+        if (name == "mean_coverage" or dents > 10.0) and wanted > 1e-6:
+            assert bias < 3.5 * noise + 1e-3, (name, bias)
 
 
 @pytest.mark.parametrize("dents", [25.0, 60.0, 240.0])
@@ -132,10 +132,17 @@ def test_the_figures_do_not_depend_on_how_long_was_simulated() -> None:
     assert abs(found[64.0] - found[4.0]) < 0.003
 
 
-def test_a_tenth_in_the_shadow_leaves_the_percentile_bare() -> None:
-    for one in groups_of("shadow", 60.0, 5):
-        assert one["p05_coverage"].value < 0.02
-        assert one["time_to_98_s"].value == NEVER or one["time_to_98_s"].in_words
+@pytest.mark.parametrize("dents", [25.0, 100.0])
+def test_a_tenth_in_the_shadow_leaves_the_percentile_bare_and_the_time_open(dents: float) -> None:
+    """Balls could get there but do not. More than so much time is all that is known."""
+    for one in groups_of("shadow", dents, 5):
+        low, time = one["p05_coverage"], one["time_to_98_s"]
+        assert low.value == 0.0
+        assert low.high == pytest.approx(
+            -np.expm1(-3.0 * FIELDS["shadow"].mean() / dents), rel=0.05
+        )
+        soonest = TREATMENT * np.log(50.0) / -np.log1p(-low.high)
+        assert (time.half_width, time.in_words) == (np.inf, f"more than {soonest:,.0f} s")
 
 
 def test_what_is_out_of_reach_counts_as_bare_exactly() -> None:
@@ -295,11 +302,10 @@ def test_the_jackknife_of_a_mean_is_the_sample_itself() -> None:
 
 
 def test_a_deviation_keeps_the_interval_of_its_variance() -> None:
-    far = root_of_variance(estimate([0.09, 0.11, 0.10, 0.10]))
+    variance = estimate([0.09, 0.11, 0.10, 0.10])
+    far = root_of_variance(variance)
     assert far.value == pytest.approx(np.sqrt(0.10))
-    assert far.half_width == pytest.approx(
-        estimate([0.09, 0.11, 0.1, 0.1]).half_width / 2 / far.value, rel=0.01
-    )
+    assert far.half_width == pytest.approx(0.5 * variance.half_width / far.value, rel=0.05)
     near = root_of_variance(estimate([0.0, 0.02, 0.01, -0.01]))
     assert near.low <= 0.0
     assert near.value == pytest.approx(np.sqrt(0.005))

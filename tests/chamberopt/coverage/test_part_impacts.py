@@ -9,26 +9,35 @@ from chamberopt.common.errors import InputError
 from chamberopt.coverage.dents import dent_diameter
 from chamberopt.coverage.part_impacts import (
     Hits,
+    ImpactSums,
     hits_on_part,
     load_hits,
+    load_matching_hits,
     save_hits,
     sort_hits_by_triangle,
+    sum_impacts,
 )
-from tests.helpers.synthetic import impact_log, patchwork, plate_design
+from tests.helpers.synthetic import impact_log, no_hits, plane_chamber, plate_design
 
 DESIGN = plate_design()
+PLANE = plane_chamber(splits=0)
+COLUMNS = ("place", "speed", "angle", "dent", "energy")
 
 
 def hits_of(rng: np.random.Generator, count: np.ndarray) -> Hits:
     """So many hits (m,) of a triangle each, in no order."""
     triangle = rng.permutation(np.repeat(np.arange(len(count), dtype=np.int32), count))
     columns = rng.uniform(0.1, 5.0, (4, len(triangle))).astype(np.float32)
-    return Hits(triangle, *columns)
+    return Hits(triangle, rng.random((len(triangle), 3)).astype(np.float32), *columns)
 
 
 def test_hits_are_the_impacts_on_the_part_with_their_size_and_energy() -> None:
-    chamber = patchwork(np.full(3, 1e-6))
-    log = impact_log([2, 0, 2], [[0, 0, -3.0], [3.0, 0, -3.0], [0, 0, -0.1]], [3.0, 3.0, 0.1])
+    chamber, wall = PLANE, len(PLANE.part.triangles)
+    log = impact_log(
+        [2, 0, wall, 2],
+        [[0, 0, -3.0], [3.0, 0, -3.0], [0, 0, -3.0], [0, 0, -0.1]],
+        [3.0, 3.0, 3.0, 0.1],
+    )
     hits = hits_on_part(log, chamber, DESIGN)
     material, shot = DESIGN.materials.part, DESIGN.shot
     np.testing.assert_array_equal(hits.triangle, [2, 0, 2])
@@ -46,6 +55,38 @@ def test_hits_are_the_impacts_on_the_part_with_their_size_and_energy() -> None:
     np.testing.assert_allclose(hits.dent, [size[0], size[0], 0.0], rtol=1e-5)
 
 
+def test_a_contact_is_where_the_ball_touches_its_triangle() -> None:
+    """The simulator logs the ball's middle, a radius above the surface."""
+    chamber = PLANE
+    top = int(
+        np.flatnonzero(chamber.part.vertices[chamber.part.triangles][:, :, 2].min(axis=1) == 0.0)[0]
+    )
+    corners = chamber.part.vertices[chamber.part.triangles[top]]
+    inside = np.array([0.2, 0.3, 0.5]) @ corners
+    log = impact_log([top], [[0, 0, -3.0]], [3.0], position=inside + [0.0, 0.0, 1.5e-3])
+    hits = hits_on_part(log, chamber, DESIGN)
+    np.testing.assert_allclose(hits.place, [inside], atol=1e-8)
+    # A middle beyond the triangle's side touches the side.
+    beyond = impact_log([top], [[0, 0, -3.0]], [3.0], position=3.0 * corners[0] + [0, 0, 1e-3])
+    place = hits_on_part(beyond, chamber, DESIGN).place[0]
+    np.testing.assert_allclose(place, corners[0], atol=1e-8)
+
+
+def test_sums_are_over_the_exposed_target() -> None:
+    rng = np.random.default_rng(2)
+    hits = [hits_of(rng, np.array([3, 2, 4])), hits_of(rng, np.array([1, 5, 0]))]
+    exposed = np.array([True, False, True])
+    found = sum_impacts(hits, exposed, area=2e-6, time=1.5)
+    speed = sum(float(one.speed[one.triangle != 1].sum(dtype=float)) for one in hits)
+    assert (found.impacts, found.time, found.area) == (8, 3.0, 2e-6)
+    assert found.speed == pytest.approx(speed)
+    parts = [sum_impacts([one], exposed, 2e-6, 1.5) for one in hits]
+    both = parts[0] + parts[1]
+    assert (both.impacts, both.time, both.area) == (8, 3.0, 2e-6)
+    assert both.speed == pytest.approx(found.speed)
+    assert sum_impacts([no_hits()], exposed, 2e-6, 1.5) == ImpactSums(0, 0.0, 1.5, 2e-6)
+
+
 def test_hits_come_back_from_their_file_by_triangle(tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
     parts = [hits_of(rng, np.array([3, 0, 5, 1])), hits_of(rng, np.array([2, 0, 0, 4]))]
@@ -54,14 +95,14 @@ def test_hits_come_back_from_their_file_by_triangle(tmp_path: Path) -> None:
     assert [len(found.of(t)) for t in range(4)] == [5, 0, 5, 5]
     assert len(found.on(np.array([True, False, False, True]))) == 10
     for t in range(4):
-        for column in ("speed", "angle", "dent", "energy"):
+        for column in COLUMNS:
             whole = np.concatenate([getattr(part, column)[part.triangle == t] for part in parts])
             np.testing.assert_array_equal(getattr(found.of(t), column), whole)
 
 
-def test_a_damaged_or_missing_hits_file_is_said(tmp_path: Path) -> None:
+def test_a_damaged_or_missing_hits_file_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "hits.npz"
-    with pytest.raises(InputError, match=r"older version.*simulate again"):
+    with pytest.raises(InputError, match=r"hits\.npz: not there.*simulate again"):
         load_hits(path)
     save_hits(path, sort_hits_by_triangle([hits_of(np.random.default_rng(1), np.array([3, 4]))], 2))
     whole = path.read_bytes()
@@ -69,3 +110,11 @@ def test_a_damaged_or_missing_hits_file_is_said(tmp_path: Path) -> None:
         path.write_bytes(damaged)
         with pytest.raises(InputError, match="damaged"):
             load_hits(path)
+
+
+def test_hits_of_another_result_are_refused(tmp_path: Path) -> None:
+    hits = sort_hits_by_triangle([hits_of(np.random.default_rng(3), np.array([3, 4]))], 2)
+    save_hits(tmp_path / "hits.npz", hits)
+    assert len(load_matching_hits(tmp_path, np.array([3, 4])).hits) == 7
+    with pytest.raises(InputError, match="another result"):
+        load_matching_hits(tmp_path, np.array([4, 3]))
