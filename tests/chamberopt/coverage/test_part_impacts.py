@@ -58,12 +58,12 @@ def test_hits_are_the_impacts_on_the_part_with_their_size_and_energy() -> None:
 def test_a_contact_is_where_the_ball_touches_its_triangle() -> None:
     """The simulator logs the ball's middle, a radius above the surface."""
     chamber = PLANE
-    top = int(
-        np.flatnonzero(chamber.part.vertices[chamber.part.triangles][:, :, 2].min(axis=1) == 0.0)[0]
-    )
+    heights = chamber.part.vertices[chamber.part.triangles][:, :, 2]
+    top = int(np.argmax(heights.min(axis=1) == 0.0))
     corners = chamber.part.vertices[chamber.part.triangles[top]]
     inside = np.array([0.2, 0.3, 0.5]) @ corners
-    log = impact_log([top], [[0, 0, -3.0]], [3.0], position=inside + [0.0, 0.0, 1.5e-3])
+    above = inside + np.array([0.0, 0.0, 1.5e-3])
+    log = impact_log([top], [[0, 0, -3.0]], [3.0], position=above)
     hits = hits_on_part(log, chamber, DESIGN)
     np.testing.assert_allclose(hits.place, [inside], atol=1e-8)
     # A middle beyond the triangle's side touches the side.

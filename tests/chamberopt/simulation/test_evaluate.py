@@ -1,45 +1,99 @@
 """An evaluation does not depend on the workers and stops at the wanted accuracy or the budget."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
 from chamberopt.chamber.build import build_chamber
+from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.errors import InputError
-from chamberopt.common.estimate import estimate, paired_difference
+from chamberopt.common.estimate import Estimate, estimate, paired_difference
 from chamberopt.common.parallel.executor import SerialExecutor, local_executor
-from chamberopt.coverage.coverage_from_impacts import Tally
+from chamberopt.coverage.dents import dent_diameter
 from chamberopt.coverage.metrics import METRICS, OBJECTIVES
+from chamberopt.coverage.part_impacts import Hits
 from chamberopt.design.design import validate
 from chamberopt.design.load import Design
-from chamberopt.simulation.evaluate import ReplicaPlan, estimate_metrics, evaluate, weighted_sum
+from chamberopt.simulation.evaluate import (
+    MAX_SPEED,
+    ReplicaPlan,
+    SeenDents,
+    estimate_metrics,
+    evaluate,
+    prepare_target,
+    weighted_sum,
+)
 from chamberopt.simulation.replicas import MIN_REPLICAS_TO_STOP
-from tests.helpers.synthetic import equal_dents, patchwork, plate_design
+from tests.helpers.synthetic import evaluation_of, plane_chamber, plate_design, random_dents
 
-TREATMENT = 50.0
-DESIGN = plate_design(process__treatment_time_s=TREATMENT)
-CHAMBER = patchwork(np.full(400, 1e-6))
-DENT = 0.1e-6  # m²: a tenth of a triangle
-# Dents per triangle and second: the expected coverage is 1 - exp(-rate · DENT / area · 50 s), 0.5
-# to 0.95.
-RATE = np.random.default_rng(0).uniform(0.14, 0.6, 400)
+DESIGN = plate_design(process__treatment_time_s=50.0)
+PLANE = plane_chamber()
 
 
-def poisson_replicas(rng: np.random.Generator, replicas: int, seconds: float) -> list[Tally]:
-    counts = rng.poisson(RATE * seconds, (replicas, len(RATE)))
-    return [equal_dents(seconds, k, DENT) for k in counts]
+def poisson_replicas(rng: np.random.Generator, replicas: int, per_mm2: float) -> list[Hits]:
+    mean = 1e6 * per_mm2 / replicas * PLANE.part.area * PLANE.part.target
+    return [random_dents(DESIGN, PLANE, mean, rng) for _ in range(replicas)]
 
 
 def test_pseudovalues_of_a_mean_are_the_sample() -> None:
-    # For a statistic linear in the tally the jackknife is the plain mean and its standard error:
-    # s/√n · t(n-1).
-    rng = np.random.default_rng(5)
-    replicas = poisson_replicas(rng, 6, 10.0)
-    rate = METRICS["impacts_per_mm2_s"]
-    got = estimate_metrics(replicas, CHAMBER, DESIGN)["impacts_per_mm2_s"]
-    each = np.array([rate.value(replica, CHAMBER, DESIGN) for replica in replicas])
+    # For a ratio of sums whose denominator is fixed the jackknife is the plain mean and its
+    # standard error: s/√n · t(n-1).
+    replicas = poisson_replicas(np.random.default_rng(5), 6, 20.0)
+    got = evaluation_of(DESIGN, PLANE, replicas).metrics["impacts_per_mm2_s"]
+    each = np.array([len(hits) for hits in replicas]) / (225.0 * DESIGN.process.recorded_time)
     np.testing.assert_allclose(got.pseudovalues, each, rtol=1e-9)
     assert got.value == pytest.approx(each.mean())
     assert got.half_width == pytest.approx(2.570582 * each.std(ddof=1) / np.sqrt(6), rel=1e-6)
+
+
+def test_random_dents_on_a_plane_cover_what_avrami_says() -> None:
+    """All figures of an even field: x is dented area over area, by the treatment time."""
+    replicas = poisson_replicas(np.random.default_rng(6), 8, 200.0)
+    found = evaluation_of(DESIGN, PLANE, replicas)
+    seconds = 8 * DESIGN.process.recorded_time
+    assert found.simulated_time == pytest.approx(seconds)
+    x = 200.0 * 0.01 * DESIGN.process.treatment_time / seconds
+    for metrics in (found.metrics, found.metrics_of_wide):
+        mean, std, low = (metrics[f"{name}_coverage"] for name in ("mean", "std", "p05"))
+        assert abs(mean.value + np.expm1(-x)) < mean.half_width + 1e-3
+        assert std.low <= 0.0
+        assert std.value < 0.03
+        assert abs(low.value + np.expm1(-x)) < low.half_width + 1e-3
+        time = metrics["time_to_98_s"]
+        assert abs(time.value - DESIGN.process.treatment_time * np.log(50.0) / x) < time.half_width
+    assert found.metrics["intensity_uniformity"].high >= 1.0 - 1e-9
+    assert found.resolution.has_mean
+    assert found.resolution.has_places
+    assert found.resolution.dents == pytest.approx(200.0, rel=0.05)
+    assert (found.reachable, found.crease_share, found.notes) == (1.0, 0.0, ())
+    assert set(found.metrics) == set(METRICS)
+    assert set(found.metrics_of_wide) == set(METRICS) - {
+        "intensity_uniformity", "mean_normal_speed_m_s", "impacts_per_mm2_s", "shot_count",
+    }  # fmt: skip
+
+
+def test_dents_are_looked_at_once_however_replicas_come() -> None:
+    replicas = poisson_replicas(np.random.default_rng(7), 5, 60.0)
+    field = prepare_target(DESIGN, PLANE, chamber_mesh(PLANE))
+    whole, part = SeenDents(field, [], []), SeenDents(field, [], [])
+    whole.add(replicas)
+    for count in (2, 2, 3, 5):
+        part.add(replicas[:count])
+        assert len(part.gauge) == len(part.wide) == count
+    both = [estimate_metrics(seen, replicas, PLANE, DESIGN) for seen in (whole, part)]
+    assert both[0] == both[1]
+
+
+def test_the_widest_dent_is_that_of_a_ball_much_faster_than_the_sonotrode() -> None:
+    field = prepare_target(DESIGN, PLANE, chamber_mesh(PLANE))
+    material, shot = DESIGN.materials.part, DESIGN.shot
+    fast = np.array([MAX_SPEED * DESIGN.sonotrode.peak_speed])
+    of_material = material.hardness, material.restitution, material.yield_speed
+    wanted = dent_diameter(fast, shot.diameter, shot.density, *of_material)[0]
+    assert field.setting.largest_dent == pytest.approx(wanted)
+    assert field.setting.ball == shot.diameter
+    assert field.setting.gauge == pytest.approx(1e-6)
 
 
 def test_what_is_made_of_a_clipped_value_agrees_with_its_interval() -> None:
@@ -55,6 +109,19 @@ def test_what_is_made_of_a_clipped_value_agrees_with_its_interval() -> None:
     assert np.mean(gain.pseudovalues) == pytest.approx(gain.value)
 
 
+def test_an_objective_of_what_is_not_known_is_not_known() -> None:
+    metrics = {
+        "mean_coverage": estimate([0.7, 0.8, 0.75]),
+        "std_coverage": estimate([0.1, 0.12, 0.11]).not_known("not resolved"),
+        "time_to_98_s": Estimate(1e6, 0.0, (1e6,) * 3, in_words="never"),
+    }
+    goal = weighted_sum(OBJECTIVES["uniform_coverage"], metrics)
+    assert (goal.in_words, goal.half_width) == ("not resolved", np.inf)
+    assert goal.value == pytest.approx(0.75 - 0.11)
+    never = weighted_sum(OBJECTIVES["minus_time_to_98_s"], metrics)
+    assert (never.value, never.half_width, never.in_words) == (-1e6, 0.0, "never")
+
+
 def test_evaluate_gives_the_same_numbers_on_any_number_of_workers() -> None:
     design = plate_design(
         process__accuracy__simulated_time_s=0.02, process__accuracy__warmup_time_s=0.02,
@@ -67,27 +134,44 @@ def test_evaluate_gives_the_same_numbers_on_any_number_of_workers() -> None:
         threaded = evaluate(design, chamber, executor)
     assert serial.objective == threaded.objective
     assert serial.metrics == threaded.metrics
-    np.testing.assert_array_equal(serial.total.dented_area, threaded.total.dented_area)
+    assert serial.metrics_of_wide == threaded.metrics_of_wide
+    for one, other in zip(serial.hits, threaded.hits, strict=True):
+        np.testing.assert_array_equal(one.place, other.place)
+        np.testing.assert_array_equal(one.dent, other.dent)
     assert seen == [(i, 4, None) for i in range(1, 5)]
-    assert serial.total.impacts.sum() > 0
-    assert serial.total.simulated_time == pytest.approx(0.08)
-    assert serial.collisions["total"] > serial.total.impacts.sum()
-    assert any("dents per target triangle" in note for note in serial.notes)
+    impacts = sum(len(hits) for hits in serial.hits)
+    assert impacts > 0
+    assert serial.simulated_time == pytest.approx(0.08)
+    assert serial.collisions["total"] > impacts
+    assert any("process.accuracy.simulated_time_s" in note for note in serial.notes)
     # Replicas there are, are added to: the same as all at once.
     done: list = []
     few = evaluate(design, chamber, SerialExecutor(), plan=ReplicaPlan(3), done=done)
-    assert (len(few.replicas), len(done)) == (3, 3)
+    assert (few.replicas, len(few.hits), len(done)) == (3, 3, 3)
     assert evaluate(design, chamber, SerialExecutor(), done=done).metrics == serial.metrics
     # Fresh draws for a confirmation.
     other = evaluate(design, chamber, SerialExecutor(), plan=ReplicaPlan(3, "confirm"))
     assert other.objective.value != serial.objective.value
-    assert (other.stream, len(other.replicas)) == ("confirm", 3)
+    assert (other.stream, other.replicas) == ("confirm", 3)
+
+
+def test_a_gauge_too_small_for_the_target_is_refused_before_anything_is_simulated(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def nothing(*_: object) -> Callable:
+        raise AssertionError("a replica was simulated")
+
+    monkeypatch.setattr("chamberopt.simulation.evaluate.simulate_replicas", nothing)
+    design = plate_design(process__accuracy__gauge_mm2=1e-3)
+    chamber = build_chamber(design)
+    with pytest.raises(InputError, match=r"process\.accuracy\.gauge_mm2.*give at least 0\.003"):
+        evaluate(design, chamber, SerialExecutor())
 
 
 def accurate(coverage: float, most: int) -> Design:
     """The plate in short replicas, with a wanted half-width and a maximum number."""
     design = plate_design(
-        process__accuracy__simulated_time_s=0.05, process__accuracy__warmup_time_s=0.02
+        process__accuracy__simulated_time_s=0.3, process__accuracy__warmup_time_s=0.02
     )
     accuracy = {
         **design.process.accuracy.model_dump(),
@@ -105,15 +189,23 @@ def test_replicas_are_added_until_the_accuracy_holds_or_the_budget_ends() -> Non
     loose = evaluate(accurate(0.2, 100), chamber, SerialExecutor())
     assert loose.stopped_by == "accuracy"
     assert loose.objective.half_width <= 0.2
-    assert len(loose.replicas) >= MIN_REPLICAS_TO_STOP
+    assert loose.replicas >= MIN_REPLICAS_TO_STOP
     tight = evaluate(accurate(0.001, 14), chamber, SerialExecutor())
-    assert (tight.stopped_by, len(tight.replicas)) == ("max_replicas", 14)
+    assert (tight.stopped_by, tight.replicas) == ("max_replicas", 14)
     assert tight.objective.half_width > 0.001
     assert any("max_replicas = 14" in note and "not reached" in note for note in tight.notes)
-    # The same replicas at once say the same: how they were added leaves no trace.
+    # The same replicas at once give the same: how they were added leaves no trace.
     again = evaluate(accurate(0.001, 14), chamber, SerialExecutor(), plan=ReplicaPlan(14))
     assert again.metrics == tight.metrics
     assert again.stopped_by == "replicas"
+
+
+def test_a_figure_that_is_not_resolved_does_not_reach_the_wanted_accuracy() -> None:
+    """Too few dents give no interval: replicas are added until there are enough."""
+    design = accurate(0.4, 12).changed({"process.accuracy.simulated_time_s": 0.002})
+    found = evaluate(design, build_chamber(design), SerialExecutor())
+    assert found.objective.half_width == np.inf
+    assert (found.stopped_by, found.replicas) == ("max_replicas", 12)
 
 
 def test_an_accuracy_that_cannot_be_is_refused() -> None:

@@ -1,41 +1,68 @@
-"""Coverage against time agrees with the figures at the treatment time, and ends where it says."""
+"""Coverage against time agrees with the figures at the treatment time, and ends where it should."""
 
 import numpy as np
 import pytest
 
+from chamberopt.chamber.scene import chamber_mesh
+from chamberopt.simulation.evaluate import prepare_target
+from chamberopt.simulation.evaluation import Evaluation
 from chamberopt.simulation.time_curve import MAX_TREATMENT_TIMES, coverage_against_time
-from tests.helpers.synthetic import equal_dents, evaluation_of, patchwork, plate_design
+from tests.helpers.synthetic import evaluation_of, plane_chamber, plate_design, random_dents
 
 DESIGN = plate_design()
+PLANE = plane_chamber()
+TREATMENT, REPLICAS = DESIGN.process.treatment_time, 8
+DENT = 1e-8  # m²
 
 
-@pytest.mark.parametrize(("dents", "end"), [(40.0, None), (4.0, MAX_TREATMENT_TIMES)])
-def test_the_curve_goes_through_the_figures_of_the_treatment_time(
-    dents: float, end: float | None
-) -> None:
-    """Dents fall at one rate on all triangles: mean coverage is 1 - exp(-rate t) at every time."""
+def curve_of(x: float, per_mm2: float) -> tuple[list[dict[str, float]], Evaluation]:
+    """The curve of a plane with dent density x at the treatment time, from so many dents."""
+    design = DESIGN.changed(
+        {"process.accuracy.simulated_time_s": per_mm2 * DENT * 1e6 / x * TREATMENT / REPLICAS}
+    )
     rng = np.random.default_rng(1)
-    seconds, treatment, size, area = 1.0, DESIGN.process.treatment_time, 1e-8, 1e-6
-    rate = dents * size / area / treatment
-    chamber = patchwork(np.full(300, area))
-    many = rate * seconds * area / size * 8
-    tallies = [equal_dents(seconds, rng.poisson(many / 8, 300), size) for _ in range(8)]
-    evaluation = evaluation_of(DESIGN, chamber, tallies)
-    rows = coverage_against_time(DESIGN, chamber, evaluation)
+    mean = 1e6 * per_mm2 / REPLICAS * PLANE.part.area
+    hits = [random_dents(design, PLANE, mean, rng) for _ in range(REPLICAS)]
+    evaluation = evaluation_of(design, PLANE, hits)
+    field = prepare_target(design, PLANE, chamber_mesh(PLANE))
+    return coverage_against_time(design, field, evaluation), evaluation
 
-    at = next(row for row in rows if row["time_s"] == treatment)
-    assert at["mean_coverage"] == pytest.approx(evaluation.metrics["mean_coverage"].value)
-    assert at["p05_half_width"] == pytest.approx(evaluation.metrics["p05_coverage"].half_width)
+
+@pytest.mark.parametrize("x", [0.3, 1.0, 6.0])
+def test_the_curve_goes_through_the_figures_of_the_treatment_time(x: float) -> None:
+    """Dents fall at one rate everywhere: mean coverage is 1 - exp(-x t / T) at every time."""
+    rows, evaluation = curve_of(x, per_mm2=200.0)
+    metrics = evaluation.metrics
+    at = next(row for row in rows if row["time_s"] == TREATMENT)
+    assert at["mean_coverage"] == pytest.approx(metrics["mean_coverage"].value, abs=3e-3)
+    assert at["p05_coverage"] == pytest.approx(metrics["p05_coverage"].value)
+    assert at["p05_half_width"] == pytest.approx(metrics["p05_coverage"].half_width, rel=0.2)
     for row in rows:
-        assert row["mean_coverage"] == pytest.approx(
-            -np.expm1(-rate * row["time_s"]), abs=3.0 * row["half_width"] + 0.02
-        )
+        exact = -np.expm1(-x * row["time_s"] / TREATMENT)
+        assert row["mean_coverage"] == pytest.approx(exact, abs=3.0 * row["half_width"] + 5e-3)
+        assert row["p05_coverage"] == pytest.approx(exact, abs=row["p05_half_width"] + 0.02)
         assert row["half_width"] >= 0.0
     for name in ("mean_coverage", "p05_coverage"):
         assert np.diff([row[name] for row in rows]).min() >= 0.0
     times = [row["time_s"] for row in rows]
     assert times == sorted(times)
-    full = evaluation.metrics["time_to_98_s"].value
+    full = metrics["time_to_98_s"].value
     assert times[-1] == pytest.approx(
-        end * treatment if end else max(treatment, min(1.1 * full, MAX_TREATMENT_TIMES * treatment))
+        np.clip(1.1 * full, TREATMENT, MAX_TREATMENT_TIMES * TREATMENT)
     )
+    if full < times[-1]:
+        after = next(row for row in rows if row["time_s"] >= full)
+        assert after["p05_coverage"] >= 0.98 - 1e-6
+
+
+def test_without_dents_enough_there_is_no_percentile_and_no_longer_time() -> None:
+    """Ten dents a window are enough for the mean at the treatment time, not at ten times it."""
+    rows, evaluation = curve_of(1.0, per_mm2=10.0)
+    found = evaluation.resolution
+    assert found.has_mean
+    assert not found.has_places
+    assert all("p05_coverage" not in row for row in rows)
+    assert rows[-1]["time_s"] <= TREATMENT * found.dents / found.needed_for_mean * (1.0 + 1e-9)
+    few, evaluation = curve_of(1.0, per_mm2=2.0)
+    assert not evaluation.resolution.has_mean
+    assert few[-1]["time_s"] < TREATMENT
