@@ -250,11 +250,6 @@ def _p05(sums: DentSums, weight: float, reachable: float, time_ratio: float) -> 
     whole = coverage_of(slice(None))
     if batches == 1:
         return estimate([whole], 0.0, 1.0)
-    if whole == 0.0:
-        # Where no dent has fallen, at most 3 are to be expected, in 95 % of the cases.
-        density = NOT_ONE * weight * time_ratio / float(sums.replicas.sum())
-        half_width = -math.expm1(-density) if math.isfinite(weight) else math.inf
-        return Estimate(0.0, half_width, (0.0,) * batches)
     rng = np.random.default_rng(0)
     by_halves = np.mean(
         [coverage_of(rng.permutation(batches)[: batches // 2]) for _ in range(SPLITS)]
@@ -269,9 +264,12 @@ def _p05(sums: DentSums, weight: float, reachable: float, time_ratio: float) -> 
             for some in sparse_points(sums.share.T)
         ]
     )
-    return estimate(
-        value + deviations, 0.0, 1.0, bias=abs(value - whole), sampling=sampling_error(of_some)
-    )
+    bias = abs(value - whole)
+    if np.quantile(sums.share.sum(axis=0), share) == 0.0:
+        # Where no dent has fallen it may be bare, or up to 3 dents were to be expected.
+        density = NOT_ONE * weight * time_ratio / float(sums.replicas.sum())
+        bias = max(bias + value, -math.expm1(-density)) if math.isfinite(weight) else math.inf
+    return estimate(value + deviations, 0.0, 1.0, bias=bias, sampling=sampling_error(of_some))
 
 
 def _low_density(shares: np.ndarray, replicas: np.ndarray, share: float) -> float:
@@ -284,7 +282,7 @@ def _low_density(shares: np.ndarray, replicas: np.ndarray, share: float) -> floa
     batches, total = len(shares), shares.sum(axis=0)
     root = np.sqrt(total / replicas.sum())
     low, middle = float(np.quantile(root, share)), float(root.mean())
-    if batches == 1 or low == 0.0:  # counts of nothing do not scatter
+    if batches == 1:
         return low**2
     rest = (replicas.sum() - replicas)[:, None]
     without_each = np.sqrt(np.maximum(total - shares, 0.0) / rest)

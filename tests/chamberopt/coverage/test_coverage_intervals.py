@@ -135,12 +135,12 @@ def test_the_figures_do_not_depend_on_how_long_was_simulated() -> None:
 @pytest.mark.parametrize("dents", [25.0, 100.0])
 def test_a_tenth_in_the_shadow_leaves_the_percentile_bare_and_the_time_open(dents: float) -> None:
     """Balls could get there but do not. More than so much time is all that is known."""
+    unit = FIELDS["shadow"].mean() / dents  # x of one dent
     for one in groups_of("shadow", dents, 5):
         low, time = one["p05_coverage"], one["time_to_98_s"]
-        assert low.value == 0.0
-        assert low.high == pytest.approx(
-            -np.expm1(-3.0 * FIELDS["shadow"].mean() / dents), rel=0.05
-        )
+        assert low.value < 0.005
+        assert low.low <= 0.0
+        assert low.high == pytest.approx(-np.expm1(-3.0 * unit), abs=0.01)
         soonest = TREATMENT * np.log(50.0) / -np.log1p(-low.high)
         assert (time.half_width, time.in_words) == (np.inf, f"more than {soonest:,.0f} s")
 
