@@ -26,6 +26,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from chamberopt.coverage.field.target_field import Gauge, TargetField
+    from chamberopt.coverage.field.windows import Places
     from chamberopt.coverage.part_impacts import Hits
 
 T = TypeVar("T")
@@ -81,14 +82,36 @@ def joined(replicas: Sequence[Footprints]) -> Footprints:
     )
 
 
-def find_footprints(field: TargetField, gauge: Gauge, hits: Hits) -> Footprints:
+class LocatedDents(NamedTuple):
+    """Dents of one replica that may be in windows of the target, or of the whole part.
+
+    Attributes:
+        contacts: where they are.
+        triangle: of the part, shape (k,).
+        radius: [m], shape (k,).
+        edge: the crease on which each lies, -1 on a smooth face, shape (k,).
+    """
+
+    contacts: Places
+    triangle: np.ndarray
+    radius: np.ndarray
+    edge: np.ndarray
+
+
+def locate_dents(field: TargetField, hits: Hits) -> LocatedDents:
+    """Find the face or the crease on which each dent lies."""
+    dents = np.flatnonzero((hits.dent > 0.0) & field.has_windows[hits.triangle])
+    contacts, triangle = field.places_of(hits, dents), hits.triangle[dents]
+    edge = _crease_of_contacts(field, contacts.place, triangle)
+    return LocatedDents(contacts, triangle, 0.5 * hits.dent[dents].astype(float), edge)
+
+
+def find_footprints(field: TargetField, gauge: Gauge, hits: Hits | LocatedDents) -> Footprints:
     """The dents of one replica in windows of one size; dents off the target count nothing."""
     from chamberopt.coverage.field.windows import Places
 
-    dents = np.flatnonzero(hits.dent > 0.0)
-    contacts = field.places_of(hits, dents)
-    radius = 0.5 * hits.dent[dents].astype(float)
-    edge = _crease_of_contacts(field, contacts.place, hits.triangle[dents])
+    dents = hits if isinstance(hits, LocatedDents) else locate_dents(field, hits)
+    contacts, radius, edge = dents.contacts, dents.radius, dents.edge
     on_face = edge < 0
     size = np.pi * radius**2
     size_on_face = size[on_face]
@@ -106,7 +129,7 @@ def find_footprints(field: TargetField, gauge: Gauge, hits: Hits) -> Footprints:
             row, half = row[covered], half[covered]
             points.append(band.point[row])
             weights.append(2.0 * np.sqrt(half) / band.length[row])
-    own = field.on_target[hits.triangle[dents]]
+    own = field.on_target[dents.triangle]
     return Footprints(
         np.concatenate(points) if points else np.zeros(0, dtype=int),
         np.concatenate(weights) if weights else np.zeros(0),
@@ -120,7 +143,8 @@ def _crease_of_contacts(field: TargetField, place: np.ndarray, triangle: np.ndar
     """The crease on which each contact lies, (k,); -1 for contacts on a smooth face."""
     creases = field.creases
     found = np.full(len(place), -1)
-    near = np.flatnonzero((creases.at_corner[triangle] >= 0).any(axis=1))
+    borders = np.asarray((creases.at_corner >= 0).any(axis=1))
+    near = np.flatnonzero(borders[triangle])
     at, own = place[near], triangle[near]
     corners = field.corners[own]
     for side in range(3):

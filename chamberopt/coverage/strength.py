@@ -43,7 +43,7 @@ LEVELS = 32  # of s; twice as many change S by less than 0.3 %
 WINDOWS = 2_000  # of the target's; S varies little from one to the next
 SATURATED = 1.1  # SAE J443
 NEWTON_STEPS = 3  # S moves by a quarter of what the saturation time is wrong by
-HALVINGS = 16
+HALVINGS = 10  # to 1 % of the time, and S to 0.3 %
 MIN_BATCHES = 4  # for two quarters
 SPLITS = 3  # into halves, and into quarters
 

@@ -35,6 +35,7 @@ from chamberopt.coverage.coverage_from_impacts import (
     find_footprints,
     in_batches,
     joined,
+    locate_dents,
 )
 from chamberopt.coverage.coverage_intervals import (
     NOT_RESOLVED,
@@ -210,8 +211,9 @@ class SeenDents:
     def add(self, hits: Sequence[Hits]) -> None:
         """Look at the replicas that are new."""
         for one in hits[len(self.gauge) :]:
-            self.gauge.append(find_footprints(self.field, self.field.gauge, one))
-            self.wide.append(find_footprints(self.field, self.field.wide, one))
+            dents = locate_dents(self.field, one)
+            self.gauge.append(find_footprints(self.field, self.field.gauge, dents))
+            self.wide.append(find_footprints(self.field, self.field.wide, dents))
 
     @property
     def crease_share(self) -> float:

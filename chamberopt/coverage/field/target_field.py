@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from chamberopt.coverage.part_impacts import Hits
     from sim_core import TriangleMesh
 
-OF_WIDE = 0.25  # of the number of windows, for those of twice the radius, which overlap more
+OF_WIDE = 0.125  # of the number of windows, for those of twice the radius, which overlap more
 # By points, on average, the area of a window is measured. With 12 the mean comes out 0.01 too high.
 POINTS_PER_WINDOW = 36
 MAX_POINTS = 8_000_000
@@ -74,8 +74,10 @@ class TargetField:
     face: np.ndarray  # smooth face of each part triangle, (m,)
     on_target: np.ndarray  # marks the part triangles of the target, (m,)
     corners: np.ndarray  # of the part triangles [m], (m, 3, 3)
+    normals: np.ndarray  # unit vectors out of the part, (m, 3)
     creases: Creases
     pieces: CreasePieces
+    has_windows: np.ndarray  # marks the part triangles whose dents can be in a window, (m,)
     touched: Places  # points that a ball can touch, spread evenly over the target
     touched_area: np.ndarray  # that each of them stands for [m²]
     reachable: float  # share of the target's area that a ball can touch
@@ -118,8 +120,7 @@ class TargetField:
         from chamberopt.coverage.field.windows import Places
 
         triangle = hits.triangle[rows]
-        normal = unit_normals(self.corners[triangle])
-        return Places(hits.place[rows].astype(float), normal, self.face[triangle])
+        return Places(hits.place[rows].astype(float), self.normals[triangle], self.face[triangle])
 
 
 def find_target_field(chamber: Chamber, mesh: TriangleMesh, setting: WindowSetting) -> TargetField:
@@ -149,8 +150,10 @@ def find_target_field(chamber: Chamber, mesh: TriangleMesh, setting: WindowSetti
         face=face,
         on_target=part.target,
         corners=part.vertices[part.triangles],
+        normals=unit_normals(part.vertices[part.triangles]),
         creases=creases,
         pieces=crease_pieces(creases, mesh, 0.5 * setting.ball, radius),
+        has_windows=part.target | (creases.at_corner >= 0).any(axis=1),
         touched=touched,
         touched_area=np.full(len(touched.place), area.sum() / count),
         reachable=len(touched.place) / count,
@@ -169,6 +172,7 @@ def with_whole_part(field: TargetField, chamber: Chamber, mesh: TriangleMesh) ->
     rest = _touched(chamber, mesh, area, count, field.face, field.setting.ball)
     return replace(
         field,
+        has_windows=np.ones(len(area), dtype=bool),
         touched=Places(*map(np.concatenate, zip(field.touched, rest, strict=True))),
         touched_area=np.concatenate(
             [field.touched_area, np.full(len(rest.place), area.sum() / count)]

@@ -70,18 +70,22 @@ class Windows:
         count = np.bincount(number, minlength=int(np.prod(self._shape)))
         self._first = np.concatenate([[0], np.cumsum(count)]).astype(np.int32)
         self._sorted = points.select(self._order)
+        self._has_points = np.zeros(int(points.face.max(initial=0)) + 1, dtype=bool)
+        self._has_points[points.face] = True  # by face
 
     def pairs(self, contacts: Places) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Yield indices of points and of the contacts in their windows, some pairs at a time."""
         point, contact = np.empty((2, PAIRS_AT_ONCE), dtype=np.int32)
         done = 0
-        columns = [np.ascontiguousarray(column) for column in contacts]
-        while done < len(contacts.place):
+        face = np.minimum(contacts.face, len(self._has_points) - 1)
+        rows = np.flatnonzero(self._has_points[face] & (face == contacts.face))
+        columns = [np.ascontiguousarray(column[rows]) for column in contacts]
+        while done < len(rows):
             done, found = _find_pairs(
                 self._low, self._edge, self._shape, self._first, self._sorted, Places(*columns),
                 self.radius, done, point, contact,
             )  # fmt: skip
-            yield self._order[point[:found]], contact[:found].copy()
+            yield self._order[point[:found]], rows[contact[:found]]
 
     def sums(self, contacts: Places, values: np.ndarray) -> np.ndarray:
         """Sums over each window of values (k,) of the contacts, shape (p,)."""
