@@ -199,7 +199,7 @@ def _view(points: np.ndarray, chamber: Any, eye: np.ndarray) -> dict[str, Any]:
 def _mesh(surface: Surface) -> dict[str, np.ndarray]:
     """Points and triangles in single precision (about 1e-5 mm)."""
     x, y, z = np.asarray(surface.points, dtype=np.float32).T
-    i, j, k = np.asarray(surface.regular_faces, dtype=np.int32).T
+    i, j, k = np.asarray(surface.regular_faces, dtype=np.int32).reshape(-1, 3).T
     return {
         name: np.ascontiguousarray(a) for name, a in zip("xyzijk", (x, y, z, i, j, k), strict=True)
     }

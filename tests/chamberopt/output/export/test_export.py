@@ -23,6 +23,7 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import SerialExecutor, local_executor
+from chamberopt.coverage.part_impacts import load_hits
 from chamberopt.design.load import Design
 from chamberopt.optimize.study import Study
 from chamberopt.output.export.chamber_files import (
@@ -121,24 +122,14 @@ def columns(table: dict[str, np.ndarray], *names: str) -> np.ndarray:
     return np.stack([table[name] for name in names], axis=1).astype(float)
 
 
-def impacts_of_result(folder: Path) -> np.ndarray:
-    """Impacts on each triangle, from the figures that coverage.vtp has of them."""
-    surface, result = read_surface(folder / "coverage.vtp"), load_result(folder)
-    times = result.design.process.treatment_time / result.data["simulated_time_s"]
-    return np.nan_to_num(surface["impacts_per_mm2"] * surface["exposed_area_mm2"] / times)
-
-
 def require_result_again(folder: Path, table: dict[str, np.ndarray]) -> None:
-    surface = read_surface(folder / "coverage.vtp")
-    on_each = np.bincount(table["triangle"], minlength=surface.n_cells)
-    np.testing.assert_allclose(on_each, impacts_of_result(folder), atol=1e-6)
+    part, hits = read_surface(folder / "part.vtp"), load_hits(folder / "hits.npz").hits
+    on_each = np.bincount(table["triangle"], minlength=part.n_cells)
+    np.testing.assert_array_equal(on_each, part["impacts"])
     dented = table["triangle"][table["dent_diameter_um"] > 0.0]
-    np.testing.assert_array_equal(np.bincount(dented, minlength=surface.n_cells), surface["dents"])
-    speeds = np.bincount(table["triangle"], table["normal_speed_m_s"], surface.n_cells)
-    hit = on_each > 0
-    np.testing.assert_allclose(
-        speeds[hit] / on_each[hit], surface["mean_normal_speed"][hit], rtol=1e-6
-    )
+    np.testing.assert_array_equal(np.bincount(dented, minlength=part.n_cells), part["dents"])
+    order = np.argsort(table["triangle"], kind="stable")
+    np.testing.assert_array_equal(table["normal_speed_m_s"][order], hits.speed)
 
 
 def test_the_rows_give_the_figures_of_the_result(simulated: Path, tmp_path: Path) -> None:
@@ -169,8 +160,8 @@ def test_places_and_velocities_are_those_of_the_parts_file(
     np.testing.assert_allclose(np.sin(np.radians(table["angle_deg"])), -across / speed, atol=1e-5)
 
 
-def test_in_the_chambers_frame_they_lie_on_coverage_vtp(simulated: Path, tmp_path: Path) -> None:
-    surface = read_surface(simulated / "coverage.vtp")
+def test_in_the_chambers_frame_they_lie_on_part_vtp(simulated: Path, tmp_path: Path) -> None:
+    surface = read_surface(simulated / "part.vtp")
     corners = np.asarray(surface.points)[surface.regular_faces]
     table = table_of(simulated, tmp_path / "i.parquet", "chamber")
     at = columns(table, "x_mm", "y_mm", "z_mm")
@@ -311,7 +302,7 @@ def test_impacts_that_are_not_the_results_are_not_handed_on(
     status, out, err = chamberopt("export", folder, *formats)
     err = err.splitlines()[-1]  # after what is said of compiling
     assert (status, out) == (2, "")
-    assert "does not simulate it again bit for bit: dents of" in err
+    assert "does not simulate it again bit for bit: the impacts on" in err
     assert "simulate the design again" in err
     assert not (tmp_path / "results" / "copy-export").exists()
     status, _, err = chamberopt(

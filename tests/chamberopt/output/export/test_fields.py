@@ -114,11 +114,11 @@ def simulated(mesh: Path, **target: float) -> tuple[Path, Chamber]:
     chamber = build_chamber(design)
     folder = mesh.parent / "result"
     save_simulation(folder, design, chamber, poisson_evaluation(design, chamber, per_mm2=1.0))
-    surface = pyvista.read(folder / "coverage.vtp")
+    surface = pyvista.read(folder / "part.vtp")
     hit, lots = surface["dents"] > 0, np.random.default_rng(3)
     for name in ("mean_normal_speed", "p90_normal_speed", "mean_angle_deg", "mean_dent_um"):
         surface[name] = np.where(hit, lots.uniform(1.0, 9.0, surface.n_cells), np.nan)
-    surface.save(folder / "coverage.vtp")
+    surface.save(folder / "part.vtp")
     return folder, chamber
 
 
@@ -164,8 +164,8 @@ def pressures(text: str) -> dict[str, dict[int, float]]:
 
 
 def means_by_hand(folder: Path) -> dict[str, dict[int, float]]:
-    """Some columns of each element from coverage.vtp, one by one."""
-    surface = pyvista.read(folder / "coverage.vtp")
+    """Some columns of each element from part.vtp, one by one."""
+    surface = pyvista.read(folder / "part.vtp")
     names = ("COVERAGE", "MEAN_NORMAL_SPEED", "MEAN_DENT_UM", "DENTS")
     found: dict[str, dict[int, float]] = {name: {} for name in names}
     for number in np.unique(surface["element"]):
@@ -285,10 +285,7 @@ def test_a_part_without_element_numbers_is_written_along(
         back.vertices[back.triangles], part.vertices[part.triangles], rtol=1e-11, atol=1e-15
     )
     assert back.elements.tolist() == list(range(1, len(part.triangles) + 1))
-    text, surface = (
-        (tmp_path / f"fields.{suffix}").read_text(),
-        pyvista.read(folder / "coverage.vtp"),
-    )
+    text, surface = ((tmp_path / f"fields.{suffix}").read_text(), pyvista.read(folder / "part.vtp"))
     found = {
         int(k): v
         for k, v in (distributions if to == "abaqus" else pressures)(text)["COVERAGE"].items()
@@ -307,13 +304,13 @@ def test_where_the_target_was_meshed_anew_elements_get_what_lies_on_them(
     """
     numbers = nastran_plate(tmp_path / "plate.bdf")
     folder, _ = simulated(tmp_path / "plate.bdf", element_mm=element_mm)
-    surface = pyvista.read(folder / "coverage.vtp")
+    surface = pyvista.read(folder / "part.vtp")
     x, y = surface.cell_centers().points[:, :2].T - [[surface.bounds[0]], [surface.bounds[2]]]
     row, column = ((TOP * at / SIDES[0]).astype(int) for at in (y, x))
     treated = surface["target"] > 0
     np.testing.assert_array_equal(surface["element"][treated], numbers[TOP * row + column][treated])
     surface["coverage"] = np.where(surface["exposed_area_mm2"] > 0, x / SIDES[0], np.nan)
-    surface.save(folder / "coverage.vtp")
+    surface.save(folder / "part.vtp")
 
     remarks = write_fields(folder, tmp_path / "fields.bdf", "nastran")
 
@@ -333,7 +330,7 @@ def test_where_the_target_was_meshed_anew_elements_get_what_lies_on_them(
 def test_vtkhdf_and_vtp_hold_every_field(tmp_path: Path) -> None:
     stl_plate(tmp_path / "plate.stl")
     folder, _ = simulated(tmp_path / "plate.stl")
-    given = pyvista.read(folder / "coverage.vtp")
+    given = pyvista.read(folder / "part.vtp")
 
     for to in ("vtp", "vtkhdf"):
         assert write_fields(folder, tmp_path / f"fields.{to}", to) == []
@@ -353,7 +350,7 @@ def test_vtkhdf_and_vtp_hold_every_field(tmp_path: Path) -> None:
 def test_every_column_of_a_result_is_handed_on(tmp_path: Path) -> None:
     stl_plate(tmp_path / "plate.stl")
     folder, _ = simulated(tmp_path / "plate.stl")
-    surface = pyvista.read(folder / "coverage.vtp")
+    surface = pyvista.read(folder / "part.vtp")
     assert set(surface.cell_data) - {"element"} <= set(COLUMNS)
 
 
@@ -379,13 +376,11 @@ def test_what_cannot_be_handed_on_is_said(tmp_path: Path) -> None:
         write_fields(folder, tmp_path / "a.bdf", "nastran")
     assert write_fields(folder, tmp_path / "a.vtp", "vtp") == []
 
-    surface = pyvista.read(folder / "coverage.vtp")
+    surface = pyvista.read(folder / "part.vtp")
     surface.cell_data.remove("element")
-    surface.save(folder / "coverage.vtp")
+    surface.save(folder / "part.vtp")
     for to in ("vtp", "vtkhdf", "abaqus", "nastran"):
-        with pytest.raises(
-            InputError, match=r"coverage\.vtp: .* without element numbers; simulate again"
-        ):
+        with pytest.raises(InputError, match=r"part\.vtp: has no element, .*; simulate again"):
             write_fields(folder, tmp_path / f"b.{to}", to)
 
 

@@ -17,6 +17,7 @@ from chamberopt.output.report import report_contents, write_part_page, write_rep
 from chamberopt.output.report.number_text import with_interval
 from chamberopt.output.report.part3d import part_scene
 from chamberopt.output.results.load import load_result
+from chamberopt.output.viewer.drawn_part import DrawnPart
 from chamberopt.output.vtp_files import read_surface
 from tests.helpers.results.report_folders import simulated, studied
 
@@ -188,8 +189,8 @@ def test_markup_in_names_and_notes_stays_text(simulation: Path, tmp_path: Path) 
 
 
 def test_the_page_carries_the_columns_of_the_target(simulation: Path, tmp_path: Path) -> None:
-    surface = read_surface(simulation / "coverage.vtp")
-    target = (surface["target"] > 0) & (surface["exposed_area_mm2"] > 0)
+    part = DrawnPart(read_surface(simulation / "coverage.vtp")).target
+    own = read_surface(simulation / "part.vtp")
     carried = Page(write_report(simulation, tmp_path / "page.html")[0]).parts()
     (scene,) = carried["scenes"]
     for name, column, factor in (
@@ -197,56 +198,66 @@ def test_the_page_carries_the_columns_of_the_target(simulation: Path, tmp_path: 
         ("p90-speed", "p90_normal_speed", 1.0),
     ):
         np.testing.assert_array_equal(
-            unpacked(scene["columns"][name]), (factor * surface[column][target]).astype(np.float32)
+            unpacked(scene["columns"][name]), (factor * part[column]).astype(np.float32)
         )
-    np.testing.assert_array_equal(unpacked(scene["number"], "<i4"), np.flatnonzero(target))
-    part = next(trace for trace in scene["figure"] if trace["name"] == "part")
-    corners = np.stack([unpacked(part[axis]["bdata"]) for axis in "xyz"], axis=1)
-    faces = np.stack(
-        [np.frombuffer(base64.b64decode(part[k]["bdata"]), part[k]["dtype"]) for k in "ijk"], axis=1
+    # Each point has the number of a triangle that it belongs to, and that triangle's own figures.
+    triangle = unpacked(scene["number"], "<i4")[unpacked(scene["triangle"], "<i4")]
+    corners = np.asarray(part.regular_faces)
+    belongs = np.zeros(part.n_points, dtype=bool)
+    for k in range(3):
+        belongs[corners[:, k]] |= triangle[corners[:, k]] == part["triangle"]
+    assert belongs.all()
+    number = unpacked(scene["number"], "<i4")
+    np.testing.assert_array_equal(unpacked(scene["impacts"], "<i4"), own["impacts"][number])
+    np.testing.assert_array_equal(unpacked(scene["element"], "<i4"), own["element"][number])
+    np.testing.assert_allclose(
+        unpacked(scene["own"]["coverage"]), 100.0 * own["coverage"][number], rtol=1e-6
     )
-    expected = np.asarray(surface.points)[surface.regular_faces[target]]
-    np.testing.assert_allclose(corners[faces], expected, atol=1e-4)
+    few, many = (
+        next(trace for trace in scene["figure"] if trace["name"] == name)
+        for name in ("few", "part")
+    )
+    places = np.stack([unpacked(many[axis]["bdata"]) for axis in "xyz"], axis=1)
+    np.testing.assert_allclose(places, part.points, atol=1e-4)
+    assert "x" not in few or not len(few["x"])
     density = unpacked(scene["columns"]["density"])
     np.testing.assert_allclose(
         -100.0 * np.expm1(-density), unpacked(scene["columns"]["coverage"]), rtol=1e-4
     )
-    assert {one["name"] for one in carried["quantities"]} == set(scene["columns"]) - {
-        "density",
-        "shown-density",
-    }
+    assert {one["name"] for one in carried["quantities"]} == set(scene["columns"]) - {"density"}
     assert set(carried["scales"]) == {"viridis", "cividis", "magma"}
 
 
-def test_an_older_result_without_single_hits_shows_what_it_has(
-    tmp_path: Path, no_pictures: None
-) -> None:
-    folder, _ = simulated(tmp_path / "older", hits=False)
-    data = json.loads((folder / "result.json").read_text())
-    for later in ("coverage_against_time", "stopped_by", "analytic"):
-        del data[later]
-    for later in ("time_to_98_s", "intensity_uniformity"):
-        del data["metrics"][later]
-    (folder / "result.json").write_text(json.dumps(data))
-    page = Page(write_report(folder)[0])
-    assert "older result does not say" in page.text
-    assert [one["name"] for one in page.parts()["quantities"]] == [
-        "coverage",
-        "impacts",
-        "speed",
-        "angle",
-    ]
+def test_words_stand_where_there_is_no_number(simulation: Path, tmp_path: Path) -> None:
+    def spoil(data: dict) -> None:
+        words = {"half_width": None, "in_words": "more than 2,300 s"}
+        data["metrics"]["time_to_98_s"] |= words
+        data["metrics"]["intensity_uniformity"] |= words | {"in_words": "not resolved"}
+
+    folder = changed(simulation, tmp_path / "words", spoil)
+    text = Page(write_report(folder)[0]).text
+    assert "covered to 98 % after more than 2,300 s." in text
+    assert "not resolved" in text
+    for words, told in (("never", "would never be covered"), ("not resolved", "too few dents")):
+        folder = changed(
+            simulation,
+            tmp_path / words,
+            lambda data, words=words: data["metrics"]["time_to_98_s"].update(in_words=words),
+        )
+        assert told in report_contents(folder)["answer"]
 
 
-def test_marked_dents_have_no_coverage_at_other_times(simulation: Path, tmp_path: Path) -> None:
-    folder = tmp_path / "marked"
-    shutil.copytree(simulation, folder)
-    surface = read_surface(folder / "coverage.vtp")
-    surface.field_data["coverage_model"] = ["dents"]
-    surface.save(folder / "coverage.vtp")
-    page = Page(write_report(folder)[0])
-    assert not {"density", "shown-density"} & set(page.parts()["scenes"][0]["columns"])
-    assert "marked every dent" in page.text
+def test_the_windows_and_what_they_take_are_told(simulation: Path, tmp_path: Path) -> None:
+    text = Page(write_report(simulation, tmp_path / "page.html")[0]).text
+    field = load_result(simulation).data["field"]
+    assert "in a window of 1 mm² round each point of the target" in text
+    assert f"{field['dents_in_median_window']:.3g}" in text
+    assert "In windows of 4 mm², twice as wide" in text
+    wide = field["double_gauge"]["mean_coverage"]
+    assert (
+        with_interval(100 * wide["value"], 100 * wide["half_width"]).replace(" ± ", "\u00a0±\u00a0")
+        in text
+    )
 
 
 def test_pilot_estimates_of_each_effect_are_shown(simulation: Path, tmp_path: Path) -> None:
@@ -268,10 +279,10 @@ def test_pilot_estimates_of_each_effect_are_shown(simulation: Path, tmp_path: Pa
 
 def test_a_part_too_large_for_a_page_is_reduced_with_a_remark(simulation: Path) -> None:
     result, surface = load_result(simulation), read_surface(simulation / "coverage.vtp")
-    target = int(((surface["target"] > 0) & (surface["exposed_area_mm2"] > 0)).sum())
+    target = int((surface["target"] > 0).sum())
     less = part_scene(result, "", max_triangles=target)
     assert any("only its target is drawn" in remark for remark in less.remarks)
-    assert next(trace for trace in less.data["figure"] if trace["name"] == "rest")["i"] == []
+    assert not next(trace for trace in less.data["figure"] if trace["name"] == "rest").get("i")
     none = part_scene(result, "", max_triangles=target - 1)
     assert none.data is None
     assert any("chamberopt inspect shows it" in remark for remark in none.remarks)
