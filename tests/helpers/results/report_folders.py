@@ -5,7 +5,6 @@ from pathlib import Path
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import SerialExecutor
-from chamberopt.coverage.part_impacts import HITS_FILE
 from chamberopt.optimize.study import Study
 from chamberopt.output.save_run import save_simulation, save_study
 from tests.helpers.studies import run_in_folder
@@ -14,13 +13,11 @@ from tests.helpers.synthetic import plate_design, poisson_evaluation
 DESIGN = plate_design()
 
 
-def simulated(folder: Path, per_mm2: float = 60.0, hits: bool = True) -> tuple[Path, Chamber]:
-    """A simulation's folder; hits False: as older versions left it."""
+def simulated(folder: Path, per_mm2: float = 60.0) -> tuple[Path, Chamber]:
+    """A simulation's folder."""
     chamber = build_chamber(DESIGN)
     evaluation = poisson_evaluation(DESIGN, chamber, per_mm2)
     save_simulation(folder, DESIGN, chamber, evaluation)
-    if not hits:
-        (folder / HITS_FILE).unlink()
     return folder, chamber
 
 
@@ -29,7 +26,6 @@ def studied(folder: Path, evaluations: int = 12) -> Path:
 
     More shot makes more dents. Far sonotrodes cannot be simulated, near ones miss a constraint.
     """
-    chamber = build_chamber(DESIGN)
     question = Study(
         design=DESIGN,
         vary={"shot.mass_g": (1.5, 8.0), "chamber.sonotrode_distance_mm": (8.0, 19.0)},
@@ -41,7 +37,7 @@ def studied(folder: Path, evaluations: int = 12) -> Path:
         if design.chamber.sonotrode_distance_mm > 17:
             raise InputError("<b>not</b> this one")
         return poisson_evaluation(
-            design, chamber, 80.0 * design.shot.mass_g, replicas or 4, seed=len(stream)
+            design, build_chamber(design), 80.0 * design.shot.mass_g, replicas or 4, len(stream)
         )
 
     save_study(folder, run_in_folder(question, folder, SerialExecutor(), simulator=simulator))
