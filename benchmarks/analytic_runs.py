@@ -10,10 +10,10 @@ from chamberopt.chamber.analytic import analytic_cavity, impacts_on_chamber
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.scene import build_scene, chamber_mesh, replica_seed
 from chamberopt.common.estimate import Estimate, estimate
-from chamberopt.coverage.coverage_from_impacts import Tally, tally_impacts
 from chamberopt.coverage.dents import impact_angle_deg
+from chamberopt.coverage.part_impacts import Hits, hits_on_part
 from chamberopt.design.load import Design
-from chamberopt.simulation.evaluate import estimate_metrics
+from chamberopt.simulation.evaluate import SeenDents, estimate_metrics, prepare_target
 from sim_core import AnalyticCavity, ImpactLog, TriangleMesh, simulate
 
 MEASURED, PEENED = 0.39, 50.0  # the paper's experiment: coverage, and after how long [s]
@@ -77,12 +77,12 @@ def values(log: ImpactLog) -> dict[str, np.ndarray]:
 
 def replica(
     design: Design, chamber: Chamber, surface: TriangleMesh | AnalyticCavity, seed: int
-) -> tuple[Tally, ImpactLog]:
+) -> tuple[Hits, ImpactLog]:
     """What the plate got in one replica, and its impacts."""
     log = simulate(build_scene(design, surface, seed)).impacts
     if isinstance(surface, AnalyticCavity):
         log = impacts_on_chamber(log, chamber)
-    return tally_impacts(log, chamber, design), log
+    return hits_on_part(log, chamber, design), log
 
 
 def run(
@@ -97,7 +97,7 @@ def run(
     chamber = build_chamber(design)
     surface = analytic_cavity(design, chamber) if analytic else chamber_mesh(chamber)
 
-    def one(number: int) -> tuple[Tally, list[np.ndarray]]:
+    def one(number: int) -> tuple[Hits, list[np.ndarray]]:
         got, log = replica(
             design, chamber, surface, replica_seed(design.process.seed, number, stream)
         )
@@ -107,8 +107,10 @@ def run(
             for name, bins in edges.items()
         ]
 
-    tallies, counts = zip(*executor.map(one, range(effort.replicas)), strict=True)
-    found = estimate_metrics(tallies, chamber, design)
+    hits, counts = zip(*executor.map(one, range(effort.replicas)), strict=True)
+    seen = SeenDents(prepare_target(design, chamber, chamber_mesh(chamber)), [], [])
+    seen.add(hits)
+    found = estimate_metrics(seen, hits, chamber, design).metrics
     shares = {name: np.array([one[k] for one in counts]) for k, name in enumerate(edges)}
     return Run(surface.volume, {name: found[name] for name in FIGURES}, shares)
 

@@ -70,7 +70,7 @@ def evaluation(accuracy: float) -> dict[str, Any]:
         "objective": round(done.objective.value, 4),
         "half_width": round(done.objective.half_width, 4),
         "stopped_by": done.stopped_by,
-        "replicas": len(done.replicas),
+        "replicas": done.replicas,
         "collisions": done.collisions["total"],
         "wall_s": round(wall, 2),
         "cpu_s": round(cpu, 2),
@@ -94,13 +94,13 @@ def replica_shares(design: Any, chamber: Any) -> dict[str, float]:
         design,
     ]
     # Builds the search tree, once for all replicas.
-    simulate_replica(ReplicaSetting(lengths[0], chamber, mesh, None), 0)
+    simulate_replica(ReplicaSetting(lengths[0], chamber, mesh), 0)
     spent = [0.0] * len(lengths)
     for number in range(TIMED):
         for i, cut in enumerate(lengths):
             begin = time.process_time()
             simulate_replica(
-                ReplicaSetting(cut, chamber, mesh, None), replica_seed(cut.process.seed, number)
+                ReplicaSetting(cut, chamber, mesh), replica_seed(cut.process.seed, number)
             )
             spent[i] += time.process_time() - begin
     fixed, warm, whole = spent

@@ -189,7 +189,7 @@ def sizes(study: Study) -> dict[str, int]:
 
     design = study.at_search_accuracy(study.design)
     chamber = build_chamber(design)
-    setting = ReplicaSetting(design, chamber, chamber_mesh(chamber), None)
+    setting = ReplicaSetting(design, chamber, chamber_mesh(chamber))
     row = evaluate_point(study, *candidates(study, 1)[0])
     with local_executor(1, "processes") as executor:
         parcel = share(executor, setting)

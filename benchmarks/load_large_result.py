@@ -53,37 +53,47 @@ def written(folder: Path, size: str, impacts: int) -> tuple[int, int]:
 
 def evaluation(design: Any, chamber: Any, impacts: int) -> Any:
     """So many impacts, anywhere on what is exposed, in replicas."""
-    from chamberopt.coverage.coverage_from_impacts import Tally
+    from chamberopt.chamber.scene import chamber_mesh
     from chamberopt.coverage.metrics import OBJECTIVES
     from chamberopt.coverage.part_impacts import Hits
-    from chamberopt.simulation.evaluate import estimate_metrics, weighted_sum
+    from chamberopt.simulation.evaluate import (
+        SeenDents,
+        estimate_metrics,
+        prepare_target,
+        weighted_sum,
+    )
     from chamberopt.simulation.evaluation import Evaluation
 
-    rng = np.random.default_rng(1)
+    rng, part = np.random.default_rng(1), chamber.part
     share = chamber.exposed_area / chamber.exposed_area.sum()
-    tallies, hits = [], []
+    hits = []
     for _ in range(REPLICAS):
         count = rng.poisson(impacts / REPLICAS * share)
         triangle = np.repeat(np.arange(len(count), dtype=np.int32), count)
         rng.shuffle(triangle)
+        parts = rng.dirichlet(np.ones(3), len(triangle))
+        place = np.einsum("ki,kij->kj", parts, part.vertices[part.triangles[triangle]])
         speed = rng.gamma(3.0, 1.0, len(triangle)).astype(np.float32)
         angle = rng.uniform(20.0, 90.0, len(triangle)).astype(np.float32)
         dent = np.float32(4e-5) * np.sqrt(speed)
-        hits.append(Hits(triangle, speed, angle, dent, np.float32(7e-6) * speed * speed))
-        sums = [
-            np.bincount(triangle, one, len(count))
-            for one in (np.pi / 4.0 * dent.astype(float) ** 2, speed, angle)
-        ]
-        tallies.append(
-            Tally(
-                design.process.recorded_time, count, count, *sums, triangle, np.pi / 4.0 * dent**2
-            )
-        )
-    metrics = estimate_metrics(tallies, chamber, design)
-    goal = weighted_sum(OBJECTIVES["uniform_coverage"], metrics)
-    total = sum(tallies[1:], tallies[0])
+        energy = np.float32(7e-6) * speed * speed
+        hits.append(Hits(triangle, place.astype(np.float32), speed, angle, dent, energy))
+    seen = SeenDents(prepare_target(design, chamber, chamber_mesh(chamber)), [], [])
+    seen.add(hits)
+    found = estimate_metrics(seen, hits, chamber, design)
     return Evaluation(
-        "uniform_coverage", goal, metrics, total, tuple(tallies), {}, {}, hits=tuple(hits)
+        objective_name="uniform_coverage",
+        objective=weighted_sum(OBJECTIVES["uniform_coverage"], found.metrics),
+        metrics=found.metrics,
+        metrics_of_wide=found.metrics_of_wide,
+        resolution=found.resolution,
+        reachable=seen.field.reachable,
+        crease_share=seen.crease_share,
+        replicas=REPLICAS,
+        simulated_time=REPLICAS * design.process.recorded_time,
+        hits=tuple(hits),
+        timings={},
+        collisions={},
     )
 
 

@@ -328,6 +328,19 @@ class TestWrongDesigns:
         key = former.split()[0]
         assert f"process.accuracy.{key}: is now called '{name}'; rename it" in said
 
+    @pytest.mark.parametrize("former", ['coverage_model = "dents"', "sample_mm = 0.2"])
+    def test_a_removed_key(self, design_file: Path, former: str) -> None:
+        said = edited(design_file, ("[process]", f"[process.accuracy]\n{former}\n[process]"))
+        text = "coverage is measured in windows of process.accuracy.gauge_mm2; leave it out"
+        assert f"process.accuracy.{former.split()[0]}: {text}" in said
+
+    @pytest.mark.parametrize("given", ["0", "-1", "1e5"])
+    def test_a_gauge_out_of_its_bounds(self, design_file: Path, given: str) -> None:
+        table = f"[process.accuracy]\ngauge_mm2 = {given}\n[process]"
+        said = edited(design_file, ("[process]", table))
+        assert "process.accuracy.gauge_mm2: given" in said
+        assert "from 0.0001 to 10000 mm²" in said
+
     def test_true_is_not_a_number(self, design_file: Path) -> None:
         assert "height_mm: given true; allowed: a number" in edited(
             design_file, ("_mm = 40", "_mm = true")

@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,12 +23,7 @@ from chamberopt.optimize.storage.study_folder import StudyFolder, open_study_fol
 from chamberopt.optimize.study import Objective, Study
 from chamberopt.output.results.load import load_result
 from chamberopt.simulation.effect_pilot import Advice
-from chamberopt.simulation.evaluation import (
-    Evaluation,
-    MarkedCoverage,
-    load_evaluation,
-    save_evaluation,
-)
+from chamberopt.simulation.evaluation import Evaluation, load_evaluation, save_evaluation
 from tests.helpers.results.resumable_study import GEAR, calls, history, logged, run, study
 from tests.helpers.synthetic import DESIGNS, plate_design, poisson_evaluation
 
@@ -188,15 +184,10 @@ class TestEvaluationFile:
     @pytest.fixture
     def evaluation(self) -> Evaluation:
         design = plate_design()
-        plain = poisson_evaluation(design, build_chamber(design))
-        curve = ((0.5, plain.metrics["mean_coverage"]), (1.0, plain.objective))
-        return Evaluation(
-            **{
-                **vars(plain),
-                "notes": ("µ ± 1", "x"),
-                "marked": MarkedCoverage(np.array([0.5, np.nan]), np.array([0.1, np.nan]), curve),
-            }
-        )
+        plain = poisson_evaluation(design, build_chamber(design), per_mm2=10.0)
+        never = plain.metrics["time_to_98_s"].not_known("never")
+        metrics = {**plain.metrics, "time_to_98_s": never}
+        return replace(plain, notes=("µ ± 1", "x"), metrics=metrics)
 
     def test_reads_back_the_same(self, evaluation: Evaluation, tmp_path: Path) -> None:
         save_evaluation(tmp_path / "one.npz", evaluation)

@@ -40,7 +40,8 @@ def test_a_weighted_sum_is_of_objectives_and_metrics(tmp_path: Path) -> None:
     [
         ({"replicas": 1}, r"search_accuracy.*replicas"),
         ({"replica": 3}, r"search_accuracy.*replica"),
-        ({"coverage_model": "dint"}, r"search_accuracy.*coverage_model"),
+        ({"coverage_model": "dents"}, r"search_accuracy.*coverage_model.*gauge_mm2"),
+        ({"gauge_mm2": 4.0}, r"search_accuracy\.gauge_mm2: .*same for all candidates"),
         ({"facets": 2}, r"search_accuracy.*facets"),
     ],
 )

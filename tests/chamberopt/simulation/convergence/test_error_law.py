@@ -1,5 +1,7 @@
 """Errors of batches and the power law through them, on noise whose truth is known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -68,7 +70,13 @@ def test_law_is_found_exactly_and_its_interval_contains_the_truth() -> None:
     assert ErrorLaw(1.0, 0.2, 0.3).halving[2] == np.inf  # an interval that includes "never"
 
 
-def test_batches_with_merged_triangles_are_left_out_of_the_law() -> None:
+def test_batches_with_too_few_dents_are_left_out_of_the_law() -> None:
     first, *others = batch_sizes(np.random.default_rng(3).normal(size=256))
-    merged = BatchSize(4, first.batches, 30.0, 30.0, 4.0, are_merged=True)
-    assert fit_error_law([merged, *others]) == fit_error_law(others)
+    poor = BatchSize(4, first.batches, 30.0, 30.0, 4.0, is_resolved=False)
+    assert fit_error_law([poor, *others]) == fit_error_law(others)
+    # With fewer than two that are resolved, all count.
+    only = [poor, BatchSize(8, 8, 15.0, 15.0, 8.0, is_resolved=False), others[-1]]
+    resolved = [
+        BatchSize(one.replicas, one.batches, one.rms, one.half_width, one.cpu_s) for one in only
+    ]
+    assert fit_error_law(only) == fit_error_law(resolved)

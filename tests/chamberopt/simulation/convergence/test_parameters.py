@@ -2,7 +2,9 @@
 
 from chamberopt.simulation.convergence.parameters import (
     DRAG_STEP,
+    GAUGE,
     MOTION,
+    POINTS,
     TIME,
     numerical_parameters,
     study_designs,
@@ -29,3 +31,15 @@ def test_drag_adds_its_step() -> None:
     effects = own.effects.model_copy(update={"drag": True})
     with_drag = numerical_parameters(own.model_copy(update={"effects": effects}))
     assert with_drag[DRAG_STEP] == (40.0, 10.0, 2.5)
+
+
+def test_gauge_and_points_are_tried_wider_and_in_other_numbers() -> None:
+    found = numerical_parameters(plate_design())
+    assert found[GAUGE] == (4.0, 1.0)
+    assert found[POINTS] == (5_000, 20_000, 80_000)
+    most = plate_design(process__accuracy__points=1_000_000, process__accuracy__gauge_mm2=1e4)
+    at_limits = numerical_parameters(most)
+    assert at_limits[GAUGE] == (1e4, 1e4)
+    assert at_limits[POINTS] == (250_000, 1_000_000)
+    few = plate_design(process__accuracy__points=1_000)
+    assert numerical_parameters(few)[POINTS] == (1_000, 4_000)

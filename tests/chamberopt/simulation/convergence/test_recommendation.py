@@ -12,7 +12,7 @@ from chamberopt.simulation.convergence.error_law import BatchSize, ErrorLaw
 from chamberopt.simulation.convergence.parameters import (
     ELASTIC_SPEED,
     FACETS,
-    MODEL,
+    GAUGE,
     MOTION,
     TIME,
     WARM_UP,
@@ -46,9 +46,10 @@ def run(
     )
 
 
-def study_of(*runs: Run, models: tuple[Run, ...] = ()) -> ConvergenceStudy:
+def study_of(*runs: Run) -> ConvergenceStudy:
     """A replica costs 0.05 s + 0.1 s for each of 1.5 s recorded and 0.8 s of warm-up."""
-    settings = {FACETS: 256, MOTION: "sinusoidal", WARM_UP: 0.8, ELASTIC_SPEED: 1.0, TIME: 1.5}
+    settings = {FACETS: 256, MOTION: "sinusoidal", WARM_UP: 0.8, ELASTIC_SPEED: 1.0}
+    settings |= {GAUGE: 1.0, TIME: 1.5}
     times = [run(TIME, 0.375, 0.1675), run(TIME, 6, 0.73), run(WARM_UP, 0.2, 0.22, 0.0, 0.03)]
     sizes = tuple(
         BatchSize(k, 400 // k, 0.02 / k**0.5, student_quantile(k - 1) * 0.02 / k**0.5, 0.28 * k)
@@ -61,8 +62,6 @@ def study_of(*runs: Run, models: tuple[Run, ...] = ()) -> ConvergenceStudy:
         runs=(*times, *runs),
         sizes=sizes,
         law=ErrorLaw(1.96 * 0.02 * 0.28**0.5, 0.5, 0.05),
-        models=models,
-        model_time=20.0,
         cpu_s=300.0,
         wall_s=150,
     )
@@ -109,20 +108,14 @@ def test_an_accuracy_out_of_reach_is_reported() -> None:
     assert all(line.startswith("#") for line in advice.lines)
 
 
-def test_dent_rates_that_differ_from_marked_dents_cause_a_remark() -> None:
-    models = tuple(
-        run(MODEL, name, 2.0, mean_bias=bias)
-        for name, bias in (
-            ("avrami", 0.011),
-            ("dents, sample_mm 0.2", 0.0005),
-            ("dents, sample_mm 0.1", 0.0),
-        )
-    )
-    study = study_of(models=models)
-    assert not any("dent rates differ" in text for text in recommend(study, 0.05).remarks)
-    [remark] = [text for text in recommend(study, 0.01).remarks if "dent rates differ" in text]
-    assert "+0.0110" in remark
-    assert 'coverage_model = "dents", sample_mm = 0.2' in remark
+def test_the_gauge_is_what_is_measured_and_not_how_well() -> None:
+    """A wider one is cheaper and without a bias, and still not recommended."""
+    study = study_of(run(GAUGE, 4.0, 0.1))
+    for accuracy in (0.05, 0.01):
+        found = recommend(study, accuracy)
+        assert found.settings[GAUGE] == 1.0
+        assert "gauge_mm2 = 1" in found.lines
+        assert not any(GAUGE in text for text in found.remarks)
 
 
 def test_the_cost_of_halving_the_error_is_compared_with_independent_replicas() -> None:

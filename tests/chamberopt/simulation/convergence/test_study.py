@@ -10,35 +10,44 @@ import numpy as np
 import pytest
 
 from chamberopt.cli import main
-from chamberopt.design.load import load_design
+from chamberopt.coverage.coverage_from_impacts import Footprints
+from chamberopt.coverage.field.target_field import TargetField
+from chamberopt.design.load import load_design, save_design
 from chamberopt.simulation.convergence.parameters import (
     ELASTIC_SPEED,
     FACETS,
-    MODEL,
+    GAUGE,
     MOTION,
+    POINTS,
     TIME,
     WARM_UP,
 )
 from chamberopt.simulation.convergence.study import TimedReplica
 from chamberopt.simulation.replicas import ReplicaSetting
-from tests.helpers.synthetic import DESIGNS, equal_dents
+from tests.helpers.synthetic import plate_design
+
+DENT = 2e-7  # m²
 
 
-def made_up_replica(setting: ReplicaSetting, number: int) -> TimedReplica:
-    """Random dents, a quarter more per second on later triangles; fewer facets give fewer."""
-    design, chamber, _, samples = setting
+def footprints_of(
+    field: TargetField, rng: np.random.Generator, seconds: float, rate: float
+) -> Footprints:
+    """Dents in windows on their own, a quarter more per second in later ones."""
+    gauge = field.gauge
+    slant = np.linspace(0.8, 1.2, len(gauge.area))
+    point = np.repeat(np.arange(len(slant)), rng.poisson(rate * seconds * slant))
+    weight = DENT / gauge.area[point]
+    return Footprints(point, weight, DENT * len(point), 0.0, DENT**2 * len(point))
+
+
+def made_up_replica(setting: ReplicaSetting, target: TargetField, number: int) -> TimedReplica:
+    """Random dents; fewer facets give fewer."""
+    design = setting.design
     seconds = design.process.recorded_time
     rng = np.random.default_rng([number, round(1e6 * seconds)])
-    slant = np.linspace(0.8, 1.2, len(chamber.exposed_area)) * (
-        0.9 if design.chamber.facets == 16 else 1.0
-    )
-    dents = rng.poisson(2e6 * seconds * chamber.exposed_area * slant)
-    tally = equal_dents(seconds, dents, 2e-7)
+    rate = 2.0 * (0.9 if design.chamber.facets == 16 else 1.0)
     cpu = 0.002 + 0.01 * (seconds + design.process.accuracy.warmup_time)
-    if samples is None:
-        return TimedReplica(tally, None, cpu)
-    share = -np.expm1(-tally.dented_area / np.maximum(chamber.exposed_area, 1e-12))
-    return TimedReplica(tally, share, 2.0 * cpu)
+    return TimedReplica(footprints_of(target, rng, seconds, rate), cpu)
 
 
 @pytest.fixture
@@ -48,8 +57,9 @@ def no_simulator(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def accuracy(folder: Path, budget: str, *options: str) -> int:
-    design = str(DESIGNS / "plate.toml")
-    return main(["accuracy", design, "--out", str(folder), f"--budget-s={budget}", *options])
+    design = folder.with_name("design.toml")
+    save_design(plate_design(process__accuracy__points=2_000), design)
+    return main(["accuracy", str(design), "--out", str(folder), f"--budget-s={budget}", *options])
 
 
 @pytest.mark.usefixtures("no_simulator")
@@ -77,7 +87,8 @@ def test_command_leaves_table_picture_and_lines_to_paste(
         WARM_UP,
         ELASTIC_SPEED,
         TIME,
-        MODEL,
+        GAUGE,
+        POINTS,
         "reference",
         "replicas",
     }
@@ -96,7 +107,7 @@ def test_command_prints_its_findings(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert accuracy(tmp_path / "out", "0.01") == 0
     out = capsys.readouterr().out
     for words in (
-        "reference: 33 replicas",
+        "reference: 42 replicas",
         "compared with the finest",
         "halving the error costs",
         "CPU s a replica",
@@ -109,10 +120,8 @@ def test_command_prints_its_findings(tmp_path: Path, capsys: pytest.CaptureFixtu
 def test_without_dents_there_is_no_error_to_measure(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: Any
 ) -> None:
-    def no_dents(setting: ReplicaSetting, number: int) -> TimedReplica:
-        triangles = len(setting.chamber.exposed_area)
-        share = None if setting.samples is None else np.zeros(triangles)
-        return TimedReplica(equal_dents(1.0, np.zeros(triangles, int), 1e-7), share, 0.01)
+    def no_dents(setting: ReplicaSetting, target: TargetField, number: int) -> TimedReplica:
+        return TimedReplica(footprints_of(target, np.random.default_rng(1), 1.0, 0.0), 0.01)
 
     monkeypatch.setattr("chamberopt.simulation.convergence.study.simulate_timed", no_dents)
     assert accuracy(tmp_path / "out", "0.01") == 2
