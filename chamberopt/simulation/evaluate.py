@@ -270,7 +270,10 @@ def as_resolved(name: str, value: Estimate, resolution: Resolution) -> Estimate:
     metric = METRICS[name]
     enough = resolution.has_places if metric.of_places else resolution.has_mean
     is_exact = metric.of_places and value.half_width == 0.0  # follows from places out of reach
-    if metric.of_impacts is not None or enough or is_exact or value.in_words == "never":
+    has_interval = math.isfinite(value.half_width) or value.in_words != ""
+    if metric.of_impacts is not None or is_exact or value.in_words == "never":
+        return value
+    if enough and has_interval:
         return value
     return value.not_known(NOT_RESOLVED)
 

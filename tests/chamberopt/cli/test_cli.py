@@ -92,7 +92,7 @@ WRONG = [
         "fraction of a replica", ("replicas = 8", "replicas = 8.5"), ("given 8.5", "a whole number")
     ),
     Wrong("two replicas", ("replicas = 8", "replicas = 2"), ("given 2", "confidence interval")),
-    Wrong("not a number", ("simulated_time_s = 1.5", "simulated_time_s = nan"), ("given nan",)),
+    Wrong("not a number", ("simulated_time_s = 4.5", "simulated_time_s = nan"), ("given nan",)),
     Wrong("unknown material", ('"steel"', '"steal"'), ("given 'steal'", "did you mean 'steel'")),
     Wrong("two densities", ('"steel"', '"steel"\ndensity_kg_m3 = 7800'), ("keep one of the two",)),
     Wrong(

@@ -2,6 +2,7 @@
 
 import math
 from concurrent.futures import Executor
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -21,10 +22,11 @@ from chamberopt.design.design import validate
 from chamberopt.design.load import Design
 from chamberopt.simulation import effect_pilot
 from chamberopt.simulation.effect_pilot import MEASURED, Advice, advise, with_effects_resolved
-from tests.helpers.synthetic import plate_design
+from tests.helpers.synthetic import dents_at, plate_design
 
 PLATE = plate_design()
 CHAMBER = build_chamber(PLATE)
+DENTS = 10  # on each triangle of the target, in made-up runs
 
 
 def with_effects(effects: Any) -> Design:
@@ -84,18 +86,15 @@ def pretend(strength: dict[str, float], monkeypatch: pytest.MonkeyPatch) -> list
             "drag": design.effects.drag,
         }
         factor = math.prod(1.0 + strength.get(name, 0.0) * there for name, there in on.items())
-        target = exposed_target(chamber)
-        count = target * 1000
-        tallies = [
-            SimpleNamespace(
-                impacts=count,
-                speed_sum=count * 3.0 * factor * (1.0 + 1e-4 * k),
-                dented_area=chamber.exposed_area * 0.01 * factor,
-                simulated_time=1.0,
-            )
-            for k in range(effect_pilot.REPLICAS)
-        ]
-        return SimpleNamespace(replicas=tallies, total=SimpleNamespace(impacts=count))
+        triangle = np.repeat(np.flatnonzero(exposed_target(chamber)), DENTS)
+        # A hundredth of each triangle is dented in a second.
+        area = 0.01 * factor * design.process.recorded_time * chamber.exposed_area[triangle] / DENTS
+        place = chamber.part.vertices[chamber.part.triangles[triangle, 0]]
+        hits = dents_at(design, triangle, place, np.sqrt(4.0 / np.pi * area))
+        speeds = [3.0 * factor * (1.0 + 1e-4 * k) for k in range(effect_pilot.REPLICAS)]
+        return SimpleNamespace(
+            hits=[replace(hits, speed=np.full(len(hits), speed)) for speed in speeds]
+        )
 
     monkeypatch.setattr(effect_pilot, "evaluate", evaluate)
     return asked

@@ -208,6 +208,16 @@ def test_a_figure_that_is_not_resolved_does_not_reach_the_wanted_accuracy() -> N
     assert (found.stopped_by, found.replicas) == ("max_replicas", 12)
 
 
+def test_a_figure_without_an_interval_is_not_resolved() -> None:
+    """The spread of intensity takes four replicas, of which a design may have three."""
+    found = evaluation_of(DESIGN, PLANE, poisson_replicas(np.random.default_rng(8), 3, 60.0))
+    assert found.resolution.has_places
+    assert found.metrics["intensity_uniformity"].in_words == "not resolved"
+    for name in ("mean_coverage", "std_coverage", "p05_coverage"):
+        assert np.isfinite(found.metrics[name].half_width)
+        assert found.metrics[name].in_words == ""
+
+
 def test_an_accuracy_that_cannot_be_is_refused() -> None:
     with pytest.raises(InputError, match=r"process\.accuracy\.max_replicas.*below replicas"):
         accurate(0.01, 5)
