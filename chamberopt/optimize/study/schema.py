@@ -187,9 +187,7 @@ class Study(FileTable):
             text = "given two objectives, which only auto, sobol and surrogate can search"
             yield Problem("objective.pareto", text)
         if "gauge_mm2" in self.search_accuracy:
-            text = (
-                "it is the same for all candidates; set process.accuracy.gauge_mm2 instead"
-            )
+            text = "it is the same for all candidates; set process.accuracy.gauge_mm2 instead"
             yield Problem("search_accuracy.gauge_mm2", text)
         try:
             self.at_search_accuracy(self.design)

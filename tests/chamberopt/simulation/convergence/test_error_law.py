@@ -1,6 +1,5 @@
 """Errors of batches and the power law through them, on noise whose truth is known."""
 
-
 import numpy as np
 import pytest
 
