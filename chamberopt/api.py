@@ -7,8 +7,8 @@
     result.metrics["mean_coverage"]            # Estimate(value=..., half_width=...), 95 % interval
     chamberopt.show(result, "more-shot.png")
 
-The coverage of each triangle is in the result's coverage.vtp, as cell data on the part's own
-triangles; pyvista and ParaView read it.
+Coverage is in the result's coverage.vtp, a mesh that suits it, and in part.vtp as means over the
+part's own triangles; pyvista and ParaView read both.
 """
 
 from __future__ import annotations

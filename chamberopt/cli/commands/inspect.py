@@ -1,4 +1,4 @@
-"""The command `inspect`: results in 3D, triangle by triangle."""
+"""The command `inspect`: results in 3D, coloured by any quantity."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def inspect(
     json: Json = False,
     out: Out = None,
 ) -> None:
-    """Show results in 3D: each part in its chamber, coloured triangle by triangle.
+    """Show results in 3D: each part in its chamber, coloured by one quantity.
 
     Options set the initial view; key h in the window lists its keys. With --out, an image is
     written to that folder.
@@ -36,11 +36,11 @@ def inspect(
     results
         One or more results folders; several are shown in linked views on one colour scale.
     quantity
-        coverage, impacts, speed, p90-speed, angle, dent, energy or interval.
+        coverage, impacts, speed, p90-speed, angle, dent, energy, interval or strength.
     time_s
         Show coverage, impacts and energy after this time instead of the treatment time.
     below
-        Show only triangles covered less than this percentage; the others are pale.
+        Show only what is covered less than this percentage; the rest is pale.
     clip
         Cut the chamber open across an axis: X, Y or Z, and where in mm: Z=12.
     cut_part
@@ -48,7 +48,7 @@ def inspect(
     chamber
         Draw the chamber.
     triangle
-        Show the numbers and impact speeds of this triangle (its row in coverage.vtp, from 0).
+        Show the numbers and impact speeds of this triangle (its row in part.vtp, from 0).
     screenshot
         Write an image to this file instead of opening a window.
     off_screen
