@@ -4,7 +4,7 @@
 
 For each case a pool of replicas is simulated once. Groups of eight are drawn from it at random, 200
 a row, and their figures are compared with those of the whole pool, which is many times as large.
-Rows are for groups with all, a half, a quarter ... of the time of each replica. A row gives the
+Rows are for groups with all and with half of the time of each replica. A row gives the
 share of the intervals that held, the bias, the ratio of the median half-width to 1.96 standard
 deviations of the figure, and in how many groups the figure was resolved. Rows are printed also for
 figures that were not: their intervals are those that the program does not show.
@@ -32,7 +32,7 @@ from chamberopt.simulation.replicas import simulate_seed
 
 ROOT = Path(__file__).parents[1]
 GROUPS, GROUP = 200, 8
-PARTS = (1.0, 0.5, 0.25)  # of each replica's time
+PARTS = (1.0, 0.5)  # of each replica's time
 
 
 class Case(NamedTuple):
