@@ -70,6 +70,8 @@ def _draw_differences(
     write_differences(folder / DIFFERENCE, comparison.results[0].folder / COVERAGE, columns)
     titles = []
     for label, one in zip(later, local, strict=True):
-        shares = f"more on {one.more:.0%}, less on {one.less:.0%} of the target".replace("%", " %")
+        over = f"; averaged over {one.radius:.1f} mm" if one.radius else ""
+        shares = f"more on {one.more:.0%}, less on {one.less:.0%} of the target{over}"
+        shares = shares.replace("%", " %")
         titles.append(f"{label} minus {first}\n{shares}")
     return draw_difference(folder / DIFFERENCE, titles, folder / "difference.png")

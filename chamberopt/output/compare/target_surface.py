@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,6 +29,8 @@ class TargetSurface:
         coverage: 0 to 1, 0 out of reach, shape (v,).
         interval: width of its 95 % interval, 0 out of reach, shape (v,).
         resolved: whether the dents there are enough to tell; so they are out of reach, shape (v,).
+        window_radius: of the windows [mm].
+        dents: simulated, in the median window.
         hits: single impacts on the target.
     """
 
@@ -39,6 +42,8 @@ class TargetSurface:
     coverage: np.ndarray
     interval: np.ndarray
     resolved: np.ndarray
+    window_radius: float
+    dents: float
     hits: Hits
 
     def at(self, other: TargetSurface) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -94,5 +99,7 @@ def read_target_surface(result: Result) -> TargetSurface:
         coverage=np.where(reached, field["coverage"][used], 0.0).astype(float),
         interval=np.where(reached, field["coverage_interval"][used], 0.0).astype(float),
         resolved=~reached | (np.asarray(field["resolved"])[used] > 0.5),
+        window_radius=math.sqrt(result.design.process.accuracy.gauge_mm2 / math.pi),
+        dents=float(result.data["field"]["dents_in_median_window"]),
         hits=hits.on(target & (np.asarray(part["exposed_area_mm2"]) > 0.0)),
     )

@@ -74,8 +74,8 @@ def test_failed_infeasible_and_confirmed_candidates_are_marked() -> None:
         "evaluation 1: 900.0 ± 1.0\nshot.mass_g = 2.5",
         "evaluation 3: 400.0 ± 1.0\nshot.mass_g = 7.5",
         "evaluation 4: 100.0 ± 1.0\nshot.mass_g = 10",
-        "evaluation 5: 600 ± 1\nshot.mass_g = 12.5",
-        "evaluation 6: 410 ± 1\nshot.mass_g = 15",
+        "evaluation 5: 600.0 ± 1.0\nshot.mass_g = 12.5",
+        "evaluation 6: 410.0 ± 1.0\nshot.mass_g = 15",
     ]
 
 
