@@ -29,6 +29,7 @@ MIN_EDGE, MAX_EDGE = 0.5, 4.0  # diameters of the gauge
 # where its ends differ by more than STEP.
 BEND, STEP = 0.02, 0.05
 MAX_TRIANGLES = 400_000  # a part that has more itself keeps its own
+
 Values = Callable[[Places], np.ndarray]
 """Coverage at some places, (p,); NaN where there is none."""
 
