@@ -250,12 +250,12 @@ def _p05(sums: DentSums, weight: float, reachable: float, time_ratio: float) -> 
     whole = coverage_of(slice(None))
     if batches == 1:
         return estimate([whole], 0.0, 1.0)
-    rng = np.random.default_rng(0)
-    by_halves = np.mean(
-        [coverage_of(rng.permutation(batches)[: batches // 2]) for _ in range(SPLITS)]
-    )
-    # With half the dents, the error that is left is about twice as large.
-    value = min(max(2.0 * whole - float(by_halves), 0.0), 1.0)
+    rng, value = np.random.default_rng(0), whole
+    if (half := max(batches // 2, 2)) < batches:  # a single batch does not show its variance
+        of_halves = [coverage_of(rng.permutation(batches)[:half]) for _ in range(SPLITS)]
+        # The error that is left goes with one over the number of dents.
+        step = (whole - float(np.mean(of_halves))) / (batches / half - 1.0)
+        value = min(max(whole + step, 0.0), 1.0)
     without = [coverage_of(rest) for rest in ~np.eye(batches, dtype=bool)]
     deviations = jackknife(np.array([whole, *without])) - whole
     of_some = -np.expm1(
