@@ -43,6 +43,7 @@ import numpy as np
 
 from chamberopt.common.estimate import Estimate, estimate
 from chamberopt.coverage.coverage_from_impacts import Batch
+from chamberopt.coverage.field.surface_points import sampling_error, sparse_points
 from chamberopt.coverage.field.target_field import Gauge
 from chamberopt.coverage.metrics import FULL_COVERAGE, NEVER, P05
 
@@ -50,7 +51,6 @@ from chamberopt.coverage.metrics import FULL_COVERAGE, NEVER, P05
 # but LEAST_RESOLVED of them, and dents in the median window for the figures of single places.
 DENTS_FOR_MEAN, DENTS_FOR_PLACES = 3.0, 25.0
 LEAST_RESOLVED = 0.05
-SPARSE = 10
 SPLITS = 6  # of the replicas into halves
 NOT_ONE = 3.0  # expected dents of which with a probability of 5 % there is not one
 NOT_RESOLVED = "not resolved"
@@ -143,7 +143,11 @@ def find_resolution(
 
 
 def coverage_estimates(
-    batches: Sequence[Batch], points: int, reachable: float, time_ratio: float
+    batches: Sequence[Batch],
+    points: int,
+    reachable: float,
+    time_ratio: float,
+    reachable_error: float = 0.0,
 ) -> dict[str, Estimate]:
     """Estimate mean_coverage, std_coverage and p05_coverage by Avrami's equation.
 
@@ -151,6 +155,7 @@ def coverage_estimates(
         points: number of windows.
         reachable: share of the target that a ball can touch.
         time_ratio: treatment time over the simulated time of one replica.
+        reachable_error: standard error of `reachable`, by the choice of points.
     """
     replicas = sum(one.replicas for one in batches)
 
@@ -164,23 +169,25 @@ def coverage_estimates(
     mean, variance = mean_and_variance(np.vstack([of_all.mean(axis=0), of_rest]), reachable)
     of_some = np.array([some.mean(axis=0) for some in sparse_points(of_all)])
     means, variances = mean_and_variance(of_some, reachable)
-    of_mean = estimate(jackknife(mean), 0.0, 1.0, sampling=sampling_error(means))
-    of_variance = estimate(jackknife(variance), 0.0, 0.25, sampling=sampling_error(variances))
+    # Both move with the reachable share too: by their differences from one standard error more.
+    mean_more, variance_more = mean_and_variance(of_all.mean(axis=0), reachable + reachable_error)
+    of_mean, of_variance = (
+        estimate(
+            jackknife(values),
+            0.0,
+            highest,
+            sampling=math.hypot(sampling_error(some), float(more - values[0])),
+        )
+        for values, highest, some, more in (
+            (mean, 1.0, means, mean_more),
+            (variance, 0.25, variances, variance_more),
+        )
+    )
     return {
         "mean_coverage": of_mean,
         "std_coverage": root_of_variance(of_variance),
         "p05_coverage": _p05(sums, _weight_of_dents(batches), reachable, time_ratio),
     }
-
-
-def sparse_points(values: np.ndarray) -> list[np.ndarray]:
-    """Every tenth of the points (p, ...), ten times; each time they are as even over the target."""
-    return [values[start::SPARSE] for start in range(SPARSE)]
-
-
-def sampling_error(of_some: np.ndarray) -> float:
-    """Standard error by the choice of points, from figures of `sparse_points`."""
-    return float(np.std(of_some, ddof=1)) / math.sqrt(len(of_some))
 
 
 def products_without_each(products: np.ndarray) -> np.ndarray:

@@ -17,7 +17,7 @@ from chamberopt.common.errors import InputError
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
-    from chamberopt.coverage.part_impacts import ImpactSums
+    from chamberopt.coverage.part_impacts import TargetImpacts
     from chamberopt.design.load import Design
 
 FULL_COVERAGE = 0.98  # SAE J2277: coverage that counts as complete
@@ -38,7 +38,7 @@ class Metric:
     lowest: float = -math.inf
     highest: float = math.inf
     # Function of the impacts on the target, and of the design; None for those with estimators.
-    of_impacts: Callable[[ImpactSums, Design], float] | None = None
+    of_impacts: Callable[[TargetImpacts, Design], float] | None = None
     required: bool = False  # whether a results folder without it is damaged
     of_places: bool = False  # whether it tells of single places, which takes more dents
 
@@ -66,15 +66,15 @@ def require_target(chamber: Chamber) -> None:
         )
 
 
-def _mean_normal_speed(sums: ImpactSums, design: Design) -> float:
-    return sums.speed / sums.impacts if sums.impacts else 0.0
+def _mean_normal_speed(impacts: TargetImpacts, design: Design) -> float:
+    return impacts.total("speed") / impacts.count if impacts.count else 0.0
 
 
-def _impacts_per_mm2_s(sums: ImpactSums, design: Design) -> float:
-    return sums.impacts / (1e6 * sums.area * sums.time)
+def _impacts_per_mm2_s(impacts: TargetImpacts, design: Design) -> float:
+    return impacts.count / (1e6 * impacts.area * impacts.time)
 
 
-def _shot_count(sums: ImpactSums, design: Design) -> float:
+def _shot_count(impacts: TargetImpacts, design: Design) -> float:
     return float(design.shot.count)
 
 

@@ -6,7 +6,7 @@ An impact takes 32 bytes here, against a hundred in the simulator's log.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -41,36 +41,26 @@ class Hits:
     def __len__(self) -> int:
         return len(self.triangle)
 
+    def on(self, triangles: np.ndarray) -> Hits:
+        """The impacts on all part triangles that are marked in (m,) bool."""
+        return _rows(self, triangles[self.triangle])
+
 
 @dataclass(frozen=True)
-class ImpactSums:
-    """Sums over the impacts on the exposed target."""
+class TargetImpacts:
+    """The impacts of some replicas on the exposed target."""
 
-    impacts: int
-    speed: float  # sum of normal speeds [m/s]
+    hits: tuple[Hits, ...]  # of each replica
     time: float  # in which they fell [s]
-    area: float  # of the target [m²]
+    area: float  # of the exposed target [m²]
 
-    def __add__(self, other: ImpactSums) -> ImpactSums:
-        return replace(
-            self,
-            impacts=self.impacts + other.impacts,
-            speed=self.speed + other.speed,
-            time=self.time + other.time,
-        )
+    @property
+    def count(self) -> int:
+        return sum(len(one) for one in self.hits)
 
-
-def sum_impacts(hits: Sequence[Hits], exposed: np.ndarray, area: float, time: float) -> ImpactSums:
-    """Add up the impacts of some replicas on a target.
-
-    Args:
-        exposed: marks its triangles in the cavity, (m,).
-        area: of these [m²].
-        time: simulated by each replica [s].
-    """
-    speeds = [one.speed[exposed[one.triangle]].astype(float) for one in hits]
-    speed = float(sum(one.sum() for one in speeds))
-    return ImpactSums(sum(len(one) for one in speeds), speed, time * len(hits), area)
+    def total(self, column: str) -> float:
+        """Sum of a column of Hits."""
+        return float(sum(getattr(one, column).sum(dtype=float) for one in self.hits))
 
 
 @dataclass(frozen=True)

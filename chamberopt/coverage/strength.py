@@ -27,12 +27,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.common.estimate import Estimate, estimate
-from chamberopt.coverage.coverage_intervals import (
-    jackknife,
-    root_of_variance,
-    sampling_error,
-    sparse_points,
-)
+from chamberopt.coverage.coverage_intervals import jackknife, root_of_variance
+from chamberopt.coverage.field.surface_points import sampling_error, sparse_points
 
 if TYPE_CHECKING:
     from chamberopt.coverage.field.target_field import TargetField
@@ -43,7 +39,7 @@ LEVELS = 32  # of s; twice as many change S by less than 0.3 %
 WINDOWS = 2_000  # of the target's; S varies little from one to the next
 SATURATED = 1.1  # SAE J443
 NEWTON_STEPS = 3  # S moves by a quarter of what the saturation time is wrong by
-HALVINGS = 10  # to 1 % of the time, and S to 0.3 %
+HALVINGS = 12
 MIN_BATCHES = 4  # for two quarters
 SPLITS = 3  # into halves, and into quarters
 
@@ -99,7 +95,7 @@ def saturated_strength(histogram: np.ndarray, highest: float) -> tuple[np.ndarra
         middle = np.sqrt(low * high)
         grows = _gain(rate, middle)[0] > 0.0
         low, high = np.where(grows, middle, low), np.where(grows, high, middle)
-    return _strength(rate, high, highest), high
+    return _strength(rate, low, highest), low
 
 
 def strength_near(histogram: np.ndarray, highest: float, time: np.ndarray) -> np.ndarray:

@@ -18,8 +18,6 @@ import time
 from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from functools import reduce
-from operator import add
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -58,7 +56,7 @@ from chamberopt.coverage.metrics import (
     parse_objective,
     require_target,
 )
-from chamberopt.coverage.part_impacts import Hits, ImpactSums, sum_impacts
+from chamberopt.coverage.part_impacts import Hits, TargetImpacts
 from chamberopt.coverage.strength import intensity_uniformity
 from chamberopt.simulation.evaluation import Evaluation
 from chamberopt.simulation.replicas import (
@@ -260,7 +258,9 @@ def _of_windows(
     process = design.process
     time_ratio = process.treatment_time / process.recorded_time
     batches = [Batch(len(part), joined(part)) for part in in_batches(prints)]
-    found = coverage_estimates(batches, len(gauge.area), field.reachable, time_ratio)
+    found = coverage_estimates(
+        batches, len(gauge.area), field.reachable, time_ratio, field.reachable_error
+    )
     found["time_to_98_s"] = time_to_98_estimate(found["p05_coverage"], process.treatment_time)
     return found, find_resolution(batches, gauge, time_ratio, process.recorded_time)
 
@@ -283,17 +283,22 @@ def _ratios(
 ) -> dict[str, Estimate]:
     """Estimates of the metrics that are ratios of sums over impacts."""
     exposed, count = exposed_target(chamber), len(batches)
-    area = float(chamber.exposed_area[exposed].sum())
-    sums = [sum_impacts(hits, exposed, area, design.process.recorded_time) for hits in batches]
-    total: ImpactSums = reduce(add, sums)
+    area, time = float(chamber.exposed_area[exposed].sum()), design.process.recorded_time
+    on_target = [tuple(hits.on(exposed) for hits in batch) for batch in batches]
+
+    def impacts(some: Sequence[tuple[Hits, ...]]) -> TargetImpacts:
+        hits = tuple(one for batch in some for one in batch)
+        return TargetImpacts(hits, time * len(hits), area)
+
+    whole = impacts(on_target)
+    rests = [impacts(on_target[:j] + on_target[j + 1 :]) for j in range(count)] if count > 1 else []
     estimates = {}
     for name, metric in METRICS.items():
         if metric.of_impacts is None:
             continue
-        plain = metric.of_impacts(total, design)
-        rests = [reduce(add, sums[:j] + sums[j + 1 :]) for j in range(count)] if count > 1 else []
+        plain = metric.of_impacts(whole, design)
         without = np.array([metric.of_impacts(rest, design) for rest in rests])
-        pseudovalues = count * plain - (count - 1) * without if count > 1 else np.array([plain])
+        pseudovalues = count * plain - (count - 1) * without if rests else np.array([plain])
         estimates[name] = estimate(pseudovalues, metric.lowest, metric.highest)
     return estimates
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
 PLASTIC_NUMBER = 1.32471795724474602596  # real root of x³ = x + 1
 # Share of its radius that a ball may reach into a surface, as in chamber/reach.
 OVERLAP = 0.01
+SPARSE = 10
 ON_SURFACE = 1e-3  # share of its radius within which a place is on the surface
 
 
@@ -114,3 +116,13 @@ def ball_fits(
     rows = rows[np.linalg.norm(found.point[rows] - place[rows], axis=1) > ON_SURFACE * radius]
     fits[rows] = closest_points(mesh, place[rows], ON_SURFACE * radius).triangle >= 0
     return fits
+
+
+def sparse_points(values: np.ndarray) -> list[np.ndarray]:
+    """Every tenth of the points (p, ...), ten times; each time they are as even over the target."""
+    return [values[start::SPARSE] for start in range(SPARSE)]
+
+
+def sampling_error(of_some: np.ndarray) -> float:
+    """Standard error by the choice of points, from figures of `sparse_points`."""
+    return float(np.std(of_some, ddof=1)) / math.sqrt(len(of_some))

@@ -25,7 +25,12 @@ from chamberopt.coverage.field.crease_bands import (
     find_band,
 )
 from chamberopt.coverage.field.smooth_faces import Creases, find_faces
-from chamberopt.coverage.field.surface_points import ball_fits, spread_points
+from chamberopt.coverage.field.surface_points import (
+    ball_fits,
+    sampling_error,
+    sparse_points,
+    spread_points,
+)
 from chamberopt.geometry.triangles import unit_normals
 
 if TYPE_CHECKING:
@@ -81,6 +86,7 @@ class TargetField:
     touched: Places  # points that a ball can touch, spread evenly over the target
     touched_area: np.ndarray  # that each of them stands for [m²]
     reachable: float  # share of the target's area that a ball can touch
+    reachable_error: float  # its standard error, by the choice of points
 
     @property
     def radius(self) -> float:
@@ -144,7 +150,7 @@ def find_target_field(chamber: Chamber, mesh: TriangleMesh, setting: WindowSetti
     face, creases = find_faces(part.vertices, part.triangles, part.target)
     radius = float(np.sqrt(gauge / np.pi))
     count = int(max(setting.points, wanted))
-    touched = _touched(chamber, mesh, area, count, face, setting.ball)
+    touched, fits = _touched(chamber, mesh, area, count, face, setting.ball)
     return TargetField(
         setting=setting,
         face=face,
@@ -156,7 +162,8 @@ def find_target_field(chamber: Chamber, mesh: TriangleMesh, setting: WindowSetti
         has_windows=part.target | (creases.at_corner >= 0).any(axis=1),
         touched=touched,
         touched_area=np.full(len(touched.place), area.sum() / count),
-        reachable=len(touched.place) / count,
+        reachable=float(fits.mean()),
+        reachable_error=sampling_error(np.array([some.mean() for some in sparse_points(fits)])),
     )
 
 
@@ -169,7 +176,7 @@ def with_whole_part(field: TargetField, chamber: Chamber, mesh: TriangleMesh) ->
         return field
     wanted = POINTS_PER_WINDOW * area.sum() / field.setting.gauge
     count = int(np.clip(wanted, 1, MAX_POINTS_OFF_TARGET))
-    rest = _touched(chamber, mesh, area, count, field.face, field.setting.ball)
+    rest, _ = _touched(chamber, mesh, area, count, field.face, field.setting.ball)
     return replace(
         field,
         has_windows=np.ones(len(area), dtype=bool),
@@ -187,10 +194,10 @@ def _touched(
     count: int,
     face: np.ndarray,
     ball: float,
-) -> Places:
-    """Of points spread over the part by area (m,), those that a ball can touch."""
+) -> tuple[Places, np.ndarray]:
+    """Of points spread over the part by area (m,), those that a ball can touch; and which."""
     from chamberopt.coverage.field.windows import Places
 
     spread = spread_points(chamber.part.vertices, chamber.part.triangles, area, count)
     fits = ball_fits(mesh, spread.place, spread.normal, 0.5 * ball)
-    return Places(spread.place[fits], spread.normal[fits], face[spread.triangle[fits]])
+    return Places(spread.place[fits], spread.normal[fits], face[spread.triangle[fits]]), fits

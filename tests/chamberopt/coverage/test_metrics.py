@@ -14,7 +14,7 @@ from chamberopt.coverage.metrics import (
     parse_objective,
     require_target,
 )
-from chamberopt.coverage.part_impacts import ImpactSums
+from chamberopt.coverage.part_impacts import Hits, TargetImpacts
 from chamberopt.design.design import validate
 from chamberopt.optimize import study
 from tests.helpers.synthetic import evaluation_of, no_hits, plane_chamber, plate_design
@@ -24,7 +24,9 @@ DESIGN = plate_design(process__treatment_time_s=50)
 
 def test_by_hand() -> None:
     """8 impacts of 3 m/s in all on 4 mm² in 0.5 s."""
-    sums = ImpactSums(impacts=8, speed=24.0, time=0.5, area=4e-6)
+    other = np.ones(8, dtype=np.float32)
+    hits = Hits(np.zeros(8, dtype=np.int32), np.zeros((8, 3)), 3.0 * other, other, other, other)
+    sums = TargetImpacts((hits,), time=0.5, area=4e-6)
     found = {
         name: metric.of_impacts(sums, DESIGN)
         for name, metric in METRICS.items()
@@ -36,7 +38,7 @@ def test_by_hand() -> None:
 
 
 def test_without_impacts_there_is_no_speed() -> None:
-    nothing = ImpactSums(0, 0.0, 1.0, 1e-6)
+    nothing = TargetImpacts((no_hits(),), 1.0, 1e-6)
     speed, rate = (METRICS[n].of_impacts for n in ("mean_normal_speed_m_s", "impacts_per_mm2_s"))
     assert speed is not None
     assert rate is not None

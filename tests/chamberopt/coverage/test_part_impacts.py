@@ -9,13 +9,12 @@ from chamberopt.common.errors import InputError
 from chamberopt.coverage.dents import dent_diameter
 from chamberopt.coverage.part_impacts import (
     Hits,
-    ImpactSums,
+    TargetImpacts,
     hits_on_part,
     load_hits,
     load_matching_hits,
     save_hits,
     sort_hits_by_triangle,
-    sum_impacts,
 )
 from tests.helpers.synthetic import impact_log, no_hits, plane_chamber, plate_design
 
@@ -76,15 +75,19 @@ def test_sums_are_over_the_exposed_target() -> None:
     rng = np.random.default_rng(2)
     hits = [hits_of(rng, np.array([3, 2, 4])), hits_of(rng, np.array([1, 5, 0]))]
     exposed = np.array([True, False, True])
-    found = sum_impacts(hits, exposed, area=2e-6, time=1.5)
-    speed = sum(float(one.speed[one.triangle != 1].sum(dtype=float)) for one in hits)
-    assert (found.impacts, found.time, found.area) == (8, 3.0, 2e-6)
-    assert found.speed == pytest.approx(speed)
-    parts = [sum_impacts([one], exposed, 2e-6, 1.5) for one in hits]
-    both = parts[0] + parts[1]
-    assert (both.impacts, both.time, both.area) == (8, 3.0, 2e-6)
-    assert both.speed == pytest.approx(found.speed)
-    assert sum_impacts([no_hits()], exposed, 2e-6, 1.5) == ImpactSums(0, 0.0, 1.5, 2e-6)
+    found = TargetImpacts(tuple(one.on(exposed) for one in hits), time=3.0, area=2e-6)
+    assert found.count == 8
+    assert not any((one.triangle == 1).any() for one in found.hits)
+    for column in ("speed", "angle", "dent", "energy"):
+        expected = sum(
+            float(getattr(one, column)[one.triangle != 1].sum(dtype=float)) for one in hits
+        )
+        assert found.total(column) == pytest.approx(expected)
+    parts = [TargetImpacts((one,), 1.5, 2e-6) for one in found.hits]
+    assert sum(part.count for part in parts) == found.count
+    assert sum(part.total("speed") for part in parts) == pytest.approx(found.total("speed"))
+    nothing = TargetImpacts((no_hits(),), 1.5, 2e-6)
+    assert (nothing.count, nothing.total("speed")) == (0, 0.0)
 
 
 def test_hits_come_back_from_their_file_by_triangle(tmp_path: Path) -> None:

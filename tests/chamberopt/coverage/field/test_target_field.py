@@ -49,7 +49,7 @@ def test_windows_have_points_enough_to_measure_their_areas(gauge_mm2: float) -> 
     field = field_of(plane_chamber(), gauge_mm2=gauge_mm2, points=1000)
     assert len(field.touched.place) == max(1000, int(POINTS_PER_WINDOW * 225.0 / gauge_mm2))
     assert len(field.gauge.area) == 1000
-    assert len(field.wide.area) == 250
+    assert len(field.wide.area) == 125
 
 
 def test_a_gauge_too_small_for_the_target_is_refused_with_the_least_that_is_possible() -> None:
