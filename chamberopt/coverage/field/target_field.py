@@ -25,25 +25,19 @@ from chamberopt.coverage.field.crease_bands import (
     find_band,
 )
 from chamberopt.coverage.field.smooth_faces import Creases, find_faces
-from chamberopt.coverage.field.surface_points import (
-    ball_fits,
-    sampling_error,
-    sparse_points,
-    spread_points,
-)
+from chamberopt.coverage.field.surface_points import ball_fits, spread_points
 from chamberopt.geometry.triangles import unit_normals
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
+    from chamberopt.coverage.field.window_areas import SurfacePieces
     from chamberopt.coverage.field.windows import Places, Windows
     from chamberopt.coverage.part_impacts import Hits
     from sim_core import TriangleMesh
 
 OF_WIDE = 0.125  # of the number of windows, for those of twice the radius, which overlap more
-# By points, on average, the area of a window is measured. With 12 the mean comes out 0.01 too high.
-POINTS_PER_WINDOW = 36
-MAX_POINTS = 8_000_000
-MAX_POINTS_OFF_TARGET = 400_000  # which are for pictures alone
+PIECES_PER_WINDOW = 12  # of the surface, about
+MAX_PIECES, MAX_PIECES_OFF_TARGET = 3e6, 4e5  # those off the target are for pictures alone
 
 
 class WindowSetting(NamedTuple):
@@ -84,9 +78,8 @@ class TargetField:
     pieces: CreasePieces
     has_windows: np.ndarray  # marks the part triangles whose dents can be in a window, (m,)
     touched: Places  # points that a ball can touch, spread evenly over the target
-    touched_area: np.ndarray  # that each of them stands for [m²]
+    surface: SurfacePieces  # of the target, or of the whole part
     reachable: float  # share of the target's area that a ball can touch
-    reachable_error: float  # its standard error, by the choice of points
 
     @property
     def radius(self) -> float:
@@ -107,10 +100,11 @@ class TargetField:
 
     def gauge_round(self, points: Places, radius: float) -> Gauge:
         """Windows of a radius [m] round points of the part."""
+        from chamberopt.coverage.field.window_areas import window_areas
         from chamberopt.coverage.field.windows import Windows
 
         windows = Windows(points, radius)
-        area = windows.sums(self.touched, self.touched_area)
+        area = window_areas(windows, self.surface)
         area[area == 0.0] = np.inf  # nothing can be touched there, so nothing covers it
         band = find_band(windows, self.creases, self.pieces, 0.5 * self.setting.largest_dent)
         return Gauge(windows, area, band)
@@ -138,66 +132,64 @@ def find_target_field(chamber: Chamber, mesh: TriangleMesh, setting: WindowSetti
     Raises:
         InputError: the windows are too small for so large a target.
     """
+    from chamberopt.coverage.field.window_areas import surface_pieces
+
     part, gauge = chamber.part, setting.gauge
     area = np.where(part.target, part.area, 0.0)
-    wanted = POINTS_PER_WINDOW * area.sum() / gauge
-    if wanted > MAX_POINTS:
-        least = 1e6 * gauge * wanted / MAX_POINTS
+    wanted = PIECES_PER_WINDOW * area.sum() / gauge
+    if wanted > MAX_PIECES:
+        least = 1e6 * gauge * wanted / MAX_PIECES
         raise InputError(
             f"process.accuracy.gauge_mm2: given {1e6 * gauge:g}, too small for a target of "
             f"{1e6 * area.sum():.4g} mm²; give at least {least:.2g}"
         )
     face, creases = find_faces(part.vertices, part.triangles, part.target)
-    radius = float(np.sqrt(gauge / np.pi))
-    count = int(max(setting.points, wanted))
-    touched, fits = _touched(chamber, mesh, area, count, face, setting.ball)
+    radius, corners = float(np.sqrt(gauge / np.pi)), part.vertices[part.triangles]
+    ball = 0.5 * setting.ball
+    surface = surface_pieces(corners[part.target], face[part.target], mesh, ball, radius)
     return TargetField(
         setting=setting,
         face=face,
         on_target=part.target,
-        corners=part.vertices[part.triangles],
-        normals=unit_normals(part.vertices[part.triangles]),
+        corners=corners,
+        normals=unit_normals(corners),
         creases=creases,
-        pieces=crease_pieces(creases, mesh, 0.5 * setting.ball, radius),
+        pieces=crease_pieces(creases, mesh, ball, radius),
         has_windows=part.target | (creases.at_corner >= 0).any(axis=1),
-        touched=touched,
-        touched_area=np.full(len(touched.place), area.sum() / count),
-        reachable=float(fits.mean()),
-        reachable_error=sampling_error(np.array([some.mean() for some in sparse_points(fits)])),
+        touched=_touched(chamber, mesh, area, face, setting),
+        surface=surface,
+        reachable=surface.reachable,
     )
 
 
 def with_whole_part(field: TargetField, chamber: Chamber, mesh: TriangleMesh) -> TargetField:
-    """The same field with points on the rest of the exposed part too, for pictures."""
-    from chamberopt.coverage.field.windows import Places
+    """The same field with the rest of the exposed part too, for pictures."""
+    from chamberopt.coverage.field.window_areas import joined_pieces, surface_pieces
 
-    area = np.where(chamber.part.target, 0.0, chamber.exposed_area)
-    if not area.any():
+    rest = ~chamber.part.target & (chamber.exposed_area > 0.0)
+    if not rest.any():
         return field
-    wanted = POINTS_PER_WINDOW * area.sum() / field.setting.gauge
-    count = int(np.clip(wanted, 1, MAX_POINTS_OFF_TARGET))
-    rest, _ = _touched(chamber, mesh, area, count, field.face, field.setting.ball)
+    # Of a large part, pieces off the target are larger than windows at their border would be.
+    area, gauge = float(chamber.part.area[rest].sum()), field.setting.gauge
+    coarser = max(1.0, np.sqrt(PIECES_PER_WINDOW * area / gauge / MAX_PIECES_OFF_TARGET))
+    pieces = surface_pieces(
+        field.corners[rest], field.face[rest], mesh, 0.5 * field.setting.ball,
+        coarser * field.radius,
+    )  # fmt: skip
     return replace(
         field,
-        has_windows=np.ones(len(area), dtype=bool),
-        touched=Places(*map(np.concatenate, zip(field.touched, rest, strict=True))),
-        touched_area=np.concatenate(
-            [field.touched_area, np.full(len(rest.place), area.sum() / count)]
-        ),
+        has_windows=np.ones(len(rest), dtype=bool),
+        surface=joined_pieces(field.surface, pieces),
     )
 
 
 def _touched(
-    chamber: Chamber,
-    mesh: TriangleMesh,
-    area: np.ndarray,
-    count: int,
-    face: np.ndarray,
-    ball: float,
-) -> tuple[Places, np.ndarray]:
-    """Of points spread over the part by area (m,), those that a ball can touch; and which."""
+    chamber: Chamber, mesh: TriangleMesh, area: np.ndarray, face: np.ndarray, setting: WindowSetting
+) -> Places:
+    """Of points spread over the part by area (m,), those that a ball can touch."""
     from chamberopt.coverage.field.windows import Places
 
-    spread = spread_points(chamber.part.vertices, chamber.part.triangles, area, count)
-    fits = ball_fits(mesh, spread.place, spread.normal, 0.5 * ball)
-    return Places(spread.place[fits], spread.normal[fits], face[spread.triangle[fits]]), fits
+    part = chamber.part
+    spread = spread_points(part.vertices, part.triangles, area, setting.points)
+    fits = ball_fits(mesh, spread.place, spread.normal, 0.5 * setting.ball)
+    return Places(spread.place[fits], spread.normal[fits], face[spread.triangle[fits]])

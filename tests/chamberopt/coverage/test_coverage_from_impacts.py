@@ -50,7 +50,8 @@ def field_of(
 
 def area_of_point(field: TargetField, gauge: Gauge) -> float:
     """What each window's middle stands for [m²]."""
-    return float(field.touched_area.sum()) / len(gauge.area)
+    surface = field.surface
+    return float((surface.area * surface.touched).sum()) / len(gauge.area)
 
 
 def booked_area(field: TargetField, gauge: Gauge, hits: Hits) -> float:

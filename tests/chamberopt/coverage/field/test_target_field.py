@@ -8,7 +8,7 @@ from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.errors import InputError
 from chamberopt.coverage.field import target_field
 from chamberopt.coverage.field.target_field import (
-    POINTS_PER_WINDOW,
+    PIECES_PER_WINDOW,
     TargetField,
     WindowSetting,
     find_target_field,
@@ -34,20 +34,22 @@ def test_an_open_plane_is_all_in_reach_and_its_windows_have_the_gauges_area() ->
     chamber = plane_chamber()
     field = field_of(chamber)
     assert field.reachable == 1.0
-    assert field.touched_area.sum() == pytest.approx(225e-6)
+    assert field.surface.area.sum() == pytest.approx(225e-6)
     for gauge, radius in ((field.gauge, field.radius), (field.wide, 2.0 * field.radius)):
         place = np.abs(gauge.windows.points.place[:, :2]).max(axis=1)
         inner, border = place < 7.5e-3 - radius, place > 7.5e-3 - 0.05e-3
-        assert np.median(gauge.area[inner]) == pytest.approx(np.pi * radius**2, rel=0.02)
+        assert gauge.area[inner] == pytest.approx(np.pi * radius**2, rel=1e-9)
         assert np.median(gauge.area[border]) == pytest.approx(0.5 * np.pi * radius**2, rel=0.08)
         assert gauge.band is None
     assert field.radius == pytest.approx(np.sqrt(1e-6 / np.pi))
 
 
 @pytest.mark.parametrize("gauge_mm2", [0.1, 1.0, 10.0])
-def test_windows_have_points_enough_to_measure_their_areas(gauge_mm2: float) -> None:
+def test_pieces_are_not_larger_than_a_window(gauge_mm2: float) -> None:
     field = field_of(plane_chamber(), gauge_mm2=gauge_mm2, points=1000)
-    assert len(field.touched.place) == max(1000, int(POINTS_PER_WINDOW * 225.0 / gauge_mm2))
+    sides = field.surface.corners - np.roll(field.surface.corners, 1, axis=1)
+    assert np.linalg.norm(sides, axis=2).max() <= field.radius
+    assert len(field.surface.area) < 3 * PIECES_PER_WINDOW * 225.0 / gauge_mm2
     assert len(field.gauge.area) == 1000
     assert len(field.wide.area) == 125
 
@@ -57,7 +59,7 @@ def test_a_gauge_too_small_for_the_target_is_refused_with_the_least_that_is_poss
     with pytest.raises(InputError, match=r"process\.accuracy\.gauge_mm2: given 0\.0001") as refused:
         field_of(chamber, gauge_mm2=1e-4)
     least = float(str(refused.value).rsplit(" ", 1)[-1])
-    assert least == pytest.approx(POINTS_PER_WINDOW * 225.0 / target_field.MAX_POINTS, rel=0.05)
+    assert least == pytest.approx(PIECES_PER_WINDOW * 225.0 / target_field.MAX_PIECES, rel=0.05)
     assert "225 mm²" in str(refused.value)
 
 
@@ -152,10 +154,10 @@ def test_points_of_the_rest_of_the_part_are_for_pictures_alone() -> None:
     field = field_of(chamber)
     whole = with_whole_part(field, chamber, chamber_mesh(chamber))
     rest = areas(chamber.part.vertices, chamber.part.triangles)[~chamber.part.target].sum()
-    assert whole.touched_area.sum() == pytest.approx(225e-6 + rest)
-    count = len(field.touched.place)
-    np.testing.assert_array_equal(whole.touched.place[:count], field.touched.place)
-    assert not set(whole.touched.face[count:]) & set(field.touched.face)
+    assert whole.surface.area.sum() == pytest.approx(225e-6 + rest)
+    count = len(field.surface.area)
+    np.testing.assert_array_equal(whole.surface.corners[:count], field.surface.corners)
+    assert not set(whole.surface.face[count:]) & set(field.surface.face)
     assert whole.reachable == field.reachable
     every = chamber_round(trimesh.creation.box((8e-3,) * 3))
     alone = field_of(every)

@@ -1,0 +1,211 @@
+"""Exact areas of windows on the surface, and what of them a ball can touch.
+
+The surface is divided into pieces not larger than a window, and finer where the border of what a
+ball can touch runs through them. A window meets the plane of a piece in a circle, so its share of
+the piece is the area that a circle and a triangle have in common.
+
+Notation
+    p        middle of the window [m]; n_p the unit normal there
+    n_t      unit normal of the piece, c a corner of it
+    theta    angle between the normals
+    a        height of p over the plane of the piece, (p - c).n_t [m]
+    l        radius of the window [m]
+
+By the distance along the surface of windows.py, unfolding turns p about the edge between the two
+planes into the plane of the piece: the circle has the radius l about
+
+    p - a n_t - a / (1 + cos theta) (n_p - cos theta n_t).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from chamberopt.coverage.field.surface_points import ball_fits
+from chamberopt.coverage.field.windows import Places, Windows
+from chamberopt.geometry.triangles import unit_normals
+from sim_core import jit
+
+if TYPE_CHECKING:
+    from sim_core import TriangleMesh
+
+LONGEST = 1.0  # side of a piece, in radii of a window
+FINEST = 0.5  # the same where the border of what a ball can touch runs through it
+INWARD = 0.1  # of the way to its middle: where the corners of a piece are tested
+FAR_SIDE = -0.9  # cosine of the angle beyond which a piece is the far side of something thin
+
+
+class SurfacePieces(NamedTuple):
+    """Pieces of a surface.
+
+    Attributes:
+        corners: [m], shape (c, 3, 3).
+        normal: unit vectors out of the part, shape (c, 3).
+        face: smooth face of each, shape (c,).
+        area: [m²], shape (c,).
+        touched: share of each that a ball can touch, shape (c,).
+    """
+
+    corners: np.ndarray
+    normal: np.ndarray
+    face: np.ndarray
+    area: np.ndarray
+    touched: np.ndarray
+
+    @property
+    def reachable(self) -> float:
+        """Share of the surface that a ball can touch."""
+        return float((self.area * self.touched).sum() / self.area.sum())
+
+
+def surface_pieces(
+    corners: np.ndarray, face: np.ndarray, mesh: TriangleMesh, ball_radius: float, radius: float
+) -> SurfacePieces:
+    """Divide triangles into pieces, and find what of them a ball can touch.
+
+    Args:
+        corners: of the triangles [m], shape (m, 3, 3).
+        face: smooth face of each, shape (m,).
+        mesh: of the chamber.
+        ball_radius: [m].
+        radius: of the windows [m].
+    """
+    corners, owner = _halved_until(corners, np.arange(len(corners)), LONGEST * radius)
+    shares = _touched_share(corners, mesh, ball_radius)
+    mixed = (shares > 0.0) & (shares < 1.0)
+    finer, finer_owner = _halved_until(
+        corners[mixed], owner[mixed], FINEST * min(radius, ball_radius)
+    )
+    corners = np.concatenate([corners[~mixed], finer])
+    owner = np.concatenate([owner[~mixed], finer_owner])
+    shares = np.concatenate([shares[~mixed], _touched_share(finer, mesh, ball_radius)])
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = 0.5 * np.linalg.norm(cross, axis=1)
+    return SurfacePieces(corners, unit_normals(corners), face[owner], area, shares)
+
+
+def joined_pieces(one: SurfacePieces, two: SurfacePieces) -> SurfacePieces:
+    """The pieces of both."""
+    return SurfacePieces(*(np.concatenate(both) for both in zip(one, two, strict=True)))
+
+
+def window_areas(windows: Windows, pieces: SurfacePieces) -> np.ndarray:
+    """The area [m²] of each window that a ball can touch, (p,)."""
+    middle = pieces.corners.mean(axis=1)
+    size = float(np.linalg.norm(pieces.corners - middle[:, None], axis=2).max(initial=0.0))
+    kept = pieces.touched > 0.0
+    near = Windows(windows.points, windows.radius + size)
+    area = np.zeros(len(windows.points.place))
+    columns = [np.ascontiguousarray(column[kept]) for column in pieces]
+    places = Places(middle[kept], np.zeros((int(kept.sum()), 3)), pieces.face[kept])
+    for point, piece in near.pairs(places):
+        _add_common_areas(
+            area, point, piece, windows.points, SurfacePieces(*columns), windows.radius
+        )
+    return area
+
+
+def _halved_until(
+    corners: np.ndarray, owner: np.ndarray, longest: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Halve triangles across their longest sides until no side is longer than that [m]."""
+    done, owners = [], []
+    while len(corners):
+        sides = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
+        long = sides.max(axis=1) > longest
+        done.append(corners[~long])
+        owners.append(owner[~long])
+        corners, owner, sides = corners[long], owner[long], sides[long]
+        first = sides.argmax(axis=1)
+        rows = np.arange(len(corners))
+        a, b, c = (corners[rows, (first + k) % 3] for k in range(3))
+        middle = 0.5 * (a + b)
+        corners = np.concatenate([np.stack([a, middle, c], 1), np.stack([middle, b, c], 1)])
+        owner = np.tile(owner, 2)
+    return np.concatenate([np.zeros((0, 3, 3)), *done]), np.concatenate(
+        [np.zeros(0, dtype=np.int64), *owners]
+    )
+
+
+def _touched_share(corners: np.ndarray, mesh: TriangleMesh, ball_radius: float) -> np.ndarray:
+    """Share of each triangle that a ball can touch, by its middle and three points beside it."""
+    normal, middle = unit_normals(corners), corners.mean(axis=1)
+    fits = [
+        ball_fits(mesh, place, normal, ball_radius)
+        for place in (
+            middle,
+            *(corners[:, k] + INWARD * (middle - corners[:, k]) for k in range(3)),
+        )
+    ]
+    return np.asarray(np.mean(fits, axis=0))
+
+
+@jit
+def _add_common_areas(area, point, piece, points, pieces, radius):  # type: ignore[no-untyped-def]
+    """Add to area (p,) what windows and pieces have in common, for pairs of both."""
+    for pair in range(len(point)):
+        i, t = point[pair], piece[pair]
+        p, n_p, n_t = points.place[i], points.normal[i], pieces.normal[t]
+        corner = pieces.corners[t]
+        cosine = n_p[0] * n_t[0] + n_p[1] * n_t[1] + n_p[2] * n_t[2]
+        if cosine < FAR_SIDE:
+            continue
+        a = 0.0
+        for k in range(3):
+            a += (p[k] - corner[0, k]) * n_t[k]
+        fold = a / (1.0 + cosine)
+        # Axes in the plane: along the first side, and across it.
+        ux = corner[1, 0] - corner[0, 0]
+        uy = corner[1, 1] - corner[0, 1]
+        uz = corner[1, 2] - corner[0, 2]
+        length = np.sqrt(ux * ux + uy * uy + uz * uz)
+        if length == 0.0:
+            continue
+        ux, uy, uz = ux / length, uy / length, uz / length
+        vx = n_t[1] * uz - n_t[2] * uy
+        vy = n_t[2] * ux - n_t[0] * uz
+        vz = n_t[0] * uy - n_t[1] * ux
+        cx = p[0] - a * n_t[0] - fold * (n_p[0] - cosine * n_t[0])
+        cy = p[1] - a * n_t[1] - fold * (n_p[1] - cosine * n_t[1])
+        cz = p[2] - a * n_t[2] - fold * (n_p[2] - cosine * n_t[2])
+        common = 0.0
+        for k in range(3):
+            m = (k + 1) % 3
+            ax, ay, az = corner[k, 0] - cx, corner[k, 1] - cy, corner[k, 2] - cz
+            bx, by, bz = corner[m, 0] - cx, corner[m, 1] - cy, corner[m, 2] - cz
+            common += _sector(
+                ax * ux + ay * uy + az * uz,
+                ax * vx + ay * vy + az * vz,
+                bx * ux + by * uy + bz * uz,
+                bx * vx + by * vy + bz * vz,
+                radius,
+            )
+        area[i] += pieces.touched[t] * abs(common)
+
+
+@jit
+def _sector(ax, ay, bx, by, radius):  # type: ignore[no-untyped-def]
+    """Signed area that a circle round 0 and the triangle (0, a, b) have in common."""
+    dx, dy = bx - ax, by - ay
+    square = dx * dx + dy * dy
+    if square == 0.0:
+        return 0.0
+    # |a + t d|² = radius² at t = middle - half and middle + half.
+    middle = -(ax * dx + ay * dy) / square
+    disc = middle * middle - (ax * ax + ay * ay - radius * radius) / square
+    whole = 0.5 * radius * radius
+    if disc <= 0.0:
+        return whole * np.arctan2(ax * by - ay * bx, ax * bx + ay * by)
+    half = np.sqrt(disc)
+    first, last = max(middle - half, 0.0), min(middle + half, 1.0)
+    if first >= last:
+        return whole * np.arctan2(ax * by - ay * bx, ax * bx + ay * by)
+    fx, fy, lx, ly = ax + first * dx, ay + first * dy, ax + last * dx, ay + last * dy
+    common = 0.5 * (fx * ly - fy * lx)
+    if first > 0.0:
+        common += whole * np.arctan2(ax * fy - ay * fx, ax * fx + ay * fy)
+    if last < 1.0:
+        common += whole * np.arctan2(lx * by - ly * bx, lx * bx + ly * by)
+    return common
