@@ -33,7 +33,9 @@ if TYPE_CHECKING:
 
 LONGEST = 1.0  # side of a piece, in radii of a window
 FINEST = 0.5  # the same where the border of what a ball can touch runs through it
-INWARD = 0.1  # of the way to its middle: where the corners of a piece are tested
+# Of the way from its corners to its middle: where a piece is tested for a border, and where its
+# share is measured, in the middles of its quarters.
+NEAR_CORNERS, IN_QUARTERS = 0.1, 0.5
 FAR_SIDE = -0.9  # cosine of the angle beyond which a piece is the far side of something thin
 
 
@@ -73,14 +75,14 @@ def surface_pieces(
         radius: of the windows [m].
     """
     corners, owner = _halved_until(corners, np.arange(len(corners)), LONGEST * radius)
-    shares = _touched_share(corners, mesh, ball_radius)
+    shares = _touched_share(corners, mesh, ball_radius, NEAR_CORNERS)
     mixed = (shares > 0.0) & (shares < 1.0)
     finer, finer_owner = _halved_until(
         corners[mixed], owner[mixed], FINEST * min(radius, ball_radius)
     )
     corners = np.concatenate([corners[~mixed], finer])
     owner = np.concatenate([owner[~mixed], finer_owner])
-    shares = np.concatenate([shares[~mixed], _touched_share(finer, mesh, ball_radius)])
+    shares = np.concatenate([shares[~mixed], _touched_share(finer, mesh, ball_radius, IN_QUARTERS)])
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = 0.5 * np.linalg.norm(cross, axis=1)
     return SurfacePieces(corners, unit_normals(corners), face[owner], area, shares)
@@ -129,14 +131,16 @@ def _halved_until(
     )
 
 
-def _touched_share(corners: np.ndarray, mesh: TriangleMesh, ball_radius: float) -> np.ndarray:
+def _touched_share(
+    corners: np.ndarray, mesh: TriangleMesh, ball_radius: float, inward: float
+) -> np.ndarray:
     """Share of each triangle that a ball can touch, by its middle and three points beside it."""
     normal, middle = unit_normals(corners), corners.mean(axis=1)
     fits = [
         ball_fits(mesh, place, normal, ball_radius)
         for place in (
             middle,
-            *(corners[:, k] + INWARD * (middle - corners[:, k]) for k in range(3)),
+            *(corners[:, k] + inward * (middle - corners[:, k]) for k in range(3)),
         )
     ]
     return np.asarray(np.mean(fits, axis=0))
