@@ -143,7 +143,11 @@ def find_resolution(
 
 
 def coverage_estimates(
-    batches: Sequence[Batch], points: int, reachable: float, time_ratio: float
+    batches: Sequence[Batch],
+    points: int,
+    reachable: float,
+    time_ratio: float,
+    reachable_error: float = 0.0,
 ) -> dict[str, Estimate]:
     """Estimate mean_coverage, std_coverage and p05_coverage by Avrami's equation.
 
@@ -151,6 +155,7 @@ def coverage_estimates(
         points: number of windows.
         reachable: share of the target that a ball can touch.
         time_ratio: treatment time over the simulated time of one replica.
+        reachable_error: standard error of `reachable`, by the choice of points.
     """
     replicas = sum(one.replicas for one in batches)
 
@@ -164,8 +169,20 @@ def coverage_estimates(
     mean, variance = mean_and_variance(np.vstack([of_all.mean(axis=0), of_rest]), reachable)
     of_some = np.array([some.mean(axis=0) for some in sparse_points(of_all)])
     means, variances = mean_and_variance(of_some, reachable)
-    of_mean = estimate(jackknife(mean), 0.0, 1.0, sampling=sampling_error(means))
-    of_variance = estimate(jackknife(variance), 0.0, 0.25, sampling=sampling_error(variances))
+    # Both move with the reachable share too: by their differences from one standard error more.
+    more = mean_and_variance(of_all.mean(axis=0), reachable + reachable_error)
+    of_mean, of_variance = (
+        estimate(
+            jackknife(values),
+            0.0,
+            highest,
+            sampling=math.hypot(sampling_error(some), float(moved - values[0])),
+        )
+        for values, highest, some, moved in (
+            (mean, 1.0, means, more[0]),
+            (variance, 0.25, variances, more[1]),
+        )
+    )
     return {
         "mean_coverage": of_mean,
         "std_coverage": root_of_variance(of_variance),

@@ -258,7 +258,9 @@ def _of_windows(
     process = design.process
     time_ratio = process.treatment_time / process.recorded_time
     batches = [Batch(len(part), joined(part)) for part in in_batches(prints)]
-    found = coverage_estimates(batches, len(gauge.area), field.reachable, time_ratio)
+    found = coverage_estimates(
+        batches, len(gauge.area), field.reachable, time_ratio, field.reachable_error
+    )
     found["time_to_98_s"] = time_to_98_estimate(found["p05_coverage"], process.treatment_time)
     return found, find_resolution(batches, gauge, time_ratio, process.recorded_time)
 

@@ -25,7 +25,12 @@ from chamberopt.coverage.field.crease_bands import (
     find_band,
 )
 from chamberopt.coverage.field.smooth_faces import Creases, find_faces
-from chamberopt.coverage.field.surface_points import ball_fits, spread_points
+from chamberopt.coverage.field.surface_points import (
+    ball_fits,
+    sampling_error,
+    sparse_points,
+    spread_points,
+)
 from chamberopt.geometry.triangles import unit_normals
 
 if TYPE_CHECKING:
@@ -36,6 +41,7 @@ if TYPE_CHECKING:
     from sim_core import TriangleMesh
 
 OF_WIDE = 0.125  # of the number of windows, for those of twice the radius, which overlap more
+POINTS_PER_CHOSEN = 4  # that are tested for a ball, for each that becomes the middle of a window
 PIECES_PER_WINDOW = 12  # of the surface, about
 MAX_PIECES, MAX_PIECES_OFF_TARGET = 3e6, 4e5  # those off the target are for pictures alone
 
@@ -80,6 +86,7 @@ class TargetField:
     touched: Places  # points that a ball can touch, spread evenly over the target
     surface: SurfacePieces  # of the target, or of the whole part
     reachable: float  # share of the target's area that a ball can touch
+    reachable_error: float  # its standard error, by the choice of points
 
     @property
     def radius(self) -> float:
@@ -146,6 +153,7 @@ def find_target_field(chamber: Chamber, mesh: TriangleMesh, setting: WindowSetti
     face, creases = find_faces(part.vertices, part.triangles, part.target)
     radius, corners = float(np.sqrt(gauge / np.pi)), part.vertices[part.triangles]
     ball = 0.5 * setting.ball
+    touched, fits = _touched(chamber, mesh, area, face, setting)
     surface = surface_pieces(corners[part.target], face[part.target], mesh, ball, radius)
     return TargetField(
         setting=setting,
@@ -156,9 +164,10 @@ def find_target_field(chamber: Chamber, mesh: TriangleMesh, setting: WindowSetti
         creases=creases,
         pieces=crease_pieces(creases, mesh, ball, radius),
         has_windows=part.target | (creases.at_corner >= 0).any(axis=1),
-        touched=_touched(chamber, mesh, area, face, setting),
+        touched=touched,
         surface=surface,
-        reachable=surface.reachable,
+        reachable=float(fits.mean()),
+        reachable_error=sampling_error(np.array([some.mean() for some in sparse_points(fits)])),
     )
 
 
@@ -185,11 +194,11 @@ def with_whole_part(field: TargetField, chamber: Chamber, mesh: TriangleMesh) ->
 
 def _touched(
     chamber: Chamber, mesh: TriangleMesh, area: np.ndarray, face: np.ndarray, setting: WindowSetting
-) -> Places:
-    """Of points spread over the part by area (m,), those that a ball can touch."""
+) -> tuple[Places, np.ndarray]:
+    """Of points spread over the part by area (m,), those that a ball can touch; and which."""
     from chamberopt.coverage.field.windows import Places
 
     part = chamber.part
-    spread = spread_points(part.vertices, part.triangles, area, setting.points)
+    spread = spread_points(part.vertices, part.triangles, area, POINTS_PER_CHOSEN * setting.points)
     fits = ball_fits(mesh, spread.place, spread.normal, 0.5 * setting.ball)
-    return Places(spread.place[fits], spread.normal[fits], face[spread.triangle[fits]])
+    return Places(spread.place[fits], spread.normal[fits], face[spread.triangle[fits]]), fits

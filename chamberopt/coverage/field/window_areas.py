@@ -56,11 +56,6 @@ class SurfacePieces(NamedTuple):
     area: np.ndarray
     touched: np.ndarray
 
-    @property
-    def reachable(self) -> float:
-        """Share of the surface that a ball can touch."""
-        return float((self.area * self.touched).sum() / self.area.sum())
-
 
 def surface_pieces(
     corners: np.ndarray, face: np.ndarray, mesh: TriangleMesh, ball_radius: float, radius: float
