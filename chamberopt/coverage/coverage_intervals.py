@@ -35,7 +35,7 @@ from figures of every tenth of them.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -84,36 +84,57 @@ class DentSums(NamedTuple):
     Attributes:
         replicas: in each batch, shape (g,).
         share: sums of w over the dents in each window, shape (g, p).
-        products: of 1 - scale w for some scales, shape (g, p, number of scales).
     """
 
     replicas: np.ndarray
     share: np.ndarray
-    products: np.ndarray
 
 
-def sum_dents(
-    batches: Sequence[Batch], points: int, scales: Callable[[int], Sequence[float] | np.ndarray]
-) -> DentSums:
-    """Add and multiply the dents of each batch, window by window.
+def sum_dents(batches: Sequence[Batch], points: int) -> DentSums:
+    """Add up the dents of each batch in each of so many windows."""
+    return DentSums(
+        np.array([one.replicas for one in batches]),
+        np.array(
+            [np.bincount(one.footprints.point, one.footprints.weight, points) for one in batches]
+        ),
+    )
+
+
+class Products(NamedTuple):
+    """Products over the dents in each window of 1 - k w, for K time ratios.
+
+    Attributes:
+        of_all: of all batches, shape (p, K).
+        of_rest: means over the windows of all batches but each, shape (g, K).
+    """
+
+    of_all: np.ndarray
+    of_rest: np.ndarray
+
+
+def multiply_dents(batches: Sequence[Batch], points: int, ratios: Sequence[float]) -> Products:
+    """Multiply over the dents of all batches, and of all but each.
 
     Args:
         points: number of windows.
-        scales: scales of w for a batch of that many replicas.
+        ratios: times over the simulated time of one replica, shape (K,).
     """
     from chamberopt.coverage.field.windows import multiply_products
 
-    share, products = [], []
-    for replicas, footprints in batches:
-        point, weight = footprints.point, footprints.weight
-        wanted = np.array(scales(replicas), dtype=float)
-        product = np.ones((points, len(wanted)))
-        multiply_products(product, point, weight, wanted)
-        products.append(product)
-        share.append(np.bincount(point, weight, points))
-    return DentSums(
-        np.array([one.replicas for one in batches]), np.array(share), np.array(products)
-    )
+    size = np.array([one.replicas for one in batches])
+    total, count, wanted = int(size.sum()), len(ratios), np.array(ratios, dtype=float)
+    # Without a batch, k belongs to the number of the other replicas; batches have two sizes.
+    sizes = np.unique(size)
+    scales = np.concatenate([wanted / total, *(wanted / max(total - one, 1) for one in sizes)])
+    products = np.ones((len(batches), points, len(scales)))
+    for product, one in zip(products, batches, strict=True):
+        multiply_products(product, one.footprints.point, one.footprints.weight, scales)
+    of_rest = np.empty((len(batches), count))
+    for number, one_size in enumerate(sizes, start=1):
+        part = products[:, :, number * count : (number + 1) * count]
+        of_this = size == one_size
+        of_rest[of_this] = products_without_each(part).mean(axis=1)[of_this]
+    return Products(products[:, :, :count].prod(axis=0), of_rest)
 
 
 def find_resolution(
@@ -157,15 +178,7 @@ def coverage_estimates(
         time_ratio: treatment time over the simulated time of one replica.
         reachable_error: standard error of `reachable`, by the choice of points.
     """
-    replicas = sum(one.replicas for one in batches)
-
-    def scales(batch: int) -> list[float]:
-        whole, rest = time_ratio / replicas, time_ratio / max(replicas - batch, 1)
-        return [whole, 2.0 * whole, rest, 2.0 * rest]
-
-    sums = sum_dents(batches, points, scales)
-    of_all = sums.products[:, :, :2].prod(axis=0)
-    of_rest = products_without_each(sums.products[:, :, 2:]).mean(axis=1)
+    of_all, of_rest = multiply_dents(batches, points, [time_ratio, 2.0 * time_ratio])
     mean, variance = mean_and_variance(np.vstack([of_all.mean(axis=0), of_rest]), reachable)
     of_some = np.array([some.mean(axis=0) for some in sparse_points(of_all)])
     means, variances = mean_and_variance(of_some, reachable)
@@ -186,7 +199,9 @@ def coverage_estimates(
     return {
         "mean_coverage": of_mean,
         "std_coverage": root_of_variance(of_variance),
-        "p05_coverage": _p05(sums, _weight_of_dents(batches), reachable, time_ratio),
+        "p05_coverage": _p05(
+            sum_dents(batches, points), _weight_of_dents(batches), reachable, time_ratio
+        ),
     }
 
 

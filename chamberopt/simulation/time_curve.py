@@ -9,12 +9,7 @@ import numpy as np
 
 from chamberopt.common.estimate import estimate
 from chamberopt.coverage.coverage_from_impacts import Batch, find_footprints, in_batches, joined
-from chamberopt.coverage.coverage_intervals import (
-    jackknife,
-    mean_and_variance,
-    products_without_each,
-    sum_dents,
-)
+from chamberopt.coverage.coverage_intervals import jackknife, mean_and_variance, multiply_dents
 
 if TYPE_CHECKING:
     from chamberopt.coverage.field.target_field import TargetField
@@ -47,20 +42,14 @@ def coverage_against_time(
     gauge = field.gauge_round(field.some_points(POINTS), field.radius)
     prints = [find_footprints(field, gauge, hits) for hits in evaluation.hits]
     batches = [Batch(len(part), joined(part)) for part in in_batches(prints)]
-    ratios = np.array(times) / design.process.recorded_time
-    scales = np.concatenate([ratios, 2.0 * ratios])
-
-    def both(batch: int) -> np.ndarray:
-        rest = max(evaluation.replicas - batch, 1)
-        return np.concatenate([scales / evaluation.replicas, scales / rest])
-
-    sums, count = sum_dents(batches, len(gauge.area), both), len(scales)
-    of_all = sums.products[:, :, :count].prod(axis=0).mean(axis=0)
-    of_rest = products_without_each(sums.products[:, :, count:]).mean(axis=1)
+    ratios = [time / design.process.recorded_time for time in times]
+    of_all, of_rest = multiply_dents(
+        batches, len(gauge.area), [*ratios, *(2.0 * ratio for ratio in ratios)]
+    )
     p05 = evaluation.metrics["p05_coverage"]
     rows = []
     for number, time in enumerate(times):
-        uncovered = np.vstack([of_all, of_rest])[:, [number, number + len(times)]]
+        uncovered = np.vstack([of_all.mean(axis=0), of_rest])[:, [number, number + len(times)]]
         mean = estimate(jackknife(mean_and_variance(uncovered, field.reachable)[0]), 0.0, 1.0)
         row = {"time_s": time, "mean_coverage": mean.value, "half_width": mean.half_width}
         if math.isfinite(p05.half_width):

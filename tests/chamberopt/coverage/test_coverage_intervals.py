@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from chamberopt.common.estimate import Estimate, estimate
-from chamberopt.coverage.coverage_from_impacts import Batch, Footprints
+from chamberopt.coverage.coverage_from_impacts import Batch, Footprints, in_batches, joined
 from chamberopt.coverage.coverage_intervals import (
     DENTS_FOR_MEAN,
     DENTS_FOR_PLACES,
@@ -134,7 +134,7 @@ def test_the_figures_do_not_depend_on_how_long_was_simulated() -> None:
     for dents in (4.0, 64.0):
         rng, x = np.random.default_rng(2), FIELDS["ramp"]
         runs = [poisson_batches(rng, x, dents) for _ in range(40)]
-        sums = [sum_dents(run, WINDOWS, lambda _: [1.0]).share.sum(axis=0) for run in runs]
+        sums = [sum_dents(run, WINDOWS).share.sum(axis=0) for run in runs]
         plain[dents] = np.mean([-np.expm1(-one).mean() for one in sums])
         found[dents] = np.mean(
             [
@@ -340,3 +340,22 @@ def test_time_to_98_by_avrami() -> None:
     assert wide.in_words == f"more than {soonest:,.0f} s"
     assert wide.half_width == np.inf
     assert time_to_98_estimate(Estimate(1.0, 0.0, (1.0,) * 3), TREATMENT).value < TREATMENT
+
+
+def test_batches_of_unequal_sizes_have_intervals_like_equal_ones() -> None:
+    """With 60 replicas 20 batches are of two and 20 of one; 40 and 80 are in equal batches."""
+    rng = np.random.default_rng(5)
+
+    def replica() -> Footprints:
+        dents = rng.poisson(10.0 * WINDOWS)
+        return Footprints(rng.integers(0, WINDOWS, dents), np.full(dents, 0.02), 1.0, 0.0, 1.0)
+
+    replicas = [replica() for _ in range(80)]
+    widths = {}
+    for count in (40, 60, 80):
+        run = [Batch(len(part), joined(part)) for part in in_batches(replicas[:count])]
+        assert len({one.replicas for one in run}) == (2 if count == 60 else 1)
+        found = coverage_estimates(run, WINDOWS, 1.0, 5.0)["mean_coverage"]
+        assert abs(found.value + np.expm1(-1.0)) < 3.0 * found.half_width
+        widths[count] = found.half_width * np.sqrt(count)
+    assert widths[60] == pytest.approx(0.5 * (widths[40] + widths[80]), rel=0.35)
