@@ -101,7 +101,9 @@ def replicas_for(study: ConvergenceStudy, accuracy: float, seconds: float) -> in
     that; so the intervals of the batches count as well.
     """
     time_ratio = float(study.settings[TIME]) / seconds
-    variance = np.var(study.reference.objective.pseudovalues, ddof=1) * time_ratio
+    reference = study.reference
+    pseudovalues = reference.objective.pseudovalues  # of batches, if there are many replicas
+    variance = np.var(pseudovalues, ddof=1) * time_ratio * reference.replicas / len(pseudovalues)
     counts = range(3, MAX_REPLICAS + 1)
     needed = 3 + bisect_left(
         counts, -accuracy, key=lambda n: -student_quantile(n - 1) * math.sqrt(variance / n)
