@@ -334,8 +334,15 @@ def weighted_sum(objective: ObjectiveFunction, metrics: dict[str, Estimate]) -> 
     columns = [weight * np.array(metric.pseudovalues) for weight, metric in terms]
     spread = estimate(np.sum(columns, axis=0))
     words = next((metric.in_words for _, metric in terms if metric.in_words), "")
-    half_width = math.inf if words == NOT_RESOLVED else spread.half_width
-    return Estimate(value, half_width, spread.pseudovalues, in_words=words)
+    bias = sum(abs(weight) * metric.bias for weight, metric in terms)
+    # What replicas do not show, biases and the choice of points, may all go one way.
+    more = sum(
+        abs(weight) * max(0.0, metric.half_width - estimate(metric.pseudovalues).half_width)
+        for weight, metric in terms
+        if math.isfinite(metric.half_width) and metric.half_width > 0.0
+    )
+    half_width = math.inf if words == NOT_RESOLVED else spread.half_width + more
+    return Estimate(value, half_width, spread.pseudovalues, bias, words)
 
 
 def _accuracy_note(

@@ -108,10 +108,10 @@ def test_a_part_that_cannot_turn_is_refused_before_anything_is_simulated(tmp_pat
 
 
 def test_too_short_a_simulation_of_a_slow_turn_is_remarked_on(tmp_path: Path, mesh) -> None:  # type: ignore[no-untyped-def]
-    slow = load_design(written(tmp_path, "{ rpm = 1 }"))
+    slow = load_design(written(tmp_path, "{ rpm = 0.1 }"))
     require_turnable(slow, mesh)
     assert any(
-        "takes 60 s to turn once" in warning
+        "takes 600 s to turn once" in warning
         for warning in describe(slow, build_chamber(slow))["warnings"]
     )
 

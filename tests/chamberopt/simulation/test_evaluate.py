@@ -164,7 +164,7 @@ def test_a_gauge_too_small_for_the_target_is_refused_before_anything_is_simulate
     monkeypatch.setattr("chamberopt.simulation.evaluate.simulate_replicas", nothing)
     design = plate_design(process__accuracy__gauge_mm2=1e-3)
     chamber = build_chamber(design)
-    with pytest.raises(InputError, match=r"process\.accuracy\.gauge_mm2.*give at least 0\.003"):
+    with pytest.raises(InputError, match=r"process\.accuracy\.gauge_mm2.*give at least 0\.0027"):
         evaluate(design, chamber, SerialExecutor())
 
 
@@ -223,3 +223,17 @@ def test_an_accuracy_that_cannot_be_is_refused() -> None:
         accurate(0.01, 5)
     with pytest.raises(InputError, match=r"process\.accuracy\.objective_half_width"):
         accurate(-0.01, 50)
+
+
+def test_an_objective_keeps_what_replicas_do_not_show() -> None:
+    """Of one metric it has the metric's interval and bias; of two it has both surpluses."""
+    replicas = (0.4, 0.5, 0.6)
+    shown = estimate(replicas).half_width
+    one = Estimate(0.5, shown + 0.07, replicas, bias=0.02)
+    alone = weighted_sum(OBJECTIVES["p05_coverage"], {"p05_coverage": one})
+    assert alone.half_width == pytest.approx(one.half_width)
+    assert alone.bias == one.bias
+    metrics = {"mean_coverage": one, "std_coverage": one}
+    both = weighted_sum(OBJECTIVES["uniform_coverage"], metrics)
+    assert both.half_width == pytest.approx(0.14)  # the replicas cancel out
+    assert both.bias == pytest.approx(0.04)
