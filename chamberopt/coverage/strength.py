@@ -175,7 +175,8 @@ def uniformity_of(parts: np.ndarray, highest: float, reachable: float) -> Estima
     by_quarters = _spread_of_pairs(parts, highest, batches // 4, rng)
     # With half the dents, the error of S is about twice as large.
     value = _uniformity(2.0 * by_halves - by_quarters, reachable)
-    bias = abs(value - _uniformity(by_halves, reachable))
+    # The bias falls more slowly than that; twice the step held where once held in 3 of 4 runs.
+    bias = 2.0 * abs(value - _uniformity(by_halves, reachable))
     of_some = [_uniformity(_spread(some, some), reachable) for some in sparse_points(strength)]
     values = np.array(
         [
