@@ -82,6 +82,11 @@ def joined(replicas: Sequence[Footprints]) -> Footprints:
     )
 
 
+def batches_of(replicas: Sequence[Footprints]) -> list[Batch]:
+    """The footprints of replicas in batches."""
+    return [Batch(len(part), joined(part)) for part in in_batches(replicas)]
+
+
 class LocatedDents(NamedTuple):
     """Dents of one replica that may be in windows of the target, or of the whole part.
 

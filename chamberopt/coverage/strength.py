@@ -57,6 +57,11 @@ def impact_strength(hits: Hits, density: float) -> np.ndarray:
     return strength
 
 
+def levels(values: np.ndarray, highest: float) -> np.ndarray:
+    """The level of each value, 0 to LEVELS - 1."""
+    return np.minimum(LEVELS * values / max(highest, 1e-300), LEVELS - 1).astype(np.int64)
+
+
 def strength_histogram(
     windows: Windows, area: np.ndarray, contacts: Places, dent: np.ndarray, level: np.ndarray
 ) -> np.ndarray:
@@ -155,7 +160,7 @@ def intensity_uniformity(
     for number, (batch, strengths) in enumerate(zip(replicas, of_hits, strict=True)):
         for hits, s in zip(batch, strengths, strict=True):
             dents = np.flatnonzero(s > 0.0)
-            level = np.minimum(LEVELS * s[dents] / highest, LEVELS - 1).astype(np.int64)
+            level = levels(s[dents], highest)
             contacts = field.places_of(hits, dents)
             parts[number] += strength_histogram(
                 windows, area, contacts, hits.dent[dents].astype(float), level
@@ -237,10 +242,7 @@ def _relative_variance(squares: np.ndarray, means: np.ndarray, reachable: float)
     batches, mean = len(means), float(means.mean())
     if mean <= 0.0:
         return 1.0
-    pairs = max(batches * (batches - 1), 1)
-    if batches == 1:
-        square, square_of_mean = float(squares[0, 0]), mean**2
-    else:
-        square = float(squares.sum() - np.trace(squares)) / pairs
-        square_of_mean = float(means.sum() ** 2 - (means**2).sum()) / pairs
+    pairs = batches * (batches - 1)
+    square = float(squares.sum() - np.trace(squares)) / pairs
+    square_of_mean = float(means.sum() ** 2 - (means**2).sum()) / pairs
     return (reachable * square - reachable**2 * square_of_mean) / (reachable * mean) ** 2

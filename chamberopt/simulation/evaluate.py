@@ -28,11 +28,10 @@ from chamberopt.common.estimate import Estimate, estimate
 from chamberopt.common.parallel.executor import share
 from chamberopt.common.progress import Progress
 from chamberopt.coverage.coverage_from_impacts import (
-    Batch,
     Footprints,
+    batches_of,
     find_footprints,
     in_batches,
-    joined,
     locate_dents,
 )
 from chamberopt.coverage.coverage_intervals import (
@@ -257,7 +256,7 @@ def _of_windows(
     """Metrics of coverage in windows of one size."""
     process = design.process
     time_ratio = process.treatment_time / process.recorded_time
-    batches = [Batch(len(part), joined(part)) for part in in_batches(prints)]
+    batches = batches_of(prints)
     found = coverage_estimates(
         batches, len(gauge.area), field.reachable, time_ratio, field.reachable_error
     )

@@ -15,12 +15,17 @@ import numpy as np
 
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.estimate import CONFIDENCE
-from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density, find_footprints
+from chamberopt.coverage.coverage_from_impacts import (
+    coverage_from_dent_density,
+    find_footprints,
+    locate_dents,
+)
 from chamberopt.coverage.field.surface_points import ball_fits, spread_within
 from chamberopt.coverage.field.target_field import Gauge, with_whole_part
 from chamberopt.coverage.strength import (
     LEVELS,
     impact_strength,
+    levels,
     saturated_strength,
     strength_histogram,
 )
@@ -48,6 +53,7 @@ class PartField:
         self.target = prepare_target(design, chamber, self._mesh)
         self.field = with_whole_part(self.target, chamber, self._mesh)
         self._hits = evaluation.hits
+        self._located = [locate_dents(self.field, hits) for hits in self._hits]
         # Treatment time over simulated time.
         self._scale = design.process.treatment_time / evaluation.simulated_time
 
@@ -164,8 +170,8 @@ class PartField:
         points = len(gauge.area)
         share, squares, dents = np.zeros((3, points))
         largest = 0.0
-        for hits in self._hits:
-            found = find_footprints(self.field, gauge, hits)
+        for hits, located in zip(self._hits, self._located, strict=True):
+            found = find_footprints(self.field, gauge, located)
             share += np.bincount(found.point, found.weight, points)
             squares += np.bincount(found.point, found.weight**2, points)
             dents += np.bincount(found.point, minlength=points)
@@ -194,7 +200,7 @@ class PartField:
             ones = np.ones(len(hits))
             is_dent = (hits.dent > 0.0).astype(float)
             columns = (ones, hits.speed, hits.angle, hits.energy, hits.dent, is_dent)
-            level = _levels(hits.speed, fastest)
+            level = levels(hits.speed, fastest)
             for point, contact in windows.pairs(places):
                 for row, column in zip(sums, columns, strict=True):
                     row += np.bincount(point, column[contact], points)
@@ -206,7 +212,7 @@ class PartField:
                 gauge.area,
                 places.select(dented),
                 hits.dent[dented].astype(float),
-                _levels(strength[dented], strongest),
+                levels(strength[dented], strongest),
             )
         impacts, speed, angle, energy, dent, dents = sums
         return {
@@ -249,11 +255,6 @@ def density_bounds(
     some = v > 0.0
     high[some] = v[some] / y[some] * gammaincinv(y[some] ** 2 / v[some], 1.0 - tail)
     return low, high
-
-
-def _levels(values: np.ndarray, highest: float) -> np.ndarray:
-    """The level of each value, 0 to LEVELS - 1."""
-    return np.minimum(LEVELS * values / max(highest, 1e-300), LEVELS - 1).astype(np.int64)
 
 
 def _ratio(top: np.ndarray, bottom: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.common.estimate import estimate
-from chamberopt.coverage.coverage_from_impacts import Batch, find_footprints, in_batches, joined
+from chamberopt.coverage.coverage_from_impacts import batches_of, find_footprints
 from chamberopt.coverage.coverage_intervals import jackknife, mean_and_variance, multiply_dents
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def coverage_against_time(
     times = sorted({*(end * np.arange(1, TIMES + 1) / TIMES).tolist(), min(treatment, end)})
     gauge = field.gauge_round(field.some_points(POINTS), field.radius)
     prints = [find_footprints(field, gauge, hits) for hits in evaluation.hits]
-    batches = [Batch(len(part), joined(part)) for part in in_batches(prints)]
+    batches = batches_of(prints)
     ratios = [time / design.process.recorded_time for time in times]
     of_all, of_rest = multiply_dents(
         batches, len(gauge.area), [*ratios, *(2.0 * ratio for ratio in ratios)]

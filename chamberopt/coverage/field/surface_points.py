@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from chamberopt.chamber.reach.reach import TOLERATED_OVERLAP
 from chamberopt.geometry.triangles import unit_normals
 
 if TYPE_CHECKING:
     from sim_core import TriangleMesh
 
 PLASTIC_NUMBER = 1.32471795724474602596  # real root of x³ = x + 1
-# Share of its radius that a ball may reach into a surface, as in chamber/reach.
-OVERLAP = 0.01
 SPARSE = 10
 ON_SURFACE = 1e-3  # share of its radius within which a place is on the surface
 
@@ -110,7 +109,7 @@ def ball_fits(
     from sim_core import closest_points
 
     found = closest_points(mesh, place + radius * normal, radius * (1.0 + 1e-6))
-    fits = (found.triangle >= 0) & (found.distance >= radius * (1.0 - OVERLAP))
+    fits = (found.triangle >= 0) & (found.distance >= radius * (1.0 - TOLERATED_OVERLAP))
     # The surface may be nearer elsewhere, also to a place outside the cavity.
     rows = np.flatnonzero(fits)
     rows = rows[np.linalg.norm(found.point[rows] - place[rows], axis=1) > ON_SURFACE * radius]

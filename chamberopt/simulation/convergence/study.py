@@ -21,13 +21,7 @@ from chamberopt.chamber.scene import chamber_mesh, replica_seed
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate, estimate, paired_difference
 from chamberopt.common.progress import Progress
-from chamberopt.coverage.coverage_from_impacts import (
-    Batch,
-    Footprints,
-    find_footprints,
-    in_batches,
-    joined,
-)
+from chamberopt.coverage.coverage_from_impacts import Footprints, batches_of, find_footprints
 from chamberopt.coverage.coverage_intervals import coverage_estimates, find_resolution
 from chamberopt.coverage.field.target_field import TargetField
 from chamberopt.coverage.metrics import parse_objective
@@ -114,7 +108,7 @@ class Replicas:
         """Objective, mean coverage, and whether there are enough dents for them."""
         process, gauge = self.setting.design.process, self.target.gauge
         prints = [one.footprints for one in self.done[part]]
-        batches = [Batch(len(some), joined(some)) for some in in_batches(prints)]
+        batches = batches_of(prints)
         ratio = process.treatment_time / process.recorded_time
         metrics = coverage_estimates(batches, len(gauge.area), self.target.reachable, ratio)
         objective = weighted_sum(parse_objective("uniform_coverage"), metrics)

@@ -4,12 +4,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from chamberopt.coverage.field.surface_points import (
-    OVERLAP,
-    ball_fits,
-    spread_points,
-    spread_within,
-)
+from chamberopt.chamber.reach.reach import TOLERATED_OVERLAP
+from chamberopt.coverage.field.surface_points import ball_fits, spread_points, spread_within
 from chamberopt.geometry.triangles import areas
 from sim_core import TriangleMesh
 
@@ -101,7 +97,7 @@ def test_the_strip_beside_a_hollow_corner_is_as_wide_as_the_ball_touches_both_wa
     fits = ball_fits(cavity, places, np.tile([0.0, 0.0, 1.0], (len(x), 1)), R)
     strip = x[fits][0]
     exact = R * np.tan(np.radians(0.5 * turn))
-    assert exact - OVERLAP * R / np.sin(angle) - 1e-6 <= strip <= exact + 1e-6
+    assert exact - TOLERATED_OVERLAP * R / np.sin(angle) - 1e-6 <= strip <= exact + 1e-6
     beyond = x < 2.0 * exact
     assert (fits[beyond] == (x[beyond] >= strip)).all()
 
