@@ -265,9 +265,11 @@ def _p05(sums: DentSums, weight: float, reachable: float, time_ratio: float) -> 
     if share <= 0.0:
         return Estimate(0.0, 0.0 if batches > 1 else math.inf, (0.0,) * batches)
 
+    def roots_of(some: np.ndarray | slice) -> DensityRoots:
+        return _density_roots(sums.share[some], sums.replicas[some], share)
+
     def coverage_of(some: np.ndarray | slice) -> float:
-        density = _low_density(sums.share[some], sums.replicas[some], share)
-        return -math.expm1(-density * time_ratio)
+        return -math.expm1(-roots_of(some).low_density() * time_ratio)
 
     whole = coverage_of(slice(None))
     if batches == 1:
@@ -278,11 +280,12 @@ def _p05(sums: DentSums, weight: float, reachable: float, time_ratio: float) -> 
         # The error that is left goes with one over the number of dents.
         step = (whole - float(np.mean(of_halves))) / (batches / half - 1.0)
         value = min(max(whole + step, 0.0), 1.0)
-    without = [coverage_of(rest) for rest in ~np.eye(batches, dtype=bool)]
+    rests = [roots_of(rest) for rest in ~np.eye(batches, dtype=bool)]
+    without = [-math.expm1(-rest.low_density() * time_ratio) for rest in rests]
     deviations = jackknife(np.array([whole, *without])) - whole
     of_some = -np.expm1(
         [
-            -_low_density(some.T, sums.replicas, share) * time_ratio
+            -_density_roots(some.T, sums.replicas, share).low_density() * time_ratio
             for some in sparse_points(sums.share.T)
         ]
     )
@@ -291,11 +294,46 @@ def _p05(sums: DentSums, weight: float, reachable: float, time_ratio: float) -> 
         # Where no dent has fallen it may be bare, or up to 3 dents were to be expected.
         density = NOT_ONE * weight * time_ratio / float(sums.replicas.sum())
         bias = max(bias + value, -math.expm1(-density)) if math.isfinite(weight) else math.inf
-    return estimate(value + deviations, 0.0, 1.0, bias=bias, sampling=sampling_error(of_some))
+    found = estimate(value + deviations, 0.0, 1.0, bias=bias, sampling=sampling_error(of_some))
+    # Where counting seems to explain all of the variance, the roots are drawn to one value, which
+    # hardly moves from replica to replica. There may be more variance, by its own interval.
+    all_of_them = roots_of(slice(None))
+    variances = np.array([one.over_target - one.counting for one in (all_of_them, *rests)])
+    reach = estimate(jackknife(variances)).half_width
+    lowest = -math.expm1(-all_of_them.low_density(reach) * time_ratio)
+    return replace(found, half_width=max(found.half_width, bias + whole - lowest))
 
 
-def _low_density(shares: np.ndarray, replicas: np.ndarray, share: float) -> float:
-    """The dent density, per replica, that this share of the windows does not exceed.
+class DensityRoots(NamedTuple):
+    """Roots of the dent density in windows, per replica.
+
+    Attributes:
+        low: that a share of the windows do not exceed.
+        middle: mean.
+        over_target: variance over the windows.
+        counting: the part of it that comes from counting.
+    """
+
+    low: float
+    middle: float
+    over_target: float
+    counting: float
+
+    def low_density(self, more: float = 0.0) -> float:
+        """The density that the share of the windows do not exceed, counting taken away.
+
+        Args:
+            more: added to the variance that is left.
+        """
+        if not self.over_target:
+            return self.low**2
+        left = max(0.0, self.over_target - self.counting) + more
+        shrink = math.sqrt(left / self.over_target)
+        return max(0.0, self.middle + shrink * (self.low - self.middle)) ** 2
+
+
+def _density_roots(shares: np.ndarray, replicas: np.ndarray, share: float) -> DensityRoots:
+    """Roots of the dent density and their variances.
 
     Args:
         shares: sums of w of each batch in each window, (g, p).
@@ -305,14 +343,11 @@ def _low_density(shares: np.ndarray, replicas: np.ndarray, share: float) -> floa
     root = np.sqrt(total / replicas.sum())
     low, middle = float(np.quantile(root, share)), float(root.mean())
     if batches == 1:
-        return low**2
+        return DensityRoots(low, middle, 0.0, 0.0)
     rest = (replicas.sum() - replicas)[:, None]
     without_each = np.sqrt(np.maximum(total - shares, 0.0) / rest)
-    # Variance of counting, by the jackknife in each window, and variance over the target.
-    counting = (batches - 1) * float(without_each.var(axis=0).mean())
-    over_target = float(root.var())
-    shrink = math.sqrt(max(0.0, 1.0 - counting / over_target)) if over_target else 0.0
-    return (middle + shrink * (low - middle)) ** 2
+    counting = (batches - 1) * float(without_each.var(axis=0).mean())  # jackknife in each window
+    return DensityRoots(low, middle, float(root.var()), counting)
 
 
 def time_to_98_estimate(p05: Estimate, seconds: float) -> Estimate:

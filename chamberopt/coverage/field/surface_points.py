@@ -75,13 +75,36 @@ def _within(
     vertices: np.ndarray, triangles: np.ndarray, triangle: np.ndarray, number: np.ndarray
 ) -> SurfacePoints:
     """Points on triangles (p,) by their numbers (p,) in the sequence of the plastic number."""
-    # The first point is the middle of a triangle.
+    corners = vertices[triangles[triangle]]
+    u, v = _of_sequence(number)
+    place = _between(corners, u[:, None], v[:, None])
+    return SurfacePoints(place, unit_normals(corners), triangle)
+
+
+def within_each(corners: np.ndarray, count: int) -> np.ndarray:
+    """So many points [m] on each of some triangles (n, 3, 3), shape (count, n, 3).
+
+    Each triangle takes the next numbers of the sequence, so that what the points miss on one of
+    many alike triangles is not missed on all of them.
+    """
+    u, v = _of_sequence(np.arange(count * len(corners)).reshape(-1, count).T)
+    return _between(corners, u[..., None], v[..., None])
+
+
+def _of_sequence(number: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Coordinates in a triangle of points by their numbers in the sequence of the plastic number.
+
+    The first is the middle of the triangle.
+    """
     u, v = ((number / PLASTIC_NUMBER**power + 1.0 / 3.0) % 1.0 for power in (1, 2))
     folded = u + v > 1.0
-    u, v = np.where(folded, 1.0 - u, u), np.where(folded, 1.0 - v, v)
-    a, b, c = (vertices[triangles[triangle, k]] for k in range(3))
-    place = a + u[:, None] * (b - a) + v[:, None] * (c - a)
-    return SurfacePoints(place, unit_normals(np.stack([a, b, c], axis=1)), triangle)
+    return np.where(folded, 1.0 - u, u), np.where(folded, 1.0 - v, v)
+
+
+def _between(corners: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Points a + u (b - a) + v (c - a) on triangles (n, 3, 3)."""
+    a, b, c = corners.swapaxes(0, 1)
+    return np.asarray(a + u * (b - a) + v * (c - a))
 
 
 def _morton(places: np.ndarray) -> np.ndarray:

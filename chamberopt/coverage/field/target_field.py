@@ -11,6 +11,7 @@ no window. Convex creases have windows of their own, pieces of the crease.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
@@ -41,8 +42,8 @@ if TYPE_CHECKING:
     from sim_core import TriangleMesh
 
 OF_WIDE = 0.125  # of the number of windows, for those of twice the radius, which overlap more
-POINTS_PER_CHOSEN = 4  # that are tested for a ball, for each that becomes the middle of a window
-PIECES_PER_WINDOW = 12  # of the surface, about
+POINTS_PER_CHOSEN = 2  # that are tested for a ball, for each that becomes the middle of a window
+PIECES_PER_WINDOW = 6  # of the surface, at most, where the border of what a ball can touch is far
 MAX_PIECES, MAX_PIECES_OFF_TARGET = 3e6, 4e5  # those off the target are for pictures alone
 
 
@@ -154,7 +155,8 @@ def find_target_field(chamber: Chamber, mesh: TriangleMesh, setting: WindowSetti
     radius, corners = float(np.sqrt(gauge / np.pi)), part.vertices[part.triangles]
     ball = 0.5 * setting.ball
     touched, fits = _touched(chamber, mesh, area, face, setting)
-    surface = surface_pieces(corners[part.target], face[part.target], mesh, ball, radius)
+    longest = _longest_side(setting, float(area.sum()), MAX_PIECES)
+    surface = surface_pieces(corners[part.target], face[part.target], mesh, ball, longest)
     return TargetField(
         setting=setting,
         face=face,
@@ -178,18 +180,22 @@ def with_whole_part(field: TargetField, chamber: Chamber, mesh: TriangleMesh) ->
     rest = ~chamber.part.target & (chamber.exposed_area > 0.0)
     if not rest.any():
         return field
-    # Of a large part, pieces off the target are larger than windows at their border would be.
-    area, gauge = float(chamber.part.area[rest].sum()), field.setting.gauge
-    coarser = max(1.0, np.sqrt(PIECES_PER_WINDOW * area / gauge / MAX_PIECES_OFF_TARGET))
+    area = float(chamber.part.area[rest].sum())
     pieces = surface_pieces(
         field.corners[rest], field.face[rest], mesh, 0.5 * field.setting.ball,
-        coarser * field.radius,
+        _longest_side(field.setting, area, MAX_PIECES_OFF_TARGET),
     )  # fmt: skip
     return replace(
         field,
         has_windows=np.ones(len(rest), dtype=bool),
         surface=joined_pieces(field.surface, pieces),
     )
+
+
+def _longest_side(setting: WindowSetting, area: float, most: float) -> float:
+    """Side [m] of the pieces of a surface: a window or a ball wide, longer if they are too many."""
+    size = min(math.sqrt(setting.gauge / math.pi), 0.5 * setting.ball)
+    return 2.0 * max(size, math.sqrt(PIECES_PER_WINDOW / math.pi * area / most))
 
 
 def _touched(

@@ -1,6 +1,6 @@
 """Exact areas of windows on the surface, and what of them a ball can touch.
 
-The surface is divided into pieces not larger than a window, and finer where the border of what a
+The surface is divided into pieces about as large as a window, finer where the border of what a
 ball can touch runs through them. A window meets the plane of a piece in a circle, so its share of
 the piece is the area that a circle and a triangle have in common.
 
@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from chamberopt.coverage.field.surface_points import ball_fits
+from chamberopt.coverage.field.surface_points import ball_fits, within_each
 from chamberopt.coverage.field.windows import Places, Windows
 from chamberopt.geometry.triangles import unit_normals
 from sim_core import jit
@@ -31,11 +31,11 @@ from sim_core import jit
 if TYPE_CHECKING:
     from sim_core import TriangleMesh
 
-LONGEST = 1.0  # side of a piece, in radii of a window
-FINEST = 0.5  # the same where the border of what a ball can touch runs through it
-# Of the way from its corners to its middle: where a piece is tested for a border, and where its
-# share is measured, in the middles of its quarters.
-NEAR_CORNERS, IN_QUARTERS = 0.1, 0.5
+FINEST = (
+    0.5  # of the longest side, for pieces through which the border of what a ball can touch runs
+)
+NEAR_CORNERS = 0.1  # of the way to its middle: where a piece is tested for a border
+PLACES_AT_BORDER = 4  # by which the share of a piece at a border is measured
 FAR_SIDE = -0.9  # cosine of the angle beyond which a piece is the far side of something thin
 
 
@@ -58,7 +58,7 @@ class SurfacePieces(NamedTuple):
 
 
 def surface_pieces(
-    corners: np.ndarray, face: np.ndarray, mesh: TriangleMesh, ball_radius: float, radius: float
+    corners: np.ndarray, face: np.ndarray, mesh: TriangleMesh, ball_radius: float, longest: float
 ) -> SurfacePieces:
     """Divide triangles into pieces, and find what of them a ball can touch.
 
@@ -67,17 +67,18 @@ def surface_pieces(
         face: smooth face of each, shape (m,).
         mesh: of the chamber.
         ball_radius: [m].
-        radius: of the windows [m].
+        longest: side of a piece [m].
     """
-    corners, owner = _halved_until(corners, np.arange(len(corners)), LONGEST * radius)
-    shares = _touched_share(corners, mesh, ball_radius, NEAR_CORNERS)
+    corners, owner = _halved_until(corners, np.arange(len(corners)), longest)
+    middle = corners.mean(axis=1)
+    beside = corners + NEAR_CORNERS * (middle[:, None] - corners)
+    shares = _touched_share(corners, np.stack([middle, *beside.swapaxes(0, 1)]), mesh, ball_radius)
     mixed = (shares > 0.0) & (shares < 1.0)
-    finer, finer_owner = _halved_until(
-        corners[mixed], owner[mixed], FINEST * min(radius, ball_radius)
-    )
+    finer, finer_owner = _halved_until(corners[mixed], owner[mixed], FINEST * longest)
+    fine = _touched_share(finer, within_each(finer, PLACES_AT_BORDER), mesh, ball_radius)
     corners = np.concatenate([corners[~mixed], finer])
     owner = np.concatenate([owner[~mixed], finer_owner])
-    shares = np.concatenate([shares[~mixed], _touched_share(finer, mesh, ball_radius, IN_QUARTERS)])
+    shares = np.concatenate([shares[~mixed], fine])
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = 0.5 * np.linalg.norm(cross, axis=1)
     return SurfacePieces(corners, unit_normals(corners), face[owner], area, shares)
@@ -127,18 +128,12 @@ def _halved_until(
 
 
 def _touched_share(
-    corners: np.ndarray, mesh: TriangleMesh, ball_radius: float, inward: float
+    corners: np.ndarray, places: np.ndarray, mesh: TriangleMesh, ball_radius: float
 ) -> np.ndarray:
-    """Share of each triangle that a ball can touch, by its middle and three points beside it."""
-    normal, middle = unit_normals(corners), corners.mean(axis=1)
-    fits = [
-        ball_fits(mesh, place, normal, ball_radius)
-        for place in (
-            middle,
-            *(corners[:, k] + inward * (middle - corners[:, k]) for k in range(3)),
-        )
-    ]
-    return np.asarray(np.mean(fits, axis=0))
+    """Share of the places (k, n, 3) on each triangle (n, 3, 3) where a ball fits."""
+    normal = np.broadcast_to(unit_normals(corners), places.shape).reshape(-1, 3)
+    fits = ball_fits(mesh, places.reshape(-1, 3), normal, ball_radius)
+    return np.asarray(fits.reshape(places.shape[:2]).mean(axis=0))
 
 
 @jit

@@ -164,7 +164,7 @@ def test_a_gauge_too_small_for_the_target_is_refused_before_anything_is_simulate
     monkeypatch.setattr("chamberopt.simulation.evaluate.simulate_replicas", nothing)
     design = plate_design(process__accuracy__gauge_mm2=1e-3)
     chamber = build_chamber(design)
-    with pytest.raises(InputError, match=r"process\.accuracy\.gauge_mm2.*give at least 0\.0027"):
+    with pytest.raises(InputError, match=r"process\.accuracy\.gauge_mm2.*give at least 0\.0013"):
         evaluate(design, chamber, SerialExecutor())
 
 
