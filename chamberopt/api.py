@@ -51,6 +51,7 @@ def simulate(
     """
     from chamberopt.chamber.analytic import analytic_cavity
     from chamberopt.chamber.build import build_chamber
+    from chamberopt.common.files import claim_folder
     from chamberopt.common.parallel.executor import local_executor
     from chamberopt.output.results.load import load_result
     from chamberopt.output.save_run import save_simulation
@@ -58,12 +59,12 @@ def simulate(
     from chamberopt.simulation.evaluate import evaluate
 
     _require("design", design, Design, "load_design")
-    chamber = build_chamber(design)
-    cavity = analytic_cavity(design, chamber) if analytic else None
-    with local_executor(workers) as executor:
+    with claim_folder(out) as folder, local_executor(workers) as executor:
+        chamber = build_chamber(design)
+        cavity = analytic_cavity(design, chamber) if analytic else None
         design, advice = with_effects_resolved(design, chamber, executor)
         evaluation = evaluate(design, chamber, executor, progress, cavity=cavity)
-    remarks = save_simulation(out, design, chamber, evaluation, advice)
+        remarks = save_simulation(folder, design, chamber, evaluation, advice)
     _warn([*map(str, advice), *evaluation.notes, *remarks])
     return load_result(out)
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -16,44 +16,37 @@ if TYPE_CHECKING:
     from chamberopt.design.load import Design
     from chamberopt.simulation.evaluation import Evaluation
 
+T = TypeVar("T")
+
+
+def results_folder(out: Path | None, name: str) -> AbstractContextManager[Path]:
+    """Claim --out, which must be new or empty, or the first free of results/NAME, NAME-2 ..."""
+    from chamberopt.common.files import claim_folder
+
+    return claimed_folder(out, name, claim_folder)
+
 
 @contextmanager
-def results_folder(out: Path | None, name: str) -> Iterator[Path]:
-    """Yield --out, which must be new or empty, or the first free of results/NAME, NAME-2 ...
+def claimed_folder(
+    out: Path | None, name: str, claim: Callable[[Path], AbstractContextManager[T]]
+) -> Iterator[T]:
+    """Claim --out or the first free folder with `claim`, which may accept more for --out."""
+    from chamberopt.common.errors import OutputTakenError
+    from chamberopt.common.files import is_new_or_empty
 
-    If the block raises and the folder is still empty, the folder is removed.
-    """
-    from chamberopt.common.files import make_output_folder
-
-    folder = make_output_folder(out) if out is not None else _first_free_folder(name)
-    try:
-        yield folder
-    except BaseException:
-        with suppress(OSError):
-            if not any(folder.iterdir()):
-                folder.rmdir()
-        raise
-
-
-def _first_free_folder(name: str) -> Path:
-    """Make the first free folder results/NAME, results/NAME-2 ..."""
-    from chamberopt.common.files import is_new_or_empty, make_output_folder
-
-    for number in count(1):
-        folder = Path("results", name if number == 1 else f"{name}-{number}")
-        if not is_new_or_empty(folder):
-            continue
-        try:
-            if not folder.is_dir():
-                folder.parent.mkdir(parents=True, exist_ok=True)
-                folder.mkdir()
-        except FileExistsError:
-            if folder.exists():  # another command made it first
-                continue
-        except OSError:
-            pass  # make_output_folder names the cause
-        return make_output_folder(folder)
-    raise AssertionError("there is always a next number")
+    with ExitStack() as held:
+        if out is not None:
+            yield held.enter_context(claim(out))
+            return
+        for number in count(1):
+            folder = Path("results", name if number == 1 else f"{name}-{number}")
+            if is_new_or_empty(folder):
+                try:
+                    claimed = held.enter_context(claim(folder))
+                except OutputTakenError:  # another command was faster
+                    continue
+                yield claimed
+                return
 
 
 def print_remarks(remarks: Sequence[str]) -> None:
@@ -87,6 +80,13 @@ def print_result(
         print_json({**values, "folder": str(folder)})
     else:
         print("\n".join([*lines, f"results in {folder}"]))
+
+
+def print_finished(folder: Path, what: str, lines: Sequence[str], as_json: bool) -> None:
+    """Print the result of a study or sweep that is finished already."""
+    again = "to run it again, give another folder (--out)"
+    print_remarks([f"{folder}: this {what} is finished, nothing was run; {again}"])
+    print_result(lines, folder, as_json)
 
 
 def estimate_line(name: str, estimate: Estimate) -> str:

@@ -11,6 +11,10 @@ class InputError(Exception):
     """
 
 
+class OutputTakenError(InputError):
+    """The place for a result holds something, or another process writes to it."""
+
+
 class WorkerLostError(BrokenExecutor):
     """A worker died while it ran a task, and so did the worker that tried again."""
 

@@ -1,20 +1,23 @@
-"""Output folders that must be new or empty, and files that are written whole or not at all."""
+"""Outputs have one writer each, overwrite nothing, and are written whole or not at all."""
 
 import csv
 import io
 import os
+import platform
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from chamberopt.common.errors import InputError
+from chamberopt.common.errors import InputError, OutputTakenError
 
-# A run that was killed may leave these in its folder: a file half written, and its lock (lock.py).
-LEFTOVER_PREFIXES = (".writing-", ".lock")
+LOCK, WRITING = ".lock", ".writing-"
+LEFTOVER_PREFIXES = (LOCK, WRITING)  # of files that a command that was killed may leave
+ANOTHER_FOLDER = "choose another folder (out, or --out)"
 # What reading a damaged .npz file can raise.
 UNREADABLE_NPZ = OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, zlib.error
 
@@ -29,18 +32,98 @@ def is_new_or_empty(folder: Path) -> bool:
 
 def make_output_folder(path: str | Path) -> Path:
     """Make a folder for results; InputError if it holds files or cannot be written."""
-    folder, remedy = Path(path), "choose another folder (out, or --out)"
+    folder = Path(path)
     if os.path.lexists(folder) and not os.path.isdir(folder):
-        raise InputError(f"{folder}: is a file; results need a folder: {remedy}")
-    try:
+        text = "is a file; results need a folder"
+        raise OutputTakenError(f"{folder}: {text}: {ANOTHER_FOLDER}")
+    with _writing_in(folder, ANOTHER_FOLDER):
         if not is_new_or_empty(folder):
             text = "already holds files, and results are never overwritten"
-            raise InputError(f"{folder}: {text}: {remedy} or remove this one")
+            raise OutputTakenError(f"{folder}: {text}: {ANOTHER_FOLDER} or remove this one")
         folder.mkdir(parents=True, exist_ok=True)
         _require_writable(folder)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be written: {error.strerror}; {remedy}") from None
     return folder
+
+
+@contextmanager
+def claim_folder(
+    path: str | Path, is_own: Callable[[Path], bool] = lambda folder: False
+) -> Iterator[Path]:
+    """Make a folder for results and hold it against other processes during a `with` block.
+
+    Folders that are made here and are empty at the end are removed.
+
+    Args:
+        is_own: whether a folder that holds files may be used all the same.
+
+    Raises:
+        OutputTakenError: the folder is a file, holds other files, or another process has it.
+        InputError: it cannot be written.
+    """
+    folder = Path(path)
+    made = [one for one in (folder, *folder.parents) if not os.path.lexists(one)]
+    if not os.path.isdir(folder):
+        make_output_folder(folder)
+    try:
+        with _only_writer(folder / LOCK, folder, ANOTHER_FOLDER):
+            if not is_own(folder):
+                make_output_folder(folder)
+            yield folder
+    finally:
+        with suppress(OSError):
+            for one in made:
+                one.rmdir()
+
+
+@contextmanager
+def claim_file(path: Path) -> Iterator[Path]:
+    """Hold a file that is to be written against other processes; errors as claim_folder."""
+    with _only_writer(path.with_name(f"{LOCK}-{path.name}"), path, "choose another name"):
+        yield path
+
+
+@contextmanager
+def _only_writer(lock_file: Path, output: Path, remedy: str) -> Iterator[None]:
+    """Hold the lock of an output.
+
+    The lock belongs to the operating system and ends with its process, however that ends. A forked
+    child would share it until both have ended; workers are spawned.
+    """
+    from filelock import FileLock, Timeout
+
+    lock, holder = FileLock(lock_file), lock_file.with_name(f"{lock_file.name}-holder")
+    with _writing_in(output, remedy):
+        try:
+            lock.acquire(timeout=0)
+        except Timeout:
+            try:
+                name = holder.read_text(encoding="utf-8")
+            except (OSError, ValueError):
+                name = "another process"
+            text = f"is being written by {name}; wait until it ends, or {remedy}"
+            raise OutputTakenError(f"{output}: {text}") from None
+    try:
+        since = datetime.now().astimezone().isoformat(sep=" ", timespec="seconds")
+        with suppress(OSError):  # a full disk is reported by the files that matter
+            name = f"process {os.getpid()} on {platform.node()} since {since}"
+            holder.write_text(name, encoding="utf-8")
+        yield
+    finally:
+        # Before the release: who opened the file that is removed here does not get its lock.
+        for one in (holder, lock_file):
+            with suppress(OSError):
+                one.unlink(missing_ok=True)
+        lock.release()
+
+
+@contextmanager
+def _writing_in(place: Path, remedy: str) -> Iterator[None]:
+    """Turn an error of the operating system into an InputError."""
+    try:
+        yield
+    except OSError as error:
+        text = f"cannot be written: {error.strerror or error}; {remedy}"
+        raise InputError(f"{place}: {text}") from None
 
 
 def check_new_file(path: Path) -> Path:
@@ -50,11 +133,8 @@ def check_new_file(path: Path) -> Path:
         raise InputError(f"{path}: {text}")
     if not path.parent.is_dir():
         raise InputError(f"{path}: the folder {path.parent} does not exist; make it first")
-    try:
+    with _writing_in(path, "choose another place"):
         _require_writable(path.parent)
-    except OSError as error:
-        text = f"cannot be written: {error.strerror}; choose another place"
-        raise InputError(f"{path}: {text}") from None
     return path
 
 
@@ -65,20 +145,27 @@ def atomic_write(path: Path) -> Iterator[Path]:
     The file is on the disk before it gets its name, so that neither a crash nor a power cut leaves
     half a file. The temporary path has the same suffix.
     """
-    temporary = path.with_name(f".writing-{path.name}")
+    temporary = path.with_name(f"{WRITING}{path.name}")
     try:
         yield temporary
         _sync(temporary)
         os.replace(temporary, path)
         sync_folder(path.parent)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror or str(error), str(path)) from error
     finally:
         temporary.unlink(missing_ok=True)
 
 
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a file, whole or not at all."""
+    with atomic_write(path) as temporary:
+        temporary.write_bytes(content)
+
+
 def write_text(path: Path, text: str) -> None:
     """Write a UTF-8 text file, whole or not at all."""
-    with atomic_write(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_bytes(path, text.encode())
 
 
 def csv_text(rows: Sequence[Mapping[str, Any]]) -> str:

@@ -22,10 +22,10 @@ from chamberopt.common.parallel.executor import SerialExecutor, share
 from chamberopt.common.progress import Progress
 from chamberopt.optimize.evaluate_candidate import CandidateEvaluator, Simulator
 from chamberopt.optimize.run_study import chamber_simulator, fixed_target, save_inputs
-from chamberopt.optimize.storage.study_folder import open_study_folder
 from chamberopt.optimize.storage.trial_log import HISTORY, Trial
 
 if TYPE_CHECKING:
+    from chamberopt.optimize.storage.study_folder import StudyFolder
     from chamberopt.optimize.study import Study
     from chamberopt.simulation.evaluation import Evaluation
 
@@ -109,7 +109,7 @@ def plan_sweep(
 def run_sweep(
     study: Study,
     plan: SweepPlan,
-    folder: str | Path,
+    folder: StudyFolder,
     executor: Executor,
     progress: Progress | None = None,
     simulator: Simulator | None = None,
@@ -119,39 +119,36 @@ def run_sweep(
     A candidate that fails is a row with its reason.
 
     Args:
-        folder: new, empty, or where this very sweep was interrupted. It receives design.toml,
+        study: the study of the folder, with its effects resolved.
+        folder: if this very sweep was interrupted in it, it is resumed. It receives design.toml,
             study.toml and history.jsonl, whose rows are in the order of the plan for any number of
             workers.
         simulator: replaces the simulation; it is sent to the workers.
     Raises:
-        InputError: all candidates fail, or the folder holds something else or another sweep.
+        InputError: all candidates fail.
     """
-    with open_study_folder(study, folder, plan.as_json()) as opened:
-        if opened.finished:
-            again = "to run it again, give another folder (--out)"
-            raise InputError(f"{folder}: this sweep is finished, nothing was run; {again}")
-        opened.begin()
-        save_inputs(study, opened.path)
-        trials: list[Trial] = []
-        for number, point in enumerate(plan.points):
-            recorded = opened.recorded.find(number, "sweep", point.tolist())
-            if recorded is None:
-                break
-            trials.append(recorded)
-        best = max((one.score for one in trials if one.feasible), default=-np.inf)
-        for trial, seconds in _evaluate_from(study, plan, len(trials), executor, simulator):
-            opened.append(trial, None, seconds)
-            trials.append(trial)
-            best = max(best, trial.score) if trial.feasible else best
-            if progress:
-                progress(len(trials), len(plan.points), best if best > -np.inf else None)
-        if all(trial.objective is None for trial in trials):
-            raise InputError(
-                "no candidate of the sweep could be simulated, the first because: "
-                f"{trials[0].reason}; change [vary] or the design; every candidate is in "
-                f"{opened.path / HISTORY}"
-            )
-        return SweepResult(study, plan, opened.path, tuple(trials), opened.seconds)
+    folder.begin()
+    save_inputs(study, folder.path)
+    trials: list[Trial] = []
+    for number, point in enumerate(plan.points):
+        recorded = folder.recorded.find(number, "sweep", point.tolist())
+        if recorded is None:
+            break
+        trials.append(recorded)
+    best = max((one.score for one in trials if one.feasible), default=-np.inf)
+    for trial, seconds in _evaluate_from(study, plan, len(trials), executor, simulator):
+        folder.append(trial, None, seconds)
+        trials.append(trial)
+        best = max(best, trial.score) if trial.feasible else best
+        if progress:
+            progress(len(trials), len(plan.points), best if best > -np.inf else None)
+    if all(trial.objective is None for trial in trials):
+        raise InputError(
+            "no candidate of the sweep could be simulated, the first because: "
+            f"{trials[0].reason}; change [vary] or the design; every candidate is in "
+            f"{folder.path / HISTORY}"
+        )
+    return SweepResult(study, plan, folder.path, tuple(trials), folder.seconds)
 
 
 def _evaluate_from(

@@ -1,9 +1,10 @@
-"""A study from a new or interrupted folder to its result."""
+"""A study or a sweep from a new or interrupted folder to its result."""
 
 from pathlib import Path
 
 from chamberopt.common.parallel.executor import SerialExecutor
 from chamberopt.optimize.run_study import StudyResult, run_study
+from chamberopt.optimize.run_sweep import SweepPlan, SweepResult, run_sweep
 from chamberopt.optimize.storage.study_folder import open_study_folder
 from chamberopt.optimize.study import Study
 
@@ -13,3 +14,10 @@ def run_in_folder(
 ) -> StudyResult:
     with open_study_folder(study, path) as folder:
         return run_study(study, folder, executor or SerialExecutor(), progress, simulator, stop)
+
+
+def sweep_in_folder(
+    study: Study, plan: SweepPlan, path: Path, executor, progress=None, simulator=None
+) -> SweepResult:
+    with open_study_folder(study, path, plan.as_json()) as folder:
+        return run_sweep(study, plan, folder, executor, progress, simulator)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json as json_format
+from contextlib import ExitStack
 from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING
@@ -39,9 +40,21 @@ def check(
     screenshot
         Write an image (.png) of the part with its target and chamber, or of the surface's faults.
     """
+    from chamberopt.common.files import claim_file, claim_folder
+    from chamberopt.output.viewer.subprocess_drawing import picture_path
+
+    with ExitStack() as claims:
+        if screenshot is not None:
+            claims.enter_context(claim_file(picture_path(screenshot)))
+        if out is not None:
+            claims.enter_context(claim_folder(out))
+        _check(file, pilot, screenshot, json, out)
+
+
+def _check(file: Path, pilot: bool, screenshot: Path | None, json: bool, out: Path | None) -> None:
     from chamberopt.chamber.build import build_chamber
     from chamberopt.chamber.checks.check import describe, shot_reach
-    from chamberopt.common.files import make_output_folder, write_text
+    from chamberopt.common.files import write_text
     from chamberopt.geometry.mesh_io.surface_error import SurfaceError
     from chamberopt.optimize.study import Study, load
     from chamberopt.output.vtp_files import write_chamber
@@ -67,7 +80,7 @@ def check(
         facts["vary"] = {k: {"low": a, "start": design.value(k), "high": b} for k, (a, b) in bounds}
         facts["evaluations"] = loaded.optimizer.evaluations
     if out is not None:
-        facts["folder"] = str(make_output_folder(out))
+        facts["folder"] = str(out)
     if not json:
         print("\n".join([f"{file}: a usable {kind}", *table_lines(facts)]), flush=True)
     if pilot:

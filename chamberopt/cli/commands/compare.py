@@ -43,8 +43,8 @@ def compare(
     from chamberopt.output.compare.comparison_folder import COMPARE, write_comparison
     from chamberopt.output.compare.table import comparison_text
 
-    gathered_candidates = read_candidates(candidates, treatment_time_s)
     with results_folder(out, "compare") as folder:
+        gathered_candidates = read_candidates(candidates, treatment_time_s)
         results = _results(gathered_candidates, folder, workers, cluster)
         comparison = comparison_of(results, [one.label for one in gathered_candidates])
         print_remarks(write_comparison(folder, comparison))

@@ -35,23 +35,25 @@ def dents(
     pixels
         Longer side of one view in pixels.
     """
+    from chamberopt.common.files import claim_file
     from chamberopt.output.resimulate.impacts import dented_share, simulate_dents
     from chamberopt.output.viewer import parse_view
     from chamberopt.output.viewer.images.dents import draw_dents, require_pixels
     from chamberopt.output.viewer.subprocess_drawing import picture_path
 
-    path = picture_path(picture, "")
     eye = parse_view(view) if view else None
     require_pixels(pixels)
-    loaded, resimulated = load_replica(result, replica)
-    design, recorded = resimulated.design, resimulated.scene.duration
-    time = design.process.treatment_time if at_s is None else at_s
-    found = simulate_dents(resimulated, time)
-    beyond = f", simulated on from {recorded:g} s" if time > recorded else ""
-    title = f"{len(found):,} dents after {time:g} s in replica {replica}{beyond}"
-    title += f": {dented_share(found, resimulated.chamber):.1%} of the target".replace("%", " %")
-    heading = f"{loaded.folder.resolve().name}: {title}"
-    failure = draw_dents(loaded.folder, found, heading, path, eye, pixels)
+    with claim_file(picture_path(picture, "")) as path:
+        loaded, resimulated = load_replica(result, replica)
+        design, recorded = resimulated.design, resimulated.scene.duration
+        time = design.process.treatment_time if at_s is None else at_s
+        found = simulate_dents(resimulated, time)
+        beyond = f", simulated on from {recorded:g} s" if time > recorded else ""
+        title = f"{len(found):,} dents after {time:g} s in replica {replica}{beyond}"
+        share = f"{100.0 * dented_share(found, resimulated.chamber):.1f} %"
+        title += f": {share} of the target"
+        heading = f"{loaded.folder.resolve().name}: {title}"
+        failure = draw_dents(loaded.folder, found, heading, path, eye, pixels)
     if failure:
         raise InputError(failure)
     print(f"{title}\npicture in {path}")

@@ -90,10 +90,12 @@ def _files(
     formats: dict[str, ExportFormat], out: Path | None, name: str
 ) -> Iterator[dict[str, Path]]:
     """The file of each format: --out itself if it is a file, else one in a new folder."""
-    from chamberopt.common.files import check_new_file
+    from chamberopt.common.files import check_new_file, claim_file
 
     if out is not None and export_formats.is_file(out, formats):
-        yield {only: check_new_file(out) for only in formats}
+        (only,) = formats
+        with claim_file(check_new_file(out)) as file:
+            yield {only: file}
         return
     with results_folder(out, name) as folder:
         yield {name: folder / one.file for name, one in formats.items()}

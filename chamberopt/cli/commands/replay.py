@@ -47,6 +47,7 @@ def replay(
     fps
         Frames shown per second.
     """
+    from chamberopt.common.files import claim_file
     from chamberopt.output.resimulate.flight import simulate_flight
     from chamberopt.output.viewer import parse_view
     from chamberopt.output.viewer.images.film import film_path, require_playable
@@ -55,9 +56,10 @@ def replay(
     path = film_path(film)
     require_playable(fps, size, frames, path)
     eye = parse_view(view) if view else DEFAULT_VIEW
-    loaded, resimulated = load_replica(result, replica)
-    flown = simulate_flight(resimulated, from_s, 1e-3 * span_ms, frames)
-    failure = draw_replay(loaded.folder, flown, path, fps, size, eye)
+    with claim_file(path):
+        loaded, resimulated = load_replica(result, replica)
+        flown = simulate_flight(resimulated, from_s, 1e-3 * span_ms, frames)
+        failure = draw_replay(loaded.folder, flown, path, fps, size, eye)
     if failure:
         raise InputError(failure)
     print(f"{len(flown.time)} frames, {len(flown.impacts)} impacts on the part: film in {path}")

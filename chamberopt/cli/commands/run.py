@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -46,16 +46,18 @@ def run(
         from chamberopt.common.parallel.executor import open_executor
         from chamberopt.optimize.storage.study_folder import open_study_folder
         from chamberopt.optimize.study import load_study
+        from chamberopt.output.results.load import load_result, summary
 
         loaded = load_study(study)
-        chamber = build_chamber(loaded.design)
         if out is None:
             console.print_remarks(_unfinished_runs(study))
-        place = console.results_folder(None, study.stem) if out is None else nullcontext(out)
-        with place as path, open_study_folder(loaded, path) as folder:
+        claim = partial(open_study_folder, loaded)
+        with console.claimed_folder(out, study.stem, claim) as folder:
             if folder.finished:
-                _print_finished(folder.path, json)
+                line = f"best design: {summary(load_result(folder.path))}"
+                console.print_finished(folder.path, "study", [line], json)
                 return
+            chamber = build_chamber(loaded.design)
             how_to_resume = f"to resume: {_command('run', study, '--out', folder.path)}"
             try:
                 with open_executor(workers, cluster) as executor:
@@ -129,15 +131,6 @@ def _result_lines(result: StudyResult) -> list[str]:
         f"± 95 % intervals; start and best: {replicas} replicas of {seconds:g} s with seeds of "
         f"their own; candidates of the search in history.csv: {effort}",
     ]
-
-
-def _print_finished(folder: Path, as_json: bool) -> None:
-    """Print the result of a study that is finished already."""
-    from chamberopt.output.results.load import load_result, summary
-
-    again = "to run it again, give another folder (--out)"
-    console.print_remarks([f"{folder}: this study is finished, nothing was run; {again}"])
-    console.print_result([f"best design: {summary(load_result(folder))}"], folder, as_json)
 
 
 def _unfinished_runs(study: Path) -> list[str]:

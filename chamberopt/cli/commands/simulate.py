@@ -38,13 +38,13 @@ def simulate(
     from chamberopt.simulation.evaluate import evaluate
 
     candidate = load_design(design)
-    chamber = build_chamber(candidate)
-    cavity = analytic_cavity(candidate, chamber) if analytic else None
-    warnings = console.print_warnings(candidate, chamber)
     with (
         console.results_folder(out, design.stem) as folder,
         open_executor(workers, cluster) as executor,
     ):
+        chamber = build_chamber(candidate)
+        cavity = analytic_cavity(candidate, chamber) if analytic else None
+        warnings = console.print_warnings(candidate, chamber)
         candidate, advice = resolve_effects(candidate, chamber, executor)
         compile_with_message(candidate, chamber, cavity)
         with progress_bar("replicas") as progress:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
+from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 
 from chamberopt.cli import console
@@ -42,22 +43,31 @@ def sweep(
     from chamberopt.common.parallel.executor import open_executor
     from chamberopt.common.progress import progress_bar
     from chamberopt.optimize.run_sweep import plan_sweep, run_sweep
+    from chamberopt.optimize.storage.study_folder import open_study_folder
     from chamberopt.optimize.study import load_study
     from chamberopt.output.results.write import best_row_note
     from chamberopt.output.save_run import save_sweep
 
     loaded = load_study(study)
     plan = plan_sweep(loaded, grid, sobol, seed)
-    chamber = build_chamber(loaded.design)
-    place = console.results_folder(None, f"{study.stem}-sweep") if out is None else nullcontext(out)
-    with place as folder, open_executor(workers, cluster, "processes") as executor:
-        design, advice = resolve_effects(loaded.design, chamber, executor)
-        loaded = loaded.model_copy(update={"design": design})
-        compile_with_message(design, chamber)
+    claim = partial(open_study_folder, loaded, plan=plan.as_json())
+    with (
+        console.claimed_folder(out, f"{study.stem}-sweep", claim) as folder,
+        ExitStack() as workers_end,
+    ):
+        if folder.finished:
+            console.print_finished(folder.path, "sweep", [], json)
+            return
+        chamber = build_chamber(loaded.design)
+        executor = workers_end.enter_context(open_executor(workers, cluster, "processes"))
+        loaded, advice = folder.with_effects_resolved(
+            lambda design: resolve_effects(design, chamber, executor)
+        )
+        compile_with_message(loaded.design, chamber)
         with progress_bar("candidates") as progress:
             result = run_sweep(loaded, plan, folder, executor, progress)
-        console.print_remarks(save_sweep(folder, result))
-    effort = console.replicas_text(loaded.at_search_accuracy(design))
+        console.print_remarks(save_sweep(folder.path, result))
+    effort = console.replicas_text(loaded.at_search_accuracy(loaded.design))
     lines = [f"{len(result.trials)} candidates in {result.seconds:.0f} s, {effort} each"]
     best = result.best
     if best is not None and best.objective is not None:
@@ -70,4 +80,4 @@ def sweep(
     if failed:
         notes.append(f"{len(failed)} candidates failed, the first because: {failed[0].reason}")
     notes.append(best_row_note(result))
-    console.print_result([*lines, *console.note_lines(notes)], folder, json)
+    console.print_result([*lines, *console.note_lines(notes)], folder.path, json)

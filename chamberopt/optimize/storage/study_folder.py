@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
-from chamberopt.common.files import make_output_folder, write_text
+from chamberopt.common.files import claim_folder, write_text
 from chamberopt.design.design import Design
 from chamberopt.optimize.storage import study_inputs
-from chamberopt.optimize.storage.lock import only_writer
 from chamberopt.optimize.storage.resume import RecordedTrials
 from chamberopt.optimize.storage.trial_log import HISTORY, TIMINGS, JsonLines, Trial, read_seconds
 from chamberopt.simulation.effect_pilot import Advice
@@ -47,9 +46,7 @@ def open_study_folder(
     if (folder / INPUTS_0_1).is_file():
         text = "this study was run by version 0.1, which cannot be resumed"
         raise InputError(f"{folder}: {text}; give another folder (--out)")
-    if not is_study_folder(folder):
-        folder = make_output_folder(folder)
-    with only_writer(folder):
+    with claim_folder(folder, is_study_folder):
         yield StudyFolder(study, folder, plan)
 
 

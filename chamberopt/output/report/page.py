@@ -12,13 +12,13 @@ from pathlib import Path
 from typing import Any
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import write_text
+from chamberopt.common.files import claim_file, write_text
 from chamberopt.output.plots.colours import hex_colours, muted
 from chamberopt.output.report import html
 from chamberopt.output.report.part3d import PartScene, part_scene, quantities_in_all
 from chamberopt.output.report.report_data import START, read_design_file, report_contents
 from chamberopt.output.report.sections import sections
-from chamberopt.output.results.load import load_result, summary
+from chamberopt.output.results.load import Result, load_result, summary
 
 REPORT = "report.html"
 GENERATOR = '<meta name="generator" content="chamberopt'
@@ -53,6 +53,12 @@ def write_report(result: str | Path, path: str | Path | None = None) -> tuple[Pa
     contents = report_contents(result)
     loaded = load_result(result)
     path = require_free_page(loaded.folder / REPORT if path is None else path)
+    with claim_file(path):
+        scene = _write_report(path, contents, loaded)
+    return path, {**contents, "remarks": list(scene.remarks)}
+
+
+def _write_report(path: Path, contents: dict[str, Any], loaded: Result) -> PartScene:
     is_study = contents["kind"] == "study"
     scene = part_scene(loaded, contents["name"])
     scenes = {"best" if is_study else "result": scene}
@@ -69,7 +75,7 @@ def write_report(result: str | Path, path: str | Path | None = None) -> tuple[Pa
     )
     body = sections(contents, viewer([scene]), scenes, read_design_file(loaded.folder))
     write_page(path, f"{contents['name']}: report", head + body, [scene])
-    return path, {**contents, "remarks": list(scene.remarks)}
+    return scene
 
 
 def write_part_page(results: Sequence[Path], path: Path) -> list[str]:
@@ -81,8 +87,11 @@ def write_part_page(results: Sequence[Path], path: Path) -> list[str]:
     Raises:
         InputError: as write_report, and for a part that is too large for a page.
     """
-    path = require_free_page(path)
-    loaded = [load_result(one) for one in results]
+    with claim_file(require_free_page(path)):
+        return _write_part_page([load_result(one) for one in results], path)
+
+
+def _write_part_page(loaded: Sequence[Result], path: Path) -> list[str]:
     names = _unique_names([one.folder.resolve() for one in loaded])
     scenes = [part_scene(one, name) for one, name in zip(loaded, names, strict=True)]
     for scene, one in zip(scenes, loaded, strict=True):

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import atomic_write
+from chamberopt.common.files import atomic_write, claim_file
 from chamberopt.output.plots.quantities import QUANTITIES
 from chamberopt.output.viewer.actors import DARK
 from chamberopt.output.viewer.opened_result import OpenedResult, ResultInfo
@@ -39,7 +39,8 @@ def inspect(
     if screenshot is not None:
         results = [asdict(one) for one in infos]
         job = {"draw": "inspect", "results": results, "state": asdict(state)}
-        skipped = draw_in_subprocess(job, picture_path(screenshot))
+        with claim_file(picture_path(screenshot)) as path:
+            skipped = draw_in_subprocess(job, path)
         if skipped:
             raise InputError(skipped)
         return

@@ -13,13 +13,14 @@ from chamberopt.cli import main
 from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import SerialExecutor, local_executor
 from chamberopt.design.load import load_design
-from chamberopt.optimize.run_sweep import plan_sweep, run_sweep
+from chamberopt.optimize.run_sweep import plan_sweep
 from chamberopt.optimize.storage.trial_log import read_trials
 from chamberopt.optimize.study import Study, load_study
 from chamberopt.output.results.load import load_result
 from chamberopt.output.save_run import save_sweep
 from chamberopt.simulation.evaluation import Evaluation
 from tests.helpers import worker_jobs
+from tests.helpers.studies import sweep_in_folder
 from tests.helpers.synthetic import DESIGNS, plate_design
 
 MASS = {"shot.mass_g": (2.0, 10.0)}
@@ -87,7 +88,7 @@ def test_what_cannot_be_planned_is_said(arguments: tuple, said: str) -> None:
 
 def test_a_failed_candidate_is_a_row_and_the_best_is_the_best_feasible(tmp_path: Path) -> None:
     question = study(constraints={"mean_coverage": {"max": 0.55}})
-    sweep = run_sweep(
+    sweep = sweep_in_folder(
         question, plan_sweep(question, 9, None), tmp_path, SerialExecutor(), None, worker_jobs.hill
     )
     assert [trial.parameters["shot.mass_g"] for trial in sweep.trials] == [
@@ -116,7 +117,7 @@ def test_when_all_fail_the_reason_is_said(tmp_path: Path) -> None:
     with pytest.raises(
         InputError, match=r"the first because: shot: .* do not fit; change \[vary\]"
     ):
-        run_sweep(
+        sweep_in_folder(
             question,
             type(plan)("grid", 2, plan.points[1:], None),
             tmp_path,
@@ -129,7 +130,7 @@ def test_when_all_fail_the_reason_is_said(tmp_path: Path) -> None:
 def test_a_candidate_that_takes_its_workers_down_is_a_row(tmp_path: Path) -> None:
     question = study()
     with local_executor(2, "processes") as executor:
-        sweep = run_sweep(
+        sweep = sweep_in_folder(
             question, plan_sweep(question, 9, None), tmp_path, executor, None, worker_jobs.deadly
         )
     assert [trial.feasible for trial in sweep.trials] == [True] * 4 + [False] + [True] * 3 + [False]
@@ -142,7 +143,7 @@ def test_a_candidate_that_takes_its_workers_down_is_a_row(tmp_path: Path) -> Non
 def test_what_a_sweep_leaves(vary: dict, way: tuple, tmp_path: Path) -> None:
     question = study(vary)
     seen: list = []
-    sweep = run_sweep(
+    sweep = sweep_in_folder(
         question,
         plan_sweep(question, *way),
         tmp_path,
@@ -176,7 +177,7 @@ def test_the_same_rows_whatever_works_on_them(tmp_path: Path) -> None:
         ("processes", local_executor(2, "processes")),
     ):
         with executor:
-            run_sweep(question, plan, tmp_path / name, executor)
+            sweep_in_folder(question, plan, tmp_path / name, executor)
         found[name] = rows(tmp_path / name)
     assert found["serial"] == found["threads"] == found["processes"]
     assert len({row["objective"] for row in found["serial"]}) == 6
@@ -217,15 +218,15 @@ def test_a_sweep_that_was_stopped_goes_on(tmp_path: Path, kept: int) -> None:
         return worker_jobs.hill(*asked)
 
     plan, whole, folder = plan_sweep(question, 9, None), tmp_path / "whole", tmp_path / "stopped"
-    run_sweep(question, plan, whole, SerialExecutor(), None, worker_jobs.hill)
-    run_sweep(question, plan, folder, SerialExecutor(), None, worker_jobs.hill)
+    sweep_in_folder(question, plan, whole, SerialExecutor(), None, worker_jobs.hill)
+    sweep_in_folder(question, plan, folder, SerialExecutor(), None, worker_jobs.hill)
     history = folder / "history.jsonl"
     history.write_bytes(b"".join(history.read_bytes().splitlines(keepends=True)[:kept]))
-    run_sweep(question, plan, folder, SerialExecutor(), None, counted)
+    sweep_in_folder(question, plan, folder, SerialExecutor(), None, counted)
     assert history.read_bytes() == (whole / "history.jsonl").read_bytes()
     assert len(calls) == 9 - kept
     with pytest.raises(InputError, match=r"sweep\.count: was 9, is 5"):
-        run_sweep(
+        sweep_in_folder(
             question,
             plan_sweep(question, 5, None),
             folder,
@@ -238,7 +239,7 @@ def test_a_sweep_that_was_stopped_goes_on(tmp_path: Path, kept: int) -> None:
 def test_a_sweep_names_what_it_maximises(tmp_path: Path) -> None:
     """A sum or a pair has no name of its own: the first goal is what its figures are of."""
     question = study(objective={"sum": {"shot_count": 1.0}})
-    sweep = run_sweep(
+    sweep = sweep_in_folder(
         question, plan_sweep(question, 2, None), tmp_path, SerialExecutor(), None, worker_jobs.hill
     )
     save_sweep(tmp_path, sweep)
@@ -252,7 +253,7 @@ def test_another_plan_on_a_finished_sweep_is_refused_as_another(tmp_path: Path) 
     folder = tmp_path / "map"
     save_sweep(
         folder,
-        run_sweep(
+        sweep_in_folder(
             question,
             plan_sweep(question, 3, None),
             folder,
@@ -262,18 +263,9 @@ def test_another_plan_on_a_finished_sweep_is_refused_as_another(tmp_path: Path) 
         ),
     )
     with pytest.raises(InputError, match=r"sweep\.count: was 3, is 2"):
-        run_sweep(
+        sweep_in_folder(
             question,
             plan_sweep(question, 2, None),
-            folder,
-            SerialExecutor(),
-            None,
-            worker_jobs.hill,
-        )
-    with pytest.raises(InputError, match="is finished"):
-        run_sweep(
-            question,
-            plan_sweep(question, 3, None),
             folder,
             SerialExecutor(),
             None,

@@ -22,11 +22,12 @@ from chamberopt.common.parallel import dask_cluster
 from chamberopt.common.parallel.dask_cluster import DaskExecutor
 from chamberopt.common.parallel.executor import SerialExecutor, share
 from chamberopt.design.load import load_design
-from chamberopt.optimize.run_sweep import plan_sweep, run_sweep
+from chamberopt.optimize.run_sweep import plan_sweep
 from chamberopt.optimize.study import Study
 from chamberopt.simulation.evaluate import ReplicaPlan, evaluate
 from tests.chamberopt.optimize.test_run_sweep import rows, small_study
 from tests.helpers import worker_jobs
+from tests.helpers.studies import sweep_in_folder
 
 distributed = pytest.importorskip(
     "distributed", reason="Dask is not installed: pip install 'chamberopt[dask]'"
@@ -135,7 +136,7 @@ def test_a_sweep_goes_on_when_a_worker_is_killed(dask: Dask, tmp_path: Path) -> 
         design=load_design(ROOT / "designs" / "gear.toml"), vary={"shot.mass_g": (2.0, 10.0)}
     )
     plan = plan_sweep(study, 40, None)
-    run_sweep(study, plan, tmp_path / "serial", SerialExecutor(), None, worker_jobs.hill)
+    sweep_in_folder(study, plan, tmp_path / "serial", SerialExecutor(), None, worker_jobs.hill)
     done = []
 
     def progress(count: int, total: int, best: float | None) -> None:
@@ -144,7 +145,7 @@ def test_a_sweep_goes_on_when_a_worker_is_killed(dask: Dask, tmp_path: Path) -> 
             dask.kill_a_worker()
 
     with DaskExecutor(str(dask.scheduler_file)) as executor:
-        run_sweep(study, plan, tmp_path / "cluster", executor, progress, worker_jobs.hill)
+        sweep_in_folder(study, plan, tmp_path / "cluster", executor, progress, worker_jobs.hill)
         dask.start_worker()
         executor._client.wait_for_workers(2, timeout=60)
     assert done == list(range(1, 41))
@@ -162,7 +163,7 @@ def test_the_same_bits_as_on_this_machine(dask: Dask, tmp_path: Path) -> None:
         ("cluster", DaskExecutor(str(dask.scheduler_file))),
     ):
         with executor:
-            run_sweep(study, plan, tmp_path / name, executor)
+            sweep_in_folder(study, plan, tmp_path / name, executor)
             evaluations.append(evaluate(study.design, chamber, executor, plan=ReplicaPlan(5)))
     assert rows(tmp_path / "cluster") == rows(tmp_path / "serial")
     one, other = evaluations
