@@ -176,12 +176,17 @@ def uniformity_of(parts: np.ndarray, highest: float, reachable: float) -> Estima
         value = _uniformity(_spread(strength, strength), reachable)
         return Estimate(value, math.inf, (value,) * batches)
     rng = np.random.default_rng(0)
-    by_halves = _spread_of_pairs(parts, highest, batches // 2, rng)
-    by_quarters = _spread_of_pairs(parts, highest, batches // 4, rng)
+    by_halves = _spreads_of_pairs(parts, highest, batches // 2, rng)
+    by_quarters = _spreads_of_pairs(parts, highest, batches // 4, rng)
     # With half the dents, the error of S is about twice as large.
-    value = _uniformity(2.0 * by_halves - by_quarters, reachable)
+    value = _uniformity(float((2.0 * by_halves - by_quarters).mean()), reachable)
     # The bias falls more slowly than that; twice the step held where once held in 3 of 4 runs.
-    bias = 2.0 * abs(value - _uniformity(by_halves, reachable))
+    # Steps of single pairs do not cancel where their mean is near 0 by chance.
+    steps = [
+        _uniformity(2.0 * half - quarter, reachable) - _uniformity(half, reachable)
+        for half, quarter in zip(by_halves, by_quarters, strict=True)
+    ]
+    bias = 2.0 * math.sqrt(float(np.mean(np.square(steps))))
     of_some = [_uniformity(_spread(some, some), reachable) for some in sparse_points(strength)]
     values = np.array(
         [
@@ -202,10 +207,10 @@ def uniformity_of(parts: np.ndarray, highest: float, reachable: float) -> Estima
     )
 
 
-def _spread_of_pairs(
+def _spreads_of_pairs(
     parts: np.ndarray, highest: float, size: int, rng: np.random.Generator
-) -> float:
-    """Mean square of S over the square of its mean, from pairs of disjoint sets of batches.
+) -> np.ndarray:
+    """Mean square of S over the square of its mean, from each of SPLITS pairs of sets of batches.
 
     Args:
         size: number of batches in each set.
@@ -218,7 +223,7 @@ def _spread_of_pairs(
             for k in (0, 1)
         )
         spreads.append(_spread(one, two))
-    return float(np.mean(spreads))
+    return np.array(spreads)
 
 
 def _spread(one: np.ndarray, two: np.ndarray) -> float:
