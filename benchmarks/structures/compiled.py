@@ -29,7 +29,7 @@ def jit(function: Callable[..., Any], arrays: bool = False) -> Any:
     before = _settings.CACHE_DIR
     _settings.CACHE_DIR = str(_FOLDER)
     try:
-        return numba.njit(cache=sim_core_jit._CACHED, nogil=True, error_model="numpy", _nrt=arrays)(
+        return numba.njit(cache=sim_core_jit.CACHED, nogil=True, error_model="numpy", _nrt=arrays)(
             function
         )
     finally:

@@ -35,6 +35,8 @@ def compile_with_message(
     print_remarks(["compiling the simulator (once per set of effects) ..."])
     seconds = sim_core.compile_simulator(*variant)
     print_remarks([f"compiled in {seconds:.0f} s"])
+    if not sim_core.is_compiled(*variant):
+        print_remarks(["compiled code cannot be kept: set NUMBA_CACHE_DIR to a folder of your own"])
 
 
 def resolve_effects(

@@ -12,7 +12,7 @@ from sim_core.geometry.analytic import cylinder_cavity
 from sim_core.geometry.mesh import TriangleMesh
 from sim_core.loop.simulate import simulate
 from sim_core.loop.spatial_blocks import MIN_BALLS
-from sim_core.numerics.jit import CACHE_FOLDER
+from sim_core.numerics.jit import CACHE_FOLDER, CACHED
 from sim_core.scene.physics import Physics
 from sim_core.scene.scene import Scene
 
@@ -74,9 +74,9 @@ def compile_simulator(
         else mesh
     )
     simulate(Scene(room, shot, physics, duration=0.01))
-    # Where the cache cannot be written, every process compiles for itself.
-    with contextlib.suppress(OSError):
-        _marker(physics, balls, alike, cylinder).touch()
+    if CACHED:
+        with contextlib.suppress(OSError):  # such as a full disk
+            _marker(physics, balls, alike, cylinder).touch()
     return time.perf_counter() - start
 
 

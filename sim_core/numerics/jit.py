@@ -9,12 +9,13 @@ import hashlib
 import os
 import shutil
 import sys
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numba
+
+from sim_core.numerics.compile_cache import CheckedCache, is_private
 
 # Both are untyped, or typed without the attributes used here.
 _settings: Any = numba.config
@@ -31,7 +32,7 @@ def _cache_root() -> Path:
     try:
         Path.home()
     except RuntimeError:  # a user without a home, as in some containers
-        return Path(tempfile.gettempdir()) / "chamberopt"
+        return Path(os.devnull)  # no cache: a shared folder is open to other users' code
     if sys.platform == "darwin":
         return Path.home() / "Library" / "Caches" / "chamberopt"
     if sys.platform == "win32":
@@ -62,17 +63,20 @@ def _remove_old_caches() -> None:
 
 
 def _cache_is_usable() -> bool:
-    """True when the folder can be written; otherwise every process compiles for itself."""
+    """True when the folder can be written, by this user only.
+
+    Otherwise every process compiles for itself.
+    """
     try:
         if not CACHE_FOLDER.exists():
-            CACHE_FOLDER.mkdir(parents=True, exist_ok=True)
+            CACHE_FOLDER.mkdir(0o700, parents=True, exist_ok=True)
             _remove_old_caches()
+        return is_private(CACHE_FOLDER) and os.access(CACHE_FOLDER, os.W_OK)
     except OSError:
         return False
-    return os.access(CACHE_FOLDER, os.W_OK)
 
 
-_CACHED = _cache_is_usable() and not _settings.DISABLE_JIT
+CACHED = _cache_is_usable() and not _settings.DISABLE_JIT
 
 
 def _compiled(function: Callable[..., Any], inline: bool) -> Callable[..., Any]:
@@ -81,7 +85,10 @@ def _compiled(function: Callable[..., Any], inline: bool) -> Callable[..., Any]:
     _settings.CACHE_DIR = str(CACHE_FOLDER)
     try:
         options = {"nogil": True, "error_model": "numpy", "fastmath": False, "_nrt": False}
-        return _njit(cache=_CACHED, forceinline=inline, **options)(function)
+        compiled = _njit(forceinline=inline, **options)(function)
+        if CACHED:
+            compiled._cache = CheckedCache(function)
+        return compiled
     finally:
         _settings.CACHE_DIR = before
 
