@@ -25,7 +25,7 @@ DIGEST_BYTES = 32
 class _InChosenFolder(CompileResultCacheImpl):
     """Code in other folders of numba would outlive edits of the sources."""
 
-    _locator_classes = [UserProvidedCacheLocator]
+    _locator_classes = [UserProvidedCacheLocator]  # noqa: RUF012
 
 
 class _CheckedFiles(IndexDataCacheFile):
