@@ -78,7 +78,7 @@ def _is_whole(path: Path) -> bool:
         return False
     if sha256(content[:-DIGEST_BYTES]).digest() == content[-DIGEST_BYTES:]:
         return True
-    _report_damage(path.parents[1])
+    _report_damage(path.parents[2])  # of steps and entries alike
     with suppress(OSError):
         path.unlink()
     return False
