@@ -26,6 +26,7 @@ from sim_core import (
 )
 from sim_core.effects.surface.surface_effects import MAKERS, SurfaceEffects, surface_effects
 from sim_core.loop.simulate import Simulation
+from sim_core.numerics.jit import Step
 from tests.helpers.scenes.cavities import box
 
 # what the loop keeps of an effect, by the name of the field and the kind of thing it is when the
@@ -75,10 +76,10 @@ def compiled_functions() -> dict[str, list[str]]:
     for name, module in list(sys.modules.items()):
         if name.startswith("sim_core."):
             for function in vars(module).values():
-                if getattr(function, "signatures", None) and function.py_func.__module__ == name:
-                    found[f"{name}.{function.py_func.__name__}"] = [
-                        str(types) for types in function.signatures
-                    ]
+                if isinstance(function, Step) and function.py_func.__module__ == name:
+                    kinds = [*function.signatures, *getattr(function, "entry", function).signatures]
+                    if kinds:
+                        found[f"{name}.{function.py_func.__name__}"] = [*map(str, kinds)]
     return found
 
 
