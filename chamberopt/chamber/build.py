@@ -67,6 +67,7 @@ class Chamber:
     # (k,), hole or deflector that a TAG_WALL triangle belongs to, by its place in
     # `bores_and_deflectors.fitting_names`, else -1. None where it is not known.
     fitting: np.ndarray | None = None
+    shape_sha256: str = ""  # of the Python file of a user's own shape, as it was run
 
     @property
     def height(self) -> float:
@@ -135,7 +136,8 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
     notes += [*room_notes, *_notes_on_room(room, traced, part.name)]
     volume = float(tetrahedron_volumes(room.vertices, room.triangles).sum())
     surface = room.vertices, room.triangles, traced.tags, traced.source
-    return Chamber(*surface, volume, part, exposed, tuple(notes), traced.fitting)
+    origin = tuple(notes), traced.fitting, design.chamber.sha256
+    return Chamber(*surface, volume, part, exposed, *origin)
 
 
 def _refuse_misplaced_part(part: Part, shape: np.ndarray, design: Design) -> None:

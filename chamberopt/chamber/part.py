@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,7 +20,19 @@ if TYPE_CHECKING:
     from chamberopt.design.design import Design
     from chamberopt.design.part import Target
 
+Axis = tuple[np.ndarray, np.ndarray]
+
 MAX_ELEMENTS = 3e5  # makes a few minutes of meshing, and slow steps after it
+
+
+@dataclass(frozen=True)
+class PartOfFile:
+    """What a result needs of the part's file once it has been read; without groups and notes."""
+
+    simulated: PartMesh  # in the file's frame
+    original: PartMesh | None  # with the file's own triangles, if target.element_mm asks for others
+    rotation: np.ndarray  # from the file's frame to the chamber's, (3, 3), applied before the shift
+    shift: np.ndarray  # [m], (3,)
 
 
 @dataclass(frozen=True)
@@ -39,13 +51,14 @@ class Part:
     sha256: str = ""  # of the mesh file as it was read
     unit: str = ""  # of the numbers in the file
     names: tuple[str, ...] = ()  # of the file's groups
-    # (m,) int64, the file's element that a triangle belongs to, as in ElementNumbers; from 1 on if
-    # not given
-    elements: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    file: PartOfFile | None = None  # None only in parts that no file has
 
-    def __post_init__(self) -> None:
-        if not len(self.elements):
-            object.__setattr__(self, "elements", np.arange(1, len(self.triangles) + 1))
+    @property
+    def elements(self) -> np.ndarray:
+        """The file's element that a triangle belongs to, (m,) int64, as in ElementNumbers."""
+        if self.file is None:
+            return np.arange(1, len(self.triangles) + 1)
+        return self.file.simulated.elements
 
 
 def posed_part(design: Design) -> tuple[Part, list[str]]:
@@ -62,28 +75,25 @@ def posed_part(design: Design) -> tuple[Part, list[str]]:
     turn, shift = _pose(mesh, design)
     vertices = snap_to_grid(mesh.vertices @ turn.T + shift)
     area = areas(vertices, mesh.triangles)
-    of_file = mesh.sha256, mesh.unit, tuple(mesh.groups), mesh.elements
+    simulated = replace(mesh, groups={}, notes=())
+    is_remeshed = design.part.target.element is not None
+    original = replace(_part_of_file(design), groups={}, notes=()) if is_remeshed else None
+    file = PartOfFile(simulated, original, turn, shift)
+    of_file = mesh.sha256, mesh.unit, tuple(mesh.groups), file
     part = Part(vertices, mesh.triangles, area, target, design.part.mesh_path.name, *of_file)
     return part, list(mesh.notes)
 
 
-def part_meshes(design: Design) -> tuple[PartMesh, PartMesh]:
-    """The part as its file has it, and as it is simulated (`posed_part`), in the file's frame."""
-    return _part_of_file(design), _meshed_part(design)[0]
+def turning_axis(design: Design, part: Part) -> Axis | None:
+    """Point [m] and direction, (3,) each, of effects.part_turn's axis in the chamber's frame.
 
-
-def turning_axis(design: Design) -> tuple[np.ndarray, np.ndarray]:
-    """Point [m] and direction, (3,) each, of effects.part_turn's axis in the chamber's frame."""
-    turn = design.effects.part_turn
-    if turn is None:
-        raise ValueError("the part of this design does not turn")
-    matrix, shift = part_pose(design)
-    return matrix @ np.array(turn.through) + shift, matrix @ np.array(turn.axis)
-
-
-def part_pose(design: Design) -> tuple[np.ndarray, np.ndarray]:
-    """From the part file's frame to the chamber's: rotation (3, 3), then shift (3,) [m]."""
-    return _pose(_meshed_part(design)[0], design)
+    None for a part that does not turn.
+    """
+    turn, file = design.effects.part_turn, part.file
+    if turn is None or file is None:
+        return None
+    point = file.rotation @ np.array(turn.through) + file.shift
+    return point, file.rotation @ np.array(turn.axis)
 
 
 def _part_of_file(design: Design) -> PartMesh:

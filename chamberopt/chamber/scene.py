@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.chamber.part import turning_axis
 from chamberopt.common.errors import InputError
 from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, further_sonotrode_tag
 
@@ -17,6 +16,7 @@ MAX_BALLS = 20_000
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
+    from chamberopt.chamber.part import Axis
     from chamberopt.design.load import Design
     from sim_core import AnalyticCavity, PartRotation, Physics, Scene, TriangleMesh, Vibration
 
@@ -58,22 +58,26 @@ def require_ball_count(design: Design) -> None:
         )
 
 
-def part_rotation(design: Design, phase: float = 0.0) -> PartRotation | None:
+def part_rotation(design: Design, axis: Axis | None, phase: float = 0.0) -> PartRotation | None:
     """The rotation of the part, if it turns, with its phase [rad] at the start."""
     from sim_core import PartRotation
 
     turn = design.effects.part_turn
     if turn is None:
         return None
-    point, axis = ((float(x), float(y), float(z)) for x, y, z in turning_axis(design))
-    return PartRotation(TAG_PART, point, axis, turn.rpm, turn.amplitude, turn.frequency_hz, phase)
+    if axis is None:
+        raise ValueError("the axis of a turning part is not given")
+    point, direction = ((float(x), float(y), float(z)) for x, y, z in axis)
+    return PartRotation(
+        TAG_PART, point, direction, turn.rpm, turn.amplitude, turn.frequency_hz, phase
+    )
 
 
-def require_turnable(design: Design, mesh: TriangleMesh) -> None:
+def require_turnable(design: Design, mesh: TriangleMesh, axis: Axis | None) -> None:
     """Raise InputError if the part should turn but its chamber leaves no room for that."""
     from sim_core import SceneError, require_free_rotation
 
-    turn = part_rotation(design)
+    turn = part_rotation(design, axis)
     if turn is not None:
         try:
             require_free_rotation(mesh, turn, design.shot.diameter)
@@ -117,10 +121,12 @@ def scene_physics(
     phase: float = 0.0,
     turn_phase: float = 0.0,
     phase_seed: int = 0,
+    axis: Axis | None = None,
 ) -> Physics:
     """The effects of a design in its chamber's mesh or analytical cavity.
 
     Args:
+        axis: of a turning part, as `turning_axis` gives it.
         phase, turn_phase: of the sonotrode and of a turning part at the start [rad].
         phase_seed: for motion = "random_phase", the seed of each ball's phase.
     """
@@ -145,7 +151,7 @@ def scene_physics(
         gravity=sim_core.Gravity() if effects.gravity else None,
         restitution=sim_core.Restitution(surfaces, balls, accuracy.elastic_below),
         vibration=vibrations(design, phase),
-        part_rotation=part_rotation(design, turn_phase),
+        part_rotation=part_rotation(design, axis, turn_phase),
         rest=sim_core.Rest() if balls_can_rest(design, mesh) else None,
         friction=friction,
         drag=sim_core.Drag(piece=accuracy.drag_step) if effects.drag else None,
@@ -155,7 +161,9 @@ def scene_physics(
     )
 
 
-def build_scene(design: Design, mesh: TriangleMesh | AnalyticCavity, seed: int) -> Scene:
+def build_scene(
+    design: Design, mesh: TriangleMesh | AnalyticCavity, seed: int, axis: Axis | None = None
+) -> Scene:
     """The scene that one replica simulates. Equal arguments give bit-identical scenes.
 
     The shot starts packed low in the chamber with the speed scale of the sonotrode, 2 pi f A: then
@@ -163,6 +171,8 @@ def build_scene(design: Design, mesh: TriangleMesh | AnalyticCavity, seed: int) 
     orders of magnitude. The phases of the sonotrode and of a turning part are random, because a
     part may take longer for one turn than a replica lasts.
 
+    Args:
+        axis: of a turning part, as `turning_axis` gives it.
     Raises:
         InputError: the shot does not fit or has too many balls, or the part cannot turn.
     """
@@ -170,13 +180,13 @@ def build_scene(design: Design, mesh: TriangleMesh | AnalyticCavity, seed: int) 
 
     require_ball_count(design)
     if not isinstance(mesh, AnalyticCavity):
-        require_turnable(design, mesh)
+        require_turnable(design, mesh, axis)
     rng = np.random.default_rng(seed)
     sonotrode, shot = design.sonotrode, design.shot
     phase = rng.uniform(0.0, 2.0 * np.pi)
     turn_phase = 0.0 if design.effects.part_turn is None else rng.uniform(0.0, 2.0 * np.pi)
     clearance = max(one.amplitude for one in (sonotrode, *design.sonotrodes))
-    diameter, turn = np.array(shot.diameters), part_rotation(design, turn_phase)
+    diameter, turn = np.array(shot.diameters), part_rotation(design, axis, turn_phase)
     try:
         # floor = 0: no balls in a well below the sonotrode's face
         positions = pack_balls(
@@ -190,7 +200,7 @@ def build_scene(design: Design, mesh: TriangleMesh | AnalyticCavity, seed: int) 
     return Scene(
         mesh=mesh,
         balls=Balls(positions, velocities, diameter, shot.density),
-        physics=scene_physics(design, mesh, phase, turn_phase, phase_seed),
+        physics=scene_physics(design, mesh, phase, turn_phase, phase_seed, axis),
         duration=design.process.recorded_time,
         warmup=design.process.accuracy.warmup_time,
         record=(TAG_PART,),

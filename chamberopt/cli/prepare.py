@@ -23,11 +23,13 @@ def compile_with_message(
 ) -> None:
     """Compile with a message, not behind a progress bar, where a minute would look like a hang."""
     import sim_core
+    from chamberopt.chamber.part import turning_axis
     from chamberopt.chamber.scene import chamber_mesh, require_ball_count, scene_physics
 
     require_ball_count(design)
     shot = design.shot
-    physics = scene_physics(design, cavity or chamber_mesh(chamber))
+    axis = turning_axis(design, chamber.part)
+    physics = scene_physics(design, cavity or chamber_mesh(chamber), axis=axis)
     is_cylinder = cavity is not None and cavity.radius is not None
     variant = physics, shot.count, shot.mix is None, is_cylinder
     if sim_core.is_compiled(*variant):
@@ -72,8 +74,11 @@ def load_replica(folder: Path, number: int) -> tuple[Result, RebuiltReplica]:
     """A result and one of its replicas, compiled to be simulated again."""
     from chamberopt.output.resimulate.rebuild import rebuild_replica
     from chamberopt.output.results.load import load_result
+    from chamberopt.output.vtp_files import CHAMBER, COVERAGE, PART
 
     loaded = load_result(folder)
+    for name in (PART, COVERAGE, CHAMBER):  # the drawing process reads them
+        loaded.path(name)
     replica = rebuild_replica(loaded, number)
     compile_with_message(replica.design, replica.chamber, replica.cavity)
     return loaded, replica

@@ -5,8 +5,6 @@ import io
 import os
 import platform
 import tempfile
-import zipfile
-import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from datetime import datetime
@@ -18,8 +16,6 @@ from chamberopt.common.errors import InputError, OutputTakenError
 LOCK, WRITING = ".lock", ".writing-"
 LEFTOVER_PREFIXES = (LOCK, WRITING)  # of files that a command that was killed may leave
 ANOTHER_FOLDER = "choose another folder (out, or --out)"
-# What reading a damaged .npz file can raise.
-UNREADABLE_NPZ = OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, zlib.error
 
 
 def is_new_or_empty(folder: Path) -> bool:

@@ -1,6 +1,7 @@
 """Types of the fields in TOML files: numbers with a unit, lists, directions, positions, files."""
 
 import math
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
@@ -83,7 +84,10 @@ def from_file(path: str, context: Mapping[str, Any] | None) -> Path:
 
     `context` is that of the pydantic validation, as `validate` in design/design.py makes it.
     """
-    return ((context or {}).get("folder", Path()) / path).resolve()
+    context = context or {}
+    named = context.get("folder", Path()) / path
+    # What a result names is recorded, and nothing is looked for on this machine.
+    return Path(os.path.abspath(named)) if context.get("recorded") else named.resolve()
 
 
 def unit_vector(direction: Vector) -> Vector:

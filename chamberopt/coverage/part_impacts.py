@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import UNREADABLE_NPZ, atomic_write
+from chamberopt.common.files import atomic_write
+from chamberopt.common.npz_files import UNREADABLE, read_arrays
 from chamberopt.coverage.dents import ball_diameters, dent_diameters, impact_angle_deg
 from chamberopt.geometry.triangles import closest_on_each
 
@@ -130,31 +131,28 @@ def load_hits(path: Path) -> HitsByTriangle:
     Raises:
         InputError: the file is missing, damaged, or not written by this version.
     """
+    columns = read_arrays(path, "restore it, or simulate again")
     try:
-        with np.load(path, allow_pickle=False) as file:
-            columns = {name: file[name] for name in file.files}
         first = columns.pop("first")
         triangle = np.repeat(np.arange(len(first) - 1, dtype=np.int32), np.diff(first))
         found = HitsByTriangle(first, Hits(triangle, **columns))
-    except FileNotFoundError:
-        raise InputError(f"{path}: not there; restore it, or simulate again") from None
-    except UNREADABLE_NPZ as error:
+    except UNREADABLE as error:
         raise InputError(f"{path}: damaged ({error}); simulate again") from None
     if any(len(column) != first[-1] for column in columns.values()):
         raise InputError(f"{path}: damaged (columns of different lengths); simulate again")
     return found
 
 
-def load_matching_hits(folder: Path, impacts: np.ndarray) -> HitsByTriangle:
+def load_matching_hits(path: Path, impacts: np.ndarray) -> HitsByTriangle:
     """The single impacts of a results folder, checked to belong to its part.vtp.
 
     Args:
+        path: of the hits.npz.
         impacts: number of impacts of each triangle by part.vtp, (m,).
 
     Raises:
         InputError: the file is missing, damaged or belongs to another result.
     """
-    path = folder / HITS_FILE
     found = load_hits(path)
     if not np.array_equal(np.diff(found.first), impacts):
         raise InputError(

@@ -7,11 +7,10 @@ frozen, refuses unknown keys, and has bounds wide enough for any real peening se
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
 from functools import cache
 from numbers import Integral, Real
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar, cast
+from typing import Annotated, Any, Literal, TypeVar
 
 import pydantic
 from pydantic import BaseModel, Field, ValidationError, ValidationInfo
@@ -26,7 +25,7 @@ from chamberopt.design.part import PartTable
 from chamberopt.design.process import Process
 from chamberopt.design.shapes import SHAPES, ChamberTable
 from chamberopt.design.shapes.base import is_custom
-from chamberopt.design.shapes.custom import MissingShape, load_custom_shape
+from chamberopt.design.shapes.custom import RecordedShape, load_custom_shape
 from chamberopt.design.shapes.imported import IMPORTED, Imported
 from chamberopt.design.shot import ShotTable
 from chamberopt.design.sonotrode import FurtherSonotrode, Sonotrode
@@ -64,7 +63,12 @@ class Design(FileTable):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the values: a worker process creates the class of a shape's designs itself."""
-        return validate, (Design, self.model_dump())
+        return _unpickled, (self.model_dump(), self.is_recorded, self.chamber.sha256)
+
+    @property
+    def is_recorded(self) -> bool:
+        """Whether it was read from a result and has a shape of the user's, which is not run."""
+        return isinstance(self.chamber, RecordedShape)
 
     @pydantic.model_validator(mode="before")
     @classmethod
@@ -171,7 +175,18 @@ class Design(FileTable):
         data = self.model_dump()
         for name, value in values.items():
             data = _replaced(data, name, name.split("."), value)
-        return validate(Design, data)
+        return validate(Design, data, recorded=self.is_recorded)
+
+
+def _unpickled(data: dict[str, Any], recorded: bool, sha256: str) -> Design:
+    """The design on a worker; InputError if the file of its shape is another one there."""
+    design = validate(Design, data, recorded=recorded)
+    if design.chamber.sha256 != sha256:
+        raise InputError(
+            f"chamber.shape: {design.chamber.shape}: on this worker its sha256 is "
+            f"{design.chamber.sha256[:16]}, expected {sha256[:16]}; give all machines the same file"
+        )
+    return design
 
 
 def _replaced(old: Any, name: str, steps: Sequence[str], value: Any) -> Any:
@@ -225,10 +240,12 @@ def design_class(data: Mapping[str, Any], context: Mapping[str, Any] | None = No
     name = chamber.get("shape") if isinstance(chamber, Mapping) else getattr(chamber, "shape", None)
     if not is_custom(name):
         return _designs_with(SHAPES.get(name, AnyShape) if isinstance(name, str) else AnyShape)
+    if (context or {}).get("recorded"):
+        return _designs_with(RecordedShape)
     try:
         return _designs_with(load_custom_shape(from_file(str(name), context)))
     except InputError:
-        return _designs_with(AnyShape if (context or {}).get("needs_mesh") else MissingShape)
+        return _designs_with(AnyShape)
 
 
 def _table(data: Any, name: str) -> Mapping[str, Any] | None:
@@ -250,26 +267,22 @@ def validate(
     data: Mapping[str, Any],
     path: Path | None = None,
     source: str = "",
-    mesh_must_exist: bool = True,
+    recorded: bool = False,
 ) -> Model:
     """The data as a frozen model.
 
     Args:
         path: of the file that holds the data; paths of meshes and shapes are relative to it.
         source: text of that file, for line numbers in messages.
-        mesh_must_exist: False for results, which can be read without the files they were made from.
+        recorded: True for the design of a result: no file that it names is looked for or run.
     Raises:
         InputError: names every problem.
     """
-    context = {"folder": path.parent if path else Path(), "needs_mesh": path and mesh_must_exist}
+    folder = path.parent if path else Path()
+    context = {"folder": folder, "needs_mesh": path and not recorded, "recorded": recorded}
     try:
         return model.model_validate(data, context=context)
     except ValidationError as error:
-        custom = is_custom((_table(data, "chamber") or {}).get("shape"))
-        if model is Design and not mesh_must_exist and custom:
-            with suppress(ValidationError):  # the shape's file may have changed since
-                missing = _designs_with(MissingShape)
-                return cast(Model, missing.model_validate(data, context=context))
         shown: type[BaseModel] = design_class(data, context) if model is Design else model
         problems = toml_errors.explain_validation_error(error, shown)
         raise InputError(toml_errors.format_problems(problems, path, source)) from None

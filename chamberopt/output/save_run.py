@@ -34,8 +34,8 @@ def save_simulation(
 ) -> list[str]:
     """Save a simulation in a new or empty folder.
 
-    Writes design.toml, coverage.vtp, part.vtp, hits.npz, chamber.stl, chamber.vtp, result.json and
-    coverage.png.
+    Writes design.toml, coverage.vtp, part.vtp, hits.npz, chamber.npz, chamber.stl, chamber.vtp,
+    result.json and coverage.png.
 
     Args:
         folder: must be new or empty.

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from chamberopt.chamber.analytic import impacts_on_chamber
+from chamberopt.chamber.part import turning_axis
 from chamberopt.chamber.scene import build_scene, replica_seed
 from chamberopt.common.errors import WorkerLostError
 from chamberopt.coverage.part_impacts import Hits, hits_on_part
@@ -140,7 +141,7 @@ def simulate_seed(
     """Run the simulator once; the impacts of its result are on the chamber's triangles."""
     from sim_core import TriangleMesh, simulate
 
-    result = simulate(build_scene(design, mesh, seed))
+    result = simulate(build_scene(design, mesh, seed, turning_axis(design, chamber.part)))
     if isinstance(mesh, TriangleMesh):
         return result
     return replace(result, impacts=impacts_on_chamber(result.impacts, chamber))

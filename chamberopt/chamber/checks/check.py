@@ -19,6 +19,7 @@ from chamberopt.geometry.triangles import areas, edge_keys, sides_of, tetrahedro
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
+    from chamberopt.chamber.part import Axis, Part
     from chamberopt.design.load import Design
     from sim_core import TriangleMesh
 
@@ -41,8 +42,7 @@ def describe(design: Design, chamber: Chamber, reach: Reach | None = None) -> di
     """
     require_ball_count(design)
     reach = shot_reach(design, chamber) if reach is None else reach
-    if design.effects.part_turn is not None:
-        require_turnable(design, reach.mesh)
+    require_turnable(design, reach.mesh, turning_axis(design, chamber.part))
     part, shot, process = chamber.part, design.shot, design.process
     exposed = chamber.exposed_area > 0.0
     box = np.ptp(part.vertices, axis=0)
@@ -75,7 +75,7 @@ def describe(design: Design, chamber: Chamber, reach: Reach | None = None) -> di
             "sonotrode_triangles": int(is_sonotrode(chamber.tags).sum()),
             "wall_triangles": int((chamber.tags == TAG_WALL).sum()),
         },
-        **_turn_facts(design),
+        **_turn_facts(design, part),
         "sonotrode": {"peak_speed_m_s": _rounded(design.sonotrode.peak_speed)},
         "shot": {
             "balls": shot.count,
@@ -133,7 +133,7 @@ def warnings(design: Design, chamber: Chamber, reach: Reach | None = None) -> li
             f"only {recorded:.3g} s: coverage is that of some of its positions; raise "
             "process.accuracy.simulated_time_s or replicas"
         )
-    texts += _sonotrode_warnings(design, reach.mesh)
+    texts += _sonotrode_warnings(design, reach.mesh, turning_axis(design, chamber.part))
     texts += target_warnings(reach, chamber, design.part.target.reachable)
     texts += pocket_warnings(reach, chamber)
     texts += gap_warnings(reach, chamber, shot.diameter, turns=turn is not None)
@@ -152,12 +152,12 @@ def _reach_facts(reach: Reach, chamber: Chamber) -> dict[str, Any]:
     return facts
 
 
-def _turn_facts(design: Design) -> dict[str, Any]:
+def _turn_facts(design: Design, part: Part) -> dict[str, Any]:
     """The motion of a turning part, its axis in the chamber's frame."""
-    turn = design.effects.part_turn
-    if turn is None:
+    turn, line = design.effects.part_turn, turning_axis(design, part)
+    if turn is None or line is None:
         return {}
-    point, axis = turning_axis(design)
+    point, axis = line
     swing = {"angle_deg": turn.angle_deg, "frequency_hz": turn.frequency_hz}
     pose = {
         "through_mm": [_rounded(x * 1e3) for x in point],
@@ -188,7 +188,7 @@ def _side_wall_warnings(design: Design, chamber: Chamber) -> list[str]:
     ]
 
 
-def _sonotrode_warnings(design: Design, mesh: TriangleMesh) -> list[str]:
+def _sonotrode_warnings(design: Design, mesh: TriangleMesh, line: Axis | None) -> list[str]:
     """Warnings about a sonotrode, or a ball on it, that may hit the part."""
     amplitude, ball = design.sonotrode.amplitude, design.shot.diameter
     remedy = "raise chamber.sonotrode_distance_mm"
@@ -198,10 +198,10 @@ def _sonotrode_warnings(design: Design, mesh: TriangleMesh) -> list[str]:
             f"part and sonotrode are only {1e3 * clear:.3g} mm apart, less than ten amplitudes of "
             f"{1e6 * amplitude:g} µm: they may hit each other; {remedy}"
         ]
-    if turn is None:
+    if turn is None or line is None:
         return []
     own = mesh.vertices[mesh.triangles[mesh.tags == TAG_PART]].reshape(-1, 3)
-    below = _lowest_height(design, own, turn.amplitude) - amplitude
+    below = _lowest_height(line, own, turn.amplitude) - amplitude
     if not 0.0 < below < ball:
         return []
     return [
@@ -223,16 +223,17 @@ def sonotrode_clearance(mesh: TriangleMesh) -> float:
     return min(least)
 
 
-def _lowest_height(design: Design, points: np.ndarray, amplitude: float | None) -> float:
+def _lowest_height(line: Axis, points: np.ndarray, amplitude: float | None) -> float:
     """The lowest height [m] that points (n, 3) [m] of the turning part reach.
 
     At angle a of the part, a point is at the height c + r cos(a - a0) for some c, r and a0. It is
     lowest where a is furthest from a0.
 
     Args:
+        line: axis of the rotation.
         amplitude: largest angle to each side [rad]; None for a part that goes round.
     """
-    point, axis = turning_axis(design)
+    point, axis = line
     axis = axis / np.linalg.norm(axis)
     offset = points - point
     along = (offset @ axis)[:, None] * axis

@@ -22,15 +22,17 @@ from chamberopt.design.shapes.construction.surface_check import find_fault, with
 from chamberopt.design.table_base import STRICT
 
 
-class MissingShape(ChamberTable):
-    """Replaces a shape whose file is missing or broken, so that its results can still be read."""
+class RecordedShape(ChamberTable):
+    """Replaces a user's own shape in the design of a result: values that were recorded, no code."""
 
     model_config = ConfigDict(**{**STRICT, "extra": "allow"})
 
     def surface(self, vertices: np.ndarray, triangles: np.ndarray) -> ShapeSurface:
-        """The surface, if the file is there again; otherwise InputError names what is wrong."""
-        shape = load_custom_shape(Path(self.shape)).model_validate(self.model_dump())
-        return shape.surface(vertices, triangles)
+        """InputError: a result holds its chamber, and never runs the file that made it."""
+        raise InputError(
+            f"chamber.shape: {self.shape}: named by a result, whose code is never run; load the "
+            "design file to build its chamber again"
+        )
 
 
 def _is_positive(number: object) -> bool:

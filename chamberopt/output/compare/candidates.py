@@ -22,9 +22,9 @@ from chamberopt.output.compare.comparability import (
     require_several,
 )
 from chamberopt.output.compare.comparison import labels, part_unit
-from chamberopt.output.results.load import Result, load_result
+from chamberopt.output.results.chamber_file import load_chamber
+from chamberopt.output.results.load import Result, load_part, load_result
 from chamberopt.output.save_run import save_simulation
-from chamberopt.output.vtp_files import ELEMENT_COLUMNS, PART, read_surface
 from chamberopt.simulation.evaluate import ReplicaPlan, evaluate
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ def read_candidates(
         if one.design.part.target.reachable:
             own = target if one.result is None else _target(one.result)
         if one.missing:
-            chamber = build_chamber(one.design, own)
+            chamber = load_chamber(one.result) if one.result else build_chamber(one.design, own)
             own = chamber.part.target if one.design.part.target.reachable else None
         if own is not None:
             target = own if target is None else target
@@ -208,7 +208,7 @@ def _mesh(one: Candidate) -> tuple[str, str]:
 
 
 def _target(result: Result) -> np.ndarray:
-    return np.asarray(read_surface(result.folder / PART, ELEMENT_COLUMNS)["target"]) > 0
+    return np.asarray(load_part(result)["target"]) > 0
 
 
 def _seed_settings(result: Result) -> SeedSettings:

@@ -17,7 +17,7 @@ from chamberopt.output.compare.table import comparison_text
 from chamberopt.output.compare.target_surface import read_target_surface
 from chamberopt.output.results.load import summary
 from chamberopt.output.viewer import draw_coverage, draw_difference, write_differences
-from chamberopt.output.vtp_files import COVERAGE
+from chamberopt.output.vtp_files import CHAMBER, COVERAGE
 
 COMPARE, DIFFERENCE = "compare.json", "difference.vtp"
 
@@ -34,6 +34,8 @@ def write_comparison(folder: str | Path, comparison: Comparison) -> list[str]:
         raise InputError(
             f"{folder}: holds a comparison, and nothing is ever overwritten: choose another folder"
         )
+    for result in comparison.results:
+        result.path(CHAMBER)  # for the picture; what else is drawn is read now
     surfaces = [read_target_surface(result) for result in comparison.results]
     for result, one in zip(comparison.results[1:], surfaces[1:], strict=True):
         require_same_triangles(

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chamberopt.coverage.part_impacts import Hits, load_matching_hits
+from chamberopt.coverage.part_impacts import HITS_FILE, Hits, load_matching_hits
 from chamberopt.geometry.triangles import areas
-from chamberopt.output.results.load import Result, load_part, read_field
+from chamberopt.output.results.load import Result, load_field, load_part
 
 MIN_COSINE = 0.7  # between normals of places that count as near each other
 NEIGHBOURS = 8  # vertices that are looked at for a place
@@ -81,7 +81,7 @@ class TargetSurface:
 def read_target_surface(result: Result) -> TargetSurface:
     """Read the target of a results folder; InputError if files are missing or damaged."""
     part = load_part(result)
-    field = read_field(result.folder, part)
+    field = load_field(result, part)
     triangles = np.asarray(field.regular_faces)[np.asarray(field["target"]) > 0]
     used, corner = np.unique(triangles, return_inverse=True)
     points = np.asarray(field.points, dtype=float)
@@ -89,7 +89,7 @@ def read_target_surface(result: Result) -> TargetSurface:
     share = np.bincount(corner.ravel(), area, len(used)) / area.sum()
     reached = np.asarray(field["reachable"])[used] > 0.5
     target = np.asarray(part["target"]) > 0
-    hits = load_matching_hits(result.folder, np.asarray(part["impacts"]))
+    hits = load_matching_hits(result.path(HITS_FILE), np.asarray(part["impacts"]))
     return TargetSurface(
         corners=np.asarray(part.points, dtype=float)[np.asarray(part.regular_faces)],
         target=target,

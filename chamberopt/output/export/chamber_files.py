@@ -17,8 +17,7 @@ import numpy as np
 from chamberopt.chamber.bores_and_deflectors import fitting_names
 from chamberopt.common.files import atomic_write, make_output_folder
 from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL, further_sonotrode_tag
-from chamberopt.output.results.load import load_result
-from chamberopt.output.vtp_files import CHAMBER, read_surface
+from chamberopt.output.results.load import load_cavity, load_result
 
 NAMES = {TAG_PART: "part", TAG_SONOTRODE: "sonotrode", TAG_WALL: "wall"}
 PART_COLOUR, WALL_COLOUR, SONOTRODE_COLOUR = "#B9BEC4", "#9DB7CC", "#E08A2E"
@@ -45,14 +44,15 @@ def read_cavity(folder: Path) -> NamedSurfaces:
     """Read the chamber of a results folder.
 
     Surfaces are named part, sonotrode and wall, and as in the design sonotrodes.0, chamber.holes.0,
-    chamber.deflectors.0 and so on. In older results holes and deflectors belong to the wall.
+    chamber.deflectors.0 and so on.
     """
-    chamber = read_surface(folder / CHAMBER)
+    result = load_result(folder)
+    chamber = load_cavity(result)
     tags = np.asarray(chamber["tag"])
     stored = "fitting" in chamber.array_names
     fitting = np.asarray(chamber["fitting"]) if stored else np.full(len(tags), -1)
     surfaces = {_name(int(tag)): (tags == tag) & (fitting < 0) for tag in np.unique(tags)}
-    for number, name in enumerate(fitting_names(load_result(folder).design)):
+    for number, name in enumerate(fitting_names(result.design)):
         surfaces[name] = fitting == number
     surfaces = {name: own for name, own in surfaces.items() if own.any()}
     points, triangles = np.asarray(chamber.points), np.asarray(chamber.regular_faces)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from chamberopt.chamber.part import part_meshes
+from chamberopt.chamber.part import PartOfFile
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import atomic_write, write_text
 from chamberopt.geometry.mesh_io.part_mesh import PartMesh
@@ -20,7 +20,9 @@ from chamberopt.output.export.element_fields import (
     fields_of_remeshed_elements,
 )
 from chamberopt.output.export.nastran_deck import nastran_deck
+from chamberopt.output.results.chamber_file import CHAMBER_FILE, load_chamber
 from chamberopt.output.results.load import Result, load_part, load_result
+from chamberopt.output.vtp_files import PART
 
 DECKS: dict[str, Callable[[list[str], PartMesh, ElementFields], dict[str, str]]] = {
     "abaqus": abaqus_deck,
@@ -41,7 +43,7 @@ def write_fields(folder: str | Path, path: str | Path, to: str) -> list[str]:
             triangles are written too, in the file's frame and unit, numbered from 1.
 
     Raises:
-        InputError: the folder is not a result, or the part's file has changed since.
+        InputError: the folder is not a result, or its files have changed since.
     """
     path = Path(path)
     if to not in FIELD_FORMATS:
@@ -69,12 +71,13 @@ def write_fields(folder: str | Path, path: str | Path, to: str) -> list[str]:
 
 
 def _write_deck(result: Result, surface: Any, to: str, path: Path) -> list[str]:
-    original, simulated = _meshes(result, surface, path)
-    own = original.numbering.own
+    part = _part_of_file(result, surface)
+    simulated, original = part.simulated, part.original
+    own = (original or simulated).numbering.own
     number = np.asarray(surface["element"]) if own else np.arange(1, surface.n_cells + 1)
     fields = fields_of_elements(surface, number)
     remarks = []
-    if own and simulated is not original:
+    if own and original is not None:
         fields = fields_of_remeshed_elements(surface, number, original, simulated)
         remarks.append(
             "the target was simulated in triangles of target.element_mm: each element gets the "
@@ -115,18 +118,14 @@ def _elements_left_out(fields: ElementFields) -> list[str]:
     ]
 
 
-def _meshes(result: Result, surface: Any, path: Path) -> tuple[PartMesh, PartMesh]:
-    """Return the part as in its file, and as it was simulated; InputError if the file changed."""
-    file = result.design.part.mesh_path
-    if path.resolve() == file.resolve():
-        raise InputError(f"{path}: is the part's own file; choose another name")
-    original, simulated = part_meshes(result.design)
-    if original.sha256 != result.part_sha256 or len(simulated.triangles) != surface.n_cells:
+def _part_of_file(result: Result, surface: Any) -> PartOfFile:
+    """The part as it was simulated, and as its file has it; InputError if they are of another."""
+    file = load_chamber(result).part.file
+    if file is None or len(file.simulated.triangles) != surface.n_cells:
         raise InputError(
-            f"{file}: has changed since {result.folder} was simulated, and its elements may be "
-            "others; restore that file, or simulate again"
+            f"{result.folder}: {CHAMBER_FILE} and {PART} are of different parts; simulate again"
         )
-    return original, simulated
+    return file
 
 
 def _origin(result: Result) -> list[str]:

@@ -7,13 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.chamber.part import part_pose
 from chamberopt.geometry.mesh_io.units import METRES_PER
 from chamberopt.output.export.formats import FrameName
 
 if TYPE_CHECKING:
-    from chamberopt.chamber.build import Chamber
-    from chamberopt.design.design import Design
+    from chamberopt.chamber.part import Part
 
 MEANING = {
     "part": "of the part's file: its axes, its origin, its unit",
@@ -49,8 +47,8 @@ class Frame:
         return turned
 
 
-def frame_of(name: FrameName, design: Design, chamber: Chamber) -> Frame:
+def frame_of(name: FrameName, part: Part) -> Frame:
     """Return the frame of that name; lengths in the chamber's frame are in mm."""
-    if name == "chamber":
+    if name == "chamber" or part.file is None:
         return Frame(name, "mm", np.eye(3), np.zeros(3))
-    return Frame(name, chamber.part.unit, *part_pose(design))
+    return Frame(name, part.unit, part.file.rotation, part.file.shift)

@@ -48,7 +48,7 @@ def write_impacts(
         InputError: the replicas do not give the result's own figures, or pyarrow is missing.
     """
     design, chamber = result.design, rebuilt.chamber
-    axes = frame_of(frame, design, chamber)
+    axes = frame_of(frame, chamber.part)
     columns = columns_of(axes)
     metadata = _metadata(result, rebuilt, axes, columns, replica_count(result, replicas))
     written = 0

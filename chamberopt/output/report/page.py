@@ -62,9 +62,9 @@ def _write_report(path: Path, contents: dict[str, Any], loaded: Result) -> PartS
     is_study = contents["kind"] == "study"
     scene = part_scene(loaded, contents["name"])
     scenes = {"best" if is_study else "result": scene}
-    start = loaded.folder / START
-    if is_study and (start / "coverage.vtp").is_file():
-        scenes = {START: part_scene(load_result(start), START, max_triangles=0), **scenes}
+    if is_study:
+        start = load_result(loaded.folder / START)
+        scenes = {START: part_scene(start, START, max_triangles=0), **scenes}
     made = f"simulated {contents['made'][:10]}, " if contents["made"] else ""
     subtitle = (
         f"{SUBTITLES.get(contents['kind'], '')}; "
@@ -73,7 +73,7 @@ def _write_report(path: Path, contents: dict[str, Any], loaded: Result) -> PartS
     head = (
         f"<header><h1>{html.text(contents['name'])}</h1>{html.paragraph(subtitle, 'soft')}</header>"
     )
-    body = sections(contents, viewer([scene]), scenes, read_design_file(loaded.folder))
+    body = sections(contents, viewer([scene]), scenes, read_design_file(loaded))
     write_page(path, f"{contents['name']}: report", head + body, [scene])
     return scene
 

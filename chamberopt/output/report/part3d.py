@@ -18,9 +18,9 @@ import numpy as np
 from chamberopt.design.shapes import TAG_PART, TAG_WALL, is_sonotrode
 from chamberopt.output.plots.colours import UNREACHED
 from chamberopt.output.plots.quantities import QUANTITIES
-from chamberopt.output.results.load import Result, load_part, read_field
+from chamberopt.output.results.load import Result, load_cavity, load_field, load_part
 from chamberopt.output.viewer.drawn_part import DrawnPart, point_areas
-from chamberopt.output.vtp_files import CHAMBER, Surface, read_surface
+from chamberopt.output.vtp_files import Surface
 
 # A triangle takes about 80 bytes of the page: up to this number it stays below 60 MB and opens.
 MAX_TRIANGLES = 600_000
@@ -58,7 +58,7 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
         InputError: a surface is missing, damaged or of another result.
     """
     own = load_part(result)
-    part = DrawnPart(read_field(result.folder, own))
+    part = DrawnPart(load_field(result, own))
     whole, target = part.whole, part.target
     reached = np.asarray(whole["reachable"]) > 0.5
     coverage, area = np.where(reached, whole["coverage"], 0.0), point_areas(whole)
@@ -78,7 +78,7 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
             "is drawn."
         )
         rest = None
-    chamber = read_surface(result.folder / CHAMBER)
+    chamber = load_cavity(result)
     eye = _eye(np.asarray(whole.face_normals) * np.asarray(whole["area"])[:, None])
     # Of the part's triangles: the one in which each point lies, and what is known of each of them.
     triangles, row = np.unique(target["triangle"], return_inverse=True)

@@ -5,14 +5,12 @@ from __future__ import annotations
 import json
 import tomllib
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate, independent_difference, paired_difference
 from chamberopt.optimize.storage.study_folder import STUDY
-from chamberopt.optimize.storage.trial_log import HISTORY, read_trials
+from chamberopt.optimize.storage.trial_log import HISTORY, TIMINGS, read_trials
 from chamberopt.output.report.conclusions import accuracy_rows, answer, cost_rows, influence
 from chamberopt.output.report.number_text import metric_label, objective_label
 from chamberopt.output.results.load import load_result
@@ -31,10 +29,9 @@ def report_contents(folder: str | Path) -> dict[str, Any]:
     """
     result = load_result(folder)
     study = result.data.get("study")
-    has_start = study and (result.folder / START).is_dir()
-    start = load_result(result.folder / START) if has_start else None
+    start = load_result(result.folder / START) if study else None
     gain = None if start is None else _change(result.objective, start.objective, result, start)
-    rows = read_trials(result.folder) if study and (result.folder / HISTORY).is_file() else []
+    rows = _evaluations_of(result) if study else []
     label = objective_label(result.objective_name)
     candidates = {"result": result} if start is None else {"start": start, "best": result}
     return {
@@ -65,6 +62,13 @@ def report_contents(folder: str | Path) -> dict[str, Any]:
     }
 
 
+def _evaluations_of(result: Result) -> list[dict[str, Any]]:
+    """The trial log of a study; InputError unless it is the one that was written."""
+    for name in {HISTORY, TIMINGS}.intersection(result.sha256):
+        result.path(name)
+    return read_trials(result.folder) if HISTORY in result.sha256 else []
+
+
 def _change(after: Estimate, before: Estimate, result: Result, start: Result) -> Estimate:
     """The difference, from pairs of replicas where both ran on the same seeds."""
     same_seeds = result.seeds == start.seeds
@@ -93,8 +97,8 @@ def _question(result: Result, study: Mapping[str, Any] | None) -> dict[str, Any]
     }
     if not study:
         return question
-    with suppress(OSError, ValueError):  # an older study has no file
-        tables = tomllib.loads((result.folder / STUDY).read_text(encoding="utf-8"))
+    if STUDY in result.sha256:
+        tables = tomllib.loads(result.path(STUDY).read_text(encoding="utf-8"))
         question["constraints"] = [
             " and ".join(f"{name} {'≥' if side == 'min' else '≤'} {limit:g}"
                          for side, limit in limits.items())
@@ -248,12 +252,7 @@ def _text(value: Any) -> str:
     return f"{value:.6g}" if isinstance(value, float) else json.dumps(value, ensure_ascii=False)
 
 
-def read_design_file(folder: Path) -> tuple[str, str]:
+def read_design_file(result: Result) -> tuple[str, str]:
     """Name and text of the design that the result belongs to."""
-    for name in ("best.toml", "design.toml"):
-        path = folder / name
-        if path.is_file():
-            return name, path.read_text(encoding="utf-8")
-    raise InputError(
-        f"{folder}: neither best.toml nor design.toml is there; give a complete results folder"
-    )
+    name = "best.toml" if result.kind == "study" else "design.toml"
+    return name, result.path(name).read_text(encoding="utf-8")

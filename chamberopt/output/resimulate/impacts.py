@@ -20,10 +20,9 @@ from chamberopt.common.parallel.executor import core_count, share
 from chamberopt.common.progress import Progress
 from chamberopt.coverage.dents import Dents, dents_on_part
 from chamberopt.coverage.field.surface_points import spread_points
-from chamberopt.coverage.part_impacts import load_matching_hits
+from chamberopt.coverage.part_impacts import HITS_FILE, load_matching_hits
 from chamberopt.output.resimulate.rebuild import REMEDY, RebuiltChamber, RebuiltReplica, made_by
 from chamberopt.output.results.load import load_part
-from chamberopt.output.vtp_files import ELEMENT_COLUMNS, PART, read_surface
 from chamberopt.simulation.replicas import run_in_order, simulate_seed
 
 if TYPE_CHECKING:
@@ -137,7 +136,7 @@ def dented_share(dents: Dents, chamber: Chamber) -> float:
 
 def _replicas_ahead(result: Result) -> int:
     """Replicas to begin before the one that is yielded: one a core, unless their logs are long."""
-    part = read_surface(result.folder / PART, ELEMENT_COLUMNS)
+    part = load_part(result)
     impacts = float(part["impacts"].sum()) / result.data["replicas"]
     return max(0, min(core_count(), int(MAX_IMPACTS_IN_MEMORY / max(impacts, 1.0)) - 1))
 
@@ -158,7 +157,7 @@ def _on_part(number: int, log: ImpactLog, chamber: Chamber) -> ReplicaImpacts:
 
 def _require_same_impacts(result: Result, triangle: np.ndarray, speed: np.ndarray) -> None:
     part = load_part(result)
-    stored = load_matching_hits(result.folder, np.asarray(part["impacts"])).hits
+    stored = load_matching_hits(result.path(HITS_FILE), np.asarray(part["impacts"])).hits
     order = np.argsort(triangle, kind="stable")
     triangle, speed = triangle[order], speed[order]
     count = np.bincount(triangle, minlength=part.n_cells)

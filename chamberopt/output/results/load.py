@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import shlex
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +21,7 @@ from chamberopt.design.load import Design
 from chamberopt.optimize.storage.study_folder import RESULT, is_study_folder
 from chamberopt.optimize.storage.trial_log import HISTORY
 from chamberopt.output.vtp_files import (
+    CHAMBER,
     COVERAGE,
     ELEMENT_COLUMNS,
     FIELD_COLUMNS,
@@ -31,7 +34,8 @@ from chamberopt.output.vtp_files import (
 if TYPE_CHECKING:
     from chamberopt.simulation.evaluation import Evaluation
 
-FORMAT = 2
+FORMAT = 3
+RESTORE = "restore the folder from where it came, or simulate again"
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,7 @@ class Result:
     kind: "simulation" or "study"; a study stands for its best design as confirmed.
     design: the candidate that the figures belong to.
     seeds: process.seed and the name of the random stream.
+    sha256: of each data file beside result.json, by its name.
     data: everything in result.json.
     """
 
@@ -53,7 +58,12 @@ class Result:
     part_sha256: str
     seeds: tuple[int, str]
     notes: tuple[str, ...]
+    sha256: dict[str, str]
     data: dict[str, Any]
+
+    def path(self, name: str) -> Path:
+        """Path of a data file of the result; InputError unless it is the file that was written."""
+        return unchanged_file(self.folder, name, self.sha256)
 
 
 def load_result(path: str | Path) -> Result:
@@ -76,11 +86,7 @@ def load_result(path: str | Path) -> Result:
         )
     try:
         data = json.loads(file.read_text(encoding="utf-8"), parse_constant=_refuse_constant)
-        if data["format"] != FORMAT:
-            raise InputError(
-                f"{file}: written in format {data['format']}, this version reads {FORMAT}; "
-                "simulate again"
-            )
+        _require_format(file, data)
         if data["kind"] == "sweep":
             raise InputError(
                 f"{folder}: a sweep is a map of many candidates, not the result of one; simulate "
@@ -89,7 +95,7 @@ def load_result(path: str | Path) -> Result:
         return Result(
             folder=folder,
             kind=data["kind"],
-            design=validate(Design, data["design"], file, mesh_must_exist=False),
+            design=validate(Design, data["design"], file, recorded=True),
             objective_name=data["objective"]["name"],
             objective=_read_estimate(data["objective"]),
             metrics={
@@ -100,6 +106,7 @@ def load_result(path: str | Path) -> Result:
             part_sha256=data["part_sha256"],
             seeds=(data["seed"], data["stream"]),
             notes=tuple(data["notes"]),
+            sha256={name: str(sha256) for name, sha256 in data["files"].items()},
             data=data,
         )
     except OSError as error:
@@ -112,44 +119,59 @@ def load_result(path: str | Path) -> Result:
         ) from None
 
 
-def load_part(result: Result) -> Surface:
-    """Read the part.vtp of a result; InputError if missing, damaged or another result's."""
-    return read_part(
-        result.folder,
-        result.data["chamber"]["target_triangles"],
-        result.metrics["impacts_per_mm2_s"].value * result.data["simulated_time_s"],
-    )
-
-
-def read_part(folder: Path, target_triangles: int, impacts_per_mm2: float) -> Surface:
-    """Read part.vtp; InputError unless it has the target and impacts that result.json records.
+def unchanged_file(folder: Path, name: str, sha256: Mapping[str, str]) -> Path:
+    """Path of a data file in a results folder; InputError unless it has its digest in result.json.
 
     Args:
-        folder: of the result.
-        target_triangles: exposed triangles of the target, by result.json.
-        impacts_per_mm2: simulated, mean over the target, by result.json.
+        sha256: of each data file by its name, as in result.json.
     """
-    part = read_surface(folder / PART, ELEMENT_COLUMNS)
-    target = (part["target"] > 0) & (part["exposed_area_mm2"] > 0.0)
-    mean = part["impacts"][target].sum() / max(part["exposed_area_mm2"][target].sum(), 1e-300)
-    if target.sum() != target_triangles or not np.isclose(mean, impacts_per_mm2, rtol=1e-6):
+    path = folder / name
+    if name not in sha256:
+        raise InputError(f"{folder / RESULT}: names no {name}; {RESTORE}")
+    if not path.is_file():
+        raise InputError(f"{path}: not there, {RESULT} names it; {RESTORE}")
+    found = file_sha256(path)
+    if found != sha256[name]:
         raise InputError(
-            f"{folder / PART}: of another result than result.json: a target of {target.sum()} "
-            f"triangles with {mean:.6g} impacts per mm², not {target_triangles} with "
-            f"{impacts_per_mm2:.6g}; simulate again"
+            f"{path}: not the file that was written with {RESULT}: its sha256 is {found[:16]}, "
+            f"expected {sha256[name][:16]}; {RESTORE}"
         )
-    return part
+    return path
 
 
-def read_field(folder: Path, part: Surface) -> Surface:
-    """Read coverage.vtp; InputError unless it belongs to the part.vtp beside it."""
-    field = read_surface(folder / COVERAGE, ("triangle", *OF_ELEMENT), FIELD_COLUMNS)
+def file_sha256(path: Path) -> str:
+    """Digest of a file; InputError if it cannot be read."""
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise InputError(
+            f"{path}: cannot be read: {error.strerror}; check its permissions"
+        ) from None
+
+
+def load_part(result: Result) -> Surface:
+    """Read the part.vtp of a result; InputError if missing, damaged or another result's."""
+    return read_surface(result.path(PART), ELEMENT_COLUMNS)
+
+
+def load_field(result: Result, part: Surface) -> Surface:
+    """Read coverage.vtp; InputError as load_part."""
+    return read_field(result.path(COVERAGE), part)
+
+
+def load_cavity(result: Result) -> Surface:
+    """Read chamber.vtp; InputError as load_part."""
+    return read_surface(result.path(CHAMBER), ("tag",))
+
+
+def read_field(path: Path, part: Surface) -> Surface:
+    """Read coverage.vtp; InputError unless it belongs to this part.vtp."""
+    field = read_surface(path, ("triangle", *OF_ELEMENT), FIELD_COLUMNS)
     triangle = np.asarray(field["triangle"])
     covers_all = np.array_equal(np.unique(triangle), np.arange(part.n_cells))
     if not covers_all or (part["impacts"][triangle] != field["element_impacts"]).any():
-        raise InputError(
-            f"{folder / COVERAGE}: of another result than the part.vtp beside it; simulate again"
-        )
+        raise InputError(f"{path}: of another result than the part.vtp beside it; simulate again")
     return field
 
 
@@ -159,6 +181,20 @@ def summary(evaluation: Evaluation | Result) -> str:
     name = evaluation.objective_name.replace("_", " ")
     shares = f"mean {estimate_text(mean, 100.0, '%')}   std {estimate_text(spread, 100.0, '%')}"
     return f"{name} {estimate_text(evaluation.objective)}   {shares}"
+
+
+def _require_format(file: Path, data: dict[str, Any]) -> None:
+    """Raise InputError unless this version of the program reads the whole result."""
+    found = data["format"]
+    if found == FORMAT:
+        return
+    made_by = data.get("versions", {}).get("chamberopt", "an unknown version")
+    newer = isinstance(found, int) and found > FORMAT
+    remedy = "read it with that version" if newer else "simulate again, or read it with that one"
+    raise InputError(
+        f"{file}: in format {found!r}, expected {FORMAT}: written by chamberopt {made_by}, another "
+        f"version than this; {remedy}"
+    )
 
 
 def _read_estimate(data: dict[str, Any]) -> Estimate:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from chamberopt.common.files import write_text
+from chamberopt.common.npz_files import save_record
 from chamberopt.common.versions import versions
 from chamberopt.coverage.metrics import METRICS, exposed_target
 from chamberopt.coverage.part_impacts import HITS_FILE, save_hits, sort_hits_by_triangle
@@ -16,7 +17,8 @@ from chamberopt.design.load import Design, save_design, with_paths_from
 from chamberopt.optimize import pareto
 from chamberopt.optimize.storage.study_folder import RESULT
 from chamberopt.optimize.storage.trial_log import read_trials, trials_as_csv
-from chamberopt.output.results.load import FORMAT
+from chamberopt.output.results.chamber_file import CHAMBER_FILE
+from chamberopt.output.results.load import FORMAT, file_sha256
 from chamberopt.output.vtp_files import write_chamber, write_coverage
 from chamberopt.simulation.complete_result import CandidateResult
 
@@ -43,8 +45,8 @@ def write_study(
 
     run_study has written design.toml, study.toml and history.jsonl. This adds best.toml,
     history.csv, pareto.csv (of two objectives), the best design's coverage.vtp, part.vtp, hits.npz,
-    chamber.stl and chamber.vtp, and start/, a results folder of the start as confirmed on the same
-    seeds.
+    chamber.npz, chamber.stl and chamber.vtp, and start/, a results folder of the start as confirmed
+    on the same seeds.
 
     Returns:
         The study's result.json, which `write_result` writes.
@@ -103,7 +105,19 @@ def write_result(
         data = {**data, "effects": [one.as_json() for one in advice]}
     if warned is not None:
         data = {**data, "warnings": list(warned)}
+    data = {**data, "files": data_digests(folder)}
     write_text(folder / RESULT, json.dumps(data, indent=2, allow_nan=False) + "\n")
+
+
+def data_digests(folder: Path) -> dict[str, str]:
+    """sha256 of each data file of a results folder; pictures, which nothing reads, are left out."""
+    files = (one for one in sorted(folder.iterdir()) if one.is_file())
+    skipped = RESULT, ".png"
+    return {
+        one.name: file_sha256(one)
+        for one in files
+        if not one.name.startswith(".") and not one.name.endswith(skipped)
+    }
 
 
 def _write_candidate(folder: Path, candidate: CandidateResult) -> dict[str, Any]:
@@ -113,6 +127,7 @@ def _write_candidate(folder: Path, candidate: CandidateResult) -> dict[str, Any]
     hits = sort_hits_by_triangle(evaluation.hits, len(chamber.part.triangles))
     save_hits(folder / HITS_FILE, hits)
     write_chamber(folder, chamber)
+    save_record(folder / CHAMBER_FILE, chamber)
     target = exposed_target(chamber)
     return {
         "format": FORMAT,
@@ -140,7 +155,7 @@ def _write_candidate(folder: Path, candidate: CandidateResult) -> dict[str, Any]
         "notes": [*chamber.notes, *evaluation.notes],
         "design": _design_values(design, folder),
         "part_sha256": chamber.part.sha256,
-        **({"shape_sha256": design.chamber.sha256} if design.chamber.sha256 else {}),
+        **({"shape_sha256": chamber.shape_sha256} if chamber.shape_sha256 else {}),
         "part_unit": chamber.part.unit,
         "versions": versions(),
     }

@@ -11,12 +11,12 @@ import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
-from chamberopt.coverage.part_impacts import HitsByTriangle, load_matching_hits
+from chamberopt.coverage.part_impacts import HITS_FILE, HitsByTriangle, load_matching_hits
 from chamberopt.output.plots.quantities import QUANTITIES
-from chamberopt.output.results.load import Result, read_field, read_part, summary
+from chamberopt.output.results.load import Result, read_field, summary, unchanged_file
 from chamberopt.output.viewer.drawn_part import DrawnPart, colour_range
 from chamberopt.output.viewer.view_state import ViewState
-from chamberopt.output.vtp_files import CHAMBER, COVERAGE, PART, read_surface
+from chamberopt.output.vtp_files import CHAMBER, COVERAGE, ELEMENT_COLUMNS, PART, read_surface
 
 FULL_SCALE = (0.0, 100.0)  # % of coverage: the same at all times
 
@@ -27,16 +27,14 @@ class ResultInfo:
 
     treatment_s: peening time.
     longest_s: end of the time slider.
-    triangles: exposed triangles of the target.
-    impacts_per_mm2: simulated, mean over the target.
+    sha256: of each data file by its name.
     """
 
     folder: str
     title: str
     treatment_s: float
     longest_s: float
-    triangles: int
-    impacts_per_mm2: float
+    sha256: dict[str, str]
 
 
 def result_info(result: Result) -> ResultInfo:
@@ -48,8 +46,7 @@ def result_info(result: Result) -> ResultInfo:
         title=f"{result.folder.resolve().name}\n{summary(result)}",
         treatment_s=treatment,
         longest_s=max([treatment, *times]),
-        triangles=result.data["chamber"]["target_triangles"],
-        impacts_per_mm2=result.metrics["impacts_per_mm2_s"].value * result.data["simulated_time_s"],
+        sha256=result.sha256,
     )
 
 
@@ -59,9 +56,12 @@ class OpenedResult:
     def __init__(self, info: ResultInfo) -> None:
         self.info = info
         self.folder = Path(info.folder)
-        self.surface = read_part(self.folder, info.triangles, info.impacts_per_mm2)
-        self.chamber = read_surface(self.folder / CHAMBER, ("tag",))
-        self.part = DrawnPart(read_field(self.folder, self.surface))
+        self.surface = read_surface(self._path(PART), ELEMENT_COLUMNS)
+        self.chamber = read_surface(self._path(CHAMBER), ("tag",))
+        self.part = DrawnPart(read_field(self._path(COVERAGE), self.surface))
+
+    def _path(self, name: str) -> Path:
+        return unchanged_file(self.folder, name, self.info.sha256)
 
     @property
     def quantities(self) -> list[str]:
@@ -72,7 +72,7 @@ class OpenedResult:
     @cached_property
     def hits(self) -> HitsByTriangle:
         """Its single impacts. Read only when needed: most of a result."""
-        return load_matching_hits(self.folder, np.asarray(self.surface["impacts"]))
+        return load_matching_hits(self._path(HITS_FILE), np.asarray(self.surface["impacts"]))
 
     def time_ratio(self, state: ViewState) -> float:
         """Return the time shown over the treatment time."""

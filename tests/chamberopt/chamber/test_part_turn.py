@@ -7,7 +7,7 @@ import pytest
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.checks.check import describe
-from chamberopt.chamber.part import turning_axis
+from chamberopt.chamber.part import Axis, posed_part, turning_axis
 from chamberopt.chamber.scene import build_scene, chamber_mesh, require_turnable
 from chamberopt.common.errors import InputError
 from chamberopt.design.design import Design
@@ -82,18 +82,26 @@ def test_a_saved_design_loads_as_the_same(tmp_path: Path, motion: str) -> None:
     assert load_design(tmp_path / "again.toml") == design
 
 
+def axis_of(design: Design) -> Axis:
+    axis = turning_axis(design, posed_part(design)[0])
+    assert axis is not None
+    return axis
+
+
 def test_the_axis_goes_with_the_part_wherever_it_is_posed(design: Design) -> None:
-    point, axis = turning_axis(design)
+    point, axis = axis_of(design)
     # The gear's axis is z in its file: after 90 degrees about x it lies along -y, at half height.
     np.testing.assert_allclose(axis, [0.0, -1.0, 0.0], atol=1e-15)
     np.testing.assert_allclose(point[[0, 2]], [0.0, 0.015 + 0.022], atol=1e-4)
     lower = design.changed({"chamber.sonotrode_distance_mm": 10.0, "part.offset_mm.0": 3.0})
-    np.testing.assert_allclose(turning_axis(lower)[0] - point, [3e-3, 0.0, -5e-3], atol=1e-12)
+    np.testing.assert_allclose(axis_of(lower)[0] - point, [3e-3, 0.0, -5e-3], atol=1e-12)
 
 
 def test_replicas_start_at_angles_of_their_own(design: Design, mesh) -> None:  # type: ignore[no-untyped-def]
     few = design.changed({"shot.mass_g": 0.2})
-    one, two, again = (build_scene(few, mesh, seed).physics.part_rotation for seed in (1, 2, 1))
+    one, two, again = (
+        build_scene(few, mesh, seed, axis_of(few)).physics.part_rotation for seed in (1, 2, 1)
+    )
     assert one == again
     assert one is not None
     assert two is not None
@@ -109,7 +117,7 @@ def test_a_part_that_cannot_turn_is_refused_before_anything_is_simulated(tmp_pat
 
 def test_too_short_a_simulation_of_a_slow_turn_is_remarked_on(tmp_path: Path, mesh) -> None:  # type: ignore[no-untyped-def]
     slow = load_design(written(tmp_path, "{ rpm = 0.1 }"))
-    require_turnable(slow, mesh)
+    require_turnable(slow, mesh, axis_of(slow))
     assert any(
         "takes 600 s to turn once" in warning
         for warning in describe(slow, build_chamber(slow))["warnings"]
@@ -122,15 +130,15 @@ def test_the_shipped_study_is_about_the_turning_gear() -> None:
     for name, bounds in study.vary.items():
         for bound in bounds:
             changed = study.design.changed({name: bound})
-            require_turnable(changed, chamber_mesh(build_chamber(changed)))
+            require_turnable(changed, chamber_mesh(build_chamber(changed)), axis_of(changed))
 
 
 def test_balls_rest_beside_a_turning_part_if_asked_or_if_something_still_faces_up(
     design: Design, mesh
 ) -> None:  # type: ignore[no-untyped-def]
     """Here only the sonotrode and the gear do, and on neither of them a ball can lie still."""
-    assert build_scene(design, mesh, 1).physics.rest is None
+    assert build_scene(design, mesh, 1, axis_of(design)).physics.rest is None
     asked = design.model_copy(update={"effects": design.effects.model_copy(update={"rest": True})})
-    physics = build_scene(asked, mesh, 1).physics
+    physics = build_scene(asked, mesh, 1, axis_of(asked)).physics
     assert physics.rest is not None
     assert physics.part_rotation is not None

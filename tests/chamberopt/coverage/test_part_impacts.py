@@ -118,6 +118,6 @@ def test_a_damaged_or_missing_hits_file_is_refused(tmp_path: Path) -> None:
 def test_hits_of_another_result_are_refused(tmp_path: Path) -> None:
     hits = sort_hits_by_triangle([hits_of(np.random.default_rng(3), np.array([3, 4]))], 2)
     save_hits(tmp_path / "hits.npz", hits)
-    assert len(load_matching_hits(tmp_path, np.array([3, 4])).hits) == 7
+    assert len(load_matching_hits(tmp_path / "hits.npz", np.array([3, 4])).hits) == 7
     with pytest.raises(InputError, match="another result"):
-        load_matching_hits(tmp_path, np.array([4, 3]))
+        load_matching_hits(tmp_path / "hits.npz", np.array([4, 3]))

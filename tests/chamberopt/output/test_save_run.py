@@ -42,6 +42,7 @@ def test_simulation_reads_back(tmp_path: Path) -> None:
         "coverage.vtp",
         "part.vtp",
         "hits.npz",
+        "chamber.npz",
         "chamber.stl",
         "chamber.vtp",
     }
@@ -93,7 +94,7 @@ def test_a_study_leaves_everything_and_its_best_design_can_be_used(tmp_path: Pat
     assert names == {
         "design.toml", "study.toml", "history.jsonl", "history.csv", "best.toml", "result.json",
         "coverage.vtp", "part.vtp", "chamber.stl", "chamber.vtp", "convergence.png", "slices.png",
-        "start", "inputs.json", "timings.jsonl", "confirm", ".lock", "hits.npz",
+        "chamber.npz", "start", "inputs.json", "timings.jsonl", "confirm", ".lock", "hits.npz",
     }  # fmt: skip
     result = load_result(folder)
     assert result.kind == "study"

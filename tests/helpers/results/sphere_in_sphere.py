@@ -13,6 +13,7 @@ import trimesh
 from chamberopt.coverage.field.display_mesh import DisplayField, DisplayMesh
 from chamberopt.coverage.part_impacts import Hits, save_hits, sort_hits_by_triangle
 from chamberopt.output.plots.quantities import QUANTITIES
+from chamberopt.output.results.write import data_digests
 from chamberopt.output.viewer import ResultInfo, ViewState
 from chamberopt.output.vtp_files import pyvista, write_chamber, write_coverage
 
@@ -76,8 +77,7 @@ def ball_result(folder: Path, moved: float = 0.0, lost: int = 0) -> ResultInfo:
         title=f"{folder.name}\nnot simulated",
         treatment_s=TREATMENT,
         longest_s=50.0,
-        triangles=int(target.sum()),
-        impacts_per_mm2=float(impacts[target].mean()),
+        sha256=data_digests(folder),
     )
 
 

@@ -133,15 +133,23 @@ def test_results_name_the_file_and_can_be_read_without_it(
     written = json.loads((folder / "first" / "result.json").read_text(encoding="utf-8"))
     assert written["shape_sha256"] == sha256(PYRAMID.encode()).hexdigest()
     assert written["design"]["chamber"]["shape"] == "../pyramid.py"
-    assert load_result(folder / "first").design == design
+    assert load_result(folder / "first").design.model_dump() == design.model_dump()
 
     (folder / "pyramid.py").unlink()
     both = compare([folder / "first", folder / "second"])
     assert both.parameters == {"chamber.side_mm": (80.0, 70.0)}
-    with pytest.raises(InputError, match=r"pyramid\.py: no such shape file"):
-        build_chamber(load_result(folder / "first").design)
-    (folder / "pyramid.py").write_text(PYRAMID, encoding="utf-8")
-    assert build_chamber(both.results[0].design).volume == pytest.approx(chamber.volume)
+    (folder / "pyramid.py").write_text("raise RuntimeError('run')", encoding="utf-8")
+    recorded = load_result(folder / "first").design
+    again = pickle.loads(pickle.dumps(recorded)).changed({"process.seed": 9})
+    with pytest.raises(InputError, match=r"pyramid\.py: named by a result, whose code"):
+        build_chamber(again)
+
+
+def test_a_worker_with_another_file_of_the_shape_is_refused(folder: Path) -> None:
+    sent = pickle.dumps(load_design(folder / "d.toml"))
+    (folder / "pyramid.py").write_text(PYRAMID.replace("0.5e-3 *", "0.4e-3 *"), encoding="utf-8")
+    with pytest.raises(InputError, match=r"pyramid\.py: on this worker its sha256 is .*expected"):
+        pickle.loads(sent)
 
 
 @pytest.mark.parametrize(

@@ -67,6 +67,6 @@ def test_what_is_no_result_is_said(tmp_path: Path) -> None:
         (folder / "result.json").write_text(damaged)
         with pytest.raises(InputError, match="damaged"):
             load_result(folder)
-    (folder / "result.json").write_text(text.replace('"format": 2', '"format": 99'))
-    with pytest.raises(InputError, match="format 99"):
+    (folder / "result.json").write_text(text.replace('"format": 3', '"format": 99'))
+    with pytest.raises(InputError, match=r"in format 99, expected 3: .* read it with that version"):
         load_result(folder)

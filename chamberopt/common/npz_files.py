@@ -1,0 +1,111 @@
+"""Arrays, and records that hold arrays, in .npz files: plain data, never pickles.
+
+A record's file has one more entry, `tree`: JSON of everything that is no array. In it {"array":
+name} stands for an array and {"is": class, "of": fields} for a dataclass. Sequences come back as
+tuples. Everything else comes back exactly.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+import zlib
+from collections.abc import Sequence
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from chamberopt.common.errors import InputError
+from chamberopt.common.files import atomic_write
+
+# What reading a damaged file can raise.
+UNREADABLE = (
+    OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, MemoryError,
+    RecursionError, NotImplementedError, zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
+# The program's own files shrink some three times; one that shrinks more was made to fill memory.
+MAX_SHRINKAGE, ALWAYS_READ = 100, 64e6  # times, bytes
+
+Record = TypeVar("Record")
+
+
+def read_arrays(path: Path, remedy: str) -> dict[str, np.ndarray]:
+    """The arrays of an .npz file by their names; InputError if it is missing or damaged."""
+    try:
+        with zipfile.ZipFile(path) as file:
+            unpacked = sum(one.file_size for one in file.infolist())
+        if unpacked > max(ALWAYS_READ, MAX_SHRINKAGE * path.stat().st_size):
+            raise ValueError(f"unpacks to {1e-6 * unpacked:,.0f} MB, which no result does")
+        with np.load(path, allow_pickle=False) as arrays:
+            return {name: arrays[name] for name in arrays.files}
+    except FileNotFoundError:
+        raise InputError(f"{path}: not there; {remedy}") from None
+    except UNREADABLE as error:
+        raise _unreadable(path, error, remedy) from None
+
+
+def save_record(path: Path, record: object) -> None:
+    """Write a dataclass with all that it holds. Raises OSError if it cannot be written."""
+    arrays: dict[str, np.ndarray] = {}
+    tree = json.dumps(_to_tree(record, arrays)).encode()
+    packed = io.BytesIO()  # in memory first, so that a full disk is one plain OSError
+    np.savez_compressed(packed, tree=np.frombuffer(tree, dtype=np.uint8), **arrays)  # type: ignore[arg-type]
+    with atomic_write(path) as temporary:
+        temporary.write_bytes(packed.getbuffer())
+
+
+def load_record(path: Path, kind: type[Record], others: Sequence[type], remedy: str) -> Record:
+    """Read a record, equal to the one that was saved.
+
+    Args:
+        kind: its class.
+        others: classes of what it holds; nothing else is made.
+        remedy: ends the message on a file that cannot be used.
+
+    Raises:
+        InputError: the file is missing or damaged, or another version of the program wrote it.
+    """
+    arrays = read_arrays(path, remedy)
+    classes = {one.__name__: one for one in (kind, *others)}
+    try:
+        record = _from_tree(json.loads(arrays.pop("tree").tobytes()), arrays, classes)
+        if not isinstance(record, kind):
+            raise TypeError("another kind of file")
+    except UNREADABLE as error:
+        raise _unreadable(path, error, remedy) from None
+    return record
+
+
+def _unreadable(path: Path, error: BaseException, remedy: str) -> InputError:
+    why = getattr(error, "strerror", None) or f"damaged ({error})"
+    return InputError(f"{path}: {why}; {remedy}")
+
+
+def _to_tree(value: Any, arrays: dict[str, np.ndarray]) -> Any:
+    """Plain JSON values; arrays go into `arrays` under new names."""
+    if isinstance(value, np.ndarray):
+        name = f"a{len(arrays)}"
+        arrays[name] = value
+        return {"array": name}
+    if is_dataclass(value):
+        parts = {one.name: _to_tree(getattr(value, one.name), arrays) for one in fields(value)}
+        return {"is": type(value).__name__, "of": parts}
+    if isinstance(value, dict):
+        return {"is": "dict", "of": {name: _to_tree(one, arrays) for name, one in value.items()}}
+    if isinstance(value, (tuple, list)):
+        return [_to_tree(one, arrays) for one in value]
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _from_tree(tree: Any, arrays: dict[str, np.ndarray], classes: dict[str, type]) -> Any:
+    if isinstance(tree, list):
+        return tuple(_from_tree(one, arrays, classes) for one in tree)
+    if not isinstance(tree, dict):
+        return tree
+    if "array" in tree:
+        return arrays[tree["array"]]
+    parts = {name: _from_tree(one, arrays, classes) for name, one in tree["of"].items()}
+    return parts if tree["is"] == "dict" else classes[tree["is"]](**parts)

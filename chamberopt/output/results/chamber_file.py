@@ -1,0 +1,92 @@
+"""chamber.npz: a result's cavity, part and target, bit for bit as they were simulated.
+
+It takes the place of the files that the design names, which are never looked for again.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chamberopt.chamber.build import Chamber
+from chamberopt.chamber.part import Part, PartOfFile
+from chamberopt.common.errors import InputError
+from chamberopt.common.npz_files import load_record
+from chamberopt.geometry.mesh_io.part_mesh import PartMesh
+from chamberopt.geometry.mesh_io.readers.raw_mesh import ElementNumbers
+from chamberopt.geometry.mesh_io.units import METRES_PER
+
+if TYPE_CHECKING:
+    from chamberopt.output.results.load import Result
+
+CHAMBER_FILE = "chamber.npz"
+REMEDY = "restore the file, or simulate again"
+
+
+def load_chamber(result: Result) -> Chamber:
+    """The chamber of a result as it was simulated; InputError for a file that is not what it was.
+
+    It is checked as a whole, because compiled functions trust their input.
+    """
+    path = result.path(CHAMBER_FILE)
+    parts = Part, PartOfFile, PartMesh, ElementNumbers
+    chamber = load_record(path, Chamber, parts, REMEDY)
+    try:
+        _require_sound(chamber)
+    except (ValueError, TypeError, AttributeError, KeyError) as error:
+        raise InputError(f"{path}: damaged ({error}); {REMEDY}") from None
+    return chamber
+
+
+def _require_sound(chamber: Chamber) -> None:
+    """Raise an error unless all arrays have the types, shapes and ranges that kernels expect."""
+    part, file = chamber.part, chamber.part.file
+    if not isinstance(part, Part) or not isinstance(file, PartOfFile):
+        raise ValueError("without its part")
+    corners, faces = len(chamber.vertices), len(chamber.triangles)
+    points, own = len(part.vertices), len(part.triangles)
+    columns = [
+        ("vertices", chamber.vertices, "f8", (corners, 3), None),
+        ("triangles", chamber.triangles, "i4", (faces, 3), (0, corners)),
+        ("tags", chamber.tags, "u1", (faces,), None),
+        ("source", chamber.source, "i", (faces,), (-1, own)),
+        ("exposed area", chamber.exposed_area, "f8", (own,), None),
+        ("part's area", part.area, "f8", (own,), None),
+        ("target", part.target, "b", (own,), None),
+        ("part's rotation", file.rotation, "f8", (3, 3), None),
+        ("part's shift", file.shift, "f8", (3,), None),
+        *_mesh_columns("part", part.vertices, part.triangles),
+        *_mesh_columns("simulated part", file.simulated.vertices, file.simulated.triangles),
+        ("elements", file.simulated.elements, "i", (own,), None),
+        ("element faces", file.simulated.numbering.faces, "i", (own,), None),
+    ]
+    if len(file.simulated.vertices) != points or len(file.simulated.triangles) != own:
+        raise ValueError("the part has another size than in its file's frame")
+    if chamber.fitting is not None:
+        columns.append(("fitting", chamber.fitting, "i", (faces,), (-1, faces)))
+    if file.original is not None:
+        own = len(file.original.triangles)
+        columns += _mesh_columns("original part", file.original.vertices, file.original.triangles)
+        columns.append(("original elements", file.original.elements, "i", (own,), None))
+    for name, column, dtype, shape, limits in columns:
+        if not isinstance(column, np.ndarray):
+            raise ValueError(f"{name} is no array")
+        if column.dtype != dtype and column.dtype.kind != dtype:
+            raise ValueError(f"{name} is of type {column.dtype}")
+        if column.shape != shape:
+            raise ValueError(f"{name} has the shape {column.shape}, expected {shape}")
+        if dtype == "f8" and not np.isfinite(column).all():
+            raise ValueError(f"{name} has a number that is not finite")
+        if limits and len(column) and not limits[0] <= column.min() <= column.max() < limits[1]:
+            raise ValueError(f"{name} is not from {limits[0]} to {limits[1] - 1}")
+    if part.unit not in METRES_PER:
+        raise ValueError(f"unit {part.unit!r}")
+
+
+def _mesh_columns(name: str, vertices: np.ndarray, triangles: np.ndarray) -> list[Any]:
+    limits = 0, len(vertices)
+    return [
+        (f"{name}'s vertices", vertices, "f8", (len(vertices), 3), None),
+        (f"{name}'s triangles", triangles, "i4", (len(triangles), 3), limits),
+    ]
