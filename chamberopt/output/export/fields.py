@@ -71,6 +71,8 @@ def write_fields(folder: str | Path, path: str | Path, to: str) -> list[str]:
 
 
 def _write_deck(result: Result, surface: Any, to: str, path: Path) -> list[str]:
+    if path.resolve() == result.design.part.mesh_path:
+        raise InputError(f"{path}: is the part's own file; choose another name")
     part = _part_of_file(result, surface)
     simulated, original = part.simulated, part.original
     own = (original or simulated).numbering.own

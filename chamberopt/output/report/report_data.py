@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 from chamberopt.common.estimate import Estimate, independent_difference, paired_difference
 from chamberopt.optimize.storage.study_folder import STUDY
-from chamberopt.optimize.storage.trial_log import HISTORY, TIMINGS, read_trials
 from chamberopt.output.report.conclusions import accuracy_rows, answer, cost_rows, influence
 from chamberopt.output.report.number_text import metric_label, objective_label
-from chamberopt.output.results.load import load_result
+from chamberopt.output.results.load import load_result, load_trials
 
 if TYPE_CHECKING:
     from chamberopt.output.results.load import Result
@@ -31,7 +30,7 @@ def report_contents(folder: str | Path) -> dict[str, Any]:
     study = result.data.get("study")
     start = load_result(result.folder / START) if study else None
     gain = None if start is None else _change(result.objective, start.objective, result, start)
-    rows = _evaluations_of(result) if study else []
+    rows = load_trials(result.folder) if study else []
     label = objective_label(result.objective_name)
     candidates = {"result": result} if start is None else {"start": start, "best": result}
     return {
@@ -60,13 +59,6 @@ def report_contents(folder: str | Path) -> dict[str, Any]:
             **{name: str(version) for name, version in result.data.get("versions", {}).items()},
         },
     }
-
-
-def _evaluations_of(result: Result) -> list[dict[str, Any]]:
-    """The trial log of a study; InputError unless it is the one that was written."""
-    for name in {HISTORY, TIMINGS}.intersection(result.sha256):
-        result.path(name)
-    return read_trials(result.folder) if HISTORY in result.sha256 else []
 
 
 def _change(after: Estimate, before: Estimate, result: Result, start: Result) -> Estimate:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import hashlib
 import json
 import shlex
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,7 +20,7 @@ from chamberopt.coverage.metrics import METRICS
 from chamberopt.design.design import validate
 from chamberopt.design.load import Design
 from chamberopt.optimize.storage.study_folder import RESULT, is_study_folder
-from chamberopt.optimize.storage.trial_log import HISTORY
+from chamberopt.optimize.storage.trial_log import HISTORY, TIMINGS, read_trials
 from chamberopt.output.vtp_files import (
     CHAMBER,
     COVERAGE,
@@ -84,9 +85,8 @@ def load_result(path: str | Path) -> Result:
         raise InputError(
             f"{folder}: not a results folder, {RESULT} is missing; give one made by simulate or run"
         )
-    try:
-        data = json.loads(file.read_text(encoding="utf-8"), parse_constant=_refuse_constant)
-        _require_format(file, data)
+    with _damage_explained(file):
+        data = _read_data(file)
         if data["kind"] == "sweep":
             raise InputError(
                 f"{folder}: a sweep is a map of many candidates, not the result of one; simulate "
@@ -106,17 +106,23 @@ def load_result(path: str | Path) -> Result:
             part_sha256=data["part_sha256"],
             seeds=(data["seed"], data["stream"]),
             notes=tuple(data["notes"]),
-            sha256={name: str(sha256) for name, sha256 in data["files"].items()},
+            sha256=_read_digests(data),
             data=data,
         )
-    except OSError as error:
-        raise InputError(
-            f"{file}: cannot be read: {error.strerror}; check its permissions"
-        ) from None
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise InputError(
-            f"{file}: damaged ({type(error).__name__}: {error}); simulate again"
-        ) from None
+
+
+def load_trials(folder: Path) -> list[dict[str, Any]]:
+    """The trial log of a study or sweep, finished or not; InputError where there is none.
+
+    If it is finished, its files must be those that were written with its result.
+    """
+    file = folder / RESULT
+    if file.is_file():
+        with _damage_explained(file):
+            sha256 = _read_digests(_read_data(file))
+        for name in sorted({HISTORY, TIMINGS} & sha256.keys()):
+            unchanged_file(folder, name, sha256)
+    return read_trials(folder)
 
 
 def unchanged_file(folder: Path, name: str, sha256: Mapping[str, str]) -> Path:
@@ -183,11 +189,33 @@ def summary(evaluation: Evaluation | Result) -> str:
     return f"{name} {estimate_text(evaluation.objective)}   {shares}"
 
 
-def _require_format(file: Path, data: dict[str, Any]) -> None:
-    """Raise InputError unless this version of the program reads the whole result."""
+@contextmanager
+def _damage_explained(file: Path) -> Iterator[None]:
+    """Report what is wrong with a result.json as InputError."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(
+            f"{file}: cannot be read: {error.strerror}; check its permissions"
+        ) from None
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise InputError(
+            f"{file}: damaged ({type(error).__name__}: {error}); simulate again"
+        ) from None
+
+
+def _read_digests(data: dict[str, Any]) -> dict[str, str]:
+    return {name: str(sha256) for name, sha256 in data["files"].items()}
+
+
+def _read_data(file: Path) -> dict[str, Any]:
+    """The content of a result.json that this version of the program reads whole; or InputError."""
+    data: dict[str, Any] = json.loads(
+        file.read_text(encoding="utf-8"), parse_constant=_refuse_constant
+    )
     found = data["format"]
     if found == FORMAT:
-        return
+        return data
     made_by = data.get("versions", {}).get("chamberopt", "an unknown version")
     newer = isinstance(found, int) and found > FORMAT
     remedy = "read it with that version" if newer else "simulate again, or read it with that one"

@@ -122,6 +122,10 @@ def test_a_study_sent_elsewhere_is_whole(
     for folder, name in ((best, "best"), (start, "start")):
         run("export", folder, "--to", "fields-abaqus", "--out", tmp_path / f"{name}.inp")
     run("export", best, "--to", "study-csv", "--out", tmp_path / "study.csv")
+    lengthened(best / "history.jsonl")
+    for command in (["report", best], ["export", best, "--to", "study-csv"]):
+        assert main([str(one) for one in command]) == 2
+        assert "history.jsonl: not the file that was written" in capsys.readouterr().err
     capsys.readouterr()
     shutil.rmtree(start)
     assert main(["report", str(best)]) == 2
