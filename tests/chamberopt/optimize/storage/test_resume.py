@@ -203,7 +203,7 @@ class TestEvaluationFile:
             with pytest.raises(InputError, match=r"one\.npz.*new folder"):
                 load_evaluation(path)
         path.unlink()
-        with pytest.raises(InputError, match=r"one\.npz: No such file"):
+        with pytest.raises(InputError, match=r"one\.npz: not there"):
             load_evaluation(path)
 
 

@@ -197,7 +197,7 @@ def test_designs_share_the_first_ones_reachable_target(
         read_candidates([tmp_path / "wide.toml", tmp_path / "result"])
 
 
-def test_a_result_whose_parts_file_is_gone_is_compared_but_not_simulated_again(
+def test_a_result_whose_parts_file_is_gone_is_compared_and_simulated_again(
     simulations: Simulations, made, tmp_path: Path
 ) -> None:
     parts = tmp_path / "parts"
@@ -212,5 +212,7 @@ def test_a_result_whose_parts_file_is_gone_is_compared_but_not_simulated_again(
         False,
         True,
     ]
-    with pytest.raises(InputError, match=r"plate\.stl"):
-        read_candidates([tmp_path / "old", made("new.toml")], 6.0)
+    again = read_candidates([tmp_path / "old", made("new.toml")], 6.0)
+    assert [one.missing for one in again] == [True, True]
+    assert again[0].chamber is not None
+    np.testing.assert_array_equal(again[0].chamber.vertices, CHAMBER.vertices)
