@@ -94,7 +94,7 @@ def test_a_study_leaves_everything_and_its_best_design_can_be_used(tmp_path: Pat
     assert names == {
         "design.toml", "study.toml", "history.jsonl", "history.csv", "best.toml", "result.json",
         "coverage.vtp", "part.vtp", "chamber.stl", "chamber.vtp", "convergence.png", "slices.png",
-        "chamber.npz", "start", "inputs.json", "timings.jsonl", "confirm", ".lock", "hits.npz",
+        "chamber.npz", "start", "inputs.json", "timings.jsonl", "confirm", "hits.npz",
     }  # fmt: skip
     result = load_result(folder)
     assert result.kind == "study"
