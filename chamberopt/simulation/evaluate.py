@@ -233,7 +233,7 @@ def estimate_metrics(
     """Estimate all metrics from replicas; with a single one the half-widths are infinite."""
     found, resolution = raw_estimates(seen, hits, design)
     found |= _ratios(in_batches(hits), chamber, design)
-    of_wide, resolution_of_wide = _of_windows(seen.field, seen.field.wide, seen.wide, design)
+    of_wide, resolution_of_wide = window_estimates(seen.field, seen.field.wide, seen.wide, design)
     return Estimates(
         {name: as_resolved(name, found[name], resolution) for name in METRICS},
         {name: as_resolved(name, one, resolution_of_wide) for name, one in of_wide.items()},
@@ -245,12 +245,12 @@ def raw_estimates(
     seen: SeenDents, hits: Sequence[Hits], design: Design
 ) -> tuple[dict[str, Estimate], Resolution]:
     """Metrics of coverage and intensity at the gauge, with intervals even where not resolved."""
-    found, resolution = _of_windows(seen.field, seen.field.gauge, seen.gauge, design)
+    found, resolution = window_estimates(seen.field, seen.field.gauge, seen.gauge, design)
     uniformity = intensity_uniformity(seen.field, in_batches(hits), design.shot.density)
     return found | {"intensity_uniformity": uniformity}, resolution
 
 
-def _of_windows(
+def window_estimates(
     field: TargetField, gauge: Gauge, prints: list[Footprints], design: Design
 ) -> tuple[dict[str, Estimate], Resolution]:
     """Metrics of coverage in windows of one size."""

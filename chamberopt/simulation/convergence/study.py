@@ -21,15 +21,14 @@ from chamberopt.chamber.scene import chamber_mesh, replica_seed
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate, estimate, paired_difference
 from chamberopt.common.progress import Progress
-from chamberopt.coverage.coverage_from_impacts import Footprints, batches_of, find_footprints
-from chamberopt.coverage.coverage_intervals import coverage_estimates, find_resolution
+from chamberopt.coverage.coverage_from_impacts import Footprints, find_footprints
 from chamberopt.coverage.field.target_field import TargetField
 from chamberopt.coverage.metrics import parse_objective
 from chamberopt.design.design import Design
 from chamberopt.simulation.convergence import error_law
 from chamberopt.simulation.convergence.error_law import BatchSize, ErrorLaw
 from chamberopt.simulation.convergence.parameters import study_designs
-from chamberopt.simulation.evaluate import prepare_target, weighted_sum
+from chamberopt.simulation.evaluate import prepare_target, weighted_sum, window_estimates
 from chamberopt.simulation.replicas import ReplicaSetting, simulate_replica
 
 if TYPE_CHECKING:
@@ -106,13 +105,11 @@ class Replicas:
 
     def estimates(self, part: slice = slice(None)) -> tuple[Estimate, Estimate, bool]:
         """Objective, mean coverage, and whether there are enough dents for them."""
-        process, gauge = self.setting.design.process, self.target.gauge
         prints = [one.footprints for one in self.done[part]]
-        batches = batches_of(prints)
-        ratio = process.treatment_time / process.recorded_time
-        metrics = coverage_estimates(batches, len(gauge.area), self.target.reachable, ratio)
+        metrics, found = window_estimates(
+            self.target, self.target.gauge, prints, self.setting.design
+        )
         objective = weighted_sum(parse_objective("uniform_coverage"), metrics)
-        found = find_resolution(batches, gauge, ratio, process.recorded_time)
         return objective, metrics["mean_coverage"], found.has_mean
 
     def run(self, parameter: str, setting: str, reference: Run | None = None) -> Run:
