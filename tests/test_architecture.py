@@ -17,8 +17,8 @@ ORDER = {
         "common geometry design chamber coverage simulation optimize output api cli __main__"
     ),
     "chamberopt/geometry": "triangles solids+remesh slivers mesh_io",
-    "chamberopt/geometry/mesh_io": "surface_error units+holes+self_intersection readers formats "
-    "healing part_mesh",
+    "chamberopt/geometry/mesh_io": "surface_error native_reader+units+holes+self_intersection "
+    "readers formats healing part_mesh",
     "chamberopt/design": (
         "table_base materials shapes effects+part+process+shot+sonotrode design load"
     ),

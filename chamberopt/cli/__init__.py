@@ -8,6 +8,7 @@ Heavy packages (numba, trimesh, pyvista, sklearn) are imported inside the comman
 
 from __future__ import annotations
 
+import errno
 import sys
 from collections.abc import Sequence
 from concurrent.futures import BrokenExecutor
@@ -16,11 +17,13 @@ from io import TextIOWrapper
 from cyclopts import CycloptsError
 
 from chamberopt.cli import commands
+from chamberopt.cli.console import show
 from chamberopt.cli.options import app
 from chamberopt.common.errors import InputError
 
 __all__ = ["app", "commands", "main"]  # importing `commands` registers every command with the app
 
+UNUSABLE_NAME = (errno.ENAMETOOLONG, errno.ELOOP)
 KEPT = "what had been finished stays on disk"
 
 
@@ -47,6 +50,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
+        if error.errno in UNUSABLE_NAME:
+            return _fail(f"{where}{error.strerror}; check the path", 2)
         return _fail(f"{where}{error.strerror or error}; {KEPT}", 1, error)
     except MemoryError as error:
         return _fail(f"out of memory; {KEPT}", 1, error)
@@ -67,5 +72,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _fail(message: str, status: int, error: BaseException | None = None) -> int:
     """Print the message and the notes of the error: the candidate concerned, how to go on."""
-    print("\n".join([message, *getattr(error, "__notes__", ())]), file=sys.stderr)
+    show([message, *getattr(error, "__notes__", ())], sys.stderr)
     return status

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TextIO, TypeVar
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
     from chamberopt.design.load import Design
     from chamberopt.simulation.evaluation import Evaluation
 
+# Characters that a terminal obeys instead of showing them, or that reverse the text.
+CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
 T = TypeVar("T")
 
 
@@ -49,10 +52,19 @@ def claimed_folder(
                 return
 
 
-def print_remarks(remarks: Sequence[str]) -> None:
+def show(lines: Iterable[str], to: TextIO | None = None) -> None:
+    """Print lines to stdout, or `to`, with control characters in names made visible.
+
+    Names of files, keys and groups come from elsewhere, and a terminal would obey them.
+    """
+    text = CONTROL.sub(lambda one: one[0].encode("unicode_escape").decode(), "\n".join(lines))
+    print(text, file=to or sys.stdout, flush=True)
+
+
+def print_remarks(remarks: Iterable[str]) -> None:
     """Print remarks, such as a skipped picture, to stderr, so that --json stays clean."""
     for remark in remarks:
-        print(remark, file=sys.stderr, flush=True)
+        show([remark], sys.stderr)
 
 
 def print_warnings(design: Design, chamber: Chamber, which: str = "") -> list[str]:
@@ -79,7 +91,7 @@ def print_result(
         values = json.loads((folder / file).read_text(encoding="utf-8"))
         print_json({**values, "folder": str(folder)})
     else:
-        print("\n".join([*lines, f"results in {folder}"]))
+        show([*lines, f"results in {folder}"])
 
 
 def print_finished(folder: Path, what: str, lines: Sequence[str], as_json: bool) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import write_text
+from chamberopt.common.limits import MAX_TEXT_BYTES, read_limited
 from chamberopt.design.design import Design, validate
 from chamberopt.design.shapes.base import is_custom
 
@@ -63,17 +64,13 @@ def read_toml(path: Path, kind: str) -> tuple[str, dict[str, Any]]:
         hint = f"; files in it: {', '.join(inside[:8])}" if inside else ""
         raise InputError(f"{path}: is a folder; give a {kind} file (.toml){hint}")
     try:
-        source = path.read_bytes().decode("utf-8-sig")
+        content = read_limited(path, MAX_TEXT_BYTES, f"{kind} file (.toml)")
+        source = content.decode("utf-8-sig")
     except FileNotFoundError:
         raise InputError(toml_errors.explain_missing_file(path, f"{kind} file", "*.toml")) from None
-    except OSError as error:
-        message = f"{path}: cannot be read: {error.strerror}; check its permissions"
-        raise InputError(message) from None
     except UnicodeDecodeError as error:
         text = f"not UTF-8 text (byte {error.start}); a {kind} file is TOML, save it as UTF-8"
         raise InputError(f"{path}: {text}") from None
-    except ValueError:  # a null character in the name
-        raise InputError(f"{str(path)!r}: not a file name; check the path") from None
     if not source.strip():
         text = f"the file is empty; a {kind} file is TOML, start from a copy of a shipped one"
         raise InputError(f"{path}: {text}")

@@ -8,7 +8,7 @@ from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING
 
-from chamberopt.cli.console import print_json, print_remarks, table_lines
+from chamberopt.cli.console import print_json, print_remarks, show, table_lines
 from chamberopt.cli.options import Json, Out, app
 from chamberopt.cli.prepare import advise_effects
 
@@ -82,11 +82,11 @@ def _check(file: Path, pilot: bool, screenshot: Path | None, json: bool, out: Pa
     if out is not None:
         facts["folder"] = str(out)
     if not json:
-        print("\n".join([f"{file}: a usable {kind}", *table_lines(facts)]), flush=True)
+        show([f"{file}: a usable {kind}", *table_lines(facts)])
     if pilot:
         facts["effects"] = advise_effects(design, chamber)
         if not json:
-            print("\n".join(f"effect: {one['said']}" for one in facts["effects"]))
+            show(f"effect: {one['said']}" for one in facts["effects"])
     if out is not None:
         write_text(out / "check.json", json_format.dumps(facts, indent=2) + "\n")
         write_chamber(out, chamber)

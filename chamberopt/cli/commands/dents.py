@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from chamberopt.cli.console import show
 from chamberopt.cli.options import View, app
 from chamberopt.cli.prepare import load_replica
 from chamberopt.common.errors import InputError
@@ -56,4 +57,4 @@ def dents(
         failure = draw_dents(loaded.folder, found, heading, path, eye, pixels)
     if failure:
         raise InputError(failure)
-    print(f"{title}\npicture in {path}")
+    show([title, f"picture in {path}"])

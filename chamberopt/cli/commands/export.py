@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from chamberopt.cli.console import print_json, print_remarks, results_folder
+from chamberopt.cli.console import print_json, print_remarks, results_folder, show
 from chamberopt.cli.options import Json, Workers, app
 from chamberopt.cli.prepare import compile_with_message
 from chamberopt.common.errors import InputError
@@ -82,7 +82,7 @@ def export(
         print_json({"result": str(folder), "files": paths, **counts})
         return
     lines = [f"{count:,} {what}" for what, count in counts.items()]
-    print("\n".join([*lines, *(f"{name:24}{file}" for name, file in files.items())]))
+    show([*lines, *(f"{name:24}{file}" for name, file in files.items())])
 
 
 @contextmanager

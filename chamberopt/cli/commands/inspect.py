@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from chamberopt.cli.console import print_json, print_remarks, results_folder
+from chamberopt.cli.console import print_json, print_remarks, results_folder, show
 from chamberopt.cli.options import Json, Out, View, app
 from chamberopt.common.errors import InputError
 
@@ -76,7 +76,7 @@ def inspect(
         raise InputError(f"inspect: {text}")
     loaded = [load_result(path) for path in results]
     if not json:
-        print("\n".join(summary(one) for one in loaded))
+        show(summary(one) for one in loaded)
     if html is not None:
         from chamberopt.output.report import write_part_page
 
@@ -98,4 +98,4 @@ def inspect(
         return
     for kind, path in (("page", html), ("picture", screenshot)):
         if path is not None:
-            print(f"{kind} in {path}")
+            show([f"{kind} in {path}"])

@@ -7,6 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from chamberopt.cli.console import show
 from chamberopt.cli.options import View, app
 from chamberopt.cli.prepare import load_replica
 from chamberopt.common.errors import InputError
@@ -62,4 +63,4 @@ def replay(
         failure = draw_replay(loaded.folder, flown, path, fps, size, eye)
     if failure:
         raise InputError(failure)
-    print(f"{len(flown.time)} frames, {len(flown.impacts)} impacts on the part: film in {path}")
+    show([f"{len(flown.time)} frames, {len(flown.impacts)} impacts on the part: film in {path}"])

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from chamberopt.cli.console import print_json
+from chamberopt.cli.console import print_json, show
 from chamberopt.cli.options import Json, app
 
 Page = Annotated[
@@ -34,4 +34,4 @@ def report(result: Path, /, *, json: Json = False, out: Page = None) -> None:
         print_json({**facts, "report": str(path)})
         return
     size = f"{path.stat().st_size / 1e6:.1f} MB"
-    print("\n".join([facts["answer"], *facts["remarks"], f"report in {path}, {size}"]))
+    show([facts["answer"], *facts["remarks"], f"report in {path}, {size}"])

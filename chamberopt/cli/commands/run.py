@@ -72,7 +72,7 @@ def run(
             console.print_result(lines, folder.path, json)
             if not json:
                 show, best = _command("report", folder.path), folder.path / "best.toml"
-                print(f"to see it: {show}; the design: {best}")
+                console.show([f"to see it: {show}; the design: {best}"])
 
 
 def _search(

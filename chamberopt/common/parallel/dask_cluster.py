@@ -15,6 +15,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from chamberopt.common.errors import ClusterLostError, InputError, WorkerLostError
+from chamberopt.common.limits import MAX_TEXT_BYTES, read_limited
 from chamberopt.common.versions import SIMULATION_PACKAGES, package_versions
 
 TIMEOUT_S = 20.0  # for the scheduler to answer, and again for its first worker
@@ -108,13 +109,14 @@ def _scheduler_address(cluster: str) -> str:
     """The scheduler's address, as given or from its file."""
     if "://" in cluster:
         return cluster
-    path = Path(cluster)
-    if not path.is_file():
-        text = f"neither an address nor a file; give tcp://HOST:PORT, or {SCHEDULER_FILE}"
-        raise InputError(f"--cluster: given {cluster!r}, {text}")
     try:
-        return str(json.loads(path.read_text(encoding="utf-8"))["address"])
-    except (OSError, ValueError, KeyError, TypeError):
+        content = read_limited(Path(cluster), MAX_TEXT_BYTES, "scheduler file")
+    except FileNotFoundError:
+        text = f"neither an address nor a file; give tcp://HOST:PORT, or {SCHEDULER_FILE}"
+        raise InputError(f"--cluster: given {cluster!r}, {text}") from None
+    try:
+        return str(json.loads(content)["address"])
+    except (ValueError, KeyError, TypeError, RecursionError):
         text = f"holds no scheduler's address; give {SCHEDULER_FILE}"
         raise InputError(f"--cluster: {cluster} {text}") from None
 

@@ -16,6 +16,7 @@ from pydantic import ConfigDict, ValidationError, model_validator
 
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
+from chamberopt.common.limits import MAX_TEXT_BYTES, read_limited
 from chamberopt.design.shapes.base import ChamberTable
 from chamberopt.design.shapes.construction.surface import ShapeSurface
 from chamberopt.design.shapes.construction.surface_check import find_fault, with_array_types
@@ -59,12 +60,9 @@ def load_custom_shape(path: Path) -> type[ChamberTable]:
     InputError if the file cannot be read or run, or does not hold exactly one shape.
     """
     try:
-        source = path.read_bytes()
+        source = read_limited(path, MAX_TEXT_BYTES, "shape file (.py)")
     except FileNotFoundError:
         message = toml_errors.explain_missing_file(path, "shape file", "*.py")
-        raise InputError(message) from None
-    except OSError as error:
-        message = f"{path}: cannot be read: {error.strerror}; check its permissions"
         raise InputError(message) from None
     return _run(path, source)
 

@@ -23,6 +23,7 @@ import numpy as np
 
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
+from chamberopt.common.limits import MAX_MESH_BYTES, read_limited, require_few
 from chamberopt.geometry.mesh_io.formats import read_raw_mesh
 from chamberopt.geometry.mesh_io.healing import sew, turn_outward
 from chamberopt.geometry.mesh_io.readers.raw_mesh import ElementNumbers, number_by_position
@@ -97,6 +98,7 @@ def read_triangles(path: Path, unit: str = "guess") -> TriangleSoup:
     corners = raw.corners
     if not len(corners):
         raise InputError(f"{path}: holds no triangles; export a surface mesh")
+    require_few(path, len(corners), "triangles")
     bad = np.flatnonzero(~np.isfinite(corners).all(axis=(1, 2)))
     if len(bad):
         raise InputError(
@@ -163,14 +165,11 @@ def _read_content(path: Path) -> bytes:
     """The bytes of a file that exists, can be read and is not empty."""
     if path.is_dir():
         raise InputError(f"{path}: is a folder; give a mesh file")
-    if not path.is_file():
-        remedy = "check part.mesh, which is relative to the design file's folder"
-        raise InputError(f"{path}: no such mesh file; {remedy}")
     try:
-        content = path.read_bytes()
-    except OSError as error:
-        why = f"cannot be read: {error.strerror}"
-        raise InputError(f"{path}: {why}; check its permissions") from None
+        content = read_limited(path, MAX_MESH_BYTES, "mesh file")
+    except FileNotFoundError:
+        remedy = "check part.mesh, which is relative to the design file's folder"
+        raise InputError(f"{path}: no such mesh file; {remedy}") from None
     if not content.strip():
         raise InputError(f"{path}: the file is empty; export the mesh again")
     return content

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter, defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from chamberopt.common.errors import InputError
+from chamberopt.common.limits import require_few
 from chamberopt.geometry.mesh_io.readers.elements import (
     CORNERS,
     EDGES,
@@ -44,10 +45,11 @@ SOLID_KIND = {
     8: "hexahedron", 20: "hexahedron",
 }  # fmt: skip
 Options = dict[str, str]
-Member = tuple[str, int]  # instance that a set names ("" for any), and a number in it
+Member = tuple[str, range]  # instance that a set names ("" for any), and numbers in it
+Members = dict[Member, None]  # in their order, each once: sets may name one another many times
 Place = tuple[int, int]  # position of a placed scope, and the file's number in it
 NO_ROWS = np.zeros(0, dtype=np.int64)
-_FindRows = Callable[[list[Member]], np.ndarray]
+_FindRows = Callable[[Iterable[Member]], np.ndarray]
 
 
 @dataclass
@@ -56,8 +58,8 @@ class _Scope:
 
     nodes: dict[int, list[float]] = field(default_factory=dict)
     elements: dict[int, tuple[str, list[int]]] = field(default_factory=dict)
-    element_sets: dict[str, list[Member]] = field(default_factory=lambda: defaultdict(list))
-    node_sets: dict[str, list[Member]] = field(default_factory=lambda: defaultdict(list))
+    element_sets: dict[str, Members] = field(default_factory=lambda: defaultdict(dict))
+    node_sets: dict[str, Members] = field(default_factory=lambda: defaultdict(dict))
     surfaces: dict[str, list[tuple[str, str]]] = field(default_factory=lambda: defaultdict(list))
 
 
@@ -83,6 +85,9 @@ def read_abaqus(path: Path, content: bytes) -> RawMesh:
     """Read the surface in an input file; InputError names keyword and line that are refused."""
     scopes, instances, notes = _read_scopes(path, content.decode("utf-8", errors="replace"))
     try:
+        placed = [scopes[instance.part] for instance in instances.values()]
+        count = sum(len(scope.nodes) + len(scope.elements) for scope in placed)
+        require_few(path, count, "nodes and elements in all instances")
         return extract_surface(_assemble(scopes, instances, notes))
     except KeyError as error:
         why = f"names {error.args[0]}, which is not there"
@@ -137,7 +142,7 @@ def _read_scopes(
                 _add_elements(scope, options, data, left_out)
             elif keyword in ("ELSET", "NSET"):
                 sets = scope.element_sets if keyword == "ELSET" else scope.node_sets
-                sets[options[keyword]] += _members(options, data, sets)
+                sets[options[keyword]] |= _members(options, data, sets)
             elif keyword == "SURFACE" and options.get("TYPE", "ELEMENT").upper() == "ELEMENT":
                 for row in data:
                     of, _, face = row.partition(",")
@@ -161,7 +166,7 @@ def _add_nodes(scope: _Scope, options: Options, data: list[str]) -> None:
         point = [float(value) if value.strip() else 0.0 for value in [*values, "", ""][:3]]
         scope.nodes[int(number)] = point
         if "NSET" in options:
-            scope.node_sets[options["NSET"]].append(("", int(number)))
+            scope.node_sets[options["NSET"]][_one("", number)] = None
 
 
 def _add_elements(scope: _Scope, options: Options, data: list[str], left_out: Counter[str]) -> None:
@@ -187,26 +192,30 @@ def _add_elements(scope: _Scope, options: Options, data: list[str], left_out: Co
         number, *nodes = flat[at : at + count + 1]
         scope.elements[number] = kind, nodes[: CORNERS[kind] + len(EDGES[kind])]
         if "ELSET" in options:
-            scope.element_sets[options["ELSET"]].append(("", number))
+            scope.element_sets[options["ELSET"]][_one("", number)] = None
 
 
-def _members(options: Options, data: list[str], sets: dict[str, list[Member]]) -> list[Member]:
+def _one(instance: str, number: int | str) -> Member:
+    return instance, range(int(number), int(number) + 1)
+
+
+def _members(options: Options, data: list[str], sets: dict[str, Members]) -> Members:
     """The members that *ELSET or *NSET lists, generates, or copies from another set."""
-    members: list[Member] = []
+    members: Members = {}
     instance = options.get("INSTANCE", "").upper()
     by_upper = {name.upper(): name for name in sets}
     for row in data:
         words = [word.strip() for word in row.split(",") if word.strip()]
         if "GENERATE" in options:
             first, last, step = (*map(int, words), 1)[:3]
-            members += [(instance, number) for number in range(first, last + 1, step)]
+            members[instance, range(first, last + 1, step)] = None
             continue
         for word in words:
             of, _, name = word.rpartition(".")
             if name.isdigit():
-                members.append((of.upper() or instance, int(name)))
+                members[_one(of.upper() or instance, name)] = None
             else:
-                members += sets[by_upper[name.upper()]]
+                members |= sets[by_upper[name.upper()]]
     return members
 
 
@@ -251,14 +260,18 @@ def _assemble(
         anywhere = [at] if scope.elements or scope.nodes else list(range(len(names) + 1))
 
         def find(
-            row_of: dict[Place, int], members: list[Member], anywhere: list[int] = anywhere
+            row_of: dict[Place, int], members: Iterable[Member], anywhere: list[int] = anywhere
         ) -> np.ndarray:
-            found = (
-                (which, number)
-                for name, number in members
-                for which in ([names.index(name)] if name in names else anywhere)
-            )
-            return np.array([row_of[place] for place in found if place in row_of], dtype=np.int64)
+            found: list[int] = []
+            for name, numbers in members:
+                where = [names.index(name)] if name in names else anywhere
+                if len(numbers) == 1:
+                    places = [(which, numbers[0]) for which in where]
+                    found += [row_of[place] for place in places if place in row_of]
+                else:  # a range may have far more numbers than the file
+                    within = (place for place in row_of if place[1] in numbers)
+                    found += [row_of[place] for place in within if place[0] in where]
+            return np.array(found, dtype=np.int64)
 
         _add_groups(mesh, scope, partial(find, element_of), partial(find, row_of))
     return mesh
@@ -274,7 +287,7 @@ def _add_groups(mesh: ElementMesh, scope: _Scope, elements: _FindRows, nodes: _F
         rows, sides = mesh.face_sets.get(name, (NO_ROWS, NO_ROWS))
         for of, face in faces:
             if of.isdigit() or of in scope.element_sets:
-                more = elements([("", int(of))] if of.isdigit() else scope.element_sets[of])
+                more = elements([_one("", of)] if of.isdigit() else scope.element_sets[of])
             elif of in mesh.element_sets:
                 more = mesh.element_sets[of]
             else:

@@ -215,8 +215,11 @@ def _add_groups(mesh: ElementMesh, properties: np.ndarray, text: str) -> None:
         mesh.element_sets[f"PID {number}"] = members
         if number in names:
             mesh.element_sets[names[number]] = members
-    for number, elements in _sets(text).items():
-        mesh.element_sets[f"SET {number}"] = np.flatnonzero(np.isin(mesh.numbers, list(elements)))
+    for number, ranges in _sets(text).items():
+        members = np.zeros(len(mesh.numbers), dtype=bool)
+        for first, last in ranges:
+            members |= (first <= mesh.numbers) & (mesh.numbers <= last)
+        mesh.element_sets[f"SET {number}"] = np.flatnonzero(members)
 
 
 def _property_names(text: str) -> dict[int, str]:
@@ -234,12 +237,10 @@ def _property_names(text: str) -> dict[int, str]:
     return names
 
 
-def _sets(text: str) -> dict[int, set[int]]:
-    """Elements of the case control's sets, such as SET 4 = 1, 2, 10 THRU 20."""
+def _sets(text: str) -> dict[int, list[tuple[int, int]]]:
+    """First and last elements of the case control's sets, such as SET 4 = 1, 2, 10 THRU 20."""
     sets = {}
     for found in re.finditer(r"^\s*SET\s+(\d+)\s*=((?:[^\n,]*,\s*\n?)*[^\n]*)", text, re.M | re.I):
-        members: set[int] = set()
-        for first, last in re.findall(r"(\d+)(?:\s+THRU\s+(\d+))?", found[2], re.I):
-            members.update(range(int(first), int(last or first) + 1))
-        sets[int(found[1])] = members
+        ranges = re.findall(r"(\d+)(?:\s+THRU\s+(\d+))?", found[2], re.I)
+        sets[int(found[1])] = [(int(first), int(last or first)) for first, last in ranges]
     return sets

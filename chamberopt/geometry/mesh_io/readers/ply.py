@@ -39,15 +39,17 @@ def read_ply(path: Path, content: bytes) -> RawMesh:
 def _require_all_lines(path: Path, content: bytes) -> None:
     """Raise InputError for a truncated text file, of which trimesh would read what is left.
 
-    A text file has a line for each element that its header counts.
+    A text file has a line for each element that its header counts, a binary one some bytes.
     """
     header, end, body = content.partition(b"end_header")
-    if not end or not re.search(rb"^format\s+ascii", header, re.MULTILINE):
+    if not end:
         return
     declared = sum(map(int, re.findall(rb"^element\s+\S+\s+(\d+)", header, re.MULTILINE)))
-    held = sum(1 for line in body.splitlines() if line.strip())
+    is_text = re.search(rb"^format\s+ascii", header, re.MULTILINE)
+    held = sum(1 for line in body.splitlines() if line.strip()) if is_text else len(body)
     if held < declared:
-        why = f"its header counts {declared} lines and {held} are there"
+        counted = "lines and" if is_text else "elements, and bytes for"
+        why = f"its header counts {declared} {counted} {held} are there"
         raise InputError(f"{path}: truncated: {why}; export it again")
 
 

@@ -1,4 +1,7 @@
-"""Read VTK files with VTK's own readers: legacy .vtk, XML .vtp and .vtu."""
+"""Read VTK files with VTK's own readers: legacy .vtk, XML .vtp and .vtu.
+
+VTK believes the counts in a file. Where they are wrong, it may end the process, or fill the memory.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from chamberopt.common.errors import InputError
+from chamberopt.geometry.mesh_io.native_reader import converted
 from chamberopt.geometry.mesh_io.readers.elements import Block, ElementMesh, extract_surface
 from chamberopt.geometry.mesh_io.readers.raw_mesh import RawMesh
 
@@ -23,30 +27,33 @@ TRIANGLE, POLYGON, QUAD = 5, 7, 9
 WITHOUT_SURFACE = (0, 1, 2, 3, 4, 21, 35)  # points and lines
 # An integer cell field with more values than this numbers the cells rather than naming groups.
 MAX_GROUPS = 64
+FIELD = "field "  # before the names of cell fields among the arrays
+
+
+UNPACK = "from chamberopt.geometry.mesh_io.readers.vtk import unpack; unpack(*sys.argv[1:])"
 
 
 def read_vtk(path: Path, content: bytes) -> RawMesh:
     """Read the surface in a VTK file; integer cell data give groups: "FIELD 3" where FIELD is 3."""
-    from vtkmodules.util.numpy_support import vtk_to_numpy
-    from vtkmodules.vtkCommonDataModel import vtkPolyData
-
-    data = _read_data(path, content)
-    if not data.GetNumberOfPoints() or not data.GetNumberOfCells():
-        return RawMesh(np.zeros((0, 3, 3)))
-    is_poly_data = isinstance(data, vtkPolyData)
-    if is_poly_data and data.GetNumberOfStrips():
+    legacy = re.search(rb"^DATASET\s+(\w+)", content[:4096], re.M | re.I)
+    xml = re.search(rb'<VTKFile[^>]*\btype\s*=\s*"(\w+)"', content[:4096])
+    found = legacy or xml
+    holds = found[1].decode().upper().replace("_", "") if found else "nothing that is known"
+    if holds not in ("POLYDATA", "UNSTRUCTUREDGRID"):
+        raise InputError(f"{path}: holds {holds}; save a PolyData or an UnstructuredGrid")
+    is_poly_data = holds == "POLYDATA"
+    reader = ("vtkXML" if xml else "vtk") + ("PolyData" if is_poly_data else "UnstructuredGrid")
+    with converted(content, "part.vtk", "part.npz", UNPACK, f"{reader}Reader") as file:
+        if file is None:
+            why = "cannot be read as VTK, it is damaged or truncated"
+            raise InputError(f"{path}: {why}; export it again")
+        with np.load(file) as arrays:
+            data = dict(arrays)
+    if data["strips"]:
         raise InputError(f"{path}: triangle strips are not supported; save plain triangles")
-    before = data.GetNumberOfVerts() + data.GetNumberOfLines() if is_poly_data else 0
-    cells = data.GetPolys() if is_poly_data else data.GetCells()
-    offsets = vtk_to_numpy(cells.GetOffsetsArray())
-    nodes = vtk_to_numpy(cells.GetConnectivityArray())
+    before, offsets, nodes, types = (data[k] for k in ("before", "offsets", "nodes", "types"))
     sizes = np.diff(offsets)
-    if is_poly_data:
-        types = np.select([sizes == 3, sizes == 4], [TRIANGLE, QUAD], POLYGON)
-    else:
-        types = vtk_to_numpy(data.GetCellTypes())
-    points = vtk_to_numpy(data.GetPoints().GetData()).astype(np.float64)
-    mesh = ElementMesh(points, [], own=False)
+    mesh = ElementMesh(data["points"], [], own=False)
     numbers = []
     for kind, size in np.unique(np.stack([types, sizes], axis=1), axis=0).tolist():
         rows = np.flatnonzero((types == kind) & (sizes == size))
@@ -61,58 +68,62 @@ def read_vtk(path: Path, content: bytes) -> RawMesh:
     if numbers:
         cell_of = np.concatenate(numbers)
         mesh.numbers = cell_of + 1
-        mesh.element_sets = _groups_of_fields(data.GetCellData(), cell_of)
+        fields = {k.removeprefix(FIELD): v for k, v in data.items() if k.startswith(FIELD)}
+        mesh.element_sets = _groups_of_fields(fields, cell_of)
     return extract_surface(mesh)
 
 
-def _read_data(path: Path, content: bytes) -> Any:
-    """VTK's data object; InputError for what VTK only reports, to continue with less."""
+def unpack(given: str, made: str, reader_name: str) -> None:
+    """Write the arrays of a VTK file as .npz; SystemExit for what VTK only reports."""
+    from vtkmodules import vtkIOLegacy, vtkIOXML
+    from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkCommonCore import vtkLogger
-    from vtkmodules.vtkIOLegacy import vtkPolyDataReader, vtkUnstructuredGridReader
-    from vtkmodules.vtkIOXML import vtkXMLPolyDataReader, vtkXMLUnstructuredGridReader
 
-    legacy = re.search(rb"^DATASET\s+(\w+)", content[:4096], re.M | re.I)
-    xml = re.search(rb'<VTKFile[^>]*\btype\s*=\s*"(\w+)"', content[:4096])
-    found = legacy or xml
-    holds = found[1].decode().upper().replace("_", "") if found else "nothing that is known"
-    if holds not in ("POLYDATA", "UNSTRUCTUREDGRID"):
-        raise InputError(f"{path}: holds {holds}; save a PolyData or an UnstructuredGrid")
-    poly = holds == "POLYDATA"
-    reader: Any
-    if xml:
-        reader = vtkXMLPolyDataReader() if poly else vtkXMLUnstructuredGridReader()
-        reader.SetFileName(str(path))
-    else:
-        reader = vtkPolyDataReader() if poly else vtkUnstructuredGridReader()
-        reader.ReadFromInputStringOn()
-        reader.SetBinaryInputString(content, len(content))
+    reader: Any = getattr(vtkIOXML if "XML" in reader_name else vtkIOLegacy, reader_name)()
+    reader.SetFileName(given)
     troubles: list[str] = []
     for source in (reader, getattr(reader, "GetXMLParser", lambda: None)()):
         if source is not None:
             source.AddObserver("ErrorEvent", lambda *_: troubles.append("error"))
             source.AddObserver("WarningEvent", lambda *_: troubles.append("warning"))
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)  # VTK's messages do not help users
-    try:
-        reader.Update()
-    finally:
-        vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_WARNING)
+    reader.Update()
     if troubles or reader.GetErrorCode():
-        why = "cannot be read as VTK, it is damaged or truncated"
-        raise InputError(f"{path}: {why}; export it again")
-    return reader.GetOutputDataObject(0)
+        raise SystemExit(1)
+    data = reader.GetOutputDataObject(0)
+    is_poly_data = "PolyData" in reader_name
+    before = data.GetNumberOfVerts() + data.GetNumberOfLines() if is_poly_data else 0
+    cells = data.GetPolys() if is_poly_data else data.GetCells()
+    offsets = vtk_to_numpy(cells.GetOffsetsArray())
+    sizes = np.diff(offsets)
+    if is_poly_data:
+        types = np.select([sizes == 3, sizes == 4], [TRIANGLE, QUAD], POLYGON)
+    else:
+        types = vtk_to_numpy(data.GetCellTypes()) if len(sizes) else sizes
+    points = vtk_to_numpy(data.GetPoints().GetData()) if data.GetPoints() else np.zeros((0, 3))
+    fields = {}
+    for k in range(data.GetCellData().GetNumberOfArrays()):
+        array = data.GetCellData().GetArray(k)
+        if array is not None and array.GetNumberOfComponents() == 1:  # no texts and vectors
+            fields[f"{FIELD}{array.GetName()}"] = vtk_to_numpy(array)
+    np.savez(
+        made,
+        points=points.astype(np.float64),
+        nodes=vtk_to_numpy(cells.GetConnectivityArray()),
+        offsets=offsets,
+        types=types,
+        before=before,
+        strips=data.GetNumberOfStrips() if is_poly_data else 0,
+        **fields,
+    )
 
 
-def _groups_of_fields(fields: Any, cells: np.ndarray) -> dict[str, np.ndarray]:
+def _groups_of_fields(fields: dict[str, np.ndarray], cells: np.ndarray) -> dict[str, np.ndarray]:
     """Sets of elements by the values of integer fields of their cells (e,)."""
-    from vtkmodules.util.numpy_support import vtk_to_numpy
-
     groups: dict[str, np.ndarray] = {}
-    for k in range(fields.GetNumberOfArrays()):
-        array = fields.GetArray(k)
-        if array is None or array.GetNumberOfComponents() != 1:
-            continue  # texts and vectors
-        values = vtk_to_numpy(array)[cells]
+    for name, field in fields.items():
+        values = field[cells]
         distinct = np.unique(values) if np.issubdtype(values.dtype, np.integer) else ()
         if 0 < len(distinct) <= MAX_GROUPS:
-            groups |= {f"{array.GetName()} {n}": np.flatnonzero(values == n) for n in distinct}
+            groups |= {f"{name} {n}": np.flatnonzero(values == n) for n in distinct}
     return groups

@@ -1,0 +1,68 @@
+"""Limits on what is read from files, checked before memory is taken; a message names its limit."""
+
+from __future__ import annotations
+
+import stat
+from pathlib import Path
+
+from chamberopt.common.errors import InputError
+
+MEBIBYTE = 1 << 20
+MAX_TEXT_BYTES = MEBIBYTE  # a design, a study, or a shape of one's own
+MAX_MESH_BYTES = 2048 * MEBIBYTE
+MAX_UNPACKED_BYTES = 1024 * MEBIBYTE  # of a compressed mesh
+MAX_READER_BYTES = 16384 * MEBIBYTE  # of memory, for a library that reads STEP or VTK
+MAX_ELEMENTS = 20_000_000  # points, elements, or members of one set
+
+
+def read_limited(path: Path, most: int, what: str) -> bytes:
+    """The bytes of a file.
+
+    Args:
+        most: bytes that it may have.
+        what: it is, such as "mesh file".
+    Raises:
+        FileNotFoundError: for the caller to explain.
+        InputError: it is no plain file, such as a device or a pipe; too large; or not readable.
+    """
+    try:
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):  # a pipe would block, a device may never end
+            raise InputError(f"{path}: is not a plain file; give a {what}")
+        require_size(path, status.st_size, most, what)
+        with path.open("rb") as file:
+            content = file.read(most + 1)  # a file may grow, and one of /proc states no size
+    except FileNotFoundError:
+        raise
+    except OSError as error:
+        why = f"cannot be read: {error.strerror}"
+        raise InputError(f"{path}: {why}; check the path and its permissions") from None
+    except ValueError:  # a null character in the name
+        raise InputError(f"{str(path)!r}: not a file name; check the path") from None
+    require_size(path, len(content), most, what)
+    return content
+
+
+def limit_memory() -> None:
+    """Refuse this process more memory than MAX_READER_BYTES, where the system can do that."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return
+    _, hard = resource.getrlimit(resource.RLIMIT_AS)
+    most = MAX_READER_BYTES if hard == resource.RLIM_INFINITY else min(MAX_READER_BYTES, hard)
+    resource.setrlimit(resource.RLIMIT_AS, (most, hard))
+
+
+def require_size(path: Path, size: int, most: int, what: str) -> None:
+    """Raise InputError if `what`, of `size` bytes, has more than are read."""
+    if size > most:
+        given = f"a {what} of {size / MEBIBYTE:,.1f} MiB"
+        raise InputError(f"{path}: {given}, at most {most / MEBIBYTE:,g} MiB are read; reduce it")
+
+
+def require_few(path: Path, count: int, what: str) -> None:
+    """Raise InputError if a file has more of something than are read."""
+    if count > MAX_ELEMENTS:
+        text = f"{count:,} {what}, at most {MAX_ELEMENTS:,} are read; export a coarser mesh"
+        raise InputError(f"{path}: {text}")
