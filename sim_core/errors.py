@@ -4,6 +4,9 @@ from typing import Any
 
 import numpy as np
 
+# Python takes True for 1.0 and "0.9" for 0.9. In a scene both are mistakes.
+NOT_NUMBERS = (bool, np.bool_, str, bytes)
+
 
 class SceneError(ValueError):
     """The scene cannot be simulated; the message names ball, triangle or field, and remedy."""
@@ -16,6 +19,8 @@ class SimulationError(RuntimeError):
 def number(name: str, value: object) -> float:
     """The value as a float; raises SceneError, naming the field, if it is not a number."""
     try:
+        if isinstance(value, NOT_NUMBERS):
+            raise TypeError
         return float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):
         raise SceneError(f"{name} is {value!r}: give a number") from None
@@ -40,11 +45,14 @@ def surface_table(
         SceneError: for a missing tag, or anything that is not a number.
     """
     try:
+        given = (*np.array(surfaces, dtype=object).ravel(), *balls)
+        if any(isinstance(value, NOT_NUMBERS) for value in given):
+            raise TypeError
         table = np.array(surfaces, dtype=np.float64)
         pair = (float(balls[0]), float(balls[1]))
     except (TypeError, ValueError, LookupError):
-        given = f"{effect}.surfaces is {surfaces!r} and {effect}.balls {balls!r}"
-        raise SceneError(f"{given}: give {form} for each tag and for the balls") from None
+        text = f"{effect}.surfaces is {surfaces!r} and {effect}.balls {balls!r}"
+        raise SceneError(f"{text}: give {form} for each tag and for the balls") from None
     if table.ndim != 2 or table.shape[1] != 2 or len(table) < tags:
         raise SceneError(
             f"{effect}.surfaces must give {form} for tags 0 to {tags - 1}, not shape {table.shape}"

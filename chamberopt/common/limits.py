@@ -6,13 +6,15 @@ import stat
 from pathlib import Path
 
 from chamberopt.common.errors import InputError
+from chamberopt.common.number_text import plain
 
 MEBIBYTE = 1 << 20
 MAX_TEXT_BYTES = MEBIBYTE  # a design, a study, or a shape of one's own
 MAX_MESH_BYTES = 2048 * MEBIBYTE
 MAX_UNPACKED_BYTES = 1024 * MEBIBYTE  # of a compressed mesh
 MAX_READER_BYTES = 16384 * MEBIBYTE  # of memory, for a library that reads STEP or VTK
-MAX_ELEMENTS = 20_000_000  # points, elements, or members of one set
+MAX_ELEMENTS = 20_000_000  # points, elements or triangles of a mesh
+MAX_COPIES = 10_000  # of bodies, where a file puts one in several places
 
 
 def read_limited(path: Path, most: int, what: str) -> bytes:
@@ -61,8 +63,8 @@ def require_size(path: Path, size: int, most: int, what: str) -> None:
         raise InputError(f"{path}: {given}, at most {most / MEBIBYTE:,g} MiB are read; reduce it")
 
 
-def require_few(path: Path, count: int, what: str) -> None:
+def require_few(path: Path, count: int, what: str, most: int = MAX_ELEMENTS) -> None:
     """Raise InputError if a file has more of something than are read."""
-    if count > MAX_ELEMENTS:
-        text = f"{count:,} {what}, at most {MAX_ELEMENTS:,} are read; export a coarser mesh"
+    if count > most:
+        text = f"{plain(count)} {what}, at most {most:,} are read; export a coarser mesh"
         raise InputError(f"{path}: {text}")

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim_core.errors import SceneError, surface_table
+from sim_core.errors import SceneError, number, surface_table
 from sim_core.numerics.jit import jit
 
 # m/s: a thousandth of the shot's speed. Mean speeds change by less than 3 % between 1 and 100 mm/s.
@@ -51,11 +51,12 @@ def checked_restitution(restitution: Restitution, tags: int) -> Restitution:
                 f"restitution.{name} is ({c0}, {v0}): C0 must lie in [0, 1] and v0 be positive "
                 "[m/s]"
             )
-    if not 0.0 <= restitution.elastic_below < math.inf:
+    elastic_below = number("restitution.elastic_below", restitution.elastic_below)
+    if not 0.0 <= elastic_below < math.inf:
         raise SceneError(
-            f"restitution.elastic_below is {restitution.elastic_below}: it must be 0 or more [m/s]"
+            f"restitution.elastic_below is {elastic_below}: it must be 0 or more [m/s]"
         )
-    return Restitution(surfaces, of_balls, float(restitution.elastic_below))
+    return Restitution(surfaces, of_balls, elastic_below)
 
 
 @jit

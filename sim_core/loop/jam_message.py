@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from sim_core.effects.restitution import ELASTIC_BELOW
 from sim_core.geometry.analytic import AnalyticCavity
 from sim_core.geometry.mesh import normals_towards_shot
 from sim_core.loop.contact_neighbours import MAX_JAM_GAP
@@ -10,6 +11,7 @@ from sim_core.scene.narrow_gaps import surface_name
 from sim_core.scene.scene import Scene
 
 MAX_NAMED = 4  # of the surfaces, and of the balls, nearest first
+ENDLESS_BELOW = 1e-6  # m/s: with a lower Restitution.elastic_below slow bounces hardly ever end
 SAME_FACING = 0.99  # cosine: triangles that face alike are one surface
 
 
@@ -31,6 +33,13 @@ def jam_message(
         return (
             f"ball {ball} is caught between {between}{through}, {where}, {when}; make room there "
             "for a ball between the part and what it turns past, or so little that none gets in"
+        )
+    restitution = scene.physics.restitution
+    if restitution is not None and not rests and restitution.elastic_below < ENDLESS_BELOW:
+        return (
+            f"ball {ball} bounces ever faster {where}, {when}: "
+            f"restitution.elastic_below is {restitution.elastic_below:g} m/s, so that slow bounces "
+            f"never end; give {ELASTIC_BELOW:g} m/s"
         )
     advice = "" if rests else "; if balls can lie still there, switch contact mode on"
     return (

@@ -28,6 +28,6 @@ def converted(
     with tempfile.TemporaryDirectory() as folder:
         given, made = Path(folder) / source, Path(folder) / target
         given.write_bytes(content)
-        command = [sys.executable, "-c", BEGIN + code, given, made, *map(str, arguments)]
+        command = [sys.executable, "-c", BEGIN + code, *map(str, (given, made, *arguments))]
         run = subprocess.run(command, capture_output=True, timeout=TIMEOUT_S, check=False)
         yield made if run.returncode == 0 and made.is_file() else None

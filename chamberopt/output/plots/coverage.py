@@ -13,7 +13,7 @@ import numpy as np
 
 from chamberopt.coverage.metrics import FULL_COVERAGE
 from chamberopt.output.plots.colours import DARK_GREY, GREY
-from chamberopt.output.plots.figure_style import new_figure, save_picture, style_axes
+from chamberopt.output.plots.figure_style import literal, new_figure, save_picture, style_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -95,14 +95,15 @@ def distributions_picture(
 
 def draw_histogram(axes: Axes, data: HistogramData) -> None:
     """Draw the outline of a histogram in per cent, one a result."""
-    for shares, label, style in zip(data.shares, data.labels, data.styles, strict=True):
+    for shares, name, style in zip(data.shares, data.labels, data.styles, strict=True):
+        label = literal(name)
         if shares is None:  # named in the legend all the same
             axes.plot([], [], label=label, lw=1.6, **style)
         else:
             axes.stairs(100.0 * shares, data.edges, label=label, lw=1.6, **style)
     axes.set_xlim(data.edges[0], data.edges[-1])
     axes.set_ylim(bottom=0.0)
-    axes.set_title(data.title, loc="left", fontsize=9)
+    axes.set_title(literal(data.title), loc="left", fontsize=9)
     style_axes(axes, data.x_label, data.y_label)
 
 
@@ -122,7 +123,7 @@ def draw_coverage_over_time(
     last = [line[0][-1] for pair in lines for line in pair if line.size]
     end = max([treatment_time, *last])
     for k, (curve, pair) in enumerate(zip(curves, lines, strict=True)):
-        axes.plot([], [], label=curve.label, **curve.style)
+        axes.plot([], [], label=literal(curve.label), **curve.style)
         if curve.time_to_98 is not None and not curve.time_to_98.in_words:
             _draw_time_to_98(axes, curve, end, 100.0 * FULL_COVERAGE - 0.9 * k)
         for (times, value, half_width), width in zip(pair, (1.8, 0.9), strict=True):

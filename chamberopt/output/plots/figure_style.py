@@ -97,6 +97,12 @@ def value_range(estimates: Sequence[Estimate]) -> tuple[float, float]:
     return low - margin, high + margin
 
 
+def literal(text: str) -> str:
+    """Text with names as they are: for matplotlib $ begins a formula, and _ hides a label."""
+    text = text.replace("$", r"\$")
+    return f" {text}" if text.startswith("_") else text
+
+
 def readable(name: str) -> str:
     """The name of an objective as text of an axis."""
     return name.replace("_", " ")
