@@ -16,11 +16,7 @@ LOOK = (
     ["export", "{}", "--to", "csv"], ["export", "study", "--to", "study"],
     ["inspect", "{}", "--html", "page.html"],
 )  # fmt: skip
-# An interrupted study or sweep is looked at, or resumed.
-RESUME = (
-    ["run", "study.toml", "--out", "study"],
-    ["run", "study.toml", "--out", "study", "--json"],
-)
+RESUME = ["run", "study.toml", "--out", "study"]
 
 
 def _values(table: Any) -> list[tuple[Any, Any]]:
@@ -34,10 +30,9 @@ def _values(table: Any) -> list[tuple[Any, Any]]:
 
 
 def _alter_json(rng: random.Random, path: Path) -> None:
-    """Change some values of a JSON file, and write it as a person would: digests stay as they were."""
-    data = json.loads(
-        path.read_text().splitlines()[0] if path.suffix == ".jsonl" else path.read_text()
-    )
+    """Change some values of a JSON file, or of a log's first line; digests stay as they were."""
+    text = path.read_text()
+    data = json.loads(text.splitlines()[0] if path.suffix == ".jsonl" else text)
     for _ in range(rng.choice((1, 1, 2, 4))):
         table, key = rng.choice(_values(data))
         if rng.random() < 0.3:
@@ -84,7 +79,7 @@ def write_altered_results(rng: random.Random, folder: Path, base: Path) -> list[
             if path.name not in kept or path.parent != folder / "study":
                 path.unlink()
         history.write_bytes(content[: rng.randrange(len(content))])
-        return rng.choice(RESUME)
+        return [*RESUME, *rng.choice(([], ["--json"]))]
     for _ in range(rng.choice((1, 1, 2))):
         path = rng.choice(main if rng.random() < 0.6 else files)
         if path.is_file():
