@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from chamberopt.chamber.analytic import analytic_cavity, impacts_on_chamber
 from chamberopt.chamber.part import turning_axis
 from chamberopt.chamber.scene import build_scene, chamber_mesh, replica_seed
 from chamberopt.common.errors import InputError
+from chamberopt.coverage.part_impacts import HITS_FILE, load_hits
 from chamberopt.output.results.chamber_file import load_chamber
 
 if TYPE_CHECKING:
@@ -35,14 +38,36 @@ class RebuiltChamber:
 class RebuiltReplica:
     """One replica of a result, ready to be simulated again; cavity as in RebuiltChamber."""
 
-    design: Design
+    result: Result
     chamber: Chamber
     cavity: AnalyticCavity | None
     scene: Scene
 
+    @property
+    def design(self) -> Design:
+        return self.result.design
+
     def on_chamber(self, impacts: ImpactLog) -> ImpactLog:
-        """Impacts with the triangles of the chamber, also where an analytical cavity has others."""
-        return impacts_on_chamber(impacts, self.chamber) if self.cavity else impacts
+        """Impacts with the triangles of the chamber, also where an analytical cavity has others.
+
+        InputError unless each on the part, within the recorded time, is one of the result's own:
+        triangle and speed tell, to the last bit.
+        """
+        impacts = impacts_on_chamber(impacts, self.chamber) if self.cavity else impacts
+        source = self.chamber.source[impacts.triangle]
+        mine = (source >= 0) & (impacts.time < self.scene.duration)
+        hits = load_hits(self.result.path(HITS_FILE)).hits
+        own = np.isin(
+            _identity(source[mine], np.asarray(impacts.normal_speed)[mine]),
+            _identity(hits.triangle, hits.speed),
+        )
+        if not own.all():
+            raise InputError(
+                f"{self.result.folder}: this program on this machine does not simulate it again "
+                f"bit for bit: {(~own).sum()} of {len(own)} impacts are not the result's (made by "
+                f"{made_by(self.result)}); {REMEDY}"
+            )
+        return impacts
 
 
 def rebuild_chamber(result: Result) -> RebuiltChamber:
@@ -67,7 +92,13 @@ def rebuild_replica(result: Result, number: int = 0) -> RebuiltReplica:
     mesh = rebuilt.cavity or chamber_mesh(rebuilt.chamber)
     axis = turning_axis(result.design, rebuilt.chamber.part)
     scene = build_scene(result.design, mesh, replica_seed(seed, number, stream), axis)
-    return RebuiltReplica(result.design, rebuilt.chamber, rebuilt.cavity, scene)
+    return RebuiltReplica(result, rebuilt.chamber, rebuilt.cavity, scene)
+
+
+def _identity(triangle: np.ndarray, speed: np.ndarray) -> np.ndarray:
+    """One number for each impact, (n,) int64, from its triangle and the bits of its speed."""
+    bits = speed.astype(np.float32).view(np.int32).astype(np.int64)
+    return np.asarray((triangle.astype(np.int64) << 32) + bits)
 
 
 def made_by(result: Result) -> str:

@@ -191,7 +191,7 @@ USERS = {
     "coverage.vtp": (0, 8, 9, 10, 11),
     "chamber.vtp": (0, 5, 6, 7, 8, 9, 10, 11),
     "chamber.npz": (1, 3, 4, 10, 11),
-    "hits.npz": (1, 9),
+    "hits.npz": (1, 9, 10, 11),
     "design.toml": (0,),
 }
 

@@ -1,5 +1,6 @@
 """A replica simulated again and beyond the end of its result has the result's own dents first."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,10 @@ def test_a_peening_continues_the_replica_of_the_result(tmp_path: Path) -> None:
     shorter = simulate_dents(replica, 0.1)
     assert shorter.time.max() <= 0.1
     np.testing.assert_array_equal(shorter.radius, own.radius[: len(shorter)])
+    slower = replica.scene.balls.velocities * (1.0 - 1e-9)
+    balls = replace(replica.scene.balls, velocities=slower)
+    with pytest.raises(InputError, match=r"does not simulate it again bit for bit: .* impacts are"):
+        simulate_dents(replace(replica, scene=replace(replica.scene, balls=balls)), 0.5)
     for time in (0.0, 601.0, float("nan")):
         with pytest.raises(InputError, match="--at-s"):
             simulate_dents(replica, time)
