@@ -13,6 +13,8 @@ MAX_TEXT_BYTES = MEBIBYTE  # a design, a study, or a shape of one's own
 MAX_MESH_BYTES = 2048 * MEBIBYTE
 MAX_UNPACKED_BYTES = 1024 * MEBIBYTE  # of a compressed mesh
 MAX_READER_BYTES = 16384 * MEBIBYTE  # of memory, for a library that reads STEP or VTK
+# A result's compressed arrays unpack to some three times their size; more fills memory on purpose.
+MAX_SHRINKAGE, ANY_SHRINKAGE_BYTES = 100, 64 * MEBIBYTE
 MAX_ELEMENTS = 20_000_000  # points, elements or triangles of a mesh
 MAX_COPIES = 10_000  # of bodies, where a file puts one in several places
 

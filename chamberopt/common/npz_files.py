@@ -20,15 +20,13 @@ import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import atomic_write
+from chamberopt.common.limits import ANY_SHRINKAGE_BYTES, MAX_SHRINKAGE
 
 # What reading a damaged file can raise.
 UNREADABLE = (
     OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, MemoryError,
     RecursionError, NotImplementedError, zipfile.BadZipFile, zlib.error,
 )  # fmt: skip
-# The program's own files shrink some three times; one that shrinks more was made to fill memory.
-MAX_SHRINKAGE, ALWAYS_READ = 100, 64e6  # times, bytes
-
 Record = TypeVar("Record")
 
 
@@ -37,7 +35,7 @@ def read_arrays(path: Path, remedy: str) -> dict[str, np.ndarray]:
     try:
         with zipfile.ZipFile(path) as file:
             unpacked = sum(one.file_size for one in file.infolist())
-        if unpacked > max(ALWAYS_READ, MAX_SHRINKAGE * path.stat().st_size):
+        if unpacked > max(ANY_SHRINKAGE_BYTES, MAX_SHRINKAGE * path.stat().st_size):
             raise ValueError(f"unpacks to {1e-6 * unpacked:,.0f} MB, which no result does")
         with np.load(path, allow_pickle=False) as arrays:
             return {name: arrays[name] for name in arrays.files}
