@@ -10,6 +10,7 @@ from chamberopt.common.number_text import plain
 
 MEBIBYTE = 1 << 20
 MAX_TEXT_BYTES = MEBIBYTE  # a design, a study, or a shape of one's own
+MAX_RESULT_BYTES = 256 * MEBIBYTE  # a result.json
 MAX_MESH_BYTES = 2048 * MEBIBYTE
 MAX_UNPACKED_BYTES = 1024 * MEBIBYTE  # of a compressed mesh
 MAX_READER_BYTES = 16384 * MEBIBYTE  # of memory, for a library that reads STEP or VTK

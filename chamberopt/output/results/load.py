@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import shlex
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -15,6 +16,7 @@ import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
+from chamberopt.common.limits import MAX_RESULT_BYTES, read_limited
 from chamberopt.common.number_text import estimate_text
 from chamberopt.coverage.metrics import METRICS
 from chamberopt.design.design import validate
@@ -198,7 +200,7 @@ def _damage_explained(file: Path) -> Iterator[None]:
         raise InputError(
             f"{file}: cannot be read: {error.strerror}; check its permissions"
         ) from None
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(
             f"{file}: damaged ({type(error).__name__}: {error}); simulate again"
         ) from None
@@ -210,8 +212,9 @@ def _read_digests(data: dict[str, Any]) -> dict[str, str]:
 
 def _read_data(file: Path) -> dict[str, Any]:
     """The content of a result.json that this version of the program reads whole; or InputError."""
+    content = read_limited(file, MAX_RESULT_BYTES, "file of a result")
     data: dict[str, Any] = json.loads(
-        file.read_text(encoding="utf-8"), parse_constant=_refuse_constant
+        content, parse_constant=_refuse_constant, parse_float=_finite_number
     )
     found = data["format"]
     if found == FORMAT:
@@ -231,6 +234,13 @@ def _read_estimate(data: dict[str, Any]) -> Estimate:
     if data["value"] is None or (data["half_width"] is None and not found.in_words):
         raise ValueError("an estimate without a value or half_width")
     return found
+
+
+def _finite_number(text: str) -> float:
+    """The number; ValueError for one too large, such as 1e999, which Python reads as infinite."""
+    if not math.isfinite(number := float(text)):
+        _refuse_constant(text)
+    return number
 
 
 def _refuse_constant(name: str) -> float:
