@@ -76,7 +76,7 @@ def write_altered_results(rng: random.Random, folder: Path, base: Path) -> list[
         content = history.read_bytes()
         kept = {"history.jsonl", "inputs.json", "timings.jsonl", "design.toml", "study.toml"}
         for path in files:
-            if path.name not in kept or path.parent != folder / "study":
+            if path.name not in kept and path.suffix != ".npz":
                 path.unlink()
         history.write_bytes(content[: rng.randrange(len(content))])
         return [*RESUME, *rng.choice(([], ["--json"]))]

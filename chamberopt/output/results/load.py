@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
@@ -39,6 +40,25 @@ if TYPE_CHECKING:
 
 FORMAT = 3
 RESTORE = "restore the folder from where it came, or simulate again"
+
+
+class _Recorded(BaseModel):
+    """Types of what commands read from a result.json without looking at it again."""
+
+    model_config = ConfigDict(strict=True, allow_inf_nan=False)
+
+    replicas: int = 0
+    stopped_by: str = ""
+    analytic: bool | None = None
+    simulated_time_s: float = 0.0
+    collisions: dict[str, float] = {}
+    timings_s: dict[str, float] = {}
+    field: dict[str, Any] = {}
+    chamber: dict[str, Any] = {}
+    study: dict[str, Any] | None = None
+    notes: list[str] = []
+    warnings: list[str] = []
+    versions: dict[str, str] = {}
 
 
 @dataclass(frozen=True)
@@ -218,6 +238,11 @@ def _read_data(file: Path) -> dict[str, Any]:
     )
     found = data["format"]
     if found == FORMAT:
+        try:
+            _Recorded.model_validate(data)
+        except ValidationError as error:
+            where, why = error.errors()[0]["loc"], error.errors()[0]["msg"]
+            raise ValueError(f"{'.'.join(map(str, where))}: {why}") from None
         return data
     made_by = data.get("versions", {}).get("chamberopt", "an unknown version")
     newer = isinstance(found, int) and found > FORMAT
