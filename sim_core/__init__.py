@@ -19,6 +19,7 @@ from sim_core.errors import SceneError, SimulationError
 from sim_core.geometry.analytic import AnalyticCavity, cylinder_cavity, prism_cavity
 from sim_core.geometry.closest_point import ClosestPoints, closest_points
 from sim_core.geometry.mesh import TriangleMesh
+from sim_core.geometry.sonotrode_border import largest_amplitude
 from sim_core.geometry.triangle_lookup import find_triangles
 from sim_core.loop.compile_ahead import compile_simulator, is_compiled
 from sim_core.loop.impact_log import ImpactLog
@@ -59,6 +60,7 @@ __all__ = [
     "find_triangles",
     "is_compiled",
     "jit",
+    "largest_amplitude",
     "pack_balls",
     "prism_cavity",
     "require_free_rotation",

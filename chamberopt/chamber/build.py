@@ -10,6 +10,7 @@ Frame: metres, z up, mean sonotrode face at z = 0, chamber axis at x = y = 0.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -125,6 +126,7 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
     traced = cavity.trace(room)
     on_part = traced.tags == TAG_PART
     _refuse_free_edges(design, room, traced.tags)
+    _refuse_wide_swings(design, room, traced.tags)
     area = areas(room.vertices, room.triangles)
     exposed = np.bincount(traced.source[on_part], area[on_part], len(part.triangles))
     if design.part.target.reachable and target is None:
@@ -189,6 +191,24 @@ def _refuse_free_edges(design: Design, room: SolidSurface, tags: np.ndarray) -> 
             "it all round, as a moving edge is not supported; let it fill the floor of the room, "
             "or of a well, from wall to wall"
         )
+
+
+def _refuse_wide_swings(design: Design, room: SolidSurface, tags: np.ndarray) -> None:
+    """Raise InputError for a sonotrode that would come out of a wall beside it."""
+    from sim_core import TriangleMesh, largest_amplitude
+
+    mesh, ball = TriangleMesh(room.vertices, room.triangles, tags), min(design.shot.diameters)
+    for k, one in enumerate((design.sonotrode, *design.sonotrodes)):
+        tag = further_sonotrode_tag(k - 1) if k else TAG_SONOTRODE
+        limit, place, leaning = largest_amplitude(mesh, tag, 0.5 * ball)
+        if one.amplitude > limit:
+            most = math.floor(1e7 * limit) / 10.0
+            raise InputError(
+                f"{f'sonotrodes.{k - 1}' if k else 'sonotrode'}.amplitude_um: given "
+                f"{one.amplitude_um:g}, but at {format_point(place)} the wall {leaning}, where "
+                f"balls of {1e3 * ball:g} mm allow at most {most:g}: a moving edge is not "
+                "supported; lower it, use larger balls, or let the wall rise more steeply"
+            )
 
 
 def _room_over_sonotrode(whole: SolidSurface, tags: np.ndarray) -> tuple[SolidSurface, list[str]]:

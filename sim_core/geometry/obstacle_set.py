@@ -27,6 +27,8 @@ class ObstacleSet(NamedTuple):
     part: PartTree | None  # the part, if it turns; its obstacles are not in ``tree``
     roots: np.ndarray  # nodes of the tree where the obstacles of each radius begin, shape (radii,)
     cylinder: CylinderAxis | None  # axis of an analytical cylinder
+    # lowest and highest corner of all that holds the balls, as far as it moves [m], shape (2, 3)
+    bounds: np.ndarray
 
 
 def build_obstacle_set(
@@ -46,6 +48,7 @@ def build_obstacle_set(
         axis: of the part that turns.
     """
     overlap = face_overlap_of(radii[-1])
+    bounds = _swept_bounds(mesh, max(amplitudes, default=0.0), axis)
     if isinstance(mesh, AnalyticCavity):
         tag, amplitude = next(zip(vibrating_tags, amplitudes, strict=True), (-1, 0.0))
         tables = [build_analytic_table(mesh, r, tag, amplitude) for r in radii]
@@ -54,16 +57,29 @@ def build_obstacle_set(
         none = np.zeros(0, dtype=np.int32)
         lone = FlatFaces(np.full(count, LONE, dtype=np.int32), none, np.zeros((0, 3, 3)), [])
         lookup = build_lookup(np.zeros((count, 3, 3)), lone, overlap)
-        return ObstacleSet(tree, lookup, mesh.tags, overlap, None, roots, mesh.axis)
+        return ObstacleSet(tree, lookup, mesh.tags, overlap, None, roots, mesh.axis, bounds)
     surface = surface_triangles(mesh, vibrating_tags, amplitudes)
     lookup = build_lookup(surface.corners, surface.flat_faces, overlap)
     tables = [build_obstacle_table(surface, r) for r in radii]
     if axis is None:
         tree, roots = join_trees([build_tree(*pair) for pair in zip(tables, radii, strict=True)])
-        return ObstacleSet(tree, lookup, mesh.tags, overlap, None, roots, None)
+        return ObstacleSet(tree, lookup, mesh.tags, overlap, None, roots, None, bounds)
     (table,), (radius,) = tables, radii  # a part that turns is not supported with several sizes
     turns = part_rows(table, mesh, axis, radius)
     part = build_part_tree(select_rows(table, turns), mesh, axis, radius)
     tree = build_tree(select_rows(table, ~turns), radius)
     root = np.zeros(1, dtype=np.int64)
-    return ObstacleSet(tree, lookup, mesh.tags, overlap, part, root, None)
+    return ObstacleSet(tree, lookup, mesh.tags, overlap, part, root, None, bounds)
+
+
+def _swept_bounds(
+    mesh: TriangleMesh | AnalyticCavity, amplitude: float, axis: RotationAxis | None
+) -> np.ndarray:
+    """The mesh's bounding box (2, 3) [m] about its middle, with all that its surfaces sweep."""
+    low, high = mesh.bounds - mesh.middle
+    if axis is not None and isinstance(mesh, TriangleMesh):
+        point = np.array(axis.point) - mesh.middle
+        own = mesh.corners[mesh.tags == axis.tag] - mesh.middle
+        reach = np.linalg.norm(own - point, axis=2).max(initial=0.0)
+        low, high = np.minimum(low, point - reach), np.maximum(high, point + reach)
+    return np.stack([low - amplitude, high + amplitude])

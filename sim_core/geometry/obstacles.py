@@ -18,12 +18,7 @@ import numpy as np
 from sim_core.errors import SceneError
 from sim_core.geometry.flat_faces import LONE, SurfaceTriangles, cover_with_quadrangles
 from sim_core.geometry.mesh import edge_partners
-from sim_core.geometry.sonotrode_border import (
-    SonotrodeBorder,
-    extend_faces,
-    find_border,
-    require_room_at_joints,
-)
+from sim_core.geometry.sonotrode_border import SonotrodeBorder, find_border, require_room_at_joints
 
 NUMBERS = 20  # of each obstacle, see ObstacleTable
 TRIANGLE = [0, 1, 2, 2]  # the four corners of a face that has only three
@@ -73,8 +68,9 @@ def build_obstacle_table(surface: SurfaceTriangles, radius: float) -> ObstacleTa
     triangles, and impacts on them are recorded on its seed; triangle_lookup.py finds the triangle.
     """
     require_room_at_joints(surface, radius)
-    faces = _faces(surface, radius, find_border(surface, radius))
-    capsules = _capsules(surface, radius)
+    border = find_border(surface, radius)
+    faces = _faces(surface, radius, border)
+    capsules = _capsules(surface, radius, border)
     return ObstacleTable(*(np.concatenate(pair) for pair in zip(faces, capsules, strict=True)))
 
 
@@ -92,6 +88,8 @@ def _faces(surface: SurfaceTriangles, radius: float, border: SonotrodeBorder) ->
         few = _few_faces(corners, outline, flat_faces.frames[k], area)
         pieces.append(corners[own][:, TRIANGLE] if few is None or len(few) > len(own) else few)
         each.append(np.full(len(pieces[-1]), flat_faces.seed[k]))
+    pieces.append(border.walls)
+    each.append(border.above)
     triangle, corner = np.concatenate(each), np.concatenate(pieces)
     normal, vibrating = surface.normals[triangle], surface.vibrating[triangle]
     numbers = np.zeros((len(triangle), NUMBERS))
@@ -105,10 +103,10 @@ def _faces(surface: SurfaceTriangles, radius: float, border: SonotrodeBorder) ->
         inward[length > 0.0] /= length[length > 0.0, None]
         numbers[:, 4 + 4 * k : 7 + 4 * k] = inward
         numbers[:, 7 + 4 * k] = np.einsum("ij,ij->i", inward, start)
-    beyond = extend_faces(numbers, triangle, vibrating, flat_faces, border)
+    numbers[vibrating, 7:20:4] -= border.overhang
     moved = corner + radius * normal[:, None]
-    amplitude = np.where(vibrating, surface.amplitude[triangle], 0.0)
-    grow = face_overlap_of(radius) + (amplitude + 2.0 * beyond)[:, None]
+    amplitude = np.where(vibrating, surface.amplitude[triangle] + border.overhang, 0.0)
+    grow = face_overlap_of(radius) + amplitude[:, None]
     return ObstacleTable(
         numbers,
         np.where(vibrating, VIBRATING_FACE, FACE).astype(np.uint8),
@@ -144,8 +142,11 @@ def _share_plane(numbers: np.ndarray, vibrating: np.ndarray) -> None:
         rows = rows[~same]
 
 
-def _capsules(surface: SurfaceTriangles, radius: float) -> ObstacleTable:
-    """One capsule for each convex edge, or straight run of edges between two flat faces."""
+def _capsules(surface: SurfaceTriangles, radius: float, border: SonotrodeBorder) -> ObstacleTable:
+    """One capsule for each convex edge, or straight run of edges between two flat faces.
+
+    And one for each edge that goes on beneath a vibrating face.
+    """
     mesh, corners, normals = surface.mesh, surface.corners, surface.normals
     of_triangle, vibrating = surface.flat_faces.of_triangle, surface.vibrating
     solid = surface.doubled > 0.0  # a triangle without area has no face; its neighbours' edges have
@@ -182,19 +183,21 @@ def _capsules(surface: SurfaceTriangles, radius: float) -> ObstacleTable:
     keep = np.flatnonzero(convex & (length > 0.0))
     first, finish = _straight_runs(mesh.triangles, corners, of_triangle, one[keep], two[keep])
     keep = keep[first]
-    edge = finish - start[keep]
+    one_side, other_side = border.sides.T
+    sides = [np.where(solid[t_one], t_one, t_two), np.where(solid[t_two], t_two, t_one)]
+    ends = np.concatenate([np.stack([start[keep], finish], axis=1), border.edges])
+    lean = [normals[t_one[keep]] - normals[t_two[keep]], normals[one_side] - normals[other_side]]
+    edge = ends[:, 1] - ends[:, 0]
     length = np.linalg.norm(edge, axis=1)
-    numbers = np.zeros((len(keep), NUMBERS))
-    numbers[:, 0:3] = start[keep]
+    numbers = np.zeros((len(ends), NUMBERS))
+    numbers[:, 0:3] = ends[:, 0]
     numbers[:, 3:6] = edge / length[:, None]
     numbers[:, 6] = length
-    numbers[:, 7:10] = normals[t_one[keep]] - normals[t_two[keep]]
-    ends = np.stack([start[keep], finish], axis=1)
-    sides = [np.where(solid[t_one], t_one, t_two), np.where(solid[t_two], t_two, t_one)]
+    numbers[:, 7:10] = np.concatenate(lean)
     return ObstacleTable(
         numbers,
-        np.full(len(keep), CAPSULE, dtype=np.uint8),
-        np.stack(sides, axis=1)[keep].astype(np.int32),
+        np.full(len(ends), CAPSULE, dtype=np.uint8),
+        np.concatenate([np.stack(sides, axis=1)[keep], border.sides]).astype(np.int32),
         ends.min(axis=1) - radius,
         ends.max(axis=1) + radius,
     )

@@ -1,12 +1,18 @@
-"""Gently rising surfaces beside a vibrating one: both are extended past their common edge.
+"""What stands beside a vibrating face: walls, and edges where two of them meet, go on beneath it.
 
-A ball against a steep wall never comes near the edge, however the vibrating face moves. On a gentle
-slope it does: it could come onto a raised face from the side, already below it, or past the end of
-the slope onto a lowered one. Extended, the two faces still meet.
+A ball's centre is a radius R from the face. On a face lowered by A it touches a wall that rises at
+a right angle at R - A above the wall's lower end: beneath it where A > R, and on gentle slopes
+sooner. So walls, and the edges of what sticks out of them, are extended down as far as the face
+goes; and the face is extended under gentle slopes, onto which a ball could otherwise come below the
+raised face. Where the faces would part all the same, the amplitude is too large.
 
              ball's centre meets     ....... raised face, extended under the slope
              one or the other  ....--''
         --------------------''~~~ slope, extended under the lowered face
+
+Notation: n normal of the vibrating face, m of a wall beside it, both towards the shot.
+run = n m, cosine of the angle by which the wall rises: 0 upright, negative where it leans over.
+rise = |n x m|, its sine.
 """
 
 from typing import NamedTuple
@@ -14,53 +20,169 @@ from typing import NamedTuple
 import numpy as np
 
 from sim_core.errors import SceneError
-from sim_core.geometry.flat_faces import LONE, FlatFaces, SurfaceTriangles
-from sim_core.geometry.mesh import edge_partners
+from sim_core.geometry.flat_faces import SurfaceTriangles, surface_triangles
+from sim_core.geometry.mesh import TriangleMesh, edge_partners
 
-SAME_LINE = 1e-9  # [-] and m: a face's border that runs along the edge, up to rounding
+LEVEL = 1e-9  # cosine or sine that is rounding
+
+
+class _Beside(NamedTuple):
+    """The k edges between vibrating faces and still ones."""
+
+    edge: np.ndarray  # directed edge 3 t + k of the still triangle, shape (k,)
+    face: np.ndarray  # vibrating triangle, shape (k,)
+    run: np.ndarray  # shape (k,)
+    rise: np.ndarray  # shape (k,)
 
 
 class SonotrodeBorder(NamedTuple):
-    """The k gentle edges between vibrating faces and still ones."""
+    """What stands beside vibrating faces where balls get beneath its end."""
 
     overhang: float  # how far the vibrating faces are extended [m]
-    slopes: np.ndarray  # the still triangle beside each edge, shape (k,)
-    lines: np.ndarray  # inward border normal and offset [m] of that triangle, shape (k, 4)
-    beyond: np.ndarray  # how far that triangle is extended [m], shape (k,)
+    # the walls beneath their ends: four corners of each [m], wound like the mesh, shape (k, 4, 3),
+    # and the triangle above, shape (k,)
+    walls: np.ndarray
+    above: np.ndarray
+    # the edges beneath their ends: both ends of each [m], shape (j, 2, 3), and the triangles on
+    # both sides, shape (j, 2)
+    edges: np.ndarray
+    sides: np.ndarray
 
 
 def find_border(surface: SurfaceTriangles, radius: float) -> SonotrodeBorder:
-    """The gentle edges for balls of one radius [m].
+    """What balls of one radius [m] meet beneath the ends of walls.
 
     Raises:
-        SceneError: where a surface rises so gently that the raised face would come out far from its
-            edge.
+        SceneError: where the amplitude is so large that a face would part from a wall.
     """
-    corners, normals, vibrating = surface.corners, surface.normals, surface.vibrating
-    two = edge_partners(surface.mesh.triangles)
-    still = two[np.repeat(vibrating, 3) & ~vibrating[two // 3]]
-    face, slope = two[still] // 3, still // 3
-    rise = np.linalg.norm(np.cross(normals[face], normals[slope]), axis=1)
-    run = np.einsum("ij,ij->i", normals[face], normals[slope])
-    gentle = (run > 0.0) & (radius * (1.0 - run) < surface.amplitude[face])
-    still, face, slope, rise, run = (x[gentle] for x in (still, face, slope, rise, run))
-    amplitude = surface.amplitude[face]
-    flat = np.flatnonzero(amplitude * run > radius * rise)
-    if len(flat):
-        k = flat[0]
-        angle, enough = np.degrees(np.arctan2([rise[k], amplitude[k]], [run[k], radius]))
+    beside = _beside(surface)
+    reached = radius * (1.0 - beside.run) < surface.amplitude[beside.face]
+    beside = _Beside(*(x[reached] for x in beside))
+    face, run, rise = beside.face, beside.run, beside.rise
+    amplitude, limit = surface.amplitude[face], _largest_amplitude(run, rise, radius)
+    over = np.flatnonzero(amplitude > limit)
+    if len(over):
+        k = over[0]
+        angle = np.degrees(np.arctan2(rise[k], run[k]))
         raise SceneError(
-            f"beside the vibrating triangle {face[k]} the surface of triangle {slope[k]} lies flat "
-            f"or rises by only {angle:.3g} degrees: a moving edge is not supported yet; let the "
-            "sonotrode fill the chamber's floor from wall to wall, flat, and walls rise from it "
-            f"by {np.ceil(enough):.0f} degrees or more"
+            f"beside the vibrating triangle {face[k]} the surface of triangle "
+            f"{beside.edge[k] // 3} {_leaning(angle)}, and a face that swings by "
+            f"{amplitude[k]:.3g} m would come out of it: a moving edge is not supported yet; let "
+            "steep walls rise from the sonotrode all round, or lower the amplitude to "
+            f"{limit[k]:.3g} m"
         )
-    start = corners[slope, still % 3]
-    inward = np.cross(corners[slope, (still % 3 + 1) % 3] - start, normals[slope])
-    inward /= np.linalg.norm(inward, axis=1)[:, None]
-    lines = np.column_stack([inward, np.einsum("ij,ij->i", inward, start)])
-    overhang = float((amplitude * run / rise).max(initial=0.0))
-    return SonotrodeBorder(overhang, slope, lines, amplitude / rise)
+    return SonotrodeBorder(
+        float((amplitude * run / rise).max(initial=0.0)), *_beneath(surface, beside, radius)
+    )
+
+
+def largest_amplitude(mesh: TriangleMesh, tag: int, radius: float) -> tuple[float, np.ndarray, str]:
+    """How far the surface of a tag may vibrate beside its walls, for balls of one radius [m].
+
+    Returns:
+        Zero-to-peak amplitude [m], inf where every wall is upright; the place [m], shape (3,),
+        that limits it; and how the wall rises there, in words.
+    """
+    beside = _beside(surface_triangles(mesh, (tag,), (0.0,)))
+    limit = _largest_amplitude(beside.run, beside.rise, radius)
+    if not np.isfinite(limit).any():
+        return float("inf"), mesh.middle, ""
+    k = int(limit.argmin())
+    angle = float(np.degrees(np.arctan2(beside.rise[k], beside.run[k])))
+    edge = beside.edge[k]
+    ends = mesh.corners[edge // 3, [edge % 3, (edge % 3 + 1) % 3]]
+    return float(limit[k]), ends.mean(axis=0), _leaning(angle)
+
+
+def _beside(surface: SurfaceTriangles) -> _Beside:
+    two, vibrating = edge_partners(surface.mesh.triangles), surface.vibrating
+    edge = two[np.repeat(vibrating, 3) & ~vibrating[two // 3]]
+    face = two[edge] // 3
+    one, other = surface.normals[face], surface.normals[edge // 3]
+    run = np.einsum("ij,ij->i", one, other)
+    return _Beside(edge, face, run, np.linalg.norm(np.cross(one, other), axis=1))
+
+
+def _largest_amplitude(run: np.ndarray, rise: np.ndarray, radius: float) -> np.ndarray:
+    """Amplitude [m], shape (k,), beyond which a face and the wall beside it part.
+
+    The raised face comes out of a slope that rises outwards; under a wall that leans over it, a
+    ball on the lowered face gets past the face's border.
+    """
+    limit = np.full(len(run), np.inf)
+    out, over = run > LEVEL, run < -LEVEL
+    limit[out] = radius * rise[out] / run[out]
+    limit[over] = radius * (1.0 - 1.0 / run[over])
+    limit[(run == 0.0) & (rise == 0.0)] = radius  # beside a triangle without area
+    return limit
+
+
+def _leaning(angle: float) -> str:
+    """How a wall rises, by its angle [degrees] to the face's plane, for messages."""
+    if angle < 90.0:
+        return f"lies flat or rises by only {angle:.3g} degrees"
+    return f"leans over it by {angle - 90.0:.3g} degrees"
+
+
+def _beneath(
+    surface: SurfaceTriangles, beside: _Beside, radius: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """The walls and edges beneath the ends of those beside vibrating faces, as SonotrodeBorder.
+
+    A wall goes on in its plane to the line that its plane has in common with the next one's. There,
+    convex towards the shot, is an edge; a concave corner is behind both walls, which may go on past
+    it, as where a cone ends in a point.
+    """
+    corners, normals, two = surface.corners, surface.normals, edge_partners(surface.mesh.triangles)
+    walls: list[list[np.ndarray]] = []
+    edges: dict[tuple[int, ...], tuple[np.ndarray, tuple[int, int]]] = {}
+    for e, moving in zip(beside.edge.tolist(), beside.face.tolist(), strict=True):
+        here, ends = e // 3, corners[e // 3, [e % 3, (e % 3 + 1) % 3]]
+        along, down = ends[1] - ends[0], -normals[moving] * surface.amplitude[moving]
+        straight = np.cross(
+            normals[here], along
+        )  # away from the triangle, which is wound clockwise
+        straight *= down @ down / (straight @ down)
+        drops = []
+        for last in (0, 1):
+            there, other = _next_wall(two, surface.vibrating, e, last)
+            line = np.cross(normals[here], normals[there])
+            turn, facing = np.linalg.norm(line), normals[here] @ normals[there]
+            is_plane = turn * radius < LEVEL and facing >= 0.0
+            back = corners[there, (other + last) % 3] - ends[last]
+            convex = not is_plane and (normals[here] @ back < 0.0 or turn < LEVEL)
+            fall = line @ down
+            drop = down if turn < LEVEL else line * (down @ down / fall) if fall else straight
+            if convex:
+                key = (surface.mesh.triangles[here, (e + last) % 3], *sorted((here, there)))
+                edges.setdefault(key, (np.stack([ends[last], ends[last] + drop]), (here, there)))
+            elif is_plane or ((drop - straight) @ along > 0.0) != last:
+                drop = straight
+            drops.append(drop)
+        walls.append([ends[1], ends[0], ends[0] + drops[0], ends[1] + drops[1]])
+    both = list(edges.values())
+    return (
+        np.array(walls).reshape(-1, 4, 3),
+        beside.edge // 3,
+        np.array([place for place, _ in both]).reshape(-1, 2, 3),
+        np.array([pair for _, pair in both], dtype=np.int64).reshape(-1, 2),
+    )
+
+
+def _next_wall(
+    partners: np.ndarray, vibrating: np.ndarray, edge: int, last: int
+) -> tuple[int, int]:
+    """The wall beside the next edge of the border, round the first or ``last`` end of an edge.
+
+    Returns:
+        Its triangle, and which of its sides lies on the border.
+    """
+    step = 1 if last else 2
+    while True:
+        edge = edge - edge % 3 + (edge + step) % 3
+        if vibrating[partners[edge] // 3]:
+            return edge // 3, edge % 3
+        edge = int(partners[edge])
 
 
 def require_room_at_joints(surface: SurfaceTriangles, radius: float) -> None:
@@ -84,34 +206,3 @@ def require_room_at_joints(surface: SurfaceTriangles, radius: float) -> None:
             "edge so blunt that a ball could touch the edge of one beside the other: a moving edge "
             "is not supported yet; let a steep wall part them"
         )
-
-
-def extend_faces(
-    numbers: np.ndarray,
-    triangle: np.ndarray,
-    vibrating: np.ndarray,
-    flat_faces: FlatFaces,
-    border: SonotrodeBorder,
-) -> np.ndarray:
-    """Move the borders of faces out over gentle edges.
-
-    Args:
-        numbers: faces as obstacles hold them, shape (k, 20), changed in place.
-        triangle: the triangle on which impacts on each face are recorded, shape (k,).
-        vibrating: whether each face vibrates, shape (k,) bool.
-        flat_faces: the flat faces of the mesh.
-        border: the gentle edges.
-
-    Returns:
-        How far each face is extended at most [m], shape (k,).
-    """
-    farther = np.where(vibrating, border.overhang, 0.0)[:, None].repeat(4, axis=1)
-    of_triangle = flat_faces.of_triangle
-    for slope, line, beyond in zip(border.slopes, border.lines, border.beyond, strict=True):
-        flat = of_triangle[slope]
-        rows = np.flatnonzero(of_triangle[triangle] == flat if flat != LONE else triangle == slope)
-        for k in range(4):
-            same = (np.abs(numbers[rows, 4 + 4 * k : 8 + 4 * k] - line) <= SAME_LINE).all(axis=1)
-            farther[rows[same], k] = np.maximum(farther[rows[same], k], beyond)
-    numbers[:, 7:20:4] -= farther
-    return np.asarray(farther.max(axis=1))

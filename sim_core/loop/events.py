@@ -47,6 +47,7 @@ DONE = 0  # the clock has come to clock.stop
 BUFFER_FULL = 1  # the impact buffer must be emptied
 TOO_MANY_EVENTS = 2  # of one ball in one window: it is jammed
 TOO_FAST = 3  # a ball is faster than the neighbour filter allows for
+HAS_LEFT = 4  # a ball is outside the chamber's bounding box
 
 # s. Longest arc searched at once. Its chord is off by g PIECE²/8 = 0.12 mm, so boxes stay tight.
 PIECE = 0.01
@@ -71,7 +72,7 @@ NEVER_BEFORE = 1e300  # finite, so that differences with it stay numbers
 def advance(state: SimulationState) -> tuple[int, int]:
     """Simulate until ``clock.stop``, or until something stops the loop.
 
-    Returns: the status DONE, BUFFER_FULL, TOO_MANY_EVENTS or TOO_FAST, and the ball concerned.
+    Returns: why it has stopped, see the status above, and the ball concerned.
     """
     queue, clock, buffer = state.queue, state.clock, state.buffer
     add_time(state.profiler, -1)
@@ -110,6 +111,8 @@ def advance(state: SimulationState) -> tuple[int, int]:
             else:
                 impact = hit_part(state.rotation, state.obstacles.part, state, event)
         elif kind == PIECE_ENDS:
+            if _has_left(state, ball, time):
+                return HAS_LEFT, ball
             drag = state.drag
             path_changes = apply_drag_piece(
                 drag, state.contact, state.motion, ball, time, state.gravity
@@ -198,6 +201,21 @@ def _note_path(state: SimulationState, ball: int, time: float) -> None:
 def _speed_squared(state: SimulationState, ball: int) -> float:
     motion = state.motion
     return motion[ball, 3] ** 2 + motion[ball, 4] ** 2 + motion[ball, 5] ** 2
+
+
+@inlined
+def _has_left(state: SimulationState, ball: int, time: float) -> bool:
+    """True for a ball outside the chamber's bounding box.
+
+    A ball that has left meets no more surfaces: it is enough to ask when it met none on a whole
+    piece of its path.
+    """
+    acceleration = ball_acceleration(state.contact, ball, state.gravity)
+    here = state_under(state.motion, ball, time, acceleration).position
+    low, high = state.obstacles.bounds
+    return not (
+        low[0] <= here.x <= high[0] and low[1] <= here.y <= high[1] and low[2] <= here.z <= high[2]
+    )
 
 
 @inlined

@@ -27,13 +27,13 @@ from sim_core.geometry.obstacle_set import build_obstacle_set
 from sim_core.impulses.drag import apply_drag_to_all
 from sim_core.loop.contact_neighbours import hide_all
 from sim_core.loop.event_queue import new_event_queue
-from sim_core.loop.events import BUFFER_FULL, DONE, TOO_FAST, TOO_MANY_EVENTS, advance
+from sim_core.loop.events import BUFFER_FULL, DONE, HAS_LEFT, TOO_FAST, TOO_MANY_EVENTS, advance
 from sim_core.loop.impact_log import ImpactLog, empty_buffer, joined, new_impact_buffer
 from sim_core.loop.jam_message import jam_message
 from sim_core.loop.neighbours import NeighbourFilter, new_neighbour_filter
 from sim_core.loop.state import Clock, SimulationState
 from sim_core.motion import WINDOW
-from sim_core.scene.invariants import contained, narrowest_gap, turned_corners
+from sim_core.scene.invariants import beneath_mean_plane, contained, narrowest_gap, turned_corners
 from sim_core.scene.scene import TOUCH, Scene
 
 # s simulated between checks that every ball is still inside; one check costs about a ms
@@ -252,9 +252,18 @@ class Simulation:
                 raise SimulationError(
                     jam_message(self.scene, self._corners(), positions, ball, self._when())
                 )
+            elif status == HAS_LEFT:
+                raise self._left(ball)
 
     def _when(self) -> str:
         return f"{self.time:.6f} s after the start"
+
+    def _left(self, ball: int) -> SimulationError:
+        where = np.round(self._positions_and_velocities()[0][ball], 6).tolist()
+        return SimulationError(
+            f"ball {ball} has left the mesh: it is at {where} m, {self._when()}. Look for surfaces "
+            "that overlap or cross near there; if there are none, please report the scene"
+        )
 
     def _positions_and_velocities(self) -> tuple[np.ndarray, np.ndarray]:
         """Positions [m] and velocities [m/s] now, (n, 3) each: point_at for all balls at once."""
@@ -277,11 +286,7 @@ class Simulation:
             )
         outside = np.flatnonzero(~self._inside(points))
         if len(outside):
-            raise SimulationError(
-                f"ball {outside[0]} has left the mesh at "
-                f"{np.round(points[outside[0]], 6).tolist()} m, {self._when()}. Look for surfaces "
-                "that overlap or cross there; if there are none, please report the scene"
-            )
+            raise self._left(int(outside[0]))
         if self.state.neighbours is None:
             return
         gap, one, two = narrowest_gap(self.balls())
@@ -292,19 +297,13 @@ class Simulation:
             )
 
     def _inside(self, points: np.ndarray) -> np.ndarray:
-        """Which points (n, 3) [m] are in the chamber.
-
-        A face that swings wider than a ball is counts where it is at either end of its stroke too.
-        """
-        mesh, corners = self.scene.mesh, self._corners()
-        vibrations = self.scene.physics.vibrations
+        """Which centres of balls (n, 3) [m] are in the chamber."""
+        mesh, corners, vibrations = self.scene.mesh, self._corners(), self.scene.physics.vibrations
         if isinstance(mesh, AnalyticCavity):
             return mesh.contains(points, max((one.amplitude for one in vibrations), default=0.0))
-        inside = contained(mesh, points, corners)
-        for one in vibrations:
-            if one.amplitude >= 0.5 * self.scene.balls.sizes[0] and not inside.all():
-                inside |= contained(mesh, points + one.peak, corners)
-                inside |= contained(mesh, points - one.peak, corners)
+        inside, radii = contained(mesh, points, corners), 0.5 * self.scene.balls.diameters
+        out = np.flatnonzero(~inside)
+        inside[out] = beneath_mean_plane(mesh, vibrations, points[out], radii[out], corners)
         return inside
 
     def _corners(self) -> np.ndarray | None:

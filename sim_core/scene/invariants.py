@@ -19,6 +19,7 @@ from sim_core.effects.part_rotation import (
     new_rotation_state,
     rotate_points,
 )
+from sim_core.effects.vibration import Vibration
 from sim_core.geometry.mesh import TriangleMesh
 from sim_core.numerics.jit import jit
 from sim_core.numerics.vec3 import Vec3, cross, dot, sub
@@ -26,6 +27,8 @@ from sim_core.numerics.vec3 import Vec3, cross, dot, sub
 # Directions that no designer's edge is parallel to, so that a ray through an edge or corner is
 # rare; where it happens, the next direction is tried.
 RAYS = np.array([[0.3671, 0.2113, 0.9058], [-0.5317, 0.7411, 0.4098], [0.6119, -0.4733, -0.6337]])
+LIFT = 1e-3  # of a radius: how far above a plane a point beneath it is lifted
+BENEATH = 1e-9  # m: beneath the lowest place of a face that is taken for rounding
 BORDER = 1e-12  # of the mesh's size squared: a ray that passes an edge by less is undecided
 
 
@@ -114,6 +117,44 @@ def contained(
             break
     if corners is not None:
         inside[~inside] = enclosed(corners, points[~inside])
+    return inside
+
+
+def beneath_mean_plane(
+    mesh: TriangleMesh,
+    vibrations: tuple[Vibration, ...],
+    points: np.ndarray,
+    radii: np.ndarray,
+    corners: np.ndarray | None = None,
+) -> np.ndarray:
+    """Which centres of balls are where a vibrating face lets them get by swinging wider than they.
+
+    That is beneath its mean plane by less than the amplitude exceeds the radius, and inside the
+    mesh once lifted above it.
+
+    Args:
+        mesh: the surface.
+        vibrations: of its faces.
+        points: centres [m], shape (n, 3).
+        radii: of the balls [m], shape (n,).
+        corners: where the triangles are now [m], as for ``contained``.
+
+    Returns:
+        Shape (n,) bool.
+    """
+    inside = np.zeros(len(points), dtype=np.bool_)
+    for one in vibrations:
+        room = one.amplitude - radii
+        if (room <= 0.0).all():
+            continue
+        face = mesh.corners[mesh.tags == one.tag]
+        up = one.peak / one.amplitude
+        outward = np.cross(face[:, 1] - face[:, 0], face[:, 2] - face[:, 0]).sum(axis=0)
+        up = up if outward @ up <= 0.0 else -up
+        depth = (face @ up).max() - points @ up
+        here = np.flatnonzero((depth >= 0.0) & (depth <= room + BENEATH))
+        lifted = points[here] + (depth[here] + LIFT * radii[here])[:, None] * up
+        inside[here] |= contained(mesh, lifted, corners)
     return inside
 
 

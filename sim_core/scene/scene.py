@@ -19,7 +19,14 @@ from sim_core.geometry.analytic import AnalyticCavity
 from sim_core.geometry.mesh import TriangleMesh, connected_components, normals_towards_shot
 from sim_core.geometry.turning_part import require_free_axis
 from sim_core.scene.analytic_scene import require_clear, require_supported
-from sim_core.scene.invariants import clearance, contained, enclosed, narrowest_gap, turned_corners
+from sim_core.scene.invariants import (
+    beneath_mean_plane,
+    clearance,
+    contained,
+    enclosed,
+    narrowest_gap,
+    turned_corners,
+)
 from sim_core.scene.narrow_gaps import find_narrow_gap, surface_name, vibrating_name
 from sim_core.scene.physics import BallCollisions, Physics
 
@@ -157,6 +164,9 @@ class Scene:
             else enclosed(corners, balls.positions)
         )
         outside = np.flatnonzero(~inside)
+        vibrations, radii = self.physics.vibrations, 0.5 * balls.diameters[outside]
+        points = balls.positions[outside]
+        outside = outside[~beneath_mean_plane(self.mesh, vibrations, points, radii, corners)]
         if len(outside):
             where = balls.positions[outside[0]].tolist()
             raise SceneError(

@@ -18,7 +18,13 @@ from sim_core import (
     TriangleMesh,
     simulate,
 )
-from sim_core.scene.invariants import clearance, contained, narrowest_gap, turned_corners
+from sim_core.scene.invariants import (
+    beneath_mean_plane,
+    clearance,
+    contained,
+    narrowest_gap,
+    turned_corners,
+)
 from tests.helpers.scenes.cavities import uniform_restitution
 from tests.helpers.scenes.fuzzed_chambers import Chamber
 from tests.sim_core.loop.test_containment import REACH, ROUNDING, clearance_at, later
@@ -170,8 +176,12 @@ def play(
         seen.collisions += result.collisions.total
         seen.pairs += result.collisions.balls
         seen.events += result.collisions.total + result.collisions.stale
-        inside = contained(mesh, result.balls.positions, corners_now(mesh, physics))
-        outside = np.flatnonzero(~inside & ~_beneath_the_mesh(Chamber(mesh, result.balls, physics)))
+        places, corners = result.balls.positions, corners_now(mesh, physics)
+        inside = contained(mesh, places, corners)
+        inside |= beneath_mean_plane(
+            mesh, physics.vibrations, places, 0.5 * balls.diameters, corners
+        )
+        outside = np.flatnonzero(~inside)
         if len(outside):
             raise SimulationError(
                 f"ball {outside[0]} is outside at {result.balls.positions[outside[0]].tolist()} m"
@@ -195,21 +205,6 @@ def overlap(chamber: Chamber) -> float:
     near = gap < REACH * balls.radius  # others touch nothing: how far they are is not measured
     surface = float((0.5 * balls.diameters - gap)[near].max(initial=-math.inf))
     return surface if physics.ball_collisions is None else max(surface, -narrowest_gap(balls)[0])
-
-
-def _beneath_the_mesh(chamber: Chamber) -> np.ndarray:
-    """True (n,) for balls so small that a floor, at its lowest, leaves room for their centres below
-    the mesh's; or a lid, the second of two sonotrodes, above it.
-    """
-    balls, vibrations = chamber.balls, chamber.physics.vibrations
-    low, high = chamber.mesh.vertices.min(axis=0), chamber.mesh.vertices.max(axis=0)
-    above = ((balls.positions > low) & (balls.positions < high))[:, :2].all(axis=1)
-    height, beyond = balls.positions[:, 2], np.zeros(len(balls), dtype=np.bool_)
-    for one, depth in zip(vibrations, (low[2] - height, height - high[2]), strict=False):
-        beyond |= (
-            above & (depth >= 0.0) & (depth <= one.amplitude - 0.5 * balls.diameters + DEEPEST)
-        )
-    return beyond
 
 
 def _in_the_room(mesh: TriangleMesh, physics: Physics) -> np.ndarray:

@@ -22,6 +22,7 @@ from sim_core import (
     SceneError,
     TriangleMesh,
     Vibration,
+    largest_amplitude,
     pack_balls,
 )
 from sim_core.geometry.obstacle_set import build_obstacle_set
@@ -42,8 +43,13 @@ class Chamber(NamedTuple):
 Surface = tuple[np.ndarray, np.ndarray]  # vertices (n, 3), triangles (m, 3)
 
 
-def random_chamber(family: str, seed: int) -> Chamber:
-    """The same family and seed make the same chamber."""
+def random_chamber(family: str, seed: int, widest_swing: float = 0.0) -> Chamber:
+    """The same arguments make the same chamber.
+
+    Args:
+        widest_swing: if positive, the floor vibrates by up to so many radii of the balls, or as
+            far as the walls beside it allow.
+    """
     rng = np.random.default_rng([seed, *family.encode()])
     wide = 10.0 ** rng.uniform(-3.0, 0.0)
     diameter = rng.uniform(0.03, 0.12)  # of the width
@@ -54,12 +60,34 @@ def random_chamber(family: str, seed: int) -> Chamber:
     mesh = TriangleMesh(
         turn.apply(wide * vertices) + away, triangles, np.where(level, FLOOR, CEILING)
     )
+    radius = 0.5 * wide * diameter
+    if widest_swing:
+        return with_swing(mesh, turn, wide, radius, widest_swing, rng)
     physics = random_physics(family in WITH_FLOOR, turn, wide, wide * diameter, rng)
-    if physics.vibration is not None and has_moving_edge(
-        mesh, 0.5 * wide * diameter, physics.vibration
-    ):
+    if physics.vibration is not None and has_moving_edge(mesh, radius, physics.vibration):
         physics = random_physics(False, turn, wide, wide * diameter, rng)
     return Chamber(mesh, random_balls(mesh, wide * diameter, physics, rng), physics)
+
+
+def with_swing(
+    mesh: TriangleMesh,
+    turn: Rotation,
+    wide: float,
+    radius: float,
+    widest: float,
+    rng: np.random.Generator,
+) -> Chamber:
+    """The mesh with a floor that swings by up to ``widest`` radii, or as far as there is room."""
+    swing = rng.uniform(0.0, widest) * radius
+    swing = min(swing, (1.0 - 1e-9) * largest_amplitude(mesh, FLOOR, radius)[0])
+    while True:
+        physics = vibrating(turn, wide, rng.uniform(0.05, 0.5), 0.0, rng, swing)
+        if has_moving_edge(mesh, radius, physics.vibrations[0]):
+            physics = random_physics(False, turn, wide, 2.0 * radius, rng)
+        try:
+            return Chamber(mesh, random_balls(mesh, 2.0 * radius, physics, rng), physics)
+        except SceneError:  # no ball is clear of all surfaces by as much
+            swing *= 0.5
 
 
 def has_moving_edge(mesh: TriangleMesh, radius: float, vibration: Vibration) -> bool:
@@ -77,20 +105,33 @@ def random_physics(
     with_floor: bool, turn: Rotation, wide: float, diameter: float, rng: np.random.Generator
 ) -> Physics:
     """Elastic with or without gravity, or with losses that a vibrating floor makes up for."""
-    down = SPEED**2 / wide * rng.uniform(0.05, 0.5)
+    pull = rng.uniform(0.05, 0.5)
     if with_floor and rng.random() < 0.5:
-        law = (rng.uniform(0.5, 0.95), rng.uniform(0.1, 2.0))
-        swing = diameter * 10.0 ** rng.uniform(-2.5, -1.0)
-        axis = tuple(turn.apply([0.0, 0.0, 1.0]).tolist())
-        sonotrode = Vibration(
-            FLOOR, swing, SPEED / (2.0 * np.pi * swing), rng.uniform(0.0, 6.0), axis
-        )
-        return Physics(
-            Gravity(*(-down * np.array(axis)).tolist()), Restitution((law, law), law), sonotrode
-        )
+        return vibrating(turn, wide, pull, diameter, rng)
+    down = SPEED**2 / wide * pull
     return Physics(
         Gravity(*(down * turn.apply([0.0, 0.6, -0.8])).tolist()) if rng.random() < 0.5 else None
     )
+
+
+def vibrating(
+    turn: Rotation,
+    wide: float,
+    pull: float,
+    diameter: float,
+    rng: np.random.Generator,
+    swing: float = 0.0,
+) -> Physics:
+    """A floor that makes up for losses; gravity is ``pull`` SPEED²/wide towards it.
+
+    Without a ``swing`` [m] it is a little of the diameter [m].
+    """
+    law = (rng.uniform(0.5, 0.95), rng.uniform(0.1, 2.0))
+    swing = swing or diameter * 10.0 ** rng.uniform(-2.5, -1.0)
+    axis = tuple(turn.apply([0.0, 0.0, 1.0]).tolist())
+    sonotrode = Vibration(FLOOR, swing, SPEED / (2.0 * np.pi * swing), rng.uniform(0.0, 6.0), axis)
+    down = -(SPEED**2) / wide * pull * np.array(axis)
+    return Physics(Gravity(*down.tolist()), Restitution((law, law), law), sonotrode)
 
 
 def random_balls(
@@ -209,11 +250,32 @@ def grooved(_: float, rng: np.random.Generator) -> Surface:
     return room_less([prism.translate([-0.45 + 0.2 * k, 0.35, -0.4]) for k in range(4)])
 
 
+def pillared(diameter: float, rng: np.random.Generator) -> Surface:
+    """A room over a star, which narrows or widens upwards, with such pillars standing in it."""
+
+    def star(corners: int, radius: float, depth: float) -> CrossSection:
+        angles = np.sort(rng.uniform(0.0, 2.0 * np.pi, corners)) + 2.0 * np.pi / corners
+        angles = np.linspace(0.0, 2.0 * np.pi, corners, endpoint=False) + 0.2 * angles / corners
+        radii = radius * rng.uniform(1.0 - depth, 1.0, corners)
+        return CrossSection([np.stack([radii * np.cos(angles), radii * np.sin(angles)], axis=1)])
+
+    def grown(outline: CrossSection, lean: float) -> Manifold:
+        return outline.extrude(1.0, scale_top=(1.0 + lean, 1.0 + lean))
+
+    lean = rng.choice([0.0, 1.0]) * rng.uniform(-0.1, 0.1, 4)
+    room = grown(star(int(rng.integers(3, 16)), 0.5, 0.5), lean[0])
+    for k in range(3):
+        width = rng.uniform(0.2, 1.0) * diameter
+        pillar = grown(star(int(rng.integers(3, 8)), width, 0.3), lean[k + 1])
+        room = room - pillar.translate([*rng.uniform(-0.2, 0.2, 2), 0.0])
+    return surface(room)
+
+
 FAMILIES: dict[str, Callable[[float, np.random.Generator], Surface]] = {
     f.__name__: f
-    for f in (hull, dented, spiked, bladed, wedged, geared, throated, slotted, grooved)
+    for f in (hull, dented, spiked, bladed, wedged, geared, throated, slotted, grooved, pillared)
 }
-WITH_FLOOR = {"spiked", "bladed", "wedged", "geared", "throated", "slotted", "grooved"}
+WITH_FLOOR = {"spiked", "bladed", "wedged", "geared", "throated", "slotted", "grooved", "pillared"}
 
 
 def turned(body: Manifold, rng: np.random.Generator) -> Manifold:
