@@ -94,7 +94,7 @@ def strengths() -> st.SearchStrategy[Strengths]:
         weight=st.just(0.0) | powers(-3.0, 2.0),
         restitution=st.sampled_from(RESTITUTIONS) | st.floats(0.0, 1.0),
         elastic_below=st.sampled_from([1e-3, 0.03]),
-        swing=st.just(0.0) | powers(-4.0, -0.5),
+        swing=st.just(0.0) | powers(-4.0, 0.4),
         beat=powers(-1.0, 1.0),
         tip=st.just(0.0) | powers(-2.0, 1.0),
         to_and_fro=st.booleans(),

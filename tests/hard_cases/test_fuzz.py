@@ -39,15 +39,19 @@ def test_any_scene_runs_or_says_why_not(plan: Plan) -> None:
 
 
 @pytest.mark.long
-@settings(
-    max_examples=5_000,
-    deadline=None,
-    suppress_health_check=SLOW,
-    phases=set(Phase) - {Phase.explain},
-)
-@given(plans(MANY))
-def test_many_scenes_run_or_say_why_not(plan: Plan) -> None:
-    play_and_check(plan)
+@pytest.mark.parametrize("effects", MANY)
+def test_many_scenes_with_these_effects_run_or_say_why_not(effects: str) -> None:
+    @settings(
+        max_examples=250,
+        deadline=None,
+        suppress_health_check=SLOW,
+        phases=set(Phase) - {Phase.explain},
+    )
+    @given(plans((effects,)))
+    def play(plan: Plan) -> None:
+        play_and_check(plan)
+
+    play()
 
 
 @pytest.mark.parametrize("path", SAVED, ids=[path.stem for path in SAVED])
