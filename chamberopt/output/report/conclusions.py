@@ -49,6 +49,11 @@ def answer(result: Result, start: Result | None, gain: Estimate | None) -> str:
     if start is None or gain is None:
         mean = metric_label("mean_coverage")
         treatment_time = result.design.process.treatment_time
+        if result.metrics["mean_coverage"].in_words == NOT_RESOLVED:
+            return (
+                "Too few dents were simulated to tell how much of the target is covered after "
+                f"{plain(treatment_time)} s."
+            )
         text = (
             f"After {plain(treatment_time)} s the target is covered to "
             f"{mean.format(result.metrics['mean_coverage'])} on average"
@@ -62,6 +67,11 @@ def answer(result: Result, start: Result | None, gain: Estimate | None) -> str:
         return (
             f"No better chamber than the start was found: its {label.text} is {before} "
             "(95 % interval)."
+        )
+    if NOT_RESOLVED in (start.objective.in_words, result.objective.in_words):
+        return (
+            "Too few dents were simulated to tell whether the best chamber found is better than "
+            "the start."
         )
     values = f"from {before} at the start to {after}"
     change = label.format(gain, sign=True)

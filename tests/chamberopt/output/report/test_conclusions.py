@@ -1,10 +1,13 @@
 """What the report says about parameters follows from the model's curves and their intervals."""
 
 import math
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
-from chamberopt.output.report.conclusions import influence
+from chamberopt.common.estimate import Estimate
+from chamberopt.output.report.conclusions import answer, influence
 from chamberopt.output.report.number_text import Label, objective_label
 
 
@@ -58,3 +61,18 @@ def test_a_time_to_minimise_is_shown_as_a_time() -> None:
     )["parameters"][0]
     assert found["mean"] == [400.0, 900.0, 2000.0]
     assert found["loss"] == pytest.approx(1600.0)
+
+
+def test_what_is_not_resolved_is_not_in_the_answer_as_a_number() -> None:
+    unknown = Estimate(0.4, 0.1).not_known("not resolved")
+    result: Any = SimpleNamespace(
+        objective_name="uniform_coverage",
+        objective=unknown,
+        metrics={"mean_coverage": unknown},
+        design=SimpleNamespace(process=SimpleNamespace(treatment_time=120.0)),
+        data={"study": {"best": {"parameters": {"x": 1}}, "start": {"parameters": {"x": 2}}}},
+    )
+    assert answer(result, None, None) == (
+        "Too few dents were simulated to tell how much of the target is covered after 120 s."
+    )
+    assert answer(result, result, unknown).startswith("Too few dents were simulated to tell wheth")
