@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import atomic_write
+from chamberopt.common.files import atomic_write, write_bytes
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -82,7 +82,7 @@ def write_chamber(folder: Path, chamber: Chamber) -> None:
     if chamber.fitting is not None:
         fields["fitting"] = chamber.fitting
     _write_surface(folder / CHAMBER, chamber.vertices, chamber.triangles, fields)
-    _write_surface(folder / "chamber.stl", chamber.vertices, chamber.triangles, {})
+    write_stl(folder / "chamber.stl", chamber.vertices * MM, chamber.triangles)
 
 
 def _write_surface(
@@ -98,8 +98,35 @@ def _write_surface(
     surface.point_data.update(points or {})
     if normal is not None:
         surface.point_data.active_normals = normal.astype(np.float32)
+    save_surface(path, surface)
+
+
+def save_surface(path: Path, surface: Surface) -> None:
+    """Write a surface as .vtp or .vtkhdf, whole or not at all.
+
+    Where a file has no room, VTK's writer of .vtp ends the process, and that of .vtkhdf leaves a
+    damaged file. So the one writes into memory; for the other, room is reserved first.
+    """
+    if path.suffix.lower() == ".vtp":
+        writer = pyvista()._vtk.vtkXMLPolyDataWriter()
+        writer.SetInputData(surface)
+        writer.SetDataModeToBinary()
+        writer.WriteToOutputStringOn()
+        writer.Write()
+        write_bytes(path, writer.GetOutputString().encode())
+        return
     with atomic_write(path) as temporary:
+        size = 1024 * (surface.actual_memory_size + 1024)
+        temporary.write_bytes(bytes(size))
         surface.save(temporary)
+
+
+def write_stl(path: Path, vertices: np.ndarray, triangles: np.ndarray) -> None:
+    """Write triangles as binary STL."""
+    from trimesh import Trimesh
+
+    content: Any = Trimesh(vertices, triangles, process=False).export(file_type="stl")
+    write_bytes(path, content)
 
 
 def read_surface(path: Path, cells: Sequence[str] = (), points: Sequence[str] = ()) -> Surface:

@@ -18,6 +18,7 @@ from chamberopt.chamber.bores_and_deflectors import fitting_names
 from chamberopt.common.files import atomic_write, make_output_folder
 from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL, further_sonotrode_tag
 from chamberopt.output.results.load import load_cavity, load_result
+from chamberopt.output.vtp_files import write_stl
 
 NAMES = {TAG_PART: "part", TAG_SONOTRODE: "sonotrode", TAG_WALL: "wall"}
 PART_COLOUR, WALL_COLOUR, SONOTRODE_COLOUR = "#B9BEC4", "#9DB7CC", "#E08A2E"
@@ -59,17 +60,17 @@ def read_cavity(folder: Path) -> NamedSurfaces:
     return NamedSurfaces(points, triangles, surfaces)
 
 
-def write_stl(folder: Path, file: Path) -> None:
+def write_cavity(folder: Path, file: Path) -> None:
     """Write the whole cavity as binary STL."""
     cavity = read_cavity(folder)
-    _write_stl(file, cavity.vertices, cavity.triangles)
+    write_stl(file, cavity.vertices, cavity.triangles)
 
 
 def write_stl_per_surface(folder: Path, out: Path) -> None:
     """Write a binary STL of each surface of the cavity into a new folder."""
     cavity, out = read_cavity(folder), make_output_folder(out)
     for name, own in cavity.surfaces.items():
-        _write_stl(out / f"{name}.stl", cavity.vertices, cavity.triangles[own])
+        write_stl(out / f"{name}.stl", cavity.vertices, cavity.triangles[own])
 
 
 def write_3mf(folder: Path, file: Path) -> None:
@@ -124,10 +125,3 @@ def _colour(name: str) -> str:
     if name.startswith("sonotrode"):
         return SONOTRODE_COLOUR
     return PART_COLOUR if name == "part" else WALL_COLOUR
-
-
-def _write_stl(file: Path, vertices: np.ndarray, triangles: np.ndarray) -> None:
-    from trimesh import Trimesh
-
-    with atomic_write(file) as temporary:
-        Trimesh(vertices, triangles, process=False).export(temporary, file_type="stl")

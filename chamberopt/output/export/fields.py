@@ -10,7 +10,7 @@ import numpy as np
 
 from chamberopt.chamber.part import PartOfFile
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import atomic_write, write_text
+from chamberopt.common.files import write_text
 from chamberopt.geometry.mesh_io.part_mesh import PartMesh
 from chamberopt.output.export.abaqus_deck import abaqus_deck
 from chamberopt.output.export.element_fields import (
@@ -22,7 +22,7 @@ from chamberopt.output.export.element_fields import (
 from chamberopt.output.export.nastran_deck import nastran_deck
 from chamberopt.output.results.chamber_file import CHAMBER_FILE, load_chamber
 from chamberopt.output.results.load import Result, load_part, load_result
-from chamberopt.output.vtp_files import PART
+from chamberopt.output.vtp_files import PART, save_surface
 
 DECKS: dict[str, Callable[[list[str], PartMesh, ElementFields], dict[str, str]]] = {
     "abaqus": abaqus_deck,
@@ -60,8 +60,7 @@ def write_fields(folder: str | Path, path: str | Path, to: str) -> list[str]:
     surface = load_part(result)
     try:
         if to not in DECKS:
-            with atomic_write(path) as temporary:
-                surface.save(temporary)
+            save_surface(path, surface)
             return []
         return _write_deck(result, surface, to, path)
     except OSError as error:

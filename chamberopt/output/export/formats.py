@@ -75,7 +75,10 @@ FORMATS = {
         ("nastran",),
     ),
     "chamber-stl": ExportFormat(
-        "chamber.stl", "the cavity as one closed body, in mm", (".stl",), "chamber_files.write_stl"
+        "chamber.stl",
+        "the cavity as one closed body, in mm",
+        (".stl",),
+        "chamber_files.write_cavity",
     ),
     "chamber-stl-per-tag": ExportFormat(
         "chamber-stl",

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from chamberopt.common.files import atomic_write
+from chamberopt.common.files import write_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -34,8 +34,9 @@ def new_figure(width: float, height: float) -> Figure:
 
 def save_picture(figure: Figure, path: Path) -> None:
     """Write the figure as .png, atomically."""
-    with atomic_write(path) as temporary:
-        figure.savefig(temporary)
+    content = io.BytesIO()
+    figure.savefig(content, format="png")
+    write_bytes(path, content.getvalue())
 
 
 def svg_text(figure: Figure, name: str, tooltips: Mapping[str, Sequence[str]] | None = None) -> str:

@@ -1,7 +1,9 @@
 """The drawing process: draws the one picture that its command line describes as JSON."""
 
 import json
+import os
 import sys
+import threading
 
 from chamberopt.common.errors import InputError
 from chamberopt.output.viewer.images.coverage import render_coverage
@@ -20,7 +22,15 @@ RENDERERS = {
     "replay": render_replay,
 }
 
+
+def _end_with_the_command() -> None:
+    """End this process when the command that started it has ended and its pipe is closed."""
+    os.read(0, 1)
+    os._exit(1)
+
+
 if __name__ == "__main__":
+    threading.Thread(target=_end_with_the_command, daemon=True).start()
     job = json.loads(sys.argv[1])
     try:
         RENDERERS[job["draw"]](job)

@@ -7,6 +7,7 @@ process. In a process of its own that costs the picture, never the result.
 from __future__ import annotations
 
 import ctypes
+import io
 import json
 import os
 import subprocess
@@ -16,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from chamberopt.common.errors import InputError
+from chamberopt.common.files import write_bytes
 
 INSTALL = (
     "install OpenGL for machines without a display (Debian: apt install libegl1 libgl1-mesa-dri)"
@@ -89,6 +91,13 @@ def file_path(file: str | Path, suffixes: tuple[str, ...], written: str, option:
     return path
 
 
+def write_screenshot(plotter: Any, picture: str) -> None:
+    """Write what a plotter shows as .png, whole or not at all."""
+    content = io.BytesIO()
+    plotter.screenshot(content)
+    write_bytes(Path(picture), content.getvalue())
+
+
 def draw_in_subprocess(
     job: dict[str, Any], picture: str | Path, max_seconds: float = MAX_SECONDS
 ) -> str | None:
@@ -104,24 +113,27 @@ def draw_in_subprocess(
 
     Raises:
         InputError: the job cannot be drawn as it was wanted.
-        subprocess.TimeoutExpired: it took too long.
     """
     name, missing = Path(picture).name, missing_opengl()
     if missing:
         return f"{name} skipped: {missing}"
-    run = subprocess.run(
-        [
-            sys.executable,
-            "-m",
-            "chamberopt.output.viewer",
-            json.dumps({**job, "picture": str(picture)}),
-        ],
-        env=without_display(),
-        capture_output=True,
-        text=True,
-        timeout=max_seconds,
-        check=False,
-    )
+    command = [sys.executable, "-m", "chamberopt.output.viewer"]
+    stdin, kept_open = os.pipe()  # it is closed when this process ends, however it ends
+    try:
+        run = subprocess.run(
+            [*command, json.dumps({**job, "picture": str(picture)})],
+            env=without_display(),
+            stdin=stdin,
+            capture_output=True,
+            text=True,
+            timeout=max_seconds,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return f"{name} skipped: it could not be drawn within {max_seconds:g} s"
+    finally:
+        os.close(stdin)
+        os.close(kept_open)
     if run.returncode == 0 and Path(picture).is_file():
         return None
     if run.returncode == 2:

@@ -10,12 +10,16 @@ from pathlib import Path
 from typing import Any
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import atomic_write, claim_file
+from chamberopt.common.files import claim_file
 from chamberopt.output.plots.quantities import QUANTITIES
 from chamberopt.output.viewer.actors import DARK
 from chamberopt.output.viewer.opened_result import OpenedResult, ResultInfo
 from chamberopt.output.viewer.plotter import ResultPlotter
-from chamberopt.output.viewer.subprocess_drawing import draw_in_subprocess, picture_path
+from chamberopt.output.viewer.subprocess_drawing import (
+    draw_in_subprocess,
+    picture_path,
+    write_screenshot,
+)
 from chamberopt.output.viewer.view_state import ViewState, state_after_key
 
 HANDLED_KEYS = "123456789bcxgurh"
@@ -60,8 +64,7 @@ def render_inspect(job: dict[str, Any]) -> None:
     view = ResultPlotter(results, off_screen=True)
     view.draw(state)
     view.aim(state)
-    with atomic_write(Path(job["picture"])) as temporary:
-        view.plotter.screenshot(temporary)
+    write_screenshot(view.plotter, job["picture"])
 
 
 def open_results(infos: Sequence[ResultInfo], state: ViewState) -> list[OpenedResult]:

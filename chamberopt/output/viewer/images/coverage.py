@@ -6,10 +6,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from chamberopt.common.files import atomic_write
 from chamberopt.output.viewer.actors import draw_in_chamber, draw_target
 from chamberopt.output.viewer.drawn_part import DrawnPart, colour_range
-from chamberopt.output.viewer.subprocess_drawing import draw_in_subprocess
+from chamberopt.output.viewer.subprocess_drawing import draw_in_subprocess, write_screenshot
 from chamberopt.output.vtp_files import CHAMBER, COVERAGE, pyvista, read_surface
 
 MAX_COLUMNS = 4  # results beside each other; further ones are drawn below
@@ -46,8 +45,7 @@ def render_coverage(job: dict[str, Any]) -> None:
         draw_in_chamber(plotter, part, chamber, title, limits)
         plotter.subplot(*place(1, column))
         draw_target(plotter, part, limits, bar=column == len(folders) - 1)
-    with atomic_write(Path(job["picture"])) as temporary:
-        plotter.screenshot(temporary)
+    write_screenshot(plotter, job["picture"])
 
 
 def panels(count: int) -> tuple[Any, Callable[[int, int], tuple[int, int]]]:

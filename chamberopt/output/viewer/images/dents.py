@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import atomic_write
+from chamberopt.output.plots.figure_style import save_picture
 from chamberopt.output.viewer.actors import GREY, NO_RENDER, Discs, disc_actor, light
 from chamberopt.output.viewer.drawn_part import DrawnPart
 from chamberopt.output.viewer.subprocess_drawing import draw_in_subprocess
@@ -117,8 +117,7 @@ def render_dents(job: dict[str, Any]) -> None:
         ScalarMappable(limits, colours), ax=list(every), shrink=0.7, extend="both", pad=0.01
     )
     bar.set_label("dent diameter [µm]")
-    with atomic_write(Path(job["picture"])) as temporary:
-        figure.savefig(temporary)
+    save_picture(figure, Path(job["picture"]))
 
 
 def dent_colours() -> Colormap:

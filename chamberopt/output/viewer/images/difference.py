@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from chamberopt.common.files import atomic_write
 from chamberopt.output.plots.colours import DIFFERENCE_MAP
 from chamberopt.output.viewer.actors import DARK, light
 from chamberopt.output.viewer.images.coverage import panels
-from chamberopt.output.viewer.subprocess_drawing import draw_in_subprocess
-from chamberopt.output.vtp_files import read_surface
+from chamberopt.output.viewer.subprocess_drawing import draw_in_subprocess, write_screenshot
+from chamberopt.output.vtp_files import read_surface, save_surface
 
 # Brown (less) over white to violet (more), for colour-blind readers too, and unlike either grey.
 PALE, NO_TARGET = "#e6e9ec", "#a9b0b7"
@@ -45,8 +44,7 @@ def write_differences(
         for name, column in ((f"difference_{k}", 100.0 * value), (f"real_{k}", real)):
             surface.point_data[name] = np.zeros(surface.n_points, dtype=np.float32)
             surface.point_data[name][used] = column
-    with atomic_write(path) as temporary:
-        surface.save(temporary)
+    save_surface(path, surface)
 
 
 def draw_difference(surface: str | Path, titles: Sequence[str], picture: str | Path) -> str | None:
@@ -76,8 +74,7 @@ def render_difference(job: dict[str, Any]) -> None:
             plotter.camera_position = [eye, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
             plotter.reset_camera(bounds=surface.extract_cells(surface["target"] > 0).bounds)
             plotter.enable_anti_aliasing("ssaa")
-    with atomic_write(Path(job["picture"])) as temporary:
-        plotter.screenshot(temporary)
+    write_screenshot(plotter, job["picture"])
 
 
 def _add_difference(plotter: Any, surface: Any, k: int, limit: float, bar: bool) -> None:

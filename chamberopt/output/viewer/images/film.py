@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
@@ -9,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import atomic_write
+from chamberopt.common.files import atomic_write, write_bytes
 from chamberopt.output.viewer.subprocess_drawing import file_path
 
 COLOURS = 96  # of a GIF, the same in all frames: with palettes of their own frames would flicker
@@ -49,18 +50,25 @@ def require_playable(fps: int, size: tuple[int, int], frames: int, path: Path) -
 
 def write_film(path: Path, frames: Sequence[np.ndarray], fps: int) -> None:
     """Write frames, each (rows, columns, 3) uint8, at `fps` frames a second; a GIF repeats."""
+    if path.suffix.lower() == ".gif":
+        write_bytes(path, _gif(frames, fps))
+        return
+    import imageio.v2 as imageio
+    from imageio_ffmpeg import count_frames_and_secs
+
     with atomic_write(path) as temporary:
-        if path.suffix.lower() == ".gif":
-            _write_gif(temporary, frames, fps)
-        else:
-            import imageio.v2 as imageio
+        imageio.mimwrite(
+            temporary, list(frames), fps=fps, codec="libx264", quality=7, macro_block_size=BLOCK
+        )
+        try:
+            whole = count_frames_and_secs(str(temporary))[0] == len(frames)
+        except RuntimeError:
+            whole = False
+        if not whole:  # ffmpeg does not tell
+            raise OSError("the film could not be written as a whole; is the disk full?")
 
-            imageio.mimwrite(
-                temporary, list(frames), fps=fps, codec="libx264", quality=7, macro_block_size=BLOCK
-            )
 
-
-def _write_gif(path: Path, frames: Sequence[np.ndarray], fps: int) -> None:
+def _gif(frames: Sequence[np.ndarray], fps: int) -> bytes:
     from PIL import Image
 
     sampled = np.unique(np.linspace(0, len(frames) - 1, SAMPLED_FRAMES).astype(int))
@@ -70,10 +78,12 @@ def _write_gif(path: Path, frames: Sequence[np.ndarray], fps: int) -> None:
         Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
         for frame in frames
     ]
+    content = io.BytesIO()
     images[0].save(
-        path, save_all=True, append_images=images[1:], duration=round(1000 / fps), loop=0,
+        content, "GIF", save_all=True, append_images=images[1:], duration=round(1000 / fps), loop=0,
         optimize=True, disposal=1,
     )  # fmt: skip
+    return content.getvalue()
 
 
 def _balanced_pixels(frames: Sequence[np.ndarray]) -> np.ndarray:

@@ -8,9 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chamberopt.common.files import atomic_write
 from chamberopt.output.viewer.actors import BACKGROUND, DARK, FAULT, GREY, SONOTRODE, add_chamber
-from chamberopt.output.viewer.subprocess_drawing import draw_in_subprocess, picture_path
+from chamberopt.output.viewer.subprocess_drawing import (
+    draw_in_subprocess,
+    picture_path,
+    write_screenshot,
+)
 from chamberopt.output.vtp_files import CHAMBER, MM, pyvista, read_surface, write_chamber
 
 if TYPE_CHECKING:
@@ -91,5 +94,4 @@ def render_part(job: dict[str, Any]) -> None:
         plotter.camera_position = [eye, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
         plotter.reset_camera()
         plotter.enable_anti_aliasing("ssaa")
-    with atomic_write(Path(job["picture"])) as temporary:
-        plotter.screenshot(temporary)
+    write_screenshot(plotter, job["picture"])
