@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import platform
 from collections.abc import Iterable
 from functools import cache
@@ -15,6 +16,10 @@ from chamberopt.common.parallel.executor import core_count
 SIMULATION_PACKAGES = ("chamberopt", "numpy", "scipy", "numba", "manifold3d")
 # The search depends on two more. Packages that only draw or print are left out.
 PACKAGES = (*SIMULATION_PACKAGES, "nlopt", "scikit-learn")
+# What else than the sources decides on what compiled code computes.
+COMPILER_SETTINGS = (
+    "NUMBA_OPT", "NUMBA_ENABLE_AVX", "NUMBA_LOOP_VECTORIZE", "NUMBA_SLP_VECTORIZE",
+)  # fmt: skip
 
 
 def versions() -> dict[str, str]:
@@ -30,6 +35,14 @@ def program_versions() -> dict[str, str]:
     """
     python = ".".join(platform.python_version_tuple()[:2])
     return {"python": python, **package_versions(), "sources": sources_digest()}
+
+
+def simulation_versions() -> dict[str, str]:
+    """What a replica's figures depend on, on whichever machine it is simulated."""
+    settings = {name: os.environ.get(name, "not set") for name in COMPILER_SETTINGS}
+    python = ".".join(platform.python_version_tuple()[:2])
+    packages = package_versions((*SIMULATION_PACKAGES, "llvmlite"))
+    return {"python": python, **packages, "sources": sources_digest(), **settings}
 
 
 def package_versions(packages: Iterable[str] = PACKAGES) -> dict[str, str]:

@@ -5,7 +5,9 @@ This is the only file that imports distributed, which the extra `dask` installs.
 
 from __future__ import annotations
 
+import asyncio
 import json
+import logging
 import pickle
 import socket
 from collections.abc import Callable
@@ -16,9 +18,11 @@ from urllib.parse import urlsplit
 
 from chamberopt.common.errors import ClusterLostError, InputError, WorkerLostError
 from chamberopt.common.limits import MAX_TEXT_BYTES, read_limited
-from chamberopt.common.versions import SIMULATION_PACKAGES, package_versions
+from chamberopt.common.versions import simulation_versions
 
-TIMEOUT_S = 20.0  # for the scheduler to answer, and again for its first worker
+TIMEOUT_S = 4.0  # for the scheduler to answer, and again to accept a client
+WORKER_TIMEOUT_S = 20.0  # for its first worker
+MAX_GREETING = 100_000  # bytes; what Dask sends first has some hundred
 SCHEDULER_FILE = "what `dask scheduler --scheduler-file FILE` wrote"
 
 
@@ -34,28 +38,30 @@ class DaskExecutor(Executor):
 
         Args:
             cluster: tcp://HOST:PORT, or a scheduler file (.json).
-            timeout: seconds to wait for the scheduler and for a worker.
+            timeout: seconds to wait for a worker.
 
         Raises:
             InputError: Dask is not installed, no scheduler answers, it has no workers, or these
-                have other versions of what figures depend on.
+                run another program.
         """
         try:
             from distributed import Client
         except ImportError:
             text = "needs Dask, which is not installed; pip install 'chamberopt[dask]'"
             raise InputError(f"--cluster: {text}") from None
-        address, timeout = _scheduler_address(cluster), TIMEOUT_S if timeout is None else timeout
+        for name in ("distributed", "distributed.client", "tornado", "asyncio"):
+            logging.getLogger(name).setLevel(logging.CRITICAL)  # an error here has one message
+        address = _scheduler_address(cluster)
         try:
-            _require_listener(address, timeout)
-            self._client = Client(address, timeout=timeout, set_as_default=False)
+            _require_scheduler(address)
+            self._client = Client(address, timeout=TIMEOUT_S, set_as_default=False)
         except (OSError, ValueError) as error:
             raise InputError(
-                f"--cluster: no scheduler answers at {address} within {timeout:g} s ({error}); "
-                "start one with `dask scheduler`, or correct the address"
+                f"--cluster: no scheduler answers at {address} within {2 * TIMEOUT_S:g} s "
+                f"({error}); start one with `dask scheduler`, or correct the address"
             ) from None
         try:
-            self._require_workers(address, timeout)
+            self._require_workers(address, WORKER_TIMEOUT_S if timeout is None else timeout)
         except BaseException:
             self._client.close()
             raise
@@ -91,17 +97,18 @@ class DaskExecutor(Executor):
         except TimeoutError:
             text = f"has no workers; start some with `dask worker {address}`"
             raise InputError(f"--cluster: the scheduler at {address} {text}") from None
-        here = package_versions(SIMULATION_PACKAGES)
-        try:
-            of_workers = self._client.run(package_versions, SIMULATION_PACKAGES)
-        except Exception as error:
-            text = f"cannot import chamberopt ({error}); install the same version there"
-            raise InputError(f"--cluster: a worker of {address} {text}") from None
+        here = simulation_versions()
+        of_workers = self._client.run(simulation_versions, on_error="return")
         for worker, there in of_workers.items():
-            names = [name for name in here if there[name] != here[name]]
+            if isinstance(there, Exception):
+                text = f"cannot run chamberopt ({there}); install the same version there"
+                raise InputError(f"--cluster: worker {worker} {text}")
+            names = [name for name in here if there.get(name) != here[name]]
             if names:
-                different = ", ".join(f"{name} {there[name]} ({here[name]} here)" for name in names)
-                remedy = "figures could differ; install the same there"
+                different = ", ".join(
+                    f"{name} {there.get(name)} ({here[name]} here)" for name in names
+                )
+                remedy = "figures could differ; install the same there and start it again"
                 raise InputError(f"--cluster: worker {worker} has {different}: {remedy}")
 
 
@@ -121,15 +128,32 @@ def _scheduler_address(cluster: str) -> str:
         raise InputError(f"--cluster: {cluster} {text}") from None
 
 
-def _require_listener(address: str, timeout: float) -> None:
-    """Raise OSError or ValueError unless something listens at the address.
+def _require_scheduler(address: str) -> None:
+    """Raise OSError or ValueError unless a Dask scheduler answers at the address.
 
-    A Dask client that finds nobody takes longer, and prints a traceback.
+    A Dask client that meets another program waits for minutes, or takes its first bytes for a
+    length and that much memory.
     """
     place = urlsplit(address)
     if place.scheme not in ("tcp", "tls") or not place.hostname or not place.port:
         raise ValueError("not of the form tcp://HOST:PORT")
-    socket.create_connection((place.hostname, place.port), timeout=timeout).close()
+    with socket.create_connection((place.hostname, place.port), TIMEOUT_S) as connection:
+        if place.scheme == "tcp":  # with TLS the client speaks first
+            greeting = connection.recv(8)
+            if not 0 < int.from_bytes(greeting, "little") < MAX_GREETING:
+                raise ValueError("another program listens there")
+    kind = asyncio.run(asyncio.wait_for(_kind_of_server(address), TIMEOUT_S))
+    if kind != "Scheduler":
+        raise ValueError(f"a Dask {kind.lower()} listens there")
+
+
+async def _kind_of_server(address: str) -> str:
+    """What a Dask server says that it is: Scheduler, Worker or Nanny."""
+    from distributed.core import rpc
+    from distributed.security import Security
+
+    async with rpc(address, connection_args=Security().get_connection_args("client")) as server:
+        return str((await server.identity())["type"])
 
 
 def _copy_outcome(dask_future: Future[Any], future: Future[Any]) -> None:

@@ -1,10 +1,13 @@
 """A real Dask scheduler with two worker processes: same bits, and a killed worker is survived."""
 
 import os
+import re
+import shutil
 import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import CancelledError, Future
@@ -21,13 +24,14 @@ from chamberopt.common.errors import ClusterLostError, InputError, WorkerLostErr
 from chamberopt.common.parallel import dask_cluster
 from chamberopt.common.parallel.dask_cluster import DaskExecutor
 from chamberopt.common.parallel.executor import SerialExecutor, share
-from chamberopt.design.load import load_design
+from chamberopt.design.load import load_design, save_design
 from chamberopt.optimize.run_sweep import plan_sweep
 from chamberopt.optimize.study import Study
 from chamberopt.simulation.evaluate import ReplicaPlan, evaluate
 from tests.chamberopt.optimize.test_run_sweep import rows, small_study
 from tests.helpers import worker_jobs
 from tests.helpers.studies import sweep_in_folder
+from tests.helpers.synthetic import plate_design
 
 distributed = pytest.importorskip(
     "distributed", reason="Dask is not installed: pip install 'chamberopt[dask]'"
@@ -42,6 +46,7 @@ class Dask:
 
     folder: Path
     programs: list[subprocess.Popen]
+    sources: Path = ROOT
 
     @property
     def scheduler_file(self) -> Path:
@@ -58,10 +63,7 @@ class Dask:
             str(self.scheduler_file),
             "--no-dashboard",
         ]
-        setting = {
-            **os.environ,
-            "PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]),
-        }
+        setting = {**os.environ, "PYTHONPATH": os.pathsep.join([str(self.sources), str(ROOT)])}
         program = subprocess.Popen(command, stdout=log, stderr=log, env=setting, cwd=self.folder)
         log.close()
         self.programs.append(program)
@@ -188,7 +190,7 @@ def test_a_scheduler_that_is_not_there_is_status_2(tmp_path: Path, capsys, monke
         ]
         assert main(command) == 2
     message = capsys.readouterr().err
-    assert f"--cluster: no scheduler answers at {address} within 0.5 s" in message
+    assert f"--cluster: no scheduler answers at {address} within 1 s" in message
     assert "start one with `dask scheduler`" in message
     assert not (tmp_path / "o").exists()
 
@@ -205,15 +207,94 @@ def test_a_scheduler_without_workers_is_refused(tmp_path: Path) -> None:
         alone.end()
 
 
-def test_another_version_on_a_worker_is_refused(
-    dask: Dask, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("greeting", [b"", b"SSH-2.0-OpenSSH_9.6\r\n", b"\0" * 8])
+def test_another_program_at_the_port_is_refused_in_time(greeting: bytes) -> None:
+    """One that says nothing, as a web server does; one whose first bytes would be a length."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        accepted = []
+
+        def answer() -> None:
+            accepted.append(server.accept()[0])
+            accepted[0].sendall(greeting)
+
+        threading.Thread(target=answer, daemon=True).start()
+        address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        began = time.monotonic()
+        with pytest.raises(InputError, match=f"no scheduler answers at {address} within 8 s"):
+            DaskExecutor(address)
+        assert time.monotonic() - began < 10.0
+        accepted[0].close()
+
+
+def test_the_address_of_a_worker_is_refused(dask: Dask) -> None:
+    with DaskExecutor(str(dask.scheduler_file)) as executor:
+        worker = next(iter(executor._client.scheduler_info()["workers"]))
+    with pytest.raises(InputError, match="a Dask worker listens there"):
+        DaskExecutor(worker)
+
+
+@pytest.mark.parametrize("name", ["numba", "sources", "NUMBA_OPT"])
+def test_a_worker_that_runs_another_program_is_refused(
+    name: str, dask: Dask, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    real = versions.package_versions()
-    monkeypatch.setattr(versions, "version", lambda name: "0.0" if name == "numba" else real[name])
-    with pytest.raises(
-        InputError, match=rf"numba {real['numba']} \(0\.0 here\): figures could differ"
-    ):
+    there = versions.simulation_versions()
+    real = versions.version
+    monkeypatch.setattr(versions, "version", lambda one: "other" if one == name else real(one))
+    if name == "sources":
+        monkeypatch.setattr(versions, "sources_digest", lambda: "other")
+    if name == "NUMBA_OPT":
+        monkeypatch.setenv(name, "other")
+    text = rf"worker tcp://\S+ has {name} {re.escape(there[name])} \(other here\): figures could"
+    with pytest.raises(InputError, match=text):
         DaskExecutor(str(dask.scheduler_file))
+
+
+def test_a_worker_with_edited_sources_is_refused(dask: Dask, tmp_path: Path) -> None:
+    """The same versions, another file: a scheduler of its own, whose worker imports a copy."""
+    copy = tmp_path / "copy"
+    for package in ("chamberopt", "sim_core"):
+        shutil.copytree(ROOT / package, copy / package)
+    with (copy / "sim_core" / "motion.py").open("a") as file:
+        file.write("# edited\n")
+    other = Dask(tmp_path, [], copy)
+    try:
+        other.start("scheduler", "--host", "127.0.0.1", "--port", "0")
+        other.start_worker()
+        while not other.scheduler_file.exists():
+            time.sleep(0.1)
+        with pytest.raises(InputError, match=r"worker tcp://\S+ has sources \w+ \(\w+ here\): fig"):
+            DaskExecutor(str(other.scheduler_file), 60)
+    finally:
+        other.end()
+
+
+@pytest.mark.parametrize("command", ["simulate", "sweep"])
+def test_a_scheduler_that_dies_is_one_message(command: str, tmp_path: Path) -> None:
+    own = Dask(tmp_path, [])
+    save_design(plate_design(process__accuracy__replicas=400), tmp_path / "plate.toml")
+    (tmp_path / "s.toml").write_text('design = "plate.toml"\n[vary]\n"shot.mass_g" = [2.0, 6.0]\n')
+    words = {"simulate": ["simulate", "plate.toml"], "sweep": ["sweep", "s.toml", "--grid", "50"]}
+    try:
+        own.start("scheduler", "--host", "127.0.0.1", "--port", "0")
+        own.start_worker()
+        while not own.scheduler_file.exists():
+            time.sleep(0.1)
+        program = subprocess.Popen(
+            [sys.executable, "-m", "chamberopt", *words[command], "--out", "out", "--cluster",
+             str(own.scheduler_file)],
+            cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, stderr=subprocess.PIPE,
+            text=True,
+        )  # fmt: skip
+        time.sleep(15.0)
+        assert program.poll() is None
+        own.programs[0].kill()
+        _, err = program.communicate(timeout=120)
+    finally:
+        own.end()
+    assert program.returncode == 1
+    lines = [line for line in err.splitlines() if "replicas" not in line and "candid" not in line]
+    assert [line for line in lines if "its scheduler has ended" in line] == lines[-1:], err
+    assert "Traceback" not in err
 
 
 def test_tasks_that_the_cluster_cancels_give_the_reason() -> None:

@@ -28,7 +28,7 @@ from chamberopt.optimize.study import Study
 from chamberopt.output.export.chamber_files import (
     read_cavity,
     write_3mf,
-    write_stl,
+    write_cavity,
     write_stl_per_surface,
 )
 from chamberopt.output.export.frame import FrameName
@@ -384,7 +384,7 @@ def test_where_nothing_may_be_written(
 def test_the_whole_chamber_as_stl_and_3mf(study: Path, tmp_path: Path) -> None:
     volume = load_result(study).data["chamber"]["volume_mm3"]
     cavity = read_cavity(study)
-    write_stl(study, tmp_path / "c.stl")
+    write_cavity(study, tmp_path / "c.stl")
     write_3mf(study, tmp_path / "c.3mf")
     stl, scene = trimesh.load_mesh(tmp_path / "c.stl"), trimesh.load_scene(tmp_path / "c.3mf")
     (body,) = scene.geometry.values()
