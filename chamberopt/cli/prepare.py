@@ -63,7 +63,7 @@ def advise_effects(design: Design, chamber: Chamber) -> list[dict[str, Any]]:
     def prepare(variant: Design) -> None:
         compile_with_message(variant, chamber)
 
-    print_remarks(["pilot runs with each effect switched on and off (--no-pilot skips them) ..."])
+    print_remarks(["pilot runs with each effect switched on and off ..."])
     with local_executor() as executor, progress_bar("pilot runs") as progress:
         advice = with_effects_resolved(design, chamber, executor, progress, prepare)[1]
         advice = advice or advise(design, chamber, executor, progress, prepare)

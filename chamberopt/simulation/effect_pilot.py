@@ -206,16 +206,33 @@ def _advise(pilot: _Pilot, progress: Progress | None) -> list[Advice]:
     for done, effect in enumerate(effects):
         if progress:
             progress(done, len(effects), None)
-        is_on = (
-            balls_can_rest(pilot.design, chamber_mesh(pilot.chamber))
-            if effect == "rest"
-            else bool(getattr(pilot.design.effects, effect))
-        )
+        is_on = _is_on(effect, pilot.design, pilot.chamber)
         other = pilot.measure({effect: not is_on})
         with_it, without = (pilot.unchanged, other) if is_on else (other, pilot.unchanged)
         reason = _reason(effect, pilot.design, pilot.chamber)
         advice.append(Advice(effect, is_on, reason, _changes(with_it, without), ACCURACY))
     return sorted(advice, key=lambda one: -one.largest_change)
+
+
+def _is_on(effect: str, design: Design, chamber: Chamber) -> bool:
+    if effect == "rest":
+        return balls_can_rest(design, chamber_mesh(chamber))
+    return bool(getattr(design.effects, effect))
+
+
+def groups(design: Design, chamber: Chamber) -> list[dict[str, Any]]:
+    """What dimensionless groups say of each effect that can be switched, without a simulation.
+
+    Returns:
+        As `Advice.as_json`, without a verdict and changes.
+    """
+    found = []
+    for effect in _switchable(design, chamber):
+        on = _is_on(effect, design, chamber)
+        state = "chosen by pilot runs" if design.effects.auto else "on" if on else "off"
+        reason = _reason(effect, design, chamber)
+        found.append({"effect": effect, "on": on, "said": f"{effect} is {state}: {reason}"})
+    return found
 
 
 def _reason(effect: str, design: Design, chamber: Chamber) -> str:

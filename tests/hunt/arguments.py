@@ -63,8 +63,7 @@ def draw_arguments(rng: random.Random, folder: Path, base: Path) -> list[str]:
         copy(source, folder / source.name)
     (folder / "loop").symlink_to("loop")
     command = rng.choice(list(COMMANDS))
-    # Pilot runs compile the simulator for every set of effects: minutes.
-    words = [command, "--no-pilot"] if command == "check" else [command]
+    words = [command]
     words += [rng.choice(FIRST[command] if rng.random() < 0.8 else NAMES)]
     if command in SECOND:
         words += [rng.choice(SECOND[command] if rng.random() < 0.9 else NAMES)]

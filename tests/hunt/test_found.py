@@ -115,8 +115,8 @@ def _instead_of_design(put: Callable[[Path], None]) -> Callable[[Path], None]:
     return change
 
 
-READ = ["check", "--no-pilot", "design.toml"]
-STUDY = ["check", "--no-pilot", "study.toml"]
+READ = ["check", "design.toml"]
+STUDY = ["check", "study.toml"]
 MESH = 'mesh = "box.stl"'
 # What is done to the files, the command, and what it says; None where it works.
 FOUND: dict[str, tuple[Callable[[Path], None], list[str], str | None]] = {

@@ -134,7 +134,7 @@ def write_wrong_files(rng: random.Random, folder: Path, base: Path) -> list[str]
     else:
         path.write_text(_altered_values(rng, texts[target]))
     opened = rng.choice((target, target, "study.toml"))
-    words = rng.choice((["check", "--no-pilot"], ["check", "--no-pilot", "--json"]))
+    words = rng.choice((["check"], ["check", "--json"]))
     if opened == "study.toml" and rng.random() < 0.2:
         words = ["sweep", "--grid", "0"]  # refused after the study was read, or before
     return [*words, opened]

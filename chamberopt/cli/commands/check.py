@@ -22,21 +22,22 @@ def check(
     file: Path,
     /,
     *,
-    pilot: bool = True,
+    pilot: bool = False,
     screenshot: Path | None = None,
     json: Json = False,
     out: Out = None,
 ) -> None:
     """Check a design or study file: geometry, volumes, shot, warnings, and the effects it needs.
 
-    Short pilot runs with each effect switched on and off show which effects matter.
+    Dimensionless groups say which effects may matter; pilot runs measure it.
 
     Parameters
     ----------
     file
         Design or study file (.toml).
     pilot
-        With --no-pilot nothing is simulated.
+        Simulate with each effect switched on and off, to measure what it changes. Each set of
+        effects must be compiled once, for up to a minute.
     screenshot
         Write an image (.png) of the part with its target and chamber, or of the surface's faults.
     """
@@ -58,6 +59,7 @@ def _check(file: Path, pilot: bool, screenshot: Path | None, json: bool, out: Pa
     from chamberopt.geometry.mesh_io.surface_error import SurfaceError
     from chamberopt.optimize.study import Study, load
     from chamberopt.output.vtp_files import write_chamber
+    from chamberopt.simulation.effect_pilot import groups
 
     loaded = load(file)
     kind, design = ("study", loaded.design) if isinstance(loaded, Study) else ("design", loaded)
@@ -83,10 +85,9 @@ def _check(file: Path, pilot: bool, screenshot: Path | None, json: bool, out: Pa
         facts["folder"] = str(out)
     if not json:
         show([f"{file}: a usable {kind}", *table_lines(facts)])
-    if pilot:
-        facts["effects"] = advise_effects(design, chamber)
-        if not json:
-            show(f"effect: {one['said']}" for one in facts["effects"])
+    facts["effects"] = advise_effects(design, chamber) if pilot else groups(design, chamber)
+    if not json:
+        show(f"effect: {one['said']}" for one in facts["effects"])
     if out is not None:
         write_text(out / "check.json", json_format.dumps(facts, indent=2) + "\n")
         write_chamber(out, chamber)

@@ -204,7 +204,7 @@ def in_a_shell(*arguments: object) -> subprocess.CompletedProcess[str]:
 @pytest.mark.parametrize("wrong", WRONG, ids=lambda wrong: wrong.name)
 def test_wrong_files(wrong: Wrong, copies: Path, chamberopt: Said) -> None:
     path = spoil(wrong, copies)
-    status, out, err = chamberopt("check", "--no-pilot", path)
+    status, out, err = chamberopt("check", path)
     assert (status, out) == (2, "")
     assert err.startswith(str(path.parent)[: len(str(copies))])  # the message begins with the file
     assert path.name in err.splitlines()[0]
@@ -284,7 +284,7 @@ class TestWrongCalls:
     def test_damaged_mesh(self, copies: Path, chamberopt: Said) -> None:
         mesh = copies / "designs" / "parts" / "gear.stl"
         mesh.write_bytes(mesh.read_bytes()[:5000])
-        status, _, err = chamberopt("check", "--no-pilot", copies / "designs" / "gear.toml")
+        status, _, err = chamberopt("check", copies / "designs" / "gear.toml")
         assert status == 2
         assert str(mesh) in err
 
@@ -295,7 +295,7 @@ class TestWrongCalls:
             raise KeyboardInterrupt
 
         monkeypatch.setattr("chamberopt.chamber.build.build_chamber", ctrl_c)
-        status, _, err = chamberopt("check", "--no-pilot", copies / "designs" / "gear.toml")
+        status, _, err = chamberopt("check", copies / "designs" / "gear.toml")
         assert (status, "interrupted" in err) == (130, True)
 
 
@@ -304,14 +304,13 @@ class TestCheck:
         "name", ["designs/gear", "designs/plate", "designs/blade", "studies/gear"]
     )
     def test_shipped(self, name: str, chamberopt: Said) -> None:
-        status, out, err = chamberopt("check", "--no-pilot", ROOT / f"{name}.toml")
+        status, out, err = chamberopt("check", ROOT / f"{name}.toml")
         assert (status, err) == (0, "")
         assert "shot.balls" in out
+        assert "effect: gravity is on: g H / V² = " in out
 
     def test_plate_has_the_papers_thirty_balls(self, chamberopt: Said) -> None:
-        status, out, _ = chamberopt(
-            "check", "--no-pilot", ROOT / "designs" / "plate.toml", "--json"
-        )
+        status, out, _ = chamberopt("check", ROOT / "designs" / "plate.toml", "--json")
         facts = json.loads(out)
         assert status == 0
         assert facts["shot"]["balls"] == 30
@@ -326,7 +325,7 @@ class TestCheck:
         path = copies / "designs" / "gear.toml"
         text = path.read_text(encoding="utf-8").replace("mass_g = 5", "mass_g = 240")
         path.write_text(text.replace("height_mm = 45", "height_mm = 26"), encoding="utf-8")
-        status, out, _ = chamberopt("check", "--no-pilot", path, "--json")
+        status, out, _ = chamberopt("check", path, "--json")
         warnings = json.loads(out)["warnings"]
         assert status == 0
         assert any("hinder each other" in text for text in warnings)
@@ -341,7 +340,7 @@ class TestCheck:
         path.write_text(
             path.read_text(encoding="utf-8").replace('unit = "mm"', ""), encoding="utf-8"
         )
-        status, out, _ = chamberopt("check", "--no-pilot", path)
+        status, out, _ = chamberopt("check", path)
         assert status == 0
         assert "unit guessed as 'mm' (by its size): the part measures 44 x 44 x 70 mm" in out
 
@@ -363,7 +362,7 @@ class TestCheck:
             content = mesh.read_bytes()  # without its last 100 triangles
             mesh.write_bytes(content[:80] + (9820).to_bytes(4, "little") + content[84:-5000])
         status, out, err = chamberopt(
-            "check", "--no-pilot", copies / "designs" / "gear.toml", "--screenshot", "look.png"
+            "check", copies / "designs" / "gear.toml", "--screenshot", "look.png"
         )
         [(title, marked, edges, missed)] = drawn
         assert "picture in look.png" in err
@@ -379,9 +378,7 @@ class TestCheck:
 
     def test_out(self, tmp_path: Path, chamberopt: Said) -> None:
         out = tmp_path / "out"
-        status, said, _ = chamberopt(
-            "check", "--no-pilot", ROOT / "designs" / "gear.toml", "--out", out
-        )
+        status, said, _ = chamberopt("check", ROOT / "designs" / "gear.toml", "--out", out)
         assert status == 0
         assert str(out) in said
         assert json.loads((out / "check.json").read_text(encoding="utf-8"))["shot"]["balls"] == 363
@@ -553,7 +550,7 @@ class TestWhole:
         assert (status, result["folder"]) == (0, str(Path("results/small")))
         assert result["study"]["evaluations"] == 3
         best = Path("results/small/best.toml")
-        status, out, _ = chamberopt("check", "--no-pilot", best, "--json")
+        status, out, _ = chamberopt("check", best, "--json")
         assert status == 0
         assert 2 <= json.loads(out)["shot"]["mass_g"] <= 5.1
         status, again, err = chamberopt(

@@ -66,7 +66,7 @@ def said_of(folder: Path, *changes: tuple[str, str], file: str = "pyramid.py") -
     (folder / file).write_text(text, encoding="utf-8")
     with pytest.raises(InputError) as refused:
         build_chamber(load_design(folder / "d.toml"))
-    assert main(["check", "--no-pilot", str(folder / "d.toml")]) == 2
+    assert main(["check", str(folder / "d.toml")]) == 2
     return str(refused.value)
 
 
