@@ -8,7 +8,6 @@ triangle.
 """
 
 import math
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +16,7 @@ from sim_core.errors import SceneError
 from sim_core.geometry.bvh import STACK, Tree, build_tree
 from sim_core.geometry.mesh import TriangleMesh
 from sim_core.geometry.obstacles import FACE, ObstacleTable
+from sim_core.numerics.computed_once import computed_once
 from sim_core.numerics.jit import jit
 from sim_core.numerics.simd import BOXES
 from sim_core.numerics.vec3 import Vec3, add_scaled, dot, sub
@@ -59,7 +59,7 @@ def closest_points(
     return found._replace(point=found.point + middle)
 
 
-@lru_cache(maxsize=8)
+@computed_once(8)
 def _tree_of(mesh: TriangleMesh, tag: int | None) -> Tree:
     """A tree of the triangles themselves: their nine numbers are their corners."""
     own = np.flatnonzero((mesh.tags == tag) | (tag is None)).astype(np.int32)

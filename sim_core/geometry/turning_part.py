@@ -1,7 +1,6 @@
 """The obstacles of a part that turns, in a tree of their own, and whether it can turn."""
 
 import math
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +10,7 @@ from sim_core.errors import SceneError
 from sim_core.geometry.bvh import Tree, build_tree
 from sim_core.geometry.mesh import TriangleMesh, connected_components, edge_partners
 from sim_core.geometry.obstacles import ObstacleTable
+from sim_core.numerics.computed_once import computed_once
 from sim_core.numerics.jit import jit
 from sim_core.numerics.vec3 import Vec3, add_scaled, dot, sub
 
@@ -53,7 +53,7 @@ def part_rows(
     return np.asarray(sides[:, 0])
 
 
-@lru_cache(maxsize=32)  # called at every replica's start
+@computed_once(32)  # called at every replica's start
 def require_free_axis(mesh: TriangleMesh, axis: RotationAxis, radius: float) -> None:
     """Raise SceneError if the part cannot turn in its chamber, for balls of this radius [m].
 

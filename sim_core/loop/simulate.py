@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
@@ -33,6 +32,7 @@ from sim_core.loop.jam_message import jam_message
 from sim_core.loop.neighbours import NeighbourFilter, new_neighbour_filter
 from sim_core.loop.state import Clock, SimulationState
 from sim_core.motion import WINDOW
+from sim_core.numerics.computed_once import computed_once
 from sim_core.scene.invariants import beneath_mean_plane, contained, narrowest_gap, turned_corners
 from sim_core.scene.scene import TOUCH, Scene
 
@@ -111,7 +111,7 @@ def _checked_frames(frames: Sequence[float] | np.ndarray, scene: Scene) -> np.nd
     return scene.warmup + times
 
 
-_obstacle_set = lru_cache(maxsize=8)(build_obstacle_set)  # replicas of one chamber share it
+_obstacle_set = computed_once(8)(build_obstacle_set)  # replicas of one chamber share it
 
 
 class Simulation:

@@ -5,7 +5,6 @@ energy and momentum by their sums.
 """
 
 import math
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +20,7 @@ from sim_core.effects.part_rotation import (
 )
 from sim_core.effects.vibration import Vibration
 from sim_core.geometry.mesh import TriangleMesh
+from sim_core.numerics.computed_once import computed_once
 from sim_core.numerics.jit import jit
 from sim_core.numerics.vec3 import Vec3, cross, dot, sub
 
@@ -41,7 +41,7 @@ class _Projection(NamedTuple):
     border: float  # a doubled area smaller than this is undecided [m²]
 
 
-@lru_cache(maxsize=32)
+@computed_once(32)
 def _projection(mesh: TriangleMesh, k: int) -> _Projection:
     return _project(mesh.corners, mesh, k)
 

@@ -1,7 +1,6 @@
 """Everything a simulation needs, checked once."""
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
@@ -18,6 +17,7 @@ from sim_core.errors import SceneError
 from sim_core.geometry.analytic import AnalyticCavity
 from sim_core.geometry.mesh import TriangleMesh, connected_components, normals_towards_shot
 from sim_core.geometry.turning_part import require_free_axis
+from sim_core.numerics.computed_once import computed_once
 from sim_core.scene.analytic_scene import require_clear, require_supported
 from sim_core.scene.invariants import (
     beneath_mean_plane,
@@ -226,7 +226,7 @@ def require_free_rotation(mesh: TriangleMesh, turn: PartRotation, diameter: floa
     require_free_axis(mesh, axis, 0.5 * diameter)
 
 
-@lru_cache(maxsize=32)  # replicas of one chamber share the answer
+@computed_once(32)  # replicas of one chamber share the answer
 def _inside_out(mesh: TriangleMesh) -> int:
     """A triangle whose own closed shell is wound the wrong way round; -1 if there is none.
 

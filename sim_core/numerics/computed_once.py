@@ -1,0 +1,29 @@
+"""Results that threads share: the first that asks computes, the others wait for it.
+
+`functools.lru_cache` alone lets all threads that ask at once compute the same: the replicas of a
+chamber would build its search tree once each.
+"""
+
+from collections.abc import Callable
+from functools import lru_cache, wraps
+from threading import RLock
+from typing import ParamSpec, TypeVar
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def computed_once(maxsize: int) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Keep the results of the last calls, as `functools.lru_cache` does, one call at a time."""
+
+    def decorate(function: Callable[P, R]) -> Callable[P, R]:
+        cached, lock = lru_cache(maxsize=maxsize)(function), RLock()
+
+        @wraps(function)
+        def locked(*args: P.args, **kwargs: P.kwargs) -> R:
+            with lock:
+                return cached(*args, **kwargs)  # type: ignore[arg-type]  # lists raise TypeError
+
+        return locked
+
+    return decorate
