@@ -120,6 +120,7 @@ class CandidateEvaluator:
             score=goals[0].value - unit * penalty,
             feasible=not violations,
             reason="; ".join(violations),
+            replicas=evaluation.replicas,
         )
         return trial, evaluation
 

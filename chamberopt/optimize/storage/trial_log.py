@@ -35,6 +35,7 @@ class Trial:
     score: float  # what the search maximises: the first objective less penalties
     feasible: bool
     reason: str  # why the candidate is not feasible, else ""
+    replicas: int | None = None  # that were simulated; None when the evaluation failed
 
     @property
     def objective(self) -> Estimate | None:
@@ -52,7 +53,7 @@ class Trial:
             "parameters": self.parameters,
             "objective": interval["value"],
             "half_width": interval["half_width"],
-            "replicas": len(objective.pseudovalues) if objective else None,
+            "replicas": self.replicas,
             # Pseudo-values tell a model of the search how uncertain each score is.
             "goals": [one.to_json() for one in self.goals],
             "penalty": self.penalty,
@@ -78,6 +79,7 @@ class Trial:
             score=float(row["score"]),
             feasible=bool(row["feasible"]),
             reason=str(row["reason"]),
+            replicas=None if row["replicas"] is None else int(row["replicas"]),
         )
 
 

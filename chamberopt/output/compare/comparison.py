@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -115,7 +116,11 @@ def part_unit(result: Result) -> str:
 def _difference(name: str, first: Result, other: Result, confidence: float) -> Difference:
     of_goal = name == first.objective_name
     after, before = (one.objective if of_goal else one.metrics[name] for one in (other, first))
-    return difference(after, before, other.seeds == first.seeds, confidence)
+    found = difference(after, before, other.seeds == first.seeds, confidence)
+    if found.time_ratio is None:
+        return found
+    # An estimate knows batches of replicas, not how many replicas there were.
+    return replace(found, replicas=math.ceil(found.time_ratio * other.data["replicas"]))
 
 
 def labels(paths: Sequence[Path]) -> tuple[str, ...]:
