@@ -34,7 +34,7 @@ RESUMES = ("run", "sweep")
 # Times and dates, or a budget of time, are in these: they are whole, but not the same each time.
 TIMED = ("result.json", "timings.jsonl", "history.csv", "compare.json", "accuracy.json",
          "accuracy.csv", "accuracy.png")  # fmt: skip
-WITH_TIMES = ("created", "timings_s", "seconds")
+WITH_TIMES = ("created", "timings_s", "seconds", "sha256")
 
 
 @pytest.fixture(scope="module")

@@ -243,6 +243,8 @@ def _read_data(file: Path) -> dict[str, Any]:
         except ValidationError as error:
             where, why = error.errors()[0]["loc"], error.errors()[0]["msg"]
             raise ValueError(f"{'.'.join(map(str, where))}: {why}") from None
+        if data.get("sha256") != content_sha256(data):
+            raise InputError(f"{file}: not as it was written: its sha256 is another; {RESTORE}")
         return data
     made_by = data.get("versions", {}).get("chamberopt", "an unknown version")
     newer = isinstance(found, int) and found > FORMAT
@@ -251,6 +253,12 @@ def _read_data(file: Path) -> dict[str, Any]:
         f"{file}: in format {found!r}, expected {FORMAT}: written by chamberopt {made_by}, another "
         f"version than this; {remedy}"
     )
+
+
+def content_sha256(data: Mapping[str, Any]) -> str:
+    """sha256 of the content of a result.json but for its own key, in whatever order it stands."""
+    rest = {name: value for name, value in data.items() if name != "sha256"}
+    return hashlib.sha256(json.dumps(rest, sort_keys=True).encode()).hexdigest()
 
 
 def _read_estimate(data: dict[str, Any]) -> Estimate:

@@ -18,7 +18,7 @@ from chamberopt.optimize import pareto
 from chamberopt.optimize.storage.study_folder import RESULT
 from chamberopt.optimize.storage.trial_log import read_trials, trials_as_csv
 from chamberopt.output.results.chamber_file import CHAMBER_FILE
-from chamberopt.output.results.load import FORMAT, file_sha256
+from chamberopt.output.results.load import FORMAT, content_sha256, file_sha256
 from chamberopt.output.vtp_files import write_chamber, write_coverage
 from chamberopt.simulation.complete_result import CandidateResult
 
@@ -106,6 +106,7 @@ def write_result(
     if warned is not None:
         data = {**data, "warnings": list(warned)}
     data = {**data, "files": data_digests(folder)}
+    data["sha256"] = content_sha256(data)
     write_text(folder / RESULT, json.dumps(data, indent=2, allow_nan=False) + "\n")
 
 

@@ -39,6 +39,7 @@ from chamberopt.output.results.load import load_result
 from chamberopt.output.save_run import save_simulation, save_study
 from chamberopt.output.vtp_files import read_surface
 from chamberopt.simulation.evaluate import evaluate
+from tests.helpers.results.digests import replace_result
 from tests.helpers.studies import run_in_folder
 from tests.helpers.synthetic import DESIGNS, plate_design, poisson_evaluation
 
@@ -258,7 +259,7 @@ def altered(folder: Path, copy: Path, change: Callable[[dict], None]) -> Path:
     shutil.copytree(folder, copy)
     data = json.loads((copy / "result.json").read_text(encoding="utf-8"))
     change(data)
-    (copy / "result.json").write_text(json.dumps(data), encoding="utf-8")
+    replace_result(copy, data)
     return copy
 
 

@@ -19,6 +19,7 @@ from chamberopt.output.report.part3d import part_scene
 from chamberopt.output.results.load import load_result
 from chamberopt.output.viewer.drawn_part import DrawnPart
 from chamberopt.output.vtp_files import read_surface
+from tests.helpers.results.digests import replace_result
 from tests.helpers.results.report_folders import simulated, studied
 
 NASTY = "a <img src=x onerror=alert(1)> & b"
@@ -84,7 +85,7 @@ def changed(folder: Path, copy: Path, change) -> Path:
     shutil.copytree(folder, copy)
     data = json.loads((copy / "result.json").read_text())
     change(data)
-    (copy / "result.json").write_text(json.dumps(data))
+    replace_result(copy, data)
     return copy
 
 
@@ -128,10 +129,10 @@ def test_no_gain_is_reported_as_none(study: Path, tmp_path: Path) -> None:
     shutil.copytree(study, folder)
     best = json.loads((folder / "result.json").read_text())
     best["study"]["best"] = {"searched_as": 0, "parameters": best["study"]["start"]["parameters"]}
-    (folder / "result.json").write_text(json.dumps(best))
+    replace_result(folder, best)
     start = json.loads((folder / "start" / "result.json").read_text())
     same = {name: best[name] for name in ("objective", "metrics")}
-    (folder / "start" / "result.json").write_text(json.dumps(start | same))
+    replace_result(folder / "start", start | same)
     contents = report_contents(folder)
     assert "No better chamber than the start was found" in contents["answer"]
     assert not contents["metrics"][0]["real"]

@@ -10,6 +10,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.output import viewer
 from chamberopt.output.results.load import load_result
 from chamberopt.output.save_run import save_simulation
+from tests.helpers.results.digests import replace_result
 from tests.helpers.synthetic import plate_design, poisson_evaluation
 
 DESIGN = plate_design()
@@ -24,16 +25,16 @@ def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     )
 
 
-def wrong_figures(text: str) -> list[str]:
+def wrong_figures(text: str) -> list[dict]:
     """Well-formed variants of result.json whose objective is no number or that lack a metric."""
     wrong = []
     for value in ("x", None, float("nan"), []):
         data = json.loads(text)
         data["objective"]["value"] = value
-        wrong.append(json.dumps(data))
+        wrong.append(data)
     data = json.loads(text)
     del data["metrics"]["std_coverage"]
-    return [*wrong, json.dumps(data)]
+    return [*wrong, data]
 
 
 @pytest.mark.usefixtures("no_pictures")
@@ -42,7 +43,7 @@ def test_a_result_can_be_looked_at_without_the_parts_file(tmp_path: Path) -> Non
     save_simulation(folder, DESIGN, CHAMBER, EVALUATION)
     data = json.loads((folder / "result.json").read_text())
     data["design"]["part"]["mesh"] = "gone.stl"
-    (folder / "result.json").write_text(json.dumps(data))
+    replace_result(folder, data)
     assert not load_result(folder).design.part.mesh_path.exists()
     assert load_result(folder).objective.value == EVALUATION.objective.value
 
@@ -57,14 +58,12 @@ def test_what_is_no_result_is_said(tmp_path: Path) -> None:
     folder = tmp_path / "plate"
     save_simulation(folder, DESIGN, CHAMBER, EVALUATION)
     text = (folder / "result.json").read_text()
-    for damaged in (
-        text[: len(text) // 2],
-        "[]",
-        "{}",
-        text.replace('"metrics"', '"metric"'),
-        *wrong_figures(text),
-    ):
+    for damaged in (text[: len(text) // 2], "[]", "{}", text.replace('"metrics"', '"metric"')):
         (folder / "result.json").write_text(damaged)
+        with pytest.raises(InputError, match=r"damaged|not as it was written"):
+            load_result(folder)
+    for wrong in wrong_figures(text):
+        replace_result(folder, wrong)
         with pytest.raises(InputError, match="damaged"):
             load_result(folder)
     (folder / "result.json").write_text(text.replace('"format": 3', '"format": 99'))
