@@ -75,6 +75,7 @@ if TYPE_CHECKING:
 # Of the sonotrode's peak speed: faster impacts, which balls would have to drive one another to,
 # leave dents as wide as this one on creases.
 MAX_SPEED = 4.0
+ENOUGH = 1.2  # times what the dents so far foretell, which scatter themselves
 
 
 @dataclass(frozen=True)
@@ -312,7 +313,7 @@ def resolution_notes(found: Resolution) -> tuple[str, ...]:
             "process.accuracy.simulated_time_s or replicas, or process.accuracy.gauge_mm2",
         )
     needs = [
-        f"{what} {needed:.0f} ({found.time_for(needed):.3g} s of simulation)"
+        f"{what} {needed:.3g} (about {ENOUGH * found.time_for(needed):.2g} s of all replicas)"
         for what, needed, there in (
             ("mean and standard deviation take", found.needed_for_mean, found.has_mean),
             ("5th percentile, times and intensity take", found.needed_for_places, found.has_places),

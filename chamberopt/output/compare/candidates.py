@@ -16,6 +16,7 @@ from chamberopt.common.progress import progress_bar
 from chamberopt.design.design import Design
 from chamberopt.design.load import load_design
 from chamberopt.output.compare.comparability import (
+    require_same_gauge,
     require_same_part,
     require_same_time,
     require_same_triangles,
@@ -90,6 +91,7 @@ def read_candidates(
         found = [_with_treatment_time(one, treatment_time_s) for one in found]
     designs = [one.design for one in found]
     require_same_time(files, designs)
+    require_same_gauge(files, designs)
     target: np.ndarray | None = None
     built = []
     for one, label in zip(found, labels([_named(file) for file in files]), strict=True):

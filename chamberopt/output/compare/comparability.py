@@ -43,6 +43,18 @@ def require_same_time(paths: Sequence[Path], designs: Sequence[Design]) -> None:
             )
 
 
+def require_same_gauge(paths: Sequence[Path], designs: Sequence[Design]) -> None:
+    """Raise InputError if coverage is looked at through windows of different areas."""
+    first = designs[0].process.accuracy.gauge_mm2
+    for path, design in zip(paths, designs, strict=True):
+        gauge = design.process.accuracy.gauge_mm2
+        if gauge != first:
+            raise InputError(
+                f"{path}: process.accuracy.gauge_mm2 is {gauge:g}, in {paths[0]} {first:g}: "
+                "figures of windows of different areas cannot be compared; simulate both with one"
+            )
+
+
 def require_same_part(
     paths: Sequence[Path], designs: Sequence[Design], meshes: Sequence[tuple[str, str]]
 ) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 from chamberopt.common.estimate import Estimate
 from chamberopt.design.shapes.base import is_custom
 from chamberopt.output.compare.comparability import (
+    require_same_gauge,
     require_same_part,
     require_same_time,
     require_several,
@@ -88,6 +89,7 @@ def comparison_of(results: Sequence[Result], names: Sequence[str]) -> Comparison
         folders, designs, [(result.part_sha256, part_unit(result)) for result in results]
     )
     require_same_time(folders, designs)
+    require_same_gauge(folders, designs)
     same_goal = all(result.objective_name == first.objective_name for result in results)
     metrics = (
         {first.objective_name: tuple(result.objective for result in results)} if same_goal else {}

@@ -223,7 +223,8 @@ def _coverage(contents: Contents, scenes: Mapping[str, PartScene]) -> str:
         ]
     caption = (
         "How much of the target's area has which coverage at the end of the treatment, "
-        "as the picture above shows it."
+        "as the picture above shows it. Both are of single windows, where counted dents scatter: "
+        "they look less even than the target is. The figures in the table are corrected for that."
     )
     shown = {name: (scene.coverage, scene.area) for name, scene in scenes.items()}
     pair = [html.chart("histogram", charts.histogram_chart(shown), caption)]

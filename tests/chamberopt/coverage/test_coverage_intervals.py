@@ -274,8 +274,8 @@ def test_too_few_dents_are_not_resolved_and_the_notes_say_what_would_do() -> Non
             assert (shown.half_width == np.inf) != is_known
     [note] = resolution_notes(few)
     assert "2.0 dents after 4 s" in note
-    assert "mean and standard deviation take 6 (12 s of simulation)" in note
-    assert "5th percentile, times and intensity take 25 (50 s of simulation)" in note
+    assert "mean and standard deviation take 6 (about 14 s of all replicas)" in note
+    assert "5th percentile, times and intensity take 25 (about 60 s of all replicas)" in note
     [note] = resolution_notes(some)
     assert "mean and standard deviation" not in note
     assert "process.accuracy.simulated_time_s" in note

@@ -245,3 +245,6 @@ def test_what_cannot_be_compared(tmp_path: Path) -> None:
     longer = left(tmp_path / "longer", 20, 0, plate_design(process__treatment_time_s=10))
     with pytest.raises(InputError, match=r"peened for 10 s.*for 5 s.*--treatment-time-s"):
         compare([one, longer])
+    wider = left(tmp_path / "wider", 20, 0, plate_design(process__accuracy__gauge_mm2=4))
+    with pytest.raises(InputError, match=r"gauge_mm2 is 4, in .* 1: .* different areas"):
+        compare([one, wider])
