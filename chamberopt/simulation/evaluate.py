@@ -39,7 +39,7 @@ from chamberopt.coverage.coverage_intervals import (
     Resolution,
     coverage_estimates,
     find_resolution,
-    time_to_98_estimate,
+    time_to_98,
 )
 from chamberopt.coverage.dents import dent_diameter
 from chamberopt.coverage.field.target_field import (
@@ -261,7 +261,10 @@ def window_estimates(
     found = coverage_estimates(
         batches, len(gauge.area), field.reachable, time_ratio, field.reachable_error
     )
-    found["time_to_98_s"] = time_to_98_estimate(found["p05_coverage"], process.treatment_time)
+    found["time_to_98_s"] = time_to_98(
+        found["p05_coverage"], batches, len(gauge.area), field.reachable, time_ratio,
+        process.treatment_time,
+    )  # fmt: skip
     return found, find_resolution(batches, gauge, time_ratio, process.recorded_time)
 
 
@@ -269,7 +272,8 @@ def as_resolved(name: str, value: Estimate, resolution: Resolution) -> Estimate:
     """The estimate of a metric, without an interval if there are too few dents for one."""
     metric = METRICS[name]
     enough = resolution.has_places if metric.of_places else resolution.has_mean
-    is_exact = metric.of_places and value.half_width == 0.0  # follows from places out of reach
+    # 0 follows from places out of reach.
+    is_exact = metric.of_places and value.value == value.half_width == 0.0
     has_interval = math.isfinite(value.half_width) or value.in_words != ""
     if metric.of_impacts is not None or is_exact or value.in_words == "never":
         return value

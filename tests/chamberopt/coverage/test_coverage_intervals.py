@@ -20,9 +20,11 @@ from chamberopt.coverage.coverage_intervals import (
     find_resolution,
     jackknife,
     mean_and_variance,
+    p05_estimate,
     products_without_each,
     root_of_variance,
     sum_dents,
+    time_to_98,
     time_to_98_estimate,
 )
 from chamberopt.coverage.field.target_field import Gauge
@@ -340,6 +342,21 @@ def test_time_to_98_by_avrami() -> None:
     assert wide.in_words == f"more than {soonest:,.0f} s"
     assert wide.half_width == np.inf
     assert time_to_98_estimate(Estimate(1.0, 0.0, (1.0,) * 3), TREATMENT).value < TREATMENT
+
+
+def test_the_time_does_not_depend_on_how_long_the_treatment_is() -> None:
+    """After hours of peening the coverage is 1 to the last digit; the time is what it was."""
+    batches = poisson_batches(np.random.default_rng(3), FIELDS["even"], 100.0)
+    found = []
+    for times_as_long in (1.0, 30.0, 1e5):
+        ratio = times_as_long * REPLICAS
+        p05 = p05_estimate(batches, WINDOWS, 1.0, ratio)
+        found.append(time_to_98(p05, batches, WINDOWS, 1.0, ratio, times_as_long * TREATMENT))
+    first = found[0]
+    assert p05.value == 1.0
+    for one in found:
+        assert one.value == pytest.approx(first.value, rel=0.05)
+        assert one.half_width == pytest.approx(first.half_width, rel=0.5)
 
 
 def test_batches_of_unequal_sizes_have_intervals_like_equal_ones() -> None:
