@@ -12,8 +12,8 @@ from tests.hunt.toml_files import odd_value
 
 LOOK = (
     ["report", "{}"], ["report", "{}", "--json"], ["compare", "result", "{}"],
-    ["compare", "{}", "result"], ["export", "{}", "--to", "vtk"],
-    ["export", "{}", "--to", "csv"], ["export", "study", "--to", "study"],
+    ["compare", "{}", "result"], ["export", "{}", "--to", "fields-vtp"],
+    ["export", "{}", "--to", "chamber-stl"], ["export", "study", "--to", "study-csv"],
     ["inspect", "{}", "--html", "page.html"],
 )  # fmt: skip
 RESUME = ["run", "study.toml", "--out", "study"]
