@@ -49,7 +49,8 @@ class DaskExecutor(Executor):
         except ImportError:
             text = "needs Dask, which is not installed; pip install 'chamberopt[dask]'"
             raise InputError(f"--cluster: {text}") from None
-        for name in ("distributed", "distributed.client", "tornado", "asyncio"):
+        quiet = "distributed", "distributed.client", "tornado", "tornado.application", "asyncio"
+        for name in quiet:
             logging.getLogger(name).setLevel(logging.CRITICAL)  # an error here has one message
         address = _scheduler_address(cluster)
         try:

@@ -16,6 +16,7 @@ from chamberopt.cli import main
 from chamberopt.output import viewer
 from chamberopt.output.compare import comparison_folder
 from tests.helpers.opengl import needs_opengl
+from tests.helpers.results.digests import replace_result
 from tests.helpers.results.report_folders import studied
 from tests.helpers.synthetic import DESIGNS
 
@@ -165,10 +166,9 @@ def test_a_shape_that_a_result_names_is_never_run(
     own = copied.parent / "own.py"
     for path in (own, copied / "own.py", tmp_path / "own.py"):
         path.write_text(HOSTILE, encoding="utf-8")
-    file = copied / "result.json"
-    data = json.loads(file.read_text(encoding="utf-8"))
+    data = json.loads((copied / "result.json").read_text(encoding="utf-8"))
     data["design"]["chamber"]["shape"] = shape.replace("/absolute", str(copied.parent))
-    file.write_text(json.dumps(data), encoding="utf-8")
+    replace_result(copied, data)
     monkeypatch.chdir(copied.parent)
     sys.addaudithook(watch)
     try:
