@@ -264,29 +264,29 @@ def p05_estimate(
         reachable: share of the target that a ball can touch.
         time_ratio: treatment time over the simulated time of one replica.
     """
-    sums, weight = sum_dents(batches_of_dents, points), _weight_of_dents(batches_of_dents)
-    batches = len(sums.replicas)
-    share = (P05 - (1.0 - reachable)) / reachable
+    batches, share = len(batches_of_dents), (P05 - (1.0 - reachable)) / reachable
     if share <= 0.0:
         return Estimate(0.0, 0.0 if batches > 1 else math.inf, (0.0,) * batches)
+    sums, weight = sum_dents(batches_of_dents, points), _weight_of_dents(batches_of_dents)
 
     def roots_of(some: np.ndarray | slice) -> DensityRoots:
         return _density_roots(sums.share[some], sums.replicas[some], share)
 
-    def coverage_of(some: np.ndarray | slice) -> float:
-        return -math.expm1(-roots_of(some).low_density() * time_ratio)
+    def coverage_of(roots: DensityRoots, more: float = 0.0) -> float:
+        return -math.expm1(-roots.low_density(more) * time_ratio)
 
-    whole = coverage_of(slice(None))
+    all_of_them = roots_of(slice(None))
+    whole = coverage_of(all_of_them)
     if batches == 1:
         return estimate([whole], 0.0, 1.0)
     rng, value = np.random.default_rng(0), whole
     if (half := max(batches // 2, 2)) < batches:  # a single batch does not show its variance
-        of_halves = [coverage_of(rng.permutation(batches)[:half]) for _ in range(SPLITS)]
+        of_halves = [coverage_of(roots_of(rng.permutation(batches)[:half])) for _ in range(SPLITS)]
         # The error that is left goes with one over the number of dents.
         step = (whole - float(np.mean(of_halves))) / (batches / half - 1.0)
         value = min(max(whole + step, 0.0), 1.0)
     rests = [roots_of(rest) for rest in ~np.eye(batches, dtype=bool)]
-    without = [-math.expm1(-rest.low_density() * time_ratio) for rest in rests]
+    without = [coverage_of(rest) for rest in rests]
     deviations = jackknife(np.array([whole, *without])) - whole
     of_some = -np.expm1(
         [
@@ -302,10 +302,9 @@ def p05_estimate(
     found = estimate(value + deviations, 0.0, 1.0, bias=bias, sampling=sampling_error(of_some))
     # Where counting seems to explain all of the variance, the roots are drawn to one value, which
     # hardly moves from replica to replica. There may be more variance, by its own interval.
-    all_of_them = roots_of(slice(None))
     variances = np.array([one.over_target - one.counting for one in (all_of_them, *rests)])
     reach = estimate(jackknife(variances)).half_width
-    lowest = -math.expm1(-all_of_them.low_density(reach) * time_ratio)
+    lowest = coverage_of(all_of_them, reach)
     return replace(found, half_width=max(found.half_width, bias + whole - lowest))
 
 

@@ -139,9 +139,7 @@ def _beneath(
     for e, moving in zip(beside.edge.tolist(), beside.face.tolist(), strict=True):
         here, ends = e // 3, corners[e // 3, [e % 3, (e % 3 + 1) % 3]]
         along, down = ends[1] - ends[0], -normals[moving] * surface.amplitude[moving]
-        straight = np.cross(
-            normals[here], along
-        )  # away from the triangle, which is wound clockwise
+        straight = np.cross(normals[here], along)  # away from the triangle: it is wound clockwise
         straight *= down @ down / (straight @ down)
         drops = []
         for last in (0, 1):
