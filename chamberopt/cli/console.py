@@ -108,9 +108,17 @@ def estimate_line(name: str, estimate: Estimate) -> str:
 
 
 def evaluation_lines(evaluation: Evaluation) -> list[str]:
-    """Objective and metrics, one line each, with their 95 % intervals."""
+    """Objective and metrics, one line each, with their 95 % intervals; last the gauge."""
+    from chamberopt.common.number_text import plain
+
     rows = {evaluation.objective_name: evaluation.objective, **evaluation.metrics}
-    return [estimate_line(name, estimate) for name, estimate in rows.items()]
+    lines = [estimate_line(name, estimate) for name, estimate in rows.items()]
+    found = evaluation.resolution
+    return [
+        *lines,
+        f"{'gauge_mm2':34}{plain(evaluation.gauge_mm2)}: area of the windows; the median window "
+        f"has {plain(found.dents, 2)} dents",
+    ]
 
 
 def note_lines(notes: Iterable[str]) -> list[str]:

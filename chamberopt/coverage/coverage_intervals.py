@@ -51,6 +51,7 @@ from chamberopt.coverage.metrics import FULL_COVERAGE, NEVER, P05
 # but LEAST_RESOLVED of them, and dents in the median window for the figures of single places.
 DENTS_FOR_MEAN, DENTS_FOR_PLACES = 3.0, 25.0
 LEAST_RESOLVED = 0.05
+ENOUGH = 1.2  # times what the dents so far foretell, which scatter themselves
 SPLITS = 6  # of the replicas into halves
 NOT_ONE = 3.0  # expected dents of which with a probability of 5 % there is not one
 NOT_RESOLVED = "not resolved"
@@ -75,8 +76,8 @@ class Resolution:
         return self.dents >= self.needed_for_places
 
     def time_for(self, needed: float) -> float:
-        """Simulated time [s] in which that many dents fall into the median window."""
-        return self.simulated_time * needed / self.dents if self.dents else math.inf
+        """Simulated time [s] in which that many dents fall into the median window, with a margin."""
+        return ENOUGH * self.simulated_time * needed / self.dents if self.dents else math.inf
 
 
 class DentSums(NamedTuple):

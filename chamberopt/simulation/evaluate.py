@@ -75,7 +75,6 @@ if TYPE_CHECKING:
 # Of the sonotrode's peak speed: faster impacts, which balls would have to drive one another to,
 # leave dents as wide as this one on creases.
 MAX_SPEED = 4.0
-ENOUGH = 1.2  # times what the dents so far foretell, which scatter themselves
 
 
 @dataclass(frozen=True)
@@ -151,6 +150,7 @@ def evaluate(
         objective=value,
         metrics=found.metrics,
         metrics_of_wide=found.metrics_of_wide,
+        gauge_mm2=accuracy.gauge_mm2,
         resolution=found.resolution,
         reachable=seen.field.reachable,
         crease_share=seen.crease_share,
@@ -317,7 +317,7 @@ def resolution_notes(found: Resolution) -> tuple[str, ...]:
             "process.accuracy.simulated_time_s or replicas, or process.accuracy.gauge_mm2",
         )
     needs = [
-        f"{what} {needed:.3g} (about {ENOUGH * found.time_for(needed):.2g} s of all replicas)"
+        f"{what} {needed:.3g} (about {found.time_for(needed):.2g} s of all replicas)"
         for what, needed, there in (
             ("mean and standard deviation take", found.needed_for_mean, found.has_mean),
             ("5th percentile, times and intensity take", found.needed_for_places, found.has_places),

@@ -23,6 +23,7 @@ class Evaluation:
     objective: Estimate  # the weighted sum of metrics that a study maximises
     metrics: dict[str, Estimate]  # estimate of each metric at the gauge, by its name
     metrics_of_wide: dict[str, Estimate]  # those of coverage in windows of twice the radius
+    gauge_mm2: float  # area of the windows in which coverage is measured
     resolution: Resolution
     reachable: float  # share of the target that a ball can touch
     crease_share: float  # share of the dented area that is on creases

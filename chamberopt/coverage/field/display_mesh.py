@@ -25,6 +25,7 @@ from chamberopt.coverage.field.windows import Places
 from chamberopt.geometry.triangles import area_vectors, sides_of, unit_vectors
 
 MIN_EDGE, MAX_EDGE = 0.5, 4.0  # diameters of the gauge
+FINEST = 0.2  # the same, at the border of what a ball can touch, which may be narrow stripes
 # An edge is split where coverage at its middle is off the mean of its ends by more than BEND, or
 # where its ends differ by more than STEP.
 BEND, STEP = 0.02, 0.05
@@ -101,15 +102,17 @@ def display_mesh(
         drawn = np.zeros(len(edges), dtype=bool)
         drawn[of_side[shown[mesh.part_triangle]]] = True
         asked = np.flatnonzero(
-            drawn & (length > MIN_EDGE * diameter) & ~np.isin(key, settled, assume_unique=True)
+            drawn & (length > FINEST * diameter) & ~np.isin(key, settled, assume_unique=True)
         )
         new, middle = np.arange(len(value), len(mesh.vertices)), _middles(mesh, edges[asked])
         read = coverage(_joined(mesh.places.select(new), middle.places))
         read = np.where(np.isfinite(read), read, -1.0)  # no value stands out from all values
         value = np.concatenate([value, read[: len(new)]])
         one, two = value[a[asked]], value[b[asked]]
-        bend = np.abs(read[len(new) :] - 0.5 * (one + two))
-        wanted = (bend > BEND) | (np.abs(one - two) > STEP)
+        mid = read[len(new) :]
+        wanted = (np.abs(mid - 0.5 * (one + two)) > BEND) | (np.abs(one - two) > STEP)
+        wanted &= length[asked] > MIN_EDGE * diameter
+        wanted |= ((one < 0.0) != (two < 0.0)) | ((one < 0.0) != (mid < 0.0))
         wanted |= length[asked] > MAX_EDGE * diameter
         settled = np.concatenate([settled, key[asked[~wanted]]])
         split = np.zeros(len(edges), dtype=bool)

@@ -166,15 +166,25 @@ def read_seconds(folder: Path) -> dict[int, float]:
 def trials_as_csv(rows: list[dict[str, Any]]) -> str:
     """The trial log as a table with a column for each parameter and metric.
 
-    NAME_pm is the half-width of NAME. A failed evaluation has no metrics.
+    NAME_pm is the half-width of NAME, empty where words such as "never" stand in the place of the
+    number. A failed evaluation has no metrics.
     """
     lines = []
     for row in rows:
         line = {key: row[key] for key in ("number", "stage")}
         line |= row["parameters"]
-        for key in ("objective", "half_width", "score", "feasible", "reason", "seconds"):
+        objective = row["goals"][0] if row["goals"] else {"value": None, "half_width": None}
+        line["objective"], line["half_width"] = _cells(objective)
+        for key in ("score", "feasible", "reason", "seconds"):
             line[key] = row[key]
         for name, metric in row["metrics"].items():
-            line |= {name: metric["value"], f"{name}_pm": metric["half_width"]}
+            line[name], line[f"{name}_pm"] = _cells(metric)
         lines.append(line)
     return csv_text(lines)
+
+
+def _cells(interval: Mapping[str, Any]) -> tuple[Any, Any]:
+    """Cells of an `Estimate.interval_json`: value and half-width, or words and nothing."""
+    if "in_words" in interval:
+        return interval["in_words"], None
+    return interval["value"], interval["half_width"]

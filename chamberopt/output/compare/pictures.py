@@ -26,11 +26,15 @@ def draw_distributions(path: Path, comparison: Comparison, found: Distributions)
     few = [
         label
         for label, result in zip(comparison.labels, comparison.results, strict=True)
-        if result.metrics["p05_coverage"].in_words
+        if not result.resolves_places
     ]
     if few:
-        title = f"few dents, whose random scatter widens the histogram: {', '.join(few)}"
-        coverage = replace(coverage, title=title)
+        shares = [
+            share if result.resolves_places else None
+            for share, result in zip(coverage.shares, comparison.results, strict=True)
+        ]
+        title = f"not drawn, too few dents: {', '.join(few)}"
+        coverage = replace(coverage, shares=shares, title=title)
     times = [result.metrics.get(TIME) for result in comparison.results]
     curves = [
         CoverageCurve(

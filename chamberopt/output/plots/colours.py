@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 # The palette of Okabe and Ito, which colour-blind readers can tell apart.
 BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#9aa3ab"
 PURPLE, SKY, YELLOW, BLACK = "#CC79A7", "#56B4E9", "#E69F00", "#000000"
@@ -15,9 +13,8 @@ DARK_GREY = "#555555"  # text and reference lines
 # in even steps, which colour-blind readers see too.
 COVERAGE_MAP, COUNT_MAP, WIDTH_MAP = "viridis", "cividis", "magma"
 DIFFERENCE_MAP = "PuOr"
-# On the target: where too few dents were simulated the map has this grey, by a share; and where no
-# ball can touch it.
-FEW_DENTS, MUTED, UNREACHED = "#868d94", 0.6, "#a9714f"
+# On the target: where too few dents were simulated, and where no ball can touch it.
+FEW_DENTS, UNREACHED = "#6c737a", "#a9714f"
 
 # Each compared result has a colour and a line style of its own.
 _COLOURS = (BLUE, ORANGE, GREEN, PURPLE, BLACK, YELLOW, SKY, GREY)
@@ -37,12 +34,3 @@ def hex_colours(colour_map: Any, count: int = 10) -> list[str]:
 
     drawn = colormaps[colour_map] if isinstance(colour_map, str) else colour_map
     return [to_hex(drawn(i / (count - 1))) for i in range(count)]
-
-
-def muted(colour_map: str) -> Any:
-    """A matplotlib colour map, greyed: for places with too few dents."""
-    from matplotlib import colormaps
-    from matplotlib.colors import ListedColormap, to_rgba
-
-    colours = colormaps[colour_map](range(256))
-    return ListedColormap((1.0 - MUTED) * colours + MUTED * np.array(to_rgba(FEW_DENTS)))

@@ -111,7 +111,9 @@ def accuracy_rows(result: Result, study: Mapping[str, Any] | None) -> dict[str, 
         "replicas, each with its own seed": f"{result.data['replicas']}",
         "number of replicas": STOP_REASONS.get(stop_reason, stop_reason),
         "dents in the median window": plain(field["dents_in_median_window"], 3),
-        "simulation that resolves every figure": f"{plain(needed, 2)} s" if needed else "",
+        "simulation that resolves every figure": f"{plain(needed, 2)} s of all replicas"
+        if needed and not result.resolves_places
+        else "",
     }
     if study and "accuracy" in study:
         search = study["accuracy"]["search"]

@@ -13,7 +13,7 @@ from typing import Any
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import claim_file, write_text
-from chamberopt.output.plots.colours import hex_colours, muted
+from chamberopt.output.plots.colours import hex_colours
 from chamberopt.output.report import html
 from chamberopt.output.report.part3d import PartScene, part_scene, quantities_in_all
 from chamberopt.output.report.report_data import START, read_design_file, report_contents
@@ -30,7 +30,7 @@ POLICY = (
 HELP = (
     "Drag to turn, use the wheel to zoom, point at the target to see its numbers there. "
     "Grey: not in the target. Brown: out of the reach of the shot. "
-    "Greyed colours: too few dents were simulated to tell."
+    "Dark grey: too few dents were simulated to tell."
 )
 SUBTITLES = {
     "study": "Report of a study: the best chamber found",
@@ -149,7 +149,7 @@ def viewer(scenes: Sequence[PartScene]) -> str:
         f"<option>{html.text(one['label'])}</option>" for one in quantities_in_all(drawn)
     )
     last = max(
-        max((time for time, _ in one["curve"]), default=3.0 * one["treatment"]) for one in drawn
+        time for one in drawn for time in (one["treatment"], *(row[0] for row in one["curve"]))
     )
     now = max(one["treatment"] for one in drawn)
     panels = ""
@@ -184,7 +184,7 @@ def write_page(path: Path, title: str, body: str, scenes: Sequence[PartScene]) -
     if drawn := [scene.data for scene in scenes if scene.data]:
         quantities = quantities_in_all(drawn)
         names = {one["colours"] for one in quantities}
-        colour_maps = {name: [hex_colours(name), hex_colours(muted(name))] for name in names}
+        colour_maps = {name: hex_colours(name) for name in names}
         content = {"quantities": quantities, "scenes": drawn, "scales": colour_maps}
         data = html.embedded_json(content, "parts")
     page = (

@@ -17,7 +17,7 @@ addEventListener("beforeprint", () => {
     for (const table of [scene.columns, scene.own])
       for (const name of Object.keys(table)) table[name] = new Float32Array(bytes(table[name]));
     for (const name of ["triangle", "number", "element", "impacts"]) scene[name] = new Int32Array(bytes(scene[name]));
-    const [part, few] = scene.figure; // few dents: the same points, in greyed colours
+    const [part, few] = scene.figure; // few dents: the same points, without colours
     for (const axis of ["x", "y", "z"]) few[axis] = part[axis];
   }
 
@@ -47,26 +47,25 @@ addEventListener("beforeprint", () => {
     return [low, chosen().unit === "%" ? Math.min(high, 100) : high];
   }
 
-  // Styles of the two traces of each scene: by many dents, and by few.
+  // Style of the coloured trace of each scene; arrays are in arrays, as restyle wants them.
   function colouring() {
     const all = scenes.map(values), [low, high] = range(all);
-    const steps = (colours) => colours.map((c, i) => [i / (colours.length - 1), c]);
-    const [clear, greyed] = scales[chosen().colours].map(steps);
+    const colours = scales[chosen().colours], colorscale = colours.map((c, i) => [i / (colours.length - 1), c]);
     const colorbar = { title: { text: chosen().title, side: "right" }, thickness: 16, len: 0.8, outlinewidth: 0 };
     return all.map((one) => {
       const intensity = one.map((x) => Number.isFinite(x) ? Math.min(Math.max(x, low), high) : low);
-      return { intensity: [intensity, intensity], cmin: low, cmax: high, colorscale: [clear, greyed],
-        showscale: [true, false], colorbar };
+      return { intensity: [intensity], cmin: low, cmax: high, colorscale: [colorscale], showscale: true, colorbar };
     });
   }
 
   function mean(scene) {
-    const curve = [[0, 0], ...scene.curve], at = seconds();
+    const curve = [[0, 0, 0], ...scene.curve], at = seconds();
     const next = curve.findIndex(([time]) => time >= at);
     if (!scene.curve.length || next < 0) return "";
-    const [t1, c1] = curve[next], [t0, c0] = curve[Math.max(next - 1, 0)];
+    const [t1, c1, h1] = curve[next], [t0, c0, h0] = curve[Math.max(next - 1, 0)];
     const share = t1 > t0 ? (at - t0) / (t1 - t0) : 1;
-    return `${(100 * (c0 + share * (c1 - c0))).toFixed(1)} %`;
+    const [value, halfWidth] = [c0 + share * (c1 - c0), h0 + share * (h1 - h0)].map((x) => (100 * x).toFixed(1));
+    return `${value} ± ${halfWidth} %`;
   }
 
   function showTime() {
@@ -84,7 +83,7 @@ addEventListener("beforeprint", () => {
     waiting = true;
     requestAnimationFrame(() => {
       waiting = false;
-      colouring().forEach((style, i) => Plotly.restyle(plots[i], style, [0, 1]));
+      colouring().forEach((style, i) => Plotly.restyle(plots[i], style, [0]));
     });
   }
 
@@ -147,8 +146,7 @@ addEventListener("beforeprint", () => {
   const styles = colouring();
   const drawn = scenes.map((scene, i) => {
     const [part, few, ...others] = scene.figure, style = styles[i];
-    const coloured = [part, few].map((trace, k) => ({ ...trace, ...style,
-      intensity: style.intensity[k], colorscale: style.colorscale[k], showscale: style.showscale[k] }));
+    const coloured = [{ ...part, ...style, intensity: style.intensity[0], colorscale: style.colorscale[0] }, few];
     const config = { displaylogo: false, responsive: true, modeBarButtons: buttons };
     return Plotly.newPlot(plots[i], [...coloured, ...others], { ...layout, scene: scene.view }, config).then((plot) => {
       pickThePartOnly(plot);

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from chamberopt.design.shapes import TAG_PART, TAG_WALL, is_sonotrode
-from chamberopt.output.plots.colours import UNREACHED
+from chamberopt.output.plots.colours import FEW_DENTS, UNREACHED
 from chamberopt.output.plots.quantities import QUANTITIES
 from chamberopt.output.results.load import Result, load_cavity, load_field, load_part
 from chamberopt.output.viewer.drawn_part import DrawnPart, point_areas
@@ -37,13 +37,14 @@ class PartScene:
     Args:
         data: for part.js; None for a part that is too large.
         remarks: sentences on what is not shown.
-        coverage: at points of the target, 0..1, 0 out of reach, shape (k,).
+        coverage: at points of the target, 0..1, 0 out of reach, shape (k,); None where too few
+            dents were simulated to tell single places apart.
         area: that each point stands for [mm²], shape (k,).
     """
 
     data: dict[str, Any] | None
     remarks: tuple[str, ...]
-    coverage: np.ndarray
+    coverage: np.ndarray | None
     area: np.ndarray
 
 
@@ -61,7 +62,8 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
     part = DrawnPart(load_field(result, own))
     whole, target = part.whole, part.target
     reached = np.asarray(whole["reachable"]) > 0.5
-    coverage, area = np.where(reached, whole["coverage"], 0.0), point_areas(whole)
+    coverage = np.where(reached, whole["coverage"], 0.0) if result.resolves_places else None
+    area = point_areas(whole)
     remarks = []
     count = whole.n_cells
     too_many = f"triangles, more than the {max_triangles:,} that a page"
@@ -88,7 +90,7 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
         "title": title,
         "treatment": result.design.process.treatment_time,
         "curve": [
-            [row["time_s"], row["mean_coverage"]]
+            [row["time_s"], row["mean_coverage"], row["half_width"]]
             for row in result.data.get("coverage_against_time", [])
         ],
         "columns": {
@@ -138,7 +140,7 @@ def _traces(part: DrawnPart, rest: Surface | None, chamber: Any, eye: np.ndarray
     for name, cells in (("part", resolved), ("few", ~resolved)):
         mesh = target | {side: target[side][cells] for side in "ijk"}
         if name == "few":  # on the same points, which the page takes from the first
-            mesh = {side: mesh[side] for side in "ijk"}
+            mesh = {side: mesh[side] for side in "ijk"} | {"color": FEW_DENTS}
         traces.append(go.Mesh3d(name=name, **mesh, hoverinfo="none", **common))
     walls = {
         "sonotrode": (is_sonotrode(tags), SONOTRODE, 0.55 if eye is ABOVE else 0.08),

@@ -226,8 +226,13 @@ def _coverage(contents: Contents, scenes: Mapping[str, PartScene]) -> str:
         "as the picture above shows it. Both are of single windows, where counted dents scatter: "
         "they look less even than the target is. The figures in the table are corrected for that."
     )
-    shown = {name: (scene.coverage, scene.area) for name, scene in scenes.items()}
-    pair = [html.chart("histogram", charts.histogram_chart(shown), caption)]
+    shown = {
+        name: (scene.coverage, scene.area)
+        for name, scene in scenes.items()
+        if scene.coverage is not None
+    }
+    pair = [html.chart("histogram", charts.histogram_chart(shown), caption)] if shown else []
+    few = [name for name in scenes if name not in shown]
     if curves := {name: rows for name, rows in contents["coverage_against_time"].items() if rows}:
         treatment_time = contents["question"]["treatment_time_s"]
         svg = charts.coverage_over_time_chart(curves, treatment_time)
@@ -235,7 +240,13 @@ def _coverage(contents: Contents, scenes: Mapping[str, PartScene]) -> str:
         pair.append(html.chart("against-time", svg, caption))
     table = html.table("± 95 % intervals", head, rows)
     title = "Compared with the start" if has_start else "Coverage"
-    return html.section(title, table, _windows(contents), html.pair(*pair))
+    which = f" of the {' and the '.join(few)}" if has_start else ""
+    text = (
+        f"How much of the area has which coverage is not drawn{which}: too few dents were "
+        "simulated to tell single places apart."
+    )
+    remark = html.paragraph(text, "soft") if few else ""
+    return html.section(title, table, _windows(contents), html.pair(*pair), remark)
 
 
 def _windows(contents: Contents) -> str:

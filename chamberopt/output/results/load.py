@@ -18,7 +18,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.limits import MAX_RESULT_BYTES, read_limited
-from chamberopt.common.number_text import estimate_text
+from chamberopt.common.number_text import estimate_text, plain
 from chamberopt.coverage.metrics import METRICS
 from chamberopt.design.design import validate
 from chamberopt.design.load import Design
@@ -83,6 +83,18 @@ class Result:
     notes: tuple[str, ...]
     sha256: dict[str, str]
     data: dict[str, Any]
+
+    @property
+    def gauge_mm2(self) -> float:
+        """Area of the windows in which coverage is measured."""
+        return self.design.process.accuracy.gauge_mm2
+
+    @property
+    def resolves_places(self) -> bool:
+        """Whether the windows have the dents that figures of single places take."""
+        field = self.data["field"]
+        needed = field["dents_needed"]["p05_times_intensity"]
+        return bool(field["dents_in_median_window"] >= needed)
 
     def path(self, name: str) -> Path:
         """Path of a data file of the result; InputError unless it is the file that was written."""
@@ -208,7 +220,8 @@ def summary(evaluation: Evaluation | Result) -> str:
     mean, spread = (evaluation.metrics[name] for name in ("mean_coverage", "std_coverage"))
     name = evaluation.objective_name.replace("_", " ")
     shares = f"mean {estimate_text(mean, 100.0, '%')}   std {estimate_text(spread, 100.0, '%')}"
-    return f"{name} {estimate_text(evaluation.objective)}   {shares}"
+    windows = f"in windows of {plain(evaluation.gauge_mm2)} mm²"
+    return f"{name} {estimate_text(evaluation.objective)}   {shares}   {windows}"
 
 
 @contextmanager

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from chamberopt.design.shapes import TAG_WALL, is_sonotrode
-from chamberopt.output.plots.colours import FEW_DENTS, UNREACHED, muted
+from chamberopt.output.plots.colours import FEW_DENTS, UNREACHED
 from chamberopt.output.viewer.drawn_part import DrawnPart
 from chamberopt.output.viewer.view_state import DEFAULT_VIEW
 from chamberopt.output.vtp_files import Surface, pyvista
@@ -36,7 +36,8 @@ def draw_in_chamber(
     light(plotter)
     add_part(plotter, part, limits)
     add_chamber(plotter, chamber)
-    plotter.add_text(escape_dollars(title), position="upper_left", font_size=13, color=DARK)
+    text = plotter.add_text(escape_dollars(title), position="upper_left", font_size=13, color=DARK)
+    text.prop.background_color, text.prop.background_opacity = BACKGROUND, 0.7  # over a tall part
     legend = "orange: sonotrode   grey: not in the target"
     plotter.add_text(legend, position="lower_left", font_size=9, color=DARK)
     plotter.camera_position = [DEFAULT_VIEW, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
@@ -66,7 +67,7 @@ def draw_target(plotter: Any, part: DrawnPart, limits: tuple[float, float], bar:
 def without_colour(part: DrawnPart) -> list[tuple[str, str, str]]:
     """(colour, its name, meaning) of what tells no value on the target, where there is any."""
     entries = (
-        (not np.all(part.target["resolved"]), FEW_DENTS, "greyed", "too few dents simulated"),
+        (not np.all(part.target["resolved"]), FEW_DENTS, "dark grey", "too few dents simulated"),
         (part.unreached.n_cells > 0, UNREACHED, "brown", "out of the reach of the shot"),
     )
     return [(colour, name, meaning) for there, colour, name, meaning in entries if there]
@@ -75,9 +76,7 @@ def without_colour(part: DrawnPart) -> list[tuple[str, str, str]]:
 def add_part(
     plotter: Any, part: DrawnPart, limits: tuple[float, float], pale: np.ndarray | None = None
 ) -> list[Any]:
-    """Add the target, coloured by its quantity, and the rest of the part in grey, if any.
-
-    Colours are greyed where too few dents were simulated.
+    """Add the target, coloured by its quantity where that is resolved, and the rest of the part.
 
     Args:
         pale: triangles of `part.target`, bool, that are drawn pale instead.
@@ -86,22 +85,20 @@ def add_part(
         The actors; the mapper of the first has the colours.
     """
     pale = np.zeros(part.target.n_cells, dtype=bool) if pale is None else pale
-    resolved, colours = np.asarray(part.target["resolved"]), part.quantity.colours
+    resolved = np.asarray(part.target["resolved"])
     style = {"ambient": 0.7, "diffuse": 0.3, **NO_RENDER}
-    actors: list[Any] = []
-    for chosen, colour_map in ((resolved, colours), (~resolved, muted(colours))):
-        cells = np.flatnonzero(chosen & ~pale)
-        hidden = not len(cells) and not actors  # the colour bar needs an actor all the same
-        if len(cells) or hidden:
-            actor = plotter.add_mesh(
-                part.target.extract_cells(cells) if len(cells) else part.whole.extract_cells([0]),
-                scalars="shown" if len(cells) else np.zeros(3), cmap=colour_map, clim=limits,
-                nan_color=FEW_DENTS, show_scalar_bar=False, **style,
-            )  # fmt: skip
-            actor.visibility = bool(len(cells))
-            actors.append(actor)
+    coloured = np.flatnonzero(resolved & ~pale)
+    actors = [
+        plotter.add_mesh(
+            part.target.extract_cells(coloured) if len(coloured) else part.whole.extract_cells([0]),
+            scalars="shown" if len(coloured) else np.zeros(3), cmap=part.quantity.colours,
+            clim=limits, nan_color=FEW_DENTS, show_scalar_bar=False, **style,
+        )
+    ]  # fmt: skip
+    actors[0].visibility = bool(len(coloured))  # the colour bar needs an actor all the same
     for surface, colour in (
         (part.target.extract_cells(np.flatnonzero(pale)), PALE),
+        (part.target.extract_cells(np.flatnonzero(~resolved & ~pale)), FEW_DENTS),
         (part.unreached, UNREACHED),
         (part.rest, GREY),
     ):

@@ -468,7 +468,7 @@ def test_the_study_as_a_table(study: Path, chamberopt: Said) -> None:
         read["shot.mass_g"], [row["parameters"]["shot.mass_g"] for row in rows]
     )
     for name, metric in rows[0]["metrics"].items():
-        assert read[name][0] == metric["value"]
+        assert read[name][0] == metric.get("in_words", metric["value"])
         assert f"{name}_pm" in read.dtype.names
     assert (read["seconds"] > 0.0).all()
 
