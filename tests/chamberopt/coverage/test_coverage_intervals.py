@@ -14,6 +14,7 @@ from chamberopt.coverage.coverage_from_impacts import Batch, Footprints, in_batc
 from chamberopt.coverage.coverage_intervals import (
     DENTS_FOR_MEAN,
     DENTS_FOR_PLACES,
+    ENOUGH,
     NOT_RESOLVED,
     Resolution,
     coverage_estimates,
@@ -239,7 +240,7 @@ def test_what_is_needed_is_three_dents_for_each_unit_of_x() -> None:
     assert found.needed_for_places == DENTS_FOR_PLACES
     assert found.has_mean
     assert not found.has_places
-    assert found.time_for(25.0) == pytest.approx(2.5)
+    assert found.time_for(25.0) == pytest.approx(ENOUGH * 2.5)
     # In windows of four times the area there is four times as much of a unit.
     wide = find_resolution(batches, plane_gauge(4e-6), time_ratio=10.0, time=0.5)
     assert wide.needed_for_mean == pytest.approx(DENTS_FOR_MEAN * 0.5 / 4.0)
