@@ -76,7 +76,7 @@ class Resolution:
         return self.dents >= self.needed_for_places
 
     def time_for(self, needed: float) -> float:
-        """Simulated time [s] in which that many dents fall into the median window, with a margin."""
+        """Simulated time [s], with a margin, in which the median window gets so many dents."""
         return ENOUGH * self.simulated_time * needed / self.dents if self.dents else math.inf
 
 
