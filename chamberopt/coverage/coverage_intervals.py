@@ -180,29 +180,40 @@ def coverage_estimates(
         time_ratio: treatment time over the simulated time of one replica.
         reachable_error: standard error of `reachable`, by the choice of points.
     """
-    of_all, of_rest = multiply_dents(batches, points, [time_ratio, 2.0 * time_ratio])
-    mean, variance = mean_and_variance(np.vstack([of_all.mean(axis=0), of_rest]), reachable)
-    of_some = np.array([some.mean(axis=0) for some in sparse_points(of_all)])
-    means, variances = mean_and_variance(of_some, reachable)
-    # Both move with the reachable share too: by their differences from one standard error more.
-    more = mean_and_variance(of_all.mean(axis=0), reachable + reachable_error)
-    of_mean, of_variance = (
-        estimate(
-            jackknife(values),
-            0.0,
-            highest,
-            sampling=math.hypot(sampling_error(some), float(moved - values[0])),
-        )
-        for values, highest, some, moved in (
-            (mean, 1.0, means, more[0]),
-            (variance, 0.25, variances, more[1]),
-        )
-    )
+    products = multiply_dents(batches, points, [time_ratio, 2.0 * time_ratio])
+    mean, variance = mean_and_variance_estimates(products, reachable, reachable_error)
     return {
-        "mean_coverage": of_mean,
-        "std_coverage": root_of_variance(of_variance),
+        "mean_coverage": mean,
+        "std_coverage": root_of_variance(variance),
         "p05_coverage": p05_estimate(batches, points, reachable, time_ratio),
     }
+
+
+def mean_and_variance_estimates(
+    products: Products, reachable: float, reachable_error: float
+) -> tuple[Estimate, Estimate]:
+    """Mean and variance of coverage over the target.
+
+    Args:
+        products: of the time ratio and of twice that.
+        reachable, reachable_error: as for `coverage_estimates`.
+    """
+    of_all, of_rest = products
+    values = mean_and_variance(np.vstack([of_all.mean(axis=0), of_rest]), reachable)
+    of_some = np.array([some.mean(axis=0) for some in sparse_points(of_all)])
+    some = mean_and_variance(of_some, reachable)
+    # Both move with the reachable share too: by their differences from one standard error more.
+    more = mean_and_variance(of_all.mean(axis=0), reachable + reachable_error)
+    mean, variance = (
+        estimate(
+            jackknife(values[k]),
+            0.0,
+            highest,
+            sampling=math.hypot(sampling_error(some[k]), float(more[k] - values[k][0])),
+        )
+        for k, highest in enumerate((1.0, 0.25))
+    )
+    return mean, variance
 
 
 def products_without_each(products: np.ndarray) -> np.ndarray:

@@ -7,9 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.common.estimate import estimate
 from chamberopt.coverage.coverage_from_impacts import batches_of, find_footprints
-from chamberopt.coverage.coverage_intervals import jackknife, mean_and_variance, multiply_dents
+from chamberopt.coverage.coverage_intervals import (
+    Products,
+    mean_and_variance_estimates,
+    multiply_dents,
+)
 
 if TYPE_CHECKING:
     from chamberopt.coverage.field.target_field import TargetField
@@ -49,8 +52,9 @@ def coverage_against_time(
     p05 = evaluation.metrics["p05_coverage"]
     rows = []
     for number, time in enumerate(times):
-        uncovered = np.vstack([of_all.mean(axis=0), of_rest])[:, [number, number + len(times)]]
-        mean = estimate(jackknife(mean_and_variance(uncovered, field.reachable)[0]), 0.0, 1.0)
+        both = [number, number + len(times)]
+        products = Products(of_all[:, both], of_rest[:, both])
+        mean, _ = mean_and_variance_estimates(products, field.reachable, field.reachable_error)
         row = {"time_s": time, "mean_coverage": mean.value, "half_width": mean.half_width}
         if math.isfinite(p05.half_width):
             # The dent density grows in proportion to the time.

@@ -35,6 +35,7 @@ def test_the_curve_goes_through_the_figures_of_the_treatment_time(x: float) -> N
     metrics = evaluation.metrics
     at = next(row for row in rows if row["time_s"] == TREATMENT)
     assert at["mean_coverage"] == pytest.approx(metrics["mean_coverage"].value, abs=3e-3)
+    assert at["half_width"] > 0.7 * metrics["mean_coverage"].half_width
     assert at["p05_coverage"] == pytest.approx(metrics["p05_coverage"].value)
     assert at["p05_half_width"] == pytest.approx(metrics["p05_coverage"].half_width, rel=0.2)
     for row in rows:
