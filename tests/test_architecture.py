@@ -33,7 +33,8 @@ ORDER = {
     "chamberopt/optimize": "study+search storage "
     "sensitivity+evaluate_candidate candidates run_study pareto+run_sweep",
     "chamberopt/cli": "interrupt+options console prepare commands",
-    "chamberopt/output": "vtp_files plots results resimulate viewer save_run report+export+compare",
+    "chamberopt/output": "vtp_reader vtp_files plots results resimulate viewer save_run "
+    "report+export+compare",
     "sim_core": "errors numerics balls effects geometry motion impulses scene contact detect loop",
 }
 # Only this file or package imports the library.

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import stat
 from pathlib import Path
+from typing import Any
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain
@@ -16,6 +18,7 @@ MAX_UNPACKED_BYTES = 1024 * MEBIBYTE  # of a compressed mesh
 MAX_READER_BYTES = 16384 * MEBIBYTE  # of memory, for a library that reads STEP or VTK
 # A result's compressed arrays unpack to some three times their size; more fills memory on purpose.
 MAX_SHRINKAGE, ANY_SHRINKAGE_BYTES = 100, 64 * MEBIBYTE
+MAX_NUMBER = 1e30  # either way, of any number in a result: squares and cubes of it are finite
 MAX_ELEMENTS = 20_000_000  # points, elements or triangles of a mesh
 MAX_COPIES = 10_000  # of bodies, where a file puts one in several places
 
@@ -71,3 +74,25 @@ def require_few(path: Path, count: int, what: str, most: int = MAX_ELEMENTS) -> 
     if count > most:
         text = f"{plain(count)} {what}, at most {most:,} are read; export a coarser mesh"
         raise InputError(f"{path}: {text}")
+
+
+def parse_json(content: bytes | str) -> Any:
+    """The value of a JSON text of a result; ValueError for any but plain numbers up to MAX_NUMBER.
+
+    Python reads NaN, and numbers too large for arithmetic, such as 1e999 or 400 digits.
+    """
+    return json.loads(
+        content, parse_constant=_plain_number, parse_float=_plain_number, parse_int=_whole_number
+    )
+
+
+def _plain_number(text: str) -> float:
+    if not abs(number := float(text)) <= MAX_NUMBER:
+        raise ValueError(f"{text[:20]} is not a number up to {MAX_NUMBER:g}")
+    return number
+
+
+def _whole_number(text: str) -> int:
+    if len(text) > 20 or not -(2**63) <= int(text) < 2**63:
+        raise ValueError(f"{text[:20]} has more digits than a whole number that is read")
+    return int(text)

@@ -14,6 +14,7 @@ import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import atomic_write
+from chamberopt.common.limits import MAX_NUMBER
 from chamberopt.common.npz_files import UNREADABLE, read_arrays
 from chamberopt.coverage.dents import ball_diameters, dent_diameters, impact_angle_deg
 from chamberopt.geometry.triangles import closest_on_each
@@ -134,13 +135,26 @@ def load_hits(path: Path) -> HitsByTriangle:
     columns = read_arrays(path, "restore it, or simulate again")
     try:
         first = columns.pop("first")
+        _require_sound(first, columns)
         triangle = np.repeat(np.arange(len(first) - 1, dtype=np.int32), np.diff(first))
-        found = HitsByTriangle(first, Hits(triangle, **columns))
+        return HitsByTriangle(first, Hits(triangle, **columns))
     except UNREADABLE as error:
         raise InputError(f"{path}: damaged ({error}); simulate again") from None
-    if any(len(column) != first[-1] for column in columns.values()):
-        raise InputError(f"{path}: damaged (columns of different lengths); simulate again")
-    return found
+
+
+def _require_sound(first: np.ndarray, columns: dict[str, np.ndarray]) -> None:
+    """Raise ValueError unless all arrays have the types, lengths and ranges of impacts."""
+    if first.dtype != np.int64 or first.ndim != 1 or not len(first) or first[0] != 0:
+        raise ValueError("first is no list of rows from 0")
+    if (np.diff(first) < 0).any():
+        raise ValueError("first goes down")
+    for name, column in columns.items():
+        shape = (first[-1], 3) if name == "place" else (first[-1],)
+        if column.dtype != np.float32 or column.shape != shape:
+            raise ValueError(f"{name}: {column.dtype} of shape {column.shape}, expected {shape}")
+        low = -MAX_NUMBER if name == "place" else 0.0
+        if not ((column >= low) & (column <= MAX_NUMBER)).all():
+            raise ValueError(f"{name} has a number that no impact has")
 
 
 def load_matching_hits(path: Path, impacts: np.ndarray) -> HitsByTriangle:

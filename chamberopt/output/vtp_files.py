@@ -6,10 +6,7 @@ triangles that suit the field, with its values at their corners, chamber.vtp the
 
 from __future__ import annotations
 
-import logging
-import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +14,7 @@ import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import atomic_write, write_bytes
+from chamberopt.output.vtp_reader import DamagedSurfaceError, read_arrays
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -34,6 +32,16 @@ OF_ELEMENT = {
 # Columns without which files cannot be used: cell data of part.vtp, point data of coverage.vtp.
 ELEMENT_COLUMNS = ("coverage", "impacts", "dents", "exposed_area_mm2", "target", "element")
 FIELD_COLUMNS = ("coverage", "dent_density", "coverage_interval", "reachable", "resolved")
+WHOLE_NUMBERS = ("impacts", "dents", "target", "element", "triangle", "element_impacts", "tag",
+                 "source", "fitting")  # fmt: skip
+# Columns that are shares, from 0 to 1, and others that are never negative.
+SHARES = ("coverage", "coverage_interval", "reachable", "resolved", "element_coverage",
+          "element_interval")  # fmt: skip
+NOT_NEGATIVE = ("impacts", "dents", "target", "triangle", "element_impacts", "tag", "dent_density",
+                "exposed_area_mm2", "reachable_area_mm2", "impacts_per_mm2", "energy_per_mm2",
+                "mean_normal_speed", "p90_normal_speed", "mean_angle_deg",
+                "mean_dent_um")  # fmt: skip
+ROUNDING = 1e-6  # of single precision
 MM = 1e3
 
 Surface = Any
@@ -139,28 +147,34 @@ def read_surface(path: Path, cells: Sequence[str] = (), points: Sequence[str] = 
         raise InputError(
             f"{path}: not there; give a results folder that simulate or run has finished"
         )
-    with _vtk_messages_off():
-        surface = pyvista().read(path)
-    # VTK reads a damaged file as an empty mesh.
-    if not isinstance(surface, pyvista().PolyData) or surface.n_cells == 0:
-        raise InputError(f"{path}: damaged, no triangles could be read; simulate again")
-    for names, there in ((cells, surface.cell_data), (points, surface.point_data)):
+    try:
+        found = read_arrays(path)
+        for column in (*found.cells.items(), *found.vertices.items()):
+            _require_sound(*column)
+    except DamagedSurfaceError as error:
+        raise InputError(f"{path}: damaged ({error}); simulate again") from None
+    for names, there in ((cells, found.cells), (points, found.vertices)):
         if missing := [name for name in names if name not in there]:
             raise InputError(
                 f"{path}: has no {missing[0]}, so it is not the file that was written here; "
                 "simulate again"
             )
+    surface = pyvista().PolyData.from_regular_faces(found.points.copy(), found.triangles)
+    surface.cell_data.update({name: column.copy() for name, column in found.cells.items()})
+    surface.point_data.update({name: column.copy() for name, column in found.vertices.items()})
+    if found.normals is not None:
+        surface.point_data.active_normals = found.normals.copy()
     return surface
 
 
-@contextmanager
-def _vtk_messages_off() -> Iterator[None]:
-    """Suppress VTK's messages on a damaged file: warnings, its own log and Python's log."""
-    disabled = logging.root.manager.disable
-    with warnings.catch_warnings(), pyvista().vtk_verbosity("off"):
-        warnings.simplefilter("ignore")
-        logging.disable(logging.ERROR)
-        try:
-            yield
-        finally:
-            logging.disable(disabled)
+def _require_sound(name: str, column: np.ndarray) -> None:
+    """Raise DamagedSurfaceError for a column that has no such values in any result."""
+    if name in WHOLE_NUMBERS and column.dtype.kind not in "iu":
+        raise DamagedSurfaceError(f"{name} are no whole numbers")
+    known = column[~np.isnan(column)] if column.dtype.kind == "f" else column
+    if not len(known):
+        return
+    low, high, is_share = known.min(), known.max(), name in SHARES
+    if (low < 0 and (is_share or name in NOT_NEGATIVE)) or (is_share and high > 1.0 + ROUNDING):
+        allowed = "0 to 1" if is_share else "0 or more"
+        raise DamagedSurfaceError(f"{name} is from {low:g} to {high:g}, allowed: {allowed}")

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from chamberopt.common.errors import InputError
-from chamberopt.optimize.storage.trial_log import JsonLines, Trial
+from chamberopt.optimize.storage.trial_log import DAMAGED, JsonLines, Trial
 
 
 class RecordedTrials:
@@ -46,7 +46,7 @@ class RecordedTrials:
             trial = Trial.from_row(row)
             if trial.number != number:
                 raise ValueError
-        except (KeyError, TypeError, ValueError, AttributeError):
+        except DAMAGED:
             raise self._log.damaged(number + 1) from None
         return trial
 

@@ -16,9 +16,11 @@ from typing import Any, Self
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.files import csv_text, sync_folder
+from chamberopt.common.limits import parse_json
 
 HISTORY = "history.jsonl"
 TIMINGS = "timings.jsonl"
+DAMAGED = KeyError, TypeError, ValueError, AttributeError, OverflowError  # of a row's values
 
 
 @dataclass(frozen=True)
@@ -65,8 +67,8 @@ class Trial:
 
     @classmethod
     def from_row(cls, row: Mapping[str, Any]) -> Self:
-        """The trial of a row, or KeyError, TypeError, ValueError or AttributeError."""
-        return cls(
+        """The trial of a row as `row` made it, or an error of DAMAGED."""
+        trial = cls(
             number=int(row["number"]),
             stage=str(row["stage"]),
             point=tuple(float(share) for share in row["point"]),
@@ -81,6 +83,9 @@ class Trial:
             reason=str(row["reason"]),
             replicas=None if row["replicas"] is None else int(row["replicas"]),
         )
+        if trial.row() != row:  # a text or true in the place of a number, or words of its own
+            raise ValueError("not as it was written")
+        return trial
 
 
 class JsonLines:
@@ -138,8 +143,8 @@ class JsonLines:
         rows = []
         for number, line in enumerate(lines, start=1):
             try:
-                row = json.loads(line)
-            except ValueError:
+                row = parse_json(line)
+            except (ValueError, RecursionError):
                 row = None
             if not isinstance(row, dict):
                 raise self.damaged(number)
@@ -152,15 +157,25 @@ def read_trials(folder: Path) -> list[dict[str, Any]]:
     path = folder / HISTORY
     if not path.is_file():
         raise InputError(f"{path}: is not there; give a study's results folder")
-    seconds = read_seconds(folder)
-    rows = JsonLines(path).rows()
+    seconds, log = read_seconds(folder), JsonLines(path)
+    rows = log.rows()
+    for number, row in enumerate(rows):
+        try:
+            Trial.from_row(row)
+        except DAMAGED:
+            raise log.damaged(number + 1) from None
     return [{**row, "seconds": seconds.get(number)} for number, row in enumerate(rows)]
 
 
 def read_seconds(folder: Path) -> dict[int, float]:
     """Wall-clock time of each evaluation [s], by its number."""
-    rows = JsonLines(folder / TIMINGS).rows()
-    return {row.get("number", -1): row.get("seconds", 0.0) for row in rows}
+    log, seconds = JsonLines(folder / TIMINGS), {}
+    for line, row in enumerate(log.rows(), start=1):
+        number, time = row.get("number"), row.get("seconds")
+        if not isinstance(number, int) or not isinstance(time, (int, float)):
+            raise log.damaged(line)
+        seconds[number] = float(time)
+    return seconds
 
 
 def trials_as_csv(rows: list[dict[str, Any]]) -> str:

@@ -13,6 +13,7 @@ from chamberopt.coverage.metrics import METRICS
 from chamberopt.design.design import Design
 from chamberopt.design.table_base import FileTable
 
+NO_SIZE = 1e-12  # a limit below it is as good as 0, and a violation is not measured by it
 FEASIBLE, NOT_KNOWN, INFEASIBLE = "feasible", "not known", "infeasible"
 
 
@@ -70,7 +71,7 @@ def expected_violation(figure: Estimate, limits: Limits) -> float:
             z = excess / error
             tail = error * math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi)
             excess = 0.5 * excess * math.erfc(-z / math.sqrt(2.0)) + tail
-        violation += max(0.0, excess) / (abs(limit) or 1.0)
+        violation += max(0.0, excess) / (abs(limit) if abs(limit) > NO_SIZE else 1.0)
     return violation
 
 

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from chamberopt.output.results.load import Result
 
 CHAMBER_FILE = "chamber.npz"
+LARGEST = 1e4  # m and m²: no part or chamber is larger
 REMEDY = "restore the file, or simulate again"
 
 
@@ -76,12 +77,22 @@ def _require_sound(chamber: Chamber) -> None:
             raise ValueError(f"{name} is of type {column.dtype}")
         if column.shape != shape:
             raise ValueError(f"{name} has the shape {column.shape}, expected {shape}")
-        if dtype == "f8" and not np.isfinite(column).all():
-            raise ValueError(f"{name} has a number that is not finite")
+        if dtype == "f8" and not (np.abs(column) <= LARGEST).all():
+            raise ValueError(f"{name} has a number that is not finite, or too large")
         if limits and len(column) and not limits[0] <= column.min() <= column.max() < limits[1]:
             raise ValueError(f"{name} is not from {limits[0]} to {limits[1] - 1}")
     if part.unit not in METRES_PER:
         raise ValueError(f"unit {part.unit!r}")
+    if type(chamber.volume) is not float or not 0.0 < chamber.volume <= LARGEST:
+        raise ValueError(f"volume {chamber.volume!r}")
+    meshes = [file.simulated, *([file.original] if file.original else [])]
+    texts = [*chamber.notes, chamber.shape_sha256, part.name, part.sha256, part.unit, *part.names]
+    for mesh in meshes:
+        texts += [*mesh.notes, mesh.sha256, mesh.unit, mesh.numbering.instance]
+    if not all(isinstance(text, str) for text in texts):
+        raise ValueError("a name or note is no text")
+    if any(mesh.groups or mesh.unit not in METRES_PER for mesh in meshes):
+        raise ValueError("the part in its file's frame has groups, or no unit")
 
 
 def _mesh_columns(name: str, vertices: np.ndarray, triangles: np.ndarray) -> list[Any]:

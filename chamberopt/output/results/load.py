@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 import shlex
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -13,17 +12,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, ValidationError
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
-from chamberopt.common.limits import MAX_RESULT_BYTES, read_limited
+from chamberopt.common.limits import MAX_RESULT_BYTES, parse_json, read_limited
 from chamberopt.common.number_text import estimate_text, plain
 from chamberopt.coverage.metrics import METRICS
 from chamberopt.design.design import validate
 from chamberopt.design.load import Design
+from chamberopt.geometry.triangles import areas
 from chamberopt.optimize.storage.study_folder import RESULT, is_study_folder
 from chamberopt.optimize.storage.trial_log import HISTORY, TIMINGS, read_trials
+from chamberopt.output.results.recorded import require_recorded
 from chamberopt.output.vtp_files import (
     CHAMBER,
     COVERAGE,
@@ -40,25 +40,6 @@ if TYPE_CHECKING:
 
 FORMAT = 3
 RESTORE = "restore the folder from where it came, or simulate again"
-
-
-class _Recorded(BaseModel):
-    """Types of what commands read from a result.json without looking at it again."""
-
-    model_config = ConfigDict(strict=True, allow_inf_nan=False)
-
-    replicas: int = 0
-    stopped_by: str = ""
-    analytic: bool | None = None
-    simulated_time_s: float = 0.0
-    collisions: dict[str, float] = {}
-    timings_s: dict[str, float] = {}
-    field: dict[str, Any] = {}
-    chamber: dict[str, Any] = {}
-    study: dict[str, Any] | None = None
-    notes: list[str] = []
-    warnings: list[str] = []
-    versions: dict[str, str] = {}
 
 
 @dataclass(frozen=True)
@@ -126,21 +107,24 @@ def load_result(path: str | Path) -> Result:
                 f"{folder}: a sweep is a map of many candidates, not the result of one; simulate "
                 "the design that you want from it, such as its best.toml"
             )
+        design = validate(Design, data["design"], file, recorded=True)
+        if data["seed"] != design.process.seed:
+            raise ValueError(f"seed: given {data['seed']}, its design has {design.process.seed}")
         return Result(
             folder=folder,
             kind=data["kind"],
-            design=validate(Design, data["design"], file, recorded=True),
+            design=design,
             objective_name=data["objective"]["name"],
-            objective=_read_estimate(data["objective"]),
+            objective=Estimate.from_json(data["objective"]),
             metrics={
-                name: _read_estimate(data["metrics"][name])
+                name: Estimate.from_json(data["metrics"][name])
                 for name, metric in METRICS.items()
                 if name in data["metrics"] or metric.required
             },
             part_sha256=data["part_sha256"],
             seeds=(data["seed"], data["stream"]),
             notes=tuple(data["notes"]),
-            sha256=_read_digests(data),
+            sha256=data["files"],
             data=data,
         )
 
@@ -153,7 +137,7 @@ def load_trials(folder: Path) -> list[dict[str, Any]]:
     file = folder / RESULT
     if file.is_file():
         with _damage_explained(file):
-            sha256 = _read_digests(_read_data(file))
+            sha256 = _read_data(file)["files"]
         for name in sorted({HISTORY, TIMINGS} & sha256.keys()):
             unchanged_file(folder, name, sha256)
     return read_trials(folder)
@@ -192,7 +176,7 @@ def file_sha256(path: Path) -> str:
 
 def load_part(result: Result) -> Surface:
     """Read the part.vtp of a result; InputError if missing, damaged or another result's."""
-    return read_surface(result.path(PART), ELEMENT_COLUMNS)
+    return read_part(result.path(PART))
 
 
 def load_field(result: Result, part: Surface) -> Surface:
@@ -205,6 +189,17 @@ def load_cavity(result: Result) -> Surface:
     return read_surface(result.path(CHAMBER), ("tag",))
 
 
+def read_part(path: Path) -> Surface:
+    """Read part.vtp; InputError unless it has values wherever the shot can come."""
+    part = read_surface(path, ELEMENT_COLUMNS)
+    exposed = np.asarray(part["exposed_area_mm2"])
+    if not np.isfinite(exposed).all() or np.isnan(part["coverage"][exposed > 0.0]).any():
+        raise InputError(f"{path}: damaged (an exposed triangle has no coverage); {RESTORE}")
+    if not (np.asarray(part["target"])[exposed > 0.0] > 0).any():
+        raise InputError(f"{path}: damaged (nothing of its target is exposed); {RESTORE}")
+    return part
+
+
 def read_field(path: Path, part: Surface) -> Surface:
     """Read coverage.vtp; InputError unless it belongs to this part.vtp."""
     field = read_surface(path, ("triangle", *OF_ELEMENT), FIELD_COLUMNS)
@@ -212,6 +207,15 @@ def read_field(path: Path, part: Surface) -> Surface:
     covers_all = np.array_equal(np.unique(triangle), np.arange(part.n_cells))
     if not covers_all or (part["impacts"][triangle] != field["element_impacts"]).any():
         raise InputError(f"{path}: of another result than the part.vtp beside it; simulate again")
+    points = field.point_data
+    reached = np.asarray(points["reachable"]) > 0.5
+    known = [points["coverage"], points["reachable"], points["resolved"]]
+    known += [points[name][reached] for name in ("dent_density", "coverage_interval")]
+    if points.active_normals is None or any(np.isnan(column).any() for column in known):
+        raise InputError(f"{path}: damaged (a place on it has no coverage); {RESTORE}")
+    target = np.asarray(field.regular_faces)[np.asarray(field["target"]) > 0]
+    if not areas(np.asarray(field.points, dtype=float), target).sum() > 0.0:
+        raise InputError(f"{path}: damaged (its target has no area); {RESTORE}")
     return field
 
 
@@ -239,30 +243,27 @@ def _damage_explained(file: Path) -> Iterator[None]:
         ) from None
 
 
-def _read_digests(data: dict[str, Any]) -> dict[str, str]:
-    return {name: str(sha256) for name, sha256 in data["files"].items()}
-
-
 def _read_data(file: Path) -> dict[str, Any]:
     """The content of a result.json that this version of the program reads whole; or InputError."""
     content = read_limited(file, MAX_RESULT_BYTES, "file of a result")
-    data: dict[str, Any] = json.loads(
-        content, parse_constant=_refuse_constant, parse_float=_finite_number
-    )
-    found = data["format"]
-    if found == FORMAT:
-        try:
-            _Recorded.model_validate(data)
-        except ValidationError as error:
-            where, why = error.errors()[0]["loc"], error.errors()[0]["msg"]
-            raise ValueError(f"{'.'.join(map(str, where))}: {why}") from None
-        if data.get("sha256") != content_sha256(data):
-            raise InputError(f"{file}: not as it was written: its sha256 is another; {RESTORE}")
-        return data
-    made_by = data.get("versions", {}).get("chamberopt", "an unknown version")
+    data = parse_json(content)
+    if not isinstance(data, dict):
+        raise ValueError("it holds no table")
+    if data["format"] != FORMAT:
+        raise _of_another_format(file, data)
+    if data.get("sha256") != content_sha256(data):
+        raise InputError(f"{file}: not as it was written: its sha256 is another; {RESTORE}")
+    require_recorded(data)
+    return data
+
+
+def _of_another_format(file: Path, data: dict[str, Any]) -> InputError:
+    found, versions = data["format"], data.get("versions")
+    versions = versions if isinstance(versions, dict) else {}
+    made_by = versions.get("chamberopt", "an unknown version")
     newer = isinstance(found, int) and found > FORMAT
     remedy = "read it with that version" if newer else "simulate again, or read it with that one"
-    raise InputError(
+    return InputError(
         f"{file}: in format {found!r}, expected {FORMAT}: written by chamberopt {made_by}, another "
         f"version than this; {remedy}"
     )
@@ -272,22 +273,3 @@ def content_sha256(data: Mapping[str, Any]) -> str:
     """sha256 of the content of a result.json but for its own key, in whatever order it stands."""
     rest = {name: value for name, value in data.items() if name != "sha256"}
     return hashlib.sha256(json.dumps(rest, sort_keys=True).encode()).hexdigest()
-
-
-def _read_estimate(data: dict[str, Any]) -> Estimate:
-    """An estimate of a result: a value with a half-width, or words."""
-    found = Estimate.from_json(data)
-    if data["value"] is None or (data["half_width"] is None and not found.in_words):
-        raise ValueError("an estimate without a value or half_width")
-    return found
-
-
-def _finite_number(text: str) -> float:
-    """The number; ValueError for one too large, such as 1e999, which Python reads as infinite."""
-    if not math.isfinite(number := float(text)):
-        _refuse_constant(text)
-    return number
-
-
-def _refuse_constant(name: str) -> float:
-    raise ValueError(f"{name} is not a number")

@@ -13,10 +13,10 @@ from chamberopt.common.errors import InputError
 from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
 from chamberopt.coverage.part_impacts import HITS_FILE, HitsByTriangle, load_matching_hits
 from chamberopt.output.plots.quantities import QUANTITIES
-from chamberopt.output.results.load import Result, read_field, summary, unchanged_file
+from chamberopt.output.results.load import Result, read_field, read_part, summary, unchanged_file
 from chamberopt.output.viewer.drawn_part import DrawnPart, colour_range
 from chamberopt.output.viewer.view_state import ViewState
-from chamberopt.output.vtp_files import CHAMBER, COVERAGE, ELEMENT_COLUMNS, PART, read_surface
+from chamberopt.output.vtp_files import CHAMBER, COVERAGE, PART, read_surface
 
 FULL_SCALE = (0.0, 100.0)  # % of coverage: the same at all times
 
@@ -56,7 +56,7 @@ class OpenedResult:
     def __init__(self, info: ResultInfo) -> None:
         self.info = info
         self.folder = Path(info.folder)
-        self.surface = read_surface(self._path(PART), ELEMENT_COLUMNS)
+        self.surface = read_part(self._path(PART))
         self.chamber = read_surface(self._path(CHAMBER), ("tag",))
         self.part = DrawnPart(read_field(self._path(COVERAGE), self.surface))
 

@@ -143,8 +143,13 @@ def test_a_front_of_two_objectives_is_listed(study: Path, tmp_path: Path) -> Non
         "uniform_coverage": {"value": 0.5, "half_width": 0.01},
         "minus_time_to_98_s": {"value": -71.3, "half_width": 2.0},
     }
-    front = [{"parameters": {"shot.mass_g": 7.5}, "standing": "feasible", "objectives": goals}]
-    folder = changed(study, tmp_path / "front", lambda data: data["study"].update(front=front))
+
+    def add_front(data: dict) -> None:
+        best = data["study"]["best"]["parameters"]
+        row = {"parameters": best, "standing": "feasible", "objectives": goals}
+        data["study"].update(front=[row])
+
+    folder = changed(study, tmp_path / "front", add_front)
     text = Page(write_report(folder)[0]).text
     assert "The study had two objectives" in text
     assert "71.3\u00a0±\u00a02.0" in text  # seconds, not their negative

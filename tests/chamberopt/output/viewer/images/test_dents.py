@@ -45,8 +45,12 @@ def coverage_file(folder: Path, chamber: Chamber) -> Path:
     part = chamber.part
     count, points = len(part.triangles), len(part.vertices)
     none, nowhere = np.zeros(count), np.zeros(points)
-    values = dict.fromkeys(("coverage", "coverage_interval", "impacts"), none)
-    values |= {"target": part.target.astype(np.uint8), "element": part.elements}
+    values = dict.fromkeys(("coverage", "coverage_interval"), none)
+    values |= {
+        "impacts": none.astype(int),
+        "target": part.target.astype(np.uint8),
+        "element": part.elements,
+    }
     upwards = np.tile([0.0, 0.0, 1.0], (points, 1))
     mesh = DisplayMesh(part.vertices, part.triangles, upwards, nowhere, np.arange(count))
     write_coverage(

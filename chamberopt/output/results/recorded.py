@@ -1,0 +1,268 @@
+"""What a result.json must hold: every key that commands read, with the types of all values.
+
+A result comes from elsewhere, and its digests tell only that it is whole. Nothing of it is used
+before this has found it as `write.py` makes it.
+"""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from chamberopt.common.errors import InputError
+from chamberopt.coverage.metrics import METRICS, parse_objective
+
+ROUNDING = 1e-9
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+Positive = Annotated[float, Field(ge=0.0)]
+Count = Annotated[int, Field(ge=0)]
+Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+Bounds = Annotated[list[float], Field(min_length=2, max_length=2)]
+Curve = Annotated[list[float], Field(min_length=1)]
+
+
+def _dated(text: str) -> str:
+    datetime.fromisoformat(text)  # ValueError for any other text
+    return text
+
+
+class _Table(BaseModel):
+    """A table of result.json; further keys are no fault."""
+
+    model_config = ConfigDict(strict=True, allow_inf_nan=False)
+
+
+class _Interval(_Table):
+    """A value and its half-width; null where there is none, with words in its place."""
+
+    value: float | None
+    half_width: Positive | None
+    in_words: str = ""
+
+
+class _Known(_Interval):
+    """An interval that has a value, and a half-width unless words stand in its place."""
+
+    @model_validator(mode="after")
+    def _is_known(self) -> Self:
+        if self.value is None or (self.half_width is None and not self.in_words):
+            raise ValueError("an estimate without a value or half_width")
+        return self
+
+
+class _Estimate(_Known):
+    pseudovalues: list[float]
+    bias: float
+
+
+class _Objective(_Estimate):
+    name: str
+
+    @model_validator(mode="after")
+    def _is_an_objective(self) -> Self:
+        try:
+            parse_objective(self.name)
+        except InputError as error:
+            raise ValueError(str(error)) from None
+        return self
+
+
+class _Needed(_Table):
+    mean_and_std: Positive | None
+    p05_times_intensity: Positive | None
+
+
+class _Field(_Table):
+    gauge_mm2: Positive
+    points: Count
+    dents_in_median_window: Positive
+    dents_needed: _Needed
+    simulated_s_needed: _Needed
+    reachable_share: float
+    crease_share: float
+    double_gauge: dict[str, _Estimate]
+
+
+class _AtTime(_Table):
+    """One row of the coverage against time."""
+
+    time_s: Positive
+    mean_coverage: Share
+    half_width: Positive
+    p05_coverage: Share | None = None
+    p05_half_width: Positive | None = None
+
+
+class _Chamber(_Table):
+    volume_mm3: Positive
+    target_exposed_area_mm2: Positive
+    target_triangles: Count
+
+
+class _Advice(_Table):
+    """Why an effect was chosen by pilot runs."""
+
+    effect: str
+    on: bool
+    verdict: str
+    said: str
+    changes: dict[str, _Interval]
+
+
+class _Slice(_Table):
+    """The model of a study's score along one parameter."""
+
+    flat: Bounds
+    share_of_variance: float
+    values: Curve
+    mean: Curve
+    half_width: Curve
+    main_effect: Curve
+
+    @model_validator(mode="after")
+    def _is_as_long(self) -> Self:
+        if (
+            len({len(one) for one in (self.values, self.mean, self.half_width, self.main_effect)})
+            > 1
+        ):
+            raise ValueError("curves of different lengths")
+        return self
+
+
+class _Model(_Table):
+    noise: float
+    expected: _Known
+    together: float
+    parameters: dict[str, _Slice]
+
+
+class _Candidate(_Table):
+    parameters: dict[str, float]
+
+
+class _FrontPoint(_Candidate):
+    standing: str
+    objectives: dict[str, _Interval]
+
+
+class _Confirmed(_Candidate):
+    searched_as: int | None
+    objective: _Estimate
+    feasible: bool
+    standing: str
+    reason: str
+
+
+class _Start(_Candidate):
+    objective: _Estimate
+    metrics: dict[str, _Estimate]
+
+
+class _Accuracy(_Table):
+    replicas: Count
+    simulated_time_s: Positive | None = None
+    objective_half_width: Positive | None = None
+
+
+class _Accuracies(_Table):
+    search: _Accuracy
+    confirm: _Accuracy
+
+
+class _Study(_Table):
+    algorithm: str
+    vary: dict[str, Bounds]
+    evaluations: Count
+    accuracy: _Accuracies
+    failed: Count
+    missing_a_constraint: Count
+    gain: _Estimate
+    improved: bool
+    at_bounds: list[str]
+    model: _Model | None = None
+    front: list[_FrontPoint] = []
+    best: _Candidate
+    start: _Start
+    confirmed: list[_Confirmed]
+    seconds: Positive
+
+    @model_validator(mode="after")
+    def _has_the_same_parameters(self) -> Self:
+        candidates = self.best, self.start, *self.front, *self.confirmed
+        names = [set(one.parameters) for one in candidates]
+        names += [set(self.model.parameters)] if self.model else []
+        if any(one != set(self.vary) for one in names):
+            raise ValueError("other parameters than vary")
+        return self
+
+
+class _Any(_Table):
+    """Any result."""
+
+    kind: Literal["simulation", "study", "sweep"]
+    created: Annotated[str, AfterValidator(_dated)]
+    notes: list[str]
+    warnings: list[str] = []
+    effects: list[_Advice] = []
+    files: dict[str, Digest]
+    versions: dict[str, str]
+
+    @model_validator(mode="after")
+    def _is_of_a_version(self) -> Self:
+        if "chamberopt" not in self.versions:
+            raise ValueError("versions: chamberopt is missing")
+        return self
+
+
+class _Candidates(_Any):
+    """The result of a candidate: a simulation, or the best of a study."""
+
+    REQUIRED: ClassVar = [name for name, metric in METRICS.items() if metric.required]
+
+    objective: _Objective
+    metrics: dict[str, _Estimate]
+    field: _Field
+    coverage_against_time: list[_AtTime]
+    seed: Annotated[int, Field(ge=0, le=2**63 - 1)]
+    stream: str
+    replicas: Annotated[int, Field(ge=1, le=1_000_000)]
+    stopped_by: str
+    analytic: bool
+    simulated_time_s: Positive
+    collisions: dict[str, Positive]
+    timings_s: dict[str, Positive]
+    chamber: _Chamber
+    design: dict[str, Any]
+    part_sha256: Digest
+    part_unit: str
+    shape_sha256: Digest | Literal[""] = ""
+    study: _Study | None = None
+
+    @model_validator(mode="after")
+    def _is_whole(self) -> Self:
+        if missing := [name for name in self.REQUIRED if name not in self.metrics]:
+            raise ValueError(f"metrics: {missing[0]} is missing")
+        if unknown := [name for name in self.field.double_gauge if name not in METRICS]:
+            raise ValueError(f"field.double_gauge: {unknown[0]!r} is no metric")
+        if (self.kind == "study") != (self.study is not None):
+            raise ValueError(f"study: belongs to a study, and this is a {self.kind}")
+        for name, found in self.metrics.items():
+            metric = METRICS.get(name)
+            value = found.value or 0.0
+            if metric and not metric.lowest - ROUNDING <= value <= metric.highest + ROUNDING:
+                limits = f"{metric.lowest:g} to {metric.highest:g}"
+                raise ValueError(f"metrics.{name}: given {value:g}, possible {limits}")
+        return self
+
+
+def require_recorded(data: dict[str, Any]) -> None:
+    """Raise ValueError, which names the key, unless commands can use all of a result.json."""
+    model = _Any if data.get("kind") == "sweep" else _Candidates
+    try:
+        model.model_validate(data)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False)[0]
+        where, why = ".".join(map(str, first["loc"])), first["msg"].removeprefix("Value error, ")
+        raise ValueError(f"{where}: {why}" if where else why) from None
