@@ -32,7 +32,7 @@ ORDER = {
     "field_values time_curve complete_result effect_pilot convergence",
     "chamberopt/optimize": "study+search storage "
     "sensitivity+evaluate_candidate candidates run_study pareto+run_sweep",
-    "chamberopt/cli": "interrupt+options console prepare commands",
+    "chamberopt/cli": "interrupt+options console prepare commands command_line",
     "chamberopt/output": "vtp_reader vtp_files plots results resimulate viewer save_run "
     "report+export+compare",
     "sim_core": "errors numerics balls effects geometry motion impulses scene contact detect loop",

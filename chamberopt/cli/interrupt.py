@@ -1,21 +1,68 @@
-"""Ctrl-C in a study: the first waits for the running evaluation, the second stops at once."""
+"""Ctrl-C: it ends every command at once, and a study after the running evaluation."""
 
 from __future__ import annotations
 
 import os
 import signal
 import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import FrameType
 from typing import Self
 
+KEPT = "what had been finished stays on disk"
+INTERRUPTED = f"interrupted; {KEPT}"
 FIRST = "finishing this evaluation, then stopping; press Ctrl-C again to stop now"
 SECOND = "stopped; the running evaluation is lost, all earlier ones are on disk"
 EARLY = "interrupted; no evaluation was running"
 SHOW_CURSOR = "\033[?25h"  # a progress bar hides it
 
 
+# In the midst of these an exception is lost, or leaves what it interrupts in pieces.
+IMPORTS, COMPILERS = "<frozen importlib", ("numba", "llvmlite")
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """Let Ctrl-C end the command: by KeyboardInterrupt, or at once where that would be lost.
+
+    It is lost where a module is imported, which is what a command begins with, and where something
+    held it back before. Nothing else is: files get their names when they are whole.
+    """
+    requested = False
+
+    def on_signal(number: int, frame: FrameType | None) -> None:
+        nonlocal requested
+        if requested or _would_be_lost(frame):
+            _write(INTERRUPTED)
+            os._exit(130)
+        requested = True
+        raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, on_signal)
+    if before is signal.SIG_IGN:  # a script's background job: Ctrl-C is not meant for this process
+        signal.signal(signal.SIGINT, before)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _would_be_lost(frame: FrameType | None) -> bool:
+    while frame is not None:
+        package = str(frame.f_globals.get("__name__", "")).partition(".")[0]
+        if frame.f_code.co_filename.startswith(IMPORTS) or package in COMPILERS:
+            return True
+        frame = frame.f_back
+    return False
+
+
 class Interrupt:
-    """Handle SIGINT during a `with` block; `requested` is True once the user wants to stop.
+    """Handle SIGINT in a study's `with` block; `requested` is True once the user wants to stop.
 
     Until `wait_for_evaluation` is called, Ctrl-C ends the process with os._exit. An exception would
     not do: Python drops one that comes while a module is imported, one during compilation can crash

@@ -1,0 +1,58 @@
+"""Ctrl-C at any moment of any command ends it, from the first line of the program that runs."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.hunt.base import write_base
+
+ROOT = Path(__file__).parents[3]
+# It tells when `main` is reached; no command ends within the second that follows.
+BEGIN = "import sys; from chamberopt.cli import main; print(flush=True); sys.exit(main())"
+COMMANDS = {
+    "check": ["design.toml"],
+    "simulate": ["design.toml", "--out", "out"],
+    "run": ["study.toml", "--out", "out"],
+    "sweep": ["study.toml", "--grid", "2", "--out", "out"],
+    "accuracy": ["design.toml", "--out", "out"],
+    "compare": ["design.toml", "design-2.toml", "--out", "out"],
+}
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("interrupt")
+    write_base(folder)
+    shutil.copy(folder / "design.toml", folder / "design-2.toml")
+    return folder
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs signals")
+@pytest.mark.parametrize("seconds", [0.02, 0.1, 0.3, 0.6])
+@pytest.mark.parametrize("name", COMMANDS)
+def test_ctrl_c_is_never_lost(name: str, seconds: float, place: Path) -> None:
+    going = subprocess.Popen(
+        [sys.executable, "-c", BEGIN, name, *COMMANDS[name]],
+        cwd=place,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert going.stdout is not None
+    assert going.stdout.readline() == "\n"
+    time.sleep(seconds)
+    going.send_signal(signal.SIGINT)
+    begin = time.monotonic()
+    _, message = going.communicate(timeout=60)
+    assert going.returncode == 130, message
+    assert time.monotonic() - begin < 5.0
+    assert "Traceback" not in message
+    assert "interrupted; " in message
+    shutil.rmtree(place / "out", ignore_errors=True)
