@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import stat
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ MAX_UNPACKED_BYTES = 1024 * MEBIBYTE  # of a compressed mesh
 MAX_READER_BYTES = 16384 * MEBIBYTE  # of memory, for a library that reads STEP or VTK
 # A result's compressed arrays unpack to some three times their size; more fills memory on purpose.
 MAX_SHRINKAGE, ANY_SHRINKAGE_BYTES = 100, 64 * MEBIBYTE
+READ_AT_ONCE = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 MAX_NUMBER = 1e30  # either way, of any number in a result: squares and cubes of it are finite
 MAX_ELEMENTS = 20_000_000  # points, elements or triangles of a mesh
 MAX_COPIES = 10_000  # of bodies, where a file puts one in several places
@@ -38,8 +40,11 @@ def read_limited(path: Path, most: int, what: str) -> bytes:
         if not stat.S_ISREG(status.st_mode):  # a pipe would block, a device may never end
             raise InputError(f"{path}: is not a plain file; give a {what}")
         require_size(path, status.st_size, most, what)
-        with path.open("rb") as file:
-            content = file.read(most + 1)  # a file may grow, and one of /proc states no size
+        # A file of /proc states no size, and may call itself plain and yet wait for more for ever.
+        with open(os.open(path, READ_AT_ONCE), "rb") as file:
+            content = file.read(most + 1)
+        if content is None:
+            raise InputError(f"{path}: is not a plain file; give a {what}")
     except FileNotFoundError:
         raise
     except OSError as error:

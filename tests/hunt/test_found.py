@@ -128,6 +128,11 @@ FOUND: dict[str, tuple[Callable[[Path], None], list[str], str | None]] = {
     "copies of copies": (_copies_of_copies, READ, r"copies of bodies, at most 10,000 are read"),
     "a device": (_design_of_study('"/dev/zero"'), STUDY, "/dev/zero: is not a plain file"),
     "a pipe": (_instead_of_design(os.mkfifo), READ, "design.toml: is not a plain file"),
+    "a plain file that never ends": (
+        _instead_of_design(lambda path: path.symlink_to("/proc/kmsg")),
+        READ,
+        "design.toml: ",
+    ),
     "a mesh that is a device": (_in_design("box.stl", "/dev/zero"), READ, "/dev/zero"),
     "a large text": (
         _instead_of_design(lambda path: path.write_bytes(b" " * (1 << 21))),
