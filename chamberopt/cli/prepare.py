@@ -24,12 +24,18 @@ def compile_with_message(
     """Compile with a message, not behind a progress bar, where a minute would look like a hang."""
     import sim_core
     from chamberopt.chamber.part import turning_axis
-    from chamberopt.chamber.scene import chamber_mesh, require_ball_count, scene_physics
+    from chamberopt.chamber.scene import (
+        chamber_mesh,
+        require_ball_count,
+        require_turnable,
+        scene_physics,
+    )
 
     require_ball_count(design)
-    shot = design.shot
+    shot, mesh = design.shot, chamber_mesh(chamber)
     axis = turning_axis(design, chamber.part)
-    physics = scene_physics(design, cavity or chamber_mesh(chamber), axis=axis)
+    require_turnable(design, mesh, axis)
+    physics = scene_physics(design, cavity or mesh, axis=axis)
     is_cylinder = cavity is not None and cavity.radius is not None
     variant = physics, shot.count, shot.mix is None, is_cylinder
     if sim_core.is_compiled(*variant):

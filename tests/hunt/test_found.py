@@ -32,6 +32,14 @@ def _vtk_with_huge_counts(folder: Path) -> None:
     _as_part(folder, "part.vtp", text)
 
 
+def _ply_of_a_corner_beyond_all(folder: Path) -> None:
+    content = whole_files()["ascii.ply"]
+    head, body = content.split(b"end_header\n")
+    lines = body.splitlines(keepends=True)
+    lines[-1] = b"3 0 1 %d\n" % 2**63
+    _as_part(folder, "part.ply", head + b"end_header\n" + b"".join(lines))
+
+
 def _nastran_set(folder: Path) -> None:
     text = whole_files()["sets.bdf"].replace(b"3 THRU 5", b"3 THRU 5000000000")
     _as_part(folder, "part.bdf", text)
@@ -121,6 +129,7 @@ MESH = 'mesh = "box.stl"'
 # What is done to the files, the command, and what it says; None where it works.
 FOUND: dict[str, tuple[Callable[[Path], None], list[str], str | None]] = {
     "VTK's counts": (_vtk_with_huge_counts, READ, "cannot be read as VTK.*damaged"),
+    "a corner beyond all": (_ply_of_a_corner_beyond_all, READ, "cannot be read as PLY.*damaged"),
     "a set THRU 5e9": (_nastran_set, READ, None),
     "a set that generates 4e9": (_abaqus_set, READ, None),
     "sets that double": (_abaqus_sets_of_sets, READ, None),

@@ -181,10 +181,13 @@ def _side_wall_warnings(design: Design, chamber: Chamber) -> list[str]:
     height = 1e3 * chamber.vertices[sides_of(chamber.triangles)[joint], 2]
     if not height.size:
         return []
+    # In plan: the height does not move a side wall. A user's own shape has keys of its own.
+    keys = [key for key in design.chamber.widths_mm() if key != "height_mm"]
+    named = f" ({', '.join(f'chamber.{key}' for key in keys)})" if keys else ""
     return [
         f"the part goes out through the side wall between z = {height.min():.4g} and "
-        f"{height.max():.4g} mm: what is outside is not peened; enlarge the chamber "
-        "(chamber.diameter_mm), or check part.offset_mm"
+        f"{height.max():.4g} mm: what is outside is not peened; enlarge the chamber"
+        f"{named}, or check part.offset_mm"
     ]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
@@ -59,7 +60,9 @@ def read_raw_mesh(path: Path, content: bytes) -> RawMesh:
     """Read a file; InputError if its format is not known, or it is damaged or truncated."""
     found = _find_format(path, content)
     try:
-        return found.read(path, content)
+        with warnings.catch_warnings():  # of numbers that are none: the mesh is checked as a whole
+            warnings.simplefilter("ignore")
+            return found.read(path, content)
     except (InputError, MemoryError):
         raise
     except Exception as error:  # each library fails in its own way on a damaged file
