@@ -1,20 +1,42 @@
-"""Draw altered results and interrupted runs, and the command that meets them."""
+"""Draw altered results and interrupted runs, and the command that meets them.
+
+Half of the altered results are forged: their digests are those of the altered files, so that what
+refuses them is not the digest but what is known of a result's values.
+"""
 
 from __future__ import annotations
 
+import base64
+import io
 import json
 import random
+import re
 import shutil
+import zlib
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from chamberopt.output.results.load import content_sha256
+from chamberopt.output.results.write import data_digests
+from tests.hunt.meshes import HUGE
 from tests.hunt.toml_files import odd_value
 
 LOOK = (
-    ["report", "{}"], ["report", "{}", "--json"], ["compare", "result", "{}"],
-    ["compare", "{}", "result"], ["export", "{}", "--to", "fields-vtp"],
-    ["export", "{}", "--to", "chamber-stl"], ["export", "study", "--to", "study-csv"],
+    ["report", "{}"],
+    ["report", "{}", "--json"],
+    ["compare", "result", "{}"],
+    ["compare", "{}", "result"],
+    ["export", "{}", "--to", "fields-vtp"],
+    ["export", "{}", "--to", "chamber-stl"],
+    ["export", "study", "--to", "study-csv"],
     ["inspect", "{}", "--html", "page.html"],
+)
+SIMULATE_AGAIN = (
+    ["dents", "{}", "d.png"], ["replay", "{}", "r.gif"], ["export", "{}", "--to", "impacts-csv"],
+    ["export", "{}", "--to", "fields-abaqus"], ["export", "{}", "--to", "chamber-3mf"],
 )  # fmt: skip
 RESUME = ["run", "study.toml", "--out", "study"]
 
@@ -55,12 +77,102 @@ def _alter_bytes(rng: random.Random, path: Path) -> None:
 def _alter(rng: random.Random, path: Path) -> None:
     kind = rng.randrange(6)
     if kind < 3 and path.suffix in (".json", ".jsonl"):
-        _alter_json(rng, path)
+        with suppress(ValueError):  # it was altered already
+            _alter_json(rng, path)
     elif kind == 3:
         path.unlink()
         rng.choice((path.mkdir, lambda: path.symlink_to(path.name), lambda: None))()
     else:
         _alter_bytes(rng, path)
+
+
+def _odd_number(rng: random.Random) -> float:
+    return rng.choice((np.nan, np.inf, -np.inf, 1e300, -1e300, -1.0, 0.0, 0.5, 2.0, 1e9, 2**40))
+
+
+def _alter_array(rng: random.Random, array: np.ndarray) -> np.ndarray:
+    """Another value, length, shape or type."""
+    kind = rng.randrange(6)
+    if kind < 3 and array.size:
+        altered = array.copy().ravel()
+        with np.errstate(all="ignore"):
+            chosen = rng.choice((0, -1, slice(None)))
+            altered[chosen] = np.array(_odd_number(rng)).astype(array.dtype)
+        return altered.reshape(array.shape)
+    if kind == 3:
+        return array[: len(array) // 2] if array.ndim else array
+    if kind == 4:
+        return np.stack([array] * 3, axis=-1)
+    with np.errstate(all="ignore"):
+        return array.astype(rng.choice(("f8", "f4", "i8", "u1", "c16", "U9")))
+
+
+def _alter_npz(rng: random.Random, path: Path) -> None:
+    """Alter an array of an .npz file, or what its tree says."""
+    with np.load(path) as file:
+        arrays = dict(file)
+    name = rng.choice(sorted(arrays))
+    if name == "tree":
+        tree = json.loads(arrays[name].tobytes())
+        table, key = rng.choice(_values(tree))
+        table[key] = odd_value(rng)
+        arrays[name] = np.frombuffer(json.dumps(tree).encode(), np.uint8)
+    else:
+        arrays[name] = _alter_array(rng, arrays[name])
+    packed = io.BytesIO()
+    np.savez(packed, **arrays)
+    path.write_bytes(packed.getvalue())
+
+
+def _alter_vtp(rng: random.Random, path: Path) -> None:
+    """Alter a number of a .vtp file's text, or of one of its arrays."""
+    text = path.read_text()
+    numbers = list(re.finditer(r'="(\d+)"', text))
+    arrays = list(re.finditer(r'type="(\w+)"[^>]*>\s*([A-Za-z0-9+/=]{20,})\s*<', text))
+    if rng.random() < 0.4:
+        found = rng.choice(numbers)
+        content = str(rng.choice(HUGE))
+        path.write_text(text[: found.start(1)] + content + text[found.end(1) :])
+        return
+    found = rng.choice(arrays)
+    kind = np.dtype(found[1].lower()) if rng.random() < 0.9 else np.dtype("u1")
+    count = int(np.frombuffer(base64.b64decode(found[2][:8])[:4], np.uint32)[0])
+    letters = 4 * -(-4 * (3 + count) // 3)
+    header = np.frombuffer(base64.b64decode(found[2][:letters]), np.uint32, 3 + count)
+    packed, parts, at = base64.b64decode(found[2][letters:]), [], 0
+    for length in header[3:].tolist():
+        parts.append(zlib.decompress(packed[at : at + length]))
+        at += length
+    block = _alter_array(rng, np.frombuffer(b"".join(parts), kind)).astype(kind).tobytes()
+    if rng.random() < 0.1:
+        block = bytes(100_000_000)
+    content = zlib.compress(block)
+    size = rng.choice((len(block), len(block), len(block), 2**32 - 1, 0))
+    words = np.array([1, size, size, len(content)], np.uint32).tobytes()
+    code = (base64.b64encode(words) + base64.b64encode(content)).decode()
+    path.write_text(text[: found.start(2)] + code + text[found.end(2) :])
+
+
+def _forge(rng: random.Random, folder: Path) -> None:
+    """Alter values of a result, and all digests with them."""
+    files = sorted(path for path in folder.iterdir() if path.suffix in (".npz", ".vtp", ".jsonl"))
+    main = folder / "result.json"
+    path = main if rng.random() < 0.4 or not files else rng.choice(files)
+    if path.suffix == ".vtp":
+        _alter_vtp(rng, path)
+    elif path.suffix == ".npz":
+        _alter_npz(rng, path)
+    else:
+        first, *rest = path.read_text().splitlines() if path != main else [path.read_text()]
+        data = json.loads(first)
+        for _ in range(rng.choice((1, 1, 2))):
+            table, key = rng.choice(_values(data))
+            table[key] = odd_value(rng) if rng.random() < 0.9 else 10**400
+        path.write_text("\n".join([json.dumps(data), *rest, ""]))
+    data = json.loads(main.read_text())
+    if isinstance(data.get("files"), dict):
+        data["files"] |= data_digests(folder)
+    main.write_text(json.dumps({**data, "sha256": content_sha256(data)}))
 
 
 def write_altered_results(rng: random.Random, folder: Path, base: Path) -> list[str]:
@@ -80,6 +192,12 @@ def write_altered_results(rng: random.Random, folder: Path, base: Path) -> list[
                 path.unlink()
         history.write_bytes(content[: rng.randrange(len(content))])
         return [*RESUME, *rng.choice(([], ["--json"]))]
+    if rng.random() < 0.5:
+        _forge(
+            rng, folder / rng.choice((chosen, "study/start") if chosen == "study" else (chosen,))
+        )
+        looked = rng.choice((*LOOK, *SIMULATE_AGAIN))
+        return [word.format(chosen) for word in looked]
     for _ in range(rng.choice((1, 1, 2))):
         path = rng.choice(main if rng.random() < 0.6 else files)
         if path.is_file():
