@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 Prepare = Callable[["Design"], None]
 
 MEASURED = SPEED, NEARER, FARTHER = (
-    "mean impact speed",
+    "mean normal speed",
     "coverage of the target's half nearer to the sonotrode",
     "coverage of its farther half",
 )
@@ -67,7 +67,7 @@ class Advice:
     effect: str
     on: bool  # whether the design has it on
     reason: str  # what a dimensionless group says of its importance
-    # Change of each of MEASURED with its 95 % interval: of the mean impact speed as a share of it,
+    # Change of each of MEASURED with its 95 % interval: of the mean normal speed as a share of it,
     # of coverages as their difference.
     changes: dict[str, Estimate]
     accuracy: float  # changes below do not matter

@@ -268,7 +268,7 @@ def test_the_windows_and_what_they_take_are_told(simulation: Path, tmp_path: Pat
 
 def test_pilot_estimates_of_each_effect_are_shown(simulation: Path, tmp_path: Path) -> None:
     sentence = "drag is on: needed (0.1 of the speed is lost on the way up; pilot: ...)"
-    changes = {"mean impact speed": {"value": -0.042, "half_width": 0.004}}
+    changes = {"mean normal speed": {"value": -0.042, "half_width": 0.004}}
     advice = {
         "effect": "drag",
         "on": True,
