@@ -30,6 +30,7 @@ RAYS = np.array([[0.3671, 0.2113, 0.9058], [-0.5317, 0.7411, 0.4098], [0.6119, -
 LIFT = 1e-3  # of a radius: how far above a plane a point beneath it is lifted
 BENEATH = 1e-9  # m: beneath the lowest place of a face that is taken for rounding
 BORDER = 1e-12  # of the mesh's size squared: a ray that passes an edge by less is undecided
+IN_CELL, IN_CELLS = 8, 16  # triangles in a cell that are aimed at, and cells of a triangle at most
 
 
 class _Projection(NamedTuple):
@@ -37,17 +38,51 @@ class _Projection(NamedTuple):
 
     corners: np.ndarray  # corner positions with the ray as third axis [m], shape (m, 3, 3)
     boxes: np.ndarray  # low and high of the first axis and of the second [m], shape (m, 4)
+    cells: "_Cells"  # of a grid over the boxes
     axes: np.ndarray  # of the projection, shape (3, 3), one a row
     border: float  # a doubled area smaller than this is undecided [m²]
 
 
+class _Cells(NamedTuple):
+    """A grid of s by s cells, and the boxes that meet each of them.
+
+    Cell (i, j) has the members from first[i s + j] up to first[i s + j + 1].
+    """
+
+    low: np.ndarray  # corner of the grid [m], shape (2,)
+    size: np.ndarray  # sides of a cell [m], shape (2,)
+    side: int  # s
+    first: np.ndarray  # shape (s² + 1,) int64
+    members: np.ndarray  # numbers of triangles, int32
+
+
+def _cells_of(boxes: np.ndarray, side: int) -> _Cells:
+    """Put boxes (m, 4) into cells; a grid finer than IN_CELLS cells a box is made coarser."""
+    low, high = boxes[:, ::2].min(axis=0), boxes[:, 1::2].max(axis=0)
+    while True:
+        size: np.ndarray = np.maximum((high - low) / side, np.finfo(float).tiny)
+        start, end = (
+            np.minimum((boxes[:, k::2] - low) / size, side - 1).astype(np.int64) for k in (0, 1)
+        )
+        wide, tall = (end - start + 1).T
+        if side == 1 or (wide * tall).sum() <= IN_CELLS * len(boxes):
+            break
+        side = (side + 1) // 2
+    owner = np.repeat(np.arange(len(boxes), dtype=np.int32), wide * tall)
+    number = np.arange(len(owner)) - np.repeat(np.cumsum(wide * tall) - wide * tall, wide * tall)
+    across, up = np.divmod(number, tall[owner])
+    cell = (start[owner, 0] + across) * side + start[owner, 1] + up
+    first = np.concatenate([[0], np.cumsum(np.bincount(cell, minlength=side * side))])
+    return _Cells(low, size, side, first, owner[np.argsort(cell, kind="stable")])
+
+
 @computed_once(32)
 def _projection(mesh: TriangleMesh, k: int) -> _Projection:
-    return _project(mesh.corners, mesh, k)
+    return _project(mesh.corners, mesh, k, max(1, math.isqrt(len(mesh.triangles) // IN_CELL)))
 
 
-def _project(triangles: np.ndarray, mesh: TriangleMesh, k: int) -> _Projection:
-    """The triangles (m, 3, 3) projected along ray k; the mesh gives the scale."""
+def _project(triangles: np.ndarray, mesh: TriangleMesh, k: int, cells: int = 1) -> _Projection:
+    """The triangles (m, 3, 3) projected along ray k, in cells² cells; the mesh gives the scale."""
     ray = RAYS[k] / np.linalg.norm(RAYS[k])
     side = np.cross(ray, [1.0, 0.0, 0.0])
     side /= np.linalg.norm(side)
@@ -55,17 +90,18 @@ def _project(triangles: np.ndarray, mesh: TriangleMesh, k: int) -> _Projection:
     corners = np.ascontiguousarray(triangles @ axes.T)
     low, high = corners.min(axis=1), corners.max(axis=1)
     boxes = np.stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1]], axis=1)
-    return _Projection(
-        corners, boxes, axes, BORDER * float(np.ptp(mesh.vertices, axis=0).max()) ** 2
-    )
+    border = BORDER * float(np.ptp(mesh.vertices, axis=0).max()) ** 2
+    return _Projection(corners, boxes, _cells_of(boxes, cells), axes, border)
 
 
 @jit
 def _crossings(projection: _Projection, u: float, v: float, w: float) -> int:
     """Number of triangles that the ray from (u, v, w) along axis 3 crosses; -1: undecided."""
     crossed = 0
-    corners, boxes = projection.corners, projection.boxes
-    for t in range(len(boxes)):
+    corners, boxes, cells = projection.corners, projection.boxes, projection.cells
+    i, j = _cell(cells, 0, u), _cell(cells, 1, v)
+    for at in range(cells.first[i * cells.side + j], cells.first[i * cells.side + j + 1]):
+        t = cells.members[at]
         if u < boxes[t, 0] or u > boxes[t, 1] or v < boxes[t, 2] or v > boxes[t, 3]:
             continue
         au, av = corners[t, 0, 0] - u, corners[t, 0, 1] - v
@@ -80,6 +116,40 @@ def _crossings(projection: _Projection, u: float, v: float, w: float) -> int:
             if above / (a + b + c) > w:
                 crossed += 1
     return crossed
+
+
+@jit
+def _cell(cells: _Cells, axis: int, x: float) -> int:
+    """Row or column of the cell nearest to a place."""
+    steps = (x - cells.low[axis]) / cells.size[axis]
+    return int(min(max(steps, 0.0), float(cells.side - 1)))
+
+
+@jit
+def _mark_near(projection: _Projection, points: np.ndarray, reach: float, near: np.ndarray) -> None:
+    corners, boxes, cells = projection.corners, projection.boxes, projection.cells
+    for n in range(len(points)):
+        u, v, w = points[n, 0], points[n, 1], points[n, 2]
+        for i in range(_cell(cells, 0, u - reach), _cell(cells, 0, u + reach) + 1):
+            row = i * cells.side
+            first = cells.first[row + _cell(cells, 1, v - reach)]
+            for at in range(first, cells.first[row + _cell(cells, 1, v + reach) + 1]):
+                t = cells.members[at]
+                a, b, c = corners[t, 0, 2], corners[t, 1, 2], corners[t, 2, 2]
+                if (
+                    boxes[t, 0] - reach <= u <= boxes[t, 1] + reach
+                    and boxes[t, 2] - reach <= v <= boxes[t, 3] + reach
+                    and min(a, b, c) - reach <= w <= max(a, b, c) + reach
+                ):
+                    near[t] = True
+
+
+def triangles_near(mesh: TriangleMesh, points: np.ndarray, reach: float) -> np.ndarray:
+    """Numbers of all triangles within reach [m] of any of the points (n, 3), and of some others."""
+    projection, near = _projection(mesh, 0), np.zeros(len(mesh.triangles), dtype=np.bool_)
+    wide = reach * (1.0 + 1e-9) + 1e-12 * float(np.abs(mesh.bounds).max())  # for rounding
+    _mark_near(projection, np.ascontiguousarray(points @ projection.axes.T), wide, near)
+    return np.flatnonzero(near)
 
 
 @jit

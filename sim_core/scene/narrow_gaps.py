@@ -20,6 +20,14 @@ TIGHT = 1e-13  # m: narrower by less is rounding; a contact is found as exactly
 OPPOSED = -1.0 + 1e-9
 
 
+class NearSurface(NamedTuple):
+    """The triangles near the balls of a scene, k of them."""
+
+    number: np.ndarray  # in the mesh, shape (k,)
+    tags: np.ndarray  # shape (k,)
+    corners: np.ndarray  # where they are at the start [m], shape (k, 3, 3)
+
+
 class NarrowGap(NamedTuple):
     """A ball that does not fit."""
 
@@ -30,20 +38,22 @@ class NarrowGap(NamedTuple):
     vibrates: bool  # whether that is so when the vibrating surfaces come nearest, not at the start
 
 
-def find_narrow_gap(
-    mesh: TriangleMesh, physics: Physics, balls: Balls, corners: np.ndarray
-) -> NarrowGap | None:
-    """The first ball that does not fit where it starts; ``corners`` (m, 3, 3) [m] at the start."""
-    radius, approach = 0.5 * balls.diameters, _largest_approach(physics)
+def find_narrow_gap(surface: NearSurface, physics: Physics, balls: Balls) -> NarrowGap | None:
+    """The first ball that does not fit where it starts.
+
+    Args:
+        surface: all triangles that are nearer to a ball than its radius and `largest_approach`.
+    """
+    radius, approach = 0.5 * balls.diameters, largest_approach(physics)
     # two such gaps, or one of more than that
-    near = clearance(corners, balls.positions, balls.radius) < radius - 0.5 * TIGHT
+    near = clearance(surface.corners, balls.positions, balls.radius) < radius - 0.5 * TIGHT
     for vibration in physics.vibrations:
-        vibrating, reach = mesh.tags == vibration.tag, balls.radius + approach
-        both = [corners[own] for own in (vibrating, ~vibrating) if own.any()]
+        vibrating, reach = surface.tags == vibration.tag, balls.radius + approach
+        both = [surface.corners[own] for own in (vibrating, ~vibrating)]
         beside = [clearance(some, balls.positions, reach) < radius + approach for some in both]
         near |= np.all(beside, axis=0)
     for ball in np.flatnonzero(near):
-        found = _tightest(mesh, physics, balls.positions[ball], float(radius[ball]), corners)
+        found = _tightest(surface, physics, balls.positions[ball], float(radius[ball]))
         if found is not None:
             return NarrowGap(int(ball), *found)
     return None
@@ -64,16 +74,17 @@ def vibrating_name(physics: Physics, tag: int) -> str:
     return "the vibrating surface" + (f" of tag {tag}" if len(physics.vibrations) > 1 else "")
 
 
-def _largest_approach(physics: Physics) -> float:
+def largest_approach(physics: Physics) -> float:
     """Bound on how much nearer [m] two surfaces come to each other than at the start."""
     return sum(2.0 * one.amplitude for one in physics.vibrations)
 
 
 def _tightest(
-    mesh: TriangleMesh, physics: Physics, here: np.ndarray, radius: float, corners: np.ndarray
+    surface: NearSurface, physics: Physics, here: np.ndarray, radius: float
 ) -> tuple[int, int, float, bool] | None:
     """The two triangles that leave a ball the least room, how much it lacks [m], and when."""
-    turn, reach = physics.part_rotation, radius + _largest_approach(physics)
+    turn, reach = physics.part_rotation, radius + largest_approach(physics)
+    corners, tags = surface.corners, surface.tags
     box = np.abs(here - np.clip(here, corners.min(axis=1), corners.max(axis=1))).max(axis=1)
     near = np.flatnonzero(box <= reach)
     away = here - _nearest_points(corners[near], here)
@@ -82,9 +93,9 @@ def _tightest(
     near, gap = near[touched], distance[touched] - radius
     away = away[touched] / distance[touched, None]
     least, moves = gap.copy(), np.full(len(near), -1)  # number of the vibration, if any
-    turns = np.zeros(len(near), np.bool_) if turn is None else mesh.tags[near] == turn.tag
+    turns = np.zeros(len(near), np.bool_) if turn is None else tags[near] == turn.tag
     for k, vibration in enumerate(physics.vibrations):
-        vibrating = mesh.tags[near] == vibration.tag
+        vibrating = tags[near] == vibration.tag
         towards = away[vibrating] @ vibration.peak
         least[vibrating] -= np.abs(towards) - np.sin(vibration.phase) * towards
         moves[vibrating] = k
@@ -94,7 +105,9 @@ def _tightest(
     if room.min(initial=np.inf) >= -TIGHT:
         return None
     one, two = np.unravel_index(room.argmin(), room.shape)
-    return int(near[one]), int(near[two]), float(-room[one, two]), bool(closer[one, two])
+    number = surface.number[near]
+    lacking, vibrates = float(-room[one, two]), bool(closer[one, two])
+    return int(number[one]), int(number[two]), lacking, vibrates
 
 
 def _nearest_points(corners: np.ndarray, point: np.ndarray) -> np.ndarray:

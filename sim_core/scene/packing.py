@@ -3,8 +3,8 @@
 The shot lies at the bottom of the chamber before peening.
 """
 
+import math
 from collections.abc import Callable
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +13,7 @@ from sim_core.effects.part_rotation import PartRotation
 from sim_core.errors import SceneError
 from sim_core.geometry.analytic import AnalyticCavity
 from sim_core.geometry.mesh import TriangleMesh
+from sim_core.numerics.jit import jit
 from sim_core.scene.invariants import clearance, contained, enclosed, turned_corners
 
 BATCH = 256  # positions tried at once
@@ -60,14 +61,14 @@ def pack_balls(
             "diameter, or one each"
         )
     each = np.broadcast_to(sizes, int(count))
-    placed = _PlacedBalls(2.0 * (0.5 * float(each.max()) + GAP))
+    placed = _PlacedBalls(len(each), 2.0 * (0.5 * float(each.max()) + GAP))
     select_free = _free_selector(mesh, part_rotation)
     positions = np.empty((int(count), 3))
     for size in np.unique(each)[::-1]:
-        before = len(placed.points)
+        before = placed.count
         layer = _Layer(mesh, select_free, float(size), clear, floor)
         _place(placed, layer, int((each == size).sum()), rng)
-        positions[each == size] = placed.points[before:]
+        positions[each == size] = placed.points[before : placed.count]
     return positions
 
 
@@ -111,45 +112,81 @@ def _place(placed: "_PlacedBalls", layer: _Layer, count: int, rng: np.random.Gen
             f"no ball of {diameter * 1e3:.3g} mm fits into the mesh: it is narrower than the ball; "
             "use smaller balls or a larger chamber"
         )
-    failures, first = 0, len(placed.points)
+    failures, first = 0, placed.count
     top = min(low[2] + FIRST_LAYER * diameter, high[2])
-    while len(placed.points) - first < count:
+    while placed.count - first < count:
         points = rng.uniform(low, [high[0], high[1], top], size=(BATCH, 3))
-        before = len(placed.points)
-        for point in layer.select_free(points, reach):
-            if len(placed.points) - first == count:
-                break
-            placed.add(point, radius)
+        before = placed.count
+        placed.add(layer.select_free(points, reach), radius, first + count)
         # a layer that accepts fewer than one point in fifty is full
-        failures = 0 if len(placed.points) - before > BATCH // 50 else failures + 1
+        failures = 0 if placed.count - before > BATCH // 50 else failures + 1
         if failures and top < high[2]:
             top = min(low[2] + GROWTH * (top - low[2]), high[2])
             failures = 0
         elif failures > MAX_FAILURES:
             raise SceneError(
-                f"only {len(placed.points) - first} of {count} balls of {diameter * 1e3:.3g} mm "
+                f"only {placed.count - first} of {count} balls of {diameter * 1e3:.3g} mm "
                 f"find a free place in {mesh.volume * 1e6:.3g} cm³; use less shot, smaller balls "
                 "or a larger chamber"
             )
 
 
 class _PlacedBalls:
-    """Balls that do not overlap, found by the grid cell of their centre.
+    """Balls that do not overlap, in chains of those whose centres are in grid cells of one hash."""
 
-    The cells are ``edge`` [m] wide, twice the largest radius.
+    def __init__(self, most: int, edge: float) -> None:
+        """Make room for so many balls in cells ``edge`` [m] wide, twice the largest radius."""
+        self.count, self.edge = 0, edge
+        self.points, self.radii = np.zeros((most, 3)), np.zeros(most)
+        self.newest = np.full(1 << most.bit_length(), -1)  # ball of each hash
+        self.older = np.full(most, -1)  # the next ball of its chain
+
+    def add(self, points: np.ndarray, radius: float, most: int) -> None:
+        """Add those of the points (n, 3) in turn that overlap no ball, up to a number of balls."""
+        at = self.points, self.radii, self.newest, self.older
+        self.count = _add(np.ascontiguousarray(points), radius, most, self.count, self.edge, *at)
+
+
+@jit
+def _add(
+    new: np.ndarray,
+    radius: float,
+    most: int,
+    count: int,
+    edge: float,
+    points: np.ndarray,
+    radii: np.ndarray,
+    newest: np.ndarray,
+    older: np.ndarray,
+) -> int:
+    """The number of balls when the new ones are added, see `_PlacedBalls`."""
+    for n in range(len(new)):
+        if count == most:
+            break
+        x, y, z = new[n, 0], new[n, 1], new[n, 2]
+        i, j, k = math.floor(x / edge), math.floor(y / edge), math.floor(z / edge)
+        is_free = True
+        for cell in range(27):
+            a, b, c = cell // 9 - 1, cell // 3 % 3 - 1, cell % 3 - 1
+            other = newest[_hash(i + a, j + b, k + c) & (len(newest) - 1)]
+            while other >= 0 and is_free:
+                dx, dy, dz = x - points[other, 0], y - points[other, 1], z - points[other, 2]
+                apart = radius + radii[other]
+                is_free = dx * dx + dy * dy + dz * dz >= apart * apart
+                other = older[other]
+        if is_free:
+            points[count, 0], points[count, 1], points[count, 2], radii[count] = x, y, z, radius
+            own = _hash(i, j, k) & (len(newest) - 1)
+            older[count], newest[own] = newest[own], count
+            count += 1
+    return count
+
+
+@jit
+def _hash(i: int, j: int, k: int) -> int:
+    """Number of a grid cell, spread over the integers by three large primes.
+
+    Source: M. Teschner et al., "Optimized spatial hashing for collision detection of deformable
+    objects", Vision, Modeling and Visualization 2003.
     """
-
-    def __init__(self, edge: float) -> None:
-        self.edge = edge
-        self.points: list[np.ndarray] = []
-        self.cells: dict[tuple[int, int, int], list[tuple[np.ndarray, float]]] = {}
-
-    def add(self, point: np.ndarray, radius: float) -> None:
-        """Add a ball unless it overlaps another."""
-        i, j, k = (int(c) for c in np.floor(point / self.edge))
-        for a, b, c in product((-1, 0, 1), repeat=3):
-            for other, its_radius in self.cells.get((i + a, j + b, k + c), ()):
-                if ((point - other) ** 2).sum() < (radius + its_radius) ** 2:
-                    return
-        self.points.append(point)
-        self.cells.setdefault((i, j, k), []).append((point, radius))
+    return (i * 73856093) ^ (j * 19349663) ^ (k * 83492791)

@@ -25,9 +25,16 @@ from sim_core.scene.invariants import (
     contained,
     enclosed,
     narrowest_gap,
+    triangles_near,
     turned_corners,
 )
-from sim_core.scene.narrow_gaps import find_narrow_gap, surface_name, vibrating_name
+from sim_core.scene.narrow_gaps import (
+    NearSurface,
+    find_narrow_gap,
+    largest_approach,
+    surface_name,
+    vibrating_name,
+)
 from sim_core.scene.physics import BallCollisions, Physics
 
 MAX_DURATION = 1e6  # s: eleven days of peening
@@ -173,26 +180,39 @@ class Scene:
                 f"ball {outside[0]} at {where} m is outside the mesh ({len(outside)} in all)"
             )
         # a turning part is where its phase has it; vibrating faces are checked at theirs below
-        still = self.mesh.corners if corners is None else corners
-        still = still[~np.isin(self.mesh.tags, [one.tag for one in self.physics.vibrations])]
-        gap = clearance(still, balls.positions, balls.radius) - 0.5 * balls.diameters
+        near = self._near(corners)
+        still = ~np.isin(near.tags, [one.tag for one in self.physics.vibrations])
+        gap = clearance(near.corners[still], balls.positions, balls.radius) - 0.5 * balls.diameters
         worst = int(gap.argmin())
         if gap[worst] < -TOUCH:
             raise SceneError(
                 f"ball {worst} at {balls.positions[worst].tolist()} m overlaps a surface by "
                 f"{-gap[worst]:.3g} m; move it or make it smaller"
             )
-        corners = self.mesh.corners.copy() if corners is None else corners
-        self._require_room_above_sonotrode(corners)
-        self._require_room_between(corners)
+        self._require_room_above_sonotrode(near)
+        self._require_room_between(near)
 
-    def _require_room_above_sonotrode(self, corners: np.ndarray) -> None:
-        """Check the balls against vibrating surfaces, and displace ``corners`` by their phases."""
+    def _near(self, corners: np.ndarray | None) -> NearSurface:
+        """The triangles that balls may touch or that may come near them, where they are at rest.
+
+        Args:
+            corners: of all triangles [m], shape (m, 3, 3), if some of them are turned.
+        """
+        assert isinstance(self.mesh, TriangleMesh)
+        reach = self.balls.radius + largest_approach(self.physics)
+        number = np.arange(len(self.mesh.triangles))
+        if corners is None:
+            number = triangles_near(self.mesh, self.balls.positions, reach)
+            corners = self.mesh.corners
+        return NearSurface(number, self.mesh.tags[number], corners[number])
+
+    def _require_room_above_sonotrode(self, near: NearSurface) -> None:
+        """Check the balls against vibrating surfaces, and displace these by their phases."""
         balls = self.balls
         for vibration in self.physics.vibrations:
-            vibrating = self.mesh.tags == vibration.tag
-            corners[vibrating] += np.sin(vibration.phase) * vibration.peak
-            gap = clearance(corners[vibrating], balls.positions, balls.radius)
+            vibrating = near.tags == vibration.tag
+            near.corners[vibrating] += np.sin(vibration.phase) * vibration.peak
+            gap = clearance(near.corners[vibrating], balls.positions, balls.radius)
             gap -= 0.5 * balls.diameters
             worst = int(gap.argmin())
             if gap[worst] < -TOUCH:
@@ -202,9 +222,9 @@ class Scene:
                     "which is displaced by its phase at the start; keep one amplitude clear of it"
                 )
 
-    def _require_room_between(self, corners: np.ndarray) -> None:
+    def _require_room_between(self, near: NearSurface) -> None:
         assert isinstance(self.mesh, TriangleMesh)
-        gap = find_narrow_gap(self.mesh, self.physics, self.balls, corners)
+        gap = find_narrow_gap(near, self.physics, self.balls)
         if gap is None:
             return
         one, two = (surface_name(self.mesh, self.physics, side) for side in (gap.one, gap.two))

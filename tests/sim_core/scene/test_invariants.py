@@ -3,7 +3,8 @@
 import numpy as np
 import trimesh
 
-from sim_core.scene.invariants import clearance, closest_pair, contained
+from sim_core import TriangleMesh
+from sim_core.scene.invariants import clearance, closest_pair, contained, triangles_near
 from tests.helpers.scenes.cavities import balls_at, box, box_around, cylinder
 
 
@@ -51,3 +52,23 @@ def test_the_closest_pair_is_found() -> None:
     balls = balls_at(np.array([[0, 0, 0], [0.1, 0, 0], [0.1, 0.02, 0], [0, 0.5, 0]]))
     assert closest_pair(balls) == (0.02, 1, 2)
     assert closest_pair(balls_at(np.zeros((1, 3)))) == (np.inf, -1, -1)
+
+
+def test_a_mesh_of_many_triangles_is_judged_as_when_every_triangle_is_asked() -> None:
+    """Cells only leave out triangles that are too far to matter, whatever their sizes."""
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=0.03)
+    slab = trimesh.creation.box((0.002, 0.09, 0.09))  # large triangles beside small ones
+    for shape in (ball, trimesh.util.concatenate([ball, slab.apply_translation((0.06, 0.0, 0.0))])):
+        mesh = TriangleMesh(shape.vertices, shape.faces, np.zeros(len(shape.faces), dtype=int))
+        points = np.random.default_rng(3).uniform(-0.035, 0.07, (500, 3))
+        inside = np.linalg.norm(points, axis=1) < 0.03 * 0.99
+        outside = (np.linalg.norm(points, axis=1) > 0.03) & (points[:, 0] < 0.058)
+        found = contained(mesh, points)
+        assert found[inside].all()
+        assert not found[outside].any()
+        np.testing.assert_array_equal(found, contained(mesh, points, mesh.corners))
+        for reach in (1e-4, 3e-3, 0.05):
+            near = triangles_near(mesh, points[:20], reach)
+            of_near = clearance(mesh.corners[near], points[:20], reach)
+            np.testing.assert_array_equal(of_near, clearance(mesh.corners, points[:20], reach))
+    assert len(triangles_near(mesh, points[:1], 1e-3)) < 0.1 * len(mesh.triangles)
