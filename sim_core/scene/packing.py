@@ -14,7 +14,13 @@ from sim_core.errors import SceneError
 from sim_core.geometry.analytic import AnalyticCavity
 from sim_core.geometry.mesh import TriangleMesh
 from sim_core.numerics.jit import jit
-from sim_core.scene.invariants import clearance, contained, enclosed, turned_corners
+from sim_core.scene.invariants import (
+    clearance,
+    contained,
+    enclosed,
+    triangles_near,
+    turned_corners,
+)
 
 BATCH = 256  # positions tried at once
 MAX_FAILURES = 40  # batches without a free place before the shot is refused
@@ -78,15 +84,21 @@ def _free_selector(
     """A function of points (n, 3) [m] and a distance [m]: those inside, that far from surfaces."""
     if isinstance(mesh, AnalyticCavity):
         return lambda points, reach: points[(mesh.gaps(points) >= reach).all(axis=1)]
-    corners = mesh.corners if part_rotation is None else turned_corners(mesh, part_rotation)
+    if part_rotation is None:
 
-    def free(points: np.ndarray, reach: float) -> np.ndarray:
+        def free(points: np.ndarray, reach: float) -> np.ndarray:
+            near = mesh.corners[triangles_near(mesh, points, reach)]
+            points = points[clearance(near, points, reach) >= reach]
+            return points[contained(mesh, points)]
+
+        return free
+    corners = turned_corners(mesh, part_rotation)
+
+    def free_of_turned(points: np.ndarray, reach: float) -> np.ndarray:
         points = points[clearance(corners, points, reach) >= reach]
-        return points[
-            contained(mesh, points) if part_rotation is None else enclosed(corners, points)
-        ]
+        return points[enclosed(corners, points)]
 
-    return free
+    return free_of_turned
 
 
 class _Layer(NamedTuple):
