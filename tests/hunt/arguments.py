@@ -70,6 +70,8 @@ def draw_arguments(rng: random.Random, folder: Path, base: Path) -> list[str]:
     if rng.random() < 0.1:
         words.append(rng.choice(NAMES))
     options = COMMANDS[command]
+    if command == "accuracy":  # a study of convergence that nothing is wrong with takes minutes
+        words += ["--budget-s", rng.choice(options["--budget-s"])]
     for name in rng.sample(list(options), rng.randrange(1, min(4, len(options) + 1))):
         words += [name]
         if options[name]:

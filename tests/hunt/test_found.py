@@ -32,6 +32,11 @@ def _vtk_with_huge_counts(folder: Path) -> None:
     _as_part(folder, "part.vtp", text)
 
 
+def _stl_of_a_wrong_normal(folder: Path) -> None:
+    content = whole_files()["text.stl"].replace(b"facet normal ", b"facet normal x", 1)
+    _as_part(folder, "part.stl", content)
+
+
 def _ply_of_a_corner_beyond_all(folder: Path) -> None:
     content = whole_files()["ascii.ply"]
     head, body = content.split(b"end_header\n")
@@ -129,6 +134,7 @@ MESH = 'mesh = "box.stl"'
 # What is done to the files, the command, and what it says; None where it works.
 FOUND: dict[str, tuple[Callable[[Path], None], list[str], str | None]] = {
     "VTK's counts": (_vtk_with_huge_counts, READ, "cannot be read as VTK.*damaged"),
+    "a normal that is no number": (_stl_of_a_wrong_normal, READ, None),
     "a corner beyond all": (_ply_of_a_corner_beyond_all, READ, "cannot be read as PLY.*damaged"),
     "a set THRU 5e9": (_nastran_set, READ, None),
     "a set that generates 4e9": (_abaqus_set, READ, None),

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 import re
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
@@ -60,8 +62,7 @@ def read_raw_mesh(path: Path, content: bytes) -> RawMesh:
     """Read a file; InputError if its format is not known, or it is damaged or truncated."""
     found = _find_format(path, content)
     try:
-        with warnings.catch_warnings():  # of numbers that are none: the mesh is checked as a whole
-            warnings.simplefilter("ignore")
+        with _libraries_quiet():
             return found.read(path, content)
     except (InputError, MemoryError):
         raise
@@ -71,6 +72,19 @@ def read_raw_mesh(path: Path, content: bytes) -> RawMesh:
             f"{path}: cannot be read as {found.name}, it is damaged or truncated "
             f"({text.splitlines()[0][:120]}); export it again"
         ) from None
+
+
+@contextmanager
+def _libraries_quiet() -> Iterator[None]:
+    """Suppress what libraries say of a damaged file, since the mesh is checked as a whole."""
+    before = logging.root.manager.disable
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        logging.disable(logging.ERROR)
+        try:
+            yield
+        finally:
+            logging.disable(before)
 
 
 def _find_format(path: Path, content: bytes) -> MeshFormat:

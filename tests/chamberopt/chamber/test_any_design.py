@@ -1,0 +1,109 @@
+"""Whatever the numbers of a design are: its cavity is closed and holds the shot, or it is refused.
+
+Refused means by an InputError that names a key of the design.
+"""
+
+from __future__ import annotations
+
+import re
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import trimesh
+from hypothesis import HealthCheck, event, example, given, settings
+from hypothesis import strategies as st
+
+from chamberopt.chamber.build import build_chamber
+from chamberopt.chamber.part import turning_axis
+from chamberopt.chamber.scene import build_scene, chamber_mesh
+from chamberopt.common.errors import InputError
+from chamberopt.design.design import Design, validate
+from tests.helpers.synthetic import plate_design
+
+KEY = re.compile(r"\b(part|chamber|sonotrode|shot|process|effects)\.\w+|\bshot: ")
+PLATE = plate_design().model_dump(mode="json", exclude_none=True)
+FEW_BALLS = 3000  # a larger shot packs as slowly as it is large
+
+
+# Usual numbers. Each is drawn near its own, and now and then one of them far from it.
+USUAL = {
+    "cylinder": {"diameter_mm": 50.0, "corner_radius_mm": 1.0},
+    "box": {"length_mm": 50.0, "width_mm": 50.0},
+    "prism": {"across_mm": 50.0, "turn_deg": 10.0},
+}
+COMMON = {"height_mm": 20.0, "sonotrode_distance_mm": 15.0, "inclination_deg": 2.0}
+SHOT = {"mass_g": 3.3, "diameter_mm": 3.0}
+FAR = (0.0, -1.0, 1e-6, 0.05, 0.3, 3.0, 10.0, 1e6)  # in usual numbers
+
+
+@st.composite
+def tables(draw: st.DrawFn) -> dict[str, Any]:
+    shape = draw(st.sampled_from(sorted(USUAL)))
+    usual = {f"chamber.{name}": one for name, one in (USUAL[shape] | COMMON).items()}
+    usual |= {f"shot.{name}": one for name, one in SHOT.items()}
+    usual |= {"sonotrode.amplitude_um": 25.0}
+    usual |= {f"part.offset_mm.{axis}": 2.0 for axis in range(2)}
+    usual |= {f"part.rotate_deg.{axis}": 3.0 for axis in range(3)}
+    numbers = {name: one * draw(st.floats(0.8, 1.25)) for name, one in usual.items()}
+    for name in draw(st.lists(st.sampled_from(sorted(usual)), max_size=2)):
+        numbers[name] = usual[name] * draw(st.sampled_from(FAR))
+    table = deepcopy(PLATE)
+    sides = {"sides": draw(st.integers(2, 70))} if shape == "prism" else {}
+    table["chamber"] = {"shape": shape, **sides}
+    table["part"] |= {"offset_mm": [0.0] * 2, "rotate_deg": [0.0] * 3}
+    for name, number in numbers.items():
+        place, key, *axis = name.split(".")
+        if axis:
+            table[place][key][int(axis[0])] = number
+        else:
+            table[place][key] = number
+    return table
+
+
+def is_closed(triangles: np.ndarray) -> bool:
+    """Whether every edge belongs to as many triangles one way round as the other."""
+    sides = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
+    one, other = (np.sort(sides @ np.array(way)) for way in ([1 << 32, 1], [1, 1 << 32]))
+    return np.array_equal(one, other)
+
+
+def winding_numbers(corners: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """How often a surface goes round each place: 1 inside.
+
+    Source: A. Van Oosterom and J. Strackee, IEEE Trans. Biomed. Eng. 30 (1983) 125.
+    """
+    found = []
+    for place in places:
+        a, b, c = np.moveaxis(corners - place, 1, 0)
+        la, lb, lc = (np.linalg.norm(one, axis=1) for one in (a, b, c))
+        volume = np.einsum("ij,ij->i", a, np.cross(b, c))
+        rest = la * lb * lc + lc * (a * b).sum(1) + lb * (a * c).sum(1) + la * (b * c).sum(1)
+        found.append(np.arctan2(volume, rest).sum() / (2.0 * np.pi))
+    return np.array(found)
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
+@example(PLATE)
+@given(tables())
+def test_a_cavity_is_closed_and_holds_the_shot_or_is_refused(table: dict[str, Any]) -> None:
+    refused = ""
+    try:
+        design = validate(Design, table, Path("design.toml"))
+        chamber = build_chamber(design)
+        if design.shot.count > FEW_BALLS:
+            return
+        scene = build_scene(design, chamber_mesh(chamber), 1, turning_axis(design, chamber.part))
+    except InputError as error:
+        refused = str(error)
+    event("refused" if refused else f"accepted {table['chamber']['shape']}")
+    if refused:
+        assert KEY.search(refused), refused
+        return
+    assert is_closed(chamber.triangles)
+    corners = chamber.vertices[chamber.triangles]
+    assert trimesh.triangles.mass_properties(corners).volume > 0.0
+    assert np.isclose(abs(trimesh.triangles.mass_properties(corners).volume), chamber.volume)
+    some = scene.balls.positions[:: max(1, len(scene.balls.positions) // 20)]
+    assert np.allclose(winding_numbers(corners, some), 1.0, atol=1e-6)
