@@ -49,8 +49,14 @@ def save_simulation(
         Remarks for the user, such as why a picture was skipped.
     """
     folder = make_output_folder(folder)
-    data = write_simulation(folder, complete_result(design, chamber, evaluation))
-    write_result(folder, data, advice, warned)
+    try:
+        data = write_simulation(folder, complete_result(design, chamber, evaluation))
+        write_result(folder, data, advice, warned)
+    except OSError:  # a full disk: without its result.json, what was written is of no use
+        for one in folder.iterdir():
+            if one.is_file() and not one.name.startswith("."):
+                one.unlink()
+        raise
     return _draw_coverage([folder], [evaluation], [folder.resolve().name], folder / "coverage.png")
 
 

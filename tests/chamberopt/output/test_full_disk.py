@@ -1,5 +1,6 @@
 """A file that finds no room: an OSError that names it, never a signal, and no half of a file."""
 
+import errno
 import multiprocessing
 import os
 import subprocess
@@ -81,6 +82,18 @@ def test_a_file_is_whole_or_not_there(name: str, tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def result(tmp_path_factory: pytest.TempPathFactory) -> Result:
     return plate_result(tmp_path_factory.mktemp("plate") / "result")
+
+
+def test_a_simulation_that_finds_no_room_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("chamberopt.output.save_run.write_result", full)
+    with pytest.raises(OSError, match="No space left"):
+        plate_result(tmp_path / "result")
+    assert not list((tmp_path / "result").iterdir())
 
 
 @pytest.mark.parametrize("name", ["fields-vtp", "chamber-3mf", "impacts-parquet"])
