@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
-from concurrent.futures import Executor
+from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -47,6 +47,7 @@ from chamberopt.coverage.field.target_field import (
     TargetField,
     WindowSetting,
     find_target_field,
+    require_wide_gauge,
 )
 from chamberopt.coverage.metrics import (
     METRICS,
@@ -119,10 +120,13 @@ def evaluate(
     mesh = chamber_mesh(chamber)
     setting = share(executor, ReplicaSetting(design, chamber, cavity or mesh))
     timings = {"simulate": 0.0, "coverage": 0.0}
-    started = time.perf_counter()
-    seen = SeenDents(prepare_target(design, chamber, mesh), [], [])
-    timings["coverage"] += time.perf_counter() - started
+    window = window_setting(design, chamber)
+    # The dents of a replica are looked at while others are simulated, so that no worker waits.
+    beside = ThreadPoolExecutor(1)
+    field = beside.submit(find_target_field, chamber, mesh, window)
+    beside.shutdown(wait=False)
     done = [] if done is None else done
+    seen: SeenDents | None = None
     while True:
         started = time.perf_counter()
         for replica in simulate_replicas(
@@ -131,8 +135,11 @@ def evaluate(
             done.append(replica)
             if progress:
                 progress(len(done), count, None)
+            seen = seen or SeenDents(field.result(), [], [])
+            seen.add([one.hits for one in done])
         simulated = time.perf_counter()
         hits = [replica.hits for replica in done]
+        seen = seen or SeenDents(field.result(), [], [])
         seen.add(hits)
         found = estimate_metrics(seen, hits, chamber, design)
         value = weighted_sum(parse_objective(plan.objective_name), found.metrics)
@@ -175,10 +182,15 @@ def evaluate(
 
 
 def prepare_target(design: Design, chamber: Chamber, mesh: TriangleMesh) -> TargetField:
-    """The target of a chamber, ready to be looked at through windows.
+    """The target of a chamber, ready to be looked at through windows; InputError as below."""
+    return find_target_field(chamber, mesh, window_setting(design, chamber))
+
+
+def window_setting(design: Design, chamber: Chamber) -> WindowSetting:
+    """The windows for the target of a chamber.
 
     Raises:
-        InputError: no triangle of it bounds the cavity, or the gauge is too small for it.
+        InputError: no triangle of the target bounds the cavity, or the gauge is too small for it.
     """
     require_target(chamber)
     material, shot = design.materials.part, design.shot
@@ -195,7 +207,8 @@ def prepare_target(design: Design, chamber: Chamber, mesh: TriangleMesh) -> Targ
     setting = WindowSetting(
         accuracy.gauge, accuracy.points, min(shot.diameters), float(largest_dent[0])
     )
-    return find_target_field(chamber, mesh, setting)
+    require_wide_gauge(chamber, setting)
+    return setting
 
 
 @dataclass

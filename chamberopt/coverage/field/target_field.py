@@ -131,26 +131,28 @@ class TargetField:
         return Places(hits.place[rows].astype(float), self.normals[triangle], self.face[triangle])
 
 
+def require_wide_gauge(chamber: Chamber, setting: WindowSetting) -> None:
+    """Raise InputError if the windows are too small for so large a target."""
+    area, gauge = float(chamber.part.area[chamber.part.target].sum()), setting.gauge
+    wanted = PIECES_PER_WINDOW * area / gauge
+    if wanted > MAX_PIECES:
+        least = 1e6 * gauge * wanted / MAX_PIECES
+        raise InputError(
+            f"process.accuracy.gauge_mm2: given {1e6 * gauge:g}, too small for a target of "
+            f"{1e6 * area:.4g} mm²; give at least {least:.2g}"
+        )
+
+
 def find_target_field(chamber: Chamber, mesh: TriangleMesh, setting: WindowSetting) -> TargetField:
     """Prepare a chamber's target.
 
     Args:
         mesh: of the chamber.
-
-    Raises:
-        InputError: the windows are too small for so large a target.
     """
     from chamberopt.coverage.field.window_areas import surface_pieces
 
     part, gauge = chamber.part, setting.gauge
     area = np.where(part.target, part.area, 0.0)
-    wanted = PIECES_PER_WINDOW * area.sum() / gauge
-    if wanted > MAX_PIECES:
-        least = 1e6 * gauge * wanted / MAX_PIECES
-        raise InputError(
-            f"process.accuracy.gauge_mm2: given {1e6 * gauge:g}, too small for a target of "
-            f"{1e6 * area.sum():.4g} mm²; give at least {least:.2g}"
-        )
     face, creases = find_faces(part.vertices, part.triangles, part.target)
     radius, corners = float(np.sqrt(gauge / np.pi)), part.vertices[part.triangles]
     ball = 0.5 * setting.ball
