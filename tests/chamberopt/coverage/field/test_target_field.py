@@ -12,6 +12,7 @@ from chamberopt.coverage.field.target_field import (
     TargetField,
     WindowSetting,
     find_target_field,
+    require_wide_gauge,
     with_whole_part,
 )
 from chamberopt.geometry.triangles import areas
@@ -57,7 +58,7 @@ def test_pieces_are_not_wider_than_a_window(gauge_mm2: float) -> None:
 def test_a_gauge_too_small_for_the_target_is_refused_with_the_least_that_is_possible() -> None:
     chamber = plane_chamber()
     with pytest.raises(InputError, match=r"process\.accuracy\.gauge_mm2: given 0\.0001") as refused:
-        field_of(chamber, gauge_mm2=1e-4)
+        require_wide_gauge(chamber, setting(gauge_mm2=1e-4))
     least = float(str(refused.value).rsplit(" ", 1)[-1])
     assert least == pytest.approx(PIECES_PER_WINDOW * 225.0 / target_field.MAX_PIECES, rel=0.05)
     assert "225 mm²" in str(refused.value)
