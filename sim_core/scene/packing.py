@@ -14,13 +14,7 @@ from sim_core.errors import SceneError
 from sim_core.geometry.analytic import AnalyticCavity
 from sim_core.geometry.mesh import TriangleMesh
 from sim_core.numerics.jit import jit
-from sim_core.scene.invariants import (
-    clearance,
-    contained,
-    enclosed,
-    triangles_near,
-    turned_corners,
-)
+from sim_core.scene.invariants import clearance, contained, enclosed, triangles_near, turned_corners
 
 BATCH = 256  # positions tried at once
 MAX_FAILURES = 40  # batches without a free place before the shot is refused
