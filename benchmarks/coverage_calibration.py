@@ -1,9 +1,10 @@
 """Do the 95 % intervals of the coverage's figures hold, and from how many dents on?
 
-    python benchmarks/coverage_calibration.py [--case NAME ...] [--replicas N] [--csv FILE]
+    python benchmarks/coverage_calibration.py [--case NAME ...] [--replicas N] [--group N]
+        [--csv FILE]
 
-For each case a pool of replicas is simulated once. Groups of eight are drawn from it at random, 200
-a row, and their figures are compared with those of the whole pool, which is many times as large.
+For each case a pool of replicas is simulated once. Groups of eight, or N, are drawn from it
+at random, 200 a row, and their figures are compared with those of the whole pool, which is many times as large.
 Rows are for groups with all and with half of the time of each replica. A row gives the
 share of the intervals that held, the bias, the ratio of the median half-width to 1.96 standard
 deviations of the figure, and in how many groups the figure was resolved. Rows are printed also for
@@ -77,7 +78,7 @@ def until(hits: Hits, rows: np.ndarray) -> Hits:
     return replace(hits, **{name: column[rows] for name, column in vars(hits).items()})
 
 
-def rows_of(name: str, case: Case, replicas: int) -> Iterator[dict[str, Any]]:
+def rows_of(name: str, case: Case, replicas: int, group: int) -> Iterator[dict[str, Any]]:
     """Calibration of all figures of a case, a row each for each part of the time."""
     whole, chamber, pool = simulate_pool(case, replicas)
     field = evaluation.prepare_target(whole, chamber, chamber_mesh(chamber))
@@ -97,7 +98,7 @@ def rows_of(name: str, case: Case, replicas: int) -> Iterator[dict[str, Any]]:
                 field, [[kind[i] for i in some] for kind in seen], [hits[i] for i in some],
                 chamber, design,
             )
-            for some in drawn(rng, replicas)
+            for some in drawn(rng, replicas, group)
         ]  # fmt: skip
         for key, true in truth.items():
             found = [estimates[key] for estimates, _, _ in groups]
@@ -109,7 +110,7 @@ def rows_of(name: str, case: Case, replicas: int) -> Iterator[dict[str, Any]]:
                 continue
             yield {
                 "case": name,
-                "seconds": GROUP * seconds,
+                "seconds": group * seconds,
                 "dents": float(np.median([dents for _, _, dents in groups])),
                 "figure": key,
                 "truth": true,
@@ -121,11 +122,11 @@ def rows_of(name: str, case: Case, replicas: int) -> Iterator[dict[str, Any]]:
             }
 
 
-def drawn(rng: np.random.Generator, replicas: int) -> Iterator[np.ndarray]:
+def drawn(rng: np.random.Generator, replicas: int, group: int) -> Iterator[np.ndarray]:
     """Groups of replicas; no replica is in two groups until all have been in one."""
     count = 0
     while True:
-        for some in rng.permutation(replicas)[: replicas // GROUP * GROUP].reshape(-1, GROUP):
+        for some in rng.permutation(replicas)[: replicas // group * group].reshape(-1, group):
             yield some
             count += 1
             if count == GROUPS:
@@ -152,11 +153,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--case", action="append", choices=list(CASES))
     parser.add_argument("--replicas", type=int, default=320)
+    parser.add_argument("--group", type=int, default=GROUP)
     parser.add_argument("--csv", help="name of a file in benchmarks/results")
     arguments = parser.parse_args()
     found = []
     for name in arguments.case or CASES:
-        rows = list(rows_of(name, CASES[name], arguments.replicas))
+        rows = list(rows_of(name, CASES[name], arguments.replicas, arguments.group))
         print_table(rows)
         found += rows
     if arguments.csv:

@@ -5,21 +5,25 @@ Notation
     y_j     pseudo-value of replica j; their mean is the estimate     (pseudovalues, (n,))
     s       standard deviation of the pseudo-values
     t       quantile of Student's distribution                        (student_quantile)
-    u       standard error by anything but replicas                  (sampling)
-    half-width = sqrt((t s)² / n + (1.96 u)²) + bias
+    u_k     signed standard errors by causes that replicas do not show, and that estimates of one
+            part have in common, such as the choice of points               (shared)
+    z       quantile of the normal distribution                      (normal_quantile)
+    half-width = sqrt((t s)² / n + z² sum of u_k²) + bias
+
+The difference of two estimates of one part has the differences of their u_k.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
 
 CONFIDENCE = 0.95
-NORMAL_95 = 1.96  # half-width of a 95 % interval in standard errors
 ZERO_TOLERANCE = 1e-12  # a value below is a rounding error of zero
 
 
@@ -33,6 +37,7 @@ class Estimate:
     pseudovalues: tuple[float, ...] = field(default=(), repr=False)
     # Bound on the error that more replicas would not remove; included in half_width.
     bias: float = 0.0
+    shared: tuple[float, ...] = field(default=(), repr=False)  # u_k; none left out are 0
     in_words: str = ""  # what stands in the place of the number where there is none, such as never
 
     @property
@@ -50,14 +55,16 @@ class Estimate:
 
     def to_json(self) -> dict[str, Any]:
         """As JSON values, with the pseudo-values by which results can be compared later."""
-        return {**self.interval_json(), "pseudovalues": list(self.pseudovalues), "bias": self.bias}
+        return {**self.interval_json(), "pseudovalues": list(self.pseudovalues), "bias": self.bias,
+                "shared": list(self.shared)}  # fmt: skip
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Estimate:
         """The estimate that `to_json` wrote. Raises KeyError, TypeError or ValueError otherwise."""
         pseudovalues = tuple(float(x) for x in data["pseudovalues"])
-        bias = float(data.get("bias", 0.0))
-        return replace(cls.from_interval_json(data), pseudovalues=pseudovalues, bias=bias)
+        bias, shared = float(data["bias"]), tuple(float(x) for x in data["shared"])
+        found = cls.from_interval_json(data)
+        return replace(found, pseudovalues=pseudovalues, bias=bias, shared=shared)
 
     def not_known(self, in_words: str) -> Estimate:
         """The same value without an interval, and the words that stand in its place."""
@@ -83,15 +90,14 @@ def estimate(
     highest: float = math.inf,
     bias: float = 0.0,
     confidence: float = CONFIDENCE,
-    sampling: float = 0.0,
+    shared: Sequence[float] = (),
 ) -> Estimate:
     """Mean of the pseudo-values with its Student-t interval.
 
     Args:
         lowest, highest: range of the quantity; the mean is clipped to it.
         bias: bound on the error that more replicas would not remove.
-        sampling: standard error that replicas do not show, and that estimates of the same part
-            have in common, so that their differences are free of it.
+        shared: signed standard errors by causes that replicas do not show.
     """
     values = np.asarray(pseudovalues, dtype=float)
     mean = float(np.clip(values.mean(), lowest, highest))
@@ -103,8 +109,26 @@ def estimate(
     if n > 1:
         spread = float(values.std(ddof=1))
         of_replicas = student_quantile(n - 1, confidence) * spread / math.sqrt(n)
-        half_width = math.hypot(of_replicas, NORMAL_95 * sampling) + bias
-    return Estimate(mean, half_width, tuple(values.tolist()), bias)
+        half_width = math.hypot(of_replicas, shared_half_width(shared, confidence)) + bias
+    return Estimate(mean, half_width, tuple(values.tolist()), bias, tuple(shared))
+
+
+def shared_half_width(shared: Sequence[float], confidence: float = CONFIDENCE) -> float:
+    """Half-width of the interval by what replicas do not show."""
+    return normal_quantile(confidence) * math.hypot(*shared)
+
+
+def sum_of_shared(terms: Iterable[tuple[float, Estimate]]) -> tuple[float, ...]:
+    """Shared standard errors of a sum of weights times estimates of one part."""
+    rows = [[weight * one for one in term.shared] for weight, term in terms]
+    return tuple(sum(column) for column in zip_longest(*rows, fillvalue=0.0))
+
+
+def normal_quantile(confidence: float) -> float:
+    """Half-width of a two-sided interval in standard errors, by the normal distribution."""
+    from scipy.special import ndtri
+
+    return float(ndtri(0.5 + confidence / 2.0))
 
 
 def student_quantile(freedom: float, confidence: float = CONFIDENCE) -> float:
@@ -125,8 +149,9 @@ def paired_difference(
     if not after.pseudovalues or len(after.pseudovalues) != len(before.pseudovalues):
         return independent_difference(after, before, confidence)
     gaps = np.subtract(after.pseudovalues, before.pseudovalues)
-    pairs = estimate(gaps, bias=after.bias + before.bias, confidence=confidence)
-    return Estimate(after.value - before.value, pairs.half_width, pairs.pseudovalues, pairs.bias)
+    shared = sum_of_shared(((1.0, after), (-1.0, before)))
+    pairs = estimate(gaps, bias=after.bias + before.bias, confidence=confidence, shared=shared)
+    return replace(pairs, value=after.value - before.value)
 
 
 def independent_difference(
@@ -138,7 +163,9 @@ def independent_difference(
         # Without replicas to count, the intervals are added in quadrature.
         return Estimate(value, math.hypot(after.half_width, before.half_width), (), bias)
     scatter = welch_half_width(after.pseudovalues, before.pseudovalues, confidence)
-    return Estimate(value, scatter + bias, (), bias)
+    shared = sum_of_shared(((1.0, after), (-1.0, before)))
+    half_width = math.hypot(scatter, shared_half_width(shared, confidence)) + bias
+    return Estimate(value, half_width, (), bias, shared)
 
 
 def welch_half_width(

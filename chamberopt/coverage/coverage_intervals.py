@@ -43,7 +43,7 @@ import numpy as np
 
 from chamberopt.common.estimate import Estimate, estimate
 from chamberopt.coverage.coverage_from_impacts import Batch
-from chamberopt.coverage.field.surface_points import sampling_error, sparse_points
+from chamberopt.coverage.field.surface_points import sampling_errors, sparse_points
 from chamberopt.coverage.field.target_field import Gauge
 from chamberopt.coverage.metrics import FULL_COVERAGE, NEVER, P05
 
@@ -76,8 +76,14 @@ class Resolution:
         return self.dents >= self.needed_for_places
 
     def time_for(self, needed: float) -> float:
-        """Simulated time [s], with a margin, in which the median window gets so many dents."""
-        return ENOUGH * self.simulated_time * needed / self.dents if self.dents else math.inf
+        """Simulated time [s] in which the median window gets so many dents.
+
+        With a margin where it has fewer now.
+        """
+        if not self.dents:
+            return math.inf
+        margin = 1.0 if self.dents >= needed else ENOUGH
+        return margin * self.simulated_time * needed / self.dents
 
 
 class DentSums(NamedTuple):
@@ -209,7 +215,7 @@ def mean_and_variance_estimates(
             jackknife(values[k]),
             0.0,
             highest,
-            sampling=math.hypot(sampling_error(some[k]), float(more[k] - values[k][0])),
+            shared=[*sampling_errors(some[k]), float(more[k] - values[k][0])],
         )
         for k, highest in enumerate((1.0, 0.25))
     )
@@ -255,7 +261,8 @@ def root_of_variance(variance: Estimate) -> Estimate:
         low, high = (math.sqrt(max(0.0, variance.value + side * reach)) for side in (-1.0, 1.0))
         slope = max(value - low, high - value) / reach
     found = estimate(value + slope * (np.array(variance.pseudovalues) - variance.value), 0.0)
-    return replace(found, half_width=slope * reach if slope else reach)
+    shared = tuple(slope * one for one in variance.shared)
+    return replace(found, half_width=slope * reach if slope else reach, shared=shared)
 
 
 def _weight_of_dents(batches: Sequence[Batch]) -> float:
@@ -311,7 +318,7 @@ def p05_estimate(
         # Where no dent has fallen it may be bare, or up to 3 dents were to be expected.
         density = NOT_ONE * weight * time_ratio / float(sums.replicas.sum())
         bias = max(bias + value, -math.expm1(-density)) if math.isfinite(weight) else math.inf
-    found = estimate(value + deviations, 0.0, 1.0, bias=bias, sampling=sampling_error(of_some))
+    found = estimate(value + deviations, 0.0, 1.0, bias=bias, shared=sampling_errors(of_some))
     # Where counting seems to explain all of the variance, the roots are drawn to one value, which
     # hardly moves from replica to replica. There may be more variance, by its own interval.
     variances = np.array([one.over_target - one.counting for one in (all_of_them, *rests)])
@@ -415,4 +422,6 @@ def time_to_98_estimate(p05: Estimate, seconds: float) -> Estimate:
     deviations = np.array(p05.pseudovalues) - p05.value
     reach = max(latest - value, value - soonest)
     slope = reach / p05.half_width if p05.half_width else 0.0
-    return replace(estimate(value - slope * deviations, 0.0, NEVER), half_width=reach)
+    shared = tuple(-slope * one for one in p05.shared)
+    found = estimate(value - slope * deviations, 0.0, NEVER)
+    return replace(found, half_width=reach, shared=shared)

@@ -28,7 +28,7 @@ import numpy as np
 
 from chamberopt.common.estimate import Estimate, estimate
 from chamberopt.coverage.coverage_intervals import jackknife, root_of_variance
-from chamberopt.coverage.field.surface_points import sampling_error, sparse_points
+from chamberopt.coverage.field.surface_points import sampling_errors, sparse_points
 
 if TYPE_CHECKING:
     from chamberopt.coverage.field.target_field import TargetField
@@ -203,7 +203,7 @@ def uniformity_of(parts: np.ndarray, highest: float, reachable: float) -> Estima
     spread = root_of_variance(estimate(jackknife(np.array([everything, *without])), 0.0))
     deviations = np.array(spread.pseudovalues) - spread.value
     return estimate(
-        value - deviations, highest=1.0, bias=bias, sampling=sampling_error(np.array(of_some))
+        value - deviations, highest=1.0, bias=bias, shared=sampling_errors(np.array(of_some))
     )
 
 

@@ -114,7 +114,8 @@ class CandidateEvaluator:
             goals=goals,
             # Without pseudo-values, which a confirmation has in a file of its own.
             metrics={
-                k: replace(one, pseudovalues=(), bias=0.0) for k, one in evaluation.metrics.items()
+                k: replace(one, pseudovalues=(), bias=0.0, shared=())
+                for k, one in evaluation.metrics.items()
             },
             penalty=penalty,
             score=goals[0].value - unit * penalty,

@@ -15,16 +15,16 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from chamberopt.chamber.analytic import cavity_note
 from chamberopt.chamber.scene import chamber_mesh
-from chamberopt.common.estimate import Estimate, estimate
+from chamberopt.common.estimate import Estimate, estimate, sum_of_shared
 from chamberopt.common.parallel.executor import share
 from chamberopt.common.progress import Progress
 from chamberopt.coverage.coverage_from_impacts import (
@@ -51,6 +51,7 @@ from chamberopt.coverage.field.target_field import (
 )
 from chamberopt.coverage.metrics import (
     METRICS,
+    P05,
     ObjectiveFunction,
     exposed_target,
     parse_objective,
@@ -249,8 +250,8 @@ def estimate_metrics(
     found |= _ratios(in_batches(hits), chamber, design)
     of_wide, resolution_of_wide = window_estimates(seen.field, seen.field.wide, seen.wide, design)
     return Estimates(
-        {name: as_resolved(name, found[name], resolution) for name in METRICS},
-        {name: as_resolved(name, one, resolution_of_wide) for name, one in of_wide.items()},
+        _all_resolved({name: found[name] for name in METRICS}, resolution),
+        _all_resolved(of_wide, resolution_of_wide),
         resolution,
     )
 
@@ -279,6 +280,19 @@ def window_estimates(
         process.treatment_time,
     )  # fmt: skip
     return found, find_resolution(batches, gauge, time_ratio, process.recorded_time)
+
+
+def _all_resolved(found: Mapping[str, Estimate], resolution: Resolution) -> dict[str, Estimate]:
+    """All estimates as far as they are resolved; the mean at least by a bound, where there is one.
+
+    The mean takes many dents where nearly all is covered, and then the 5th percentile is known.
+    """
+    shown = {name: as_resolved(name, one, resolution) for name, one in found.items()}
+    mean, p05 = shown["mean_coverage"], shown["p05_coverage"]
+    if mean.in_words == NOT_RESOLVED and 0.0 < p05.low < math.inf:
+        least = 100.0 * (1.0 - P05) * p05.low
+        shown["mean_coverage"] = mean.not_known(f"more than {math.floor(least)} %")
+    return shown
 
 
 def as_resolved(name: str, value: Estimate, resolution: Resolution) -> Estimate:
@@ -349,17 +363,18 @@ def weighted_sum(objective: ObjectiveFunction, metrics: dict[str, Estimate]) -> 
     terms = [(weight, metrics[name]) for name, weight in objective.terms.items()]
     value = sum(weight * metric.value for weight, metric in terms)
     columns = [weight * np.array(metric.pseudovalues) for weight, metric in terms]
-    spread = estimate(np.sum(columns, axis=0))
+    spread = estimate(np.sum(columns, axis=0), shared=sum_of_shared(terms))
     words = next((metric.in_words for _, metric in terms if metric.in_words), "")
     bias = sum(abs(weight) * metric.bias for weight, metric in terms)
-    # What replicas do not show, biases and the choice of points, may all go one way.
+    # Biases, and by how much a steep interval is wider, may all go one way.
     more = sum(
-        abs(weight) * max(0.0, metric.half_width - estimate(metric.pseudovalues).half_width)
+        abs(weight) * max(0.0, metric.half_width - plain.half_width)
         for weight, metric in terms
         if math.isfinite(metric.half_width) and metric.half_width > 0.0
+        for plain in [estimate(metric.pseudovalues, shared=metric.shared)]
     )
     half_width = math.inf if words == NOT_RESOLVED else spread.half_width + more
-    return Estimate(value, half_width, spread.pseudovalues, bias, words)
+    return replace(spread, value=value, half_width=half_width, bias=bias, in_words=words)
 
 
 def _accuracy_note(

@@ -9,12 +9,15 @@ import numpy as np
 
 from chamberopt.coverage.coverage_from_impacts import batches_of, find_footprints
 from chamberopt.coverage.coverage_intervals import (
+    NEARLY_FULL,
     Products,
     mean_and_variance_estimates,
     multiply_dents,
 )
+from chamberopt.coverage.metrics import FULL_COVERAGE
 
 if TYPE_CHECKING:
+    from chamberopt.common.estimate import Estimate
     from chamberopt.coverage.field.target_field import TargetField
     from chamberopt.design.load import Design
     from chamberopt.simulation.evaluation import Evaluation
@@ -49,19 +52,40 @@ def coverage_against_time(
     of_all, of_rest = multiply_dents(
         batches, len(gauge.area), [*ratios, *(2.0 * ratio for ratio in ratios)]
     )
-    p05 = evaluation.metrics["p05_coverage"]
+    rates = _rates_of_p05(evaluation.metrics["p05_coverage"], treatment, full)
     rows = []
     for number, time in enumerate(times):
         both = [number, number + len(times)]
         products = Products(of_all[:, both], of_rest[:, both])
         mean, _ = mean_and_variance_estimates(products, field.reachable, field.reachable_error)
         row = {"time_s": time, "mean_coverage": mean.value, "half_width": mean.half_width}
-        if math.isfinite(p05.half_width):
+        if rates:
             # The dent density grows in proportion to the time.
-            low, middle, high = (
-                -math.expm1(time / treatment * math.log1p(-min(max(value, 0.0), 1.0 - 1e-12)))
-                for value in (p05.low, p05.value, p05.high)
-            )
+            low, middle, high = (-math.expm1(-rate * time) for rate in rates)
             row |= {"p05_coverage": middle, "p05_half_width": max(middle - low, high - middle)}
         rows.append(row)
     return rows
+
+
+def _rates_of_p05(p05: Estimate, treatment: float, full: Estimate) -> list[float]:
+    """Dent density per second of where the 5th percentile of coverage is: low, middle, high.
+
+    A coverage near 1 hardly tells a density from twice as large a one, but the time to full
+    coverage does.
+
+    Args:
+        p05: the percentile after the treatment time [s].
+        full: time until it is FULL_COVERAGE [s].
+
+    Returns:
+        Nothing where it is not resolved.
+    """
+    if p05.value > NEARLY_FULL:
+        if not math.isfinite(full.half_width) or full.low <= 0.0:
+            return []
+        times = full.high, full.value, full.low
+        return [-math.log(1.0 - FULL_COVERAGE) / time for time in times]
+    if not math.isfinite(p05.half_width):
+        return []
+    shares = p05.low, p05.value, p05.high
+    return [-math.log1p(-min(max(one, 0.0), 1.0 - 1e-12)) / treatment for one in shares]

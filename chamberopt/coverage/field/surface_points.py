@@ -145,6 +145,12 @@ def sparse_points(values: np.ndarray) -> list[np.ndarray]:
     return [values[start::SPARSE] for start in range(SPARSE)]
 
 
-def sampling_error(of_some: np.ndarray) -> float:
-    """Standard error by the choice of points, from figures of `sparse_points`."""
-    return float(np.std(of_some, ddof=1)) / math.sqrt(len(of_some))
+def sampling_errors(of_some: np.ndarray) -> list[float]:
+    """Signed standard errors by the choice of points, from figures of `sparse_points`.
+
+    Figures of the same points move together: what they have in common is not in the errors of their
+    difference. The root of the sum of their squares is the standard error.
+    """
+    count = len(of_some)
+    errors: list[float] = ((of_some - of_some.mean()) / math.sqrt(count * (count - 1))).tolist()
+    return errors

@@ -28,7 +28,7 @@ from chamberopt.coverage.field.crease_bands import (
 from chamberopt.coverage.field.smooth_faces import Creases, find_faces
 from chamberopt.coverage.field.surface_points import (
     ball_fits,
-    sampling_error,
+    sampling_errors,
     sparse_points,
     spread_points,
 )
@@ -171,7 +171,9 @@ def find_target_field(chamber: Chamber, mesh: TriangleMesh, setting: WindowSetti
         touched=touched,
         surface=surface,
         reachable=float(fits.mean()),
-        reachable_error=sampling_error(np.array([some.mean() for some in sparse_points(fits)])),
+        reachable_error=math.hypot(
+            *sampling_errors(np.array([some.mean() for some in sparse_points(fits)]))
+        ),
     )
 
 

@@ -16,6 +16,7 @@ from chamberopt.common.estimate import (
     Estimate,
     independent_difference,
     paired_difference,
+    shared_half_width,
     student_quantile,
     welch_half_width,
 )
@@ -92,9 +93,12 @@ def difference(
         scatter = _paired_half_width(gap, confidence)
     else:
         scatter = partial(welch_half_width, after.pseudovalues, before.pseudovalues, confidence)
+    lasting = shared_half_width(gap.shared, confidence)
     # The bias comes from having few dents, so it is assumed to shrink as the scatter does.
     needed = _smallest_number(
-        lambda n: scatter(n / count) + gap.bias * math.sqrt(count / n), count, abs(gap.value)
+        lambda n: math.hypot(scatter(n / count), lasting) + gap.bias * math.sqrt(count / n),
+        count,
+        abs(gap.value),
     )
     return found if needed is None else replace(found, time_ratio=needed / count, replicas=needed)
 

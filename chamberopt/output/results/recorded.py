@@ -55,6 +55,7 @@ class _Known(_Interval):
 class _Estimate(_Known):
     pseudovalues: list[float]
     bias: float
+    shared: list[float]
 
 
 class _Objective(_Estimate):

@@ -103,7 +103,7 @@ def add_part(
         (part.rest, GREY),
     ):
         if surface.n_cells:
-            style |= {"ambient": 0.45, "diffuse": 0.55} if colour == GREY else {}
+            style |= {"ambient": 0.75, "diffuse": 0.25} if colour == GREY else {}
             actors.append(plotter.add_mesh(surface, color=colour, **style))
     for actor in actors:
         actor.prop.interpolation = "Phong"  # by the normals of the surface, not of its triangles
