@@ -4,7 +4,8 @@
         [--csv FILE]
 
 For each case a pool of replicas is simulated once. Groups of eight, or N, are drawn from it
-at random, 200 a row, and their figures are compared with those of the whole pool, which is many times as large.
+at random, 200 a row, and their figures are compared with those of the whole pool, which is many
+times as large.
 Rows are for groups with all and with half of the time of each replica. A row gives the
 share of the intervals that held, the bias, the ratio of the median half-width to 1.96 standard
 deviations of the figure, and in how many groups the figure was resolved. Rows are printed also for

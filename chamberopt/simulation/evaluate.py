@@ -364,7 +364,9 @@ def weighted_sum(objective: ObjectiveFunction, metrics: dict[str, Estimate]) -> 
     value = sum(weight * metric.value for weight, metric in terms)
     columns = [weight * np.array(metric.pseudovalues) for weight, metric in terms]
     spread = estimate(np.sum(columns, axis=0), shared=sum_of_shared(terms))
+    # Words of a single metric are true of it alone.
     words = next((metric.in_words for _, metric in terms if metric.in_words), "")
+    words = NOT_RESOLVED if words and len(terms) > 1 else words
     bias = sum(abs(weight) * metric.bias for weight, metric in terms)
     # Biases, and by how much a steep interval is wider, may all go one way.
     more = sum(
@@ -373,7 +375,8 @@ def weighted_sum(objective: ObjectiveFunction, metrics: dict[str, Estimate]) -> 
         if math.isfinite(metric.half_width) and metric.half_width > 0.0
         for plain in [estimate(metric.pseudovalues, shared=metric.shared)]
     )
-    half_width = math.inf if words == NOT_RESOLVED else spread.half_width + more
+    is_open = words == NOT_RESOLVED or any(math.isinf(metric.half_width) for _, metric in terms)
+    half_width = math.inf if is_open else spread.half_width + more
     return replace(spread, value=value, half_width=half_width, bias=bias, in_words=words)
 
 
