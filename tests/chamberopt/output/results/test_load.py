@@ -67,5 +67,5 @@ def test_what_is_no_result_is_said(tmp_path: Path) -> None:
         with pytest.raises(InputError, match="damaged"):
             load_result(folder)
     (folder / "result.json").write_text(text.replace('"format": 4', '"format": 99'))
-    with pytest.raises(InputError, match=r"in format 99, expected 3: .* read it with that version"):
+    with pytest.raises(InputError, match=r"in format 99, expected 4: .* read it with that version"):
         load_result(folder)
