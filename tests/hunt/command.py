@@ -2,6 +2,7 @@
 
 A server process imports everything once and forks for each command, so that a command costs
 milliseconds and yet can neither end nor change the tests that run it. Start it with `Server()`.
+`Executable()` starts what a user starts, which takes a second.
 """
 
 from __future__ import annotations
@@ -74,6 +75,32 @@ class Server:
         request = {"folder": str(folder), "words": list(words), "kill_after": kill_after}
         print(json.dumps({**request, "seconds": seconds}), file=self._process.stdin, flush=True)
         return Outcome(**json.loads(self._process.stdout.readline()))
+
+
+class Executable:
+    """Starts the installed program for each command."""
+
+    def run(self, folder: Path, words: Sequence[str], seconds: float = SECONDS) -> Outcome:
+        """Run `chamberopt WORDS` in a folder, as Server.run does."""
+        begin = time.monotonic()
+        program = Path(sys.executable).with_name("chamberopt")
+        with subprocess.Popen(
+            [program, *words],
+            cwd=folder,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            errors="replace",
+            preexec_fn=lambda: _limit(MEMORY, seconds),
+            process_group=0,
+        ) as going:
+            try:
+                texts = going.communicate(timeout=2.0 * seconds)
+            except subprocess.TimeoutExpired:
+                os.killpg(going.pid, signal.SIGKILL)
+                texts = going.communicate()
+        return Outcome(going.returncode, *texts, time.monotonic() - begin)
 
 
 def fault(outcome: Outcome, allowed: Sequence[int] = (0, 2)) -> str | None:
@@ -150,16 +177,21 @@ def _run(request: dict[str, Any]) -> Outcome:
     return Outcome(status, *texts, time.monotonic() - begin)
 
 
+def _limit(memory: int, seconds: float) -> None:
+    """Limit this process's memory [bytes], the files that it writes, and its CPU time."""
+    limit = round(seconds)
+    resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (FILE_SIZE, FILE_SIZE))
+    resource.setrlimit(resource.RLIMIT_CPU, (limit, limit + 1))
+
+
 def _be_the_command(request: dict[str, Any], files: list[int]) -> None:
     """Become `chamberopt WORDS`, within the limits; does not return."""
     status = 70
     try:
         os.setpgid(0, 0)
         taken = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-        resource.setrlimit(resource.RLIMIT_AS, (taken + MEMORY, taken + MEMORY))
-        resource.setrlimit(resource.RLIMIT_FSIZE, (FILE_SIZE, FILE_SIZE))
-        limit = round(request["seconds"])
-        resource.setrlimit(resource.RLIMIT_CPU, (limit, limit + 1))
+        _limit(taken + MEMORY, request["seconds"])
         os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
         os.dup2(files[0], 1)
         os.dup2(files[1], 2)

@@ -16,7 +16,7 @@ import pytest
 
 from tests.hunt import arguments, meshes, results, toml_files
 from tests.hunt.base import write_base
-from tests.hunt.command import Server, fault, fingerprint
+from tests.hunt.command import Executable, Server, fault, fingerprint
 
 DRAW: dict[str, Callable[[random.Random, Path, Path], list[str]]] = {
     "toml": toml_files.write_wrong_files,
@@ -25,6 +25,8 @@ DRAW: dict[str, Callable[[random.Random, Path, Path], list[str]]] = {
     "results": results.write_altered_results,
 }
 FEW = {"toml": 160, "mesh": 70, "arguments": 40, "results": 40}
+# Seeds whose commands end within seconds, for the program that a user starts.
+STARTED = {"toml": (0, 1, 2), "mesh": (1, 4, 10), "arguments": (1, 4, 7), "results": (3, 6, 8)}
 MANY = {"toml": 5_000, "mesh": 3_000, "arguments": 1_000, "results": 1_000}
 CHUNK = 100
 LONG = [(kind, at) for kind, count in MANY.items() for at in range(0, count, CHUNK)]
@@ -52,7 +54,9 @@ def base(server: Server, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def complaint(server: Server, kind: str, seed: int, folder: Path, base: Path) -> str | None:
+def complaint(
+    server: Server | Executable, kind: str, seed: int, folder: Path, base: Path
+) -> str | None:
     """What is wrong with the end of one drawn command, or None; the folder is removed."""
     folder.mkdir()
     words = DRAW[kind](random.Random(f"{kind}{seed}"), folder, base)
@@ -75,6 +79,13 @@ def complaint(server: Server, kind: str, seed: int, folder: Path, base: Path) ->
 @pytest.mark.parametrize("kind", DRAW)
 def test_some_wrong_input_is_refused(server: Server, base: Path, tmp_path: Path, kind: str) -> None:
     complaints = [complaint(server, kind, k, tmp_path / "case", base) for k in range(FEW[kind])]
+    assert not any(complaints), "\n\n".join(filter(None, complaints))
+
+
+@pytest.mark.parametrize("kind", DRAW)
+def test_the_program_that_a_user_starts_refuses_it(base: Path, tmp_path: Path, kind: str) -> None:
+    case, seeds = tmp_path / "case", STARTED[kind]
+    complaints = [complaint(Executable(), kind, seed, case, base) for seed in seeds]
     assert not any(complaints), "\n\n".join(filter(None, complaints))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import random
+import shutil
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -120,6 +121,7 @@ def write_wrong_files(rng: random.Random, folder: Path, base: Path) -> list[str]
     Args:
         base: folder with design.toml, study.toml and the files they name.
     """
+    shutil.copy(base / "box.stl", folder)
     texts = {name: (base / name).read_text() for name in ("design.toml", "study.toml")}
     target = rng.choice(("design.toml", "design.toml", "study.toml"))
     for name, text in texts.items():
