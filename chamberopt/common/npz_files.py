@@ -14,7 +14,7 @@ import zlib
 from collections.abc import Sequence
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -75,6 +75,25 @@ def load_record(path: Path, kind: type[Record], others: Sequence[type], remedy: 
     except UNREADABLE as error:
         raise _unreadable(path, error, remedy) from None
     return record
+
+
+def is_of_type(value: Any, hint: Any) -> bool:
+    """Whether a value read from a file, and all that it holds, has the types of its class.
+
+    A whole number may stand for a float; true and false are no numbers.
+
+    Args:
+        hint: a plain class, a dataclass, tuple[T, ...] or dict[str, T].
+    """
+    if is_dataclass(hint):
+        parts = get_type_hints(hint).items()
+        return type(value) is hint and all(is_of_type(getattr(value, k), one) for k, one in parts)
+    kind, inner = get_origin(hint), get_args(hint)
+    if kind is tuple:
+        return type(value) is tuple and all(is_of_type(one, inner[0]) for one in value)
+    if kind is dict:
+        return type(value) is dict and all(is_of_type(one, inner[1]) for one in value.values())
+    return type(value) is hint or (hint is float and type(value) is int)
 
 
 def _unreadable(path: Path, error: BaseException, remedy: str) -> InputError:

@@ -143,13 +143,18 @@ def load_hits(path: Path) -> HitsByTriangle:
 
 
 def _require_sound(first: np.ndarray, columns: dict[str, np.ndarray]) -> None:
-    """Raise ValueError unless all arrays have the types, lengths and ranges of impacts."""
+    """Raise ValueError unless `first` is a list of rows and the columns are those of impacts."""
     if first.dtype != np.int64 or first.ndim != 1 or not len(first) or first[0] != 0:
         raise ValueError("first is no list of rows from 0")
     if (np.diff(first) < 0).any():
         raise ValueError("first goes down")
+    require_impacts(columns, int(first[-1]))
+
+
+def require_impacts(columns: dict[str, np.ndarray], count: int) -> None:
+    """Raise ValueError unless columns of Hits have the types and ranges of so many impacts."""
     for name, column in columns.items():
-        shape = (first[-1], 3) if name == "place" else (first[-1],)
+        shape = (count, 3) if name == "place" else (count,)
         if column.dtype != np.float32 or column.shape != shape:
             raise ValueError(f"{name}: {column.dtype} of shape {column.shape}, expected {shape}")
         low = -MAX_NUMBER if name == "place" else 0.0

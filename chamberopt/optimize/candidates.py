@@ -197,7 +197,7 @@ class Candidates:
             trial, evaluation = self._evaluator.trial(number, point, stage, replicas, best_low)
             self._folder.append(trial, evaluation, time.perf_counter() - began)
         elif stage == "confirm" and trial.objective is not None:
-            evaluation = self._folder.evaluation(number)
+            evaluation = self._folder.evaluation(trial)
         if number == 0:
             self._evaluator.reference = Reference(trial.score, self._evaluator.unit(trial.metrics))
         self.trials.append(trial)

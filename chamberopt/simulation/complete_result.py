@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from chamberopt.simulation.evaluation import require_triangles
 from chamberopt.simulation.field_values import PartField
 from chamberopt.simulation.time_curve import coverage_against_time
 
@@ -30,7 +31,11 @@ class CandidateResult:
 
 
 def complete_result(design: Design, chamber: Chamber, evaluation: Evaluation) -> CandidateResult:
-    """Compute what only a final result needs; a search does without it."""
+    """Compute what only a final result needs; a search does without it.
+
+    InputError if the evaluation, which a resumed study has read from a file, is of another part.
+    """
+    require_triangles(evaluation, len(chamber.part.triangles))
     seen = PartField(design, chamber, evaluation)
     return CandidateResult(
         design=design,

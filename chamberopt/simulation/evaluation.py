@@ -9,10 +9,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
-from chamberopt.common.npz_files import load_record, save_record
+from chamberopt.common.limits import MAX_NUMBER
+from chamberopt.common.npz_files import is_of_type, load_record, save_record
 from chamberopt.coverage.coverage_intervals import Resolution
-from chamberopt.coverage.part_impacts import Hits
+from chamberopt.coverage.metrics import METRICS
+from chamberopt.coverage.part_impacts import Hits, require_impacts
+
+REMEDY = "restore the file or run the study in a new folder"
 
 
 @dataclass(frozen=True)
@@ -45,6 +50,50 @@ def save_evaluation(path: Path, evaluation: Evaluation) -> None:
 
 
 def load_evaluation(path: Path) -> Evaluation:
-    """Read an evaluation, equal to the one that was saved; InputError if missing or damaged."""
-    remedy = "restore the file or run the study in a new folder"
-    return load_record(path, Evaluation, (Estimate, Hits, Resolution), remedy)
+    """Read an evaluation, equal to the one that was saved.
+
+    InputError if the file is missing, damaged, or holds what no evaluation has.
+    """
+    found = load_record(path, Evaluation, (Estimate, Hits, Resolution), REMEDY)
+    try:
+        _require_sound(found)
+    except ValueError as error:
+        raise InputError(f"{path}: damaged ({error}); {REMEDY}") from None
+    return found
+
+
+def require_triangles(evaluation: Evaluation, triangles: int) -> None:
+    """Raise InputError unless all impacts are on a part of so many triangles."""
+    for hits in evaluation.hits:
+        if len(hits) and not 0 <= hits.triangle.min() <= hits.triangle.max() < triangles:
+            text = "confirm: an impact is on a triangle that the part does not have"
+            raise InputError(f"{text}; {REMEDY}")
+
+
+def _require_sound(found: Evaluation) -> None:
+    """Raise ValueError unless all values have the types, lengths and ranges of an evaluation."""
+    if not is_of_type(found, Evaluation):
+        raise ValueError("a value is of another type")
+    if found.metrics.keys() != METRICS.keys() or found.metrics_of_wide.keys() - METRICS.keys():
+        raise ValueError("its metrics are not those of this program")
+    estimates = found.objective, *found.metrics.values(), *found.metrics_of_wide.values()
+    needed = found.resolution
+    known = [
+        found.objective.value, found.reachable, found.crease_share, found.simulated_time,
+        needed.dents, needed.needed_for_mean, needed.needed_for_places, needed.simulated_time,
+        *found.timings.values(), *found.collisions.values(),
+        *(one.bias for one in estimates), *(x for one in estimates for x in one.pseudovalues),
+    ]  # fmt: skip
+    if not all(abs(number) <= MAX_NUMBER for number in known):
+        raise ValueError("a number is not finite, or too large")
+    if not (found.simulated_time > 0.0 and found.objective.pseudovalues and found.replicas > 0):
+        raise ValueError("it has no simulated time, or no replicas")
+    if any(one.half_width < 0.0 for one in estimates):
+        raise ValueError("an interval is negative")
+    if len(found.hits) != found.replicas:
+        raise ValueError(f"impacts of {len(found.hits)} replicas, expected {found.replicas}")
+    for hits in found.hits:
+        if hits.triangle.dtype.kind != "i" or hits.triangle.ndim != 1:
+            raise ValueError("the triangles of impacts are no whole numbers")
+        columns = {name: one for name, one in vars(hits).items() if name != "triangle"}
+        require_impacts(columns, len(hits))

@@ -191,6 +191,8 @@ def write_altered_results(rng: random.Random, folder: Path, base: Path) -> list[
             if path.name not in kept and path.suffix != ".npz":
                 path.unlink()
         history.write_bytes(content[: rng.randrange(len(content))])
+        if rng.random() < 0.5:
+            _alter_npz(rng, rng.choice(sorted((folder / "study" / "confirm").iterdir())))
         return [*RESUME, *rng.choice(([], ["--json"]))]
     if rng.random() < 0.5:
         _forge(

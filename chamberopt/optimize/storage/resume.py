@@ -8,17 +8,30 @@ as that of an uninterrupted run.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from chamberopt.common.errors import InputError
+from chamberopt.coverage.metrics import METRICS
 from chamberopt.optimize.storage.trial_log import DAMAGED, JsonLines, Trial
+from chamberopt.optimize.study.parameters import ParameterSpace
+
+if TYPE_CHECKING:
+    from chamberopt.optimize.study import Study
 
 
 class RecordedTrials:
-    """The trials of a log, read once; a last line cut off by a crash is removed."""
+    """The trials of a log, read once; a last line cut off by a crash is removed.
 
-    def __init__(self, log: JsonLines) -> None:
-        self._log = log
+    InputError for a row that is none of this study.
+    """
+
+    def __init__(self, log: JsonLines, study: Study) -> None:
+        self._log, self._objectives = log, len(study.objective.goals)
+        self._space = ParameterSpace(study.design, study.vary)
         log.repair()
         self.trials = [self._trial(number, row) for number, row in enumerate(log.rows())]
 
@@ -34,6 +47,8 @@ class RecordedTrials:
         if wanted != recorded:
             what = f"recorded is the {recorded}, but the search now asks for the {wanted}"
             raise self._mismatch(number, what)
+        if trial.parameters != self._space.values_at(np.array(point)):
+            raise self._log.damaged(number + 1)
         return trial
 
     def require_end(self, number: int) -> None:
@@ -44,11 +59,21 @@ class RecordedTrials:
     def _trial(self, number: int, row: dict[str, object]) -> Trial:
         try:
             trial = Trial.from_row(row)
-            if trial.number != number:
+            if trial.number != number or not self._is_possible(trial):
                 raise ValueError
         except DAMAGED:
             raise self._log.damaged(number + 1) from None
         return trial
+
+    def _is_possible(self, trial: Trial) -> bool:
+        """Whether a trial has the figures of this study, or failed, which its start never does."""
+        if not trial.goals:
+            return trial.number > 0 or trial.stage != "search"
+        return (
+            len(trial.goals) == self._objectives
+            and all(math.isfinite(goal.value) for goal in trial.goals)
+            and trial.metrics.keys() == METRICS.keys()
+        )
 
     def _mismatch(self, number: int, what: str) -> InputError:
         return InputError(

@@ -72,7 +72,7 @@ class StudyFolder:
             if self.finished:  # a result stays valid when the program changes
                 before, now = ({k: one.get(k) for k in ("study", "sweep")} for one in (before, now))
             study_inputs.require_same_inputs(path, before, now)
-        self.recorded = RecordedTrials(self._history)
+        self.recorded = RecordedTrials(self._history, study)
         self._timings.repair()
 
     @property
@@ -123,9 +123,21 @@ class StudyFolder:
             raise _damaged(path, error) from None
         return self._study.model_copy(update={"design": resolved}), advice
 
-    def evaluation(self, number: int) -> Evaluation:
-        """The evaluation of a recorded confirmation; InputError if its file is not usable."""
-        return load_evaluation(self._evaluation_path(number))
+    def evaluation(self, trial: Trial) -> Evaluation:
+        """The evaluation of a recorded confirmation; InputError unless its file has its figures."""
+        path = self._evaluation_path(trial.number)
+        found = load_evaluation(path)
+        metrics = {name: one.interval_json() for name, one in found.metrics.items()}
+        if (
+            found.objective.to_json() != trial.goals[0].to_json()
+            or metrics != {name: one.interval_json() for name, one in trial.metrics.items()}
+            or found.replicas != trial.replicas
+        ):
+            raise InputError(
+                f"{path}: not the evaluation that row {trial.number + 1} of {HISTORY} tells of; "
+                "restore the file or run the study in a new folder (--out)"
+            )
+        return found
 
     def append(self, trial: Trial, evaluation: Evaluation | None, seconds: float) -> None:
         """Store a trial, and the whole evaluation of a confirmation; both are then on the disk.

@@ -272,6 +272,31 @@ class TestDamage:
         with pytest.raises(InputError, match=r"006\.npz: damaged"):
             run(study(evaluations=6), folder)
 
+    @pytest.mark.parametrize(
+        ("changed", "said"),
+        [
+            ({"replicas": "4"}, "of another type"),
+            ({"objective": True}, "of another type"),
+            ({"metrics": {}}, "metrics are not those"),
+            ({"reachable": float("nan")}, "not finite"),
+            ({"simulated_time": 0.0}, "no simulated time"),
+            ({"hits": ()}, "impacts of 0 replicas, expected 4"),
+            ({"objective": Estimate(0.5, 0.1, (0.5,))}, r"not the evaluation that row 7"),
+        ],
+    )
+    def test_of_a_confirmation_that_is_forged(self, changed: dict, said: str, folder: Path) -> None:
+        path = folder / "confirm" / "006.npz"
+        save_evaluation(path, replace(load_evaluation(path), **changed))
+        with pytest.raises(InputError, match=rf"006\.npz: .*{said}"):
+            run(study(evaluations=6), folder)
+
+    def test_of_parameters(self, folder: Path) -> None:
+        rows = [json.loads(row) for row in history(folder).splitlines()]
+        rows[2]["parameters"] = {"chamber.height_mm": 1.0}
+        (folder / "history.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
+        with pytest.raises(InputError, match=r"history\.jsonl:3: damaged row"):
+            run(study(evaluations=6), folder)
+
     def test_of_the_whole_history(self, folder: Path) -> None:
         (folder / "history.jsonl").unlink()
         (folder / "history.jsonl").mkdir()
