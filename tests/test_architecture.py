@@ -27,7 +27,7 @@ ORDER = {
         "analytic checks"
     ),
     "chamberopt/coverage": "dents part_impacts+metrics field coverage_from_impacts "
-    "coverage_intervals strength",
+    "resolution+percentile coverage_intervals strength",
     "chamberopt/simulation": "resting_balls replicas evaluation evaluate "
     "field_values time_curve complete_result effect_pilot convergence",
     "chamberopt/optimize": "study+search storage "

@@ -113,6 +113,19 @@ def estimate(
     return Estimate(mean, half_width, tuple(values.tolist()), bias, tuple(shared))
 
 
+def jackknife(values: np.ndarray) -> np.ndarray:
+    """Pseudo-values about a value that needs no correction of its bias.
+
+    Args:
+        values: of all batches, and of all but each, (g + 1,).
+    """
+    batches = len(values) - 1
+    if batches == 1:
+        return values[:1]
+    raw = batches * values[0] - (batches - 1) * values[1:]
+    return np.asarray(raw + (values[0] - raw.mean()))
+
+
 def shared_half_width(shared: Sequence[float], confidence: float = CONFIDENCE) -> float:
     """Half-width of the interval by what replicas do not show."""
     return normal_quantile(confidence) * math.hypot(*shared)

@@ -26,8 +26,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.common.estimate import Estimate, estimate
-from chamberopt.coverage.coverage_intervals import jackknife, root_of_variance
+from chamberopt.common.estimate import Estimate, estimate, jackknife
+from chamberopt.coverage.coverage_intervals import root_of_variance
 from chamberopt.coverage.field.surface_points import sampling_errors, sparse_points
 
 if TYPE_CHECKING:

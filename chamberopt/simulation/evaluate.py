@@ -34,13 +34,7 @@ from chamberopt.coverage.coverage_from_impacts import (
     in_batches,
     locate_dents,
 )
-from chamberopt.coverage.coverage_intervals import (
-    NOT_RESOLVED,
-    Resolution,
-    coverage_estimates,
-    find_resolution,
-    time_to_98,
-)
+from chamberopt.coverage.coverage_intervals import coverage_estimates
 from chamberopt.coverage.dents import dent_diameter
 from chamberopt.coverage.field.target_field import (
     Gauge,
@@ -58,6 +52,8 @@ from chamberopt.coverage.metrics import (
     require_target,
 )
 from chamberopt.coverage.part_impacts import Hits, TargetImpacts
+from chamberopt.coverage.percentile import time_to_98
+from chamberopt.coverage.resolution import NOT_RESOLVED, Resolution, find_resolution
 from chamberopt.coverage.strength import intensity_uniformity
 from chamberopt.simulation.evaluation import Evaluation
 from chamberopt.simulation.replicas import (

@@ -9,12 +9,12 @@ import numpy as np
 
 from chamberopt.coverage.coverage_from_impacts import batches_of, find_footprints
 from chamberopt.coverage.coverage_intervals import (
-    NEARLY_FULL,
     Products,
     mean_and_variance_estimates,
     multiply_dents,
 )
 from chamberopt.coverage.metrics import FULL_COVERAGE
+from chamberopt.coverage.percentile import NEARLY_FULL
 
 if TYPE_CHECKING:
     from chamberopt.common.estimate import Estimate

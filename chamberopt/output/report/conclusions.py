@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
+from chamberopt.coverage.resolution import NOT_RESOLVED
 from chamberopt.optimize.candidates import POINTS_PER_PARAMETER
 from chamberopt.output.report.number_text import (
     Label,

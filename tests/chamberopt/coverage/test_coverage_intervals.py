@@ -9,28 +9,26 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from chamberopt.common.estimate import Estimate, estimate
+from chamberopt.common.estimate import Estimate, estimate, jackknife
 from chamberopt.coverage.coverage_from_impacts import Batch, Footprints, in_batches, joined
 from chamberopt.coverage.coverage_intervals import (
+    coverage_estimates,
+    mean_and_variance,
+    products_without_each,
+    root_of_variance,
+)
+from chamberopt.coverage.field.target_field import Gauge
+from chamberopt.coverage.field.windows import Places, Windows
+from chamberopt.coverage.metrics import NEVER
+from chamberopt.coverage.percentile import p05_estimate, sum_dents, time_to_98, time_to_98_estimate
+from chamberopt.coverage.resolution import (
     DENTS_FOR_MEAN,
     DENTS_FOR_PLACES,
     ENOUGH,
     NOT_RESOLVED,
     Resolution,
-    coverage_estimates,
     find_resolution,
-    jackknife,
-    mean_and_variance,
-    p05_estimate,
-    products_without_each,
-    root_of_variance,
-    sum_dents,
-    time_to_98,
-    time_to_98_estimate,
 )
-from chamberopt.coverage.field.target_field import Gauge
-from chamberopt.coverage.field.windows import Places, Windows
-from chamberopt.coverage.metrics import NEVER
 from chamberopt.simulation.evaluate import as_resolved, resolution_notes
 
 WINDOWS = 1000
