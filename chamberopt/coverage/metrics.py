@@ -153,7 +153,7 @@ OBJECTIVES = {
         ),
         ObjectiveFunction(
             "intensity_uniformity",
-            "how evenly hard the target is hit",
+            "how even the peening strength is over the target",
             {"intensity_uniformity": 1.0},
         ),
     )

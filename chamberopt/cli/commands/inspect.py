@@ -36,7 +36,8 @@ def inspect(
     results
         One or more results folders; several are shown in linked views on one colour scale.
     quantity
-        coverage, impacts, speed, p90-speed, angle, dent, energy, interval or strength.
+        coverage, impacts, speed, p90-speed, angle, dent, energy, interval or strength (the
+        peening strength S of a place; intensity_uniformity tells how even it is).
     time_s
         Show coverage, impacts and energy after this time instead of the treatment time.
     below

@@ -24,6 +24,7 @@ class Quantity:
         return f"{self.label} [{self.unit}]"
 
 
+OTHER_NAMES = {"intensity": "strength", "p90": "p90-speed"}  # what one may call them
 QUANTITIES = {
     one.name: one
     for one in (

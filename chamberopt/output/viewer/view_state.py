@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from chamberopt.common.errors import InputError
-from chamberopt.output.plots.quantities import QUANTITIES
+from chamberopt.output.plots.quantities import OTHER_NAMES, QUANTITIES
 
 Vector = tuple[float, float, float]
 Plane = tuple[Vector, Vector | None]
@@ -64,6 +64,7 @@ class ViewState:
     def __post_init__(self) -> None:
         if self.quantity not in QUANTITIES:
             close = difflib.get_close_matches(self.quantity, QUANTITIES, 1, 0.5)
+            close = [OTHER_NAMES[self.quantity]] if self.quantity in OTHER_NAMES else close
             hint = f"did you mean {close[0]}?" if close else f"there are {', '.join(QUANTITIES)}"
             raise InputError(f"--quantity {self.quantity}: not known; {hint}")
         if self.time_s is not None and not 0.0 <= self.time_s < math.inf:

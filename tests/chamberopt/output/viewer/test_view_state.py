@@ -16,6 +16,7 @@ ALL = list(QUANTITIES)
     ("options", "said"),
     [
         ({"quantity": "covrage"}, "did you mean coverage"),
+        ({"quantity": "intensity"}, "did you mean strength"),
         ({"quantity": "xyz"}, "there are coverage, impacts"),
         ({"time_s": -1.0}, "0 or more"),
         ({"time_s": float("nan")}, "0 or more"),
