@@ -48,6 +48,17 @@ class Estimate:
     def high(self) -> float:
         return self.value + self.half_width
 
+    @property
+    def beyond_scatter(self) -> float:
+        """By how much the interval is wider than what replicas and shared errors tell.
+
+        That is the bias, and what a steep interval has more.
+        """
+        if not self.pseudovalues or not math.isfinite(self.half_width):
+            return self.bias
+        scatter = estimate(self.pseudovalues, shared=self.shared).half_width
+        return max(self.bias, self.half_width - scatter) if math.isfinite(scatter) else self.bias
+
     def interval_json(self) -> dict[str, Any]:
         """Value and half-width as JSON values, null where they are not finite, and the words."""
         interval = {"value": _finite(self.value), "half_width": _finite(self.half_width)}
@@ -163,7 +174,8 @@ def paired_difference(
         return independent_difference(after, before, confidence)
     gaps = np.subtract(after.pseudovalues, before.pseudovalues)
     shared = sum_of_shared(((1.0, after), (-1.0, before)))
-    pairs = estimate(gaps, bias=after.bias + before.bias, confidence=confidence, shared=shared)
+    bias = after.beyond_scatter + before.beyond_scatter
+    pairs = estimate(gaps, bias=bias, confidence=confidence, shared=shared)
     return replace(pairs, value=after.value - before.value)
 
 
@@ -171,7 +183,7 @@ def independent_difference(
     after: Estimate, before: Estimate, confidence: float = CONFIDENCE
 ) -> Estimate:
     """Difference after - before of two that were simulated independently (Welch's t)."""
-    value, bias = after.value - before.value, after.bias + before.bias
+    value, bias = after.value - before.value, after.beyond_scatter + before.beyond_scatter
     if min(len(after.pseudovalues), len(before.pseudovalues)) < 2:
         # Without replicas to count, the intervals are added in quadrature.
         return Estimate(value, math.hypot(after.half_width, before.half_width), (), bias)

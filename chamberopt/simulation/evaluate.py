@@ -365,12 +365,7 @@ def weighted_sum(objective: ObjectiveFunction, metrics: dict[str, Estimate]) -> 
     words = NOT_RESOLVED if words and len(terms) > 1 else words
     bias = sum(abs(weight) * metric.bias for weight, metric in terms)
     # Biases, and by how much a steep interval is wider, may all go one way.
-    more = sum(
-        abs(weight) * max(0.0, metric.half_width - plain.half_width)
-        for weight, metric in terms
-        if math.isfinite(metric.half_width) and metric.half_width > 0.0
-        for plain in [estimate(metric.pseudovalues, shared=metric.shared)]
-    )
+    more = sum(abs(weight) * metric.beyond_scatter for weight, metric in terms)
     is_open = words == NOT_RESOLVED or any(math.isinf(metric.half_width) for _, metric in terms)
     half_width = math.inf if is_open else spread.half_width + more
     return replace(spread, value=value, half_width=half_width, bias=bias, in_words=words)
