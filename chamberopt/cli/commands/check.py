@@ -42,10 +42,11 @@ def check(
         Write an image (.png) of the part with its target and chamber, or of the surface's faults.
     """
     from chamberopt.common.files import claim_file, claim_folder
-    from chamberopt.output.viewer.subprocess_drawing import picture_path
 
     with ExitStack() as claims:
         if screenshot is not None:
+            from chamberopt.output.viewer.subprocess_drawing import picture_path
+
             claims.enter_context(claim_file(picture_path(screenshot)))
         if out is not None:
             claims.enter_context(claim_folder(out))
