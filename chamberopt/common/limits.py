@@ -86,9 +86,17 @@ def parse_json(content: bytes | str) -> Any:
 
     Python reads NaN, and numbers too large for arithmetic, such as 1e999 or 400 digits.
     """
-    return json.loads(
+    value = json.loads(
         content, parse_constant=_plain_number, parse_float=_plain_number, parse_int=_whole_number
     )
+    require_text(content, value)
+    return value
+
+
+def require_text(content: bytes | str, value: Any) -> None:
+    """Raise ValueError if a text of a JSON value has half a character, which no file can hold."""
+    if ("\\ud" if isinstance(content, str) else b"\\ud") in content.lower():  # type: ignore[operator]
+        json.dumps(value, ensure_ascii=False).encode()  # UnicodeEncodeError is a ValueError
 
 
 def _plain_number(text: str) -> float:

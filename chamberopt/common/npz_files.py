@@ -20,7 +20,7 @@ import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import atomic_write
-from chamberopt.common.limits import ANY_SHRINKAGE_BYTES, MAX_SHRINKAGE
+from chamberopt.common.limits import ANY_SHRINKAGE_BYTES, MAX_SHRINKAGE, require_text
 
 # What reading a damaged file can raise.
 UNREADABLE = (
@@ -69,7 +69,10 @@ def load_record(path: Path, kind: type[Record], others: Sequence[type], remedy: 
     arrays = read_arrays(path, remedy)
     classes = {one.__name__: one for one in (kind, *others)}
     try:
-        record = _from_tree(json.loads(arrays.pop("tree").tobytes()), arrays, classes)
+        text = arrays.pop("tree").tobytes()
+        tree = json.loads(text)
+        require_text(text, tree)
+        record = _from_tree(tree, arrays, classes)
         if not isinstance(record, kind):
             raise TypeError("another kind of file")
     except UNREADABLE as error:

@@ -86,6 +86,7 @@ FORGED: dict[str, tuple[Callable[[Path], None], list[str], str]] = {
     "a number for a stream": (_values(stream=5), REPLAY, "stream: Input should be"),
     "a text for effects": (_values(effects="all"), LOOK, "effects: Input should be"),
     "a number for a date": (_values(created=5), LOOK, "created: Input should be"),
+    "half a character": (_values(notes=["\ud800"]), LOOK, "surrogates not allowed"),
     "no date": (_values(created="soon"), LOOK, "created: "),
     "a seed of 400 digits": (_values(seed=10**400), REPLAY, "more digits"),
     "another seed": (_values(seed=7), REPLAY, "seed: given 7, its design has 1"),
