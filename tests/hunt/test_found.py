@@ -32,6 +32,13 @@ def _vtk_with_huge_counts(folder: Path) -> None:
     _as_part(folder, "part.vtp", text)
 
 
+def _vtk_of_many_components(folder: Path) -> None:
+    text = whole_files()["text.vtp"].replace(
+        b'NumberOfComponents="3"', b'NumberOfComponents="3000000000.0"'
+    )
+    _as_part(folder, "part.vtp", text)
+
+
 def _stl_of_a_wrong_normal(folder: Path) -> None:
     content = whole_files()["text.stl"].replace(b"facet normal ", b"facet normal x", 1)
     _as_part(folder, "part.stl", content)
@@ -133,7 +140,7 @@ STUDY = ["check", "study.toml"]
 MESH = 'mesh = "box.stl"'
 # What is done to the files, the command, and what it says; None where it works.
 FOUND: dict[str, tuple[Callable[[Path], None], list[str], str | None]] = {
-    "VTK's counts": (_vtk_with_huge_counts, READ, "cannot be read as VTK.*damaged"),
+    "VTK's counts": (_vtk_with_huge_counts, READ, "NumberOfPoints is '8000000000000'"),
     "a normal that is no number": (_stl_of_a_wrong_normal, READ, None),
     "a corner beyond all": (_ply_of_a_corner_beyond_all, READ, "cannot be read as PLY.*damaged"),
     "a set THRU 5e9": (_nastran_set, READ, None),
@@ -167,6 +174,11 @@ FOUND: dict[str, tuple[Callable[[Path], None], list[str], str | None]] = {
         r"shot\.\\x1b\]0;owned\\x07: unknown key",
     ),
     "an argument that commands": (lambda _: None, ["report", NAME], r"\\x1b\]0;owned\\x07"),
+    "components without end": (
+        _vtk_of_many_components,
+        READ,
+        "NumberOfComponents is '3000000000.0', expected a whole number up to 1000",
+    ),
     "true for a number": (
         _in_design("C0 = 0.91, v0_m_s = 1.5", "C0 = true, v0_m_s = 1.5"),
         READ,

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from chamberopt.common.errors import InputError
+from chamberopt.common.limits import MAX_ELEMENTS
 from chamberopt.geometry.mesh_io.native_reader import converted
 from chamberopt.geometry.mesh_io.readers.elements import Block, ElementMesh, extract_surface
 from chamberopt.geometry.mesh_io.readers.raw_mesh import RawMesh
@@ -27,6 +28,7 @@ TRIANGLE, POLYGON, QUAD = 5, 7, 9
 WITHOUT_SURFACE = (0, 1, 2, 3, 4, 21, 35)  # points and lines
 # An integer cell field with more values than this numbers the cells rather than naming groups.
 MAX_GROUPS = 64
+MAX_COMPONENTS = 1000  # of an array
 FIELD = "field "  # before the names of cell fields among the arrays
 
 
@@ -41,6 +43,8 @@ def read_vtk(path: Path, content: bytes) -> RawMesh:
     holds = found[1].decode().upper().replace("_", "") if found else "nothing that is known"
     if holds not in ("POLYDATA", "UNSTRUCTUREDGRID"):
         raise InputError(f"{path}: holds {holds}; save a PolyData or an UnstructuredGrid")
+    if xml:
+        _require_counts(path, content)
     is_poly_data = holds == "POLYDATA"
     reader = ("vtkXML" if xml else "vtk") + ("PolyData" if is_poly_data else "UnstructuredGrid")
     with converted(content, "part.vtk", "part.npz", UNPACK, f"{reader}Reader") as file:
@@ -71,6 +75,16 @@ def read_vtk(path: Path, content: bytes) -> RawMesh:
         fields = {k.removeprefix(FIELD): v for k, v in data.items() if k.startswith(FIELD)}
         mesh.element_sets = _groups_of_fields(fields, cell_of)
     return extract_surface(mesh)
+
+
+def _require_counts(path: Path, content: bytes) -> None:
+    """Raise InputError for a count in XML that is no number, or so large that VTK would hang."""
+    for name, text in re.findall(rb"""\b(NumberOf\w+)\s*=\s*["']([^"']*)""", content):
+        most = MAX_COMPONENTS if name == b"NumberOfComponents" else MAX_ELEMENTS
+        if not text.strip().isdigit() or int(text) > most:
+            found = f"{name.decode()} is {text[:40].decode(errors='replace')!r}"
+            expected = f"expected a whole number up to {most}"
+            raise InputError(f"{path}: {found}, {expected}; it is damaged, export it again")
 
 
 def unpack(given: str, made: str, reader_name: str) -> None:
