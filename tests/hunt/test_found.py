@@ -153,7 +153,7 @@ FOUND: dict[str, tuple[Callable[[Path], None], list[str], str | None]] = {
     "a plain file that never ends": (
         _instead_of_design(lambda path: path.symlink_to("/proc/kmsg")),
         READ,
-        "design.toml: ",
+        "design.toml:",  # not a plain file, or what the kernel has just said is no TOML
     ),
     "a mesh that is a device": (_in_design("box.stl", "/dev/zero"), READ, "/dev/zero"),
     "a large text": (
