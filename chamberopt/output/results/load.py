@@ -94,7 +94,8 @@ def load_result(path: str | Path) -> Result:
     if not file.is_file():
         if is_study_folder(folder) or (folder / HISTORY).is_file():
             raise InputError(
-                f"{folder}: this study has not finished, {RESULT} is missing; continue it with: "
+                f"{folder}: this study or sweep has not finished, {RESULT} is missing; continue it "
+                "with the command that began it, such as: "
                 f"chamberopt run STUDY.toml --out {shlex.quote(str(folder))}"
             )
         raise InputError(
