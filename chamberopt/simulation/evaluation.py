@@ -82,7 +82,8 @@ def _require_sound(found: Evaluation) -> None:
         found.objective.value, found.reachable, found.crease_share, found.simulated_time,
         needed.dents, needed.needed_for_mean, needed.needed_for_places, needed.simulated_time,
         *found.timings.values(), *found.collisions.values(),
-        *(one.bias for one in estimates), *(x for one in estimates for x in one.pseudovalues),
+        *(one.bias for one in estimates),
+        *(x for one in estimates for x in (*one.pseudovalues, *one.shared)),
     ]  # fmt: skip
     if not all(abs(number) <= MAX_NUMBER for number in known):
         raise ValueError("a number is not finite, or too large")

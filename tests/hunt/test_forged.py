@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +16,6 @@ from chamberopt.output.vtp_files import pyvista, save_surface
 from tests.helpers.results.digests import accept_changes
 from tests.hunt.base import write_base
 from tests.hunt.command import Server, fault
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[Server]:
-    with Server() as one:
-        yield one
 
 
 @pytest.fixture(scope="module")

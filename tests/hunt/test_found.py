@@ -6,7 +6,7 @@ import io
 import os
 import re
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -17,12 +17,6 @@ from tests.hunt.command import Server, fault
 from tests.hunt.meshes import whole_files
 
 NAME = "\x1b]0;owned\x07"
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[Server]:
-    with Server() as one:
-        yield one
 
 
 def _vtk_with_huge_counts(folder: Path) -> None:

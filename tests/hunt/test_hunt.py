@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import random
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -31,12 +31,6 @@ MANY = {"toml": 5_000, "mesh": 3_000, "arguments": 1_000, "results": 1_000}
 CHUNK = 100
 LONG = [(kind, at) for kind, count in MANY.items() for at in range(0, count, CHUNK)]
 REPLACED = "report.html"  # a command replaces its own older page
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[Server]:
-    with Server() as one:
-        yield one
 
 
 @pytest.fixture(scope="module")
