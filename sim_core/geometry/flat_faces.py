@@ -187,7 +187,9 @@ def cover_with_quadrangles(outline: np.ndarray, area: float) -> np.ndarray | Non
     covered = 0.5 * one + 0.5 * two
     if abs(covered.sum() - area) > 1e-9 * area:
         return None
-    return np.asarray(pieces[covered > 0.0])
+    longest = np.linalg.norm(np.roll(pieces, -1, axis=1) - pieces, axis=2).max(axis=1)
+    # A piece thinner than that is covered by the overlap of its neighbours.
+    return np.asarray(pieces[covered > STRAIGHT * longest])
 
 
 def _doubled_area(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
@@ -224,7 +226,12 @@ def _cut(region: shapely.Geometry) -> list[shapely.Geometry]:
 
 
 def _quadrangles(polygon: shapely.Geometry) -> np.ndarray:
-    """Convex quadrangles (k, 4, 2) of a polygon, with no corner added."""
+    """Convex quadrangles (k, 4, 2) of a polygon, with no corner added.
+
+    A cut that passes a corner by a rounding leaves a side of 1e-17 m, whose direction is none and
+    would shut balls out of the piece: such corners are left out.
+    """
+    polygon = shapely.simplify(polygon, STRAIGHT)
     ring = shapely.get_coordinates(shapely.orient_polygons(polygon))[:-1]
     turns = _doubled_area(np.roll(ring, 1, axis=0), ring, np.roll(ring, -1, axis=0))
     if shapely.get_num_interior_rings(polygon) == 0 and (turns >= 0.0).all():

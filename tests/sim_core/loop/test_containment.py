@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from benchmarks.scenes import scene
-from sim_core import Physics, Scene, SceneError, SimulationError, SimulationResult, simulate
+from benchmarks.scenes import DIAMETER, PHYSICS, cylinder, scene
+from sim_core import Balls, Physics, Scene, SceneError, SimulationError, SimulationResult, simulate
 from sim_core.geometry.flat_faces import SurfaceTriangles, surface_triangles
 from sim_core.geometry.sonotrode_border import SonotrodeBorder, find_border
 from sim_core.loop.simulate import Simulation
@@ -262,3 +262,15 @@ def test_no_ball_leaves_the_gears_chamber_in_a_hundred_million_collisions() -> N
     )
     print("gear", record)
     assert record.checks > 1_000
+
+
+def test_no_ball_falls_through_a_wide_floor_beside_its_rim() -> None:
+    """A ring of balls dropped on it; one place once had no floor."""
+    radius = 0.42866070498705616
+    mesh = cylinder(radius, 0.04, 10_000)
+    angle = np.arange(800) * 2.0 * np.pi / 800
+    place = (radius - 2e-3) * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    falls = np.tile([0.0, 0.0, -1.9], (800, 1))
+    balls = Balls(np.column_stack([place, np.full(800, 3e-3)]), falls, DIAMETER)
+    done = simulate(Scene(mesh, balls, PHYSICS, 0.002))
+    assert done.collisions.sonotrode >= 800
