@@ -7,8 +7,8 @@ Notation:
     a: acceleration [m/s²], that of gravity unless the ball is in contact mode
 
 The difference between two balls is then a straight line, pairs need no clock of their own, and the
-numbers of a ball change only at its events. The clock's zero moves on every window, a whole number
-of periods of the fastest sonotrode, so that t stays small and its rounding with it.
+numbers of a ball change only at its events. The clock's zero moves on every window, so that t stays
+small and its rounding with it.
 """
 
 from typing import NamedTuple

@@ -76,7 +76,7 @@ def upkeep(pairs, ends, before, times, partners):  # type: ignore[no-untyped-def
     balls = len(ends)
     if balls == 0:
         return 0
-    refresh_neighbours(pairs.neighbours, pairs.motion)
+    refresh_neighbours(pairs.neighbours, pairs.motion, 0.0)
     for ball in range(balls if pairs.neighbours.blocks is not None else 0):
         times[ball], partners[ball] = search(pairs, ball, 0.0, before)
     flown = 0.0

@@ -27,9 +27,11 @@ neglects less than capture²/2 of energy per mass.
 supports. Without Friction this is sliding friction; with Friction the ball spins, Coulomb's law
 decides whether it rolls or slips, and the resistance is that against rolling.
 
-**What moves supports no ball.** Nothing rests on a vibrating surface or on a turning part: hits
-there keep their law. The turning part moves what it touches, however slowly, and what it presses
-moves balls that lie still in its way.
+**What moves supports no ball,** unless ``Rest.on_vibrating`` is True: then a ball sticks to a
+vibrating face, and moves with it, for as long as the face presses it. Balls on such a ball hop.
+Otherwise nothing rests on a vibrating surface, and never on a turning part: hits there keep their
+law. The turning part moves what it touches, however slowly, and what it presses moves balls that
+lie still in its way.
 
 **Balls on balls.** A ball that lies still is itself a still surface for hits slower than
 ``Restitution.elastic_below``, as if friction held it, so heaps come to rest from below. Two
@@ -42,6 +44,7 @@ twice as long each time. A faster hit wakes a ball, and with it those that stand
 - ``effects/contact_mode.py``: the options (Rest) and the state of all balls (ContactState).
 - ``supports.py``: supports of a ball, the projection on their cone, the list of balls in contact.
 - ``landing_and_lift_off.py``: capture by a surface, and which supports a ball keeps as it moves on.
+- ``riding.py``: a ball sticks to a vibrating face, moves with it, and is let go.
 - ``rolling_friction.py``: velocity and acceleration on supports, with resistance and friction.
 - ``path_end.py``: when a path in contact ends: at the border of a face, off an edge, at a stop.
 - ``ball_on_ball.py``: two balls meet, at least one of them not in free flight.

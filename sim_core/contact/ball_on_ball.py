@@ -15,10 +15,10 @@ import math
 import numpy as np
 
 from sim_core.contact.jamming import count_slow_hit
-from sim_core.contact.landing_and_lift_off import BOUNCES, impart, touch_down
+from sim_core.contact.landing_and_lift_off import impart, touch_down
 from sim_core.contact.pushed_by_part import drop_pressed_balls, is_pressed, note_touch
 from sim_core.contact.supports import BLOCKED, SHORTEST_HOP, response
-from sim_core.effects.contact_mode import ASLEEP, ON_BALL, ContactState
+from sim_core.effects.contact_mode import ASLEEP, BOUNCES, ON_BALL, ContactState
 from sim_core.effects.friction import OF_BALLS, FrictionState
 from sim_core.effects.restitution import Restitution, restitution_law
 from sim_core.impulses.collision import pair_velocity_change

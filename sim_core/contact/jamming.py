@@ -5,7 +5,15 @@ import numpy as np
 from sim_core.contact.landing_and_lift_off import move_on
 from sim_core.contact.pushed_by_part import TOUCHING
 from sim_core.contact.supports import forget_left_support
-from sim_core.effects.contact_mode import ASLEEP, JAMMED, PRESSED, TOUCHED, UNTOUCHED, ContactState
+from sim_core.effects.contact_mode import (
+    ASLEEP,
+    JAMMED,
+    PRESSED,
+    TOUCHED,
+    UNTOUCHED,
+    ContactState,
+    rides,
+)
 from sim_core.motion import BallEvent, BallState, state_under
 from sim_core.numerics.jit import jit
 from sim_core.numerics.vec3 import Vec3, dot, set_vec3, sub, vec3_at
@@ -66,7 +74,7 @@ def count_slow_hit(
         hits.number[ball] = 0
         hits.began[ball] = now
         return
-    if contact.mode[ball] >= ASLEEP:
+    if contact.mode[ball] >= ASLEEP or rides(contact.ride, ball):
         return
     acceleration = vec3_at(contact.acceleration, ball)
     velocity = state_under(motion, ball, event.time, acceleration).velocity

@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 
+from sim_core.contact.riding import settle_on_face
 from sim_core.contact.rolling_friction import braked, reset_spin, stopped_if_creeping
 from sim_core.contact.supports import (
     ROUNDING,
@@ -22,15 +23,22 @@ from sim_core.contact.supports import (
     set_mode,
     support_normal,
 )
-from sim_core.effects.contact_mode import ASLEEP, FLYING, JAMMED, ON_BALL, ContactState
+from sim_core.effects.contact_mode import (
+    ASLEEP,
+    BOUNCES,
+    CAUGHT,
+    FLYING,
+    JAMMED,
+    ON_BALL,
+    ROLLS,
+    ContactState,
+    rides,
+)
 from sim_core.geometry.bvh import Tree
 from sim_core.geometry.obstacles import CAPSULE
 from sim_core.motion import BallEvent, BallState, change_velocity, set_path
 from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.vec3 import Vec3, add_scaled, cross, dot, set_vec3, vec3_at
-
-# results of a hit on a still surface
-BOUNCES, ROLLS, CAUGHT = 0, 1, 2
 
 # what ends a path in contact, in place of an obstacle's number (event_queue.py has -1 and -2)
 PATH_GOES_ON = -1
@@ -38,6 +46,7 @@ BRAKE_ENDS = -3  # the ball stops, or the direction of its brake is set again
 WAKES = -4
 LIES_STILL = -5
 RECHECK = -6  # a jammed ball looks whether the balls around it are still there
+RIDE_ENDS = -7  # the parabola of a ball that moves with a vibrating face
 LEAVES_SUPPORT = -10  # minus the number of the support
 
 # Faces that meet at less than this angle stand for a smooth surface (cosine).
@@ -65,6 +74,8 @@ def settle(contact: ContactState, motion: np.ndarray, event: BallEvent, at: Ball
     """
     ball, supports = event.ball, contact.supports
     contact.wake_pending[ball] = 0
+    if settle_on_face(contact.ride, contact, motion, event, at):
+        return
     for support in range(supports.number[ball] - 1, -1, -1):
         other = ON_BALL - supports.obstacles[ball, support]
         if other >= 0 and contact.mode[other] < ASLEEP:
@@ -207,6 +218,8 @@ def touch_down(
             * contact.capture
             / max(speed, math.sqrt(weight * bend), contact.capture)
         )
+    if rides(contact.ride, ball):
+        return BOUNCES
     neighbour, last = _smooth_neighbour(contact, ball, normal)
     forget_left_support(contact, ball)
     if neighbour != NO_SUPPORT and presses:

@@ -10,10 +10,12 @@ from sim_core.contact.landing_and_lift_off import (
     LIES_STILL,
     PATH_GOES_ON,
     RECHECK,
+    RIDE_ENDS,
     WAKES,
 )
+from sim_core.contact.riding import seen_from_face
 from sim_core.contact.supports import support_normal
-from sim_core.effects.contact_mode import ASLEEP, FLYING, ContactState, Supports
+from sim_core.effects.contact_mode import ASLEEP, FLYING, ContactState, Ride, Supports, rides
 from sim_core.effects.friction import FrictionState
 from sim_core.geometry.bvh import Tree
 from sim_core.geometry.obstacles import FACE, VIBRATING_FACE
@@ -46,6 +48,8 @@ def out_of_reach(
     """
     if contact is None:
         return False
+    if rides(contact.ride, ball):
+        return False  # it does not move along a plane that stands still
     supports = contact.supports
     for support in range(supports.number[ball]):
         normal = support_normal(supports, ball, support)
@@ -89,6 +93,8 @@ def end_of_path(
     mode = contact.mode[ball]
     if mode == FLYING:
         return length, PATH_GOES_ON
+    if rides(contact.ride, ball):
+        return _end_of_ride(contact.ride, tree, face_overlap, event, flight, length)
     if contact.wake_pending[ball] != 0:
         wait = max(0.0, contact.stays_until[ball] - event.time_since_start)
         return (wait, WAKES) if wait <= length else (length, PATH_GOES_ON)
@@ -115,6 +121,25 @@ def end_of_path(
         # Otherwise the direction would turn in every piece by less than MAX_TURN, unnoticed.
         end = BRAKE_ENDS
     return best, end
+
+
+@inlined
+def _end_of_ride(
+    ride: Ride | None,
+    tree: Tree,
+    face_overlap: float,
+    event: BallEvent,
+    flight: Flight,
+    length: float,
+) -> tuple[float, int]:
+    """The same of a ball that moves with a vibrating face: where that ends, or its parabola."""
+    if ride is None:
+        return length, PATH_GOES_ON
+    face = int(np.int64(ride.face[event.ball]))
+    seen = seen_from_face(ride, event.ball, event.time, flight)
+    left = max(ride.until[event.ball] - event.time, 0.0)
+    left = min(left, _leaves_face(tree.numbers, face, seen, OVER * face_overlap))
+    return (left, RIDE_ENDS) if left <= length else (length, PATH_GOES_ON)
 
 
 @jit

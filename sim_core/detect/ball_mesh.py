@@ -5,10 +5,10 @@ from typing import NamedTuple
 import numpy as np
 
 from sim_core.contact.path_end import out_of_reach
+from sim_core.contact.riding import moves_with_face
 from sim_core.detect.ball_cylinder import cylinder_delay, is_cylinder_wall
 from sim_core.detect.ball_sonotrode import (
     find_later_contact,
-    same_plane,
     vibrating_plane_delay,
     within_moved_borders,
 )
@@ -19,7 +19,7 @@ from sim_core.effects.vibration import Wave
 from sim_core.geometry.analytic import CylinderAxis
 from sim_core.geometry.ball_sizes import BallSizes, radius_of_ball, root_of_ball
 from sim_core.geometry.bvh import STACK, Tree
-from sim_core.geometry.obstacles import CAPSULE, FACE
+from sim_core.geometry.obstacles import CAPSULE, FACE, same_plane
 from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.roots import NEVER
 from sim_core.numerics.simd import BOXES, boxes_hit, lowest_bit
@@ -161,6 +161,8 @@ def first_contact(
             delay = capsule_delay(tree.numbers, row, ball, radius, best)
         elif is_cylinder_wall(cylinder, kind):
             delay = cylinder_delay(cylinder, tree.numbers, row, ball)
+        elif moves_with_face(contact, tree, number, row):
+            continue
         else:
             own = wave_of_face(waves, wave, row)
             if plane_row < 0 or not (

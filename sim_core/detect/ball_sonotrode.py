@@ -8,21 +8,10 @@ from sim_core.detect.ball_triangle import HALF, face_normal, within_borders
 from sim_core.effects.sonotrodes import SonotrodeWaves, same_sonotrode
 from sim_core.effects.vibration import Wave
 from sim_core.geometry.bvh import Tree
-from sim_core.geometry.obstacles import VIBRATING_FACE
+from sim_core.geometry.obstacles import VIBRATING_FACE, same_plane
 from sim_core.numerics.jit import jit
 from sim_core.numerics.roots import NEVER, WaveGap, first_wave_approach, next_wave_approach
 from sim_core.numerics.vec3 import Flight, add_scaled, dot, position_after
-
-
-@jit
-def same_plane(numbers: np.ndarray, row: int, other: int) -> bool:
-    """True when two faces hold the same plane, bit for bit, as those of a flat sonotrode do."""
-    return (
-        numbers[row, 0] == numbers[other, 0]
-        and numbers[row, 1] == numbers[other, 1]
-        and numbers[row, 2] == numbers[other, 2]
-        and numbers[row, 3] == numbers[other, 3]
-    )
 
 
 @jit

@@ -11,6 +11,8 @@ import numpy as np
 from sim_core.effects.friction import FrictionState
 from sim_core.effects.gravity import Gravity, gravity_acceleration
 from sim_core.effects.restitution import ELASTIC_BELOW, Restitution
+from sim_core.effects.sonotrodes import SonotrodeWaves
+from sim_core.effects.vibration import Wave
 from sim_core.errors import SceneError, number
 from sim_core.numerics.jit import inlined
 from sim_core.numerics.vec3 import Vec3, vec3_at
@@ -25,6 +27,8 @@ MAX_SUPPORTS = 4  # three hold a ball; a fourth is needed until it is decided wh
 
 # values of ContactState.mode: how a ball moves
 FLYING, SLIDING, ASLEEP, JAMMED = 0, 1, 2, 3
+# results of a hit on a surface; a ball that rolls goes on as if it and the last were one
+BOUNCES, ROLLS, CAUGHT = 0, 1, 2
 # values of SlowHits.part_contact: what the turning part does to a ball
 UNTOUCHED, TOUCHED, PRESSED = 0, 1, 2
 
@@ -37,10 +41,12 @@ class Rest(NamedTuple):
 
     capture: normal speed [m/s] below which a hit on a still surface ends in contact.
     resistance: deceleration of a ball in contact, as a share of the load on its supports.
+    on_vibrating: whether balls also stick to vibrating faces while these press them.
     """
 
     capture: float = CAPTURE
     resistance: float = RESISTANCE
+    on_vibrating: bool = False
 
 
 class Supports(NamedTuple):
@@ -105,6 +111,22 @@ class ContactList(NamedTuple):
     length: np.ndarray
 
 
+class Ride(NamedTuple):
+    """Balls that move with a vibrating face, for n balls.
+
+    face: number of the obstacle that a ball rides on, -1 for none, (n,) int32.
+    height: of the face's plane at rest, moved by a radius [m], (n,).
+    until: when the ball's present parabola along the face ends [s on the window's clock], (n,).
+    wave, waves: of the only sonotrode, or of all.
+    """
+
+    face: np.ndarray
+    height: np.ndarray
+    until: np.ndarray
+    wave: Wave
+    waves: SonotrodeWaves | None
+
+
 class ContactState(NamedTuple):
     """State of contact mode for n balls.
 
@@ -118,6 +140,7 @@ class ContactState(NamedTuple):
     capture, resistance: as in Rest.
     elastic_below: balls that hit each other more slowly lose no speed [m/s].
     radius: of every ball [m]. reach: distance at which two balls touch [m], 0 where they never do.
+    ride: None unless balls stick to vibrating faces.
     """
 
     mode: np.ndarray
@@ -137,13 +160,20 @@ class ContactState(NamedTuple):
     reach: float
     gravity: Vec3
     friction_state: FrictionState | None
+    ride: Ride | None = None
 
 
 def checked_rest(rest: Rest | None) -> Rest | None:
     """The same with plain floats; raises SceneError for numbers out of range."""
     if rest is None:
         return None
-    plain = Rest(number("rest.capture", rest.capture), number("rest.resistance", rest.resistance))
+    plain = Rest(
+        number("rest.capture", rest.capture),
+        number("rest.resistance", rest.resistance),
+        rest.on_vibrating,
+    )
+    if not isinstance(plain.on_vibrating, bool):
+        raise SceneError(f"rest.on_vibrating is {plain.on_vibrating!r}: give True or False")
     if not 0.0 < plain.capture < math.inf:
         raise SceneError(f"rest.capture is {plain.capture} m/s: it must be positive")
     if not 0.0 <= plain.resistance < math.inf:
@@ -193,6 +223,24 @@ def new_contact_state(
     )
 
 
+def new_ride(
+    rest: Rest | None, balls: int, wave: Wave | None, waves: SonotrodeWaves | None
+) -> Ride | None:
+    """The state of n balls of which none rides; None where none ever does."""
+    if rest is None or not rest.on_vibrating or wave is None:
+        return None
+    face = np.full(balls, -1, dtype=np.int32)
+    return Ride(face, np.zeros(balls), np.zeros(balls), wave, waves)
+
+
+@inlined
+def rides(ride: Ride | None, ball: int) -> bool:
+    """True for a ball that moves with a vibrating face."""
+    if ride is None:
+        return False
+    return ride.face[ball] >= 0
+
+
 @inlined
 def ball_acceleration(contact: ContactState | None, ball: int, gravity: Gravity | None) -> Vec3:
     """A ball's acceleration [m/s²]: gravity, or what its supports leave of it."""
@@ -225,5 +273,22 @@ def still_surface_restitution(
     if contact is None:
         return restitution
     if restitution is None:
+        return restitution
+    return Restitution(restitution.surfaces, restitution.balls, 0.0)
+
+
+@inlined
+def vibrating_restitution(
+    contact: ContactState | None, restitution: Restitution | None
+) -> Restitution | None:
+    """The law for hits on vibrating faces: the same where balls stick to them."""
+    if contact is None:
+        return restitution
+    return _where_balls_stick(contact.ride, restitution)
+
+
+@inlined
+def _where_balls_stick(ride: Ride | None, restitution: Restitution | None) -> Restitution | None:
+    if ride is None or restitution is None:
         return restitution
     return Restitution(restitution.surfaces, restitution.balls, 0.0)

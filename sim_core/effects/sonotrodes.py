@@ -1,11 +1,10 @@
-"""Several sonotrodes, of one frequency or several: each vibrating face has the wave of its own tag.
+"""Faces whose phase does not repeat every window: several sonotrodes, or a slowly shaken one.
 
-The clock's window is a whole number of periods of the fastest sonotrode. The others need not fit
-into
-it: what each lacks to whole periods is added to its phase at every window's end, counted in 2^-62
-of a turn. Whole numbers are added without rounding, so that a phase is off by at most 2^-63 of a
-turn a
-window: 3e-11 rad after the longest simulation.
+The clock's window is a whole number of periods of the fastest sonotrode, unless it is shorter than
+one: then it stays as it is, so that what is stored for a window is as small at any frequency. A
+face that does not make whole periods in a window carries its phase on: what it lacks is added at
+every window's end, counted in 2^-62 of a turn. Whole numbers are added without rounding, so that a
+phase is off by at most 2^-63 of a turn a window: 3e-11 rad after the longest simulation.
 """
 
 from fractions import Fraction
@@ -20,6 +19,7 @@ from sim_core.numerics.vec3 import Vec3
 PARTS = 2**62  # of a turn: the sum of two is still an int64
 PART = PARTS - 1
 TURN = 2.0 * np.pi
+ROUNDING = 2.0**-52  # of a window made of whole periods
 
 
 class SonotrodeWaves(NamedTuple):
@@ -34,39 +34,48 @@ class SonotrodeWaves(NamedTuple):
     faces: np.ndarray  # the sonotrode of each obstacle, shape (obstacles,) int64
 
 
-def whole_period_window(vibrations: tuple[Vibration, ...], window: float) -> float:
-    """The window [s] nearest to the given one that is whole periods of the fastest vibration."""
-    if not vibrations:
+def carry_phases(vibrations: tuple[Vibration, ...], window: float) -> bool:
+    """True when a window of about this length [s] is not whole periods of every vibration."""
+    return len(vibrations) > 1 or any(window * one.frequency < 1.0 for one in vibrations)
+
+
+def clock_window(vibrations: tuple[Vibration, ...], window: float) -> float:
+    """The window [s] nearest to the given one that is whole periods of the fastest vibration.
+
+    The given one if it is shorter than a period.
+    """
+    fastest = max((one.frequency for one in vibrations), default=0.0)
+    if window * fastest < 1.0:
         return window
-    fastest = max(one.frequency for one in vibrations)
-    return max(1.0, round(window * fastest)) / fastest
+    return round(window * fastest) / fastest
 
 
 def new_waves(
     vibrations: tuple[Vibration, ...], waves: tuple[Wave, ...], window: float, tags: np.ndarray
 ) -> SonotrodeWaves | None:
-    """The waves at the scene's start; None for fewer than two, where one wave needs no table.
+    """The waves at the scene's start; None for one that makes whole periods in a window.
 
     Args:
         vibrations: the sonotrodes.
         waves: of the sonotrodes.
-        window: as whole_period_window gives it [s].
+        window: as clock_window gives it [s].
         tags: of all obstacles, shape (obstacles,).
     """
-    if len(waves) < 2:
-        return None
-    fastest = Fraction(float(max(one.frequency for one in vibrations)))
-    periods = [
-        Fraction(float(one.frequency)) / fastest * round(Fraction(window) * fastest)
-        for one in vibrations
-    ]
-    random_phase = np.array([wave.phase for wave in waves])
+    fastest = Fraction(float(max((one.frequency for one in vibrations), default=0.0)))
+    of_fastest = Fraction(window) * fastest
+    whole = round(of_fastest)
+    if abs(of_fastest - whole) <= ROUNDING * whole:
+        of_fastest = Fraction(whole)
+        if len(waves) < 2:
+            return None
+    periods = [of_fastest * Fraction(float(one.frequency)) / fastest for one in vibrations]
+    first = np.array([wave.phase for wave in waves])
     faces = np.zeros(len(tags), dtype=np.int64)
     for k, one in enumerate(vibrations):
         faces[tags == one.tag] = k
     return SonotrodeWaves(
         np.array([[wave.amplitude, wave.omega, wave.phase, *wave.axis] for wave in waves]),
-        random_phase,
+        first,
         np.zeros(len(waves), dtype=np.int64),
         np.array([round(PARTS * (count % 1)) & PART for count in periods], dtype=np.int64),
         faces,

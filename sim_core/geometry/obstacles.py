@@ -19,6 +19,7 @@ from sim_core.errors import SceneError
 from sim_core.geometry.flat_faces import LONE, SurfaceTriangles, cover_with_quadrangles
 from sim_core.geometry.mesh import edge_partners
 from sim_core.geometry.sonotrode_border import SonotrodeBorder, find_border, require_room_at_joints
+from sim_core.numerics.jit import jit
 
 NUMBERS = 20  # of each obstacle, see ObstacleTable
 TRIANGLE = [0, 1, 2, 2]  # the four corners of a face that has only three
@@ -54,6 +55,17 @@ class ObstacleTable(NamedTuple):
     triangles: np.ndarray
     low: np.ndarray  # lowest corner of the bounding box [m], shape (k, 3)
     high: np.ndarray  # highest corner of the bounding box [m], shape (k, 3)
+
+
+@jit
+def same_plane(numbers: np.ndarray, row: int, other: int) -> bool:
+    """True when two faces hold the same plane, bit for bit, as those of a flat sonotrode do."""
+    return (
+        numbers[row, 0] == numbers[other, 0]
+        and numbers[row, 1] == numbers[other, 1]
+        and numbers[row, 2] == numbers[other, 2]
+        and numbers[row, 3] == numbers[other, 3]
+    )
 
 
 def face_overlap_of(radius: float) -> float:

@@ -19,7 +19,7 @@ from sim_core.numerics.jit import jit
 from sim_core.numerics.vec3 import Vec3, add_scaled, dot, scaled
 
 # Smallest angle [rad] at which a ball leaves a cylinder wall: it moves R angle²/2 = 0.2 nm away. A
-# ball of 5 m/s hits the wall a million times a second, a tenth of what counts as a jam.
+# ball of 5 m/s hits the wall a million times a second, a hundredth of what counts as a jam.
 RECONTACT_ANGLE = 1e-4
 
 

@@ -8,10 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from sim_core.balls import Balls
+from sim_core.effects.sonotrodes import carry_phases
 from sim_core.geometry.analytic import cylinder_cavity
 from sim_core.geometry.mesh import TriangleMesh
 from sim_core.loop.simulate import simulate
 from sim_core.loop.spatial_blocks import MIN_BALLS
+from sim_core.motion import WINDOW
 from sim_core.numerics.jit import CACHE_FOLDER, CACHED
 from sim_core.scene.physics import Physics
 from sim_core.scene.scene import Scene
@@ -22,8 +24,10 @@ def _marker(physics: Physics, balls: int, alike: bool, cylinder: bool) -> Path:
     effects = {**physics._asdict(), **physics.surface._asdict()}
     present = [name for name, effect in effects.items() if effect is not None]
     kind = ["many" if balls >= MIN_BALLS else "few", "alike" if alike else "mixed"]
-    if len(physics.vibrations) > 1:
+    if carry_phases(physics.vibrations, WINDOW) and physics.random_phase is None:
         kind.append("sonotrodes")
+    if physics.rest is not None and physics.rest.on_vibrating:
+        kind.append("riding")
     return CACHE_FOLDER / "-".join(["compiled", *present, *kind, *["bore"] * cylinder])
 
 

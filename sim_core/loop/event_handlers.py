@@ -11,24 +11,30 @@ import numpy as np
 from sim_core.contact.ball_on_ball import meet
 from sim_core.contact.jamming import hold_still
 from sim_core.contact.landing_and_lift_off import (
-    BOUNCES,
     RECHECK,
-    ROLLS,
+    RIDE_ENDS,
     deflect,
     end_path,
     land,
     moved_off_edge,
 )
 from sim_core.contact.pushed_by_part import constrained_change, push_ball
+from sim_core.contact.riding import go_on_riding, is_of_plane, stick
 from sim_core.detect.ball_cylinder import normal_at
+from sim_core.detect.ball_sonotrode import within_moved_borders
 from sim_core.detect.ball_triangle import away_from_capsule, face_normal, nearer_neighbour
 from sim_core.effects.contact_mode import (
     ASLEEP,
+    BOUNCES,
     JAMMED,
+    ROLLS,
     UNTOUCHED,
     ContactState,
+    Ride,
     ball_acceleration,
+    rides,
     still_surface_restitution,
+    vibrating_restitution,
 )
 from sim_core.effects.part_rotation import (
     RotationState,
@@ -146,6 +152,8 @@ def hit_surface(state: SimulationState, event: BallEvent) -> Impact:
             state.waves, wave_of_ball(state.random_phase, state.wave, ball), obstacle
         )
         relative = sub(relative, surface_velocity(wave, event.time))
+        landed = stick(state.contact, tree, state.motion, event, obstacle, here)
+        law = vibrating_restitution(state.contact, state.restitution)
     else:
         landed = land(state.contact, tree, state.motion, event, obstacle, here, away)
         law = still_surface_restitution(state.contact, state.restitution)
@@ -236,6 +244,11 @@ def end_contact_path(
     if contact is None:
         return False
     reason = int(np.int64(state.queue.obstacle[event.ball]))
+    if reason == RIDE_ENDS:
+        here = _here(state, event)
+        face = _face_under(contact.ride, state, event, here)
+        go_on_riding(contact.ride, contact, state.motion, event, here, face)
+        return True
     if reason == RECHECK:
         if count_neighbours(contact, state.motion, event):
             contact.wake_pending[event.ball] = 1
@@ -244,11 +257,29 @@ def end_contact_path(
 
 
 @inlined
+def _face_under(ride: Ride | None, state: SimulationState, event: BallEvent, at: BallState) -> int:
+    """The face, of the plane that a ball rides on, that it is on now; -1 beside them all."""
+    if ride is None:
+        return -1
+    tree, overlap = state.obstacles.tree, state.obstacles.face_overlap
+    flight, last = Flight(at.position, at.velocity, at.velocity), ride.face[event.ball]
+    for k in range(-1, len(tree.kinds)):
+        row = int(np.int64(last)) if k < 0 else k  # most likely it is still on the same
+        if is_of_plane(ride, tree, last, row):
+            wave = wave_of_face(ride.waves, ride.wave, row)
+            if within_moved_borders(tree.numbers, row, flight, overlap, wave, event.time, 0.0):
+                return row
+    return -1
+
+
+@inlined
 def gives_up(contact: ContactState | None, queue: EventQueue, ball: int) -> bool:
     """True for a ball in a jam that contact mode cannot resolve; it is to be held still."""
     if contact is None:
         return False
     if queue.events[ball] % JAM_EVENTS != 0 or contact.mode[ball] >= ASLEEP:
+        return False
+    if rides(contact.ride, ball):
         return False
     return contact.slow_hits.part_contact[ball] == UNTOUCHED  # else the part would go through it
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from sim_core.contact.landing_and_lift_off import LIES_STILL
 from sim_core.contact.path_end import end_of_path
+from sim_core.contact.riding import shift_contact
 from sim_core.detect.ball_mesh import first_contact
 from sim_core.detect.ball_turning_part import first_part_contact
 from sim_core.effects.contact_mode import ball_acceleration, is_flying, is_still
@@ -33,7 +34,14 @@ from sim_core.loop.event_handlers import (
 )
 from sim_core.loop.event_queue import SEARCH_ON, Meetings, forget_events, reschedule, shift_queue
 from sim_core.loop.impact_log import log_impact, no_impact
-from sim_core.loop.neighbours import NeighbourFilter, follow, refresh_neighbours, speed_limit
+from sim_core.loop.neighbours import (
+    NeighbourFilter,
+    follow,
+    refresh_neighbours,
+    shift_sorting,
+    sort_is_due,
+    speed_limit,
+)
 from sim_core.loop.state import SEARCHES, STALE, SimulationState
 from sim_core.motion import BallEvent, shift_motion, state_under
 from sim_core.numerics import profiler
@@ -51,8 +59,9 @@ HAS_LEFT = 4  # a ball is outside the chamber's bounding box
 
 # s. Longest arc searched at once. Its chord is off by g PIECE²/8 = 0.12 mm, so boxes stay tight.
 PIECE = 0.01
-# of one ball in one window (20 ms): ten million a second is no gas but a jam
-EVENT_LIMIT = 200_000
+# Of one ball a second, counted over a window: so many are no gas but a jam. A row of balls that is
+# pressed flat between two walls, in a dense layer, has a tenth as many for a while.
+EVENT_LIMIT = 1e8
 
 # kinds of event
 HOLD = 0  # a ball in a jam that contact mode cannot resolve is held still
@@ -75,6 +84,7 @@ def advance(state: SimulationState) -> tuple[int, int]:
     Returns: why it has stopped, see the status above, and the ball concerned.
     """
     queue, clock, buffer = state.queue, state.clock, state.buffer
+    event_limit = EVENT_LIMIT * clock.window
     add_time(state.profiler, -1)
     while True:
         # 1 next event
@@ -87,11 +97,14 @@ def advance(state: SimulationState) -> tuple[int, int]:
                 return DONE, -1
             _begin_window(state)
             continue
+        if sort_is_due(state.neighbours, time):
+            _sort_neighbours(state, time)
+            continue
         if buffer.filled[0] == len(buffer.time):
             return BUFFER_FULL, -1
         clock.now[0] = time
         queue.events[ball] += 1
-        if queue.events[ball] > EVENT_LIMIT:
+        if queue.events[ball] > event_limit:
             return TOO_MANY_EVENTS, ball
         event = BallEvent(ball, time, clock.now[1] * clock.window + time)
         kind, partner = _kind_of_event(queue.meetings, state, ball)
@@ -153,14 +166,22 @@ def _begin_window(state: SimulationState) -> None:
     """Move the clock's zero forward by one window."""
     window = state.clock.window
     shift_motion(state.motion, window, state.gravity, state.contact)
-    refresh_neighbours(state.neighbours, state.motion)
-    hide_all(state.contact, state.neighbours)
+    shift_sorting(state.neighbours)
+    _sort_neighbours(state, 0.0)
     shift_queue(state.queue, window)
     shift_rotation(state.rotation, window)
     shift_phases(state.waves)
+    shift_contact(state.contact, window)
     shift_spins(state.friction_state, window)
     shift_drag(state.drag, window)
     state.clock.now[1] += 1.0
+
+
+@jit
+def _sort_neighbours(state: SimulationState, time: float) -> None:
+    """Read the paths of all balls again, and sort many into blocks."""
+    refresh_neighbours(state.neighbours, state.motion, time)
+    hide_all(state.contact, state.neighbours)
 
 
 @inlined

@@ -40,11 +40,12 @@ def jam_message(
             f"ball {ball} bounces ever faster {where}, {when}: "
             f"restitution.elastic_below is {restitution.elastic_below:g} m/s, so that slow bounces "
             f"never end; give {ELASTIC_BELOW:g} m/s"
+            + (", or Rest(on_vibrating=True)" if scene.physics.vibrations else "")
         )
     advice = "" if rests else "; if balls can lie still there, switch contact mode on"
     return (
         f"ball {ball} jams {where}{f', between {between}' if between else ''}: "
-        f"more than ten million events a second; {when}. "
+        f"more than a hundred million events a second; {when}. "
         f"Look for a gap just as wide as the ball there{advice}"
     )
 

@@ -18,21 +18,26 @@ from sim_core.loop.spatial_blocks import (
     MIN_BALLS,
     Blocks,
     ball_in_column,
+    blocks_are_worn,
     column_of,
     new_blocks,
+    shift_blocks,
     sort_blocks,
     widen,
 )
 from sim_core.motion import free_fall_position
 from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.roots import NEVER
-from sim_core.numerics.simd import BOXES, LANES, balls_near, boxes_hit, lowest_bit
+from sim_core.numerics.simd import BOXES, LANES, balls_near, balls_near_until, boxes_hit, lowest_bit
 from sim_core.numerics.vec3 import Vec3, sub
 
 FAR_SHARE = np.float32(1.0 - 1e-6)  # of distance²: float32 loses 2e-7 of it in the miss distance
 SLACK = np.float32(1.000001)  # on float32 times: ten times their rounding
 # of the largest number in a sum of three products, with a reserve
 ROUNDINGS = 16.0 * float(np.finfo(np.float32).eps)
+# of the square of the largest number in a distance², a sum of three squares of which each is up to
+# (3.5 + 3.5)² times as large, with a dozen roundings
+SQUARE_ROUNDINGS = 16.0 * ROUNDINGS
 MAX_FINITE_SPEED = 1e150  # m/s: its square is finite
 TINY = 1e-30  # stands for a velocity component of zero, whose inverse would be infinite
 
@@ -43,7 +48,8 @@ class NeighbourFilter(NamedTuple):
     paths: base position and velocity, a column a ball, (6, m) float32, padded with NaN, which meets
         nothing.
     probe: the column of the ball whose meetings are searched, its time, and what the filter allows
-        for rounding, (10,) float32.
+        for rounding; when the search ends, and the square of a distance within reach, (12,)
+        float32.
     reach: sum of two radii [m]; of several sizes that of the largest.
     max_speed: speed up to which the margins for rounding are good [m/s].
     window: [s]. blocks: only for many balls. radii: only for several sizes [m], (n,).
@@ -69,29 +75,47 @@ def new_neighbour_filter(
 ) -> NeighbourFilter:
     """The filter for balls with this motion (n, 6) in a room from ``low`` to ``high`` (3,) [m]."""
     # A base position lies up to one window's flight outside the room.
-    margin = ROUNDINGS * (float(np.max(high - low)) + max_speed * window)
-    probe = np.zeros(10, dtype=np.float32)
+    farthest = float(np.max(high - low)) + max_speed * window
+    margin = ROUNDINGS * farthest
+    probe = np.zeros(12, dtype=np.float32)
     # the last: up to this b w + t w² may be of a ball that still approaches
-    probe[7:] = (FAR_SHARE, -((reach + margin) ** 2), margin * max_speed)
+    probe[7:10] = (FAR_SHARE, -((reach + margin) ** 2), margin * max_speed)
+    probe[11] = (reach + margin) ** 2 + SQUARE_ROUNDINGS * farthest**2
     paths = np.full((6, -(-len(motion) // LANES) * LANES), np.nan, dtype=np.float32)
     blocks = (
-        new_blocks(len(motion), low, high, reach + 2.0 * margin)
+        new_blocks(len(motion), low, high, reach + 2.0 * margin, window)
         if len(motion) >= MIN_BALLS
         else None
     )
     neighbours = NeighbourFilter(paths, probe, reach, max_speed, window, blocks, radii)
-    refresh_neighbours(neighbours, motion)
+    refresh_neighbours(neighbours, motion, 0.0)
     return neighbours
 
 
 @jit
-def refresh_neighbours(neighbours: NeighbourFilter | None, motion: np.ndarray) -> None:
-    """Read the paths of all balls again, at a window's start."""
+def refresh_neighbours(neighbours: NeighbourFilter | None, motion: np.ndarray, time: float) -> None:
+    """Read the paths of all balls again, at a window's start or when they are sorted again."""
     if neighbours is None:
         return
-    sort_blocks(neighbours.blocks, motion, neighbours.window)
+    sort_blocks(neighbours.blocks, motion, time, neighbours.window)
     for ball in range(len(motion)):
         _write_path(neighbours, motion, ball)
+
+
+@inlined
+def sort_is_due(neighbours: NeighbourFilter | None, time: float) -> bool:
+    """True when refresh_neighbours is to be called before what happens at ``time`` [s]."""
+    if neighbours is None:
+        return False
+    return blocks_are_worn(neighbours.blocks, time)
+
+
+@inlined
+def shift_sorting(neighbours: NeighbourFilter | None) -> None:
+    """Move the clock's zero forward by one window."""
+    if neighbours is None:
+        return
+    shift_blocks(neighbours.blocks, neighbours.window)
 
 
 @inlined
@@ -100,7 +124,7 @@ def follow(neighbours: NeighbourFilter | None, motion: np.ndarray, ball: int, ti
     if neighbours is None:
         return
     _write_path(neighbours, motion, ball)
-    widen(neighbours.blocks, motion, ball, time, neighbours.window)
+    widen(neighbours.blocks, motion, ball, time)
 
 
 @inlined
@@ -138,7 +162,7 @@ def next_meeting(
     """Time [s] and partner of the ball's first meeting after ``time`` and before ``before``.
 
     If there is none, the partner is -1 and the time is that up to which this is known: NEVER for
-    few balls, the end of the window for many.
+    few balls, for many that until which their blocks hold.
     """
     probe = neighbours.probe
     column = column_of(neighbours.blocks, ball)
@@ -179,23 +203,47 @@ def _search(
         if partner < 0:
             return NEVER, -1
         return time + best, partner
-    best, partner = min(before, neighbours.window) - time, -1
+    best, partner = min(before, blocks.until[0]) - time, -1
     _aim(blocks.ray, motion, ball, time)
     column = column_of(blocks, ball)
-    for node in range(len(blocks.boxes)):
-        entered = boxes_hit(blocks.boxes, node, blocks.ray, np.float32(best) * SLACK, blocks.enter)
-        while entered != 0:
-            block = BOXES * node + lowest_bit(entered)
-            entered &= entered - 1
-            near = _without(
-                balls_near(neighbours.paths, LANES * block, neighbours.probe),
-                column - LANES * block,
+    own = column // LANES  # first: whom it meets there leaves a shorter path to look along
+    best, partner = _best_in_block(neighbours, motion, ball, time, own, best, partner)
+    for group in range(len(blocks.groups)):
+        nodes = boxes_hit(blocks.groups, group, blocks.ray, np.float32(best) * SLACK, blocks.enter)
+        while nodes != 0:
+            node = BOXES * group + lowest_bit(nodes)
+            nodes &= nodes - 1
+            entered = boxes_hit(
+                blocks.boxes, node, blocks.ray, np.float32(best) * SLACK, blocks.enter
             )
-            if near != 0:
-                best, partner = _nearest(
-                    neighbours, motion, ball, time, LANES * block, near, best, partner
-                )
-    return (time + best, partner) if partner >= 0 else (neighbours.window, -1)
+            while entered != 0:
+                block = BOXES * node + lowest_bit(entered)
+                entered &= entered - 1
+                if block != own:
+                    best, partner = _best_in_block(
+                        neighbours, motion, ball, time, block, best, partner
+                    )
+    return (time + best, partner) if partner >= 0 else (blocks.until[0], -1)
+
+
+@jit
+def _best_in_block(
+    neighbours: NeighbourFilter,
+    motion: np.ndarray,
+    ball: int,
+    time: float,
+    block: int,
+    best: float,
+    partner: int,
+) -> tuple[float, int]:
+    """The earlier of the best meeting so far (a delay [s]) and those in a block."""
+    first = LANES * block
+    neighbours.probe[10] = np.float32(time + best) * SLACK
+    near = balls_near_until(neighbours.paths, first, neighbours.probe)
+    near = _without(near, column_of(neighbours.blocks, ball) - first)
+    if near != 0:
+        best, partner = _nearest(neighbours, motion, ball, time, first, near, best, partner)
+    return best, partner
 
 
 @inlined

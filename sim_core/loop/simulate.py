@@ -9,14 +9,14 @@ import numpy as np
 from sim_core.balls import Balls
 from sim_core.contact.resting_balls import Resting, resting
 from sim_core.detect.ball_mesh import new_scratch
-from sim_core.effects.contact_mode import checked_rest, new_contact_state
+from sim_core.effects.contact_mode import checked_rest, new_contact_state, new_ride
 from sim_core.effects.drag import checked_drag, new_drag_state
 from sim_core.effects.friction import FrictionState, checked_friction, new_friction_state
 from sim_core.effects.gravity import checked_gravity, gravity_acceleration
 from sim_core.effects.part_rotation import angle_at, checked_axis, new_rotation_state
 from sim_core.effects.random_phase import checked_random_phase, new_random_phase_state
 from sim_core.effects.restitution import checked_restitution
-from sim_core.effects.sonotrodes import new_waves, whole_period_window
+from sim_core.effects.sonotrodes import clock_window, new_waves
 from sim_core.effects.vibration import checked_waves
 from sim_core.errors import SceneError, SimulationError
 from sim_core.geometry.analytic import AnalyticCavity
@@ -132,11 +132,13 @@ class Simulation:
         restitution = physics.restitution
         if restitution is not None:
             restitution = checked_restitution(restitution, tags)
-        window = whole_period_window(vibrations, WINDOW)
+        window = clock_window(vibrations, WINDOW)
         vibrating_tags = tuple(one.tag for one in vibrations)
         amplitudes = tuple(float(one.amplitude) for one in vibrations)
         vibrating = scene.mesh.corners[np.isin(scene.mesh.tags, vibrating_tags)] - self.centre
         random_phase = checked_random_phase(physics.random_phase, len(vibrations))
+        if random_phase is not None:  # each ball's own phase is to hold in the next window too
+            window = max(window, 1.0 / vibrations[0].frequency)
         radii = tuple(float(r) for r in 0.5 * balls.sizes)
         axle = checked_axis(physics.part_rotation)
         obstacles = _obstacle_set(scene.mesh, radii, vibrating_tags, amplitudes, axle)
@@ -153,6 +155,10 @@ class Simulation:
             restitution,
             friction_state,
         )
+        sonotrodes = new_waves(vibrations, waves, window, obstacle_tags)
+        if contact is not None:
+            ride = new_ride(physics.rest, len(motion), wave, sonotrodes)
+            contact = contact._replace(ride=ride)
         state = SimulationState(
             motion=motion,
             neighbours=None,
@@ -175,7 +181,7 @@ class Simulation:
             ),
             drag=new_drag_state(checked_drag(physics.drag), balls.diameters, balls.densities),
             sizes=new_ball_sizes(balls, obstacles.roots),
-            waves=new_waves(vibrations, waves, window, obstacle_tags),
+            waves=sonotrodes,
         )
         max_speed = 2.0 * max(1.0, float(np.abs(balls.velocities).max()))
         return state._replace(neighbours=self._new_filter(state, max_speed))

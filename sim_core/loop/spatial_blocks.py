@@ -1,11 +1,12 @@
-"""Many balls in blocks of sixteen neighbours, each with a box around its balls' paths in a window.
+"""Many balls in blocks of sixteen neighbours, each with a box around its balls' paths for a while.
 
 In the free-fall frame a path is a straight line, so the box of a block grows only when one of its
-balls is hit. Every window, balls are sorted into blocks again, along a curve that keeps neighbours
-together. A ball then looks only through blocks whose boxes its own path enters, eight boxes at
-once, as in the tree of obstacles.
+balls is hit. Balls are sorted into blocks again, along a curve that keeps neighbours together,
+before the boxes have grown much: every window, and where balls are hit often, more often. A ball
+then looks only through blocks whose boxes its own path enters, eight boxes at once, as in the tree
+of obstacles: first boxes around eight nodes of eight blocks each, then those of the blocks.
 
-Source: G. M. Morton, A computer oriented geodetic data base, IBM Ltd. (1966): the curve.
+Source: J. Skilling, Programming the Hilbert curve, AIP Conf. Proc. 707 (2004) 381.
 """
 
 from typing import NamedTuple
@@ -19,6 +20,9 @@ from sim_core.numerics.simd import BOXES, LANES
 # window, no block is left out.
 MIN_BALLS = 1024
 BITS = 5  # of the curve's code along each axis
+# Changes of path of a ball, on average, after which balls are sorted again. With fewer the searches
+# that end where knowledge does cost more, with more the boxes are wider.
+CHANGES = 8
 FAR = np.float32(1e30)  # an empty box is one that no path reaches
 
 
@@ -28,6 +32,10 @@ class Blocks(NamedTuple):
     column: of each ball, (n,) int32. ball: in each column, -1 for none, (columns,) int32.
     boxes: low x, y, z and high x, y, z of eight boxes [m], (k, 6, 8) float32; they are larger by
         ``margin`` [m], which is the balls' reach and the rounding.
+    groups: the same of boxes around eight nodes of ``boxes`` each.
+    sorted_at, until: when the balls were sorted, and until when the boxes hold their paths [s on
+        the window's clock], (1,).
+    interval: how long that was meant to be [s], (1,). changes: of paths since then, (1,) int64.
     low, scale: where the curve begins [m], (3,), and its steps [1/m].
     code, starts, ray, enter: working space.
     """
@@ -35,6 +43,11 @@ class Blocks(NamedTuple):
     column: np.ndarray
     ball: np.ndarray
     boxes: np.ndarray
+    groups: np.ndarray
+    sorted_at: np.ndarray
+    until: np.ndarray
+    interval: np.ndarray
+    changes: np.ndarray
     code: np.ndarray
     starts: np.ndarray
     low: np.ndarray
@@ -44,7 +57,9 @@ class Blocks(NamedTuple):
     enter: np.ndarray
 
 
-def new_blocks(balls: int, low: np.ndarray, high: np.ndarray, margin: float) -> Blocks:
+def new_blocks(
+    balls: int, low: np.ndarray, high: np.ndarray, margin: float, window: float
+) -> Blocks:
     """Blocks of balls in a room from ``low`` to ``high`` (3,) [m]; to be sorted before use."""
     columns = -(-balls // LANES) * LANES
     nodes = -(-columns // (LANES * BOXES))
@@ -52,6 +67,11 @@ def new_blocks(balls: int, low: np.ndarray, high: np.ndarray, margin: float) -> 
         np.zeros(balls, dtype=np.int32),
         np.full(columns, -1, dtype=np.int32),
         np.full((nodes, 6, BOXES), FAR, dtype=np.float32),
+        np.full((-(-nodes // BOXES), 6, BOXES), FAR, dtype=np.float32),
+        np.zeros(1),
+        np.zeros(1),
+        np.full(1, window),
+        np.zeros(1, dtype=np.int64),
         np.zeros(balls, dtype=np.int32),
         np.zeros((1 << (3 * BITS)) + 1, dtype=np.int32),
         np.array(low, dtype=np.float64),
@@ -78,49 +98,124 @@ def ball_in_column(blocks: Blocks | None, column: int) -> int:
     return blocks.ball[column]
 
 
+@inlined
+def blocks_are_worn(blocks: Blocks | None, time: float) -> bool:
+    """True when the balls are to be sorted again before what happens at ``time`` [s]."""
+    if blocks is None:
+        return False
+    return time >= blocks.until[0] or blocks.changes[0] > 2 * CHANGES * len(blocks.column)
+
+
 @jit
-def sort_blocks(blocks: Blocks | None, motion: np.ndarray, window: float) -> None:
-    """Put balls that are near each other at a window's start into one block, and set its box."""
+def sort_blocks(blocks: Blocks | None, motion: np.ndarray, time: float, window: float) -> None:
+    """Put balls that are near each other at ``time`` [s] into one block, and set its box.
+
+    It holds until each ball is expected to have changed its path CHANGES times, at most until the
+    window ends.
+    """
     if blocks is None:
         return
-    top = (1 << BITS) - 1
+    lasted, changes = time - blocks.sorted_at[0], blocks.changes[0]
+    if lasted > 0.0:
+        wanted = lasted * CHANGES * len(motion) / max(changes, 1)
+        blocks.interval[0] = min(max(wanted, 0.25 * lasted), 2.0 * blocks.interval[0], window)
+    blocks.sorted_at[0] = time
+    blocks.until[0] = min(time + blocks.interval[0], window)
     blocks.starts[:] = 0
     for ball in range(len(motion)):
-        code = 0
-        for axis in range(3):
-            place = int((motion[ball, axis] - blocks.low[axis]) * blocks.scale)
-            place = min(max(place, 0), top)
-            for bit in range(BITS):
-                code |= ((place >> bit) & 1) << (3 * bit + axis)
+        code = _place_on_curve(
+            _cell(blocks, motion, ball, 0, time),
+            _cell(blocks, motion, ball, 1, time),
+            _cell(blocks, motion, ball, 2, time),
+        )
         blocks.code[ball] = code
         blocks.starts[code + 1] += 1
     for code in range(1, len(blocks.starts)):
         blocks.starts[code] += blocks.starts[code - 1]
     blocks.boxes[:] = FAR
+    blocks.groups[:] = FAR
     for ball in range(len(motion)):
         column = blocks.starts[blocks.code[ball]]
         blocks.starts[blocks.code[ball]] += 1
         blocks.column[ball] = column
         blocks.ball[column] = ball
-        widen(blocks, motion, ball, 0.0, window)
+        widen(blocks, motion, ball, time)
+    blocks.changes[0] = 0
 
 
 @inlined
-def widen(blocks: Blocks | None, motion: np.ndarray, ball: int, time: float, window: float) -> None:
-    """Widen the box of the ball's block to hold its path from ``time`` [s] to the window's end."""
+def _cell(blocks: Blocks, motion: np.ndarray, ball: int, axis: int, time: float) -> int:
+    """Which step of the curve's grid a ball is in along an axis."""
+    now = motion[ball, axis] + motion[ball, 3 + axis] * time
+    return min(max(int((now - blocks.low[axis]) * blocks.scale), 0), (1 << BITS) - 1)
+
+
+@jit
+def _place_on_curve(x: int, y: int, z: int) -> int:
+    """Number of a cell along Hilbert's curve, which goes from cell to cell without a jump."""
+    bit = 1 << (BITS - 1)
+    while bit > 1:  # undo the turns of the curve, from the largest cubes to the smallest
+        low = bit - 1
+        if x & bit:
+            x ^= low
+        if y & bit:
+            x ^= low
+        else:
+            swap = (x ^ y) & low
+            x, y = x ^ swap, y ^ swap
+        if z & bit:
+            x ^= low
+        else:
+            swap = (x ^ z) & low
+            x, z = x ^ swap, z ^ swap
+        bit >>= 1
+    y ^= x
+    z ^= y
+    flips, bit = 0, 1 << (BITS - 1)
+    while bit > 1:
+        if z & bit:
+            flips ^= bit - 1
+        bit >>= 1
+    x, y, z = x ^ flips, y ^ flips, z ^ flips
+    place = 0
+    for k in range(BITS - 1, -1, -1):
+        place = 8 * place + 4 * ((x >> k) & 1) + 2 * ((y >> k) & 1) + ((z >> k) & 1)
+    return place
+
+
+@jit
+def shift_blocks(blocks: Blocks | None, window: float) -> None:
+    """Move the clock's zero forward by ``window`` [s]."""
     if blocks is None:
         return
+    blocks.sorted_at[0] -= window
+
+
+@inlined
+def widen(blocks: Blocks | None, motion: np.ndarray, ball: int, time: float) -> None:
+    """Widen the boxes that the ball is in to hold its path from ``time`` [s] on."""
+    if blocks is None:
+        return
+    blocks.changes[0] += 1
     block = blocks.column[ball] // LANES
     node, child = block // BOXES, block % BOXES
-    empty = blocks.boxes[node, 0, child] == FAR
+    group, place = node // BOXES, node % BOXES
     for axis in range(3):
         start = motion[ball, axis] + motion[ball, 3 + axis] * time
-        end = motion[ball, axis] + motion[ball, 3 + axis] * window
+        end = motion[ball, axis] + motion[ball, 3 + axis] * blocks.until[0]
         low = np.float32(min(start, end) - blocks.margin)
         high = np.float32(max(start, end) + blocks.margin)
-        blocks.boxes[node, axis, child] = (
-            low if empty else min(low, blocks.boxes[node, axis, child])
-        )
-        blocks.boxes[node, 3 + axis, child] = (
-            high if empty else max(high, blocks.boxes[node, 3 + axis, child])
-        )
+        _stretch(blocks.boxes, node, axis, child, low, high)
+        _stretch(blocks.groups, group, axis, place, low, high)
+
+
+@inlined
+def _stretch(
+    boxes: np.ndarray, node: int, axis: int, child: int, low: np.float32, high: np.float32
+) -> None:
+    if boxes[node, 3 + axis, child] == FAR:  # empty
+        boxes[node, axis, child] = low
+        boxes[node, 3 + axis, child] = high
+        return
+    boxes[node, axis, child] = min(low, boxes[node, axis, child])
+    boxes[node, 3 + axis, child] = max(high, boxes[node, 3 + axis, child])

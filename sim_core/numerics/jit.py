@@ -9,6 +9,7 @@ import hashlib
 import os
 import shutil
 import sys
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -80,6 +81,11 @@ def _cache_is_usable() -> bool:
 CACHED = _cache_is_usable() and not _settings.DISABLE_JIT
 
 
+# Threads take turns: one that restored numba's folder while another read it sent compiled code to
+# the current folder.
+_DECORATING = threading.RLock()
+
+
 class Step(CPUDispatcher):
     """A compiled function that other compiled functions call.
 
@@ -90,25 +96,27 @@ class Step(CPUDispatcher):
     """
 
     def __call__(self, *arguments: Any) -> Any:
-        if not hasattr(self, "entry"):
-            self.entry = _compiled(self.py_func, inline=False, from_python=True)
+        with _DECORATING:
+            if not hasattr(self, "entry"):
+                self.entry = _compiled(self.py_func, inline=False, from_python=True)
         return self.entry(*arguments)
 
 
 def _compiled(function: Callable[..., Any], inline: bool, from_python: bool = False) -> Any:
     # numba reads the folder when the decorator runs; other packages keep theirs. Its files do not
     # tell functions with wrappers from those without.
-    before = _settings.CACHE_DIR
-    _settings.CACHE_DIR = str(CACHE_FOLDER / ("entries" if from_python else "steps"))
-    try:
-        options = {"nogil": True, "error_model": "numpy", "fastmath": False, "_nrt": False}
-        if not from_python:
-            options |= {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-        compiled = _njit(forceinline=inline, **options)(function)
-        if CACHED:
-            compiled._cache = CheckedCache(function)
-    finally:
-        _settings.CACHE_DIR = before
+    options = {"nogil": True, "error_model": "numpy", "fastmath": False, "_nrt": False}
+    if not from_python:
+        options |= {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    with _DECORATING:
+        before = _settings.CACHE_DIR
+        _settings.CACHE_DIR = str(CACHE_FOLDER / ("entries" if from_python else "steps"))
+        try:
+            compiled = _njit(forceinline=inline, **options)(function)
+            if CACHED:
+                compiled._cache = CheckedCache(function)
+        finally:
+            _settings.CACHE_DIR = before
     if not from_python and not _settings.DISABLE_JIT:
         compiled.__class__ = Step
     return compiled

@@ -5,6 +5,8 @@ bit. Each has a numpy version that replaces it when numba's JIT is off.
 """
 
 import time
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numba
@@ -119,8 +121,10 @@ def _boxes_hit_numpy(bounds: Any, node: int, ray: Any, longest: Any, enter: Any)
     return int(np.packbits(near <= far, bitorder="little")[0])
 
 
-@intrinsic
-def _balls_near(typing_context: Any, lanes: Any, first: Any, probe: Any) -> Any:
+def _near_filter(
+    lanes: Any, probe: Any, limited: bool
+) -> tuple[Any, Callable[[Any, Any, Any, Any], Any]]:
+    """Signature and code of balls_near, or if ``limited`` of balls_near_until."""
     signature = types.int64(lanes, types.int64, probe)
 
     def codegen(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
@@ -138,7 +142,7 @@ def _balls_near(typing_context: Any, lanes: Any, first: Any, probe: Any) -> Any:
         def number(k: int) -> Any:
             return v.spread(builder.load(builder.gep(probes, [ir.Constant(constant, k)])))
 
-        def near(start: Any) -> Any:
+        def near_of(start: Any) -> Any:
             square = closing = speed = None
             for axis in range(3):
                 place, velocity = (
@@ -158,18 +162,36 @@ def _balls_near(typing_context: Any, lanes: Any, first: Any, probe: Any) -> Any:
                 ">=", builder.fmul(closing, closing), builder.fmul(speed, miss)
             )
             approaching = builder.fcmp_ordered("<", v.fused(speed, number(6), closing), number(9))
-            return v.mask(builder.and_(may_meet, approaching))
+            near = builder.and_(may_meet, approaching)
+            if limited:  # at the end of the search the pair is within reach, or has passed by
+                end = number(10)
+                rate = v.fused(speed, end, closing)
+                passed = builder.fcmp_ordered(">", rate, builder.fneg(number(9)))
+                apart = v.fused(builder.fadd(rate, closing), end, square)
+                in_reach = builder.fcmp_ordered("<=", apart, number(11))
+                near = builder.and_(near, builder.or_(passed, in_reach))
+            return v.mask(near)
 
-        mask = near(first)
+        mask = near_of(first)
         for k in range(1, LANES // WIDTH):
-            more = near(builder.add(first, ir.Constant(constant, k * WIDTH)))
+            more = near_of(builder.add(first, ir.Constant(constant, k * WIDTH)))
             mask = builder.or_(mask, builder.shl(more, ir.Constant(more.type, k * WIDTH)))
         return mask
 
     return signature, codegen
 
 
-def _balls_near_numpy(lanes: Any, first: int, probe: Any) -> int:
+@intrinsic
+def _balls_near(typing_context: Any, lanes: Any, first: Any, probe: Any) -> Any:
+    return _near_filter(lanes, probe, limited=False)
+
+
+@intrinsic
+def _balls_near_until(typing_context: Any, lanes: Any, first: Any, probe: Any) -> Any:
+    return _near_filter(lanes, probe, limited=True)
+
+
+def _balls_near_numpy(lanes: Any, first: int, probe: Any, limited: bool = False) -> int:
     block = lanes[:, first : first + LANES]
     with np.errstate(over="ignore", invalid="ignore"):
         apart = block[0:3] - probe[0:3, None]
@@ -178,8 +200,11 @@ def _balls_near_numpy(lanes: Any, first: int, probe: Any) -> int:
         closing = (apart * relative).sum(axis=0)
         speed = (relative * relative).sum(axis=0)
         miss = square * probe[7] + probe[8]
-        may_meet = (closing * closing >= speed * miss) & (speed * probe[6] + closing < probe[9])
-    bits = np.packbits(may_meet, bitorder="little")
+        near = (closing * closing >= speed * miss) & (speed * probe[6] + closing < probe[9])
+        if limited:
+            rate = speed * probe[10] + closing
+            near &= (rate > -probe[9]) | ((rate + closing) * probe[10] + square <= probe[11])
+    bits = np.packbits(near, bitorder="little")
     return int.from_bytes(bits.tobytes(), "little")
 
 
@@ -218,8 +243,10 @@ _plain = _settings.DISABLE_JIT
 #   longest: end of the flight [s] float32; enter: entry times [s], shape (8,) float32, written
 boxes_hit: Any = _boxes_hit_numpy if _plain else _boxes_hit
 # balls_near(lanes, first, probe) -> bit mask of the LANES balls that may meet the probe
-#   lanes: positions and velocities, shape (6, n) float32; first: lane; probe: shape (10,) float32
+#   lanes: positions and velocities, shape (6, n) float32; first: lane; probe: shape (12,) float32
 balls_near: Any = _balls_near_numpy if _plain else _balls_near
+# balls_near_until: the same without those that cannot meet before the time probe[10]
+balls_near_until: Any = partial(_balls_near_numpy, limited=True) if _plain else _balls_near_until
 lowest_bit: Any = _lowest_bit_numpy if _plain else _lowest_bit
 # ticks() -> the processor's clock, in its own unit
 ticks: Any = time.perf_counter_ns if _plain else _ticks

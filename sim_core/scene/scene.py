@@ -104,7 +104,13 @@ class Scene:
         checked_waves(self.physics.vibration)
         vibrations, turn = self.physics.vibrations, self.physics.part_rotation
         checked_gravity(self.physics.gravity)
-        checked_rest(self.physics.rest)
+        rest = checked_rest(self.physics.rest)
+        for name in ("friction", "random_phase", "part_rotation", "drag"):
+            if rest is not None and rest.on_vibrating and getattr(self.physics, name) is not None:
+                raise SceneError(
+                    f"rest.on_vibrating is True, and physics.{name} is given: not supported "
+                    f"together yet; leave one of them out"
+                )
         for name in ("rest", "part_rotation", "friction"):
             if getattr(self.physics, name) is not None and not self.balls.alike:
                 raise SceneError(

@@ -17,13 +17,13 @@ from chamberopt.coverage.part_impacts import Hits
 from chamberopt.coverage.resolution import Resolution
 from chamberopt.design.load import Design, load_design
 from chamberopt.geometry.triangles import areas
-from chamberopt.simulation.evaluate import (
+from chamberopt.simulation.estimates import (
     SeenDents,
     estimate_metrics,
-    prepare_target,
     resolution_notes,
     weighted_sum,
 )
+from chamberopt.simulation.evaluate import prepare_target
 from chamberopt.simulation.evaluation import Evaluation
 from sim_core import closest_points
 
@@ -41,11 +41,19 @@ def plate_design(**values: float) -> Design:
 
 
 def chamber_round(
-    mesh: trimesh.Trimesh, target: np.ndarray | None = None, gap: float = 5e-3
+    mesh: trimesh.Trimesh,
+    target: np.ndarray | None = None,
+    gap: float = 5e-3,
+    symmetric: bool = False,
 ) -> Chamber:
-    """A part that floats in the middle of a box, which is a gap [m] larger on all sides."""
+    """A part that floats in a box, which is a gap [m] larger on all sides.
+
+    On one side it is a little more, unless the room may be symmetric.
+    """
     vertices, triangles = np.asarray(mesh.vertices), np.asarray(mesh.faces)
-    room = trimesh.creation.box(bounds=mesh.bounds + np.array([[-gap], [gap]]))
+    bounds = mesh.bounds + np.array([[-gap], [gap]])
+    bounds[1, 0] += 0.0 if symmetric else 0.1 * gap
+    room = trimesh.creation.box(bounds=bounds)
     own, walls = len(triangles), len(room.faces)
     area = areas(vertices, triangles)
     wanted = np.ones(own, dtype=bool) if target is None else target
@@ -184,6 +192,7 @@ def evaluation_of(design: Design, chamber: Chamber, hits: Sequence[Hits]) -> Eva
         resolution=found.resolution,
         reachable=seen.field.reachable,
         crease_share=seen.crease_share,
+        alike=seen.field.alike,
         replicas=len(hits),
         simulated_time=len(hits) * design.process.recorded_time,
         hits=tuple(hits),

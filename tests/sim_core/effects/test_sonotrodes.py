@@ -24,7 +24,7 @@ from sim_core import (
     simulate,
 )
 from sim_core.effects.contact_mode import ASLEEP
-from sim_core.effects.sonotrodes import PARTS, new_waves, shift_phases, whole_period_window
+from sim_core.effects.sonotrodes import PARTS, clock_window, new_waves, shift_phases
 from sim_core.effects.vibration import checked_waves
 from sim_core.loop import compile_ahead
 from sim_core.loop.simulate import Simulation
@@ -81,7 +81,7 @@ def test_phases_do_not_drift(windows: int) -> None:
     800 in it.
     """
     vibrations = tuple(Vibration(k, 25e-6, f, 0.1 * k) for k, f in enumerate(FREQUENCIES))
-    window = whole_period_window(vibrations, WINDOW)
+    window = clock_window(vibrations, WINDOW)
     assert window * 40e3 == 800
     waves = new_waves(vibrations, checked_waves(vibrations), window, np.array([0, 3, 2]))
     assert waves is not None
@@ -95,6 +95,36 @@ def test_phases_do_not_drift(windows: int) -> None:
     assert (
         waves.numbers[[3, 0, 5], 2] == [0.1 * 3, 0.0, 0.1 * 5]
     ).all()  # whole periods to the last bit
+
+
+@pytest.mark.parametrize("frequency", [0.4, 0.123, 11.5, 30.0, 49.0])
+def test_a_slow_phase_does_not_drift(frequency: float) -> None:
+    """A window shorter than a period keeps its length, at any frequency."""
+    slow = (Vibration(0, 1e-3, frequency, 0.1),)
+    window = clock_window(slow, WINDOW)
+    assert window == WINDOW
+    waves = new_waves(slow, checked_waves(slow), window, np.array([0]))
+    assert waves is not None
+    for _ in range(100_000):
+        shift_phases(waves)
+    turns = Fraction(frequency) * Fraction(WINDOW) * 100_000 % 1
+    off = (waves.numbers[0, 2] - 0.1) / math.tau - float(turns)
+    assert abs(off - round(off)) < 1e-14 + 100_000 / PARTS
+
+
+def test_a_slow_sonotrode_is_the_same_alone_and_beside_a_fast_one_that_keeps_still() -> None:
+    """Alone its phase is carried on every 20 ms; beside the other every whole number of periods."""
+    slow = Vibration(FLOOR, 3e-3, 7.3, 4.5)
+    one, other = played(slow, 0.3), played((HIGH._replace(amplitude=0.0), slow), 0.3)
+    np.testing.assert_array_equal(one.impacts.triangle[:60], other.impacts.triangle[:60])
+    np.testing.assert_allclose(one.impacts.time[:60], other.impacts.time[:60], rtol=0.0, atol=1e-9)
+
+
+def test_random_phases_keep_a_window_of_whole_periods() -> None:
+    physics = Physics(Gravity(), vibration=LOW._replace(frequency=7.3), random_phase=RandomPhase(1))
+    state = Simulation(Scene(ROOM, balls_at(MIDDLE), physics, 1.0)).state
+    assert state.clock.window * 7.3 == pytest.approx(1.0, rel=1e-15)
+    assert state.waves is None
 
 
 def test_one_vibration_needs_no_table() -> None:

@@ -9,8 +9,9 @@ from sim_core.loop.neighbours import (
     new_neighbour_filter,
     next_meeting,
     refresh_neighbours,
+    sort_is_due,
 )
-from sim_core.loop.spatial_blocks import MIN_BALLS
+from sim_core.loop.spatial_blocks import BITS, CHANGES, MIN_BALLS, _place_on_curve
 
 REACH = 3e-3  # m
 WINDOW = 0.02  # s
@@ -77,6 +78,42 @@ def test_every_meeting_is_found(balls: int, half: float) -> None:
     assert met > 5
 
 
+def test_balls_hit_often_are_sorted_often_and_none_is_lost() -> None:
+    """So many changes of path that the blocks are worn before the window ends, several times."""
+    rng = np.random.default_rng(9)
+    balls, half = 2000, 0.06
+    motion = gas(balls, half, rng)
+    neighbours = filter_of(motion, half)
+    blocks = neighbours.blocks
+    assert blocks is not None
+    sorts = 0
+    for time in np.linspace(0.0, 0.3 * WINDOW, 8 * CHANGES * balls):
+        if sort_is_due(neighbours, time):
+            refresh_neighbours(neighbours, motion, time)
+            sorts += 1
+            assert time < blocks.until[0] <= WINDOW
+        ball = int(rng.integers(balls))
+        if rng.random() < 0.005:
+            expected, partner = all_pairs(motion, ball, time, blocks.until[0])
+            meeting, found = next_meeting(neighbours, motion, ball, time, np.inf)
+            assert found == partner
+            assert meeting == pytest.approx(expected if found >= 0 else blocks.until[0], rel=1e-9)
+        here = motion[ball, :3] + motion[ball, 3:] * time
+        motion[ball, 3:] = rng.normal(0.0, 3.0, 3)
+        motion[ball, :3] = here - motion[ball, 3:] * time
+        follow(neighbours, motion, ball, time)
+    assert sorts > 4
+    assert blocks.interval[0] < 0.1 * WINDOW
+
+
+def test_the_curve_passes_every_cell_and_goes_from_neighbour_to_neighbour() -> None:
+    side = range(1 << BITS)
+    cells = np.array([(x, y, z) for x in side for y in side for z in side])
+    places = np.array([_place_on_curve(*(int(k) for k in cell)) for cell in cells])
+    assert sorted(places) == list(range(len(cells)))
+    assert (np.abs(np.diff(cells[places.argsort()], axis=0)).sum(axis=1) == 1).all()
+
+
 @pytest.mark.parametrize("balls", [40, 1000])
 def test_a_graze_within_the_filters_rounding_is_not_lost(balls: int) -> None:
     """Pairs that miss or touch by less than float32 can tell: float64 decides, not the filter."""
@@ -102,7 +139,7 @@ def test_sorting_into_blocks_keeps_every_ball() -> None:
         motion[:, :3] = rng.uniform(
             -0.12, 0.12, (count, 3)
         )  # some outside the room, as bases may be
-        refresh_neighbours(neighbours, motion)
+        refresh_neighbours(neighbours, motion, 0.0)
         slots = neighbours.blocks.column
         assert sorted(slots) == list(range(count))
         assert (neighbours.blocks.ball[slots] == np.arange(count)).all()

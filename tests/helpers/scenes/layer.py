@@ -1,0 +1,48 @@
+"""A layer of balls on a shaken floor, 5.4 diameters deep, as in experiments.
+
+Source: C. Bizon, M. D. Shattuck, J. B. Swift, W. D. McCormick & H. L. Swinney, Phys. Rev. Lett. 80
+(1998) 57: patterns at Γ = A omega² / g of 2 to 8 and f* = f sqrt(depth / g) of 0.2 to 0.6.
+"""
+
+import math
+
+import numpy as np
+
+from sim_core import Balls, Gravity, Physics, Scene, Vibration
+from sim_core.effects.restitution import ELASTIC_BELOW
+from tests.helpers.scenes.cavities import FLOOR, box, uniform_restitution
+
+G = 9.80665
+DIAMETER = 1e-3
+DEPTH = 5.4 * DIAMETER
+PER_AREA = 6.0  # balls for each D² of floor
+
+
+def shaken_layer(
+    count: int,
+    gamma: float,
+    f_star: float,
+    cycles: float,
+    e: float = 0.7,
+    elastic_below: float = ELASTIC_BELOW,
+) -> Scene:
+    """A loose lattice that falls on the floor, which starts from its lowest position."""
+    frequency = f_star * math.sqrt(G / DEPTH)
+    amplitude = gamma * G / (math.tau * frequency) ** 2
+    side = math.sqrt(count / PER_AREA) * DIAMETER
+    row = int(side / (1.04 * DIAMETER))
+    layer, place = np.divmod(np.arange(count), row * row)
+    step = side / row
+    positions = np.stack(
+        [(place % row + 0.5) * step, (place // row + 0.5) * step, (0.6 + 1.05 * layer) * DIAMETER],
+        axis=1,
+    )
+    rng = np.random.default_rng(1)
+    positions += rng.uniform(-0.01, 0.01, positions.shape) * DIAMETER
+    balls = Balls(positions, rng.normal(0.0, 0.05, positions.shape), DIAMETER)
+    shaking = Vibration(FLOOR, amplitude, frequency, -0.5 * math.pi)
+    law = uniform_restitution(e, 1e6, elastic_below)
+    top = positions[:, 2].max() + 60.0 * DIAMETER
+    room = box((side, side, top))
+    physics = Physics(Gravity(), law, shaking)
+    return Scene(room, balls, physics, cycles / frequency, record=(FLOOR,))
