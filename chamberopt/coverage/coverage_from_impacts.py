@@ -105,10 +105,11 @@ class LocatedDents(NamedTuple):
 
 def locate_dents(field: TargetField, hits: Hits) -> LocatedDents:
     """Find the face or the crease on which each dent lies."""
-    dents = np.flatnonzero((hits.dent > 0.0) & field.has_windows[hits.triangle])
-    contacts, triangle = field.places_of(hits, dents), hits.triangle[dents]
-    edge = _crease_of_contacts(field, contacts.place, triangle)
-    return LocatedDents(contacts, triangle, 0.5 * hits.dent[dents].astype(float), edge)
+    seen = (hits.dent > 0.0) & field.has_windows[hits.triangle]
+    dents = field.in_sector(hits.select(seen))
+    contacts = field.places_of(dents, np.arange(len(dents)))
+    edge = _crease_of_contacts(field, contacts.place, dents.triangle)
+    return LocatedDents(contacts, dents.triangle, 0.5 * dents.dent.astype(float), edge)
 
 
 def find_footprints(field: TargetField, gauge: Gauge, hits: Hits | LocatedDents) -> Footprints:

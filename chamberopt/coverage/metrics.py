@@ -29,7 +29,7 @@ P05 = 0.05  # share of the target's area that may be covered less than p05_cover
 class Metric:
     """A named number of a candidate.
 
-    Those of coverage and intensity have estimators of their own, see simulation/evaluate.py.
+    Those of coverage and intensity have estimators of their own, see simulation/estimates.py.
     """
 
     name: str

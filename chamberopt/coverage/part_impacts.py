@@ -45,7 +45,11 @@ class Hits:
 
     def on(self, triangles: np.ndarray) -> Hits:
         """The impacts on all part triangles that are marked in (m,) bool."""
-        return _rows(self, triangles[self.triangle])
+        return self.select(triangles[self.triangle])
+
+    def select(self, rows: slice | np.ndarray) -> Hits:
+        """The impacts of these rows."""
+        return Hits(*(getattr(self, column.name)[rows] for column in fields(Hits)))
 
 
 @dataclass(frozen=True)
@@ -74,11 +78,11 @@ class HitsByTriangle:
 
     def of(self, triangle: int) -> Hits:
         """The impacts on one part triangle."""
-        return _rows(self.hits, slice(self.first[triangle], self.first[triangle + 1]))
+        return self.hits.select(slice(self.first[triangle], self.first[triangle + 1]))
 
     def on(self, triangles: np.ndarray) -> Hits:
         """The impacts on all triangles that are marked in (m,) bool."""
-        return _rows(self.hits, np.repeat(triangles, np.diff(self.first)))
+        return self.hits.select(np.repeat(triangles, np.diff(self.first)))
 
 
 def hits_on_part(impacts: ImpactLog, chamber: Chamber, design: Design) -> Hits:
@@ -112,7 +116,7 @@ def sort_hits_by_triangle(hits: Sequence[Hits], triangles: int) -> HitsByTriangl
         *(np.concatenate([getattr(one, column.name) for one in hits]) for column in fields(Hits))
     )
     first = np.concatenate([[0], np.cumsum(np.bincount(together.triangle, minlength=triangles))])
-    return HitsByTriangle(first, _rows(together, np.argsort(together.triangle, kind="stable")))
+    return HitsByTriangle(first, together.select(np.argsort(together.triangle, kind="stable")))
 
 
 def save_hits(path: Path, hits: HitsByTriangle) -> None:
@@ -179,7 +183,3 @@ def load_matching_hits(path: Path, impacts: np.ndarray) -> HitsByTriangle:
             "result; simulate again"
         )
     return found
-
-
-def _rows(hits: Hits, rows: slice | np.ndarray) -> Hits:
-    return Hits(*(getattr(hits, column.name)[rows] for column in fields(Hits)))

@@ -152,6 +152,7 @@ def intensity_uniformity(
     rows = np.linspace(0, len(gauge.area) - 1, min(WINDOWS, len(gauge.area))).astype(int)
     windows = Windows(gauge.windows.points.select(rows), gauge.windows.radius)
     area = gauge.area[rows]
+    replicas = [[field.in_sector(hits) for hits in batch] for batch in replicas]
     of_hits = [[impact_strength(hits, density) for hits in batch] for batch in replicas]
     highest = max(float(s.max(initial=0.0)) for batch in of_hits for s in batch)
     if highest == 0.0:

@@ -7,7 +7,16 @@ from typing import Annotated
 from pydantic import Field
 
 from chamberopt.common.toml_errors import Problem
-from chamberopt.common.toml_fields import MeshFile, Names, Pair, Triple, Turns, list_field, quantity
+from chamberopt.common.toml_fields import (
+    MeshFile,
+    Names,
+    Pair,
+    Shift,
+    Triple,
+    Turns,
+    list_field,
+    quantity,
+)
 from chamberopt.design.table_base import FileTable
 from chamberopt.geometry.mesh_io.units import Unit
 
@@ -68,9 +77,7 @@ class PartTable(FileTable):
     mesh: MeshFile = Field(description="mesh file, path relative to the design file")
     unit: Unit = Field(default="guess", description="of the numbers in the mesh file")
     rotate_deg: Turns = Field(default=(0.0, 0.0, 0.0), description="turns about x, then y, then z")
-    offset_mm: Pair = list_field(
-        "two numbers [x, y] in mm", "sideways from the chamber axis", (0.0, 0.0)
-    )
+    offset_mm: Shift = Field(default=(0.0, 0.0), description="sideways from the chamber axis")
     target: Target = Field(default_factory=Target, description="which triangles must be covered")
 
     @property

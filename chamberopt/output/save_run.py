@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,11 +14,12 @@ from chamberopt.output.plots.study import convergence_picture, pareto_picture, s
 from chamberopt.output.plots.sweep import sweep_map
 from chamberopt.output.results.load import summary
 from chamberopt.output.results.write import write_result, write_simulation, write_study, write_sweep
-from chamberopt.simulation.complete_result import complete_result
+from chamberopt.simulation.complete_result import CandidateResult, complete_result
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.design.load import Design
+    from chamberopt.optimize.candidates import ConfirmedCandidate
     from chamberopt.optimize.run_study import StudyResult
     from chamberopt.optimize.run_sweep import SweepResult
     from chamberopt.simulation.effect_pilot import Advice
@@ -83,12 +85,19 @@ def save_study(
         Remarks for the user, such as why a picture was skipped.
     """
     folder = Path(folder)
-    start, best = (
-        complete_result(one.design, build_chamber(one.design, study_result.target), one.evaluation)
-        for one in (study_result.start, study_result.best)
-    )
-    data = write_study(folder, study_result, start, best)
-    remarks = _draw_study(folder, study_result)
+
+    def complete(one: ConfirmedCandidate) -> CandidateResult:
+        chamber = build_chamber(one.design, study_result.target)
+        return complete_result(one.design, chamber, one.evaluation)
+
+    # The search keeps all cores busy; so that its end does too, start and best are worked out in
+    # threads beside the diagrams.
+    with ThreadPoolExecutor(2) as threads:
+        results = threads.map(complete, (study_result.start, study_result.best))
+        _draw_diagrams(folder, study_result)
+        start, best = results
+        data = write_study(folder, study_result, start, best)
+        remarks = _draw_start_and_best(folder, study_result, threads)
     write_result(folder, data, advice, warned)
     return remarks
 
@@ -105,18 +114,27 @@ def save_sweep(folder: str | Path, sweep: SweepResult) -> list[str]:
     return remarks
 
 
-def _draw_study(folder: Path, study_result: StudyResult) -> list[str]:
-    """Draw the pictures of a study whose data is written; return remarks on skipped pictures."""
+def _draw_diagrams(folder: Path, study_result: StudyResult) -> None:
+    """Draw what the trials and the model of a study give."""
     convergence_picture(folder / "convergence.png", study_result)
     if study_result.sensitivity:
         slices_picture(folder / "slices.png", study_result, study_result.sensitivity)
     if study_result.study.objective.pareto:
         pareto_picture(folder / "pareto.png", study_result)
+
+
+def _draw_start_and_best(folder: Path, study_result: StudyResult, threads: Executor) -> list[str]:
+    """Draw the coverage of a study whose data is written; return remarks on skipped pictures."""
     start, best = study_result.start.evaluation, study_result.best.evaluation
-    remarks = _draw_coverage([folder], [best], ["best design"], folder / "coverage.png")
     folders, names = [folder / "start", folder], ["start", "best design"]
-    remarks += _draw_coverage(folders, [start, best], names, folder / "before_after.png")
-    return list(dict.fromkeys(remarks))
+    pictures = [
+        threads.submit(_draw_coverage, *one)
+        for one in (
+            ([folder], [best], ["best design"], folder / "coverage.png"),
+            (folders, [start, best], names, folder / "before_after.png"),
+        )
+    ]
+    return list(dict.fromkeys(remark for one in pictures for remark in one.result()))
 
 
 def _draw_coverage(

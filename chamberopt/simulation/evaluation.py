@@ -13,6 +13,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.limits import MAX_NUMBER
 from chamberopt.common.npz_files import is_of_type, load_record, save_record
+from chamberopt.coverage.field.symmetry import MAX_COPIES
 from chamberopt.coverage.metrics import METRICS
 from chamberopt.coverage.part_impacts import Hits, require_impacts
 from chamberopt.coverage.resolution import Resolution
@@ -41,6 +42,8 @@ class Evaluation:
     stream: str = "search"  # stream of seeds, "search" or "confirm"
     # What ended it: "replicas" (their number was given), "accuracy" or "max_replicas".
     stopped_by: str = "replicas"
+    # How many places of the target are alike by symmetry; figures are means over them.
+    alike: int = 1
     analytic: bool = False  # whether it ran in an exact cavity instead of the chamber's mesh
 
 
@@ -89,6 +92,8 @@ def _require_sound(found: Evaluation) -> None:
         raise ValueError("a number is not finite, or too large")
     if not (found.simulated_time > 0.0 and found.objective.pseudovalues and found.replicas > 0):
         raise ValueError("it has no simulated time, or no replicas")
+    if not 1 <= found.alike <= MAX_COPIES:
+        raise ValueError(f"{found.alike} places alike")
     if any(one.half_width < 0.0 for one in estimates):
         raise ValueError("an interval is negative")
     if len(found.hits) != found.replicas:

@@ -191,11 +191,12 @@ class PartField:
         points, windows = len(gauge.area), gauge.windows
         density = self._design.shot.density
         sums = np.zeros((6, points))
-        fastest = max(float(hits.speed.max(initial=0.0)) for hits in self._hits)
-        strengths = [impact_strength(hits, density) for hits in self._hits]
+        turned = [self.field.in_sector(hits) for hits in self._hits]
+        fastest = max(float(hits.speed.max(initial=0.0)) for hits in turned)
+        strengths = [impact_strength(hits, density) for hits in turned]
         strongest = max(float(one.max(initial=0.0)) for one in strengths)
         by_speed, by_strength = np.zeros((points, LEVELS)), np.zeros((points, LEVELS))
-        for hits, strength in zip(self._hits, strengths, strict=True):
+        for hits, strength in zip(turned, strengths, strict=True):
             places = self.field.places_of(hits, np.arange(len(hits)))
             ones = np.ones(len(hits))
             is_dent = (hits.dent > 0.0).astype(float)

@@ -6,7 +6,8 @@ Notation
     A     area of the window that a ball can touch [m²]                (area, (p,))
 
 Places that no ball can touch, because something is in the ball's way, count as bare and belong to
-no window. Convex creases have windows of their own, pieces of the crease.
+no window. Convex creases have windows of their own, pieces of the crease. Where places are alike
+by symmetry, the windows of all are one window with an area n times as large (symmetry.py).
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ from chamberopt.coverage.field.surface_points import (
     sparse_points,
     spread_points,
 )
+from chamberopt.coverage.field.symmetry import TOLERANCE, Symmetry, find_symmetry
 from chamberopt.geometry.triangles import unit_normals
 
 if TYPE_CHECKING:
@@ -55,20 +57,22 @@ class WindowSetting(NamedTuple):
         points: number of windows; figures are means over them.
         ball: diameter of the smallest ball [m].
         largest_dent: diameter [m].
+        symmetric: whether all that moves keeps the symmetry of the chamber about its axis.
     """
 
     gauge: float
     points: int
     ball: float
     largest_dent: float
+    symmetric: bool = False
 
 
 @dataclass(frozen=True)
 class Gauge:
-    """The windows of one size round some points."""
+    """The windows of one size round some points, each with those that are alike by symmetry."""
 
     windows: Windows
-    area: np.ndarray  # that a ball can touch in each window [m²], (p,)
+    area: np.ndarray  # that a ball can touch in each window and in those alike [m²], (p,)
     band: CreaseBand | None  # None if no point is near a crease
 
 
@@ -88,6 +92,12 @@ class TargetField:
     surface: SurfacePieces  # of the target, or of the whole part
     reachable: float  # share of the target's area that a ball can touch
     reachable_error: float  # its standard error, by the choice of points
+    symmetry: Symmetry | None  # None where no two places are alike
+
+    @property
+    def alike(self) -> int:
+        """How many places of the target are alike: 1 without symmetry."""
+        return self.symmetry.copies if self.symmetry else 1
 
     @property
     def radius(self) -> float:
@@ -111,10 +121,12 @@ class TargetField:
         from chamberopt.coverage.field.window_areas import window_areas
         from chamberopt.coverage.field.windows import Windows
 
-        windows = Windows(points, radius)
-        area = window_areas(windows, self.surface)
+        windows = Windows(self._points_in_sector(points), radius)
+        area = self.alike * window_areas(windows, self.surface)
         area[area == 0.0] = np.inf  # nothing can be touched there, so nothing covers it
         band = find_band(windows, self.creases, self.pieces, 0.5 * self.setting.largest_dent)
+        if band is not None:
+            band = band._replace(length=self.alike * band.length)
         return Gauge(windows, area, band)
 
     def some_points(self, count: int) -> Places:
@@ -122,6 +134,45 @@ class TargetField:
         there = len(self.touched.place)
         rows = np.linspace(0, there - 1, min(count, there)).round().astype(int)
         return self.touched.select(rows)
+
+    def in_sector(self, hits: Hits) -> Hits:
+        """The impacts where the windows are: the same without symmetry.
+
+        Those that are not in the cavity, which no simulation makes, stay where they are.
+        """
+        if self.symmetry is None:
+            return hits
+        margin = 2.0 * self.radius + self.setting.largest_dent
+        rows, turn = self.symmetry.into_sector(hits.place, margin)
+        place = self.symmetry.turned(hits.place[rows], turn)
+        triangle = np.where(turn == 0, hits.triangle[rows], self.symmetry.triangles_at(place))
+        lost = triangle < 0
+        if (self.symmetry.triangles_at(hits.place[rows[lost]], TOLERANCE) >= 0).any():
+            raise RuntimeError("an impact is beside the part after a turn that changes nothing")
+        place[lost], triangle[lost] = hits.place[rows[lost]], hits.triangle[rows[lost]]
+        return replace(
+            hits.select(rows), place=place.astype(np.float32), triangle=triangle.astype(np.int32)
+        )
+
+    def _points_in_sector(self, points: Places) -> Places:
+        if self.symmetry is None:
+            return points
+        from chamberopt.coverage.field.windows import Places
+
+        _, turn = self.symmetry.into_sector(points.place)
+        place, normal = (self.symmetry.turned(one, turn) for one in (points.place, points.normal))
+        return Places(place, normal, self._faces_after(self.symmetry)[turn, points.face])
+
+    def _faces_after(self, symmetry: Symmetry) -> np.ndarray:
+        """Which smooth face each one comes to be by each number of turns, (n, faces)."""
+        after = np.tile(np.arange(int(self.face.max()) + 1), (symmetry.copies, 1))
+        middles, triangles = symmetry.on_each(self.face)
+        faces = self.face[triangles]
+        for turn in range(1, symmetry.copies):
+            after[turn, faces] = self.face[
+                symmetry.triangles_at(symmetry.turned(middles, np.array(turn)))
+            ]
+        return after
 
     def places_of(self, hits: Hits, rows: np.ndarray) -> Places:
         """The contacts of some impacts."""
@@ -157,6 +208,7 @@ def find_target_field(chamber: Chamber, mesh: TriangleMesh, setting: WindowSetti
     radius, corners = float(np.sqrt(gauge / np.pi)), part.vertices[part.triangles]
     ball = 0.5 * setting.ball
     touched, fits = _touched(chamber, mesh, area, face, setting)
+    symmetry = find_symmetry(chamber, mesh) if setting.symmetric else None
     longest = _longest_side(setting, float(area.sum()), MAX_PIECES)
     surface = surface_pieces(corners[part.target], face[part.target], mesh, ball, longest)
     return TargetField(
@@ -174,6 +226,7 @@ def find_target_field(chamber: Chamber, mesh: TriangleMesh, setting: WindowSetti
         reachable_error=math.hypot(
             *sampling_errors(np.array([some.mean() for some in sparse_points(fits)]))
         ),
+        symmetry=symmetry,
     )
 
 

@@ -38,7 +38,7 @@ from chamberopt.output.vtp_files import (
 if TYPE_CHECKING:
     from chamberopt.simulation.evaluation import Evaluation
 
-FORMAT = 4
+FORMAT = 5
 RESTORE = "restore the folder from where it came, or simulate again"
 
 

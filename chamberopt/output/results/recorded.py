@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from chamberopt.common.errors import InputError
+from chamberopt.common.errors import InputError, first_wrong_value
 from chamberopt.coverage.metrics import METRICS, parse_objective
 
 ROUNDING = 1e-9
@@ -83,6 +83,7 @@ class _Field(_Table):
     simulated_s_needed: _Needed
     reachable_share: float
     crease_share: float
+    alike_places: Annotated[int, Field(ge=1)]
     double_gauge: dict[str, _Estimate]
 
 
@@ -264,6 +265,4 @@ def require_recorded(data: dict[str, Any]) -> None:
     try:
         model.model_validate(data)
     except ValidationError as error:
-        first = error.errors(include_url=False, include_input=False)[0]
-        where, why = ".".join(map(str, first["loc"])), first["msg"].removeprefix("Value error, ")
-        raise ValueError(f"{where}: {why}" if where else why) from None
+        raise ValueError(first_wrong_value(error)) from None

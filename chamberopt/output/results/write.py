@@ -179,6 +179,7 @@ def _about_field(design: Design, evaluation: Evaluation) -> dict[str, Any]:
         },
         "reachable_share": evaluation.reachable,
         "crease_share": evaluation.crease_share,
+        "alike_places": evaluation.alike,
         "double_gauge": {
             name: _with_unit(value, METRICS[name].unit)
             for name, value in evaluation.metrics_of_wide.items()

@@ -28,7 +28,8 @@ from chamberopt.design.design import Design
 from chamberopt.simulation.convergence import error_law
 from chamberopt.simulation.convergence.error_law import BatchSize, ErrorLaw
 from chamberopt.simulation.convergence.parameters import study_designs
-from chamberopt.simulation.evaluate import prepare_target, weighted_sum, window_estimates
+from chamberopt.simulation.estimates import weighted_sum, window_estimates
+from chamberopt.simulation.evaluate import prepare_target
 from chamberopt.simulation.replicas import ReplicaSetting, simulate_replica
 
 if TYPE_CHECKING:

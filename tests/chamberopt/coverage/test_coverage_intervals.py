@@ -29,7 +29,7 @@ from chamberopt.coverage.resolution import (
     Resolution,
     find_resolution,
 )
-from chamberopt.simulation.evaluate import as_resolved, resolution_notes
+from chamberopt.simulation.estimates import as_resolved, resolution_notes
 
 WINDOWS = 1000
 TREATMENT = 50.0  # s

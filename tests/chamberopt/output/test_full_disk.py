@@ -55,9 +55,12 @@ WRITERS: dict[str, Callable[[Path], None]] = {
     "page.html": lambda path: write_text(path, "x" * 100_000),
 }
 ROOM = 20_000  # bytes
+# Other processes would read half of a file of compiled code.
+NO_BYTECODE = {"PYTHONPATH": str(Path(__file__).parents[3]), "PYTHONDONTWRITEBYTECODE": "1"}
 
 
 def limited(write: Callable[[Path], None], path: Path) -> None:
+    sys.dont_write_bytecode = True
     resource.setrlimit(resource.RLIMIT_FSIZE, (ROOM, ROOM))
     try:
         write(path)
@@ -109,7 +112,7 @@ def test_an_export_is_one_message(name: str, result: Result, tmp_path: Path) -> 
         capture_output=True,
         text=True,
         check=False,
-        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])},
+        env={**os.environ, **NO_BYTECODE},
     )
     assert ended.returncode in (1, 2)
     assert "Traceback" not in ended.stderr
@@ -128,7 +131,7 @@ def test_the_drawing_process_ends_with_the_command_that_opened_it() -> None:
          "sys.argv[1:] = ['{\"draw\": \"coverage\"}']\n"
          "runpy.run_module('chamberopt.output.viewer', run_name='__main__')"],
         stdin=reader,
-        env={**without_display(), "PYTHONPATH": str(Path(__file__).parents[3])},
+        env={**without_display(), **NO_BYTECODE},
     )  # fmt: skip
     os.close(reader)
     time.sleep(5.0)

@@ -15,15 +15,8 @@ from chamberopt.coverage.metrics import METRICS, OBJECTIVES
 from chamberopt.coverage.part_impacts import Hits
 from chamberopt.design.design import validate
 from chamberopt.design.load import Design
-from chamberopt.simulation.evaluate import (
-    MAX_SPEED,
-    ReplicaPlan,
-    SeenDents,
-    estimate_metrics,
-    evaluate,
-    prepare_target,
-    weighted_sum,
-)
+from chamberopt.simulation.estimates import SeenDents, estimate_metrics, weighted_sum
+from chamberopt.simulation.evaluate import MAX_SPEED, ReplicaPlan, evaluate, prepare_target
 from chamberopt.simulation.replicas import MIN_REPLICAS_TO_STOP
 from tests.helpers.synthetic import evaluation_of, plane_chamber, plate_design, random_dents
 

@@ -66,6 +66,6 @@ def test_what_is_no_result_is_said(tmp_path: Path) -> None:
         replace_result(folder, wrong)
         with pytest.raises(InputError, match="damaged"):
             load_result(folder)
-    (folder / "result.json").write_text(text.replace('"format": 4', '"format": 99'))
-    with pytest.raises(InputError, match=r"in format 99, expected 4: .* read it with that version"):
+    (folder / "result.json").write_text(text.replace('"format": 5', '"format": 99'))
+    with pytest.raises(InputError, match=r"in format 99, expected 5: .* read it with that version"):
         load_result(folder)

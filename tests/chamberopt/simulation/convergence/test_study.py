@@ -36,7 +36,7 @@ def footprints_of(
     gauge = field.gauge
     slant = np.linspace(0.8, 1.2, len(gauge.area))
     point = np.repeat(np.arange(len(slant)), rng.poisson(rate * seconds * slant))
-    weight = DENT / gauge.area[point]
+    weight = field.alike * DENT / gauge.area[point]
     return Footprints(point, weight, DENT * len(point), 0.0, DENT**2 * len(point))
 
 

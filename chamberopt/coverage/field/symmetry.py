@@ -1,0 +1,142 @@
+"""Turns about the chamber's axis that change nothing: what is alike is looked at together.
+
+Notation
+    n   number of turns by 2 pi / n that leave cavity, target and sonotrode as they are  (copies)
+
+All n places that such turns bring to one another are hit equally often and equally hard, so their
+windows are looked at as one window of n times the area: n times the dents for one simulation. To
+do so, all impacts and all windows are turned into one sector of the chamber; impacts near its
+borders count again beyond them. The mean over the target stays as it was; what differs from place
+to place by chance scatters less. Nothing is lost: which of the n places a dent falls on tells
+nothing of their common rate (Rao and Blackwell; E. L. Lehmann and G. Casella, "Theory of Point
+Estimation", Springer 1998, section 1.7).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from chamberopt.design.shapes import TAG_PART
+from chamberopt.geometry.triangles import areas
+
+if TYPE_CHECKING:
+    from chamberopt.chamber.build import Chamber
+    from sim_core import TriangleMesh
+
+MAX_COPIES = 360
+TOLERANCE = 2e-7  # m, by which surfaces that are alike may differ: a file's rounding
+INSIDE = 0.01  # of the way from a corner to the middle
+FEW = 40  # triangles that are tried before all
+
+
+@dataclass(frozen=True)
+class Symmetry:
+    """A cavity that looks the same from several sides."""
+
+    copies: int
+    mesh: TriangleMesh  # of the chamber
+    source: np.ndarray  # part triangle of each of its triangles, -1 for walls, (t,)
+
+    @property
+    def step(self) -> float:
+        """The smallest of the turns [rad]."""
+        return 2.0 * np.pi / self.copies
+
+    def into_sector(self, place: np.ndarray, margin: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """Turns by which places (k, 3) [m] come into the sector round the x axis.
+
+        Args:
+            margin: what is nearer than this to the sector [m] counts as there too.
+
+        Returns:
+            Rows of the places, and their turns in steps. Each row comes once, by the turn into the
+            sector itself, and after them the rows that are near it after another turn.
+        """
+        angle = np.arctan2(place[:, 1], place[:, 0])
+        sector = np.round(angle / self.step)
+        beside, radius = angle - self.step * sector, np.hypot(place[:, 0], place[:, 1])
+        rows, turns = [np.arange(len(place))], [-sector]
+        # Only what is near a border of its own sector can be near another.
+        close = np.flatnonzero(_off(0.5 * self.step - np.abs(beside), radius) < margin)
+        for other in range(1, self.copies):
+            around = np.abs((beside[close] + other * self.step + np.pi) % (2.0 * np.pi) - np.pi)
+            near = close[_off(around - 0.5 * self.step, radius[close]) < margin]
+            rows.append(near)
+            turns.append(other - sector[near])
+        return np.concatenate(rows), (np.concatenate(turns) % self.copies).astype(int)
+
+    def on_each(self, face: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """A place in the cavity on each smooth face, of its largest triangle there.
+
+        Args:
+            face: of each triangle of the part, (m,).
+
+        Returns:
+            Places (f, 3) [m] and triangles of the part (f,).
+        """
+        own = np.flatnonzero(self.source >= 0)
+        size = areas(self.mesh.vertices, self.mesh.triangles[own])
+        order = np.argsort(-size, kind="stable")
+        _, first = np.unique(face[self.source[own[order]]], return_index=True)
+        chosen = own[order[first]]
+        return self.mesh.corners[chosen].mean(axis=1), self.source[chosen]
+
+    def turned(self, place: np.ndarray, turn: np.ndarray) -> np.ndarray:
+        """Places or directions (k, 3) after so many steps, (k,)."""
+        return turn_about_axis(place, turn * self.step)
+
+    def triangles_at(self, place: np.ndarray, reach: float = 10.0 * TOLERANCE) -> np.ndarray:
+        """Part triangle at each place (k, 3), (k,); -1 where the part does not bound the cavity.
+
+        Args:
+            reach: how far from a place it is looked for [m].
+        """
+        from sim_core import closest_points
+
+        found = closest_points(self.mesh, place, reach, TAG_PART).triangle
+        return np.where(found < 0, -1, self.source[found])
+
+
+def _off(angle: np.ndarray, radius: np.ndarray) -> np.ndarray:
+    """Distance from a half plane through the axis [m], at an angle to it and a radius, (k,)."""
+    return radius * np.sin(np.clip(angle, 0.0, 0.5 * np.pi))
+
+
+def find_symmetry(chamber: Chamber, mesh: TriangleMesh) -> Symmetry | None:
+    """The largest number of turns that leave a chamber as it is; None if there are none.
+
+    Corners must lie on the surface again; places just inside the corners of each triangle, on one
+    with the same tag, and of the target or not as before.
+    """
+    from sim_core import closest_points
+
+    corners = chamber.vertices[chamber.triangles]
+    inside = corners + INSIDE * (corners.mean(axis=1, keepdims=True) - corners)
+    on_target = np.append(chamber.part.target, False)[chamber.source]  # -1, a wall, is the last
+    looks = chamber.tags + 256 * on_target.astype(int)
+
+    def is_kept(angle: float, triangles: np.ndarray) -> bool:
+        for places in (corners, inside):
+            turned = turn_about_axis(places[triangles].reshape(-1, 3), angle)
+            found = closest_points(mesh, turned, TOLERANCE).triangle
+            if (found < 0).any():
+                return False
+        return bool((looks[found] == np.repeat(looks[triangles], 3)).all())
+
+    count = len(corners)
+    few = np.linspace(0, count - 1, min(FEW, count)).astype(int)
+    for copies in range(MAX_COPIES, 1, -1):
+        angle = 2.0 * np.pi / copies
+        if is_kept(angle, few) and is_kept(angle, np.arange(count)):
+            return Symmetry(copies, mesh, chamber.source)
+    return None
+
+
+def turn_about_axis(place: np.ndarray, angle: float | np.ndarray) -> np.ndarray:
+    """Places (k, 3) turned about the z axis by angles (k,) or one for all [rad]."""
+    cosine, sine = np.cos(angle), np.sin(angle)
+    x, y, z = place.T.astype(float)
+    return np.stack([cosine * x - sine * y, sine * x + cosine * y, z], axis=1)
