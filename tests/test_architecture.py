@@ -28,7 +28,7 @@ ORDER = {
     ),
     "chamberopt/coverage": "dents part_impacts+metrics field coverage_from_impacts "
     "resolution+percentile coverage_intervals strength",
-    "chamberopt/simulation": "resting_balls replicas evaluation evaluate "
+    "chamberopt/simulation": "resting_balls replicas evaluation estimates evaluate "
     "field_values time_curve complete_result effect_pilot convergence",
     "chamberopt/optimize": "study+search storage "
     "sensitivity+evaluate_candidate candidates run_study pareto+run_sweep",

@@ -1,4 +1,4 @@
-"""Ctrl-C: it ends every command at once, and a study after the running evaluation."""
+"""Ctrl-C: it ends every command at once, and a study after the running evaluations."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from typing import Self
 
 KEPT = "what had been finished stays on disk"
 INTERRUPTED = f"interrupted; {KEPT}"
-FIRST = "finishing this evaluation, then stopping; press Ctrl-C again to stop now"
-SECOND = "stopped; the running evaluation is lost, all earlier ones are on disk"
+FIRST = "finishing what runs, then stopping; press Ctrl-C again to stop now"
+SECOND = "stopped; the running evaluations are lost, all earlier ones are on disk"
 EARLY = "interrupted; no evaluation was running"
 SHOW_CURSOR = "\033[?25h"  # a progress bar hides it
 
@@ -66,8 +66,9 @@ class Interrupt:
 
     Until `wait_for_evaluation` is called, Ctrl-C ends the process with os._exit. An exception would
     not do: Python drops one that comes while a module is imported, one during compilation can crash
-    the compiler, and replicas that run in threads would be waited for. Nothing can be lost: each
-    trial is on disk before the next evaluation begins, and files are written atomically.
+    the compiler, and replicas that run in threads would be waited for. Nothing can be lost: trials
+    are on disk as soon as they and those before them are finished, and files are written
+    atomically.
     """
 
     def __init__(self) -> None:
@@ -85,7 +86,7 @@ class Interrupt:
         signal.signal(signal.SIGINT, self._before)
 
     def wait_for_evaluation(self, how_to_resume: str) -> None:
-        """From now on finish the running evaluation first, unless Ctrl-C comes twice."""
+        """From now on finish the running evaluations first, unless Ctrl-C comes twice."""
         self._waits, self._how_to_resume = True, how_to_resume
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:

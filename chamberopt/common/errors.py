@@ -1,6 +1,12 @@
 """Errors that a user can put right, and errors of lost workers."""
 
+from __future__ import annotations
+
 from concurrent.futures import BrokenExecutor
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pydantic import ValidationError
 
 
 class InputError(Exception):
@@ -21,3 +27,10 @@ class WorkerLostError(BrokenExecutor):
 
 class ClusterLostError(BrokenExecutor):
     """The cluster ended with tasks unfinished; the command line exits with status 1."""
+
+
+def first_wrong_value(error: ValidationError) -> str:
+    """Where the first wrong value of a program's own file lies, and what is wrong with it."""
+    first = error.errors(include_url=False, include_input=False)[0]
+    where, why = ".".join(map(str, first["loc"])), first["msg"].removeprefix("Value error, ")
+    return f"{where}: {why}" if where else why

@@ -28,7 +28,7 @@ def _nonzero(direction: Vector) -> Vector:
     return direction
 
 
-def _within_limits(position: Vector) -> Vector:
+def _within_limits(position: tuple[float, ...]) -> tuple[float, ...]:
     if max(map(abs, position)) > MAX_COORDINATE_MM:
         allowed = f"each must be from -{MAX_COORDINATE_MM} to {MAX_COORDINATE_MM} mm"
         raise CrossCheckError([Problem("", f"given {list(position)}; {allowed}")])
@@ -54,6 +54,7 @@ def _form(form: str) -> Any:
 # The form is what error messages show.
 Direction = Annotated[Triple, AfterValidator(_nonzero), _form("three numbers [x, y, z], not all 0")]
 Position = Annotated[Triple, AfterValidator(_within_limits), _form("three numbers [x, y, z] in mm")]
+Shift = Annotated[Pair, AfterValidator(_within_limits), _form("two numbers [x, y] in mm")]
 Turns = Annotated[Triple, _form("three numbers [x, y, z] in degrees")]  # about x, then y, then z
 # Paths are relative to the file that names them, and absolute once read: the design stays valid
 # wherever it is saved.

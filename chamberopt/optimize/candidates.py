@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -57,8 +59,14 @@ class ConfirmedCandidate:
 class Candidates:
     """Scores points of the unit cube; candidates on record are not evaluated again.
 
-    `start` is the design of the study as a point (d,); `trials` has those of the search first.
-    KeyboardInterrupt is raised when `stop`, called before each evaluation, returns True.
+    Up to `optimizer.batch` candidates are evaluated at a time, in threads that share the workers:
+    while one builds its chamber or estimates its metrics, the workers have replicas of another.
+    Trials are recorded in the order in which their evaluations began. What a candidate is evaluated
+    with follows from the trials that are recorded by then, so that nothing depends on speed.
+
+    `start` is the design of the study as a point (d,); `trials` has those of the search first. When
+    `stop`, called before each evaluation, returns True, those that run are finished and recorded,
+    and KeyboardInterrupt is raised. Leaving the `with` block by an error does not wait for them.
     """
 
     def __init__(
@@ -74,16 +82,27 @@ class Candidates:
         self._evaluator = CandidateEvaluator(study, simulator)
         self.start = self._evaluator.space.start
         self.trials: list[Trial] = []
-        self._points: list[np.ndarray] = []  # of the search
+        self._points: list[np.ndarray] = []  # of the search, those that run included
+        self._running: deque[_Running] = deque()
+        self._confirmations: dict[int, Evaluation] = {}  # by number, until they are asked for
+        self._threads = ThreadPoolExecutor(study.optimizer.batch, "candidate")
+        self._last_end = 0.0  # of an evaluation, by the clock
 
-    def score(self, point: np.ndarray) -> float:
-        """Evaluate a point of the search: the objective less penalties.
+    def __enter__(self) -> Self:
+        return self
 
-        InputError or an error of sim_core if the start, which comes first, cannot be simulated.
+    def __exit__(self, *error: object) -> None:
+        self._threads.shutdown(wait=error[0] is None, cancel_futures=True)
+
+    def begin(self, point: np.ndarray) -> Callable[[], float]:
+        """Begin to evaluate a point of the search; the function waits for its score.
+
+        The score is the objective less penalties. InputError or an error of sim_core if the start,
+        which comes first, cannot be simulated.
         """
-        trial, _ = self._evaluate(point, "search", None)
+        number = self._begin(point, "search", None)
         self._points.append(point)
-        return trial.score
+        return lambda: self._finish(number).score
 
     def model_data(self, weight: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Scores (n,) of the search and their variances (n,), as a model learns them.
@@ -92,7 +111,7 @@ class Candidates:
         nobody knows, and a cliff would bend the model far around it. The weights of two objectives
         are by default random ones for this step.
         """
-        searched = [trial.goals for trial in self.trials[: len(self._points)]]
+        searched = [trial.goals for trial in self.trials if trial.stage == "search"]
         failed = np.array([not goals for goals in searched])
         some = next(goals for goals in searched if goals)
         rows = [goals or some for goals in searched]
@@ -103,7 +122,7 @@ class Candidates:
         penalty = unit * np.array([trial.penalty for trial in self.trials[: len(rows)]])
         if len(some) > 1 and weight is not FIRST_OBJECTIVE:
             if weight is None:
-                weight = draw_weights(self._study.optimizer.seed, len(rows))
+                weight = draw_weights(self._study.optimizer.seed, len(self._points))
             score, variance = scalarise(values, variances, weight, ~failed)
             penalty = penalty / unit
         score = score - penalty
@@ -128,22 +147,35 @@ class Candidates:
         asks_for_accuracy = self._study.design.process.accuracy.objective_half_width is not None
         replicas = None if asks_for_accuracy else settings.confirm_replicas
         promising = self._promising(settings.confirm)
-        confirmed = [self._confirm(*one, replicas) for one in promising]
+        confirmed = self._confirm(promising, replicas)
         for _ in range(settings.confirm_rounds - 1):
             close = close_to_best([one for one in confirmed if one]) if replicas else []
             if not close:
                 break
             replicas = 2 * (replicas or 0)
-            for i, one in enumerate(confirmed):
-                if one and (i == 0 or any(one is other for other in close)):
-                    confirmed[i] = self._confirm(*promising[i], replicas) or one
+            again = [
+                i
+                for i, one in enumerate(confirmed)
+                if one and (i == 0 or any(one is other for other in close))
+            ]
+            more = self._confirm([promising[i] for i in again], replicas)
+            for i, one in zip(again, more, strict=True):
+                confirmed[i] = one or confirmed[i]
         return [one for one in confirmed if one]
 
     def _confirm(
-        self, searched: int | None, point: np.ndarray, replicas: int | None
+        self, places: list[tuple[int | None, np.ndarray]], replicas: int | None
+    ) -> list[ConfirmedCandidate | None]:
+        """Simulate candidates, given with their trial numbers in the search, with new seeds."""
+        begun = [self._begin(point, "confirm", replicas) for _, point in places]
+        return [self._confirmed(*one, n) for one, n in zip(places, begun, strict=True)]
+
+    def _confirmed(
+        self, searched: int | None, point: np.ndarray, number: int
     ) -> ConfirmedCandidate | None:
-        trial, evaluation = self._evaluate(point, "confirm", replicas)
-        if evaluation is None or not trial.goals:
+        trial = self._finish(number)
+        evaluation = self._confirmations.pop(number, None)
+        if evaluation is None:
             return None
         parameters, goals = trial.parameters, self._evaluator.goals(evaluation)
         figures = self._evaluator.constrained(parameters, evaluation)
@@ -182,32 +214,68 @@ class Candidates:
                 chosen.append((None, point))
         return chosen
 
-    def _evaluate(
-        self, point: np.ndarray, stage: str, replicas: int | None
-    ) -> tuple[Trial, Evaluation | None]:
-        """Take a trial from the record, or evaluate the candidate and record it."""
-        number, evaluation = len(self.trials), None
-        trial = self._folder.recorded.find(number, stage, point.tolist())
-        if trial is None:
+    def _begin(self, point: np.ndarray, stage: str, replicas: int | None) -> int:
+        """Begin to evaluate a candidate, or take it from the record; returns its number."""
+        while len(self._running) >= self._study.optimizer.batch:
+            self._finish_oldest()
+        number = len(self.trials) + len(self._running)
+        recorded = self._folder.recorded.find(number, stage, point.tolist())
+        if recorded is not None:
+            evaluation: Future[Evaluation | str] = Future()
+            in_file = stage == "confirm" and recorded.objective is not None
+            evaluation.set_result(self._folder.evaluation(recorded) if in_file else "")
+        else:
             if self._stop and self._stop():
+                while self._running:
+                    self._finish_oldest()
                 raise KeyboardInterrupt
-            began = time.perf_counter()
             lows = (t.objective.low for t in self.trials if t.feasible and t.objective)
-            best_low = max(lows, default=-np.inf) if number else None
-            trial, evaluation = self._evaluator.trial(number, point, stage, replicas, best_low)
-            self._folder.append(trial, evaluation, time.perf_counter() - began)
-        elif stage == "confirm" and trial.objective is not None:
-            evaluation = self._folder.evaluation(trial)
-        if number == 0:
+            best_low = max(lows, default=-np.inf) if self.trials else None
+            what = number, point, stage, replicas, best_low
+            evaluation = self._threads.submit(self._evaluator.evaluate, *what)
+        began = time.perf_counter()
+        self._running.append(_Running(number, point, stage, began, recorded, evaluation))
+        return number
+
+    def _finish(self, number: int) -> Trial:
+        """Wait for the trial of this number, and record it and those before it."""
+        while len(self.trials) <= number:
+            self._finish_oldest()
+        return self.trials[number]
+
+    def _finish_oldest(self) -> None:
+        one = self._running[0]
+        evaluation, trial = one.evaluation.result(), one.recorded
+        if trial is None:
+            trial = self._evaluator.trial(one.number, one.point, one.stage, evaluation)
+            # The clock's seconds of evaluations that run at a time count once.
+            now = time.perf_counter()
+            seconds, self._last_end = now - max(one.began, self._last_end), now
+            self._folder.append(trial, evaluation, seconds)
+        self._running.popleft()
+        if one.number == 0:
             self._evaluator.reference = Reference(trial.score, self._evaluator.unit(trial.metrics))
         self.trials.append(trial)
+        if one.stage == "confirm" and isinstance(evaluation, Evaluation):
+            self._confirmations[one.number] = evaluation
         # Trials from the record but the last one are not shown.
-        if self._progress and number + 1 >= len(self._folder.recorded.trials):
+        if self._progress and one.number + 1 >= len(self._folder.recorded.trials):
             settings = self._study.optimizer
             total = max(len(self.trials), settings.evaluations + 1 + settings.confirm)
-            scores = (t.score for t in self.trials if t.feasible and t.stage == stage)
+            scores = (t.score for t in self.trials if t.feasible and t.stage == one.stage)
             self._progress(len(self.trials), total, max(scores, default=None))
-        return trial, evaluation
+
+
+@dataclass(frozen=True)
+class _Running:
+    """A candidate whose evaluation runs, or is on record."""
+
+    number: int
+    point: np.ndarray
+    stage: str
+    began: float  # by the clock [s]
+    recorded: Trial | None
+    evaluation: Future[Evaluation | str]  # or why there is none
 
 
 def _variances(goals: list[Estimate]) -> np.ndarray:

@@ -16,7 +16,7 @@ from chamberopt.coverage.metrics import METRICS, parse_objective
 from chamberopt.optimize.storage.trial_log import Trial
 from chamberopt.optimize.study.constraints import describe_violations, expected_violation
 from chamberopt.optimize.study.parameters import ParameterSpace
-from chamberopt.simulation.evaluate import weighted_sum
+from chamberopt.simulation.estimates import weighted_sum
 from chamberopt.simulation.evaluation import Evaluation
 
 if TYPE_CHECKING:
@@ -62,15 +62,17 @@ class CandidateEvaluator:
         others = (name for name in self._study.constraints if name not in figures)
         return figures | {name: Estimate(design.value(name), 0.0) for name in others}
 
-    def trial(
+    def evaluate(
         self,
         number: int,
         point: np.ndarray,
         stage: str,
         replicas: int | None = None,
         best_low: float | None = None,
-    ) -> tuple[Trial, Evaluation | None]:
-        """Evaluate the candidate at a point (d,): the trial, and the evaluation unless it failed.
+    ) -> Evaluation | str:
+        """Simulate the candidate at a point (d,); a text with the reason if that is not possible.
+
+        Several threads may call this at a time.
 
         Args:
             stage: "search", "confirm" or "sweep"; all but "confirm" are evaluated at the accuracy
@@ -82,34 +84,43 @@ class CandidateEvaluator:
         """
         from sim_core import SceneError, SimulationError
 
-        parameters = self.space.values_at(point)
-        is_start = stage == "search" and number == 0
-        worst = self.reference.score - FAILURE_PENALTY * self.reference.unit
-        at = tuple(point.tolist())
-        failed = Trial(number, stage, at, parameters, (), {}, 0.0, worst, False, "")
         try:
             evaluation = self._evaluate(self.space.design_at(point), stage, replicas, best_low)
             goals = self.goals(evaluation)
             if not all(math.isfinite(goal.value) for goal in goals):
                 raise InputError(f"its objective is {goals[0].value}, not a number to compare")
         except (InputError, SceneError, SimulationError) as error:
-            if is_start:
+            if is_start(number, stage):
                 raise
-            return replace(failed, reason=str(error)), None
+            return str(error)
         except Exception as error:
             # A fault of the program or the machine, not of the candidate: it is not recorded.
+            parameters = self.space.values_at(point)
             values = ", ".join(f"{name} = {value!r}" for name, value in parameters.items())
             error.add_note(f"in evaluation {number + 1} ({stage}): {values}")
             raise
+        return evaluation
+
+    def trial(
+        self, number: int, point: np.ndarray, stage: str, evaluation: Evaluation | str
+    ) -> Trial:
+        """The row of an evaluated candidate; its score needs `reference`."""
+        parameters = self.space.values_at(point)
+        worst = self.reference.score - FAILURE_PENALTY * self.reference.unit
+        at = tuple(point.tolist())
+        failed = Trial(number, stage, at, parameters, (), {}, 0.0, worst, False, "")
+        if isinstance(evaluation, str):
+            return replace(failed, reason=evaluation)
         unit = self.reference.unit
-        if is_start:
+        if is_start(number, stage):
             unit = self.unit(evaluation.metrics)
+        goals = self.goals(evaluation)
         figures, constraints = self.constrained(parameters, evaluation), self._study.constraints
         penalty = sum(expected_violation(figures[k], limits) for k, limits in constraints.items())
         violations: list[str] = []
         for name, limits in constraints.items():
             violations += describe_violations(name, figures[name], limits)
-        trial = replace(
+        return replace(
             failed,
             goals=goals,
             # Without pseudo-values, which a confirmation has in a file of its own.
@@ -123,7 +134,6 @@ class CandidateEvaluator:
             reason="; ".join(violations),
             replicas=evaluation.replicas,
         )
-        return trial, evaluation
 
     def _evaluate(
         self, design: Design, stage: str, replicas: int | None, best_low: float | None
@@ -155,3 +165,8 @@ class CandidateEvaluator:
         terms = parse_objective(self._study.objective.goals[0]).terms.items()
         sizes = {k: 1.0 if METRICS[k].highest <= 1.0 else abs(metrics[k].value) for k, _ in terms}
         return max(abs(weight) * sizes[name] for name, weight in terms) or 1.0
+
+
+def is_start(number: int, stage: str) -> bool:
+    """Whether this is the first candidate of a search, the design as it is."""
+    return number == 0 and stage == "search"

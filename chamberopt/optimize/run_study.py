@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
@@ -17,6 +18,7 @@ from chamberopt.common.progress import Progress
 from chamberopt.design.load import save_design
 from chamberopt.optimize.candidates import FIRST_OBJECTIVE, Candidates, ConfirmedCandidate, Stop
 from chamberopt.optimize.evaluate_candidate import Simulator
+from chamberopt.optimize.search.gaussian_process import one_thread
 from chamberopt.optimize.search.maximise import PARETO_PHASES, maximise
 from chamberopt.optimize.sensitivity import Sensitivity, analyse_sensitivity
 from chamberopt.optimize.storage.study_folder import STUDY, StudyFolder
@@ -107,12 +109,13 @@ def run_study(
     save_inputs(study, folder.path)
     target = fixed_target(study)
     simulator = simulator or chamber_simulator(study, executor, target)
-    candidates = Candidates(study, folder, simulator, progress, stop)
     settings = study.optimizer
     if study.objective.pareto and settings.algorithm == "auto" and not settings.phases:
         settings = settings.model_copy(update={"phases": PARETO_PHASES})
-    algorithm = maximise(candidates.score, candidates.start, settings, candidates.model_data)
-    confirmed = candidates.confirm()
+    # The model's threads are limited during all evaluations: a limit is one of the whole process.
+    with one_thread(), Candidates(study, folder, simulator, progress, stop) as candidates:
+        algorithm = maximise(candidates.begin, candidates.start, settings, candidates.model_data)
+        confirmed = candidates.confirm()
     folder.recorded.require_end(len(candidates.trials))
     if not confirmed or confirmed[0].searched != 0:
         reason = next(one.reason for one in candidates.trials if one.stage == "confirm")
@@ -185,15 +188,17 @@ def chamber_simulator(study: Study, executor: Executor, target: np.ndarray | Non
     """
     from chamberopt.chamber.build import build_chamber
 
-    # Chamber and replicas of confirmed candidates, and of the last candidate of the search.
-    known: dict[str, tuple[Chamber, list[Replica]]] = {}
+    # Chamber and replicas of confirmed candidates, and of each thread's last one of the search.
+    confirmed: dict[str, tuple[Chamber, list[Replica]]] = {}
+    searched = threading.local()
 
     def simulate_candidate(design: Design, stream: str, replicas: int | None) -> Evaluation:
         began = time.perf_counter()
-        key = f"{stream} {design.model_dump_json()}"
+        key = design.model_dump_json()
+        known = confirmed if stream == "confirm" else vars(searched)
         if key not in known:
-            for other in [other for other in known if other.startswith("search")]:
-                del known[other]
+            if stream != "confirm":
+                known.clear()
             known[key] = build_chamber(design, target), []
         chamber, done = known[key]
         seconds = time.perf_counter() - began

@@ -183,7 +183,9 @@ def evaluate_point(
     """Evaluate one candidate on one worker; the trial, and its wall-clock time [s]."""
     began = time.perf_counter()
     simulator = simulator or chamber_simulator(study, SerialExecutor(), target)
-    trial = CandidateEvaluator(study, simulator).trial(number, point, "sweep")[0]
+    evaluator = CandidateEvaluator(study, simulator)
+    evaluation = evaluator.evaluate(number, point, "sweep")
+    trial = evaluator.trial(number, point, "sweep", evaluation)
     return trial, time.perf_counter() - began
 
 

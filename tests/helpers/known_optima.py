@@ -12,7 +12,7 @@ from tests.helpers.synthetic import DESIGNS
 
 GEAR = load_design(DESIGNS / "gear.toml")
 VARY = {"chamber.height_mm": (35.0, 60.0), "shot.mass_g": (2.0, 10.0)}
-NO_FRILLS = {"first_replicas": 0, "confirm_rounds": 1}
+NO_FRILLS = {"first_replicas": 0, "confirm_rounds": 1, "batch": 1}
 
 
 def bowl_shares(design) -> np.ndarray:

@@ -77,7 +77,7 @@ def _alter_bytes(rng: random.Random, path: Path) -> None:
 def _alter(rng: random.Random, path: Path) -> None:
     kind = rng.randrange(6)
     if kind < 3 and path.suffix in (".json", ".jsonl"):
-        with suppress(ValueError):  # it was altered already
+        with suppress(ValueError, IndexError):  # it was altered already, or emptied
             _alter_json(rng, path)
     elif kind == 3:
         path.unlink()

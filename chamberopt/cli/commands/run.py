@@ -33,8 +33,8 @@ def run(
 ) -> None:
     """Search for a better design, confirm it with new seeds, and write it as best.toml.
 
-    With --out of an interrupted run, the run is resumed. Ctrl-C stops after the current
-    evaluation; a second Ctrl-C stops at once.
+    With --out of an interrupted run, the run is resumed. Ctrl-C stops after the running
+    evaluations; a second Ctrl-C stops at once.
 
     Parameters
     ----------

@@ -30,7 +30,8 @@ class DaskExecutor(Executor):
     """Runs tasks on the workers of a Dask scheduler.
 
     If a worker dies, the scheduler runs its task again on another. A task that takes several
-    workers down (distributed.scheduler.allowed-failures) raises WorkerLostError.
+    workers down (distributed.scheduler.allowed-failures) raises WorkerLostError. An exception that
+    leaves the `with` block cancels the tasks.
     """
 
     def __init__(self, cluster: str, timeout: float | None = None) -> None:
@@ -91,6 +92,9 @@ class DaskExecutor(Executor):
         """Disconnect; the cluster keeps running."""
         self._executor.shutdown(wait and not cancel_futures)
         self._client.close()
+
+    def __exit__(self, *error: Any) -> None:
+        self.shutdown(cancel_futures=error[0] is not None)
 
     def _require_workers(self, address: str, timeout: float) -> None:
         try:

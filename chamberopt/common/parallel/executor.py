@@ -37,7 +37,7 @@ def local_executor(workers: int | None = None, kind: WorkerKind = "threads") -> 
         raise InputError(f"--workers: given {workers}; {remedy}")
     count = workers or core_count()
     if kind == "threads":
-        return ThreadPoolExecutor(count, thread_name_prefix="replica")
+        return ThreadExecutor(count, thread_name_prefix="replica")
     from chamberopt.common.parallel.processes import ProcessExecutor
 
     return ProcessExecutor(count)
@@ -65,6 +65,13 @@ def share(executor: Executor, value: Any) -> Any:
     """Prepare an argument for many tasks of an executor; the tasks receive the value itself."""
     share_with_workers = getattr(executor, "share", None)
     return value if share_with_workers is None else share_with_workers(value)
+
+
+class ThreadExecutor(ThreadPoolExecutor):
+    """Worker threads; an exception that leaves the `with` block cancels the tasks that wait."""
+
+    def __exit__(self, *error: Any) -> None:
+        self.shutdown(cancel_futures=error[0] is not None)
 
 
 class SerialExecutor(Executor):

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 # A process may die by chance, for example when another program takes all memory. If two die of the
 # same task, the task is the cause.
 MAX_ATTEMPTS = 2
-MAX_SHARED = 2  # shared values that a worker keeps: of this candidate, and of the one before it
+MAX_SHARED = 4  # shared values that a worker keeps, of candidates that are evaluated at a time
 
 
 class SharedFile:

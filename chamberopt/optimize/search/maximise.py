@@ -9,7 +9,7 @@ import numpy as np
 from chamberopt.optimize.search.acquisition import propose_point
 from chamberopt.optimize.search.gaussian_process import MAX_POINTS, GaussianProcess
 from chamberopt.optimize.search.nlopt_search import LOCAL, run_nlopt, seed_nlopt
-from chamberopt.optimize.search.stopping import BudgetSpentError, Score, ScoredPoints
+from chamberopt.optimize.search.stopping import Begin, BudgetSpentError, ScoredPoints
 from chamberopt.optimize.study.schema import Optimizer, Phase
 
 # Two phases are not algorithms of NLopt: evenly spread points, and the model of the scores.
@@ -32,12 +32,16 @@ ModelData = Callable[[], tuple[np.ndarray, np.ndarray]]
 
 
 def maximise(
-    score: Score, start: np.ndarray, settings: Optimizer, model_data: ModelData | None = None
+    begin: Begin, start: np.ndarray, settings: Optimizer, model_data: ModelData | None = None
 ) -> str:
     """Maximise a score over the unit cube, beginning at `start`.
 
-    The function `score` is called once per different point and keeps its own record; the same seed
+    The function `begin` is called once per different point and keeps its own record; the same seed
     and the same scores give the same search. stopping.py lists the reasons to stop.
+
+    Evenly spread points and those of the model are evaluated `settings.batch` at a time: the next
+    is proposed when all but the last `batch - 1` have scores. Other algorithms take one point after
+    another.
 
     Args:
         start: first point, shape (d,).
@@ -45,17 +49,18 @@ def maximise(
     Returns:
         The phases that ran, e.g. "sobol, then surrogate".
     Raises:
-        InputError: an algorithm cannot take these parameters. Errors of `score` pass unchanged.
+        InputError: an algorithm cannot take these parameters. Errors of `begin` pass unchanged.
     """
-    search = _Search(score, start, settings, model_data)
+    search = _Search(begin, start, settings, model_data)
     try:
-        search.scored.score(start)
+        search.scored.begin(start)
         for phase, end in search.plan():
             search.run(phase, max(1, round(end * settings.evaluations)))
         if settings.algorithm == "auto" and not settings.phases:
             search.repeat_local_search()
     except BudgetSpentError:
         pass
+    search.scored.wait()
     return ", then ".join(search.phases_run) or "none"
 
 
@@ -63,11 +68,11 @@ class _Search:
     """A search under way."""
 
     def __init__(
-        self, score: Score, start: np.ndarray, settings: Optimizer, model_data: ModelData | None
+        self, begin: Begin, start: np.ndarray, settings: Optimizer, model_data: ModelData | None
     ) -> None:
         self._start, self._settings = start, settings
-        self.scored = ScoredPoints(score, start, settings.evaluations)
-        self._model_data = model_data or (lambda: (self.scored.scores, np.zeros(len(self.scored))))
+        self.scored = ScoredPoints(begin, start, settings.evaluations, settings.batch)
+        self._model_data = model_data or self._scores_without_noise
         self.phases_run: list[str] = []
         self._rng = np.random.default_rng(settings.seed)
         seed_nlopt(settings.seed)
@@ -98,6 +103,10 @@ class _Search:
         else:
             self._search_with_nlopt(phase, limit, self._settings.initial_step)
 
+    def _scores_without_noise(self) -> tuple[np.ndarray, np.ndarray]:
+        scores = np.array(self.scored.scores)
+        return scores, np.zeros(len(scores))
+
     def repeat_local_search(self) -> None:
         """Repeat rounds of local searches with smaller steps until a round finds no new point."""
         before = 0
@@ -113,23 +122,27 @@ class _Search:
         wanted = limit - len(self.scored)
         sobol = Sobol(len(self._start), seed=self._settings.seed)
         for point in sobol.random_base2(max(1, (wanted - 1).bit_length()))[:wanted]:
-            self.scored.score(point)
+            self.scored.begin(point)
 
     def _follow_model(self, limit: int) -> None:
+        if not self.scored.scores:
+            self.scored.wait()
         while len(self.scored) < limit:
+            self.scored.wait_for_place()
             scores, variances = self._model_data()
             if np.ptp(scores) == 0.0:  # equal scores give the model nothing to learn
-                self.scored.score(self._rng.random(len(self._start)))
+                self.scored.begin(self._rng.random(len(self._start)))
                 continue
-            points = self.scored.points
+            points, known = np.array(self.scored.points), len(scores)
             is_rough = len(points) % ROUGH_STEP_INTERVAL == 0
             factor = ROUGH_LENGTH_FACTOR if is_rough else 1.0
-            model = GaussianProcess(np.array(points), scores, variances, factor)
-            self.scored.score(propose_point(model, self._rng))
+            model = GaussianProcess(points[:known], scores, variances, factor, points[known:])
+            self.scored.begin(propose_point(model, self._rng))
 
     def _search_with_nlopt(self, algorithm: str, limit: int, step: float) -> None:
         # Some algorithms keep asking for points that have scores already: 100 calls per point of
         # the budget end them.
+        self.scored.wait()
         max_calls, tolerance = 100 * self.scored.budget, self._settings.tolerance
 
         def score(point: np.ndarray) -> float:

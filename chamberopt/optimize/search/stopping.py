@@ -1,4 +1,4 @@
-"""When a search stops, and the scores it has until then.
+"""When a search stops, and the points and scores it has until then.
 
 A search ends for one of these reasons:
 
@@ -6,8 +6,8 @@ A search ends for one of these reasons:
 2. It has converged: the last phase ends because the steps of its local algorithm are below
    `optimizer.tolerance` (nlopt_search.py), or rounds of local searches find no new point
    (maximise.py).
-3. The user stops it: Candidates asks `stop()` before each evaluation and raises KeyboardInterrupt.
-   The study can be resumed.
+3. The user stops it: Candidates asks `stop()` before each evaluation, finishes those that run and
+   raises KeyboardInterrupt. The study can be resumed.
 4. An error ends it: the start cannot be simulated, an algorithm cannot take the parameters, the
    disk is full, or workers are lost. A candidate that cannot be simulated does not end it.
 
@@ -16,12 +16,14 @@ A phase ends in the same way, at its share of the budget.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 
 import numpy as np
 
-Score = Callable[[np.ndarray], float]
-"""score(point (d,) of the unit cube) -> finite number to be maximised."""
+Begin = Callable[[np.ndarray], Callable[[], float]]
+"""begin(point (d,) of the unit cube) starts an evaluation, and returns a function that waits for
+its score, a finite number to be maximised."""
 
 
 class BudgetSpentError(Exception):
@@ -29,37 +31,53 @@ class BudgetSpentError(Exception):
 
 
 class ScoredPoints:
-    """The points that a search has scored; each is scored once and counts once in the budget.
+    """The points of a search; each is evaluated once and counts once in the budget.
 
-    `points` (d,) are in the order of evaluation; `best` is the highest so far, or the start.
+    Up to `batch` evaluations run at a time. Scores are taken in the order in which the evaluations
+    began, so that nothing depends on which of them ends first. `points` (d,) are all that began;
+    the first of them have `scores`. `best` is the point with the highest score, or the start.
     """
 
-    def __init__(self, score: Score, start: np.ndarray, budget: int) -> None:
-        self._score, self.budget = score, budget
-        self._scores: dict[bytes, float] = {}  # by the exact bytes of the point
+    def __init__(self, begin: Begin, start: np.ndarray, budget: int, batch: int) -> None:
+        self._begin, self.budget, self._batch = begin, budget, batch
+        self._numbers: dict[bytes, int] = {}  # by the exact bytes of the point
+        self._running: deque[Callable[[], float]] = deque()
         self.points: list[np.ndarray] = []
+        self.scores: list[float] = []
         self.best, self._best_score = start, -np.inf
 
     def __len__(self) -> int:
         return len(self.points)
 
-    @property
-    def scores(self) -> np.ndarray:
-        """Scores (n,) in the order of evaluation."""
-        return np.array(list(self._scores.values()))
-
     def score(self, point: np.ndarray, limit: int | None = None) -> float:
-        """The score of a point.
+        """The score of a point, which nothing else is evaluated beside; errors as of `begin`."""
+        number = self.begin(point, limit)
+        self.wait()
+        return self.scores[number]
+
+    def begin(self, point: np.ndarray, limit: int | None = None) -> int:
+        """Begin to evaluate a point, unless that was done; returns its place in `points`.
 
         BudgetSpentError if it is new, and there are `limit` points, or as many as the budget.
         """
         key = point.tobytes()
-        if key not in self._scores:
+        if key not in self._numbers:
             if len(self) >= min(self.budget, self.budget if limit is None else limit):
                 raise BudgetSpentError
-            value = float(self._score(point))
-            self._scores[key] = value
+            self.wait_for_place()
+            self._running.append(self._begin(point))
+            self._numbers[key] = len(self)
             self.points.append(point)
+        return self._numbers[key]
+
+    def wait_for_place(self) -> None:
+        """Wait until one more evaluation may run."""
+        self.wait(self._batch - 1)
+
+    def wait(self, running: int = 0) -> None:
+        """Wait for the scores of all evaluations but the last so many."""
+        while len(self._running) > running:
+            value = float(self._running.popleft()())
             if value > self._best_score:
-                self.best, self._best_score = point, value
-        return self._scores[key]
+                self.best, self._best_score = self.points[len(self.scores)], value
+            self.scores.append(value)

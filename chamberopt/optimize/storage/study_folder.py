@@ -9,8 +9,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from chamberopt.common.errors import InputError
-from chamberopt.common.estimate import Estimate
+from pydantic import TypeAdapter, ValidationError
+
+from chamberopt.common.errors import InputError, first_wrong_value
 from chamberopt.common.files import claim_folder, write_text
 from chamberopt.design.design import Design
 from chamberopt.optimize.storage import study_inputs
@@ -118,8 +119,12 @@ class StudyFolder:
         stored = _read_json(path)
         try:
             resolved = design.changed({"effects": stored["effects"]})
-            advice = [_advice(**one) for one in stored["advice"]]
-        except (KeyError, TypeError, AttributeError) as error:
+            advice = TypeAdapter(list[Advice]).validate_python(stored["advice"])
+            if not all(one.changes for one in advice):
+                raise ValueError("advice without changes")
+        except ValidationError as error:
+            raise _damaged(path, first_wrong_value(error)) from None
+        except (KeyError, TypeError, ValueError, InputError) as error:
             raise _damaged(path, error) from None
         return self._study.model_copy(update={"design": resolved}), advice
 
@@ -139,13 +144,13 @@ class StudyFolder:
             )
         return found
 
-    def append(self, trial: Trial, evaluation: Evaluation | None, seconds: float) -> None:
+    def append(self, trial: Trial, evaluation: Evaluation | str | None, seconds: float) -> None:
         """Store a trial, and the whole evaluation of a confirmation; both are then on the disk.
 
         OSError if they cannot be written, InputError if a file that the design names has changed.
         """
         study_inputs.require_same_files(self._study.design, self._inputs, self.path)
-        if trial.stage == "confirm" and evaluation is not None:
+        if trial.stage == "confirm" and isinstance(evaluation, Evaluation):
             path = self._evaluation_path(trial.number)
             path.parent.mkdir(exist_ok=True)
             save_evaluation(path, evaluation)  # before the row, which says that this file exists
@@ -169,11 +174,6 @@ def _read_json(path: Path) -> dict[str, Any]:
     return data
 
 
-def _damaged(path: Path, error: Exception) -> InputError:
+def _damaged(path: Path, error: object) -> InputError:
     remedy = "restore the file or run the study in a new folder (--out)"
     return InputError(f"{path}: damaged ({error}); {remedy}")
-
-
-def _advice(changes: dict[str, dict[str, Any]], **others: Any) -> Advice:
-    estimates = {name: Estimate.from_json(one) for name, one in changes.items()}
-    return Advice(changes=estimates, **others)

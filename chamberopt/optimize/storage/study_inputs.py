@@ -42,7 +42,7 @@ def require_same_inputs(folder: Path, before: Mapping[str, Any], now: Mapping[st
 
 def require_same_files(design: Design, before: Mapping[str, Any], folder: Path) -> None:
     """Raise InputError if a file that the design names has changed since the study began."""
-    title = f"{folder}: changed while the study ran, so the running evaluation is not kept:"
+    title = f"{folder}: changed while the study ran, so the running evaluations are not kept:"
     remedy = "to resume, restore the file and run the study again on this folder"
     now = _with_digests(design.model_dump(mode="json"))
     _require_same(before["study"]["design"], now, title, remedy)

@@ -1,4 +1,4 @@
-"""Append-only trial log: one row for each evaluation, on the disk before the next one begins.
+"""Append-only trial log: one row for each evaluation, on the disk before another takes its place.
 
 Two runs of one study write the same history.jsonl, byte for byte; run times are kept in a separate
 file, timings.jsonl.

@@ -115,6 +115,9 @@ class Optimizer(FileTable):
         1e-6, 0.5, "of the bounds", "step below which local algorithms stop", 0.02
     )
     evaluations: int = quantity(2, 1000000, "", "candidates that the search simulates", 40)
+    batch: int = quantity(
+        1, 64, "", "candidates evaluated at a time, each proposed before the others have scores", 2
+    )
     seed: int = quantity(0, 2**31 - 1, "", "seed of the search's own random numbers", 1)
     confirm: int = quantity(1, 1000, "", "best candidates simulated again with new seeds", 3)
     confirm_replicas: int = quantity(3, 100000, "", "replicas of each confirmation", 16)

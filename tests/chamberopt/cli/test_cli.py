@@ -48,7 +48,7 @@ WRONG = [
         ("height_mm = 45", "heigth_mm = 45"),
         (":15", "unknown key", "did you mean 'height_mm'"),
     ),
-    Wrong("misspelt table", ("[sonotrode]", "[sonotrod]"), (":18", "did you mean 'sonotrode'")),
+    Wrong("misspelt table", ("[sonotrode]", "[sonotrod]"), (":19", "did you mean 'sonotrode'")),
     Wrong(
         "effect not there yet",
         ("gravity = true", "wind = 0.3"),
@@ -71,7 +71,7 @@ WRONG = [
     Wrong(
         "negative mass",
         ("mass_g = 5", "mass_g = -5"),
-        (":23", "shot.mass_g: given -5", "from 0.0001 to 10000 g"),
+        (":24", "shot.mass_g: given -5", "from 0.0001 to 10000 g"),
     ),
     Wrong(
         "metres for mm",
@@ -92,7 +92,7 @@ WRONG = [
         "fraction of a replica", ("replicas = 8", "replicas = 8.5"), ("given 8.5", "a whole number")
     ),
     Wrong("two replicas", ("replicas = 8", "replicas = 2"), ("given 2", "confidence interval")),
-    Wrong("not a number", ("simulated_time_s = 4.5", "simulated_time_s = nan"), ("given nan",)),
+    Wrong("not a number", ("simulated_time_s = 1.5", "simulated_time_s = nan"), ("given nan",)),
     Wrong("unknown material", ('"steel"', '"steal"'), ("given 'steal'", "did you mean 'steel'")),
     Wrong("two densities", ('"steel"', '"steel"\ndensity_kg_m3 = 7800'), ("keep one of the two",)),
     Wrong(
@@ -100,7 +100,7 @@ WRONG = [
         ("shot = { C0 = 0.91", "shot = { C0 = 1.2"),
         ("C0: given 1.2", "0.05 to 1"),
     ),
-    Wrong("no hardness", (", hardness_HB = 300", ""), (":33", "hardness_HB: missing", "HB")),
+    Wrong("no hardness", (", hardness_HB = 300", ""), (":34", "hardness_HB: missing", "HB")),
     Wrong(
         "unknown shape",
         ('"cylinder"', '"cylindre"'),

@@ -1,5 +1,7 @@
 """Scores of candidates, and the number of replicas that each candidate gets."""
 
+import threading
+import time
 from pathlib import Path
 
 import numpy as np
@@ -50,3 +52,34 @@ def test_the_plainly_bad_get_few_replicas_and_close_calls_more(tmp_path: Path) -
     assert 8 in confirmed
     best, start = (one.evaluation.objective.pseudovalues for one in (result.best, result.start))
     assert len(best) == len(start) == max(confirmed)  # pair by pair, as the gain needs
+
+
+def test_a_batch_gives_the_same_trials_whichever_ends_first(tmp_path: Path) -> None:
+    """Three at a time, delayed at random: proposals and replicas follow from the record alone."""
+
+    def run_with_delays(name: str, seed: int) -> tuple[bytes, int]:
+        delays, lock = np.random.default_rng(seed), threading.Lock()
+        now, most = [0], [0]
+
+        def simulator(design, stream, replicas):
+            with lock:
+                now[0] += 1
+                most[0] = max(most[0], now[0])
+                delay = delays.uniform(0.0, 0.02)
+            time.sleep(delay)
+            x, count = bowl_shares(design), replicas or design.process.accuracy.replicas
+            rng = np.random.default_rng(np.frombuffer(x.tobytes(), dtype=np.uint32))
+            made = judged(bowl(x) + rng.normal(0.0, 0.02, count))
+            with lock:
+                now[0] -= 1
+            if x[0] > 0.95:
+                raise InputError("too high")
+            return made
+
+        settings = {"batch": 3, "first_replicas": 4, "confirm_rounds": 3, "evaluations": 18}
+        run_bowl(tmp_path / name, simulator, settings)
+        return (tmp_path / name / "history.jsonl").read_bytes(), most[0]
+
+    first, at_a_time = run_with_delays("first", 1)
+    assert at_a_time == 3
+    assert run_with_delays("second", 2) == (first, 3)

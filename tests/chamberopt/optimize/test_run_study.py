@@ -55,7 +55,8 @@ def analytic(noise: float, calls: list | None = None, seed: int = 0):
 
 
 def study(**optimizer) -> Study:
-    plain = {"first_replicas": 0, "confirm_rounds": 1}  # one call of the simulator a candidate
+    # One call of the simulator a candidate, and one after another.
+    plain = {"first_replicas": 0, "confirm_rounds": 1, "batch": 1}
     settings = {"evaluations": 40, "confirm": 3, "confirm_replicas": 16, **plain, **optimizer}
     return Study(design=GEAR, vary=BOUNDS, optimizer=settings)
 

@@ -8,6 +8,8 @@ import math
 import multiprocessing
 import os
 import signal
+import threading
+import time
 from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
 from dataclasses import replace
@@ -180,6 +182,7 @@ design = "{(DESIGNS / "plate.toml").as_posix()}"
 [vary]
 "shot.mass_g" = [1.5, 8.0]
 [optimizer]
+batch = 1
 first_replicas = 0
 confirm_rounds = 1
 evaluations = 5
@@ -236,13 +239,30 @@ class TestCommandLine:
         assert "gain" in out
         assert len(evaluated) == len(set(evaluated)) == self.rows() == ROWS
 
+    def test_ctrl_c_finishes_all_that_runs(self, evaluated: list) -> None:
+        """The third and the fourth run when it comes, and the third ends last."""
+        study, at_a_time = Path("small.toml"), threading.Barrier(2)
+
+        def interrupt() -> None:
+            at_a_time.wait(20)
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.2)
+
+        self.at.update({3: interrupt, 4: lambda: at_a_time.wait(20)})
+        study.write_text(STUDY.replace("batch = 1", "batch = 2"))
+        assert main(["run", "small.toml", "--out", "out"]) == 130
+        assert (self.rows(), len(evaluated)) == (4, 4)
+        assert main(["run", "small.toml", "--out", "out"]) == 0
+        assert len(evaluated) == len(set(evaluated)) == self.rows() == ROWS
+
     @needs_fork
     def test_ctrl_c_twice_stops_at_once(
         self, evaluated: list, capfd: pytest.CaptureFixture[str]
     ) -> None:
         def twice() -> None:
-            os.kill(os.getpid(), signal.SIGINT)
-            os.kill(os.getpid(), signal.SIGINT)
+            for seconds in (1.0, 20.0):  # the main thread takes one signal at a time
+                os.kill(os.getpid(), signal.SIGINT)
+                time.sleep(seconds)
             raise AssertionError("went on after the second Ctrl-C")
 
         self.at[3] = twice
@@ -250,7 +270,7 @@ class TestCommandLine:
         child.start()
         child.join(60)
         err = capfd.readouterr().err
-        assert child.exitcode == 130
+        assert child.exitcode == 130, err
         assert (
             err.index(FIRST)
             < err.index(SECOND)

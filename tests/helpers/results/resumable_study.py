@@ -28,8 +28,8 @@ CALLS = "calls.log"
 
 
 def study(**optimizer: object) -> Study:
-    """One call of the simulator a row, unless asked otherwise."""
-    once = {"first_replicas": 0, "confirm_rounds": 1}
+    """One call of the simulator a row, and one after another, unless asked otherwise."""
+    once = {"first_replicas": 0, "confirm_rounds": 1, "batch": 1}
     settings = {"evaluations": 16, "confirm": 3, "confirm_replicas": 4, **once, **optimizer}
     return Study(design=GEAR, vary=BOUNDS, optimizer=settings)
 

@@ -2,6 +2,7 @@
 
 import pickle
 import sys
+import threading
 from collections import Counter
 from concurrent.futures import Executor
 from pathlib import Path
@@ -167,9 +168,27 @@ def test_lost_workers_are_one_message_and_status_1(monkeypatch: pytest.MonkeyPat
 
 
 @pytest.mark.parametrize(
-    ("workers", "kind"),
-    [(1, "ThreadPoolExecutor"), (8, "ThreadPoolExecutor"), (9, "ProcessExecutor")],
+    ("workers", "kind"), [(1, "ThreadExecutor"), (8, "ThreadExecutor"), (9, "ProcessExecutor")]
 )
 def test_too_many_cores_for_threads_are_given_processes(workers: int, kind: str) -> None:
     with open_executor(workers, None) as executor:  # processes start with their first task
         assert type(executor).__name__ == kind
+
+
+def test_an_error_cancels_the_tasks_that_wait() -> None:
+    running, ended, futures = threading.Event(), threading.Event(), []
+
+    def task() -> None:
+        running.set()
+        ended.wait(20)
+
+    def fail_while_it_runs() -> None:
+        with local_executor(1) as executor:
+            futures.extend(executor.submit(task) for _ in range(2))
+            assert running.wait(20)
+            threading.Timer(0.1, ended.set).start()
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        fail_while_it_runs()
+    assert [future.cancelled() for future in futures] == [False, True]

@@ -1,12 +1,21 @@
 """The phases of a search keep their budget, improve on the start and are reproducible."""
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 import pytest
 
 from chamberopt.common.errors import InputError
 from chamberopt.optimize.search.maximise import maximise
+from chamberopt.optimize.search.stopping import Begin
 from chamberopt.optimize.study.schema import Optimizer
-from tests.helpers.known_optima import bowl, hill
+from tests.helpers.known_optima import PEAK, bowl, hill
+
+
+def one_by_one(score: Callable[[np.ndarray], float]) -> Begin:
+    """Evaluations that run when their scores are waited for."""
+    return lambda point: partial(score, point)
 
 
 def test_phases_have_their_shares_and_the_last_what_is_left() -> None:
@@ -14,7 +23,7 @@ def test_phases_have_their_shares_and_the_last_what_is_left() -> None:
     shares = {"sobol": 0.4, "LN_SBPLX": 0.3, "surrogate": 1.0}
     phases = [{"algorithm": name, "share": share} for name, share in shares.items()]
     ran = maximise(
-        lambda x: points.append(x) or bowl(x),
+        one_by_one(lambda x: points.append(x) or bowl(x)),
         np.full(2, 0.5),
         Optimizer(evaluations=20, phases=phases),
     )
@@ -29,7 +38,7 @@ def test_first_step_and_tolerance_are_in_units_of_the_bounds() -> None:
     def walk(**settings) -> list[np.ndarray]:
         points: list[np.ndarray] = []
         maximise(
-            lambda x: points.append(x) or bowl(x),
+            one_by_one(lambda x: points.append(x) or bowl(x)),
             np.full(2, 0.5),
             Optimizer(algorithm="LN_BOBYQA", evaluations=60, **settings),
         )
@@ -54,7 +63,7 @@ def test_every_algorithm_improves_and_keeps_its_budget(algorithm: str) -> None:
         return hill(x)
 
     start = np.array([0.4, 0.5, 0.375])
-    maximise(score, start, Optimizer(algorithm=algorithm, evaluations=30))
+    maximise(one_by_one(score), start, Optimizer(algorithm=algorithm, evaluations=30))
     np.testing.assert_array_equal(points[0], start)
     assert len(points) <= 30
     assert len({x.tobytes() for x in points}) == len(points)
@@ -65,7 +74,7 @@ def test_same_seed_same_search() -> None:
     def walk(seed: int) -> list[bytes]:
         points: list[bytes] = []
         maximise(
-            lambda x: points.append(x.tobytes()) or hill(x),
+            one_by_one(lambda x: points.append(x.tobytes()) or hill(x)),
             np.full(3, 0.4),
             Optimizer(evaluations=25, seed=seed),
         )
@@ -74,8 +83,34 @@ def test_same_seed_same_search() -> None:
     assert walk(3) == walk(3)
 
 
+def test_a_batch_is_proposed_before_the_others_have_scores() -> None:
+    """Never more than three run, scores come in order, and no two of a batch are the same place."""
+    points: list[np.ndarray] = []
+    scored: list[int] = []
+
+    def begin(point: np.ndarray) -> Callable[[], float]:
+        number = len(points)
+        assert number - len(scored) <= 2
+        points.append(point)
+
+        def wait() -> float:
+            assert number == len(scored)
+            scored.append(number)
+            return hill(point)
+
+        return wait
+
+    maximise(begin, np.full(3, 0.4), Optimizer(evaluations=30, batch=3))
+    assert len(scored) == len(points) == 30
+    assert max(map(hill, points)) > PEAK - 0.005
+    for i, point in enumerate(points):
+        assert all(np.abs(point - other).max() >= 0.005 for other in points[max(0, i - 2) : i])
+
+
 def test_what_an_algorithm_cannot_do_is_said() -> None:
     with pytest.raises(InputError, match=r"GN_AGS cannot search 12 parameter.*auto"):
         maximise(
-            lambda x: -float(x @ x), np.full(12, 0.5), Optimizer(algorithm="GN_AGS", evaluations=30)
+            one_by_one(lambda x: -float(x @ x)),
+            np.full(12, 0.5),
+            Optimizer(algorithm="GN_AGS", evaluations=30),
         )
