@@ -13,7 +13,8 @@ from chamberopt.common.estimate import Estimate, estimate
 from chamberopt.coverage.dents import impact_angle_deg
 from chamberopt.coverage.part_impacts import Hits, hits_on_part
 from chamberopt.design.load import Design
-from chamberopt.simulation.evaluate import SeenDents, estimate_metrics, prepare_target
+from chamberopt.simulation.estimates import SeenDents, estimate_metrics
+from chamberopt.simulation.evaluate import prepare_target
 from sim_core import AnalyticCavity, ImpactLog, TriangleMesh, simulate
 
 MEASURED, PEENED = 0.39, 50.0  # the paper's experiment: coverage, and after how long [s]

@@ -29,6 +29,7 @@ from chamberopt.coverage.coverage_from_impacts import find_footprints
 from chamberopt.coverage.part_impacts import Hits, hits_on_part
 from chamberopt.design.design import Design
 from chamberopt.design.load import load_design
+from chamberopt.simulation import estimates
 from chamberopt.simulation import evaluate as evaluation
 from chamberopt.simulation.replicas import simulate_seed
 
@@ -50,8 +51,8 @@ CASES = {
     "plate": Case("plate", {}, 4.0),
     "plate, two ball sizes": Case("plate", {"shot.diameter_mm": None, "shot.mix": SIZES}, 4.0),
     "blade": Case("blade", {}, 10.0),
-    "gear, 15 % out of reach": Case("gear", {}, 4.5),
-    "gear, reachable": Case("gear", {"part.target.reachable": True}, 4.5),
+    "gear, 15 % out of reach": Case("gear", {}, 1.5),
+    "gear, reachable": Case("gear", {"part.target.reachable": True}, 1.5),
     "gear, turning": Case("gear_turning", {}, 4.0),
 }
 
@@ -102,7 +103,7 @@ def rows_of(name: str, case: Case, replicas: int, group: int) -> Iterator[dict[s
             for some in drawn(rng, replicas, group)
         ]  # fmt: skip
         for key, true in truth.items():
-            found = [estimates[key] for estimates, _, _ in groups]
+            found = [figures_of[key] for figures_of, _, _ in groups]
             resolved = np.mean([key in known for _, known, _ in groups])
             values = np.array([one.value for one in found])
             widths = np.array([one.half_width for one in found])
@@ -138,12 +139,12 @@ def figures(
     field: Any, seen: list[Any], hits: list[Hits], chamber: Chamber, design: Design
 ) -> tuple[dict[str, Any], set[str], float]:
     """Estimates, which of them are resolved, and the dents in the median window."""
-    dents = evaluation.SeenDents(field, *seen)
-    raw, resolution = evaluation.raw_estimates(dents, hits, design)
+    dents = estimates.SeenDents(field, *seen)
+    raw, resolution = estimates.raw_estimates(dents, hits, design)
     known = {
-        key for key, one in raw.items() if not evaluation.as_resolved(key, one, resolution).in_words
+        key for key, one in raw.items() if not estimates.as_resolved(key, one, resolution).in_words
     }
-    raw["uniform_coverage"] = evaluation.weighted_sum(
+    raw["uniform_coverage"] = estimates.weighted_sum(
         evaluation.parse_objective("uniform_coverage"), raw
     )
     known |= {"uniform_coverage"} if resolution.has_mean else set()

@@ -24,6 +24,7 @@ from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.coverage.part_impacts import Hits
 from chamberopt.design.design import Design
 from chamberopt.design.load import load_design
+from chamberopt.simulation import estimates
 from chamberopt.simulation import evaluate as evaluation
 
 GEAR = Path(__file__).parents[1] / "designs/gear.toml"
@@ -47,15 +48,15 @@ def row(name: str, design: Design, chamber: Chamber, hits: list[Hits]) -> dict[s
     mesh = chamber_mesh(chamber)
     field = evaluation.prepare_target(design, chamber, mesh)
 
-    def seen() -> evaluation.SeenDents:
-        dents = evaluation.SeenDents(field, [], [])
+    def seen() -> estimates.SeenDents:
+        dents = estimates.SeenDents(field, [], [])
         dents.add(hits)
         return dents
 
     dents = seen()
     prepare = median_cpu(lambda: evaluation.prepare_target(design, chamber, mesh).wide)
     look = median_cpu(seen)
-    estimate = median_cpu(lambda: evaluation.estimate_metrics(dents, hits, chamber, design))
+    estimate = median_cpu(lambda: estimates.estimate_metrics(dents, hits, chamber, design))
     return {
         "case": name,
         "impacts": sum(len(one) for one in hits),

@@ -56,12 +56,8 @@ def evaluation(design: Any, chamber: Any, impacts: int) -> Any:
     from chamberopt.chamber.scene import chamber_mesh
     from chamberopt.coverage.metrics import OBJECTIVES
     from chamberopt.coverage.part_impacts import Hits
-    from chamberopt.simulation.evaluate import (
-        SeenDents,
-        estimate_metrics,
-        prepare_target,
-        weighted_sum,
-    )
+    from chamberopt.simulation.estimates import SeenDents, estimate_metrics, weighted_sum
+    from chamberopt.simulation.evaluate import prepare_target
     from chamberopt.simulation.evaluation import Evaluation
 
     rng, part = np.random.default_rng(1), chamber.part
@@ -89,6 +85,7 @@ def evaluation(design: Any, chamber: Any, impacts: int) -> Any:
         resolution=found.resolution,
         reachable=seen.field.reachable,
         crease_share=seen.crease_share,
+        alike=seen.field.alike,
         replicas=REPLICAS,
         simulated_time=REPLICAS * design.process.recorded_time,
         hits=tuple(hits),

@@ -20,6 +20,7 @@ import json
 import time
 import warnings
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -70,18 +71,17 @@ Optimizer = Callable[[Record, int], np.ndarray]
 """optimizer(record, evaluations) asks the record and returns the point it recommends."""
 
 
-def ours(record: Record, evaluations: int, algorithm: str = "auto") -> np.ndarray:
-    maximise(
-        record.ask,
-        record.problem.begin(record.seed),
-        schema.Optimizer(algorithm=algorithm, evaluations=evaluations, seed=record.seed),
-        record.seen,
-    )
-    return record.fitted
+def ours_with(**settings: Any) -> Optimizer:
+    def search(record: Record, evaluations: int) -> np.ndarray:
+        maximise(
+            lambda point: partial(record.ask, point),
+            record.problem.begin(record.seed),
+            schema.Optimizer(evaluations=evaluations, seed=record.seed, **settings),
+            record.seen,
+        )
+        return record.fitted
 
-
-def mlsl(record: Record, evaluations: int) -> np.ndarray:
-    return ours(record, evaluations, "GN_MLSL_LDS")
+    return search
 
 
 def random(record: Record, evaluations: int) -> np.ndarray:
@@ -143,13 +143,15 @@ def optuna_with(sampler: str) -> Optimizer:
 
 
 OPTIMIZERS: dict[str, Optimizer] = {
-    "ours": ours,
+    "ours": ours_with(),
     "optuna-gp": optuna_with("GPSampler"),
     "optuna-tpe": optuna_with("TPESampler"),
     "cma-es": cma_es,
     "sobol": sobol,
     "random": random,
-    "nlopt-mlsl": mlsl,  # ours too: algorithm = "GN_MLSL_LDS"
+    # Ours too.
+    "nlopt-mlsl": ours_with(algorithm="GN_MLSL_LDS"),
+    **{f"batch-{count}": ours_with(batch=count) for count in (1, 2, 3, 4, 8)},
 }
 
 
@@ -194,11 +196,11 @@ def rows(
 def verdict(made: list[dict[str, Any]]) -> str:
     """Says on how many problems ours has the lowest mean regret, and how it does on the worst one.
 
-    Our own other algorithm is left out of the comparison.
+    Our own other algorithms are left out of the comparison.
     """
     by_problem: dict[str, dict[str, float]] = {}
     for one in made:
-        if one["optimizer"] != "nlopt-mlsl":
+        if one["optimizer"] != "nlopt-mlsl" and not one["optimizer"].startswith("batch-"):
             by_problem.setdefault(one["problem"], {})[one["optimizer"]] = one["mean_regret"]
     first = sum(regrets["ours"] <= min(regrets.values()) for regrets in by_problem.values())
     worst = max(

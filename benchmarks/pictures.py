@@ -67,3 +67,28 @@ def lines_picture(
         *grid[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False
     )
     figure.savefig(path)
+
+
+def growth_picture(path: Path, tables: dict[str, Sequence[dict[str, Any]]]) -> None:
+    """A panel for each table: all columns against the first, and a line of slope 1."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(4.2 * len(tables), 5.0), dpi=130, layout="constrained")
+    FigureCanvasAgg(figure)
+    for axes, (kind, rows) in zip(figure.subplots(1, len(tables), squeeze=False)[0],
+                                  tables.items(), strict=True):  # fmt: skip
+        across, *others = rows[0]
+        sizes = np.array([row[across] for row in rows])
+        for name, colour, mark in zip(others, COLOURS, MARKS, strict=False):
+            label = name.replace("_", " ").replace("cpu s", "CPU s")
+            values = [row[name] for row in rows]
+            axes.loglog(sizes, values, marker=mark, color=colour, lw=1.6, label=label)
+        low = min(rows[0][name] for name in others)
+        axes.loglog(sizes, low * sizes / sizes[0], color="#bbbbbb", lw=1, ls="--", label="linear")
+        axes.set_title(f"against {kind}", loc="left")
+        axes.set_xlabel(across)
+        axes.grid(which="major", color="#dddddd", lw=0.7)
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.legend(frameon=False, fontsize=9)
+    figure.savefig(path)

@@ -27,7 +27,8 @@ from chamberopt.common.parallel.executor import core_count
 from chamberopt.coverage.metrics import parse_objective
 from chamberopt.design.design import Design
 from chamberopt.design.load import load_design
-from chamberopt.simulation.evaluate import evaluate, weighted_sum
+from chamberopt.simulation.estimates import weighted_sum
+from chamberopt.simulation.evaluate import evaluate
 
 ROOT = Path(__file__).parents[1]
 FIGURES = ("mean_coverage", "std_coverage", "p05_coverage", "time_to_98_s", "intensity_uniformity")

@@ -1,0 +1,203 @@
+"""What a user waits for, and how fast the simulator is: every figure of docs/core.md's first table.
+
+    python benchmarks/speed.py [--before FOLDER] [--rows ROW ...]
+
+`--before` is a checkout of another version, installed in a virtual environment `.venv` of its own:
+each row is then measured with both in turns. "cold" starts with an empty cache of compiled code,
+"warm" with that of the run before it. CPU seconds are those of all processes of a command. Figures
+are medians of three rounds, one for what takes minutes. Rows go to benchmarks/results/speed.csv
+with the name of the machine. It takes half an hour; growth is in growth.py, the yardsticks (embree,
+the paper's method) are in events.py.
+"""
+
+import argparse
+import json
+import os
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from benchmarks.scenes import ROOT
+from benchmarks.table import print_table, write_csv
+
+ROUNDS = 3
+COMPILE = """
+from dataclasses import replace
+from sim_core import Rest, compile_simulator
+from benchmarks.scenes import PHYSICS
+compile_simulator({physics})
+"""
+STUDY = """
+design = "{root}/designs/gear.toml"
+[vary]
+"chamber.height_mm" = [28, 60]
+"chamber.sonotrode_distance_mm" = [10, 30]
+[optimizer]
+evaluations = 40
+seed = 1
+confirm = 1
+confirm_replicas = 8
+[search_accuracy]
+simulated_time_s = 1.0
+"""
+SCENES = (
+    "cylinder-200-1k",
+    "cylinder-200-10k",
+    "cylinder-200-100k",
+    "gear-200-10k",
+    "gear-200-100k",
+)
+
+
+class Version(NamedTuple):
+    """A checkout, its interpreter, and an empty folder for its compiled code and its results."""
+
+    root: Path
+    python: str
+    folder: Path
+
+    def spent(self, words: list[str], cache: str | Path) -> dict[str, float]:
+        """Seconds of a command, by the clock and of CPU. Raises RuntimeError if it fails."""
+        setting = {**os.environ, "NUMBA_CACHE_DIR": str(self.folder / cache)}
+        before, begin = _children(), time.perf_counter()
+        going = subprocess.Popen([self.python, *words], cwd=self.root, env=setting,
+                                 stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)  # fmt: skip
+        assert going.stdout is not None
+        going.stdout.read(1)
+        first = time.perf_counter() - begin
+        going.stdout.read()
+        if going.wait():
+            raise RuntimeError(f"{words} ended with {going.returncode}")
+        return {
+            "first_s": first,
+            "all_s": time.perf_counter() - begin,
+            "cpu_s": _children() - before,
+        }
+
+    def printed(self, words: list[str]) -> Any:
+        """The JSON that a benchmark of this version prints."""
+        setting = {**os.environ, "NUMBA_CACHE_DIR": str(self.folder / "cache")}
+        done = subprocess.run([self.python, *words], cwd=self.root, env=setting, text=True,
+                              stdout=subprocess.PIPE, check=True)  # fmt: skip
+        return json.loads(done.stdout)
+
+
+def _children() -> float:
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def compiling(version: Version, turn: int) -> Iterator[tuple[str, float]]:
+    """CPU seconds of the first simulation that are spent on compiling."""
+    for name, physics in (
+        ("without rest", "PHYSICS"),
+        ("with rest", "PHYSICS._replace(rest=Rest())"),
+    ):
+        words = ["-c", COMPILE.format(physics=physics)]
+        cold, warm = (version.spent(words, f"{name}{turn}")["cpu_s"] for _ in range(2))
+        yield f"compile {name}, CPU s", cold - warm
+
+
+def checking(version: Version, turn: int) -> Iterator[tuple[str, float]]:
+    """`chamberopt check` of the gear."""
+    words = ["-m", "chamberopt", "check", "designs/gear.toml"]
+    for state in ("cold", "warm"):
+        spent = version.spent(words, f"check{turn}")
+        yield f"check, {state}, s to the first output", spent["first_s"]
+        yield f"check, {state}, s to the end", spent["all_s"]
+        yield f"check, {state}, CPU s", spent["cpu_s"]
+
+
+def quickstart(version: Version, turn: int) -> Iterator[tuple[str, float]]:
+    """The first command of the README."""
+    out = str(version.folder / f"quickstart{turn}")
+    words = ["-m", "chamberopt", "run", "studies/quickstart.toml", "--out", out]
+    yield "README's first command, cold, s", version.spent(words, f"quick{turn}")["all_s"]
+
+
+def colliding(version: Version, turn: int) -> Iterator[tuple[str, float]]:
+    """Collisions in a steady chamber."""
+    words = ["benchmarks/events.py", "--quick", "--json", "--scenes", *SCENES]
+    for row in version.printed(words):
+        if "collisions_per_cpu_s" in row:
+            yield f"{row['scene']}, M collisions / CPU s", 1e-6 * row["collisions_per_cpu_s"]
+
+
+def evaluating(version: Version, turn: int) -> Iterator[tuple[str, float]]:
+    """The gear to ± 1 % on the objective, imports and all."""
+    row = version.printed(["benchmarks/evaluation.py", "--here", "0.01"])
+    yield "gear to ± 1 %, CPU s", row["cpu_s"]
+    yield "gear to ± 1 %, s", row["wall_s"]
+
+
+def studying(version: Version, turn: int) -> Iterator[tuple[str, float]]:
+    """40 evaluations of a study, on one worker and on two."""
+    study = version.folder / "study.toml"
+    study.write_text(STUDY.format(root=version.root), encoding="utf-8")
+    seconds = []
+    for workers in (1, 2):
+        out = str(version.folder / f"study{turn}-{workers}")
+        words = ["-m", "chamberopt", "run", str(study), "--workers", str(workers), "--out", out]
+        seconds.append(version.spent(words, "cache")["all_s"])
+        yield f"40 evaluations, {workers} worker(s), s", seconds[-1]
+    yield "40 evaluations, one worker / two", seconds[0] / seconds[1]
+
+
+# Each with its rounds.
+ROWS: dict[str, tuple[Callable[[Version, int], Iterator[tuple[str, float]]], int]] = {
+    "compile": (compiling, ROUNDS),
+    "check": (checking, ROUNDS),
+    "collisions": (colliding, ROUNDS),
+    "evaluation": (evaluating, ROUNDS),
+    "study": (studying, 1),
+    "quickstart": (quickstart, 1),
+}
+
+
+def measure(names: list[str], versions: dict[str, Version]) -> list[dict[str, Any]]:
+    """The median of every figure, a column for each version."""
+    found: dict[str, dict[str, list[float]]] = {}
+    for name in names:
+        row, rounds = ROWS[name]
+        for turn in range(rounds):
+            for label, version in versions.items():
+                for what, value in row(version, turn):
+                    found.setdefault(what, {}).setdefault(label, []).append(value)
+    return [
+        {"what": what, **{one: float(f"{statistics.median(all_):.3g}") for one, all_ in by.items()}}
+        for what, by in found.items()
+    ]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--before", type=Path, help="checkout of another version")
+    parser.add_argument("--rows", nargs="+", choices=ROWS, default=list(ROWS))
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        versions = {}
+        if options.before:
+            other = options.before.resolve()
+            python = str(other / ".venv" / "bin" / "python")
+            versions["before"] = Version(other, python, Path(folder) / "before")
+        versions["now"] = Version(ROOT, sys.executable, Path(folder) / "now")
+        for version in versions.values():
+            version.folder.mkdir()
+        rows = measure(options.rows, versions)
+    print_table(rows)
+    if options.rows == list(ROWS):
+        write_csv("speed.csv", rows)
+
+
+if __name__ == "__main__":
+    main()
