@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
@@ -245,6 +245,9 @@ class Candidates:
 
     def _finish_oldest(self) -> None:
         one = self._running[0]
+        # A signal that another thread was given wakes nobody who waits without end.
+        while not one.evaluation.done():
+            wait([one.evaluation], timeout=0.2)
         evaluation, trial = one.evaluation.result(), one.recorded
         if trial is None:
             trial = self._evaluator.trial(one.number, one.point, one.stage, evaluation)
