@@ -1,9 +1,8 @@
 """A ball that sticks to a shaken plate, against the map of a bouncing ball that sticks.
 
 The map is that of J. M. Luck & A. Mehta, Phys. Rev. E 48 (1993) 3988, here in plain Python and in
-the plate's own units: phases, heights over g / omega², speeds over g / omega. The plate is at
-Γ sin(phase). Bounces are followed until they are slower than CAPTURE; then the ball is on the
-plate, until the plate's acceleration is -g.
+the units of tests/helpers/scenes/shaken_plate.py. Bounces are followed until they are slower than
+CAPTURE; then the ball is on the plate, until the plate's acceleration is -g.
 """
 
 import math
@@ -23,41 +22,23 @@ from sim_core import (
     Restitution,
     Scene,
     SceneError,
-    SimulationResult,
     Vibration,
     simulate,
 )
 from sim_core.contact.riding import AT_ONCE, time_to_let_go
 from sim_core.numerics.roots import NEVER
-from tests.helpers.scenes.cavities import FLOOR, box, cylinder
-
-G = 9.80665
-DIAMETER = 3e-3
-CAPTURE = 1e-5  # of g / omega
-FAST = 1e-3  # slower bounces are not compared one by one
-
-
-def plate(gamma: float, frequency: float, phase: float = 0.0) -> Vibration:
-    return Vibration(FLOOR, gamma * G / (math.tau * frequency) ** 2, frequency, phase)
-
-
-def shaken(vibration: Vibration, e: float, start: float, periods: float) -> SimulationResult:
-    """A ball dropped from ``start`` (over g / omega²) above the plate's mean height, at rest."""
-    omega = math.tau * vibration.frequency
-    drop = start * G / omega**2
-    room = box((0.01, 0.01, drop + 30.0 * vibration.amplitude + 0.02))
-    ball = Balls(np.array([[4e-3, 5e-3, drop + 0.5 * DIAMETER]]), np.zeros((1, 3)), DIAMETER)
-    law = Restitution(((e, 1e9),) * 3, (e, 1e9))
-    rest = Rest(capture=CAPTURE * G / omega, on_vibrating=True)
-    physics = Physics(Gravity(), law, vibration, rest)
-    return simulate(Scene(room, ball, physics, periods / vibration.frequency))
-
-
-def impacts(vibration: Vibration, e: float, start: float, periods: float) -> np.ndarray:
-    """Phase and speed of the fast impacts, (n, 2), simulated."""
-    log, omega = shaken(vibration, e, start, periods).impacts, math.tau * vibration.frequency
-    hits = np.stack([log.time * omega + vibration.phase, log.normal_speed * omega / G], axis=1)
-    return hits[hits[:, 1] > FAST]
+from tests.helpers.scenes.cavities import box, cylinder
+from tests.helpers.scenes.shaken_plate import (
+    CAPTURE,
+    DIAMETER,
+    FAST,
+    G,
+    first_doubling,
+    first_locking,
+    impacts,
+    in_step,
+    plate,
+)
 
 
 def landing(gamma: float, phase: float, height: float, speed: float) -> float:
@@ -142,25 +123,13 @@ def test_every_impact_is_that_of_the_map(gamma: float, e: float, frequency: floa
         assert len(seen) == together
 
 
-def locked_phases(gamma: float, e: float, periods: int) -> np.ndarray:
-    """Phases of the last impacts of a ball that was dropped into step with the plate."""
-    phase = math.acos(min(math.pi * (1.0 - e) / (1.0 + e) / gamma, 1.0))
-    start = gamma * math.sin(phase) + 0.5 * math.pi**2
-    vibration = plate(gamma, 11.5, phase - math.pi)
-    return impacts(vibration, e, start, periods)[-16:, 0] % math.tau
-
-
 @pytest.mark.parametrize("e", [0.5, 0.7])
 def test_locking_and_period_doubling_are_where_theory_has_them(e: float) -> None:
-    """Luck and Mehta: one impact a period, cos(phase) = π(1-e)/(1+e)/Γ, is stable from the Γ where
-    it exists to the root of its square + 4 (1+e²)²/(1+e)⁴.
-    """
-    first = math.pi * (1.0 - e) / (1.0 + e)
-    last = math.hypot(first, 2.0 * (1.0 + e * e) / (1.0 + e) ** 2)
+    first, last = first_locking(e), first_doubling(e)
     for gamma in (1.05 * first, 0.98 * last):
-        phases = locked_phases(gamma, e, 400)
+        phases = in_step(gamma, e, 400)[-16:, 0] % math.tau
         np.testing.assert_allclose(phases, math.acos(first / gamma), rtol=0.0, atol=1e-6)
-    doubled = locked_phases(1.01 * last, e, 1000)
+    doubled = in_step(1.01 * last, e, 1000)[-16:, 0] % math.tau
     np.testing.assert_allclose(doubled[2:], doubled[:-2], rtol=0.0, atol=1e-6)
     assert abs(doubled[1] - doubled[0]) > 0.05
 

@@ -1,0 +1,1 @@
+"""Published cases that the simulator is held against; benchmarks/validation.py runs them."""
