@@ -66,14 +66,15 @@ class Estimate:
 
     def to_json(self) -> dict[str, Any]:
         """As JSON values, with the pseudo-values by which results can be compared later."""
-        return {**self.interval_json(), "pseudovalues": list(self.pseudovalues), "bias": self.bias,
-                "shared": list(self.shared)}  # fmt: skip
+        return {**self.interval_json(), "pseudovalues": list(self.pseudovalues),
+                "bias": _finite(self.bias), "shared": list(self.shared)}  # fmt: skip
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Estimate:
         """The estimate that `to_json` wrote. Raises KeyError, TypeError or ValueError otherwise."""
         pseudovalues = tuple(float(x) for x in data["pseudovalues"])
-        bias, shared = float(data["bias"]), tuple(float(x) for x in data["shared"])
+        bias = math.inf if data["bias"] is None else float(data["bias"])
+        shared = tuple(float(x) for x in data["shared"])
         found = cls.from_interval_json(data)
         return replace(found, pseudovalues=pseudovalues, bias=bias, shared=shared)
 
@@ -91,7 +92,9 @@ class Estimate:
 
 
 def _finite(number: float) -> float | None:
-    """None for NaN and for the infinite half-width of a single replica: JSON has neither."""
+    """None for NaN and for what is infinite, such as the half-width of a single replica or the
+    bias where there is no dent at all: JSON has neither.
+    """
     return number if math.isfinite(number) else None
 
 

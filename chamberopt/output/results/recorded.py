@@ -54,7 +54,7 @@ class _Known(_Interval):
 
 class _Estimate(_Known):
     pseudovalues: list[float]
-    bias: float
+    bias: float | None  # none if infinite, where there is no dent at all
     shared: list[float]
 
 

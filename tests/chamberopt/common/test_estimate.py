@@ -1,6 +1,7 @@
 """Estimates keep their range, and differences have intervals, paired or independent."""
 
 import json
+import math
 
 import numpy as np
 import pytest
@@ -49,3 +50,6 @@ def test_an_estimate_comes_back_from_json() -> None:
         Estimate.from_json(interval)
     single = json.dumps(estimate([0.5]).to_json(), allow_nan=False)  # its half-width is infinite
     assert Estimate.from_json(json.loads(single)) == estimate([0.5])
+    without_dents = estimate([0.0, 0.0, 0.0], bias=math.inf)
+    written = json.dumps(without_dents.to_json(), allow_nan=False)
+    assert Estimate.from_json(json.loads(written)) == without_dents
