@@ -53,8 +53,7 @@ def report(design: Design, effort: Effort, exact: Run, meshed: dict[int, Run]) -
 def _opening(design: Design, effort: Effort) -> list[str]:
     sonotrode, materials = design.sonotrode, design.materials
     laws = ", ".join(
-        f"{name} {getattr(materials, name).restitution:g} / "
-        f"{getattr(materials, name).yield_speed:g}"
+        f"{name} {getattr(materials, name).C0:g} / {getattr(materials, name).v0_m_s:g}"
         for name in ("shot", "wall", "sonotrode", "part")
     )
     return [

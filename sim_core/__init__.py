@@ -12,7 +12,12 @@ from sim_core.effects.friction import Friction
 from sim_core.effects.gravity import Gravity
 from sim_core.effects.part_rotation import PartRotation
 from sim_core.effects.random_phase import RandomPhase
-from sim_core.effects.restitution import Restitution, restitution_at
+from sim_core.effects.restitution import (
+    Restitution,
+    RestitutionLaw,
+    TabulatedRestitution,
+    restitution_at,
+)
 from sim_core.effects.surface.surface_effects import SurfaceEffects, surface_effects
 from sim_core.effects.vibration import Vibration
 from sim_core.errors import SceneError, SimulationError
@@ -45,11 +50,13 @@ __all__ = [
     "Rest",
     "Resting",
     "Restitution",
+    "RestitutionLaw",
     "Scene",
     "SceneError",
     "SimulationError",
     "SimulationResult",
     "SurfaceEffects",
+    "TabulatedRestitution",
     "TriangleMesh",
     "Vibration",
     "can_rest",

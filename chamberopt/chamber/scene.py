@@ -138,11 +138,10 @@ def scene_physics(
         raise InputError(
             'effects: still "auto"; resolve them first with a pilot run, as simulate and run do'
         )
-    # One (C0, v0) a tag, in the order TAG_PART, TAG_SONOTRODE, TAG_WALL, further sonotrodes.
+    # One law a tag, in the order TAG_PART, TAG_SONOTRODE, TAG_WALL, further sonotrodes.
     laws = [materials.part, materials.sonotrode, materials.wall]
     laws += [materials.sonotrode] * len(design.sonotrodes)
-    surfaces = tuple((law.restitution, law.yield_speed) for law in laws)
-    balls = (materials.shot.restitution, materials.shot.yield_speed)
+    surfaces, balls = tuple(law.restitution for law in laws), materials.shot.restitution
     accuracy, friction = design.process.accuracy, None
     if effects.friction is not None:
         of_surfaces = (effects.friction.surfaces,) * len(surfaces)

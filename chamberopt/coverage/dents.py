@@ -6,7 +6,8 @@ Notation
     rho density of the ball [kg/m³]                     (density)
     v   normal speed of the impact [m/s]                (normal_speed)
     B   Brinell hardness of the part [Pa]               (hardness)
-    e   coefficient of restitution at this speed, which falls from c0 at the yield speed v0 [m/s]
+    e   coefficient of restitution of ball on part at this speed
+    v0  yield speed of the part [m/s]                   (yield_speed)
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from chamberopt.geometry.triangles import closest_on_each, unit_normals
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.design.load import Design
+    from chamberopt.design.materials import PartMaterial
     from sim_core import ImpactLog
 
 
@@ -47,12 +49,7 @@ def dents_on_part(impacts: ImpactLog, chamber: Chamber, design: Design) -> Dents
 
 
 def dent_diameter(
-    normal_speed: np.ndarray,
-    diameter: float | np.ndarray,
-    density: float,
-    hardness: float,
-    c0: float,
-    v0: float,
+    normal_speed: np.ndarray, diameter: float | np.ndarray, density: float, material: PartMaterial
 ) -> np.ndarray:
     """Diameter of the dent that a ball leaves: d = 1.278 D (1 - e²)^¼ (rho v² / B)^¼.
 
@@ -60,7 +57,9 @@ def dent_diameter(
 
     Args:
         normal_speed: v [m/s], (n,).
-        c0, v0: parameters of sim_core's restitution law.
+        diameter: D [m], (n,) or one for all.
+        density: rho [kg/m³].
+        material: of the part, which has e(v), v0 and B.
 
     Returns:
         Diameter [m], (n,); 0 where the normal speed is not above the yield speed v0.
@@ -70,10 +69,11 @@ def dent_diameter(
     from sim_core import restitution_at
 
     speed = np.asarray(normal_speed, dtype=float)
-    # Below v0 the contact is elastic (Kirk): the energy that c0 < 1 loses there goes into waves,
-    # not into a dent.
-    dents = speed > v0
-    e = np.where(dents, restitution_at(speed, c0, v0), 1.0)
+    hardness = material.hardness
+    # Below v0 the contact is elastic (Kirk): what e < 1 loses there goes into waves, not into a
+    # dent. That is so whichever law gives e.
+    dents = speed > material.yield_speed
+    e = np.where(dents, restitution_at(speed, material.restitution), 1.0)
     return (
         1.278
         * diameter
@@ -89,15 +89,8 @@ def ball_diameters(impacts: ImpactLog, design: Design) -> float | np.ndarray:
 
 def dent_diameters(impacts: ImpactLog, design: Design) -> np.ndarray:
     """Diameter [m] of the dent that each impact would leave on the part, (n,)."""
-    material = design.materials.part
-    return dent_diameter(
-        impacts.normal_speed,
-        ball_diameters(impacts, design),
-        design.shot.density,
-        material.hardness,
-        material.restitution,
-        material.yield_speed,
-    )
+    diameters, density = ball_diameters(impacts, design), design.shot.density
+    return dent_diameter(impacts.normal_speed, diameters, density, design.materials.part)
 
 
 def impact_angle_deg(velocity: np.ndarray, normal_speed: np.ndarray) -> np.ndarray:

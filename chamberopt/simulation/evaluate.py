@@ -47,6 +47,7 @@ if TYPE_CHECKING:
 # Of the sonotrode's peak speed: faster impacts, which balls would have to drive one another to,
 # leave dents as wide as this one on creases.
 MAX_SPEED = 4.0
+SPEEDS = 1001  # up to there, of which one leaves the widest dent
 
 
 @dataclass(frozen=True)
@@ -168,20 +169,16 @@ def window_setting(design: Design, chamber: Chamber) -> WindowSetting:
     require_target(chamber)
     material, shot = design.materials.part, design.shot
     fastest = max(one.peak_speed for one in (design.sonotrode, *design.sonotrodes)) * MAX_SPEED
-    largest_dent = dent_diameter(
-        np.array([max(fastest, 2.0 * material.yield_speed)]),
-        max(shot.diameters),
-        shot.density,
-        material.hardness,
-        material.restitution,
-        material.yield_speed,
-    )
+    fastest = max(fastest, 2.0 * material.yield_speed)
+    # With a table of restitution a slower impact may leave a wider dent than the fastest.
+    speeds = np.linspace(0.0, fastest, SPEEDS)
+    dents = dent_diameter(speeds, max(shot.diameters), shot.density, material)
     accuracy = design.process.accuracy
     setting = WindowSetting(
         gauge=accuracy.gauge,
         points=accuracy.points,
         ball=min(shot.diameters),
-        largest_dent=float(largest_dent[0]),
+        largest_dent=float(dents.max()),
         symmetric=design.effects.part_turn is None and not design.sonotrodes,
     )
     require_wide_gauge(chamber, setting)

@@ -20,7 +20,7 @@ from sim_core.contact.pushed_by_part import drop_pressed_balls, is_pressed, note
 from sim_core.contact.supports import BLOCKED, SHORTEST_HOP, response
 from sim_core.effects.contact_mode import ASLEEP, BOUNCES, ON_BALL, ContactState
 from sim_core.effects.friction import OF_BALLS, FrictionState
-from sim_core.effects.restitution import Restitution, restitution_law
+from sim_core.effects.restitution import BALLS, RestitutionState, restitution_law
 from sim_core.impulses.collision import pair_velocity_change
 from sim_core.impulses.friction import add_pair_friction, add_surface_friction
 from sim_core.motion import BallEvent, BallState, state_under
@@ -44,7 +44,7 @@ def meet(
     motion: np.ndarray,
     one: BallEvent,
     two: BallEvent,
-    restitution: Restitution | None,
+    restitution: RestitutionState | None,
 ) -> bool:
     """Two balls meet now; True when one that lay still is moved, so that others must be woken."""
     first = place(contact, motion, one.ball, one.time)
@@ -63,7 +63,7 @@ def meet(
     normal = Vec3(scale * apart.x, scale * apart.y, scale * apart.z)
     back = scaled(-1.0, normal)
     if slow and (still_one or still_two) and not pressed:
-        e = 1.0 if restitution is None else _of_balls(restitution, approach)
+        e = _of_balls(restitution, approach)
         rebound = (1.0 + e) * approach
         if still_one:
             _land_on_ball(contact, motion, two, one.ball, second, normal, rebound)
@@ -123,8 +123,11 @@ def _land_on_ball(
 
 
 @jit
-def _of_balls(restitution: Restitution, speed: float) -> float:
-    return restitution_law(speed, restitution.balls[0], restitution.balls[1])
+def _of_balls(restitution: RestitutionState | None, speed: float) -> float:
+    """e of ball on ball at any speed [m/s], also below elastic_below; 1 without the effect."""
+    if restitution is None:
+        return 1.0
+    return restitution_law(restitution.laws, BALLS, speed)
 
 
 @jit

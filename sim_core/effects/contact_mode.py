@@ -10,7 +10,7 @@ import numpy as np
 
 from sim_core.effects.friction import FrictionState
 from sim_core.effects.gravity import Gravity, gravity_acceleration
-from sim_core.effects.restitution import ELASTIC_BELOW, Restitution
+from sim_core.effects.restitution import ELASTIC_BELOW, RestitutionState
 from sim_core.effects.sonotrodes import SonotrodeWaves
 from sim_core.effects.vibration import Wave
 from sim_core.errors import SceneError, number
@@ -187,7 +187,7 @@ def new_contact_state(
     radius: float,
     reach: float,
     gravity: Gravity | None,
-    restitution: Restitution | None,
+    restitution: RestitutionState | None,
     friction_state: FrictionState | None,
 ) -> ContactState | None:
     """The state with all balls in flight; None without the effect."""
@@ -267,20 +267,20 @@ def is_still(contact: ContactState | None, ball: int) -> bool:
 
 @inlined
 def still_surface_restitution(
-    contact: ContactState | None, restitution: Restitution | None
-) -> Restitution | None:
+    contact: ContactState | None, restitution: RestitutionState | None
+) -> RestitutionState | None:
     """The law for hits on still surfaces: with contact mode they lose energy at all speeds."""
     if contact is None:
         return restitution
     if restitution is None:
         return restitution
-    return Restitution(restitution.surfaces, restitution.balls, 0.0)
+    return RestitutionState(restitution.laws, 0.0)
 
 
 @inlined
 def vibrating_restitution(
-    contact: ContactState | None, restitution: Restitution | None
-) -> Restitution | None:
+    contact: ContactState | None, restitution: RestitutionState | None
+) -> RestitutionState | None:
     """The law for hits on vibrating faces: the same where balls stick to them."""
     if contact is None:
         return restitution
@@ -288,7 +288,9 @@ def vibrating_restitution(
 
 
 @inlined
-def _where_balls_stick(ride: Ride | None, restitution: Restitution | None) -> Restitution | None:
+def _where_balls_stick(
+    ride: Ride | None, restitution: RestitutionState | None
+) -> RestitutionState | None:
     if ride is None or restitution is None:
         return restitution
-    return Restitution(restitution.surfaces, restitution.balls, 0.0)
+    return RestitutionState(restitution.laws, 0.0)

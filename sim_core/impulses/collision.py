@@ -12,7 +12,7 @@ force, m v²/R on average. The sides of a mesh are flat and need none of this.
 
 import math
 
-from sim_core.effects.restitution import Restitution, ball_restitution, surface_restitution
+from sim_core.effects.restitution import RestitutionState, ball_restitution, surface_restitution
 from sim_core.geometry.analytic import CylinderAxis
 from sim_core.geometry.obstacles import CYLINDER_WALL
 from sim_core.numerics.jit import jit
@@ -24,7 +24,7 @@ RECONTACT_ANGLE = 1e-4
 
 
 @jit
-def pair_velocity_change(apart: Vec3, closing: Vec3, restitution: Restitution | None) -> Vec3:
+def pair_velocity_change(apart: Vec3, closing: Vec3, restitution: RestitutionState | None) -> Vec3:
     """Velocity change [m/s] of the first of two equal balls, and minus that of the second.
 
     Dividing by |apart|² keeps the energy of an elastic collision to rounding, where a rounded unit
@@ -48,7 +48,7 @@ def pair_velocity_change(apart: Vec3, closing: Vec3, restitution: Restitution | 
 
 @jit
 def surface_velocity_change(
-    away: Vec3, relative: Vec3, restitution: Restitution | None, tag: int
+    away: Vec3, relative: Vec3, restitution: RestitutionState | None, tag: int
 ) -> Vec3:
     """Velocity change [m/s] of a ball at a surface; zero when it separates.
 

@@ -43,7 +43,7 @@ from sim_core.effects.part_rotation import (
     to_room_frame,
 )
 from sim_core.effects.random_phase import wave_of_ball
-from sim_core.effects.restitution import Restitution
+from sim_core.effects.restitution import RestitutionState
 from sim_core.effects.sonotrodes import wave_of_face
 from sim_core.effects.surface.surface_effects import apply_surface_effects
 from sim_core.effects.vibration import surface_velocity
@@ -74,7 +74,7 @@ def _resolve_contact(
     state: SimulationState,
     event: BallEvent,
     touch: Touch,
-    law: Restitution | None,
+    law: RestitutionState | None,
     approach: float,
 ) -> Vec3:
     """Velocity change [m/s], in the room's frame, of a ball that hits a surface and bounces.

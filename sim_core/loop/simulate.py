@@ -129,9 +129,8 @@ class Simulation:
         vibrations, waves = physics.vibrations, checked_waves(physics.vibration)
         wave = min(waves, key=lambda one: one.omega, default=None)
         tags = int(scene.mesh.tags.max()) + 1
-        restitution = physics.restitution
-        if restitution is not None:
-            restitution = checked_restitution(restitution, tags)
+        law = physics.restitution
+        restitution = None if law is None else checked_restitution(law, tags)
         window = clock_window(vibrations, WINDOW)
         vibrating_tags = tuple(one.tag for one in vibrations)
         amplitudes = tuple(float(one.amplitude) for one in vibrations)

@@ -11,7 +11,7 @@ from sim_core.effects.friction import FrictionState
 from sim_core.effects.gravity import Gravity
 from sim_core.effects.part_rotation import RotationState
 from sim_core.effects.random_phase import RandomPhaseState
-from sim_core.effects.restitution import Restitution
+from sim_core.effects.restitution import RestitutionState
 from sim_core.effects.sonotrodes import SonotrodeWaves
 from sim_core.effects.surface.surface_effects import SurfaceEffects
 from sim_core.effects.vibration import Wave
@@ -57,7 +57,7 @@ class SimulationState(NamedTuple):
     queue: EventQueue
     scratch: Scratch
     gravity: Gravity | None
-    restitution: Restitution | None
+    restitution: RestitutionState | None
     wave: Wave | None
     rotation: RotationState | None
     clock: Clock

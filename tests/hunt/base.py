@@ -34,7 +34,7 @@ material = "steel"
 [materials]
 shot = { C0 = 0.91, v0_m_s = 1.5 }
 wall = { C0 = 0.91, v0_m_s = 0.44 }
-sonotrode = { C0 = 0.91, v0_m_s = 1.1 }
+sonotrode = { e_at_m_s = [[0.1, 0.97], [1, 0.91], [5, 0.6]] }
 part = { C0 = 0.91, v0_m_s = 0.17, hardness_HB = 120 }
 [effects]
 gravity = true

@@ -37,7 +37,10 @@ def odd_value(rng: random.Random, depth: int = 0) -> Any:
         return rng.choice((rng.uniform(-100, 100), rng.randrange(-10, 10_000)))
     if kind == 4:
         return [odd_value(rng, depth + 1) for _ in range(rng.choice((0, 1, 2, 3, 3, 40)))]
-    names = [rng.choice((*TEXTS[:8], "C0", "mu", "rpm", "min", "box_mm", ESCAPE)) for _ in range(3)]
+    names = [
+        rng.choice((*TEXTS[:8], "C0", "e_at_m_s", "mu", "rpm", "min", "box_mm", ESCAPE))
+        for _ in range(3)
+    ]
     return {name: odd_value(rng, depth + 1) for name in names[: rng.randrange(4)]}
 
 

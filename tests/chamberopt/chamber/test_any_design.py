@@ -22,7 +22,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.design.design import Design, validate
 from tests.helpers.synthetic import plate_design
 
-KEY = re.compile(r"\b(part|chamber|sonotrode|shot|process|effects)\.\w+|\bshot: ")
+KEY = re.compile(r"\b(part|chamber|sonotrode|shot|materials|process|effects)\.\w+|\bshot: ")
 PLATE = plate_design().model_dump(mode="json", exclude_none=True)
 FEW_BALLS = 3000  # a larger shot packs as slowly as it is large
 
@@ -41,6 +41,12 @@ CHAMBERS: dict[str, dict[str, Any]] = {
 DEFLECTOR = {"kind": "rod", "at_mm": [18.0, 2.0, 8.0], "rotate_deg": [90.0, 5.0, 0.0],
              "diameter_mm": 3.0, "length_mm": 12.0}  # fmt: skip
 HOLE = {"at_mm": [1.0, 1.0, 12.0], "axis": [1.0, 0.2, 0.1], "diameter_mm": 5.0, "depth_mm": 4.0}
+LAWS = (  # of restitution
+    {"C0": 0.9, "v0_m_s": 0.4},
+    {"C0": 0.9, "v0_m_s": 0.4, "exponent": 0.2},
+    {"C0": 0.9, "exponent": 0.0},
+    {"e_at_m_s": [[0.0, 1.0], [0.5, 0.8], [5.0, 0.4]]},
+)
 FAR = (0.0, -1.0, 1e-6, 0.05, 0.3, 3.0, 10.0, 1e6)  # in usual numbers
 
 
@@ -56,11 +62,16 @@ def tables(draw: st.DrawFn) -> dict[str, Any]:
     table["part"] |= {"offset_mm": [2.0, 2.0], "rotate_deg": [3.0, 3.0, 3.0]}
     table["shot"] |= {"mass_g": 3.3, "diameter_mm": 3.0}
     table["sonotrode"]["amplitude_um"] = 25.0
+    for surface in ("shot", "wall", "sonotrode"):
+        table["materials"][surface] = deepcopy(draw(st.sampled_from(LAWS)))
+    yields = {"v0_m_s": 0.2, "hardness_HB": 120.0}
+    table["materials"]["part"] = deepcopy(draw(st.sampled_from(LAWS))) | yields
     pose = {name: table["part"][name] for name in ("offset_mm", "rotate_deg")}
     drawn = (table["chamber"], pose, table["shot"], table["sonotrode"])
     leaves = [leaf for part_of_it in drawn for leaf in floats(part_of_it)]
     for place, key in leaves:
         place[key] *= draw(st.floats(0.8, 1.25))
+    leaves += floats(table["materials"])
     for place, key in draw(st.lists(st.sampled_from(leaves), max_size=2)):
         place[key] *= draw(st.sampled_from(FAR))
     return table

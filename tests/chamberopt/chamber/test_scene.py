@@ -12,7 +12,7 @@ from chamberopt.design.effects import Effects, FrictionTable, SurfaceEffectTable
 from chamberopt.design.load import load_design
 from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE
 from chamberopt.design.shot import ShotSize
-from sim_core import Drag, Rest, SurfaceEffects
+from sim_core import Drag, Rest, SurfaceEffects, TabulatedRestitution
 from sim_core.effects.restitution import ELASTIC_BELOW
 from tests.helpers.synthetic import DESIGNS, plate_design
 
@@ -63,6 +63,9 @@ def test_what_the_design_says_is_in_the_scene(design, mesh) -> None:
     by_tag = np.array(scene.physics.restitution.surfaces)
     expected = [(m.C0, m.v0_m_s) for m in (materials.part, materials.sonotrode, materials.wall)]
     np.testing.assert_array_equal(by_tag, expected)
+    table = {"e_at_m_s": ((0.1, 0.9), (3.0, 0.5))}
+    other = build_scene(design.changed({"materials.wall": table}), mesh, 1).physics.restitution
+    assert other.surfaces[2] == TabulatedRestitution((0.1, 3.0), (0.9, 0.5))
     assert scene.physics.gravity is not None
     weightless = build_scene(
         design.model_copy(update={"effects": type(design.effects)(gravity=False)}), mesh, 1

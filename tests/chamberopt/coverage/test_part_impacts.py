@@ -43,14 +43,7 @@ def test_hits_are_the_impacts_on_the_part_with_their_size_and_energy() -> None:
     np.testing.assert_allclose(hits.angle, [90.0, 45.0, 90.0], rtol=1e-5)
     mass = shot.density * np.pi / 6 * shot.diameter**3
     np.testing.assert_allclose(hits.energy, 0.5 * mass * np.array([9.0, 9.0, 0.01]), rtol=1e-5)
-    size = dent_diameter(
-        np.array([3.0]),
-        shot.diameter,
-        shot.density,
-        material.hardness,
-        material.restitution,
-        material.yield_speed,
-    )
+    size = dent_diameter(np.array([3.0]), shot.diameter, shot.density, material)
     np.testing.assert_allclose(hits.dent, [size[0], size[0], 0.0], rtol=1e-5)
 
 

@@ -22,6 +22,7 @@ UNSET = (
     "shot.density_kg_m3",
     "process.accuracy.objective_half_width",
     "part.target.element_mm",
+    *(f"materials.{name}.exponent" for name in ("shot", "wall", "sonotrode", "part")),
 )  # numbers that a design need not have
 TABLES = """
 [part]
@@ -97,7 +98,8 @@ class TestUnits:
 
     def test_brinell_in_pascal(self, design: Design) -> None:
         assert design.materials.part.hardness == pytest.approx(9.81e6 * 120)
-        assert (design.materials.part.restitution, design.materials.part.yield_speed) == (0.6, 0.2)
+        assert design.materials.part.restitution == (0.6, 0.2)
+        assert design.materials.part.yield_speed == 0.2
 
     def test_at_least_one_ball(self, design: Design) -> None:
         assert design.changed({"shot.mass_g": 0.01}).shot.count == 1
@@ -112,6 +114,29 @@ class TestUnits:
             TABLES.replace('material = "steel"', "density_kg_m3 = 3850"), encoding="utf-8"
         )
         assert load_design(design_file).shot.density == 3850.0
+
+    def test_laws_of_restitution(self, design_file: Path) -> None:
+        text = TABLES
+        for old, new in {
+            "shot = { C0 = 0.9, v0_m_s = 1.5": "shot = { C0 = 0.9, v0_m_s = 1.5, exponent = 0.2",
+            "wall = { C0 = 0.8, v0_m_s = 0.4": "wall = { C0 = 0.8, exponent = 0",
+            "C0 = 0.6, v0_m_s = 0.2": "e_at_m_s = [[0, 1], [2, 0.5]], v0_m_s = 0.2",
+        }.items():
+            assert old in text
+            text = text.replace(old, new)
+        design_file.write_text(text, encoding="utf-8")
+        design = load_design(design_file)
+        materials = design.materials
+        assert materials.shot.restitution == (0.9, 1.5, 0.2)
+        assert materials.sonotrode.restitution == (0.7, 1.1)
+        assert materials.wall.restitution[0::2] == (0.8, 0.0)  # whatever v0 is
+        assert materials.part.restitution == ((0.0, 2.0), (1.0, 0.5))
+        assert materials.part.yield_speed == 0.2
+        other = design.changed({"materials.part.e_at_m_s.1.1": 0.4, "materials.shot.exponent": 0})
+        assert other.materials.part.restitution == ((0.0, 2.0), (1.0, 0.4))
+        assert other.materials.shot.restitution == (0.9, 1.5, 0.0)
+        save_design(other, design_file.with_name("again.toml"))
+        assert load_design(design_file.with_name("again.toml")) == other
 
     def test_mesh_counts_from_the_file(self, design: Design, design_file: Path) -> None:
         assert design.part.mesh_path == design_file.resolve().parent / "part.stl"
@@ -260,9 +285,7 @@ class TestShipped:
             speed = math.sqrt(26 * (strength / stiffness) ** 4 * strength / 7800)
             speed *= 0.5 if name == "shot" else 1.0
             law = getattr(design.materials, name)
-            assert law.yield_speed == pytest.approx(
-                speed * (1.18 / law.restitution) ** 4, rel=0.03
-            ), name
+            assert law.v0_m_s == pytest.approx(speed * (1.18 / law.C0) ** 4, rel=0.03), name
 
 
 class TestWrongDesigns:
@@ -357,6 +380,34 @@ class TestWrongDesigns:
             design_file, ("part = { C0 = 0.6, v0_m_s = 0.2, hardness_HB = 120 }", "part = 0.6")
         )
         assert "materials.part: given 0.6; allowed: a table" in said
+
+    @pytest.mark.parametrize(
+        ("law", "said"),
+        [
+            ("v0_m_s = 0.4", "C0: missing; give C0, or e_at_m_s for a table"),
+            ("C0 = 0.8", "v0_m_s: missing; give the speed above which e falls, or exponent = 0"),
+            ("C0 = 0.8, v0_m_s = 0.4, exponent = -1", "exponent: given -1; allowed: a number from"),
+            ("C0 = 1.1, v0_m_s = 0.4", "C0: given 1.1"),
+            ("C0 = 0.8, e_at_m_s = [[1, 0.9]]", "C0: given beside e_at_m_s, the whole law"),
+            ("exponent = 0, e_at_m_s = [[1, 0.9]]", "exponent: given beside e_at_m_s"),
+            ("v0_m_s = 1, e_at_m_s = [[1, 0.9]]", "v0_m_s: given beside e_at_m_s"),
+            ("e_at_m_s = []", "e_at_m_s: given an empty list; allowed: pairs [v in m/s, e]"),
+            ("e_at_m_s = [[1, 0.9, 2]]", "e_at_m_s.0: given [1, 0.9, 2]; allowed: pairs"),
+            ("e_at_m_s = [[1, 0.9], [2, 1.2]]", "e_at_m_s.1.1: given 1.2; allowed: e from 0 to 1"),
+            ("e_at_m_s = [[-1, 0.9]]", "e_at_m_s.0.0: given -1; allowed: 0 to 1000 m/s"),
+            ("e_at_m_s = [[2, 0.9], [1, 0.8]]", "e_at_m_s.1.0: given 1 after 2 m/s; give each"),
+            ("e_at_m_s = [[2, 0.9], [2, 0.8]]", "e_at_m_s.1.0: given 2 after 2 m/s; give each"),
+        ],
+    )
+    def test_a_bad_law_of_restitution(self, design_file: Path, law: str, said: str) -> None:
+        found = edited(design_file, ("wall = { C0 = 0.8, v0_m_s = 0.4 }", f"wall = {{ {law} }}"))
+        assert f"materials.wall.{said}" in found
+
+    @pytest.mark.parametrize("law", ["C0 = 0.6, exponent = 0", "e_at_m_s = [[1, 0.9]]"])
+    def test_a_part_that_does_not_say_where_dents_begin(self, design_file: Path, law: str) -> None:
+        said = edited(design_file, ("C0 = 0.6, v0_m_s = 0.2", law))
+        lacking = "give the speed below which the part is not dented"
+        assert f"materials.part.v0_m_s: missing; {lacking}" in said
 
     def test_no_density_and_two_densities(self, design_file: Path) -> None:
         said = edited(

@@ -82,8 +82,7 @@ def test_the_widest_dent_is_that_of_a_ball_much_faster_than_the_sonotrode() -> N
     field = prepare_target(DESIGN, PLANE, chamber_mesh(PLANE))
     material, shot = DESIGN.materials.part, DESIGN.shot
     fast = np.array([MAX_SPEED * DESIGN.sonotrode.peak_speed])
-    of_material = material.hardness, material.restitution, material.yield_speed
-    wanted = dent_diameter(fast, shot.diameter, shot.density, *of_material)[0]
+    wanted = dent_diameter(fast, shot.diameter, shot.density, material)[0]
     assert field.setting.largest_dent == pytest.approx(wanted)
     assert field.setting.ball == shot.diameter
     assert field.setting.gauge == pytest.approx(1e-6)

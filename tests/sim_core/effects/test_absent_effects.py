@@ -33,7 +33,7 @@ from tests.helpers.scenes.cavities import box
 # effect is there
 KEPT = {
     "gravity": ("gravity", "Gravity"),
-    "restitution": ("restitution", "Restitution"),
+    "restitution": ("restitution", "RestitutionState"),
     "vibration": ("wave", "Wave"),
     "rest": ("contact", "ContactState"),
     "part_rotation": ("rotation", "RotationState"),
