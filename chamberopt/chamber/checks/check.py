@@ -87,6 +87,7 @@ def describe(design: Design, chamber: Chamber, reach: Reach | None = None) -> di
         "simulated_time_s": _rounded(simulated),
         "notes": [
             *chamber.notes,
+            *_friction_notes(design),
             *(ledge.message for ledge in find_ledges(design, chamber) if not ledge.level),
         ],
         "warnings": warnings(design, chamber, reach),
@@ -139,6 +140,19 @@ def warnings(design: Design, chamber: Chamber, reach: Reach | None = None) -> li
     texts += gap_warnings(reach, chamber, shot.diameter, turns=turn is not None)
     texts += _side_wall_warnings(design, chamber)
     return texts + [ledge.message for ledge in find_ledges(design, chamber) if ledge.level]
+
+
+def _friction_notes(design: Design) -> list[str]:
+    """What it means that a design has no friction; see docs/physics.md."""
+    if design.effects.friction is not None or design.effects.auto:
+        return []
+    remedy = "give yours, e.g. effects.friction = { mu = 0.3, beta0 = 0.2 }; --pilot measures it"
+    if design.shot.mix is not None:
+        remedy = "it is not supported beside shot.mix yet"
+    return [
+        "without effects.friction the balls are smooth: in a cylinder, any mu from 0.1 to 0.5 made "
+        f"the shot slower by 22 to 47 % (docs/physics.md); {remedy}"
+    ]
 
 
 def _reach_facts(reach: Reach, chamber: Chamber) -> dict[str, Any]:

@@ -75,6 +75,23 @@ def test_a_level_top_is_warned_of_with_area_place_and_remedy(gear: tuple[Design,
     assert not find_ledges(without_gravity(design), chamber)
 
 
+def test_a_design_without_friction_says_what_that_means(gear: tuple[Design, Chamber]) -> None:
+    design, chamber = gear
+
+    def notes(effects: Any, design: Design = design) -> list[str]:
+        found = described(design.changed({"effects": effects}), chamber)["notes"]
+        return [text for text in found if "friction" in text]
+
+    (said,) = notes({})
+    assert "without effects.friction the balls are smooth" in said
+    assert "give yours, e.g. effects.friction = { mu" in said
+    assert not notes({"friction": {"mu": 0.3, "beta0": 0.2}})
+    assert not notes("auto")  # pilot runs decide
+    mix = [{"diameter_mm": 1.5, "share": 0.5}, {"diameter_mm": 1.4, "share": 0.5}]
+    mixed = design.changed({"shot.diameter_mm": None, "shot.mix": mix})
+    assert "not supported beside shot.mix" in notes({"rest": False}, mixed)[0]
+
+
 def test_slopes_are_a_note_and_no_warning() -> None:
     """A gutter round the wall holds balls; the blade's slopes and leaning walls do not."""
     design, chamber = made("blade")
