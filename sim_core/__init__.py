@@ -27,9 +27,10 @@ from sim_core.geometry.mesh import TriangleMesh
 from sim_core.geometry.sonotrode_border import largest_amplitude
 from sim_core.geometry.triangle_lookup import find_triangles
 from sim_core.loop.compile_ahead import compile_simulator, is_compiled
-from sim_core.loop.impact_log import ImpactLog
+from sim_core.loop.impact_log import CollisionLog, ImpactLog
 from sim_core.loop.simulate import Collisions, SimulationResult, simulate
 from sim_core.numerics.jit import jit
+from sim_core.scene.frames import Energies, Frames, energies
 from sim_core.scene.packing import pack_balls
 from sim_core.scene.physics import BallCollisions, Physics
 from sim_core.scene.scene import Scene, require_free_rotation
@@ -39,8 +40,11 @@ __all__ = [
     "BallCollisions",
     "Balls",
     "ClosestPoints",
+    "CollisionLog",
     "Collisions",
     "Drag",
+    "Energies",
+    "Frames",
     "Friction",
     "Gravity",
     "ImpactLog",
@@ -64,6 +68,7 @@ __all__ = [
     "compile_simulator",
     "cylinder_cavity",
     "drag_coefficient",
+    "energies",
     "find_triangles",
     "is_compiled",
     "jit",

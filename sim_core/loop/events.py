@@ -21,7 +21,7 @@ from sim_core.effects.part_rotation import shift_rotation, time_of_one_turn
 from sim_core.effects.random_phase import update_phase, wave_of_ball
 from sim_core.effects.sonotrodes import shift_phases
 from sim_core.effects.vibration import Wave
-from sim_core.geometry.ball_sizes import face_overlap_of_ball
+from sim_core.geometry.ball_sizes import face_overlap_of_ball, radius_of_ball
 from sim_core.impulses.drag import apply_drag_piece, apply_drag_until, time_to_next_drag
 from sim_core.loop.contact_neighbours import first_meeting, hide, hide_all, wake_if_it_moves
 from sim_core.loop.event_handlers import (
@@ -33,7 +33,7 @@ from sim_core.loop.event_handlers import (
     hold_jammed_ball,
 )
 from sim_core.loop.event_queue import SEARCH_ON, Meetings, forget_events, reschedule, shift_queue
-from sim_core.loop.impact_log import log_impact, no_impact
+from sim_core.loop.impact_log import CollisionBuffer, is_full, log_collision, log_impact, no_impact
 from sim_core.loop.neighbours import (
     NeighbourFilter,
     follow,
@@ -52,7 +52,7 @@ from sim_core.numerics.vec3 import Flight
 
 # status of advance(): why it has stopped
 DONE = 0  # the clock has come to clock.stop
-BUFFER_FULL = 1  # the impact buffer must be emptied
+BUFFER_FULL = 1  # the buffers of impacts and collisions must be emptied
 TOO_MANY_EVENTS = 2  # of one ball in one window: it is jammed
 TOO_FAST = 3  # a ball is faster than the neighbour filter allows for
 HAS_LEFT = 4  # a ball is outside the chamber's bounding box
@@ -100,7 +100,7 @@ def advance(state: SimulationState) -> tuple[int, int]:
         if sort_is_due(state.neighbours, time):
             _sort_neighbours(state, time)
             continue
-        if buffer.filled[0] == len(buffer.time):
+        if buffer.filled[0] == len(buffer.time) or is_full(state.collision_buffer):
             return BUFFER_FULL, -1
         clock.now[0] = time
         queue.events[ball] += 1
@@ -117,6 +117,7 @@ def advance(state: SimulationState) -> tuple[int, int]:
         if kind == HOLD:
             hold_jammed_ball(state.contact, state, event)
         elif kind == MEETING:
+            _log_meeting(state.collision_buffer, state, event, partner)
             collide(state.contact, state, event, partner)
         elif kind == SURFACE:
             if queue.obstacle[ball] < len(state.obstacles.tree.kinds):
@@ -208,6 +209,23 @@ def _move(state: SimulationState, event: BallEvent, kind: int, partner: int) -> 
     while ball >= 0:
         apply_drag_until(state.drag, state.contact, state.motion, ball, event.time, state.gravity)
         ball = partner if kind == MEETING and ball != partner else -1
+
+
+@inlined
+def _log_meeting(
+    buffer: CollisionBuffer | None, state: SimulationState, event: BallEvent, partner: int
+) -> None:
+    """Log a collision of balls before it changes their paths, if that is asked for."""
+    if buffer is None:
+        return
+    ball, motion, gravity = event.ball, state.motion, state.gravity
+    here = state_under(motion, ball, event.time, ball_acceleration(state.contact, ball, gravity))
+    there = state_under(
+        motion, partner, event.time, ball_acceleration(state.contact, partner, gravity)
+    )
+    radius = radius_of_ball(state.sizes, 0.5, ball)
+    share = radius / (radius + radius_of_ball(state.sizes, 0.5, partner))
+    log_collision(buffer, event, partner, state.clock.origin, here, there, share)
 
 
 @inlined

@@ -1,16 +1,19 @@
-"""The impacts of the shot on the recorded surfaces, one array a quantity."""
+"""The impacts of the shot on the recorded surfaces, and the collisions of balls, if asked for.
+
+Both logs have one array a quantity, and a buffer that the compiled loop fills.
+"""
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 from sim_core.geometry.triangle_lookup import TriangleLookup, find_triangle
-from sim_core.motion import BallEvent
+from sim_core.motion import BallEvent, BallState
 from sim_core.numerics.jit import inlined
-from sim_core.numerics.vec3 import Vec3, set_vec3
+from sim_core.numerics.vec3 import Vec3, add_scaled, dot, scaled, set_vec3, sub
 
-BUFFER_SIZE = 65_536  # impacts that the compiled loop writes before handing them over
+BUFFER_SIZE = 65_536  # rows that the compiled loop writes before handing them over
 
 
 class Impact(NamedTuple):
@@ -113,16 +116,120 @@ class ImpactLog:
         return ImpactLog(**{name: column[rows] for name, column in vars(self).items()})
 
 
-def empty_buffer(buffer: ImpactBuffer) -> ImpactLog:
-    """Copy the impacts out of a buffer, which is empty then."""
+class CollisionBuffer(NamedTuple):
+    """What the compiled loop writes: arrays of BUFFER_SIZE rows, see CollisionLog.
+
+    filled: rows written, (1,). record: whether collisions are logged now, (1,) bool.
+    """
+
+    time: np.ndarray
+    one: np.ndarray
+    two: np.ndarray
+    position: np.ndarray
+    normal: np.ndarray
+    velocity: np.ndarray
+    normal_speed: np.ndarray
+    filled: np.ndarray
+    record: np.ndarray
+
+
+def new_collision_buffer(wanted: bool) -> CollisionBuffer | None:
+    """An empty buffer that is not written to yet; None unless wanted."""
+    if not wanted:
+        return None
+    return CollisionBuffer(
+        time=np.zeros(BUFFER_SIZE),
+        one=np.zeros(BUFFER_SIZE, dtype=np.int32),
+        two=np.zeros(BUFFER_SIZE, dtype=np.int32),
+        position=np.zeros((BUFFER_SIZE, 3)),
+        normal=np.zeros((BUFFER_SIZE, 3)),
+        velocity=np.zeros((BUFFER_SIZE, 3)),
+        normal_speed=np.zeros(BUFFER_SIZE),
+        filled=np.zeros(1, dtype=np.int64),
+        record=np.zeros(1, dtype=np.bool_),
+    )
+
+
+@inlined
+def is_full(buffer: CollisionBuffer | None) -> bool:
+    """True when no further collision can be written."""
+    if buffer is None:
+        return False
+    return bool(buffer.filled[0] == len(buffer.time))
+
+
+@inlined
+def log_collision(
+    buffer: CollisionBuffer,
+    event: BallEvent,
+    partner: int,
+    origin: float,
+    here: BallState,
+    there: BallState,
+    share: float,
+) -> None:
+    """Write a collision down if it is one: balls in touch may part.
+
+    Args:
+        origin: zero of the times [s].
+        here, there: the ball and its partner before.
+        share: radius of the ball over the sum of both.
+    """
+    apart, closing = sub(there.position, here.position), sub(there.velocity, here.velocity)
+    distance = np.sqrt(dot(apart, apart))
+    speed = -dot(apart, closing) / distance
+    if not (buffer.record[0] and speed > 0.0):
+        return
+    row = buffer.filled[0]
+    buffer.time[row] = event.time_since_start - origin
+    buffer.one[row] = event.ball
+    buffer.two[row] = partner
+    set_vec3(buffer.position, row, add_scaled(here.position, share, apart))
+    set_vec3(buffer.normal, row, scaled(1.0 / distance, apart))
+    set_vec3(buffer.velocity, row, closing)
+    buffer.normal_speed[row] = speed
+    buffer.filled[0] = row + 1
+
+
+@dataclass(frozen=True)
+class CollisionLog:
+    """One row a collision of two balls, in order of time.
+
+    time: [s] since the end of the warm-up, (n,).
+    one, two: the balls, (n,) int32.
+    position: of the point where they touch [m], (n, 3).
+    normal: unit vector from ball one to ball two, (n, 3).
+    velocity: of ball two relative to ball one, before, without spins [m/s], (n, 3).
+    normal_speed: at which they approach each other, before; positive [m/s], (n,).
+    """
+
+    time: np.ndarray
+    one: np.ndarray
+    two: np.ndarray
+    position: np.ndarray
+    normal: np.ndarray
+    velocity: np.ndarray
+    normal_speed: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+
+Log = TypeVar("Log", ImpactLog, CollisionLog)
+
+
+def empty_buffer(buffer: ImpactBuffer | CollisionBuffer, kind: type[Log]) -> Log:
+    """Copy what is logged out of a buffer, which is empty then."""
     rows = int(buffer.filled[0])
     buffer.filled[0] = 0
-    return ImpactLog(*(column[:rows].copy() for column in buffer[:6]))
+    names = kind.__dataclass_fields__
+    return kind(**{name: getattr(buffer, name)[:rows].copy() for name in names})
 
 
-def joined(logs: list[ImpactLog], centre: np.ndarray) -> ImpactLog:
+def joined(logs: list[Log], centre: np.ndarray) -> Log:
     """Several logs as one, in order; ``centre`` [m] is added to the positions."""
-    names = ImpactLog.__dataclass_fields__
-    whole = ImpactLog(**{name: np.concatenate([vars(log)[name] for log in logs]) for name in names})
+    kind = type(logs[0])
+    names = kind.__dataclass_fields__
+    whole = kind(**{name: np.concatenate([vars(log)[name] for log in logs]) for name in names})
     whole.position[:] += centre
     return whole

@@ -27,12 +27,20 @@ from sim_core.impulses.drag import apply_drag_to_all
 from sim_core.loop.contact_neighbours import hide_all
 from sim_core.loop.event_queue import new_event_queue
 from sim_core.loop.events import BUFFER_FULL, DONE, HAS_LEFT, TOO_FAST, TOO_MANY_EVENTS, advance
-from sim_core.loop.impact_log import ImpactLog, empty_buffer, joined, new_impact_buffer
+from sim_core.loop.impact_log import (
+    CollisionLog,
+    ImpactLog,
+    empty_buffer,
+    joined,
+    new_collision_buffer,
+    new_impact_buffer,
+)
 from sim_core.loop.jam_message import jam_message
 from sim_core.loop.neighbours import NeighbourFilter, new_neighbour_filter
 from sim_core.loop.state import Clock, SimulationState
 from sim_core.motion import WINDOW
 from sim_core.numerics.computed_once import computed_once
+from sim_core.scene.frames import Frames, frames_of
 from sim_core.scene.invariants import beneath_mean_plane, contained, narrowest_gap, turned_corners
 from sim_core.scene.scene import TOUCH, Scene
 
@@ -62,14 +70,18 @@ class SimulationResult:
 
     impacts: on the recorded surfaces. balls: at the end. collisions: their numbers.
     resting: the balls that lie still at the end.
-    frames: centres of the balls at the requested times [m], (f, n, 3).
+    frames: the balls at the requested times.
+    ball_collisions: of balls with one another; None unless Scene.record_collisions is True.
+    time: at the end [s], on the clock of Scene.start_time.
     """
 
     impacts: ImpactLog
     balls: Balls
     collisions: Collisions
     resting: Resting
-    frames: np.ndarray
+    frames: Frames
+    ball_collisions: CollisionLog | None
+    time: float
 
 
 def simulate(scene: Scene, frames: Sequence[float] | np.ndarray = ()) -> SimulationResult:
@@ -78,53 +90,61 @@ def simulate(scene: Scene, frames: Sequence[float] | np.ndarray = ()) -> Simulat
     The GIL is released meanwhile. The same scene gives the same bits on any thread.
 
     Args:
-        frames: times, ascending [s since the end of the warm-up], (f,), at which the positions of
-            the balls are noted, each on its flight at that very time. They change no bit of the
-            rest.
+        frames: times, ascending [s since the end of the warm-up], (f,), at which the balls are
+            noted, each on its flight at that very time. They change no bit of the rest.
 
     Raises:
         SimulationError: when a ball is lost, jams, or stops being a number.
     """
+    times = _checked_frames(frames, scene)
     run = Simulation(scene)
     run.play(scene.warmup, record=False)
     end = scene.warmup + scene.duration
-    noted = run.play(end, record=True, frames=_checked_frames(frames, scene))
+    noted = run.play(end, record=True, frames=scene.warmup + times)
     balls, state = run.balls(), run.state
     still = resting(state.contact, state.obstacles, balls.positions, run.centre, scene.warmup)
-    counts = Collisions(*(int(n) for n in state.counts))
-    return SimulationResult(joined(run.logs, run.centre), balls, counts, still, noted)
+    return SimulationResult(
+        impacts=joined(run.logs, run.centre),
+        balls=balls,
+        collisions=Collisions(*(int(n) for n in state.counts)),
+        resting=still,
+        frames=frames_of(times, noted, balls),
+        ball_collisions=joined(run.meetings, run.centre) if run.meetings else None,
+        time=scene.start_time + end,
+    )
 
 
 def _checked_frames(frames: Sequence[float] | np.ndarray, scene: Scene) -> np.ndarray:
-    """Frame times [s since the start].
+    """Frame times as an array (f,).
 
     Raises SceneError for times that are not ascending or not within the duration.
     """
-    times = np.asarray(frames, dtype=float).reshape(-1)
-    if not np.isfinite(times).all() or (np.diff(times) <= 0.0).any():
+    times = np.array(frames, dtype=float).reshape(-1)
+    if not np.isfinite(times).all() or (np.diff(scene.warmup + times) <= 0.0).any():
         raise SceneError("frames: not ascending times; give each once, in order")
     if len(times) and not 0.0 <= times[0] <= times[-1] <= scene.duration:
         raise SceneError(
             f"frames: from {times[0]:g} to {times[-1]:g} s; "
             f"allowed: 0 to the duration, {scene.duration:g} s"
         )
-    return scene.warmup + times
+    return times
 
 
 _obstacle_set = computed_once(8)(build_obstacle_set)  # replicas of one chamber share it
 
 
 class Simulation:
-    """A scene being simulated: the state that the loop works on, and the impacts so far."""
+    """A scene being simulated: the state that the loop works on, and what is logged so far."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self.centre = scene.mesh.middle
         self.logs: list[ImpactLog] = []
+        self.meetings: list[CollisionLog] = []
         self.state = self._new_state()
 
     def _new_state(self) -> SimulationState:
-        scene, physics, balls = self.scene, self.scene.physics, self.scene.balls
+        scene, physics, balls = self.scene, self.scene.physics_at_start, self.scene.balls
         gravity = checked_gravity(physics.gravity)
         vibrations, waves = physics.vibrations, checked_waves(physics.vibration)
         wave = min(waves, key=lambda one: one.omega, default=None)
@@ -181,6 +201,7 @@ class Simulation:
             drag=new_drag_state(checked_drag(physics.drag), balls.diameters, balls.densities),
             sizes=new_ball_sizes(balls, obstacles.roots),
             waves=sonotrodes,
+            collision_buffer=new_collision_buffer(scene.record_collisions),
         )
         max_speed = 2.0 * max(1.0, float(np.abs(balls.velocities).max()))
         return state._replace(neighbours=self._new_filter(state, max_speed))
@@ -214,26 +235,33 @@ class Simulation:
 
     def play(
         self, until: float, record: bool, frames: Sequence[float] | np.ndarray = ()
-    ) -> np.ndarray:
+    ) -> list[Balls]:
         """Simulate until a time [s], with a check of containment every CHECK_EVERY.
 
-        Returns: the positions [m], (f, n, 3), at the times ``frames`` [s].
+        Returns: the balls at each of the times ``frames`` [s since the start].
         """
-        recorded = self.scene.record
-        self.state.buffer.record[:] = record and recorded is None
+        recorded, buffers = self.scene.record, (self.state.buffer, self.state.collision_buffer)
+        buffers[0].record[:] = record and recorded is None
         if record and recorded is not None:
-            self.state.buffer.record[list(recorded)] = True
+            buffers[0].record[list(recorded)] = True
+        if buffers[1] is not None:
+            buffers[1].record[:] = record
         start = self.time
         checks = np.linspace(start, until, 1 + max(1, math.ceil((until - start) / CHECK_EVERY)))[1:]
         due, requested, noted = set(checks), set(frames), []
         for stop in sorted({*checks, *frames}):
             self.advance_to(float(stop))
             if stop in requested:
-                noted.append(self._positions_and_velocities()[0])
+                noted.append(self.balls())
             if stop in due:
                 self._require_sound()
-        self.logs.append(empty_buffer(self.state.buffer))
-        return np.array(noted).reshape(-1, len(self.state.motion), 3)
+        self._empty_buffers()
+        return noted
+
+    def _empty_buffers(self) -> None:
+        self.logs.append(empty_buffer(self.state.buffer, ImpactLog))
+        if self.state.collision_buffer is not None:
+            self.meetings.append(empty_buffer(self.state.collision_buffer, CollisionLog))
 
     def advance_to(self, stop: float) -> None:
         """Run the event loop until a time [s], and attend to what makes it pause."""
@@ -243,7 +271,7 @@ class Simulation:
             if status == DONE:
                 return
             if status == BUFFER_FULL:
-                self.logs.append(empty_buffer(self.state.buffer))
+                self._empty_buffers()
             elif status == TOO_FAST:
                 speed = float(np.abs(self.state.motion[ball, 3:]).max())
                 if not math.isfinite(speed):

@@ -18,7 +18,7 @@ from sim_core.effects.vibration import Wave
 from sim_core.geometry.ball_sizes import BallSizes
 from sim_core.geometry.obstacle_set import ObstacleSet
 from sim_core.loop.event_queue import EventQueue
-from sim_core.loop.impact_log import ImpactBuffer
+from sim_core.loop.impact_log import CollisionBuffer, ImpactBuffer
 from sim_core.loop.neighbours import NeighbourFilter
 from sim_core.numerics.profiler import Profiler
 
@@ -48,6 +48,7 @@ class SimulationState(NamedTuple):
     motion: base position [m] and velocity [m/s] of each ball in the free-fall frame, (n, 6).
     neighbours: the filter made of it, None where balls do not collide with one another.
     counts: of events, (5,) int64, see WALLS.
+    collision_buffer: None unless collisions of balls are logged.
     profiler: None unless the loop is measured.
     """
 
@@ -71,3 +72,4 @@ class SimulationState(NamedTuple):
     drag: DragState | None
     sizes: BallSizes | None
     waves: SonotrodeWaves | None
+    collision_buffer: CollisionBuffer | None

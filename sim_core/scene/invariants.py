@@ -23,6 +23,7 @@ from sim_core.geometry.mesh import TriangleMesh
 from sim_core.numerics.computed_once import computed_once
 from sim_core.numerics.jit import jit
 from sim_core.numerics.vec3 import Vec3, cross, dot, sub
+from sim_core.scene.frames import Frames, energies
 
 # Directions that no designer's edge is parallel to, so that a ray through an edge or corner is
 # rare; where it happens, the next direction is tried.
@@ -374,12 +375,9 @@ def narrowest_gap(balls: Balls) -> tuple[float, int, int]:
 
 def energy(balls: Balls, gravity: Gravity | None = None) -> float:
     """Kinetic energy, with that of spins, plus potential energy [J], which is 0 at the origin."""
-    each = 0.5 * np.einsum("ij,ij->i", balls.velocities, balls.velocities)
-    if balls.spins is not None:  # the moment of inertia of a solid sphere: 2/5 m R²
-        each += 0.2 * (0.5 * balls.diameters) ** 2 * np.einsum("ij,ij->i", balls.spins, balls.spins)
-    if gravity is not None:
-        each -= balls.positions @ np.array([gravity.x, gravity.y, gravity.z])
-    return float(balls.masses @ each)
+    spins = None if balls.spins is None else balls.spins[None]
+    now = Frames(np.zeros(1), balls.positions[None], balls.velocities[None], spins)
+    return float(energies(now, balls, gravity).total[0])
 
 
 def momentum(balls: Balls) -> np.ndarray:

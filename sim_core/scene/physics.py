@@ -3,6 +3,8 @@
 An effect that is None is absent from memory and machine code.
 """
 
+import math
+from fractions import Fraction
 from typing import NamedTuple
 
 from sim_core.effects.contact_mode import Rest
@@ -58,3 +60,27 @@ class Physics(NamedTuple):
         if self.vibration is None:
             return ()
         return (self.vibration,) if isinstance(self.vibration, Vibration) else self.vibration
+
+    def begun_at(self, time: float) -> "Physics":
+        """The same effects on a clock that begins ``time`` [s] later.
+
+        Vibrations and the turning part have gone on. Turns are counted as fractions, so that no
+        digits of the phase are lost to their number.
+        """
+        if time == 0.0:
+            return self
+        vibrations = tuple(
+            one._replace(phase=_phase_after(one.phase, one.frequency, time))
+            for one in self.vibrations
+        )
+        turn = self.part_rotation
+        if turn is not None:
+            rate = Fraction(float(turn.rpm)) / 60 if turn.rpm is not None else turn.frequency
+            assert rate is not None
+            turn = turn._replace(phase=_phase_after(turn.phase, rate, time))
+        return self._replace(vibration=vibrations or None, part_rotation=turn)
+
+
+def _phase_after(phase: float, rate: float | Fraction, time: float) -> float:
+    """A phase [rad] that grows by ``rate`` turns a second, after ``time`` [s]."""
+    return phase + 2.0 * math.pi * float(Fraction(rate) * Fraction(float(time)) % 1)

@@ -66,6 +66,10 @@ class Scene:
         duration: of the recorded simulation [s].
         warmup: simulated before, without recording [s].
         record: tags of the surfaces whose impacts are logged; all if None.
+        record_collisions: whether collisions of balls with one another are logged too.
+        start_time: of the first instant on the clock of the vibrations and the turning part [s]:
+            their phases are those at time 0. A scene that goes on with the balls of an earlier
+            result has that result's ``time``.
 
     Raises:
         SceneError: naming the ball, triangle or field, for a ball outside the mesh, overlapping a
@@ -81,9 +85,12 @@ class Scene:
     duration: float
     warmup: float = 0.0
     record: tuple[int, ...] | None = None
+    record_collisions: bool = False
+    start_time: float = 0.0
 
     def __post_init__(self) -> None:
-        for name, value in (("duration", self.duration), ("warmup", self.warmup)):
+        for name in ("duration", "warmup", "start_time"):
+            value = getattr(self, name)
             if not isinstance(value, (int, float, np.number)) or not 0.0 <= value <= MAX_DURATION:
                 raise SceneError(
                     f"scene.{name} is {value!r}: give seconds from 0 to {MAX_DURATION:g}"
@@ -93,8 +100,17 @@ class Scene:
         if self.record is not None and not all(tag in self.mesh.tags for tag in self.record):
             tags = np.unique(self.mesh.tags).tolist()
             raise SceneError(f"scene.record is {self.record}, but the mesh has tags {tags}")
+        if self.record_collisions not in (True, False):
+            raise SceneError(
+                f"scene.record_collisions is {self.record_collisions!r}: give True or False"
+            )
         self._require_physics()
         self._require_room()
+
+    @property
+    def physics_at_start(self) -> Physics:
+        """The effects with phases as they are at the scene's start."""
+        return self.physics.begun_at(self.start_time)
 
     def _require_physics(self) -> None:
         for name, effect in self.physics._asdict().items():
@@ -128,7 +144,17 @@ class Scene:
                 "give a Friction, or no spins"
             )
         checked_drag(self.physics.drag)
-        checked_random_phase(self.physics.random_phase, len(vibrations))
+        random_phase = checked_random_phase(self.physics.random_phase, len(vibrations))
+        if random_phase is not None and self.start_time > 0.0:
+            raise SceneError(
+                f"scene.start_time is {self.start_time} s, and physics.random_phase is given: "
+                "which phase each ball has found is not known any more; leave one of them out"
+            )
+        if self.record_collisions and self.physics.ball_collisions is None:
+            raise SceneError(
+                "scene.record_collisions is True, but physics.ball_collisions is None: balls do "
+                "not meet; leave one of them out"
+            )
         axis = checked_axis(turn)
         tags = np.unique(self.mesh.tags).tolist()
         if turn is not None and axis is not None and isinstance(self.mesh, TriangleMesh):
@@ -148,7 +174,7 @@ class Scene:
 
     def _require_room(self) -> None:
         if isinstance(self.mesh, AnalyticCavity):
-            require_clear(self.mesh, self.balls, self.physics.vibrations, TOUCH)
+            require_clear(self.mesh, self.balls, self.physics_at_start.vibrations, TOUCH)
         else:
             self._require_room_in_mesh()
         if self.physics.ball_collisions is None:
@@ -169,7 +195,7 @@ class Scene:
                 f"mesh triangle {wrong} belongs to a body that is inside out: the cavity is behind "
                 "it; reverse every triangle of that body so that normals point away from the shot"
             )
-        turn = self.physics.part_rotation
+        turn = self.physics_at_start.part_rotation
         corners = None if turn is None else turned_corners(self.mesh, turn)
         inside = (
             contained(self.mesh, balls.positions)
@@ -215,7 +241,7 @@ class Scene:
     def _require_room_above_sonotrode(self, near: NearSurface) -> None:
         """Check the balls against vibrating surfaces, and displace these by their phases."""
         balls = self.balls
-        for vibration in self.physics.vibrations:
+        for vibration in self.physics_at_start.vibrations:
             vibrating = near.tags == vibration.tag
             near.corners[vibrating] += np.sin(vibration.phase) * vibration.peak
             gap = clearance(near.corners[vibrating], balls.positions, balls.radius)
@@ -230,7 +256,7 @@ class Scene:
 
     def _require_room_between(self, near: NearSurface) -> None:
         assert isinstance(self.mesh, TriangleMesh)
-        gap = find_narrow_gap(near, self.physics, self.balls)
+        gap = find_narrow_gap(near, self.physics_at_start, self.balls)
         if gap is None:
             return
         one, two = (surface_name(self.mesh, self.physics, side) for side in (gap.one, gap.two))

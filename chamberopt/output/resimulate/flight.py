@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 MIN_SPAN = 1e-6  # s
 MAX_FRAMES = 2000
-MAX_POSITIONS = 10_000_000  # of all balls in all frames and their trails: 240 MB
+MAX_POSITIONS = 10_000_000  # of all balls in all frames and their trails: 480 MB with velocities
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ def simulate_flight(
     impacts = replica.on_chamber(simulated.impacts)
     on_part = replica.chamber.source[impacts.triangle] >= 0
     impacts = impacts.only((impacts.time >= start) & on_part)
-    positions = simulated.frames
+    positions = simulated.frames.positions
     before = np.full((1, trail, *positions.shape[1:]), np.nan)
     later = positions[:-1].reshape(frames - 1, trail, *positions.shape[1:])
     time, rotation = times[::trail], scene.physics.part_rotation

@@ -143,7 +143,9 @@ def test_below_the_weight_a_ball_rides_for_ever() -> None:
     frames = np.linspace(1.0, 3.0, 500)
     result = simulate(Scene(room, ball, physics, 3.0), frames)
     floor = vibration.amplitude * np.sin(math.tau * 11.5 * frames)
-    np.testing.assert_allclose(result.frames[:, 0, 2] - 0.5 * DIAMETER, floor, rtol=0.0, atol=2e-11)
+    np.testing.assert_allclose(
+        result.frames.positions[:, 0, 2] - 0.5 * DIAMETER, floor, rtol=0.0, atol=2e-11
+    )
     assert result.impacts.time.max() < 1.0
     assert result.collisions.sonotrode < 50
 
@@ -160,7 +162,7 @@ def test_a_riding_ball_slides_over_the_plate_and_its_seams() -> None:
     result = simulate(Scene(room, ball, physics, 4.0), frames)
     up = vibration.amplitude / math.hypot(0.3, 1.0)
     np.testing.assert_allclose(
-        result.frames[:, 0, 2] - 0.5 * DIAMETER,
+        result.frames.positions[:, 0, 2] - 0.5 * DIAMETER,
         up * np.sin(math.tau * 9.0 * frames),
         rtol=0.0,
         atol=2e-11,
@@ -184,7 +186,9 @@ def test_a_riding_ball_goes_on_from_face_to_face_of_a_plate() -> None:
     physics = Physics(Gravity(), law, vibration, Rest(on_vibrating=True))
     result = simulate(Scene(cylinder(0.015, 0.05), ball, physics, 3.0), frames)
     floor = vibration.amplitude * np.sin(math.tau * 9.0 * frames)
-    np.testing.assert_allclose(result.frames[:, 0, 2] - 0.5 * DIAMETER, floor, rtol=0.0, atol=2e-11)
+    np.testing.assert_allclose(
+        result.frames.positions[:, 0, 2] - 0.5 * DIAMETER, floor, rtol=0.0, atol=2e-11
+    )
     assert np.hypot(*result.balls.velocities[0, :2]) == pytest.approx(math.hypot(0.11, 0.07))
 
 
@@ -196,7 +200,7 @@ def test_a_ball_that_falls_on_one_that_rides_comes_to_rest_on_it() -> None:
     physics = Physics(Gravity(), law, vibration, Rest(on_vibrating=True))
     scene = Scene(room, Balls(places, np.zeros((2, 3)), DIAMETER), physics, 2.0)
     result = simulate(scene, np.linspace(1.5, 2.0, 200))
-    low, high = result.frames[:, 0, 2], result.frames[:, 1, 2]
+    low, high = result.frames.positions[:, 0, 2], result.frames.positions[:, 1, 2]
     floor = vibration.amplitude * np.sin(math.tau * 11.5 * np.linspace(1.5, 2.0, 200))
     assert np.abs(low - floor - 0.5 * DIAMETER).max() < 2e-5
     assert (high - low - DIAMETER > -1e-12).all()

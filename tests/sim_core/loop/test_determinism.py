@@ -99,12 +99,15 @@ def test_frames_show_the_balls_on_their_flights_and_change_nothing() -> None:
             getattr(plain.impacts, column), getattr(watched.impacts, column)
         )
     np.testing.assert_array_equal(plain.balls.positions, watched.balls.positions)
-    assert plain.frames.shape == (0, len(scene.balls), 3)
-    np.testing.assert_array_equal(watched.frames[-1], watched.balls.positions)
+    assert plain.frames.positions.shape == plain.frames.velocities.shape == (0, len(scene.balls), 3)
+    assert plain.frames.spins is None
+    np.testing.assert_array_equal(watched.frames.time, times)
+    np.testing.assert_array_equal(watched.frames.positions[-1], watched.balls.positions)
+    np.testing.assert_array_equal(watched.frames.velocities[-1], watched.balls.velocities)
 
     # The frame at an impact has the ball where the log has it.
     rows = np.flatnonzero(np.diff(plain.impacts.time, append=np.inf) > 1e-9)[10:20]
-    at = simulate(scene, frames=plain.impacts.time[rows]).frames
+    at = simulate(scene, frames=plain.impacts.time[rows]).frames.positions
     there = at[np.arange(len(rows)), plain.impacts.ball[rows]]
     np.testing.assert_allclose(there, plain.impacts.position[rows], atol=1e-12)
 
