@@ -1,17 +1,29 @@
-"""The README's Python runs as printed, and its commands and files exist."""
+"""The Python of the README and of docs/science.md runs as printed, and named files exist."""
 
 import re
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from chamberopt.output.viewer import missing_opengl
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-SNIPPETS = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+BLOCK = r"```{}\n(.*?)```"
+SNIPPETS = re.findall(BLOCK.format("python"), README, re.DOTALL)
+NUMBER = r"-?\d+\.?\d*"
+
+
+def run(code: str, folder: Path) -> str:
+    """What a program prints."""
+    answer = subprocess.run(
+        [sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=False
+    )
+    assert answer.returncode == 0, answer.stderr
+    return answer.stdout
 
 
 @pytest.mark.parametrize("snippet", SNIPPETS, ids=["toolkit", "simulator"])
@@ -20,11 +32,20 @@ def test_the_readmes_python_runs_as_printed(snippet: str, tmp_path: Path) -> Non
         (tmp_path / folder).symlink_to(ROOT / folder)
     if missing_opengl():  # the only line that needs OpenGL
         snippet = re.sub(r"chamberopt\.show\(.*", "", snippet)
-    answer = subprocess.run(
-        [sys.executable, "-c", snippet], cwd=tmp_path, capture_output=True, text=True, check=False
+    printed = run(snippet, tmp_path)
+    assert "±" in printed or "impacts" in printed
+
+
+def test_the_page_for_science_prints_what_it_shows(tmp_path: Path) -> None:
+    """Words as shown, and numbers within a tenth: on another processor a gas takes other paths."""
+    page = (ROOT / "docs/science.md").read_text(encoding="utf-8")
+    blocks, shown = (
+        "".join(re.findall(BLOCK.format(kind), page, re.DOTALL)) for kind in ("python", "text")
     )
-    assert answer.returncode == 0, answer.stderr
-    assert "±" in answer.stdout or "impacts" in answer.stdout
+    printed = run(blocks, tmp_path)
+    assert re.sub(NUMBER, "", printed).split() == re.sub(NUMBER, "", shown).split()
+    seen, expected = (np.array(re.findall(NUMBER, text), float) for text in (printed, shown))
+    np.testing.assert_allclose(seen, expected, rtol=0.1, atol=0.02)
 
 
 def test_files_named_in_the_readme_exist() -> None:
