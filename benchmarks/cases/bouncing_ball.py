@@ -60,7 +60,7 @@ def rows() -> Iterator[Row]:
                   first_locking(e), 0.0, *locking(e))  # fmt: skip
     for e in RESTITUTIONS:
         yield Row("bouncing ball", f"e = {e}", "Γ at which its period doubles",
-                  first_doubling(e), 1e-6, doubling(e), 0.0)  # fmt: skip
+                  first_doubling(e), 0.0, doubling(e), 1e-6)  # fmt: skip
 
 
 def picture(path: Path) -> None:

@@ -80,7 +80,7 @@ def haff_picture(path: Path) -> None:
 def shaken_temperature(e: float) -> tuple[float, float, float]:
     """kT/m of a gas over a shaken floor, over theory's: <U²>/(kT/m), the ratio, its half-width.
 
-    Theory, to first order in <U²>/(kT/m), balls that fly far and smooth elastic sides: kT/m = (2√2/π)
+    Theory, to first order in <U²>/(kT/m), for balls that fly far: kT/m = (2√2/π)
     <U²> / (N d² (1 - e²) / area), V. Kumaran, J. Fluid Mech. 364 (1998) 163.
     """
     depth = SHAKEN * SHOT**2 / SIDE**2

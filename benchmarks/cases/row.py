@@ -1,5 +1,6 @@
 """One line of docs/validation.md: a figure that was simulated beside its reference."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +15,7 @@ class Row(NamedTuple):
         case: name of the case.
         conditions: what tells this row from the others of the case.
         quantity: what is compared, with its unit.
-        reference: what theory or publication says.
+        reference: what theory or publication says; NaN where it gives no number.
         allowed: how far the reference itself may be off: the theory's own error, or the precision
             with which a measurement was published.
         found: what is simulated.
@@ -30,8 +31,10 @@ class Row(NamedTuple):
     half_width: float
 
     @property
-    def agrees(self) -> bool:
-        """Whether the two agree within what is known of both."""
+    def agrees(self) -> bool | None:
+        """Whether the two agree within what is known of both; None without a reference."""
+        if math.isnan(self.reference):
+            return None
         return abs(self.found - self.reference) <= self.allowed + self.half_width
 
 

@@ -8,7 +8,15 @@ import math
 
 import numpy as np
 
-from sim_core import Balls, Gravity, Physics, Scene, Vibration
+from sim_core import (
+    Balls,
+    Gravity,
+    Physics,
+    Restitution,
+    Scene,
+    TabulatedRestitution,
+    Vibration,
+)
 from sim_core.effects.restitution import ELASTIC_BELOW
 from tests.helpers.scenes.cavities import FLOOR, box, uniform_restitution
 
@@ -18,6 +26,14 @@ DEPTH = 5.4 * DIAMETER
 PER_AREA = 6.0  # balls for each D² of floor
 
 
+def bizon_restitution(e: float, elastic_below: float = ELASTIC_BELOW) -> Restitution:
+    """1 - (1 - e) (v / v0)^(3/4) below v0 = sqrt(g D), and e above, of all and everything."""
+    v0 = math.sqrt(G * DIAMETER)
+    speeds = v0 * np.linspace(0.0, 1.0, 41) ** 2
+    law = TabulatedRestitution(speeds, 1.0 - (1.0 - e) * (speeds / v0) ** 0.75)
+    return Restitution((law,) * 3, law, elastic_below)
+
+
 def shaken_layer(
     count: int,
     gamma: float,
@@ -25,6 +41,7 @@ def shaken_layer(
     cycles: float,
     e: float = 0.7,
     elastic_below: float = ELASTIC_BELOW,
+    law: Restitution | None = None,
 ) -> Scene:
     """A loose lattice that falls on the floor, which starts from its lowest position."""
     frequency = f_star * math.sqrt(G / DEPTH)
@@ -41,7 +58,7 @@ def shaken_layer(
     positions += rng.uniform(-0.01, 0.01, positions.shape) * DIAMETER
     balls = Balls(positions, rng.normal(0.0, 0.05, positions.shape), DIAMETER)
     shaking = Vibration(FLOOR, amplitude, frequency, -0.5 * math.pi)
-    law = uniform_restitution(e, 1e6, elastic_below)
+    law = law or uniform_restitution(e, 1e6, elastic_below)
     top = positions[:, 2].max() + 60.0 * DIAMETER
     room = box((side, side, top))
     physics = Physics(Gravity(), law, shaking)

@@ -1,0 +1,185 @@
+"""The cylinder of published ultrasonic peening experiments: steel balls of 3 mm over a sonotrode.
+
+Radius 35 mm, height 40 mm, 25 µm at 20 kHz: M. Micoulaut, D. Retraint, P. Viot & M. François,
+ICSP-9 (2005) 119; with S. Mechkov, Granular Matter 9 (2007) 25.
+"""
+
+import json
+import math
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.cases.row import Row, mean_and_half_width
+from sim_core import (
+    AnalyticCavity,
+    Balls,
+    Friction,
+    Gravity,
+    Physics,
+    Restitution,
+    Scene,
+    SimulationResult,
+    Vibration,
+    cylinder_cavity,
+    pack_balls,
+    simulate,
+)
+
+CEILING, FLOOR, SIDE = 0, 1, 2
+RADIUS, HEIGHT, DIAMETER = 0.035, 0.04, 3e-3  # m
+AMPLITUDE, FREQUENCY = 25e-6, 20e3  # m, Hz
+CONSTANT = 1e9  # m/s: v0 of a restitution that does not depend on speed
+WARM_UP = 1.0  # s
+SEEDS = 8
+RINGS = 8
+CONTACTS = (8e-6, 4e-6, 2e-6)  # s: Hertz's theory gives steel balls 7.5 µs at 5 m/s
+
+
+def peened(
+    count: int,
+    restitution: Restitution,
+    seconds: float,
+    seed: int,
+    mu: float = 0.0,
+    amplitude: float = AMPLITUDE,
+    frames: int = 0,
+) -> SimulationResult:
+    """Simulate after the warm-up; impacts on the ceiling are logged."""
+    cavity, rng = _cavity(), np.random.default_rng(seed)
+    places = pack_balls(cavity, count, DIAMETER, rng, amplitude)
+    balls = Balls(places, rng.normal(0.0, 1.0, places.shape), DIAMETER)
+    shaking = Vibration(FLOOR, amplitude, FREQUENCY, rng.uniform(0.0, 2.0 * np.pi))
+    friction = Friction(((mu, 0.0),) * 3, (mu, 0.0)) if mu else None
+    physics = Physics(Gravity(), restitution, shaking, friction=friction)
+    scene = Scene(cavity, balls, physics, seconds, WARM_UP, record=(CEILING,))
+    return simulate(scene, np.linspace(0.0, seconds, frames + 1)[1:] if frames else ())
+
+
+def constant(e: float, wall: float | None = None) -> Restitution:
+    """The same at all speeds; another one of the side."""
+    law, side = (e, CONSTANT), (e if wall is None else wall, CONSTANT)
+    return Restitution((law, law, side), law)
+
+
+def by_speed() -> Restitution:
+    """The paper's law of the designs that come with the program."""
+    law = (0.91, 1.0)
+    return Restitution((law,) * 3, law)
+
+
+def ring_shares(wall: float, seeds: int) -> np.ndarray:
+    """Impacts per area of the ceiling in rings of equal width, over their mean, (seeds, RINGS)."""
+    edges = np.linspace(0.0, 1.0, RINGS + 1)
+    found = []
+    for seed in range(seeds):
+        places = peened(200, constant(0.91, wall), 2.0, seed).impacts.position
+        way = np.hypot(places[:, 0], places[:, 1]) / (RADIUS - 0.5 * DIAMETER)
+        found.append(np.histogram(way, edges)[0] / len(way) / np.diff(edges**2))
+    return np.array(found)
+
+
+def side_walls() -> Iterator[Row]:
+    """Inelastic sides make impacts gather at the rim; of elastic ones balls know nothing."""
+    for wall in (1.0, 0.9, 0.7, 0.5):
+        shares = ring_shares(wall, SEEDS)
+        ratio, half_width = mean_and_half_width(shares[:, -1] / shares[:, :2].mean(axis=1))
+        reference = 1.0 if wall == 1.0 else math.nan
+        yield Row("side walls", f"restitution {wall}", "impacts per area, rim / centre", reference,
+                  0.0, ratio, half_width)  # fmt: skip
+
+
+def side_walls_picture(path: Path) -> None:
+    """Impacts per area against the distance from the axis."""
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(figsize=(7, 4.5), layout="constrained")
+    middle = (np.arange(RINGS) + 0.5) / RINGS * (RADIUS - 0.5 * DIAMETER) * 1e3
+    for wall in (1.0, 0.9, 0.7, 0.5):
+        shares = ring_shares(wall, SEEDS)
+        error = 2.0 * shares.std(axis=0, ddof=1) / np.sqrt(len(shares))
+        axes.errorbar(middle, shares.mean(axis=0), error, capsize=2, label=f"sides with e = {wall}")
+    axes.set(xlabel="distance from the axis, mm", ylabel="impacts per area / mean", ylim=(0, None),
+             title="200 balls of 3 mm: where they hit the ceiling")  # fmt: skip
+    axes.legend(frameon=False)
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+def exponent(restitution: Restitution, count: int) -> tuple[float, float]:
+    """p in (mean normal speed on the ceiling) ~ amplitude^p, from 25 to 50 µm."""
+    samples = []
+    for seed in range(SEEDS):
+        low, high = (
+            peened(count, restitution, 2.0, seed, amplitude=amplitude).impacts.normal_speed.mean()
+            for amplitude in (AMPLITUDE, 2.0 * AMPLITUDE)
+        )
+        samples.append(np.log2(high / low))
+    return mean_and_half_width(np.array(samples))
+
+
+def practice() -> Iterator[Row]:
+    """What the trade reports of intensity: nearly in proportion to amplitude, hardly to charge."""
+    for name, law in (("e falls with speed", by_speed()), ("e constant", constant(0.91))):
+        for count in (50, 200):
+            yield Row("practice", f"{name}, {count} balls", "exponent of the amplitude", 0.96, 0.09,
+                      *exponent(law, count))  # fmt: skip
+    few, many = (
+        np.array([peened(count, by_speed(), 2.0, seed).impacts.normal_speed.mean()
+                  for seed in range(SEEDS)])
+        for count in (100, 200)
+    )  # fmt: skip
+    yield Row("practice", "e falls with speed", "speed with 200 balls / with 100", 1.0, 0.05,
+              *mean_and_half_width(many / few))  # fmt: skip
+
+
+def soft_speed(count: int, mu: float, contact: float) -> tuple[float, float]:
+    """√<v²> [m/s] of the balls in LAMMPS with contacts of ``contact`` [s], and its half-width."""
+    places = pack_balls(_cavity(), count, DIAMETER, np.random.default_rng(1), AMPLITUDE)
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "scene.npz"
+        np.savez(
+            file, positions=places, density=7800.0, diameter=DIAMETER, contact_s=contact, e=0.91,
+            mu=mu, radius=RADIUS, height=HEIGHT, amplitude=AMPLITUDE, frequency=FREQUENCY,
+            warmup_s=WARM_UP, duration_s=1.0, blocks=10,
+        )  # fmt: skip
+        program = Path(__file__).with_name("soft_spheres.py")
+        done = subprocess.run([sys.executable, str(program), str(file)], check=True, text=True,
+                              stdout=subprocess.PIPE)  # fmt: skip
+    return _root(*mean_and_half_width(np.array(json.loads(done.stdout))))
+
+
+def hard_speed(count: int, mu: float) -> tuple[float, float]:
+    """√<v²> [m/s] of the balls here, and its 95 % half-width."""
+    played = (peened(count, constant(0.91), 1.0, seed, mu, frames=40) for seed in range(SEEDS))
+    squares = [(one.frames.velocities**2).sum(axis=-1).mean() for one in played]
+    return _root(*mean_and_half_width(np.array(squares)))
+
+
+def peers() -> Iterator[Row]:
+    """Hard spheres against soft ones as contacts get shorter, and their limit."""
+    for count in (200, 30):
+        for mu in (0.2, 0.0):
+            found, half_width = hard_speed(count, mu)
+            soft = [soft_speed(count, mu, contact) for contact in CONTACTS]
+            values, errors = np.array(soft).T
+            conditions = f"{count} balls, friction {mu}"
+            for contact, value, error in zip(CONTACTS, values, errors, strict=True):
+                yield Row("soft spheres", f"{conditions}, contacts of {contact * 1e6:g} µs",
+                          "√<v²>, m/s", value, error, found, half_width)  # fmt: skip
+            fit, spread = np.polyfit(CONTACTS, values, 1, w=2.0 / errors, cov="unscaled")
+            error = 2.0 * np.sqrt(spread[1, 1])
+            yield Row("soft spheres", f"{conditions}, carried on to contacts of no time",
+                      "√<v²>, m/s", fit[1], error, found, half_width)  # fmt: skip
+
+
+def _root(mean: float, half_width: float) -> tuple[float, float]:
+    return float(np.sqrt(mean)), float(0.5 * half_width / np.sqrt(mean))
+
+
+def _cavity() -> AnalyticCavity:
+    return cylinder_cavity(2.0 * RADIUS, 0.0, HEIGHT, (FLOOR, CEILING, SIDE))
