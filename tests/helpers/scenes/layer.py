@@ -8,15 +8,7 @@ import math
 
 import numpy as np
 
-from sim_core import (
-    Balls,
-    Gravity,
-    Physics,
-    Restitution,
-    Scene,
-    TabulatedRestitution,
-    Vibration,
-)
+from sim_core import Balls, Gravity, Physics, Restitution, Scene, TabulatedRestitution, Vibration
 from sim_core.effects.restitution import ELASTIC_BELOW
 from tests.helpers.scenes.cavities import FLOOR, box, uniform_restitution
 
