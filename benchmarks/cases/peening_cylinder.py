@@ -35,6 +35,7 @@ RADIUS, HEIGHT, DIAMETER = 0.035, 0.04, 3e-3  # m
 AMPLITUDE, FREQUENCY = 25e-6, 20e3  # m, Hz
 CONSTANT = 1e9  # m/s: v0 of a restitution that does not depend on speed
 WARM_UP = 1.0  # s
+SOFT_S = 0.5  # s, warm-up and record of soft spheres, of which a second takes minutes
 SEEDS = 8
 RINGS = 8
 CONTACTS = (8e-6, 4e-6, 2e-6)  # s: Hertz's theory gives steel balls 7.5 µs at 5 m/s
@@ -145,7 +146,7 @@ def soft_speed(count: int, mu: float, contact: float) -> tuple[float, float]:
         np.savez(
             file, positions=places, density=7800.0, diameter=DIAMETER, contact_s=contact, e=0.91,
             mu=mu, radius=RADIUS, height=HEIGHT, amplitude=AMPLITUDE, frequency=FREQUENCY,
-            warmup_s=WARM_UP, duration_s=1.0, blocks=10,
+            warmup_s=SOFT_S,duration_s=SOFT_S, blocks=10,
         )  # fmt: skip
         program = Path(__file__).with_name("soft_spheres.py")
         done = subprocess.run([sys.executable, str(program), str(file)], check=True, text=True,
