@@ -22,7 +22,7 @@ def locks(gamma: float, e: float) -> bool:
     hits = in_step(gamma, e, PERIODS)
     phase = math.acos(min(first_locking(e) / gamma, 1.0))
     last = hits[-1, 0] - phase
-    return len(hits) == PERIODS and abs((last + math.pi) % math.tau - math.pi) < IN_STEP
+    return len(hits) == PERIODS and bool(abs((last + math.pi) % math.tau - math.pi) < IN_STEP)
 
 
 def locking(e: float) -> tuple[float, float]:

@@ -163,6 +163,7 @@ def play(
         here = np.flatnonzero(_in_the_room(mesh, physics)[log.triangle])[-WATCHED:]
         if len(here):
             gap = clearance_at(Chamber(mesh, balls, physics), log.position[here], log.time[here])
+            gap += _hop_within_a_contact(physics, log.normal_speed[here])
             seen.penetration = max(
                 seen.penetration, float((0.5 * balls.diameters[log.ball[here]] - gap).max())
             )
@@ -249,6 +250,17 @@ def energy_above_floor(mesh: TriangleMesh, balls: Balls, physics: Physics) -> fl
         down = np.array(physics.gravity)
         each += (mesh.vertices @ down).max() - balls.positions @ down
     return float(np.average(each, weights=balls.masses))
+
+
+def _hop_within_a_contact(physics: Physics, speeds: np.ndarray) -> np.ndarray:
+    """Height [m] of hops at normal speeds [m/s] that is of the size of DEEPEST, 0 for higher ones.
+
+    Where nothing lets a ball lie, it slides along an edge in ever lower hops of µm/s. A hop lower
+    than contacts are resolved happens within the contact, as deep as it is high.
+    """
+    weight = float(np.linalg.norm(physics.gravity or (0.0, 0.0, 0.0)))
+    height = 0.5 * speeds**2 / max(weight, 1e-300)
+    return np.where(height < 10.0 * DEEPEST, height, 0.0)
 
 
 def allowed(mesh: TriangleMesh) -> float:
