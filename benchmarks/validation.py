@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from benchmarks.cases import bouncing_ball, gases, peening_cylinder, shaken_layer
+from benchmarks.cases import bouncing_ball, gases, peening_cylinder, shaken_cell, shaken_layer
 from benchmarks.cases.row import Row
 from benchmarks.scenes import ROOT
 from benchmarks.table import write_csv
@@ -38,9 +38,10 @@ class Case(NamedTuple):
 
 CASES = {
     "bouncing_ball": Case(bouncing_ball.rows, bouncing_ball.picture),
-    "elastic_gas": Case(gases.equation_of_state),
+    "elastic_gas": Case(gases.equation_of_state, gases.state_picture),
     "cooling_gas": Case(gases.haff, gases.haff_picture),
     "shaken_gas": Case(gases.shaken_gas),
+    "shaken_cell": Case(shaken_cell.rows),
     "side_walls": Case(peening_cylinder.side_walls, peening_cylinder.side_walls_picture),
     "practice": Case(peening_cylinder.practice),
     "soft_spheres": Case(peening_cylinder.peers, long=True),

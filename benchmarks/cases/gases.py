@@ -9,10 +9,19 @@ import numpy as np
 from benchmarks.cases.row import SURE, Row, mean_and_half_width
 from sim_core import Balls, Gravity, Physics, Restitution, Scene, Vibration, simulate
 from tests.helpers.scenes.cavities import FLOOR, box
-from tests.helpers.scenes.gas import enskog_rate, gas_over_theory, in_a_box, lattice_gas, played
+from tests.helpers.scenes.gas import (
+    carnahan_starling,
+    enskog_rate,
+    gas_over_theory,
+    in_a_box,
+    lattice_gas,
+    played,
+)
 
 ELASTIC = (1.0, 1e9)  # (C0, v0 [m/s])
 SEEDS = 5
+
+PACKINGS = (0.02, 0.1, 0.2, 0.3)
 
 PER_SIDE = 16  # 4,096 balls that cool
 # Enskog's theory lets velocities of balls that meet be independent and Maxwell's: that they are not
@@ -29,10 +38,29 @@ G = 9.80665
 
 
 def equation_of_state() -> Iterator[Row]:
-    for packing in (0.02, 0.1, 0.2, 0.3):
+    for packing in PACKINGS:
         for name, (ratio, error, allowed) in gas_over_theory(packing).items():
             yield Row("elastic gas", f"φ = {packing}", f"{name} over Carnahan–Starling's", 1.0,
                       allowed, ratio, SURE * error)  # fmt: skip
+
+
+def state_picture(path: Path) -> None:
+    """pV/NkT against the packing."""
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(figsize=(7, 4.5), layout="constrained")
+    line = np.linspace(0.0, 0.32, 100)
+    axes.plot(line, carnahan_starling(line), color="0.4", label="Carnahan & Starling")
+    axes.plot(line, 1.0 + 4.0 * line, "--", color="0.7", label="second virial coefficient alone")
+    for packing in PACKINGS:
+        ratio, error, _ = gas_over_theory(packing)["pressure"]
+        middle = ratio * carnahan_starling(packing)
+        axes.errorbar(packing, middle, SURE * error * middle, fmt="o", color="tab:red",
+                      label="simulated" if packing == PACKINGS[0] else None)  # fmt: skip
+    axes.set(xlabel="packing φ", ylabel="pV / NkT", title="Elastic balls")
+    axes.legend(frameon=False)
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
 
 
 def cooling(e: float, packing: float, seed: int, times: np.ndarray) -> np.ndarray:
