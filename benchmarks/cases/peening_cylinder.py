@@ -174,7 +174,7 @@ def peers() -> Iterator[Row]:
                           "√<v²> in LAMMPS, m/s", math.nan, 0.0, value, error)  # fmt: skip
             fit, spread = np.polyfit(CONTACTS, values, 1, w=2.0 / errors, cov="unscaled")
             error = 2.0 * np.sqrt(spread[1, 1])
-            yield Row("soft spheres", f"{conditions}, contacts of no time: a line through them, and here",
+            yield Row("soft spheres", f"{conditions}, contacts of no time",
                       "√<v²>, m/s", fit[1], error, found, half_width)  # fmt: skip
 
 
