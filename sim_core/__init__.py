@@ -1,7 +1,7 @@
 """sim_core: exact event-driven dynamics of balls in a closed cavity.
 
-Build a Scene from a TriangleMesh (or a cylinder_cavity or prism_cavity), Balls and Physics, then
-simulate it. All quantities are in SI units.
+Build a Scene from a TriangleMesh (or a cylinder_cavity, prism_cavity or periodic_box), Balls and
+Physics, then simulate it. All quantities are in SI units.
 """
 
 from sim_core.balls import Balls
@@ -21,7 +21,7 @@ from sim_core.effects.restitution import (
 from sim_core.effects.surface.surface_effects import SurfaceEffects, surface_effects
 from sim_core.effects.vibration import Vibration
 from sim_core.errors import SceneError, SimulationError
-from sim_core.geometry.analytic import AnalyticCavity, cylinder_cavity, prism_cavity
+from sim_core.geometry.analytic import AnalyticCavity, cylinder_cavity, periodic_box, prism_cavity
 from sim_core.geometry.closest_point import ClosestPoints, closest_points
 from sim_core.geometry.mesh import TriangleMesh
 from sim_core.geometry.sonotrode_border import largest_amplitude
@@ -74,6 +74,7 @@ __all__ = [
     "jit",
     "largest_amplitude",
     "pack_balls",
+    "periodic_box",
     "prism_cavity",
     "require_free_rotation",
     "restitution_at",

@@ -9,6 +9,9 @@
 This is the first system of Badreddine et al., "CAD based simulation of ultrasonic shot peening".
 Being convex it has no edge that a ball could hit, so its planes need no borders. All effects are
 simulated except contact mode and a turning part.
+
+A box may be periodic along x, y or both: it has no sides there, and what leaves it on one side
+comes in on the other (numerics/periodic_sides.py).
 """
 
 from collections.abc import Sequence
@@ -18,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim_core.errors import SceneError
-from sim_core.geometry.mesh import MAX_TAGS
+from sim_core.geometry.mesh import MAX_TAGS, TriangleMesh
 from sim_core.geometry.obstacles import (
     CYLINDER_WALL,
     FACE,
@@ -30,6 +33,8 @@ from sim_core.geometry.obstacles import (
 
 FLOOR, CEILING, SIDE = 0, 1, 2  # numbers of the surfaces; SIDE is the first of the sides
 MIN_CORNER_SINE = 1e-9  # of the angle at an outline's corner; less is a corner on a straight line
+# m: how far floor and ceiling of a periodic box go on. A ball at MAX_SPEED flies 2e4 m in a window.
+UNBOUNDED = 1e5
 MAX_OPPOSITE_COSINE = -1.0 + 1e-9  # between the normals of two opposite sides, as in narrow_gaps.py
 
 
@@ -44,7 +49,7 @@ class CylinderAxis(NamedTuple):
 class AnalyticCavity:
     """An upright cylinder or convex prism; it takes the place of a TriangleMesh in a Scene.
 
-    Use ``cylinder_cavity`` or ``prism_cavity`` to make one.
+    Use ``cylinder_cavity``, ``prism_cavity`` or ``periodic_box`` to make one.
 
     Args:
         bottom: height of the floor [m].
@@ -53,6 +58,7 @@ class AnalyticCavity:
         outline: corners of a prism [m], shape (n, 2), anticlockwise seen from above.
         centre: axis of a cylinder [m], shape (2,).
         radius: of a cylinder [m]; None for a prism.
+        periodic: axes along which a box is periodic, of 0 (x) and 1 (y).
     """
 
     bottom: float
@@ -61,6 +67,29 @@ class AnalyticCavity:
     outline: np.ndarray
     centre: np.ndarray
     radius: float | None
+    periodic: tuple[int, ...] = ()
+
+    @property
+    def periods(self) -> np.ndarray:
+        """Sides of a box along which it is periodic [m], 0 where it is not, shape (3,)."""
+        sides = np.ptp(self.bounds, axis=0)
+        return np.where(np.isin(np.arange(3), self.periodic), sides, 0.0)
+
+    def put_back(self, points: np.ndarray) -> np.ndarray:
+        """The images in the box of points (..., 3) [m], where it is periodic."""
+        if not self.periodic:
+            return points
+        sides = self.periods
+        turns = np.floor((points - self.bounds[0]) / np.where(sides > 0.0, sides, np.inf))
+        return np.asarray(points - sides * turns)
+
+    @property
+    def edges(self) -> np.ndarray:
+        """Ends of the outline's edges that are walls [m], shape (s, 2, 2)."""
+        ends = np.stack([self.outline, np.roll(self.outline, -1, axis=0)], axis=1)
+        # the first edge of a periodic box is along x, the second along y, ...
+        along = np.arange(len(ends)) % 2
+        return ends[~np.isin(1 - along, self.periodic)]
 
     @property
     def bounds(self) -> np.ndarray:
@@ -95,11 +124,12 @@ class AnalyticCavity:
     @property
     def planes(self) -> tuple[np.ndarray, np.ndarray]:
         """Unit normals towards the shot (p, 3) and offsets (p,) [m] of the plane surfaces."""
-        edge = np.roll(self.outline, -1, axis=0) - self.outline
+        start = self.edges[:, 0]
+        edge = self.edges[:, 1] - start
         inward = np.column_stack([-edge[:, 1], edge[:, 0]]) / np.hypot(*edge.T)[:, None]
         ends = [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]
         normals = np.concatenate([ends, np.column_stack([inward, 0.0 * edge[:, 0]])])
-        offsets = [self.bottom, -self.top, *np.einsum("ij,ij->i", inward, self.outline)]
+        offsets = [self.bottom, -self.top, *np.einsum("ij,ij->i", inward, start)]
         return normals, np.array(offsets)
 
     @property
@@ -110,8 +140,9 @@ class AnalyticCavity:
         """
         (x, y, z), (u, v, w) = self.bounds
         flat = [[[x, y, z], [x, v, z], [u, y, z]], [[x, y, w], [u, y, w], [x, v, w]]]
-        ends = np.stack([self.outline, np.roll(self.outline, -1, axis=0)], axis=1)
-        sides = [[[*a, z], [*b, z], [*b, w]] for a, b in ends] or [[[u, self.centre[1], z]] * 3]
+        sides = [[[*a, z], [*b, z], [*b, w]] for a, b in self.edges]
+        if self.radius is not None:
+            sides = [[[u, self.centre[1], z]] * 3]
         return np.array(flat + sides)
 
     def gaps(self, points: np.ndarray) -> np.ndarray:
@@ -134,6 +165,8 @@ class AnalyticCavity:
         if self.radius is not None:
             return 2.0 * self.radius, SIDE, SIDE
         normals, offsets = (values[SIDE:] for values in self.planes)
+        if len(normals) == 0:
+            return np.inf, SIDE, SIDE
         opposite = normals @ normals.T < MAX_OPPOSITE_COSINE
         distance = np.where(opposite, -offsets[:, None] - offsets, np.inf)
         one, two = np.unravel_index(distance.argmin(), distance.shape)
@@ -223,14 +256,52 @@ def prism_cavity(
     return _cavity(bottom, top, _all_tags(tags, len(corners)), corners, np.zeros(2), None)
 
 
+def periodic_box(
+    low: Sequence[float], high: Sequence[float], tags: Sequence[int], periodic: str = "xy"
+) -> AnalyticCavity:
+    """A box with floor and ceiling whose sides are periodic: a ball that leaves it comes in again.
+
+    Args:
+        low: lowest corner [m], shape (3,).
+        high: highest corner [m], shape (3,).
+        tags: of floor and ceiling, and with "x" or "y" of the two walls that are left.
+        periodic: "xy", or along "x" or "y" alone.
+
+    Raises:
+        SceneError: for corners that do not span a box, and for other directions.
+    """
+    try:
+        corners = np.array([low, high], dtype=np.float64)
+    except (TypeError, ValueError):
+        corners = np.zeros((0, 3))
+    if corners.shape != (2, 3) or not (
+        np.isfinite(corners).all() and (corners[0] < corners[1]).all()
+    ):
+        raise SceneError(
+            f"periodic_box: corners are {low} and {high}: give x, y and z [m] of the lowest and "
+            "of the highest"
+        )
+    if periodic not in ("xy", "x", "y"):
+        raise SceneError(f'periodic_box: periodic is {periodic!r}: give "xy", "x" or "y"')
+    (x, y, z), (u, v, w) = corners
+    outline = np.array([[x, y], [u, y], [u, v], [x, v]])
+    axes = tuple("xy".index(axis) for axis in periodic)
+    return _cavity(z, w, _all_tags(tags, 4 - 2 * len(axes)), outline, np.zeros(2), None, axes)
+
+
+def periods_of(room: TriangleMesh | AnalyticCavity) -> np.ndarray:
+    """Sides along which a cavity is periodic [m], 0 where it is not, shape (3,)."""
+    return room.periods if isinstance(room, AnalyticCavity) else np.zeros(3)
+
+
 def _all_tags(tags: Sequence[int], sides: int) -> np.ndarray:
     """One tag for each surface; the tag of the first side is that of all, if only one is given."""
-    each = [*tags, *([tags[-1]] * (sides - 1) if len(tags) == SIDE + 1 else [])]
+    each = [*tags, *([tags[-1]] * (sides - 1) if sides and len(tags) == SIDE + 1 else [])]
     valid = all(tag == int(tag) and 0 <= tag < MAX_TAGS for tag in each)
     if len(each) != SIDE + sides or not valid:
         raise SceneError(
-            f"an analytical cavity's tags are {tuple(tags)}: give floor, ceiling and sides, "
-            f"0 to {MAX_TAGS - 1}"
+            f"an analytical cavity's tags are {tuple(tags)}: give floor, ceiling and "
+            f"{sides} sides, 0 to {MAX_TAGS - 1}"
         )
     return np.array(each, dtype=np.uint8)
 
@@ -242,13 +313,14 @@ def _cavity(
     outline: np.ndarray,
     centre: np.ndarray,
     radius: float | None,
+    periodic: tuple[int, ...] = (),
 ) -> AnalyticCavity:
     """A cavity with read-only arrays; raises SceneError unless the top is above the bottom."""
     if not (np.isfinite([bottom, top]).all() and bottom < top):
         raise SceneError(f"an analytical cavity from {bottom} to {top} m: top must be above bottom")
     for array in (outline, centre, tags):
         array.flags.writeable = False
-    return AnalyticCavity(float(bottom), float(top), tags, outline, centre, radius)
+    return AnalyticCavity(float(bottom), float(top), tags, outline, centre, radius, periodic)
 
 
 def build_analytic_table(
@@ -278,10 +350,10 @@ def build_analytic_table(
     low[:, 2] -= amplitude
     high[FLOOR, 2] = numbers[FLOOR, 3] + amplitude
     low[CEILING, 2] = -numbers[CEILING, 3]
-    ends = np.stack([cavity.outline, np.roll(cavity.outline, -1, axis=0)], axis=1) - middle[:2]
-    for side, both in enumerate(ends, SIDE):
+    for side, both in enumerate(cavity.edges - middle[:2], SIDE):
         moved = np.concatenate([both, both + radius * normals[side, :2]])
         low[side, :2], high[side, :2] = moved.min(axis=0), moved.max(axis=0)
+    low[:, cavity.periodic], high[:, cavity.periodic] = -UNBOUNDED, UNBOUNDED
     grow = face_overlap_of(radius)
     triangles = np.repeat(np.arange(count, dtype=np.int32)[:, None], 2, axis=1)
     return ObstacleTable(numbers, kinds, triangles, low - grow, high + grow)

@@ -5,7 +5,13 @@ from typing import NamedTuple
 import numpy as np
 
 from sim_core.effects.part_rotation import RotationAxis
-from sim_core.geometry.analytic import AnalyticCavity, CylinderAxis, build_analytic_table
+from sim_core.geometry.analytic import (
+    UNBOUNDED,
+    AnalyticCavity,
+    CylinderAxis,
+    build_analytic_table,
+    periods_of,
+)
 from sim_core.geometry.bvh import Tree, build_tree, join_trees
 from sim_core.geometry.flat_faces import LONE, FlatFaces, surface_triangles
 from sim_core.geometry.mesh import TriangleMesh
@@ -77,6 +83,8 @@ def _swept_bounds(
 ) -> np.ndarray:
     """The mesh's bounding box (2, 3) [m] about its middle, with all that its surfaces sweep."""
     low, high = mesh.bounds - mesh.middle
+    periodic = periods_of(mesh) > 0.0
+    low[periodic], high[periodic] = -UNBOUNDED, UNBOUNDED
     if axis is not None and isinstance(mesh, TriangleMesh):
         point = np.array(axis.point) - mesh.middle
         own = mesh.corners[mesh.tags == axis.tag] - mesh.middle

@@ -62,6 +62,7 @@ from sim_core.loop.impact_log import Impact, no_impact
 from sim_core.loop.state import BALLS, SONOTRODE, WALLS, SimulationState
 from sim_core.motion import BallEvent, BallState, change_velocity, free_fall_position, state_under
 from sim_core.numerics.jit import inlined
+from sim_core.numerics.periodic_sides import nearest_image
 from sim_core.numerics.vec3 import Flight, Touch, Vec3, dot, sub
 
 # Events of one ball in one window after which contact mode holds it still, and again after as many.
@@ -222,6 +223,7 @@ def collide(
     apart = sub(
         free_fall_position(motion, two.ball, time), free_fall_position(motion, one.ball, time)
     )
+    apart = nearest_image(state.sides, apart)
     closing = Vec3(
         motion[two.ball, 3] - motion[one.ball, 3],
         motion[two.ball, 4] - motion[one.ball, 4],

@@ -33,7 +33,14 @@ from sim_core.loop.event_handlers import (
     hold_jammed_ball,
 )
 from sim_core.loop.event_queue import SEARCH_ON, Meetings, forget_events, reschedule, shift_queue
-from sim_core.loop.impact_log import CollisionBuffer, is_full, log_collision, log_impact, no_impact
+from sim_core.loop.impact_log import (
+    Collision,
+    CollisionBuffer,
+    is_full,
+    log_collision,
+    log_impact,
+    no_impact,
+)
 from sim_core.loop.neighbours import (
     NeighbourFilter,
     follow,
@@ -46,9 +53,10 @@ from sim_core.loop.state import SEARCHES, STALE, SimulationState
 from sim_core.motion import BallEvent, shift_motion, state_under
 from sim_core.numerics import profiler
 from sim_core.numerics.jit import inlined, jit
+from sim_core.numerics.periodic_sides import nearest_image, put_back, top_speed
 from sim_core.numerics.profiler import add_time
 from sim_core.numerics.roots import NEVER
-from sim_core.numerics.vec3 import Flight
+from sim_core.numerics.vec3 import Flight, add_scaled, sub
 
 # status of advance(): why it has stopped
 DONE = 0  # the clock has come to clock.stop
@@ -81,7 +89,7 @@ NEVER_BEFORE = 1e300  # finite, so that differences with it stay numbers
 def advance(state: SimulationState) -> tuple[int, int]:
     """Simulate until ``clock.stop``, or until something stops the loop.
 
-    Returns: why it has stopped, see the status above, and the ball concerned.
+    Returns: why it has stopped, see the status above, and the ball concerned, -1 for any.
     """
     queue, clock, buffer = state.queue, state.clock, state.buffer
     event_limit = EVENT_LIMIT * clock.window
@@ -96,6 +104,8 @@ def advance(state: SimulationState) -> tuple[int, int]:
                 clock.now[0] = left
                 return DONE, -1
             _begin_window(state)
+            if top_speed(state.sides) > speed_limit(state.neighbours):
+                return TOO_FAST, -1
             continue
         if sort_is_due(state.neighbours, time):
             _sort_neighbours(state, time)
@@ -181,6 +191,7 @@ def _begin_window(state: SimulationState) -> None:
 @jit
 def _sort_neighbours(state: SimulationState, time: float) -> None:
     """Read the paths of all balls again, and sort many into blocks."""
+    put_back(state.sides, state.motion, time)
     refresh_neighbours(state.neighbours, state.motion, time)
     hide_all(state.contact, state.neighbours)
 
@@ -223,9 +234,13 @@ def _log_meeting(
     there = state_under(
         motion, partner, event.time, ball_acceleration(state.contact, partner, gravity)
     )
+    apart = nearest_image(state.sides, sub(there.position, here.position))
     radius = radius_of_ball(state.sizes, 0.5, ball)
     share = radius / (radius + radius_of_ball(state.sizes, 0.5, partner))
-    log_collision(buffer, event, partner, state.clock.origin, here, there, share)
+    closing = sub(there.velocity, here.velocity)
+    touched = add_scaled(here.position, share, apart)
+    collision = Collision(ball, partner, touched, apart, closing)
+    log_collision(buffer, event.time_since_start - state.clock.origin, collision)
 
 
 @inlined

@@ -8,10 +8,12 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from sim_core.geometry.analytic import AnalyticCavity
+from sim_core.geometry.mesh import TriangleMesh
 from sim_core.geometry.triangle_lookup import TriangleLookup, find_triangle
-from sim_core.motion import BallEvent, BallState
+from sim_core.motion import BallEvent
 from sim_core.numerics.jit import inlined
-from sim_core.numerics.vec3 import Vec3, add_scaled, dot, scaled, set_vec3, sub
+from sim_core.numerics.vec3 import Vec3, dot, scaled, set_vec3
 
 BUFFER_SIZE = 65_536  # rows that the compiled loop writes before handing them over
 
@@ -158,35 +160,35 @@ def is_full(buffer: CollisionBuffer | None) -> bool:
     return bool(buffer.filled[0] == len(buffer.time))
 
 
-@inlined
-def log_collision(
-    buffer: CollisionBuffer,
-    event: BallEvent,
-    partner: int,
-    origin: float,
-    here: BallState,
-    there: BallState,
-    share: float,
-) -> None:
-    """Write a collision down if it is one: balls in touch may part.
+class Collision(NamedTuple):
+    """Two balls that meet; no collision if they are in touch and part.
 
-    Args:
-        origin: zero of the times [s].
-        here, there: the ball and its partner before.
-        share: radius of the ball over the sum of both.
+    position: where they touch [m]. apart: from ball one to ball two [m]. velocity: of ball two
+    relative to ball one, before [m/s].
     """
-    apart, closing = sub(there.position, here.position), sub(there.velocity, here.velocity)
+
+    one: int
+    two: int
+    position: Vec3
+    apart: Vec3
+    velocity: Vec3
+
+
+@inlined
+def log_collision(buffer: CollisionBuffer, time: float, collision: Collision) -> None:
+    """Write a collision down; ``time`` [s] as in CollisionLog."""
+    apart = collision.apart
     distance = np.sqrt(dot(apart, apart))
-    speed = -dot(apart, closing) / distance
+    speed = -dot(apart, collision.velocity) / distance
     if not (buffer.record[0] and speed > 0.0):
         return
     row = buffer.filled[0]
-    buffer.time[row] = event.time_since_start - origin
-    buffer.one[row] = event.ball
-    buffer.two[row] = partner
-    set_vec3(buffer.position, row, add_scaled(here.position, share, apart))
+    buffer.time[row] = time
+    buffer.one[row] = collision.one
+    buffer.two[row] = collision.two
+    set_vec3(buffer.position, row, collision.position)
     set_vec3(buffer.normal, row, scaled(1.0 / distance, apart))
-    set_vec3(buffer.velocity, row, closing)
+    set_vec3(buffer.velocity, row, collision.velocity)
     buffer.normal_speed[row] = speed
     buffer.filled[0] = row + 1
 
@@ -226,10 +228,12 @@ def empty_buffer(buffer: ImpactBuffer | CollisionBuffer, kind: type[Log]) -> Log
     return kind(**{name: getattr(buffer, name)[:rows].copy() for name in names})
 
 
-def joined(logs: list[Log], centre: np.ndarray) -> Log:
-    """Several logs as one, in order; ``centre`` [m] is added to the positions."""
+def joined(logs: list[Log], room: TriangleMesh | AnalyticCavity) -> Log:
+    """Several logs as one, in order, with positions in the room."""
     kind = type(logs[0])
     names = kind.__dataclass_fields__
     whole = kind(**{name: np.concatenate([vars(log)[name] for log in logs]) for name in names})
-    whole.position[:] += centre
+    whole.position[:] += room.middle
+    if isinstance(room, AnalyticCavity):
+        whole.position[:] = room.put_back(whole.position)
     return whole

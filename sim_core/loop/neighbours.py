@@ -27,8 +27,24 @@ from sim_core.loop.spatial_blocks import (
 )
 from sim_core.motion import free_fall_position
 from sim_core.numerics.jit import inlined, jit
-from sim_core.numerics.roots import NEVER
-from sim_core.numerics.simd import BOXES, LANES, balls_near, balls_near_until, boxes_hit, lowest_bit
+from sim_core.numerics.periodic_sides import (
+    PeriodicSides,
+    horizon,
+    images,
+    nearest_image,
+    note_all_speeds,
+    note_speed,
+)
+from sim_core.numerics.simd import (
+    BOXES,
+    LANES,
+    balls_near,
+    balls_near_until,
+    boxes_hit,
+    images_near,
+    images_near_until,
+    lowest_bit,
+)
 from sim_core.numerics.vec3 import Vec3, sub
 
 FAR_SHARE = np.float32(1.0 - 1e-6)  # of distance²: float32 loses 2e-7 of it in the miss distance
@@ -48,11 +64,12 @@ class NeighbourFilter(NamedTuple):
     paths: base position and velocity, a column a ball, (6, m) float32, padded with NaN, which meets
         nothing.
     probe: the column of the ball whose meetings are searched, its time, and what the filter allows
-        for rounding; when the search ends, and the square of a distance within reach, (12,)
-        float32.
+        for rounding; when the search ends, and the square of a distance within reach; for
+        periodic sides see simd.py, (17,) float32.
     reach: sum of two radii [m]; of several sizes that of the largest.
     max_speed: speed up to which the margins for rounding are good [m/s].
     window: [s]. blocks: only for many balls. radii: only for several sizes [m], (n,).
+    sides: None unless the box is periodic.
     """
 
     paths: np.ndarray
@@ -62,6 +79,7 @@ class NeighbourFilter(NamedTuple):
     window: float
     blocks: Blocks | None
     radii: np.ndarray | None = None
+    sides: PeriodicSides | None = None
 
 
 def new_neighbour_filter(
@@ -72,22 +90,27 @@ def new_neighbour_filter(
     max_speed: float,
     window: float,
     radii: np.ndarray | None = None,
+    sides: PeriodicSides | None = None,
 ) -> NeighbourFilter:
     """The filter for balls with this motion (n, 6) in a room from ``low`` to ``high`` (3,) [m]."""
-    # A base position lies up to one window's flight outside the room.
-    farthest = float(np.max(high - low)) + max_speed * window
+    # A base position lies up to one window's flight outside the room, and up to two where the ball
+    # itself may be outside it.
+    flights = 1.0 if sides is None else 2.0
+    farthest = float(np.max(high - low)) + flights * max_speed * window
     margin = ROUNDINGS * farthest
-    probe = np.zeros(12, dtype=np.float32)
+    probe = np.zeros(17, dtype=np.float32)
     # the last: up to this b w + t w² may be of a ball that still approaches
     probe[7:10] = (FAR_SHARE, -((reach + margin) ** 2), margin * max_speed)
+    if sides is not None:
+        probe[13:17] = sides[:4]
     probe[11] = (reach + margin) ** 2 + SQUARE_ROUNDINGS * farthest**2
     paths = np.full((6, -(-len(motion) // LANES) * LANES), np.nan, dtype=np.float32)
     blocks = (
-        new_blocks(len(motion), low, high, reach + 2.0 * margin, window)
+        new_blocks(len(motion), low, high, reach + 2.0 * margin, window, sides)
         if len(motion) >= MIN_BALLS
         else None
     )
-    neighbours = NeighbourFilter(paths, probe, reach, max_speed, window, blocks, radii)
+    neighbours = NeighbourFilter(paths, probe, reach, max_speed, window, blocks, radii, sides)
     refresh_neighbours(neighbours, motion, 0.0)
     return neighbours
 
@@ -97,6 +120,7 @@ def refresh_neighbours(neighbours: NeighbourFilter | None, motion: np.ndarray, t
     """Read the paths of all balls again, at a window's start or when they are sorted again."""
     if neighbours is None:
         return
+    note_all_speeds(neighbours.sides, motion)
     sort_blocks(neighbours.blocks, motion, time, neighbours.window)
     for ball in range(len(motion)):
         _write_path(neighbours, motion, ball)
@@ -124,6 +148,7 @@ def follow(neighbours: NeighbourFilter | None, motion: np.ndarray, ball: int, ti
     if neighbours is None:
         return
     _write_path(neighbours, motion, ball)
+    note_speed(neighbours.sides, motion, ball)
     widen(neighbours.blocks, motion, ball, time)
 
 
@@ -162,14 +187,49 @@ def next_meeting(
     """Time [s] and partner of the ball's first meeting after ``time`` and before ``before``.
 
     If there is none, the partner is -1 and the time is that up to which this is known: NEVER for
-    few balls, for many that until which their blocks hold.
+    few balls, for many that until which their blocks hold, and no later than the horizon of
+    periodic sides.
     """
     probe = neighbours.probe
     column = column_of(neighbours.blocks, ball)
     for k in range(6):
         probe[k] = neighbours.paths[k, column]
     probe[6] = np.float32(time)
-    return _search(neighbours.blocks, neighbours, motion, ball, time, before)
+    _aim_at_images(neighbours.sides, probe)
+    known = time + horizon(neighbours.sides, motion, ball, neighbours.reach)
+    return _search(neighbours.blocks, neighbours, motion, ball, time, before, known)
+
+
+@inlined
+def _aim_at_images(sides: PeriodicSides | None, probe: np.ndarray) -> None:
+    """Let the filter count time from now on, as it takes the nearest images of now."""
+    if sides is None:
+        return
+    probe[12] = probe[6]
+    probe[6] = np.float32(0.0)
+
+
+@inlined
+def _near(sides: PeriodicSides | None, paths: np.ndarray, first: int, probe: np.ndarray) -> int:
+    if sides is None:
+        return balls_near(paths, first, probe)
+    return images_near(paths, first, probe)
+
+
+@inlined
+def _near_until(
+    sides: PeriodicSides | None,
+    paths: np.ndarray,
+    first: int,
+    probe: np.ndarray,
+    time: float,
+    delay: float,
+) -> int:
+    if sides is None:
+        probe[10] = np.float32(time + delay) * SLACK
+        return balls_near_until(paths, first, probe)
+    probe[10] = np.float32(delay) * SLACK
+    return images_near_until(paths, first, probe)
 
 
 @inlined
@@ -180,50 +240,63 @@ def _search(
     ball: int,
     time: float,
     before: float,
+    known: float,
 ) -> tuple[float, int]:
-    """What next_meeting returns, from all columns or the blocks that the ball's path enters."""
+    """What next_meeting returns, from all columns or the blocks that the ball's path enters.
+
+    Args:
+        known: end of the horizon [s].
+    """
     if blocks is None:
         here = free_fall_position(motion, ball, time)
         velocity = Vec3(motion[ball, 3], motion[ball, 4], motion[ball, 5])
-        best = before - time
+        best = min(before, known) - time
         partner = -1
         for first in range(0, len(motion), LANES):
-            near = _without(balls_near(neighbours.paths, first, neighbours.probe), ball - first)
+            near = _near(neighbours.sides, neighbours.paths, first, neighbours.probe)
+            near = _without(near, ball - first)
             while near != 0:
                 other = first + lowest_bit(near)
                 near &= near - 1
                 closing = sub(Vec3(motion[other, 3], motion[other, 4], motion[other, 5]), velocity)
                 reach = _pair_reach(neighbours.radii, neighbours.reach, ball, other)
-                delay = pair_delay(
-                    sub(free_fall_position(motion, other, time), here), closing, reach
-                )
+                apart = sub(free_fall_position(motion, other, time), here)
+                delay = pair_delay(nearest_image(neighbours.sides, apart), closing, reach)
                 if delay < best:
                     best = delay
                     partner = other
         if partner < 0:
-            return NEVER, -1
+            return known, -1
         return time + best, partner
-    best, partner = min(before, blocks.until[0]) - time, -1
+    known = min(known, blocks.until[0])
+    best, partner = min(before, known) - time, -1
     _aim(blocks.ray, motion, ball, time)
     column = column_of(blocks, ball)
     own = column // LANES  # first: whom it meets there leaves a shorter path to look along
     best, partner = _best_in_block(neighbours, motion, ball, time, own, best, partner)
-    for group in range(len(blocks.groups)):
-        nodes = boxes_hit(blocks.groups, group, blocks.ray, np.float32(best) * SLACK, blocks.enter)
-        while nodes != 0:
-            node = BOXES * group + lowest_bit(nodes)
-            nodes &= nodes - 1
-            entered = boxes_hit(
-                blocks.boxes, node, blocks.ray, np.float32(best) * SLACK, blocks.enter
-            )
-            while entered != 0:
-                block = BOXES * node + lowest_bit(entered)
-                entered &= entered - 1
-                if block != own:
-                    best, partner = _best_in_block(
-                        neighbours, motion, ball, time, block, best, partner
-                    )
-    return (time + best, partner) if partner >= 0 else (blocks.until[0], -1)
+    x, last_x, first_y, last_y = images(neighbours.sides, motion, ball, time, time + best)
+    while x <= last_x:
+        y = first_y
+        while y <= last_y:
+            _aim_from_image(neighbours.sides, blocks.ray, motion, ball, time, x, y)
+            for group in range(len(blocks.groups)):
+                longest = np.float32(best) * SLACK
+                nodes = boxes_hit(blocks.groups, group, blocks.ray, longest, blocks.enter)
+                while nodes != 0:
+                    node = BOXES * group + lowest_bit(nodes)
+                    nodes &= nodes - 1
+                    longest = np.float32(best) * SLACK
+                    entered = boxes_hit(blocks.boxes, node, blocks.ray, longest, blocks.enter)
+                    while entered != 0:
+                        block = BOXES * node + lowest_bit(entered)
+                        entered &= entered - 1
+                        if block != own:
+                            best, partner = _best_in_block(
+                                neighbours, motion, ball, time, block, best, partner
+                            )
+            y += 1
+        x += 1
+    return (time + best, partner) if partner >= 0 else (known, -1)
 
 
 @jit
@@ -238,8 +311,7 @@ def _best_in_block(
 ) -> tuple[float, int]:
     """The earlier of the best meeting so far (a delay [s]) and those in a block."""
     first = LANES * block
-    neighbours.probe[10] = np.float32(time + best) * SLACK
-    near = balls_near_until(neighbours.paths, first, neighbours.probe)
+    near = _near_until(neighbours.sides, neighbours.paths, first, neighbours.probe, time, best)
     near = _without(near, column_of(neighbours.blocks, ball) - first)
     if near != 0:
         best, partner = _nearest(neighbours, motion, ball, time, first, near, best, partner)
@@ -260,6 +332,24 @@ def _aim(ray: np.ndarray, motion: np.ndarray, ball: int, time: float) -> None:
         speed = motion[ball, 3 + axis]
         ray[axis] = ray[3 + axis] = np.float32(here[axis])
         ray[6 + axis] = np.float32(1.0 / (speed if abs(speed) >= TINY else TINY))
+
+
+@inlined
+def _aim_from_image(
+    sides: PeriodicSides | None,
+    ray: np.ndarray,
+    motion: np.ndarray,
+    ball: int,
+    time: float,
+    x: int,
+    y: int,
+) -> None:
+    """Move the origin of ``ray`` to an image of the ball, so many sides away along x and y."""
+    if sides is None:
+        return
+    here = free_fall_position(motion, ball, time)
+    ray[0] = ray[3] = np.float32(here.x + x * sides.x)
+    ray[1] = ray[4] = np.float32(here.y + y * sides.y)
 
 
 @inlined
@@ -284,7 +374,8 @@ def _nearest(
         near &= near - 1
         closing = sub(Vec3(motion[other, 3], motion[other, 4], motion[other, 5]), velocity)
         reach = _pair_reach(neighbours.radii, neighbours.reach, ball, other)
-        delay = pair_delay(sub(free_fall_position(motion, other, time), here), closing, reach)
+        apart = sub(free_fall_position(motion, other, time), here)
+        delay = pair_delay(nearest_image(neighbours.sides, apart), closing, reach)
         if delay < best or (delay == best and other < partner):
             best = delay
             partner = other

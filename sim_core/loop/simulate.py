@@ -19,7 +19,7 @@ from sim_core.effects.restitution import checked_restitution
 from sim_core.effects.sonotrodes import clock_window, new_waves
 from sim_core.effects.vibration import checked_waves
 from sim_core.errors import SceneError, SimulationError
-from sim_core.geometry.analytic import AnalyticCavity
+from sim_core.geometry.analytic import AnalyticCavity, periods_of
 from sim_core.geometry.ball_sizes import new_ball_sizes
 from sim_core.geometry.mesh import MAX_TAGS
 from sim_core.geometry.obstacle_set import build_obstacle_set
@@ -40,6 +40,7 @@ from sim_core.loop.neighbours import NeighbourFilter, new_neighbour_filter
 from sim_core.loop.state import Clock, SimulationState
 from sim_core.motion import WINDOW
 from sim_core.numerics.computed_once import computed_once
+from sim_core.numerics.periodic_sides import new_periodic_sides
 from sim_core.scene.frames import Frames, frames_of
 from sim_core.scene.invariants import beneath_mean_plane, contained, narrowest_gap, turned_corners
 from sim_core.scene.scene import TOUCH, Scene
@@ -104,12 +105,12 @@ def simulate(scene: Scene, frames: Sequence[float] | np.ndarray = ()) -> Simulat
     balls, state = run.balls(), run.state
     still = resting(state.contact, state.obstacles, balls.positions, run.centre, scene.warmup)
     return SimulationResult(
-        impacts=joined(run.logs, run.centre),
+        impacts=joined(run.logs, scene.mesh),
         balls=balls,
         collisions=Collisions(*(int(n) for n in state.counts)),
         resting=still,
         frames=frames_of(times, noted, balls),
-        ball_collisions=joined(run.meetings, run.centre) if run.meetings else None,
+        ball_collisions=joined(run.meetings, scene.mesh) if run.meetings else None,
         time=scene.start_time + end,
     )
 
@@ -202,6 +203,7 @@ class Simulation:
             sizes=new_ball_sizes(balls, obstacles.roots),
             waves=sonotrodes,
             collision_buffer=new_collision_buffer(scene.record_collisions),
+            sides=new_periodic_sides(periods_of(scene.mesh)),
         )
         max_speed = 2.0 * max(1.0, float(np.abs(balls.velocities).max()))
         return state._replace(neighbours=self._new_filter(state, max_speed))
@@ -221,8 +223,9 @@ class Simulation:
         low, high = self.scene.mesh.bounds - self.centre
         balls, window = self.scene.balls, state.clock.window
         radii = None if balls.alike else 0.5 * balls.diameters
+        reach, sides = 2.0 * balls.radius, state.sides
         neighbours = new_neighbour_filter(
-            state.motion, low, high, 2.0 * balls.radius, max_speed, window, radii
+            state.motion, low, high, reach, max_speed, window, radii, sides
         )
         hide_all(state.contact, neighbours)
         return neighbours
@@ -273,7 +276,8 @@ class Simulation:
             if status == BUFFER_FULL:
                 self._empty_buffers()
             elif status == TOO_FAST:
-                speed = float(np.abs(self.state.motion[ball, 3:]).max())
+                fast = self.state.motion[ball if ball >= 0 else slice(None), 3:]
+                speed = float(np.abs(fast).max())
                 if not math.isfinite(speed):
                     raise SimulationError(
                         f"ball {ball}: its velocity is not a number any more; {self._when()}"
@@ -308,6 +312,8 @@ class Simulation:
         velocities_now = velocities + now * acceleration
         apply_drag_to_all(state.drag, state.contact, velocities_now, now)
         positions = base + velocities * now + 0.5 * now * now * acceleration + self.centre
+        if isinstance(self.scene.mesh, AnalyticCavity):
+            positions = self.scene.mesh.put_back(positions)
         return positions, velocities_now
 
     def _require_sound(self) -> None:
@@ -322,7 +328,7 @@ class Simulation:
             raise self._left(int(outside[0]))
         if self.state.neighbours is None:
             return
-        gap, one, two = narrowest_gap(self.balls())
+        gap, one, two = narrowest_gap(self.balls(), self.scene.mesh)
         if gap < -TOUCH:
             raise SimulationError(
                 f"balls {one} and {two} overlap by {-gap:.3g} m, {self._when()}; "

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim_core.numerics.jit import inlined, jit
+from sim_core.numerics.periodic_sides import PeriodicSides, forget_extent, note_extent, time_in_box
 from sim_core.numerics.simd import BOXES, LANES
 
 # Number of balls from which blocks pay. With fewer, in a chamber that the shot crosses in one
@@ -37,6 +38,7 @@ class Blocks(NamedTuple):
         the window's clock], (1,).
     interval: how long that was meant to be [s], (1,). changes: of paths since then, (1,) int64.
     low, scale: where the curve begins [m], (3,), and its steps [1/m].
+    sides: None unless the box is periodic.
     code, starts, ray, enter: working space.
     """
 
@@ -53,12 +55,18 @@ class Blocks(NamedTuple):
     low: np.ndarray
     scale: float
     margin: float
+    sides: PeriodicSides | None
     ray: np.ndarray
     enter: np.ndarray
 
 
 def new_blocks(
-    balls: int, low: np.ndarray, high: np.ndarray, margin: float, window: float
+    balls: int,
+    low: np.ndarray,
+    high: np.ndarray,
+    margin: float,
+    window: float,
+    sides: PeriodicSides | None = None,
 ) -> Blocks:
     """Blocks of balls in a room from ``low`` to ``high`` (3,) [m]; to be sorted before use."""
     columns = -(-balls // LANES) * LANES
@@ -77,6 +85,7 @@ def new_blocks(
         np.array(low, dtype=np.float64),
         float((1 << BITS) / np.max(np.asarray(high) - low)),
         float(margin),
+        sides,
         np.zeros(9, dtype=np.float32),
         np.zeros(BOXES, dtype=np.float32),
     )
@@ -120,7 +129,7 @@ def sort_blocks(blocks: Blocks | None, motion: np.ndarray, time: float, window: 
         wanted = lasted * CHANGES * len(motion) / max(changes, 1)
         blocks.interval[0] = min(max(wanted, 0.25 * lasted), 2.0 * blocks.interval[0], window)
     blocks.sorted_at[0] = time
-    blocks.until[0] = min(time + blocks.interval[0], window)
+    blocks.until[0] = min(time + min(blocks.interval[0], time_in_box(blocks.sides)), window)
     blocks.starts[:] = 0
     for ball in range(len(motion)):
         code = _place_on_curve(
@@ -134,6 +143,7 @@ def sort_blocks(blocks: Blocks | None, motion: np.ndarray, time: float, window: 
         blocks.starts[code] += blocks.starts[code - 1]
     blocks.boxes[:] = FAR
     blocks.groups[:] = FAR
+    forget_extent(blocks.sides)
     for ball in range(len(motion)):
         column = blocks.starts[blocks.code[ball]]
         blocks.starts[blocks.code[ball]] += 1
@@ -205,6 +215,7 @@ def widen(blocks: Blocks | None, motion: np.ndarray, ball: int, time: float) -> 
         end = motion[ball, axis] + motion[ball, 3 + axis] * blocks.until[0]
         low = np.float32(min(start, end) - blocks.margin)
         high = np.float32(max(start, end) + blocks.margin)
+        note_extent(blocks.sides, axis, low, high)
         _stretch(blocks.boxes, node, axis, child, low, high)
         _stretch(blocks.groups, group, axis, place, low, high)
 

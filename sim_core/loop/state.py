@@ -20,6 +20,7 @@ from sim_core.geometry.obstacle_set import ObstacleSet
 from sim_core.loop.event_queue import EventQueue
 from sim_core.loop.impact_log import CollisionBuffer, ImpactBuffer
 from sim_core.loop.neighbours import NeighbourFilter
+from sim_core.numerics.periodic_sides import PeriodicSides
 from sim_core.numerics.profiler import Profiler
 
 # places in SimulationState.counts: hits on walls, on balls and on the sonotrode, searches for a
@@ -49,6 +50,7 @@ class SimulationState(NamedTuple):
     neighbours: the filter made of it, None where balls do not collide with one another.
     counts: of events, (5,) int64, see WALLS.
     collision_buffer: None unless collisions of balls are logged.
+    sides: None unless the box is periodic.
     profiler: None unless the loop is measured.
     """
 
@@ -73,3 +75,4 @@ class SimulationState(NamedTuple):
     sizes: BallSizes | None
     waves: SonotrodeWaves | None
     collision_buffer: CollisionBuffer | None
+    sides: PeriodicSides | None

@@ -61,6 +61,14 @@ class _Vectors:
         )
         return self.builder.call(function, [a, b, c])
 
+    def rounded(self, a: Any) -> Any:
+        """a rounded to whole numbers."""
+        kind = ir.FunctionType(self.type, [self.type])
+        function = cgutils.get_or_insert_function(
+            self.builder.module, kind, f"llvm.rint.v{self.width}f32"
+        )
+        return self.builder.call(function, [a])
+
     def sum(self, total: Any | None, a: Any, b: Any) -> Any:
         """total + a b, or a b when there is no total yet."""
         return self.builder.fmul(a, b) if total is None else self.fused(a, b, total)
@@ -122,9 +130,9 @@ def _boxes_hit_numpy(bounds: Any, node: int, ray: Any, longest: Any, enter: Any)
 
 
 def _near_filter(
-    lanes: Any, probe: Any, limited: bool
+    lanes: Any, probe: Any, limited: bool, periodic: bool = False
 ) -> tuple[Any, Callable[[Any, Any, Any, Any], Any]]:
-    """Signature and code of balls_near, or if ``limited`` of balls_near_until."""
+    """Signature and code of balls_near or images_near, or if ``limited`` of the other two."""
     signature = types.int64(lanes, types.int64, probe)
 
     def codegen(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
@@ -153,6 +161,11 @@ def _near_filter(
                 )
                 apart = builder.fsub(place, number(axis))
                 relative = builder.fsub(velocity, number(3 + axis))
+                if periodic:
+                    apart = v.fused(relative, number(12), apart)
+                if periodic and axis < 2:
+                    whole = v.rounded(builder.fmul(apart, number(15 + axis)))
+                    apart = v.fused(builder.fneg(whole), number(13 + axis), apart)
                 square = v.sum(square, apart, apart)
                 closing = v.sum(closing, apart, relative)
                 speed = v.sum(speed, relative, relative)
@@ -191,11 +204,26 @@ def _balls_near_until(typing_context: Any, lanes: Any, first: Any, probe: Any) -
     return _near_filter(lanes, probe, limited=True)
 
 
-def _balls_near_numpy(lanes: Any, first: int, probe: Any, limited: bool = False) -> int:
+@intrinsic
+def _images_near(typing_context: Any, lanes: Any, first: Any, probe: Any) -> Any:
+    return _near_filter(lanes, probe, limited=False, periodic=True)
+
+
+@intrinsic
+def _images_near_until(typing_context: Any, lanes: Any, first: Any, probe: Any) -> Any:
+    return _near_filter(lanes, probe, limited=True, periodic=True)
+
+
+def _balls_near_numpy(
+    lanes: Any, first: int, probe: Any, limited: bool = False, periodic: bool = False
+) -> int:
     block = lanes[:, first : first + LANES]
     with np.errstate(over="ignore", invalid="ignore"):
         apart = block[0:3] - probe[0:3, None]
         relative = block[3:6] - probe[3:6, None]
+        if periodic:
+            apart += relative * probe[12]
+            apart[:2] -= np.rint(apart[:2] * probe[15:17, None]) * probe[13:15, None]
         square = (apart * apart).sum(axis=0)
         closing = (apart * relative).sum(axis=0)
         speed = (relative * relative).sum(axis=0)
@@ -243,10 +271,17 @@ _plain = _settings.DISABLE_JIT
 #   longest: end of the flight [s] float32; enter: entry times [s], shape (8,) float32, written
 boxes_hit: Any = _boxes_hit_numpy if _plain else _boxes_hit
 # balls_near(lanes, first, probe) -> bit mask of the LANES balls that may meet the probe
-#   lanes: positions and velocities, shape (6, n) float32; first: lane; probe: shape (12,) float32
+#   lanes: positions and velocities, shape (6, n) float32; first: lane; probe: shape (17,) float32
 balls_near: Any = _balls_near_numpy if _plain else _balls_near
 # balls_near_until: the same without those that cannot meet before the time probe[10]
 balls_near_until: Any = partial(_balls_near_numpy, limited=True) if _plain else _balls_near_until
+# images_near, images_near_until: the same for the nearest images, at the time probe[12], in a box
+#   with sides probe[13:15] along x and y, whose inverses are probe[15:17]; all other times count
+#   from there
+images_near: Any = partial(_balls_near_numpy, periodic=True) if _plain else _images_near
+images_near_until: Any = (
+    partial(_balls_near_numpy, limited=True, periodic=True) if _plain else _images_near_until
+)
 lowest_bit: Any = _lowest_bit_numpy if _plain else _lowest_bit
 # ticks() -> the processor's clock, in its own unit
 ticks: Any = time.perf_counter_ns if _plain else _ticks

@@ -9,6 +9,10 @@ from sim_core.geometry.analytic import CEILING, FLOOR, AnalyticCavity
 from sim_core.scene.narrow_gaps import TIGHT
 from sim_core.scene.physics import Physics
 
+# Of the largest ball, the smallest side of a periodic box. From two on, no ball can touch another
+# on both sides, but the closer to two, the shorter is what a prediction can look ahead.
+MIN_DIAMETERS = 3.0
+
 
 def require_supported(cavity: AnalyticCavity, physics: Physics) -> None:
     """Raise SceneError for effects that are not supported in an analytical cavity."""
@@ -55,6 +59,7 @@ def require_clear(
     That is one outside the cavity, one that overlaps a surface by more than ``touch`` [m], and one
     wider than the cavity where it is narrowest. The vibrating floor is where its phase has it.
     """
+    _require_inside_periods(cavity, balls)
     gap, radii = cavity.gaps(balls.positions), 0.5 * balls.diameters
     amplitude = 0.0
     for vibration in vibrations:
@@ -80,4 +85,23 @@ def require_clear(
             raise SceneError(
                 f"ball {int(radii.argmax())} does not fit {between}: the gap is narrower than the "
                 f"ball by {2.0 * radii.max() - room:.3g} m; widen it or make the ball smaller"
+            )
+
+
+def _require_inside_periods(cavity: AnalyticCavity, balls: Balls) -> None:
+    """Raise SceneError for a ball outside a periodic box, and for a box too small for the balls."""
+    low, high = cavity.bounds
+    for axis in cavity.periodic:
+        name, side, least = "xyz"[axis], high[axis] - low[axis], MIN_DIAMETERS * 2.0 * balls.radius
+        if side < least:
+            raise SceneError(
+                f"the periodic box is {side:.3g} m wide along {name}: give it {least:.3g} m or "
+                f"more, {MIN_DIAMETERS:g} diameters of the largest ball, or make balls smaller"
+            )
+        place = balls.positions[:, axis]
+        outside = np.flatnonzero((place < low[axis]) | (place > high[axis]))
+        if len(outside):
+            raise SceneError(
+                f"ball {outside[0]} at {balls.positions[outside[0]].tolist()} m is outside the "
+                f"periodic box along {name}: put it back by whole sides of {side:.6g} m"
             )

@@ -5,7 +5,7 @@ energy and momentum by their sums.
 """
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -19,12 +19,17 @@ from sim_core.effects.part_rotation import (
     rotate_points,
 )
 from sim_core.effects.vibration import Vibration
+from sim_core.geometry.analytic import AnalyticCavity, periods_of
 from sim_core.geometry.mesh import TriangleMesh
 from sim_core.numerics.computed_once import computed_once
 from sim_core.numerics.jit import jit
 from sim_core.numerics.vec3 import Vec3, cross, dot, sub
 from sim_core.scene.frames import Frames, energies
 
+if TYPE_CHECKING:
+    from scipy.spatial import KDTree
+
+Room = TriangleMesh | AnalyticCavity
 # Directions that no designer's edge is parallel to, so that a ray through an edge or corner is
 # rare; where it happens, the next direction is tried.
 RAYS = np.array([[0.3671, 0.2113, 0.9058], [-0.5317, 0.7411, 0.4098], [0.6119, -0.4733, -0.6337]])
@@ -341,36 +346,53 @@ def clearance(corners: np.ndarray, points: np.ndarray, reach: float) -> np.ndarr
     return gap
 
 
-def closest_pair(balls: Balls) -> tuple[float, int, int]:
-    """Smallest centre distance [m], and of which two balls; (inf, -1, -1) for a single ball."""
+def closest_pair(balls: Balls, room: Room | None = None) -> tuple[float, int, int]:
+    """Smallest centre distance [m], and of which two balls; (inf, -1, -1) for a single ball.
+
+    Args:
+        balls: any.
+        room: counts where it is periodic.
+    """
     if len(balls) < 2:
         return math.inf, -1, -1
-    from scipy.spatial import KDTree
-
-    distance, partner = KDTree(balls.positions).query(balls.positions, k=2)
+    tree = _pair_tree(balls, room)
+    distance, partner = tree.query(tree.data, k=2)
     one = int(distance[:, 1].argmin())
     two = int(partner[one, 1])  # of balls in one place, the first may be either one
     return float(distance[one, 1]), one, two if two != one else int(partner[one, 0])
 
 
-def narrowest_gap(balls: Balls) -> tuple[float, int, int]:
+def narrowest_gap(balls: Balls, room: Room | None = None) -> tuple[float, int, int]:
     """Smallest gap [m] between two balls, negative when they overlap, and which two.
 
     (inf, -1, -1) for a single ball, and for balls of several sizes if no two are nearer than the
-    largest diameter.
+    largest diameter. The room counts where it is periodic.
     """
     if np.ndim(balls.diameter) == 0:
-        distance, one, two = closest_pair(balls)
+        distance, one, two = closest_pair(balls, room)
         return distance - float(balls.diameter), one, two
-    from scipy.spatial import KDTree
-
-    pairs = KDTree(balls.positions).query_pairs(2.0 * balls.radius, output_type="ndarray")
+    pairs = _pair_tree(balls, room).query_pairs(2.0 * balls.radius, output_type="ndarray")
     if len(pairs) == 0:
         return math.inf, -1, -1
-    apart = np.linalg.norm(balls.positions[pairs[:, 0]] - balls.positions[pairs[:, 1]], axis=1)
-    gap = apart - 0.5 * balls.diameters[pairs].sum(axis=1)
+    apart = balls.positions[pairs[:, 0]] - balls.positions[pairs[:, 1]]
+    sides = np.zeros(3) if room is None else periods_of(room)
+    apart -= sides * np.rint(apart / np.where(sides > 0.0, sides, np.inf))
+    gap = np.linalg.norm(apart, axis=1) - 0.5 * balls.diameters[pairs].sum(axis=1)
     worst = int(gap.argmin())
     return float(gap[worst]), int(pairs[worst, 0]), int(pairs[worst, 1])
+
+
+def _pair_tree(balls: Balls, room: Room | None) -> "KDTree":
+    """A tree of the centres, on a torus where the room is periodic."""
+    from scipy.spatial import KDTree
+
+    if not isinstance(room, AnalyticCavity) or not room.periods.any():
+        return KDTree(balls.positions)
+    places, sides = balls.positions - room.bounds[0], room.periods
+    for axis in room.periodic:  # below the side, where rounding would put them on it
+        within = np.mod(places[:, axis], sides[axis])
+        places[:, axis] = np.minimum(within, np.nextafter(sides[axis], 0.0))
+    return KDTree(places, boxsize=sides)
 
 
 def energy(balls: Balls, gravity: Gravity | None = None) -> float:

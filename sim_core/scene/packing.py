@@ -11,7 +11,7 @@ import numpy as np
 
 from sim_core.effects.part_rotation import PartRotation
 from sim_core.errors import SceneError
-from sim_core.geometry.analytic import AnalyticCavity
+from sim_core.geometry.analytic import AnalyticCavity, periods_of
 from sim_core.geometry.mesh import TriangleMesh
 from sim_core.numerics.jit import jit
 from sim_core.scene.invariants import clearance, contained, enclosed, triangles_near, turned_corners
@@ -61,7 +61,7 @@ def pack_balls(
             "diameter, or one each"
         )
     each = np.broadcast_to(sizes, int(count))
-    placed = _PlacedBalls(len(each), 2.0 * (0.5 * float(each.max()) + GAP))
+    placed = _PlacedBalls(len(each), 2.0 * (0.5 * float(each.max()) + GAP), periods_of(mesh))
     select_free = _free_selector(mesh, part_rotation)
     positions = np.empty((int(count), 3))
     for size in np.unique(each)[::-1]:
@@ -111,7 +111,8 @@ def _place(placed: "_PlacedBalls", layer: _Layer, count: int, rng: np.random.Gen
     mesh, diameter = layer.mesh, layer.diameter
     radius = 0.5 * diameter + GAP
     reach = radius + layer.clear
-    low, high = mesh.bounds[0] + reach, mesh.bounds[1] - reach
+    reach_of_walls = np.where(periods_of(mesh) > 0.0, 0.0, reach)
+    low, high = mesh.bounds[0] + reach_of_walls, mesh.bounds[1] - reach_of_walls
     low[2] = max(low[2], layer.floor + reach)
     if (high < low).any():
         raise SceneError(
@@ -140,9 +141,12 @@ def _place(placed: "_PlacedBalls", layer: _Layer, count: int, rng: np.random.Gen
 class _PlacedBalls:
     """Balls that do not overlap, in chains of those whose centres are in grid cells of one hash."""
 
-    def __init__(self, most: int, edge: float) -> None:
-        """Make room for so many balls in cells ``edge`` [m] wide, twice the largest radius."""
-        self.count, self.edge = 0, edge
+    def __init__(self, most: int, edge: float, periods: np.ndarray) -> None:
+        """Make room for so many balls in cells ``edge`` [m] wide, twice the largest radius.
+
+        ``periods`` (3,) [m]: sides along which the room is periodic, else 0.
+        """
+        self.count, self.edge, self.periods = 0, edge, periods
         self.points, self.radii = np.zeros((most, 3)), np.zeros(most)
         self.newest = np.full(1 << most.bit_length(), -1)  # ball of each hash
         self.older = np.full(most, -1)  # the next ball of its chain
@@ -150,7 +154,8 @@ class _PlacedBalls:
     def add(self, points: np.ndarray, radius: float, most: int) -> None:
         """Add those of the points (n, 3) in turn that overlap no ball, up to a number of balls."""
         at = self.points, self.radii, self.newest, self.older
-        self.count = _add(np.ascontiguousarray(points), radius, most, self.count, self.edge, *at)
+        grid = self.edge, self.periods
+        self.count = _add(np.ascontiguousarray(points), radius, most, self.count, *grid, *at)
 
 
 @jit
@@ -160,6 +165,7 @@ def _add(
     most: int,
     count: int,
     edge: float,
+    periods: np.ndarray,
     points: np.ndarray,
     radii: np.ndarray,
     newest: np.ndarray,
@@ -169,18 +175,24 @@ def _add(
     for n in range(len(new)):
         if count == most:
             break
-        x, y, z = new[n, 0], new[n, 1], new[n, 2]
-        i, j, k = math.floor(x / edge), math.floor(y / edge), math.floor(z / edge)
         is_free = True
-        for cell in range(27):
-            a, b, c = cell // 9 - 1, cell // 3 % 3 - 1, cell % 3 - 1
-            other = newest[_hash(i + a, j + b, k + c) & (len(newest) - 1)]
-            while other >= 0 and is_free:
-                dx, dy, dz = x - points[other, 0], y - points[other, 1], z - points[other, 2]
-                apart = radius + radii[other]
-                is_free = dx * dx + dy * dy + dz * dz >= apart * apart
-                other = older[other]
+        for image in range(9):
+            east, north = image // 3 - 1, image % 3 - 1
+            if (east != 0 and periods[0] == 0.0) or (north != 0 and periods[1] == 0.0):
+                continue
+            x, y, z = new[n, 0] + east * periods[0], new[n, 1] + north * periods[1], new[n, 2]
+            i, j, k = math.floor(x / edge), math.floor(y / edge), math.floor(z / edge)
+            for cell in range(27):
+                a, b, c = cell // 9 - 1, cell // 3 % 3 - 1, cell % 3 - 1
+                other = newest[_hash(i + a, j + b, k + c) & (len(newest) - 1)]
+                while other >= 0 and is_free:
+                    dx, dy, dz = x - points[other, 0], y - points[other, 1], z - points[other, 2]
+                    apart = radius + radii[other]
+                    is_free = dx * dx + dy * dy + dz * dz >= apart * apart
+                    other = older[other]
         if is_free:
+            x, y, z = new[n, 0], new[n, 1], new[n, 2]
+            i, j, k = math.floor(x / edge), math.floor(y / edge), math.floor(z / edge)
             points[count, 0], points[count, 1], points[count, 2], radii[count] = x, y, z, radius
             own = _hash(i, j, k) & (len(newest) - 1)
             older[count], newest[own] = newest[own], count

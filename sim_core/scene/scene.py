@@ -179,7 +179,7 @@ class Scene:
             self._require_room_in_mesh()
         if self.physics.ball_collisions is None:
             return
-        gap_between, one, two = narrowest_gap(self.balls)
+        gap_between, one, two = narrowest_gap(self.balls, self.mesh)
         if gap_between < -TOUCH:
             raise SceneError(
                 f"balls {one} and {two} overlap by {-gap_between:.3g} m at the start; "

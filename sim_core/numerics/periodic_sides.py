@@ -1,0 +1,174 @@
+"""Periodic sides: balls that leave a box on one side come in on the other.
+
+Nothing happens at a border. Places are taken modulo the sides: two balls meet as their nearest
+images do, and balls are put back into the box where paths are read again anyway.
+
+Notation:
+    L: side of the box along x or y [m]; 0 where there are walls
+    r: reach, the sum of two radii [m]
+    v, V: speed of a ball along that direction, and the largest of any ball [m/s]
+
+Of two balls the nearest images now are those that can meet next: any others are L/2 or more apart
+along x or y, and need (L/2 - r) / (v + V) to meet. A prediction looks no farther ahead than that
+(``horizon``). V is kept up to date as paths change: of two balls, the one whose path changed last
+has looked at the other with a V that holds for both.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sim_core.numerics.jit import inlined, jit
+from sim_core.numerics.roots import NEVER
+from sim_core.numerics.vec3 import Vec3
+
+SLACK = 1.0 - 1e-6  # on the horizon, for rounding
+SHORT = 0.125  # of a side: longer paths widen boxes and meet more images, shorter are sorted more
+FAR = 1e30
+
+
+class PeriodicSides(NamedTuple):
+    """A box that is periodic along x, y or both, about its middle.
+
+    x, y: L along each [m]. per_x, per_y: 1/L, and 0 where L is.
+    fastest: V along each [m/s], (2,).
+    low, high: what the boxes of all balls' paths reach along each [m], (2,), where there are many
+        balls (loop/spatial_blocks.py).
+    """
+
+    x: float
+    y: float
+    per_x: float
+    per_y: float
+    fastest: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+
+def new_periodic_sides(sides: np.ndarray) -> PeriodicSides | None:
+    """The sides (3,) [m] as compiled code needs them; None if none is periodic."""
+    if not sides.any():
+        return None
+    x, y = (float(side) for side in sides[:2])
+    per_x, per_y = (1.0 / side if side > 0.0 else 0.0 for side in (x, y))
+    return PeriodicSides(x, y, per_x, per_y, np.zeros(2), np.full(2, FAR), np.full(2, -FAR))
+
+
+@inlined
+def nearest_image(sides: PeriodicSides | None, apart: Vec3) -> Vec3:
+    """The shortest of all differences [m] between the images of two places."""
+    if sides is None:
+        return apart
+    return Vec3(
+        apart.x - sides.x * np.rint(apart.x * sides.per_x),
+        apart.y - sides.y * np.rint(apart.y * sides.per_y),
+        apart.z,
+    )
+
+
+@jit
+def put_back(sides: PeriodicSides | None, motion: np.ndarray, time: float) -> None:
+    """Put all balls into the box in which they are at ``time`` [s]; ``motion`` as in motion.py."""
+    if sides is None:
+        return
+    for ball in range(len(motion)):
+        x, y = motion[ball, 0], motion[ball, 1]
+        motion[ball, 0] = x - sides.x * np.rint((x + motion[ball, 3] * time) * sides.per_x)
+        motion[ball, 1] = y - sides.y * np.rint((y + motion[ball, 4] * time) * sides.per_y)
+
+
+@inlined
+def note_speed(sides: PeriodicSides | None, motion: np.ndarray, ball: int) -> None:
+    """Raise V to the speed of a ball with a new path."""
+    if sides is None:
+        return
+    for axis in range(2):
+        sides.fastest[axis] = max(sides.fastest[axis], abs(motion[ball, 3 + axis]))
+
+
+@inlined
+def note_all_speeds(sides: PeriodicSides | None, motion: np.ndarray) -> None:
+    """Set V to the speed of the balls as they are now."""
+    if sides is None:
+        return
+    sides.fastest[:] = 0.0
+    for ball in range(len(motion)):
+        note_speed(sides, motion, ball)
+
+
+@inlined
+def top_speed(sides: PeriodicSides | None) -> float:
+    """V [m/s], which gravity along a periodic direction raises without end; 0 without sides."""
+    if sides is None:
+        return 0.0
+    return max(sides.fastest[0], sides.fastest[1])
+
+
+@inlined
+def horizon(sides: PeriodicSides | None, motion: np.ndarray, ball: int, reach: float) -> float:
+    """How long [s] the ball's meetings are those of the nearest images now."""
+    if sides is None:
+        return NEVER
+    x = sides.fastest[0] + abs(motion[ball, 3])
+    y = sides.fastest[1] + abs(motion[ball, 4])
+    time = NEVER
+    if sides.x > 0.0 and x > 0.0:
+        time = SLACK * (0.5 * sides.x - reach) / x
+    if sides.y > 0.0 and y > 0.0:
+        time = min(time, SLACK * (0.5 * sides.y - reach) / y)
+    return time
+
+
+@inlined
+def time_in_box(sides: PeriodicSides | None) -> float:
+    """How long [s] paths may be so that they reach few images of the box."""
+    if sides is None:
+        return NEVER
+    time = NEVER
+    if sides.x * sides.fastest[0] > 0.0:
+        time = SHORT * sides.x / sides.fastest[0]
+    if sides.y * sides.fastest[1] > 0.0:
+        time = min(time, SHORT * sides.y / sides.fastest[1])
+    return time
+
+
+@inlined
+def forget_extent(sides: PeriodicSides | None) -> None:
+    """What the boxes reach is that of the paths noted from now on."""
+    if sides is None:
+        return
+    sides.low[:] = FAR
+    sides.high[:] = -FAR
+
+
+@inlined
+def note_extent(sides: PeriodicSides | None, axis: int, low: float, high: float) -> None:
+    """Widen what the boxes reach along x, y or z [m]."""
+    if sides is None:
+        return
+    if axis < 2:
+        sides.low[axis] = min(sides.low[axis], low)
+        sides.high[axis] = max(sides.high[axis], high)
+
+
+@inlined
+def images(
+    sides: PeriodicSides | None, motion: np.ndarray, ball: int, start: float, end: float
+) -> tuple[int, int, int, int]:
+    """First and last of the ball's images along x, and along y, whose paths get into the boxes.
+
+    Args:
+        start, end: of the path [s].
+    """
+    if sides is None:
+        return 0, 0, 0, 0
+    x, u = motion[ball, 0], motion[ball, 3]
+    y, v = motion[ball, 1], motion[ball, 4]
+    a, b = x + u * start, x + u * end
+    c, d = y + v * start, y + v * end
+    return (
+        int(np.ceil((sides.low[0] - max(a, b)) * sides.per_x)),
+        int(np.floor((sides.high[0] - min(a, b)) * sides.per_x)),
+        int(np.ceil((sides.low[1] - max(c, d)) * sides.per_y)),
+        int(np.floor((sides.high[1] - min(c, d)) * sides.per_y)),
+    )
