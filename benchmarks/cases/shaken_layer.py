@@ -6,6 +6,7 @@ f*^(-1.32), H being the depth of the layer.
 """
 
 from collections.abc import Iterator
+from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 
@@ -16,21 +17,26 @@ from sim_core import simulate
 from tests.helpers.scenes.layer import DEPTH, DIAMETER, bizon_restitution, shaken_layer
 
 GAMMA, F_STAR = 3.0, 0.44
+BALLS, CYCLES = 60_000, 100
 CELL = 1.0  # D, of the grid on which heights are averaged
 LAST = 12  # cycles that are looked at
 STRIKE = 0.25  # of a period, at which the pattern is high
+BAND = 0.5  # of the wave number, to either side
+ANTIPHASE = 0.2  # a pattern that changes places wholly has -1, one that stays +1, chance 0
+FIT = 0.05  # of the experiment's wavelengths about their fit, read from its figure
 
 
-def heights(count: int, cycles: int) -> np.ndarray:
+@lru_cache
+def heights() -> np.ndarray:
     """Mean height of the balls over each cell, in D, at the same phase of the last cycles.
 
     (LAST, k, k)
     """
-    scene = shaken_layer(count, GAMMA, F_STAR, cycles, law=bizon_restitution(0.7))
-    period = scene.duration / cycles
-    times = period * (np.arange(cycles - LAST, cycles) + STRIKE)
+    scene = shaken_layer(BALLS, GAMMA, F_STAR, CYCLES, law=bizon_restitution(0.7), sides=False)
+    period = scene.duration / CYCLES
+    times = period * (np.arange(CYCLES - LAST, CYCLES) + STRIKE)
     places = simulate(scene, times).frames.positions / DIAMETER
-    side = float(np.ptp(scene.mesh.vertices[:, 0])) / DIAMETER
+    side = float(np.ptp(scene.mesh.bounds[:, 0])) / DIAMETER
     edges = np.linspace(0.0, side, round(side / CELL) + 1)
     maps = []
     for place in places:
@@ -40,46 +46,42 @@ def heights(count: int, cycles: int) -> np.ndarray:
     return np.array(maps)
 
 
-def wavelength(height: np.ndarray) -> float:
-    """λ [D] of the strongest wave: the mean wave number of the power about its peak."""
-    wave = height - height.mean()
-    window = np.outer(np.hanning(len(wave)), np.hanning(len(wave)))
-    size = 4 * len(wave)
-    power = np.abs(np.fft.fftshift(np.fft.fft2(wave * window, (size, size)))) ** 2
-    number = np.fft.fftshift(np.fft.fftfreq(size, CELL))
+def pattern(height: np.ndarray) -> tuple[float, np.ndarray]:
+    """λ [D] of the strongest wave, and the pattern of waves about as long, of the same shape.
+
+    λ is that of the mean wave number of their power. The box is periodic, and so are its waves.
+    """
+    waves = np.fft.fft2(height - height.mean())
+    number = np.fft.fftfreq(len(height), CELL)
     k = np.hypot(*np.meshgrid(number, number, indexing="ij"))
-    bins = np.arange(0.5, 40.5) / size * 2.0
-    radial = np.histogram(k, bins, weights=power)[0]
-    peak = int(np.argmax(radial[1:])) + 1
-    near = slice(max(1, peak - 3), peak + 4)
-    middle = 0.5 * (bins[1:] + bins[:-1])
-    return float(radial[near].sum() / (radial[near] @ middle[near]))
+    power = np.abs(waves) ** 2
+    near = np.abs(k - k.ravel()[np.argmax(power)]) < BAND * k.ravel()[np.argmax(power)]
+    length = float(power[near].sum() / (power[near] @ k[near]))
+    return length, np.fft.ifft2(np.where(near, waves, 0.0)).real
 
 
-def rows(count: int, cycles: int) -> Iterator[Row]:
-    maps = heights(count, cycles)
-    waves = maps - maps.mean(axis=(1, 2), keepdims=True)
+def rows() -> Iterator[Row]:
+    lengths, patterns = zip(*map(pattern, heights()), strict=True)
     after = [float((one * two).sum() / np.sqrt((one**2).sum() * (two**2).sum()))
-             for one, two in pairwise(waves)]  # fmt: skip
-    conditions = f"Γ = {GAMMA}, f* = {F_STAR}, {count:,} balls, {cycles} cycles"
-    yield Row("shaken layer", conditions, "correlation with the next cycle", -1.0, 0.2,
-              *mean_and_half_width(np.array(after)))  # fmt: skip
+             for one, two in pairwise(patterns)]  # fmt: skip
+    conditions = f"Γ = {GAMMA}, f* = {F_STAR}, {BALLS:,} balls, {CYCLES} cycles"
+    yield Row("shaken layer", conditions, "correlation of the pattern with that a cycle later", -1.0,
+              ANTIPHASE, *mean_and_half_width(np.array(after)))  # fmt: skip
     expected = DEPTH / DIAMETER * (1.0 + 1.1 * F_STAR**-1.32)
-    found = np.array([wavelength(one) for one in maps])
-    yield Row("shaken layer", conditions, "wavelength, diameters", expected, 0.1 * expected,
-              *mean_and_half_width(found))  # fmt: skip
+    yield Row("shaken layer", conditions, "wavelength, diameters", expected, FIT * expected,
+              *mean_and_half_width(np.array(lengths)))  # fmt: skip
 
 
-def picture(path: Path, count: int, cycles: int) -> None:
+def picture(path: Path) -> None:
     """The layer from above in two cycles that follow each other."""
     import matplotlib.pyplot as plt
 
-    maps = heights(count, cycles)
+    maps = heights()
     figure, both = plt.subplots(1, 2, figsize=(9, 4.4), layout="constrained")
-    for axes, one, name in zip(both, maps[-2:], (cycles - 1, cycles), strict=True):
+    for axes, one, cycle in zip(both, maps[-2:], (CYCLES - 1, CYCLES), strict=True):
         side = len(one) * CELL
         shown = axes.imshow(one.T, origin="lower", extent=(0, side, 0, side), cmap="gray")
-        axes.set(title=f"cycle {name}", xlabel="diameters")
+        axes.set(title=f"cycle {cycle}", xlabel="diameters")
     figure.colorbar(shown, ax=both, label="mean height, diameters")
     figure.savefig(path, dpi=110)
     plt.close(figure)

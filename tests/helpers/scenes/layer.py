@@ -8,9 +8,20 @@ import math
 
 import numpy as np
 
-from sim_core import Balls, Gravity, Physics, Restitution, Scene, TabulatedRestitution, Vibration
+from sim_core import (
+    AnalyticCavity,
+    Balls,
+    Gravity,
+    Physics,
+    Restitution,
+    Scene,
+    TabulatedRestitution,
+    TriangleMesh,
+    Vibration,
+    periodic_box,
+)
 from sim_core.effects.restitution import ELASTIC_BELOW
-from tests.helpers.scenes.cavities import FLOOR, box, uniform_restitution
+from tests.helpers.scenes.cavities import CEILING, FLOOR, box, uniform_restitution
 
 G = 9.80665
 DIAMETER = 1e-3
@@ -34,8 +45,12 @@ def shaken_layer(
     e: float = 0.7,
     elastic_below: float = ELASTIC_BELOW,
     law: Restitution | None = None,
+    sides: bool = True,
 ) -> Scene:
-    """A loose lattice that falls on the floor, which starts from its lowest position."""
+    """A loose lattice that falls on the floor, which starts from its lowest position.
+
+    Without sides the box is periodic.
+    """
     frequency = f_star * math.sqrt(G / DEPTH)
     amplitude = gamma * G / (math.tau * frequency) ** 2
     side = math.sqrt(count / PER_AREA) * DIAMETER
@@ -52,6 +67,8 @@ def shaken_layer(
     shaking = Vibration(FLOOR, amplitude, frequency, -0.5 * math.pi)
     law = law or uniform_restitution(e, 1e6, elastic_below)
     top = positions[:, 2].max() + 60.0 * DIAMETER
-    room = box((side, side, top))
+    room: TriangleMesh | AnalyticCavity = box((side, side, top))
+    if not sides:
+        room = periodic_box((0.0, 0.0, 0.0), (side, side, top), (FLOOR, CEILING))
     physics = Physics(Gravity(), law, shaking)
     return Scene(room, balls, physics, cycles / frequency, record=(FLOOR,))
