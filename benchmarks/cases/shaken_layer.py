@@ -65,7 +65,7 @@ def rows() -> Iterator[Row]:
     after = [float((one * two).sum() / np.sqrt((one**2).sum() * (two**2).sum()))
              for one, two in pairwise(patterns)]  # fmt: skip
     conditions = f"Γ = {GAMMA}, f* = {F_STAR}, {BALLS:,} balls, {CYCLES} cycles"
-    yield Row("shaken layer", conditions, "correlation of the pattern with that a cycle later", -1.0,
+    yield Row("shaken layer", conditions, "correlation with the next cycle", -1.0,
               ANTIPHASE, *mean_and_half_width(np.array(after)))  # fmt: skip
     expected = DEPTH / DIAMETER * (1.0 + 1.1 * F_STAR**-1.32)
     yield Row("shaken layer", conditions, "wavelength, diameters", expected, FIT * expected,
