@@ -17,7 +17,7 @@ from sim_core import simulate
 from tests.helpers.scenes.layer import DEPTH, DIAMETER, bizon_restitution, shaken_layer
 
 GAMMA, F_STAR = 3.0, 0.44
-BALLS, CYCLES = 60_000, 100
+BALLS, CYCLES = 60_000, 60
 CELL = 1.0  # D, of the grid on which heights are averaged
 LAST = 12  # cycles that are looked at
 STRIKE = 0.25  # of a period, at which the pattern is high
