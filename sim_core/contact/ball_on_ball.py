@@ -127,7 +127,7 @@ def _of_balls(restitution: RestitutionState | None, speed: float) -> float:
     """e of ball on ball at any speed [m/s], also below elastic_below; 1 without the effect."""
     if restitution is None:
         return 1.0
-    return restitution_law(restitution.laws, BALLS, speed)
+    return restitution_law(restitution.points, BALLS, speed)
 
 
 @jit

@@ -274,7 +274,7 @@ def still_surface_restitution(
         return restitution
     if restitution is None:
         return restitution
-    return RestitutionState(restitution.laws, 0.0)
+    return RestitutionState(restitution.points, 0.0)
 
 
 @inlined
@@ -293,4 +293,4 @@ def _where_balls_stick(
 ) -> RestitutionState | None:
     if ride is None or restitution is None:
         return restitution
-    return RestitutionState(restitution.laws, 0.0)
+    return RestitutionState(restitution.points, 0.0)

@@ -42,7 +42,8 @@ from sim_core.numerics.jit import jit
 ELASTIC_BELOW = 0.01
 
 EXPONENT = 0.25  # of a law that is given without one; two square roots are faster than a power
-BALLS = -1  # row of ball on ball, the last
+BALLS = -1  # in place of a surface's tag: ball on ball has the last law
+V, E, Q = 0, 1, 2  # columns of the points of a law
 
 
 class TabulatedRestitution(NamedTuple):
@@ -81,21 +82,12 @@ class Restitution(NamedTuple):
     elastic_below: float = ELASTIC_BELOW
 
 
-class RestitutionLaws(NamedTuple):
-    """Laws as compiled code needs them: a row for each surface tag, and the last for the balls.
-
-    Rows of fewer than n points repeat their last one.
-    """
-
-    speeds: np.ndarray  # v_1 to v_n [m/s], shape (rows, n)
-    coefficients: np.ndarray  # e_1 to e_n, shape (rows, n)
-    exponents: np.ndarray  # q, shape (rows,)
-
-
 class RestitutionState(NamedTuple):
-    """Restitution as compiled code needs it."""
+    """Restitution as compiled code needs it: one array, which every impact is handed."""
 
-    laws: RestitutionLaws
+    # v_i [m/s], e_i and q of the points of each law, by surface tag, and last of the law of the
+    # balls; one of fewer than n points repeats its last; shape (laws, n, 3)
+    points: np.ndarray
     elastic_below: float  # [m/s]
 
 
@@ -117,22 +109,13 @@ def checked_restitution(restitution: Restitution, tags: int) -> RestitutionState
         raise SceneError(
             f"restitution.elastic_below is {elastic_below}: it must be 0 or more [m/s]"
         )
-    laws = RestitutionLaws(
-        _filled_up([speeds for speeds, _, _ in points]),
-        _filled_up([e for _, e, _ in points]),
-        np.array([exponent for _, _, exponent in points]),
-    )
-    return RestitutionState(laws, elastic_below)
+    most = max(map(len, points))
+    filled_up = [np.pad(one, ((0, most - len(one)), (0, 0)), mode="edge") for one in points]
+    return RestitutionState(np.array(filled_up), elastic_below)
 
 
-def _filled_up(rows: list[np.ndarray]) -> np.ndarray:
-    """Rows of various lengths as one array, whose shorter rows repeat their last number."""
-    longest = max(map(len, rows))
-    return np.array([np.pad(row, (0, longest - len(row)), mode="edge") for row in rows])
-
-
-def _points(name: str, law: Any) -> tuple[np.ndarray, np.ndarray, float]:
-    """v_i [m/s] and e_i, (n,) each, and q of a law; raises SceneError, naming it, if it is bad."""
+def _points(name: str, law: Any) -> np.ndarray:
+    """v_i [m/s], e_i and q of a law, (n, 3); raises SceneError, naming the law, if it is bad."""
     if isinstance(law, TabulatedRestitution):
         return _table(name, law)
     values = tuple(law) if isinstance(law, (tuple, list, np.ndarray)) else ()
@@ -145,10 +128,10 @@ def _points(name: str, law: Any) -> tuple[np.ndarray, np.ndarray, float]:
             f"{name} is {numbers}: C0 must lie in [0, 1], v0 be positive [m/s], and an exponent "
             "be 0 or more"
         )
-    return np.array([v0]), np.array([c0]), exponent
+    return np.array([[v0, c0, exponent]])
 
 
-def _table(name: str, table: TabulatedRestitution) -> tuple[np.ndarray, np.ndarray, float]:
+def _table(name: str, table: TabulatedRestitution) -> np.ndarray:
     columns = []
     for field, values in table._asdict().items():
         try:
@@ -169,33 +152,34 @@ def _table(name: str, table: TabulatedRestitution) -> tuple[np.ndarray, np.ndarr
         if not 0.0 <= e[i] <= 1.0:
             raise SceneError(f"{name}.e[{i}] is {e[i]}: it must lie in [0, 1]")
         previous = speed
-    return speeds, e, 0.0
+    return np.column_stack([speeds, e, np.zeros(len(e))])
 
 
 @jit
-def restitution_law(laws: RestitutionLaws, row: int, speed: float) -> float:
-    """e of one of the laws at a relative normal speed [m/s]."""
-    speeds, coefficients = laws.speeds, laws.coefficients
-    high = speeds.shape[1] - 1
-    if speed < speeds[row, high]:
-        if speed <= speeds[row, 0]:
-            return coefficients[row, 0]
-        low = 0
-        while high - low > 1:
-            middle = (low + high) // 2
-            if speed < speeds[row, middle]:
-                high = middle
-            else:
-                low = middle
-        share = (speed - speeds[row, low]) / (speeds[row, high] - speeds[row, low])
-        return coefficients[row, low] + share * (coefficients[row, high] - coefficients[row, low])
-    exponent = laws.exponents[row]
-    if exponent == 0.0:
-        return coefficients[row, high]
-    ratio = speed / speeds[row, high]
+def restitution_law(points: np.ndarray, law: int, speed: float) -> float:
+    """e at a relative normal speed [m/s], by the law of a surface's tag or of BALLS."""
+    last = points.shape[1] - 1
+    if speed < points[law, last, V]:
+        return points[law, 0, E] if speed <= points[law, 0, V] else _between(points, law, speed)
+    e, exponent = points[law, last, E], points[law, last, Q]
     if exponent == EXPONENT:
-        return coefficients[row, high] / math.sqrt(math.sqrt(ratio))
-    return coefficients[row, high] / ratio**exponent
+        return e / math.sqrt(math.sqrt(speed / points[law, last, V]))
+    return e if exponent == 0.0 else e / (speed / points[law, last, V]) ** exponent
+
+
+@jit
+def _between(points: np.ndarray, law: int, speed: float) -> float:
+    """e between the first and the last point of a law."""
+    low, high = 0, points.shape[1] - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if speed < points[law, middle, V]:
+            high = middle
+        else:
+            low = middle
+    rise = points[law, high, E] - points[law, low, E]
+    wide = points[law, high, V] - points[law, low, V]
+    return points[law, low, E] + rise * (speed - points[law, low, V]) / wide
 
 
 @jit
@@ -205,7 +189,7 @@ def surface_restitution(restitution: RestitutionState | None, tag: int, speed: f
         return 1.0
     if speed < restitution.elastic_below:
         return 1.0
-    return restitution_law(restitution.laws, tag, speed)
+    return restitution_law(restitution.points, tag, speed)
 
 
 @jit
@@ -215,17 +199,17 @@ def ball_restitution(restitution: RestitutionState | None, speed: float) -> floa
         return 1.0
     if speed < restitution.elastic_below:
         return 1.0
-    return restitution_law(restitution.laws, BALLS, speed)
+    return restitution_law(restitution.points, BALLS, speed)
 
 
 def restitution_at(speed: np.ndarray, law: RestitutionLaw) -> np.ndarray:
     """e of a law on an array of speeds [m/s] of any shape; SceneError for a bad law."""
     speed = np.asarray(speed, dtype=np.float64)
-    speeds, coefficients, exponent = _points("law", law)
-    e = np.interp(speed, speeds, coefficients)
+    points = _points("law", law)
+    e, exponent = np.interp(speed, points[:, V], points[:, E]), points[-1, Q]
     if exponent == 0.0:
         return np.asarray(e)
-    ratio = np.maximum(speed / speeds[-1], 1.0)
+    ratio = np.maximum(speed / points[-1, V], 1.0)
     # math.sqrt and numpy's round alike, so that this is the e that a simulation takes
     fall = np.sqrt(np.sqrt(ratio)) if exponent == EXPONENT else ratio**exponent
     return np.asarray(e / fall)

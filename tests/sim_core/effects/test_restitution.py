@@ -102,13 +102,13 @@ def test_a_slow_ball_rises_from_one_that_lies_still_by_the_law_of_balls(law: str
 def test_each_surface_has_a_law_of_its_own_kind() -> None:
     """A table's rows of points are longer than a power law's."""
     given = Restitution([law for law, _ in LAWS.values()], (0.7, 1.0))
-    laws = checked_restitution(given, len(LAWS)).laws
+    points = checked_restitution(given, len(LAWS)).points
     speeds = np.concatenate([[0.0, 0.2, 3.0, 4.0, 1e300], np.geomspace(1e-3, 100.0, 200)])
     for row, (law, e) in enumerate(LAWS.values()):
-        compiled = [restitution_law(laws, row, speed) for speed in speeds]
+        compiled = [restitution_law(points, row, speed) for speed in speeds]
         np.testing.assert_allclose(compiled, [e(speed) for speed in speeds], rtol=1e-14)
         np.testing.assert_allclose(restitution_at(speeds, law), compiled, rtol=1e-14)
-    assert restitution_law(laws, len(LAWS), 0.5) == 0.7
+    assert restitution_law(points, len(LAWS), 0.5) == 0.7
 
 
 def test_a_table_is_another_law_to_a_thousandth() -> None:
