@@ -92,7 +92,7 @@ class RestitutionState(NamedTuple):
 
 
 def checked_restitution(restitution: Restitution, tags: int) -> RestitutionState:
-    """The laws as arrays, one row for each tag or more; raises SceneError if one is bad."""
+    """The points of the laws of all tags, or more; raises SceneError if one is bad."""
     form = f"give {LAW_FORMS} for each of the tags 0 to {tags - 1}"
     if isinstance(restitution.surfaces, TabulatedRestitution):
         raise SceneError(f"restitution.surfaces is one table: {form}")
