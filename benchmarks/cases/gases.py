@@ -66,8 +66,8 @@ def state_picture(path: Path) -> None:
 def cooling(e: float, packing: float, seed: int, times: np.ndarray) -> np.ndarray:
     """√(E₀/E) of a cooling gas at ``times`` (in its time constant τ), (t,).
 
-    Energy falls at (1 - e²) kT/2 a collision in the mean, so that τ = 6 / ((1 - e²) ν), ν being a
-    ball's collisions a second at the start: P. K. Haff, J. Fluid Mech. 134 (1983) 401.
+    Each ball loses (1 - e²) kT/2 at each of its collisions in the mean, so that τ = 6 / ((1 - e²)
+    ν), with ν a ball's collisions a second at first: P. K. Haff, J. Fluid Mech. 134 (1983) 401.
     """
     gas = lattice_gas(PER_SIDE, packing, seed)
     ((melted, _),) = played(gas, 1, 20.0, record=())

@@ -39,6 +39,9 @@ WARM_UP = 1.0  # s
 SOFT_S = {200: 0.5, 30: 2.0}
 SEEDS = 8
 RINGS = 8
+# Balls crowd at a hard wall: 1.5 φ d over the ring's width more in the outer ring at φ = 0.018, to
+# lowest order of the surface tension of scaled particle theory (tests/helpers/scenes/gas.py).
+CROWDING = 1.02, 0.01
 CONTACTS = (8e-6, 4e-6, 2e-6)  # s: Hertz's theory gives steel balls 7.5 µs at 5 m/s
 
 
@@ -86,13 +89,13 @@ def ring_shares(wall: float, seeds: int) -> np.ndarray:
 
 
 def side_walls() -> Iterator[Row]:
-    """Inelastic sides make impacts gather at the rim; of elastic ones balls know nothing."""
+    """Inelastic sides make impacts gather at the rim; at elastic ones balls crowd a little."""
     for wall in (1.0, 0.9, 0.7, 0.5):
         shares = ring_shares(wall, SEEDS)
         ratio, half_width = mean_and_half_width(shares[:, -1] / shares[:, :2].mean(axis=1))
-        reference = 1.0 if wall == 1.0 else math.nan
-        yield Row("side walls", f"restitution {wall}", "impacts per area, rim / centre", reference,
-                  0.0, ratio, half_width)  # fmt: skip
+        reference, allowed = CROWDING if wall == 1.0 else (math.nan, 0.0)
+        yield Row("side walls", f"restitution {wall}", "impacts per area, rim / centre",
+                  reference, allowed, ratio, half_width)  # fmt: skip
 
 
 def side_walls_picture(path: Path) -> None:
@@ -128,14 +131,14 @@ def practice() -> Iterator[Row]:
     """What the trade reports of intensity: nearly in proportion to amplitude, hardly to charge."""
     for name, law in (("e falls with speed", by_speed()), ("e constant", constant(0.91))):
         for count in (50, 200):
-            yield Row("practice", f"{name}, {count} balls", "exponent of the amplitude", 0.96, 0.09,
-                      *exponent(law, count))  # fmt: skip
+            yield Row("practice", f"{name}, {count} balls", "speed's exponent of the amplitude",
+                      math.nan, 0.0, *exponent(law, count))  # fmt: skip
     few, many = (
         np.array([peened(count, by_speed(), 2.0, seed).impacts.normal_speed.mean()
                   for seed in range(SEEDS)])
         for count in (100, 200)
     )  # fmt: skip
-    yield Row("practice", "e falls with speed", "speed with 200 balls / with 100", 1.0, 0.05,
+    yield Row("practice", "e falls with speed", "speed with 200 balls / with 100", math.nan, 0.0,
               *mean_and_half_width(many / few))  # fmt: skip
 
 
