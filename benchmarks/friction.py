@@ -9,29 +9,16 @@ Figures are means over 3 s in steady state with 95 % intervals from 8 seeds.
 
 import argparse
 import math
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from benchmarks.cases.peening_cylinder import chamber, constant
 from benchmarks.table import print_table, write_csv
 from chamberopt.common.estimate import Estimate, estimate
-from sim_core import (
-    Balls,
-    Friction,
-    Gravity,
-    Physics,
-    Restitution,
-    Scene,
-    Vibration,
-    cylinder_cavity,
-    pack_balls,
-    simulate,
-)
+from sim_core import simulate
 
-LID, FLOOR, SIDE = 0, 1, 2
-RADIUS, HEIGHT, DIAMETER = 0.035, 0.04, 3e-3  # m
-AMPLITUDE, FREQUENCY = 25e-6, 20e3  # m, Hz
-STEEL = (0.91, 1.0, 0.0)  # e at all speeds
 PIECE = 0.05  # s: the mean square speed is that at the ends of such pieces; whole periods
 WARMUP, PIECES, SEEDS = 10, 60, 8
 COUNTS = (200, 30)
@@ -50,20 +37,12 @@ class Figures(NamedTuple):
 
 def figures(count: int, friction: tuple[float, float] | None, seed: int) -> Figures:
     """Simulate so many balls piece by piece."""
-    cavity = cylinder_cavity(2.0 * RADIUS, 0.0, HEIGHT, (FLOOR, LID, SIDE))
-    rng = np.random.default_rng(seed)
-    places = pack_balls(cavity, count, DIAMETER, rng, AMPLITUDE)
-    balls = Balls(places, rng.normal(0.0, 1.0, places.shape), DIAMETER)
-    physics = Physics(
-        Gravity(),
-        Restitution((STEEL,) * 3, STEEL),
-        Vibration(FLOOR, AMPLITUDE, FREQUENCY, rng.uniform(0.0, math.tau)),
-        friction=None if friction is None else Friction((friction,) * 3, friction),
-    )
+    scene = chamber(count, constant(0.91), PIECE, seed, friction)
     squares, speeds = [], []
     for piece in range(WARMUP + PIECES):
-        result = simulate(Scene(cavity, balls, physics, PIECE, record=(LID,)))
+        result = simulate(scene)
         balls = result.balls
+        scene = replace(scene, balls=balls)
         if piece >= WARMUP:
             squares.append(float((balls.velocities**2).sum(axis=1).mean()))
             speeds.append(result.impacts.normal_speed)

@@ -10,6 +10,8 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -20,10 +22,10 @@ from sim_core import (
     Balls,
     Friction,
     Gravity,
+    ImpactLog,
     Physics,
     Restitution,
     Scene,
-    SimulationResult,
     Vibration,
     cylinder_cavity,
     pack_balls,
@@ -33,7 +35,6 @@ from sim_core import (
 CEILING, FLOOR, SIDE = 0, 1, 2
 RADIUS, HEIGHT, DIAMETER = 0.035, 0.04, 3e-3  # m
 AMPLITUDE, FREQUENCY = 25e-6, 20e3  # m, Hz
-CONSTANT = 1e9  # m/s: v0 of a restitution that does not depend on speed
 WARM_UP = 1.0  # s
 # s, warm-up and record of soft spheres, of which a second takes minutes; few balls forget slowly
 SOFT_S = {200: 0.5, 30: 2.0}
@@ -45,29 +46,35 @@ CROWDING = 1.02, 0.01
 CONTACTS = (8e-6, 4e-6, 2e-6)  # s: Hertz's theory gives steel balls 7.5 µs at 5 m/s
 
 
-def peened(
+def chamber(
     count: int,
     restitution: Restitution,
     seconds: float,
     seed: int,
-    mu: float = 0.0,
+    friction: tuple[float, float] | None = None,
     amplitude: float = AMPLITUDE,
-    frames: int = 0,
-) -> SimulationResult:
-    """Simulate after the warm-up; impacts on the ceiling are logged."""
+) -> Scene:
+    """So many balls in the cylinder, with one friction (mu, beta0); the ceiling's log is kept."""
     cavity, rng = _cavity(), np.random.default_rng(seed)
     places = pack_balls(cavity, count, DIAMETER, rng, amplitude)
     balls = Balls(places, rng.normal(0.0, 1.0, places.shape), DIAMETER)
     shaking = Vibration(FLOOR, amplitude, FREQUENCY, rng.uniform(0.0, 2.0 * np.pi))
-    friction = Friction(((mu, 0.0),) * 3, (mu, 0.0)) if mu else None
-    physics = Physics(Gravity(), restitution, shaking, friction=friction)
-    scene = Scene(cavity, balls, physics, seconds, WARM_UP, record=(CEILING,))
-    return simulate(scene, np.linspace(0.0, seconds, frames + 1)[1:] if frames else ())
+    law = None if friction is None else Friction((friction,) * 3, friction)
+    physics = Physics(Gravity(), restitution, shaking, friction=law)
+    return Scene(cavity, balls, physics, seconds, record=(CEILING,))
+
+
+def impacts(
+    count: int, restitution: Restitution, seed: int, amplitude: float = AMPLITUDE
+) -> ImpactLog:
+    """Impacts on the ceiling in two seconds after the warm-up, without friction."""
+    scene = chamber(count, restitution, 2.0, seed, amplitude=amplitude)
+    return simulate(replace(scene, warmup=WARM_UP)).impacts
 
 
 def constant(e: float, wall: float | None = None) -> Restitution:
     """The same at all speeds; another one of the side."""
-    law, side = (e, CONSTANT), (e if wall is None else wall, CONSTANT)
+    law, side = (e, 1.0, 0.0), (e if wall is None else wall, 1.0, 0.0)
     return Restitution((law, law, side), law)
 
 
@@ -77,12 +84,13 @@ def by_speed() -> Restitution:
     return Restitution((law,) * 3, law)
 
 
+@lru_cache
 def ring_shares(wall: float, seeds: int) -> np.ndarray:
     """Impacts per area of the ceiling in rings of equal width, over their mean, (seeds, RINGS)."""
     edges = np.linspace(0.0, 1.0, RINGS + 1)
     found = []
     for seed in range(seeds):
-        places = peened(200, constant(0.91, wall), 2.0, seed).impacts.position
+        places = impacts(200, constant(0.91, wall), seed).position
         way = np.hypot(places[:, 0], places[:, 1]) / (RADIUS - 0.5 * DIAMETER)
         found.append(np.histogram(way, edges)[0] / len(way) / np.diff(edges**2))
     return np.array(found)
@@ -120,7 +128,7 @@ def exponent(restitution: Restitution, count: int) -> tuple[float, float]:
     samples = []
     for seed in range(SEEDS):
         low, high = (
-            peened(count, restitution, 2.0, seed, amplitude=amplitude).impacts.normal_speed.mean()
+            impacts(count, restitution, seed, amplitude).normal_speed.mean()
             for amplitude in (AMPLITUDE, 2.0 * AMPLITUDE)
         )
         samples.append(np.log2(high / low))
@@ -134,7 +142,7 @@ def practice() -> Iterator[Row]:
             yield Row("practice", f"{name}, {count} balls", "speed's exponent of the amplitude",
                       math.nan, 0.0, *exponent(law, count))  # fmt: skip
     few, many = (
-        np.array([peened(count, by_speed(), 2.0, seed).impacts.normal_speed.mean()
+        np.array([impacts(count, by_speed(), seed).normal_speed.mean()
                   for seed in range(SEEDS)])
         for count in (100, 200)
     )  # fmt: skip
@@ -160,8 +168,11 @@ def soft_speed(count: int, mu: float, contact: float) -> tuple[float, float]:
 
 def hard_speed(count: int, mu: float) -> tuple[float, float]:
     """√<v²> [m/s] of the balls here, and its 95 % half-width."""
-    played = (peened(count, constant(0.91), 1.0, seed, mu, frames=40) for seed in range(SEEDS))
-    squares = [(one.frames.velocities**2).sum(axis=-1).mean() for one in played]
+    friction, squares = (mu, 0.0) if mu else None, []
+    for seed in range(SEEDS):
+        scene = replace(chamber(count, constant(0.91), 1.0, seed, friction), warmup=WARM_UP)
+        frames = simulate(scene, np.linspace(0.0, 1.0, 41)[1:]).frames
+        squares.append((frames.velocities**2).sum(axis=-1).mean())
     return _root(*mean_and_half_width(np.array(squares)))
 
 
