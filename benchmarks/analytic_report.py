@@ -62,14 +62,15 @@ def _opening(design: Design, effort: Effort) -> list[str]:
         *_paragraph(
             "Written by `python benchmarks/analytic.py`; every figure on this page is from that "
             f"run. Intervals are 95 %, over {effort.replicas} replicas of {effort.seconds:g} s "
-            "each. Simulate a chamber so yourself: `chamberopt simulate designs/plate.toml "
-            "--analytic`, wherever the cavity is a cylinder, box or prism."
+            "each. Simulate this chamber yourself: `chamberopt simulate "
+            "designs/plate_paper.toml --analytic`. Any cavity that is a cylinder, box or prism can "
+            "be simulated so."
         ),
         *_paragraph(
             "The paper this project starts from computes one chamber twice, with analytical "
             "surfaces and with the CAD mesh, and sets both beside an experiment: an aluminium "
             "plate 15 mm over the sonotrode, peened for 50 s. It does not give the amplitude, the "
-            "chamber's diameter, C0 or v0. **Assumed here** (`designs/plate.toml`):"
+            "chamber's diameter, C0 or v0. **Assumed here** (`designs/plate_paper.toml`):"
         ),
         *_item(
             f"a cylinder of {1e3 * design.chamber.diameter:g} mm, closed by the plate; "
@@ -82,15 +83,16 @@ def _opening(design: Design, effort: Effort) -> list[str]:
         ),
         *_item(
             "dents by Kirk's energy balance at 120 HB, where the paper only says that their size "
-            "goes with the normal speed; coverage is Avrami's, of the middle 26 x 26 mm of the "
-            "plate;"
+            "goes with the normal speed; coverage is Avrami's, of the triangles in the "
+            "middle 26 x 26 mm of the plate, 672 mm²;"
         ),
         *_item(
             f"the amplitude **fitted**, {1e6 * sonotrode.amplitude:.2f} µm zero to peak, so that "
             f"the analytical chamber covers {100.0 * MEASURED:g} % in {PEENED:g} s. It stands for "
             "all that is not known, and is no finding about the experiment. Machines are set to 25 "
-            "to 40 µm, with which this chamber is covered over 99 %: something else assumed here "
-            "must be off too, such as the diameter, and would give another amplitude."
+            "to 40 µm (`designs/plate.toml` has 25), with which this chamber is covered over 99 %: "
+            "something else assumed here must be off too, such as the diameter, and would give "
+            "another amplitude."
         ),
         "",
     ]

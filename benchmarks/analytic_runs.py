@@ -109,7 +109,7 @@ def run(
         ]
 
     hits, counts = zip(*executor.map(one, range(effort.replicas)), strict=True)
-    seen = SeenDents(prepare_target(design, chamber, chamber_mesh(chamber)), [], [])
+    seen = SeenDents.none(prepare_target(design, chamber, chamber_mesh(chamber)))
     seen.add(hits)
     found = estimate_metrics(seen, hits, chamber, design).metrics
     shares = {name: np.array([one[k] for one in counts]) for k, name in enumerate(edges)}

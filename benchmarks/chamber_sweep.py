@@ -63,18 +63,19 @@ def row(
         for (name, (low, high)), x in zip(vary.items(), (u, v), strict=True)
     }
     candidate = design.changed(values)
-    found = evaluate(
-        candidate, build_chamber(candidate), SerialExecutor(), plan=ReplicaPlan(replicas, "confirm")
-    ).objective
-    error = standard_error(found)
+    chamber = build_chamber(candidate)
+    found = evaluate(candidate, chamber, SerialExecutor(), plan=ReplicaPlan(replicas, "confirm"))
+    objective = found.objective
+    error = standard_error(objective)
     usual = usual_seconds(design)
     start = [(design.value(name) - low) / (high - low) for name, (low, high) in vary.items()]
     return {
         "u": u,
         "v": v,
         **values,
-        "uniform_coverage": found.value,
+        "uniform_coverage": objective.value,
         "standard_error": error,
+        "reachable": found.reachable,
         "search_error": error
         * np.sqrt(replicas * design.process.accuracy.simulated_time_s / usual),
         "start_u": start[0],

@@ -91,17 +91,15 @@ def rows_of(name: str, case: Case, replicas: int, group: int) -> Iterator[dict[s
         design = whole.changed({"process.accuracy.simulated_time_s": seconds})
         hits = [until(one, times < seconds) for one, times in pool]
         sizes = field.gauge, field.wide
-        seen = [[find_footprints(field, gauge, one) for one in hits] for gauge in sizes]
+        seen: list[Any] = [[find_footprints(field, gauge, one) for one in hits] for gauge in sizes]
+        seen.append([field.in_sector(one) for one in hits])
         if not truth:
-            of_pool = figures(field, seen, hits, chamber, design)[0]
+            of_pool = figures(field, seen, design)[0]
             truth = {key: one.value for key, one in of_pool.items()}
         groups = [
-            figures(
-                field, [[kind[i] for i in some] for kind in seen], [hits[i] for i in some],
-                chamber, design,
-            )
+            figures(field, [[kind[i] for i in some] for kind in seen], design)
             for some in drawn(rng, replicas, group)
-        ]  # fmt: skip
+        ]
         for key, true in truth.items():
             found = [figures_of[key] for figures_of, _, _ in groups]
             resolved = np.mean([key in known for _, known, _ in groups])
@@ -135,12 +133,10 @@ def drawn(rng: np.random.Generator, replicas: int, group: int) -> Iterator[np.nd
                 return
 
 
-def figures(
-    field: Any, seen: list[Any], hits: list[Hits], chamber: Chamber, design: Design
-) -> tuple[dict[str, Any], set[str], float]:
+def figures(field: Any, seen: list[Any], design: Design) -> tuple[dict[str, Any], set[str], float]:
     """Estimates, which of them are resolved, and the dents in the median window."""
     dents = estimates.SeenDents(field, *seen)
-    raw, resolution = estimates.raw_estimates(dents, hits, design)
+    raw, resolution = estimates.raw_estimates(dents, design)
     known = {
         key for key, one in raw.items() if not estimates.as_resolved(key, one, resolution).in_words
     }

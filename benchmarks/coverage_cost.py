@@ -49,7 +49,7 @@ def row(name: str, design: Design, chamber: Chamber, hits: list[Hits]) -> dict[s
     field = evaluation.prepare_target(design, chamber, mesh)
 
     def seen() -> estimates.SeenDents:
-        dents = estimates.SeenDents(field, [], [])
+        dents = estimates.SeenDents.none(field)
         dents.add(hits)
         return dents
 

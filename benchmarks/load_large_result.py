@@ -74,7 +74,7 @@ def evaluation(design: Any, chamber: Any, impacts: int) -> Any:
         dent = np.float32(4e-5) * np.sqrt(speed)
         energy = np.float32(7e-6) * speed * speed
         hits.append(Hits(triangle, place.astype(np.float32), speed, angle, dent, energy))
-    seen = SeenDents(prepare_target(design, chamber, chamber_mesh(chamber)), [], [])
+    seen = SeenDents.none(prepare_target(design, chamber, chamber_mesh(chamber)))
     seen.add(hits)
     found = estimate_metrics(seen, hits, chamber, design)
     return Evaluation(

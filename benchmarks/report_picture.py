@@ -1,8 +1,9 @@
 """The picture of docs/report.md: a results folder's report as a browser shows it.
 
-    python benchmarks/report_picture.py results/quickstart
+    python benchmarks/report_picture.py results/quickstart [PICTURE.png]
 
-Needs playwright and a Chromium on PATH.
+Writes docs/images/report.png, or the picture given. Needs `pip install playwright` and a Chromium
+on PATH (of the operating system, or by `playwright install chromium`).
 """
 
 import shutil
@@ -35,4 +36,6 @@ def report_picture(folder: Path, picture: Path) -> None:
 
 
 if __name__ == "__main__":
-    report_picture(Path(sys.argv[1]), IMAGES / "report.png")
+    written = Path(sys.argv[2]) if len(sys.argv) > 2 else IMAGES / "report.png"
+    report_picture(Path(sys.argv[1]), written)
+    print(f"picture in {written}")

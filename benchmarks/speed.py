@@ -6,8 +6,8 @@
 each row is then measured with both in turns. "cold" starts with an empty cache of compiled code,
 "warm" with that of the run before it. CPU seconds are those of all processes of a command. Figures
 are medians of three rounds, one for what takes minutes. Rows go to benchmarks/results/speed.csv
-with the name of the machine. It takes half an hour; growth is in growth.py, the yardsticks (embree,
-the paper's method) are in events.py.
+with the name of the machine. It takes ten minutes, on Linux; growth is in growth.py, the yardsticks
+(embree, the paper's method) are in events.py.
 """
 
 import argparse
@@ -64,11 +64,18 @@ class Version(NamedTuple):
     python: str
     folder: Path
 
-    def spent(self, words: list[str], cache: str | Path) -> dict[str, float]:
-        """Seconds of a command, by the clock and of CPU. Raises RuntimeError if it fails."""
+    def spent(
+        self, words: list[str], cache: str | Path, cores: set[int] | None = None
+    ) -> dict[str, float]:
+        """Seconds of a command, by the clock and of CPU. Raises RuntimeError if it fails.
+
+        Args:
+            cores: that the command may use; None for all.
+        """
         setting = {**os.environ, "NUMBA_CACHE_DIR": str(self.folder / cache)}
         before, begin = _children(), time.perf_counter()
-        going = subprocess.Popen([self.python, *words], cwd=self.root, env=setting,
+        pinned = ["taskset", "-c", ",".join(map(str, sorted(cores)))] if cores else []
+        going = subprocess.Popen([*pinned, self.python, *words], cwd=self.root, env=setting,
                                  stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)  # fmt: skip
         assert going.stdout is not None
         going.stdout.read(1)
@@ -139,16 +146,17 @@ def evaluating(version: Version, turn: int) -> Iterator[tuple[str, float]]:
 
 
 def studying(version: Version, turn: int) -> Iterator[tuple[str, float]]:
-    """40 evaluations of a study, on one worker and on two."""
+    """40 evaluations of a study, on one core and on two."""
     study = version.folder / "study.toml"
     study.write_text(STUDY.format(root=version.root), encoding="utf-8")
     seconds = []
-    for workers in (1, 2):
-        out = str(version.folder / f"study{turn}-{workers}")
-        words = ["-m", "chamberopt", "run", str(study), "--workers", str(workers), "--out", out]
-        seconds.append(version.spent(words, "cache")["all_s"])
-        yield f"40 evaluations, {workers} worker(s), s", seconds[-1]
-    yield "40 evaluations, one worker / two", seconds[0] / seconds[1]
+    for cores in (1, 2):
+        out = str(version.folder / f"study{turn}-{cores}")
+        words = ["-m", "chamberopt", "run", str(study), "--out", out]
+        found = version.spent(words, "cache", set(sorted(os.sched_getaffinity(0))[:cores]))
+        seconds.append(found["all_s"])
+        yield f"40 evaluations, {cores} core(s), s", seconds[-1]
+    yield "40 evaluations, one core / two", seconds[0] / seconds[1]
 
 
 # Each with its rounds.

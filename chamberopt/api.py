@@ -5,6 +5,7 @@
     design = chamberopt.load_design("designs/gear.toml")
     result = chamberopt.simulate(design.changed({"shot.mass_g": 8}), "results/more-shot")
     result.metrics["mean_coverage"]            # Estimate(value=..., half_width=...), 95 % interval
+    result.notes                               # what to know before trusting it
     chamberopt.show(result, "more-shot.png")
 
 Coverage is in the result's coverage.vtp, a mesh that suits it, and in part.vtp as means over the
@@ -35,6 +36,7 @@ def simulate(
     out: str | Path,
     *,
     analytic: bool = False,
+    tolerances: bool = False,
     workers: int | None = None,
     progress: Progress | None = None,
 ) -> Result:
@@ -43,6 +45,7 @@ def simulate(
     Args:
         out: new or empty folder.
         analytic: use the exact cylinder, box or prism instead of its mesh, if the chamber is one.
+        tolerances: also simulate what the design's tolerances do; see "tolerances" of result.data.
         workers: number of threads, by default one per core; it does not change the result.
         progress: called as progress(done, total, None) after each replica.
     Raises:
@@ -56,16 +59,23 @@ def simulate(
     from chamberopt.output.results.load import load_result
     from chamberopt.output.save_run import save_simulation
     from chamberopt.simulation.effect_pilot import with_effects_resolved
-    from chamberopt.simulation.evaluate import evaluate
+    from chamberopt.simulation.peening.calibration_errors import evaluate_calibrated
+    from chamberopt.simulation.peening.tolerances import plan_tolerances, simulate_tolerances
 
     _require("design", design, Design, "load_design")
+    if tolerances:
+        plan_tolerances(design)
     with claim_folder(out) as folder, local_executor(workers) as executor:
         chamber = build_chamber(design)
         cavity = analytic_cavity(design, chamber) if analytic else None
         design, advice = with_effects_resolved(design, chamber, executor)
-        evaluation = evaluate(design, chamber, executor, progress, cavity=cavity)
-        remarks = save_simulation(folder, design, chamber, evaluation, advice)
-    _warn([*map(str, advice), *evaluation.notes, *remarks])
+        found = None
+        if tolerances:
+            evaluation, found = simulate_tolerances(design, chamber, executor, progress, analytic)
+        else:
+            evaluation = evaluate_calibrated(design, chamber, executor, progress, cavity=cavity)
+        remarks = save_simulation(folder, design, chamber, evaluation, advice, None, found)
+    _warn([*map(str, advice), *remarks])
     return load_result(out)
 
 
@@ -100,7 +110,7 @@ def optimise(
             )
             result = run_study(study, folder, executor, progress)
             remarks = save_study(out, result, advice)
-            _warn([*map(str, advice), *result.best.evaluation.notes, *remarks])
+            _warn([*map(str, advice), *remarks])
     return load_result(out)
 
 

@@ -16,25 +16,25 @@ ORDER = {
     "chamberopt": (
         "common geometry design chamber coverage simulation optimize output api cli __main__"
     ),
-    "chamberopt/geometry": "triangles solids+remesh slivers mesh_io",
+    "chamberopt/geometry": "triangles faces+solids+remesh slivers mesh_io",
     "chamberopt/geometry/mesh_io": "surface_error native_reader+units+holes+self_intersection "
     "readers formats healing part_mesh",
     "chamberopt/design": (
-        "table_base materials shapes effects+part+process+shot+sonotrode design load"
+        "table_base materials shapes effects+part+process+shot+sonotrode peening design load"
     ),
     "chamberopt/chamber": (
         "target deflector_meshes bores_and_deflectors reach part build dimensionless scene "
-        "analytic checks"
+        "analytic checks propose"
     ),
     "chamberopt/coverage": "dents part_impacts+metrics field coverage_from_impacts "
-    "resolution+percentile coverage_intervals strength",
+    "resolution+percentile coverage_intervals strength strength_intervals compression",
     "chamberopt/simulation": "resting_balls replicas evaluation estimates evaluate "
-    "field_values time_curve complete_result effect_pilot convergence",
+    "field_values time_curve complete_result effect_pilot peening convergence",
     "chamberopt/optimize": "study+search storage "
-    "sensitivity+evaluate_candidate candidates run_study pareto+run_sweep",
-    "chamberopt/cli": "interrupt+options console prepare commands command_line",
+    "sensitivity+evaluate_candidate+observe candidates run_study pareto+run_sweep",
+    "chamberopt/cli": "interrupt+options+resume console prepare commands command_line",
     "chamberopt/output": "vtp_reader vtp_files plots results resimulate viewer save_run "
-    "report+export+compare",
+    "report+export compare editor",
     "sim_core": "errors numerics balls effects geometry motion impulses scene contact detect loop",
 }
 # Only this file or package imports the library.
@@ -44,11 +44,14 @@ ONE_IMPORTER = {
     "nlopt": "optimize/search/nlopt_search.py",
     "pyvista": "output/vtp_files.py",
     "vtk": "output/viewer/",
+    "starlette": "output/editor/",
+    "uvicorn": "output/editor/server.py",
+    "tomlkit": "output/editor/edited_file.py",
     "distributed": "common/parallel/dask_cluster.py",
     "dask": "common/parallel/dask_cluster.py",
-    "plotly": "output/report/",
     # VTK's file readers alone, which need no OpenGL
     "vtkmodules": "geometry/mesh_io/readers/vtk.py",
+    "gmsh": "geometry/mesh_io/readers/step/tessellation.py",
 }
 MOST_ENTRIES = 12
 

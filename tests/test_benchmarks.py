@@ -11,11 +11,12 @@ import pytest
 import trimesh
 
 from benchmarks import analytic, flights, wall_query, who_meets_whom
-from benchmarks.analytic_runs import INSCRIBED, Run, fit, hotelling
+from benchmarks.analytic_runs import INSCRIBED, PEENED, Run, fit, hotelling
 from benchmarks.gas import sample_gas
 from benchmarks.scenes import DIAMETER
 from benchmarks.structures.mesh_obstacles import build_shell
 from chamberopt.common.estimate import Estimate
+from chamberopt.design.load import load_design
 from sim_core.loop.spatial_blocks import MIN_BALLS
 from tests.helpers.scenes.cavities import box_around
 
@@ -69,6 +70,17 @@ def test_the_analytical_chamber_beside_the_meshed_one(tmp_path: Path) -> None:
     assert float(rows["impacts_per_mm2_s, 8 facets"]["difference_over_half_width"]) > 0.0, (
         "less room, more impacts"
     )
+
+
+def test_the_shipped_plate_of_the_paper_is_the_chamber_of_the_page() -> None:
+    page = (analytic.ROOT / "docs" / "analytic.md").read_text(encoding="utf-8")
+    paper, plate = (
+        load_design(analytic.ROOT / "designs" / f"{name}.toml") for name in ("plate_paper", "plate")
+    )
+    assert f"{1e6 * paper.sonotrode.amplitude:.2f} µm zero to peak" in page
+    assert paper.process.treatment_time == PEENED
+    fitted = {"sonotrode.amplitude_um": 25.0, "process.treatment_time_s": 5.0}
+    assert paper.changed(fitted) == plate
 
 
 def test_a_quick_comparison_does_not_go_into_the_documentation() -> None:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-SURE = 2.0  # standard errors to either side: a 95 % interval
+ERRORS_EACH_SIDE = 2.0  # standard errors to either side: a 95 % interval
 
 
 class Row(NamedTuple):

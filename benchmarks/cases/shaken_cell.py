@@ -11,36 +11,56 @@ from collections.abc import Iterator
 import numpy as np
 
 from benchmarks.cases.row import Row, mean_and_half_width
-from sim_core import Balls, Gravity, Physics, Restitution, Scene, Vibration, pack_balls, simulate
+from sim_core import (
+    Balls,
+    Friction,
+    Gravity,
+    Physics,
+    Restitution,
+    Scene,
+    Vibration,
+    pack_balls,
+    simulate,
+)
+from sim_core.effects.gravity import STANDARD
 from tests.helpers.scenes.cavities import CEILING, FLOOR, box
 
 DIAMETER = 1.6e-3  # m
 WIDE, DEEP, HIGH = 48.0, 1.05, 32.0  # diameters
 GAMMA, FREQUENCY = 32.0, 60.0  # strength A omega² / g, and Hz
 STEEL = (0.93, 1.0, 0.0)
+RUBBING = (0.2, 0.4)  # mu and beta0 of balls, floor and ceiling; the plates stay smooth
 SECONDS, FRAMES, SEEDS = 8.0, 400, 4
+SLICES = {"middle third of the height": 1.0 / 3.0, "slice of two diameters": 2.0 / HIGH}
 
 
-def tail(count: int, seed: int) -> float:
-    """p of the horizontal velocities in the middle third of the cell's height."""
+def tails(count: int, friction: tuple[float, float] | None, seed: int) -> list[float]:
+    """p of the horizontal velocities in each of SLICES about the middle of the cell's height."""
     from scipy.stats import gennorm
 
-    amplitude = GAMMA * 9.80665 / (math.tau * FREQUENCY) ** 2
+    amplitude = GAMMA * STANDARD / (math.tau * FREQUENCY) ** 2
     room = box((WIDE * DIAMETER, DEEP * DIAMETER, HIGH * DIAMETER))
     rng = np.random.default_rng(seed)
     places = pack_balls(room, count, DIAMETER, rng, 0.02 * DIAMETER)
     balls = Balls(places, rng.normal(0.0, 0.5, places.shape), DIAMETER)
     shaking = tuple(Vibration(tag, amplitude, FREQUENCY, 0.0) for tag in (FLOOR, CEILING))
     law = Restitution((STEEL,) * 3, STEEL)
-    scene = Scene(room, balls, Physics(Gravity(), law, shaking), SECONDS, 2.0, record=())
+    rubbing = None if friction is None else Friction((friction, friction, (0.0, 0.0)), friction)
+    physics = Physics(Gravity(), law, shaking, friction=rubbing)
+    scene = Scene(room, balls, physics, SECONDS, 2.0, record=())
     frames = simulate(scene, np.linspace(0.0, SECONDS, FRAMES + 1)[1:]).frames
-    height = frames.positions[:, :, 2] / (HIGH * DIAMETER)
-    middle = frames.velocities[:, :, 0][np.abs(height - 0.5) < 1.0 / 6.0]
-    return float(gennorm.fit(middle, floc=0.0)[0])
+    off_middle = np.abs(frames.positions[:, :, 2] / (HIGH * DIAMETER) - 0.5)
+    across = frames.velocities[:, :, 0]
+    return [
+        float(gennorm.fit(across[off_middle < 0.5 * part], floc=0.0)[0]) for part in SLICES.values()
+    ]
 
 
 def rows() -> Iterator[Row]:
-    for count in (150, 300, 500):
-        found = np.array([tail(count, seed) for seed in range(SEEDS)])
-        yield Row("shaken cell", f"{count} balls", "exponent p of P(v) ~ exp(-|v|^p)", 1.55, 0.1,
-                  *mean_and_half_width(found))  # fmt: skip
+    for count, friction in ((150, None), (300, None), (500, None), (150, RUBBING), (500, RUBBING)):
+        name = "no friction" if friction is None else f"friction {friction[0]}"
+        found = np.array([tails(count, friction, seed) for seed in range(SEEDS)])
+        for part, exponents in zip(SLICES, found.T, strict=True):
+            yield Row("shaken cell", f"{count} balls, {name}, {part}",
+                      "exponent p of P(v) ~ exp(-|v|^p)", 1.55, 0.1,
+                      *mean_and_half_width(exponents))  # fmt: skip

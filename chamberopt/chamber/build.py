@@ -28,7 +28,7 @@ from chamberopt.chamber.part import Part, posed_part
 from chamberopt.chamber.reach.reach import find_reach, reached_part_share
 from chamberopt.common.errors import InputError
 from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, further_sonotrode_tag, is_sonotrode
-from chamberopt.geometry.mesh_io.surface_error import format_box, format_point
+from chamberopt.geometry.mesh_io.surface_error import SurfaceError, format_box, format_point
 from chamberopt.geometry.slivers import MIN_HEIGHT, remove_slivers
 from chamberopt.geometry.solids import (
     SolidSurface,
@@ -42,15 +42,18 @@ from chamberopt.geometry.triangles import (
     areas,
     find_shells,
     find_unwalled_border,
+    sharp_edges,
     tetrahedron_volumes,
 )
 
 if TYPE_CHECKING:
     from chamberopt.design.load import Design
+    from chamberopt.design.shapes.construction.surface import ShapeSurface
 
 # Rotation of a triangle by rounding [rad] that is worth a note; the facets of a round wall turn a
 # ball's path a hundred times as much.
 MAX_ROTATION = 1e-3
+TARGET = "the target"
 
 
 @dataclass(frozen=True)
@@ -75,6 +78,14 @@ class Chamber:
         """From the sonotrode to the highest point of the cavity [m]."""
         return float(self.vertices[:, 2].max())
 
+    def on_zone(self, zone: str) -> Chamber:
+        """The same chamber with a zone of the part as the target."""
+        return replace(self, part=replace(self.part, target=self.part.zones[zone]))
+
+    def surfaces(self) -> dict[str, Chamber]:
+        """The chamber with its target, and with each zone as the target, by names for messages."""
+        return {TARGET: self, **{f"zone {name}": self.on_zone(name) for name in self.part.zones}}
+
 
 def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
     """The chamber of a design.
@@ -91,7 +102,7 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
     part = part if target is None else replace(part, target=target)
     notes += design.chamber.notes(design.shot.diameter)
     shape = design.chamber.surface(part.vertices, part.triangles)
-    _refuse_misplaced_part(part, shape.vertices, design)
+    _refuse_misplaced_part(part, shape, design)
 
     cavity = cavity_solid(design, shape, deflectors)
     notes += [note for one in deflectors for note in one.notes]
@@ -114,9 +125,8 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
     whole = cavity.body.surface()
     tags = cavity.trace(whole).tags
     if not (tags == TAG_PART).any():
-        drawn, posed = "check the groups", "change part.offset_mm or the sizes"
-        remedy = f"{drawn if is_drawn else posed} in [chamber]"
-        raise InputError(f"{part.name}: no part of it is inside the chamber; {remedy}")
+        text = f"{part.name}: no part of it is inside the chamber; "
+        raise _misplaced(part, shape, text + _where_to_look(is_drawn))
 
     room, room_notes = _room_over_sonotrode(whole, tags)
     if not is_drawn:
@@ -134,16 +144,37 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
         notes.append(note)
     elif design.part.target.reachable:
         notes.append("target.reachable: the target is what the shot reaches in the study's start")
-    notes += _hidden_target_notes(part, exposed)
+    if not (exposed[part.target] > 0.0).any():
+        text = f"part.target: none of its {int(part.target.sum())} triangles bounds the cavity, so "
+        turn = "" if is_drawn else "check part.rotate_deg (which side faces the sonotrode); "
+        raise _misplaced(part, shape, f"{text}no shot reaches it; {turn}{_where_to_look(is_drawn)}")
+    _refuse_hidden_zones(part, exposed)
     notes += [*room_notes, *_notes_on_room(room, traced, part.name)]
     volume = float(tetrahedron_volumes(room.vertices, room.triangles).sum())
     surface = room.vertices, room.triangles, traced.tags, traced.source
     origin = tuple(notes), traced.fitting, design.chamber.sha256
-    return Chamber(*surface, volume, part, exposed, *origin)
+    chamber = Chamber(*surface, volume, part, exposed, *origin)
+    return replace(chamber, notes=(*notes, *_hidden_notes(chamber)))
 
 
-def _refuse_misplaced_part(part: Part, shape: np.ndarray, design: Design) -> None:
-    """Raise InputError for a part outside a shape's vertices (n, 3) [m], or too low."""
+def _misplaced(part: Part, shape: ShapeSurface, text: str) -> SurfaceError:
+    """An error that shows the part and the edges of the chamber without it."""
+    edges = shape.vertices[sharp_edges(shape.vertices, shape.triangles)]
+    return SurfaceError(text, part.vertices[part.triangles], edges)
+
+
+def _where_to_look(is_drawn: bool) -> str:
+    """How a part comes to its place, as a remedy for one in the wrong place."""
+    if is_drawn:
+        return "check the groups in [chamber]"
+    return (
+        "the middle of the part's box is on the chamber's axis unless part.offset_mm moves it: "
+        "change that, or the sizes in [chamber]"
+    )
+
+
+def _refuse_misplaced_part(part: Part, shape: ShapeSurface, design: Design) -> None:
+    """Raise InputError for a part outside a shape, or too low."""
     distance, amplitude = design.chamber.sonotrode_distance, design.sonotrode.amplitude
     if distance <= amplitude:
         drawn = design.chamber.sonotrode_distance_mm is None
@@ -162,18 +193,22 @@ def _refuse_misplaced_part(part: Part, shape: np.ndarray, design: Design) -> Non
             )
         return
     low, high = part.vertices.min(axis=0), part.vertices.max(axis=0)
-    wall_low, wall_high = shape.min(axis=0), shape.max(axis=0)
+    wall_low, wall_high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)
     if low[2] >= wall_high[2]:
-        raise InputError(
+        raise _misplaced(
+            part,
+            shape,
             f"chamber.{design.chamber.ceiling_key}: with a ceiling at {1e3 * wall_high[2]:g} mm, "
             f"but the part begins {1e3 * low[2]:g} mm above the sonotrode, above the ceiling; "
-            "raise the ceiling or lower chamber.sonotrode_distance_mm"
+            "raise the ceiling or lower chamber.sonotrode_distance_mm",
         )
     if (low[:2] >= wall_high[:2]).any() or (high[:2] <= wall_low[:2]).any():
-        raise InputError(
+        raise _misplaced(
+            part,
+            shape,
             f"part.offset_mm: given {[1e3 * value for value in design.part.offset]}: the part "
             f"({format_box(high - low)}) is beside the chamber "
-            f"({format_box(wall_high - wall_low)}); bring it nearer to the axis"
+            f"({format_box(wall_high - wall_low)}); bring it nearer to the axis",
         )
 
 
@@ -202,10 +237,11 @@ def _refuse_wide_swings(design: Design, room: SolidSurface, tags: np.ndarray) ->
         tag = further_sonotrode_tag(k - 1) if k else TAG_SONOTRODE
         limit, place, leaning = largest_amplitude(mesh, tag, 0.5 * ball)
         if one.amplitude > limit:
-            most = math.floor(1e7 * limit) / 10.0
+            most = math.floor(1e7 * limit * one.per_amplitude) / 10.0
+            given = one.amplitude * one.per_amplitude
             raise InputError(
-                f"{f'sonotrodes.{k - 1}' if k else 'sonotrode'}.amplitude_um: given "
-                f"{one.amplitude_um:g}, but at {format_point(place)} the wall {leaning}, where "
+                f"{f'sonotrodes.{k - 1}' if k else 'sonotrode'}.{one.amplitude_key}: given "
+                f"{1e6 * given:g}, but at {format_point(place)} the wall {leaning}, where "
                 f"balls of {1e3 * ball:g} mm allow at most {most:g}: a moving edge is not "
                 "supported; lower it, use larger balls, or let the wall rise more steeply"
             )
@@ -270,25 +306,36 @@ def _only_reachable(
     )
 
 
-def hidden_share(part: Part, exposed: np.ndarray) -> float:
-    """The share of the target outside the cavity, by each part triangle's area in it (m,) [m²]."""
-    return float(1.0 - exposed[part.target].sum() / part.area[part.target].sum())
+def selection_of(surface: str) -> str:
+    """Where a design chooses a surface of `Chamber.surfaces`, for messages."""
+    return "[part.target]" if surface == TARGET else f"the target of {surface}"
 
 
-def _hidden_target_notes(part: Part, exposed: np.ndarray) -> list[str]:
-    """A note on the share of the target outside the cavity; InputError if that is all of it."""
-    if not (exposed[part.target] > 0.0).any():
-        raise InputError(
-            f"part.target: none of its {int(part.target.sum())} triangles bounds the cavity, so no "
-            "shot reaches it; check part.rotate_deg (which side faces the sonotrode) and the sizes "
-            "in [chamber]"
-        )
-    hidden = hidden_share(part, exposed)
-    if hidden < 1e-3:
-        return []
+def hidden_share(chamber: Chamber) -> float:
+    """The share of the target's area outside the cavity."""
+    part = chamber.part
+    return float(1.0 - chamber.exposed_area[part.target].sum() / part.area[part.target].sum())
+
+
+def _refuse_hidden_zones(part: Part, exposed: np.ndarray) -> None:
+    """Raise InputError if all of a zone is outside the cavity, where each part triangle has an area
+    in it (m,) [m²]."""
+    for name, zone in part.zones.items():
+        if not (exposed[zone] > 0.0).any():
+            raise InputError(
+                f"zones: {name}: none of its {int(zone.sum())} triangles bounds the cavity, so no "
+                "shot reaches it; leave the zone out, or move the part or the walls"
+            )
+
+
+def _hidden_notes(chamber: Chamber) -> list[str]:
+    """Notes on the shares of the target and of zones outside the cavity."""
+    shares = {name: hidden_share(one) for name, one in chamber.surfaces().items()}
     return [
-        f"{hidden:.1%} of the target's area is outside the cavity and counts as not covered; "
-        "narrow [part.target] to what is to be peened, or enlarge the chamber"
+        f"{hidden:.1%} of the area of {name} is outside the cavity and counts as not covered; "
+        f"narrow {selection_of(name)} to what is to be peened, or enlarge the chamber"
+        for name, hidden in shares.items()
+        if hidden >= 1e-3
     ]
 
 

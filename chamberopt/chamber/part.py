@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,13 +12,14 @@ import numpy as np
 from chamberopt.chamber.target import chosen_triangles
 from chamberopt.common.errors import InputError
 from chamberopt.geometry.mesh_io.part_mesh import PartMesh, read_part_cached
+from chamberopt.geometry.mesh_io.readers.step.tessellation import Tessellation
 from chamberopt.geometry.remesh import remesh, triangle_quality
 from chamberopt.geometry.solids import snap_to_grid
 from chamberopt.geometry.triangles import areas, rotation_matrix
 
 if TYPE_CHECKING:
     from chamberopt.design.design import Design
-    from chamberopt.design.part import Target
+    from chamberopt.design.part import Selection, Target
 
 Axis = tuple[np.ndarray, np.ndarray]
 
@@ -52,6 +53,7 @@ class Part:
     unit: str = ""  # of the numbers in the file
     names: tuple[str, ...] = ()  # of the file's groups
     file: PartOfFile | None = None  # None only in parts that no file has
+    zones: dict[str, np.ndarray] = field(default_factory=dict)  # triangles of each zone, (m,) bool
 
     @property
     def elements(self) -> np.ndarray:
@@ -80,8 +82,50 @@ def posed_part(design: Design) -> tuple[Part, list[str]]:
     original = replace(_part_of_file(design), groups={}, notes=()) if is_remeshed else None
     file = PartOfFile(simulated, original, turn, shift)
     of_file = mesh.sha256, mesh.unit, tuple(mesh.groups), file
-    part = Part(vertices, mesh.triangles, area, target, design.part.mesh_path.name, *of_file)
+    zones = {
+        zone.name: chosen_triangles(mesh, zone.target, f"zones.{k}.target")
+        for k, zone in enumerate(design.zones)
+    }
+    name = design.part.mesh_path.name
+    part = Part(vertices, mesh.triangles, area, target, name, *of_file, zones)
     return part, list(mesh.notes)
+
+
+@dataclass(frozen=True)
+class PartPreview:
+    """The part as its file has it, with the place and the target that a design gives it."""
+
+    mesh: PartMesh  # with the file's own triangles (m, 3), in the file's frame
+    rotation: np.ndarray  # from the file's frame to the chamber's, (3, 3), applied before the shift
+    shift: np.ndarray  # [m], (3,)
+    target: np.ndarray  # (m,)
+    zones: dict[str, np.ndarray]  # (m,) bool each
+
+    @property
+    def vertices(self) -> np.ndarray:
+        """In the chamber's frame [m], (n, 3)."""
+        return np.asarray(self.mesh.vertices @ self.rotation.T + self.shift)
+
+
+def preview_part(design: Design) -> PartPreview:
+    """What `posed_part` begins with, at once: before target.element_mm and rounding.
+
+    Raises:
+        InputError: the file cannot be used, or target or zone are empty.
+    """
+    mesh, part = _part_of_file(design), design.part
+    file = part.mesh_path, part.unit, part.limits
+
+    def chosen(wanted: Selection, field: str) -> np.ndarray:
+        if design.chamber.setup() is not None:
+            return chosen_triangles(mesh, wanted, field)
+        return _chosen(file, wanted, field, mesh.sha256)
+
+    target = chosen(part.target, "part.target")
+    zones = {
+        one.name: chosen(one.target, f"zones.{k}.target") for k, one in enumerate(design.zones)
+    }
+    return PartPreview(mesh, *_pose(mesh, design), target, zones)
 
 
 def turning_axis(design: Design, part: Part) -> Axis | None:
@@ -99,7 +143,9 @@ def turning_axis(design: Design, part: Part) -> Axis | None:
 def _part_of_file(design: Design) -> PartMesh:
     """The part as its file has it; a file is read once, also if many chambers are built from it."""
     part, setup = design.part, design.chamber.setup()
-    return read_part_cached(part.mesh_path, part.unit) if setup is None else setup.part
+    if setup is not None:
+        return setup.part
+    return read_part_cached(part.mesh_path, part.unit, part.limits)
 
 
 def _meshed_part(design: Design) -> tuple[PartMesh, np.ndarray]:
@@ -107,15 +153,23 @@ def _meshed_part(design: Design) -> tuple[PartMesh, np.ndarray]:
     part, mesh = design.part, _part_of_file(design)
     if part.target.element is None:
         return mesh, chosen_triangles(mesh, part.target)
-    return _remeshed(part.mesh_path, part.unit, part.target, part.target.element, mesh.sha256)
+    file = part.mesh_path, part.unit, part.limits
+    return _remeshed(file, part.target, part.target.element, mesh.sha256)
+
+
+@lru_cache(maxsize=16)
+def _chosen(
+    file: tuple[Path, str, Tessellation | None], wanted: Selection, field: str, _sha256: str
+) -> np.ndarray:
+    return chosen_triangles(read_part_cached(*file), wanted, field)
 
 
 @lru_cache(maxsize=4)
 def _remeshed(
-    path: Path, unit: str, wanted: Target, size: float, _sha256: str
+    file: tuple[Path, str, Tessellation | None], wanted: Target, size: float, _sha256: str
 ) -> tuple[PartMesh, np.ndarray]:
     """The part with its target in triangles with sides of about a size [m], and that target."""
-    mesh = read_part_cached(path, unit)
+    mesh = read_part_cached(*file)
     target = chosen_triangles(mesh, wanted)
     area = float(areas(mesh.vertices, mesh.triangles)[target].sum())
     count = area / (np.sqrt(3.0) / 4.0 * size * size)

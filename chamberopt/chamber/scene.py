@@ -132,6 +132,7 @@ def scene_physics(
     """
     import sim_core
 
+    design = design.simulated
     effects, materials = design.effects, design.materials
     is_random = design.sonotrode.motion == "random_phase"
     if effects.auto:
@@ -178,6 +179,7 @@ def build_scene(
     from sim_core import AnalyticCavity, Balls, Scene, SceneError, pack_balls
 
     require_ball_count(design)
+    design = design.simulated
     if not isinstance(mesh, AnalyticCavity):
         require_turnable(design, mesh, axis)
     rng = np.random.default_rng(seed)

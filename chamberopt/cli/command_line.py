@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import logging
 import sys
 from collections.abc import Sequence
 from concurrent.futures import BrokenExecutor
@@ -12,10 +13,12 @@ from cyclopts import CycloptsError
 
 from chamberopt.cli import commands  # noqa: F401  # registers every command with the app
 from chamberopt.cli.console import show
-from chamberopt.cli.interrupt import KEPT
+from chamberopt.cli.interrupt import INTERRUPTED
 from chamberopt.cli.options import app
 from chamberopt.common.errors import InputError
+from chamberopt.common.progress import write_json_lines
 
+PROGRESS = "--progress"
 UNUSABLE_NAME = (errno.ENAMETOOLONG, errno.ELOOP)
 
 
@@ -25,15 +28,17 @@ def run_command(arguments: Sequence[str] | None = None) -> int:
         if isinstance(stream, TextIOWrapper):
             # A terminal that cannot show ± must not end the command before its results are printed.
             stream.reconfigure(errors="backslashreplace")
+    # It warns on stderr where it cannot keep its own cache, as without a home.
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
     try:
-        given = list(sys.argv[1:] if arguments is None else arguments)
+        given = _without_progress(list(sys.argv[1:] if arguments is None else arguments))
         app(given, exit_on_error=False, print_error=False, result_action="return_value")
     except CycloptsError as error:
         return _fail(f"{str(error).rstrip()} (chamberopt --help lists commands and options)", 2)
     except InputError as error:
-        return _fail(str(error), 2)
+        return _fail(str(error), 2, error)
     except KeyboardInterrupt as error:
-        return _fail(f"interrupted; {KEPT}", 130, error)
+        return _fail(INTERRUPTED, 130, error)
     except BrokenPipeError:  # the program that reads stdout has ended, as `head` does
         sys.stderr.close()
         return 0
@@ -41,13 +46,13 @@ def run_command(arguments: Sequence[str] | None = None) -> int:
         where = f"{error.filename}: " if error.filename else ""
         if error.errno in UNUSABLE_NAME:
             return _fail(f"{where}{error.strerror}; check the path", 2)
-        return _fail(f"{where}{error.strerror or error}; {KEPT}", 1, error)
+        return _fail(f"{where}{error.strerror or error}", 1, error)
     except MemoryError as error:
-        return _fail(f"out of memory; {KEPT}", 1, error)
+        return _fail("out of memory", 1, error)
     except BrokenExecutor as error:
         cause = "killed from outside, or out of memory: use fewer workers"
         what = str(error) or "a worker process died, twice"
-        return _fail(f"{what} ({cause}); {KEPT}", 1, error)
+        return _fail(f"{what} ({cause})", 1, error)
     except (ValueError, RuntimeError) as error:
         import sim_core
 
@@ -57,6 +62,17 @@ def run_command(arguments: Sequence[str] | None = None) -> int:
             return _fail(f"the simulation stopped: {error}", 1, error)
         raise  # a fault of ours
     return 0
+
+
+def _without_progress(given: list[str]) -> list[str]:
+    """The arguments without `--progress jsonl`, which every command takes."""
+    if PROGRESS not in given:
+        return given
+    k = given.index(PROGRESS)
+    if given[k + 1 : k + 2] != ["jsonl"]:
+        raise InputError(f"{PROGRESS}: allowed: jsonl, lines of JSON on stderr for other programs")
+    write_json_lines()
+    return given[:k] + given[k + 2 :]
 
 
 def _fail(message: str, status: int, error: BaseException | None = None) -> int:

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import json
-import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from itertools import count
 from pathlib import Path
+from shutil import rmtree
 from typing import TYPE_CHECKING, Any, TextIO, TypeVar
+
+from chamberopt.common.errors import visible
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.common.estimate import Estimate
     from chamberopt.design.load import Design
     from chamberopt.simulation.evaluation import Evaluation
+    from chamberopt.simulation.peening.tolerances import ToleranceResult
 
-# Characters that a terminal obeys instead of showing them, or that reverse the text.
-CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
 T = TypeVar("T")
 
 
@@ -52,13 +53,28 @@ def claimed_folder(
                 return
 
 
+@contextmanager
+def whole_or_nothing(folder: Path) -> Iterator[None]:
+    """Empty a folder, which was new or empty before, where the `with` block fails."""
+    from chamberopt.common.files import LEFTOVER_PREFIXES
+
+    try:
+        yield
+    except BaseException:
+        for one in folder.iterdir():
+            if one.is_dir():
+                rmtree(one, ignore_errors=True)
+            elif not one.name.startswith(LEFTOVER_PREFIXES):
+                one.unlink(missing_ok=True)
+        raise
+
+
 def show(lines: Iterable[str], to: TextIO | None = None) -> None:
     """Print lines to stdout, or `to`, with control characters in names made visible.
 
     Names of files, keys and groups come from elsewhere, and a terminal would obey them.
     """
-    text = CONTROL.sub(lambda one: one[0].encode("unicode_escape").decode(), "\n".join(lines))
-    print(text, file=to or sys.stdout, flush=True)
+    print(visible("\n".join(lines)), file=to or sys.stdout, flush=True)
 
 
 def print_remarks(remarks: Iterable[str]) -> None:
@@ -118,6 +134,50 @@ def evaluation_lines(evaluation: Evaluation) -> list[str]:
         *lines,
         f"{'gauge_mm2':34}{plain(evaluation.gauge_mm2)}: area of the windows; the median window "
         f"has {plain(found.dents, 2)} dents",
+    ]
+
+
+def tolerance_lines(found: ToleranceResult) -> list[str]:
+    """Figures over the box of tolerances, the worst corner, and what each tolerance does."""
+    from chamberopt.common.number_text import estimate_text, plain
+
+    rows = [["over the tolerances", "as designed", "q05", "q95", "in the worst corner"]]
+    for name, figure in found.figures.items():
+        known = (figure.nominal, figure.q05, figure.q95, figure.simulated)
+        rows.append([name, *(estimate_text(one) if one else "" for one in known)])
+    lines = [f"{name:34}{''.join(f'{one:19} ' for one in ends)}".rstrip() for name, *ends in rows]
+    if found.corner:
+        place = ", ".join(f"{name} = {plain(value)}" for name, value in found.corner.items())
+        lines.append(f"worst corner, for {found.worst_for}: {place}")
+    lines.append("")
+    for name, figure in found.figures.items():
+        lines.append(f"{name}: change at the low and at the high end of")
+        small, none = [], []
+        for number in found.numbers:
+            effects = figure.effects[number.name]
+            if any(abs(end.value) > end.half_width for end in effects):
+                low, high = (estimate_text(end, sign=True) for end in effects)
+                span = f"{number.name} {plain(number.low)} .. {plain(number.high)}"
+                lines.append(f"    {span:50}{low:21} {high}")
+            elif all(end.half_width == 0.0 for end in effects):
+                none.append(number.name)
+            else:
+                small.append(number.name)
+        lines += [f"    not resolved: {', '.join(small)}"] if small else []
+        lines += [f"    does not depend on: {', '.join(none)}"] if none else []
+    return [*lines, *note_lines(found.notes)]
+
+
+def zone_lines(design: Design, evaluation: Evaluation) -> list[str]:
+    """Whether the limits of each zone are met, a line each."""
+    from chamberopt.common.number_text import estimate_text
+    from chamberopt.optimize.study.constraints import judge_zones
+
+    return [
+        f"zone {zone}: {row['key']} {row['limit']:g}: {row['standing']} "
+        f"({row['metric']} {estimate_text(evaluation.metrics[row['metric']])})"
+        for zone, rows in judge_zones(design, evaluation.metrics).items()
+        for row in rows
     ]
 
 

@@ -11,8 +11,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Self
 
-KEPT = "what had been finished stays on disk"
-INTERRUPTED = f"interrupted; {KEPT}"
+INTERRUPTED = "interrupted"
 FIRST = "finishing what runs, then stopping; press Ctrl-C again to stop now"
 SECOND = "stopped; the running evaluations are lost, all earlier ones are on disk"
 EARLY = "interrupted; no evaluation was running"
@@ -28,7 +27,8 @@ def interruptible() -> Iterator[None]:
     """Let Ctrl-C end the command: by KeyboardInterrupt, or at once where that would be lost.
 
     It is lost where a module is imported, which is what a command begins with, and where something
-    held it back before. Nothing else is: files get their names when they are whole.
+    held it back before. Nothing else is: files get their names when they are whole. Threads that
+    simulate end with the process, at once.
     """
     requested = False
 
@@ -50,6 +50,9 @@ def interruptible() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
+    if requested:
+        sys.stdout.flush()
+        os._exit(130)
 
 
 def _would_be_lost(frame: FrameType | None) -> bool:

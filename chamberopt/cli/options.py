@@ -1,16 +1,29 @@
 """The application object, and the options that several commands share."""
 
+from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, get_args
 
-from cyclopts import App, Parameter
+from cyclopts import App, CoercionError, Parameter, Token, convert
+
+
+def _convert(kind: Any, tokens: Sequence[Token]) -> Any:
+    """The value of an option; refuses 1.5 as a whole number, which cyclopts would round."""
+    if int in (kind, *get_args(kind)):
+        for token in tokens:
+            if "." in token.value and token.value.rpartition(".")[2].strip("0"):
+                raise CoercionError(token=token, target_type=int)
+    return convert(kind, tokens)
+
 
 app = App(
     name="chamberopt",
-    help="Design ultrasonic shot peening chambers for uniform coverage of a part.",
+    help="Design ultrasonic shot peening chambers for uniform coverage of a part. Every command "
+    "takes --progress jsonl, which tells its steps to other programs.",
     version=version("chamberopt"),
     suppress_keyboard_interrupt=False,
+    default_parameter=Parameter(converter=_convert),
 )
 
 Json = Annotated[

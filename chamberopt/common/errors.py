@@ -1,12 +1,16 @@
-"""Errors that a user can put right, and errors of lost workers."""
+"""Errors that a user can put right, errors of lost workers, and text that is safe to show."""
 
 from __future__ import annotations
 
+import re
 from concurrent.futures import BrokenExecutor
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
+
+# Characters that a terminal obeys instead of showing them, or that reverse the text.
+CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
 
 
 class InputError(Exception):
@@ -27,6 +31,16 @@ class WorkerLostError(BrokenExecutor):
 
 class ClusterLostError(BrokenExecutor):
     """The cluster ended with tasks unfinished; the command line exits with status 1."""
+
+
+def visible(text: str) -> str:
+    """The text with control characters as escapes; it keeps its tabs and line breaks."""
+    return CONTROL.sub(lambda one: one[0].encode("unicode_escape").decode(), text)
+
+
+def one_line(text: str) -> str:
+    """The text as `visible` gives it, with line breaks as escapes too."""
+    return visible(text).replace("\n", "\\n")
 
 
 def first_wrong_value(error: ValidationError) -> str:

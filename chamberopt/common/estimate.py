@@ -24,6 +24,11 @@ from typing import Any
 import numpy as np
 
 CONFIDENCE = 0.95
+# Position in Estimate.shared of the errors that a calibration leaves: those by the choice of points
+# come before.
+FIRST_OF_CALIBRATION = 16
+# And that of what an estimate of the part's metal under this shot leaves out, such as its depth.
+OF_METAL = FIRST_OF_CALIBRATION - 1
 ZERO_TOLERANCE = 1e-12  # a value below is a rounding error of zero
 
 
@@ -81,6 +86,35 @@ class Estimate:
     def not_known(self, in_words: str) -> Estimate:
         """The same value without an interval, and the words that stand in its place."""
         return replace(self, half_width=math.inf, in_words=in_words)
+
+    def times(self, factor: float) -> Estimate:
+        """The estimate of so many times this figure; the factor is exact and above 0."""
+        return replace(
+            self,
+            value=factor * self.value,
+            half_width=factor * self.half_width,
+            pseudovalues=tuple(factor * one for one in self.pseudovalues),
+            bias=factor * self.bias,
+            shared=tuple(factor * one for one in self.shared),
+        )
+
+    def with_shared(self, first: int, errors: Sequence[float]) -> Estimate:
+        """The estimate with more shared errors, from the position `first` on."""
+        if len(self.shared) > first:
+            raise ValueError(f"{len(self.shared)} shared errors, at most {first} were expected")
+        shared = (*self.shared, *(0.0,) * (first - len(self.shared)), *errors)
+        if not math.isfinite(self.half_width) or not self.pseudovalues:
+            return replace(self, shared=shared)
+        scatter = estimate(self.pseudovalues, shared=self.shared).half_width
+        wider = math.hypot(scatter, shared_half_width(errors))
+        return replace(self, shared=shared, half_width=self.half_width - scatter + wider)
+
+    def of_another_metal(self) -> Estimate:
+        """The estimate with an error of its own in the place of that of the metal."""
+        if len(self.shared) <= OF_METAL:
+            return self
+        before, own = self.shared[: OF_METAL - 1], self.shared[OF_METAL]
+        return replace(self, shared=(*before, own, 0.0, *self.shared[OF_METAL + 1 :]))
 
     @classmethod
     def from_interval_json(cls, data: Mapping[str, Any]) -> Estimate:

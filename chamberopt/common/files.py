@@ -1,9 +1,11 @@
 """Outputs have one writer each, overwrite nothing, and are written whole or not at all."""
 
 import csv
+import errno
 import io
 import os
 import platform
+import shutil
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -16,6 +18,9 @@ from chamberopt.common.errors import InputError, OutputTakenError
 LOCK, WRITING = ".lock", ".writing-"
 LEFTOVER_PREFIXES = (LOCK, WRITING)  # of files that a command that was killed may leave
 ANOTHER_FOLDER = "choose another folder (out, or --out)"
+# Bytes that must be free where a command begins to write: a result of a usual part takes a few MB,
+# and on a disk that is nearly full other programs fail too.
+LEAST_FREE = 20_000_000
 
 
 def is_new_or_empty(folder: Path) -> bool:
@@ -30,7 +35,8 @@ def make_output_folder(path: str | Path) -> Path:
     """Make a folder for results; InputError if it holds files or cannot be written."""
     folder = Path(path)
     if os.path.lexists(folder) and not os.path.isdir(folder):
-        text = "is a file; results need a folder"
+        what = "is a file" if os.path.exists(folder) else "is a link that leads nowhere"
+        text = f"{what}; results need a folder"
         raise OutputTakenError(f"{folder}: {text}: {ANOTHER_FOLDER}")
     with _writing_in(folder, ANOTHER_FOLDER):
         if not is_new_or_empty(folder):
@@ -56,6 +62,8 @@ def claim_folder(
         OutputTakenError: the folder is a file, holds other files, or another process has it.
         InputError: it cannot be written.
     """
+    import filelock  # noqa: F401  # here: Ctrl-C ends an import at once, and nothing is made yet
+
     folder = Path(path)
     made = [one for one in (folder, *folder.parents) if not os.path.lexists(one)]
     if not os.path.isdir(folder):
@@ -80,7 +88,7 @@ def claim_file(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def _only_writer(lock_file: Path, output: Path, remedy: str) -> Iterator[None]:
-    """Hold the lock of an output.
+    """Hold the lock of an output for which there is room.
 
     The lock belongs to the operating system and ends with its process, however that ends. A forked
     child would share it until both have ended; workers are spawned.
@@ -89,6 +97,7 @@ def _only_writer(lock_file: Path, output: Path, remedy: str) -> Iterator[None]:
 
     lock, holder = FileLock(lock_file), lock_file.with_name(f"{lock_file.name}-holder")
     with _writing_in(output, remedy):
+        _require_space(lock_file.parent)
         try:
             lock.acquire(timeout=0)
         except Timeout:
@@ -113,7 +122,7 @@ def _only_writer(lock_file: Path, output: Path, remedy: str) -> Iterator[None]:
 
 
 @contextmanager
-def _writing_in(place: Path, remedy: str) -> Iterator[None]:
+def _writing_in(place: Path | str, remedy: str) -> Iterator[None]:
     """Turn an error of the operating system into an InputError."""
     try:
         yield
@@ -127,11 +136,20 @@ def check_new_file(path: Path) -> Path:
     if os.path.lexists(path):
         text = "already exists, and nothing is ever overwritten: choose another name or remove it"
         raise InputError(f"{path}: {text}")
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: the folder {path.parent} does not exist; make it first")
-    with _writing_in(path, "choose another place"):
-        _require_writable(path.parent)
+    require_place(path)
     return path
+
+
+def require_place(path: Path, option: str = "") -> None:
+    """Raise InputError, which begins with the option, unless a file can be written there."""
+    folder = path.resolve().parent
+    if not folder.is_dir():
+        text = f"the folder {path.parent} does not exist; make it first"
+        raise InputError(f"{option}{path}: {text}")
+    if path.is_dir():
+        raise InputError(f"{option}{path}: is a folder; give another name")
+    with _writing_in(f"{option}{path}", "choose another place"):
+        _require_writable(folder)
 
 
 @contextmanager
@@ -184,6 +202,14 @@ def _require_writable(folder: Path) -> None:
     """Raise OSError now rather than after an hour's work."""
     with tempfile.TemporaryFile(dir=folder):
         pass
+
+
+def _require_space(folder: Path) -> None:
+    """Raise OSError where results will hardly find room."""
+    disk = shutil.disk_usage(folder)
+    if disk.free < LEAST_FREE and disk.total:  # some file systems do not tell: all is 0
+        text = f"only {1e-6 * disk.free:.1f} MB of this disk are free"
+        raise OSError(errno.ENOSPC, f"{text}, at least {1e-6 * LEAST_FREE:g} are needed")
 
 
 def _sync(path: Path) -> None:

@@ -25,8 +25,13 @@ def estimate_text(
     return with_interval(factor * estimate.value, abs(factor) * estimate.half_width, unit, sign)
 
 
-def plain(value: float, digits: int = 4) -> str:
-    """The number to a number of significant digits, without an exponent if it is of usual size."""
+def plain(value: float | str, digits: int = 4) -> str:
+    """The number to a number of significant digits, without an exponent if it is of usual size.
+
+    A text is as it is.
+    """
+    if isinstance(value, str):
+        return value
     if not math.isfinite(value):
         return "not known"
     if abs(value) < ZERO_TOLERANCE:

@@ -1,26 +1,83 @@
-"""Progress on the terminal: a bar with the best value so far and the time left."""
+"""Progress on stderr: the named steps of a command, with counts, the best value and time left.
+
+After `write_json_lines` each step is lines of JSON, for a program that reads them: {"step": name,
+"done": 3, "total": 20, "best": 0.81}, and at its end {"step": name, "ended": true}.
+"""
 
 from __future__ import annotations
 
+import json
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TextIO
+from functools import partial
+from typing import TYPE_CHECKING, Any, TextIO
+
+if TYPE_CHECKING:
+    from rich.progress import Progress as Display
 
 # Called as progress(done, total, best value so far or None).
 Progress = Callable[[int, int, "float | None"], None]
 
+FIRST_LINE = 30.0  # s from which a step is worth a line in a log; the next come after twice as long
+LEAST_PAUSE = 0.2  # s between JSON lines of a step
+_json_lines = False
+_displays: list[Display] = []  # on the terminal now, at most one: steps within steps share it
+
+
+def write_json_lines() -> None:
+    """Tell of steps in lines of JSON from now on."""
+    global _json_lines
+    _json_lines = True
+
 
 @contextmanager
-def progress_bar(what: str, stream: TextIO | None = None) -> Iterator[Progress]:
-    """Show a progress bar during a `with` block, and give the function that updates it.
+def step(
+    what: str, total: int | None = None, *, stream: TextIO | None = None
+) -> Iterator[Progress]:
+    """Show a named step during a `with` block, and give the function that counts in it.
 
-    The bar goes to stderr (or `stream`). Nothing is shown where that is not a terminal, so that
-    logs and pipes stay clean.
+    The total is what is known of it at the beginning.
+
+    On a terminal the step has a line on stderr (or `stream`) from its beginning to its end, below
+    that of the step around it. Logs and pipes stay clean: they get a plain line about a long step
+    now and then.
     """
     stream = stream or sys.stderr
-    if not stream.isatty():
-        yield lambda done, total, best: None
+    if _json_lines:
+        write = _json_writer(what, stream)
+        write(0, total or 0, None)
+        try:
+            yield write
+        finally:
+            print(json.dumps({"step": what, "ended": True}), file=stream, flush=True)
+        return
+    if not _displays and not stream.isatty():
+        yield _log_lines(what, stream)
+        return
+    with _display(stream) as display:
+        row = display.add_task(what, total=None, count="", best="", left="")
+        if total is not None:
+            _update(display, row, 0, total, None)
+        try:
+            yield partial(_update, display, row)
+        finally:
+            display.refresh()
+            display.remove_task(row)
+
+
+def _update(display: Display, row: Any, done: int, total: int, best: float | None) -> None:
+    best_text = "" if best is None else f"best {best:.4f}"
+    count = f"{done:,}/{total:,}"
+    display.update(row, completed=done, total=total, count=count, best=best_text, left="left")
+
+
+@contextmanager
+def _display(stream: TextIO) -> Iterator[Display]:
+    """The display on the terminal, begun by the outermost step."""
+    if _displays:
+        yield _displays[0]
         return
     from rich import progress as rich
     from rich.console import Console
@@ -28,21 +85,51 @@ def progress_bar(what: str, stream: TextIO | None = None) -> Iterator[Progress]:
     columns = (
         "{task.description}",
         rich.BarColumn(),
-        rich.MofNCompleteColumn(),
+        "[green]{task.fields[count]}",
         "[bold]{task.fields[best]}",
         rich.TimeElapsedColumn(),
-        "[dim]left",
+        "[dim]{task.fields[left]}",
         rich.TimeRemainingColumn(),
     )
     # An evaluation can take seconds. The time left is estimated from all of the last hour's.
     console = Console(file=stream)
     with rich.Progress(
-        *columns, console=console, speed_estimate_period=3600, transient=True
-    ) as bar:
-        task = bar.add_task(what, total=None, best="")
+        *columns, console=console, speed_estimate_period=3600, transient=True, redirect_stdout=False
+    ) as display:
+        _displays.append(display)
+        try:
+            yield display
+        finally:
+            _displays.clear()
 
-        def show(done: int, total: int, best: float | None) -> None:
-            text = "" if best is None else f"best {best:.4f}"
-            bar.update(task, completed=done, total=total, best=text)
 
-        yield show
+def _json_writer(what: str, stream: TextIO) -> Progress:
+    due = 0.0
+
+    def write(done: int, total: int, best: float | None) -> None:
+        nonlocal due
+        if time.monotonic() >= due or done == total:
+            due = time.monotonic() + LEAST_PAUSE
+            found = {"step": what, "done": done, "total": total, "best": best}
+            print(json.dumps(found), file=stream, flush=True)
+
+    return write
+
+
+def _log_lines(what: str, stream: TextIO) -> Progress:
+    begun = time.monotonic()
+    due, first = begun + FIRST_LINE, None
+
+    def write(done: int, total: int, best: float | None) -> None:
+        nonlocal due, first
+        now = time.monotonic()
+        first = first or (now, done)  # what came before, such as compiling, is not counted
+        if now < due or not first[1] < done < total:
+            return
+        due = now + (now - begun)
+        found = "" if best is None else f", best {best:.4f}"
+        left = (now - first[0]) * (total - done) / (done - first[1])
+        print(f"{what}: {done:,} of {total:,}{found}, about {left:.0f} s left",
+              file=stream, flush=True)  # fmt: skip
+
+    return write

@@ -54,8 +54,12 @@ def closest_name(name: str, known: Iterable[str]) -> str | None:
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """A hint: "did you mean 'x'?", the allowed names, or both if there are few."""
-    words = list(known)
+    """A hint: "did you mean 'x'?", the allowed names, or both if there are few.
+
+    Of a dotted name the table counts, if it is known: no other has the same keys.
+    """
+    words, table = list(known), name.rpartition(".")[0]
+    words = [one for one in words if table and one.rpartition(".")[0] == table] or words
     close = closest_name(name, words)
     allowed = f"allowed: {', '.join(words)}"
     if close is None:
@@ -143,6 +147,14 @@ def numeric_fields(
                     yield from ((f"{name}.{i}", field) for i in range(len(parts)))
 
 
+def text_choices(table: BaseModel, prefix: str) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Dotted name and allowed texts of every text of a table that is set and has a few to be."""
+    for name, field in type(table).model_fields.items():
+        allowed = get_args(_alternatives(field.annotation)[0])
+        if isinstance(getattr(table, name), str) and len(allowed) > 1:
+            yield f"{prefix}.{name}", allowed
+
+
 def key_lines(source: str) -> dict[str, int]:
     """Line number of every table header and key in a TOML text, by dotted name.
 
@@ -208,12 +220,17 @@ def _alternatives(annotation: Any) -> tuple[Any, ...]:
     """The types of an optional field, without None and annotations; otherwise the type itself."""
     types = get_args(annotation)
     types = tuple(t for t in types if t is not type(None)) if type(None) in types else (annotation,)
-    return tuple(get_args(t)[0] if get_origin(t) is Annotated else t for t in types)
+    return tuple(map(_bare, types))
+
+
+def _bare(annotation: Any) -> Any:
+    """A type without what annotates it."""
+    return get_args(annotation)[0] if get_origin(annotation) is Annotated else annotation
 
 
 def _table_of(field: FieldInfo, of_rows: bool = False) -> type[BaseModel] | None:
     """Model of a field that is a table, or of the rows of a list of tables."""
-    types = (*_alternatives(field.annotation), *get_args(field.annotation)[1:])
+    types = (*_alternatives(field.annotation), *map(_bare, get_args(field.annotation)[1:]))
     if of_rows:
         lists = (t for t in _alternatives(field.annotation) if get_origin(t) is tuple)
         types = tuple(item for one in lists for item in get_args(one)[:1])
@@ -289,7 +306,8 @@ def _explain_unknown_key(key: str, table: type[BaseModel], model: type[BaseModel
         home, _, last = name.rpartition(".")
         if last.lower() == key.lower():
             place = f"in [{home}]" if home else "above the first [table]"
-            return f"unknown key here; did you mean {last!r} {place}?"
+            allowed = f"allowed here: {', '.join(table.model_fields)}"
+            return f"unknown key here; did you mean {last!r} {place}? ({allowed})"
     return f"unknown key; allowed here: {', '.join(table.model_fields)}"
 
 

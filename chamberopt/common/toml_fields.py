@@ -1,14 +1,19 @@
-"""Types of the fields in TOML files: numbers with a unit, lists, directions, positions, files."""
+"""TOML files: reading one, and types of fields: numbers with a unit, lists, positions, files."""
 
 import math
 import os
+import re
+import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
+from pydantic.fields import FieldInfo
 
 from chamberopt.common import toml_errors
+from chamberopt.common.errors import InputError
+from chamberopt.common.limits import MAX_TEXT_BYTES, read_limited
 from chamberopt.common.toml_errors import CrossCheckError, Problem
 
 MAX_COORDINATE_MM = 10000  # from the middle of the sonotrode: no chamber is larger
@@ -75,6 +80,13 @@ def quantity(low: float, high: float, unit: str, what: str, default: Any = ...) 
     return Field(default, ge=low, le=high, description=what, json_schema_extra={"unit": unit})
 
 
+def allowed_range(field: FieldInfo) -> tuple[float, float]:
+    """The least and the largest value of a field made by `quantity`; infinite without a bound."""
+    low = max((one.ge for one in field.metadata if hasattr(one, "ge")), default=-math.inf)
+    high = min((one.le for one in field.metadata if hasattr(one, "le")), default=math.inf)
+    return low, high
+
+
 def list_field(form: str, what: str, default: Any = ...) -> Any:
     """Field of a list; error messages show its form and meaning."""
     return Field(default, description=what, json_schema_extra={"form": form})
@@ -101,3 +113,37 @@ def metres(millimetres: Vector) -> Vector:
     """Convert a position from mm to m."""
     x, y, z = (k * 1e-3 for k in millimetres)
     return x, y, z
+
+
+def read_toml(
+    path: Path, kind: str, remedy: str = "start from a copy of a shipped one"
+) -> tuple[str, dict[str, Any]]:
+    """Text and content of a TOML file of a kind, such as "design"; InputError if unusable."""
+    if path.is_dir():
+        inside = sorted(p.name for p in path.glob("*.toml"))
+        hint = f"; files in it: {', '.join(inside[:8])}" if inside else ""
+        raise InputError(f"{path}: is a folder; give a {kind} file (.toml){hint}")
+    try:
+        content = read_limited(path, MAX_TEXT_BYTES, f"{kind} file (.toml)")
+        source = content.decode("utf-8-sig")
+    except FileNotFoundError:
+        raise InputError(toml_errors.explain_missing_file(path, f"{kind} file", "*.toml")) from None
+    except UnicodeDecodeError as error:
+        text = f"not UTF-8 text (byte {error.start}); a {kind} file is TOML, save it as UTF-8"
+        raise InputError(f"{path}: {text}") from None
+    if not source.strip():
+        text = f"the file is empty; a {kind} file is TOML, {remedy}"
+        raise InputError(f"{path}: {text}")
+    try:
+        return source, tomllib.loads(source)
+    except tomllib.TOMLDecodeError as error:
+        place, text = str(path), str(error)
+        found = re.search(r"^(.*?) \(at line (\d+), column (\d+)\)$", text, re.DOTALL)
+        if found:
+            place, text = f"{path}:{found[2]}", f"{found[1]}, column {found[3]}"
+        message = f"{place}: not valid TOML: {text}; correct the line, e.g. name = 1.5"
+        raise InputError(message) from None
+    # A number with thousands of digits, or thousands of nested brackets.
+    except (ValueError, RecursionError) as error:
+        message = f"{path}: not a {kind} file: {error}; {remedy}"
+        raise InputError(message) from None

@@ -37,7 +37,13 @@ import numpy as np
 from chamberopt.common.estimate import Estimate, estimate, jackknife
 from chamberopt.coverage.coverage_from_impacts import Batch
 from chamberopt.coverage.field.surface_points import sampling_errors, sparse_points
-from chamberopt.coverage.percentile import p05_estimate
+from chamberopt.coverage.percentile import (
+    P05_COVERAGE,
+    P95_COVERAGE,
+    P95_EXPOSURE,
+    mean_exposure,
+    quantile_estimate,
+)
 
 
 class Products(NamedTuple):
@@ -84,7 +90,7 @@ def coverage_estimates(
     time_ratio: float,
     reachable_error: float = 0.0,
 ) -> dict[str, Estimate]:
-    """Estimate mean_coverage, std_coverage and p05_coverage by Avrami's equation.
+    """Estimate mean, deviation and percentiles of coverage and exposure, by Avrami's equation.
 
     Args:
         points: number of windows.
@@ -97,7 +103,15 @@ def coverage_estimates(
     return {
         "mean_coverage": mean,
         "std_coverage": root_of_variance(variance),
-        "p05_coverage": p05_estimate(batches, points, reachable, time_ratio),
+        "exposure": mean_exposure(batches, points, reachable, time_ratio, reachable_error),
+        **{
+            name: quantile_estimate(quantile, batches, points, reachable, time_ratio)
+            for name, quantile in (
+                ("p05_coverage", P05_COVERAGE),
+                ("p95_coverage", P95_COVERAGE),
+                ("p95_exposure", P95_EXPOSURE),
+            )
+        },
     }
 
 

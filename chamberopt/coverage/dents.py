@@ -90,7 +90,7 @@ def ball_diameters(impacts: ImpactLog, design: Design) -> float | np.ndarray:
 def dent_diameters(impacts: ImpactLog, design: Design) -> np.ndarray:
     """Diameter [m] of the dent that each impact would leave on the part, (n,)."""
     diameters, density = ball_diameters(impacts, design), design.shot.density
-    return dent_diameter(impacts.normal_speed, diameters, density, design.materials.part)
+    return dent_diameter(impacts.normal_speed, diameters, density, design.simulated.materials.part)
 
 
 def impact_angle_deg(velocity: np.ndarray, normal_speed: np.ndarray) -> np.ndarray:

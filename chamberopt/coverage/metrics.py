@@ -1,19 +1,23 @@
 """The registry of metrics of a candidate, and of objectives that a study can maximise.
 
 A new metric is one entry of `METRICS`, a new objective one of `OBJECTIVES`. Study files, tables,
-reports and result folders take names, units and ranges from here. All metrics are over the target.
+reports and result folders take names, units and ranges from here, by `find_metric`: the metrics of
+`METRICS` are over the target, and "ZONE.mean_coverage" is the same over a zone of the design. Not
+every design has all of them: `metric_problem` says why one is lacking.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
+from chamberopt.design.peening.calibration import why_no_intensity
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -23,6 +27,7 @@ if TYPE_CHECKING:
 FULL_COVERAGE = 0.98  # SAE J2277: coverage that counts as complete
 NEVER = 1e6  # s: eleven days of peening stand for never
 P05 = 0.05  # share of the target's area that may be covered less than p05_coverage
+P95 = 0.95  # share of the target's area that may be covered less than p95_coverage
 
 
 @dataclass(frozen=True)
@@ -41,6 +46,9 @@ class Metric:
     of_impacts: Callable[[TargetImpacts, Design], float] | None = None
     required: bool = False  # whether a results folder without it is damaged
     of_places: bool = False  # whether it tells of single places, which takes more dents
+    of_zones: bool = True  # whether a zone of the target has it too
+    # Why a design lacks it, "" if it has it; None for metrics that all designs have.
+    lacking: Callable[[Design], str] | None = None
 
 
 @dataclass(frozen=True)
@@ -74,6 +82,10 @@ def _impacts_per_mm2_s(impacts: TargetImpacts, design: Design) -> float:
     return impacts.count / (1e6 * impacts.area * impacts.time)
 
 
+def _why_no_intensity(design: Design) -> str:
+    return why_no_intensity(design.calibration)
+
+
 def _shot_count(impacts: TargetImpacts, design: Design) -> float:
     return float(design.shot.count)
 
@@ -100,6 +112,22 @@ METRICS = {
             of_places=True,
         ),
         Metric(
+            "p95_coverage",
+            "",
+            "coverage that 5 % of the target's area exceeds",
+            0.0,
+            1.0,
+            of_places=True,
+        ),
+        Metric("exposure", "", "mean exposure, in times to 98 % coverage", 0.0, of_places=True),
+        Metric(
+            "p95_exposure",
+            "",
+            "exposure that 5 % of the target's area exceeds",
+            0.0,
+            of_places=True,
+        ),
+        Metric(
             "time_to_98_s",
             "s",
             "time until 95 % of the target's area is 98 % covered",
@@ -113,6 +141,47 @@ METRICS = {
             "1 - relative spread of the local peening strength",
             of_places=True,
         ),
+        Metric("strength_um", "µm", "mean peening strength", 0.0, of_places=True),
+        Metric(
+            "strength_p05_um",
+            "µm",
+            "peening strength that 95 % of the area exceeds",
+            0.0,
+            of_places=True,
+        ),
+        Metric(
+            "strength_p95_um",
+            "µm",
+            "peening strength that 5 % of the area exceeds",
+            0.0,
+            of_places=True,
+        ),
+        Metric(
+            "almen_intensity",
+            "mmA",
+            "mean Almen intensity",
+            0.0,
+            of_places=True,
+            lacking=_why_no_intensity,
+        ),
+        Metric(
+            "almen_intensity_p05",
+            "mmA",
+            "Almen intensity that 95 % of the area exceeds",
+            0.0,
+            of_places=True,
+            lacking=_why_no_intensity,
+        ),
+        Metric(
+            "almen_intensity_p95",
+            "mmA",
+            "Almen intensity that 5 % of the area exceeds",
+            0.0,
+            of_places=True,
+            lacking=_why_no_intensity,
+        ),
+        Metric("saturation_time_s", "s", "saturation time of a strip", 0.0, of_places=True),
+        Metric("compression_depth_um", "µm", "estimated depth of compression", 0.0, of_places=True),
         Metric(
             "mean_normal_speed_m_s",
             "m/s",
@@ -130,10 +199,49 @@ METRICS = {
             required=True,
         ),
         Metric(
-            "shot_count", "balls", "number of balls", 0.0, of_impacts=_shot_count, required=True
+            "shot_count",
+            "balls",
+            "number of balls",
+            0.0,
+            of_impacts=_shot_count,
+            required=True,
+            of_zones=False,
         ),
     )
 }
+
+
+def find_metric(name: str) -> Metric | None:
+    """The metric of a name such as "mean_coverage" or "ZONE.mean_coverage"; None if it is none."""
+    zone, _, of_target = name.rpartition(".")
+    metric = METRICS.get(of_target)
+    if metric is None or not zone:
+        return METRICS.get(name)
+    if not (zone.isidentifier() and metric.of_zones):
+        return None
+    of_target, of_zone = metric.summary, metric.summary.replace("the target", f"zone {zone}")
+    summary = of_zone if of_zone != of_target else f"{of_target}, zone {zone}"
+    return replace(metric, name=name, summary=summary, required=False)
+
+
+def metric_problem(design: Design, name: str) -> str:
+    """Why a design lacks the metric of a name; "" if it has it."""
+    metric = find_metric(name)
+    if metric is None:
+        return f"not a metric; {toml_errors.did_you_mean(name, METRICS)}"
+    zone, zones = name.rpartition(".")[0], [one.name for one in design.zones]
+    if zone and zone not in zones:
+        hint = toml_errors.did_you_mean(zone, zones) if zones else "add it as [[zones]]"
+        return f"the design has no zone {zone!r}; {hint}"
+    return metric.lacking(design) if metric.lacking else ""
+
+
+def metric_names(design: Design) -> tuple[str, ...]:
+    """The names of all metrics of a design, those of its zones last."""
+    of_target = tuple(name for name in METRICS if not metric_problem(design, name))
+    of_zones = (f"{zone.name}.{name}" for zone in design.zones for name in of_target)
+    return (*of_target, *(name for name in of_zones if find_metric(name)))
+
 
 OBJECTIVES = {
     one.name: one
@@ -181,7 +289,7 @@ def parse_objective(name: str) -> ObjectiveFunction:
         weight, _, part = term.partition(" ")
         try:
             factor = float(weight)
-            of_part = {part: 1.0} if part in METRICS else OBJECTIVES[part].terms
+            of_part = {part: 1.0} if find_metric(part) else OBJECTIVES[part].terms
         except (ValueError, KeyError):
             raise InputError(
                 f"objective.name: {name!r} is not an objective; allowed: {', '.join(OBJECTIVES)}"
@@ -189,3 +297,37 @@ def parse_objective(name: str) -> ObjectiveFunction:
         for metric, share in of_part.items():
             terms[metric] = terms.get(metric, 0.0) + factor * share
     return ObjectiveFunction(name, "weighted sum", terms)
+
+
+def highest_uniform_coverage(reachable: float) -> float:
+    """The largest uniform_coverage where only a share r of the target is within reach of the balls.
+
+    The rest has no coverage. If all within reach is covered alike, to c, the mean is r c and the
+    standard deviation is c sqrt(r (1 - r)).
+    """
+    return max(0.0, reachable - math.sqrt(max(0.0, reachable * (1.0 - reachable))))
+
+
+def highest_objective(name: str, reachable: float) -> float:
+    """The largest value of an objective where a share of the target is within reach of the balls.
+
+    It is infinite where nothing is known.
+    """
+    terms = parse_objective(name).terms
+    if terms == OBJECTIVES["uniform_coverage"].terms:
+        return highest_uniform_coverage(reachable)
+    known = {"mean_coverage": reachable, "p05_coverage": float(reachable >= 1.0 - P05)}
+    highest = 0.0
+    for metric, weight in terms.items():
+        limits = find_metric(metric)
+        if weight and limits:
+            best = known.get(metric, limits.highest) if weight > 0.0 else limits.lowest
+            highest += weight * best
+    return highest
+
+
+def require_metrics(design: Design, objective: str) -> None:
+    """Raise InputError unless a design has all metrics of an objective."""
+    for name in parse_objective(objective).terms:
+        if problem := metric_problem(design, name):
+            raise InputError(f"objective: {name}: {problem}")

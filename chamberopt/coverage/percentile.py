@@ -1,19 +1,20 @@
-"""The 5th percentile of coverage over the target, and the time until it is full.
+"""Percentiles of coverage and exposure over the target, and the time until it is full.
 
 The 5th percentile of k times the sum of w_j is too low, because counts scatter. sqrt(x) scatters
 alike everywhere (M. S. Bartlett, J. Roy. Stat. Soc. Suppl. 3 (1936) 68), so the roots are drawn to
 their mean until they vary over the target as the true ones do: the variance of counting, which
 shows from replica to replica, is taken away. The result of half of the replicas shows what error
 is left; the step from it to that of all is made once more, and the interval includes it. This asks
-for about 25 dents in a window.
+for about 25 dents in a window. The 95th percentile, which is too high, is found alike.
 
-Notation: as in coverage_intervals.py.
+Notation: as in coverage_intervals.py. The exposure M = x / ln 50 is the peening time over the time
+in which a place with as many dents is 98 % covered, by Avrami's equation: M = 2 is "200 %".
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -22,11 +23,33 @@ import numpy as np
 from chamberopt.common.estimate import Estimate, estimate, jackknife
 from chamberopt.coverage.coverage_from_impacts import Batch
 from chamberopt.coverage.field.surface_points import sampling_errors, sparse_points
-from chamberopt.coverage.metrics import FULL_COVERAGE, NEVER, P05
+from chamberopt.coverage.metrics import FULL_COVERAGE, NEVER, P05, P95
 
 SPLITS = 6  # of the replicas into halves
 NOT_ONE = 3.0  # expected dents of which with a probability of 5 % there is not one
 NEARLY_FULL = 0.9  # coverage above which times come from a shorter treatment
+
+
+class Quantile(NamedTuple):
+    """A figure of single places, and the share of the target's area that has less of it."""
+
+    level: float
+    of_density: Callable[[np.ndarray | float], np.ndarray | float]  # the figure, from x
+    highest: float  # value of the figure
+
+
+def _coverage(density: np.ndarray | float) -> np.ndarray | float:
+    return -np.expm1(-density)
+
+
+def exposure_from_density(density: np.ndarray | float) -> np.ndarray | float:
+    """M from x, see above."""
+    return density / -math.log(1.0 - FULL_COVERAGE)
+
+
+P05_COVERAGE = Quantile(P05, _coverage, 1.0)
+P95_COVERAGE = Quantile(P95, _coverage, 1.0)
+P95_EXPOSURE = Quantile(P95, exposure_from_density, math.inf)
 
 
 class DentSums(NamedTuple):
@@ -58,18 +81,23 @@ def _weight_of_dents(batches: Sequence[Batch]) -> float:
     return float(sum(one.sum() for one in weights)) / count if count else math.inf
 
 
-def p05_estimate(
-    batches_of_dents: Sequence[Batch], points: int, reachable: float, time_ratio: float
+def quantile_estimate(
+    quantile: Quantile,
+    batches_of_dents: Sequence[Batch],
+    points: int,
+    reachable: float,
+    time_ratio: float,
 ) -> Estimate:
-    """The 5th percentile of coverage over the target; what is out of reach is bare.
+    """A percentile over the target; what is out of reach is bare.
 
     Args:
+        quantile: such as P05_COVERAGE.
         batches_of_dents: dents of each batch of replicas.
         points: number of windows.
         reachable: share of the target that a ball can touch.
         time_ratio: treatment time over the simulated time of one replica.
     """
-    batches, share = len(batches_of_dents), (P05 - (1.0 - reachable)) / reachable
+    batches, share = len(batches_of_dents), (quantile.level - (1.0 - reachable)) / reachable
     if share <= 0.0:
         return Estimate(0.0, 0.0 if batches > 1 else math.inf, (0.0,) * batches)
     sums, weight = sum_dents(batches_of_dents, points), _weight_of_dents(batches_of_dents)
@@ -77,25 +105,25 @@ def p05_estimate(
     def roots_of(some: np.ndarray | slice) -> DensityRoots:
         return _density_roots(sums.share[some], sums.replicas[some], share)
 
-    def coverage_of(roots: DensityRoots, more: float = 0.0) -> float:
-        return -math.expm1(-roots.low_density(more) * time_ratio)
+    def value_of(roots: DensityRoots, more: float = 0.0) -> float:
+        return float(quantile.of_density(roots.density(more) * time_ratio))
 
     all_of_them = roots_of(slice(None))
-    whole = coverage_of(all_of_them)
+    whole = value_of(all_of_them)
     if batches == 1:
-        return estimate([whole], 0.0, 1.0)
+        return estimate([whole], 0.0, quantile.highest)
     rng, value = np.random.default_rng(0), whole
     if (half := max(batches // 2, 2)) < batches:  # a single batch does not show its variance
-        of_halves = [coverage_of(roots_of(rng.permutation(batches)[:half])) for _ in range(SPLITS)]
+        of_halves = [value_of(roots_of(rng.permutation(batches)[:half])) for _ in range(SPLITS)]
         # The error that is left goes with one over the number of dents.
         step = (whole - float(np.mean(of_halves))) / (batches / half - 1.0)
-        value = min(max(whole + step, 0.0), 1.0)
+        value = min(max(whole + step, 0.0), quantile.highest)
     rests = [roots_of(rest) for rest in ~np.eye(batches, dtype=bool)]
-    without = [coverage_of(rest) for rest in rests]
+    without = [value_of(rest) for rest in rests]
     deviations = jackknife(np.array([whole, *without])) - whole
-    of_some = -np.expm1(
+    of_some = np.array(
         [
-            -_density_roots(some.T, sums.replicas, share).low_density() * time_ratio
+            value_of(_density_roots(some.T, sums.replicas, share))
             for some in sparse_points(sums.share.T)
         ]
     )
@@ -103,42 +131,84 @@ def p05_estimate(
     if np.quantile(sums.share.sum(axis=0), share) == 0.0:
         # Where no dent has fallen it may be bare, or up to 3 dents were to be expected.
         density = NOT_ONE * weight * time_ratio / float(sums.replicas.sum())
-        bias = max(bias + value, -math.expm1(-density)) if math.isfinite(weight) else math.inf
-    found = estimate(value + deviations, 0.0, 1.0, bias=bias, shared=sampling_errors(of_some))
+        most = float(quantile.of_density(density))
+        bias = max(bias + value, most) if math.isfinite(weight) else math.inf
+    found = estimate(
+        value + deviations, 0.0, quantile.highest, bias=bias, shared=sampling_errors(of_some)
+    )
     # Where counting seems to explain all of the variance, the roots are drawn to one value, which
     # hardly moves from replica to replica. There may be more variance, by its own interval.
     variances = np.array([one.over_target - one.counting for one in (all_of_them, *rests)])
     reach = estimate(jackknife(variances)).half_width
-    lowest = coverage_of(all_of_them, reach)
-    return replace(found, half_width=max(found.half_width, bias + whole - lowest))
+    furthest = value_of(all_of_them, reach)
+    return replace(found, half_width=max(found.half_width, bias + abs(furthest - whole)))
+
+
+def mean_exposure(
+    batches: Sequence[Batch],
+    points: int,
+    reachable: float,
+    time_ratio: float,
+    reachable_error: float = 0.0,
+) -> Estimate:
+    """The mean exposure M over the target, which has no bias: it is linear in the dents.
+
+    Args:
+        batches, points, reachable, time_ratio: as for `quantile_estimate`.
+        reachable_error: standard error of `reachable`, by the choice of points.
+    """
+    sums = sum_dents(batches, points)
+    total, replicas = sums.share.sum(axis=0), sums.replicas
+    of_one_dent = float(exposure_from_density(reachable * time_ratio))  # as wide as its window
+    whole = of_one_dent * float(total.mean()) / float(replicas.sum())
+    if not whole or len(batches) == 1:
+        return Estimate(whole, math.inf, (whole,) * len(batches))
+    rests = (total.mean() - sums.share.mean(axis=1)) / (replicas.sum() - replicas)
+    of_some = np.array([some.mean() for some in sparse_points(total)]) / replicas.sum()
+    shared = [*sampling_errors(of_one_dent * of_some), whole * reachable_error / reachable]
+    return estimate(jackknife(np.r_[whole, of_one_dent * rests]), 0.0, shared=shared)
+
+
+def in_order(low: Estimate, high: Estimate, name: str) -> dict[str, Estimate]:
+    """The 5th and 95th percentile of a figure, by name, which has {} in the place of p05 and p95.
+
+    Of an even surface the corrections may exchange them; then both are their middle.
+    """
+    if low.value > high.value:
+        middle = 0.5 * (low.value + high.value)
+        low, high = (
+            replace(one, value=middle, half_width=one.half_width + abs(one.value - middle))
+            for one in (low, high)
+        )
+    return {name.format("p05"): low, name.format("p95"): high}
 
 
 class DensityRoots(NamedTuple):
     """Roots of the dent density in windows, per replica.
 
     Attributes:
-        low: that a share of the windows do not exceed.
+        at_share: that a share of the windows do not exceed.
         middle: mean.
         over_target: variance over the windows.
         counting: the part of it that comes from counting.
     """
 
-    low: float
+    at_share: float
     middle: float
     over_target: float
     counting: float
 
-    def low_density(self, more: float = 0.0) -> float:
+    def density(self, more: float = 0.0) -> float:
         """The density that the share of the windows do not exceed, counting taken away.
 
         Args:
             more: added to the variance that is left.
         """
         if not self.over_target:
-            return self.low**2
+            return self.at_share**2
         left = max(0.0, self.over_target - self.counting) + more
         shrink = math.sqrt(left / self.over_target)
-        return max(0.0, self.middle + shrink * (self.low - self.middle)) ** 2
+        return max(0.0, self.middle + shrink * (self.at_share - self.middle)) ** 2
 
 
 def _density_roots(shares: np.ndarray, replicas: np.ndarray, share: float) -> DensityRoots:
@@ -150,13 +220,13 @@ def _density_roots(shares: np.ndarray, replicas: np.ndarray, share: float) -> De
     """
     batches, total = len(shares), shares.sum(axis=0)
     root = np.sqrt(total / replicas.sum())
-    low, middle = float(np.quantile(root, share)), float(root.mean())
+    at_share, middle = float(np.quantile(root, share)), float(root.mean())
     if batches == 1:
-        return DensityRoots(low, middle, 0.0, 0.0)
+        return DensityRoots(at_share, middle, 0.0, 0.0)
     rest = (replicas.sum() - replicas)[:, None]
     without_each = np.sqrt(np.maximum(total - shares, 0.0) / rest)
     counting = (batches - 1) * float(without_each.var(axis=0).mean())  # jackknife in each window
-    return DensityRoots(low, middle, float(root.var()), counting)
+    return DensityRoots(at_share, middle, float(root.var()), counting)
 
 
 def time_to_98(
@@ -174,13 +244,13 @@ def time_to_98(
 
     Args:
         p05: 5th percentile of the coverage after the treatment.
-        batches, points, reachable, time_ratio: as for `p05_estimate`.
+        batches, points, reachable, time_ratio: as for `quantile_estimate`.
         seconds: of the treatment.
     """
     part = 1.0
     while p05.value > NEARLY_FULL:
         part /= 4.0
-        p05 = p05_estimate(batches, points, reachable, part * time_ratio)
+        p05 = quantile_estimate(P05_COVERAGE, batches, points, reachable, part * time_ratio)
     return time_to_98_estimate(p05, part * seconds)
 
 

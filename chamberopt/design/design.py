@@ -7,7 +7,7 @@ frozen, refuses unknown keys, and has bounds wide enough for any real peening se
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from functools import cache
+from functools import cache, partial
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
@@ -17,11 +17,19 @@ from pydantic import BaseModel, Field, ValidationError, ValidationInfo
 
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
-from chamberopt.common.toml_errors import CrossCheckError, Problem
+from chamberopt.common.toml_errors import CrossCheckError, Problem, text_choices
 from chamberopt.common.toml_fields import Several, from_file, list_field
 from chamberopt.design.effects import Effects
-from chamberopt.design.materials import Materials
+from chamberopt.design.materials import Materials, with_numbers
 from chamberopt.design.part import PartTable
+from chamberopt.design.peening.calibration import (
+    CalibrationField,
+    calibration_problems,
+    with_measured_values,
+)
+from chamberopt.design.peening.tolerances import FORM as TOLERANCE_FORM
+from chamberopt.design.peening.tolerances import Tolerance, tolerance_problems
+from chamberopt.design.peening.zones import MAX_ZONES, Zone, zone_problems
 from chamberopt.design.process import Process
 from chamberopt.design.shapes import SHAPES, ChamberTable
 from chamberopt.design.shapes.base import is_custom
@@ -33,6 +41,7 @@ from chamberopt.design.table_base import STRICT, FileTable
 
 # Each further sonotrode has a tag below 255 and needs a cut through all walls that come before it.
 MAX_SONOTRODES = 50
+NOT_VARIED = ("calibration.", "zones.", "part.tessellation.")
 
 
 class Design(FileTable):
@@ -48,8 +57,19 @@ class Design(FileTable):
     )
     shot: ShotTable
     materials: Materials
+    zones: Annotated[Several[Zone], Field(max_length=MAX_ZONES)] = list_field(
+        f"a list of at most {MAX_ZONES} tables, [[zones]]",
+        "surfaces of the part with figures and limits of their own",
+        (),
+    )
     effects: Effects = Field(default_factory=Effects)
     process: Process
+    calibration: CalibrationField = None
+    tolerances: dict[str, Tolerance] | None = Field(
+        default=None,
+        description="how far numbers of the design may lie off in production, by dotted name",
+        json_schema_extra={"form": f"NAME = {TOLERANCE_FORM}"},
+    )
 
     @pydantic.model_validator(mode="wrap")
     @classmethod
@@ -66,6 +86,12 @@ class Design(FileTable):
         return _unpickled, (self.model_dump(), self.is_recorded, self.chamber.sha256)
 
     @property
+    def simulated(self) -> "Design":
+        """The design that is simulated: with its calibration's values in the place of its own."""
+        found: Design = with_measured_values(self)
+        return found
+
+    @property
     def is_recorded(self) -> bool:
         """Whether it was read from a result and has a shape of the user's, which is not run."""
         return isinstance(self.chamber, RecordedShape)
@@ -80,6 +106,16 @@ class Design(FileTable):
         file = {key: part[key] for key in ("mesh", "unit") if key in part}
         return {**data, "chamber": {**file, **chamber}}
 
+    @pydantic.model_validator(mode="before")
+    @classmethod
+    def _look_up_metals(cls, data: Any) -> Any:
+        """Put the catalogue's numbers in the place of its names, so that results hold them."""
+        if (materials := _table(data, "materials")) is None:
+            return data
+        shot = data.get("shot")
+        of_shot = shot.get if isinstance(shot, Mapping) else partial(getattr, shot)
+        return {**data, "materials": with_numbers(materials, of_shot("material", None))}
+
     @pydantic.field_validator("effects", mode="before")
     @classmethod
     def _accept_auto(cls, effects: Any) -> Any:
@@ -91,6 +127,9 @@ class Design(FileTable):
     def _problems(self) -> Iterator[Problem]:
         yield from self._setup_problems()
         yield from self._size_problems()
+        yield from tolerance_problems(self, dict(toml_errors.numeric_fields(self)))
+        yield from zone_problems(self.zones, self.calibration)
+        yield from calibration_problems(self)
         for effect in ("rest", "part_turn", "friction"):
             if self.shot.mix is not None and getattr(self.effects, effect):
                 text = "given beside shot.mix: not supported together yet"
@@ -106,7 +145,7 @@ class Design(FileTable):
 
     def _size_problems(self) -> Iterator[Problem]:
         """Problems of part, balls and sonotrode that do not fit into the chamber."""
-        chamber, amplitude_um = self.chamber, self.sonotrode.amplitude_um
+        chamber, amplitude_um = self.chamber, self.sonotrode.zero_to_peak_um
         distance, widths = chamber.sonotrode_distance_mm, chamber.widths_mm()
         if distance is None:  # as drawn: known only once the set-up's file is read
             distance = math.inf
@@ -143,14 +182,57 @@ class Design(FileTable):
             if any(value):
                 text = f"given {list(value)} {beside}: the part is where its file has it"
                 yield Problem(f"part.{key}", f"{text}; leave it out")
-        if part.target.element_mm is not None:
-            text = f"given {beside}: not supported together; leave it out"
-            yield Problem("part.target.element_mm", text)
+        for key, is_given in (
+            ("tessellation", part.tessellation is not None),
+            ("target.element_mm", part.target.element_mm is not None),
+        ):
+            if is_given:
+                text = f"given {beside}: not supported together; leave it out"
+                yield Problem(f"part.{key}", text)
 
     def numbers(self) -> tuple[str, ...]:
         """Dotted names of every continuous number, which a study may vary."""
         fields = toml_errors.numeric_fields(self)
-        return tuple(name for name, field in fields if field.annotation is not int)
+        return tuple(
+            name
+            for name, field in fields
+            if field.annotation is not int and not name.startswith(NOT_VARIED)
+        )
+
+    def whole_numbers(self) -> tuple[str, ...]:
+        """Dotted names of every whole number that belongs to the chamber, such as its sides."""
+        fields = toml_errors.numeric_fields(self)
+        others = ("process.", "calibration.", "zones.", "tolerances.", "chamber.facets")
+        whole = (name for name, field in fields if field.annotation is int)
+        return tuple(name for name in whole if not name.startswith(others))
+
+    def choices(self) -> dict[str, tuple[str, ...]]:
+        """Dotted names of the texts of which a study may choose, and what each may be."""
+        tables = {"chamber": self.chamber, "sonotrode": self.sonotrode, "shot": self.shot}
+        found = (one for name, table in tables.items() for one in text_choices(table, name))
+        return {name: texts for name, texts in found if name != "chamber.unit"}
+
+    def why_fixed(self, name: str) -> str:
+        """Why a number cannot be changed by degrees; an empty text if it can."""
+        if name == "chamber.shape":
+            return "each shape has keys of its own; run a study for each and compare them"
+        if name.startswith("calibration."):
+            return "what was measured, with errors that intervals hold already; it cannot vary"
+        numbers = self.numbers()
+        try:
+            self.value(name)
+        except InputError as error:
+            if name in numbers:
+                return str(error).removeprefix(f"{name}: ")
+            return f"unknown; {toml_errors.did_you_mean(name, numbers)}"
+        if name.startswith("process.accuracy."):
+            return (
+                "a setting of the simulation, not of the chamber; it cannot vary, see "
+                "[search_accuracy]"
+            )
+        if name.startswith("zones."):
+            return "what is asked of the design, not a choice of it; it cannot vary"
+        return "" if name in numbers else "a whole number cannot vary; leave it out"
 
     def value(self, name: str) -> float:
         """The number at a dotted name, in the file's unit; InputError if none is set there."""
@@ -164,6 +246,13 @@ class Design(FileTable):
             if value is None:
                 raise InputError(f"{name}: not set in this design; give it a value there first")
         return value
+
+    def setting(self, name: str) -> float | str:
+        """The number, or the text of `choices`, at a dotted name; InputError as `value`."""
+        if name not in self.choices():
+            return self.value(name)
+        table, key = name.split(".")
+        return str(getattr(getattr(self, table), key))
 
     def changed(self, values: Mapping[str, Any]) -> "Design":
         """A copy with other values, checked again as a whole.

@@ -2,19 +2,17 @@
 
 import os
 import re
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import write_text
-from chamberopt.common.limits import MAX_TEXT_BYTES, read_limited
+from chamberopt.common.toml_fields import read_toml
 from chamberopt.design.design import Design, validate
 from chamberopt.design.shapes.base import is_custom
 
-__all__ = ["Design", "load_design", "save_design"]
+__all__ = ["Design", "load_design", "read_toml", "save_design"]
 
 
 def load_design(path: str | Path) -> Design:
@@ -33,8 +31,9 @@ def save_design(design: Design, path: str | Path) -> None:
     path = Path(path)
     data = with_paths_from(path.resolve().parent, _without_none(design.model_dump()))
     header = "# A complete candidate chamber, written by chamberopt.\n"
-    header += "# Units are in the names; amplitude_um is zero-to-peak.\n\n"
-    write_text(path, header + _lists_on_one_line(tomli_w.dumps(data)))
+    header += "# Units are in the names; amplitude_um is zero-to-peak, "
+    header += "amplitude_pv_um peak-to-valley.\n\n"
+    write_text(path, header + lists_on_one_line(tomli_w.dumps(data)))
 
 
 def with_paths_from(folder: Path, value: Any) -> Any:
@@ -57,38 +56,6 @@ def _relative(path: str, folder: Path) -> str:
         return Path(path).as_posix()
 
 
-def read_toml(path: Path, kind: str) -> tuple[str, dict[str, Any]]:
-    """Text and content of a TOML file of a kind, "design" or "study"; InputError if unusable."""
-    if path.is_dir():
-        inside = sorted(p.name for p in path.glob("*.toml"))
-        hint = f"; files in it: {', '.join(inside[:8])}" if inside else ""
-        raise InputError(f"{path}: is a folder; give a {kind} file (.toml){hint}")
-    try:
-        content = read_limited(path, MAX_TEXT_BYTES, f"{kind} file (.toml)")
-        source = content.decode("utf-8-sig")
-    except FileNotFoundError:
-        raise InputError(toml_errors.explain_missing_file(path, f"{kind} file", "*.toml")) from None
-    except UnicodeDecodeError as error:
-        text = f"not UTF-8 text (byte {error.start}); a {kind} file is TOML, save it as UTF-8"
-        raise InputError(f"{path}: {text}") from None
-    if not source.strip():
-        text = f"the file is empty; a {kind} file is TOML, start from a copy of a shipped one"
-        raise InputError(f"{path}: {text}")
-    try:
-        return source, tomllib.loads(source)
-    except tomllib.TOMLDecodeError as error:
-        place, text = str(path), str(error)
-        found = re.search(r"^(.*?) \(at line (\d+), column (\d+)\)$", text, re.DOTALL)
-        if found:
-            place, text = f"{path}:{found[2]}", f"{found[1]}, column {found[3]}"
-        message = f"{place}: not valid TOML: {text}; correct the line, e.g. name = 1.5"
-        raise InputError(message) from None
-    # A number with thousands of digits, or thousands of nested brackets.
-    except (ValueError, RecursionError) as error:
-        message = f"{path}: not a {kind} file: {error}; start from a copy of a shipped one"
-        raise InputError(message) from None
-
-
 def is_study(data: Mapping[str, Any]) -> bool:
     """Whether these are the values of a study file."""
     return isinstance(data.get("design"), str) or not {"vary", "optimizer"}.isdisjoint(data)
@@ -101,7 +68,7 @@ def _without_none(value: Any) -> Any:
     return [_without_none(inner) for inner in value] if isinstance(value, tuple) else value
 
 
-def _lists_on_one_line(toml: str) -> str:
+def lists_on_one_line(toml: str) -> str:
     """Put the numbers of a list on one line; tomli_w writes every number on its own."""
     lines: list[str] = []
     opened = 0

@@ -1,5 +1,6 @@
 """The part of a design: its mesh file, its place in the chamber, and the target to be covered."""
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
@@ -11,6 +12,8 @@ from chamberopt.common.toml_fields import (
     MeshFile,
     Names,
     Pair,
+    Position,
+    Several,
     Shift,
     Triple,
     Turns,
@@ -18,16 +21,34 @@ from chamberopt.common.toml_fields import (
     quantity,
 )
 from chamberopt.design.table_base import FileTable
+from chamberopt.geometry.mesh_io.readers.step.tessellation import Tessellation
 from chamberopt.geometry.mesh_io.units import Unit
 
+MAX_FACES = 500
 
-class Target(FileTable):
-    """Which triangles of the part must be covered; they meet all given conditions."""
+
+class FaceAt(FileTable):
+    """A face of the part, by a place on it."""
+
+    at_mm: Position = Field(description="a place on the face, in the part file's frame")
+    crease_deg: float = quantity(
+        0.1, 180, "degrees", "the face ends where neighbouring triangles turn by more", 30.0
+    )
+    alike: bool = Field(default=False, description="also all faces congruent with it, or mirrored")
+
+
+class Selection(FileTable):
+    """Triangles of the part, which meet all given conditions."""
 
     surface: Names = list_field(
         'a name in quotes, or a list of names, e.g. ["flank", "root"]',
         "groups, sets, properties or colours of the part's file; all: the whole surface",
         ("all",),
+    )
+    faces: Annotated[Several[FaceAt], Field(max_length=MAX_FACES)] = list_field(
+        f"a list of at most {MAX_FACES} tables {{ at_mm = [x, y, z] }}",
+        "faces by a place on each; { at_mm = [x, y, z], alike = true } is all that are like it",
+        (),
     )
     direction: Triple | None = list_field(
         "three numbers [x, y, z], not all 0", "reference direction in the part file's frame", None
@@ -42,17 +63,11 @@ class Target(FileTable):
         "holding the triangles' centroids, in the part file's frame",
         None,
     )
-    element_mm: float | None = quantity(
-        0.01, 1000, "mm", "wanted side of the target's triangles; absent: the file's", None
+    radius_mm: Pair | None = list_field(
+        "two numbers [low, high], 0 <= low < high, mm",
+        "distance of the triangles' centroids from the z axis of the part file's frame",
+        None,
     )
-    reachable: bool = Field(
-        default=False, description="only what a ball can touch, in the design's own chamber"
-    )
-
-    @property
-    def element(self) -> float | None:
-        """Wanted side of the target's triangles [m]."""
-        return None if self.element_mm is None else self.element_mm * 1e-3
 
     def _problems(self) -> Iterator[Problem]:
         if (self.direction is None) != (self.angle_deg is None):
@@ -65,10 +80,47 @@ class Target(FileTable):
         if self.angle_deg is not None and not 0 <= self.angle_deg[0] < self.angle_deg[1] <= 180:
             allowed = "[low, high] with 0 <= low < high <= 180 degrees"
             yield Problem("angle_deg", f"given {list(self.angle_deg)}; allowed: {allowed}")
+        if self.radius_mm is not None and not 0 <= self.radius_mm[0] < self.radius_mm[1]:
+            text = f"given {list(self.radius_mm)}; allowed: [low, high] with 0 <= low < high"
+            yield Problem("radius_mm", text)
         if self.box_mm is not None and not all(a < b for a, b in zip(*self.box_mm, strict=True)):
             corners = [list(corner) for corner in self.box_mm]
             text = f"given {corners}; each low corner must be below its high corner"
             yield Problem("box_mm", text)
+
+
+class Target(Selection):
+    """Which triangles of the part must be covered."""
+
+    element_mm: float | None = quantity(
+        0.01, 1000, "mm", "wanted side of the target's triangles; absent: the file's", None
+    )
+    reachable: bool = Field(
+        default=False, description="only what a ball can touch, in the design's own chamber"
+    )
+
+    @property
+    def element(self) -> float | None:
+        """Wanted side of the target's triangles [m]."""
+        return None if self.element_mm is None else self.element_mm * 1e-3
+
+
+class TessellationTable(FileTable):
+    """How fine the triangles of a STEP file are."""
+
+    chord_mm: float = quantity(
+        1e-4, 10, "mm", "distance that triangles keep from the surface", 0.02
+    )
+    angle_deg: float = quantity(1, 60, "degrees", "largest angle between neighbours", 8.0)
+    side_mm: float | None = quantity(
+        0.01, 1000, "mm", "longest side; absent: a fortieth of the part's diagonal", None
+    )
+
+    @property
+    def limits(self) -> Tessellation:
+        """The same in m and rad."""
+        side = 0.0 if self.side_mm is None else 1e-3 * self.side_mm
+        return Tessellation(1e-3 * self.chord_mm, math.radians(self.angle_deg), side)
 
 
 class PartTable(FileTable):
@@ -78,12 +130,20 @@ class PartTable(FileTable):
     unit: Unit = Field(default="guess", description="of the numbers in the mesh file")
     rotate_deg: Turns = Field(default=(0.0, 0.0, 0.0), description="turns about x, then y, then z")
     offset_mm: Shift = Field(default=(0.0, 0.0), description="sideways from the chamber axis")
+    tessellation: TessellationTable | None = Field(
+        default=None, description="how fine the triangles of a STEP file are"
+    )
     target: Target = Field(default_factory=Target, description="which triangles must be covered")
 
     @property
     def mesh_path(self) -> Path:
         """Absolute path of the mesh file."""
         return Path(self.mesh)
+
+    @property
+    def limits(self) -> Tessellation | None:
+        """How fine the triangles of a STEP file are; None: the usual limits."""
+        return None if self.tessellation is None else self.tessellation.limits
 
     @property
     def offset(self) -> tuple[float, float]:

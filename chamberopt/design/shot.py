@@ -2,12 +2,13 @@
 
 import math
 from collections.abc import Iterator
+from typing import Any, Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from chamberopt.common.toml_errors import Problem
 from chamberopt.common.toml_fields import Several, list_field, quantity
-from chamberopt.design.materials import SHOT_DENSITY, ShotMaterial
+from chamberopt.design.materials import ball, balls, find
 from chamberopt.design.table_base import SI, FileTable
 
 
@@ -28,12 +29,20 @@ class ShotTable(FileTable):
         "2 to 8 sizes and their shares of the mass",
         None,
     )
-    material: ShotMaterial | None = Field(default=None, description="sets the density")
+    material: Literal[tuple(one.name for one in balls())] | None = Field(  # type: ignore[valid-type]
+        default=None, description="sets the density"
+    )
     density_kg_m3: float | None = quantity(500, 25000, "kg/m³", "instead of material", None)
+
+    @field_validator("material", mode="before")
+    @classmethod
+    def _use_its_first_name(cls, given: Any) -> Any:
+        found = find(given, balls())
+        return given if found is None else found.name
 
     def _problems(self) -> Iterator[Problem]:
         if self.material is None and self.density_kg_m3 is None:
-            materials = ", ".join(f'"{name}"' for name in SHOT_DENSITY)
+            materials = ", ".join(f'"{one.name}"' for one in balls())
             text = f"missing; give material (one of {materials}) or density_kg_m3"
             yield Problem("material", text)
         if self.material is not None and self.density_kg_m3 is not None:
@@ -83,7 +92,10 @@ class ShotTable(FileTable):
     @property
     def density(self) -> float:
         """Ball density [kg/m³]."""
-        return self.density_kg_m3 if self.material is None else SHOT_DENSITY[self.material]  # type: ignore[return-value]
+        if self.material is not None:
+            return ball(self.material).density_kg_m3
+        assert self.density_kg_m3 is not None
+        return self.density_kg_m3
 
     mass = SI("mass_g", 1e-3, "Wanted mass of the whole charge [kg], not rounded to whole balls")
 

@@ -1,23 +1,57 @@
 """Sonotrodes of a design: the one that is the chamber's floor, and further ones in its walls."""
 
 import math
+from collections.abc import Iterator
 from typing import Literal
 
 from pydantic import Field
 
+from chamberopt.common.toml_errors import Problem
 from chamberopt.common.toml_fields import Direction, Position, quantity
 from chamberopt.design.shapes.hole_and_deflector_tables import PlacedBore
 from chamberopt.design.table_base import SI, FileTable
 
 
 class VibratingFace(FileTable):
-    """A face that vibrates. Amplitude is ZERO-TO-PEAK: half of a peak-to-valley figure."""
+    """A face that vibrates, by its zero-to-peak amplitude or by twice that, peak to valley."""
 
     frequency_khz: float = quantity(0.01, 200, "kHz", "usually 20")
-    amplitude_um: float = quantity(0.1, 500, "µm", "zero-to-peak: half of peak-to-valley")
+    amplitude_um: float | None = quantity(
+        0.1, 500, "µm", "zero-to-peak: half of peak-to-valley", None
+    )
+    amplitude_pv_um: float | None = quantity(
+        0.2, 1000, "µm", "peak-to-valley, as the trade says: twice zero-to-peak", None
+    )
 
     frequency = SI("frequency_khz", 1e3, "Frequency [Hz]")
-    amplitude = SI("amplitude_um", 1e-6, "Zero-to-peak amplitude [m]")
+
+    def _problems(self) -> Iterator[Problem]:
+        if self.amplitude_um is None and self.amplitude_pv_um is None:
+            text = "missing; give it (zero-to-peak), or amplitude_pv_um (peak-to-valley)"
+            yield Problem("amplitude_um", text)
+        if self.amplitude_um is not None and self.amplitude_pv_um is not None:
+            text = f"given beside amplitude_um = {self.amplitude_um:g}; give one of the two"
+            yield Problem("amplitude_pv_um", text)
+
+    @property
+    def amplitude_key(self) -> str:
+        """The key that gives the amplitude."""
+        return "amplitude_pv_um" if self.amplitude_um is None else "amplitude_um"
+
+    @property
+    def per_amplitude(self) -> float:
+        """What the given key has over the zero-to-peak amplitude: 1 or 2."""
+        return 2.0 if self.amplitude_um is None else 1.0
+
+    @property
+    def zero_to_peak_um(self) -> float:
+        """Zero-to-peak amplitude [µm], whichever key gives it."""
+        return float(getattr(self, self.amplitude_key)) / self.per_amplitude
+
+    @property
+    def amplitude(self) -> float:
+        """Zero-to-peak amplitude [m]."""
+        return self.zero_to_peak_um * 1e-6
 
     @property
     def peak_speed(self) -> float:

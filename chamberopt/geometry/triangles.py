@@ -55,6 +55,14 @@ def border_edges(triangles: np.ndarray) -> np.ndarray:
     return sides[~np.isin(sides[:, 0] * count + sides[:, 1], sides[:, 1] * count + sides[:, 0])]
 
 
+def sharp_edges(vertices: np.ndarray, triangles: np.ndarray, degrees: float = 30.0) -> np.ndarray:
+    """Ends (k, 2) of the edges of a closed surface at which it turns by more than an angle."""
+    normals, pairs = unit_vectors(area_vectors(vertices, triangles)), side_pairs(triangles)
+    one, two = normals[pairs.T // 3]
+    is_sharp = np.einsum("ij,ij->i", one, two) < np.cos(np.radians(degrees))
+    return np.asarray(sides_of(triangles)[pairs[is_sharp, 0]])
+
+
 def find_shells(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The connected piece of each triangle (m,), and the volume that each piece encloses [m³]."""
     a, b = triangles[:, [0, 1]].T.ravel(), triangles[:, [1, 2]].T.ravel()

@@ -7,16 +7,20 @@ from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
+from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate, paired_difference
 from chamberopt.common.progress import Progress
 from chamberopt.optimize.evaluate_candidate import CandidateEvaluator, Reference, Simulator
-from chamberopt.optimize.search.acquisition import recommend_point
-from chamberopt.optimize.search.gaussian_process import GaussianProcess, pool_variances
-from chamberopt.optimize.search.scalarisation import draw_weights, scalarise
+from chamberopt.optimize.observe import FIRST_OBJECTIVE, observe
+from chamberopt.optimize.search.acquisition import recommend_points
+from chamberopt.optimize.search.scalarisation import draw_weights
+from chamberopt.optimize.search.search_model import Observations, SearchModel
+from chamberopt.optimize.search.stopping import Scored
 from chamberopt.optimize.storage.study_folder import StudyFolder
 from chamberopt.optimize.storage.trial_log import Trial
 from chamberopt.optimize.study.constraints import FEASIBLE, INFEASIBLE, assess_feasibility
@@ -31,8 +35,6 @@ MIN_DISTANCE = 0.02
 # With fewer points for each parameter the length scales of a model are not determined.
 POINTS_PER_PARAMETER = 4
 
-FIRST_OBJECTIVE = np.array([1.0, 0.0])  # weights of two objectives
-
 Stop = Callable[[], bool]
 """Returns True when the user wants to stop the study."""
 
@@ -42,7 +44,7 @@ class ConfirmedCandidate:
     """A candidate simulated with new seeds."""
 
     searched: int | None  # number of its trial in the search; None if the model recommended it
-    parameters: dict[str, float]
+    parameters: dict[str, float | str]
     design: Design
     evaluation: Evaluation
     # FEASIBLE if the whole intervals of the constrained figures are within their limits, INFEASIBLE
@@ -50,6 +52,9 @@ class ConfirmedCandidate:
     feasibility: str
     reason: str  # the limits that are, or may be, violated
     goals: tuple[Estimate, ...]  # of each objective of the study
+    # What the design's tolerances cost of the first objective on average, by the search's model;
+    # those of numbers that do not vary are not in it. 0 if there is no model.
+    lost_to_tolerances: float = 0.0
 
     @property
     def feasible(self) -> bool:
@@ -80,7 +85,8 @@ class Candidates:
         self._study, self._folder = study, folder
         self._progress, self._stop = progress, stop
         self._evaluator = CandidateEvaluator(study, simulator)
-        self.start = self._evaluator.space.start
+        self.space = self._evaluator.space
+        self.start = self.space.start
         self.trials: list[Trial] = []
         self._points: list[np.ndarray] = []  # of the search, those that run included
         self._running: deque[_Running] = deque()
@@ -94,7 +100,7 @@ class Candidates:
     def __exit__(self, *error: object) -> None:
         self._threads.shutdown(wait=error[0] is None, cancel_futures=True)
 
-    def begin(self, point: np.ndarray) -> Callable[[], float]:
+    def begin(self, point: np.ndarray) -> Callable[[], Scored]:
         """Begin to evaluate a point of the search; the function waits for its score.
 
         The score is the objective less penalties. InputError or an error of sim_core if the start,
@@ -102,39 +108,41 @@ class Candidates:
         """
         number = self._begin(point, "search", None)
         self._points.append(point)
-        return lambda: self._finish(number).score
 
-    def model_data(self, weight: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Scores (n,) of the search and their variances (n,), as a model learns them.
+        def wait() -> Scored:
+            trial = self._finish(number)
+            return Scored(trial.score, bool(trial.goals))
 
-        A candidate that could not be simulated gets the worst score of the others: how bad it is
-        nobody knows, and a cliff would bend the model far around it. The weights of two objectives
-        are by default random ones for this step.
+        return wait
+
+    def observations(self, weight: np.ndarray | None = None) -> Observations:
+        """What the trials of the search tell a model.
+
+        The weights of two objectives are by default random ones for this step.
         """
-        searched = [trial.goals for trial in self.trials if trial.stage == "search"]
-        failed = np.array([not goals for goals in searched])
-        some = next(goals for goals in searched if goals)
-        rows = [goals or some for goals in searched]
-        values = np.array([[goal.value for goal in goals] for goals in rows])
-        variances = np.array([_variances([goals[k] for goals in rows]) for k in range(len(some))]).T
-        score, variance = values[:, 0], variances[:, 0]
-        unit = self._evaluator.reference.unit
-        penalty = unit * np.array([trial.penalty for trial in self.trials[: len(rows)]])
-        if len(some) > 1 and weight is not FIRST_OBJECTIVE:
-            if weight is None:
-                weight = draw_weights(self._study.optimizer.seed, len(self._points))
-            score, variance = scalarise(values, variances, weight, ~failed)
-            penalty = penalty / unit
-        score = score - penalty
-        score[failed] = score[~failed].min()
-        return score, variance
+        if weight is None:
+            weight = draw_weights(self._study.optimizer.seed, len(self._points))
+        searched = [trial for trial in self.trials if trial.stage == "search"]
+        return observe(searched, self._study.all_constraints, weight)
 
-    def model(self, weight: np.ndarray | None = None) -> GaussianProcess | None:
+    def _model(self, weight: np.ndarray | None = None) -> SearchModel | None:
         """A model of the whole search; None if there are too few points."""
-        scores, variances = self.model_data(weight)
+        seen = self.observations(weight)
+        scores = seen.scores[seen.simulated]
         if len(scores) < POINTS_PER_PARAMETER * len(self.start) or np.ptp(scores) == 0.0:
             return None
-        return GaussianProcess(np.array(self._points), scores, variances)
+        return SearchModel(self.space.domain, np.array(self._points), seen)
+
+    @cached_property
+    def objective_model(self) -> SearchModel | None:
+        """A model of the first objective when the search has ended; None with too few points."""
+        return self._model(FIRST_OBJECTIVE)
+
+    @property
+    def _best_low(self) -> float:
+        """The highest lower end of the objective's intervals so far."""
+        lows = (t.objective.low for t in self.trials if t.feasible and t.objective)
+        return max(lows, default=-np.inf)
 
     def confirm(self) -> list[ConfirmedCandidate]:
         """Simulate the start and the best candidates with new seeds and the design's own accuracy.
@@ -179,15 +187,24 @@ class Candidates:
             return None
         parameters, goals = trial.parameters, self._evaluator.goals(evaluation)
         figures = self._evaluator.constrained(parameters, evaluation)
-        standing = assess_feasibility(self._study.constraints, figures)
-        design = self._evaluator.space.design_at(point)
-        return ConfirmedCandidate(searched, parameters, design, evaluation, *standing, goals)
+        standing = assess_feasibility(self._study.all_constraints, figures)
+        design = self.space.design_at(point)
+        lost = self._lost_to_tolerances(point)
+        return ConfirmedCandidate(searched, parameters, design, evaluation, *standing, goals, lost)
+
+    def _lost_to_tolerances(self, point: np.ndarray) -> float:
+        model = self.objective_model
+        if model is None or not model.domain.has_misses:
+            return 0.0
+        lost = float(model.score(point[None])[0][0] - model.expected(point[None])[0][0])
+        return max(0.0, lost)  # where the model rises beyond a bound, nobody has looked
 
     def _promising(self, count: int) -> list[tuple[int | None, np.ndarray]]:
         """The start and up to `count` distinct others, each with its trial number.
 
-        For one objective: the best feasible candidates and one that the model recommends. For two:
-        what the model recommends for `count` weights, from one end of the front to the other.
+        For one objective: the best feasible candidates and the two that the model recommends, of
+        which one was evaluated. For two: what the model recommends for `count` weights, from one
+        end of the front to the other.
         """
         chosen: list[tuple[int | None, np.ndarray]] = [(0, self._points[0])]
 
@@ -196,22 +213,29 @@ class Candidates:
 
         has_two_objectives = len(self._study.objective.goals) > 1
         first = (np.arange(count) + 0.5) / count
-        weights = np.stack([first, 1.0 - first], axis=1) if has_two_objectives else [None]
-        models = [self.model(weight) for weight in weights]
+        models = [self.objective_model]
+        if has_two_objectives:
+            models = [self._model(weight) for weight in np.stack([first, 1.0 - first], axis=1)]
         seed = self._study.optimizer.seed
-        recommended = [recommend_point(model, seed) for model in models if model is not None]
+        recommended = [recommend_points(model, seed) for model in models if model is not None]
         scores = np.array([trial.score for trial in self.trials[: len(self._points)]])
         best_first = [int(i) for i in np.argsort(-scores, kind="stable") if self.trials[i].feasible]
-        # A recommendation takes one place, but never the only one; for two objectives, all.
-        places = count
-        if recommended and (has_two_objectives or count > 1):
-            places = 0 if has_two_objectives else count - 1
-        for i in best_first:
-            if len(chosen) <= places and is_new(self._points[i]):
-                chosen.append((i, self._points[i]))
-        for point in recommended:
-            if len(chosen) <= count and is_new(point):
-                chosen.append((None, point))
+        seen = [self._points[i] for i in best_first]
+        if has_two_objectives:
+            wanted = [new for _, new in recommended] or seen
+        else:  # the luckiest one first, then what the model recommends, then the next ones
+            by_model = (one for both in recommended for one in reversed(both))
+            wanted = [*seen[:1], *by_model, *seen[1:]]
+        numbers = {point.tobytes(): i for i, point in reversed(list(enumerate(self._points)))}
+        best_low = self._best_low
+        for point in wanted:
+            number = numbers.get(point.tobytes())
+            if (
+                len(chosen) <= count
+                and is_new(point)
+                and (number is not None or self._evaluator.has_promise(point, best_low))
+            ):
+                chosen.append((number, point))
         return chosen
 
     def _begin(self, point: np.ndarray, stage: str, replicas: int | None) -> int:
@@ -221,16 +245,15 @@ class Candidates:
         number = len(self.trials) + len(self._running)
         recorded = self._folder.recorded.find(number, stage, point.tolist())
         if recorded is not None:
-            evaluation: Future[Evaluation | str] = Future()
+            evaluation: Future[Evaluation | InputError] = Future()
             in_file = stage == "confirm" and recorded.objective is not None
-            evaluation.set_result(self._folder.evaluation(recorded) if in_file else "")
+            evaluation.set_result(self._folder.evaluation(recorded) if in_file else InputError(""))
         else:
             if self._stop and self._stop():
                 while self._running:
                     self._finish_oldest()
                 raise KeyboardInterrupt
-            lows = (t.objective.low for t in self.trials if t.feasible and t.objective)
-            best_low = max(lows, default=-np.inf) if self.trials else None
+            best_low = self._best_low if self.trials else None
             what = number, point, stage, replicas, best_low
             evaluation = self._threads.submit(self._evaluator.evaluate, *what)
         began = time.perf_counter()
@@ -278,14 +301,7 @@ class _Running:
     stage: str
     began: float  # by the clock [s]
     recorded: Trial | None
-    evaluation: Future[Evaluation | str]  # or why there is none
-
-
-def _variances(goals: list[Estimate]) -> np.ndarray:
-    """Squared standard errors (n,) of one objective, pooled over the candidates."""
-    samples = [goal.pseudovalues for goal in goals]
-    spreads = [float(np.var(one, ddof=1)) if len(one) > 1 else np.nan for one in samples]
-    return pool_variances(np.array(spreads), np.array([max(1, len(one)) for one in samples]))
+    evaluation: Future[Evaluation | InputError]  # or why there is none
 
 
 def close_to_best(confirmed: list[ConfirmedCandidate]) -> list[ConfirmedCandidate]:

@@ -12,9 +12,9 @@ import numpy as np
 
 from chamberopt.common.errors import InputError, WorkerLostError
 from chamberopt.common.estimate import Estimate
-from chamberopt.coverage.metrics import METRICS, parse_objective
+from chamberopt.coverage.metrics import find_metric, highest_objective, parse_objective
 from chamberopt.optimize.storage.trial_log import Trial
-from chamberopt.optimize.study.constraints import describe_violations, expected_violation
+from chamberopt.optimize.study.constraints import describe_violations, exact, expected_violation
 from chamberopt.optimize.study.parameters import ParameterSpace
 from chamberopt.simulation.estimates import weighted_sum
 from chamberopt.simulation.evaluation import Evaluation
@@ -30,6 +30,14 @@ FAILURE_PENALTY = 2.0
 Simulator = Callable[["Design", str, "int | None"], Evaluation]
 """simulator(design, stream of seeds, number of replicas or None) evaluates one candidate; it raises
 InputError or an error of sim_core for a candidate that cannot be simulated."""
+
+
+class NoPromiseError(InputError):
+    """A candidate is not worth a simulation: its objective is at most `highest`."""
+
+    def __init__(self, text: str, highest: float) -> None:
+        super().__init__(text)
+        self.highest = highest
 
 
 class Reference(NamedTuple):
@@ -53,13 +61,12 @@ class CandidateEvaluator:
         return evaluation.objective, *(weighted_sum(parse_objective(x), metrics) for x in others)
 
     def constrained(
-        self, parameters: Mapping[str, float], evaluation: Evaluation
+        self, parameters: Mapping[str, float | str], evaluation: Evaluation
     ) -> dict[str, Estimate]:
         """The figures that may have limits: metrics, and numbers of the design, which are exact."""
-        figures = {name: Estimate(value, 0.0) for name, value in parameters.items()}
-        figures |= evaluation.metrics
+        figures = exact(parameters) | evaluation.metrics
         design = self._study.design
-        others = (name for name in self._study.constraints if name not in figures)
+        others = (name for name in self._study.all_constraints if name not in figures)
         return figures | {name: Estimate(design.value(name), 0.0) for name in others}
 
     def evaluate(
@@ -69,8 +76,8 @@ class CandidateEvaluator:
         stage: str,
         replicas: int | None = None,
         best_low: float | None = None,
-    ) -> Evaluation | str:
-        """Simulate the candidate at a point (d,); a text with the reason if that is not possible.
+    ) -> Evaluation | InputError:
+        """Simulate the candidate at a point (d,); the error with the reason if that is impossible.
 
         Several threads may call this at a time.
 
@@ -92,7 +99,7 @@ class CandidateEvaluator:
         except (InputError, SceneError, SimulationError) as error:
             if is_start(number, stage):
                 raise
-            return str(error)
+            return error if isinstance(error, InputError) else InputError(str(error))
         except Exception as error:
             # A fault of the program or the machine, not of the candidate: it is not recorded.
             parameters = self.space.values_at(point)
@@ -102,20 +109,23 @@ class CandidateEvaluator:
         return evaluation
 
     def trial(
-        self, number: int, point: np.ndarray, stage: str, evaluation: Evaluation | str
+        self, number: int, point: np.ndarray, stage: str, evaluation: Evaluation | InputError
     ) -> Trial:
         """The row of an evaluated candidate; its score needs `reference`."""
         parameters = self.space.values_at(point)
         worst = self.reference.score - FAILURE_PENALTY * self.reference.unit
         at = tuple(point.tolist())
         failed = Trial(number, stage, at, parameters, (), {}, 0.0, worst, False, "")
-        if isinstance(evaluation, str):
-            return replace(failed, reason=evaluation)
+        if isinstance(evaluation, NoPromiseError):
+            highest = evaluation.highest
+            return replace(failed, reason=str(evaluation), score=highest, highest=highest)
+        if isinstance(evaluation, InputError):
+            return replace(failed, reason=str(evaluation))
         unit = self.reference.unit
         if is_start(number, stage):
             unit = self.unit(evaluation.metrics)
         goals = self.goals(evaluation)
-        figures, constraints = self.constrained(parameters, evaluation), self._study.constraints
+        figures, constraints = self.constrained(parameters, evaluation), self._study.all_constraints
         penalty = sum(expected_violation(figures[k], limits) for k, limits in constraints.items())
         violations: list[str] = []
         for name, limits in constraints.items():
@@ -141,6 +151,8 @@ class CandidateEvaluator:
         if stage == "confirm":
             return self._simulate(design, "confirm", replicas)
         design = self._study.at_search_accuracy(design)
+        if best_low is not None:
+            self._require_promise(design, best_low)
         few, accuracy = self._study.optimizer.first_replicas, design.process.accuracy
         fixed_replicas = accuracy.objective_half_width is None
         if best_low is not None and 0 < few < accuracy.replicas and fixed_replicas:
@@ -148,6 +160,31 @@ class CandidateEvaluator:
             if len(self._study.objective.goals) == 1 and first.objective.high < best_low:
                 return first
         return self._simulate(design, "search", replicas)
+
+    def has_promise(self, point: np.ndarray, best_low: float) -> bool:
+        """Whether a point can be built and may be better than the best, as far as reach tells."""
+        try:
+            design = self._study.at_search_accuracy(self.space.design_at(point))
+            self._require_promise(design, best_low)
+        except InputError:
+            return False
+        return True
+
+    def _require_promise(self, design: Design, best_low: float) -> None:
+        """Raise NoPromiseError if reach alone shows that a candidate is worse than the best."""
+        find_reachable = getattr(self._simulator, "reachable", None)
+        goals = self._study.objective.goals
+        if find_reachable is None or len(goals) > 1:
+            return
+        reachable = find_reachable(design)
+        highest = highest_objective(goals[0], reachable)
+        if highest < best_low:
+            raise NoPromiseError(
+                f"not simulated: {1.0 - reachable:.1%} of the target is out of reach of the balls, "
+                f"so that the objective is at most {highest:.4g}, and the best's is at least "
+                f"{best_low:.4g}",
+                highest,
+            )
 
     def _simulate(self, design: Design, stream: str, replicas: int | None) -> Evaluation:
         try:
@@ -162,9 +199,12 @@ class CandidateEvaluator:
 
         For a metric between 0 and 1 this is its weight, for another also the size of the metric.
         """
-        terms = parse_objective(self._study.objective.goals[0]).terms.items()
-        sizes = {k: 1.0 if METRICS[k].highest <= 1.0 else abs(metrics[k].value) for k, _ in terms}
-        return max(abs(weight) * sizes[name] for name, weight in terms) or 1.0
+        sizes = []
+        for name, weight in parse_objective(self._study.objective.goals[0]).terms.items():
+            metric = find_metric(name)
+            is_share = metric is not None and metric.highest <= 1.0
+            sizes.append(abs(weight) * (1.0 if is_share else abs(metrics[name].value)))
+        return max(sizes) or 1.0
 
 
 def is_start(number: int, stage: str) -> bool:

@@ -20,7 +20,7 @@ class ParetoPoint:
     """One candidate in the plane of the two objectives."""
 
     stage: str  # "search" or "confirm"
-    parameters: dict[str, float]
+    parameters: dict[str, float | str]
     goals: tuple[Estimate, ...]
     feasibility: str
     # No other candidate of its stage is better in one objective and as good in the other.

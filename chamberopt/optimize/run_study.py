@@ -5,18 +5,19 @@ from __future__ import annotations
 import threading
 import time
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate, estimate, paired_difference
 from chamberopt.common.files import write_text
 from chamberopt.common.progress import Progress
 from chamberopt.design.load import save_design
-from chamberopt.optimize.candidates import FIRST_OBJECTIVE, Candidates, ConfirmedCandidate, Stop
+from chamberopt.optimize.candidates import Candidates, ConfirmedCandidate, Stop
 from chamberopt.optimize.evaluate_candidate import Simulator
 from chamberopt.optimize.search.gaussian_process import one_thread
 from chamberopt.optimize.search.maximise import PARETO_PHASES, maximise
@@ -24,14 +25,25 @@ from chamberopt.optimize.sensitivity import Sensitivity, analyse_sensitivity
 from chamberopt.optimize.storage.study_folder import STUDY, StudyFolder
 from chamberopt.optimize.storage.trial_log import HISTORY, Trial
 from chamberopt.optimize.study.constraints import NOT_KNOWN
-from chamberopt.simulation.evaluate import ReplicaPlan, evaluate
+from chamberopt.simulation.evaluate import ReplicaPlan, evaluate, prepare_target
 from chamberopt.simulation.evaluation import Evaluation
+from chamberopt.simulation.peening.calibration_errors import evaluate_calibrated
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
+    from chamberopt.coverage.field.target_field import TargetField
     from chamberopt.design.design import Design
     from chamberopt.optimize.study import Study
     from chamberopt.simulation.replicas import Replica
+
+
+TOLERANCES = (
+    "what the [tolerances] do to the best design: chamberopt simulate best.toml --tolerances"
+)
+MEAN = (
+    "the search maximised the mean of the objective over the [tolerances] of what it varies; at "
+    "the best design it is {lost:.2g} {side} the value without them, by its model"
+)
 
 
 @dataclass(frozen=True)
@@ -55,10 +67,13 @@ class StudyResult:
     sensitivity: Sensitivity | None = None  # None if there are too few points for a model
 
     @property
-    def at_bounds(self) -> tuple[str, ...]:
-        """A sentence for each parameter whose best value lies on a bound, where the search ends."""
-        sentences = []
-        for name, (low, high) in self.study.vary.items():
+    def notes(self) -> tuple[str, ...]:
+        """What tolerances did to the search, and each parameter whose best value is on a bound."""
+        lost = self.best.lost_to_tolerances
+        sentences = tolerance_notes(lost) if self.study.design.tolerances else []
+        numbers = {name: one for name, one in self.study.vary.items() if not one.texts}
+        for name, varied in numbers.items():
+            low, high = varied.bounds
             value = self.best.design.value(name)
             for bound, side in ((low, "lower"), (high, "upper")):
                 if abs(value - bound) < 1e-3 * (high - low):
@@ -108,13 +123,16 @@ def run_study(
     folder.begin()
     save_inputs(study, folder.path)
     target = fixed_target(study)
-    simulator = simulator or chamber_simulator(study, executor, target)
+    simulator = simulator or ChamberSimulator(study, executor, target)
     settings = study.optimizer
     if study.objective.pareto and settings.algorithm == "auto" and not settings.phases:
         settings = settings.model_copy(update={"phases": PARETO_PHASES})
     # The model's threads are limited during all evaluations: a limit is one of the whole process.
     with one_thread(), Candidates(study, folder, simulator, progress, stop) as candidates:
-        algorithm = maximise(candidates.begin, candidates.start, settings, candidates.model_data)
+        search = candidates.begin, candidates.start, settings, candidates.observations
+        space = candidates.space
+        first = [space.domain.snap(space.point_of(one)[None])[0] for one in study.begin_with]
+        algorithm = maximise(*search, space.domain, first)
         confirmed = candidates.confirm()
     folder.recorded.require_end(len(candidates.trials))
     if not confirmed or confirmed[0].searched != 0:
@@ -130,14 +148,12 @@ def run_study(
             "widen [vary] or raise optimizer.evaluations; every evaluation is in "
             f"{folder.path / HISTORY}"
         )
-    best = max(winners, key=lambda candidate: candidate.evaluation.objective.value)
+    best = max(winners, key=lambda one: one.goals[0].value - one.lost_to_tolerances)
     is_gain = best is not start
     gain = paired_difference(best.goals[0], start.goals[0]) if is_gain else Estimate(0.0, 0.0)
-    model, noise = (
-        candidates.model(FIRST_OBJECTIVE),
-        estimate(best.evaluation.objective.pseudovalues).half_width,
-    )
-    sensitivity = analyse_sensitivity(model, study.vary, best.parameters, noise) if model else None
+    model = candidates.objective_model
+    noise = estimate(best.evaluation.objective.pseudovalues).half_width
+    sensitivity = analyse_sensitivity(model, space, best.parameters, noise) if model else None
     return StudyResult(
         study=study,
         folder=folder.path,
@@ -151,6 +167,12 @@ def run_study(
         target=target,
         sensitivity=sensitivity,
     )
+
+
+def tolerance_notes(lost: float) -> list[str]:
+    """What a search with tolerances has maximised; a loss of 0 is that without a model."""
+    side = "below" if lost > 0.0 else "above"
+    return [*([MEAN.format(lost=abs(lost), side=side)] if lost else []), TOLERANCES]
 
 
 def fixed_target(study: Study) -> np.ndarray | None:
@@ -181,29 +203,54 @@ def save_inputs(study: Study, folder: Path) -> None:
     write_text(folder / STUDY, tomli_w.dumps({"design": "design.toml", **values}))
 
 
-def chamber_simulator(study: Study, executor: Executor, target: np.ndarray | None) -> Simulator:
+@dataclass
+class _Simulated:
+    """What is kept of a candidate."""
+
+    chamber: Chamber
+    replicas: list[Replica] = field(default_factory=list)
+    target: TargetField | None = None
+
+
+class ChamberSimulator:
     """The simulator of a study: chamber, replicas, coverage.
 
-    Asked for more replicas of a candidate, it adds them to those it has.
+    Asked for more replicas of a candidate, it adds them to those it has. Several threads may call
+    it at a time.
     """
-    from chamberopt.chamber.build import build_chamber
 
-    # Chamber and replicas of confirmed candidates, and of each thread's last one of the search.
-    confirmed: dict[str, tuple[Chamber, list[Replica]]] = {}
-    searched = threading.local()
+    def __init__(self, study: Study, executor: Executor, target: np.ndarray | None) -> None:
+        self._study, self._executor, self._target = study, executor, target
+        self._confirmed: dict[str, _Simulated] = {}
+        self._searched = threading.local()  # each thread's last candidate of the search
 
-    def simulate_candidate(design: Design, stream: str, replicas: int | None) -> Evaluation:
+    def __call__(self, design: Design, stream: str, replicas: int | None) -> Evaluation:
         began = time.perf_counter()
+        one = self._candidate(design, stream)
+        seconds = time.perf_counter() - began
+        plan = ReplicaPlan(replicas, stream, self._study.objective.goals[0])
+        settings: dict[str, Any] = {"plan": plan, "done": one.replicas}
+        if stream == "confirm":
+            evaluation = evaluate_calibrated(design, one.chamber, self._executor, **settings)
+        else:
+            settings["target"] = one.target
+            evaluation = evaluate(design, one.chamber, self._executor, **settings)
+        return replace(evaluation, timings={"chamber": seconds, **evaluation.timings})
+
+    def reachable(self, design: Design) -> float:
+        """Share of the target that the balls can touch, without any simulation."""
+        one = self._candidate(design, "search")
+        one.target = prepare_target(design, one.chamber, chamber_mesh(one.chamber))
+        return one.target.reachable
+
+    def _candidate(self, design: Design, stream: str) -> _Simulated:
+        from chamberopt.chamber.build import build_chamber
+
         key = design.model_dump_json()
-        known = confirmed if stream == "confirm" else vars(searched)
+        known = self._confirmed if stream == "confirm" else vars(self._searched)
         if key not in known:
             if stream != "confirm":
                 known.clear()
-            known[key] = build_chamber(design, target), []
-        chamber, done = known[key]
-        seconds = time.perf_counter() - began
-        plan = ReplicaPlan(replicas, stream, study.objective.goals[0])
-        evaluation = evaluate(design, chamber, executor, plan=plan, done=done)
-        return replace(evaluation, timings={"chamber": seconds, **evaluation.timings})
-
-    return simulate_candidate
+            known[key] = _Simulated(build_chamber(design, self._target))
+        found: _Simulated = known[key]
+        return found

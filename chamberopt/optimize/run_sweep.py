@@ -21,8 +21,9 @@ from chamberopt.common.errors import InputError, WorkerLostError
 from chamberopt.common.parallel.executor import SerialExecutor, share
 from chamberopt.common.progress import Progress
 from chamberopt.optimize.evaluate_candidate import CandidateEvaluator, Simulator
-from chamberopt.optimize.run_study import chamber_simulator, fixed_target, save_inputs
+from chamberopt.optimize.run_study import ChamberSimulator, fixed_target, save_inputs
 from chamberopt.optimize.storage.trial_log import HISTORY, Trial
+from chamberopt.optimize.study.parameters import ParameterSpace
 
 if TYPE_CHECKING:
     from chamberopt.optimize.storage.study_folder import StudyFolder
@@ -58,9 +59,13 @@ class SweepResult:
 
     @property
     def best(self) -> Trial | None:
-        """The feasible candidate with the largest objective; partly the luckiest one."""
+        """The feasible candidate with the largest objective; partly the luckiest one.
+
+        One whose objective is not resolved counts only where there is no other.
+        """
         feasible = [trial for trial in self.trials if trial.feasible]
-        return max(feasible, key=lambda trial: trial.score, default=None)
+        resolved = [one for one in feasible if one.objective and not one.objective.in_words]
+        return max(resolved or feasible, key=lambda one: one.score, default=None)
 
 
 def plan_sweep(
@@ -76,7 +81,7 @@ def plan_sweep(
     """
     from scipy.stats.qmc import Sobol
 
-    dimensions = len(study.vary)
+    domain, dimensions = ParameterSpace(study.design, study.vary).domain, len(study.vary)
     if (grid is None) == (sobol is None):
         given = "neither" if grid is None else "both"
         raise InputError(
@@ -90,8 +95,13 @@ def plan_sweep(
         if grid < 2:
             raise InputError(f"--grid: given {grid}; give at least 2 values of each parameter")
         _require_few(grid**dimensions, f"--grid: {grid} values of {dimensions} parameters")
-        axis = np.linspace(0.0, 1.0, grid)
-        return SweepPlan("grid", grid, np.array(list(product(axis, repeat=dimensions))), None)
+        axes = domain.snap(np.repeat(np.linspace(0.0, 1.0, grid)[:, None], dimensions, axis=1)).T
+        each = [  # of few levels each once, and all choices
+            np.unique(line) if axis.ordered else np.linspace(0.0, 1.0, axis.levels)
+            for line, axis in zip(axes, domain.axes, strict=True)
+        ]
+        points = np.array(list(product(*each)))
+        return SweepPlan("grid", grid, points, None)
     assert sobol is not None
     if sobol < 1:
         raise InputError(f"--sobol: given {sobol}; give at least 1 point")
@@ -102,8 +112,9 @@ def plan_sweep(
     with warnings.catch_warnings():
         # A count that is not a power of 2 is spread a little less evenly, which is no error.
         warnings.simplefilter("ignore", UserWarning)
-        points = np.asarray(Sobol(dimensions, scramble=True, seed=seed).random(sobol))
-    return SweepPlan("sobol", sobol, points, seed)
+        points = domain.snap(Sobol(dimensions, scramble=True, seed=seed).random(sobol))
+    firsts = np.unique(points, axis=0, return_index=True)[1]  # of few levels each once
+    return SweepPlan("sobol", sobol, points[np.sort(firsts)], seed)
 
 
 def run_sweep(
@@ -182,7 +193,7 @@ def evaluate_point(
 ) -> tuple[Trial, float]:
     """Evaluate one candidate on one worker; the trial, and its wall-clock time [s]."""
     began = time.perf_counter()
-    simulator = simulator or chamber_simulator(study, SerialExecutor(), target)
+    simulator = simulator or ChamberSimulator(study, SerialExecutor(), target)
     evaluator = CandidateEvaluator(study, simulator)
     evaluation = evaluator.evaluate(number, point, "sweep")
     trial = evaluator.trial(number, point, "sweep", evaluation)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from chamberopt.optimize.run_sweep import SweepResult
     from chamberopt.simulation.effect_pilot import Advice
     from chamberopt.simulation.evaluation import Evaluation
+    from chamberopt.simulation.peening.tolerances import ToleranceResult
 
 
 def save_simulation(
@@ -33,6 +34,7 @@ def save_simulation(
     evaluation: Evaluation,
     advice: Sequence[Advice] = (),
     warned: Sequence[str] | None = None,
+    tolerances: ToleranceResult | None = None,
 ) -> list[str]:
     """Save a simulation in a new or empty folder.
 
@@ -46,6 +48,7 @@ def save_simulation(
         evaluation: of the design.
         advice: why effects were chosen, if the design left the choice to the program.
         warned: warnings of `chamberopt check`; None if it was not run.
+        tolerances: what its tolerances do, if that was simulated.
 
     Returns:
         Remarks for the user, such as why a picture was skipped.
@@ -53,7 +56,8 @@ def save_simulation(
     folder = make_output_folder(folder)
     try:
         data = write_simulation(folder, complete_result(design, chamber, evaluation))
-        write_result(folder, data, advice, warned)
+        more = {"tolerances": tolerances.as_json()} if tolerances else {}
+        write_result(folder, data | more, advice, warned)
     except OSError:  # a full disk: without its result.json, what was written is of no use
         for one in folder.iterdir():
             if one.is_file() and not one.name.startswith("."):

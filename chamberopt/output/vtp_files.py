@@ -29,11 +29,12 @@ OF_ELEMENT = {
     "element_interval": "coverage_interval",
     "element_impacts": "impacts",
 }
+ZONE = "zone"  # one more column of both, in results with zones
 # Columns without which files cannot be used: cell data of part.vtp, point data of coverage.vtp.
 ELEMENT_COLUMNS = ("coverage", "impacts", "dents", "exposed_area_mm2", "target", "element")
 FIELD_COLUMNS = ("coverage", "dent_density", "coverage_interval", "reachable", "resolved")
 WHOLE_NUMBERS = ("impacts", "dents", "target", "element", "triangle", "element_impacts", "tag",
-                 "source", "fitting")  # fmt: skip
+                 "source", "fitting", ZONE)  # fmt: skip
 # Columns that are shares, from 0 to 1, and others that are never negative.
 SHARES = ("coverage", "coverage_interval", "reachable", "resolved", "element_coverage",
           "element_interval")  # fmt: skip
@@ -64,11 +65,13 @@ def write_coverage(
         values: of each triangle of the part, by name, (m,) each: the cell data of part.vtp.
         display: fields at the vertices of a mesh to draw: the point data of coverage.vtp. Its
             triangles have the number of the part's triangle in which they lie (triangle), and of
-            that its element, target, element_coverage, element_interval and element_impacts.
+            that its element, target, element_coverage, element_interval, element_impacts and,
+            where there are zones, zone.
     """
     part, mesh = chamber.part, display.mesh
     _write_surface(folder / PART, part.vertices, part.triangles, values)
-    own = {name: values[column][mesh.part_triangle] for name, column in OF_ELEMENT.items()}
+    columns = OF_ELEMENT | ({ZONE: ZONE} if ZONE in values else {})
+    own = {name: values[column][mesh.part_triangle] for name, column in columns.items()}
     _write_surface(
         folder / COVERAGE,
         mesh.vertices,
@@ -165,6 +168,12 @@ def read_surface(path: Path, cells: Sequence[str] = (), points: Sequence[str] = 
     if found.normals is not None:
         surface.point_data.active_normals = found.normals.copy()
     return surface
+
+
+def size_text(surface: Surface) -> str:
+    """Length, width and height of a surface."""
+    x, y, z = np.ptp(np.reshape(surface.bounds, (3, 2)), axis=1)
+    return f"{x:.4g} × {y:.4g} × {z:.4g} mm"
 
 
 def _require_sound(name: str, column: np.ndarray) -> None:

@@ -135,7 +135,7 @@ def advise(
     Raises:
         InputError, sim_core.SimulationError: as `evaluate` does.
     """
-    return _advise(_Pilot(design, chamber, executor, prepare), progress)
+    return _advise(_Pilot(design, chamber, executor, progress, prepare))
 
 
 def with_effects_resolved(
@@ -159,8 +159,8 @@ def with_effects_resolved(
     if not design.effects.auto:
         return design, []
     complete = _switched(design, dict.fromkeys(_switchable(design, chamber), True))
-    pilot = _Pilot(complete, chamber, executor, prepare)
-    advice = _advise(pilot, progress)
+    pilot = _Pilot(complete, chamber, executor, progress, prepare)
+    advice = _advise(pilot)
     off = [one.effect for one in advice if one.verdict == "makes no difference"]
     while len(off) > 1:
         without = pilot.measure(dict.fromkeys(off, False))
@@ -174,10 +174,17 @@ class _Pilot:
     """Short runs of a design with some of its effects switched."""
 
     def __init__(
-        self, design: Design, chamber: Chamber, executor: Executor, prepare: Prepare | None
+        self,
+        design: Design,
+        chamber: Chamber,
+        executor: Executor,
+        progress: Progress | None,
+        prepare: Prepare | None,
     ) -> None:
         self.design, self.chamber = design, chamber
-        self._executor, self._prepare = executor, prepare
+        self.effects = _switchable(design, chamber)
+        self._executor, self._progress, self._prepare = executor, progress, prepare
+        self._begun = 0
         first = evaluate(self._variant({}, FIRST_TIME), chamber, executor)
         target = exposed_target(chamber)
         hits = sum(int(target[one.triangle].sum()) for one in first.hits)
@@ -196,16 +203,17 @@ class _Pilot:
                 "process.accuracy.objective_half_width": None,
             }
         )
+        if self._progress:  # one short run for the time, one unchanged, one for each effect
+            self._progress(self._begun, max(2 + len(self.effects), self._begun + 1), None)
+        self._begun += 1
         if self._prepare is not None:
             self._prepare(variant)
         return variant
 
 
-def _advise(pilot: _Pilot, progress: Progress | None) -> list[Advice]:
-    effects, advice = _switchable(pilot.design, pilot.chamber), []
-    for done, effect in enumerate(effects):
-        if progress:
-            progress(done, len(effects), None)
+def _advise(pilot: _Pilot) -> list[Advice]:
+    advice = []
+    for effect in pilot.effects:
         is_on = _is_on(effect, pilot.design, pilot.chamber)
         other = pilot.measure({effect: not is_on})
         with_it, without = (pilot.unchanged, other) if is_on else (other, pilot.unchanged)

@@ -5,10 +5,11 @@ Notation
     S     a metric as a function of the impacts of some batches
     y_j   pseudo-value of batch j: g S(all) - (g - 1) S(all but j)
 
-Coverage, the time to full coverage and the intensity uniformity have estimators of their own
-(coverage/coverage_intervals.py, coverage/strength.py). The other metrics are ratios of sums: the
-delete-one jackknife over batches corrects their bias of order 1/g and gives the standard error (B.
-Efron and R. J. Tibshirani, "An Introduction to the Bootstrap", Chapman & Hall 1993, chapter 11).
+Coverage, the time to full coverage and figures of strength have estimators of their own
+(coverage_intervals.py, percentile.py, strength_intervals.py and compression.py in coverage). The
+other metrics are ratios of sums: the delete-one jackknife over batches corrects their bias of order
+1/g and gives the standard error (B. Efron and R. J. Tibshirani, "An Introduction to the Bootstrap",
+Chapman & Hall 1993, chapter 11).
 """
 
 from __future__ import annotations
@@ -20,7 +21,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from chamberopt.chamber.build import TARGET
+from chamberopt.chamber.checks.gaps import MIN_MISSED_SHARE
 from chamberopt.common.estimate import Estimate, estimate, sum_of_shared
+from chamberopt.coverage.compression import compression_estimate
 from chamberopt.coverage.coverage_from_impacts import (
     Footprints,
     batches_of,
@@ -30,24 +34,39 @@ from chamberopt.coverage.coverage_from_impacts import (
 )
 from chamberopt.coverage.coverage_intervals import coverage_estimates
 from chamberopt.coverage.field.target_field import Gauge, TargetField
-from chamberopt.coverage.metrics import METRICS, P05, ObjectiveFunction, exposed_target
+from chamberopt.coverage.metrics import (
+    METRICS,
+    P05,
+    ObjectiveFunction,
+    exposed_target,
+    find_metric,
+    highest_uniform_coverage,
+)
 from chamberopt.coverage.part_impacts import Hits, TargetImpacts
-from chamberopt.coverage.percentile import time_to_98
+from chamberopt.coverage.percentile import in_order, time_to_98
 from chamberopt.coverage.resolution import NOT_RESOLVED, Resolution, find_resolution
-from chamberopt.coverage.strength import intensity_uniformity
+from chamberopt.coverage.strength_intervals import strength_estimates
+from chamberopt.design.peening.calibration import calibrated_strip
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.design.load import Design
+    from chamberopt.design.peening.calibration import Calibration
 
 
 @dataclass
 class SeenDents:
-    """The dents of the replicas so far, in windows of both sizes."""
+    """The replicas so far: dents in windows of both sizes, and impacts in the windows' sector."""
 
     field: TargetField
     gauge: list[Footprints]
     wide: list[Footprints]
+    in_sector: list[Hits]
+
+    @classmethod
+    def none(cls, field: TargetField) -> SeenDents:
+        """Before the first replica."""
+        return cls(field, [], [], [])
 
     def add(self, hits: Sequence[Hits]) -> None:
         """Look at the replicas that are new."""
@@ -55,6 +74,7 @@ class SeenDents:
             dents = locate_dents(self.field, one)
             self.gauge.append(find_footprints(self.field, self.field.gauge, dents))
             self.wide.append(find_footprints(self.field, self.field.wide, dents))
+            self.in_sector.append(self.field.in_sector(one))
 
     @property
     def crease_share(self) -> float:
@@ -75,23 +95,69 @@ def estimate_metrics(
     seen: SeenDents, hits: Sequence[Hits], chamber: Chamber, design: Design
 ) -> Estimates:
     """Estimate all metrics from replicas; with a single one the half-widths are infinite."""
-    found, resolution = raw_estimates(seen, hits, design)
+    found, resolution = raw_estimates(seen, design)
     found |= _ratios(in_batches(hits), chamber, design)
     of_wide, resolution_of_wide = window_estimates(seen.field, seen.field.wide, seen.wide, design)
     return Estimates(
-        _all_resolved({name: found[name] for name in METRICS}, resolution),
+        _all_resolved({name: found[name] for name in METRICS if name in found}, resolution),
         _all_resolved(of_wide, resolution_of_wide),
         resolution,
     )
 
 
-def raw_estimates(
-    seen: SeenDents, hits: Sequence[Hits], design: Design
-) -> tuple[dict[str, Estimate], Resolution]:
+def estimate_zones(
+    zones: Mapping[str, SeenDents], hits: Sequence[Hits], chamber: Chamber, design: Design
+) -> tuple[dict[str, Estimate], tuple[str, ...]]:
+    """The metrics of zones by names such as root.mean_coverage, and notes on them.
+
+    Args:
+        zones: the dents on each zone, by its name.
+    """
+    metrics: dict[str, Estimate] = {}
+    notes: list[str] = []
+    for zone, seen in zones.items():
+        found = estimate_metrics(seen, hits, chamber.on_zone(zone), design)
+        of_zone = {f"{zone}.{name}": one for name, one in found.metrics.items()}
+        metrics |= {name: one for name, one in of_zone.items() if find_metric(name)}
+        surface = f"zone {zone}"
+        notes += reach_notes(seen.field.reachable, surface)
+        notes += resolution_notes(found.resolution, surface)
+        notes += strength_notes(found.metrics, found.resolution, surface)
+        if seen.field.is_one_window:
+            notes.append(
+                f"zone {zone}: smaller than two windows, so intensity_uniformity is not resolved: "
+                "lower process.accuracy.gauge_mm2, and simulate longer, to see differences in it"
+            )
+    return metrics, tuple(notes)
+
+
+def raw_estimates(seen: SeenDents, design: Design) -> tuple[dict[str, Estimate], Resolution]:
     """Metrics of coverage and intensity at the gauge, with intervals even where not resolved."""
     found, resolution = window_estimates(seen.field, seen.field.gauge, seen.gauge, design)
-    uniformity = intensity_uniformity(seen.field, in_batches(hits), design.shot.density)
-    return found | {"intensity_uniformity": uniformity}, resolution
+    process, batches = design.process, in_batches(seen.in_sector)
+    shot = design.shot.density, calibrated_strip(design.shot, design.calibration)
+    found |= strength_estimates(seen.field, batches, process.recorded_time, *shot)
+    found |= _calibrated(found, design.calibration)
+    if not design.materials.part.hardens_strongly:
+        times = process.recorded_time, process.treatment_time
+        found["compression_depth_um"] = compression_estimate(seen.field, batches, *times)
+    return found, resolution
+
+
+def _calibrated(
+    found: Mapping[str, Estimate], calibration: Calibration | None
+) -> dict[str, Estimate]:
+    """Almen intensities, and the saturation time of a real strip."""
+    if calibration is None or not calibration.has_strips:
+        return {}
+    figures = {
+        f"almen_intensity{which}": found[f"strength{which}_um"].times(
+            calibration.intensity_mmA(1.0)
+        )
+        for which in ("", "_p05", "_p95")
+    }
+    time = found["saturation_time_s"].times(1.0 / calibration.factor("beta"))
+    return {**figures, "saturation_time_s": time}
 
 
 def window_estimates(
@@ -108,6 +174,7 @@ def window_estimates(
         found["p05_coverage"], batches, len(gauge.area), field.reachable, time_ratio,
         process.treatment_time,
     )  # fmt: skip
+    found |= in_order(found["p05_coverage"], found["p95_coverage"], "{}_coverage")
     return found, find_resolution(batches, gauge, time_ratio, process.recorded_time)
 
 
@@ -163,14 +230,27 @@ def _ratios(
     return estimates
 
 
-def resolution_notes(found: Resolution) -> tuple[str, ...]:
-    """What is not resolved, and the simulated time that would do."""
+def reach_notes(reachable: float, surface: str = TARGET) -> tuple[str, ...]:
+    """How high coverage can go where some of a surface is out of reach, and so has coverage 0."""
+    if reachable > 1.0 - MIN_MISSED_SHARE:
+        return ()
+    highest = highest_uniform_coverage(reachable)
+    uniform = f" or a uniform_coverage above {highest:.2f}" if surface == TARGET else ""
+    bare = ", and its p05_coverage is 0" if reachable < 1.0 - P05 else ""
+    return (
+        f"{1.0 - reachable:.1%} of {surface} is out of reach of the balls and counts as bare: no "
+        f"chamber with so much of it has a mean_coverage above {reachable:.2f}{uniform}{bare}",
+    )
+
+
+def resolution_notes(found: Resolution, surface: str = TARGET) -> tuple[str, ...]:
+    """What of a surface is not resolved, and the simulated time that would do."""
     if found.has_mean and found.has_places:
         return ()
     if not found.dents:
         return (
-            "fewer than half of the target's windows were hit: no figure of it is resolved; raise "
-            "process.accuracy.simulated_time_s or replicas, or process.accuracy.gauge_mm2",
+            f"fewer than half of the windows of {surface} were hit: no figure of it is resolved; "
+            "raise process.accuracy.simulated_time_s or replicas, or process.accuracy.gauge_mm2",
         )
     needs = [
         f"{what} {needed:.3g} (about {found.time_for(needed):.2g} s of all replicas)"
@@ -181,9 +261,24 @@ def resolution_notes(found: Resolution) -> tuple[str, ...]:
         if not there
     ]
     return (
-        f"the median window has {found.dents:.1f} dents after {found.simulated_time:.3g} s: "
-        f"{', '.join(needs)}; raise process.accuracy.simulated_time_s or replicas, or "
-        "process.accuracy.gauge_mm2",
+        f"the median window of {surface} has {found.dents:.1f} dents after "
+        f"{found.simulated_time:.3g} s: {', '.join(needs)}; raise "
+        "process.accuracy.simulated_time_s or replicas, or process.accuracy.gauge_mm2",
+    )
+
+
+def strength_notes(
+    metrics: Mapping[str, Estimate], resolution: Resolution, surface: str = TARGET
+) -> tuple[str, ...]:
+    """Why strength and saturation are not resolved where other figures of places are."""
+    saturation = metrics["saturation_time_s"]
+    if saturation.in_words != NOT_RESOLVED or not resolution.has_places or not saturation.value:
+        return ()
+    return (
+        f"on {surface} a strip would saturate after {saturation.value:.2g} s or more, by dents of "
+        f"which the {resolution.simulated_time:.3g} s of all replicas hold too few: strength and "
+        "saturation take twice that time or more; raise process.accuracy.simulated_time_s or "
+        "replicas",
     )
 
 

@@ -11,22 +11,28 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.chamber.analytic import cavity_note
+from chamberopt.chamber.checks.check import friction_notes
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.parallel.executor import share
 from chamberopt.common.progress import Progress
+from chamberopt.coverage.compression import stress_notes
 from chamberopt.coverage.dents import dent_diameter
 from chamberopt.coverage.field.target_field import (
     TargetField,
     WindowSetting,
     find_target_field,
+    require_touchable_zones,
     require_wide_gauge,
 )
-from chamberopt.coverage.metrics import parse_objective, require_target
+from chamberopt.coverage.metrics import parse_objective, require_metrics, require_target
 from chamberopt.simulation.estimates import (
     SeenDents,
     estimate_metrics,
+    estimate_zones,
+    reach_notes,
     resolution_notes,
+    strength_notes,
     weighted_sum,
 )
 from chamberopt.simulation.evaluation import Evaluation
@@ -69,6 +75,7 @@ def evaluate(
     plan: ReplicaPlan | None = None,
     cavity: AnalyticCavity | None = None,
     done: list[Replica] | None = None,
+    target: TargetField | None = None,
 ) -> Evaluation:
     """Simulate a candidate in independent replicas and estimate its objective and metrics.
 
@@ -78,12 +85,15 @@ def evaluate(
     Args:
         cavity: simulate in this exact cavity instead of the chamber's mesh.
         done: first replicas of this very candidate, already simulated; the new ones are appended.
+        target: of `prepare_target`, if that was called already.
 
     Raises:
-        InputError: the shot does not fit into the chamber.
+        InputError: the shot does not fit into the chamber, or the objective takes a metric that
+            the design lacks.
         sim_core.SimulationError: a replica cannot be simulated.
     """
     plan = plan or ReplicaPlan()
+    require_metrics(design, plan.objective_name)
     accuracy = design.process.accuracy
     wanted = accuracy.objective_half_width if plan.count is None else None
     count = plan.count or accuracy.replicas
@@ -93,9 +103,11 @@ def evaluate(
     setting = share(executor, ReplicaSetting(design, chamber, cavity or mesh))
     timings = {"simulate": 0.0, "coverage": 0.0}
     window = window_setting(design, chamber)
+    require_touchable_zones(chamber, mesh, 0.5 * window.ball)
     # The dents of a replica are looked at while others are simulated, so that no worker waits.
     beside = ThreadPoolExecutor(1)
-    field = beside.submit(find_target_field, chamber, mesh, window)
+    field = beside.submit(lambda: target or find_target_field(chamber, mesh, window))
+    zones = beside.submit(see_zones, design, chamber, mesh)
     beside.shutdown(wait=False)
     done = [] if done is None else done
     seen: SeenDents | None = None
@@ -107,14 +119,18 @@ def evaluate(
             done.append(replica)
             if progress:
                 progress(len(done), count, None)
-            seen = seen or SeenDents(field.result(), [], [])
-            seen.add([one.hits for one in done])
+            seen = seen or SeenDents.none(field.result())
+            for one in (seen, *zones.result().values()):
+                one.add([replica.hits for replica in done])
         simulated = time.perf_counter()
         hits = [replica.hits for replica in done]
-        seen = seen or SeenDents(field.result(), [], [])
-        seen.add(hits)
+        seen = seen or SeenDents.none(field.result())
+        for one in (seen, *zones.result().values()):
+            one.add(hits)
         found = estimate_metrics(seen, hits, chamber, design)
-        value = weighted_sum(parse_objective(plan.objective_name), found.metrics)
+        of_zones, zone_notes = estimate_zones(zones.result(), hits, chamber, design)
+        metrics = found.metrics | of_zones
+        value = weighted_sum(parse_objective(plan.objective_name), metrics)
         timings["simulate"] += simulated - started
         timings["coverage"] += time.perf_counter() - simulated
         if wanted is None:
@@ -127,7 +143,7 @@ def evaluate(
     return Evaluation(
         objective_name=plan.objective_name,
         objective=value,
-        metrics=found.metrics,
+        metrics=metrics,
         metrics_of_wide=found.metrics_of_wide,
         gauge_mm2=accuracy.gauge_mm2,
         resolution=found.resolution,
@@ -143,12 +159,18 @@ def evaluate(
         },
         notes=(
             *((cavity_note(cavity),) if cavity else ()),
+            *friction_notes(design),
+            *reach_notes(seen.field.reachable),
             *_symmetry_note(seen.field.alike),
             *_accuracy_note(stopped_by, len(done), value, wanted),
             *resolution_notes(found.resolution),
+            *strength_notes(found.metrics, found.resolution),
+            *zone_notes,
+            *stress_notes(design.materials.part),
             *resting_notes([replica.resting for replica in done if replica.resting], len(done)),
             *bouncing_notes([replica.bouncing_share for replica in done]),
         ),
+        zones={name: one.field.reachable for name, one in zones.result().items()},
         stream=plan.stream,
         stopped_by=stopped_by,
         analytic=cavity is not None,
@@ -160,6 +182,14 @@ def prepare_target(design: Design, chamber: Chamber, mesh: TriangleMesh) -> Targ
     return find_target_field(chamber, mesh, window_setting(design, chamber))
 
 
+def see_zones(design: Design, chamber: Chamber, mesh: TriangleMesh) -> dict[str, SeenDents]:
+    """The zones of a chamber's part by their names, ready for dents; InputError as below."""
+    surfaces = {name: chamber.on_zone(name) for name in chamber.part.zones}
+    return {
+        name: SeenDents.none(prepare_target(design, one, mesh)) for name, one in surfaces.items()
+    }
+
+
 def window_setting(design: Design, chamber: Chamber) -> WindowSetting:
     """The windows for the target of a chamber.
 
@@ -167,6 +197,7 @@ def window_setting(design: Design, chamber: Chamber) -> WindowSetting:
         InputError: no triangle of the target bounds the cavity, or the gauge is too small for it.
     """
     require_target(chamber)
+    design = design.simulated
     material, shot = design.materials.part, design.shot
     fastest = max(one.peak_speed for one in (design.sonotrode, *design.sonotrodes)) * MAX_SPEED
     fastest = max(fastest, 2.0 * material.yield_speed)

@@ -6,7 +6,7 @@ simulating them again.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from chamberopt.common.errors import InputError
@@ -14,7 +14,7 @@ from chamberopt.common.estimate import Estimate
 from chamberopt.common.limits import MAX_NUMBER
 from chamberopt.common.npz_files import is_of_type, load_record, save_record
 from chamberopt.coverage.field.symmetry import MAX_COPIES
-from chamberopt.coverage.metrics import METRICS
+from chamberopt.coverage.metrics import METRICS, find_metric
 from chamberopt.coverage.part_impacts import Hits, require_impacts
 from chamberopt.coverage.resolution import Resolution
 
@@ -44,6 +44,8 @@ class Evaluation:
     stopped_by: str = "replicas"
     # How many places of the target are alike by symmetry; figures are means over them.
     alike: int = 1
+    # Share of each zone that a ball can touch, by its name.
+    zones: dict[str, float] = field(default_factory=dict)
     analytic: bool = False  # whether it ran in an exact cavity instead of the chamber's mesh
 
 
@@ -77,7 +79,9 @@ def _require_sound(found: Evaluation) -> None:
     """Raise ValueError unless all values have the types, lengths and ranges of an evaluation."""
     if not is_of_type(found, Evaluation):
         raise ValueError("a value is of another type")
-    if found.metrics.keys() != METRICS.keys() or found.metrics_of_wide.keys() - METRICS.keys():
+    names = {*found.metrics, *found.metrics_of_wide}
+    required = {name for name, metric in METRICS.items() if metric.required}
+    if required - found.metrics.keys() or not all(map(find_metric, names)):
         raise ValueError("its metrics are not those of this program")
     estimates = found.objective, *found.metrics.values(), *found.metrics_of_wide.values()
     needed = found.resolution

@@ -15,6 +15,7 @@ import numpy as np
 
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.estimate import CONFIDENCE
+from chamberopt.coverage.compression import compression_depth
 from chamberopt.coverage.coverage_from_impacts import (
     coverage_from_dent_density,
     find_footprints,
@@ -24,11 +25,12 @@ from chamberopt.coverage.field.surface_points import ball_fits, spread_within
 from chamberopt.coverage.field.target_field import Gauge, with_whole_part
 from chamberopt.coverage.strength import (
     LEVELS,
-    impact_strength,
     levels,
     saturated_strength,
     strength_histogram,
+    strip_dents,
 )
+from chamberopt.design.peening.calibration import calibrated_strip
 from chamberopt.simulation.evaluate import prepare_target
 
 if TYPE_CHECKING:
@@ -54,6 +56,7 @@ class PartField:
         self.field = with_whole_part(self.target, chamber, self._mesh)
         self._hits = evaluation.hits
         self._located = [locate_dents(self.field, hits) for hits in self._hits]
+        self._simulated_time = evaluation.simulated_time
         # Treatment time over simulated time.
         self._scale = design.process.treatment_time / evaluation.simulated_time
 
@@ -103,7 +106,9 @@ class PartField:
             mean_normal_speed, p90_normal_speed: mean and 90th percentile [m/s].
             mean_angle_deg: mean angle of the impacts [degrees]; 90 is head on.
             mean_dent_um: mean diameter of the dents [µm].
-            strength_um: peening strength S [µm], see coverage/strength.py.
+            strength_um, saturation_time_s: peening strength S [µm] and T, see coverage/strength.py.
+            almen_intensity_mmA: [mmA]; only where the design has a calibration to strips.
+            compression_depth_um: [µm], see coverage/compression.py; absent for some metals.
         """
         gauge = gauge or self.field.gauge_round(places, self.field.radius)
         fits = self.reachable(places) & np.isfinite(gauge.area)
@@ -127,6 +132,8 @@ class PartField:
             impacts, dents: simulated numbers on the triangle itself.
             exposed_area_mm2, reachable_area_mm2: its areas in the cavity, and where a ball fits.
             target, element: of the triangle; its number in the part's file.
+            zone: number of the last zone that has it, from 1, 0 for none; zone_NAME: whether that
+                zone has it. Both only where there are zones.
         """
         from chamberopt.coverage.field.windows import Places
 
@@ -163,7 +170,18 @@ class PartField:
             "reachable_area_mm2": reached * part.area * 1e6,
             "target": part.target.astype(np.uint8),
             "element": part.elements,
+            **self._zones(),
         }
+
+    def _zones(self) -> dict[str, np.ndarray]:
+        """The zones of each triangle of the part, see `element_values`."""
+        zones = self._chamber.part.zones
+        if not zones:
+            return {}
+        last = np.zeros(len(self._chamber.part.triangles), dtype=np.uint8)
+        for number, zone in enumerate(zones.values(), start=1):
+            last[zone] = number
+        return {"zone": last, **{f"zone_{k}": one.astype(np.uint8) for k, one in zones.items()}}
 
     def _dents(self, gauge: Gauge) -> dict[str, np.ndarray]:
         """Coverage and its interval, by the footprints of the dents."""
@@ -189,14 +207,17 @@ class PartField:
     def _impacts(self, gauge: Gauge) -> dict[str, np.ndarray]:
         """Means and percentiles over the impacts in the windows, dents on creases included."""
         points, windows = len(gauge.area), gauge.windows
-        density = self._design.shot.density
+        shot, metal = self._design.shot, self._design.materials.part
         sums = np.zeros((6, points))
         turned = [self.field.in_sector(hits) for hits in self._hits]
         fastest = max(float(hits.speed.max(initial=0.0)) for hits in turned)
-        strengths = [impact_strength(hits, density) for hits in turned]
-        strongest = max(float(one.max(initial=0.0)) for one in strengths)
-        by_speed, by_strength = np.zeros((points, LEVELS)), np.zeros((points, LEVELS))
-        for hits, strength in zip(turned, strengths, strict=True):
+        # Dents on a strip by their strength, and on the part by their size.
+        strip = calibrated_strip(shot, self._design.calibration)
+        on_strip = [strip_dents(hits, shot.density, strip) for hits in turned]
+        strongest = max(float(one.max(initial=0.0)) for _, one in on_strip)
+        widest = max(float(hits.dent.max(initial=0.0)) for hits in turned)
+        by_speed, by_strength, by_size = np.zeros((3, points, LEVELS))
+        for hits, (strip_dent, strength) in zip(turned, on_strip, strict=True):
             places = self.field.places_of(hits, np.arange(len(hits)))
             ones = np.ones(len(hits))
             is_dent = (hits.dent > 0.0).astype(float)
@@ -207,24 +228,38 @@ class PartField:
                     row += np.bincount(point, column[contact], points)
                 at = point.astype(np.int64) * LEVELS + level[contact]
                 by_speed += np.bincount(at, minlength=points * LEVELS).reshape(points, LEVELS)
-            dented = np.flatnonzero(strength > 0.0)
-            by_strength += strength_histogram(
-                windows,
-                gauge.area,
-                places.select(dented),
-                hits.dent[dented].astype(float),
-                levels(strength[dented], strongest),
-            )
+            for sizes, values, highest, histogram in (
+                (strip_dent, strength, strongest, by_strength),
+                (hits.dent, hits.dent, widest, by_size),
+            ):
+                dented = np.flatnonzero(values > 0.0)
+                histogram += strength_histogram(
+                    windows,
+                    gauge.area,
+                    places.select(dented),
+                    sizes[dented].astype(float),
+                    levels(values[dented], highest),
+                )
         impacts, speed, angle, energy, dent, dents = sums
-        return {
+        strength, time = saturated_strength(by_strength, strongest)
+        found = {
             "impacts_per_mm2": self._scale * 1e-6 * _ratio(impacts, gauge.area),
             "energy_per_mm2": self._scale * 1e-3 * _ratio(energy, gauge.area),
             "mean_normal_speed": _ratio(speed, impacts),
             "p90_normal_speed": _quantile(by_speed, HIGH_SPEED) * fastest,
             "mean_angle_deg": _ratio(angle, impacts),
             "mean_dent_um": 1e6 * _ratio(dent, dents),
-            "strength_um": 1e6 * saturated_strength(by_strength, strongest)[0],
+            "strength_um": 1e6 * strength,
+            "saturation_time_s": np.where(time > 0.0, time * self._simulated_time, np.nan),
         }
+        calibration = self._design.calibration
+        if calibration is not None and calibration.has_strips:
+            found["almen_intensity_mmA"] = calibration.intensity_mmA(1.0) * found["strength_um"]
+            found["saturation_time_s"] /= calibration.factor("beta")
+        if not metal.hardens_strongly:
+            depth = compression_depth(by_size, self._scale, widest)
+            found["compression_depth_um"] = 1e6 * depth
+        return found
 
 
 def density_bounds(

@@ -1,4 +1,8 @@
-"""Coverage against peening time: mean and 5th percentile with intervals."""
+"""Coverage against peening time: mean and 5th percentile with intervals.
+
+What a calibration leaves open moves the dent density x of all times by one factor, and a coverage C
+by -(1 - C) ln(1 - C) times as much, as Avrami's C = 1 - exp(-x) does.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from chamberopt.common.estimate import FIRST_OF_CALIBRATION, shared_half_width
 from chamberopt.coverage.coverage_from_impacts import batches_of, find_footprints
 from chamberopt.coverage.coverage_intervals import (
     Products,
@@ -53,18 +58,36 @@ def coverage_against_time(
         batches, len(gauge.area), [*ratios, *(2.0 * ratio for ratio in ratios)]
     )
     rates = _rates_of_p05(evaluation.metrics["p05_coverage"], treatment, full)
+    open_density = _open_density(evaluation.metrics["mean_coverage"])
     rows = []
     for number, time in enumerate(times):
         both = [number, number + len(times)]
         products = Products(of_all[:, both], of_rest[:, both])
         mean, _ = mean_and_variance_estimates(products, field.reachable, field.reachable_error)
-        row = {"time_s": time, "mean_coverage": mean.value, "half_width": mean.half_width}
+        half_width = math.hypot(mean.half_width, open_density * _by_density(mean.value))
+        row = {"time_s": time, "mean_coverage": mean.value, "half_width": half_width}
         if rates:
             # The dent density grows in proportion to the time.
             low, middle, high = (-math.expm1(-rate * time) for rate in rates)
             row |= {"p05_coverage": middle, "p05_half_width": max(middle - low, high - middle)}
         rows.append(row)
     return rows
+
+
+def _open_density(mean: Estimate) -> float:
+    """Half-width of the logarithm of the dent density by what a calibration leaves open.
+
+    Args:
+        mean: coverage after the treatment time.
+    """
+    slope = _by_density(mean.value)
+    return shared_half_width(mean.shared[FIRST_OF_CALIBRATION:]) / slope if slope > 1e-6 else 0.0
+
+
+def _by_density(coverage: float) -> float:
+    """Slope of a coverage by the logarithm of its dent density."""
+    left = 1.0 - coverage
+    return -left * math.log(left) if 0.0 < left < 1.0 else 0.0
 
 
 def _rates_of_p05(p05: Estimate, treatment: float, full: Estimate) -> list[float]:

@@ -3,6 +3,7 @@
 import contextlib
 import math
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +15,13 @@ from sim_core.geometry.mesh import TriangleMesh
 from sim_core.loop.simulate import simulate
 from sim_core.loop.spatial_blocks import MIN_BALLS
 from sim_core.motion import WINDOW
-from sim_core.numerics.jit import CACHE_FOLDER, CACHED
+from sim_core.numerics.jit import CACHE_FOLDER, CACHED, compilations_counted
 from sim_core.scene.physics import Physics
 from sim_core.scene.scene import Scene
+
+# How many functions are compiled for the first set of effects, and for a further one, roughly:
+# most of them serve all sets.
+FIRST_SET, FURTHER_SET = 200, 50
 
 
 def _marker(physics: Physics, balls: int, alike: bool, cylinder: bool) -> Path:
@@ -37,13 +42,19 @@ def is_compiled(physics: Physics, balls: int, alike: bool = True, cylinder: bool
 
 
 def compile_simulator(
-    physics: Physics, balls: int = 1, alike: bool = True, cylinder: bool = False
+    physics: Physics,
+    balls: int = 1,
+    alike: bool = True,
+    cylinder: bool = False,
+    progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> float:
     """Compile what a scene with these effects needs, or load it from the cache.
 
     Args:
         balls: their number. alike: of one size and density.
         cylinder: in an analytical cylinder, not in a mesh or a prism.
+        progress: called as progress(done, total) after each function that is compiled; how many
+            there will be is a guess.
 
     Returns:
         The time that it took [s].
@@ -77,7 +88,9 @@ def compile_simulator(
         if cylinder
         else mesh
     )
-    simulate(Scene(room, shot, physics, duration=0.01))
+    usual = FURTHER_SET if any(CACHE_FOLDER.glob("compiled-*")) else FIRST_SET
+    with compilations_counted(lambda done: progress(done, max(usual, done + 1))):
+        simulate(Scene(room, shot, physics, duration=0.01))
     if CACHED:
         with contextlib.suppress(OSError):  # such as a full disk
             _marker(physics, balls, alike, cylinder).touch()

@@ -1,7 +1,7 @@
 """Simulate a scene: set up its arrays, run the compiled event loop, check what must never break."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,7 +85,11 @@ class SimulationResult:
     time: float
 
 
-def simulate(scene: Scene, frames: Sequence[float] | np.ndarray = ()) -> SimulationResult:
+def simulate(
+    scene: Scene,
+    frames: Sequence[float] | np.ndarray = (),
+    progress: Callable[[float], None] = lambda seconds: None,
+) -> SimulationResult:
     """Simulate the scene from its start to the end of its duration.
 
     The GIL is released meanwhile. The same scene gives the same bits on any thread.
@@ -93,12 +97,14 @@ def simulate(scene: Scene, frames: Sequence[float] | np.ndarray = ()) -> Simulat
     Args:
         frames: times, ascending [s since the end of the warm-up], (f,), at which the balls are
             noted, each on its flight at that very time. They change no bit of the rest.
+        progress: called about every simulated second with the time since the start, which is that
+            of the warm-up [s].
 
     Raises:
         SimulationError: when a ball is lost, jams, or stops being a number.
     """
     times = _checked_frames(frames, scene)
-    run = Simulation(scene)
+    run = Simulation(scene, progress)
     run.play(scene.warmup, record=False)
     end = scene.warmup + scene.duration
     noted = run.play(end, record=True, frames=scene.warmup + times)
@@ -137,8 +143,10 @@ _obstacle_set = computed_once(8)(build_obstacle_set)  # replicas of one chamber 
 class Simulation:
     """A scene being simulated: the state that the loop works on, and what is logged so far."""
 
-    def __init__(self, scene: Scene) -> None:
-        self.scene = scene
+    def __init__(
+        self, scene: Scene, progress: Callable[[float], None] = lambda seconds: None
+    ) -> None:
+        self.scene, self.progress = scene, progress
         self.centre = scene.mesh.middle
         self.logs: list[ImpactLog] = []
         self.meetings: list[CollisionLog] = []
@@ -258,6 +266,7 @@ class Simulation:
                 noted.append(self.balls())
             if stop in due:
                 self._require_sound()
+                self.progress(self.time)
         self._empty_buffers()
         return noted
 

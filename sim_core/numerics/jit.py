@@ -10,11 +10,13 @@ import os
 import shutil
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numba
+from numba.core import event
 from numba.core.registry import CPUDispatcher
 
 from sim_core.numerics.compile_cache import CheckedCache, is_private
@@ -120,6 +122,25 @@ def _compiled(function: Callable[..., Any], inline: bool, from_python: bool = Fa
     if not from_python and not _settings.DISABLE_JIT:
         compiled.__class__ = Step
     return compiled
+
+
+class _Counter(event.Listener):
+    def __init__(self, count: Callable[[int], None]) -> None:
+        self.compiled, self.count = 0, count
+
+    def on_start(self, event: Any) -> None:
+        pass
+
+    def on_end(self, event: Any) -> None:
+        self.compiled += 1
+        self.count(self.compiled)
+
+
+@contextmanager
+def compilations_counted(count: Callable[[int], None]) -> Iterator[None]:
+    """In a `with` block, call `count` after each function with how many were compiled so far."""
+    with event.install_listener("numba:compile", _Counter(count)):
+        yield
 
 
 def jit(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -20,7 +20,7 @@ def bowl_shares(design) -> np.ndarray:
     return (np.array([design.value(name) for name in VARY]) - low) / (high - low)
 
 
-def run_bowl(folder: Path, simulator, optimizer: dict | None = None, **tables):
+def run_bowl(folder: Path, simulator, optimizer: dict | None = None, design=GEAR, **tables):
     settings = {
         "evaluations": 16,
         "confirm": 2,
@@ -29,7 +29,7 @@ def run_bowl(folder: Path, simulator, optimizer: dict | None = None, **tables):
         **(optimizer or {}),
     }
     return run_in_folder(
-        Study(design=GEAR, vary=VARY, optimizer=settings, **tables),
+        Study(design=design, vary=VARY, optimizer=settings, **tables),
         folder,
         SerialExecutor(),
         None,

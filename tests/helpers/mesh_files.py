@@ -56,8 +56,8 @@ def obj_face(quad: tuple[int, ...], shift: int = 1) -> str:
     return "f " + " ".join(f"{k + shift}/1" for k in quad) + "\n"
 
 
-def step_of_a_box(unit: str) -> str:
-    """A box as a faceted_brep of ISO 10303-42: points, loops, planes."""
+def step_of_a_box(unit: str, heights: tuple[float, ...] = (0.0,)) -> str:
+    """A box, or several at heights, as faceted_breps of ISO 10303-42: points, loops, planes."""
     lines: list[str] = []
 
     def put(text: str) -> int:
@@ -74,27 +74,33 @@ def step_of_a_box(unit: str) -> str:
         f"(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNIT_ASSIGNED_CONTEXT((#{length},#{angle},#{solid}))"
         "REPRESENTATION_CONTEXT('',''))"
     )
-    points = [put(f"CARTESIAN_POINT('',({x:.1f},{y:.1f},{z:.1f}))") for x, y, z in CORNERS]
-    faces = []
-    for quad in QUADS:
-        loop = put(f"POLY_LOOP('',({references(points[k] for k in quad)}))")
-        bound = put(f"FACE_OUTER_BOUND('',#{loop},.T.)")
-        along, normal = (
-            CORNERS[quad[1]] - CORNERS[quad[0]],
-            np.cross(*np.diff(CORNERS[list(quad[:3])], axis=0)),
-        )
-        z, x = (
-            put(f"DIRECTION('',({x:.1f},{y:.1f},{z:.1f}))") for x, y, z in np.sign([normal, along])
-        )
-        axes = put(f"AXIS2_PLACEMENT_3D('',#{points[quad[0]]},#{z},#{x})")
-        plane = put(f"PLANE('',#{axes})")
-        faces.append(put(f"FACE_SURFACE('',(#{bound}),#{plane},.T.)"))
-    shell = put(f"CLOSED_SHELL('',({references(faces)}))")
-    brep = put(f"FACETED_BREP('block',#{shell})")
+    breps = []
+    for height in heights:
+        points = [
+            put(f"CARTESIAN_POINT('',({x:.1f},{y:.1f},{z:.1f}))")
+            for x, y, z in CORNERS + np.array([0, 0, height])
+        ]
+        faces = []
+        for quad in QUADS:
+            loop = put(f"POLY_LOOP('',({references(points[k] for k in quad)}))")
+            bound = put(f"FACE_OUTER_BOUND('',#{loop},.T.)")
+            along, normal = (
+                CORNERS[quad[1]] - CORNERS[quad[0]],
+                np.cross(*np.diff(CORNERS[list(quad[:3])], axis=0)),
+            )
+            z, x = (
+                put(f"DIRECTION('',({x:.1f},{y:.1f},{z:.1f}))")
+                for x, y, z in np.sign([normal, along])
+            )
+            axes = put(f"AXIS2_PLACEMENT_3D('',#{points[quad[0]]},#{z},#{x})")
+            plane = put(f"PLANE('',#{axes})")
+            faces.append(put(f"FACE_SURFACE('',(#{bound}),#{plane},.T.)"))
+        shell = put(f"CLOSED_SHELL('',({references(faces)}))")
+        breps.append(put(f"FACETED_BREP('block',#{shell})"))
     origin = put("CARTESIAN_POINT('',(0.,0.,0.))")
     z, x = put("DIRECTION('',(0.,0.,1.))"), put("DIRECTION('',(1.,0.,0.))")
     axes = put(f"AXIS2_PLACEMENT_3D('',#{origin},#{z},#{x})")
-    shape = put(f"FACETED_BREP_SHAPE_REPRESENTATION('',(#{axes},#{brep}),#{context})")
+    shape = put(f"FACETED_BREP_SHAPE_REPRESENTATION('',(#{axes},{references(breps)}),#{context})")
     application = put("APPLICATION_CONTEXT('automotive design')")
     about = put(f"PRODUCT_CONTEXT('',#{application},'mechanical')")
     product = put(f"PRODUCT('block','block','',(#{about}))")

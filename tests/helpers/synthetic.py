@@ -12,7 +12,7 @@ from chamberopt.chamber.build import Chamber
 from chamberopt.chamber.part import Part
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.estimate import Estimate, estimate
-from chamberopt.coverage.metrics import METRICS, OBJECTIVES
+from chamberopt.coverage.metrics import OBJECTIVES, metric_names
 from chamberopt.coverage.part_impacts import Hits
 from chamberopt.coverage.resolution import Resolution
 from chamberopt.design.load import Design, load_design
@@ -20,10 +20,11 @@ from chamberopt.geometry.triangles import areas
 from chamberopt.simulation.estimates import (
     SeenDents,
     estimate_metrics,
+    estimate_zones,
     resolution_notes,
     weighted_sum,
 )
-from chamberopt.simulation.evaluate import prepare_target
+from chamberopt.simulation.evaluate import prepare_target, see_zones
 from chamberopt.simulation.evaluation import Evaluation
 from sim_core import closest_points
 
@@ -38,6 +39,20 @@ def plate_design(**values: float) -> Design:
     """The shipped plate, with other numbers: plate_design(shot__mass_g=3) sets shot.mass_g."""
     changes = {name.replace("__", "."): value for name, value in values.items()}
     return load_design(DESIGNS / "plate.toml").changed(changes)
+
+
+def machine_values(**sds: float) -> dict[str, Any]:
+    """The table of a calibration: what is named has this standard deviation of its logarithm."""
+    count = len(sds)
+    return {
+        "program": "0",
+        "parameters": tuple(sds),
+        "log_mean": (0.0,) * count,
+        "log_covariance": tuple(map(tuple, (np.diag(list(sds.values())) ** 2).tolist())),
+        "amplitude_um": (20.0, 30.0),
+        "ball_diameter_mm": (3.0, 3.0),
+        "ball_density_kg_m3": 7800.0,
+    }
 
 
 def chamber_round(
@@ -147,7 +162,7 @@ def judged(objective: np.ndarray, **metrics: float) -> Evaluation:
     """An evaluation whose replicas have these objectives; metrics given are exact, the others 0."""
     exact = {
         name: Estimate(metrics.get(name, 0.0), 0.0, (metrics.get(name, 0.0),) * 3)
-        for name in METRICS
+        for name in {*metric_names(plate_design()), *metrics}
     }
     count = len(objective)
     return Evaluation(
@@ -180,13 +195,17 @@ def poisson_evaluation(
 
 def evaluation_of(design: Design, chamber: Chamber, hits: Sequence[Hits]) -> Evaluation:
     """The evaluation of replicas whose impacts are known."""
-    seen = SeenDents(prepare_target(design, chamber, chamber_mesh(chamber)), [], [])
+    seen = SeenDents.none(prepare_target(design, chamber, chamber_mesh(chamber)))
     seen.add(hits)
     found = estimate_metrics(seen, hits, chamber, design)
+    zones = see_zones(design, chamber, chamber_mesh(chamber))
+    for one in zones.values():
+        one.add(hits)
+    of_zones, zone_notes = estimate_zones(zones, hits, chamber, design)
     return Evaluation(
         objective_name="uniform_coverage",
         objective=weighted_sum(OBJECTIVES["uniform_coverage"], found.metrics),
-        metrics=found.metrics,
+        metrics=found.metrics | of_zones,
         metrics_of_wide=found.metrics_of_wide,
         gauge_mm2=design.process.accuracy.gauge_mm2,
         resolution=found.resolution,
@@ -198,5 +217,6 @@ def evaluation_of(design: Design, chamber: Chamber, hits: Sequence[Hits]) -> Eva
         hits=tuple(hits),
         timings={"chamber": 0.1, "simulate": 1.0, "coverage": 0.1},
         collisions={"walls": 5, "balls": 3, "sonotrode": 2, "total": 10},
-        notes=resolution_notes(found.resolution),
+        notes=(*resolution_notes(found.resolution), *zone_notes),
+        zones={name: one.field.reachable for name, one in zones.items()},
     )

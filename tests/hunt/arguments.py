@@ -29,8 +29,11 @@ COMMANDS: dict[str, dict[str, tuple[str, ...]]] = {
     "sweep": {"--grid": NUMBERS, "--sobol": NUMBERS, "--seed": NUMBERS, "--json": (),
               "--out": (*OUTPUTS, "sweep"), "--workers": NUMBERS},
     "accuracy": {"--budget-s": ("0", "-1", "nan", "inf", "x", "", "1e-9"), "--out": OUTPUTS},
+    "strip": {"--type": ("A", "N", "C", "x"), "--at": ("lid", "x", ""), "--disc-mm": NUMBERS,
+              "--distance-mm": NUMBERS, "--workers": NUMBERS, "--json": (), "--out": OUTPUTS},
     "compare": {"--treatment-time-s": NUMBERS, "--json": (), "--out": OUTPUTS},
-    "report": {"--json": (), "--out": (*OUTPUTS, "page.html", "result/result.json")},
+    "report": {"--json": (), "--sheet": (),
+               "--out": (*OUTPUTS, "page.html", "sheet.pdf", "result/result.json")},
     "export": {"--to": ("vtk", "csv", "abaqus", "impacts-csv", "study", "x", "", "step", "stl"),
                "--frame": ("part", "chamber", "x"), "--replicas": NUMBERS, "--json": (),
                "--out": (*OUTPUTS, "file.csv")},
@@ -46,6 +49,7 @@ COMMANDS: dict[str, dict[str, tuple[str, ...]]] = {
 FIRST = {
     "check": ("design.toml", "study.toml"), "simulate": ("design.toml",), "run": ("study.toml",),
     "sweep": ("study.toml",), "accuracy": ("design.toml",), "report": ("result", "study"),
+    "strip": ("design.toml",),
     "compare": ("result", "study"), "export": ("result", "study"), "inspect": ("result", "study"),
     "dents": ("result",), "replay": ("result",),
 }  # fmt: skip

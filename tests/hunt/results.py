@@ -26,7 +26,7 @@ from tests.hunt.toml_files import odd_value
 
 LOOK = (
     ["report", "{}"],
-    ["report", "{}", "--json"],
+    ["report", "{}", "--sheet", "--json"],
     ["compare", "result", "{}"],
     ["compare", "{}", "result"],
     ["export", "{}", "--to", "fields-vtp"],

@@ -29,6 +29,7 @@ COMMANDS = {
     "sweep": ["sweep", "s.toml", "--grid", "4", "--workers", "2"],
     "compare": ["compare", "plate.toml", "light.toml"],
     "accuracy": ["accuracy", "plate.toml", "--budget-s", "1"],
+    "strip": ["strip", "plate.toml", "--disc-mm", "40"],
 }
 RESUMES = ("run", "sweep")
 # Times and dates, or a budget of time, are in these: they are whole, but not the same each time.
@@ -161,7 +162,7 @@ def check(place: Path, name: str, kills: int, seed: int) -> None:
 
 
 @pytest.mark.skipif(not hasattr(os, "setsid"), reason="needs sessions of processes")
-@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize("name", ["simulate"])  # all of them in the long test
 def test_killed_at_a_random_moment(name: str, place: Path) -> None:
     check(place, name, 1, seed=1)
 

@@ -6,14 +6,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chamberopt.chamber.build import hidden_share
-from chamberopt.chamber.checks.gaps import gap_warnings, pocket_warnings, target_warnings
+from chamberopt.chamber.build import hidden_share, selection_of
+from chamberopt.chamber.checks.calibration import calibration_warnings
+from chamberopt.chamber.checks.fillets import fillet_warnings
+from chamberopt.chamber.checks.gaps import gap_warnings, pocket_warnings, surface_warnings
 from chamberopt.chamber.checks.ledges import find_ledges
 from chamberopt.chamber.checks.place_names import CEILING, SIDE_WALL, on_target, surface_names
 from chamberopt.chamber.dimensionless import free_path
 from chamberopt.chamber.part import turning_axis
-from chamberopt.chamber.reach.reach import Reach, find_reach
-from chamberopt.chamber.scene import chamber_mesh, require_ball_count, require_turnable
+from chamberopt.chamber.reach.reach import Reach, find_reach, reached_part_share
+from chamberopt.chamber.scene import (
+    build_scene,
+    chamber_mesh,
+    replica_seed,
+    require_ball_count,
+    require_turnable,
+)
+from chamberopt.design.peening.tolerances import require_tolerances, tolerance_box
 from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL, is_sonotrode
 from chamberopt.geometry.triangles import areas, edge_keys, sides_of, tetrahedron_volumes
 
@@ -25,7 +34,8 @@ if TYPE_CHECKING:
 
 # Share of the free volume above which the balls move as a dense bed rather than as a gas: few of
 # them reach the part, and event-driven simulation slows down because collisions are so frequent.
-MAX_PACKING_FRACTION = 0.3
+# Near a quarter the shot finds no places to start from.
+MAX_PACKING_FRACTION = 0.2
 MIN_AMPLITUDES = 10.0  # between part and sonotrode, as for sonotrode_distance_mm of a design
 MAX_HIDDEN_SHARE = 0.05  # of the target's area; more means that a ceiling or wall is misplaced
 MIN_FREE_PATH = 10.0  # chamber heights: beyond it, few dents come from balls that met another
@@ -42,13 +52,38 @@ def describe(design: Design, chamber: Chamber, reach: Reach | None = None) -> di
     """
     require_ball_count(design)
     reach = shot_reach(design, chamber) if reach is None else reach
-    require_turnable(design, reach.mesh, turning_axis(design, chamber.part))
-    part, shot, process = chamber.part, design.shot, design.process
+    axis = turning_axis(design, chamber.part)
+    require_turnable(design, reach.mesh, axis)
+    if not design.effects.auto:  # whether the shot fits
+        build_scene(design, reach.mesh, replica_seed(design.process.seed, 0), axis)
+    process = design.process
+    accuracy = process.accuracy
+    simulated = accuracy.replicas * (process.recorded_time + accuracy.warmup_time)
+    return {
+        **first_facts(design, chamber, reach.mesh),
+        **_zone_facts(reach, chamber),
+        **_turn_facts(design, chamber.part),
+        "materials": {name: law.in_words for name, law in design.materials},
+        "reach": _reach_facts(reach, chamber),
+        **_tolerance_facts(design),
+        "replicas": {
+            "count": accuracy.replicas,
+            "recorded_s": _rounded(process.recorded_time),
+            "warmup_s": _rounded(accuracy.warmup_time),
+            "simulated_s_in_all": _rounded(simulated),
+        },
+        "notes": notes(design, chamber),
+        "warnings": warnings(design, chamber, reach),
+    }
+
+
+def first_facts(design: Design, chamber: Chamber, mesh: TriangleMesh) -> dict[str, Any]:
+    """The facts that are known before what the shot reaches; mesh is the chamber's."""
+    part, shot = chamber.part, design.shot
     exposed = chamber.exposed_area > 0.0
-    box = np.ptp(part.vertices, axis=0)
+    box, low = np.ptp(part.vertices, axis=0), part.vertices.min(axis=0)
     shape = design.chamber.surface(part.vertices, part.triangles)  # without the part
     shape_volume = float(tetrahedron_volumes(shape.vertices, shape.triangles).sum())
-    simulated = process.accuracy.replicas * (process.recorded_time + process.accuracy.warmup_time)
     return {
         "part": {
             "mesh": str(design.part.mesh_path),
@@ -56,6 +91,8 @@ def describe(design: Design, chamber: Chamber, reach: Reach | None = None) -> di
             "names": list(part.names),
             "triangles": len(part.triangles),
             "bounding_box_mm": [_rounded(side * 1e3) for side in box],
+            "box_middle_mm": [_rounded(x * 1e3) for x in low[:2] + 0.5 * box[:2]],  # from the axis
+            "lowest_point_mm": _rounded(low[2] * 1e3),
             "area_mm2": _rounded(part.area.sum() * 1e6),
             "exposed_area_mm2": _rounded(chamber.exposed_area.sum() * 1e6),
         },
@@ -70,28 +107,33 @@ def describe(design: Design, chamber: Chamber, reach: Reach | None = None) -> di
             "shape_volume_cm3": _rounded(shape_volume * 1e6),
             "free_volume_cm3": _rounded(chamber.volume * 1e6),
             "closed": "yes",  # otherwise SceneError was raised above
-            "sonotrode_clearance_mm": _rounded(sonotrode_clearance(reach.mesh) * 1e3),
+            "sonotrode_clearance_mm": _rounded(sonotrode_clearance(mesh) * 1e3),
             "part_triangles": int((chamber.tags == TAG_PART).sum()),
             "sonotrode_triangles": int(is_sonotrode(chamber.tags).sum()),
             "wall_triangles": int((chamber.tags == TAG_WALL).sum()),
         },
-        **_turn_facts(design, part),
-        "sonotrode": {"peak_speed_m_s": _rounded(design.sonotrode.peak_speed)},
+        "sonotrode": {
+            "amplitude_um": _rounded(1e6 * design.sonotrode.amplitude),
+            "amplitude_pv_um": _rounded(2e6 * design.sonotrode.amplitude),
+            "peak_speed_m_s": _rounded(design.sonotrode.peak_speed),
+        },
         "shot": {
             "balls": shot.count,
             "ball_mass_mg": _rounded(shot.ball_mass * 1e6),
             "mass_g": _rounded(shot.count * shot.ball_mass * 1e3),
             "packing_fraction": _rounded(shot.volume / chamber.volume),
         },
-        "reach": _reach_facts(reach, chamber),
-        "simulated_time_s": _rounded(simulated),
-        "notes": [
-            *chamber.notes,
-            *_friction_notes(design),
-            *(ledge.message for ledge in find_ledges(design, chamber) if not ledge.level),
-        ],
-        "warnings": warnings(design, chamber, reach),
     }
+
+
+def notes(design: Design, chamber: Chamber) -> list[str]:
+    """What was assumed or left out, and what the design does without."""
+    return [
+        *chamber.notes,
+        *_place_notes(design),
+        *friction_notes(design),
+        *(ledge.message for ledge in find_ledges(design, chamber) if not ledge.level),
+    ]
 
 
 def shot_reach(design: Design, chamber: Chamber) -> Reach:
@@ -102,6 +144,17 @@ def shot_reach(design: Design, chamber: Chamber) -> Reach:
 def warnings(design: Design, chamber: Chamber, reach: Reach | None = None) -> list[str]:
     """Sentences about values that are allowed but probably not intended, each with a remedy."""
     reach = shot_reach(design, chamber) if reach is None else reach
+    texts = first_warnings(design, chamber, reach.mesh)
+    for name, surface in _to_be_peened(design, chamber).items():
+        texts += surface_warnings(reach, surface, name, design.part.target.reachable)
+    texts += pocket_warnings(reach, chamber)
+    turns = design.effects.part_turn is not None
+    texts += gap_warnings(reach, chamber, design.shot.diameter, turns)
+    return texts + fillet_warnings(reach, chamber, max(design.shot.diameters))
+
+
+def first_warnings(design: Design, chamber: Chamber, mesh: TriangleMesh) -> list[str]:
+    """The warnings that need not know what the shot reaches; mesh is the chamber's."""
     shot, texts = design.shot, []
     filled = shot.volume / chamber.volume
     if filled > MAX_PACKING_FRACTION:
@@ -114,12 +167,13 @@ def warnings(design: Design, chamber: Chamber, reach: Reach | None = None) -> li
             f"shot.mass_g = {shot.mass_g:g} is rounded to {shot.count} whole ball(s) of "
             f"{shot.ball_mass * 1e6:.3g} mg: the charge differs by more than 5 %"
         )
-    hidden = hidden_share(chamber.part, chamber.exposed_area)
-    if hidden > MAX_HIDDEN_SHARE:
-        texts.append(
-            f"{hidden:.0%} of the target's area is outside the chamber and counts as not covered: "
-            "enlarge the chamber, or narrow [part.target] to what is to be peened"
-        )
+    for name, surface in _to_be_peened(design, chamber).items():
+        if (hidden := hidden_share(surface)) > MAX_HIDDEN_SHARE:
+            texts.append(
+                f"{hidden:.0%} of the area of {name} is outside the chamber and counts as not "
+                f"covered: enlarge the chamber, or narrow {selection_of(name)} to what is to be "
+                "peened"
+            )
     path = free_path(design, chamber)
     if not design.effects.ball_collisions and path < MIN_FREE_PATH:
         texts.append(
@@ -134,19 +188,33 @@ def warnings(design: Design, chamber: Chamber, reach: Reach | None = None) -> li
             f"only {recorded:.3g} s: coverage is that of some of its positions; raise "
             "process.accuracy.simulated_time_s or replicas"
         )
-    texts += _sonotrode_warnings(design, reach.mesh, turning_axis(design, chamber.part))
-    texts += target_warnings(reach, chamber, design.part.target.reachable)
-    texts += pocket_warnings(reach, chamber)
-    texts += gap_warnings(reach, chamber, shot.diameter, turns=turn is not None)
+    texts += calibration_warnings(design)
+    texts += _sonotrode_warnings(design, mesh, turning_axis(design, chamber.part))
     texts += _side_wall_warnings(design, chamber)
     return texts + [ledge.message for ledge in find_ledges(design, chamber) if ledge.level]
 
 
-def _friction_notes(design: Design) -> list[str]:
+def _to_be_peened(design: Design, chamber: Chamber) -> dict[str, Chamber]:
+    """The surfaces of the chamber but for zones that are to be spared."""
+    spared = {f"zone {one.name}" for one in design.zones if one.is_spared}
+    return {name: one for name, one in chamber.surfaces().items() if name not in spared}
+
+
+def _place_notes(design: Design) -> list[str]:
+    """Where a part stands that is not moved."""
+    if design.chamber.setup() is not None or any(design.part.offset):
+        return []
+    return ["the middle of the part's box is on the chamber's axis; part.offset_mm moves it"]
+
+
+def friction_notes(design: Design) -> list[str]:
     """What it means that a design has no friction; see docs/physics.md."""
     if design.effects.friction is not None or design.effects.auto:
         return []
-    remedy = "give yours, e.g. effects.friction = { mu = 0.3, beta0 = 0.2 }; --pilot measures it"
+    remedy = (
+        "give yours, e.g. effects.friction = { mu = 0.3, beta0 = 0.2 }; chamberopt check --pilot "
+        "measures it"
+    )
     if design.shot.mix is not None:
         remedy = "it is not supported beside shot.mix yet"
     return [
@@ -166,6 +234,22 @@ def _reach_facts(reach: Reach, chamber: Chamber) -> dict[str, Any]:
     return facts
 
 
+def _zone_facts(reach: Reach, chamber: Chamber) -> dict[str, Any]:
+    """Size of each zone, and the share of it in the chamber that the smallest balls can touch."""
+    part = chamber.part
+    share = reached_part_share(reach, chamber.source, len(part.triangles))
+    facts = {}
+    for name, zone in part.zones.items():
+        exposed = chamber.exposed_area[zone]
+        facts[f"zone {name}"] = {
+            "triangles": int(zone.sum()),
+            "area_mm2": _rounded(part.area[zone].sum() * 1e6),
+            "exposed_area_mm2": _rounded(exposed.sum() * 1e6),
+            "reachable_share": _rounded(share[zone] @ exposed / exposed.sum()),
+        }
+    return facts
+
+
 def _turn_facts(design: Design, part: Part) -> dict[str, Any]:
     """The motion of a turning part, its axis in the chamber's frame."""
     turn, line = design.effects.part_turn, turning_axis(design, part)
@@ -178,6 +262,14 @@ def _turn_facts(design: Design, part: Part) -> dict[str, Any]:
         "axis": [_rounded(x) for x in axis / np.linalg.norm(axis)],
     }
     return {"part_turn": {**(swing if turn.rpm is None else {"rpm": turn.rpm}), **pose}}
+
+
+def _tolerance_facts(design: Design) -> dict[str, Any]:
+    """The range of each number that has a tolerance; InputError if the design cannot have it."""
+    require_tolerances(design)
+    box = tolerance_box(design)
+    ranges = {k: {"low": a, "start": design.value(k), "high": b} for k, (a, b) in box.items()}
+    return {"tolerances": ranges} if box else {}
 
 
 def _side_wall_warnings(design: Design, chamber: Chamber) -> list[str]:

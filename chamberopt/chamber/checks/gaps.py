@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from chamberopt.chamber.build import TARGET, selection_of
 from chamberopt.chamber.checks.place_names import (
     CEILING,
     SONOTRODE,
@@ -73,7 +74,8 @@ def pocket_warnings(reach: Reach, chamber: Chamber) -> list[str]:
             in_target = float(touches.area[own & target].sum())
             loss = f", though {mm2(in_target)} of the target are in it" if in_target else ""
             text = (
-                f"a pocket around {around(touches.point[own], touches.area[own])} would hold a "
+                f"a pocket around {around(touches.point[own], touches.area[own])} in the "
+                "chamber's frame would hold a "
                 f"ball of {1e3 * reach.diameter:g} mm but has no way in for one{loss}; widen its "
                 "mouth, close it, or use smaller balls"
             )
@@ -81,8 +83,15 @@ def pocket_warnings(reach: Reach, chamber: Chamber) -> list[str]:
     return [text for _, text in sorted(found, key=lambda one: -one[0])[:MAX_WARNINGS]]
 
 
-def target_warnings(reach: Reach, chamber: Chamber, only_reachable: bool = False) -> list[str]:
-    """A warning about the share of the target that no ball can touch, for any peening time."""
+def surface_warnings(
+    reach: Reach, chamber: Chamber, name: str = TARGET, only_reachable: bool = False
+) -> list[str]:
+    """A warning about the share of the target that no ball can touch, for any peening time.
+
+    Args:
+        chamber: with the surface of this name as its target, see `Chamber.surfaces`.
+        only_reachable: whether the design takes only what the shot reaches for the target.
+    """
     touches = reach.touches
     own = on_target(chamber)[touches.triangle]
     whole, missed = float(touches.area[own].sum()), own & ~reach.reached
@@ -91,16 +100,18 @@ def target_warnings(reach: Reach, chamber: Chamber, only_reachable: bool = False
         return []
     sharp = own & ~reach.fits
     place = one_of(touches.point[missed], touches.area[missed])
-    or_set = "" if only_reachable else ", or set part.target.reachable = true"
-    remedy = f"narrow [part.target]{or_set}"
+    remedy = f"narrow {selection_of(name)}"
+    if name == TARGET and not only_reachable:
+        remedy += ", or set part.target.reachable = true"
     if touches.area[sharp].sum() > 0.5 * left:
         order = np.argsort(touches.radius[own])
         second_half = np.cumsum(touches.area[own][order]) > 0.5 * left
         diameter_mm = 2e3 * float(touches.radius[own][order][np.argmax(second_half)])
         remedy = f"balls of {diameter_mm:.2g} mm would fit half of that; or {remedy}"
     return [
-        f"{left / whole:.1%} of the target in the chamber ({mm2(left)}) cannot be touched by a "
-        f"ball of {1e3 * reach.diameter:g} mm, however long it is peened: e.g. at {place}; {remedy}"
+        f"{left / whole:.1%} of {name} in the chamber ({mm2(left)}) cannot be touched by a "
+        f"ball of {1e3 * reach.diameter:g} mm, however long it is peened: e.g. at {place} in "
+        f"the chamber's frame; {remedy}"
     ]
 
 
@@ -141,7 +152,7 @@ def _gap_warning(
         for end in (radius.min(), radius.max())
     )
     between = f"between {one} and {two}" if one != two else f"of {one}"
-    where = f"at {one_of(biggest.centre, biggest.area)}"
+    where = f"at {one_of(biggest.centre, biggest.area)} in the chamber's frame"
     what = (
         f"the gap {between} {where}"
         if len(gaps) == 1
@@ -168,7 +179,7 @@ def _remedy(sides: set[str]) -> str:
     if SONOTRODE in sides:
         return "raise chamber.sonotrode_distance_mm"
     if CEILING in sides:
-        return "raise chamber.height_mm or close the gap"
+        return "raise the ceiling or close the gap"
     if all("part" in side for side in sides):
         return "use smaller balls, or close it where it is not to be peened"
     return "enlarge the chamber, check part.offset_mm, or close the gap"

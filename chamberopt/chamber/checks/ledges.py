@@ -60,7 +60,8 @@ def find_ledges(design: Design, chamber: Chamber) -> list[Ledge]:
         message = (
             f"balls can come to rest {where} the {name}, which neither vibrates nor turns: "
             f"{mm2(area[shown].sum())} {extent}, around "
-            f"{around(corners.mean(axis=1), area[shown])}, at z = {heights}; "
+            f"{around(corners.mean(axis=1), area[shown])} in the chamber's frame, "
+            f"at z = {heights}; "
             f"{REMEDY[tag].format(key=design.chamber.ceiling_key)}"
         )
         found.append(Ledge(message, level))

@@ -31,7 +31,7 @@ def surface_names(chamber: Chamber) -> np.ndarray:
 
 
 def around(points: np.ndarray, weights: np.ndarray | None = None) -> str:
-    """The mean of points (n, 3) [m] with weights (n,), as "(x, y, z) mm"."""
+    """The mean of points (n, 3) [m] with weights (n,): "(x, y, z) mm", in the chamber's frame."""
     middle = np.average(1e3 * points, axis=0, weights=weights)
     return f"({', '.join(f'{x:.1f}' for x in np.round(middle, 1) + 0.0)}) mm"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from chamberopt.cli.console import print_result, results_folder
+from chamberopt.cli.console import print_remarks, print_result, results_folder
 from chamberopt.cli.options import Json, Out, app
 from chamberopt.cli.prepare import compile_with_message
 
@@ -25,15 +25,21 @@ def accuracy(
         CPU seconds to spend on simulations; with more, smaller errors become visible.
     """
     from chamberopt.common.parallel.executor import local_executor
-    from chamberopt.common.progress import progress_bar
+    from chamberopt.common.progress import step
     from chamberopt.design.load import load_design
     from chamberopt.output.results.accuracy_results import accuracy_text, write_accuracy_results
-    from chamberopt.simulation.convergence.study import require_budget, run_convergence_study
+    from chamberopt.simulation.convergence.study import (
+        describe_cost,
+        require_budget,
+        run_convergence_study,
+    )
 
     require_budget(budget_s)
     one = load_design(design)
     with results_folder(out, f"{design.stem}-accuracy") as folder:
-        with local_executor() as executor, progress_bar("CPU seconds") as progress:
-            study = run_convergence_study(one, budget_s, executor, progress, compile_with_message)
-        write_accuracy_results(folder, study)
+        print_remarks([describe_cost(one, budget_s)])
+        with local_executor() as executor:
+            study = run_convergence_study(one, budget_s, executor, compile_with_message)
+        with step("writing and drawing"):
+            write_accuracy_results(folder, study)
     print_result(accuracy_text(study), folder, json, "accuracy.json")

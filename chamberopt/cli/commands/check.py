@@ -5,7 +5,6 @@ from __future__ import annotations
 import json as json_format
 from contextlib import ExitStack
 from pathlib import Path
-from textwrap import fill
 from typing import TYPE_CHECKING
 
 from chamberopt.cli.console import print_json, print_remarks, show, table_lines
@@ -57,6 +56,7 @@ def _check(file: Path, pilot: bool, screenshot: Path | None, json: bool, out: Pa
     from chamberopt.chamber.build import build_chamber
     from chamberopt.chamber.checks.check import describe, shot_reach
     from chamberopt.common.files import write_text
+    from chamberopt.common.progress import step
     from chamberopt.geometry.mesh_io.surface_error import SurfaceError
     from chamberopt.optimize.study import Study, load
     from chamberopt.output.vtp_files import write_chamber
@@ -65,22 +65,30 @@ def _check(file: Path, pilot: bool, screenshot: Path | None, json: bool, out: Pa
     loaded = load(file)
     kind, design = ("study", loaded.design) if isinstance(loaded, Study) else ("design", loaded)
     try:
-        chamber = build_chamber(design)
+        with step("building the chamber"):
+            chamber = build_chamber(design)
     except SurfaceError as error:
         if screenshot is not None:  # the faults in red; the message itself follows on stderr
             from chamberopt.output.viewer import draw_part
 
-            text = fill(str(error), 110)
-            remark = draw_part(error.corners, text, screenshot, edges=error.edges)
+            with step("drawing"):
+                remark = draw_part(error.corners, str(error), screenshot, edges=error.edges)
             print_remarks([remark or f"picture in {screenshot}"])
+            error.__notes__.clear()  # how to see it
         raise
-    reach = shot_reach(design, chamber)
-    facts = describe(design, chamber, reach)
+    with step("finding what the shot reaches"):
+        reach = shot_reach(design, chamber)
+        facts = describe(design, chamber, reach)
     if screenshot is not None:
-        _draw_target(chamber, reach, screenshot)
+        with step("drawing"):
+            draw_target(chamber, reach, screenshot)
     if isinstance(loaded, Study):
-        bounds = loaded.vary.items()
-        facts["vary"] = {k: {"low": a, "start": design.value(k), "high": b} for k, (a, b) in bounds}
+        facts["vary"] = {
+            name: {"values": list(varied.texts), "start": design.setting(name)}
+            if varied.texts
+            else {"low": varied.bounds[0], "start": design.value(name), "high": varied.bounds[1]}
+            for name, varied in loaded.vary.items()
+        }
         facts["evaluations"] = loaded.optimizer.evaluations
     if out is not None:
         facts["folder"] = str(out)
@@ -96,16 +104,13 @@ def _check(file: Path, pilot: bool, screenshot: Path | None, json: bool, out: Pa
         print_json(facts)
 
 
-def _draw_target(chamber: Chamber, reach: Reach, screenshot: Path) -> None:
-    """Draw the part with its target, and in red the target's triangles that no ball can touch."""
+def draw_target(chamber: Chamber, reach: Reach, screenshot: Path) -> None:
+    """Draw the part with its target, and the target's triangles that hardly a ball can touch."""
     from chamberopt.chamber.reach.reach import reached_part_share
     from chamberopt.output.viewer import draw_part
 
     part = chamber.part
     missed = part.target & (reached_part_share(reach, chamber.source, len(part.triangles)) <= 0.5)
-    title = f"{part.name}: the target in orange"
-    if missed.any():
-        title += ", in red where hardly a ball can touch it"
     corners = part.vertices[part.triangles]
-    remark = draw_part(corners, title, screenshot, part.target, missed=missed, chamber=chamber)
+    remark = draw_part(corners, part.name, screenshot, part.target, missed=missed, chamber=chamber)
     print_remarks([remark or f"picture in {screenshot}"])

@@ -38,16 +38,19 @@ def compare(
     treatment_time_s
         Compare after this time; results of another treatment time are simulated again.
     """
+    from chamberopt.common.progress import step
     from chamberopt.output.compare.candidates import read_candidates
     from chamberopt.output.compare.comparison import comparison_of
     from chamberopt.output.compare.comparison_folder import COMPARE, write_comparison
     from chamberopt.output.compare.table import comparison_text
 
     with results_folder(out, "compare") as folder:
-        gathered_candidates = read_candidates(candidates, treatment_time_s)
+        with step("reading and building"):
+            gathered_candidates = read_candidates(candidates, treatment_time_s)
         results = _results(gathered_candidates, folder, workers, cluster)
-        comparison = comparison_of(results, [one.label for one in gathered_candidates])
-        print_remarks(write_comparison(folder, comparison))
+        with step("comparing and drawing"):
+            comparison = comparison_of(results, [one.label for one in gathered_candidates])
+            print_remarks(write_comparison(folder, comparison))
     print_result([comparison_text(comparison)], folder, json, COMPARE)
 
 

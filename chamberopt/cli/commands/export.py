@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from chamberopt.cli.console import print_json, print_remarks, results_folder, show
+from chamberopt.cli.console import print_json, print_remarks, results_folder, show, whole_or_nothing
 from chamberopt.cli.options import Json, Workers, app
 from chamberopt.cli.prepare import compile_with_message
 from chamberopt.common.errors import InputError
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from chamberopt.output.results.load import Result
 
 To = Annotated[
-    list[str],
+    list[str] | None,
     Parameter(
         name="--to",
         negative="",
@@ -35,7 +35,7 @@ def export(
     result: Path,
     /,
     *,
-    to: To,
+    to: To = None,
     frame: FrameName | None = None,
     replicas: int | None = None,
     workers: Workers = None,
@@ -44,7 +44,8 @@ def export(
 ) -> None:
     """Write a result in the formats of other programs.
 
-    No result stores its impacts: for them it is simulated again and compared with the original.
+    A result does not store its impacts. To export them, it is simulated again, and the new
+    simulation must be the same as the old one to the last bit.
 
     Parameters
     ----------
@@ -58,9 +59,10 @@ def export(
     out
         Folder for the files, new or empty; for a single format also a file that does not exist.
     """
+    from chamberopt.common.progress import step
     from chamberopt.output.results.load import load_result
 
-    formats = export_formats.formats_by_name(to)
+    formats = export_formats.formats_by_name(to or ())
     from_impacts = [name for name, one in formats.items() if one.writer is None]
     for name, given in (("frame", frame), ("replicas", replicas)):
         if given is not None and not from_impacts:
@@ -70,13 +72,16 @@ def export(
     folder = loaded.folder if loaded else result
     counts: dict[str, int] = {}
     with _files(formats, out, f"{folder.resolve().name}-export") as files:
-        # Impacts come first: they are refused where they differ from the result.
+        remarks: list[str] = []
+        for name, one in formats.items():
+            if one.writer is not None:
+                with step(name):
+                    remarks += one.write(folder, files[name])
+        print_remarks(dict.fromkeys(remarks))  # several formats leave out the same
+        # Impacts come last: to simulate them takes long, and what else is wrong is told before.
         if loaded and from_impacts:
             tables = [files[name] for name in from_impacts]
             counts["impacts"] = _write_impacts(loaded, tables, frame or "part", replicas, workers)
-        for name, one in formats.items():
-            if one.writer is not None:
-                print_remarks(one.write(folder, files[name]))
     if json:
         paths = {name: str(file) for name, file in files.items()}
         print_json({"result": str(folder), "files": paths, **counts})
@@ -97,7 +102,7 @@ def _files(
         with claim_file(check_new_file(out)) as file:
             yield {only: file}
         return
-    with results_folder(out, name) as folder:
+    with results_folder(out, name) as folder, whole_or_nothing(folder):
         yield {name: folder / one.file for name, one in formats.items()}
 
 
@@ -106,20 +111,25 @@ def _write_impacts(
 ) -> int:
     """Simulate the result again, write its impacts to the files, and return their number."""
     from chamberopt.common.parallel.executor import open_executor
-    from chamberopt.common.progress import progress_bar
+    from chamberopt.common.progress import step
+    from chamberopt.coverage.part_impacts import HITS_FILE
     from chamberopt.output.export.impacts_table import require_writable, write_impacts
     from chamberopt.output.resimulate.impacts import replica_count
     from chamberopt.output.resimulate.rebuild import rebuild_chamber
+    from chamberopt.output.vtp_files import PART
 
     require_writable(files)
     recorded = result.data["replicas"]
-    fewer = replica_count(result, replicas) < recorded
+    count = replica_count(result, replicas)
+    for name in (PART, HITS_FILE):  # the impacts are compared with them at the end
+        result.path(name)
     ground = rebuild_chamber(result)
-    compile_with_message(result.design, ground.chamber, ground.cavity)
-    with open_executor(workers, None) as executor, progress_bar("replicas") as progress:
-        impacts = write_impacts(
-            files, result, ground, executor, frame=frame, replicas=replicas, progress=progress
-        )
-    if fewer:
+    with open_executor(workers, None) as executor:
+        compile_with_message(result.design, ground.chamber, ground.cavity)
+        with step("impacts, replicas", count) as progress:
+            impacts = write_impacts(
+                files, result, ground, executor, frame=frame, replicas=replicas, progress=progress
+            )
+    if count < recorded:
         print_remarks([f"only {replicas} of {recorded} replicas: not compared with the result"])
     return impacts

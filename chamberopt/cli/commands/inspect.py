@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack, nullcontext
 from pathlib import Path
 
 from chamberopt.cli.console import print_json, print_remarks, results_folder, show
@@ -36,8 +37,9 @@ def inspect(
     results
         One or more results folders; several are shown in linked views on one colour scale.
     quantity
-        coverage, impacts, speed, p90-speed, angle, dent, energy, interval or strength (the
-        peening strength S of a place; intensity_uniformity tells how even it is).
+        coverage, impacts, speed, p90-speed, angle, dent, energy, interval, strength (the
+        peening strength S of a place), almen (its intensity, if the design is calibrated),
+        saturation (its time), depth (of compression) or zones.
     time_s
         Show coverage, impacts and energy after this time instead of the treatment time.
     below
@@ -57,6 +59,7 @@ def inspect(
     html
         Write an HTML page that shows the parts in a browser.
     """
+    from chamberopt.common.progress import step
     from chamberopt.output import viewer
     from chamberopt.output.results.load import load_result, summary
 
@@ -75,22 +78,31 @@ def inspect(
     if screenshot is not None and out is not None:
         text = "--screenshot and --out both name the place of the image; give one of them"
         raise InputError(f"inspect: {text}")
-    loaded = [load_result(path) for path in results]
-    if not json:
-        show(summary(one) for one in loaded)
-    if html is not None:
-        from chamberopt.output.report import write_part_page
+    to_folder = screenshot is None and (off_screen or out is not None)
+    with ExitStack() as claims:
+        if html is not None:
+            from chamberopt.output.report import require_free_page, write_part_page
 
-        if look != viewer.ViewState():
-            remedy = "remove the options that set the initial view"
-            raise InputError(f"inspect: the page of --html sets the view in the browser; {remedy}")
-        print_remarks(write_part_page([one.folder for one in loaded], html))
-    if screenshot is None and (off_screen or out is not None):
-        with results_folder(out, "inspect") as folder:
-            screenshot = folder / "inspect.png"
-            viewer.inspect([viewer.result_info(one) for one in loaded], look, screenshot)
-    elif html is None or screenshot is not None:
-        viewer.inspect([viewer.result_info(one) for one in loaded], look, screenshot)
+            if look != viewer.ViewState():
+                text = "the page of --html sets the view in the browser"
+                remedy = "remove the options that set the initial view"
+                raise InputError(f"inspect: {text}; {remedy}")
+            require_free_page(html)
+        if to_folder:
+            screenshot = claims.enter_context(results_folder(out, "inspect")) / "inspect.png"
+        if screenshot is not None:
+            viewer.require_opengl(viewer.picture_path(screenshot))
+        with step("reading"):
+            loaded = [load_result(path) for path in results]
+        if not json:
+            show(summary(one) for one in loaded)
+        if html is not None:
+            with step("writing the page"):
+                print_remarks(write_part_page([one.folder for one in loaded], html))
+        if html is None or screenshot is not None:
+            infos = [viewer.result_info(one) for one in loaded]
+            with step("drawing") if screenshot else nullcontext():
+                viewer.inspect(infos, look, screenshot)
     if json:
         first = {**loaded[0].data, "folder": str(loaded[0].folder)} if len(loaded) == 1 else {}
         folders = [str(one.folder) for one in loaded]

@@ -1,4 +1,4 @@
-"""The command `report`: a result as an HTML page."""
+"""The command `report`: a result as an HTML page, or as a process sheet to print."""
 
 from __future__ import annotations
 
@@ -10,13 +10,15 @@ from cyclopts import Parameter
 from chamberopt.cli.console import print_json, show
 from chamberopt.cli.options import Json, app
 
-Page = Annotated[
-    Path | None, Parameter(name="--out", help="The page (.html), by default RESULT/report.html.")
-]
+_PAGE = (
+    "The page (.html), by default RESULT/report.html; with --sheet a .pdf, by default "
+    "RESULT/process_sheet.pdf."
+)
+Page = Annotated[Path | None, Parameter(name="--out", help=_PAGE)]
 
 
 @app.command
-def report(result: Path, /, *, json: Json = False, out: Page = None) -> None:
+def report(result: Path, /, *, sheet: bool = False, json: Json = False, out: Page = None) -> None:
     """Write a result as one HTML page: the answer with its uncertainty, the chamber in 3D, and how
     it was found.
 
@@ -26,12 +28,33 @@ def report(result: Path, /, *, json: Json = False, out: Page = None) -> None:
     ----------
     result
         Results folder of a study or a simulation.
+    sheet
+        Write a process sheet instead: one A4 page (.pdf) to print, with drawing, settings, what to
+        expect and what to measure first.
     """
+    if sheet:
+        _write_sheet(result, json, out)
+        return
+    from chamberopt.common.progress import step
     from chamberopt.output.report import write_report
 
-    path, facts = write_report(result, out)
+    with step("writing the page"):
+        path, facts = write_report(result, out)
     if json:
         print_json({**facts, "report": str(path)})
         return
     size = f"{path.stat().st_size / 1e6:.1f} MB"
-    show([facts["answer"], *facts["remarks"], f"report in {path}, {size}"])
+    lines = [one["text"] for one in facts["answer_lines"]]
+    show([facts["answer"], *lines, *facts["remarks"], f"report in {path}, {size}"])
+
+
+def _write_sheet(result: Path, json: bool, out: Path | None) -> None:
+    from chamberopt.common.progress import step
+    from chamberopt.output.report.sheet import write_sheet
+
+    with step("writing the sheet"):
+        path, facts = write_sheet(result, out)
+    if json:
+        print_json({**facts, "sheet": str(path)})
+        return
+    show([facts["answer"], f"process sheet in {path}"])

@@ -15,6 +15,7 @@ def simulate(
     /,
     *,
     analytic: bool = False,
+    tolerances: bool = False,
     workers: Workers = None,
     cluster: Cluster = None,
     json: Json = False,
@@ -28,28 +29,52 @@ def simulate(
         Design file (.toml).
     analytic
         Use the exact cylinder, box or prism instead of its triangles, if the chamber is one.
+    tolerances
+        Also simulate what the design's [tolerances] do: a further run for each, and one for the
+        worst corner.
     """
     from chamberopt.chamber.analytic import analytic_cavity
     from chamberopt.chamber.build import build_chamber
     from chamberopt.common.parallel.executor import open_executor
-    from chamberopt.common.progress import progress_bar
+    from chamberopt.common.progress import step
     from chamberopt.design.load import load_design
     from chamberopt.output.save_run import save_simulation
-    from chamberopt.simulation.evaluate import evaluate
+    from chamberopt.simulation.peening.calibration_errors import evaluate_calibrated
+    from chamberopt.simulation.peening.tolerances import plan_tolerances, simulate_tolerances
 
     candidate = load_design(design)
+    if tolerances:
+        plan_tolerances(candidate)  # before any work: they may be wrong
+    elif candidate.tolerances:
+        console.print_remarks(["the design has [tolerances]; --tolerances simulates them too"])
     with (
         console.results_folder(out, design.stem) as folder,
         open_executor(workers, cluster) as executor,
     ):
-        chamber = build_chamber(candidate)
-        cavity = analytic_cavity(candidate, chamber) if analytic else None
-        warnings = console.print_warnings(candidate, chamber)
+        with step("building the chamber"):
+            chamber = build_chamber(candidate)
+            cavity = analytic_cavity(candidate, chamber) if analytic else None
+            warnings = console.print_warnings(candidate, chamber)
         candidate, advice = resolve_effects(candidate, chamber, executor)
         compile_with_message(candidate, chamber, cavity)
-        with progress_bar("replicas") as progress:
-            evaluation = evaluate(candidate, chamber, executor, progress, cavity=cavity)
-        remarks = save_simulation(folder, candidate, chamber, evaluation, advice, warnings)
+        with step("replicas", candidate.process.accuracy.replicas) as progress:
+            if tolerances:
+                evaluation, found = simulate_tolerances(
+                    candidate, chamber, executor, progress, analytic
+                )
+            else:
+                evaluation = evaluate_calibrated(
+                    candidate, chamber, executor, progress, cavity=cavity
+                )
+                found = None
+        with step("writing and drawing"):
+            remarks = save_simulation(
+                folder, candidate, chamber, evaluation, advice, warnings, found
+            )
     console.print_remarks(remarks)
     notes = console.note_lines([*map(str, advice), *chamber.notes, *evaluation.notes])
-    console.print_result([*console.evaluation_lines(evaluation), *notes], folder, json)
+    limits = console.zone_lines(candidate, evaluation)
+    lines = [*console.evaluation_lines(evaluation), *limits, *notes]
+    if found:
+        lines += ["", *console.tolerance_lines(found)]
+    console.print_result(lines, folder, json)

@@ -81,7 +81,7 @@ class DaskExecutor(Executor):
         future: Future[Any] = Future()
 
         def copy_outcome(_: Future[Any]) -> None:
-            if not future.cancelled():
+            if future.set_running_or_notify_cancel():  # from here on nobody can cancel it
                 _copy_outcome(dask_future, future)
 
         dask_future.add_done_callback(copy_outcome)

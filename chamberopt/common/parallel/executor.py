@@ -68,10 +68,14 @@ def share(executor: Executor, value: Any) -> Any:
 
 
 class ThreadExecutor(ThreadPoolExecutor):
-    """Worker threads; an exception that leaves the `with` block cancels the tasks that wait."""
+    """Worker threads; an exception that leaves the `with` block cancels the tasks that wait.
+
+    Ctrl-C does not wait for the tasks that run either: the command line ends their process.
+    """
 
     def __exit__(self, *error: Any) -> None:
-        self.shutdown(cancel_futures=error[0] is not None)
+        wait = error[0] is not KeyboardInterrupt
+        self.shutdown(wait, cancel_futures=error[0] is not None)
 
 
 class SerialExecutor(Executor):

@@ -47,7 +47,7 @@ def spread_points(
     unreasonable effectiveness of quasirandom sequences", 2018.
     """
     chosen = np.flatnonzero(area > 0.0)
-    chosen = chosen[np.argsort(_morton(vertices[triangles[chosen]].mean(axis=1)), kind="stable")]
+    chosen = chosen[np.argsort(morton(vertices[triangles[chosen]].mean(axis=1)), kind="stable")]
     upto = np.cumsum(area[chosen])
     owner = np.searchsorted(upto, (np.arange(count) + 0.5) / count * upto[-1])
     triangle = chosen[np.minimum(owner, len(chosen) - 1)]
@@ -107,7 +107,7 @@ def _between(corners: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
     return np.asarray(a + u * (b - a) + v * (c - a))
 
 
-def _morton(places: np.ndarray) -> np.ndarray:
+def morton(places: np.ndarray) -> np.ndarray:
     """Position of places (n, 3) along a Morton curve: the bits of their coordinates in turn."""
     low = places.min(axis=0)
     cells = ((places - low) / max(float(np.ptp(places, axis=0).max()), 1e-12) * 1023).astype(int)

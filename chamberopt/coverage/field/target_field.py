@@ -34,7 +34,7 @@ from chamberopt.coverage.field.surface_points import (
     spread_points,
 )
 from chamberopt.coverage.field.symmetry import TOLERANCE, Symmetry, find_symmetry
-from chamberopt.geometry.triangles import unit_normals
+from chamberopt.geometry.triangles import areas, unit_normals
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -44,7 +44,9 @@ if TYPE_CHECKING:
     from sim_core import TriangleMesh
 
 OF_WIDE = 0.125  # of the number of windows, for those of twice the radius, which overlap more
+POINTS_OF_ZONE = 1000  # that are tested for a ball before any work
 POINTS_PER_CHOSEN = 2  # that are tested for a ball, for each that becomes the middle of a window
+MIN_WINDOWS = 2.0  # side by side on a target of which they show how even it is
 PIECES_PER_WINDOW = 6  # of the surface, at most, where the border of what a ball can touch is far
 MAX_PIECES, MAX_PIECES_OFF_TARGET = 3e6, 4e5  # those off the target are for pictures alone
 
@@ -103,6 +105,14 @@ class TargetField:
     def radius(self) -> float:
         """Radius of a window [m]."""
         return float(np.sqrt(self.setting.gauge / np.pi))
+
+    @property
+    def is_one_window(self) -> bool:
+        """Whether windows hold most of the target each, so that they tell nothing of evenness."""
+        corners = self.corners[self.on_target].reshape(-1, 3)
+        target = float(areas(corners, np.arange(len(corners)).reshape(-1, 3)).sum())
+        of_window = float(np.median(self.gauge.area)) / self.alike
+        return self.reachable * target < MIN_WINDOWS * of_window
 
     @cached_property
     def gauge(self) -> Gauge:
@@ -192,6 +202,22 @@ def require_wide_gauge(chamber: Chamber, setting: WindowSetting) -> None:
             f"process.accuracy.gauge_mm2: given {1e6 * gauge:g}, too small for a target of "
             f"{1e6 * area:.4g} mm²; give at least {least:.2g}"
         )
+
+
+def require_touchable_zones(chamber: Chamber, mesh: TriangleMesh, ball: float) -> None:
+    """Raise InputError for a zone of the part that no ball of a radius [m] can touch.
+
+    Of so many points on each zone: of less than a thousandth of it nothing could be told.
+    """
+    part = chamber.part
+    for name, zone in part.zones.items():
+        area = np.where(zone, chamber.exposed_area, 0.0)
+        spread = spread_points(part.vertices, part.triangles, area, POINTS_OF_ZONE)
+        if not ball_fits(mesh, spread.place, spread.normal, ball).any():
+            raise InputError(
+                f"zones: {name}: a ball of {2e3 * ball:g} mm touches nothing of it, so it has no "
+                "figures; leave the zone out, or use smaller balls"
+            )
 
 
 def find_target_field(chamber: Chamber, mesh: TriangleMesh, setting: WindowSetting) -> TargetField:

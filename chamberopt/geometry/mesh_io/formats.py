@@ -17,7 +17,8 @@ from chamberopt.geometry.mesh_io.readers.nastran import read_nastran
 from chamberopt.geometry.mesh_io.readers.obj import read_obj
 from chamberopt.geometry.mesh_io.readers.ply import read_ply
 from chamberopt.geometry.mesh_io.readers.raw_mesh import RawMesh
-from chamberopt.geometry.mesh_io.readers.step import read_step
+from chamberopt.geometry.mesh_io.readers.step.read_step import read_step
+from chamberopt.geometry.mesh_io.readers.step.tessellation import Tessellation
 from chamberopt.geometry.mesh_io.readers.stl import is_binary_stl, read_stl
 from chamberopt.geometry.mesh_io.readers.threemf import read_3mf
 from chamberopt.geometry.mesh_io.readers.vtk import read_vtk
@@ -58,12 +59,21 @@ HEAD = 1 << 16  # bytes in which a text file shows its format, even after commen
 BINARY_HEAD = 1 << 10
 
 
-def read_raw_mesh(path: Path, content: bytes) -> RawMesh:
-    """Read a file; InputError if its format is not known, or it is damaged or truncated."""
+def read_raw_mesh(path: Path, content: bytes, how: Tessellation | None = None) -> RawMesh:
+    """Read a file; `how` is for faces of CAD.
+
+    Raises:
+        InputError: the format is not known, has no faces of CAD, or is damaged or truncated.
+    """
     found = _find_format(path, content)
+    if how is not None and found.name != "STEP":
+        raise InputError(
+            f"{path}: part.tessellation is for STEP, and the file is {found.name}, which has its "
+            "own triangles; leave it out, or see part.target.element_mm"
+        )
     try:
         with _libraries_quiet():
-            return found.read(path, content)
+            return found.read(path, content) if how is None else read_step(path, content, how)
     except (InputError, MemoryError):
         raise
     except Exception as error:  # each library fails in its own way on a damaged file

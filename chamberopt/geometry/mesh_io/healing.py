@@ -14,6 +14,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.geometry.mesh_io.holes import close_holes, count_holes
 from chamberopt.geometry.mesh_io.surface_error import OpenSurfaceError, SurfaceError, format_point
 from chamberopt.geometry.triangles import (
+    areas,
     connected_pieces,
     edge_keys,
     find_shells,
@@ -23,6 +24,7 @@ from chamberopt.geometry.triangles import (
     unique_rows,
 )
 
+STRAY_SHARE = 0.01  # of the area: more than that is not there by mistake
 WELD = 1e-6  # of the bounding box's diagonal: what a text format with 6 digits rounds away
 
 
@@ -33,6 +35,24 @@ class SewnSurface(NamedTuple):
     triangles: np.ndarray  # (k, 3), rows of the points
     source: np.ndarray  # (k,), the given triangle that each one is; -1 if it closes a hole
     notes: list[str]  # what was changed
+
+
+def sew_bodies(path: Path, corners: np.ndarray, bodies: np.ndarray) -> SewnSurface:
+    """Sew triangles (m, 3, 3) [m] body by body (m,): bodies that touch keep their own vertices."""
+    rows = [np.flatnonzero(bodies == body) for body in np.unique(bodies)]
+    sewn = [sew(path, corners[own]) for own in rows]
+    first = np.cumsum([0, *(len(one.points) for one in sewn)])
+    return SewnSurface(
+        np.concatenate([one.points for one in sewn]),
+        np.concatenate([one.triangles + k for one, k in zip(sewn, first, strict=False)]),
+        np.concatenate(
+            [
+                np.where(one.source >= 0, own[one.source], -1)
+                for one, own in zip(sewn, rows, strict=True)
+            ]
+        ),
+        [note for one in sewn for note in one.notes],
+    )
 
 
 def sew(path: Path, corners: np.ndarray) -> SewnSurface:
@@ -51,6 +71,9 @@ def sew(path: Path, corners: np.ndarray) -> SewnSurface:
             note = f"merged {merged} vertices less than {1e3 * tolerance:.2g} mm apart"
             surface = welded._replace(notes=[*surface.notes, note, *welded.notes])
             open_edges = _edges(surface.triangles, count=1)
+    if len(open_edges):
+        surface = _drop_strays(surface)
+        open_edges = _edges(surface.triangles, count=1)
     if len(open_edges):
         more, notes = close_holes(surface.points, surface.triangles, open_edges, tolerance)
         surface = surface._replace(
@@ -99,6 +122,33 @@ def _drop_useless(points: np.ndarray, triangles: np.ndarray, source: np.ndarray)
         triangles, source = triangles[kept], source[kept]
     used, renumbered = np.unique(triangles, return_inverse=True)
     return SewnSurface(points[used], renumbered.reshape(-1, 3), source, notes)
+
+
+def _drop_strays(surface: SewnSurface) -> SewnSurface:
+    """Drop facets that hang on nothing, or by an edge that is closed without them.
+
+    They are pieces, joined where exactly two triangles meet, with at least as many open edges as
+    triangles: a body with a hole in it has few.
+    """
+    points, triangles = surface.points, surface.triangles
+    _, edge, times = np.unique(edge_keys(triangles), return_inverse=True, return_counts=True)
+    joined = np.flatnonzero(times[edge] == 2)
+    a, b = (joined[np.argsort(edge[joined], kind="stable")].reshape(-1, 2) // 3).T
+    count, piece = connected_pieces(a, b, len(triangles))
+    open_edges = np.bincount(piece, (times[edge] == 1).reshape(-1, 3).sum(axis=1), count)
+    stray = (open_edges >= np.bincount(piece, minlength=count))[piece]
+    area = areas(points, triangles)
+    if not stray.any() or area[stray].sum() > STRAY_SHARE * area.sum():
+        return surface
+    first, many = np.flatnonzero(stray)[0], int(stray.sum())
+    note = (
+        f"dropped {many} stray triangle{'s' * (many > 1)} of no closed surface, "
+        f"the first is triangle {surface.source[first] + 1} "
+        f"at {format_point(points[triangles[first]].mean(axis=0))}"
+    )
+    used, numbers = np.unique(triangles[~stray], return_inverse=True)
+    source = surface.source[~stray]
+    return SewnSurface(points[used], numbers.reshape(-1, 3), source, [*surface.notes, note])
 
 
 def _weld(points: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray]:

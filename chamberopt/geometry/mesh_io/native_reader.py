@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 import subprocess
 import sys
 import tempfile
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 TIMEOUT_S = 1800.0
-BEGIN = "import sys; from chamberopt.common.limits import limit_memory; limit_memory(); "
+BEGIN = (
+    "import sys; from chamberopt.common.limits import limit_memory; limit_memory(); "
+    "from chamberopt.geometry.mesh_io.native_reader import end_with_parent; "
+    "end_with_parent(sys.argv[1]); "
+)
 
 
 @contextmanager
@@ -29,5 +36,26 @@ def converted(
         given, made = Path(folder) / source, Path(folder) / target
         given.write_bytes(content)
         command = [sys.executable, "-c", BEGIN + code, *map(str, (given, made, *arguments))]
-        run = subprocess.run(command, capture_output=True, timeout=TIMEOUT_S, check=False)
+        watched, held = os.pipe()  # it is closed when this process ends, however it ends
+        try:
+            run = subprocess.run(
+                command, stdin=watched, capture_output=True, timeout=TIMEOUT_S, check=False
+            )
+        finally:
+            os.close(watched)
+            os.close(held)
         yield made if run.returncode == 0 and made.is_file() else None
+
+
+def end_with_parent(source: str) -> None:
+    """End this process, and remove the folder of its file, when the one that started it has ended.
+
+    The other one holds the end of the pipe that this one has as its standard input.
+    """
+
+    def watch() -> None:
+        os.read(0, 1)
+        shutil.rmtree(Path(source).parent, ignore_errors=True)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()

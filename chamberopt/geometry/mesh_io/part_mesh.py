@@ -25,9 +25,11 @@ from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
 from chamberopt.common.limits import MAX_MESH_BYTES, read_limited, require_few
 from chamberopt.geometry.mesh_io.formats import read_raw_mesh
-from chamberopt.geometry.mesh_io.healing import sew, turn_outward
+from chamberopt.geometry.mesh_io.healing import sew_bodies, turn_outward
 from chamberopt.geometry.mesh_io.readers.raw_mesh import ElementNumbers, number_by_position
+from chamberopt.geometry.mesh_io.readers.step.tessellation import Tessellation
 from chamberopt.geometry.mesh_io.self_intersection import refuse_self_intersection
+from chamberopt.geometry.mesh_io.surface_error import SurfaceError
 from chamberopt.geometry.mesh_io.units import METRES_PER, find_unit
 
 
@@ -65,36 +67,50 @@ class TriangleSoup:
     notes: tuple[str, ...]
     sha256: str
     unit: str
+    bodies: np.ndarray  # (m,), the body of each; 0 where the file does not tell bodies apart
 
 
-def read_part(path: Path, unit: str = "guess") -> PartMesh:
+def read_part(path: Path, unit: str = "guess", how: Tessellation | None = None) -> PartMesh:
     """Read a part whose numbers are in um, mm, cm, m or in; or guess the unit.
+
+    Args:
+        how: how fine the triangles of a STEP file are.
 
     Raises:
         InputError: the file is missing, empty, truncated or not finite; its surface is open, not
             manifold or crosses itself; or it has a size that no part has.
     """
-    return close_surface(read_triangles(path, unit))
+    soup = read_triangles(path, unit, how)
+    try:
+        return close_surface(soup)
+    except SurfaceError as error:
+        if how is not None:
+            error.args = (f"{error}; or make part.tessellation finer",)
+        raise
 
 
-def read_part_cached(path: Path, unit: str = "guess") -> PartMesh:
+def read_part_cached(path: Path, unit: str = "guess", how: Tessellation | None = None) -> PartMesh:
     """As read_part, but reads a file again only if it has changed: a study builds many chambers."""
     try:
         stamp = path.stat()
     except OSError:
-        return read_part(path, unit)  # raises an error that explains why
-    return _read_part_cached(path, unit, stamp.st_mtime_ns, stamp.st_size)
+        return read_part(path, unit, how)  # raises an error that explains why
+    return _read_part_cached(path, unit, how, stamp.st_mtime_ns, stamp.st_size)
 
 
 @lru_cache(maxsize=8)
-def _read_part_cached(path: Path, unit: str, _changed: int, _size: int) -> PartMesh:
-    return read_part(path, unit)
+def _read_part_cached(
+    path: Path, unit: str, how: Tessellation | None, _changed: int, _size: int
+) -> PartMesh:
+    return read_part(path, unit, how)
 
 
-def read_triangles(path: Path, unit: str = "guess") -> TriangleSoup:
+def read_triangles(
+    path: Path, unit: str = "guess", how: Tessellation | None = None
+) -> TriangleSoup:
     """Read a mesh file without making a surface of it; raises InputError as read_part."""
     content = _read_content(path)
-    raw = read_raw_mesh(path, content)
+    raw = read_raw_mesh(path, content, how)
     corners = raw.corners
     if not len(corners):
         raise InputError(f"{path}: holds no triangles; export a surface mesh")
@@ -109,7 +125,8 @@ def read_triangles(path: Path, unit: str = "guess") -> TriangleSoup:
     corners = corners * METRES_PER[unit] + 0.0  # + 0.0 turns -0 into 0, to be one place
     numbering, notes = raw.numbering or number_by_position(len(corners)), (*raw.notes, *unit_notes)
     sha256 = hashlib.sha256(content).hexdigest()
-    return TriangleSoup(path, corners, numbering, raw.groups, notes, sha256, unit)
+    bodies = np.zeros(len(corners), dtype=np.int64) if raw.bodies is None else raw.bodies
+    return TriangleSoup(path, corners, numbering, raw.groups, notes, sha256, unit, bodies)
 
 
 def close_surface(soup: TriangleSoup, only: np.ndarray | None = None) -> PartMesh:
@@ -120,7 +137,9 @@ def close_surface(soup: TriangleSoup, only: np.ndarray | None = None) -> PartMes
     """
     path = soup.path
     chosen = np.arange(len(soup.corners)) if only is None else np.flatnonzero(only)
-    vertices, triangles, source, healed = sew(path, soup.corners[chosen])
+    vertices, triangles, source, healed = sew_bodies(
+        path, soup.corners[chosen], soup.bodies[chosen]
+    )
     triangles, turned = turn_outward(path, vertices, triangles)
     refuse_self_intersection(path, vertices, triangles)
     given = np.where(source >= 0, chosen[source], -1)  # -1: closes a hole

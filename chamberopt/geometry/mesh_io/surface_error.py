@@ -8,7 +8,7 @@ from chamberopt.common.errors import InputError
 
 
 class SurfaceError(InputError):
-    """A surface cannot be used.
+    """A surface cannot be used, as it is or where it is.
 
     Args:
         corners: of the surface's triangles as read, (m, 3, 3) [m].
@@ -18,6 +18,7 @@ class SurfaceError(InputError):
     def __init__(self, message: str, corners: np.ndarray, edges: np.ndarray) -> None:
         super().__init__(message)
         self.corners, self.edges = corners, edges
+        self.add_note("to see it: chamberopt check FILE.toml --screenshot PICTURE.png")
 
 
 class OpenSurfaceError(SurfaceError):

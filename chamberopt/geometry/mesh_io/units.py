@@ -24,6 +24,7 @@ UNIT_COMMENT = re.compile(rb"\bunits?\b[\"' ]*[=:][\"' ]*(\w+)", re.I)
 
 # m, longest side of the bounding box of a part that can be peened in a chamber.
 MIN_SIZE, MAX_SIZE = 5e-4, 3.0
+GUESSED = "unit guessed as"  # in the note of a unit that is not certain
 # Units that exporters write, the most likely first, and the sizes [m] for which they are guessed.
 # Inches and centimetres cannot be told from millimetres by size, so they are never guessed.
 GUESSED_UNITS = ("mm", "m", "um")
@@ -43,16 +44,15 @@ def find_unit(
             so large or so small.
     """
     sides = np.ptp(corners.reshape(-1, 3), axis=0)
-    is_step = content[:64].lstrip().startswith(b"ISO-10303-21")  # converted to metres by its reader
-    if stated is not None and given not in ("guess", stated) and not is_step:
+    if stated is not None and given not in ("guess", stated):
         raise InputError(
             f"{path}: part.unit is {given!r}, but the file says that its numbers are in "
             f"{stated!r}; leave part.unit out, or export in the unit that is meant"
         )
-    unit, why, wrong = stated or given, "stated by the file", ""
+    unit, why, wrong = stated or given, "unit stated by the file", ""
     if unit == "guess":
         unit, reason = _guess(path, content, sides)
-        why, wrong = f"guessed as {unit!r} ({reason})", "; give part.unit if that is wrong"
+        why, wrong = f"{GUESSED} {unit!r} ({reason})", "; give part.unit if that is wrong"
     box = format_box(sides * METRES_PER[unit])
     if not MIN_SIZE <= sides.max() * METRES_PER[unit] <= MAX_SIZE:
         fits = [repr(u) for u, m in METRES_PER.items() if MIN_SIZE <= sides.max() * m <= MAX_SIZE]
@@ -61,7 +61,7 @@ def find_unit(
             f"{1e3 * MIN_SIZE:g} to {1e3 * MAX_SIZE:g} mm"
             + (f"; unit = {' or '.join(fits)} would be plausible" if fits else "")
         )
-    return unit, [] if unit == given else [f"unit {why}: the part measures {box}{wrong}"]
+    return unit, [] if unit == given else [f"{why}: the part measures {box}{wrong}"]
 
 
 def _guess(path: Path, content: bytes, sides: np.ndarray) -> tuple[str, str]:

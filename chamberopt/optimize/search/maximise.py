@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from chamberopt.optimize.search.acquisition import propose_point
-from chamberopt.optimize.search.gaussian_process import MAX_POINTS, GaussianProcess
+from chamberopt.optimize.search.domain import Axis, Domain
+from chamberopt.optimize.search.gaussian_process import MAX_POINTS
 from chamberopt.optimize.search.nlopt_search import LOCAL, run_nlopt, seed_nlopt
+from chamberopt.optimize.search.search_model import Observations, SearchModel
 from chamberopt.optimize.search.stopping import Begin, BudgetSpentError, ScoredPoints
 from chamberopt.optimize.study.schema import Optimizer, Phase
 
@@ -27,12 +29,17 @@ ROUGH_STEP_INTERVAL, ROUGH_LENGTH_FACTOR = 4, 0.5
 # First steps of the local searches from the best point so far, as factors of the initial step.
 LOCAL_STEP_FACTORS = (1.0, 0.5, 0.25)
 
-ModelData = Callable[[], tuple[np.ndarray, np.ndarray]]
-"""Returns scores (n,) and their variances (n,) at the points so far, as the model learns them."""
+Observe = Callable[[], Observations]
+"""Returns what the model learns from the first points, those whose evaluations have ended."""
 
 
 def maximise(
-    begin: Begin, start: np.ndarray, settings: Optimizer, model_data: ModelData | None = None
+    begin: Begin,
+    start: np.ndarray,
+    settings: Optimizer,
+    observe: Observe | None = None,
+    domain: Domain | None = None,
+    begin_with: Sequence[np.ndarray] = (),
 ) -> str:
     """Maximise a score over the unit cube, beginning at `start`.
 
@@ -45,15 +52,18 @@ def maximise(
 
     Args:
         start: first point, shape (d,).
-        model_data: what the model learns; by default the scores, with unknown noise.
+        observe: what the model learns; by default the scores, with unknown noise.
+        domain: which values each parameter can have; by default any.
+        begin_with: points (d,) that are evaluated after the start.
     Returns:
         The phases that ran, e.g. "sobol, then surrogate".
     Raises:
         InputError: an algorithm cannot take these parameters. Errors of `begin` pass unchanged.
     """
-    search = _Search(begin, start, settings, model_data)
+    search = _Search(begin, start, settings, observe, domain or Domain([Axis()] * len(start)))
     try:
-        search.scored.begin(start)
+        for point in (start, *begin_with):
+            search.scored.begin(point)
         for phase, end in search.plan():
             search.run(phase, max(1, round(end * settings.evaluations)))
         if settings.algorithm == "auto" and not settings.phases:
@@ -68,11 +78,17 @@ class _Search:
     """A search under way."""
 
     def __init__(
-        self, begin: Begin, start: np.ndarray, settings: Optimizer, model_data: ModelData | None
+        self,
+        begin: Begin,
+        start: np.ndarray,
+        settings: Optimizer,
+        observe: Observe | None,
+        domain: Domain,
     ) -> None:
-        self._start, self._settings = start, settings
-        self.scored = ScoredPoints(begin, start, settings.evaluations, settings.batch)
-        self._model_data = model_data or self._scores_without_noise
+        self._start, self._settings, self._domain = start, settings, domain
+        budget, batch = settings.evaluations, settings.batch
+        self.scored = ScoredPoints(begin, start, budget, batch, domain.size)
+        self._observe = observe or self._scores_without_noise
         self.phases_run: list[str] = []
         self._rng = np.random.default_rng(settings.seed)
         seed_nlopt(settings.seed)
@@ -93,7 +109,7 @@ class _Search:
     def run(self, phase: str, limit: int) -> None:
         """Run one phase until it converges or there are `limit` points."""
         limit = min(limit, self.scored.budget)
-        if len(self.scored) >= limit:
+        if not self.scored.left(limit):
             return
         self.phases_run.append(phase)
         if phase == SPREAD:
@@ -103,15 +119,15 @@ class _Search:
         else:
             self._search_with_nlopt(phase, limit, self._settings.initial_step)
 
-    def _scores_without_noise(self) -> tuple[np.ndarray, np.ndarray]:
+    def _scores_without_noise(self) -> Observations:
         scores = np.array(self.scored.scores)
-        return scores, np.zeros(len(scores))
+        return Observations(scores, np.zeros(len(scores)), np.ones(len(scores), dtype=bool))
 
     def repeat_local_search(self) -> None:
         """Repeat rounds of local searches with smaller steps until a round finds no new point."""
         before = 0
-        while before < len(self.scored):
-            before = len(self.scored)
+        while before < len(self.scored.points):
+            before = len(self.scored.points)
             for factor in LOCAL_STEP_FACTORS:
                 step = factor * self._settings.initial_step
                 self._search_with_nlopt(LOCAL, self.scored.budget, step)
@@ -119,24 +135,25 @@ class _Search:
     def _spread(self, limit: int) -> None:
         from scipy.stats.qmc import Sobol
 
-        wanted = limit - len(self.scored)
+        wanted = self.scored.left(limit)
         sobol = Sobol(len(self._start), seed=self._settings.seed)
         for point in sobol.random_base2(max(1, (wanted - 1).bit_length()))[:wanted]:
-            self.scored.begin(point)
+            self.scored.begin(self._domain.snap(point[None])[0])
 
     def _follow_model(self, limit: int) -> None:
         if not self.scored.scores:
             self.scored.wait()
-        while len(self.scored) < limit:
+        while True:
             self.scored.wait_for_place()
-            scores, variances = self._model_data()
-            if np.ptp(scores) == 0.0:  # equal scores give the model nothing to learn
-                self.scored.begin(self._rng.random(len(self._start)))
+            if not self.scored.left(limit):
+                return
+            seen, points = self._observe(), np.array(self.scored.points)
+            if np.ptp(seen.scores[seen.simulated]) == 0.0:  # nothing to learn
+                self.scored.begin(self._domain.snap(self._rng.random((1, len(self._start))))[0])
                 continue
-            points, known = np.array(self.scored.points), len(scores)
             is_rough = len(points) % ROUGH_STEP_INTERVAL == 0
             factor = ROUGH_LENGTH_FACTOR if is_rough else 1.0
-            model = GaussianProcess(points[:known], scores, variances, factor, points[known:])
+            model = SearchModel(self._domain, points, seen, factor)
             self.scored.begin(propose_point(model, self._rng))
 
     def _search_with_nlopt(self, algorithm: str, limit: int, step: float) -> None:
@@ -146,7 +163,7 @@ class _Search:
         max_calls, tolerance = 100 * self.scored.budget, self._settings.tolerance
 
         def score(point: np.ndarray) -> float:
-            return self.scored.score(point, limit)
+            return self.scored.score(self._domain.snap(point[None])[0], limit)
 
         try:
             run_nlopt(score, self.scored.best, algorithm, step, tolerance, max_calls)

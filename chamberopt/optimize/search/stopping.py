@@ -2,13 +2,16 @@
 
 A search ends for one of these reasons:
 
-1. The budget is spent: `optimizer.evaluations` different points have scores (BudgetSpentError).
-2. It has converged: the last phase ends because the steps of its local algorithm are below
+1. The budget is spent: `optimizer.evaluations` different points were simulated
+   (BudgetSpentError). A point that cannot be simulated, or that geometry alone shows to be no
+   better, costs nothing, until there are as many of those as the budget.
+2. All points were evaluated, where every parameter has levels.
+3. It has converged: the last phase ends because the steps of its local algorithm are below
    `optimizer.tolerance` (nlopt_search.py), or rounds of local searches find no new point
    (maximise.py).
-3. The user stops it: Candidates asks `stop()` before each evaluation, finishes those that run and
+4. The user stops it: Candidates asks `stop()` before each evaluation, finishes those that run and
    raises KeyboardInterrupt. The study can be resumed.
-4. An error ends it: the start cannot be simulated, an algorithm cannot take the parameters, the
+5. An error ends it: the start cannot be simulated, an algorithm cannot take the parameters, the
    disk is full, or workers are lost. A candidate that cannot be simulated does not end it.
 
 A phase ends in the same way, at its share of the budget.
@@ -16,14 +19,24 @@ A phase ends in the same way, at its share of the budget.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
-Begin = Callable[[np.ndarray], Callable[[], float]]
+
+class Scored(NamedTuple):
+    """A score, a finite number to be maximised, and whether it took a simulation."""
+
+    score: float
+    simulated: bool = True
+
+
+Begin = Callable[[np.ndarray], Callable[[], Scored]]
 """begin(point (d,) of the unit cube) starts an evaluation, and returns a function that waits for
-its score, a finite number to be maximised."""
+its score."""
 
 
 class BudgetSpentError(Exception):
@@ -34,20 +47,35 @@ class ScoredPoints:
     """The points of a search; each is evaluated once and counts once in the budget.
 
     Up to `batch` evaluations run at a time. Scores are taken in the order in which the evaluations
-    began, so that nothing depends on which of them ends first. `points` (d,) are all that began;
-    the first of them have `scores`. `best` is the point with the highest score, or the start.
+    began, so that nothing depends on which of them ends first. `points` (d,) are all that began,
+    of `size` that there are; the first of them have `scores`. `best` is the point with the highest
+    score, or the start.
     """
 
-    def __init__(self, begin: Begin, start: np.ndarray, budget: int, batch: int) -> None:
-        self._begin, self.budget, self._batch = begin, budget, batch
+    def __init__(
+        self, begin: Begin, start: np.ndarray, budget: int, batch: int, size: float = math.inf
+    ) -> None:
+        self._begin, self.budget, self._batch, self._size = begin, budget, batch, size
         self._numbers: dict[bytes, int] = {}  # by the exact bytes of the point
-        self._running: deque[Callable[[], float]] = deque()
+        self._running: deque[Callable[[], Scored]] = deque()
+        self._free = 0  # points that took no simulation
         self.points: list[np.ndarray] = []
         self.scores: list[float] = []
         self.best, self._best_score = start, -np.inf
 
-    def __len__(self) -> int:
-        return len(self.points)
+    def left(self, limit: int) -> int:
+        """How many more points may begin, until as many as `limit` count.
+
+        Where none is left, those that run are waited for: they may turn out to cost nothing.
+        """
+        if len(self.points) >= self._size:
+            return 0
+        for _ in range(2):
+            left = min(limit, self.budget) - len(self.points) + min(self._free, self.budget)
+            if left > 0:
+                return left
+            self.wait()
+        return 0
 
     def score(self, point: np.ndarray, limit: int | None = None) -> float:
         """The score of a point, which nothing else is evaluated beside; errors as of `begin`."""
@@ -62,11 +90,11 @@ class ScoredPoints:
         """
         key = point.tobytes()
         if key not in self._numbers:
-            if len(self) >= min(self.budget, self.budget if limit is None else limit):
-                raise BudgetSpentError
             self.wait_for_place()
+            if not self.left(self.budget if limit is None else limit):
+                raise BudgetSpentError
             self._running.append(self._begin(point))
-            self._numbers[key] = len(self)
+            self._numbers[key] = len(self.points)
             self.points.append(point)
         return self._numbers[key]
 
@@ -77,7 +105,8 @@ class ScoredPoints:
     def wait(self, running: int = 0) -> None:
         """Wait for the scores of all evaluations but the last so many."""
         while len(self._running) > running:
-            value = float(self._running.popleft()())
+            value, simulated = self._running.popleft()()
+            self._free += not simulated
             if value > self._best_score:
                 self.best, self._best_score = self.points[len(self.scores)], value
             self.scores.append(value)

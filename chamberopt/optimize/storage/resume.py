@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.coverage.metrics import METRICS
+from chamberopt.coverage.metrics import metric_names
 from chamberopt.optimize.storage.trial_log import DAMAGED, JsonLines, Trial
 from chamberopt.optimize.study.parameters import ParameterSpace
 
@@ -32,6 +32,7 @@ class RecordedTrials:
     def __init__(self, log: JsonLines, study: Study) -> None:
         self._log, self._objectives = log, len(study.objective.goals)
         self._space = ParameterSpace(study.design, study.vary)
+        self._metrics = set(metric_names(study.design))
         log.repair()
         self.trials = [self._trial(number, row) for number, row in enumerate(log.rows())]
 
@@ -72,7 +73,7 @@ class RecordedTrials:
         return (
             len(trial.goals) == self._objectives
             and all(math.isfinite(goal.value) for goal in trial.goals)
-            and trial.metrics.keys() == METRICS.keys()
+            and trial.metrics.keys() == self._metrics
         )
 
     def _mismatch(self, number: int, what: str) -> InputError:

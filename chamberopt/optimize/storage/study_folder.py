@@ -144,7 +144,9 @@ class StudyFolder:
             )
         return found
 
-    def append(self, trial: Trial, evaluation: Evaluation | str | None, seconds: float) -> None:
+    def append(
+        self, trial: Trial, evaluation: Evaluation | Exception | None, seconds: float
+    ) -> None:
         """Store a trial, and the whole evaluation of a confirmation; both are then on the disk.
 
         OSError if they cannot be written, InputError if a file that the design names has changed.

@@ -30,7 +30,7 @@ class Trial:
     number: int
     stage: str  # "search", "confirm" or "sweep"
     point: tuple[float, ...]  # place in the unit cube, see study/parameters.py
-    parameters: dict[str, float]  # values in the units of the file, by dotted name
+    parameters: dict[str, float | str]  # values in the units of the file, by dotted name
     goals: tuple[Estimate, ...]  # of each objective of the study; empty when the evaluation failed
     metrics: dict[str, Estimate]  # without their pseudo-values
     penalty: float  # violation of the constraints, relative to their limits
@@ -38,6 +38,7 @@ class Trial:
     feasible: bool
     reason: str  # why the candidate is not feasible, else ""
     replicas: int | None = None  # that were simulated; None when the evaluation failed
+    highest: float | None = None  # largest objective by reach alone, if that spared a simulation
 
     @property
     def objective(self) -> Estimate | None:
@@ -56,6 +57,7 @@ class Trial:
             "objective": interval["value"],
             "half_width": interval["half_width"],
             "replicas": self.replicas,
+            "highest": self.highest,
             # Pseudo-values tell a model of the search how uncertain each score is.
             "goals": [one.to_json() for one in self.goals],
             "penalty": self.penalty,
@@ -72,7 +74,10 @@ class Trial:
             number=int(row["number"]),
             stage=str(row["stage"]),
             point=tuple(float(share) for share in row["point"]),
-            parameters={name: float(value) for name, value in row["parameters"].items()},
+            parameters={
+                name: value if isinstance(value, str) else float(value)
+                for name, value in row["parameters"].items()
+            },
             goals=tuple(Estimate.from_json(one) for one in row["goals"]),
             metrics={
                 name: Estimate.from_interval_json(metric) for name, metric in row["metrics"].items()
@@ -82,6 +87,7 @@ class Trial:
             feasible=bool(row["feasible"]),
             reason=str(row["reason"]),
             replicas=None if row["replicas"] is None else int(row["replicas"]),
+            highest=None if row["highest"] is None else float(row["highest"]),
         )
         if trial.row() != row:  # a text or true in the place of a number, or words of its own
             raise ValueError("not as it was written")
@@ -186,7 +192,7 @@ def trials_as_csv(rows: list[dict[str, Any]]) -> str:
     """
     lines = []
     for row in rows:
-        line = {key: row[key] for key in ("number", "stage")}
+        line = {"number": row["number"] + 1, "stage": row["stage"]}  # as pictures count
         line |= row["parameters"]
         objective = row["goals"][0] if row["goals"] else {"value": None, "half_width": None}
         line["objective"], line["half_width"] = _cells(objective)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 from pydantic import Field
 
@@ -9,12 +10,15 @@ from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate, student_quantile
 from chamberopt.common.toml_errors import Problem
-from chamberopt.coverage.metrics import METRICS
+from chamberopt.coverage.metrics import find_metric, metric_names, metric_problem
+from chamberopt.coverage.resolution import NOT_RESOLVED
 from chamberopt.design.design import Design
+from chamberopt.design.peening.zones import LIMITED, Zone
 from chamberopt.design.table_base import FileTable
 
 NO_SIZE = 1e-12  # a limit below it is as good as 0, and a violation is not measured by it
 FEASIBLE, NOT_KNOWN, INFEASIBLE = "feasible", "not known", "infeasible"
+MET = {FEASIBLE: "met", NOT_KNOWN: "not known", INFEASIBLE: "not met"}  # a limit of a zone
 
 
 class Limits(FileTable):
@@ -30,13 +34,47 @@ class Limits(FileTable):
             yield Problem("min", f"given {self.min:g}, above max = {self.max:g}")
 
 
+def zone_constraints(design: Design) -> dict[str, Limits]:
+    """The limits of a design's zones, as constraints on their metrics."""
+    return {metric: limits for zone in design.zones for _, metric, limits in zone_limits(zone)}
+
+
+def zone_limits(zone: Zone) -> Iterator[tuple[str, str, Limits]]:
+    """The keys that limit a zone, with the metrics that they limit."""
+    for key, limited in LIMITED.items():
+        given = getattr(zone, key)
+        if given is not None:
+            numbers = given if isinstance(given, tuple) else (given,)
+            for limit, (metric, side) in zip(numbers, limited, strict=True):
+                yield key, f"{zone.name}.{metric}", Limits(**{side: limit})
+
+
+def judge_zones(design: Design, metrics: Mapping[str, Estimate]) -> dict[str, list[dict[str, Any]]]:
+    """The limits of each zone, by its name, and whether the whole intervals of its figures meet
+    them: a row of plain JSON values with key, limit, metric and standing for each limit.
+    """
+    judged: dict[str, list[dict[str, Any]]] = {}
+    for zone in design.zones:
+        rows = judged.setdefault(zone.name, [])
+        for key, metric, limits in zone_limits(zone):
+            standing, _ = assess_feasibility({metric: limits}, metrics)
+            limit = limits.max if limits.min is None else limits.min
+            rows.append({"key": key, "limit": limit, "metric": metric, "standing": MET[standing]})
+    return judged
+
+
 def limit_problems(
     design: Design, vary: Mapping[str, tuple[float, float]], name: str, limits: Limits
 ) -> list[Problem]:
     """Reasons why a constraint makes no sense: an unknown name, or limits no candidate can meet."""
     field, numbers = f"constraints.{name}", design.numbers()
-    if name in METRICS:
-        low, high = METRICS[name].lowest, METRICS[name].highest
+    if metric := find_metric(name):
+        if lacking := metric_problem(design, name):
+            return [Problem(field, lacking)]
+        if name in zone_constraints(design):
+            text = "the zone limits it in the design already; change it there, or leave it out"
+            return [Problem(field, text)]
+        low, high = metric.lowest, metric.highest
     elif name in vary:
         low, high = vary[name]
     elif name in numbers:
@@ -45,7 +83,7 @@ def limit_problems(
         except InputError as error:
             return [Problem(field, str(error).removeprefix(f"{name}: "))]
     else:
-        known = (*METRICS, *(numbers if "." in name else ()))
+        known = (*metric_names(design), *(numbers if "." in name else ()))
         return [Problem(field, f"not a metric; {toml_errors.did_you_mean(name, known)}")]
     within = f"{low:g}" if low == high else f"from {low:g} to {high:g}"
     change = "change the limit or [vary]" if name in numbers else "change the limit"
@@ -58,13 +96,22 @@ def limit_problems(
     return problems
 
 
+def exact(values: Mapping[str, float | str]) -> dict[str, Estimate]:
+    """The numbers among values of a design as figures, without error."""
+    numbers = ((k, value) for k, value in values.items() if not isinstance(value, str))
+    return {name: Estimate(value, 0.0) for name, value in numbers}
+
+
 def expected_violation(figure: Estimate, limits: Limits) -> float:
     """Expected excess of the true value over its limits, relative to the limits.
 
     The mean of max(0, x - limit) for x normally distributed about the estimate. Even an estimate
     within its limit has a small penalty if it is uncertain, which keeps the search away from the
-    limit by about its own uncertainty. For an exact number it is the plain excess.
+    limit by about its own uncertainty. For an exact number it is the plain excess, and 0 for a
+    figure that is not resolved.
     """
+    if figure.in_words == NOT_RESOLVED:
+        return 0.0
     violation, error = 0.0, standard_error(figure)
     for limit, excess, _ in _excesses(figure, limits):
         if error > 0.0:
@@ -76,7 +123,9 @@ def expected_violation(figure: Estimate, limits: Limits) -> float:
 
 
 def describe_violations(name: str, figure: Estimate, limits: Limits) -> list[str]:
-    """The limits that the estimate itself violates, one text for each."""
+    """The limits that the estimate itself violates, a text for each; none if it is not resolved."""
+    if figure.in_words == NOT_RESOLVED:
+        return []
     violated = (text for _, excess, text in _excesses(figure, limits) if excess > 0.0)
     return [f"{name} {figure.value:.4g} {text}" for text in violated]
 

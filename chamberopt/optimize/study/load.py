@@ -1,7 +1,7 @@
 """Load study files; all problems of a file and of the design it names are reported in one error."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.toml_errors import Problem
 from chamberopt.design.design import Design, validate
 from chamberopt.design.load import is_study, load_design, read_toml
+from chamberopt.optimize.study.parameters import Varied
 from chamberopt.optimize.study.schema import Study
 
 
@@ -40,7 +41,12 @@ def _study(path: Path, source: str, data: dict[str, Any]) -> Study:
         problem = Problem("design", f'{text}design = "../designs/gear.toml"')
         raise InputError(toml_errors.format_problems([problem], path, source))
     if isinstance(data.get("vary"), Mapping):
-        data = {**data, "vary": _flatten(data["vary"])}
+        data = {**data, "vary": _flatten(data["vary"], is_table=_varies)}
+    if isinstance(data.get("constraints"), Mapping):
+        data = {**data, "constraints": _flatten(data["constraints"], is_table=_limits)}
+    objective = data.get("objective")
+    if isinstance(objective, Mapping) and isinstance(objective.get("sum"), Mapping):
+        data = {**data, "objective": {**objective, "sum": _flatten(objective["sum"])}}
     try:
         design = load_design(Path(os.path.normpath(path.parent / named)))
     except InputError as error:
@@ -53,7 +59,7 @@ def _study(path: Path, source: str, data: dict[str, Any]) -> Study:
 def _other_problems(data: Mapping[str, Any], path: Path, source: str) -> list[str]:
     """Problems of a study file whose design cannot be loaded."""
     try:
-        Study.model_validate({**data, "design": None})
+        Study.model_validate({**data, "design": None}, context={"folder": path.parent})
     except ValidationError as error:
         problems = toml_errors.explain_validation_error(error, Study)
         others = [problem for problem in problems if problem.field != "design"]
@@ -61,10 +67,27 @@ def _other_problems(data: Mapping[str, Any], path: Path, source: str) -> list[st
     return []
 
 
-def _flatten(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Dotted names, however they are written: as quoted keys, dotted keys or nested tables."""
+def _flatten(
+    table: Mapping[str, Any],
+    prefix: str = "",
+    is_table: Callable[[Mapping[str, Any]], bool] = lambda _: False,
+) -> dict[str, Any]:
+    """Dotted names, however they are written: as quoted keys, dotted keys or nested tables.
+
+    Args:
+        is_table: whether a mapping is what is named, such as { min = 0.9 }, not a part of a name.
+    """
     flat: dict[str, Any] = {}
     for name, value in table.items():
-        is_table = isinstance(value, Mapping)
-        flat |= _flatten(value, f"{prefix}{name}.") if is_table else {prefix + name: value}
+        is_prefix = isinstance(value, Mapping) and not is_table(value)
+        inner = _flatten(value, f"{prefix}{name}.", is_table) if is_prefix else {}
+        flat |= inner if is_prefix else {prefix + name: value}
     return flat
+
+
+def _limits(table: Mapping[str, Any]) -> bool:
+    return not table or not all(isinstance(one, Mapping) for one in table.values())
+
+
+def _varies(table: Mapping[str, Any]) -> bool:
+    return bool(Varied.model_fields.keys() & table.keys())

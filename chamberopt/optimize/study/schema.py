@@ -1,19 +1,29 @@
 """The tables of a study file: what varies, what is maximised, what must hold, and the budget."""
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
 from chamberopt.common.toml_errors import CrossCheckError, Problem
-from chamberopt.common.toml_fields import Several, list_field, quantity
-from chamberopt.coverage.metrics import METRICS, OBJECTIVES, RENAMED_OBJECTIVES, renamed_objective
+from chamberopt.common.toml_fields import Several, from_file, list_field, quantity
+from chamberopt.coverage.metrics import (
+    METRICS,
+    OBJECTIVES,
+    RENAMED_OBJECTIVES,
+    find_metric,
+    metric_problem,
+    parse_objective,
+    renamed_objective,
+)
 from chamberopt.design.design import Design
+from chamberopt.design.load import load_design
 from chamberopt.design.table_base import FileTable
-from chamberopt.optimize.study.constraints import Limits, limit_problems
-from chamberopt.optimize.study.parameters import Bounds, bound_problems
+from chamberopt.optimize.study.constraints import Limits, limit_problems, zone_constraints
+from chamberopt.optimize.study.parameters import Vary, from_catalogue, vary_problems
 
 
 def _refuse_old_name(name: Any) -> Any:
@@ -61,7 +71,7 @@ class Objective(FileTable):
         for name in self.sum:
             if name in RENAMED_OBJECTIVES:
                 yield Problem(f"sum.{name}", renamed_objective(name))
-            elif name not in names:
+            elif name not in names and not find_metric(name):
                 text = f"not an objective or a metric; {toml_errors.did_you_mean(name, names)}"
                 yield Problem(f"sum.{name}", text)
         if self.sum and not any(self.sum.values()):
@@ -147,16 +157,16 @@ class Optimizer(FileTable):
 class Study(FileTable):
     """A design, what may vary in it, what is maximised, what must hold, and the budget.
 
-    `vary` maps a dotted parameter of the design to (low, high) in the units of the file.
+    `vary` maps a dotted parameter of the design to what it may be, in the units of the file.
     """
 
     RENAMED: ClassVar[dict[str, str]] = {"draft": "search_accuracy"}  # former names of keys
 
     design: Design = Field(description="design that the search starts from")
-    vary: dict[str, Bounds] = Field(
+    vary: dict[str, Vary] = Field(
         min_length=1,
         description='e.g. "chamber.height_mm" = [35, 60]',
-        json_schema_extra={"form": "[low, high]"},
+        json_schema_extra={"form": "[low, high], { low =, high =, step = } or { choose = [...] }"},
     )
     objective: Objective = Field(default_factory=Objective)
     constraints: dict[str, Limits] = Field(
@@ -164,12 +174,50 @@ class Study(FileTable):
         description="METRIC = { min =, max = }, or a number of the design in quotes",
     )
     optimizer: Optimizer = Field(default_factory=Optimizer)
+    begin_with: Several[dict[str, float | str]] = list_field(
+        "design files, or tables of the values of all names in [vary]",
+        "candidates that are evaluated first, such as the best design for a similar part",
+        (),
+    )
     search_accuracy: dict[str, int | float | str] = Field(
         default_factory=dict,
         description="while searching, instead of the design's own: keys of [process.accuracy], "
         "and facets",
         json_schema_extra={"form": "a number or a text"},
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _look_up_sizes(cls, data: Any) -> Any:
+        """The sizes of the catalogue, so that a study does not depend on it."""
+        if not isinstance(data, Mapping) or not isinstance(data.get("vary"), Mapping):
+            return data
+        design = data.get("design")  # None where it has problems of its own
+        material = design.shot.material if isinstance(design, Design) else "steel"
+        return {**data, "vary": from_catalogue(data["vary"], material)}
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_begin_with(cls, data: Any, info: ValidationInfo) -> Any:
+        """The values of the designs to begin with, so that a study is whole without their files."""
+        given = data.get("begin_with") if isinstance(data, Mapping) else None
+        if not isinstance(given, (list, tuple)) or not isinstance(data.get("vary"), Mapping):
+            return data
+        read = []
+        for k, one in enumerate(given):
+            if isinstance(one, str):
+                try:
+                    design = load_design(from_file(one, info.context))
+                    one = {name: design.setting(name) for name in data["vary"]}
+                except InputError as error:
+                    raise CrossCheckError([Problem(f"begin_with.{k}", str(error))]) from None
+            read.append(one)
+        return {**data, "begin_with": read}
+
+    @property
+    def all_constraints(self) -> dict[str, Limits]:
+        """The constraints of the study, and the limits of its design's zones."""
+        return {**self.constraints, **zone_constraints(self.design)}
 
     def at_search_accuracy(self, design: Design) -> Design:
         """A candidate at the accuracy of the search, which is usually coarser than its own.
@@ -181,10 +229,38 @@ class Study(FileTable):
         return design.changed({f"{tables.get(k, 'process.accuracy')}.{k}": v for k, v in values})
 
     def _problems(self) -> Iterator[Problem]:
-        for name, bounds in self.vary.items():
-            yield from bound_problems(self.design, name, bounds)
+        for name, varied in self.vary.items():
+            yield from vary_problems(self.design, name, varied)
+        bounds = {name: one.bounds for name, one in self.vary.items() if not one.texts}
+        for k, values in enumerate(self.begin_with):
+            if values.keys() != self.vary.keys():
+                text = f"has {', '.join(values) or 'nothing'}; give {', '.join(self.vary)}"
+                yield Problem(f"begin_with.{k}", text)
+            for name, value in values.items():
+                low, high = bounds.get(name, (-math.inf, math.inf))
+                texts = self.vary[name].texts if name in self.vary else ()
+                if texts or isinstance(value, str):
+                    if value not in texts:
+                        text = (
+                            f"given {value!r}, which is none of the values in [vary]; add it there"
+                        )
+                        yield Problem(f"begin_with.{k}.{name}", text)
+                elif not low <= value <= high:
+                    text = (
+                        f"{value:g} is outside [{low:g}, {high:g}] of [vary]; widen it, or leave "
+                    )
+                    yield Problem(f"begin_with.{k}.{name}", f"{text}the design out")
+        if len(self.begin_with) >= self.optimizer.evaluations:
+            text = f"given {self.optimizer.evaluations}, too few for the start and those of "
+            text += f"begin_with; give {len(self.begin_with) + 1} or more"
+            yield Problem("optimizer.evaluations", text)
         for name, limits in self.constraints.items():
-            yield from limit_problems(self.design, self.vary, name, limits)
+            yield from limit_problems(self.design, bounds, name, limits)
+        for goal in self.objective.goals:
+            for name in parse_objective(goal).terms:
+                if problem := metric_problem(self.design, name):
+                    field = "objective.sum" if self.objective.sum else "objective"
+                    yield Problem(field, f"{name}: {problem}")
         phases = [phase.algorithm for phase in self.optimizer.phases] or [self.optimizer.algorithm]
         if self.objective.pareto and not {"auto", "sobol", "surrogate"}.issuperset(phases):
             text = "given two objectives, which only auto, sobol and surrogate can search"

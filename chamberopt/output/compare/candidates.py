@@ -12,11 +12,12 @@ import numpy as np
 
 from chamberopt.chamber.analytic import analytic_cavity
 from chamberopt.chamber.build import build_chamber
-from chamberopt.common.progress import progress_bar
+from chamberopt.common.progress import step
 from chamberopt.design.design import Design
 from chamberopt.design.load import load_design
 from chamberopt.output.compare.comparability import (
     require_same_gauge,
+    require_same_machine,
     require_same_part,
     require_same_time,
     require_same_triangles,
@@ -26,7 +27,8 @@ from chamberopt.output.compare.comparison import labels, part_unit
 from chamberopt.output.results.chamber_file import load_chamber
 from chamberopt.output.results.load import Result, load_part, load_result
 from chamberopt.output.save_run import save_simulation
-from chamberopt.simulation.evaluate import ReplicaPlan, evaluate
+from chamberopt.simulation.evaluate import ReplicaPlan
+from chamberopt.simulation.peening.calibration_errors import evaluate_calibrated
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -92,6 +94,7 @@ def read_candidates(
     designs = [one.design for one in found]
     require_same_time(files, designs)
     require_same_gauge(files, designs)
+    require_same_machine(files, designs)
     target: np.ndarray | None = None
     built = []
     for one, label in zip(found, labels([_named(file) for file in files]), strict=True):
@@ -149,8 +152,10 @@ def _simulate(
     analytic = one.result is not None and one.result.data.get("analytic")
     cavity = analytic_cavity(design, one.chamber) if analytic else None
     design, advice = prepare(design, one.chamber, cavity)
-    with progress_bar(f"{one.label}: replicas") as progress:
-        evaluation = evaluate(design, one.chamber, executor, progress, settings.plan, cavity)
+    with step(f"{one.label}: replicas", design.process.accuracy.replicas) as progress:
+        evaluation = evaluate_calibrated(
+            design, one.chamber, executor, progress, settings.plan, cavity
+        )
     remarks = save_simulation(folder, design, one.chamber, evaluation, advice)
     return load_result(folder), [f"{one.label}: {text}" for text in (*map(str, advice), *remarks)]
 

@@ -55,6 +55,20 @@ def require_same_gauge(paths: Sequence[Path], designs: Sequence[Design]) -> None
             )
 
 
+def require_same_machine(paths: Sequence[Path], designs: Sequence[Design]) -> None:
+    """Raise InputError if designs have calibrations of different machines.
+
+    What a calibration leaves open is common to the designs that have it, and cancels.
+    """
+    calibrated = [pair for pair in zip(paths, designs, strict=True) if pair[1].calibration]
+    for path, design in calibrated[1:]:
+        if design.calibration != calibrated[0][1].calibration:
+            raise InputError(
+                f"{path}: another calibration than in {calibrated[0][0]}: what two calibrations "
+                "leave open cannot be subtracted; simulate both designs with one"
+            )
+
+
 def require_same_part(
     paths: Sequence[Path], designs: Sequence[Design], meshes: Sequence[tuple[str, str]]
 ) -> None:
@@ -75,6 +89,8 @@ def require_same_part(
             "unit": (meshes[0][1], mesh[1]),
             "target": (designs[0].part.target, design.part.target),
         }
+        ours, others = ({one.name: one.target for one in x.zones} for x in (designs[0], design))
+        pairs |= {f"zone {k}": (ours[k], others[k]) for k in ours.keys() & others.keys()}
         for name, (mine, theirs) in pairs.items():
             if mine != theirs:
                 raise InputError(

@@ -6,18 +6,22 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from chamberopt.common.estimate import Estimate
 from chamberopt.design.shapes.base import is_custom
 from chamberopt.output.compare.comparability import (
     require_same_gauge,
+    require_same_machine,
     require_same_part,
     require_same_time,
     require_several,
 )
 from chamberopt.output.compare.difference import Difference, confidence_of_each, difference
 from chamberopt.output.results.load import Result, load_result
+
+if TYPE_CHECKING:
+    from chamberopt.design.load import Design
 
 TIME = "time_to_98_s"
 # The number of replicas tells more than the rule that decided it.
@@ -90,6 +94,7 @@ def comparison_of(results: Sequence[Result], names: Sequence[str]) -> Comparison
     )
     require_same_time(folders, designs)
     require_same_gauge(folders, designs)
+    require_same_machine(folders, designs)
     same_goal = all(result.objective_name == first.objective_name for result in results)
     metrics = (
         {first.objective_name: tuple(result.objective for result in results)} if same_goal else {}
@@ -118,11 +123,18 @@ def part_unit(result: Result) -> str:
 def _difference(name: str, first: Result, other: Result, confidence: float) -> Difference:
     of_goal = name == first.objective_name
     after, before = (one.objective if of_goal else one.metrics[name] for one in (other, first))
+    if _metal(other.design) != _metal(first.design):
+        after = after.of_another_metal()
     found = difference(after, before, other.seeds == first.seeds, confidence)
     if found.time_ratio is None:
         return found
     # An estimate knows batches of replicas, not how many replicas there were.
     return replace(found, replicas=math.ceil(found.time_ratio * other.data["replicas"]))
+
+
+def _metal(design: Design) -> tuple[Any, ...]:
+    """What an error in Estimate.shared of the part's metal belongs to."""
+    return design.materials.part, design.shot.density, set(design.shot.diameters)
 
 
 def labels(paths: Sequence[Path]) -> tuple[str, ...]:
@@ -138,9 +150,14 @@ def labels(paths: Sequence[Path]) -> tuple[str, ...]:
 def _differing_values(results: Sequence[Result]) -> dict[str, tuple[Any, ...]]:
     """Return the dotted design values that are not the same in all results; None where missing."""
     designs = [_design_values(result) for result in results]
-    names = dict.fromkeys(name for design in designs for name in design)
+    # v0_for repeats what v0_m_s, the ball, the hardness and C0 say.
+    all_names = (name for design in designs for name in design)
+    names = dict.fromkeys(name for name in all_names if not name.endswith(".v0_for"))
     rows = {name: tuple(design.get(name) for design in designs) for name in names}
-    return {name: values for name, values in rows.items() if len(set(map(str, values))) > 1}
+    found = {name: values for name, values in rows.items() if len(set(map(str, values))) > 1}
+    if "chamber.shape" in found:  # which says it already
+        found.pop("shape_sha256", None)
+    return found
 
 
 def _design_values(result: Result) -> dict[str, Any]:

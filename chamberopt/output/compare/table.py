@@ -81,6 +81,8 @@ def _legend(comparison: Comparison) -> list[str]:
 def _cells(gap: Difference) -> list[str]:
     """Cells of a difference: its value, whether it is real, and what it takes to know."""
     shown = estimate_text(Estimate(gap.value, gap.half_width, in_words=gap.in_words), sign=True)
+    if gap.half_width == 0.0 and not gap.in_words:
+        return [shown, "exact", ""]
     if gap.value == 0.0 or gap.in_words:
         return [shown, "no", ""]
     if gap.real:

@@ -29,12 +29,30 @@ COLUMNS = {
     "mean_angle_deg": ("mean angle of impacts to the surface, degrees, 90 is head on", "impacts"),
     "mean_dent_um": ("mean diameter of dents, micrometres", "dents"),
     "strength_um": ("peening strength, micrometres", "dents"),
+    "almen_intensity_mmA": ("Almen intensity, mmA", "dents"),
+    "saturation_time_s": ("saturation time of an Almen strip, s", "dents"),
+    "compression_depth_um": ("estimated depth of compression, micrometres", "dents"),
     "impacts": ("number of simulated impacts", "sum"),
     "dents": ("number of simulated dents", "sum"),
     "exposed_area_mm2": ("area inside the chamber, mm2", "sum"),
     "reachable_area_mm2": ("area that a ball can touch, mm2", "sum"),
     "target": ("1: must be covered", "any"),
 }
+ZONE_COLUMN = "zone_"  # begins the column of each zone
+
+
+def combination_of(column: str) -> tuple[str, str]:
+    """Meaning and combination of a column, as in COLUMNS."""
+    if column.startswith(ZONE_COLUMN):
+        return f"1: in the zone {column.removeprefix(ZONE_COLUMN)}", "any"
+    return COLUMNS[column]
+
+
+def _columns(surface: Any) -> tuple[str, ...]:
+    zones = (name for name in surface.cell_data if name.startswith(ZONE_COLUMN))
+    return (*COLUMNS, *zones)
+
+
 WEIGHTS = {"area": "exposed_area_mm2", "impacts": "impacts", "dents": "dents"}
 
 
@@ -59,7 +77,7 @@ def fields_of_elements(surface: Any, number: np.ndarray) -> ElementFields:
         number: element number of each triangle, shape (m,); 0 for triangles in no element.
     """
     cells = np.flatnonzero(number > 0)
-    return _combined(surface, cells, number[cells], np.ones(len(cells)), tuple(COLUMNS))
+    return _combined(surface, cells, number[cells], np.ones(len(cells)), _columns(surface))
 
 
 def fields_of_remeshed_elements(
@@ -85,7 +103,7 @@ def fields_of_remeshed_elements(
         share_around = own_area / areas(simulated.vertices, simulated.triangles[around])
         cells, share = np.r_[cells, around], np.r_[share, share_around]
     numbers = np.r_[number[number > 0], original.elements[small]]
-    names = tuple(name for name, (_, combination) in COLUMNS.items() if combination != "sum")
+    names = tuple(name for name in _columns(surface) if combination_of(name)[1] != "sum")
     return _combined(surface, cells, numbers, share, names)
 
 
@@ -102,7 +120,8 @@ def _combined(
     for name in names:
         if name not in surface.cell_data:
             continue
-        values, combination = np.asarray(surface[name], dtype=np.float64)[cells], COLUMNS[name][1]
+        values = np.asarray(surface[name], dtype=np.float64)[cells]
+        combination = combination_of(name)[1]
         if combination == "sum":
             columns[name] = total(values)
         elif combination == "any":

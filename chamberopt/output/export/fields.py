@@ -10,12 +10,12 @@ import numpy as np
 
 from chamberopt.chamber.part import PartOfFile
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import write_text
+from chamberopt.common.files import require_place, write_text
 from chamberopt.geometry.mesh_io.part_mesh import PartMesh
 from chamberopt.output.export.abaqus_deck import abaqus_deck
 from chamberopt.output.export.element_fields import (
-    COLUMNS,
     ElementFields,
+    combination_of,
     fields_of_elements,
     fields_of_remeshed_elements,
 )
@@ -52,21 +52,13 @@ def write_fields(folder: str | Path, path: str | Path, to: str) -> list[str]:
         raise InputError(
             f"{path}: {to} files need their ending; name it {path.with_suffix('.' + to).name}"
         )
-    if not path.resolve().parent.is_dir() or path.is_dir():
-        raise InputError(
-            f"{path}: is not a file in an existing folder; make the folder, or give a file name"
-        )
+    require_place(path)
     result = load_result(folder)
     surface = load_part(result)
-    try:
-        if to not in DECKS:
-            save_surface(path, surface)
-            return []
-        return _write_deck(result, surface, to, path)
-    except OSError as error:
-        raise InputError(
-            f"{path}: cannot be written: {error.strerror}; choose another place"
-        ) from None
+    if to not in DECKS:
+        save_surface(path, surface)
+        return []
+    return _write_deck(result, surface, to, path)
 
 
 def _write_deck(result: Result, surface: Any, to: str, path: Path) -> list[str]:
@@ -95,7 +87,7 @@ def _write_deck(result: Result, surface: Any, to: str, path: Path) -> list[str]:
             f"left out {added} triangles that are in no element of the file: they close its holes"
         )
     remarks += _elements_left_out(fields)
-    meanings = [f"{name.upper()}: {COLUMNS[name][0]}" for name in fields.columns]
+    meanings = [f"{name.upper()}: {combination_of(name)[0]}" for name in fields.columns]
     for suffix, text in DECKS[to]([*_origin(result), *meanings], simulated, fields).items():
         file = path.with_stem(path.stem + suffix) if suffix else path
         write_text(file, text)

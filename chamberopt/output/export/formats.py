@@ -92,6 +92,12 @@ FORMATS = {
         (".3mf",),
         "chamber_files.write_3mf",
     ),
+    "tolerances-csv": ExportFormat(
+        "tolerances.csv",
+        "what each tolerance does to each figure",
+        (".csv",),
+        "tolerance_table.write_tolerance_table",
+    ),
     STUDY: ExportFormat(
         "study.csv",
         "the evaluations of a study or sweep, finished or not",
@@ -105,8 +111,12 @@ def formats_by_name(names: Sequence[str]) -> dict[str, ExportFormat]:
     """Return the formats with these names, each once.
 
     Raises:
-        InputError: a name is unknown.
+        InputError: a name is unknown, or there is none.
     """
+    if not names:
+        raise InputError(
+            f"--to: give one or more of {', '.join(FORMATS)} (chamberopt export --help)"
+        )
     for name in names:
         if name not in FORMATS:
             from chamberopt.common.toml_errors import did_you_mean  # imports pydantic

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.output.plots.colours import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, YELLOW
-from chamberopt.output.plots.figure_style import new_figure, save_picture, style_axes
+from chamberopt.output.plots.figure_style import SMALL, TITLE, new_figure, save_picture, style_axes
 from chamberopt.simulation.convergence.error_law import NORMAL
 from chamberopt.simulation.convergence.parameters import DESIGNED, GAUGE, TIME, short_name
 from chamberopt.simulation.convergence.recommendation import ACCURACIES, BIAS_SHARE, recommend
@@ -49,10 +49,10 @@ def _draw_errors(axes: Axes, study: ConvergenceStudy) -> None:
         axes.plot(*zip(*reached, strict=True), "*", ms=14, color=BLACK, zorder=6,
                   label="recommended for 5 %, 1 %, 0.1 %: predicted cost")  # fmt: skip
     title = f"more replicas alone: half the error for {law.halving[0]:.1f} times the CPU time"
-    axes.set_title(title, loc="left", fontsize=11)
+    axes.set_title(title, loc="left", fontsize=TITLE)
     error_label = "error of the objective (half-width of 95 % interval)"
     style_axes(axes, "CPU seconds of an evaluation", error_label)
-    axes.legend(fontsize=8, frameon=False, loc="best")
+    axes.legend(fontsize=SMALL, frameon=False, loc="best")
 
 
 def _draw_bias_marks(axes: Axes, study: ConvergenceStudy) -> None:
@@ -88,7 +88,7 @@ def _draw_biases(axes: Axes, study: ConvergenceStudy) -> None:
                       capsize=2, color=BLUE, mfc=BLUE if run.is_biased else "white")  # fmt: skip
         ratio = run.cpu.value / study.reference.cpu.value
         names.append(f"{short_name(run.parameter)} {run.setting}  ({ratio:.2f}×)")
-    axes.set_yticks(heights, names, fontsize=8)
+    axes.set_yticks(heights, names, fontsize=SMALL)
     axes.set_ylim(-1.3, len(runs) - 0.5)  # leaves room for the legend below the last
     axes.axvline(0.0, color=GREY, lw=1)
     allowed = BIAS_SHARE * ACCURACIES[1]
@@ -98,6 +98,6 @@ def _draw_biases(axes: Axes, study: ConvergenceStudy) -> None:
     limit = 1.15 * max(allowed, *(run.max_bias for run in runs if run.parameter != TIME))
     axes.set_xlim(-limit, limit)
     axes.xaxis.set_major_locator(MaxNLocator(5))
-    axes.set_title("one setting off the reference (CPU time over its)", loc="left", fontsize=11)
+    axes.set_title("one setting off the reference (CPU time over its)", loc="left", fontsize=TITLE)
     style_axes(axes, "bias of the objective, 95 % interval")
-    axes.legend(fontsize=8, frameon=False, loc="lower left")
+    axes.legend(fontsize=SMALL, frameon=False, loc="lower left")

@@ -13,13 +13,19 @@ DARK_GREY = "#555555"  # text and reference lines
 # in even steps, which colour-blind readers see too.
 COVERAGE_MAP, COUNT_MAP, WIDTH_MAP = "viridis", "cividis", "magma"
 DIFFERENCE_MAP = "PuOr"
-# On the target: where too few dents were simulated, and where no ball can touch it.
-FEW_DENTS, UNREACHED = "#6c737a", "#a9714f"
+# On the target: where too few dents were simulated, where no ball can touch it, and where it is not
+# in the chamber.
+FEW_DENTS, UNREACHED, OUTSIDE = "#6c737a", "#a9714f", PURPLE
 
 # Each compared result has a colour and a line style of its own.
 _COLOURS = (BLUE, ORANGE, GREEN, PURPLE, BLACK, YELLOW, SKY, GREY)
 _DASHES = (6, 1, 1, 1, 1, 1), (8, 2), (2, 1), (4, 1, 1, 1)
 _LINES = ("-", "--", "-.", ":", *((0, dashes) for dashes in _DASHES))
+
+
+def zone_colour(index: int) -> str:
+    """Colour of the zone with this index; later ones begin again."""
+    return (SKY, PURPLE, GREEN, BLUE, BLACK)[index % 5]  # none like the sonotrode
 
 
 def line_style(index: int) -> dict[str, Any]:

@@ -13,7 +13,13 @@ import numpy as np
 
 from chamberopt.coverage.metrics import FULL_COVERAGE
 from chamberopt.output.plots.colours import DARK_GREY, GREY
-from chamberopt.output.plots.figure_style import literal, new_figure, save_picture, style_axes
+from chamberopt.output.plots.figure_style import (
+    SMALL,
+    literal,
+    new_figure,
+    save_picture,
+    style_axes,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -82,13 +88,17 @@ def distributions_picture(
         "thick: mean; thin: 95 % of the area has more, and a mark where that reaches 98 %;\n"
         f"as far as known to ± {100.0 * MAX_HALF_WIDTH:g} %",
         loc="left",
-        fontsize=9,
+        fontsize=SMALL,
     )
     for axes, histogram in zip(panels.ravel()[[0, 2, 3]], (coverage, *impacts), strict=True):
         draw_histogram(axes, histogram)
     for axes in panels.ravel():
         axes.legend(
-            fontsize=8, frameon=False, loc="upper left", bbox_to_anchor=(0.0, -0.13), handlelength=4
+            fontsize=SMALL,
+            frameon=False,
+            loc="upper left",
+            bbox_to_anchor=(0.0, -0.13),
+            handlelength=4,
         )
     save_picture(figure, path)
 
@@ -103,7 +113,7 @@ def draw_histogram(axes: Axes, data: HistogramData) -> None:
             axes.stairs(100.0 * shares, data.edges, label=label, lw=1.6, **style)
     axes.set_xlim(data.edges[0], data.edges[-1])
     axes.set_ylim(bottom=0.0)
-    axes.set_title(literal(data.title), loc="left", fontsize=9)
+    axes.set_title(literal(data.title), loc="left", fontsize=SMALL)
     style_axes(axes, data.x_label, data.y_label)
 
 
@@ -130,12 +140,12 @@ def draw_coverage_over_time(
             axes.plot([0.0, *times], [0.0, *(100.0 * value)], lw=width, **curve.style)
             if width > 1.0 or len(curves) <= MAX_BANDS:
                 low, high = np.clip((value - half_width, value + half_width), 0.0, 1.0) * 100.0
-                axes.fill_between(times, low, high, color=curve.style["color"], alpha=0.13, lw=0)
+                axes.fill_between(times, low, high, color=curve.style["color"], alpha=0.25, lw=0)
     axes.axhline(100.0 * FULL_COVERAGE, color=GREY, lw=0.8)
     axes.axvline(treatment_time, color=GREY, lw=0.8)
-    axes.text(treatment_time, 1.0, " treatment", fontsize=7.5, color=DARK_GREY)
+    axes.text(treatment_time, 1.0, " treatment", fontsize=SMALL, color=DARK_GREY)
     axes.set_xlim(0.0, 1.02 * end)
-    axes.set_ylim(0.0, 104.0)
+    axes.set_ylim(-2.0, 104.0)  # a line at zero is not the axis
     style_axes(axes, "peening time [s]", "coverage [%]")
 
 

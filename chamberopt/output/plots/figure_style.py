@@ -15,10 +15,12 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
     from chamberopt.common.estimate import Estimate
 
+TITLE, SMALL = 11, 9  # of titles, and of legends and all that is small, in every figure
 SVG = "http://www.w3.org/2000/svg"
 
 
@@ -79,6 +81,12 @@ def style_axes(axes: Axes, x_label: str = "", y_label: str = "") -> None:
         axes.set_xlabel(x_label)
     if y_label:
         axes.set_ylabel(y_label)
+
+
+def name_choices(axis: Axis, texts: Sequence[str]) -> None:
+    """An axis of the positions of texts, with the texts at them; as it is if there are none."""
+    if texts:
+        axis.set_ticks(range(len(texts)), texts)
 
 
 def value_range(estimates: Sequence[Estimate]) -> tuple[float, float]:

@@ -46,5 +46,9 @@ QUANTITIES = {
             WIDTH_MAP,
         ),
         Quantity("strength", "peening strength", "µm", "strength_um"),
+        Quantity("almen", "Almen intensity", "mmA", "almen_intensity_mmA"),
+        Quantity("saturation", "saturation time of a strip", "s", "saturation_time_s"),
+        Quantity("depth", "estimated depth of compression", "µm", "compression_depth_um"),
+        Quantity("zones", "zone", "", "zone"),
     )
 }

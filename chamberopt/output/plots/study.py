@@ -9,9 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.common.estimate import Estimate
-from chamberopt.common.number_text import estimate_text
+from chamberopt.common.number_text import estimate_text, plain
 from chamberopt.output.plots.colours import BLUE, GREEN, GREY, ORANGE
 from chamberopt.output.plots.figure_style import (
+    SMALL,
+    TITLE,
+    name_choices,
     new_figure,
     readable,
     save_picture,
@@ -38,7 +41,7 @@ class EvaluatedCandidate:
     Args:
         number: place in the order of evaluations, from 1.
         stage: "search" or "confirm".
-        objective: None when the candidate could not be simulated.
+        objective: None when the candidate was not simulated.
         feasible: whether it meets the constraints.
         parameters: values by dotted name.
     """
@@ -47,7 +50,7 @@ class EvaluatedCandidate:
     stage: str
     objective: Estimate | None
     feasible: bool
-    parameters: Mapping[str, float] = field(default_factory=dict)
+    parameters: Mapping[str, float | str] = field(default_factory=dict)
 
 
 def convergence_picture(path: Path, result: StudyResult) -> None:
@@ -65,14 +68,17 @@ def convergence_picture(path: Path, result: StudyResult) -> None:
     axes = figure.add_subplot(grid[0, :])
     draw_convergence(axes, candidates, y_label)
     start, best = (one.evaluation.objective for one in (result.start, result.best))
-    axes.axhline(start.value, color=ORANGE, lw=1.2, ls="--", label="start, confirmed")
+    axes.axhline(start.value, color=ORANGE, lw=1.2, ls="--", label="start, as confirmed")
     axes.set_title(
         f"best {estimate_text(best)}, start {estimate_text(start)}: "
         f"gain {estimate_text(result.gain, sign=True)}   ({result.algorithm})",
         loc="left",
-        fontsize=11,
+        fontsize=TITLE,
     )
-    axes.legend(fontsize=8, ncols=3, frameon=False, loc="lower right")
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower left", ncols=4, fontsize=SMALL, frameon=False,
+                  title="lower panels: the later in the search, the darker",
+                  title_fontsize=SMALL, alignment="left")  # fmt: skip
     first: Axes | None = None
     for i, name in enumerate(names):
         axes = figure.add_subplot(grid[1 + i // columns, i % columns], sharey=first)
@@ -118,7 +124,7 @@ def draw_convergence(
             tooltips[label] = [_tooltip(one) for one in group]
     if failed:
         axes.plot(failed, np.full(len(failed), 0.02), "|", color=GREY, clip_on=False,
-                  label="could not be simulated", transform=axes.get_xaxis_transform())  # fmt: skip
+                  label="not simulated", transform=axes.get_xaxis_transform())  # fmt: skip
     if feasible:
         best = np.minimum if smaller_is_better else np.maximum
         values = best.accumulate([one.objective.value for one in feasible if one.objective])
@@ -142,7 +148,7 @@ def _point(candidate: EvaluatedCandidate) -> tuple[int, float, float]:
 
 def _tooltip(candidate: EvaluatedCandidate) -> str:
     assert candidate.objective is not None
-    rows = [f"{name} = {one:.4g}" for name, one in candidate.parameters.items()]
+    rows = [f"{name} = {plain(one)}" for name, one in candidate.parameters.items()]
     first = f"evaluation {candidate.number}: {estimate_text(candidate.objective)}"
     return "\n".join([first, *rows])
 
@@ -151,10 +157,11 @@ def _draw_parameter(
     axes: Axes, result: StudyResult, candidates: Sequence[EvaluatedCandidate], name: str
 ) -> None:
     """Draw the search over one parameter, later ones darker, and start and best as confirmed."""
+    varied = result.study.vary[name]
     search = [one for one in candidates if one.stage == "search"]
     shown = [one for one in search if one.objective]
     axes.scatter(
-        [one.parameters[name] for one in shown],
+        [varied.place(one.parameters[name]) for one in shown],
         [one.objective.value for one in shown if one.objective],
         c=[one.number for one in shown],
         cmap="Blues",
@@ -167,13 +174,14 @@ def _draw_parameter(
         (result.best, GREEN, "*", 13, "best"),
     ):
         value = confirmed.evaluation.objective.value
-        axes.plot(confirmed.parameters[name], value, marker, color=colour, label=label, ms=size,
-                  mec="white")  # fmt: skip
-    low, high = result.study.vary[name]
-    margin = 0.03 * (high - low)
+        place = varied.place(confirmed.parameters[name])
+        axes.plot(place, value, marker, color=colour, label=label, ms=size, mec="white")
+    low, high = varied.bounds
+    margin = (0.2 if varied.texts else 0.03) * (high - low)
     axes.set_xlim(low - margin, high + margin)
+    name_choices(axes.xaxis, varied.texts)
     style_axes(axes, name)
-    axes.legend(fontsize=8, frameon=False)
+    axes.legend(fontsize=SMALL, frameon=False)
 
 
 def slices_picture(path: Path, result: StudyResult, sensitivity: Sensitivity) -> None:
@@ -190,8 +198,8 @@ def slices_picture(path: Path, result: StudyResult, sensitivity: Sensitivity) ->
 
 def slices_figure(
     slices: Sequence[Slice],
-    start: Mapping[str, float],
-    best: Mapping[str, float],
+    start: Mapping[str, float | str],
+    best: Mapping[str, float | str],
     flat_label: str,
     y_label: str,
 ) -> Figure:
@@ -206,23 +214,40 @@ def slices_figure(
     figure = new_figure(3.4 * max(columns, 2), 3.3 * rows + 0.5)
     panels = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
     for axes, one in zip(panels, slices, strict=False):
-        low, high = one.mean - one.half_width, one.mean + one.half_width
-        axes.axvspan(*one.flat, color=GREEN, alpha=0.12, lw=0, label=flat_label)
-        axes.fill_between(one.values, low, high, color=BLUE, alpha=0.15, lw=0)
-        axes.plot(
-            one.values, one.mean, color=BLUE, label="the others as in the best, 95 % interval"
-        )
-        axes.plot(one.values, one.effect, color=GREY, ls="--", label="mean over the others")
-        axes.axvline(best[one.name], color=GREEN, lw=1.2, label="best")
-        axes.axvline(start[one.name], color=ORANGE, lw=1.0, ls=":", label="start")
-        axes.set_title(f"{one.share:.0%} of the variance", loc="left", fontsize=9)
+        of_slice = "the others as in the best, 95 % interval; without a band: or worse"
+        width = np.where(one.or_worse, np.nan, one.half_width)  # no band there
+        of_mean = "mean over the others; above, its share of the variance over the bounds"
+        if one.texts:
+            for text in one.flat:
+                place = _place(one, text)
+                axes.axvspan(
+                    place - 0.2, place + 0.2, color=GREEN, alpha=0.12, lw=0, label=flat_label
+                )
+            axes.errorbar(one.values, one.mean, width, fmt="o", color=BLUE, label=of_slice)
+            axes.plot(one.values, one.effect, "D", mfc="none", color=GREY, label=of_mean)
+            name_choices(axes.xaxis, one.texts)
+        else:
+            low, high = one.mean - width, one.mean + width
+            axes.axvspan(*one.flat, color=GREEN, alpha=0.12, lw=0, label=flat_label)
+            axes.fill_between(one.values, low, high, color=BLUE, alpha=0.15, lw=0)
+            axes.plot(one.values, one.mean, color=BLUE, label=of_slice)
+            axes.plot(one.values, one.effect, color=GREY, ls="--", label=of_mean)
+        axes.axvline(_place(one, best[one.name]), color=GREEN, lw=1.2, label="best")
+        axes.axvline(_place(one, start[one.name]), color=ORANGE, lw=1.0, ls=":", label="start")
+        axes.set_title(f"alone {one.share:.0%} of the variance", loc="left", fontsize=SMALL)
         style_axes(axes, one.name)
     for axes in panels[len(slices) :]:
         axes.set_visible(False)
     panels[0].set_ylabel(y_label)
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=3, fontsize=8, frameon=False)
+    found = [axes.get_legend_handles_labels() for axes in panels[: len(slices)]]
+    legend = {label: one for pair in found for one, label in zip(*pair, strict=True)}
+    figure.legend(legend.values(), legend.keys(), loc="outside upper center",
+                  ncols=2 if columns > 2 else 1, fontsize=SMALL, frameon=False)  # fmt: skip
     return figure
+
+
+def _place(of: Slice, value: float | str) -> float:
+    return float(of.texts.index(value) if isinstance(value, str) else value)
 
 
 def pareto_picture(path: Path, result: StudyResult) -> None:
@@ -262,5 +287,5 @@ def pareto_picture(path: Path, result: StudyResult) -> None:
     axes.set_ylim(*value_range(y_goals))
     x_name, y_name = map(readable, result.study.objective.goals)
     style_axes(axes, f"{x_name}, better to the right", f"{y_name}, better upwards")
-    axes.legend(fontsize=8, frameon=False)
+    axes.legend(fontsize=SMALL, frameon=False)
     save_picture(figure, path)

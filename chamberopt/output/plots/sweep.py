@@ -10,9 +10,19 @@ import numpy as np
 
 from chamberopt.common.number_text import estimate_text
 from chamberopt.output.plots.colours import BLUE, COVERAGE_MAP, GREY, ORANGE
-from chamberopt.output.plots.figure_style import new_figure, readable, save_picture, style_axes
+from chamberopt.output.plots.figure_style import (
+    SMALL,
+    TITLE,
+    name_choices,
+    new_figure,
+    readable,
+    save_picture,
+    style_axes,
+)
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -47,7 +57,7 @@ def sweep_map(path: Path, sweep: SweepResult) -> list[str]:
         _draw_curve(figure.add_subplot(), sweep, names[0])
     else:
         _draw_maps(figure, sweep, shown, (rows, columns))
-    figure.suptitle(_title(sweep), fontsize=11)
+    figure.suptitle(_title(sweep), fontsize=TITLE)
     save_picture(figure, path)
     return remarks
 
@@ -66,17 +76,17 @@ def _draw_curve(axes: Axes, sweep: SweepResult, name: str) -> None:
         (False, GREY, "x", "misses a constraint"),
     ):
         rows = [
-            (trial.parameters[name], trial.objective.value, trial.objective.half_width)
+            (*_places(sweep, [trial], name), trial.objective.value, trial.objective.half_width)
             for trial in sweep.trials
             if trial.objective and trial.feasible == feasible
         ]
         if rows:
             x, y, half_width = zip(*sorted(rows), strict=True)
             axes.errorbar(x, y, yerr=half_width, fmt=line, ms=5, lw=1, color=colour, label=label)
-    start = sweep.study.design.value(name)
-    axes.axvline(start, color=ORANGE, lw=1, ls="--", label="the design as it is")
+    axes.axvline(_start(sweep, name), color=ORANGE, lw=1, ls="--", label="the design as it is")
+    name_choices(axes.xaxis, sweep.study.vary[name].texts)
     style_axes(axes, name, readable(sweep.study.objective.goals[0]))
-    axes.legend(fontsize=8, frameon=False)
+    axes.legend(fontsize=SMALL, frameon=False)
 
 
 def _draw_maps(
@@ -90,6 +100,8 @@ def _draw_maps(
         panels.append(axes)
         colours = (_draw_squares if is_grid else _draw_points)(axes, sweep, pair)
         _draw_marks(axes, sweep, pair)
+        for axis, name in zip((axes.xaxis, axes.yaxis), pair, strict=True):
+            name_choices(axis, sweep.study.vary[name].texts)
         axes.set_xlabel(pair[0])
         axes.set_ylabel(pair[1])
     if colours is not None:
@@ -98,17 +110,16 @@ def _draw_maps(
         *panels[0].get_legend_handles_labels(),
         loc="outside lower center",
         ncols=4,
-        fontsize=8,
+        fontsize=SMALL,
         frameon=False,
     )
 
 
 def _draw_squares(axes: Axes, sweep: SweepResult, pair: tuple[str, str]) -> Any:
     """Draw a grid of two parameters; candidates that could not be simulated stay white."""
-    count = sweep.plan.count
+    x, y = (np.unique(_places(sweep, sweep.trials, name)) for name in pair)
     objective = [trial.objective.value if trial.objective else np.nan for trial in sweep.trials]
-    values = np.array(objective).reshape(count, count)  # the second parameter runs fastest
-    x, y = (np.linspace(*sweep.study.vary[name], count) for name in pair)
+    values = np.array(objective).reshape(len(x), len(y))  # the second parameter runs fastest
     return axes.pcolormesh(x, y, values.T, cmap=COVERAGE_MAP, shading="nearest")
 
 
@@ -118,7 +129,7 @@ def _draw_points(axes: Axes, sweep: SweepResult, pair: tuple[str, str]) -> Any:
         ((trial.objective.value, trial) for trial in sweep.trials if trial.objective),
         key=lambda row: row[0],
     )
-    x, y = ([trial.parameters[name] for _, trial in evaluated] for name in pair)
+    x, y = (_places(sweep, [trial for _, trial in evaluated], name) for name in pair)
     colours = [value for value, _ in evaluated]
     return axes.scatter(x, y, c=colours, cmap=COVERAGE_MAP, s=34, edgecolors="none")
 
@@ -128,18 +139,27 @@ def _draw_marks(axes: Axes, sweep: SweepResult, pair: tuple[str, str]) -> None:
     infeasible = [trial for trial in sweep.trials if trial.objective and not trial.feasible]
     failed = [trial for trial in sweep.trials if not trial.objective]
 
-    def places(trials: list[Trial]) -> list[list[float]]:
-        return [[trial.parameters[name] for trial in trials] for name in pair]
-
     for trials, label, colour in (
         (infeasible, "misses a constraint", "black"),
         (failed, "could not be simulated", GREY),
     ):
         if trials:
-            x, y = places(trials)
+            x, y = (_places(sweep, trials, name) for name in pair)
             axes.scatter(x, y, marker="x", s=22, lw=1, color=colour, label=label)
-    start = (sweep.study.design.value(name) for name in pair)
-    axes.plot(*start, "o", color=ORANGE, mec="white", ms=8, label="the design as it is")
+    # Open marks: what lies below them keeps its colour.
+    start = (_start(sweep, name) for name in pair)
+    axes.plot(*start, "o", color=ORANGE, mfc="none", mew=2.2, ms=13, label="the design as it is")
     if sweep.best is not None:
-        axes.plot(*places([sweep.best]), "*", color="white", mec="black", ms=13,
-                  label="best as simulated")  # fmt: skip
+        place = [_places(sweep, [sweep.best], name) for name in pair]
+        for colour, width, label in (("white", 4.0, ""), ("black", 1.6, "best as simulated")):
+            axes.plot(*place, "s", color=colour, mfc="none", mew=width, ms=13,
+                      label=label)  # fmt: skip
+
+
+def _places(sweep: SweepResult, trials: Sequence[Trial], name: str) -> list[float]:
+    """Values of a parameter; positions of texts."""
+    return [sweep.study.vary[name].place(trial.parameters[name]) for trial in trials]
+
+
+def _start(sweep: SweepResult, name: str) -> float:
+    return sweep.study.vary[name].place(sweep.study.design.setting(name))

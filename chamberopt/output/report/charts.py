@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -16,10 +17,11 @@ from chamberopt.output.plots.coverage import (
     draw_coverage_over_time,
     draw_histogram,
 )
-from chamberopt.output.plots.figure_style import new_figure, svg_text
+from chamberopt.output.plots.figure_style import SMALL, new_figure, svg_text
 from chamberopt.output.plots.study import EvaluatedCandidate, draw_convergence, slices_figure
 
 WIDE, NARROW = (11.0, 3.8), (5.5, 4.0)  # inch
+Y_LABEL = 40  # letters of a line that fit beside a chart
 BIN_EDGES = np.linspace(0.0, 100.0, 41)  # of a coverage histogram [%]
 STYLES = {
     "start": {"color": ORANGE, "ls": "--"},
@@ -48,9 +50,9 @@ def convergence_chart(
     ]
     figure = new_figure(*WIDE)
     axes = figure.subplots()
-    tooltips = draw_convergence(axes, candidates, y_label, smaller_is_better)
+    tooltips = draw_convergence(axes, candidates, fill(y_label, Y_LABEL), smaller_is_better)
     handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper left", ncols=5, fontsize=8, frameon=False)
+    figure.legend(handles, labels, loc="outside upper left", ncols=5, fontsize=SMALL, frameon=False)
     return svg_text(figure, "convergence", tooltips)
 
 
@@ -66,14 +68,17 @@ def slices_chart(parameters: Sequence[Mapping[str, Any]], y_label: str) -> str:
             values=np.array(row["values"]),
             mean=np.array(row["mean"]),
             half_width=np.array(row["half_width"]),
+            or_worse=np.array(row["or_worse"]),
             effect=np.array(row["effect"]),
             share=row["share"],
             flat=row["flat"],
+            texts=tuple(row["texts"]),
         )
         for row in parameters
     ]
     start, best = ({row["name"]: row[key] for row in parameters} for key in ("start", "best"))
-    figure = slices_figure(slices, start, best, "loses no more than the noise", y_label)
+    label = fill(y_label, Y_LABEL)
+    figure = slices_figure(slices, start, best, "loses no more than the noise", label)
     return svg_text(figure, "slices")
 
 
@@ -85,9 +90,9 @@ def coverage_over_time_chart(
     axes = figure.subplots()
     drawn = [CoverageCurve(name, rows, STYLES[name]) for name, rows in curves.items()]
     draw_coverage_over_time(axes, drawn, treatment_time)
-    axes.set_title("thick: mean; thin: 95 % of the area has more", loc="left", fontsize=9)
+    axes.set_title("thick: mean; thin: 95 % of the area has more", loc="left", fontsize=SMALL)
     if len(drawn) > 1:
-        axes.legend(fontsize=8, frameon=False, loc="lower right")
+        axes.legend(fontsize=SMALL, frameon=False, loc="lower right")
     return svg_text(figure, "coverage over time")
 
 
@@ -108,5 +113,5 @@ def histogram_chart(coverage_and_area: Mapping[str, tuple[np.ndarray, np.ndarray
     labels = "coverage [%]", "share of the target's area [%]"
     draw_histogram(axes, HistogramData(BIN_EDGES, shares, names, styles, *labels))
     if len(names) > 1:
-        axes.legend(fontsize=8, frameon=False)
+        axes.legend(fontsize=SMALL, frameon=False)
     return svg_text(figure, "histogram")

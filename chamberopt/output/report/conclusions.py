@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from chamberopt.chamber.checks.calibration import misfit_texts
+from chamberopt.common.estimate import Estimate
+from chamberopt.coverage.metrics import OBJECTIVES
 from chamberopt.coverage.resolution import NOT_RESOLVED
 from chamberopt.optimize.candidates import POINTS_PER_PARAMETER
+from chamberopt.optimize.study.constraints import FEASIBLE, MET
 from chamberopt.output.report.number_text import (
     Label,
     metric_label,
@@ -17,9 +21,9 @@ from chamberopt.output.report.number_text import (
     with_interval,
     with_unit,
 )
+from chamberopt.output.report.peening.zones import zone_lines
 
 if TYPE_CHECKING:
-    from chamberopt.common.estimate import Estimate
     from chamberopt.output.results.load import Result
 
 STEPS = {
@@ -61,12 +65,12 @@ def answer(result: Result, start: Result | None, gain: Estimate | None) -> str:
         if label.text != mean.text:
             text += f", and its {label.text} is {label.format(result.objective)}"
         return f"{text} (95 % intervals); {full_coverage(result)}."
+    named = label.text if result.objective_name in OBJECTIVES else label.in_full
     before, after = label.format(start.objective), label.format(result.objective)
     study = result.data["study"]
     if study["best"]["parameters"] == study["start"]["parameters"]:
         return (
-            f"No better chamber than the start was found: its {label.text} is {before} "
-            "(95 % interval)."
+            f"No better chamber than the start was found: its {named} is {before} (95 % interval)."
         )
     if NOT_RESOLVED in (start.objective.in_words, result.objective.in_words):
         return (
@@ -78,13 +82,53 @@ def answer(result: Result, start: Result | None, gain: Estimate | None) -> str:
     intervals = "(95 % intervals, both simulated again with fresh seeds)"
     if gain.low > 0.0:
         return (
-            f"The best chamber found changes the {label.text} {values}: a change of {change} "
+            f"The best chamber found changes the {named} {values}: a change of {change} "
             f"{intervals}, which is more than noise."
         )
     return (
-        f"No chamber was found that is certainly better: the {label.text} goes {values}, but the "
+        f"No chamber was found that is certainly better: the {named} goes {values}, but the "
         f"change of {change} is within the noise {intervals}."
     )
+
+
+def answer_lines(result: Result, zones: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """What belongs to the answer: zones with their limits, constraints, doubts of a calibration.
+
+    Args:
+        zones: as zone_contents returns them.
+    Returns:
+        "text" of each sentence, and "warns": whether a limit is not certainly met, or the
+        calibration has something to know.
+    """
+    limited = tuple(f"{row['metric']} " for zone in zones["zones"] for row in zone["limits"])
+    calibration = result.design.calibration
+    doubts = [*misfit_texts(calibration), calibration.not_mmA] if calibration else []
+    texts = [*_constraint_texts(result, limited)]
+    texts += [f"{one[0].upper()}{one[1:]}." for one in doubts if one]
+    return [*zone_lines(zones), *({"text": text, "warns": True} for text in texts)]
+
+
+def _constraint_texts(result: Result, limited: tuple[str, ...]) -> Iterator[str]:
+    """Which constraints the best, the start and candidates better than the best may not meet.
+
+    Args:
+        limited: begins reasons that the best's zones have in sentences of their own.
+    """
+    study, label = result.data.get("study", {}), objective_label(result.objective_name)
+    for one in study.get("confirmed", []):
+        reasons = one["reason"].split("; ") if one["standing"] != FEASIBLE else []
+        if one["parameters"] == study["best"]["parameters"]:
+            whose = "The best chamber found"
+            reasons = [text for text in reasons if not text.startswith(limited)]
+        elif one["parameters"] == study["start"]["parameters"]:
+            whose = "The start"
+        elif one["objective"]["value"] > result.objective.value:
+            value = label.format(Estimate.from_json(one["objective"]))
+            whose = f"Another chamber, whose {label.text} is {value}"
+        else:
+            continue
+        if reasons:
+            yield f"{whose}: constraints {MET[one['standing']]}: {', '.join(reasons)}."
 
 
 def full_coverage(result: Result) -> str:
@@ -153,7 +197,7 @@ def cost_rows(
     if study:
         rows["evaluations"] = {
             "in the search": _count(study["evaluations"]),
-            "of these failed": _count(study.get("failed", 0)),
+            "of these not simulated": _count(study.get("failed", 0)),
             "of these miss a constraint": _count(study.get("missing_a_constraint", 0)),
             "confirmations": _count(sum(row["stage"] == "confirm" for row in evaluations)),
             "run time of all": f"{plain(study['seconds'], 3)} s",
@@ -176,7 +220,8 @@ def influence(study: Mapping[str, Any], label: Label) -> dict[str, Any]:
         "said": sentences; "parameters": one row each, the most important first, empty without a
         model. A row holds
             loss, loss_half_width: cost of moving this parameter alone from its best value to the
-                worst one within its bounds.
+                worst one within its bounds; without a half-width it may cost more.
+            loss_text: the same in words.
             surely: cost of such a move that is certain, 0 if the intervals reach zero.
             share: of the objective's variance over the bounds, by its main effect.
             flat: range in which it may lie without losing more than the noise.
@@ -195,11 +240,10 @@ def influence(study: Mapping[str, Any], label: Label) -> dict[str, Any]:
     sentences = []
     first = rows[0]
     if first["surely"]:
-        loss = with_interval(first["loss"], first["loss_half_width"], label.unit)
         sentences.append(
-            f"{first['name']} mattered most: moved alone from its best value to another within its "
-            f"bounds, it costs up to {loss}, and certainly "
-            f"{with_unit(first['surely'], label.unit)} or more."
+            f"{first['name']} mattered most near the best design: moved alone from its best value "
+            f"to another within its bounds, it costs {first['loss_text']}, and "
+            f"{with_unit(first['surely'], label.unit)} or more where the model is surest."
         )
     if uncertain := [row["name"] for row in rows if not row["surely"]]:
         *others, last = uncertain
@@ -216,6 +260,9 @@ def influence(study: Mapping[str, Any], label: Label) -> dict[str, Any]:
                 "; the rest is how parameters act together, so each curve below holds near the "
                 "best design"
             )
+        widest = max(rows, key=lambda row: row["share"])
+        if widest is not first:
+            rest += f". Over all of the bounds {widest['name']} has the largest effect of its own"
         sentences.append(
             "The effects of single parameters are "
             f"{per_cent(shares)} of the variance over the bounds{rest}."
@@ -234,21 +281,28 @@ def _parameter_row(name: str, study: Mapping[str, Any], label: Label) -> dict[st
     size = abs(label.factor)
     losses = [size * (best["value"] - mean) for mean in parameter["mean"]]
     half_widths = [size * math.hypot(half, best["half_width"]) for half in parameter["half_width"]]
+    or_worse = parameter.get("or_worse", [False] * len(losses))
     worst = max(range(len(losses)), key=losses.__getitem__)
     certain = [loss - half for loss, half in zip(losses, half_widths, strict=True)]
+    loss, half_width = max(0.0, losses[worst]), half_widths[worst]
+    text = f"up to {with_interval(loss, half_width, label.unit)}"
+    if or_worse[worst]:
+        text = f"{with_unit(loss, label.unit)} or more"
     return {
         "name": name,
         "share": parameter["share_of_variance"],
-        "loss": max(0.0, losses[worst]),
-        "loss_half_width": half_widths[worst],
+        "loss": loss,
+        "loss_half_width": None if or_worse[worst] else half_width,
+        "loss_text": text,
         "surely": max(0.0, *certain),
         "flat": parameter["flat"],
-        "bounds": study["vary"][name],
+        "texts": parameter.get("choices", []),
         "start": study["start"]["parameters"][name],
         "best": study["best"]["parameters"][name],
         "values": parameter["values"],
         "mean": [label.factor * value for value in parameter["mean"]],
         "half_width": [size * value for value in parameter["half_width"]],
+        "or_worse": or_worse,
         "effect": [label.factor * value for value in parameter["main_effect"]],
     }
 
@@ -256,7 +310,9 @@ def _parameter_row(name: str, study: Mapping[str, Any], label: Label) -> dict[st
 def _reason_without_model(count: int, failed: int, parameters: int) -> str:
     needed = POINTS_PER_PARAMETER * parameters
     if count - failed < needed:
-        evaluations = f"{count} evaluations" + (f", {failed} of them failed," if failed else "")
+        evaluations = f"{count} evaluations" + (
+            f", {failed} of them not simulated," if failed else ""
+        )
         return (
             f"{evaluations} are too few to tell what each parameter does: {needed} or more are "
             "needed for a model of them."

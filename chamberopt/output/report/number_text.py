@@ -10,7 +10,7 @@ from typing import Any
 from chamberopt.common import number_text
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
-from chamberopt.coverage.metrics import METRICS, parse_objective
+from chamberopt.coverage.metrics import OBJECTIVES, find_metric, parse_objective
 
 THIN_SPACE = "\u202f"  # between thousands; no line breaks there
 
@@ -22,7 +22,7 @@ class Label:
     Args:
         text: name in plain words.
         unit: of the number shown.
-        factor: number shown over number stored; negative for an objective that is minus a metric.
+        factor: number shown over number stored; negative for an objective that falls with a metric.
         meaning: explanation, where the text needs one.
     """
 
@@ -30,6 +30,11 @@ class Label:
     unit: str = ""
     factor: float = 1.0
     meaning: str = ""
+
+    @property
+    def in_full(self) -> str:
+        """Such as "weighted sum (mean coverage − 0.001 × ...)"."""
+        return f"{self.text} ({self.meaning})" if self.meaning else self.text
 
     @property
     def with_unit(self) -> str:
@@ -48,7 +53,7 @@ class Label:
 
 def metric_label(name: str) -> Label:
     """The label of a metric; shares of the surface are shown in per cent."""
-    metric = METRICS.get(name)
+    metric = find_metric(name)
     if metric is None:
         return Label(name.replace("_", " "))
     if name.endswith("_coverage"):
@@ -57,19 +62,36 @@ def metric_label(name: str) -> Label:
 
 
 def objective_label(name: str) -> Label:
-    """The label of an objective: the metric's label where it is plus or minus a metric."""
+    """The label of an objective: the metric's label where it is a multiple of one metric."""
     try:
         objective = parse_objective(name)
     except InputError:  # written by another version of the program
         return Label(name.replace("_", " "))
     (metric, weight), *others = objective.terms.items()
-    if not others and abs(weight) == 1.0:
+    if not others and weight:
         label = metric_label(metric)
-        return Label(label.text, label.unit, weight * label.factor)
-    return Label(name.replace("_", " "), meaning=objective.summary)
+        return Label(label.text, label.unit, label.factor / weight)
+    if name in OBJECTIVES:
+        return Label(name.replace("_", " "), meaning=objective.summary)
+    return Label("weighted sum", meaning=_sum_text(objective.terms))
 
 
-def plain(value: float, digits: int = 4) -> str:
+def _sum_text(terms: Mapping[str, float]) -> str:
+    """Such as "mean coverage of the target − 0.001 × number of balls"; shares are 0 to 1."""
+    text = ""
+    for name, weight in terms.items():
+        metric = find_metric(name)
+        words = metric.summary if metric else name
+        if metric and metric.unit not in ("", "balls"):
+            words += f" [{metric.unit}]"
+        words = f"({words})" if " - " in words else words
+        size = "" if abs(weight) == 1.0 else f"{plain(abs(weight))} × "
+        sign = "−" if weight < 0.0 else "+" if text else ""
+        text += f" {sign} {size}{words}" if sign else f"{size}{words}"
+    return text.strip()
+
+
+def plain(value: float | str, digits: int = 4) -> str:
     """The number to a number of significant digits, without an exponent if it is of usual size."""
     return typeset(number_text.plain(value, digits))
 

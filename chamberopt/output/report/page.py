@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import version
@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import claim_file, write_text
+from chamberopt.common.files import claim_file, require_place, write_text
 from chamberopt.output.plots.colours import hex_colours
 from chamberopt.output.report import html
 from chamberopt.output.report.part3d import PartScene, part_scene, quantities_in_all
@@ -24,9 +24,10 @@ REPORT = "report.html"
 GENERATOR = '<meta name="generator" content="chamberopt'
 # The browser enforces that nothing is fetched, even if a text of the result held markup.
 POLICY = (
-    "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; "
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
     "img-src data: blob:; worker-src blob:; font-src data:; base-uri 'none'; form-action 'none'"
 )
+SCRIPTS = "three/three.min.js", "view3d.js", "part.js"
 HELP = (
     "Drag to turn, use the wheel to zoom, point at the target to see its numbers there. "
     "Grey: not in the target. Brown: out of the reach of the shot. "
@@ -36,6 +37,24 @@ SUBTITLES = {
     "study": "Report of a study: the best chamber found",
     "simulation": "Report of one simulated chamber",
 }
+
+
+@dataclass(frozen=True)
+class PageFile:
+    """A kind of file that replaces older ones of its kind, and no others.
+
+    endings: of its name, the usual one first.
+    is_one: whether the content of a file is of this kind.
+    """
+
+    name: str
+    endings: tuple[str, ...]
+    is_one: Callable[[bytes], bool]
+
+
+REPORT_FILE = PageFile(
+    "report", (".html", ".htm"), lambda content: GENERATOR.encode() in content[:2000]
+)
 
 
 def write_report(result: str | Path, path: str | Path | None = None) -> tuple[Path, dict[str, Any]]:
@@ -50,10 +69,10 @@ def write_report(result: str | Path, path: str | Path | None = None) -> tuple[Pa
     Raises:
         InputError: the folder is no finished result, or the path holds anything but a report.
     """
-    contents = report_contents(result)
     loaded = load_result(result)
     path = require_free_page(loaded.folder / REPORT if path is None else path)
     with claim_file(path):
+        contents = report_contents(result)
         scene = _write_report(path, contents, loaded)
     return path, {**contents, "remarks": list(scene.remarks)}
 
@@ -92,6 +111,26 @@ def write_part_page(results: Sequence[Path], path: Path) -> list[str]:
 
 
 def _write_part_page(loaded: Sequence[Result], path: Path) -> list[str]:
+    names, scenes = _scenes(loaded)
+    summaries = [f"{name}: {summary(one)}" for name, one in zip(names, loaded, strict=True)]
+    title = ", ".join(names)
+    content = html.section("Part in its chamber", html.items(summaries), viewer(scenes))
+    write_page(path, title, f"<header><h1>{html.text(title)}</h1></header>{content}", scenes)
+    return [remark for scene in scenes for remark in scene.remarks]
+
+
+def parts_content(results: Sequence[Path]) -> tuple[str, dict[str, Any]]:
+    """HTML of the parts of results in 3D, and what `showParts` of part.js fills it with.
+
+    Raises:
+        InputError: as write_part_page.
+    """
+    _, scenes = _scenes([load_result(one) for one in results])
+    return viewer(scenes), _content([scene.data for scene in scenes if scene.data])
+
+
+def _scenes(loaded: Sequence[Result]) -> tuple[list[str], list[PartScene]]:
+    """Names of results, and their parts, each remark with the name where there are several."""
     names = _unique_names([one.folder.resolve() for one in loaded])
     scenes = [part_scene(one, name) for one, name in zip(loaded, names, strict=True)]
     for scene, one in zip(scenes, loaded, strict=True):
@@ -102,11 +141,7 @@ def _write_part_page(loaded: Sequence[Result], path: Path) -> list[str]:
             replace(scene, remarks=tuple(f"{name}: {remark}" for remark in scene.remarks))
             for name, scene in zip(names, scenes, strict=True)
         ]
-    summaries = [f"{name}: {summary(one)}" for name, one in zip(names, loaded, strict=True)]
-    title = ", ".join(names)
-    content = html.section("Part in its chamber", html.items(summaries), viewer(scenes))
-    write_page(path, title, f"<header><h1>{html.text(title)}</h1></header>{content}", scenes)
-    return [remark for scene in scenes for remark in scene.remarks]
+    return names, scenes
 
 
 def _unique_names(folders: Sequence[Path]) -> list[str]:
@@ -116,24 +151,23 @@ def _unique_names(folders: Sequence[Path]) -> list[str]:
     return names if unique else ["/".join(folder.parts[-2:]) for folder in folders]
 
 
-def require_free_page(path: str | Path) -> Path:
-    """Return the path; raise InputError unless it is free or holds an older report."""
-    path = Path(path)
-    if path.suffix.lower() not in (".html", ".htm"):
-        raise InputError(f"{path}: a report is one .html file; give such a name (--out FILE.html)")
-    if not path.resolve().parent.is_dir():
-        raise InputError(f"{path}: the folder does not exist; make it first")
-    try:
-        is_report = path.is_file() and GENERATOR.encode() in path.read_bytes()[:2000]
-    except OSError as error:
+def require_free_page(path: str | Path, file: PageFile = REPORT_FILE) -> Path:
+    """Return the path; raise InputError unless it is free or holds an older page of the kind."""
+    path, first = Path(path), file.endings[0]
+    remedy = f"give another name (--out FILE{first})"
+    if path.suffix.lower() not in file.endings:
         raise InputError(
-            f"{path}: cannot be read: {error.strerror}; give another name (--out FILE.html)"
-        ) from None
-    if os.path.lexists(path) and not is_report:
-        raise InputError(
-            f"{path}: this file exists and is no report, so it is not replaced; "
-            "give another name (--out FILE.html)"
+            f"{path}: a {file.name} is one {first} file; give such a name (--out FILE{first})"
         )
+    try:
+        is_own = path.is_file() and file.is_one(path.read_bytes())
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}; {remedy}") from None
+    if os.path.lexists(path) and not is_own:
+        raise InputError(
+            f"{path}: this file exists and is no {file.name}, so it is not replaced; {remedy}"
+        )
+    require_place(path)
     return path
 
 
@@ -177,16 +211,11 @@ def viewer(scenes: Sequence[PartScene]) -> str:
 
 
 def write_page(path: Path, title: str, body: str, scenes: Sequence[PartScene]) -> None:
-    """Put a page together and write it atomically; raise InputError if it cannot be written."""
-    from plotly.offline import get_plotlyjs
-
+    """Put a page together and write it, whole or not at all."""
     data = ""
     if drawn := [scene.data for scene in scenes if scene.data]:
-        quantities = quantities_in_all(drawn)
-        names = {one["colours"] for one in quantities}
-        colour_maps = {name: hex_colours(name) for name in names}
-        content = {"quantities": quantities, "scenes": drawn, "scales": colour_maps}
-        data = html.embedded_json(content, "parts")
+        data = html.embedded_json(_content(drawn), "parts")
+    scripts = "</script><script>".join(map(_asset, SCRIPTS))
     page = (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
@@ -194,17 +223,19 @@ def write_page(path: Path, title: str, body: str, scenes: Sequence[PartScene]) -
         '<meta name="viewport" content="width=device-width">'
         f"<title>{html.text(title)}</title><style>{_asset('style.css')}</style></head>\n"
         f"<body><main>{body}</main>\n{data}\n"
-        f"<script>{get_plotlyjs()}</script><script>{_asset('part.js')}</script></body></html>\n"
+        f"<script>{scripts}</script></body></html>\n"
     )
-    try:
-        write_text(path, page)
-    except OSError as error:
-        raise InputError(
-            f"{path}: cannot be written: {error.strerror}; give another place (--out FILE.html)"
-        ) from None
+    write_text(path, page)
+
+
+def _content(drawn: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """The scenes, their quantities and the colours of these, for part.js."""
+    quantities = quantities_in_all(drawn)
+    scales = {name: hex_colours(name) for name in {one["colours"] for one in quantities}}
+    return {"quantities": quantities, "scenes": drawn, "scales": scales}
 
 
 @cache
 def _asset(name: str) -> str:
     """Text of a script or style sheet of this package."""
-    return Path(__file__).with_name(name).read_text(encoding="utf-8")
+    return (Path(__file__).parent / "browser" / name).read_text(encoding="utf-8")

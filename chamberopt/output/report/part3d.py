@@ -1,4 +1,4 @@
-"""The part in its chamber in 3D: meshes for plotly, and the numbers by which the page colours it.
+"""The part in its chamber in 3D: its surfaces, and the numbers by which the page colours it.
 
 Colours are made in the browser (part.js). The page carries the numbers at each point of the target
 once, in single precision, and shows any of them, or the coverage at any time:
@@ -8,7 +8,6 @@ once, in single precision, and shows any of them, or the coverage at any time:
 from __future__ import annotations
 
 import base64
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -24,8 +23,8 @@ from chamberopt.output.vtp_files import Surface
 
 # A triangle takes about 80 bytes of the page: up to this number it stays below 60 MB and opens.
 MAX_TRIANGLES = 600_000
-# Places of the camera, from the middle of the cavity, in lengths of its diagonal.
-ABOVE, BELOW = np.array([0.55, -0.9, 0.62]), np.array([0.55, -0.9, -0.62])
+USUAL = np.array([0.55, -0.9, 0.62])  # direction to the camera from the middle of the cavity
+DISTANCE = 1.8  # of the camera, in lengths of the cavity's diagonal
 EDGE_ANGLE = 30.0  # degrees; edges of the chamber that are sharper are drawn
 PART_GREY, SONOTRODE, GLASS, EDGES = "#b9bec4", "#c58b52", "#9fc3dd", "#6f8796"
 
@@ -109,8 +108,9 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
         "number": _packed(triangles, "<i4"),
         "element": _packed(own["element"][triangles], "<i4"),
         "impacts": _packed(own["impacts"][triangles], "<i4"),
-        "figure": _traces(part, rest, chamber, eye),
-        "view": _view(np.asarray(own.points, dtype=float), chamber, eye),
+        "surfaces": _surfaces(part, rest, chamber, eye),
+        "edges": {"ends": _packed(_edges(chamber, np.asarray(chamber["tag"]))), "colour": EDGES},
+        "view": _view(chamber, eye),
     }
     return PartScene(data, tuple(remarks), coverage, area)
 
@@ -125,101 +125,74 @@ def quantities_in_all(scenes: Sequence[dict[str, Any]]) -> list[dict[str, str]]:
     ]
 
 
-def _traces(part: DrawnPart, rest: Surface | None, chamber: Any, eye: np.ndarray) -> Any:
-    """Traces of plotly by name: part, few, unreached, rest, sonotrode, glass, edges."""
-    import plotly.graph_objects as go
-
+def _surfaces(part: DrawnPart, rest: Surface | None, chamber: Any, eye: np.ndarray) -> Any:
+    """What view3d.js draws, by names: part, few, unreached, rest, sonotrode, glass."""
     tags = np.asarray(chamber["tag"])
-    # Flat colours that match the colour bar: little shading, no shine. With both epsilons at 0
-    # slivers are shaded as their neighbours.
-    soft = {"ambient": 0.85, "diffuse": 0.25, "specular": 0.0, "roughness": 1.0, "fresnel": 0.0}
-    soft |= {"facenormalsepsilon": 0.0, "vertexnormalsepsilon": 0.0}
-    common = {"lighting": soft, "showscale": False}
-    target, resolved = _mesh(part.target), np.asarray(part.target["resolved"])
-    traces = []
-    for name, cells in (("part", resolved), ("few", ~resolved)):
-        mesh = target | {side: target[side][cells] for side in "ijk"}
-        if name == "few":  # on the same points, which the page takes from the first
-            mesh = {side: mesh[side] for side in "ijk"} | {"color": FEW_DENTS}
-        traces.append(go.Mesh3d(name=name, **mesh, hoverinfo="none", **common))
+    target, resolved = part.target, np.asarray(part.target["resolved"])
+    corners = target.regular_faces
+    found: dict[str, dict[str, Any]] = {
+        "part": {"points": _packed(target.points), "triangles": _packed(corners[resolved], "<i4")},
+        # On the points of the part, which the page need not carry twice.
+        "few": {"triangles": _packed(corners[~resolved], "<i4"), "colour": FEW_DENTS},
+    }
     walls = {
-        "sonotrode": (is_sonotrode(tags), SONOTRODE, 0.55 if eye is ABOVE else 0.08),
+        "sonotrode": (is_sonotrode(tags), SONOTRODE, 0.55 if eye[2] > 0.0 else 0.08),
         "glass": (tags == TAG_WALL, GLASS, 0.13),
     }
-    surfaces = [("unreached", part.unreached, UNREACHED, 1.0), ("rest", rest, PART_GREY, 1.0)]
-    surfaces += [
+    others = [("unreached", part.unreached, UNREACHED, 1.0), ("rest", rest, PART_GREY, 1.0)]
+    others += [
         (name, chamber.extract_cells(here).extract_surface(algorithm="dataset_surface"), *look)
         for name, (here, *look) in walls.items()
     ]
-    for name, surface, colour, opacity in surfaces:
-        mesh = {} if surface is None else _mesh(surface)
-        look = {"color": colour, "opacity": opacity, "hoverinfo": "skip", "flatshading": True}
-        traces.append(go.Mesh3d(name=name, **mesh, **look, **common))
-    line = {"color": EDGES, "width": 2}
-    traces.append(
-        go.Scatter3d(
-            name="edges", mode="lines", line=line, hoverinfo="skip", **_edges(chamber, tags)
-        )
-    )
-    return json.loads(go.Figure(traces, {"template": None}).to_json())["data"]
+    for name, surface, colour, opacity in others:
+        if surface is not None and surface.n_cells:
+            shape = _packed(surface.points), _packed(surface.regular_faces, "<i4")
+            look = {"colour": colour, "opacity": opacity}
+            found[name] = {"points": shape[0], "triangles": shape[1], **look}
+    return found
 
 
 def _eye(normal: np.ndarray) -> np.ndarray:
-    """Where the camera is: above, unless twice as much of the target is visible from below.
+    """The direction to the camera from which most of the target faces it, a little aside.
 
-    From above the border of the chamber hides least.
+    From above, where the border of the chamber hides least, unless twice as much faces down; and
+    where much the same is seen from all sides, as of a gear, from USUAL.
 
     Args:
         normal: of the target's triangles, any length, shape (k, 3).
     """
-    above, below = (float(np.maximum(normal @ eye, 0.0).sum()) for eye in (ABOVE, BELOW))
-    return BELOW if below > 2.0 * above else ABOVE
+    turn = np.arctan2(USUAL[1], USUAL[0]) + np.radians(np.arange(0.0, 360.0, 30.0))
+    around = np.hypot(*USUAL[:2]) * np.column_stack([np.cos(turn), np.sin(turn)])
+    best, seen = {}, {}
+    for height in (USUAL[2], -USUAL[2]):
+        ways = np.column_stack([around, np.full(len(turn), height)])
+        faces = np.maximum(normal @ ways.T, 0.0).sum(axis=0)
+        k = 0 if faces[0] > 0.9 * faces.max() else int(faces.argmax())
+        best[height], seen[height] = ways[k], faces[k]
+    eye = best[-USUAL[2] if seen[-USUAL[2]] > 2.0 * seen[USUAL[2]] else USUAL[2]]
+    aside = 1.1 * eye[:2] + 0.5 * USUAL[:2]
+    return np.r_[aside * np.hypot(*USUAL[:2]) / np.hypot(*aside), eye[2]]
 
 
-def _view(points: np.ndarray, chamber: Any, eye: np.ndarray) -> dict[str, Any]:
-    """Axis ranges and camera such that the cavity fills the view, even if the part is larger."""
+def _view(chamber: Any, eye: np.ndarray) -> dict[str, Any]:
+    """Middle of the cavity, place of the eye, and size of what must fill the view [mm]."""
     around = np.asarray(chamber.points, dtype=float)
-    low, high = (of(np.concatenate([around, points]), axis=0) for of in (np.min, np.max))
     size = float(np.linalg.norm(np.ptp(around, axis=0)))
-    middle = (0.5 * (around.min(axis=0) + around.max(axis=0)) - 0.5 * (low + high)) / size
-
-    def named(vector: np.ndarray) -> dict[str, float]:
-        return dict(zip("xyz", vector.tolist(), strict=True))
-
+    middle = 0.5 * (around.min(axis=0) + around.max(axis=0))
     return {
-        **{
-            f"{name}axis": {"range": [low[i], high[i]], "visible": False}
-            for i, name in enumerate("xyz")
-        },
-        "aspectmode": "manual",
-        "aspectratio": named((high - low) / size),
-        "camera": {"center": named(middle), "eye": named(middle + eye)},
-        "dragmode": "orbit",
+        "middle": middle.tolist(),
+        "eye": (middle + DISTANCE * size * eye).tolist(),
+        "size": size,
     }
 
 
-def _mesh(surface: Surface) -> dict[str, np.ndarray]:
-    """Points and triangles in single precision (about 1e-5 mm)."""
-    x, y, z = np.asarray(surface.points, dtype=np.float32).T
-    i, j, k = np.asarray(surface.regular_faces, dtype=np.int32).reshape(-1, 3).T
-    return {
-        name: np.ascontiguousarray(a) for name, a in zip("xyzijk", (x, y, z, i, j, k), strict=True)
-    }
-
-
-def _edges(chamber: Any, tags: np.ndarray) -> dict[str, np.ndarray]:
-    """The sharp edges of the cavity, as one line that is broken by NaN."""
+def _edges(chamber: Any, tags: np.ndarray) -> np.ndarray:
+    """The ends of the sharp edges of the cavity, one after the other, (2 n, 3)."""
     around = chamber.extract_cells(tags != TAG_PART).extract_surface(algorithm="dataset_surface")
     lines = around.extract_feature_edges(
         feature_angle=EDGE_ANGLE, manifold_edges=False, non_manifold_edges=False
     )
-    ends = np.asarray(lines.points)[np.asarray(lines.lines).reshape(-1, 3)[:, 1:]]
-    broken = (
-        np.concatenate([ends, np.full((len(ends), 1, 3), np.nan)], axis=1)
-        .reshape(-1, 3)
-        .astype(np.float32)
-    )
-    return dict(zip("xyz", broken.T.copy(), strict=True))
+    return np.asarray(lines.points)[np.asarray(lines.lines).reshape(-1, 3)[:, 1:]]
 
 
 def _packed(values: np.ndarray, kind: str = "<f4") -> str:

@@ -10,8 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 from chamberopt.common.estimate import Estimate, independent_difference, paired_difference
 from chamberopt.optimize.storage.study_folder import STUDY
-from chamberopt.output.report.conclusions import accuracy_rows, answer, cost_rows, influence
-from chamberopt.output.report.number_text import metric_label, objective_label
+from chamberopt.output.report.conclusions import (
+    accuracy_rows,
+    answer,
+    answer_lines,
+    cost_rows,
+    influence,
+)
+from chamberopt.output.report.number_text import metric_label, objective_label, plain
+from chamberopt.output.report.peening.tolerances import tolerance_contents
+from chamberopt.output.report.peening.zones import limit_text, zone_contents
 from chamberopt.output.results.load import load_result, load_trials
 
 if TYPE_CHECKING:
@@ -32,14 +40,18 @@ def report_contents(folder: str | Path) -> dict[str, Any]:
     gain = None if start is None else _change(result.objective, start.objective, result, start)
     rows = load_trials(result.folder) if study else []
     label = objective_label(result.objective_name)
+    zones = zone_contents(result)
     candidates = {"result": result} if start is None else {"start": start, "best": result}
     return {
         "kind": result.kind,
         "name": result.folder.resolve().name,
         "made": result.data.get("created", ""),
         "answer": answer(result, start, gain),
+        "answer_lines": answer_lines(result, zones),
         "question": _question(result, study),
         "metrics": _metrics(result, start),
+        "calibrated": result.design.calibration is not None,
+        "zones": zones,
         "field": _field(result),
         "front": [_pareto_row(row) for row in study.get("front", [])] if study else [],
         "evaluations": [_evaluation(row, label.factor) for row in rows],
@@ -47,6 +59,7 @@ def report_contents(folder: str | Path) -> dict[str, Any]:
         "coverage_against_time": {
             name: one.data.get("coverage_against_time", []) for name, one in candidates.items()
         },
+        "tolerances": tolerance_contents(result.data.get("tolerances")),
         "accuracy": accuracy_rows(result, study),
         "cost": cost_rows(result, study, rows),
         "effects": _effects(result),
@@ -63,6 +76,8 @@ def report_contents(folder: str | Path) -> dict[str, Any]:
 
 def _change(after: Estimate, before: Estimate, result: Result, start: Result) -> Estimate:
     """The difference, from pairs of replicas where both ran on the same seeds."""
+    if after == before:  # the start is the best: nothing that is shown of it is uncertain
+        return Estimate(0.0, 0.0).not_known("not known") if after.in_words else Estimate(0.0, 0.0)
     same_seeds = result.seeds == start.seeds
     change = (paired_difference if same_seeds else independent_difference)(after, before)
     return change.not_known("not known") if after.in_words or before.in_words else change
@@ -96,15 +111,19 @@ def _question(result: Result, study: Mapping[str, Any] | None) -> dict[str, Any]
                          for side, limit in limits.items())
             for name, limits in tables.get("constraints", {}).items()
         ]  # fmt: skip
+    question["constraints"] += [
+        f"{limit_text(row)} of zone {zone['name']}"
+        for zone in result.data.get("zones", [])
+        for row in zone["limits"]
+    ]
     question["vary"] = [
         {
             "name": name,
-            "low": low,
-            "high": high,
+            "values": (", " if isinstance(ends[0], str) else " to ").join(map(plain, ends)),
             "start": study["start"]["parameters"][name],
             "best": study["best"]["parameters"][name],
         }
-        for name, (low, high) in study["vary"].items()
+        for name, ends in study["vary"].items()
     ]
     return {**question, "evaluations": study["evaluations"], "algorithm": study["algorithm"]}
 
@@ -117,7 +136,8 @@ def _metrics(result: Result, start: Result | None) -> list[dict[str, Any]]:
     entries += [
         (name, metric_label(name), metric, start.metrics.get(name) if start else None)
         for name, metric in result.metrics.items()
-        if metric_label(name).text != label.text  # else the objective is this metric
+        # Else the objective is this metric, or it is in the table of zones.
+        if metric_label(name).text != label.text and "." not in name
     ]
     rows = []
     for name, label, value, before in entries:
@@ -133,6 +153,7 @@ def _metrics(result: Result, start: Result | None) -> list[dict[str, Any]]:
                 "start": label.scale(before),
                 "change": label.scale(change),
                 "real": abs(change.value) > change.half_width,
+                "exact": change.half_width == 0.0 and not change.in_words,
             }
         rows.append(row)
     return rows
@@ -200,15 +221,8 @@ def _effect_text(name: str, value: Any) -> str:
 
 
 def _notes(result: Result, study: Mapping[str, Any] | None) -> list[str]:
-    """What limits the answer: what is uncertain in the study, then the notes of the simulation."""
-    if not study:
-        return list(result.notes)
-    unknown = [
-        f"constraints: {one['reason']}"
-        for one in study.get("confirmed", [])
-        if one["parameters"] == study["best"]["parameters"] and one.get("standing") == "not known"
-    ]
-    return [*unknown, *study.get("at_bounds", []), *result.notes]
+    """What limits the answer: notes of the study, and of the simulation."""
+    return [*(study or {}).get("notes", []), *result.notes]
 
 
 def _design(result: Result, start: Result | None) -> list[dict[str, Any]]:

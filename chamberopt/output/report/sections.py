@@ -9,20 +9,19 @@ from typing import Any
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.number_text import estimate_text
 from chamberopt.output.report import charts, html
-from chamberopt.output.report.number_text import (
-    interval_text,
-    per_cent,
-    plain,
-    typeset,
-    with_interval,
-    with_unit,
-)
+from chamberopt.output.report.number_text import interval_text, per_cent, plain, typeset, with_unit
 from chamberopt.output.report.part3d import PartScene
+from chamberopt.output.report.peening.tolerances import tolerance_section
+from chamberopt.output.report.peening.zones import zones_section
 
 Contents = Mapping[str, Any]  # of report_contents, or a part of it
 LIMITS_OF_INTERVALS = (
     "The intervals cover random variation between simulations only. They do not include errors in "
     "your restitution, friction and material data: calibrate those with your machine."
+)
+LIMITS_OF_CALIBRATED = (
+    "The intervals cover random variation between simulations, and what the calibration of the "
+    "machine leaves open. They do not include what the model itself leaves out."
 )
 TILES = ("mean_coverage", "p05_coverage", "time_to_98_s")  # shown beside the objective
 
@@ -47,6 +46,8 @@ def sections(
         parts += [_pareto_front(contents), _convergence(contents), _influence(contents)]
     parts += [
         _coverage(contents, scenes),
+        zones_section(contents),
+        tolerance_section(contents["tolerances"]),
         _accuracy_and_cost(contents),
         _effects(contents),
         _notes(contents),
@@ -84,12 +85,7 @@ def _question(contents: Contents) -> str:
     if question["constraints"]:
         limits = f"Constraints: {', '.join(question['constraints'])}."
     rows = [
-        (
-            row["name"],
-            f"{plain(row['low'])} to {plain(row['high'])}",
-            plain(row["start"]),
-            plain(row["best"]),
-        )
+        (row["name"], row["values"], plain(row["start"]), plain(row["best"]))
         for row in question["vary"]
     ]
     varied = html.table("What was varied", ("parameter", "bounds", "start", "best"), rows)
@@ -107,9 +103,14 @@ def _answer(contents: Contents) -> str:
             start = f'<dd class="start">start: {html.text(_tile_value(row, "start"))}</dd>'
         value = html.text(_tile_value(row, "result"))
         tiles.append(f"<div><dt>{html.text(row['label'])}</dt><dd>{value}</dd>{start}</div>")
+    lines = "".join(
+        html.paragraph(one["text"], "warning" if one["warns"] else "")
+        for one in contents["answer_lines"]
+    )
+    limits = LIMITS_OF_CALIBRATED if contents["calibrated"] else LIMITS_OF_INTERVALS
     content = (
-        f"{html.paragraph(contents['answer'], 'sentence')}"
-        f'<dl class="tiles">{"".join(tiles)}</dl>{html.paragraph(LIMITS_OF_INTERVALS, "soft")}'
+        f"{html.paragraph(contents['answer'], 'sentence')}{lines}"
+        f'<dl class="tiles">{"".join(tiles)}</dl>{html.paragraph(limits, "soft")}'
     )
     return f'<section class="answer"><h2>The answer</h2>{content}</section>'
 
@@ -164,7 +165,9 @@ def _convergence(contents: Contents) -> str:
     folded = ""
     if failed:
         reasons = html.table("", ("evaluation", "reason"), failed, numbers=False)
-        folded = html.fold(f"{len(failed)} evaluations failed or missed a constraint", reasons)
+        folded = html.fold(
+            f"Evaluations not simulated, or that missed a constraint: {len(failed)}", reasons
+        )
     return html.section("How the search went", html.chart("convergence", svg, caption), folded)
 
 
@@ -177,24 +180,26 @@ def _influence(contents: Contents) -> str:
     if parameters:
         head = (
             "parameter",
-            "moved alone costs up to",
-            "and certainly",
-            "share of variance",
+            "moved alone costs",
+            "where surest, at least",
+            "own share of variance",
             "no loss within",
         )
         rows = [
             (
                 row["name"],
-                with_interval(row["loss"], row["loss_half_width"], objective["unit"]),
+                row["loss_text"],
                 with_unit(row["surely"], objective["unit"]) if row["surely"] else "not known",
                 per_cent(row["share"]),
-                " to ".join(map(plain, row["flat"])),
+                (" or " if row["texts"] else " to ").join(map(plain, row["flat"])),
             )
             for row in parameters
         ]
         caption = (
-            "Each parameter alone. Band: 95 % interval of the model. "
-            "Shaded range: no more than the noise is lost."
+            "Each parameter alone. Band: 95 % interval of the model; without one: as bad or worse. "
+            "Shaded range: no more than the noise is lost. Above: how much of the variance over "
+            "the bounds is that of the dashed line; what is missing to 100 % is how parameters act "
+            "together."
         )
         svg = charts.slices_chart(parameters, _label(objective))
         content.append(html.table("By a model of all evaluations", head, rows))
@@ -216,7 +221,7 @@ def _coverage(contents: Contents, scenes: Mapping[str, PartScene]) -> str:
                 _interval(row, "start"),
                 _interval(row, "result"),
                 _interval(row, "change", sign=True),
-                "yes" if row["real"] else "no",
+                "exact" if row["exact"] else "yes" if row["real"] else "no",
             )
             for row in contents["metrics"]
             if "start" in row
@@ -236,7 +241,11 @@ def _coverage(contents: Contents, scenes: Mapping[str, PartScene]) -> str:
     if curves := {name: rows for name, rows in contents["coverage_against_time"].items() if rows}:
         treatment_time = contents["question"]["treatment_time_s"]
         svg = charts.coverage_over_time_chart(curves, treatment_time)
-        caption = "Coverage against peening time, with 95 % intervals; 98 % counts as full."
+        caption = (
+            "Coverage against peening time; 98 % counts as full. Bands are 95 % intervals, and "
+            "often narrower than their line. The thin line is zero where more than 5 % of the "
+            "target is out of reach."
+        )
         pair.append(html.chart("against-time", svg, caption))
     table = html.table("± 95 % intervals", head, rows)
     title = "Compared with the start" if has_start else "Coverage"
@@ -297,7 +306,7 @@ def _effects(contents: Contents) -> str:
         content.append(
             html.paragraph(
                 "No pilot run was made to estimate what each effect changes. "
-                "“chamberopt check” makes one for a design."
+                "“chamberopt check --pilot” makes one for a design."
             )
         )
     return html.section("Physical effects", *content)

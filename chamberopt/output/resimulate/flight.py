@@ -6,6 +6,7 @@ Every position is the simulator's own at the time of its frame; nothing is inter
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -16,10 +17,11 @@ from chamberopt.coverage.dents import Dents, dents_on_part
 
 if TYPE_CHECKING:
     from chamberopt.output.resimulate.rebuild import RebuiltReplica
-    from sim_core import ImpactLog, PartRotation, Vibration
+    from sim_core import ImpactLog, PartRotation, Scene, Vibration
 
 MIN_SPAN = 1e-6  # s
 MAX_FRAMES = 2000
+TRAIL = 4
 MAX_POSITIONS = 10_000_000  # of all balls in all frames and their trails: 480 MB with velocities
 
 
@@ -37,7 +39,6 @@ class FlightFrames:
     part_angle: rotation of the part [rad], shape (f,).
     part_axis: of the rotation, a point [m] and a direction; None where the part stands still.
     dents, impacts: on the part within the time shown, in the part's frame.
-    part_triangle: triangle of the part that each impact hit.
     """
 
     time: np.ndarray
@@ -50,11 +51,15 @@ class FlightFrames:
     part_axis: tuple[np.ndarray, np.ndarray] | None
     dents: Dents
     impacts: ImpactLog
-    part_triangle: np.ndarray
 
 
 def simulate_flight(
-    replica: RebuiltReplica, start: float, span: float, frames: int, trail: int = 4
+    replica: RebuiltReplica,
+    start: float,
+    span: float,
+    frames: int,
+    trail: int = TRAIL,
+    progress: Callable[[float], None] = lambda seconds: None,
 ) -> FlightFrames:
     """Simulate a replica again and record evenly spaced frames, the first and last at its ends.
 
@@ -64,6 +69,7 @@ def simulate_flight(
         span: time from the first to the last frame [s].
         frames: how many.
         trail: positions of each ball recorded from one frame to the next, the frame's included.
+        progress: as for sim_core.simulate.
 
     Raises:
         InputError: the replica did not simulate that time, or there are too many frames.
@@ -72,11 +78,11 @@ def simulate_flight(
     from sim_core import simulate
 
     scene = replica.scene
-    _require_simulated(start, span, frames, scene.duration, trail * len(scene.balls))
+    require_simulated(scene, start, span, frames, trail)
     end = min(start + span, scene.duration)
     times = np.linspace(start, end, (frames - 1) * trail + 1)
     # Cut short at `end`, a scene gives the same bits up to there as the whole one.
-    simulated = simulate(replace(scene, duration=end), frames=times)
+    simulated = simulate(replace(scene, duration=end), times, progress)
     impacts = replica.on_chamber(simulated.impacts)
     on_part = replica.chamber.source[impacts.triangle] >= 0
     impacts = impacts.only((impacts.time >= start) & on_part)
@@ -100,7 +106,6 @@ def simulate_flight(
         part_axis=axis,
         dents=dents_on_part(impacts, replica.chamber, replica.design),
         impacts=impacts,
-        part_triangle=replica.chamber.source[impacts.triangle],
     )
 
 
@@ -122,9 +127,11 @@ def rotation_angle(rotation: PartRotation | None, time: np.ndarray) -> np.ndarra
     return np.asarray(rotation.amplitude * np.sin(phase))
 
 
-def _require_simulated(
-    start: float, span: float, frames: int, duration: float, positions: int
+def require_simulated(
+    scene: Scene, start: float, span: float, frames: int, trail: int = TRAIL
 ) -> None:
+    """Raise InputError for a time that a replica did not simulate, or too many frames."""
+    duration, positions = scene.duration, trail * len(scene.balls)
     if not 0.0 <= start < duration:
         raise InputError(
             f"--from-s: given {start:g}; the replica was simulated from 0 to {duration:g} s"

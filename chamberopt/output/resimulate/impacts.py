@@ -7,9 +7,10 @@ the result keeps of them: their triangles and speeds.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from sim_core import ImpactLog
 
 MAX_SIMULATED_TREATMENT = 600.0  # s; a dent map of more takes minutes to compute
+COSTED = 0.02  # share of a simulation by which its cost is foretold
 SAMPLES = 200_000  # points of the target, for the share inside dents
 MAX_IMPACTS_IN_MEMORY = 4e6  # of all replicas being simulated; each takes about 200 bytes
 
@@ -97,22 +99,45 @@ def replica_count(result: Result, replicas: int | None) -> int:
     return replicas or there
 
 
-def simulate_dents(replica: RebuiltReplica, time: float) -> Dents:
+def simulate_dents(
+    replica: RebuiltReplica, time: float, progress: Callable[[float], None] = lambda seconds: None
+) -> Dents:
     """Return the dents of a replica simulated for a time [s], even longer than the result's.
 
+    Args:
+        progress: as for sim_core.simulate.
+
     Raises:
-        InputError: the time is too long to simulate.
+        InputError: as require_dent_time.
         sim_core.SimulationError: the simulation had to stop.
     """
     from sim_core import simulate
 
+    require_dent_time(time)
+    scene = replace(replica.scene, duration=time)
+    impacts = simulate(scene, progress=progress).impacts
+    return dents_on_part(replica.on_chamber(impacts), replica.chamber, replica.design)
+
+
+def require_dent_time(time: float) -> None:
+    """Raise InputError for a time [s] that is too long to simulate."""
     if not 0.0 < time <= MAX_SIMULATED_TREATMENT:
         raise InputError(
             f"--at-s: given {time:g}; a dent map simulates all of it: more than 0, at most "
             f"{MAX_SIMULATED_TREATMENT:g} s are supported"
         )
-    impacts = simulate(replace(replica.scene, duration=time)).impacts
-    return dents_on_part(replica.on_chamber(impacts), replica.chamber, replica.design)
+
+
+def simulation_seconds(replica: RebuiltReplica, time: float) -> float:
+    """About how long simulating a replica for a time [s] takes, from the beginning of it."""
+    from sim_core import simulate
+
+    scene, seconds = replica.scene, 0.0
+    for part in (0.001, COSTED):  # the first loads compiled code
+        began = perf_counter()
+        simulate(replace(scene, duration=part * time))
+        seconds = perf_counter() - began
+    return seconds * (scene.warmup + time) / (scene.warmup + COSTED * time)
 
 
 def dented_share(dents: Dents, chamber: Chamber) -> float:

@@ -13,6 +13,7 @@ from chamberopt.chamber.build import Chamber
 from chamberopt.chamber.part import Part, PartOfFile
 from chamberopt.common.errors import InputError
 from chamberopt.common.npz_files import load_record
+from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE
 from chamberopt.geometry.mesh_io.part_mesh import PartMesh
 from chamberopt.geometry.mesh_io.readers.raw_mesh import ElementNumbers
 from chamberopt.geometry.mesh_io.units import METRES_PER
@@ -57,6 +58,7 @@ def _require_sound(chamber: Chamber) -> None:
         ("target", part.target, "b", (own,), None),
         ("part's rotation", file.rotation, "f8", (3, 3), None),
         ("part's shift", file.shift, "f8", (3,), None),
+        *((f"zone {name}", zone, "b", (own,), None) for name, zone in part.zones.items()),
         *_mesh_columns("part", part.vertices, part.triangles),
         *_mesh_columns("simulated part", file.simulated.vertices, file.simulated.triangles),
         ("elements", file.simulated.elements, "i", (own,), None),
@@ -81,6 +83,9 @@ def _require_sound(chamber: Chamber) -> None:
             raise ValueError(f"{name} has a number that is not finite, or too large")
         if limits and len(column) and not limits[0] <= column.min() <= column.max() < limits[1]:
             raise ValueError(f"{name} is not from {limits[0]} to {limits[1] - 1}")
+    for tag, surface in ((TAG_PART, "part"), (TAG_SONOTRODE, "sonotrode")):
+        if not (chamber.tags == tag).any():
+            raise ValueError(f"without a {surface} in the cavity")
     if part.unit not in METRES_PER:
         raise ValueError(f"unit {part.unit!r}")
     if type(chamber.volume) is not float or not 0.0 < chamber.volume <= LARGEST:

@@ -17,7 +17,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.limits import MAX_RESULT_BYTES, parse_json, read_limited
 from chamberopt.common.number_text import estimate_text, plain
-from chamberopt.coverage.metrics import METRICS
+from chamberopt.coverage.metrics import find_metric
 from chamberopt.design.design import validate
 from chamberopt.design.load import Design
 from chamberopt.geometry.triangles import areas
@@ -39,6 +39,15 @@ if TYPE_CHECKING:
     from chamberopt.simulation.evaluation import Evaluation
 
 FORMAT = 5
+# Folders of other commands, by the file that each has: what they are, and where that can be seen.
+OTHER_FOLDERS = {
+    "calibration.json": "a calibration: see calibration.txt and calibration.png in it; designs "
+    "take its machine.toml",
+    "strip.json": "a virtual strip: see strip.png and strip.csv in it",
+    "accuracy.json": "an accuracy study: see accuracy.png and accuracy.csv in it",
+    "compare.json": "a comparison: see compare.txt in it",
+    "check.json": "a check of a design: see check.json in it",
+}
 RESTORE = "restore the folder from where it came, or simulate again"
 
 
@@ -98,9 +107,9 @@ def load_result(path: str | Path) -> Result:
                 "with the command that began it, such as: "
                 f"chamberopt run STUDY.toml --out {shlex.quote(str(folder))}"
             )
-        raise InputError(
-            f"{folder}: not a results folder, {RESULT} is missing; give one made by simulate or run"
-        )
+        is_other = (text for name, text in OTHER_FOLDERS.items() if (folder / name).is_file())
+        what = next(is_other, f"not a results folder, {RESULT} is missing")
+        raise InputError(f"{folder}: {what}; here a folder made by simulate or run is needed")
     with _damage_explained(file):
         data = _read_data(file)
         if data["kind"] == "sweep":
@@ -118,9 +127,9 @@ def load_result(path: str | Path) -> Result:
             objective_name=data["objective"]["name"],
             objective=Estimate.from_json(data["objective"]),
             metrics={
-                name: Estimate.from_json(data["metrics"][name])
-                for name, metric in METRICS.items()
-                if name in data["metrics"] or metric.required
+                name: Estimate.from_json(found)
+                for name, found in data["metrics"].items()
+                if find_metric(name)
             },
             part_sha256=data["part_sha256"],
             seeds=(data["seed"], data["stream"]),

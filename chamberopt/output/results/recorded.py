@@ -12,7 +12,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from chamberopt.common.errors import InputError, first_wrong_value
-from chamberopt.coverage.metrics import METRICS, parse_objective
+from chamberopt.coverage.metrics import METRICS, find_metric, parse_objective
 
 ROUNDING = 1e-9
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -20,6 +20,7 @@ Positive = Annotated[float, Field(ge=0.0)]
 Count = Annotated[int, Field(ge=0)]
 Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 Bounds = Annotated[list[float], Field(min_length=2, max_length=2)]
+Texts = Annotated[list[str], Field(min_length=1)]
 Curve = Annotated[list[float], Field(min_length=1)]
 
 
@@ -97,6 +98,23 @@ class _AtTime(_Table):
     p05_half_width: Positive | None = None
 
 
+class _ZoneLimit(_Table):
+    key: str
+    limit: float
+    metric: str
+    standing: Literal["met", "not met", "not known"]
+
+
+class _Zone(_Table):
+    """A zone of the part, and whether its figures meet its limits."""
+
+    name: str
+    triangles: Count
+    exposed_area_mm2: Positive
+    reachable_share: Share
+    limits: list[_ZoneLimit]
+
+
 class _Chamber(_Table):
     volume_mm3: Positive
     target_exposed_area_mm2: Positive
@@ -116,19 +134,19 @@ class _Advice(_Table):
 class _Slice(_Table):
     """The model of a study's score along one parameter."""
 
-    flat: Bounds
+    flat: Bounds | Texts
+    choices: list[str] = []
     share_of_variance: float
     values: Curve
     mean: Curve
     half_width: Curve
     main_effect: Curve
+    or_worse: list[bool] | None = None  # results before 0.2 lack it
 
     @model_validator(mode="after")
     def _is_as_long(self) -> Self:
-        if (
-            len({len(one) for one in (self.values, self.mean, self.half_width, self.main_effect)})
-            > 1
-        ):
+        curves = (self.values, self.mean, self.half_width, self.main_effect, self.or_worse)
+        if len({len(one) for one in curves if one is not None}) > 1:
             raise ValueError("curves of different lengths")
         return self
 
@@ -141,7 +159,7 @@ class _Model(_Table):
 
 
 class _Candidate(_Table):
-    parameters: dict[str, float]
+    parameters: dict[str, float | str]
 
 
 class _FrontPoint(_Candidate):
@@ -175,14 +193,14 @@ class _Accuracies(_Table):
 
 class _Study(_Table):
     algorithm: str
-    vary: dict[str, Bounds]
+    vary: dict[str, Bounds | Texts]
     evaluations: Count
     accuracy: _Accuracies
     failed: Count
     missing_a_constraint: Count
     gain: _Estimate
     improved: bool
-    at_bounds: list[str]
+    notes: list[str] = []
     model: _Model | None = None
     front: list[_FrontPoint] = []
     best: _Candidate
@@ -197,6 +215,56 @@ class _Study(_Table):
         names += [set(self.model.parameters)] if self.model else []
         if any(one != set(self.vary) for one in names):
             raise ValueError("other parameters than vary")
+        return self
+
+
+class _Range(_Table):
+    """A number with a tolerance, and the value at which it was simulated too."""
+
+    low: float
+    nominal: float
+    high: float
+    changed_to: float
+
+
+class _Ends(_Table):
+    low: _Known
+    high: _Known
+
+
+class _InCorner(_Table):
+    predicted: _Known
+    simulated: _Known
+    agrees: bool
+
+
+class _ToleratedFigure(_Table):
+    nominal: _Known
+    q05: _Known
+    q95: _Known
+    lowest: _Known
+    highest: _Known
+    effects: dict[str, _Ends]
+    corner: _InCorner | None
+
+
+class _Tolerances(_Table):
+    """Figures over the box of tolerances."""
+
+    box: dict[str, _Range]
+    worst_for: str
+    corner: dict[str, float]
+    figures: dict[str, _ToleratedFigure]
+    notes: list[str]
+
+    @model_validator(mode="after")
+    def _is_of_one_box(self) -> Self:
+        of_numbers = [set(one.effects) for one in self.figures.values()]
+        of_numbers += [set(self.corner)] if self.corner else []
+        if not self.box or any(one != set(self.box) for one in of_numbers):
+            raise ValueError("other numbers than those of the box")
+        if self.worst_for and self.worst_for not in self.figures:
+            raise ValueError(f"worst_for: {self.worst_for!r} is none of the figures")
         return self
 
 
@@ -225,6 +293,7 @@ class _Candidates(_Any):
 
     objective: _Objective
     metrics: dict[str, _Estimate]
+    zones: list[_Zone] = []
     field: _Field
     coverage_against_time: list[_AtTime]
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)]
@@ -241,17 +310,21 @@ class _Candidates(_Any):
     part_unit: str
     shape_sha256: Digest | Literal[""] = ""
     study: _Study | None = None
+    tolerances: _Tolerances | None = None
 
     @model_validator(mode="after")
     def _is_whole(self) -> Self:
         if missing := [name for name in self.REQUIRED if name not in self.metrics]:
             raise ValueError(f"metrics: {missing[0]} is missing")
-        if unknown := [name for name in self.field.double_gauge if name not in METRICS]:
+        limited = {limit.metric for zone in self.zones for limit in zone.limits}
+        if missing := sorted(limited - self.metrics.keys()):
+            raise ValueError(f"zones: {missing[0]} is limited and not among the metrics")
+        if unknown := [name for name in self.field.double_gauge if not find_metric(name)]:
             raise ValueError(f"field.double_gauge: {unknown[0]!r} is no metric")
         if (self.kind == "study") != (self.study is not None):
             raise ValueError(f"study: belongs to a study, and this is a {self.kind}")
         for name, found in self.metrics.items():
-            metric = METRICS.get(name)
+            metric = find_metric(name)
             value = found.value or 0.0
             if metric and not metric.lowest - ROUNDING <= value <= metric.highest + ROUNDING:
                 limits = f"{metric.lowest:g} to {metric.highest:g}"

@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any
 from chamberopt.common.files import write_text
 from chamberopt.common.npz_files import save_record
 from chamberopt.common.versions import versions
-from chamberopt.coverage.metrics import METRICS, exposed_target
+from chamberopt.coverage.metrics import exposed_target, find_metric
 from chamberopt.coverage.part_impacts import HITS_FILE, save_hits, sort_hits_by_triangle
 from chamberopt.design.load import Design, save_design, with_paths_from
 from chamberopt.optimize import pareto
 from chamberopt.optimize.storage.study_folder import RESULT
 from chamberopt.optimize.storage.trial_log import read_trials, trials_as_csv
+from chamberopt.optimize.study.constraints import judge_zones
 from chamberopt.output.results.chamber_file import CHAMBER_FILE
 from chamberopt.output.results.load import FORMAT, content_sha256, file_sha256
 from chamberopt.output.vtp_files import write_chamber, write_coverage
@@ -25,6 +26,7 @@ from chamberopt.simulation.complete_result import CandidateResult
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from chamberopt.chamber.build import Chamber
     from chamberopt.common.estimate import Estimate
     from chamberopt.optimize.run_study import StudyResult
     from chamberopt.optimize.run_sweep import SweepResult
@@ -134,10 +136,8 @@ def _write_candidate(folder: Path, candidate: CandidateResult) -> dict[str, Any]
         "format": FORMAT,
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "objective": {"name": evaluation.objective_name, **_with_unit(evaluation.objective, "")},
-        "metrics": {
-            name: _with_unit(value, METRICS[name].unit)
-            for name, value in evaluation.metrics.items()
-        },
+        "metrics": {name: _with_unit_of(name, value) for name, value in evaluation.metrics.items()},
+        **({"zones": _about_zones(design, chamber, evaluation)} if design.zones else {}),
         "field": _about_field(design, evaluation),
         "coverage_against_time": candidate.time_curve,
         "seed": design.process.seed,
@@ -162,6 +162,21 @@ def _write_candidate(folder: Path, candidate: CandidateResult) -> dict[str, Any]
     }
 
 
+def _about_zones(design: Design, chamber: Chamber, evaluation: Evaluation) -> list[dict[str, Any]]:
+    """Each zone, and whether its figures meet its limits; the figures are among the metrics."""
+    judged = judge_zones(design, evaluation.metrics)
+    return [
+        {
+            "name": name,
+            "triangles": int(zone.sum()),
+            "exposed_area_mm2": float(chamber.exposed_area[zone].sum() * 1e6),
+            "reachable_share": evaluation.zones[name],
+            "limits": judged[name],
+        }
+        for name, zone in chamber.part.zones.items()
+    ]
+
+
 def _about_field(design: Design, evaluation: Evaluation) -> dict[str, Any]:
     """The windows that the figures of coverage belong to, and the figures of twice the radius."""
     found = evaluation.resolution
@@ -181,8 +196,7 @@ def _about_field(design: Design, evaluation: Evaluation) -> dict[str, Any]:
         "crease_share": evaluation.crease_share,
         "alike_places": evaluation.alike,
         "double_gauge": {
-            name: _with_unit(value, METRICS[name].unit)
-            for name, value in evaluation.metrics_of_wide.items()
+            name: _with_unit_of(name, value) for name, value in evaluation.metrics_of_wide.items()
         },
     }
 
@@ -196,7 +210,7 @@ def _about_study(result: StudyResult) -> dict[str, Any]:
     search = [trial for trial in result.trials if trial.stage == "search"]
     return {
         "algorithm": result.algorithm,
-        "vary": {name: list(bounds) for name, bounds in result.study.vary.items()},
+        "vary": {name: list(one.ends) for name, one in result.study.vary.items()},
         "evaluations": len(search),
         "accuracy": {
             "search": result.study.at_search_accuracy(
@@ -211,7 +225,7 @@ def _about_study(result: StudyResult) -> dict[str, Any]:
         ),
         "gain": _with_unit(result.gain, ""),
         "improved": result.improved,
-        "at_bounds": list(result.at_bounds),
+        "notes": list(result.notes),
         **({"model": result.sensitivity.as_json()} if result.sensitivity else {}),
         **({"front": pareto.front_json(result)} if result.study.objective.pareto else {}),
         "best": {"searched_as": result.best.searched, "parameters": result.best.parameters},
@@ -219,7 +233,7 @@ def _about_study(result: StudyResult) -> dict[str, Any]:
             "parameters": result.start.parameters,
             "objective": _with_unit(result.start.evaluation.objective, ""),
             "metrics": {
-                name: _with_unit(value, METRICS[name].unit)
+                name: _with_unit_of(name, value)
                 for name, value in result.start.evaluation.metrics.items()
             },
         },
@@ -246,7 +260,7 @@ def _about_sweep(sweep: SweepResult) -> dict[str, Any]:
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "sweep": {
             "objective": study.objective.goals[0],
-            "vary": {name: list(bounds) for name, bounds in study.vary.items()},
+            "vary": {name: list(one.ends) for name, one in study.vary.items()},
             "method": plan.method,
             "count": plan.count,
             "seed": plan.seed,
@@ -264,6 +278,11 @@ def _about_sweep(sweep: SweepResult) -> dict[str, Any]:
         "notes": [best_row_note(sweep)],
         "versions": versions(),
     }
+
+
+def _with_unit_of(name: str, estimate: Estimate) -> dict[str, Any]:
+    metric = find_metric(name)
+    return _with_unit(estimate, metric.unit if metric else "")
 
 
 def _with_unit(estimate: Estimate, unit: str) -> dict[str, Any]:

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from chamberopt.design.shapes import TAG_WALL, is_sonotrode
-from chamberopt.output.plots.colours import FEW_DENTS, UNREACHED
+from chamberopt.output.plots.colours import FEW_DENTS, OUTSIDE, UNREACHED, zone_colour
 from chamberopt.output.viewer.drawn_part import DrawnPart
-from chamberopt.output.viewer.view_state import DEFAULT_VIEW
 from chamberopt.output.vtp_files import Surface, pyvista
 
 GREY, DARK, GLASS, SONOTRODE, BACKGROUND = "#b9bec4", "#2b3440", "#9db7cc", "#e08a2e", "white"
 FAULT, PALE = "#d01c1c", "#eceff2"
-VIEW_FROM_BELOW = (1.0, -1.4, -0.8)  # a little below, where the shot comes from
-SHARP_EDGE = 30  # degrees between the triangles at an edge of the chamber that is drawn
+SHARP_EDGE = 30  # degrees between the triangles at an edge that is drawn
 ROUND_STEPS = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)  # of colour bars, times powers of ten
 LIFT = 0.1  # of discs off the surface, in their radii: the facets of a round edge do not hide them
 DISC_SIDES = 24
+SCATTER = "counted dents scatter: single places look less even than they are"
 NO_RENDER = {"render": False, "reset_camera": False}  # until everything is in the plotter
 
 
@@ -29,48 +29,15 @@ def light(plotter: Any) -> None:
     plotter.add_light(pyvista().Light(light_type="headlight"))
 
 
-def draw_in_chamber(
-    plotter: Any, part: DrawnPart, chamber: Surface, title: str, limits: tuple[float, float]
-) -> None:
-    """Draw the part inside the glass chamber, over the sonotrode."""
-    light(plotter)
-    add_part(plotter, part, limits)
-    add_chamber(plotter, chamber)
-    text = plotter.add_text(escape_dollars(title), position="upper_left", font_size=13, color=DARK)
-    text.prop.background_color, text.prop.background_opacity = BACKGROUND, 0.7  # over a tall part
-    legend = "orange: sonotrode   grey: not in the target"
-    plotter.add_text(legend, position="lower_left", font_size=9, color=DARK)
-    plotter.camera_position = [DEFAULT_VIEW, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
-    plotter.reset_camera()
-    plotter.enable_anti_aliasing("ssaa")
-
-
-def draw_target(plotter: Any, part: DrawnPart, limits: tuple[float, float], bar: bool) -> None:
-    """Draw the target from near, with a colour bar if wanted."""
-    light(plotter)
-    target = add_part(plotter, part, limits)[0]
-    if bar:
-        steps, number_format = colour_bar_ticks(limits)
-        plotter.add_scalar_bar(
-            part.quantity.title + "\n", mapper=target.mapper, vertical=True, fmt=number_format,
-            n_labels=steps + 1, color=DARK, width=0.06, height=0.55, position_x=0.88,
-            position_y=0.2, title_font_size=20, label_font_size=20,
-        )  # fmt: skip
-    legend = "   ".join(f"{name}: {meaning}" for _, name, meaning in without_colour(part))
-    plotter.add_text(legend, position="lower_left", font_size=9, color=DARK)
-    plotter.camera_position = [VIEW_FROM_BELOW, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
-    plotter.reset_camera(bounds=part.whole.bounds)
-    plotter.camera.SetWindowCenter(0.14 if bar else 0.0, 0.0)  # makes room for the colour bar
-    plotter.enable_anti_aliasing("ssaa")
-
-
-def without_colour(part: DrawnPart) -> list[tuple[str, str, str]]:
-    """(colour, its name, meaning) of what tells no value on the target, where there is any."""
+def colour_meanings(parts: Sequence[DrawnPart]) -> list[tuple[str, str]]:
+    """Colours that stand for no value and what they mean, those that there are."""
     entries = (
-        (not np.all(part.target["resolved"]), FEW_DENTS, "dark grey", "too few dents simulated"),
-        (part.unreached.n_cells > 0, UNREACHED, "brown", "out of the reach of the shot"),
+        (any(part.rest.n_cells for part in parts), GREY, "not in the target"),
+        (any(not np.all(part.target["resolved"]) for part in parts), FEW_DENTS, "too few dents"),
+        (any(part.unreached.n_cells for part in parts), UNREACHED, "out of the shot's reach"),
+        (any(part.outside.n_cells for part in parts), OUTSIDE, "target outside the chamber"),
     )
-    return [(colour, name, meaning) for there, colour, name, meaning in entries if there]
+    return [(colour, meaning) for there, colour, meaning in entries if there]
 
 
 def add_part(
@@ -84,6 +51,8 @@ def add_part(
     Returns:
         The actors; the mapper of the first has the colours.
     """
+    if part.quantity.name == "zones":
+        return _add_zones(plotter, part)
     pale = np.zeros(part.target.n_cells, dtype=bool) if pale is None else pale
     resolved = np.asarray(part.target["resolved"])
     style = {"ambient": 0.7, "diffuse": 0.3, **NO_RENDER}
@@ -100,6 +69,7 @@ def add_part(
         (part.target.extract_cells(np.flatnonzero(pale)), PALE),
         (part.target.extract_cells(np.flatnonzero(~resolved & ~pale)), FEW_DENTS),
         (part.unreached, UNREACHED),
+        (part.outside, OUTSIDE),
         (part.rest, GREY),
     ):
         if surface.n_cells:
@@ -107,6 +77,18 @@ def add_part(
             actors.append(plotter.add_mesh(surface, color=colour, **style))
     for actor in actors:
         actor.prop.interpolation = "Phong"  # by the normals of the surface, not of its triangles
+    return actors
+
+
+def _add_zones(plotter: Any, part: DrawnPart) -> list[Any]:
+    """Add the part with each zone in its colour; without values, there is no colour bar."""
+    actors = []
+    for number, surface in part.zones.items():
+        colour = zone_colour(number - 1) if number else GREY
+        actors.append(
+            plotter.add_mesh(surface, color=colour, ambient=0.6, diffuse=0.4, **NO_RENDER)
+        )
+        actors[-1].prop.interpolation = "Phong"
     return actors
 
 
@@ -128,6 +110,18 @@ def add_chamber(plotter: Any, chamber: Surface) -> tuple[dict[int, Any], list[An
         plotter.add_mesh(wall, color=GLASS, opacity=0.16, specular=0.3, **style),
         plotter.add_mesh(edges, color=DARK, line_width=2, opacity=0.6, **style),
     ]
+
+
+def add_edges(plotter: Any, part: Surface) -> None:
+    """Add the sharp edges of a part as thin lines."""
+    whole = pyvista().PolyData(part.points, part.faces).clean()
+    edges = whole.extract_feature_edges(
+        SHARP_EDGE, boundary_edges=False, non_manifold_edges=False, manifold_edges=False
+    )
+    if edges.n_cells:
+        mapper = plotter.add_mesh(edges, color=DARK, line_width=3, opacity=0.6, **NO_RENDER).mapper
+        mapper.SetResolveCoincidentTopologyToPolygonOffset()  # in front of the part's surface
+        mapper.SetRelativeCoincidentTopologyLineOffsetParameters(-2.0, -4.0)
 
 
 class Discs(NamedTuple):

@@ -8,11 +8,13 @@ import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
+from chamberopt.design.shapes import TAG_PART
 from chamberopt.geometry.triangles import area_vectors
 from chamberopt.output.plots.quantities import QUANTITIES, Quantity
-from chamberopt.output.vtp_files import Surface, pyvista
+from chamberopt.output.vtp_files import ZONE, Surface, pyvista
 
 NEARLY_ALL = (0.01, 0.985)  # shares of the area at the ends of the colour scale
+ON_BOUNDARY = 1e-4  # of the length of the part's surface: what is nearer than that is on it
 ROUNDS = 12  # of averages over neighbours, before which a place counts as resolved or not
 
 
@@ -22,15 +24,24 @@ class DrawnPart:
     whole: the target.
     target: where a ball can touch it, with point data "shown" in the quantity's unit and cell data
         "resolved": whether the simulated dents are enough to tell.
-    unreached: where no ball can touch it.
+    unreached: where no ball can touch it, in the chamber.
+    outside: where it is outside the chamber; empty if the chamber is not given.
+    inside: target and unreached together.
+    surface: all of the part.
     rest: the part beside the target.
+    zones: the surface of each zone by its number, from 1; 0 is what is in none. Empty without any.
     quantity: the one in "shown".
 
     A triangle belongs to what most of its corners are. All have cell data "triangle", the number of
     the part's triangle, and "area" [mm²].
     """
 
-    def __init__(self, field: Surface, quantity: Quantity = QUANTITIES["coverage"]) -> None:
+    def __init__(
+        self,
+        field: Surface,
+        quantity: Quantity = QUANTITIES["coverage"],
+        chamber: Surface | None = None,
+    ) -> None:
         corners = np.asarray(field.regular_faces)
         vectors = area_vectors(np.asarray(field.points, dtype=float), corners)
         field.cell_data["area"] = np.linalg.norm(vectors, axis=1)
@@ -53,10 +64,18 @@ class DrawnPart:
                 return empty
             return field.extract_cells(chosen).extract_surface(algorithm="dataset_surface")
 
-        self.whole, self.rest = cells(on_target), cells(~on_target)
+        self.surface, self.whole, self.rest = field, cells(on_target), cells(~on_target)
         field.cell_data["resolved"] = resolved
         self.target = cells(on_target & reached)
-        self.unreached = cells(on_target & ~reached)
+        outside = on_target & ~reached
+        if chamber is not None:
+            outside[outside] = _is_outside(field.extract_cells(outside), chamber)
+        else:
+            outside[:] = False
+        self.unreached, self.outside = cells(on_target & ~reached & ~outside), cells(outside)
+        self.inside = cells(on_target & ~outside) if outside.any() else self.whole
+        zone = np.asarray(field[ZONE]) if ZONE in field.cell_data else np.zeros(0)
+        self.zones = {int(number): cells(zone == number) for number in np.unique(zone)}
         self.show(quantity)
 
     def show(self, quantity: Quantity, times: float = 1.0) -> None:
@@ -65,6 +84,8 @@ class DrawnPart:
         times: the peening time over the treatment time; scales coverage and what grows with time.
         """
         self.quantity = quantity
+        if quantity.column == ZONE:  # drawn by `zones`
+            return
         self.target["shown"] = self.values(quantity, times)
 
     def values(self, quantity: Quantity, times: float = 1.0) -> np.ndarray:
@@ -82,6 +103,18 @@ class DrawnPart:
         """Which triangles of `target` have at least a coverage [%]; `times` as in show."""
         values = self.values(QUANTITIES["coverage"], times)
         return np.asarray(values[self.target.regular_faces].mean(axis=1) >= share)
+
+
+def _is_outside(surface: Surface, chamber: Surface) -> np.ndarray:
+    """Which triangles (c,) of a part's surface are no boundary of its chamber."""
+    of_part = np.asarray(chamber["tag"]) == TAG_PART
+    if not surface.n_cells or not of_part.any():
+        return np.zeros(surface.n_cells, dtype=bool)
+    boundary = chamber.extract_cells(of_part).extract_surface(algorithm="dataset_surface")
+    middle = surface.cell_centers().points
+    _, nearest = boundary.find_closest_cell(middle, return_closest_point=True)
+    away = np.linalg.norm(nearest - middle, axis=1)
+    return np.asarray(away > ON_BOUNDARY * boundary.length)
 
 
 def _majority(marked: np.ndarray, among: np.ndarray, corners: np.ndarray) -> np.ndarray:

@@ -16,9 +16,13 @@ from chamberopt.output.plots.quantities import QUANTITIES
 from chamberopt.output.results.load import Result, read_field, read_part, summary, unchanged_file
 from chamberopt.output.viewer.drawn_part import DrawnPart, colour_range
 from chamberopt.output.viewer.view_state import ViewState
-from chamberopt.output.vtp_files import CHAMBER, COVERAGE, PART, read_surface
+from chamberopt.output.vtp_files import CHAMBER, COVERAGE, PART, ZONE, read_surface
 
 FULL_SCALE = (0.0, 100.0)  # % of coverage: the same at all times
+_REMEDIES = {  # where a result lacks a quantity
+    "almen": "give the design a calibration to strips and simulate again",
+    "zones": "give the design [[zones]] and simulate again",
+}
 
 
 @dataclass(frozen=True)
@@ -28,6 +32,7 @@ class ResultInfo:
     treatment_s: peening time.
     longest_s: end of the time slider.
     sha256: of each data file by its name.
+    zones: names of the part's zones.
     """
 
     folder: str
@@ -35,6 +40,7 @@ class ResultInfo:
     treatment_s: float
     longest_s: float
     sha256: dict[str, str]
+    zones: Sequence[str] = ()
 
 
 def result_info(result: Result) -> ResultInfo:
@@ -47,6 +53,7 @@ def result_info(result: Result) -> ResultInfo:
         treatment_s=treatment,
         longest_s=max([treatment, *times]),
         sha256=result.sha256,
+        zones=[zone.name for zone in result.design.zones],
     )
 
 
@@ -58,7 +65,7 @@ class OpenedResult:
         self.folder = Path(info.folder)
         self.surface = read_part(self._path(PART))
         self.chamber = read_surface(self._path(CHAMBER), ("tag",))
-        self.part = DrawnPart(read_field(self._path(COVERAGE), self.surface))
+        self.part = DrawnPart(read_field(self._path(COVERAGE), self.surface), chamber=self.chamber)
 
     def _path(self, name: str) -> Path:
         return unchanged_file(self.folder, name, self.info.sha256)
@@ -66,7 +73,7 @@ class OpenedResult:
     @property
     def quantities(self) -> list[str]:
         """Names of the quantities that the result has."""
-        there = self.part.whole.point_data
+        there = [*self.part.whole.point_data, *([ZONE] if self.part.zones else [])]
         return [name for name, one in QUANTITIES.items() if one.column in there]
 
     @cached_property
@@ -81,9 +88,10 @@ class OpenedResult:
     def show(self, state: ViewState) -> None:
         """Colour the part by the state's quantity; InputError if the result does not have it."""
         if state.quantity not in self.quantities:
+            remedy = _REMEDIES.get(state.quantity, "simulate again")
             raise InputError(
                 f"--quantity {state.quantity}: {self.folder / COVERAGE} does not have it; "
-                "simulate again"
+                f"{remedy}, or choose one of {', '.join(self.quantities)}"
             )
         self.part.show(QUANTITIES[state.quantity], self.time_ratio(state))
 
@@ -106,7 +114,11 @@ class OpenedResult:
             return [*lines, "outside the chamber or hidden"]
         if not surface["target"][triangle]:
             lines.append("not in the target")
+        of_zones = [name for name in self.info.zones if surface[f"{ZONE}_{name}"][triangle]]
+        lines += [f"zone {name}" for name in of_zones]
         for name in self.quantities:
+            if name == "zones":
+                continue
             quantity, value = QUANTITIES[name], self._value(name, triangle, state)
             text = f"{value:.4g} {quantity.unit}" if np.isfinite(value) else "none"
             lines.append(f"{quantity.label}: {text}")
@@ -133,6 +145,8 @@ def colour_limits(results: Sequence[OpenedResult], state: ViewState) -> tuple[fl
     """Show the state's quantity on all results and return their common colour scale."""
     for one in results:
         one.show(state)
+    if state.quantity == "zones":
+        return 0.0, 1.0  # each has a colour of its own
     if state.quantity == "coverage" and state.time_s is not None:
         return FULL_SCALE
     return colour_range([one.part for one in results])

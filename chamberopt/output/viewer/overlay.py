@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections.abc import Sequence
 from typing import Any
@@ -11,16 +12,19 @@ import numpy as np
 from chamberopt.geometry.triangles import unit_normals
 from chamberopt.output.plots.quantities import Quantity
 from chamberopt.output.viewer.actors import DARK, NO_RENDER, colour_bar_ticks, escape_dollars
+from chamberopt.output.viewer.camera import Room
 from chamberopt.output.vtp_files import pyvista
 
-SMALL_FONT, LARGE_FONT = 8, 10  # in views of at least FULL_WIDTH pixels
+SMALL_FONT, LARGE_FONT = 9, 11  # in views of at least FULL_WIDTH pixels
 FULL_WIDTH = 750
 MIN_SCALE = 0.75  # of fonts in narrower views
 LINE_HEIGHT, LETTER_WIDTH = 2.3, 1.0  # pixels for each unit of font size; the width is a mean
 MIN_LETTERS = 12  # in a line
+TITLE, NUMBERS = 0.72, 0.27  # of the width of a view, for its title and a triangle's numbers
 EDGE = 10  # pixels between text and the edge of the view
 MARK = "#d6006c"  # of the chosen triangle; in none of the colour maps
 BINS = 20
+NUMBER = re.compile(r"\S+ \S+ ± \S+( %)?")
 
 Size = tuple[int, int]
 """Width and height of a view [pixels]."""
@@ -33,20 +37,49 @@ def fonts(size: Size) -> tuple[int, int]:
 
 
 def wrap(text: str, width: float, font: int) -> str:
-    """Wrap text to lines of a width [pixels]."""
+    """Wrap text to lines of a width [pixels]; a number stays with its interval and its unit."""
+    text = NUMBER.sub(lambda one: one[0].replace(" ", "\xa0"), text)
     letters = max(int(width / (LETTER_WIDTH * font)), MIN_LETTERS)
-    return "\n".join("\n".join(textwrap.wrap(line, letters)) for line in text.splitlines())
+    lines = (textwrap.wrap(line, letters) for line in text.splitlines())
+    return "\n".join("\n".join(several) for several in lines).replace("\xa0", " ")
+
+
+def show_margins(plotter: Any, room: Room, size: Size) -> None:
+    """Keep the part out of the room for text, however it is turned: white at the view's sides."""
+    import vtk
+
+    left, right = room.left / size[0], 1.0 - room.right / size[0]
+    low, high = room.below / size[1], 1.0 - room.above / size[1]
+    for number, (x0, x1, y0, y1) in enumerate(
+        ((0.0, left, 0.0, 1.0), (right, 1.0, 0.0, 1.0), (0.0, 1.0, 0.0, low), (0.0, 1.0, high, 1.0))
+    ):
+        mapper, place = vtk.vtkPolyDataMapper2D(), vtk.vtkCoordinate()
+        place.SetCoordinateSystemToNormalizedViewport()
+        mapper.SetTransformCoordinate(place)
+        corners = np.array([[x0, y0, 0.0], [x1, y0, 0.0], [x1, y1, 0.0], [x0, y1, 0.0]])
+        mapper.SetInputData(pyvista().PolyData(corners, [4, 0, 1, 2, 3]))
+        strip = vtk.vtkActor2D()
+        strip.SetMapper(mapper)
+        strip.GetProperty().SetColor(1.0, 1.0, 1.0)
+        plotter.add_actor(strip, name=f"margin {number}", pickable=False, **NO_RENDER)
+
+
+def title_height(title: str, size: Size) -> float:
+    """Height [pixels] of what show_title writes."""
+    large = fonts(size)[1]
+    return 2 * EDGE + LINE_HEIGHT * large * len(wrap(title, TITLE * size[0], large).splitlines())
 
 
 def show_title(plotter: Any, title: str, lines: Sequence[str], size: Size) -> None:
     """Write the title in the upper left, and below it the lines on a triangle, if any."""
     small, large = fonts(size)
-    title = wrap(title, 0.72 * size[0], large)
+    title = wrap(title, TITLE * size[0], large)
     text = _add_text(plotter, "title", title, (EDGE, size[1] - EDGE), large)
     text.prop.justification_vertical = "top"
+    text.prop.background_color, text.prop.background_opacity = "white", 0.85  # over a tall part
     if lines:
         below = size[1] - 3 * EDGE - LINE_HEIGHT * large * len(title.splitlines())
-        numbers = wrap("\n".join(lines), 0.4 * size[0], small)
+        numbers = wrap("\n".join(lines), NUMBERS * size[0], small)
         text = _add_text(plotter, "numbers", numbers, (EDGE, below), small)
         text.prop.justification_vertical = "top"
 
@@ -64,25 +97,35 @@ def show_colour_bar(
     )  # fmt: skip
     bar.DrawAboveRangeSwatchOff()
     bar.DrawNanAnnotationOff()
-    title = "\n".join(textwrap.wrap(quantity.title, 20))
+    lines = textwrap.wrap(quantity.title, 14)
+    if quantity.unit == "%" and limits != (0.0, 100.0):
+        lines.append(f"{limits[0]:g} to {limits[1]:g} %")
+    title = "\n".join(lines)
     place = (size[0] - EDGE, 0.885 * size[1])
     text = _add_text(plotter, "bar title", title, place, fonts(size)[1])
     text.prop.justification_horizontal = "right"
 
 
 def show_legend(
-    plotter: Any, entries: Sequence[tuple[str, str]], remarks: Sequence[str], size: Size
+    plotter: Any, entries: Sequence[tuple[str, str]], remarks: Sequence[str], size: Size, width: int
 ) -> None:
-    """Draw a patch of each colour with its meaning in the lower left, and remarks above."""
+    """Draw a patch of each colour with its meaning in the lower left, and remarks above.
+
+    width: that they may take [pixels].
+    """
     small, _ = fonts(size)
-    line = LINE_HEIGHT * small
-    for row, (colour, meaning) in enumerate(reversed(entries)):
+    line, x, row = LINE_HEIGHT * small, EDGE, 0
+    for number, (colour, meaning) in enumerate(reversed(entries)):
+        taken = int((8 + LETTER_WIDTH * len(meaning)) * small)
+        if x > EDGE and x + taken > width:
+            x, row = EDGE, row + 1
         y = EDGE + row * line
-        patch = _add_text(plotter, f"patch {row}", "    ", (EDGE, y), small)
+        patch = _add_text(plotter, f"patch {number}", "    ", (x, y), small)
         patch.prop.background_color, patch.prop.background_opacity = colour, 1.0
-        _add_text(plotter, f"meaning {row}", meaning, (EDGE + 4 * small, y), small)
-    text = wrap("\n".join(remarks), 0.32 * size[0], small)
-    _add_text(plotter, "remarks", text, (EDGE, 2 * EDGE + len(entries) * line), small)
+        _add_text(plotter, f"meaning {number}", meaning, (x + 4 * small, y), small)
+        x += taken
+    text = wrap("   ".join(one.replace(" ", "\xa0") for one in remarks), width, small)
+    _add_text(plotter, "remarks", text, (EDGE, EDGE + 1.2 * line + row * line), small)
 
 
 def show_histogram(plotter: Any, speed: np.ndarray) -> None:

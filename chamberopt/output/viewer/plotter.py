@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import reduce
 from typing import Any
 
 import numpy as np
 
 from chamberopt.common.errors import InputError
+from chamberopt.design.shapes import is_sonotrode
 from chamberopt.geometry.triangles import unit_normals
+from chamberopt.output.plots.colours import zone_colour
 from chamberopt.output.plots.quantities import QUANTITIES
 from chamberopt.output.viewer import overlay
 from chamberopt.output.viewer.actors import (
@@ -18,8 +19,19 @@ from chamberopt.output.viewer.actors import (
     SONOTRODE,
     add_chamber,
     add_part,
+    colour_meanings,
     light,
-    without_colour,
+)
+from chamberopt.output.viewer.camera import (
+    Room,
+    cells_of,
+    chamber_view,
+    directions,
+    fit_camera,
+    near_directions,
+    near_views,
+    seen_area,
+    target_in_chamber,
 )
 from chamberopt.output.viewer.opened_result import (
     OpenedResult,
@@ -27,15 +39,17 @@ from chamberopt.output.viewer.opened_result import (
     common_quantities,
     same_part,
 )
-from chamberopt.output.viewer.view_state import DEFAULT_VIEW, KEYS, Plane, ViewState
-from chamberopt.output.vtp_files import Surface, pyvista
+from chamberopt.output.viewer.view_state import KEYS, Plane, ViewState
+from chamberopt.output.vtp_files import pyvista, size_text
 
 MAX_RESULTS = 6
 VIEW_SIZES = {1: (1400, 900), 2: (1000, 900), 3: (800, 800), 4: (900, 700)}  # by number of results
 SMALLEST_VIEW = (700, 650)  # with more results
 SCREEN = (1500, 850)  # pixels; a window of this size fits on most screens
-VIEW_ANGLE = 30.0  # degrees
-STEEPER_BELOW = 2.0  # times as steep from below as from above, to see past the sonotrode
+LEFT, RIGHT, BELOW = 20, 150, 90  # pixels for colour bar, legend and so on
+CHART = 0.37  # of the width of a view, for the chart of a triangle
+TRIAD = 0.86, 0.0, 1.0, 0.2  # shares of a view
+LEGEND, BESIDE_CHART, BESIDE_SLIDER = 0.84, 0.6, 0.4  # of the width of a view, for its legend
 PIN_LENGTH = 0.06  # of the mark on a triangle, as a share of the target's size
 
 
@@ -83,6 +97,10 @@ class ResultPlotter:
         self.plotter.enable_anti_aliasing("msaa", multi_samples=8)  # ssaa would move the charts
         self.linked = same_part(results)
         self.quantities = common_quantities(results)
+        for number in range(len(results)):
+            self._select_view(number)
+            self.plotter.add_axes(line_width=2, viewport=TRIAD, color=overlay.DARK)
+        self._seen: dict[tuple[int, bool], np.ndarray] = {}
         self._actors: list[set[str]] = [set() for _ in results]  # drawn here, by name
 
     def draw(self, state: ViewState) -> None:
@@ -99,18 +117,48 @@ class ResultPlotter:
 
     def aim(self, state: ViewState) -> None:
         """Point the cameras, all the same way, at everything that is drawn."""
-        boxes = [_bounds(result, state) for result in self.results]
-        for number, result in enumerate(self.results):
+        groups = [self.results] * len(self.results) if self.linked else [[r] for r in self.results]
+        eye = None
+        for number, group in enumerate(groups):
             self._select_view(number)
-            box = reduce(_union, boxes) if self.linked else boxes[number]
-            eye, middle = _eye(result, state), box.mean(axis=1)
-            up = (0.0, 1.0, 0.0) if abs(eye[2]) > 0.99 * np.linalg.norm(eye) else (0.0, 0.0, 1.0)
-            self.plotter.camera_position = [tuple(middle + eye), tuple(middle), up]
-            self.plotter.camera.view_angle = VIEW_ANGLE  # zoom() narrows it, so it is set each time
-            self.plotter.reset_camera(bounds=box.ravel().tolist())
-            self.plotter.camera.zoom(1.15)
+            eye = eye if self.linked and eye is not None else self._eye(group, state)
+            points = np.concatenate([_points(one, state) for one in group])
+            fit_camera(self.plotter, points, eye, self.view_size(), self._room(number, state))
         if self.linked:
             self.plotter.link_views()
+
+    def _room(self, number: int, state: ViewState) -> Room:
+        """Room of a view for title, colour bar or chart, legend and a triangle's numbers."""
+        size, left, right = self.view_size(), LEFT, RIGHT
+        if state.triangle is not None and state.view in (None, number):
+            left, right = (int(one * size[0]) for one in (overlay.NUMBERS, CHART))
+        of_menu = 3 * ["menu"] if self.menu else []
+        title = "\n".join([self.results[number].info.title, *of_menu])
+        return Room(left, right, BELOW, overlay.title_height(title, size))
+
+    def _eye(self, results: Sequence[OpenedResult], state: ViewState) -> np.ndarray:
+        """Direction to the eye: as wanted, or to the triangle, or where targets are seen."""
+        if state.eye is not None:
+            return np.array(state.eye)
+        first = results[0]
+        if state.triangle is not None and state.triangle < first.surface.n_cells:
+            corners = first.surface.points[first.surface.regular_faces[state.triangle]]
+            return unit_normals(corners) + np.array([0.2, -0.3, 0.1])
+        target = target_in_chamber(first.surface)[0]
+        eyes = directions(steep=False) if state.chamber else near_directions(target)
+        seen = np.hstack([self._seen_area(one, state.chamber, eyes) for one in results])
+        return chamber_view(seen, eyes) if state.chamber else near_views(seen, eyes)[0]
+
+    def _seen_area(self, result: OpenedResult, chamber: bool, eyes: np.ndarray) -> np.ndarray:
+        """What is seen of a result's target, as from seen_area; worked out once."""
+        key = self.results.index(result), chamber
+        if key not in self._seen:
+            target, *hiding = target_in_chamber(result.surface)
+            if chamber:
+                chosen = is_sonotrode(np.asarray(result.chamber["tag"]))
+                hiding.append(cells_of(result.chamber, chosen))
+            self._seen[key] = seen_area(target, hiding, eyes)
+        return self._seen[key]
 
     def pick_triangle(self, x: float, y: float) -> tuple[int, int] | None:
         """Return view and triangle at a point of the window [pixels], None beside the part."""
@@ -162,17 +210,26 @@ class ResultPlotter:
             lines, speed = _triangle_lines(result, state.triangle, state)
             corners = result.surface.points[result.surface.regular_faces[state.triangle]]
             overlay.mark_triangle(plotter, corners, PIN_LENGTH * result.part.whole.length)
+        overlay.show_margins(plotter, self._room(number, state), size)
         title = result.info.title
         if self.menu and number == 0:
             menu = _menu(self.quantities, state)
             title += "\n" + overlay.wrap(menu, 0.6 * size[0], overlay.fonts(size)[1])
         overlay.show_title(plotter, title, lines, size)
         quantity = QUANTITIES[state.quantity]
-        overlay.show_colour_bar(plotter, quantity, limits, part_actors[0], _bar_name(number), size)
-        overlay.show_legend(plotter, _legend(result, state), _remarks(result, state, pale), size)
+        if quantity.name != "zones":
+            bar = part_actors[0], _bar_name(number)
+            overlay.show_colour_bar(plotter, quantity, limits, *bar, size)
+        share = BESIDE_SLIDER if self.menu else BESIDE_CHART if lines else LEGEND
+        wide = int(share * size[0])
+        remarks = _remarks(result, state, pale)
+        overlay.show_legend(plotter, _legend(result, state), remarks, size, wide)
         self._actors[number] = set(plotter.renderer.actors) - before
         if len(speed):
             overlay.show_histogram(plotter, speed)
+            plotter.hide_axes()
+        else:
+            plotter.show_axes()
 
 
 def _bar_name(number: int) -> str:
@@ -198,8 +255,11 @@ def _triangle_lines(
 
 
 def _remarks(result: OpenedResult, state: ViewState, pale: np.ndarray | None) -> list[str]:
-    """Return remarks on time and threshold."""
-    quantity, part, remarks = QUANTITIES[state.quantity], result.part, []
+    """Return remarks on sizes, time and threshold."""
+    quantity, part = QUANTITIES[state.quantity], result.part
+    remarks = [f"part {size_text(result.surface)}"]
+    if state.chamber:
+        remarks.append(f"chamber {size_text(result.chamber)}")
     if quantity.name == "coverage" or quantity.grows:
         treatment = result.info.treatment_s
         time = treatment if state.time_s is None else state.time_s
@@ -213,36 +273,14 @@ def _remarks(result: OpenedResult, state: ViewState, pale: np.ndarray | None) ->
 
 def _legend(result: OpenedResult, state: ViewState) -> list[tuple[str, str]]:
     """Return (colour, meaning) of colours that stand for no value."""
-    entries = [(GREY, "not in the target")]
-    entries += [(colour, meaning) for colour, _, meaning in without_colour(result.part)]
+    if state.quantity == "zones":
+        entries = [(zone_colour(k), name) for k, name in enumerate(result.info.zones)]
+        entries.append((GREY, "in no zone"))
+        return [(SONOTRODE, "sonotrode"), *entries] if state.chamber else entries
+    entries = colour_meanings([result.part])
     if state.below is not None:
         entries.append((PALE, f"coverage {state.below:g} % or more"))
     return [(SONOTRODE, "sonotrode"), *entries] if state.chamber else entries
-
-
-def _eye(result: OpenedResult, state: ViewState) -> np.ndarray:
-    """Return the direction to the eye: as wanted, or in front of the chosen triangle."""
-    if state.eye is not None:
-        return np.array(state.eye)
-    if state.triangle is None or state.triangle >= result.surface.n_cells:
-        return view_of_target(result.part.whole)
-    corners = result.surface.points[result.surface.regular_faces[state.triangle]]
-    return unit_normals(corners) + np.array([0.2, -0.3, 0.1])
-
-
-def view_of_target(target: Surface) -> np.ndarray:
-    """Return a direction to the eye from which much of the target is seen.
-
-    From a little above, where the chamber's edge hides least, unless twice as much of the target is
-    seen from below.
-    """
-    above, below = np.array(DEFAULT_VIEW), np.array(DEFAULT_VIEW) * [1.0, 1.0, -STEEPER_BELOW]
-    area, normal = np.asarray(target["area"]), np.asarray(target.face_normals)
-    from_above, from_below = (
-        float(area @ np.maximum(normal @ eye, 0.0)) / float(np.linalg.norm(eye))
-        for eye in (above, below)
-    )
-    return below if from_below > 2.0 * from_above else above
 
 
 def _cut(actors: Sequence[Any], cut: Plane, result: OpenedResult) -> None:
@@ -254,15 +292,8 @@ def _cut(actors: Sequence[Any], cut: Plane, result: OpenedResult) -> None:
         actor.mapper.AddClippingPlane(plane)
 
 
-def _bounds(result: OpenedResult, state: ViewState) -> np.ndarray:
-    """Return bounds (3, 2) [mm] of what is drawn, or of the target if the chamber is not."""
+def _points(result: OpenedResult, state: ViewState) -> np.ndarray:
+    """Points (k, 3) [mm] of what is drawn, or of the target if the chamber is not."""
     if not state.chamber:
-        return np.reshape(result.part.whole.bounds, (3, 2))
-    boxes = (np.reshape(one.bounds, (3, 2)) for one in (result.surface, result.chamber))
-    return _union(*boxes)
-
-
-def _union(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Return the box round two boxes, (3, 2) each."""
-    low, high = np.minimum(one[:, 0], other[:, 0]), np.maximum(one[:, 1], other[:, 1])
-    return np.stack([low, high], axis=1)
+        return np.asarray(result.part.whole.points)
+    return np.concatenate([result.surface.points, result.chamber.points])

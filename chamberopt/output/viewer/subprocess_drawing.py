@@ -13,11 +13,14 @@ import os
 import subprocess
 import sys
 import tempfile
+import threading
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import write_bytes
+from chamberopt.common.files import require_place, write_bytes
 
 INSTALL = (
     "install OpenGL for machines without a display (Debian: apt install libegl1 libgl1-mesa-dri)"
@@ -77,18 +80,15 @@ def file_path(file: str | Path, suffixes: tuple[str, ...], written: str, option:
     path = Path(file)
     if path.suffix.lower() not in suffixes:
         raise InputError(f"{option}{path}: {written}; give such a name")
-    if not path.resolve().parent.is_dir():
-        raise InputError(f"{option}{path}: the folder does not exist; make it first")
-    if path.is_dir():
-        raise InputError(f"{option}{path}: is a folder; give another name")
-    try:  # now, not after everything has been simulated and drawn
-        with tempfile.TemporaryFile(dir=path.resolve().parent):
-            pass
-    except OSError as error:
-        raise InputError(
-            f"{option}{path}: cannot be written: {error.strerror}; choose another place"
-        ) from None
+    require_place(path, option)
     return path
+
+
+def require_opengl(picture: Path) -> Path:
+    """Return a picture's path; InputError where this machine cannot draw it."""
+    if missing := missing_opengl():
+        raise InputError(f"{picture}: cannot be drawn: {missing}")
+    return picture
 
 
 def write_screenshot(plotter: Any, picture: str) -> None:
@@ -99,7 +99,10 @@ def write_screenshot(plotter: Any, picture: str) -> None:
 
 
 def draw_in_subprocess(
-    job: dict[str, Any], picture: str | Path, max_seconds: float = MAX_SECONDS
+    job: dict[str, Any],
+    picture: str | Path,
+    max_seconds: float = MAX_SECONDS,
+    count: Callable[[int], None] = lambda drawn: None,
 ) -> str | None:
     """Do a drawing job in a process of its own.
 
@@ -107,6 +110,7 @@ def draw_in_subprocess(
         job: as JSON; "draw" names one of viewer.__main__.RENDERERS.
         picture: file to write.
         max_seconds: after which the process is stopped.
+        count: called with each number that the process prints on a line of its own.
 
     Returns:
         None, or one line that says why there is no picture.
@@ -118,26 +122,36 @@ def draw_in_subprocess(
     if missing:
         return f"{name} skipped: {missing}"
     command = [sys.executable, "-m", "chamberopt.output.viewer"]
-    stdin, kept_open = os.pipe()  # it is closed when this process ends, however it ends
-    try:
-        run = subprocess.run(
+    begun = time.monotonic()
+    with (
+        tempfile.TemporaryFile("w+") as errors,
+        subprocess.Popen(
             [*command, json.dumps({**job, "picture": str(picture)})],
             env=without_display(),
-            stdin=stdin,
-            capture_output=True,
+            stdin=subprocess.PIPE,  # it is closed when this process ends, however it ends
+            stdout=subprocess.PIPE,
+            stderr=errors,
             text=True,
-            timeout=max_seconds,
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        return f"{name} skipped: it could not be drawn within {max_seconds:g} s"
-    finally:
-        os.close(stdin)
-        os.close(kept_open)
-    if run.returncode == 0 and Path(picture).is_file():
+        ) as drawing,
+    ):
+        stop = threading.Timer(max_seconds, drawing.kill)
+        stop.start()
+        try:
+            for line in drawing.stdout or ():
+                if line.strip().isdigit():
+                    count(int(line))
+            status = drawing.wait()
+        finally:
+            stop.cancel()
+            drawing.kill()
+        errors.seek(0)
+        messages = errors.read().strip()
+    if status == 0 and Path(picture).is_file():
         return None
-    if run.returncode == 2:
-        raise InputError(run.stderr.strip().splitlines()[-1])
-    if "Traceback" in run.stderr:
-        return f"{name} skipped: drawing failed ({run.stderr.strip().splitlines()[-1]})"
-    return f"{name} skipped: drawing failed (status {run.returncode}); {INSTALL}"
+    if status == 2:
+        raise InputError(messages.splitlines()[-1])
+    if time.monotonic() - begun > max_seconds:
+        return f"{name} skipped: it could not be drawn within {max_seconds:g} s"
+    if "Traceback" in messages:
+        return f"{name} skipped: drawing failed ({messages.splitlines()[-1]})"
+    return f"{name} skipped: drawing failed (status {status}); {INSTALL}"

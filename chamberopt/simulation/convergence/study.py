@@ -20,7 +20,8 @@ import numpy as np
 from chamberopt.chamber.scene import chamber_mesh, replica_seed
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate, estimate, paired_difference
-from chamberopt.common.progress import Progress
+from chamberopt.common.parallel.executor import core_count
+from chamberopt.common.progress import step
 from chamberopt.coverage.coverage_from_impacts import Footprints, find_footprints
 from chamberopt.coverage.field.target_field import TargetField
 from chamberopt.coverage.metrics import parse_objective
@@ -130,11 +131,19 @@ def require_budget(budget_s: float) -> None:
         raise InputError(f"--budget-s: given {budget_s:g}; {remedy}")
 
 
+def describe_cost(design: Design, budget_s: float) -> str:
+    """What a study will cost, for the user, before it begins."""
+    settings = len(study_designs(design)[1])
+    return (
+        f"{settings} settings, each in {MIN_ROUNDS} replicas or more: about {budget_s:g} CPU s "
+        f"(--budget-s) on {core_count()} cores, more where one replica takes long; and compiling"
+    )
+
+
 def run_convergence_study(
     design: Design,
     budget_s: float,
     executor: Executor,
-    progress: Progress | None = None,
     prepare: Callable[[Design, Chamber], None] = lambda design, chamber: None,
 ) -> ConvergenceStudy:
     """Simulate all runs for about the budgeted CPU seconds, at least three replicas of each.
@@ -149,23 +158,30 @@ def run_convergence_study(
     started = time.perf_counter()
     settings, designs = study_designs(design)
     chambers: dict[ChamberTable, tuple[Chamber, TriangleMesh]] = {}
-    replicas = {}
-    for key, one in designs.items():
-        if one.chamber not in chambers:
-            first = next(iter(chambers.values()), None)
-            chamber = build_chamber(one, first and first[0].part.target)
-            chambers[one.chamber] = chamber, chamber_mesh(chamber)
-        setting = ReplicaSetting(one, *chambers[one.chamber])
-        replicas[key] = Replicas(setting, prepare_target(one, *chambers[one.chamber]))
-        prepare(one, replicas[key].setting.chamber)
+    replicas: dict[tuple[str, str], Replicas] = {}
+    with step("building and compiling, settings") as built:
+        for key, one in designs.items():
+            built(len(replicas), len(designs), None)
+            if one.chamber not in chambers:
+                first = next(iter(chambers.values()), None)
+                chamber = build_chamber(one, first and first[0].part.target)
+                chambers[one.chamber] = chamber, chamber_mesh(chamber)
+            setting = ReplicaSetting(one, *chambers[one.chamber])
+            replicas[key] = Replicas(setting, prepare_target(one, *chambers[one.chamber]))
+            prepare(one, replicas[key].setting.chamber)
     (reference_key, reference), *others = replicas.items()
     a_round = [*(one for _, one in others), *[reference] * len(others)]
     enough = max(MIN_REPLICAS, MIN_ROUNDS * len(others))
-    spent = 0.0
-    while (count := len(reference.done)) < MAX_REPLICAS and (count < enough or spent < budget_s):
-        spent += _add_replicas(a_round, executor)
-        if progress:
-            progress(min(round(spent), round(budget_s)), round(budget_s), None)
+    spent, least = 0.0, budget_s
+    with step("simulating, CPU seconds") as simulated:
+        while (count := len(reference.done)) < MAX_REPLICAS and (
+            count < enough or spent < budget_s
+        ):
+            spent += _add_replicas(a_round, executor)
+            if not count:
+                _require_error(reference.estimates()[1].value)
+                least = max(budget_s, spent * math.ceil(enough / len(others)))
+            simulated(min(round(spent), round(least)), round(least), None)
     reference_run = reference.run(*reference_key)
     sizes = _batch_sizes(reference, reference_run)
     return ConvergenceStudy(
@@ -203,6 +219,14 @@ def simulate_timed(setting: ReplicaSetting, target: TargetField, number: int) ->
     return TimedReplica(found, time.thread_time() - begin)
 
 
+def _require_error(size: float) -> None:
+    """Raise InputError where coverage, or the error of a batch, is nothing."""
+    if size < ZERO_ERROR:
+        why = "no dent on the target was simulated, so there is no error to measure"
+        remedy = "raise it, or see chamberopt check"
+        raise InputError(f"process.accuracy.simulated_time_s: {why}; {remedy}")
+
+
 def _batch_sizes(reference: Replicas, whole: Run) -> tuple[BatchSize, ...]:
     """Errors of batches of 4, 8, 16 ... replicas."""
     sizes, count = [], 4
@@ -213,10 +237,7 @@ def _batch_sizes(reference: Replicas, whole: Run) -> tuple[BatchSize, ...]:
         values = np.array([objective.value for objective, _, _ in estimates])
         rms = error_law.rms_error(values, whole.objective.value, count / whole.replicas)
         half_width = float(np.mean([objective.half_width for objective, _, _ in estimates]))
-        if min(rms, half_width) < ZERO_ERROR:
-            why = "no dent on the target was simulated, so there is no error to measure"
-            remedy = "raise it, or see chamberopt check"
-            raise InputError(f"process.accuracy.simulated_time_s: {why}; {remedy}")
+        _require_error(min(rms, half_width))
         cpu_s = count * whole.cpu.value + estimating
         is_resolved = all(resolved for _, _, resolved in estimates)
         sizes.append(BatchSize(count, batches, rms, half_width, cpu_s, is_resolved))

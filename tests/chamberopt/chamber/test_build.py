@@ -186,7 +186,7 @@ def test_a_rod_through_the_ceiling_is_held_and_cut_at_the_ceiling(tmp_path: Path
     hidden = 1.0 - (1e-4 + 4 * 0.01 * inside) / (2e-4 + 4 * 0.01 * 0.1)
     (note,) = chamber.notes
     assert note.startswith(
-        f"{hidden:.1%} of the target's area is outside the cavity and counts as not covered"
+        f"{hidden:.1%} of the area of the target is outside the cavity and counts as not covered"
     )
 
 

@@ -35,3 +35,6 @@ def test_an_amplitude_too_large_for_the_walls_is_refused(lean: float, said: str 
     with pytest.raises(InputError, match=said):
         build_chamber(design)
     build_chamber(design.changed({"sonotrode.amplitude_um": 173.0}))
+    in_trade = design.changed({"sonotrode": {"frequency_khz": 2, "amplitude_pv_um": 1000}})
+    with pytest.raises(InputError, match=r"amplitude_pv_um: given 1000, .* at most 34[67]\.\d:"):
+        build_chamber(in_trade)

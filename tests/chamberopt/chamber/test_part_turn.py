@@ -127,8 +127,8 @@ def test_too_short_a_simulation_of_a_slow_turn_is_remarked_on(tmp_path: Path, me
 def test_the_shipped_study_is_about_the_turning_gear() -> None:
     study = load_study(ROOT / "studies" / "gear_turning.toml")
     assert study.design.effects.part_turn is not None
-    for name, bounds in study.vary.items():
-        for bound in bounds:
+    for name, varied in study.vary.items():
+        for bound in varied.bounds:
             changed = study.design.changed({name: bound})
             require_turnable(changed, chamber_mesh(build_chamber(changed)), axis_of(changed))
 

@@ -170,3 +170,18 @@ def test_a_target_that_no_ball_touches_is_refused(tmp_path: Path) -> None:
         match=r"part\.target\.reachable: a ball of 1\.5 mm touches nothing of the target",
     ):
         build_chamber(Design.model_validate(data))
+
+
+def test_a_face_is_named_by_a_place_on_it(tmp_path: Path) -> None:
+    top = {"faces": [{"at_mm": [0, 0, 15]}]}
+    assert target_area_mm2(build_chamber(design_of(tmp_path, top))) == pytest.approx(200.0)
+    alike = {"faces": [{"at_mm": [0, 0, 15], "alike": True}, {"at_mm": [5, 0, 0]}]}
+    assert target_area_mm2(build_chamber(design_of(tmp_path, alike))) == pytest.approx(1000.0)
+    whole = {"faces": [{"at_mm": [0, 0, 15], "crease_deg": 91}]}
+    assert target_area_mm2(build_chamber(design_of(tmp_path, whole))) == pytest.approx(2200.0)
+
+
+def test_a_place_beside_the_part_is_refused(tmp_path: Path) -> None:
+    target = {"faces": [{"at_mm": [0, 0, 17]}]}
+    with pytest.raises(InputError, match=r"part\.target\.faces\.0\.at_mm: .* 2 mm beside the part"):
+        build_chamber(design_of(tmp_path, target))

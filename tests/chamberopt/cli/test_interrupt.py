@@ -54,5 +54,5 @@ def test_ctrl_c_is_never_lost(name: str, seconds: float, place: Path) -> None:
     assert going.returncode == 130, message
     assert time.monotonic() - begin < 5.0
     assert "Traceback" not in message
-    assert "interrupted; " in message
+    assert "interrupted" in message
     shutil.rmtree(place / "out", ignore_errors=True)

@@ -111,6 +111,7 @@ def test_a_folder_sent_elsewhere_gives_the_same(
     assert not (there / "executed").exists()
 
 
+@pytest.mark.long
 @needs_opengl
 def test_a_study_sent_elsewhere_is_whole(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]

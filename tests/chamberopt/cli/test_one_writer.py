@@ -37,6 +37,7 @@ def claimed(path: Path) -> AbstractContextManager[Path]:
         ("sweep s.toml --grid 2 --out out", "out"),
         ("compare plate.toml plate.toml --out out", "out"),
         ("accuracy plate.toml --out out", "out"),
+        ("strip plate.toml --disc-mm 40 --out out", "out"),
         ("check plate.toml --out out", "out"),
         ("check plate.toml --screenshot check.png", "check.png"),
         ("report result", "result/report.html"),
@@ -58,7 +59,7 @@ def test_the_second_is_told_at_once(
 
     monkeypatch.chdir(folder)
     monkeypatch.setattr("chamberopt.chamber.build.build_chamber", never)
-    monkeypatch.setattr("chamberopt.output.viewer.subprocess_drawing.subprocess.run", never)
+    monkeypatch.setattr("chamberopt.output.viewer.subprocess_drawing.subprocess.Popen", never)
     before = sorted(folder.rglob("*"))
     with claimed(Path(output)):
         assert main(command.split()) == 2

@@ -20,7 +20,14 @@ from chamberopt.coverage.coverage_intervals import (
 from chamberopt.coverage.field.target_field import Gauge
 from chamberopt.coverage.field.windows import Places, Windows
 from chamberopt.coverage.metrics import NEVER
-from chamberopt.coverage.percentile import p05_estimate, sum_dents, time_to_98, time_to_98_estimate
+from chamberopt.coverage.percentile import (
+    P05_COVERAGE,
+    in_order,
+    quantile_estimate,
+    sum_dents,
+    time_to_98,
+    time_to_98_estimate,
+)
 from chamberopt.coverage.resolution import (
     DENTS_FOR_MEAN,
     DENTS_FOR_PLACES,
@@ -104,9 +111,12 @@ def test_mean_and_deviation_have_no_bias_and_their_intervals_hold(field: str, de
 @pytest.mark.parametrize("field", ["even", "ramp"])
 def test_percentile_and_time_are_right_from_25_dents_on(field: str, dents: float) -> None:
     groups = list(groups_of(field, dents, 100))
-    low = true_figures(FIELDS[field])["p05_coverage"]
+    low, x = true_figures(FIELDS[field])["p05_coverage"], FIELDS[field]
     for name, wanted, close in (
         ("p05_coverage", low, 0.02),
+        ("p95_coverage", -np.expm1(-np.quantile(x, 0.95)), 0.02),
+        ("exposure", x.mean() / np.log(50.0), 0.002),
+        ("p95_exposure", np.quantile(x, 0.95) / np.log(50.0), 0.02),
         ("time_to_98_s", TREATMENT * np.log(50.0) / -np.log1p(-low), 10.0),
     ):
         values = np.array([one[name].value for one in groups])
@@ -282,7 +292,7 @@ def test_too_few_dents_are_not_resolved_and_the_notes_say_what_would_do() -> Non
     assert "process.accuracy.simulated_time_s" in note
     assert resolution_notes(many) == ()
     [note] = resolution_notes(Resolution(0.0, 3.0, 25.0, 4.0))
-    assert "fewer than half of the target's windows were hit" in note
+    assert "fewer than half of the windows of the target were hit" in note
     assert Resolution(0.0, 3.0, 25.0, 4.0).time_for(25.0) == np.inf
 
 
@@ -349,7 +359,7 @@ def test_the_time_does_not_depend_on_how_long_the_treatment_is() -> None:
     found = []
     for times_as_long in (1.0, 30.0, 1e5):
         ratio = times_as_long * REPLICAS
-        p05 = p05_estimate(batches, WINDOWS, 1.0, ratio)
+        p05 = quantile_estimate(P05_COVERAGE, batches, WINDOWS, 1.0, ratio)
         found.append(time_to_98(p05, batches, WINDOWS, 1.0, ratio, times_as_long * TREATMENT))
     first = found[0]
     assert p05.value == 1.0
@@ -375,3 +385,12 @@ def test_batches_of_unequal_sizes_have_intervals_like_equal_ones() -> None:
         assert abs(found.value + np.expm1(-1.0)) < 3.0 * found.half_width
         widths[count] = found.half_width * np.sqrt(count)
     assert widths[60] == pytest.approx(0.5 * (widths[40] + widths[80]), rel=0.35)
+
+
+def test_percentiles_that_the_corrections_exchange_are_one() -> None:
+    low, high = Estimate(0.8, 0.1), Estimate(0.7, 0.2)
+    assert in_order(high, low, "{}_a") == {"p05_a": high, "p95_a": low}
+    middle = in_order(low, high, "{}_a")
+    assert [one.value for one in middle.values()] == [0.75, 0.75]
+    # Their old values are still within.
+    assert [one.half_width for one in middle.values()] == pytest.approx([0.15, 0.25])

@@ -11,7 +11,11 @@ from chamberopt.coverage.metrics import (
     NEVER,
     OBJECTIVES,
     exposed_target,
+    find_metric,
+    metric_names,
+    metric_problem,
     parse_objective,
+    require_metrics,
     require_target,
 )
 from chamberopt.coverage.part_impacts import Hits, TargetImpacts
@@ -46,10 +50,12 @@ def test_without_impacts_there_is_no_speed() -> None:
 
 
 def test_figures_of_single_places_are_those_that_take_more_dents() -> None:
-    assert {name for name, metric in METRICS.items() if metric.of_places} == {
-        "p05_coverage",
-        "time_to_98_s",
-        "intensity_uniformity",
+    assert {name for name, metric in METRICS.items() if not metric.of_places} == {
+        "mean_coverage",
+        "std_coverage",
+        "mean_normal_speed_m_s",
+        "impacts_per_mm2_s",
+        "shot_count",
     }
 
 
@@ -62,6 +68,34 @@ def test_the_target_is_what_is_chosen_and_bounds_the_cavity() -> None:
     require_target(chamber)
     with pytest.raises(InputError, match=r"part\.target: no triangle of the target"):
         require_target(hidden)
+
+
+def test_a_metric_of_a_zone_is_found_by_its_name() -> None:
+    of_target, of_zone = METRICS["p05_coverage"], find_metric("root.p05_coverage")
+    assert find_metric("p05_coverage") is of_target
+    assert of_zone is not None
+    assert (of_zone.lowest, of_zone.highest, of_zone.unit) == (0.0, 1.0, "")
+    assert of_zone.summary == "coverage that 95 % of zone root's area exceeds"
+    assert of_zone.of_places
+    assert not of_zone.required
+    for wrong in ("shiny", "root.shiny", "root.shot_count", "a b.p05_coverage", ".p05_coverage"):
+        assert find_metric(wrong) is None
+    uncalibrated = tuple(name for name in METRICS if not name.startswith("almen"))
+    assert metric_names(DESIGN) == uncalibrated
+    assert "no zone 'root'" in metric_problem(DESIGN, "root.p05_coverage")
+    made = parse_objective("1 root.mean_coverage + -0.1 std_coverage")
+    assert made.terms == {"root.mean_coverage": 1.0, "std_coverage": -0.1}
+    with pytest.raises(InputError, match="no zone 'root'"):
+        require_metrics(DESIGN, made.name)
+
+
+def test_a_metric_that_the_design_lacks_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    lacking = replace(METRICS["p05_coverage"], name="rare", lacking=lambda _: "takes a moon")
+    monkeypatch.setitem(METRICS, "rare", lacking)
+    assert metric_problem(DESIGN, "rare") == "takes a moon"
+    assert "rare" not in metric_names(DESIGN)
+    with pytest.raises(InputError, match="rare: takes a moon"):
+        require_metrics(DESIGN, "1 rare + 1 mean_coverage")
 
 
 def test_nothing_hit() -> None:

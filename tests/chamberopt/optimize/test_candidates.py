@@ -5,6 +5,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from chamberopt.common.errors import InputError
 from chamberopt.optimize.storage.trial_log import read_trials
@@ -83,3 +84,39 @@ def test_a_batch_gives_the_same_trials_whichever_ends_first(tmp_path: Path) -> N
     first, at_a_time = run_with_delays("first", 1)
     assert at_a_time == 3
     assert run_with_delays("second", 2) == (first, 3)
+
+
+def test_reach_alone_spares_simulations_and_costs_no_evaluation(tmp_path: Path) -> None:
+    """Above half of the bounds a third of the target is out of reach: at most 0.667 - 0.471."""
+
+    class Simulator:
+        simulated = 0
+
+        def reachable(self, design) -> float:
+            return 1.0 if bowl_shares(design)[0] < 0.5 else 2.0 / 3.0
+
+        def __call__(self, design, stream, replicas):
+            assert stream == "confirm" or not self.simulated or self.reachable(design) == 1.0
+            self.simulated += stream == "search"
+            return judged(np.full(3, bowl(bowl_shares(design))))
+
+    simulator = Simulator()
+    result = run_bowl(tmp_path, simulator)
+    spared = [trial for trial in result.trials if trial.highest is not None]
+    assert simulator.simulated == 16
+    assert spared
+    assert all(t.highest == t.score == pytest.approx(2 / 3 - np.sqrt(2) / 3) for t in spared)
+    assert "out of reach of the balls" in spared[0].reason
+    assert bowl_shares(result.best.design)[0] < 0.5
+    assert bowl(bowl_shares(result.best.design)) > 0.73  # 0.76 is the best there
+
+
+def test_designs_to_begin_with_come_after_the_start(tmp_path: Path) -> None:
+    values = {"chamber.height_mm": 52.0, "shot.mass_g": 4.5}
+
+    def simulator(design, stream, replicas):
+        return judged(np.full(3, bowl(bowl_shares(design))))
+
+    result = run_bowl(tmp_path, simulator, {"evaluations": 6}, begin_with=[values])
+    assert result.trials[1].parameters == values
+    assert len([trial for trial in result.trials if trial.stage == "search"]) == 6

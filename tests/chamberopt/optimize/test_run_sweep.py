@@ -5,11 +5,13 @@ A candidate that fails becomes a row and does not end the sweep.
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from chamberopt.cli import main
+from chamberopt.cli.resume import resume_note, unfinished
 from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import SerialExecutor, local_executor
 from chamberopt.design.load import load_design
@@ -64,6 +66,11 @@ def test_sobol_points_are_spread_and_their_seed_is_the_studys() -> None:
     assert (plan.points != plan_sweep(study(PAIR), None, 64, 8).points).any()
     boxes = (plan.points * 8).astype(int)  # a (0, 6, 2) net: one point in each of 64 boxes
     assert len({tuple(box) for box in boxes.tolist()}) == 64
+
+
+def test_candidates_that_are_alike_are_simulated_once() -> None:
+    vary = {"shot.diameter_mm": {"choose": [1.5, 2.0, 3.0]}}
+    assert sorted(plan_sweep(study(vary), None, 8).points.ravel().tolist()) == [0.0, 0.5, 1.0]
 
 
 @pytest.mark.parametrize(
@@ -158,7 +165,8 @@ def test_what_a_sweep_leaves(vary: dict, way: tuple, tmp_path: Path) -> None:
         sweep.best.parameters["shot.mass_g"]
     )
     assert len((tmp_path / "history.csv").read_text().splitlines()) == 1 + len(sweep.trials)
-    assert load_study(tmp_path / "study.toml").vary == vary
+    varied = load_study(tmp_path / "study.toml").vary
+    assert {name: one.bounds for name, one in varied.items()} == vary
     said = json.loads((tmp_path / "result.json").read_text())
     assert said["kind"] == "sweep"
     assert said["sweep"]["best"]["number"] == sweep.best.number
@@ -234,6 +242,25 @@ def test_a_sweep_that_was_stopped_goes_on(tmp_path: Path, kept: int) -> None:
             None,
             worker_jobs.hill,
         )
+
+
+@pytest.mark.parametrize(("way", "option"), [((3, None), "--grid 3"), ((None, 2), "--sobol 2")])
+def test_a_new_sweep_names_the_command_that_resumes_the_unfinished_one(
+    way: tuple, option: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    question, folder = study(), Path("results", "s-sweep")
+    plan = plan_sweep(question, *way)
+    sweep_in_folder(question, plan, folder, SerialExecutor(), None, worker_jobs.hill)
+    seed = "" if plan.seed is None else f"--seed {plan.seed} "
+    command = f"chamberopt sweep s.toml {option} {seed}--out {folder}"
+    assert unfinished(Path("s.toml"), "s-sweep") == [
+        f"{folder}: not finished; to resume it: {command}"
+    ]
+    begun = SimpleNamespace(begun=True)
+    with pytest.raises(KeyboardInterrupt) as raised, resume_note(begun, command):
+        raise KeyboardInterrupt
+    assert raised.value.__notes__ == [f"to resume: {command}"]
 
 
 def test_a_sweep_names_what_it_maximises(tmp_path: Path) -> None:

@@ -214,8 +214,10 @@ class TestCommandLine:
             )
 
         self.at: dict[int, Callable[[], None]] = {}
-        monkeypatch.setattr("chamberopt.optimize.run_study.chamber_simulator", lambda *_: simulator)
-        monkeypatch.setattr("chamberopt.cli.commands.run.compile_with_message", lambda *_: None)
+        monkeypatch.setattr("chamberopt.optimize.run_study.ChamberSimulator", lambda *_: simulator)
+        monkeypatch.setattr(
+            "chamberopt.cli.commands.search.run.compile_with_message", lambda *_: None
+        )
         monkeypatch.setattr("chamberopt.output.viewer.draw_coverage", lambda *_: None)
         return done
 
@@ -290,14 +292,16 @@ class TestCommandLine:
         An exception would be dropped during an import, and would crash the compiler.
         """
         monkeypatch.setattr(
-            "chamberopt.cli.commands.run.compile_with_message",
+            "chamberopt.cli.commands.search.run.compile_with_message",
             lambda *_: os.kill(os.getpid(), signal.SIGINT),
         )
         child = fork.Process(target=main, args=(["run", "small.toml"],))
         child.start()
         child.join(60)
         assert (child.exitcode, EARLY in capfd.readouterr().err) == (130, True)
-        monkeypatch.setattr("chamberopt.cli.commands.run.compile_with_message", lambda *_: None)
+        monkeypatch.setattr(
+            "chamberopt.cli.commands.search.run.compile_with_message", lambda *_: None
+        )
         assert main(["run", "small.toml"]) == 0
         assert [path.name for path in Path("results").iterdir()] == ["small"]
 
@@ -310,10 +314,7 @@ class TestCommandLine:
         self.at[4] = lambda: monkeypatch.setattr("os.fsync", full)
         assert main(["run", "small.toml", "--out", "out"]) == 1
         *_, what, how = capfd.readouterr().err.splitlines()
-        assert what == (
-            f"{Path('out/history.jsonl')}: No space left on device; what had been finished "
-            "stays on disk"
-        )
+        assert what == f"{Path('out/history.jsonl')}: No space left on device"
         assert how == "to resume: chamberopt run small.toml --out out"
         assert self.rows() == 3
 

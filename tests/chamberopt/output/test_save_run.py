@@ -4,6 +4,7 @@ import hashlib
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from chamberopt.chamber.build import build_chamber
@@ -13,13 +14,17 @@ from chamberopt.design.load import load_design
 from chamberopt.optimize.study import Study
 from chamberopt.output import viewer
 from chamberopt.output.compare.comparison import compare
-from chamberopt.output.results.load import load_result, summary
+from chamberopt.output.report.report_data import report_contents
+from chamberopt.output.results.chamber_file import load_chamber
+from chamberopt.output.results.load import load_part, load_result, summary
 from chamberopt.output.save_run import save_simulation, save_study
+from chamberopt.output.viewer.opened_result import OpenedResult
 from tests.helpers.studies import run_in_folder
 from tests.helpers.synthetic import plate_design, poisson_evaluation
 
 DESIGN = plate_design()
 CHAMBER = build_chamber(DESIGN)
+DOWN = {"direction": [0, 0, -1], "angle_deg": [0, 10]}
 EVALUATION = poisson_evaluation(DESIGN, CHAMBER)
 
 
@@ -28,6 +33,39 @@ def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
         viewer, "draw_coverage", lambda *_: "coverage.png skipped: no OpenGL library found"
     )
+
+
+@pytest.mark.usefixtures("no_pictures")
+def test_zones_read_back_and_are_shown_from_the_folder_alone(tmp_path: Path) -> None:
+    box = [[-100.0, -100.0, -100.0], [0.0, 100.0, 100.0]]
+    zone = {"name": "left", "target": {"box_mm": box, **DOWN}, "coverage_min": 0.999}
+    design = DESIGN.changed({"zones": (zone,)})
+    chamber = build_chamber(design)
+    save_simulation(tmp_path / "a", design, chamber, poisson_evaluation(design, chamber))
+    assert load_design(tmp_path / "a" / "design.toml") == design
+    moved = (tmp_path / "a").rename(tmp_path / "b")
+    result = load_result(moved)
+    assert result.design.zones == design.zones
+    assert result.metrics["left.p05_coverage"].in_words == ""
+    (found,) = result.data["zones"]
+    assert found["name"] == "left"
+    assert 0.4 < found["reachable_share"] < 0.6  # of what is a lid too, outside the chamber
+    assert found["limits"][0]["standing"] == "not met"
+    assert load_chamber(result).part.zones["left"].sum() == found["triangles"]
+    part = load_part(result)
+    assert part["zone"].sum() == part["zone_left"].sum() == found["triangles"]
+    text = report_contents(moved)
+    (limit,) = text["zones"]["zones"][0]["limits"]
+    assert limit["label"] == "coverage that 95 % of the zone's area exceeds"
+    (line,) = text["answer_lines"]
+    assert line["text"].startswith("Zone left: coverage_min = 0.999 is not met (")
+    assert line["warns"]
+    assert not [row for row in text["metrics"] if "." in row["name"]]
+    seen = OpenedResult(viewer.result_info(result))
+    assert "zones" in seen.quantities
+    assert set(seen.part.zones) == {0, 1}
+    inside = int(np.flatnonzero(part["zone_left"] * part["exposed_area_mm2"])[0])
+    assert "zone left" in seen.describe_triangle(inside, viewer.ViewState())
 
 
 @pytest.mark.usefixtures("no_pictures")
@@ -110,7 +148,7 @@ def test_a_study_leaves_everything_and_its_best_design_can_be_used(tmp_path: Pat
     about = result.data["study"]
     assert about["improved"]
     assert about["gain"]["value"] == outcome.gain.value
-    assert about["evaluations"] == 12
+    assert about["evaluations"] - about["failed"] == 12  # what is not simulated costs nothing
     assert about["failed"] == sum(trial.objective is None for trial in outcome.trials)
     assert (folder / "convergence.png").stat().st_size > 20_000
     assert len((folder / "history.csv").read_text().splitlines()) == len(outcome.trials) + 1

@@ -11,11 +11,11 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate, estimate, paired_difference
 from chamberopt.common.parallel.executor import SerialExecutor, local_executor
 from chamberopt.coverage.dents import dent_diameter
-from chamberopt.coverage.metrics import METRICS, OBJECTIVES
+from chamberopt.coverage.metrics import OBJECTIVES, metric_names
 from chamberopt.coverage.part_impacts import Hits
 from chamberopt.design.design import validate
 from chamberopt.design.load import Design
-from chamberopt.simulation.estimates import SeenDents, estimate_metrics, weighted_sum
+from chamberopt.simulation.estimates import SeenDents, estimate_metrics, reach_notes, weighted_sum
 from chamberopt.simulation.evaluate import MAX_SPEED, ReplicaPlan, evaluate, prepare_target
 from chamberopt.simulation.replicas import MIN_REPLICAS_TO_STOP
 from tests.helpers.synthetic import evaluation_of, plane_chamber, plate_design, random_dents
@@ -53,6 +53,8 @@ def test_random_dents_on_a_plane_cover_what_avrami_says() -> None:
         assert std.low <= 0.0
         assert std.value < 0.03
         assert abs(low.value + np.expm1(-x)) < low.half_width + 1e-3
+        exposure = metrics["exposure"]
+        assert abs(exposure.value - x / np.log(50.0)) < exposure.half_width
         time = metrics["time_to_98_s"]
         assert abs(time.value - DESIGN.process.treatment_time * np.log(50.0) / x) < time.half_width
     assert found.metrics["intensity_uniformity"].high >= 1.0 - 1e-9
@@ -60,16 +62,30 @@ def test_random_dents_on_a_plane_cover_what_avrami_says() -> None:
     assert found.resolution.has_places
     assert found.resolution.dents == pytest.approx(60.0, rel=0.05)
     assert (found.reachable, found.crease_share, found.notes) == (1.0, 0.0, ())
-    assert set(found.metrics) == set(METRICS)
-    assert set(found.metrics_of_wide) == set(METRICS) - {
-        "intensity_uniformity", "mean_normal_speed_m_s", "impacts_per_mm2_s", "shot_count",
-    }  # fmt: skip
+    assert set(found.metrics) == set(metric_names(DESIGN))
+    of_windows = {f"{name}_coverage" for name in ("mean", "std", "p05", "p95")}
+    of_windows |= {"exposure", "p95_exposure", "time_to_98_s"}
+    assert set(found.metrics_of_wide) == of_windows
+
+
+def test_a_note_says_how_high_coverage_can_go_with_some_of_the_target_out_of_reach() -> None:
+    """r of the area covered to 1 and the rest bare: mean r, standard deviation sqrt(r (1 - r))."""
+    covered = np.repeat([1.0, 0.0], [80, 20])
+    (note,) = reach_notes(0.8)
+    assert "20.0% of the target is out of reach" in note
+    highest = f"mean_coverage above {covered.mean():.2f} or a uniform_coverage above "
+    assert f"{highest}{covered.mean() - covered.std():.2f}" in note
+    assert reach_notes(0.999) == ()
+    assert "uniform_coverage above 0.00" in reach_notes(0.4)[0]
+    (of_zone,) = reach_notes(0.8, "zone root")
+    assert of_zone.startswith("20.0% of zone root is out of reach")
+    assert of_zone.endswith("mean_coverage above 0.80, and its p05_coverage is 0")
 
 
 def test_dents_are_looked_at_once_however_replicas_come() -> None:
     replicas = poisson_replicas(np.random.default_rng(7), 5, 60.0)
     field = prepare_target(DESIGN, PLANE, chamber_mesh(PLANE))
-    whole, part = SeenDents(field, [], []), SeenDents(field, [], [])
+    whole, part = SeenDents.none(field), SeenDents.none(field)
     whole.add(replicas)
     for count in (2, 2, 3, 5):
         part.add(replicas[:count])
@@ -136,6 +152,7 @@ def test_evaluate_gives_the_same_numbers_on_any_number_of_workers() -> None:
     assert serial.simulated_time == pytest.approx(0.08)
     assert serial.collisions["total"] > impacts
     assert any("process.accuracy.simulated_time_s" in note for note in serial.notes)
+    assert sum(note.startswith("without effects.friction") for note in serial.notes) == 1
     # Replicas there are, are added to: the same as all at once.
     done: list = []
     few = evaluate(design, chamber, SerialExecutor(), plan=ReplicaPlan(3), done=done)

@@ -1,9 +1,12 @@
 """Coverage against time agrees with the figures at the treatment time, and ends where it should."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from chamberopt.chamber.scene import chamber_mesh
+from chamberopt.common.estimate import FIRST_OF_CALIBRATION, normal_quantile
 from chamberopt.simulation.evaluate import prepare_target
 from chamberopt.simulation.evaluation import Evaluation
 from chamberopt.simulation.time_curve import MAX_TREATMENT_TIMES, coverage_against_time
@@ -54,6 +57,22 @@ def test_the_curve_goes_through_the_figures_of_the_treatment_time(x: float) -> N
     if full < times[-1]:
         after = next(row for row in rows if row["time_s"] >= full)
         assert after["p05_coverage"] >= 0.98 - 1e-6
+
+
+def test_the_curve_holds_what_a_calibration_leaves_open() -> None:
+    """A dent density that is known to 10 %: coverage moves by 0.1 x exp(-x) at every time."""
+    plain, evaluation = curve_of(1.0, per_mm2=200.0)
+    mean = evaluation.metrics["mean_coverage"]
+    error = 0.1 * -(1.0 - mean.value) * np.log1p(-mean.value)
+    wider = mean.with_shared(FIRST_OF_CALIBRATION, [0.6 * error, 0.8 * error])
+    metrics = evaluation.metrics | {"mean_coverage": wider}
+    field = prepare_target(DESIGN, PLANE, chamber_mesh(PLANE))
+    design = DESIGN.changed({"process.accuracy.simulated_time_s": 2.0 * TREATMENT / REPLICAS})
+    rows = coverage_against_time(design, field, replace(evaluation, metrics=metrics))
+    for before, after in zip(plain, rows, strict=True):
+        left = 1.0 - after["mean_coverage"]
+        of_density = normal_quantile(0.95) * 0.1 * -left * np.log(left)
+        assert after["half_width"] == pytest.approx(np.hypot(before["half_width"], of_density))
 
 
 def test_without_dents_enough_there_is_no_percentile_and_no_longer_time() -> None:

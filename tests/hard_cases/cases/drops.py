@@ -8,13 +8,13 @@ import numpy as np
 import trimesh
 
 from sim_core import Balls, Gravity, Physics, TriangleMesh
+from sim_core.effects.gravity import STANDARD as G
 from tests.hard_cases.outcome import Claim, Outcome, named, near, outcome_of, play
 from tests.helpers.scenes.cavities import box, box_around
 from tests.helpers.scenes.fuzzed_chambers import Chamber
 from tests.sim_core.loop.test_containment import TOUCH
 
 RADIUS = 1.5e-3  # m
-G = 9.80665  # m/s²
 HALF = 0.03  # m: of the room about a body
 DROP = 0.01  # m: from the start down to where a ball right above would touch
 EXACT = 1e-12  # s, m/s: rounding of times below 1 s and of speeds below 10 m/s, a thousandfold

@@ -10,7 +10,7 @@ from chamberopt.output.save_run import save_simulation, save_study
 from tests.helpers.studies import run_in_folder
 from tests.helpers.synthetic import plate_design, poisson_evaluation
 
-DESIGN = plate_design()
+DESIGN = plate_design(process__accuracy__points=2000)  # figures of a page need no more
 
 
 def simulated(folder: Path, per_mm2: float = 60.0) -> tuple[Path, Chamber]:
@@ -21,7 +21,7 @@ def simulated(folder: Path, per_mm2: float = 60.0) -> tuple[Path, Chamber]:
     return folder, chamber
 
 
-def studied(folder: Path, evaluations: int = 12) -> Path:
+def studied(folder: Path, evaluations: int = 8) -> Path:
     """A study's folder.
 
     More shot makes more dents. Far sonotrodes cannot be simulated, near ones miss a constraint.
@@ -37,7 +37,7 @@ def studied(folder: Path, evaluations: int = 12) -> Path:
         if design.chamber.sonotrode_distance_mm > 17:
             raise InputError("<b>not</b> this one")
         return poisson_evaluation(
-            design, build_chamber(design), 80.0 * design.shot.mass_g, replicas or 4, len(stream)
+            design, build_chamber(design), 40.0 * design.shot.mass_g, replicas or 4, len(stream)
         )
 
     save_study(folder, run_in_folder(question, folder, SerialExecutor(), simulator=simulator))

@@ -18,7 +18,7 @@ from chamberopt.output.viewer import ResultInfo, ViewState
 from chamberopt.output.vtp_files import pyvista, write_chamber, write_coverage
 
 TREATMENT = 10.0  # s
-SIZE = 480, 340  # pixels
+SIZE = 960, 680  # pixels
 
 
 def ball_result(folder: Path, moved: float = 0.0, lost: int = 0) -> ResultInfo:
@@ -162,7 +162,7 @@ def driven(folder: Path) -> list[dict[str, Any]]:
                 "planes": [
                     _planes(a)
                     for a in actors.values()
-                    if hasattr(a, "mapper") and a.mapper is not None
+                    if a.IsA("vtkActor") and a.mapper is not None
                 ],
                 "charts": len(renderer.get_charts()), "eye": list(renderer.camera.position),
             })  # fmt: skip

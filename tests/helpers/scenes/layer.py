@@ -20,10 +20,10 @@ from sim_core import (
     Vibration,
     periodic_box,
 )
+from sim_core.effects.gravity import STANDARD as G
 from sim_core.effects.restitution import ELASTIC_BELOW
 from tests.helpers.scenes.cavities import CEILING, FLOOR, box, uniform_restitution
 
-G = 9.80665
 DIAMETER = 1e-3
 DEPTH = 5.4 * DIAMETER
 PER_AREA = 6.0  # balls for each D² of floor
@@ -45,30 +45,30 @@ def shaken_layer(
     e: float = 0.7,
     elastic_below: float = ELASTIC_BELOW,
     law: Restitution | None = None,
-    sides: bool = True,
+    width: float | None = None,
 ) -> Scene:
     """A loose lattice that falls on the floor, which starts from its lowest position.
 
-    Without sides the box is periodic.
+    The floor is a square with sides, or periodic and ``width`` [m] wide.
     """
     frequency = f_star * math.sqrt(G / DEPTH)
     amplitude = gamma * G / (math.tau * frequency) ** 2
     side = math.sqrt(count / PER_AREA) * DIAMETER
-    row = int(side / (1.04 * DIAMETER))
-    layer, place = np.divmod(np.arange(count), row * row)
-    step = side / row
-    positions = np.stack(
-        [(place % row + 0.5) * step, (place // row + 0.5) * step, (0.6 + 1.05 * layer) * DIAMETER],
-        axis=1,
-    )
+    floor = (side, side)
+    if width is not None:
+        floor = (count / PER_AREA * DIAMETER / (width / DIAMETER), width)
+    row, rows = (int(length / (1.04 * DIAMETER)) for length in floor)
+    layer, place = np.divmod(np.arange(count), row * rows)
+    x, y = (place % row + 0.5) * (floor[0] / row), (place // row + 0.5) * (floor[1] / rows)
+    positions = np.stack([x, y, (0.6 + 1.05 * layer) * DIAMETER], axis=1)
     rng = np.random.default_rng(1)
     positions += rng.uniform(-0.01, 0.01, positions.shape) * DIAMETER
     balls = Balls(positions, rng.normal(0.0, 0.05, positions.shape), DIAMETER)
     shaking = Vibration(FLOOR, amplitude, frequency, -0.5 * math.pi)
     law = law or uniform_restitution(e, 1e6, elastic_below)
     top = positions[:, 2].max() + 60.0 * DIAMETER
-    room: TriangleMesh | AnalyticCavity = box((side, side, top))
-    if not sides:
-        room = periodic_box((0.0, 0.0, 0.0), (side, side, top), (FLOOR, CEILING))
+    room: TriangleMesh | AnalyticCavity = box((*floor, top))
+    if width is not None:
+        room = periodic_box((0.0, 0.0, 0.0), (*floor, top), (FLOOR, CEILING))
     physics = Physics(Gravity(), law, shaking)
     return Scene(room, balls, physics, cycles / frequency, record=(FLOOR,))

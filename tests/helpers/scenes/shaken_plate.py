@@ -18,9 +18,9 @@ from sim_core import (
     Vibration,
     simulate,
 )
+from sim_core.effects.gravity import STANDARD as G
 from tests.helpers.scenes.cavities import FLOOR, box
 
-G = 9.80665
 DIAMETER = 3e-3
 CAPTURE = 1e-5  # of g / omega: a ball that bounces more slowly is on the plate
 FAST = 1e-3  # slower bounces are not compared one by one

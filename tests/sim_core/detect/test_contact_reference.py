@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from sim_core.effects.gravity import STANDARD as G
 from sim_core.geometry.obstacles import NUMBERS
 from tests.helpers.contacts.reference import (
     ContactErrors,
@@ -15,7 +16,6 @@ from tests.helpers.contacts.reference import (
     check_waves,
 )
 
-G = 9.80665
 RADIUS = 1.5e-3
 LIMIT = 0.01
 OFF = 2e-12  # m: twice what the tests allow

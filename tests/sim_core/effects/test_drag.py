@@ -26,6 +26,7 @@ from sim_core import (
     Vibration,
     simulate,
 )
+from sim_core.effects.gravity import STANDARD as G
 from sim_core.scene.invariants import closest_pair, contained, energy
 from tests.helpers.scenes.cavities import FLOOR, box, cylinder, uniform_restitution
 from tests.sim_core.physics.test_conservation import gas
@@ -37,7 +38,6 @@ THICK = Drag(
     density=1000.0 * AIR, viscosity=VISCOSITY
 )  # Re > 1000 down to 5 mm/s, and 400 m/s² at 5 m/s
 K = 0.75 * 0.44 * THICK.density / (DENSITY * DIAMETER)
-G = 9.80665
 
 
 def row(
@@ -188,6 +188,7 @@ def test_air_so_thin_that_it_does_nothing_changes_nothing() -> None:
     np.testing.assert_allclose(thin.positions, none.positions, atol=1e-9)
 
 
+@pytest.mark.long
 def test_drag_goes_with_contact_mode_and_drawn_phases() -> None:
     """Heavy air over a lossy floor: shot comes to rest on the still floor, and goes on over the
     shaking one.

@@ -21,10 +21,10 @@ from sim_core import (
     restitution_at,
     simulate,
 )
+from sim_core.effects.gravity import STANDARD as G
 from sim_core.effects.restitution import checked_restitution, restitution_law
 from tests.helpers.scenes.cavities import balls_at, box, uniform_restitution
 
-G = 9.80665
 DIAMETER = 3e-3
 ROOM = box((0.02, 0.02, 0.02))
 BALL = balls_at(np.array([[0.01, 0.01, 0.0025]]))

@@ -9,6 +9,7 @@ import pytest
 from scipy.optimize import brentq
 
 from sim_core import Balls, Gravity, ImpactLog, Physics, Scene, TriangleMesh, Vibration, simulate
+from sim_core.effects.gravity import STANDARD
 from tests.helpers.scenes.cavities import CEILING, FLOOR, SIDES, box
 from tests.sim_core.geometry.test_sonotrode_border import trough
 
@@ -91,7 +92,7 @@ def plates_hit(log: ImpactLog, room: TriangleMesh) -> np.ndarray:
     return np.where(tags == FLOOR, 0, 1)
 
 
-@pytest.mark.parametrize("g", [0.0, 9.80665])
+@pytest.mark.parametrize("g", [0.0, STANDARD])
 def test_a_bead_between_two_gentle_plates_follows_its_reference_for_hundreds_of_hits(
     g: float,
 ) -> None:
@@ -108,7 +109,7 @@ def test_a_bead_between_two_gentle_plates_follows_its_reference_for_hundreds_of_
 
 
 @pytest.mark.parametrize(
-    ("g", "v", "duration"), [(0.0, 1.0, 1.5), (9.80665, 1.0, 1.5), (0.0, -0.05, 60.0)]
+    ("g", "v", "duration"), [(0.0, 1.0, 1.5), (STANDARD, 1.0, 1.5), (0.0, -0.05, 60.0)]
 )
 def test_each_hit_gives_twice_the_plates_speed_and_the_next_comes_on_time(
     g: float, v: float, duration: float

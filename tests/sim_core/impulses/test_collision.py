@@ -23,10 +23,11 @@ from sim_core import (
     cylinder_cavity,
     simulate,
 )
+from sim_core.effects.gravity import STANDARD as G
 from sim_core.geometry.analytic import CEILING, FLOOR, SIDE
 from sim_core.impulses.collision import RECONTACT_ANGLE
 
-RADIUS, HEIGHT, DIAMETER, G = 0.035, 0.02, 3e-3, 9.80665
+RADIUS, HEIGHT, DIAMETER = 0.035, 0.02, 3e-3
 REACH = RADIUS - 0.5 * DIAMETER
 CENTRE = np.array([0.3, -0.2])
 ROOM = cylinder_cavity(2.0 * RADIUS, 0.0, HEIGHT, (1, 0, 2), (0.3, -0.2))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from sim_core import Balls, Gravity, Physics, Rest, Restitution, Scene, SceneError, simulate
+from sim_core.effects.gravity import STANDARD
 from sim_core.loop.impact_log import BUFFER_SIZE
 from sim_core.loop.simulate import Simulation
 from tests.helpers.scenes.cavities import box
@@ -31,7 +32,7 @@ def test_two_balls_meet_where_and_when_they_must(rest: Rest | None) -> None:
     time = (0.04 - math.sqrt(reach**2 - miss**2)) / 4.0
     normal = np.array([math.sqrt(reach**2 - miss**2), miss, 0.0]) / reach
     sign = 1.0 if log.one[0] == 0 else -1.0
-    fallen = np.array([0.0, 0.0, -0.5 * 9.80665 * time**2])
+    fallen = np.array([0.0, 0.0, -0.5 * STANDARD * time**2])
     first = places[0] + np.array([3.0 * time, 0.0, 0.0]) + fallen
     assert {int(log.one[0]), int(log.two[0])} == {0, 1}
     np.testing.assert_allclose(log.time, [time], atol=1e-15)

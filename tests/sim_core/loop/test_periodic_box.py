@@ -75,6 +75,7 @@ def test_two_balls_meet_across_the_corner() -> None:
     np.testing.assert_allclose(log.position[0], touched, atol=1e-12)
 
 
+@pytest.mark.long
 def test_fast_balls_meet_after_any_number_of_trips_round_the_box() -> None:
     """At up to 30 m/s a ball crosses the box fifty times in a window."""
     rng = np.random.default_rng(1)
@@ -101,7 +102,7 @@ def test_fast_balls_meet_after_any_number_of_trips_round_the_box() -> None:
     assert trips > 10.0
 
 
-@pytest.mark.parametrize("count", [5, 200, MIN_BALLS, 3000])
+@pytest.mark.parametrize("count", [5, 200, MIN_BALLS, pytest.param(3000, marks=pytest.mark.long)])
 def test_every_meeting_with_an_image_is_found(count: int) -> None:
     """Against the quadratic of every image; the filter takes sixteen balls at a time in float32."""
     rng, window = np.random.default_rng(count), 0.02

@@ -30,7 +30,7 @@ def compare_with_theory(packing: float, effort: int) -> None:
 
 
 @pytest.mark.parametrize("packing", PACKINGS)
-def test_pressure_collision_rate_and_mean_free_path(packing: float) -> None:
+def test_pressure_and_collision_rate(packing: float) -> None:
     compare_with_theory(packing, EFFORT)
 
 

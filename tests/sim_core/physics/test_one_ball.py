@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from sim_core import Balls, Gravity, Physics, Restitution, Scene, restitution_at, simulate
+from sim_core.effects.gravity import STANDARD as G
 from tests.helpers.scenes.cavities import CEILING, FLOOR, box
 
 DIAMETER = 3e-3
-G = 9.80665
 
 
 def one_ball(z: float, vz: float) -> Balls:

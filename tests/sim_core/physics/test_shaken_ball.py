@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 from sim_core import Balls, Gravity, Physics, Restitution, Scene, TriangleMesh, Vibration, simulate
+from sim_core.effects.gravity import STANDARD as G
 from tests.helpers.scenes.cavities import CEILING, FLOOR, box
 from tests.helpers.scenes.gas import SURE, jackknife
 
 DIAMETER = 3e-3
-G = 9.80665
 TOP = 0.02  # m, height of the ceiling
 SHAKING = Vibration(FLOOR, 25e-6, 20e3, phase=0.7)
 OMEGA = math.tau * SHAKING.frequency

@@ -49,6 +49,7 @@ class RawMesh:
     unit: str | None = None  # of the file's numbers, if the file states one
     notes: tuple[str, ...] = ()  # what was left out or turned into triangles
     numbering: ElementNumbers | None = None  # None if the file has only triangles
+    bodies: np.ndarray | None = None  # (m,), the body of each, if each is closed by itself
 
 
 def read_scene(file: BinaryIO | Path, kind: str) -> RawMesh:

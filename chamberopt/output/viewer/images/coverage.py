@@ -1,23 +1,26 @@
-"""Coverage of one result, or of several side by side on one colour scale, as a .png."""
+"""Coverage of one result, or of several below one another on one colour scale, as a .png."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from chamberopt.output.viewer.actors import draw_in_chamber, draw_target
-from chamberopt.output.viewer.drawn_part import DrawnPart, colour_range
-from chamberopt.output.viewer.subprocess_drawing import draw_in_subprocess, write_screenshot
-from chamberopt.output.vtp_files import CHAMBER, COVERAGE, pyvista, read_surface
+import numpy as np
 
-MAX_COLUMNS = 4  # results beside each other; further ones are drawn below
+from chamberopt.output.viewer.actors import SCATTER, SONOTRODE, add_edges, add_part, colour_meanings
+from chamberopt.output.viewer.camera import target_in_chamber
+from chamberopt.output.viewer.drawn_part import DrawnPart, colour_range
+from chamberopt.output.viewer.images.page import ColourBar, Row, write_page
+from chamberopt.output.viewer.images.panels import choose_views, part_panels
+from chamberopt.output.viewer.subprocess_drawing import draw_in_subprocess
+from chamberopt.output.vtp_files import CHAMBER, COVERAGE, PART, read_surface, size_text
 
 
 def draw_coverage(
     folders: Sequence[str | Path], titles: Sequence[str], picture: str | Path
 ) -> str | None:
-    """Draw the coverage of one result, or of several side by side on one colour scale.
+    """Draw the coverage of one result, or of several below one another on one colour scale.
 
     Args:
         folders: each with coverage.vtp and chamber.vtp.
@@ -32,39 +35,38 @@ def draw_coverage(
 
 
 def render_coverage(job: dict[str, Any]) -> None:
-    """Draw each result twice in the drawing process: in its chamber, and the target from near."""
-    folders = [Path(folder) for folder in job["folders"]]
-    parts = [DrawnPart(read_surface(folder / COVERAGE)) for folder in folders]
+    """Draw each result in its chamber and its target from near, in the drawing process."""
+    folders, titles = [Path(folder) for folder in job["folders"]], job["titles"]
     chambers = [read_surface(folder / CHAMBER) for folder in folders]
+    parts = [
+        DrawnPart(read_surface(folder / COVERAGE), chamber=chamber)
+        for folder, chamber in zip(folders, chambers, strict=True)
+    ]
     limits = colour_range(parts)
-    plotter, place = panels(len(folders))
-    for column, (part, chamber, title) in enumerate(
-        zip(parts, chambers, job["titles"], strict=True)
-    ):
-        plotter.subplot(*place(0, column))
-        draw_in_chamber(plotter, part, chamber, title, limits)
-        plotter.subplot(*place(1, column))
-        draw_target(plotter, part, limits, bar=column == len(folders) - 1)
-    write_screenshot(plotter, job["picture"])
+    targets = [target_in_chamber(read_surface(folder / PART)) for folder in folders]
+    views = choose_views(targets, chambers)
+    rows = []
+    for part, chamber, title in zip(parts, chambers, titles, strict=True):
+
+        def add(plotter: Any, part: DrawnPart = part) -> None:
+            add_part(plotter, part, limits)
+            add_edges(plotter, part.surface)
+
+        panels = part_panels(add, part.inside, part.surface, chamber, views)
+        rows.append(Row(title, panels))
+    legend = [(SONOTRODE, "sonotrode"), *colour_meanings(parts)]
+    remarks = [f"part {size_text(parts[0].surface)}", SCATTER]
+    write_page(job["picture"], rows, legend, coverage_bar(parts, limits), remarks)
 
 
-def panels(count: int) -> tuple[Any, Callable[[int, int], tuple[int, int]]]:
-    """Make a plotter with two views of each of `count` results.
-
-    The views of a single result stand beside each other. Those of several results stand one below
-    the other, in bands of MAX_COLUMNS results.
-
-    Returns:
-        The plotter, and a function that gives row and column of view 0 or 1 of the k-th result.
-    """
-    if count == 1:
-        size, shape = [1800, 900], (1, 2)
-    else:
-        columns, bands = min(count, MAX_COLUMNS), -(-count // MAX_COLUMNS)
-        size, shape = [900 * columns, 1500 * bands], (2 * bands, columns)
-    plotter = pyvista().Plotter(off_screen=True, shape=shape, window_size=size, border=False)
-
-    def place(view: int, k: int) -> tuple[int, int]:
-        return (0, view) if count == 1 else (2 * (k // MAX_COLUMNS) + view, k % MAX_COLUMNS)
-
-    return plotter, place
+def coverage_bar(parts: Sequence[DrawnPart], limits: tuple[float, float]) -> ColourBar:
+    """The colours of the quantity, and its scale where that is not all of 0 to 100 %."""
+    quantity = parts[0].quantity
+    shown = np.concatenate([part.target["shown"] for part in parts])
+    shown = shown[np.isfinite(shown)]
+    low, high = bool((shown < limits[0]).any()), bool((shown > limits[1]).any())
+    beyond = {(True, True): "both", (True, False): "min", (False, True): "max"}
+    label = quantity.title
+    if quantity.unit == "%" and limits != (0.0, 100.0):
+        label += f", scale from {limits[0]:g} to {limits[1]:g} %"
+    return ColourBar(label, quantity.colours, limits, beyond.get((low, high), "neither"))

@@ -10,21 +10,22 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.output.plots.figure_style import save_picture
 from chamberopt.output.viewer.actors import GREY, NO_RENDER, Discs, disc_actor, light
+from chamberopt.output.viewer.camera import near_directions, near_views, seen_area, view_frame
 from chamberopt.output.viewer.drawn_part import DrawnPart
+from chamberopt.output.viewer.images.page import ColourBar, Panel, Row, write_page
+from chamberopt.output.viewer.images.panels import NEAR_CAPTIONS
+from chamberopt.output.viewer.images.view import View, aim_along
 from chamberopt.output.viewer.subprocess_drawing import draw_in_subprocess
 from chamberopt.output.viewer.view_state import Vector
 from chamberopt.output.vtp_files import COVERAGE, MM, pyvista, read_surface
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.colors import Colormap
 
     from chamberopt.coverage.dents import Dents
@@ -32,11 +33,6 @@ if TYPE_CHECKING:
 MIN_PIXELS, MAX_PIXELS = 200, 4000  # of the longer side: readable, and what graphics drivers allow
 MIN_SHORTER_SIDE = 4  # pixels; below it the target is seen edge on
 MARGIN = 1.06  # of the picture's sides over the target's
-FLAT = 0.9  # a target counts as flat if its mean unit normal is at least this long
-# From near and a little below, where the shot comes from; and from the opposite side.
-OPPOSITE_VIEWS: tuple[Vector, Vector] = ((1.0, -1.4, -0.5), (-1.0, 1.4, 0.5))
-WIDE = 0.8  # height over width below which two views are put above one another
-PIXELS_PER_INCH, LETTERS_PER_INCH = 130, 12
 DARKEST = 0.35  # where the part of viridis begins that cannot be mistaken for black
 AMBIENT = 0.75  # brightness of a surface seen edge on, as a share of one seen face on
 INNER, RIM_SHADE = 0.8, 0.72  # a dent's darker rim: its inner radius and its brightness
@@ -58,8 +54,8 @@ def draw_dents(
         dents: in order of time.
         title: written above the picture.
         picture: file to write, .png.
-        view: direction from the part to the eye; None shows a flat target face on, any other from
-            two opposite sides.
+        view: direction from the part to the eye; None shows a flat target face on, and any other
+            from where it is seen.
         pixels: longer side of one view, as require_pixels accepts it.
 
     Returns:
@@ -84,40 +80,21 @@ def require_pixels(pixels: int) -> None:
 
 def render_dents(job: dict[str, Any]) -> None:
     """Draw the picture in the drawing process."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
-    from matplotlib.figure import Figure
-
     with np.load(job["dents"]) as data:
         diameter = 2e6 * data["radius"]  # µm
         low, high = np.percentile(diameter, [1.0, 99.0]) if len(diameter) else (0.0, 1.0)
-        colours, limits = dent_colours(), Normalize(low, max(high, low + 1.0), clip=True)
-        rgb = (255.0 * colours(limits(diameter))[:, :3]).astype(np.uint8)
+        colours, limits = dent_colours(), (float(low), max(float(high), float(low) + 1.0))
+        shade = np.clip((diameter - limits[0]) / (limits[1] - limits[0]), 0.0, 1.0)
+        rgb = (255.0 * colours(shade)[:, :3]).astype(np.uint8)
         discs = Discs(data["place"] * MM, -data["normal"], data["radius"] * MM, rgb)
     part = DrawnPart(read_surface(Path(job["folder"]) / COVERAGE))
-    views = [job["view"]] if job["view"] else default_views(part)
-    sides = [render_side(part, discs, view, job["pixels"]) for view in views]
-
-    height, width = np.max([image.shape[:2] for image, _ in sides], axis=0) / PIXELS_PER_INCH
-    rows, columns = (len(sides), 1) if height < WIDE * width else (1, len(sides))
-    size = (width * columns + 1.2, (height + 0.3) * rows + 0.6)
-    figure = Figure(figsize=size, dpi=PIXELS_PER_INCH, layout="constrained")
-    FigureCanvasAgg(figure)
-    every = np.atleast_1d(figure.subplots(rows, columns))
-    for axes, (image, pixel_mm) in zip(every, sides, strict=True):
-        axes.imshow(image, interpolation="antialiased")
-        axes.set_axis_off()
-        _draw_length_scale(axes, image.shape, pixel_mm)
-    legend = "black: not peened   grey: not in the target"
-    letters = int(LETTERS_PER_INCH * size[0])
-    text = "\n".join(fill(one, letters) for one in (job["title"], legend))
-    figure.suptitle(text, x=0.01, ha="left", fontsize=10, parse_math=False)
-    bar = figure.colorbar(
-        ScalarMappable(limits, colours), ax=list(every), shrink=0.7, extend="both", pad=0.01
-    )
-    bar.set_label("dent diameter [µm]")
-    save_picture(figure, Path(job["picture"]))
+    panels = [
+        Panel(render_side(part, discs, view, job["pixels"]), caption, is_cut=part.rest.n_cells > 0)
+        for view, caption in zip(_views(part, job["view"]), NEAR_CAPTIONS, strict=False)
+    ]
+    legend = [("black", "not peened"), (GREY, "not in the target")]
+    bar = ColourBar("dent diameter [µm]", colours, limits, "both")
+    write_page(job["picture"], [Row(job["title"], panels)], legend[: 1 + panels[0].is_cut], bar)
 
 
 def dent_colours() -> Colormap:
@@ -128,16 +105,17 @@ def dent_colours() -> Colormap:
     return ListedColormap(colormaps["viridis"](np.linspace(DARKEST, 1.0, 256)), "light viridis")
 
 
-def default_views(part: DrawnPart) -> Sequence[Vector]:
-    """Directions to the eye: face on for a flat target, else from two opposite sides."""
-    area = np.asarray(part.whole["area"])
-    x, y, z = area @ np.asarray(part.whole.face_normals) / area.sum()
-    return [(x, y, z)] if x * x + y * y + z * z > FLAT * FLAT else OPPOSITE_VIEWS
+def _views(part: DrawnPart, wanted: Vector | None) -> list[np.ndarray]:
+    """Directions to the eye: as wanted, or from where the target is seen."""
+    if wanted is not None:
+        return [np.array(wanted)]
+    eyes = near_directions(part.whole)
+    return near_views(seen_area(part.whole, [part.rest], eyes), eyes)
 
 
 def render_side(
-    part: DrawnPart, discs: Discs, view: Vector, pixels: int
-) -> tuple[np.ndarray, float]:
+    part: DrawnPart, discs: Discs, view: Sequence[float] | np.ndarray, pixels: int
+) -> View:
     """Render the target, black, and its dents from one direction.
 
     Args:
@@ -147,16 +125,12 @@ def render_side(
         pixels: longer side of the image.
 
     Returns:
-        The image, uint8 of shape (rows, columns, 3), and the size of its pixels [mm].
+        The image; its longer side has so many pixels.
 
     Raises:
         InputError: the target is seen edge on.
     """
-    towards_eye = np.array(view) / np.linalg.norm(view)
-    upright = (0.0, 0.0, 1.0) if abs(towards_eye[2]) < 0.99 else (0.0, 1.0, 0.0)
-    right = np.cross(upright, towards_eye)
-    right /= np.linalg.norm(right)
-    frame = np.stack([right, np.cross(towards_eye, right), towards_eye])
+    frame = view_frame(np.asarray(view))
     corners = np.asarray(part.whole.points) @ frame.T
     low, high = corners.min(axis=0), corners.max(axis=0)
     pixel_mm = MARGIN * float((high - low)[:2].max()) / pixels
@@ -172,16 +146,12 @@ def render_side(
         part.rest if part.rest.n_cells else pyvista().Sphere(radius=0.0),
         color=GREY, ambient=AMBIENT, diffuse=1.0 - AMBIENT, **NO_RENDER,
     )  # fmt: skip
-    middle = 0.5 * (low + high) @ frame
-    distance = 2.0 * float(part.whole.length)
-    plotter.camera_position = [middle + distance * towards_eye, middle, frame[1]]
-    plotter.camera.parallel_projection = True
-    plotter.camera.parallel_scale = 0.5 * rows * pixel_mm
-    plotter.renderer.ResetCameraClippingRange()
+    aim_along(plotter, frame, 0.5 * (low + high) @ frame, 0.5 * rows * pixel_mm)
+    corner = 0.5 * (low + high)[:2] + 0.5 * pixel_mm * np.array([-columns, rows])
     bare = _screenshot(plotter)
-    shown = discs.only(discs.normal @ towards_eye > 0.0)
+    shown = discs.only(discs.normal @ frame[2] > 0.0)
     if not len(shown.radius):
-        return bare.astype(np.uint8), pixel_mm
+        return View(bare.astype(np.uint8), frame, corner, pixel_mm)
     actor = disc_actor(_with_rims(shown, pixel_mm), AMBIENT)
     plotter.add_actor(actor, **NO_RENDER)
     dented = _screenshot(plotter)
@@ -192,7 +162,8 @@ def render_side(
     target.prop.color, rest.prop.color, rest.prop.lighting = "white", "black", False
     share = _screenshot(plotter) / 255.0
     plotter.close()
-    return (bare + share * (dented - bare)).round().astype(np.uint8), pixel_mm
+    image = (bare + share * (dented - bare)).round().astype(np.uint8)
+    return View(image, frame, corner, pixel_mm)
 
 
 def _screenshot(plotter: Any) -> np.ndarray:
@@ -211,13 +182,3 @@ def _with_rims(discs: Discs, pixel_mm: float) -> Discs:
     found.radius[upper] *= INNER
     found.colour[lower] = (RIM_SHADE * found.colour[lower]).astype(np.uint8)
     return found
-
-
-def _draw_length_scale(axes: Axes, shape: tuple[int, ...], pixel_mm: float) -> None:
-    """Draw a bar of a round length, at most a fifth of the image's width, below the image."""
-    longest = 0.2 * shape[1] * pixel_mm
-    power = 10.0 ** np.floor(np.log10(longest))
-    length = max(step * power for step in (1.0, 2.0, 5.0) if step * power <= longest)
-    bar, below = [0.0, length / pixel_mm], 1.015 * shape[0]
-    axes.plot(bar, [below, below], color="black", lw=2, clip_on=False, solid_capstyle="butt")
-    axes.text(0.0, below + 0.008 * shape[0], f"{length:g} mm", va="top", fontsize=9)

@@ -9,14 +9,15 @@ from typing import Any
 import numpy as np
 
 from chamberopt.output.plots.colours import DIFFERENCE_MAP
-from chamberopt.output.viewer.actors import DARK, light
-from chamberopt.output.viewer.images.coverage import panels
-from chamberopt.output.viewer.subprocess_drawing import draw_in_subprocess, write_screenshot
+from chamberopt.output.viewer.actors import NO_RENDER
+from chamberopt.output.viewer.camera import cells_of, near_directions, near_views, seen_area
+from chamberopt.output.viewer.images.page import ColourBar, Row, write_page
+from chamberopt.output.viewer.images.panels import near_panels
+from chamberopt.output.viewer.subprocess_drawing import draw_in_subprocess
 from chamberopt.output.vtp_files import read_surface, save_surface
 
 # Brown (less) over white to violet (more), for colour-blind readers too, and unlike either grey.
 PALE, NO_TARGET = "#e6e9ec", "#a9b0b7"
-LEGEND = "violet: more coverage   orange: less   pale: within the noise   grey: not in the target"
 
 
 def write_differences(
@@ -58,47 +59,38 @@ def draw_difference(surface: str | Path, titles: Sequence[str], picture: str | P
 
 
 def render_difference(job: dict[str, Any]) -> None:
-    """Draw each candidate in the drawing process: from below, like the shot, and from above."""
+    """Draw each candidate in the drawing process, from where most of the target is seen."""
     surface, titles = read_surface(Path(job["surface"])), job["titles"]
-    plotter, place = panels(len(titles))
     limit = _scale_limit(surface, len(titles))
-    for k, title in enumerate(titles):
-        for row, side in enumerate((-1.0, 1.0)):
-            plotter.subplot(*place(row, k))
-            _add_difference(plotter, surface, k + 1, limit, bar=(row, k) == (1, len(titles) - 1))
-            if row == 0:
-                plotter.add_text(title, position="upper_left", font_size=13, color=DARK)
-            else:
-                plotter.add_text(LEGEND, position="lower_left", font_size=9, color=DARK)
-            eye = (-side, 1.4 * side, 0.8 * side)
-            plotter.camera_position = [eye, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
-            plotter.reset_camera(bounds=surface.extract_cells(surface["target"] > 0).bounds)
-            plotter.enable_anti_aliasing("ssaa")
-    write_screenshot(plotter, job["picture"])
+    on_target = np.asarray(surface["target"]) > 0
+    target, rest = cells_of(surface, on_target), cells_of(surface, ~on_target)
+    eyes = near_directions(target)
+    views = near_views(seen_area(target, [rest], eyes), eyes)
+    rows = []
+    for k, title in enumerate(titles, start=1):
+
+        def add(plotter: Any, k: int = k) -> None:
+            _add_difference(plotter, target, rest, k, limit)
+
+        rows.append(Row(title, near_panels(add, target, surface, views)))
+    legend = [(PALE, "within the noise"), (NO_TARGET, "not in the target")]
+    bar = ColourBar("difference of coverage [%-points]", DIFFERENCE_MAP, (-limit, limit), "both")
+    write_page(job["picture"], rows, legend, bar)
 
 
-def _add_difference(plotter: Any, surface: Any, k: int, limit: float, bar: bool) -> None:
-    light(plotter)
-    target = np.asarray(surface["target"]) > 0
-    corners = np.asarray(surface.regular_faces)
-    real = (np.asarray(surface[f"real_{k}"])[corners] > 0.0).sum(axis=1) > 1  # of most corners
-    look: dict[str, Any] = {"ambient": 0.7, "diffuse": 0.3}
-    for chosen, colour in ((~target, NO_TARGET), (target & ~real, PALE)):
-        if chosen.any():
-            plotter.add_mesh(surface.extract_cells(chosen), color=colour, **look)
-    style = {
-        "vertical": True, "title": "difference\n[%-points]\n", "fmt": "%+.1f", "n_labels": 5,
-        "color": DARK, "width": 0.06, "height": 0.55, "position_x": 0.84, "position_y": 0.2,
-        "title_font_size": 20, "label_font_size": 20,
-    }  # fmt: skip
-    chosen = target & real
-    shown = surface.extract_cells(chosen if chosen.any() else [int(np.flatnonzero(target)[0])])
-    if not chosen.any():  # the colour bar needs an actor all the same
-        shown[f"difference_{k}"] = np.full(shown.n_points, np.nan)
-    plotter.add_mesh(
-        shown, scalars=f"difference_{k}", cmap=DIFFERENCE_MAP, clim=(-limit, limit),
-        nan_color=PALE, show_scalar_bar=bar, scalar_bar_args=style if bar else None, **look,
-    )  # fmt: skip
+def _add_difference(plotter: Any, target: Any, rest: Any, k: int, limit: float) -> None:
+    look: dict[str, Any] = {"ambient": 0.7, "diffuse": 0.3, **NO_RENDER}
+    if rest.n_cells:
+        plotter.add_mesh(rest, color=NO_TARGET, **look)
+    # The border is half way between a vertex where the difference is real and one where it is not.
+    noise, shown = target.clip_scalar(scalars=f"real_{k}", value=0.5, both=True)
+    if noise.n_cells:
+        plotter.add_mesh(noise, color=PALE, **look)
+    if shown.n_cells:
+        plotter.add_mesh(
+            shown, scalars=f"difference_{k}", cmap=DIFFERENCE_MAP, clim=(-limit, limit),
+            nan_color=PALE, show_scalar_bar=False, **look,
+        )  # fmt: skip
 
 
 def _scale_limit(surface: Any, count: int) -> float:

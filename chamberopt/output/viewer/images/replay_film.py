@@ -7,6 +7,7 @@ sonotrode hardly moves in the picture.
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +21,10 @@ from chamberopt.output.viewer.actors import (
     escape_dollars,
     light,
 )
+from chamberopt.output.viewer.camera import Room, cells_of, fit_camera, target_in_chamber
 from chamberopt.output.viewer.images.film import write_film
+from chamberopt.output.viewer.images.panels import choose_views
+from chamberopt.output.viewer.overlay import LINE_HEIGHT, wrap
 from chamberopt.output.viewer.subprocess_drawing import draw_in_subprocess
 from chamberopt.output.viewer.view_state import Vector
 from chamberopt.output.vtp_files import CHAMBER, MM, PART, pyvista, read_surface
@@ -31,11 +35,10 @@ if TYPE_CHECKING:
 # Blue of Okabe and Ito and a magenta, beside greys: colour-blind readers tell them from one another
 # and from the orange sonotrode.
 BALL, HIT, DENT, TRAIL = "#5d6b7a", "#FF2E9A", "#0072B2", "#7f8c99"
-TARGET, REST, HIT_TRIANGLE = (230, 233, 236), (185, 190, 196), (255, 105, 180)
-HIT_FRAMES = 3  # for which a ball that has hit the part, its dent and the triangle are coloured
+TARGET, REST = "#e6e9ec", "#a9b0b7"
+HIT_FRAMES = 3  # for which a ball that has hit the part and its dent are coloured
 TRAIL_FRAMES = 3
-ZOOM = 1.4
-DEFAULT_VIEW = (1.0, -1.6, 0.12)
+FONT = 10
 MAX_FRAME_SECONDS = 10.0  # for drawing, without a graphics card
 MAX_ROUND_BALLS = 2000  # above it balls have fewer sides
 
@@ -46,7 +49,8 @@ def draw_replay(
     film: Path,
     fps: int,
     size: tuple[int, int],
-    view: Vector = DEFAULT_VIEW,
+    view: Vector | None = None,
+    count: Callable[[int], None] = lambda drawn: None,
 ) -> str | None:
     """Draw a flight into a film.
 
@@ -56,7 +60,9 @@ def draw_replay(
         film: file to write, as film_path accepts it.
         fps: frames a second, as require_playable accepts them.
         size: width and height [pixels], as require_playable accepts them.
-        view: direction from the chamber's middle to the eye.
+        view: direction from the chamber's middle to the eye; None to choose one that shows the
+            target.
+        count: called after each frame with how many are drawn.
 
     Returns:
         None, or one line that says why there is no film.
@@ -69,7 +75,7 @@ def draw_replay(
     )
     title = (
         f"{result.resolve().name}   slowed {slower:.3g} times   sonotrode {motion}   "
-        "magenta: has just hit the part"
+        "magenta: has just hit the part   pale: target"
     )
     point, axis = (np.zeros(3), np.zeros(3)) if flight.part_axis is None else flight.part_axis
     with tempfile.TemporaryDirectory() as folder:
@@ -90,11 +96,11 @@ def draw_replay(
             dent_time=flight.dents.time,
             hit_time=flight.impacts.time,
             hit_ball=flight.impacts.ball,
-            hit_triangle=flight.part_triangle,
         )
         job = {"draw": "replay", "folder": str(result), "flight": str(data), "title": title,
-               "fps": fps, "size": list(size), "view": list(view)}  # fmt: skip
-        return draw_in_subprocess(job, film, 600.0 + MAX_FRAME_SECONDS * len(flight.time))
+               "fps": fps, "size": list(size), "view": view}  # fmt: skip
+        longest = 600.0 + MAX_FRAME_SECONDS * len(flight.time)
+        return draw_in_subprocess(job, film, longest, count)
 
 
 def render_replay(job: dict[str, Any]) -> None:
@@ -107,6 +113,7 @@ def render_replay(job: dict[str, Any]) -> None:
     for number in range(len(flight["time"])):
         scene.show(number)
         frames.append(np.ascontiguousarray(plotter.screenshot(return_img=True)[..., :3]))
+        print(number + 1, flush=True)  # for `count` of draw_in_subprocess
     write_film(Path(job["picture"]), frames, job["fps"])
 
 
@@ -117,22 +124,25 @@ class _ReplayScene:
         self, plotter: Any, folder: Path, flight: dict[str, np.ndarray], job: dict[str, Any]
     ) -> None:
         self.plotter, self.flight, self.title = plotter, flight, job["title"]
+        self.width = job["size"][0] - 20
         self.recent = HIT_FRAMES * float(flight["time"][1] - flight["time"][0])
         light(plotter)
-        chamber, self.surface = read_surface(folder / CHAMBER), read_surface(folder / PART)
+        chamber, surface = read_surface(folder / CHAMBER), read_surface(folder / PART)
         self.sonotrodes, _ = add_chamber(plotter, chamber)
-        on_target = np.asarray(self.surface["target"]) > 0
-        self.plain = np.where(on_target[:, None], TARGET, REST).astype(np.uint8)
-        self.surface["colour"] = self.plain.copy()
-        self.part = plotter.add_mesh(
-            self.surface, scalars="colour", rgb=True, ambient=0.4, diffuse=0.6
-        )
+        on_target = np.asarray(surface["target"]) > 0
+        self.part = [
+            plotter.add_mesh(cells_of(surface, chosen), color=colour, ambient=0.55, diffuse=0.45)
+            for chosen, colour in ((on_target, TARGET), (~on_target, REST))
+            if chosen.any()
+        ]
         sides = 20 if len(flight["diameter"]) < MAX_ROUND_BALLS else 8
         self.ball = pyvista().Sphere(radius=0.5, theta_resolution=sides, phi_resolution=sides)
-        plotter.camera_position = [job["view"], (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
-        plotter.reset_camera(bounds=chamber.bounds)
-        plotter.camera.zoom(ZOOM)
-        plotter.camera.SetWindowCenter(0.0, -0.08)  # makes room for the text
+        eye = job["view"] or choose_views([target_in_chamber(surface)], [chamber])[0]
+        width, height = job["size"]
+        # The longest text that a frame has, two lines of clock and title.
+        lines = wrap(f"{self._clock(-1, 10**6)}\n{self.title}", width, FONT).count("\n") + 1
+        room = Room(10.0, 10.0, min(LINE_HEIGHT * FONT * (lines + 0.5), 0.3 * height), 10.0)
+        fit_camera(plotter, np.asarray(chamber.points), np.array(eye), (width, height), room)
         plotter.enable_anti_aliasing("ssaa")
 
     def show(self, number: int) -> None:
@@ -140,11 +150,9 @@ class _ReplayScene:
         flight, now = self.flight, self.flight["time"][number]
         for tag, displacement in zip(flight["tags"], flight["displacements"], strict=True):
             self.sonotrodes[int(tag)].position = displacement[number]
-        self.part.user_matrix = flight["pose"][number]
+        for actor in self.part:
+            actor.user_matrix = flight["pose"][number]
         recent = (flight["hit_time"] <= now) & (flight["hit_time"] > now - self.recent)
-        colours = self.plain.copy()
-        colours[flight["hit_triangle"][recent]] = HIT_TRIANGLE
-        self.surface["colour"] = colours
         hit = np.isin(np.arange(len(flight["diameter"])), flight["hit_ball"][recent])
         self._show_balls("balls", number, ~hit, BALL)
         self._show_balls("balls that hit", number, hit, HIT)
@@ -154,16 +162,25 @@ class _ReplayScene:
         self._replace(
             "trails", pyvista().PolyData(trail) if len(trail) else None, color=TRAIL, point_size=2.0
         )
-        impacts = int((flight["hit_time"] <= now).sum())
-        clock = (
-            f"{1e3 * now:.3f} ms after the warm-up   {impacts} impacts on the part, {dents} dents "
-            f"since {1e3 * flight['time'][0]:g} ms"
-        )
-        text = escape_dollars(f"{clock}\n{self.title}")
+        text = wrap(f"{self._clock(number, dents)}\n{self.title}", self.width, FONT)
         self.plotter.add_text(
-            text, position="lower_left", font_size=8, color=DARK, name="clock", render=False
+            escape_dollars(text),
+            position=(10, 10),
+            font_size=FONT,
+            color=DARK,
+            name="clock",
+            render=False,
         )
         self.plotter.render()
+
+    def _clock(self, number: int, dents: int) -> str:
+        """A line with the time of a frame, and impacts and dents by then."""
+        flight, now = self.flight, self.flight["time"][number]
+        impacts = int((flight["hit_time"] <= now).sum())
+        return (
+            f"{1e3 * now:.3f} ms after the warm-up   since {1e3 * flight['time'][0]:g} ms "
+            f"{impacts} impacts on the part, {dents} fast enough to leave a dent"
+        )
 
     def _show_balls(self, name: str, number: int, chosen: np.ndarray, colour: str) -> None:
         mesh = None

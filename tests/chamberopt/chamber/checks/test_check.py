@@ -65,7 +65,7 @@ def test_a_level_top_is_warned_of_with_area_place_and_remedy(gear: tuple[Design,
     design, chamber = gear
     (said,) = (text for text in warned(design, chamber) if "come to rest" in text)
     assert "come to rest on the part, which neither vibrates nor turns" in said
-    assert "around (0.0, 0.0, 25.0) mm, at z = 25 mm" in said
+    assert "around (0.0, 0.0, 25.0) mm in the chamber's frame, at z = 25 mm" in said
     assert "effects.part_turn" in said
     area = float(said.split("turns: ")[1].split(" mm²")[0])
     shaft = math.pi * 8**2
@@ -200,9 +200,9 @@ def test_a_gap_too_low_for_a_ball_is_warned_of_with_its_place_and_width() -> Non
         text for text in warned(*made("gear", chamber__height_mm=26.0)) if "the gap between" in text
     )
     assert "the gap between the ceiling and the part's upper side at (" in said
-    assert ", 25.5) mm is 1 to 1.0" in said
+    assert ", 25.5) mm in the chamber's frame is 1 to 1.0" in said
     assert (
-        "narrower than a ball of 1.5 mm: no ball gets in there; raise chamber.height_mm or close "
+        "narrower than a ball of 1.5 mm: no ball gets in there; raise the ceiling or close "
         "the gap" in said
     )
     (said,) = (

@@ -8,7 +8,7 @@ import pytest
 import trimesh
 
 from chamberopt.chamber.build import Chamber, build_chamber
-from chamberopt.chamber.checks.gaps import gap_warnings, pocket_warnings, target_warnings
+from chamberopt.chamber.checks.gaps import gap_warnings, pocket_warnings, surface_warnings
 from chamberopt.chamber.part import Part
 from chamberopt.chamber.reach.largest_ball import largest_balls
 from chamberopt.chamber.reach.reach import TOLERATED_OVERLAP, Reach, find_reach, reached_part_share
@@ -89,8 +89,11 @@ def test_of_a_slot_narrower_than_the_ball_nothing_is_touched_and_it_is_said() ->
     (said,) = gap_warnings(found, chamber, BALL)
     assert "2.4 mm wide, narrower than a ball of 3 mm: no ball gets in there" in said
     assert "the gap of the part's side" in said
-    (said,) = target_warnings(found, chamber)
+    (said,) = surface_warnings(found, chamber)
     assert said.startswith("100.0% of the target in the chamber (")
+    (said,) = surface_warnings(found, chamber, "zone root")
+    assert said.startswith("100.0% of zone root in the chamber (")
+    assert said.endswith("; or narrow the target of zone root")
     assert not gap_warnings(reached(slot(3.3)), slot(3.3), BALL)
 
 

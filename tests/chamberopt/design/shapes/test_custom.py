@@ -93,7 +93,7 @@ def test_its_keys_are_checked_and_vary(folder: Path) -> None:
     (folder / "s.toml").write_text(
         'design = "d.toml"\n[vary]\n"chamber.side_mm" = [60, 90]\n', encoding="utf-8"
     )
-    assert load_study(folder / "s.toml").vary == {"chamber.side_mm": (60.0, 90.0)}
+    assert load_study(folder / "s.toml").vary["chamber.side_mm"].bounds == (60.0, 90.0)
     assert "d.toml:9: chamber.sid_mm: unknown key; did you mean 'side_mm'?" in said_of(
         folder, ("side_mm", "sid_mm"), file="d.toml"
     )

@@ -454,7 +454,7 @@ def test_a_study_moves_the_sonotrode_of_a_drawn_set_up(tmp_path: Path) -> None:
 
     result = run_in_folder(question, tmp_path / "study", SerialExecutor(), None, volume_off)
 
-    assert result.best.design.value("chamber.sonotrode_distance_mm") == pytest.approx(best, abs=0.3)
+    assert result.best.design.value("chamber.sonotrode_distance_mm") == pytest.approx(best, abs=0.5)
 
 
 def test_the_shipped_set_up_is_the_plates_own_chamber() -> None:

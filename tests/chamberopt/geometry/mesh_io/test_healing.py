@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from chamberopt.geometry.mesh_io.part_mesh import read_part
+from chamberopt.geometry.mesh_io.surface_error import OpenSurfaceError
 from chamberopt.geometry.triangles import tetrahedron_volumes
-from tests.helpers.mesh_files import box_corners, write_ascii_stl, write_stl
+from tests.helpers.mesh_files import ball_corners, box_corners, write_ascii_stl, write_stl
 
 
 def test_an_inside_out_part_is_turned_with_a_note(tmp_path: Path) -> None:
@@ -58,3 +59,34 @@ def test_vertices_apart_by_rounding_are_merged_with_a_note(tmp_path: Path) -> No
 
     assert len(part.vertices) == 8
     assert "merged" in part.notes[0]
+
+
+@pytest.mark.parametrize("hold", ["nothing", "a corner", "an edge"])
+def test_stray_facets_are_dropped_with_a_note_and_their_place(tmp_path: Path, hold: str) -> None:
+    corners = ball_corners(2)
+    a, b, _ = corners[40]
+    up = 1.3 * a
+    fin = {"nothing": [1.1 * a, 1.1 * b, up], "a corner": [a, 1.1 * b, up], "an edge": [a, b, up]}
+    strays = np.array([fin[hold], [fin[hold][1], fin[hold][2], 1.3 * b]])  # two that share a side
+
+    plain = read_part(write_stl(tmp_path / "ball.stl", corners), "mm")
+    part = read_part(
+        write_stl(tmp_path / "stray.stl", np.insert(corners, 100, strays, axis=0)), "mm"
+    )
+
+    assert (part.vertices == plain.vertices).all()
+    assert len(part.triangles) == len(corners)
+    assert part.elements[99:101].tolist() == [100, 103]  # the others keep their numbers
+    assert (
+        "dropped 2 stray triangles of no closed surface, the first is triangle 101 at ("
+        in (part.notes[0])
+    )
+
+
+def test_a_sheet_that_is_no_small_thing_is_not_dropped_but_located(tmp_path: Path) -> None:
+    sheet = np.array([[[0.0, 0.0, 30.0], [20.0, 0.0, 30.0], [0.0, 20.0, 30.0]]])
+
+    with pytest.raises(OpenSurfaceError, match="3 open edges in 1 hole, the first from") as caught:
+        read_part(write_stl(tmp_path / "box.stl", np.r_[box_corners(), sheet]), "mm")
+
+    assert caught.value.edges[..., 2] == pytest.approx(0.03)

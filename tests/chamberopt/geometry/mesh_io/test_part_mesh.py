@@ -89,7 +89,7 @@ def broken(folder: Path, how: str) -> Path:
     [
         ("missing", r"no such mesh file.*part\.mesh"),
         ("folder", "is a folder"),
-        ("step", r"holds no solid|needs the package cascadio"),
+        ("step", r"export it again as AP214|needs the package gmsh"),
         ("empty", "the file is empty"),
         ("no triangles", "holds no triangles"),
         ("truncated", "truncated.*says 12 triangles and holds 6"),

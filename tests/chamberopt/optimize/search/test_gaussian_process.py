@@ -1,9 +1,9 @@
-"""The model holds the truth in its interval, and the variances of its scores are pooled."""
+"""The model holds the truth in its interval, and the variances of its scores are moderated."""
 
 import numpy as np
 import pytest
 
-from chamberopt.optimize.search.gaussian_process import GaussianProcess, pool_variances
+from chamberopt.optimize.search.gaussian_process import GaussianProcess, moderate_variances
 from tests.helpers.known_optima import bowl
 
 
@@ -39,12 +39,31 @@ def test_a_running_evaluation_takes_away_uncertainty_only(length_factor: float) 
     np.testing.assert_allclose(less**2, expected, rtol=1e-6)
 
 
-def test_spreads_are_pooled() -> None:
+def test_far_from_all_points_its_mean_is_not_that_of_the_points_that_gather() -> None:
+    """29 points on a top of 0.8 and 10 elsewhere, of 0.2: the mean far away is nearer to these."""
+    rng = np.random.default_rng(6)
+    near = np.clip(0.9 + 0.02 * rng.normal(size=(29, 2)), 0.0, 1.0)
+    points = np.vstack([near, 0.6 * rng.random((10, 2))])
+    scores = np.where(np.arange(39) < 29, 0.8, 0.2) + rng.normal(0.0, 0.01, 39)
+    mean, _ = GaussianProcess(points, scores, np.full(39, 1e-4))(np.array([[30.0, 30.0]]))
+    assert scores.mean() > 0.6
+    assert 0.25 < mean[0] < 0.55
+
+
+def test_variances_are_drawn_towards_those_of_all() -> None:
+    """Alike, they are all but common; different by far more than chance, each keeps its own."""
+    rng = np.random.default_rng(7)
+    alike = rng.normal(0.0, 0.1, (200, 4)).var(axis=1, ddof=1)
+    pooled = moderate_variances(alike, np.full(200, 4))
+    np.testing.assert_allclose(pooled.mean(), 0.01 / 4, rtol=0.2)
+    assert np.log(pooled).std() < 0.2 * np.log(alike).std()
+    true = np.exp(rng.normal(0.0, 3.0, 200))
+    own = (np.sqrt(true)[:, None] * rng.normal(size=(200, 40))).var(axis=1, ddof=1)
     np.testing.assert_allclose(
-        pool_variances(np.array([1.0, 3.0, np.nan]), np.array([2, 4, 1])), [1.0, 0.5, 2.0]
+        moderate_variances(own, np.full(200, 40)), own / 40, rtol=0.02, atol=5e-4
     )
-    wild = pool_variances(
-        np.array([1.0, 3.0, 1e9]), np.array([2, 2, 2])
-    )  # must not drown the others
-    np.testing.assert_allclose(wild, [1.0, 1.0, 5e8])
-    assert not pool_variances(np.full(2, np.nan), np.ones(2)).any()
+    wild = np.append(alike, [1e9, np.nan])
+    found = moderate_variances(wild, np.full(202, 4))
+    assert found[200] > 1e6  # must not drown the others
+    assert np.median(found[:200]) < 0.02
+    assert not moderate_variances(np.full(2, np.nan), np.ones(2)).any()

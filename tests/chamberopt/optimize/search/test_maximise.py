@@ -1,21 +1,21 @@
 """The phases of a search keep their budget, improve on the start and are reproducible."""
 
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 import pytest
 
 from chamberopt.common.errors import InputError
+from chamberopt.optimize.search.domain import Axis, Domain
 from chamberopt.optimize.search.maximise import maximise
-from chamberopt.optimize.search.stopping import Begin
+from chamberopt.optimize.search.stopping import Begin, Scored
 from chamberopt.optimize.study.schema import Optimizer
 from tests.helpers.known_optima import PEAK, bowl, hill
 
 
 def one_by_one(score: Callable[[np.ndarray], float]) -> Begin:
     """Evaluations that run when their scores are waited for."""
-    return lambda point: partial(score, point)
+    return lambda point: lambda: Scored(score(point))
 
 
 def test_phases_have_their_shares_and_the_last_what_is_left() -> None:
@@ -88,15 +88,15 @@ def test_a_batch_is_proposed_before_the_others_have_scores() -> None:
     points: list[np.ndarray] = []
     scored: list[int] = []
 
-    def begin(point: np.ndarray) -> Callable[[], float]:
+    def begin(point: np.ndarray) -> Callable[[], Scored]:
         number = len(points)
         assert number - len(scored) <= 2
         points.append(point)
 
-        def wait() -> float:
+        def wait() -> Scored:
             assert number == len(scored)
             scored.append(number)
-            return hill(point)
+            return Scored(hill(point))
 
         return wait
 
@@ -105,6 +105,35 @@ def test_a_batch_is_proposed_before_the_others_have_scores() -> None:
     assert max(map(hill, points)) > PEAK - 0.005
     for i, point in enumerate(points):
         assert all(np.abs(point - other).max() >= 0.005 for other in points[max(0, i - 2) : i])
+
+
+def test_what_cannot_be_simulated_costs_nothing() -> None:
+    """Half of the cube cannot be simulated: there are as many evaluations as without it."""
+    simulated: list[bool] = []
+
+    def begin(point: np.ndarray) -> Callable[[], Scored]:
+        simulated.append(bool(point[0] < 0.5))
+        return lambda: Scored(hill(point) if point[0] < 0.5 else -1.0, bool(point[0] < 0.5))
+
+    maximise(begin, np.full(3, 0.4), Optimizer(evaluations=20))
+    assert sum(simulated) == 20
+    assert 0 < simulated.count(False) <= 20
+    simulated.clear()
+    maximise(lambda x: lambda: Scored(hill(x), simulated=bool(simulated.append(False))),
+             np.full(3, 0.4), Optimizer(evaluations=6))  # fmt: skip
+    assert len(simulated) == 12  # nowhere: it ends
+
+
+@pytest.mark.parametrize("flat", [False, True])
+def test_a_search_ends_when_all_points_were_evaluated(flat: bool) -> None:
+    points: list[np.ndarray] = []
+    maximise(
+        one_by_one(lambda x: points.append(x) or (0.0 if flat else bowl(x))),
+        np.array([0.5, 1.0]),
+        Optimizer(evaluations=20),
+        domain=Domain([Axis(3), Axis(2)]),
+    )
+    assert len(points) == len(np.unique(points, axis=0)) == 6
 
 
 def test_what_an_algorithm_cannot_do_is_said() -> None:

@@ -22,6 +22,7 @@ from chamberopt.common.estimate import Estimate
 from chamberopt.design.load import Design
 from chamberopt.optimize.storage.study_folder import StudyFolder, open_study_folder
 from chamberopt.optimize.study import Objective, Study
+from chamberopt.optimize.study.parameters import Varied
 from chamberopt.output.results.load import load_result
 from chamberopt.simulation.effect_pilot import Advice
 from chamberopt.simulation.evaluation import Evaluation, load_evaluation, save_evaluation
@@ -127,6 +128,7 @@ fork = (
 )
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("quick_disk")
 @pytest.mark.skipif(fork is None, reason="needs fork")
 def test_killed_at_twenty_random_moments(tmp_path: Path) -> None:
@@ -360,7 +362,7 @@ class TestChanges:
         assert "study.design.shot.mass_g: was 5.0, is 6.0" in self.refused(heavier, folder)
 
     def test_of_the_bounds(self, folder: Path) -> None:
-        bounds = {**study().vary, "shot.mass_g": (2.0, 9.0)}
+        bounds = {**study().vary, "shot.mass_g": Varied(low=2.0, high=9.0)}
         said = self.refused(study().model_copy(update={"vary": bounds}), folder)
         assert "study.vary.shot.mass_g: was [2.0, 10.0], is [2.0, 9.0]" in said
 

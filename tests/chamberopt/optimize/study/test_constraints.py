@@ -1,14 +1,20 @@
 """Constraints are judged by the intervals of the figures."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from chamberopt.common.estimate import Estimate, estimate
-from chamberopt.optimize.study import Limits
-from chamberopt.optimize.study.constraints import assess_feasibility, expected_violation
-from tests.helpers.known_optima import bowl, bowl_shares, run_bowl
+from chamberopt.optimize.study import Limits, Study
+from chamberopt.optimize.study.constraints import (
+    NOT_KNOWN,
+    assess_feasibility,
+    describe_violations,
+    expected_violation,
+)
+from tests.helpers.known_optima import GEAR, VARY, bowl, bowl_shares, run_bowl
 from tests.helpers.synthetic import judged
 
 
@@ -45,6 +51,29 @@ def test_a_number_of_the_design_can_be_a_constraint(tmp_path: Path) -> None:
     assert result.best.feasibility == "feasible"
 
 
+def test_the_limits_of_a_zone_are_constraints(tmp_path: Path) -> None:
+    """The best is at 4.4 g, where the zone is covered to 0.56: it may be covered to 0.5."""
+    zone = {"name": "face", "target": {}, "coverage_max": 0.5}
+    design = GEAR.changed({"zones": (zone,)})
+
+    def simulator(design, stream, replicas):
+        made = judged(np.full(3, bowl(bowl_shares(design))))
+        of_zone = {f"face.{k}": one for k, one in made.metrics.items() if k != "shot_count"}
+        covered = Estimate(design.shot.mass_g / 8.0, 0.0, (design.shot.mass_g / 8.0,) * 3)
+        metrics = made.metrics | of_zone | {"face.p95_coverage": covered}
+        return replace(made, metrics=metrics)
+
+    result = run_bowl(tmp_path, simulator, design=design)
+    assert 3.5 < result.best.design.shot.mass_g <= 4.0
+    assert result.best.feasibility == "feasible"
+    reasons = [trial.reason for trial in result.trials if not trial.feasible]
+    assert any("face.p95_coverage" in reason and "> max 0.5" in reason for reason in reasons)
+    with pytest.raises(ValueError, match="the zone limits it in the design already"):
+        Study(design=design, vary=VARY, constraints={"face.p95_coverage": Limits(max=0.4)})
+    with pytest.raises(ValueError, match=r"zones\.0\.coverage_max: what is asked of"):
+        Study(design=design, vary={"zones.0.coverage_max": (0.1, 0.9)})
+
+
 def test_where_no_constraint_is_surely_kept_the_answer_says_so(tmp_path: Path) -> None:
     def simulator(design, stream, replicas):
         made = judged(np.full(4, bowl(bowl_shares(design))))
@@ -54,3 +83,10 @@ def test_where_no_constraint_is_surely_kept_the_answer_says_so(tmp_path: Path) -
     result = run_bowl(tmp_path, simulator, constraints={"mean_coverage": Limits(min=0.5)})
     assert result.best.feasibility == "not known"
     assert "mean_coverage 0.505 ± 0.13 may be < min 0.5" in result.warnings[0]
+
+
+def test_a_figure_that_is_not_resolved_is_not_known_to_violate_anything() -> None:
+    figure = Estimate(0.3, 0.1).not_known("not resolved")
+    assert expected_violation(figure, Limits(min=0.5)) == 0.0
+    assert describe_violations("figure", figure, Limits(min=0.5)) == []
+    assert assess_feasibility({"figure": Limits(min=0.5)}, {"figure": figure})[0] == NOT_KNOWN

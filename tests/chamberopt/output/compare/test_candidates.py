@@ -51,7 +51,7 @@ class Simulations:
 @pytest.fixture
 def simulations(monkeypatch: pytest.MonkeyPatch) -> Simulations:
     found = Simulations()
-    monkeypatch.setattr(candidates, "evaluate", found.evaluate)
+    monkeypatch.setattr(candidates, "evaluate_calibrated", found.evaluate)
     monkeypatch.setattr(viewer, "draw_coverage", lambda *_: None)
     return found
 

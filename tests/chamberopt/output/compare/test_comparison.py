@@ -14,7 +14,8 @@ from scipy import stats
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate, estimate
-from chamberopt.coverage.metrics import NEVER
+from chamberopt.coverage.compression import ERROR
+from chamberopt.coverage.metrics import NEVER, find_metric
 from chamberopt.design.load import load_design
 from chamberopt.output import viewer
 from chamberopt.output.compare import comparison_folder
@@ -25,7 +26,7 @@ from chamberopt.output.compare.table import comparison_text
 from chamberopt.output.save_run import save_simulation
 from chamberopt.output.vtp_files import read_surface
 from tests.helpers.results.digests import accept_changes
-from tests.helpers.synthetic import DESIGNS, plate_design, poisson_evaluation
+from tests.helpers.synthetic import DESIGNS, machine_values, plate_design, poisson_evaluation
 
 PLATE = plate_design()
 CHAMBER = build_chamber(PLATE)
@@ -57,12 +58,23 @@ def test_the_same_twice(tmp_path: Path) -> None:
         assert not gap.real
         assert gap.time_ratio is None
         # The bias of these knows nothing of pairs.
-        if name not in ("p05_coverage", "time_to_98_s", "intensity_uniformity"):
+        metric = find_metric(name)
+        if metric is None or not metric.of_places:
             assert gap.half_width == 0.0, name
+    depth, (gap,) = (both.metrics["compression_depth_um"][0],
+                     both.differences["compression_depth_um"])  # fmt: skip
+    assert gap.half_width < 0.5 * ERROR * depth.value  # which is common to both
     text = comparison_text(both)
     assert "the designs do not differ" in text
-    assert row(text, "mean_coverage").endswith("no")
+    assert row(text, "mean_coverage").endswith("exact")
     assert "b - a: paired" in text
+
+
+def test_the_error_of_the_depth_is_not_common_to_two_metals(tmp_path: Path) -> None:
+    other = plate_design(materials__part__tensile_MPa=500.0)
+    both = compare([left(tmp_path / "a", 10), left(tmp_path / "other", 10, design=other)])
+    (apart,) = both.differences["compression_depth_um"]
+    assert apart.half_width > np.sqrt(2.0) * ERROR * both.metrics["compression_depth_um"][0].value
 
 
 def test_what_differs_is_named_and_measured(tmp_path: Path) -> None:
@@ -248,3 +260,10 @@ def test_what_cannot_be_compared(tmp_path: Path) -> None:
     wider = left(tmp_path / "wider", 20, 0, plate_design(process__accuracy__gauge_mm2=4))
     with pytest.raises(InputError, match=r"gauge_mm2 is 4, in .* 1: .* different areas"):
         compare([one, wider])
+    machines = [
+        left(tmp_path / name, 20, 0, plate_design(calibration=machine_values(v0=sd)))
+        for name, sd in (("mine", 0.1), ("yours", 0.2))
+    ]
+    with pytest.raises(InputError, match="another calibration than in"):
+        compare(machines)
+    compare([one, machines[0]])

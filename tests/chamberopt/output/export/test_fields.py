@@ -366,7 +366,7 @@ def test_what_cannot_be_handed_on_is_said(tmp_path: Path) -> None:
         write_fields(folder, tmp_path / "a.cdb", "ansys")
     with pytest.raises(InputError, match=r"name it fields\.vtkhdf"):
         write_fields(folder, tmp_path / "fields.h5", "vtkhdf")
-    with pytest.raises(InputError, match="make the folder"):
+    with pytest.raises(InputError, match="nowhere does not exist; make it first"):
         write_fields(folder, tmp_path / "nowhere" / "a.inp", "abaqus")
     with pytest.raises(InputError, match="part's own file"):
         write_fields(folder, tmp_path / "plate.bdf", "nastran")

@@ -63,7 +63,7 @@ def test_failed_infeasible_and_confirmed_candidates_are_marked() -> None:
     for label in (
         "time [s]",
         "evaluation",
-        "could not be simulated",
+        "not simulated",
         "misses a constraint",
         "confirmed on fresh seeds",
         "best so far (as searched)",
@@ -80,7 +80,7 @@ def test_failed_infeasible_and_confirmed_candidates_are_marked() -> None:
 
 
 def test_a_search_in_which_all_failed_is_drawn() -> None:
-    assert "could not be simulated" in charts.convergence_chart(
+    assert "not simulated" in charts.convergence_chart(
         [evaluation(1, None), evaluation(2, None)], "goal", False
     )
 

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from chamberopt.common.estimate import Estimate
-from chamberopt.output.report.conclusions import answer, influence
+from chamberopt.output.report.conclusions import answer, answer_lines, influence
 from chamberopt.output.report.number_text import Label, objective_label
 
 
@@ -50,7 +50,7 @@ def test_too_few_evaluations_are_reported() -> None:
     )
     assert none["parameters"] == []
     assert none["said"] == [
-        "3 evaluations, 1 of them failed, are too few to tell what each parameter does: "
+        "3 evaluations, 1 of them not simulated, are too few to tell what each parameter does: "
         "4 or more are needed for a model of them."
     ]
 
@@ -61,6 +61,53 @@ def test_a_time_to_minimise_is_shown_as_a_time() -> None:
     )["parameters"][0]
     assert found["mean"] == [400.0, 900.0, 2000.0]
     assert found["loss"] == pytest.approx(1600.0)
+
+
+def test_constraints_that_are_not_certainly_met_are_in_the_answer() -> None:
+    band = {"key": "intensity_mmA", "unit": "mmA", "figure": {"value": 0.12, "half_width": 0.03}}
+    band |= {"limit": 0.1, "metric": "root.almen_intensity_p05", "standing": "not known"}
+    mean = {"value": 90.0, "half_width": 2.0}
+    zones = {
+        "zones": [
+            {"name": "root", "limits": [band], "mean_coverage": mean},
+            {"name": "tip", "limits": [], "mean_coverage": mean},
+        ]
+    }
+    reason = "shot_count 33 may be > max 30; root.almen_intensity_p05 0.12 may be < min 0.1"
+    reasons = [("infeasible", "shot_count 50 > max 30"), ("not known", reason)]
+    reasons += [("not known", "faster"), ("not known", "slower")]
+    confirmed = [
+        {
+            "parameters": {"x": x},
+            "standing": standing,
+            "reason": text,
+            "objective": Estimate(-seconds, 20.0).to_json(),
+        }
+        for x, seconds, (standing, text) in zip(
+            (2, 1, 3, 4), (300, 200, 100, 400), reasons, strict=True
+        )
+    ]
+    misfit = SimpleNamespace(kind="dent diameters", error_scale=2.0)
+    study = {name: {"parameters": {"x": x}} for name, x in (("best", 1), ("start", 2))}
+    design = SimpleNamespace(calibration=SimpleNamespace(misfits=[misfit], not_mmA=""))
+    result: Any = SimpleNamespace(
+        data={"study": study | {"confirmed": confirmed}},
+        design=design,
+        objective_name="minus_time_to_98_s",
+        objective=Estimate(-200.0, 20.0),
+    )
+    lines = answer_lines(result, zones)
+    assert [one["text"] for one in lines] == [
+        "Zone root: intensity_mmA ≥ 0.1 is not known (0.12 ± 0.03 mmA).",
+        "Zone tip: no limits; mean coverage 90.0 ± 2.0 %.",
+        "The start: constraints not met: shot_count 50 > max 30.",
+        "The best chamber found: constraints not known: shot_count 33 may be > max 30.",
+        "Another chamber, whose time until 95 % of the target's area is 98 % covered is 100 ± 20 "
+        "s: constraints not known: faster.",
+        "Calibration: the model explains your dent diameters only with errors 2 times as "
+        "large, as intervals have them: look at the picture of the calibration.",
+    ]
+    assert [one["warns"] for one in lines] == [True, False, True, True, True, True]
 
 
 def test_what_is_not_resolved_is_not_in_the_answer_as_a_number() -> None:

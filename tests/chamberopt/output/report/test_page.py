@@ -167,11 +167,11 @@ def test_the_page_needs_nothing_but_itself(
             assert attributes.get(name, "data:").startswith("data:"), (tag, attributes)
     text = path.read_text(encoding="utf-8")
     assert not re.findall(r"@import|url\(\s*['\"]?(?!data:)", text[: text.index("</style>")])
-    assert sum("plotly.js v" in script[:200] for script in page.scripts) == 1
+    assert sum(script.startswith("var THREE") for script in page.scripts) == 1
     policy = next(a["content"] for tag, a in page.elements if tag == "meta" and "http-equiv" in a)
     assert policy.startswith("default-src 'none'")
     assert "http" not in policy
-    own = [script for script in page.scripts if "plotly.js v" not in script[:200]]
+    own = [script for script in page.scripts if not script.startswith("var THREE")]
     assert not any("http" in script for script in own)
     assert ("html", {"lang": "en"}) in page.elements
     charts_shown = [a for tag, a in page.elements if tag == "div" and a.get("role") == "img"]
@@ -219,13 +219,9 @@ def test_the_page_carries_the_columns_of_the_target(simulation: Path, tmp_path: 
     np.testing.assert_allclose(
         unpacked(scene["own"]["coverage"]), 100.0 * own["coverage"][number], rtol=1e-6
     )
-    few, many = (
-        next(trace for trace in scene["figure"] if trace["name"] == name)
-        for name in ("few", "part")
-    )
-    places = np.stack([unpacked(many[axis]["bdata"]) for axis in "xyz"], axis=1)
+    places = unpacked(scene["surfaces"]["part"]["points"]).reshape(-1, 3)
     np.testing.assert_allclose(places, part.points, atol=1e-4)
-    assert "x" not in few or not len(few["x"])
+    assert "points" not in scene["surfaces"]["few"]
     density = unpacked(scene["columns"]["density"])
     np.testing.assert_allclose(
         -100.0 * np.expm1(-density), unpacked(scene["columns"]["coverage"]), rtol=1e-4
@@ -288,7 +284,7 @@ def test_a_part_too_large_for_a_page_is_reduced_with_a_remark(simulation: Path) 
     target = int((surface["target"] > 0).sum())
     less = part_scene(result, "", max_triangles=target)
     assert any("only its target is drawn" in remark for remark in less.remarks)
-    assert not next(trace for trace in less.data["figure"] if trace["name"] == "rest").get("i")
+    assert "rest" not in less.data["surfaces"]
     none = part_scene(result, "", max_triangles=target - 1)
     assert none.data is None
     assert any("chamberopt inspect shows it" in remark for remark in none.remarks)
@@ -322,7 +318,7 @@ def test_only_an_older_report_is_replaced(simulation: Path, tmp_path: Path) -> N
     assert precious.read_text() == "<p>keep me</p>"
     with pytest.raises(InputError, match=r"one \.html file"):
         write_report(simulation, tmp_path / "page.pdf")
-    with pytest.raises(InputError, match="folder does not exist"):
+    with pytest.raises(InputError, match="does not exist; make it first"):
         write_report(simulation, tmp_path / "gone" / "page.html")
 
 

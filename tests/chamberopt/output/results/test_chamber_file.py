@@ -66,6 +66,7 @@ def wrong_chambers() -> dict[str, Chamber]:
         "vertices has a number that is not finite": replace(one, vertices=nowhere),
         "source is not from -1 to": replace(one, source=beyond),
         "tags has the shape": replace(one, tags=one.tags[:-1]),
+        "without a sonotrode": replace(one, tags=np.where(one.tags == 1, 2, one.tags).astype("u1")),
         "target is no array": replace(one, part=replace(part, target="all")),  # type: ignore[arg-type]
         "another size than in its file": replace(
             one, part=replace(part, file=replace(file, simulated=short))

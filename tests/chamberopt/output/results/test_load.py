@@ -52,6 +52,12 @@ def test_a_result_can_be_looked_at_without_the_parts_file(tmp_path: Path) -> Non
 def test_what_is_no_result_is_said(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="not a results folder"):
         load_result(tmp_path)
+    for name, said in (("calibration", "calibration.txt and"), ("strip", "strip.png and")):
+        folder = tmp_path / name
+        folder.mkdir()
+        (folder / f"{name}.json").write_text("{}")
+        with pytest.raises(InputError, match=f"{said} .*made by simulate or run is needed"):
+            load_result(folder)
     (tmp_path / "history.jsonl").write_text("{}\n")
     with pytest.raises(InputError, match="has not finished"):
         load_result(tmp_path)

@@ -19,9 +19,7 @@ import pytest
 from PIL import Image
 from scipy.ndimage import uniform_filter
 
-from chamberopt.output.viewer.plotter import view_of_target
 from chamberopt.output.viewer.subprocess_drawing import without_display
-from chamberopt.output.vtp_files import pyvista
 from tests.helpers.opengl import needs_opengl
 
 REFERENCES = Path(__file__).parents[3] / "pictures"
@@ -80,20 +78,6 @@ def test_what_is_wrong_is_noticed(pictures: dict[str, np.ndarray], wrong: str) -
 @pytest.mark.parametrize("name", ["coverage", "pick"])
 def test_softer_edges_are_no_change(name: str) -> None:
     assert difference(uniform_filter(reference(name), (3, 3, 1)), reference(name)) < TOLERANCE
-
-
-def test_a_target_that_looks_down_is_seen_from_below() -> None:
-    for looks, side in ((-1.0, -1.0), (1.0, 1.0)):
-        plate = (
-            pyvista()
-            .Plane(direction=(0.0, 0.0, looks), i_resolution=2, j_resolution=2)
-            .triangulate()
-        )
-        plate["area"] = np.full(plate.n_cells, 0.125)
-        assert np.sign(view_of_target(plate)[2]) == side
-    ball = pyvista().Sphere()
-    ball["area"] = np.ones(ball.n_cells)
-    assert view_of_target(ball)[2] > 0.0
 
 
 if __name__ == "__main__":

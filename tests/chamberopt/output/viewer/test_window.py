@@ -36,8 +36,8 @@ def test_a_window_shows_what_its_keys_say(steps: dict[str, dict[str, Any]]) -> N
     def first(step: str) -> dict[str, Any]:
         return steps[step]["views"][0]
 
-    assert "coverage [%]" in first("opened")["words"]
-    assert "mean normal speed\n[m/s]" in first("3")["words"]
+    assert "coverage [%]\n10 to 100 %" in first("opened")["words"]
+    assert "mean normal\nspeed [m/s]" in first("3")["words"]
     assert any("[3 speed]" in text for text in first("3")["words"])
     assert first("b")["pale"] == first("opened")["pale"] == 0
     assert first("slid")["pale"] > 100  # above 98 % by then

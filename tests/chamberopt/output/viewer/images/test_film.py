@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
+from chamberopt.common import files
 from chamberopt.common.errors import InputError
-from chamberopt.output.viewer import subprocess_drawing
 from chamberopt.output.viewer.images import film
 from chamberopt.output.viewer.images.film import film_path, write_film
 
@@ -44,7 +44,7 @@ def test_where_no_film_can_be_is_said(tmp_path: Path, monkeypatch: pytest.Monkey
         InputError, match=r"shot\.avi: films are written as \.gif or \.mp4; give such a name"
     ):
         film_path(tmp_path / "shot.avi")
-    with pytest.raises(InputError, match="the folder does not exist"):
+    with pytest.raises(InputError, match="nowhere does not exist; make it first"):
         film_path(tmp_path / "nowhere" / "shot.gif")
     (tmp_path / "shot.gif").mkdir()
     with pytest.raises(InputError, match=r"shot\.gif: is a folder"):
@@ -54,7 +54,7 @@ def test_where_no_film_can_be_is_said(tmp_path: Path, monkeypatch: pytest.Monkey
         raise PermissionError(13, "Permission denied")
 
     with monkeypatch.context() as patch:
-        patch.setattr(subprocess_drawing.tempfile, "TemporaryFile", refuse)
+        patch.setattr(files.tempfile, "TemporaryFile", refuse)
         with pytest.raises(InputError, match=r"a\.gif: cannot be written: Permission"):
             film_path(tmp_path / "a.gif")
     monkeypatch.setattr(film, "find_spec", lambda _: None)

@@ -25,9 +25,9 @@ def test_a_part_is_drawn_with_its_target_or_with_its_fault_in_red(tmp_path: Path
     red = [
         (picture[..., 0] - picture[..., 1:].max(axis=2) > 0.5).mean() for picture in (target, fault)
     ]
-    orange = [(picture[..., 1] - picture[..., 2] > 0.1).mean() for picture in (target, fault)]
+    blue = [(picture[..., 2] - picture[..., 0] > 0.3).mean() for picture in (target, fault)]
     assert red[1] > 5e-4 > 10 * red[0]
-    assert orange[0] > 0.05 > 10 * orange[1]
+    assert blue[0] > 0.05 > 10 * blue[1]
 
 
 def test_a_part_is_drawn_only_where_there_can_be_such_a_file(tmp_path: Path) -> None:

@@ -1,0 +1,107 @@
+"""The search of shipped studies against Optuna's Gaussian process, through the same evaluations.
+
+    python benchmarks/real_chambers.py --seeds 5
+    python benchmarks/real_chambers.py studies/plate.toml --evaluations 20
+
+Both have the study's budget, start, noise, geometry known before a simulation, and confirmation:
+only where to look next is asked of another. A row has the confirmed objective of each. The first
+command takes about 20 CPU minutes. Optuna's Gaussian process needs the extra "bench" and torch.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+import time
+import warnings
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+
+from benchmarks.table import print_table, write_csv
+from chamberopt.common.parallel.executor import local_executor
+from chamberopt.optimize import run_study
+from chamberopt.optimize.search.domain import Domain
+from chamberopt.optimize.search.stopping import Begin
+from chamberopt.optimize.storage.study_folder import open_study_folder
+from chamberopt.optimize.study import load_study
+from chamberopt.optimize.study.schema import Optimizer
+
+ROOT = Path(__file__).parents[1]
+
+
+def optuna_search(
+    begin: Begin, start: np.ndarray, settings: Optimizer, _: Any, domain: Domain, *__: Any
+) -> str:
+    """Optuna in the place of `maximise`."""
+    import optuna
+
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
+    study = optuna.create_study(
+        direction="maximize", sampler=optuna.samplers.GPSampler(seed=settings.seed)
+    )
+    names = [f"x{k}" for k in range(len(domain))]
+    study.enqueue_trial(dict(zip(names, start.tolist(), strict=True)))
+    simulated = 0
+    for _ in range(2 * settings.evaluations):
+        trial = study.ask()
+        point = np.array([trial.suggest_float(name, 0.0, 1.0) for name in names])
+        scored = begin(start if not trial.number else np.round(point, 4))()
+        study.tell(trial, scored.score)
+        simulated += scored.simulated
+        if simulated == settings.evaluations:
+            break
+    return "optuna"
+
+
+def confirmed(file: Path, seed: int, evaluations: int | None, search: Any) -> dict[str, Any]:
+    """The answer of one search."""
+    study = load_study(file)
+    settings = {"seed": seed, "batch": 1, "evaluations": evaluations or study.optimizer.evaluations}
+    study = study.model_copy(
+        update={
+            "design": study.design.changed({"process.seed": 100 + seed}),
+            "optimizer": study.optimizer.model_copy(update=settings),
+        }
+    )
+    began = time.perf_counter()
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        local_executor(None) as executor,
+        patch.object(run_study, "maximise", search),
+        open_study_folder(study, Path(folder) / "study") as opened,
+    ):
+        result = run_study.run_study(study, opened, executor)
+    best = result.best.goals[0]
+    spared = sum(not trial.goals for trial in result.trials if trial.stage == "search")
+    return {
+        "objective": round(best.value, 4),
+        "half_width": round(best.half_width, 4),
+        "not_simulated": spared,
+        "seconds": round(time.perf_counter() - began, 1),
+    }
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("study", nargs="?", type=Path, default=ROOT / "studies" / "quickstart.toml")
+    parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--evaluations", type=int)
+    asked = parser.parse_args()
+    rows = []
+    for seed in range(asked.seeds):
+        for name, search in (("ours", run_study.maximise), ("optuna-gp", optuna_search)):
+            found = confirmed(asked.study, seed, asked.evaluations, search)
+            rows.append({"study": asked.study.stem, "seed": seed, "search": name, **found})
+            print(rows[-1], flush=True)
+    print_table(rows)
+    print(f"written to {write_csv(f'real_{asked.study.stem}.csv', rows)}")
+
+
+if __name__ == "__main__":
+    main()

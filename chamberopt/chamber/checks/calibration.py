@@ -1,0 +1,61 @@
+"""Where a design is outside what its calibration was measured at."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from chamberopt.design.peening.calibration import NO_STRIPS
+
+if TYPE_CHECKING:
+    from chamberopt.design.load import Design
+    from chamberopt.design.peening.calibration import Calibration
+
+# Beyond these the model was tried by no measurement of the machine.
+AMPLITUDE_RANGE, DIAMETER_RANGE, DENSITY_RANGE = 1.3, 1.5, 1.05
+
+
+def calibration_warnings(design: Design) -> list[str]:
+    """What of a design is outside its calibration, and what that does not explain."""
+    one = design.calibration
+    if one is None:
+        return []
+    texts = []
+    low, high = one.amplitude_um
+    for sonotrode in (design.sonotrode, *design.sonotrodes):
+        amplitude = sonotrode.zero_to_peak_um
+        if not (2.0 - AMPLITUDE_RANGE) * low <= amplitude <= AMPLITUDE_RANGE * high:
+            texts.append(
+                f"calibration: made at amplitudes of {low:g} to {high:g} µm zero-to-peak, more "
+                f"than 30 % from this design's {amplitude:g}: measure strips at that amplitude too"
+            )
+    small, large = one.ball_diameter_mm
+    for diameter, _ in design.shot.sizes:
+        size = 1e3 * diameter
+        if not small / DIAMETER_RANGE <= size <= large * DIAMETER_RANGE:
+            texts.append(
+                f"calibration: made with balls of {small:g} to {large:g} mm, and this design's of "
+                f"{size:g} mm differ by more than a factor of 1.5: calibrate with such balls"
+            )
+    density, ratio = design.shot.density, design.shot.density / one.ball_density_kg_m3
+    if max(ratio, 1.0 / ratio) > DENSITY_RANGE:
+        texts.append(
+            f"calibration: made with balls of {one.ball_density_kg_m3:g} kg/m³, this design's have "
+            f"{density:g}: another material has other constants; calibrate with this shot"
+        )
+    texts += misfit_texts(one)
+    if one.not_mmA:
+        texts.append(one.not_mmA)
+    if not one.has_strips:
+        texts.append(f"calibration: {NO_STRIPS}")
+    return texts
+
+
+def misfit_texts(calibration: Calibration) -> list[str]:
+    """Which measurements the model does not explain."""
+    return [
+        f"calibration: the model explains your {misfit.kind} only with errors "
+        f"{misfit.error_scale:.2g} times as large, as intervals have them: look at the picture of "
+        "the calibration"
+        for misfit in calibration.misfits
+        if misfit.error_scale > 1.0
+    ]

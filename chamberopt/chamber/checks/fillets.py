@@ -1,0 +1,149 @@
+"""Warnings about shot that is large for the fillets and slots of the target and the zones.
+
+Shot of more than half a fillet's radius, or a quarter of a slot's width, peens there less than
+beside it, although it may touch everything.
+
+Source: ASTM B851, as quoted in docs/peening.md.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from chamberopt.chamber.checks.gaps import MAX_COSINE
+from chamberopt.chamber.checks.place_names import one_of
+from chamberopt.chamber.reach.largest_ball import largest_balls
+from chamberopt.chamber.reach.reach import TOLERATED_OVERLAP
+from chamberopt.design.shapes import TAG_PART
+from chamberopt.geometry.triangles import area_vectors, edge_keys, sides_of
+
+if TYPE_CHECKING:
+    from chamberopt.chamber.build import Chamber
+    from chamberopt.chamber.reach.reach import Reach
+
+OF_FILLET, OF_SLOT = 0.5, 0.25  # largest shot, of the fillet's radius and of the slot's width
+LEAST_TURN, SHARP = 1.0, 60.0  # degrees at an inner edge of a fillet's facets; more has no fillet
+HOLLOW = 1.0 / 3.0  # share of the turning near an edge of a fillet that is inwards, less outwards
+SMALLEST = 0.05  # share of the inner edges' length, or of the slots' area, that may be smaller
+MAX_POINTS = 5000  # of the surface that slots are looked for at
+
+
+def fillet_warnings(reach: Reach, chamber: Chamber, largest: float) -> list[str]:
+    """Warnings about fillets and slots that are small for the largest ball [m]."""
+    part = chamber.part
+    chosen = np.any([part.target, *part.zones.values()], axis=0) & (chamber.exposed_area > 0.0)
+    return [*_fillets(chamber, chosen, largest), *_slots(reach, chamber, chosen, largest)]
+
+
+def inner_edges(
+    vertices: np.ndarray, triangles: np.ndarray, chosen: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The inner edges between chosen triangles: of each its middle, length and fillet radius.
+
+    Facets of a height L that turn by an angle a at each edge touch a circle of the radius
+    L / (2 tan(a / 2)); at edges that turn by more than SHARP it is 0. Triangles of a shaft or a
+    cone turn inwards at some edges too: an edge counts only if the surface round it is HOLLOW.
+
+    Args:
+        vertices: [m], shape (n, 3).
+        triangles: normals out of the part, shape (m, 3).
+        chosen: marks triangles, shape (m,).
+    Returns:
+        Middles [m], shape (e, 3), lengths [m] and radii [m], shape (e,).
+    """
+    sides, triangle = sides_of(triangles), np.repeat(np.arange(len(triangles)), 3)
+    keys = edge_keys(triangles)
+    order = np.argsort(keys, kind="stable")
+    same = np.flatnonzero(keys[order][1:] == keys[order][:-1])
+    one, two = order[same], order[same + 1]
+    both = chosen[triangle[one]] & chosen[triangle[two]]
+    one, two = one[both], two[both]
+    normal = area_vectors(vertices, triangles)
+    size = np.linalg.norm(normal, axis=1)
+    unit = normal / np.maximum(size, 1e-300)[:, None]
+    a, b = unit[triangle[one]], unit[triangle[two]]
+    turn = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ij,ij->i", a, b))
+    ends = vertices[sides[one]]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    # The surface turns inwards where the other triangle rises over the plane of the first.
+    over = vertices[triangles[triangle[two]]].mean(axis=1) - ends[:, 0]
+    inwards = np.where(np.einsum("ij,ij->i", over, a) > 0.0, turn, -turn)
+    around = sides[one], ends[:, 1] - ends[:, 0]
+    hollow = _turn_across(*around, inwards) > HOLLOW * _turn_across(*around, turn)
+    inner = (inwards > np.radians(LEAST_TURN)) & (hollow | (turn > np.radians(SHARP)))
+    # Mean height of the two triangles over their edge; `size` is an area.
+    height = (size[triangle[one]] + size[triangle[two]]) / np.maximum(length, 1e-300)
+    turn = turn[inner]
+    radius = height[inner] / (2.0 * np.tan(0.5 * turn))
+    radius[turn > np.radians(SHARP)] = 0.0
+    return ends.mean(axis=1)[inner], length[inner], radius
+
+
+def _turn_across(ends: np.ndarray, way: np.ndarray, turns: np.ndarray) -> np.ndarray:
+    """How far a surface turns across each edge [m rad], with the edges that share an end with it.
+
+    Each of them counts by its turn, its length and its squared cosine to the edge. Sharp edges,
+    at which a fillet ends, do not count.
+
+    Args:
+        ends: vertices of each edge, shape (e, 2).
+        way: from one to the other [m], shape (e, 3).
+        turns: of each edge [rad], shape (e,).
+    """
+    length = np.maximum(np.linalg.norm(way, axis=1), 1e-300)
+    along = way / length[:, None]
+    turned = np.where(np.abs(turns) > np.radians(SHARP), 0.0, turns) * length
+    each = turned[:, None, None] * along[:, :, None] * along[:, None, :]
+    around = np.zeros((ends.max(initial=0) + 1, 3, 3))  # of a vertex
+    np.add.at(around, ends, each[:, None])
+    both = around[ends].sum(axis=1) - each  # which has the edge itself twice
+    across: np.ndarray = np.einsum("ei,eij,ej->e", along, both, along)
+    return across
+
+
+def _fillets(chamber: Chamber, chosen: np.ndarray, largest: float) -> list[str]:
+    middle, length, radius = inner_edges(chamber.part.vertices, chamber.part.triangles, chosen)
+    small = radius * OF_FILLET < largest
+    if length[small].sum() < largest:  # what is shorter than a ball is no fillet
+        return []
+    smallest = _low_quantile(radius[small], length[small])
+    fillet = f"fillets of about {1e3 * smallest:.2g} mm" if smallest else "inner edges without one"
+    where = one_of(middle[small], length[small])
+    return [
+        f"shot of {1e3 * largest:g} mm is larger than half the radius of the target's smallest "
+        f"fillets ({fillet}, e.g. at {where}): the shot peens them less than what is beside them; "
+        "use smaller balls, or give them a zone of their own (docs/peening.md)"
+    ]
+
+
+def _slots(reach: Reach, chamber: Chamber, chosen: np.ndarray, largest: float) -> list[str]:
+    """A warning about faces of the part that face each other less than four balls apart."""
+    mesh, touches = reach.mesh, reach.touches
+    source = chamber.source[touches.triangle]
+    own = np.flatnonzero((source >= 0) & chosen[np.maximum(source, 0)])
+    step = max(1, -(-len(own) // MAX_POINTS))
+    own = own[::step]
+    widest = largest / OF_SLOT
+    overlap = TOLERATED_OVERLAP * 0.5 * reach.diameter
+    points, normals = touches.point[own], touches.normal[own]
+    radius, obstacle, cosine = largest_balls(mesh, points, normals, 0.5 * widest, overlap)
+    facing = (obstacle >= 0) & (cosine < MAX_COSINE) & (mesh.tags[obstacle] == TAG_PART)
+    area = step * touches.area[own]
+    if not facing.any() or area[facing].sum() < largest**2:
+        return []
+    width = 2.0 * _low_quantile(radius[facing], area[facing])
+    where = one_of(points[facing], area[facing])
+    return [
+        f"shot of {1e3 * largest:g} mm is larger than a quarter of the target's narrowest slot, "
+        f"about {1e3 * width:.2g} mm wide, e.g. at {where}: few balls get to its bottom, and "
+        "slowly; use smaller balls, or give it a zone of its own (docs/peening.md)"
+    ]
+
+
+def _low_quantile(values: np.ndarray, weight: np.ndarray) -> float:
+    """The value below which the smallest SMALLEST of the weight is."""
+    order = np.argsort(values)
+    upto = np.cumsum(weight[order])
+    return float(values[order][np.searchsorted(upto, SMALLEST * upto[-1])])

@@ -1,0 +1,1 @@
+"""A first design for a part: its target, pose, balls, chamber and charge, each with its reason."""

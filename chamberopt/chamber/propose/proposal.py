@@ -1,0 +1,243 @@
+"""Propose a whole design for a part, and improve it until its own check finds nothing to say.
+
+Every number is a rule of thumb with its reason beside it; a study then varies them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from chamberopt.chamber.build import Chamber, build_chamber
+from chamberopt.chamber.checks.check import shot_reach, warnings
+from chamberopt.chamber.propose.balls import fit_fillets, propose_ball, touched_shares
+from chamberopt.chamber.propose.pose import propose_pose, square_to_walls
+from chamberopt.chamber.propose.ranges import LARGEST_MM, Range, propose_charge, propose_ranges
+from chamberopt.chamber.propose.sizes import Sizes, propose_sizes, shape_for
+from chamberopt.chamber.propose.target import Surface, Target, propose_target, surfaces
+from chamberopt.chamber.reach.reach import Reach
+from chamberopt.common.errors import InputError
+from chamberopt.common.progress import step
+from chamberopt.common.toml_fields import MAX_COORDINATE_MM
+from chamberopt.design.design import Design, validate
+from chamberopt.design.materials import alloy, ball, balls
+from chamberopt.design.shapes import TAG_SONOTRODE
+from chamberopt.geometry.mesh_io.part_mesh import PartMesh, read_part
+from chamberopt.geometry.mesh_io.surface_error import format_box
+from chamberopt.geometry.mesh_io.units import GUESSED
+from chamberopt.geometry.triangles import areas, rotation_matrix
+
+LARGEST_BALL = 3e-3  # m: larger ones are used, but are few and slow to cover
+BALLS_ACROSS = 50  # ball diameters in the part's width: with smaller balls there are thousands
+WIDER = (1.0, 1.4, 2.0)  # factors on the room round the part that are tried
+AMPLITUDE_UM, FREQUENCY_KHZ = 40.0, 20.0
+USUAL_PART, WALL, SONOTRODE = "42CrMo4", "42CrMo4", "Ti-6Al-4V"  # of the catalogue
+TREATMENT_S, HALF_WIDTH = 300.0, 0.01
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What the user asks for; None and empty texts leave it to the proposal."""
+
+    unit: str = "guess"
+    shape: str | None = None
+    alloy: str = ""
+    shot: str = "steel"
+    ball_mm: float | None = None
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A design with the reason for each value, and what its check says."""
+
+    design: Design
+    tables: dict[str, dict[str, Any]]  # the values of the design file
+    reasons: dict[str, str]  # of values, by dotted name
+    bounds: dict[str, Range]  # of the study
+    known: tuple[Surface, ...]  # surfaces to choose the target from
+    mesh: PartMesh
+    chamber: Chamber
+    reach: Reach
+    warnings: tuple[str, ...]
+
+
+def propose(
+    path: Path, wanted: Wanted, choose: Callable[[Sequence[Surface]], Sequence[str]]
+) -> Proposal:
+    """A design for the part in a file.
+
+    Args:
+        choose: gives the names of the surfaces to peen, of those that there are.
+    Raises:
+        InputError: the part cannot be used, or no chamber can be built round it.
+    """
+    part_alloy, shot = alloy(wanted.alloy or USUAL_PART).name, _shot(wanted.shot)
+    with step("reading the part"):
+        mesh = _read(path, wanted.unit)
+        known = surfaces(mesh)
+    target = propose_target(mesh, known, choose(known))
+    _require_near_origin(path, target)
+    turns, pose_reason = propose_pose(mesh.vertices, mesh.triangles, target.triangles)
+    with step("choosing the balls"):
+        diameter, ball_reason = _ball_diameter(mesh, target, wanted)
+    square = square_to_walls(mesh.vertices, turns)
+    shape = wanted.shape or shape_for(np.ptp(mesh.vertices @ rotation_matrix(square).T, axis=0))
+    turns = square if shape == "box" else turns
+    posed = mesh.vertices @ rotation_matrix(turns).T
+    posed[:, 2] -= posed[:, 2].min()
+    top = float(posed[mesh.triangles[target.triangles], 2].max())
+    tables: dict[str, dict[str, Any]] = {
+        "part": {"mesh": str(path.resolve()), "unit": mesh.unit, "rotate_deg": list(turns)},
+        "part.target": target.keys,
+        "chamber": {},
+        "sonotrode": {"frequency_khz": FREQUENCY_KHZ, "amplitude_um": AMPLITUDE_UM},
+        "shot": {"mass_g": 1.0, "diameter_mm": round(1e3 * diameter, 4), "material": shot},
+        "materials": {"part": part_alloy, "wall": WALL, "sonotrode": SONOTRODE},
+        "effects": {"gravity": True},
+        "process": {"treatment_time_s": TREATMENT_S, "seed": 1},
+        "process.accuracy": {
+            "replicas": 8,
+            "simulated_time_s": 2.0,
+            "warmup_time_s": 0.2,
+            "objective_half_width": HALF_WIDTH,
+        },
+    }
+    reasons = {
+        "part.unit": ("GUESSED: " if any(GUESSED in note for note in mesh.notes) else "")
+        + f"the part measures {format_box(mesh.size)}",
+        "part.rotate_deg": f"{pose_reason}; about the file's x, then y, then z",
+        "part.target": target.reason,
+        "sonotrode.amplitude_um": "ZERO-TO-PEAK, half of peak-to-valley; take your machine's",
+        "shot.diameter_mm": ball_reason,
+        "materials.part": "C0 and v0 are computed: to be calibrated"
+        if wanted.alloy
+        else "NOT KNOWN, a guess: chamberopt materials lists alloys",
+        "effects.gravity": "friction is left out: chamberopt check says what it would change",
+        "process.treatment_time_s": "a start: the report has coverage over time",
+        "process.accuracy.objective_half_width": "replicas are added until it is this sure",
+    }
+    best: Proposal | None = None
+    refused: InputError | None = None
+    with step("building and checking the chamber") as progress:
+        for number, wider in enumerate(WIDER):
+            progress(number, len(WIDER), None)
+            sizes = propose_sizes(posed, top, diameter, shape, wider)
+            tables["chamber"] = _chamber_table(sizes)
+            try:
+                made = _checked(tables, {**reasons, **_size_reasons(sizes)}, sizes, known, mesh)
+            except InputError as error:
+                refused = refused or error
+                continue
+            if best is None or len(made.warnings) < len(best.warnings):
+                best = made
+            if not any(word in text for text in made.warnings for word in ("gap", "side wall")):
+                break
+    if best is None:
+        assert refused is not None
+        raise refused
+    return best
+
+
+def _shot(name: str) -> str:
+    """The material of balls of a name; InputError if their restitution is not known."""
+    found = ball(name)
+    if found.hardness_HB is None:
+        known = ", ".join(one.name for one in balls() if one.hardness_HB is not None)
+        text = "the hardness of these balls is not known, and their restitution follows from it"
+        raise InputError(f"--shot: given {name!r}; {text}; give one of {known}")
+    return found.name
+
+
+def _read(path: Path, unit: str) -> PartMesh:
+    """The part; messages and notes name the option in the place of the design's field."""
+    try:
+        mesh = read_part(path, unit)
+    except InputError as error:
+        raise InputError(str(error).replace("part.unit", "--unit")) from None
+    return replace(mesh, notes=tuple(note.replace("part.unit", "--unit") for note in mesh.notes))
+
+
+def _require_near_origin(path: Path, target: Target) -> None:
+    """Raise InputError if the design could not say where the target's faces are."""
+    far = max((abs(x) for face in target.keys.get("faces", ()) for x in face["at_mm"]), default=0)
+    if far > MAX_COORDINATE_MM:
+        text = f"the part is {1e-3 * far:.4g} m from the origin of its file"
+        most = f"at most {1e-3 * MAX_COORDINATE_MM:g} m are allowed"
+        raise InputError(f"{path}: {text}, {most}; move it to the origin in CAD and export again")
+
+
+def _ball_diameter(mesh: PartMesh, target: Target, wanted: Wanted) -> tuple[float, str]:
+    """Diameter [m] of the balls, and the reason for it."""
+    if wanted.ball_mm is not None:
+        return 1e-3 * wanted.ball_mm, "as asked"
+    least = float(np.sort(mesh.size)[1]) / BALLS_ACROSS
+    sold = [
+        size
+        for size in (6e-4, 8e-4, 1e-3, 1.2e-3, 1.5e-3, 2e-3, 2.5e-3, 3e-3, 4e-3)
+        if size <= LARGEST_BALL
+    ]
+    sizes = [size for size in sold if size >= least] or sold[-1:]
+    surface = mesh.vertices, mesh.triangles, target.triangles, sizes
+    return propose_ball(touched_shares(*surface), fit_fillets(*surface), sizes)
+
+
+def _chamber_table(sizes: Sizes) -> dict[str, Any]:
+    distance, height = round(1e3 * sizes.distance, 3), round(1e3 * sizes.height, 3)
+    return {
+        "shape": sizes.shape,
+        **sizes.plan,
+        "height_mm": height,
+        "sonotrode_distance_mm": distance,
+    }
+
+
+def _size_reasons(sizes: Sizes) -> dict[str, str]:
+    first = next(key for key in sizes.plan if key.endswith("_mm"))
+    where = "the part goes out through it" if sizes.through_ceiling else "it hangs without a holder"
+    return {
+        f"chamber.{first}": f"leaves {1e3 * sizes.gap:.3g} mm beside the part",
+        "chamber.height_mm": f"sonotrode to ceiling; {where}",
+        "chamber.sonotrode_distance_mm": "mean sonotrode face to the part's lowest point",
+    }
+
+
+def _checked(
+    tables: dict[str, dict[str, Any]],
+    reasons: dict[str, str],
+    sizes: Sizes,
+    known: Sequence[Surface],
+    mesh: PartMesh,
+) -> Proposal:
+    """The proposal of these values, with its charge, built and checked."""
+    largest = max(size for key, size in tables["chamber"].items() if key.endswith("_mm"))
+    if largest > LARGEST_MM:
+        text = f"the part measures {format_box(mesh.size)}, too much for a chamber: it would need"
+        most = f"{largest:g} mm, and {LARGEST_MM:g} mm are the most"
+        raise InputError(f"{text} {most}; check --unit, or cut the part down to what is peened")
+    design = validate(Design, _nested(tables))
+    chamber = build_chamber(design)
+    floor = float(areas(chamber.vertices, chamber.triangles)[chamber.tags == TAG_SONOTRODE].sum())
+    diameter, ball_mass = design.shot.diameter, design.shot.ball_mass
+    mass_g, reason = propose_charge(floor, diameter, ball_mass)
+    tables = {**tables, "shot": {**tables["shot"], "mass_g": mass_g}}
+    design = validate(Design, _nested(tables))
+    reach = shot_reach(design, chamber)
+    reasons = {**reasons, "shot.mass_g": f"{reason}: {design.shot.count}"}
+    found = tuple(warnings(design, chamber, reach))
+    bounds = propose_ranges(sizes, mass_g, 1e3 * diameter, ball_mass)
+    return Proposal(design, tables, reasons, bounds, tuple(known), mesh, chamber, reach, found)
+
+
+def _nested(tables: dict[str, dict[str, Any]]) -> dict[str, Any]:
+    """Tables by dotted name as nested ones."""
+    nested: dict[str, Any] = {}
+    for name, values in tables.items():
+        table = nested
+        for key in name.split("."):
+            table = table.setdefault(key, {})
+        table.update(values)
+    return nested

@@ -1,0 +1,109 @@
+"""The files of a proposal: a design and a study, each value with its reason as a comment."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from chamberopt.chamber.propose.proposal import Proposal
+from chamberopt.chamber.propose.target import Surface
+from chamberopt.common.errors import one_line
+from chamberopt.design.load import with_paths_from
+
+MAX_LISTED = 20  # surfaces in a comment
+EVALUATIONS, SEARCH_HALF_WIDTH = 20, 0.04
+
+
+def design_text(proposal: Proposal, folder: Path) -> str:
+    """The text of a design file in a folder, which names the part relative to it."""
+    tables = with_paths_from(folder.resolve(), proposal.tables)
+    name = Path(tables["part"]["mesh"]).name
+    rules = "proposed by `chamberopt new`: rules of thumb to vary."
+    lines = [f"# A first chamber for {one_line(name)}, {rules}"]
+    for table, values in tables.items():
+        reason = proposal.reasons.get(table)
+        lines += ["", f"[{table}]" + (f"  # {one_line(reason)}" if reason else "")]
+        lines += _values(values, table, proposal.reasons)
+        if table == "part.target":
+            lines += _choices(proposal.known)
+    return "\n".join(lines) + "\n"
+
+
+def study_text(proposal: Proposal, design: str) -> str:
+    """The text of a study file beside the design file of a name."""
+    bounds = {name: one._asdict() for name, one in proposal.bounds.items()}
+    start = {name: f"now {proposal.design.value(name):g}" for name in proposal.bounds}
+    return study_lines(design, bounds, start)
+
+
+def study_lines(
+    design: str,
+    bounds: Mapping[str, Mapping[str, float]],
+    notes: Mapping[str, str],
+    evaluations: int = EVALUATIONS,
+) -> str:
+    """The text of a study that varies numbers of a design file beside it.
+
+    Args:
+        bounds: keys in [vary] by dotted name, such as low and high.
+        notes: a comment on each.
+    """
+    vary = {f'"{name}"': dict(one) for name, one in bounds.items()}
+    lines = [
+        "# Searches a better chamber for the same part.",
+        _line("design", design),
+        "",
+        "[vary]  # in the units of the names",
+        *_values(vary, "x", {f'x."{name}"': text for name, text in notes.items()}),
+        "",
+        "[objective]",
+        'name = "uniform_coverage"  # mean minus standard deviation of coverage',
+        "",
+        "[optimizer]",
+        f"evaluations = {evaluations}",
+        "confirm = 2  # the best candidates, simulated again on fresh seeds",
+        "confirm_replicas = 8",
+        "seed = 1",
+        "",
+        "[search_accuracy]  # of the search; confirmations take the design's own",
+        "replicas = 4",
+        "simulated_time_s = 1",
+        f"objective_half_width = {SEARCH_HALF_WIDTH}",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _values(values: Mapping[str, Any], table: str, reasons: Mapping[str, str]) -> list[str]:
+    lines = [_line(key, value) for key, value in values.items()]
+    noted = [reasons.get(f"{table}.{key}") for key in values]
+    width = max((len(line) for line, reason in zip(lines, noted, strict=True) if reason), default=0)
+    return [
+        f"{line:{width}}  # {reason}" if reason else line
+        for line, reason in zip(lines, noted, strict=True)
+    ]
+
+
+def _line(key: str, value: Any) -> str:
+    """A key and its value on one line."""
+    if isinstance(value, dict):
+        return f"{key} = {{ {', '.join(_line(k, v) for k, v in value.items())} }}"
+    if isinstance(value, list):
+        return f"{key} = [{', '.join(_line('', one)[3:] for one in value)}]"
+    if isinstance(value, float) and value.is_integer():
+        value = int(value)
+    text = tomli_w.dumps({"x": value})[4:].strip()
+    return f"{key} = {text}"
+
+
+def _choices(known: Sequence[Surface]) -> list[str]:
+    """Comments on the surfaces to choose from, as the keys of [part.target] that choose them."""
+    lines = ["# The part's surfaces, the largest first; lists of several are one target:"]
+    for one in known[:MAX_LISTED]:
+        keys = ", ".join(_line(key, value) for key, value in one.keys.items())
+        lines.append(f"# {keys}  # {one_line(one.name)}: {one.text}")
+    if len(known) > MAX_LISTED:
+        lines.append(f"#   and {len(known) - MAX_LISTED} smaller ones (--target pick)")
+    return lines

@@ -1,0 +1,1 @@
+"""The commands in the trade's terms, one file each."""

@@ -1,0 +1,1 @@
+"""The commands that simulate a replica of a result again, to show what it does."""

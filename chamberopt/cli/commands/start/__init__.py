@@ -1,0 +1,1 @@
+"""The commands that begin a design, one file each."""

@@ -1,0 +1,104 @@
+"""The commands `materials` and `shot`: the catalogue of alloys and of balls as they are sold."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from textwrap import wrap
+from typing import TYPE_CHECKING, Any
+
+from chamberopt.cli.console import print_json, show
+from chamberopt.cli.options import Json, app
+
+if TYPE_CHECKING:
+    from chamberopt.design.materials.catalogue import Alloy, Ball
+
+UNITS = {"density_kg_m3": "kg/m³", "E_GPa": "E GPa", "poisson": "nu", "hardness_HB": "HB",
+         "yield_MPa": "yield MPa", "tensile_MPa": "tensile MPa"}  # fmt: skip
+
+
+@app.command
+def materials(name: str | None = None, /, *, json: Json = False) -> None:
+    """List the alloys that [materials] of a design may name, and the restitution on each.
+
+    Parameters
+    ----------
+    name
+        One alloy, by any of its names; all of them if it is left out.
+    """
+    from chamberopt.design.materials import DEFAULT_C0, alloy, alloys, balls, computed_v0
+
+    listed = alloys() if name is None else (alloy(name),)
+    hard = [ball for ball in balls() if ball.hardness_HB is not None]
+    speeds = {one.name: {ball.name: computed_v0(ball, one) for ball in hard} for one in listed}
+    if json:
+        rows = [one.model_dump() | {"C0": DEFAULT_C0, "v0_m_s": speeds[one.name]} for one in listed]
+        print_json({"alloys": rows})
+        return
+    table = [["", *UNITS.values(), *(f"v0 {ball.also[0]}" for ball in hard)]]
+    for one in listed:
+        numbers = [getattr(one, key) for key in UNITS]
+        table.append([one.name, *map(_text, (*numbers, *speeds[one.name].values()))])
+    show([
+        *_columns(table),
+        "",
+        f"v0 [m/s] of these balls: e = C0 for v < v0, C0 (v / v0)^(-1/4) above, C0 = {DEFAULT_C0};",
+        "by Johnson's formula from E, HB and the ball's density: to calibrate (docs/physics.md)",
+        "",
+        *_sources(listed),
+    ])  # fmt: skip
+
+
+@app.command
+def shot(name: str | None = None, /, *, json: Json = False) -> None:
+    """List the balls that shot.material may name, the sizes in which they are sold, and grades.
+
+    Parameters
+    ----------
+    name
+        One material of balls, by any of its names; all of them if it is left out.
+    """
+    from chamberopt.design.materials import ball, balls, computed_v0, grades
+
+    listed = balls() if name is None else (ball(name),)
+    speeds = {
+        one.name: None if one.hardness_HB is None else computed_v0(one, one) for one in listed
+    }
+    if json:
+        rows = [one.model_dump() | {"v0_m_s": speeds[one.name]} for one in listed]
+        print_json({"balls": rows, "grades": [one.model_dump() for one in grades()]})
+        return
+    keys = list(UNITS)[:4]
+    table = [["", *(UNITS[key] for key in keys), "v0 m/s", "grades"]]
+    for one in listed:
+        numbers = (*(getattr(one, key) for key in keys), speeds[one.name])
+        table.append([one.name, *map(_text, numbers), " ".join(one.grades)])
+    lines = [*_columns(table), "", "v0: of two such balls. Diameters [mm] in which they are sold:"]
+    for one in listed:
+        lines += _wrapped(f"{one.name}: {', '.join(map(_text, one.sizes_mm))}")
+    limits = [["ISO 3290-1, µm", "one ball", "form", "lot"]]
+    limits += [[one.name, *map(_text, (one.ball_um, one.form_um, one.lot_um))] for one in grades()]
+    show([*lines, "", *_columns(limits), "", *_sources(listed)])
+
+
+def _sources(listed: Sequence[Alloy | Ball]) -> list[str]:
+    lines = []
+    for one in listed:
+        lines.append(f"{one.name} ({', '.join(one.also)}): {one.condition}")
+        lines += _wrapped(one.source)
+    return lines
+
+
+def _wrapped(text: str) -> list[str]:
+    return wrap(text, 100, initial_indent="    ", subsequent_indent="    ")
+
+
+def _text(number: Any) -> str:
+    return "-" if number is None else f"{number:g}"
+
+
+def _columns(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Rows of cells in columns: the first to the left, the others to the right."""
+    first, *others = (max(map(len, column)) for column in zip(*rows, strict=True))
+    return [
+        "  ".join([row[0].ljust(first), *map(str.rjust, row[1:], others)]).rstrip() for row in rows
+    ]

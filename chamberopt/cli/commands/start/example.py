@@ -1,0 +1,61 @@
+"""The command `example`: a shipped design, its part and a study, to try the program with."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+from chamberopt.cli.console import show
+from chamberopt.cli.options import Out, app
+
+CAD_FILE = "fir_tree"  # without a design: `chamberopt new` proposes one
+STUDIES = {"gear": "quickstart", "plate": "plate", "blade": "blade"}  # file of each one's study
+
+
+@app.command
+def example(name: Literal["gear", "plate", "blade", "fir_tree"], /, *, out: Out = None) -> None:
+    """Write a shipped design, its part and a study of it into a folder, by default ./NAME.
+
+    Parameters
+    ----------
+    name
+        A pinion on its shaft, a plate that closes the chamber, a compressor blade; or fir_tree,
+        a STEP file alone, for docs/tutorial.md.
+    """
+    from chamberopt.common.files import claim_folder, write_bytes, write_text
+
+    shipped = shipped_files()
+    if name == CAD_FILE:
+        with claim_folder(out or Path(name)) as folder:
+            step = shipped / f"designs/parts/{name}.step"
+            write_bytes(folder / step.name, step.read_bytes())
+        shown = [f"{folder}: {step.name}", "to go on:", f"  cd {folder}"]
+        show([*shown, f"  chamberopt new {step.name} --target FIR_TREE --out chamber"])
+        return
+    design, study = f"{name}.toml", f"{name}_study.toml"
+    with claim_folder(out or Path(name)) as folder:
+        part = folder / "parts" / f"{name}.stl"
+        part.parent.mkdir()
+        write_bytes(part, (shipped / f"designs/parts/{name}.stl").read_bytes())
+        write_bytes(folder / design, (shipped / f"designs/{name}.toml").read_bytes())
+        text = (shipped / f"studies/{STUDIES[name]}.toml").read_text(encoding="utf-8")
+        write_text(folder / study, text.replace("../designs/", ""))
+    show(
+        [
+            f"{folder}: {design}, {study} and {part.relative_to(folder).as_posix()}",
+            "to go on:",
+            f"  cd {folder}",
+            f"  chamberopt check {design}",
+            f"  chamberopt run {study}",
+            f"  chamberopt report results/{name}_study",
+        ]
+    )
+
+
+def shipped_files() -> Path:
+    """The folder that holds designs/ and studies/: of the wheel, or the root of a checkout."""
+    import chamberopt
+
+    package = Path(chamberopt.__file__).parent
+    examples = package / "examples"
+    return examples if examples.is_dir() else package.parent

@@ -1,0 +1,62 @@
+"""How a study or sweep that was interrupted is resumed: the command, and when it is printed."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from chamberopt.common.errors import InputError
+
+if TYPE_CHECKING:
+    from chamberopt.optimize.storage.study_folder import StudyFolder
+
+
+def resume_command(study: Path, folder: Path, plan: Mapping[str, Any] | None = None) -> str:
+    """The command that resumes a study, or the sweep with this plan, quoted for a shell."""
+    if plan is None:
+        return quoted("run", study, "--out", folder)
+    seed = () if plan["seed"] is None else ("--seed", plan["seed"])
+    return quoted("sweep", study, f"--{plan['method']}", plan["count"], *seed, "--out", folder)
+
+
+def quoted(*words: object) -> str:
+    """A chamberopt command, quoted for a shell."""
+    return shlex.join(["chamberopt", *map(str, words)])
+
+
+@contextmanager
+def resume_note(folder: StudyFolder, command: str) -> Iterator[None]:
+    """Add to any error but a wrong input how to resume, if anything is there to resume from."""
+    try:
+        yield
+    except InputError:
+        raise
+    except BaseException as error:
+        if folder.begun:
+            error.add_note(f"to resume: {command}")
+        raise
+
+
+def unfinished(study: Path, name: str) -> list[str]:
+    """Remarks on earlier runs of a study that were interrupted, because a new one begins now.
+
+    Args:
+        name: of the folder in results/ that the command would use.
+    """
+    from chamberopt.optimize.storage.study_folder import INPUTS, is_finished, is_study_folder
+
+    results, remarks = Path("results"), []
+    for folder in (results / name, *sorted(results.glob(f"{name}-[0-9]*"))):
+        if not is_study_folder(folder) or is_finished(folder):
+            continue
+        try:
+            plan = json.loads((folder / INPUTS).read_text(encoding="utf-8"))["sweep"]
+            command = resume_command(study, folder, plan)
+        except (OSError, ValueError, LookupError, TypeError):  # damaged: `--out` will say so
+            command = resume_command(study, folder)
+        remarks.append(f"{folder}: not finished; to resume it: {command}")
+    return remarks

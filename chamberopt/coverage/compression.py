@@ -1,0 +1,112 @@
+"""Depth of the layer that peening puts under compression, estimated from the dents.
+
+Notation
+    d       diameter of a dent on the part [m]
+    L(d)    dents wider than d in a window, as a rate [1/s]: as in strength.py with s = d
+    z(t)    depth of compression after a time t [m]
+
+    z(t) = 1.1 integral over d of 1 - exp(-L(d) t)
+
+For hard metals at 4 to 8 m/s and balls of 1.5 to 3 mm three estimates of one impact's depth agree
+with its dent's diameter to 10 %: that of S. T. S. Al-Hassani, "Mechanical aspects of residual
+stress development in shot peening", ICSP-1, 1981, with the dent of the full energy; the depth where
+the elastic stress of Hertz meets the yield stress (J. K. Li et al., "Mechanical approach to the
+residual stress field induced by shot peening", Mater. Sci. Eng. A147 (1991) 167); and D. Kirk's
+rule that the dent's size governs it. They leave 30 %, and no measured profile was compared. For a
+metal that hardens strongly, such as 316L, whose first yielding says little of its flow stress, the
+second gives 1.6 to 1.7 d: then there is no estimate.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from chamberopt.common.estimate import (
+    CONFIDENCE,
+    OF_METAL,
+    Estimate,
+    estimate,
+    jackknife,
+    normal_quantile,
+)
+from chamberopt.coverage.strength import dent_rates, strength_at
+from chamberopt.coverage.strength_intervals import MIN_BATCHES, level_histograms
+
+if TYPE_CHECKING:
+    from chamberopt.coverage.field.target_field import TargetField
+    from chamberopt.coverage.part_impacts import Hits
+    from chamberopt.design.materials import PartMaterial
+
+OF_DENT = 1.1  # depth over the integral of diameters
+ERROR = 0.3  # of the estimate, the same wherever the same shot peens the same metal
+PEAK_STRESS = 0.5, 0.7  # compressive, of the tensile strength, almost whatever the intensity
+
+
+def compression_depth(histogram: np.ndarray, time_ratio: float, highest: float) -> np.ndarray:
+    """z [m] of each window (p,).
+
+    Args:
+        histogram: dented area over area of each window, by level of d, (p, LEVELS).
+        time_ratio: peening time over the time in which the dents fell.
+        highest: d at the upper end of the levels [m].
+    """
+    times = np.full(len(histogram), time_ratio)
+    return np.asarray(OF_DENT * strength_at(dent_rates(histogram), times, highest))
+
+
+def compression_estimate(
+    field: TargetField, batches: Sequence[Sequence[Hits]], seconds: float, peening_time: float
+) -> Estimate:
+    """Mean depth of compression over what shot can touch of the target [µm].
+
+    Its interval holds the error of the estimate itself, which is most of it.
+
+    Args:
+        batches: impacts of the replicas of each batch, in the sector of the windows.
+        seconds: simulated time of each replica.
+        peening_time: [s].
+    """
+    found = level_histograms(field, batches, seconds, lambda hits: (hits.dent, hits.dent))
+    count, total = len(batches), found.parts.sum(axis=0)
+    if found.highest == 0.0:
+        return Estimate(0.0, math.inf, (0.0,) * count)
+
+    def mean(histogram: np.ndarray, time: float) -> float:
+        return 1e6 * float(compression_depth(histogram, peening_time / time, found.highest).mean())
+
+    value, all_seconds = mean(total, found.seconds.sum()), found.seconds.sum()
+    if count < MIN_BATCHES:
+        return Estimate(value, math.inf, (value,) * count)
+    without = [
+        mean(total - part, all_seconds - own)
+        for part, own in zip(found.parts, found.seconds, strict=True)
+    ]
+    deviations = jackknife(np.array([value, *without])) - value
+    # Windows with few dents lack the widest ones; with half of the dents twice as much.
+    half = count // 2
+    halves = [(found.parts[rows].sum(axis=0), found.seconds[rows].sum())
+              for rows in (slice(half), slice(half, 2 * half))]  # fmt: skip
+    step = value - float(np.mean([mean(*one) for one in halves]))
+    depth = estimate(value + step + deviations, 0.0, bias=abs(step))
+    return depth.with_shared(OF_METAL, [ERROR / normal_quantile(CONFIDENCE) * depth.value])
+
+
+def stress_notes(metal: PartMaterial) -> tuple[str, ...]:
+    """What can be said of the stress under the surface, as notes of a result."""
+    notes = []
+    if metal.tensile_MPa is not None:
+        low, high = (share * metal.tensile_MPa for share in PEAK_STRESS)
+        notes.append(
+            f"the largest compressive stress is usually {PEAK_STRESS[0]:g} to {PEAK_STRESS[1]:g} "
+            f"of the tensile strength, {low:.0f} to {high:.0f} MPa, almost whatever the intensity"
+        )
+    if metal.hardens_strongly:
+        notes.append(
+            "materials.part: tensile_MPa and yield_MPa are those of a metal that hardens strongly, "
+            "whose depth of compression cannot be estimated from the size of its dents"
+        )
+    return tuple(notes)

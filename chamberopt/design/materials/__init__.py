@@ -1,0 +1,31 @@
+"""Materials of balls and surfaces: tables of a design, and a catalogue of what they may name."""
+
+from chamberopt.design.materials.catalogue import (
+    alloy,
+    alloys,
+    ball,
+    ball_sizes,
+    balls,
+    find,
+    grades,
+)
+from chamberopt.design.materials.named_metals import DEFAULT_C0, computed_v0, with_numbers
+from chamberopt.design.materials.tables import Materials, PartMaterial, RestitutionTable
+from chamberopt.design.materials.yield_speed import BRINELL_TO_PASCAL
+
+__all__ = [
+    "BRINELL_TO_PASCAL",
+    "DEFAULT_C0",
+    "Materials",
+    "PartMaterial",
+    "RestitutionTable",
+    "alloy",
+    "alloys",
+    "ball",
+    "ball_sizes",
+    "balls",
+    "computed_v0",
+    "find",
+    "grades",
+    "with_numbers",
+]

@@ -1,0 +1,136 @@
+"""The catalogue: alloys, and balls as they are sold, from alloys.toml and balls.toml beside it."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+from typing import TypeVar
+
+from pydantic import Field
+
+from chamberopt.common.errors import InputError
+from chamberopt.common.toml_errors import did_you_mean
+from chamberopt.common.toml_fields import Several, quantity
+from chamberopt.design.materials.yield_speed import Elastic
+from chamberopt.design.table_base import FileTable
+
+
+class Named(FileTable):
+    """What every solid of the catalogue has."""
+
+    name: str
+    also: Several[str] = Field(description="other names under which it is found")
+    condition: str
+    density_kg_m3: float = quantity(500, 25000, "kg/m³", "density")
+    E_GPa: float = quantity(1, 1500, "GPa", "Young's modulus")
+    poisson: float = quantity(0, 0.5, "", "Poisson's ratio")
+    source: str = Field(description="what was read where; what is by heart is not verified")
+
+    @property
+    def elastic(self) -> Elastic:
+        return Elastic(self.E_GPa * 1e9, self.poisson)
+
+
+class Alloy(Named):
+    """A metal of parts, walls and sonotrodes, in one condition."""
+
+    hardness_HB: float = quantity(5, 1000, "HB", "Brinell hardness of the surface")  # noqa: N815
+    yield_MPa: float | None = quantity(10, 5000, "MPa", "yield strength", None)  # noqa: N815
+    tensile_MPa: float | None = quantity(10, 5000, "MPa", "tensile strength", None)  # noqa: N815
+
+
+class Ball(Named):
+    """A material of balls, and the diameters and grades in which they are sold."""
+
+    hardness_HB: float | None = quantity(5, 3000, "HB", "None: v0 is not known", None)  # noqa: N815
+    sizes_mm: Several[float] = Field(description="diameters sold")
+    grades: Several[str] = Field(description="names of the grades sold")
+
+
+class Grade(FileTable):
+    """What a grade of ISO 3290-1 allows."""
+
+    name: str
+    ball_um: float = quantity(0.01, 1000, "µm", "differences of the diameters of one ball")
+    form_um: float = quantity(0.01, 1000, "µm", "deviation of a ball from a sphere")
+    lot_um: float = quantity(0.01, 1000, "µm", "differences of the mean diameters in a lot")
+
+
+class _Alloys(FileTable):
+    alloy: Several[Alloy]
+
+
+class _Balls(FileTable):
+    ball: Several[Ball]
+    grade: Several[Grade]
+
+
+File = TypeVar("File", bound=FileTable)
+Solid = TypeVar("Solid", bound=Named)
+
+
+def alloys() -> tuple[Alloy, ...]:
+    """All alloys, those of one base metal together."""
+    return _read("alloys.toml", _Alloys).alloy
+
+
+def balls() -> tuple[Ball, ...]:
+    """All materials of balls."""
+    return _read("balls.toml", _Balls).ball
+
+
+def grades() -> tuple[Grade, ...]:
+    """All grades, the finest first."""
+    return _read("balls.toml", _Balls).grade
+
+
+def find(name: object, among: Iterable[Solid]) -> Solid | None:
+    """The one of this name, of whose case, spaces and hyphens nothing depends; None if unknown."""
+    if not isinstance(name, str):
+        return None
+    plain = _plain(name)
+    return next((one for one in among if plain in map(_plain, (one.name, *one.also))), None)
+
+
+def alloy(name: str) -> Alloy:
+    """The alloy of this name; InputError if there is none."""
+    return _found(name, alloys(), "alloy")
+
+
+def ball(name: str) -> Ball:
+    """The material of balls of this name; InputError if there is none."""
+    return _found(name, balls(), "material of balls")
+
+
+def ball_sizes(material: str) -> tuple[float, ...]:
+    """Diameters [mm] in which balls of a material are sold, ascending; InputError if unknown."""
+    return ball(material).sizes_mm
+
+
+def unknown(name: object, among: Iterable[Named]) -> str:
+    """Why a name was not found: the most similar one, or all."""
+    known = [word for one in among for word in (one.name, *one.also)]
+    close = did_you_mean(str(name), known)
+    if close.startswith("did"):
+        return f"unknown; {close}"
+    return f"unknown; known are {', '.join(one.name for one in among)}"
+
+
+def _found(name: str, among: tuple[Solid, ...], kind: str) -> Solid:
+    found = find(name, among)
+    if found is None:
+        raise InputError(f"{kind} {name!r}: {unknown(name, among)}")
+    return found
+
+
+def _plain(name: str) -> str:
+    return re.sub(r"[\W_]", "", name).casefold()
+
+
+@cache
+def _read(file: str, kind: type[File]) -> File:
+    path = Path(__file__).with_name(file)
+    return kind.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))

@@ -1,0 +1,121 @@
+"""Names of metals in [materials]: the numbers of the catalogue, and v0 by Johnson's formula."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from chamberopt.common.toml_errors import Problem
+from chamberopt.design.materials.catalogue import Alloy, Ball, alloys, balls, find, unknown
+from chamberopt.design.materials.yield_speed import BRINELL_TO_PASCAL, yield_speed
+
+SURFACES = ("wall", "sonotrode", "part")
+OTHER_LAW = {"exponent", "e_at_m_s"}  # with one of these a table has all of its law
+DEFAULT_C0 = 0.91
+NOT_NAMED = (
+    "the catalogue gives both only for a shot.material with a known hardness, see chamberopt shot"
+)
+
+
+def with_numbers(materials: Mapping[str, Any], material: object) -> dict[str, Any]:
+    """The tables of [materials] with numbers in the place of names.
+
+    Numbers that are given stay. A v0 that was computed for another ball, hardness or C0 is
+    computed anew. What is not in the catalogue stays as it is, and is reported by the tables.
+
+    Args:
+        material: shot.material as given; one that is unknown is reported at its own place.
+    """
+    ball = find(material, balls()) or (None if material is None else balls()[0])
+    tables = {name: _surface(name, given, ball) for name, given in materials.items()}
+    if (shot := _pair(materials.get("shot"), ball)) is not None:
+        tables["shot"] = shot
+    return tables
+
+
+def name_problems(materials: object) -> Iterator[Problem]:
+    """Names in [materials] that with_numbers did not find."""
+    for name, given in materials.items() if isinstance(materials, Mapping) else ():
+        if isinstance(given, str) and name == "shot":
+            known = find(given, balls()) is not None
+            text = "it is not shot.material; leave it out" if known else unknown(given, balls())
+            yield Problem(name, f"given {given!r}: {text}")
+        elif isinstance(given, str) and name in SURFACES:
+            yield Problem(name, f"given {given!r}: {unknown(given, alloys())}")
+        elif isinstance(given, Mapping) and name in SURFACES and not given.get("v0_for"):
+            alloy = given.get("alloy")
+            if isinstance(alloy, str) and find(alloy, alloys()) is None:
+                yield Problem(f"{name}.alloy", f"given {alloy!r}: {unknown(alloy, alloys())}")
+
+
+def _surface(name: str, given: Any, ball: Ball | None) -> Any:
+    """The table of a surface; what was given if it names no known alloy."""
+    table = {"alloy": given} if isinstance(given, str) else given
+    if name not in SURFACES or not isinstance(table, Mapping) or not table.get("alloy"):
+        return given
+    table = {key: value for key, value in table.items() if value is not None}
+    alloy = find(table["alloy"], alloys())
+    if alloy is not None and "v0_for" not in table:  # a resolved table has all of them
+        keys = ("hardness_HB", "yield_MPa", "tensile_MPa")[: 3 if name == "part" else 1]
+        table = {key: getattr(alloy, key) for key in keys} | table | {"alloy": alloy.name}
+    elif alloy is None and "v0_for" not in table:
+        return given
+    return _with_v0(table, ball, alloy, table.get("hardness_HB", 0.0))
+
+
+def _pair(given: Any, ball: Ball | None) -> Any:
+    """The table of two balls; what was given if it is a law of its own."""
+    if given is None or (isinstance(given, str) and ball and find(given, balls()) is ball):
+        given = {}
+    if not isinstance(given, Mapping) or (given and not given.get("v0_for")):
+        return given
+    table = {key: value for key, value in given.items() if value is not None}
+    return _with_v0(table, ball, ball, None) or None
+
+
+def _with_v0(
+    table: dict[str, Any], ball: Ball | None, other: Alloy | Ball | None, hardness: Any
+) -> dict[str, Any]:
+    """A table with C0 and v0, and for what v0 holds; as it is if it has a law of its own.
+
+    Args:
+        other: what the ball hits; None if it is not in the catalogue.
+        hardness: of the surface as given [HB]; None for two balls.
+    """
+    c0 = table.get("C0", DEFAULT_C0)
+    if not (_is_number(c0) and (hardness is None or _is_number(hardness))):
+        return table  # reported by the table
+    surface = "its like" if hardness is None else f"{hardness:g} HB"
+    v0_for = f"{ball.name if ball else 'unknown'} on {surface}, C0 = {c0:g}"
+    if table.get("v0_for") == v0_for:
+        return table
+    if "v0_for" in table:
+        table = {key: value for key, value in table.items() if key not in ("v0_m_s", "v0_for")}
+    if "v0_m_s" in table and OTHER_LAW.isdisjoint(table):
+        return {"C0": c0, **table}
+    if ball is None or ball.hardness_HB is None or other is None or not OTHER_LAW.isdisjoint(table):
+        return table
+    v0 = computed_v0(ball, other, c0, hardness)
+    return {**table, "C0": c0, "v0_m_s": v0, "v0_for": v0_for}
+
+
+def computed_v0(
+    ball: Ball, other: Alloy | Ball, c0: float = DEFAULT_C0, hardness: float | None = None
+) -> float:
+    """v0 [m/s] of a ball, of known hardness, on a surface or on an equal ball.
+
+    Two digits, which is more than the formula is good for.
+
+    Args:
+        hardness: of the surface [HB], if not that of the catalogue.
+    """
+    harder, given = ball.hardness_HB, hardness or other.hardness_HB
+    assert harder is not None
+    assert given is not None
+    softer = min(harder, given) * BRINELL_TO_PASCAL
+    v0 = yield_speed(ball.elastic, other.elastic, ball.density_kg_m3, softer, c0)
+    return float(f"{0.5 * v0 if isinstance(other, Ball) else v0:.2g}")
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and value > 0.0

@@ -1,0 +1,151 @@
+"""[tolerances] of a design: how far its numbers may lie from what the file says, in production.
+
+[tolerances]
+amplitude_pv_um = 4                      # the number given, 4 µm more or less
+"shot.mass_g" = ["-10 %", "0 %"]         # what it loses until shot is added
+"process.treatment_time_s" = "2 %"
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Protocol
+
+from pydantic import PlainValidator
+from pydantic.fields import FieldInfo
+
+from chamberopt.common import toml_errors
+from chamberopt.common.errors import InputError
+from chamberopt.common.toml_errors import CrossCheckError, Problem
+from chamberopt.common.toml_fields import allowed_range
+
+SHORT_NAMES = {key: f"sonotrode.{key}" for key in ("amplitude_um", "amplitude_pv_um")}
+# A design gives one of the two; peak to valley is twice zero-to-peak.
+TWINS = {"amplitude_um": ("amplitude_pv_um", 2.0), "amplitude_pv_um": ("amplitude_um", 0.5)}
+FORM = 'a number, a share such as "2 %", or [low, high] of these, such as ["-10 %", "0 %"]'
+
+
+def _deviation(side: Any) -> tuple[float, bool]:
+    """A deviation, and whether it is in per cent. ValueError if it is neither."""
+    if isinstance(side, str) and (found := re.fullmatch(r"\s*([-+]?[\d.]+)\s*%\s*", side)):
+        return float(found[1]), True
+    if isinstance(side, bool) or not isinstance(side, (int, float)) or not math.isfinite(side):
+        raise ValueError
+    return float(side), False
+
+
+def _checked(given: Any) -> Any:
+    """A tolerance as its file has it, once it is found to be one."""
+    several = isinstance(given, (list, tuple))
+    shown = list(given) if several else given
+    try:
+        if several:
+            low, high = (_deviation(side)[0] for side in given)
+        else:
+            high = _deviation(given)[0]
+            low = -high
+    except ValueError:
+        remedy = f"allowed: {FORM}"
+        if isinstance(given, dict):
+            remedy = 'put the whole name in quotes, such as "shot.mass_g" = "2 %"'
+        raise CrossCheckError([Problem("", f"given {shown!r}; {remedy}")]) from None
+    if not low <= 0.0 <= high or low == high:
+        text = "give how far the number may lie off: "
+        text += "low below 0 or 0, high above it" if several else "more than 0"
+        raise CrossCheckError([Problem("", f"given {shown!r}; {text}")])
+    return tuple(given) if several else given
+
+
+Tolerance = Annotated[Any, PlainValidator(_checked)]  # a side, or a tuple of two
+
+
+class ToleratedDesign(Protocol):
+    """What is asked of a design here."""
+
+    @property
+    def tolerances(self) -> dict[str, Tolerance] | None: ...
+    def value(self, name: str) -> float: ...
+    def why_fixed(self, name: str) -> str: ...
+    def changed(self, values: Mapping[str, Any]) -> object: ...
+
+
+def tolerance_box(design: ToleratedDesign) -> dict[str, tuple[float, float]]:
+    """Lowest and highest value of each number that has a tolerance, by its whole dotted name.
+
+    They are in the units of the file, those of the key that the design gives.
+    """
+    box = {}
+    for key, tolerance in (design.tolerances or {}).items():
+        name, factor = _number_of(design, key)
+        box[name] = _range(design.value(name), tolerance, factor)
+    return box
+
+
+def require_tolerances(design: ToleratedDesign) -> None:
+    """Raise InputError unless the design can have both ends of the range of each number."""
+    for name, ends in tolerance_box(design).items():
+        for end in ends:
+            try:
+                design.changed({name: end, "tolerances": None})
+            except InputError as error:
+                text = f"the design cannot have {name} = {end:g}: {error}"
+                raise InputError(f"tolerances.{name}: {text}") from None
+
+
+def tolerance_problems(
+    design: ToleratedDesign, fields: Mapping[str, FieldInfo]
+) -> Iterator[Problem]:
+    """Tolerances of what is no number of the design, and ranges beyond what a number may be.
+
+    Args:
+        fields: of every number of the design, by dotted name.
+    """
+    seen: set[str] = set()
+    for key, tolerance in (design.tolerances or {}).items():
+        place = f"tolerances.{key}"
+        name, factor = _number_of(design, key)
+        if reason := design.why_fixed(name):
+            yield Problem(place, reason)
+            continue
+        if name in seen:
+            yield Problem(place, f"{name} has a tolerance already; keep one of the two")
+        seen.add(name)
+        value = design.value(name)
+        low, high = _range(value, tolerance, factor)
+        if low == high:
+            text = f"given {tolerance!r} of {name} = 0, which is no range; give it without %"
+            yield Problem(place, text)
+        if any(not _is_allowed(fields[name], end) for end in (low, high)):
+            allowed = toml_errors.describe_allowed(fields[name])
+            text = f"given {tolerance!r}, so that {name} is {low:g} to {high:g}"
+            yield Problem(place, f"{text}; allowed: {allowed}; narrow it")
+
+
+def _number_of(design: ToleratedDesign, key: str) -> tuple[str, float]:
+    """The number of the design that a key means, and its size over that of the key's number."""
+    name = SHORT_NAMES.get(key, key)
+    table, _, last = name.rpartition(".")
+    if last in TWINS and design.why_fixed(name):
+        other, size = TWINS[last]
+        if not design.why_fixed(f"{table}.{other}"):
+            return f"{table}.{other}", size
+    return name, 1.0
+
+
+def _range(value: float, tolerance: Any, factor: float) -> tuple[float, float]:
+    several = isinstance(tolerance, tuple)
+    ends = []
+    for sign, side in zip(
+        (-1.0, 1.0), tolerance if several else (tolerance, tolerance), strict=True
+    ):
+        size, is_share = _deviation(side)
+        size *= 1.0 if several else sign
+        ends.append(value + size * (0.01 * abs(value) if is_share else factor))
+    return ends[0], ends[1]
+
+
+def _is_allowed(field: FieldInfo, value: float) -> bool:
+    low, high = allowed_range(field)
+    return bool(low <= value <= high)

@@ -1,0 +1,90 @@
+"""Faces of a surface: pieces within which neighbouring triangles turn by less than an angle."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from chamberopt.geometry.triangles import (
+    area_vectors,
+    areas,
+    closest_on_each,
+    connected_pieces,
+    side_pairs,
+    unit_vectors,
+)
+
+SAME = 0.02  # relative difference of size and extent below which faces count as alike
+
+
+class Faces:
+    """The faces of a closed surface.
+
+    Args:
+        vertices: [m], shape (n, 3).
+        triangles: shape (m, 3).
+        crease_deg: neighbours whose normals differ by less are of one face.
+    """
+
+    def __init__(self, vertices: np.ndarray, triangles: np.ndarray, crease_deg: float) -> None:
+        normal = unit_vectors(area_vectors(vertices, triangles))
+        one, two = (side_pairs(triangles) // 3).T
+        smooth = np.einsum("ij,ij->i", normal[one], normal[two]) > np.cos(np.radians(crease_deg))
+        # A triangle without area has no normal: it goes with its neighbours.
+        smooth |= ~normal[one].any(axis=1) | ~normal[two].any(axis=1)
+        self.of_triangle = connected_pieces(one[smooth], two[smooth], len(triangles))[1]  # (m,)
+        self.count = int(self.of_triangle.max()) + 1
+        self._corners, self._normal = vertices[triangles], normal
+        self._weight = areas(vertices, triangles)
+        self.area = np.bincount(self.of_triangle, self._weight)  # [m²], (count,)
+
+    def at(self, place: np.ndarray) -> tuple[int, float]:
+        """The face closest to a place (3,) [m], and its distance [m]."""
+        points = closest_on_each(self._corners, np.broadcast_to(place, (len(self._corners), 3)))
+        away = np.linalg.norm(points - place, axis=1)
+        return int(self.of_triangle[away.argmin()]), float(away.min())
+
+    def normal(self, face: int) -> np.ndarray:
+        """Mean normal (3,) of a face, of length 1; 0 for one that bends all round."""
+        own = self.of_triangle == face
+        mean = self._weight[own] @ self._normal[own] / max(float(self._weight[own].sum()), 1e-30)
+        length = float(np.linalg.norm(mean))
+        return np.asarray(mean / length if length > SAME else 0.0 * mean)
+
+    def place(self, face: int) -> np.ndarray:
+        """A place (3,) [m] on a face: the middle of its triangle closest to the face's middle."""
+        own = np.flatnonzero(self.of_triangle == face)
+        middles = self._corners[own].mean(axis=1)
+        middle = np.average(middles, axis=0, weights=self._weight[own] + 1e-30)
+        return np.asarray(middles[np.linalg.norm(middles - middle, axis=1).argmin()])
+
+    def alike(self, face: int) -> np.ndarray:
+        """Marks (count,) the faces that are congruent with one, or its mirror image."""
+        figures = self._figures
+        scale = np.maximum(np.abs(figures[face]), 1e-12 * np.abs(figures).max())
+        return np.asarray((np.abs(figures - figures[face]) <= SAME * scale).all(axis=1))
+
+    @cached_property
+    def _figures(self) -> np.ndarray:
+        """Area, extents along the principal axes, and bend of each face, (count, 5), in metres."""
+        face, corners = self.of_triangle, self._corners
+        weight = self._weight / np.maximum(self.area, 1e-30)[face]
+
+        def per_face(values: np.ndarray) -> np.ndarray:
+            """Sums of values (m, ...) over the triangles of each face."""
+            flat = values.reshape(len(values), -1)
+            sums = [np.bincount(face, column, self.count) for column in flat.T]
+            return np.stack(sums, axis=1).reshape(self.count, *values.shape[1:])
+
+        middle = per_face(weight[:, None] * corners.mean(axis=1))
+        offset = corners - middle[face][:, None]
+        # The second moment of a triangle's area is that of its corners and of its middle.
+        total = np.concatenate([offset, offset.mean(axis=1, keepdims=True) * 3.0], axis=1)
+        moments = per_face(weight[:, None, None] * np.einsum("tki,tkj->tij", total, total) / 12.0)
+        extent = np.sqrt(np.maximum(np.linalg.eigvalsh(moments), 0.0))
+        size = np.sqrt(self.area)
+        # The thinnest extent of a flat face is rounding: differences count against its size.
+        extent[extent < SAME * size[:, None]] = 0.0
+        bend = np.linalg.norm(per_face(weight[:, None] * self._normal), axis=1)
+        return np.column_stack([size, extent, size * bend])

@@ -1,0 +1,120 @@
+// The page: its tabs, what is asked of the server as the design changes, and what is said of it.
+import { makeFields, showValues } from "./fields.js";
+import { fillSurfaces, fillTarget, showChosen } from "./target.js";
+import { fillRun, follow } from "./run.js";
+import { closeResults } from "./results.js";
+import { ask, attempt, element, isUnsaved, listen, read, say, state, undo, unpack } from "./state.js";
+import { showCavity, showPart, showShape, showState } from "./scene.js";
+
+const find = (id) => document.getElementById(id);
+const AGAIN = 3000; // ms after which a check that another page has superseded is asked again
+const QUIET = 150; // ms after the last change, before the cavity is cut
+
+for (const tab of document.querySelectorAll("nav button")) tab.addEventListener("click", () => {
+  for (const one of document.querySelectorAll("nav button")) one.setAttribute("aria-selected", one === tab);
+  for (const one of document.querySelectorAll(".tab")) one.hidden = one.id !== tab.dataset.tab;
+  if (tab.dataset.tab !== "results") closeResults();
+});
+
+// The shape follows at once: the newest changes are asked for as soon as the last answer is here.
+let asking = false, asked = null, timer = 0, round = 0;
+async function followShape() {
+  if (asking) return;
+  asking = true;
+  while (asked !== state.changes) {
+    const changes = asked = state.changes;
+    try {
+      const answer = unpack(await ask("/shape", { changes }));
+      refuse("");
+      if (answer.state.length !== fillTarget.part.triangles.length / 3) await showPartOf(); // its file has changed
+      showShape(answer);
+      document.body.dataset.shape = String(Number(document.body.dataset.shape ?? 0) + 1);
+    } catch (error) { if (asked === state.changes) refuse(error.message); }
+  }
+  asking = false;
+}
+
+// The cavity, then what is reached, once nothing has moved for a moment; an answer to older values is dropped.
+function followCavity() {
+  clearTimeout(timer);
+  find("said").classList.add("waiting");
+  document.body.dataset.checked = "";
+  const mine = ++round;
+  timer = setTimeout(async () => {
+    try {
+      const buffer = await ask("/cavity", { changes: state.changes });
+      if (mine !== round) return;
+      const cavity = unpack(buffer, 4);
+      showCavity(cavity);
+      sayOf(cavity);
+      document.body.dataset.checked = "cavity";
+      const reach = unpack(await ask("/reach", { number: new DataView(buffer).getUint32(0, true) }));
+      if (mine !== round) return;
+      showState(reach.state);
+      sayOf(reach);
+      find("said").classList.remove("waiting");
+      document.body.dataset.checked = "reach";
+    } catch (error) {
+      if (mine !== round) return;
+      if (error.superseded) timer = setTimeout(followCavity, AGAIN); // by another page of this design
+      else refuse(error.message);
+    }
+  }, QUIET);
+}
+
+function refuse(text) {
+  find("error").textContent = text;
+  find("error").hidden = !text;
+}
+
+function sayOf({ facts, warnings, notes }) {
+  const list = (texts) => texts.map((text) => element("li", { textContent: text }));
+  find("warnings").replaceChildren(...list(warnings));
+  find("notes").replaceChildren(...list(notes));
+  const rows = [];
+  const add = (table, prefix) => {
+    for (const [name, value] of Object.entries(table)) {
+      if (value && typeof value === "object" && !Array.isArray(value)) { add(value, `${prefix}${name}.`); continue; }
+      const words = (prefix + name).split(/(?<=[._])/).flatMap((word) => [word, element("wbr")]); // where lines may break
+      const text = Array.isArray(value) ? value.join(", ") : String(value);
+      const shown = name === "mesh" ? text.split(/[\\/]/).pop() : text; // without its folder
+      rows.push(element("dt", {}, ...words), element("dd", { textContent: shown, title: text }));
+    }
+  };
+  add(facts, "");
+  find("facts").replaceChildren(...rows);
+}
+
+listen((what) => {
+  if (what === "read") {
+    find("file").textContent = state.file.file;
+    find("file").title = state.file.folder;
+    document.title = `${state.file.file}: chamberopt`;
+    makeFields();
+    fillTarget();
+    fillRun();
+    asked = null;
+  } else {
+    showValues();
+    fillSurfaces();
+    showChosen();
+  }
+  find("unsaved").textContent = isUnsaved() ? "not saved yet" : "";
+  find("save").disabled = !isUnsaved();
+  find("undo").disabled = !state.past.length;
+  followShape();
+  followCavity();
+});
+addEventListener("beforeunload", (event) => { if (isUnsaved()) event.preventDefault(); });
+
+find("undo").addEventListener("click", undo);
+find("save").addEventListener("click", () => attempt(async () => {
+  await read("/save", { changes: state.changes });
+  say(`saved in ${state.file.file}`, true);
+}));
+async function showPartOf() { fillTarget.part = showPart(await ask("/part", {})); }
+const begin = () => read("/read", {}, showPartOf);
+find("reload").addEventListener("click", () => attempt(async () => {
+  if (!isUnsaved() || confirm("Go on from the file as it is now? What is not saved is lost.")) await begin();
+}));
+attempt(begin).then(() => { document.body.dataset.ready = "yes"; attempt(follow); });

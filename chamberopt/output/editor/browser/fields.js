@@ -1,0 +1,95 @@
+// A slider and a field for every number of the design, grouped by its tables; the ends of sliders bound a study.
+import { change, element, endMove, original, say, state, value } from "./state.js";
+
+const OPEN = ["chamber", "shot", "sonotrode"], POSE = ["part.rotate_deg", "part.offset_mm"];
+const rows = new Map();
+export const ends = new Map(); // low and high of each slider, by name
+export const varied = new Set();
+
+export function makeFields() {
+  const groups = new Map(), pose = document.getElementById("pose-fields");
+  rows.clear();
+  pose.replaceChildren();
+  for (const field of state.file.fields) {
+    const isPose = POSE.some((name) => field.name.startsWith(name));
+    if (isPose && state.file.is_drawn) continue; // where its file has it
+    const table = field.name.slice(0, field.name.indexOf(".", field.name.startsWith("process.accuracy") ? 8 : 0));
+    const row = field.choices ? choiceRow(field) : numberRow(field);
+    if (isPose) { pose.append(row); continue; }
+    if (!groups.has(table)) groups.set(table, element("details", { open: OPEN.includes(table) }, element("summary", { textContent: `[${table}]` })));
+    groups.get(table).append(row);
+  }
+  document.getElementById("numbers").replaceChildren(...groups.values());
+  showValues();
+}
+
+const label = (field) => element("label", { title: field.text, htmlFor: field.name },
+  element("b", { textContent: field.name.split(".").slice(1).join(".").replace(/(deg|mm)\.([012])$/, (_, unit, k) => `${unit}, ${"xyz"[k]}`) }), element("span", { textContent: field.text }));
+
+function choiceRow(field) {
+  const select = element("select", { id: field.name }, ...field.choices.map((one) => element("option", { textContent: one })));
+  select.addEventListener("change", () => change({ [field.name]: select.value }));
+  rows.set(field.name, { show: (now) => { select.value = now; }, row: null });
+  return element("div", { className: "field" }, label(field), select);
+}
+
+// Ends that a slider begins with: half and one and a half times the value, within what the schema allows.
+function firstEnds(field) {
+  if (field.name.includes("rotate_deg")) return [-180, 180];
+  const at = field.value ?? 0, most = field.most ?? Infinity, least = field.least ?? -Infinity;
+  const room = Math.abs(at) / 2 || (field.name.endsWith("_mm.0") || field.name.endsWith("_mm.1") ? 20
+    : Math.min(Number.isFinite(most) ? most / 10 : 10, 10));
+  const round = (x) => field.whole ? Math.round(x) : Number(x.toPrecision(3));
+  return [Math.max(least, round(at - room)), Math.min(most, round(at + room))];
+}
+
+function numberRow(field) {
+  const box = element("input", { type: "text", inputMode: "decimal", id: field.name, placeholder: "not set", disabled: field.fixed });
+  const slider = element("input", { type: "range", disabled: field.fixed, ariaLabel: field.name });
+  const [low, high] = [0, 1].map(() => element("input", { type: "number", step: "any", ariaLabel: `end of the slider of ${field.name}` }));
+  if (!ends.has(field.name)) ends.set(field.name, firstEnds(field));
+  const scale = () => {
+    [low.value, high.value] = [slider.min, slider.max] = ends.get(field.name);
+    const span = slider.max - slider.min;
+    slider.step = field.whole ? 1 : 10 ** Math.floor(Math.log10(span / 100)) || "any";
+  };
+  const newEnds = () => {
+    const wanted = [Number(low.value), Number(high.value)];
+    if (wanted[0] < wanted[1]) ends.set(field.name, wanted);
+    scale();
+    show(value(field.name));
+  };
+  const show = (now) => {
+    if (document.activeElement !== box) box.value = now ?? "";
+    slider.value = now ?? slider.min;
+    row.classList.toggle("changed", now !== original(field.name));
+  };
+  slider.addEventListener("input", () => change({ [field.name]: Number(slider.value) }, field.name));
+  slider.addEventListener("change", endMove);
+  box.addEventListener("change", () => {
+    const text = box.value.trim().replace(",", "."), now = text === "" ? null : Number(text);
+    if (Number.isNaN(now)) say(`${field.name}: given ${box.value}, which is no number`);
+    else change({ [field.name]: now });
+  });
+  for (const end of [low, high]) end.addEventListener("change", newEnds);
+  const more = element("div", { className: "ends" }, low, "…", high);
+  if (field.varies && !field.fixed) {
+    const tick = element("input", { type: "checkbox", checked: varied.has(field.name) });
+    tick.addEventListener("change", () => {
+      varied[tick.checked ? "add" : "delete"](field.name);
+      document.dispatchEvent(new Event("varied"));
+    });
+    more.append(element("label", {}, tick, " vary"));
+  }
+  const unit = element("small", { textContent: field.fixed ? "catalogue" : field.unit });
+  const row = element("div", { className: "field" }, label(field), slider, box, unit, more);
+  more.hidden = true;
+  row.addEventListener("focusin", () => { more.hidden = false; });
+  row.addEventListener("pointerenter", () => { more.hidden = false; });
+  row.addEventListener("pointerleave", () => { more.hidden = !varied.has(field.name) && !row.contains(document.activeElement); });
+  scale();
+  rows.set(field.name, { show, row });
+  return row;
+}
+
+export function showValues() { for (const [name, { show }] of rows) show(value(name)); }

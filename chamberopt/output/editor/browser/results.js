@@ -1,0 +1,50 @@
+// Results below the design's folder: in 3D, one or two side by side, with report and process sheet.
+import { ask, attempt, element } from "./state.js";
+import { start } from "./run.js";
+
+const find = (id) => document.getElementById(id), list = find("result-list");
+const FILES = [["report", "report.html", "report"], ["sheet", "process_sheet.pdf", "process sheet"]];
+
+async function refresh() {
+  const rows = await ask("/results");
+  list.replaceChildren(...rows.map((row) => {
+    const tick = element("input", { type: "checkbox", value: row.folder, disabled: Boolean(row.unusable) });
+    const item = element("li", {}, element("label", {}, tick, ` ${row.folder}`), element("small", { textContent: row.text }), element("br"));
+    for (const [command, file, name] of row.unusable ? [] : FILES) {
+      const button = element("button", { textContent: row[file] ? name : `make the ${name}` });
+      button.addEventListener("click", () => attempt(() => open(command, row.folder, file, row[file])));
+      item.append(button, " ");
+    }
+    return item;
+  }));
+  if (!rows.length) list.append(element("li", { textContent: "none yet: simulate, or run a study" }));
+}
+
+async function open(command, folder, file, isThere) {
+  if (!isThere && await start(command, folder) !== 0) throw new Error(find("printed").textContent);
+  await refresh();
+  window.open(`/files/${`${folder}/${file}`.split("/").map(encodeURIComponent).join("/")}`, "_blank", "noopener");
+}
+
+find("show-results").addEventListener("click", () => attempt(async () => {
+  const folders = [...list.querySelectorAll("input:checked")].map((one) => one.value).reverse(); // the older first
+  if (!folders.length || folders.length > 2) throw new Error("tick one result, or two to compare");
+  const { html, content, comparison } = await ask("/shown", { folders });
+  closeResults();
+  find("shown").innerHTML = html; // the server's own, as in a report; names in it are escaped
+  if (comparison) find("shown").append(element("pre", { textContent: comparison }));
+  find("shown").hidden = find("close-results").hidden = false;
+  views = showParts(content);
+}));
+
+let views = [];
+export function closeResults() {
+  for (const view of views) view.dispose();
+  views = [];
+  find("shown").hidden = find("close-results").hidden = true;
+  find("shown").replaceChildren();
+}
+find("close-results").addEventListener("click", closeResults);
+find("refresh").addEventListener("click", () => attempt(refresh));
+document.querySelector("[data-tab=results]").addEventListener("click", () => attempt(refresh));
+document.addEventListener("ended", () => attempt(refresh));

@@ -1,0 +1,74 @@
+// Running the commands on what is saved, and writing a study from the sliders.
+import { ask, attempt, element, isUnsaved, say, state, read } from "./state.js";
+import { ends, varied } from "./fields.js";
+
+const find = (id) => document.getElementById(id);
+const EVERY = 500; // ms between looks at a command
+
+export function fillRun() {
+  const chosen = find("of").value;
+  const names = state.file.files.map((one) => one.name);
+  find("of").replaceChildren(...names.map((name) => element("option", { textContent: name })));
+  find("of").value = names.includes(chosen) ? chosen : state.file.file;
+  allow();
+  showVaried();
+}
+
+// A design is simulated; a study is run or swept.
+function allow() {
+  const kind = state.file.files.find((one) => one.name === find("of").value)?.kind;
+  for (const button of document.querySelectorAll("[data-command]")) button.disabled = (button.dataset.command === "simulate") !== (kind === "design");
+}
+find("of").addEventListener("change", allow);
+
+function showVaried() {
+  const items = [...varied].map((name) => element("li", { textContent: `${name}: ${ends.get(name).join(" … ")}` }));
+  find("varied").replaceChildren(...(items.length ? items : [element("li", { textContent: "nothing is ticked" })]));
+}
+document.addEventListener("varied", showVaried);
+
+// Start a command, follow it to its end, and give its exit status.
+export async function start(command, of) {
+  return follow(await ask("/start", { command, of, points: find("points").value }));
+}
+
+// Show a command that runs, by default what the server has started last, and give its exit status.
+export async function follow(started) {
+  let now = started ?? await ask("/status");
+  if (!now.command) return null;
+  document.body.dataset.ended = "";
+  while (now.exit === null) {
+    show(now);
+    await new Promise((done) => { setTimeout(done, EVERY); });
+    now = await ask("/status");
+  }
+  show(now);
+  document.body.dataset.ended = String(now.exit);
+  return now.exit;
+}
+
+function show({ command, steps, lines, exit }) {
+  find("stop").disabled = exit !== null;
+  const bars = steps.map((step) => element("div", {},
+    `${step.step}${step.total ? `: ${step.done} of ${step.total}` : ""}${step.best === null ? "" : `, best ${step.best.toFixed(4)}`}`,
+    Object.assign(element("progress"), step.total ? { max: step.total, value: step.done } : {})));
+  const ended = exit === null ? [] : [element("b", { textContent: exit === 0 ? "finished" : `ended with exit status ${exit}` })];
+  find("progress").replaceChildren(element("code", { textContent: command }), ...bars, ...ended);
+  find("printed").textContent = lines.join("\n");
+}
+
+for (const button of document.querySelectorAll("[data-command]")) button.addEventListener("click", () => attempt(async () => {
+  if (isUnsaved()) throw new Error("there are unsaved changes: commands use the saved file, so save or undo them first");
+  await start(button.dataset.command, find("of").value);
+  document.dispatchEvent(new Event("ended"));
+}));
+find("stop").addEventListener("click", () => attempt(() => ask("/stop", {})));
+find("write-study").addEventListener("click", () => attempt(async () => {
+  if (isUnsaved()) throw new Error("there are unsaved changes: the study begins from the saved design, so save or undo them first");
+  const vary = Object.fromEntries([...varied].map((name) => [name, ends.get(name)]));
+  const { study } = await ask("/study", { vary, name: find("study-name").value, evaluations: Number(find("evaluations").value) });
+  await read();
+  find("of").value = study;
+  allow();
+  say(`written: ${study}`, true);
+}));

@@ -1,0 +1,177 @@
+// The view: part and chamber as the newest answers have them, and handles that turn and move the part.
+import { change, endMove, unpack, value } from "./state.js";
+
+const KINDS = [["rest of the part", "#b9bec4"], ["target", "#2f9e6e"], ["target outside the chamber", "#7a4fb0"],
+  ["target that no ball touches", "#8c5a2b"], ["zone", "#3d7ec4"]];
+const WALLS = ["#9fc3dd", 0.16], SONOTRODE = ["#c58b52", 0.6];
+export const view = new View3D(document.getElementById("view"));
+let part = null, handles = null, grip = null, placed = null, coloured = [];
+
+export function showPart(buffer) {
+  part = unpack(buffer);
+  view.surface("part", { points: part.points.slice(), triangles: part.triangles.slice() });
+  placed = null;
+  document.getElementById("legend").replaceChildren(...[...KINDS, ["sonotrode", SONOTRODE[0]]].map(([name, colour]) => {
+    const item = document.createElement("li"), patch = document.createElement("i");
+    patch.style.background = colour;
+    item.append(patch, name);
+    return item;
+  }));
+  return part;
+}
+
+// What `shape` answers: at once, without the part taken out.
+export function showShape(answer) {
+  const mesh = view.get("part"), r = answer.rotation, s = answer.shift;
+  mesh.matrixAutoUpdate = false;
+  mesh.matrix.set(r[0], r[1], r[2], s[0], r[3], r[4], r[5], s[1], r[6], r[7], r[8], s[2], 0, 0, 0, 1);
+  mesh.matrixWorldNeedsUpdate = true;
+  mesh.visible = true;
+  view.remove("remeshed");
+  colour("part", answer.state);
+  walls(answer);
+  const first = !placed;
+  placed = answer;
+  if (first) lookAtAll();
+  dimensions();
+  if (grip && !handles.dragging) grip.position.set(...middle());
+}
+
+// What `cavity` answers: exactly what the shot flies in.
+export function showCavity(answer) {
+  walls(answer);
+  if (answer.part_points) {
+    view.surface("remeshed", { points: answer.part_points.slice(), triangles: answer.part_triangles.slice() });
+    view.get("part").visible = false;
+  }
+  showState(answer.state);
+}
+
+export function showState(state) { colour(view.get("remeshed") ? "remeshed" : "part", state); }
+
+function colour(name, state) {
+  const mesh = view.get(name);
+  if (coloured[0] === mesh && coloured[1].every((kind, k) => kind === state[k])) return;
+  coloured = [mesh, state];
+  const rgb = KINDS.map(([, hex]) => [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16) / 255));
+  const colours = new Float32Array(3 * state.length);
+  state.forEach((kind, k) => colours.set(rgb[kind], 3 * k));
+  view.colourTriangles(name, colours);
+}
+
+function walls(answer) {
+  const surface = (name, triangles, [colour, opacity]) =>
+    view.surface(name, { points: answer.points.slice(), triangles: triangles.slice(), colour, opacity });
+  surface("walls", answer.walls, WALLS);
+  const [colour, opacity] = SONOTRODE; // from below the part is seen through it
+  surface("sonotrode", answer.sonotrode, [colour, view.camera.position.z < 0 ? 0.15 : opacity]);
+  view.lines("edges", answer.edges.slice(), "#6f8796");
+}
+
+const mid = (a, b) => a.map((x, i) => 0.5 * (x + b[i]));
+const middle = () => mid(...placed.part_mm);
+const short = (x) => String(Number(x.toPrecision(4)));
+
+function lookAtAll() {
+  const [low, high] = placed.shape_mm, size = Math.hypot(...high.map((x, i) => x - low[i]));
+  const centre = mid(low, high), way = wayToTarget();
+  view.look({ middle: centre, eye: centre.map((x, i) => x + 2.3 * size * way[i]), size });
+}
+
+view.renderer.domElement.addEventListener("dblclick", () => { if (placed) lookAtAll(); });
+
+// Direction to the eye from which most of the target faces it, of twelve from above and as many from below.
+function wayToTarget() {
+  const corners = view.get("part").geometry.getAttribute("position").array, r = placed.rotation, ways = [];
+  for (const up of [0.33, -0.33]) for (let k = 0; k < 12; k++) {
+    const turn = (k - 1.95) * Math.PI / 6;
+    ways.push([0.94 * Math.cos(turn), 0.94 * Math.sin(turn), up]);
+  }
+  const worth = ways.map(() => 0);
+  for (let k = 0; k < placed.state.length; k++) {
+    if (placed.state[k] !== 1) continue;
+    const [a, b, c] = [0, 3, 6].map((i) => new THREE.Vector3().fromArray(corners, 9 * k + i));
+    const own = b.sub(a).cross(c.sub(a)), normal = [0, 1, 2].map((i) => r[3 * i] * own.x + r[3 * i + 1] * own.y + r[3 * i + 2] * own.z);
+    ways.forEach((way, i) => { worth[i] += Math.max(0, way[0] * normal[0] + way[1] * normal[1] + way[2] * normal[2]); });
+  }
+  const best = (first) => { // the usual way where much the same is seen from all sides
+    const most = Math.max(...worth.slice(first, first + 12));
+    return worth[first] > 0.9 * most ? first : worth.indexOf(most, first);
+  };
+  const above = best(0), below = best(12);
+  const [x, y, z] = ways[worth[below] > 2 * worth[above] ? below : above]; // the floor hides least from above
+  const aside = [1.1 * x + 0.5 * ways[0][0], 1.1 * y + 0.5 * ways[0][1]], long = 0.94 / Math.hypot(...aside);
+  return [long * aside[0], long * aside[1], z]; // a little aside shows its depth
+}
+
+// Sizes of the chamber and of the part's box, its height over the sonotrode, and the axes of the part's file.
+function dimensions() {
+  const [low, high] = placed.shape_mm, [a, b] = placed.part_mm, size = Math.hypot(...high.map((x, i) => x - low[i]));
+  const text = 0.026 * size, gap = 0.06 * size;
+  const ends = [
+    [low[0], low[1] - gap, 0], [high[0], low[1] - gap, 0],
+    [high[0] + gap, high[1], 0], [high[0] + gap, high[1], high[2]],
+    [b[0], a[1], 0], [b[0], a[1], a[2]],
+  ];
+  for (const [i, j] of [[0, 1], [1, 3], [3, 2], [2, 0], [4, 5], [5, 7], [7, 6], [6, 4], [0, 4], [1, 5], [2, 6], [3, 7]])
+    for (const k of [i, j]) ends.push([k & 1 ? b[0] : a[0], k & 2 ? b[1] : a[1], k & 4 ? b[2] : a[2]]);
+  const o = placed.shift, r = placed.rotation, long = 0.15 * size, axes = [];
+  for (const k of [0, 1, 2]) {
+    const tip = o.map((x, i) => x + long * r[3 * i + k]);
+    ends.push(o, tip);
+    axes.push([`file ${"xyz"[k]}`, tip]);
+  }
+  view.lines("dimensions", Float32Array.from(ends.flat()), "#56616a");
+  view.texts("sizes", [
+    [`${short(high[0] - low[0])} mm`, [0.5 * (low[0] + high[0]), low[1] - gap, -0.4 * gap]],
+    [`${short(high[2])} mm`, [high[0] + gap, high[1], 0.8 * high[2]]],
+    [`${short(a[2])} mm`, [b[0], a[1], 0.5 * a[2]]],
+    [b.map((x, i) => short(x - a[i])).join(" × ") + " mm", [0.5 * (a[0] + b[0]), a[1], b[2] + text]],
+    ...axes,
+  ], text);
+}
+
+// Number of the part's triangle below the pointer, or null.
+export function triangleAt(event) { return view.at(event, ["part"])?.triangle ?? null; }
+
+// Handles at the part's middle: "rotate", "translate" or "" for none.
+export function setHandles(mode) {
+  if (!handles) {
+    handles = new THREE.TransformControls(view.camera, view.renderer.domElement);
+    grip = new THREE.Object3D();
+    view.scene.add(grip, handles.getHelper());
+    handles.addEventListener("change", () => view.draw());
+    handles.addEventListener("dragging-changed", (event) => { view.orbit.enabled = !event.value; endMove(); begin(); });
+    handles.addEventListener("objectChange", moved);
+    handles.setSize(0.8);
+  }
+  begin();
+  if (mode) handles.attach(grip); else handles.detach();
+  if (mode) handles.setMode(mode);
+  handles.showZ = mode !== "translate";
+  handles.setRotationSnap(Math.PI / 180);
+  handles.setTranslationSnap(0.1);
+  view.draw();
+}
+
+let begun = null;
+function begin() {
+  if (!placed) return;
+  grip.position.set(...middle());
+  grip.quaternion.identity();
+  const r = placed.rotation;
+  begun = { turn: new THREE.Matrix4().set(r[0], r[1], r[2], 0, r[3], r[4], r[5], 0, r[6], r[7], r[8], 0, 0, 0, 0, 1),
+    at: grip.position.clone(), offset: [0, 1].map((k) => value(`part.offset_mm.${k}`) ?? 0) };
+}
+
+function moved() {
+  if (handles.mode === "rotate") {
+    const whole = new THREE.Matrix4().makeRotationFromQuaternion(grip.quaternion).multiply(begun.turn);
+    const angle = new THREE.Euler().setFromRotationMatrix(whole, "ZYX"); // turned about x, then y, then z
+    const turns = ["x", "y", "z"].map((name, k) => [`part.rotate_deg.${k}`, Number((angle[name] * 180 / Math.PI).toFixed(1)) + 0]);
+    change(Object.fromEntries(turns), "turning");
+  } else {
+    const shift = grip.position.clone().sub(begun.at).toArray();
+    change(Object.fromEntries([0, 1].map((k) => [`part.offset_mm.${k}`, Number((begun.offset[k] + shift[k]).toFixed(2))])), "moving");
+  }
+}

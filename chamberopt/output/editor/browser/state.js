@@ -1,0 +1,92 @@
+// What the page knows: the file as read, changes not yet saved, and questions to the server.
+const listeners = [];
+export const state = { file: null, changes: {}, past: [] };
+export const listen = (hear) => listeners.push(hear);
+const tell = (what) => { for (const hear of listeners) hear(what); };
+
+// The key that the address brought: kept for reloads of this tab, and sent with every question.
+if (location.hash.length > 1) {
+  sessionStorage.setItem("key", location.hash.slice(1));
+  history.replaceState(null, "", "/");
+}
+
+// Answer of the server as JSON, or as bytes; throws an error with the server's words.
+export async function ask(path, question) {
+  const headers = { "x-chamberopt-key": sessionStorage.getItem("key") ?? "" };
+  const request = question === undefined ? { headers }
+    : { method: "POST", headers, body: JSON.stringify({ read: state.file?.read, ...question }) };
+  const answer = await fetch(path, request).catch(() => { throw new Error("the server has ended: start chamberopt edit again"); });
+  const isBytes = answer.headers.get("content-type") === "application/octet-stream";
+  if (isBytes) return answer.arrayBuffer();
+  if (answer.status === 403) throw new Error(await answer.text());
+  const told = await answer.json().catch(() => ({ error: `the server failed at this (${answer.status})` }));
+  if (told.superseded || told.error) throw Object.assign(new Error(told.error), { superseded: Boolean(told.superseded) });
+  return told;
+}
+
+// A packed answer (see answers.py): its head, with the arrays by name.
+export function unpack(buffer, at = 0) {
+  const length = new DataView(buffer).getUint32(at, true), head = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, at + 4, length)));
+  const kinds = { "<f4": Float32Array, "<u4": Uint32Array, u1: Uint8Array };
+  let place = at + 4 + length;
+  for (const [name, [kind, count]] of Object.entries(head.arrays)) {
+    head[name] = new kinds[kind](buffer, place, count);
+    place += Math.ceil(head[name].byteLength / 4) * 4;
+  }
+  return head;
+}
+
+export async function read(path = "/read", question = {}, before = () => {}) {
+  state.file = await ask(path, question);
+  await before();
+  state.changes = {};
+  state.past = [];
+  tell("read");
+}
+
+export const original = (name) => state.file.fields.find((one) => one.name === name)?.value ?? null;
+export const value = (name) => name in state.changes ? state.changes[name] : original(name);
+
+// Change values by dotted name; null takes a key out of the file. A slider's moves are undone as one.
+export function change(values, move = "") {
+  say("");
+  if (!move || state.move !== move) state.past.push(state.changes);
+  state.move = move;
+  state.changes = { ...state.changes, ...values };
+  for (const name of Object.keys(values))
+    if (state.file.fields.some((one) => one.name === name) && state.changes[name] === original(name)) delete state.changes[name];
+  tell("changed");
+}
+
+export function endMove() { state.move = ""; }
+
+export function undo() {
+  if (!state.past.length) return;
+  say("");
+  state.changes = state.past.pop();
+  state.move = "";
+  tell("changed");
+}
+
+export const isUnsaved = () => Object.keys(state.changes).length > 0;
+
+let fading = 0;
+export function say(text, good = false) {
+  const box = document.getElementById("message");
+  box.textContent = text;
+  box.className = good ? "good" : "";
+  box.hidden = !text;
+  clearTimeout(fading);
+  if (good) fading = setTimeout(() => { box.hidden = true; }, 4000);
+}
+
+// Run an act; what goes wrong is said on the page.
+export async function attempt(act) {
+  try { say(""); return await act(); } catch (error) { say(error.message); return undefined; }
+}
+
+export function element(tag, properties = {}, ...inner) {
+  const made = Object.assign(document.createElement(tag), properties);
+  made.append(...inner);
+  return made;
+}

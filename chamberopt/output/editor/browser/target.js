@@ -1,0 +1,100 @@
+// Choosing the target and zones by clicking faces, or by names of the file, and turning a face down.
+import { ask, attempt, change, element, say, state } from "./state.js";
+import { setHandles, triangleAt, view } from "./scene.js";
+
+const find = (id) => document.getElementById(id);
+const KEYS = ["surface", "faces", "direction", "angle_deg", "box_mm", "radius_mm"];
+let newZone = false;
+
+export function fillTarget() {
+  fillSurfaces();
+  find("names").replaceChildren(...fillTarget.part.names.map((one) => {
+    const button = element("button", { textContent: one.name, title: "make it the target" });
+    button.addEventListener("click", () => choose(one.name));
+    return element("li", {}, button, ` ${one.area_mm2} mm², ${one.triangles} triangles`);
+  }));
+  if (!fillTarget.part.names.length) find("names").append(element("li", { textContent: "none" }));
+  showChosen();
+}
+
+export function fillSurfaces() {
+  const surfaces = { ...state.file.surfaces }, chosen = find("surface").value;
+  for (const [name, zone] of Object.entries(state.changes)) if (/^zones\.\d+$/.test(name)) surfaces[`${name}.target`] = `zone ${zone.name}`;
+  find("surface").replaceChildren(...Object.entries(surfaces).map(([table, name]) => element("option", { value: table, textContent: name })));
+  if (chosen in surfaces) find("surface").value = chosen;
+  return Object.keys(surfaces);
+}
+
+// What the file will say of the target, as far as the page has changed it.
+export function showChosen() {
+  const table = find("surface").value, added = state.changes[table.replace(/\.target$/, "")]?.target;
+  const kept = { ...(table === "part.target" ? state.file.target : added) };
+  for (const key of KEYS) {
+    const now = state.changes[`${table}.${key}`];
+    if (now === null) delete kept[key]; else if (now !== undefined) kept[key] = now;
+  }
+  find("chosen").textContent = [`[${table}]`, ...Object.entries(kept).map(([key, now]) => `${key} = ${JSON.stringify(now)}`)].join("\n");
+}
+
+// The names that the target is chosen by, as far as it is chosen by names.
+function names() {
+  const table = find("surface").value, now = state.changes[`${table}.surface`];
+  const kept = now === undefined ? (table === "part.target" ? state.file.target.surface : []) : now;
+  return [kept ?? []].flat().filter((name) => name !== "all");
+}
+
+// Add a name of the file to the target, or take it away, as a click on a face does.
+function choose(name) {
+  const takes = document.querySelector("input[name=act]:checked").value === "take";
+  const wanted = takes ? names().filter((one) => one !== name) : [...new Set([...names(), name])];
+  if (wanted.length) only({ surface: wanted }); else say("nothing would be left: add another name first");
+}
+
+// Choose by these keys alone.
+function only(keys) {
+  const table = find("surface").value;
+  change(Object.fromEntries(KEYS.map((key) => [`${table}.${key}`, keys[key] ?? null])));
+}
+find("whole").addEventListener("click", () => only({}));
+find("surface").addEventListener("change", showChosen);
+
+let clicks = Promise.resolve(); // one after the other, each on what the one before has made
+async function click(event) {
+  const down = find("down").getAttribute("aria-pressed") === "true";
+  if (!down && find("target").hidden) return;
+  const triangle = triangleAt(event), crease_deg = Number(find("crease").value);
+  if (triangle === null) throw new Error("no face of the part is there");
+  const made = state.changes;
+  document.body.dataset.picked = triangle;
+  const act = down ? "down" : document.querySelector("input[name=act]:checked").value;
+  const where = { changes: state.changes, triangle, crease_deg, alike: find("alike").checked };
+  if (newZone && !down) {
+    const name = find("zone").value.trim();
+    const faces = await ask("/pick", { ...where, act: "face" }), table = `zones.${fillSurfaces().length - 1}`;
+    change({ [table]: { name, target: faces } });
+    fillSurfaces();
+    find("surface").value = `${table}.target`;
+    showChosen();
+    newZone = false;
+    find("add-zone").setAttribute("aria-pressed", "false");
+    return;
+  }
+  const answer = await ask("/pick", { ...where, table: find("surface").value, act });
+  if (state.changes === made) change(answer); // unless it was undone meanwhile
+  find("down").setAttribute("aria-pressed", "false");
+}
+
+let from = null; // a click is not a turn of the view
+view.renderer.domElement.addEventListener("pointerdown", (event) => { from = [event.clientX, event.clientY]; });
+view.renderer.domElement.addEventListener("pointerup", (event) => {
+  if (event.button === 0 && from && Math.hypot(event.clientX - from[0], event.clientY - from[1]) < 4) {
+    clicks = clicks.then(() => attempt(() => click(event)));
+  }
+});
+find("down").addEventListener("click", () => find("down").setAttribute("aria-pressed", find("down").getAttribute("aria-pressed") !== "true"));
+find("add-zone").addEventListener("click", () => attempt(async () => {
+  if (!find("zone").value.trim()) throw new Error("give the new zone a name first");
+  newZone = !newZone;
+  find("add-zone").setAttribute("aria-pressed", newZone);
+}));
+for (const one of document.querySelectorAll("input[name=handles]")) one.addEventListener("change", () => setHandles(one.value));

@@ -1,0 +1,183 @@
+"""The design file being edited: its text with changes, and saving it line by line."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import stat
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from chamberopt.common.errors import InputError
+from chamberopt.common.files import write_text
+from chamberopt.common.toml_fields import read_toml
+from chamberopt.design.design import Design, validate
+from chamberopt.design.shapes.base import is_custom
+
+# By dotted name, in the file's units; None takes a key out of the file.
+Changes = Mapping[str, Any]
+# What is changed beside the fields of the page: a target or zone, and what it chooses.
+PICKED = re.compile(
+    r"(part\.target|zones\.\d+\.target)\.(surface|faces|direction|angle_deg|box_mm|radius_mm)"
+    r"|zones\.\d+"
+)
+
+
+class EditedFile:
+    """A design file as one page read it.
+
+    Args:
+        trusted: whether its shape may be a Python file, which is run.
+
+    Raises:
+        InputError: it does not load, or has a shape of the user's that is not trusted.
+    """
+
+    def __init__(self, path: Path, trusted: bool) -> None:
+        self.path = path.resolve()
+        self.text, data = read_toml(self.path, "design")
+        self._shape = custom_shape(data)
+        if self._shape and not trusted:
+            raise InputError(
+                f"{path.name}: runs the Python file {self._shape}, which may do anything; read it, "
+                "and begin again with --trust-shape if you trust it"
+            )
+        self.design = validate(Design, data, self.path, self.text)
+
+    @property
+    def folder(self) -> Path:
+        return self.path.parent
+
+    @property
+    def digest(self) -> str:
+        """By which a page says what it read."""
+        return hashlib.sha256(self.text.encode()).hexdigest()
+
+    def with_changes(self, changes: Changes) -> Design:
+        """The design that the file would hold; InputError names every problem."""
+        text = self.changed_text(changes)
+        return validate(Design, tomllib.loads(text), self.path, text)
+
+    def changed_text(self, changes: Changes) -> str:
+        """The text of the file with changes; comments, order and other lines stay.
+
+        Raises:
+            InputError: a name is not one that the page may change, or the file says it in a way
+                that cannot be changed by itself.
+        """
+        import tomlkit
+        from tomlkit.exceptions import TOMLKitError
+
+        from chamberopt.output.editor.fields import field_names
+
+        document, known = tomlkit.parse(self.text), field_names(self.design)
+        for name, value in changes.items():
+            if name not in known and not PICKED.fullmatch(name):
+                raise InputError(f"{name}: not changed on the page; change it in the file")
+            try:
+                self._change(document, name, value)
+            except (TOMLKitError, ValueError, TypeError, AttributeError, IndexError) as error:
+                raise InputError(
+                    f"{name}: the page cannot change it where the file says it ({error}); write "
+                    "its table with a header of its own, as [part.target]"
+                ) from None
+        return tomlkit.dumps(document) if changes else self.text
+
+    def save(self, changes: Changes) -> None:
+        """Write the file; InputError, and nothing written, if it was changed elsewhere meanwhile,
+        may not be written, or would not load."""
+        text = self.changed_text(changes)
+        self.with_changes(changes)
+        if read_toml(self.path, "design")[0] != self.text:
+            raise InputError(
+                f"{self.path.name}: changed on disk since this page read it, so it is not "
+                "replaced; reload the page to go on from what it says now"
+            )
+        mode = stat.S_IMODE(self.path.stat().st_mode)
+        if not mode & stat.S_IWUSR:
+            raise InputError(f"{self.path.name}: is read-only; allow writing, or save a copy")
+        write_text(self.path, text)
+        self.path.chmod(mode)
+
+    def is_fixed(self, name: str) -> bool:
+        """Whether a number is not the file's own, as of a metal that it takes by its name."""
+        inner: Any = tomllib.loads(self.text)
+        for step in name.split(".")[:-1]:
+            inner = inner.get(step, {}) if isinstance(inner, dict) else {}
+            if isinstance(inner, str):
+                return True
+        return False
+
+    def _change(self, document: Any, name: str, value: Any) -> None:
+        """Set or remove one key, making the tables and lists on the way to it."""
+        import tomlkit
+
+        steps, table = name.split("."), document
+        for k, step in enumerate(steps[:-1]):
+            if isinstance(table, list):
+                table = table[int(step)]
+                continue
+            if step not in table:
+                if value is None:
+                    return
+                if steps[k + 1].isdecimal():  # a list that the file leaves at its default
+                    present = list(self._present(steps[: k + 1]))
+                    table[step] = present or tomlkit.aot()
+                else:
+                    table.append(step, tomlkit.table())
+            table = table[step]
+            if not isinstance(table, dict | list):
+                text = f"given {table!r}, which is no table; change it in the file"
+                raise InputError(f"{'.'.join(steps[: k + 1])}: {text}")
+        last = steps[-1]
+        if value is None:
+            if isinstance(table, list):
+                raise InputError(f"{name}: nothing given; give a number")
+            if last in table:
+                del table[last]
+        elif not isinstance(table, list):
+            table[last] = _inline(value)
+        elif int(last) < len(table):
+            table[int(last)] = value
+        else:  # a further table, such as a zone
+            table.append(_table(value))
+
+    def _present(self, steps: list[str]) -> Any:
+        """The value of the design at the end of a path."""
+        value: Any = self.design
+        for step in steps:
+            value = getattr(value, step)
+        return value
+
+
+def custom_shape(data: Mapping[str, Any]) -> str:
+    """The Python file that is the shape of a design's values; "" if it is none."""
+    chamber = data.get("chamber")
+    shape = chamber.get("shape") if isinstance(chamber, Mapping) else None
+    return str(shape) if is_custom(shape) else ""
+
+
+def _inline(value: Any) -> Any:
+    """A list of tables with each on one line; other values as they are."""
+    import tomlkit
+
+    if isinstance(value, dict):
+        row = tomlkit.inline_table()
+        row.update({key: _inline(inner) for key, inner in value.items()})
+        return row
+    if not (isinstance(value, list) and value and isinstance(value[0], dict)):
+        return value
+    rows = tomlkit.array()
+    for one in value:
+        rows.append(_inline(one))
+    return rows.multiline(len(value) > 1)
+
+
+def _table(value: dict[str, Any]) -> Any:
+    import tomlkit
+
+    table = tomlkit.table()
+    table.update({key: _inline(inner) for key, inner in value.items()})
+    return table

@@ -1,0 +1,174 @@
+// The part in 3D: colours it by a quantity or by the coverage at a time, and shows the numbers at a point.
+"use strict";
+// Fills the panels #part-0, #part-1 ... of a page with scenes, which the controls on it serve together.
+function showParts({ quantities, scenes, scales }) {
+  const find = (id) => document.getElementById(id);
+  const controls = { quantity: find("quantity"), time: find("time"), fit: find("fit"), glass: find("glass") };
+  const label = find("label");
+  const SOLID = ["part", "few", "unreached", "rest"];
+
+  const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
+  for (const scene of scenes) {
+    for (const table of [scene.columns, scene.own])
+      for (const name of Object.keys(table)) table[name] = new Float32Array(bytes(table[name]));
+    for (const name of ["triangle", "number", "element", "impacts"]) scene[name] = new Int32Array(bytes(scene[name]));
+    for (const surface of Object.values(scene.surfaces)) {
+      if (surface.points) surface.points = new Float32Array(bytes(surface.points));
+      surface.triangles = new Uint32Array(bytes(surface.triangles));
+    }
+    scene.surfaces.few.points = scene.surfaces.part.points;
+  }
+
+  // Three significant digits; rounding errors around 0 are shown as 0.
+  const number = (x) => !Number.isFinite(x) ? "–" : Math.abs(x) < 1e-12 ? "0" : Math.abs(x) >= 1e4
+    ? Math.round(x).toString() : String(Number(x.toPrecision(3)));
+  const seconds = () => Number(controls.time.value);
+  const chosen = () => quantities[controls.quantity.selectedIndex];
+  const moves = () => chosen().name === "coverage";
+  const covered = (density, scene) => -100 * Math.expm1(-density * seconds() / scene.treatment);
+
+  function values(scene) {
+    return moves() ? scene.columns.density.map((d) => covered(d, scene)) : scene.columns[chosen().name];
+  }
+
+  // Range of the colours: 1st to 99th percentile of all results, widened to round numbers.
+  function range(all) {
+    if (chosen().unit === "%" && !controls.fit.checked) return [0, 100];
+    const known = Float32Array.from(all.flatMap((one) => Array.from(one.filter(Number.isFinite)))).sort();
+    if (!known.length) return [0, 1];
+    const at = (share) => known[Math.round(share * (known.length - 1))];
+    let [low, high] = [at(0.01), at(0.99)];
+    const span = high > low ? high - low : Math.max(Math.abs(high), 1e-9);
+    const step = 10 ** Math.floor(Math.log10(span)) / 2;
+    low = low >= 0 && low < 0.4 * high ? 0 : step * Math.floor(low / step);
+    high = Math.max(step * Math.ceil(high / step), low + step);
+    return [low, chosen().unit === "%" ? Math.min(high, 100) : high];
+  }
+
+  function mean(scene) {
+    const curve = [[0, 0, 0], ...scene.curve], at = seconds();
+    const next = curve.findIndex(([time]) => time >= at);
+    if (!scene.curve.length || next < 0) return "";
+    const [t1, c1, h1] = curve[next], [t0, c0, h0] = curve[Math.max(next - 1, 0)];
+    const share = t1 > t0 ? (at - t0) / (t1 - t0) : 1;
+    const [value, halfWidth] = [c0 + share * (c1 - c0), h0 + share * (h1 - h0)].map((x) => (100 * x).toFixed(1));
+    return `${value} ± ${halfWidth} %`;
+  }
+
+  function showTime() {
+    const named = (scene) => mean(scene) && (scenes.length > 1 ? `${mean(scene)} (${scene.title})` : mean(scene));
+    const means = scenes.map(named).filter(Boolean).join(", ");
+    find("at").textContent = `${number(seconds())} s${means ? `: the target is covered to ${means} on average` : ""}`;
+    find("times").hidden = !moves();
+  }
+
+  // The scale of colours with its ends and three values between, and what it shows.
+  function showBar(bar, low, high) {
+    const scale = document.createElement("i"), ticks = document.createElement("span"), title = document.createElement("b");
+    scale.style.background = `linear-gradient(to top, ${scales[chosen().colours].join(", ")})`;
+    title.textContent = chosen().title;
+    for (const share of [1, 0.75, 0.5, 0.25, 0]) {
+      const tick = document.createElement("em");
+      tick.textContent = number(low + share * (high - low));
+      ticks.append(tick);
+    }
+    bar.replaceChildren(scale, ticks, title);
+  }
+
+  const panels = scenes.map((_, i) => find(`part-${i}`));
+  const bars = panels.map((panel) => {
+    const bar = document.createElement("div");
+    bar.className = "bar";
+    panel.append(bar);
+    return bar;
+  });
+  const views = scenes.map((scene, i) => {
+    const stage = document.createElement("div");
+    stage.className = "stage";
+    panels[i].append(stage);
+    const view = new View3D(stage);
+    for (const [name, surface] of Object.entries(scene.surfaces)) view.surface(name, { ...surface, scale: name === "part" });
+    view.lines("edges", new Float32Array(bytes(scene.edges.ends)), scene.edges.colour);
+    view.look(scene.view);
+    return view;
+  });
+
+  let waiting = false; // a slider moves faster than a large part can be coloured
+  function recolour() {
+    showTime();
+    if (waiting) return;
+    waiting = true;
+    requestAnimationFrame(() => {
+      waiting = false;
+      const all = scenes.map(values), [low, high] = range(all);
+      all.forEach((one, i) => {
+        const share = one.map((x) => Number.isFinite(x) ? Math.min(Math.max((x - low) / (high - low), 0), 1) : 0);
+        views[i].paint("part", share, scales[chosen().colours]);
+        showBar(bars[i], low, high);
+      });
+      document.body.dataset.drawn = "yes";
+    });
+  }
+
+  function point(event, i) {
+    const hit = event.buttons ? null : views[i].at(event, SOLID), scene = scenes[i];
+    label.hidden = !hit || !["part", "few"].includes(hit.name);
+    if (label.hidden) return;
+    const k = hit.corner, t = scene.triangle[k];
+    const rows = quantities.map((one) => {
+      const now = one.name === "coverage";
+      const value = now ? covered(scene.columns.density[k], scene) : scene.columns[one.name][k];
+      return [now ? `coverage after ${number(seconds())} s` : one.label, `${number(value)} ${one.unit}`];
+    });
+    rows.push([`coverage of the triangle after ${number(scene.treatment)} s`, `${number(scene.own.coverage[t])} %`],
+      ["width of its 95 % interval", `${number(scene.own.interval[t])} %`],
+      ["simulated impacts on the triangle", String(scene.impacts[t])]);
+    const table = document.createElement("table");
+    const caption = table.createCaption();
+    caption.textContent = `element ${scene.element[t]}, triangle ${scene.number[t]} of the part`;
+    for (const [name, value] of rows) {
+      const row = table.insertRow();
+      row.insertCell().textContent = name;
+      row.insertCell().textContent = value;
+    }
+    label.replaceChildren(table);
+    const gap = 18;
+    const right = event.clientX + gap, width = label.offsetWidth;
+    const left = right + width > innerWidth ? event.clientX - gap - width : right;
+    const top = Math.min(event.clientY + gap, innerHeight - label.offsetHeight - 4);
+    label.style.left = `${Math.max(left, 4)}px`;
+    label.style.top = `${Math.max(top, 4)}px`;
+  }
+
+  views.forEach((view, i) => {
+    panels[i].addEventListener("pointermove", (event) => point(event, i));
+    panels[i].addEventListener("pointerleave", () => { label.hidden = true; });
+    panels[i].addEventListener("dblclick", () => view.look(scenes[i].view));
+    for (const other of views) if (other !== view) view.follow(other);
+  });
+  controls.quantity.addEventListener("change", recolour);
+  controls.fit.addEventListener("change", recolour);
+  controls.time.addEventListener("input", recolour);
+  controls.glass.addEventListener("change", () => {
+    for (const view of views) view.show(["sonotrode", "glass", "edges"], controls.glass.checked);
+  });
+  recolour();
+  return views;
+}
+
+(() => {
+  const parts = document.getElementById("parts");
+  const views = parts ? showParts(JSON.parse(parts.textContent)) : [];
+  // A printer cannot read what WebGL has drawn, so an image takes its place.
+  addEventListener("beforeprint", () => {
+    for (const fold of document.querySelectorAll("details.print")) fold.open = true;
+    for (const view of views) {
+      const image = document.createElement("img");
+      image.className = "printed";
+      image.alt = view.element.parentElement.getAttribute("aria-label");
+      image.src = view.image();
+      view.element.append(image);
+    }
+  });
+  addEventListener("afterprint", () => document.querySelectorAll("img.printed").forEach((image) => image.remove()));
+})();

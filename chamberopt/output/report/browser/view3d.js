@@ -1,0 +1,221 @@
+// A view of surfaces in 3D, with z up: camera, light, colours, and what the pointer meets. Lengths in mm.
+"use strict";
+THREE.ColorManagement.enabled = false; // a colour on the screen is the one of the colour bar
+class View3D {
+  #meshes = new Map();
+  #waiting = false;
+  #heard = [];
+
+  // The element is filled by the view, and has its size.
+  constructor(element) {
+    this.element = element;
+    const renderer = this.renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true });
+    renderer.outputColorSpace = THREE.LinearSRGBColorSpace;
+    renderer.autoClear = false;
+    renderer.setPixelRatio(devicePixelRatio);
+    element.append(renderer.domElement);
+    this.scene = new THREE.Scene();
+    this.camera = new THREE.PerspectiveCamera(30, 1, 1, 1000);
+    this.camera.up.set(0, 0, 1);
+    const sun = new THREE.DirectionalLight(0xffffff, 0.9);
+    sun.position.set(-0.4, 0.5, 1);
+    this.camera.add(sun);
+    this.scene.add(this.camera, new THREE.AmbientLight(0xffffff, 2.4));
+    this.orbit = new THREE.OrbitControls(this.camera, renderer.domElement);
+    this.orbit.addEventListener("change", () => { this.draw(); for (const hear of this.#heard) hear(); });
+    this.triad = new THREE.Scene();
+    for (const [name, colour, at] of [["x", "#b3261e", [1, 0, 0]], ["y", "#1b7a3a", [0, 1, 0]], ["z", "#1f4fa3", [0, 0, 1]]]) {
+      this.triad.add(View3D.lineOf([[0, 0, 0], at], colour), View3D.textOf(name, at.map((x) => 1.3 * x), 0.55, colour));
+    }
+    this.triadCamera = new THREE.PerspectiveCamera(30, 1, 0.1, 20);
+    this.triadCamera.up.set(0, 0, 1);
+    new ResizeObserver(() => this.#resize()).observe(element);
+    this.#resize();
+  }
+
+  static lineOf(points, colour) {
+    const geometry = new THREE.BufferGeometry().setAttribute("position",
+      new THREE.BufferAttribute(Float32Array.from(points.flat()), 3));
+    return new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: colour }));
+  }
+
+  // A text that faces the eye, with a height in the scene's units.
+  static textOf(text, at, height, colour = "#1c2226") {
+    const canvas = document.createElement("canvas"), pen = canvas.getContext("2d"), font = "600 48px system-ui, sans-serif";
+    pen.font = font;
+    canvas.width = Math.ceil(pen.measureText(text).width) + 16;
+    canvas.height = 64;
+    Object.assign(pen, { font, fillStyle: colour, textBaseline: "middle", strokeStyle: "rgba(255,255,255,0.85)", lineWidth: 8 });
+    pen.strokeText(text, 8, 32);
+    pen.fillText(text, 8, 32);
+    const sprite = new THREE.Sprite(new THREE.SpriteMaterial({ map: new THREE.CanvasTexture(canvas), depthTest: false }));
+    sprite.scale.set(height * canvas.width / canvas.height, height, 1);
+    sprite.position.set(...at);
+    return sprite;
+  }
+
+  // Replace a surface. triangles: three numbers of points each; colours: of each triangle, as [r, g, b] in 0..1 one after
+  // the other. Where `scale` is set, values between 0 and 1 at the points are its colours (see `paint`).
+  surface(name, { points, triangles, colour = "#ffffff", opacity = 1, scale = false }) {
+    this.remove(name);
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute("position", new THREE.BufferAttribute(points, 3));
+    geometry.setIndex(new THREE.BufferAttribute(triangles, 1));
+    const see = opacity < 1;
+    const material = new THREE.MeshLambertMaterial({ color: colour, opacity, transparent: see, depthWrite: !see,
+      side: THREE.DoubleSide, flatShading: true });
+    // Where surfaces lie on each other, the solid one is in front.
+    if (see) Object.assign(material, { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 });
+    if (scale) geometry.setAttribute("uv", new THREE.BufferAttribute(new Float32Array(points.length / 3 * 2).fill(0.5), 2));
+    return this.#keep(name, new THREE.Mesh(geometry, material));
+  }
+
+  // Colour each triangle of a surface; it then has three points of its own.
+  colourTriangles(name, colours) {
+    const { mesh } = this.#meshes.get(name);
+    if (mesh.geometry.index) mesh.geometry = mesh.geometry.toNonIndexed();
+    const each = new Float32Array(9 * colours.length / 3);
+    for (let k = 0; k < colours.length; k += 3) {
+      for (let corner = 0; corner < 9; corner += 3) each.set(colours.subarray(k, k + 3), 3 * k + corner);
+    }
+    mesh.geometry.setAttribute("color", new THREE.BufferAttribute(each, 3));
+    mesh.material.vertexColors = true;
+    mesh.material.needsUpdate = true;
+    this.draw();
+  }
+
+  // Colour a surface by values between 0 and 1 at its points, along a scale of colours "#rrggbb".
+  paint(name, values, scale) {
+    const { mesh } = this.#meshes.get(name), uv = mesh.geometry.getAttribute("uv"), n = scale.length;
+    for (let i = 0; i < values.length; i++) uv.array[2 * i] = (0.5 + values[i] * (n - 1)) / n;
+    uv.needsUpdate = true;
+    if (mesh.userData.scale !== scale) {
+      const texels = Uint8Array.from(scale.flatMap((c) => [1, 3, 5].map((k) => parseInt(c.slice(k, k + 2), 16)).concat(255)));
+      mesh.material.map = new THREE.DataTexture(texels, n, 1);
+      mesh.material.map.needsUpdate = mesh.material.needsUpdate = true;
+      mesh.userData.scale = scale;
+    }
+    this.draw();
+  }
+
+  // Replace lines: ends of one after the other, [x, y, z, x, y, z, ...].
+  lines(name, ends, colour) {
+    this.remove(name);
+    const geometry = new THREE.BufferGeometry().setAttribute("position", new THREE.BufferAttribute(ends, 3));
+    return this.#keep(name, new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: colour })));
+  }
+
+  // Replace texts: [text, [x, y, z]] each.
+  texts(name, texts, height) {
+    this.remove(name);
+    const group = new THREE.Object3D();
+    for (const [text, at] of texts) group.add(View3D.textOf(text, at, height));
+    return this.#keep(name, group);
+  }
+
+  #keep(name, mesh) {
+    this.#meshes.set(name, { mesh });
+    this.scene.add(mesh);
+    this.draw();
+    return mesh;
+  }
+
+  get(name) { return this.#meshes.get(name)?.mesh; }
+
+  remove(name) {
+    const mesh = this.get(name);
+    if (!mesh) return;
+    mesh.traverse((one) => { one.geometry?.dispose(); one.material?.map?.dispose(); one.material?.dispose(); });
+    mesh.removeFromParent();
+    this.#meshes.delete(name);
+    this.draw();
+  }
+
+  show(names, visible) {
+    for (const name of names) if (this.get(name)) this.get(name).visible = visible;
+    this.draw();
+  }
+
+  // The surface of these names that a pointer event meets first: { name, triangle, corner: its closest point, place }.
+  at(event, names) {
+    const box = this.renderer.domElement.getBoundingClientRect(), ray = new THREE.Raycaster();
+    ray.setFromCamera(new THREE.Vector2((event.clientX - box.left) / box.width * 2 - 1,
+      1 - (event.clientY - box.top) / box.height * 2), this.camera);
+    const meshes = names.map((name) => this.get(name)).filter(Boolean);
+    const hit = ray.intersectObjects(meshes, false)[0];
+    if (!hit) return null;
+    const name = names.find((one) => this.get(one) === hit.object), position = hit.object.geometry.getAttribute("position");
+    const place = hit.object.worldToLocal(hit.point.clone());
+    const far = (i) => new THREE.Vector3().fromBufferAttribute(position, i).distanceTo(place);
+    const corner = [hit.face.a, hit.face.b, hit.face.c].reduce((best, i) => far(i) < far(best) ? i : best);
+    return { name, triangle: hit.faceIndex, corner, place: hit.point };
+  }
+
+  // Look at a place from an eye; what is within `size` of it fills the view.
+  look({ middle, eye, size }) {
+    this.home = { middle, eye, size };
+    this.orbit.target.set(...middle);
+    this.camera.position.set(...eye);
+    this.camera.near = size / 200;
+    this.camera.far = size * 20;
+    this.camera.updateProjectionMatrix();
+    this.orbit.update();
+    this.draw();
+  }
+
+  // Turn as another view does.
+  follow(other) {
+    let busy = false;
+    other.#heard.push(() => {
+      if (busy || this.camera.position.equals(other.camera.position)) return;
+      busy = true;
+      this.camera.position.copy(other.camera.position);
+      this.orbit.target.copy(other.orbit.target);
+      this.orbit.update();
+      busy = false;
+    });
+  }
+
+  #resize() {
+    const { clientWidth: width, clientHeight: height } = this.element;
+    if (!width || !height) return;
+    this.renderer.setSize(width, height);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    this.#render(); // at once: a canvas of a new size is empty
+  }
+
+  draw() {
+    if (this.#waiting) return;
+    this.#waiting = true;
+    requestAnimationFrame(() => { this.#waiting = false; this.#render(); });
+  }
+
+  #render() {
+    if (!this.renderer.domElement.isConnected) return;
+    const { renderer, camera } = this, { clientWidth: width, clientHeight: height } = this.element, corner = 84;
+    renderer.setViewport(0, 0, width, height);
+    renderer.clear();
+    renderer.render(this.scene, camera);
+    renderer.clearDepth();
+    renderer.setViewport(4, 4, corner, corner);
+    this.triadCamera.position.copy(camera.position).sub(this.orbit.target).setLength(7);
+    this.triadCamera.lookAt(0, 0, 0);
+    renderer.render(this.triad, this.triadCamera);
+  }
+
+  // Give up what the view holds of the graphics card: a browser allows a page a few views.
+  dispose() {
+    for (const name of [...this.#meshes.keys()]) this.remove(name);
+    this.orbit.dispose();
+    this.renderer.dispose();
+    this.renderer.forceContextLoss();
+    this.renderer.domElement.remove();
+  }
+
+  // What is drawn, as the address of a picture.
+  image() {
+    this.#render();
+    return this.renderer.domElement.toDataURL("image/png");
+  }
+}

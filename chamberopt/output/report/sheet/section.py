@@ -1,0 +1,92 @@
+"""What drawings need of meshes: plane cuts, the areas that they enclose, the sonotrode's size."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chamberopt.design.shapes import TAG_SONOTRODE
+from chamberopt.geometry.triangles import border_edges
+
+if TYPE_CHECKING:
+    from matplotlib.path import Path
+
+    from chamberopt.chamber.build import Chamber
+
+# The plane is moved by this [m], so that it goes through no corner of a mesh.
+OFF_THE_CORNERS = 1.7e-8
+SAME = 0.02  # mm: lengths that differ by less are the same
+FEWEST_CORNERS = 8  # of a face that is drawn as a round one
+
+
+def cut(
+    vertices: np.ndarray, triangles: np.ndarray, axis: int, at: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """The lines in which a plane square to an axis cuts a mesh.
+
+    Args:
+        vertices: (n, 3) [m].
+        triangles: (m, 3).
+        axis: 0, 1 or 2, the plane's normal.
+        at: place of the plane on that axis [m].
+
+    Returns:
+        Ends of the lines (k, 2, 2) [m], in the two other axes, which go round each body in one
+        sense; ends that meet are equal to the last bit. And the triangle of each, (k,).
+    """
+    height = vertices[:, axis] - (at + OFF_THE_CORNERS)
+    above = (height > 0.0)[triangles]
+    cut_ones = np.flatnonzero(above.any(axis=1) & ~above.all(axis=1))
+    above, corners = above[cut_ones], triangles[cut_ones]
+    # The corner that is alone on its side of the plane; the plane cuts the two edges from it.
+    alone = np.where(above.sum(axis=1) == 1, above.argmax(axis=1), above.argmin(axis=1))
+    row = np.arange(len(corners))
+    ends = []
+    for step in (1, 2):
+        edge = np.sort([corners[row, alone], corners[row, (alone + step) % 3]], axis=0)
+        low, high = height[edge]
+        share = (low / (low - high))[:, None]
+        ends.append(vertices[edge[0]] + share * (vertices[edge[1]] - vertices[edge[0]]))
+    lines = np.delete(np.stack(ends, axis=1), axis, axis=2)
+    turned = above.sum(axis=1) == 1
+    lines[turned] = lines[turned, ::-1]
+    return lines, cut_ones
+
+
+def inside(lines: np.ndarray) -> Path | None:
+    """The areas that the lines of closed bodies, which may overlap, enclose; None without any."""
+    import shapely
+    from matplotlib.path import Path
+
+    apart = lines[(lines[:, 0] != lines[:, 1]).any(axis=1)]
+    if not len(apart):
+        return None
+    crossing_at_ends = shapely.node(shapely.multilinestrings(shapely.linestrings(apart)))
+    rings = []
+    for face in shapely.get_parts(shapely.polygonize([crossing_at_ends])):
+        if _turns_around(apart, shapely.point_on_surface(face)):
+            whole = shapely.geometry.polygon.orient(face)
+            rings += [np.asarray(ring.coords) for ring in (whole.exterior, *whole.interiors)]
+    return Path.make_compound_path(*(Path(one, closed=True) for one in rings)) if rings else None
+
+
+def _turns_around(lines: np.ndarray, point: Any) -> int:
+    """How often the lines go round a point: what a ray to the right crosses, up less down."""
+    (x1, y1), (x2, y2) = lines[:, 0].T, lines[:, 1].T
+    way = (y2 > point.y).astype(int) - (y1 > point.y)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        right = point.x < x1 + (point.y - y1) / (y2 - y1) * (x2 - x1)
+    return int(way[right & (way != 0)].sum())
+
+
+def face_size_mm(chamber: Chamber) -> tuple[float, ...]:
+    """Diameter of a round sonotrode, or the lengths of another along x and y [mm]."""
+    face = chamber.triangles[chamber.tags == TAG_SONOTRODE]
+    rim = np.unique(border_edges(face))
+    rim = rim if len(rim) else np.unique(face)
+    corners = 1e3 * chamber.vertices[rim, :2]
+    radius = np.hypot(*corners.T)
+    if len(rim) >= FEWEST_CORNERS and np.ptp(radius) < SAME:
+        return (2.0 * float(radius.max()),)
+    return tuple(np.ptp(corners, axis=0).tolist())

@@ -1,0 +1,1 @@
+"""Calibrate the model to one machine, from what was measured on it."""

@@ -1,0 +1,61 @@
+"""Fillets and slots that are small for the shot."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial import Delaunay
+
+from chamberopt.chamber.checks.check import shot_reach
+from chamberopt.chamber.checks.fillets import fillet_warnings, inner_edges
+from tests.helpers.synthetic import chamber_round
+
+SIDES = 48
+
+
+def test_the_radius_of_a_bore_follows_from_its_facets() -> None:
+    """Facets between points of a circle of 5 mm touch one of 5 mm times cos(pi / SIDES)."""
+    ring = trimesh.creation.annulus(r_min=5e-3, r_max=9e-3, height=4e-3, sections=SIDES)
+    every = np.ones(len(ring.faces), dtype=bool)
+    _, length, radius = inner_edges(ring.vertices, ring.faces, every)
+    assert len(radius) == SIDES
+    assert length == pytest.approx(4e-3)
+    assert radius == pytest.approx(5e-3 * np.cos(np.pi / SIDES))
+
+
+def test_no_fillets_are_found_on_a_shaft_whose_triangles_are_not_even() -> None:
+    """At many of its edges triangles turn inwards; inside out it is a bore, and counts."""
+    rng = np.random.default_rng(1)
+    around, along = np.meshgrid(np.arange(40.0), np.arange(40.0))
+    flat = np.stack([around, along], axis=-1).reshape(-1, 2) + rng.uniform(-0.3, 0.3, (1600, 2))
+    angle = 2.0 * np.pi / 45.0 * flat[:, 0]
+    places = np.stack([5e-3 * np.cos(angle), 5e-3 * np.sin(angle), 7e-4 * flat[:, 1]], axis=-1)
+    triangles = Delaunay(flat).simplices
+    every = np.ones(len(triangles), dtype=bool)
+    _, length, _ = inner_edges(places, triangles, every)
+    assert length.sum() < 2e-3  # of 2 m: what is shorter than a ball is not told
+    _, length, _ = inner_edges(places, triangles[:, ::-1], every)
+    assert length.sum() > 1.0
+
+
+def warned(mesh: trimesh.Trimesh, ball: float) -> list[str]:
+    chamber = chamber_round(mesh)
+    shot = SimpleNamespace(diameters=(ball,), diameter=ball)
+    reach = shot_reach(SimpleNamespace(shot=shot), chamber)
+    return fillet_warnings(reach, chamber, ball)
+
+
+def test_shot_of_more_than_half_a_fillet_or_a_quarter_of_a_slot_is_warned_of() -> None:
+    """An L has an inner edge without a fillet; a U of 6 mm is a slot for balls above 1.5 mm."""
+    foot = trimesh.creation.box(bounds=[[0, 0, 0], [0.03, 0.02, 0.003]])
+    wall = trimesh.creation.box(bounds=[[0, 0, 0.0], [0.003, 0.02, 0.02]])
+    other = trimesh.creation.box(bounds=[[0.009, 0, 0.0], [0.012, 0.02, 0.02]])
+    corner = trimesh.boolean.union([foot, wall], engine="manifold")
+    (said,) = warned(corner, 1e-3)
+    assert "half the radius of the target's smallest fillets (inner edges without one" in said
+    assert warned(foot, 1e-3) == []
+    slot = trimesh.boolean.union([corner, other], engine="manifold")
+    assert [text for text in warned(slot, 1.4e-3) if "slot" in text] == []
+    (said,) = (text for text in warned(slot, 1.6e-3) if "slot" in text)
+    assert "quarter of the target's narrowest slot, about 6 mm wide" in said

@@ -1,0 +1,105 @@
+"""What `chamberopt new` proposes: a charge and ranges that a study takes, the target, the text."""
+
+import tomllib
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import trimesh
+
+from chamberopt.chamber.propose.ranges import propose_charge, propose_ranges
+from chamberopt.chamber.propose.sizes import Sizes
+from chamberopt.chamber.propose.target import propose_target, surfaces
+from chamberopt.chamber.propose.text import design_text
+from chamberopt.geometry.mesh_io.part_mesh import PartMesh
+from chamberopt.geometry.mesh_io.readers.raw_mesh import number_by_position
+from chamberopt.optimize.study.parameters import Varied
+
+
+@pytest.mark.parametrize(
+    ("floor_mm2", "ball_mm", "height_mm", "mass_g", "reason"),
+    [
+        (2700, 3, 63, 9.6, "a quarter of a layer"),
+        (92400, 3, 355, 330, "a quarter of a layer"),  # 327 g, of which a study has no steps
+        (1075, 0.1, 39, 0.081, "the most that is supported"),  # more than 20000 balls
+        (1.4e6, 3, 1533, 2200, "the most that is supported"),
+        (3e6, 20, 1900, 10000, "the most that is supported"),  # of shot.mass_g
+    ],
+)
+def test_a_study_takes_what_is_proposed(
+    floor_mm2: float, ball_mm: float, height_mm: float, mass_g: float, reason: str
+) -> None:
+    """Its values have a number of steps that it takes, the start among them, within the limits."""
+    ball_mass = 7790.0 * np.pi / 6.0 * (1e-3 * ball_mm) ** 3
+    charge, why = propose_charge(1e-6 * floor_mm2, 1e-3 * ball_mm, ball_mass)
+    assert (charge, why[: len(reason)]) == (pytest.approx(mass_g), reason)
+    distance = max(8e-3, 0.3e-3 * height_mm)
+    below = 1e-3 * height_mm - distance - 5e-3 * ball_mm
+    sizes = Sizes("box", {}, distance, 1e-3 * height_mm, 0.01, False, below)
+    starts = (height_mm, round(1e3 * distance), charge)
+    ranges = propose_ranges(sizes, charge, ball_mm, ball_mass)
+    for (name, one), start in zip(ranges.items(), starts, strict=True):
+        varied = Varied(**one._asdict())
+        assert start in varied.values(is_whole=False), name
+    assert ranges["chamber.height_mm"].high <= 2000
+    assert ranges["shot.mass_g"].high <= min(10000.0, 20000e3 * ball_mass)
+
+
+def box_with(names: dict[str, int | tuple[int, ...]]) -> PartMesh:
+    """A box of 20 x 20 x 30 mm whose sides 0 to 5 have names: -x, +x, -y, +y, -z, +z."""
+    box = trimesh.creation.box((0.02, 0.02, 0.03))
+    side = 2 * np.abs(box.face_normals).argmax(axis=1) + (box.face_normals.sum(axis=1) > 0)
+    groups = {name: np.isin(side, sides) for name, sides in names.items()}
+    triangles = box.faces.astype(np.int32)
+    return PartMesh(box.vertices, triangles, number_by_position(12), (), "", groups)
+
+
+ALL = (0, 1, 2, 3, 4, 5)
+
+
+@pytest.mark.parametrize(
+    ("names", "wanted", "target"),
+    [
+        ({"Flank": 0, "FLANK": 1, "flank": 4}, ["flank"], ["flank"]),
+        ({"Flank": 0, "FLANK": 1, "flank": 4}, ["Flank"], ["Flank"]),
+        ({"Flank": 0}, ["FLANK"], ["Flank"]),
+        ({}, ["ALL", "face 1"], ["all"]),
+        ({"A": 0}, ["A", "a"], ["A"]),
+        ({"Face 1": 4}, ["face 1"], ["Face 1"]),
+        # A colour marks a face that has a name too; of several the reddest, not that of a body.
+        ({"SLOT": 4, "SIDE": 0, "#ff0000": 4, "#008000": 5, "#9999a6": (0, 1)}, [], ["SLOT"]),
+        ({"SIDE": 0, "#ff2010": ALL}, [], ["SIDE"]),
+        ({"PEEN_ME": 4, "SIDE": 0, "#ff0000": 0}, [], ["PEEN_ME"]),
+        ({"UNPEENED": 0, "FREE": 4}, [], ["FREE"]),
+        ({"do not peen": 0, "NOT_TO_PEEN": 1, "no target": 2, "mask": 3, "FREE": 4}, [], ["FREE"]),
+        ({"nicht zu strahlen": 0, "ungestrahlt": 1, "Strahlen": 4}, [], ["Strahlen"]),
+        ({"No. 5 target": 4, "SIDE": 0}, [], ["No. 5 target"]),
+    ],
+)
+def test_the_target_is_what_is_named_or_marked(
+    names: dict[str, int | tuple[int, ...]], wanted: list[str], target: list[str]
+) -> None:
+    mesh = box_with(names)
+    assert propose_target(mesh, surfaces(mesh), wanted).keys == {"surface": target}
+
+
+def test_faces_do_not_take_a_name_of_the_file() -> None:
+    mesh = box_with({"Face 1": 4, "face 3": 5})
+    found = [one.name for one in surfaces(mesh)]
+    assert found == ["Face 1", "face 3", "face 2", "face 4"]
+
+
+def test_names_cannot_write_into_the_design(tmp_path: Path) -> None:
+    """Line breaks and control characters of names and files stay in their comments."""
+    bad = "a\n[shot]\nmass_g = 1\r\x00\x07\x7f\u202e"
+    mesh = box_with({bad: 4})
+    known = surfaces(mesh)
+    target = propose_target(mesh, known, [bad])
+    tables = {"part": {"mesh": str(tmp_path / f"{bad}.stl")}, "part.target": target.keys}
+    reasons = {"part.target": target.reason}
+    text = design_text(SimpleNamespace(tables=tables, reasons=reasons, known=known), tmp_path)
+    written = {"part": {"mesh": f"{bad}.stl", "target": {"surface": [bad]}}}
+    assert tomllib.loads(text) == written
+    choices = [line for line in text.splitlines() if line.startswith("# surface = ")]
+    assert tomllib.loads(choices[0].removeprefix("# ")) == {"surface": [bad]}

@@ -1,0 +1,210 @@
+"""`chamberopt new`: from a part's file to a design that check accepts, without an edit."""
+
+import io
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+from chamberopt.chamber.propose.balls import propose_ball, touched_shares
+from chamberopt.chamber.propose.pose import propose_pose, square_to_walls
+from chamberopt.chamber.propose.proposal import Proposal, propose
+from chamberopt.chamber.propose.target import propose_target, surfaces
+from chamberopt.cli import main
+from chamberopt.design.load import load_design
+from chamberopt.geometry.mesh_io.part_mesh import PartMesh, read_part
+from chamberopt.geometry.triangles import rotation_matrix
+from chamberopt.optimize.study import load_study
+from tests.chamberopt.design.test_shipped_parts import PARTS
+from tests.helpers.eight_parts import EIGHT_PARTS, KEPT_ASIDE, ExamplePart
+
+SHARES = np.array([0.95, 0.94, 0.6])
+SIZES = (1e-3, 2e-3, 3e-3)
+
+
+@pytest.fixture(scope="module")
+def gear() -> PartMesh:
+    return read_part(PARTS / "gear.stl", "mm")
+
+
+def test_a_gears_teeth_are_its_target_and_stand_upright(gear: PartMesh) -> None:
+    target = propose_target(gear, surfaces(gear), [])
+    shipped = load_design(PARTS.parent / "gear.toml")
+    assert len(target.keys["faces"]) == 3  # flanks, tips and roots
+    assert shipped.part.target.direction == (0, 0, 1)
+    turns, reason = propose_pose(gear.vertices, gear.triangles, target.triangles)
+    assert turns == (0.0, 0.0, 0.0)  # the shaft up
+    assert "upright" in reason
+
+
+@pytest.mark.parametrize("direction", [(0, 0, 1), (1, 0, 0), (0.6, 0.0, 0.8), (-0.48, 0.6, 0.64)])
+def test_a_flat_target_is_turned_to_the_sonotrode(direction: tuple[float, float, float]) -> None:
+    plate = trimesh.creation.box((60, 40, 5))
+    turn = trimesh.geometry.align_vectors((0, 0, 1), direction)[:3, :3]
+    vertices, target = plate.vertices @ turn.T, plate.face_normals[:, 2] > 0.5
+    turns, _ = propose_pose(vertices, plate.faces, target)
+    assert rotation_matrix(turns) @ direction == pytest.approx([0, 0, -1], abs=2e-3)
+    sides = np.ptp(vertices @ rotation_matrix(square_to_walls(vertices, turns)).T, axis=0)
+    assert sides == pytest.approx([60, 40, 5], abs=0.3)
+
+
+def test_a_ball_touches_what_its_radius_lets_it(tmp_path: Path) -> None:
+    """A slot of 2 mm with square corners: balls above 2 mm touch none of its walls."""
+    from shapely import Polygon
+
+    outline = [(0, 0), (22, 0), (22, 10), (12, 10), (12, 5), (10, 5), (10, 10), (0, 10)]
+    block = trimesh.creation.extrude_polygon(Polygon(outline), 20)
+    middle = block.triangles_center
+    walls = (np.abs(middle[:, 0] - 11) < 1.01) & (middle[:, 1] > 5.01) & (middle[:, 1] < 9.99)
+    shares = touched_shares(1e-3 * block.vertices, block.faces, walls, (1e-3, 1.9e-3, 2.1e-3))
+    # The corner at the bottom keeps a ball half its diameter away.
+    assert shares == pytest.approx([0.9, 0.81, 0.0], abs=0.01)
+
+
+def test_the_largest_ball_that_misses_little_is_proposed() -> None:
+    assert propose_ball(SHARES, np.array([True, False, False]), SIZES)[0] == 1e-3  # fillets
+    assert propose_ball(SHARES, np.zeros(3, dtype=bool), SIZES)[0] == 2e-3
+
+
+def test_new_writes_a_design_and_a_study_that_are_accepted(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    part = EIGHT_PARTS["crank_pin"].write(tmp_path)
+    command = ["new", str(part), "--target", "PIN", "--target", "FILLETS"]
+    assert main([*command, "--material", "18CrNiMo7-6", "--shape", "prism"]) == 0
+    assert "crank_pin/design.toml" in capfd.readouterr().out
+    design = load_design("crank_pin/design.toml")
+    assert set(design.part.target.surface) == {"PIN", "FILLETS"}
+    assert design.chamber.shape == "prism"
+    study = load_study("crank_pin/study.toml")
+    assert "chamber.height_mm" in study.vary
+    assert Path("crank_pin/design.png").stat().st_size > 10_000
+    assert main(command) == 2
+    assert "already holds files" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--target", "PINN"], "--target: 'PINN' is not a name in the part's file; did you mean"),
+        (["--target", "face 99"], "--target: given 'face 99', but the part has face 1 to face"),
+        (["--target", "PIN", "--target", "face 1"], "cannot be one target; give one kind"),
+        (["--target", "pick"], "--target: pick asks, and nobody answers here"),
+        (["--material", "unobtainium"], "alloy 'unobtainium': unknown"),
+        (["--shot", "lead"], "material of balls 'lead': unknown"),
+        (["--shot", "glass"], "--shot: given 'glass'; the hardness of these balls is not known"),
+        (["--unit", "m"], "with --unit = 'm' the part measures"),
+        (["--ball-mm", "900"], "--ball-mm: given 900; allowed: from 0.1 to 20 mm"),
+    ],
+)
+def test_what_new_cannot_use_is_told(
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    options: list[str],
+    message: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    part = EIGHT_PARTS["crank_pin"].write(tmp_path)
+    assert main(["new", str(part), *options]) == 2
+    (line,) = (one for one in capfd.readouterr().err.splitlines() if one.strip())
+    assert message in line
+    assert not Path("crank_pin").exists()
+
+
+@pytest.mark.parametrize(
+    ("part", "message"),
+    [
+        ("nowhere.stl", "nowhere.stl: no such file"),
+        (".", ".: is a folder; give the file of the part"),
+        (os.devnull, f"{os.devnull}: is no plain file; give the file of the part"),
+    ],
+)
+def test_a_part_that_is_no_file_is_told(
+    part: str, message: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["new", part]) == 2
+    assert message in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("side", "moved", "options", "message"),
+    [
+        (2.5, 0.0, (), "the part measures 2500 x 20 x 20 mm, too much for a chamber"),
+        (0.1, 11.0, (), "the part is 10.98 m from the origin of its file, at most 10 m"),
+        (0.1, 0.0, ("--target", "pick"), "--target: pick got no answer"),
+    ],
+)
+def test_a_box_that_cannot_be_used_is_told(
+    side: float,
+    moved: float,
+    options: tuple[str, ...],
+    message: str,
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.stdin", Nobody())
+    box = trimesh.creation.box((side, 0.02, 0.02))
+    box.apply_translation((moved, 0, 0)).export("box.stl")
+    assert main(["new", "box.stl", "--unit", "m", *options]) == 2
+    assert message in capfd.readouterr().err
+    assert list(Path().iterdir()) == [Path("box.stl")]
+
+
+class Nobody(io.StringIO):
+    """A terminal whose input has ended."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_a_guess_is_said_and_no_folder_is_held_while_the_design_is_made(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ctrl-C in the midst of the work leaves nothing; what is written has the guess too."""
+    monkeypatch.chdir(tmp_path)
+    trimesh.creation.box((20, 20, 30)).export("box.stl")
+    held: list[Path] = []
+
+    def watched(*given: Any) -> Proposal:
+        held.extend(Path().glob("out*"))
+        return propose(*given)
+
+    monkeypatch.setattr("chamberopt.chamber.propose.proposal.propose", watched)
+    monkeypatch.setattr("chamberopt.cli.commands.check.draw_target", lambda *_: None)
+    assert main(["new", "box.stl", "--out", "out"]) == 0
+    said = capfd.readouterr()
+    assert "mm: GUESSED: the part measures 20 x 20 x 30 mm" in said.out
+    assert "unit guessed as 'mm' (by its size)" in said.err
+    assert "give --unit if that is wrong" in said.err
+    assert not held
+    assert sorted(one.name for one in Path("out").iterdir()) == ["design.toml", "study.toml"]
+    assert "# GUESSED: the part measures" in Path("out/design.toml").read_text(encoding="utf-8")
+    load_study("out/study.toml")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", [*EIGHT_PARTS, *KEPT_ASIDE])
+def test_from_file_to_process_sheet(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The eight parts of the tutorial's readers, and those kept aside: no file is edited."""
+    monkeypatch.chdir(tmp_path)
+    one: ExamplePart = {**EIGHT_PARTS, **KEPT_ASIDE}[name]
+    part = one.write(tmp_path)
+    unit = [] if one.unit is None else ["--unit", one.unit]
+    assert main(["new", str(part), "--out", "new", *unit]) == 0
+    size = np.ptp(read_part(part, one.unit or "guess").vertices, axis=0)
+    assert 1e3 * size == pytest.approx(one.size_mm, abs=0.1)
+    assert main(["check", "new/design.toml"]) == 0
+    assert main(["simulate", "new/design.toml", "--out", "simulated"]) == 0
+    study = Path("new/study.toml")
+    study.write_text(study.read_text().replace("evaluations = 20", "evaluations = 8"))
+    assert main(["run", str(study), "--out", "studied"]) == 0
+    assert main(["report", "studied", "--sheet"]) == 0

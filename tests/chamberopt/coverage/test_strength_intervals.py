@@ -1,0 +1,212 @@
+"""Figures of peening strength over surfaces of which they are known."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from chamberopt.chamber.scene import chamber_mesh
+from chamberopt.common.estimate import Estimate, paired_difference
+from chamberopt.coverage.compression import ERROR, OF_DENT, compression_estimate, stress_notes
+from chamberopt.coverage.field.target_field import TargetField, WindowSetting, find_target_field
+from chamberopt.coverage.part_impacts import Hits
+from chamberopt.coverage.strength import strip_dents
+from chamberopt.coverage.strength_intervals import (
+    MIN_BATCHES,
+    StrengthHistograms,
+    estimates_of,
+    level_histograms,
+    strength_estimates,
+)
+from chamberopt.design.peening.almen_strip import strip_material
+from tests.helpers.results.strength_histograms import histogram_of
+from tests.helpers.synthetic import dents_at, no_hits, plane_chamber, plate_design, triangles_at
+
+DESIGN = plate_design()
+PLANE = plane_chamber()
+BALL = DESIGN.shot.diameter
+WEAK = 0.49  # strength on one half of the plane, over that on the other
+OF_HALVES = 1.0 - (1.0 - WEAK) / (1.0 + WEAK)
+
+
+@cache
+def plane_field() -> TargetField:
+    setting = WindowSetting(1e-6, 20_000, 3e-3, 1e-3)
+    return find_target_field(PLANE, chamber_mesh(PLANE), setting)
+
+
+def plane_dents(rng: np.random.Generator, per_mm2: float, diameter: np.ndarray | None) -> Hits:
+    """Random dents; without a diameter they are weaker on one half of the plane."""
+    count = rng.poisson(per_mm2 * 225.0)
+    place = np.column_stack([rng.uniform(-7.499e-3, 7.499e-3, (count, 2)), np.zeros(count)])
+    if diameter is None:
+        size = np.where(place[:, 0] > 0.0, 0.2e-3, 0.2e-3 * np.sqrt(WEAK))
+    else:
+        size = rng.choice(diameter, count)
+    return dents_at(DESIGN, triangles_at(PLANE, place), place, size)
+
+
+def known(histogram: np.ndarray, reachable: float = 1.0) -> dict[str, Estimate]:
+    """Figures of eight batches with the same dents, each simulated for two seconds."""
+    parts = np.tile(histogram / 8, (8, 1, 1))
+    return estimates_of(StrengthHistograms(parts, np.full(8, 2.0), 1.0), reachable)
+
+
+def uniformity(histogram: np.ndarray, reachable: float = 1.0) -> Estimate:
+    return known(histogram, reachable)["intensity_uniformity"]
+
+
+def figures(field: TargetField, replicas: list[list[Hits]]) -> dict[str, Estimate]:
+    """Figures where the strength of each dent is the square of its diameter over that of a ball."""
+
+    def dents(hits: Hits) -> tuple[np.ndarray, np.ndarray]:
+        return hits.dent, hits.dent**2 / BALL
+
+    found = level_histograms(field, replicas, 2.0, dents)
+    return estimates_of(found, field.reachable)
+
+
+def test_an_even_surface_has_the_uniformity_one() -> None:
+    histogram = np.tile(histogram_of((1.0, 2.0), (0.4, 3.0)), (60, 1))
+    found = uniformity(histogram)
+    assert found.value == pytest.approx(1.0, abs=1e-6)
+    # Uneven coverage of even strength is as intense everywhere.
+    uneven = np.linspace(1.0, 9.0, 60)[:, None] * histogram
+    assert uniformity(uneven).value == pytest.approx(1.0, abs=2e-3)
+
+
+def test_two_strengths_have_the_uniformity_of_their_two_values() -> None:
+    """Half of the surface has twice the strength of the rest: mean 1.5, deviation 0.5."""
+    strong, weak = histogram_of((1.0, 2.0)), histogram_of((0.5 - 1e-9, 2.0))
+    histogram = np.concatenate([np.tile(strong, (40, 1)), np.tile(weak, (40, 1))])
+    found = uniformity(histogram)
+    assert found.value == pytest.approx(1.0 - 1.0 / 3.0, abs=0.01)
+
+
+@pytest.mark.parametrize("reachable", [0.9, 0.5])
+def test_what_is_out_of_reach_has_no_strength(reachable: float) -> None:
+    """S is 0 on a share 1 - r: the square of its relative spread is 1 / r - 1."""
+    histogram = np.tile(histogram_of((1.0, 2.0)), (60, 1))
+    found = uniformity(histogram, reachable)
+    assert found.value == pytest.approx(1.0 - np.sqrt(1.0 / reachable - 1.0))
+
+
+def test_scatter_of_counts_is_not_taken_for_unevenness() -> None:
+    """Dents of two sizes fall at random, as often everywhere: about 60 in a window."""
+    rng, field = np.random.default_rng(6), plane_field()
+    sizes = np.array([0.1e-3, 0.2e-3])
+    replicas = [[plane_dents(rng, 7.5, sizes)] for _ in range(8)]
+    found = figures(field, replicas)["intensity_uniformity"]
+    assert 0.97 < found.value <= 1.0
+    assert found.high >= 1.0 - 1e-6
+    assert found.half_width < 0.05
+
+
+def test_places_of_two_strengths_are_told_from_scatter() -> None:
+    rng, field = np.random.default_rng(7), plane_field()
+    replicas = [[plane_dents(rng, 7.5, None)] for _ in range(8)]
+    found = figures(field, replicas)["intensity_uniformity"]
+    # The windows over the line between the halves, a fifteenth of the plane, have both.
+    assert abs(found.value - OF_HALVES) < found.half_width + 0.02
+    more = [[plane_dents(rng, 15.0, None)] for _ in range(8)]
+    assert figures(field, more)["intensity_uniformity"].value == pytest.approx(
+        found.value, abs=0.02
+    )
+
+
+def test_few_replicas_have_no_interval_and_no_dents_no_figure() -> None:
+    rng, field = np.random.default_rng(8), plane_field()
+    few = [[plane_dents(rng, 30.0, None)] for _ in range(MIN_BATCHES - 1)]
+    found = figures(field, few)["intensity_uniformity"]
+    assert found.half_width == np.inf
+    assert found.value == pytest.approx(OF_HALVES, abs=0.05)
+
+
+def test_without_a_dent_nothing_is_known() -> None:
+    strip = strip_material(DESIGN.shot)
+    found = strength_estimates(plane_field(), [[no_hits()]] * 8, 2.0, DESIGN.shot.density, strip)
+    assert all((one.value, one.half_width) == (0.0, np.inf) for one in found.values())
+
+
+# Mean, percentiles, saturation
+
+
+def test_equal_impacts_saturate_as_the_curve_of_kirk() -> None:
+    """h = s (1 - exp(-b t)): T = ln 10 / b and S = 0.9 s; 16 s had two dents a window."""
+    histogram = np.tile(histogram_of((1.0, 2.0)), (60, 1))
+    found = known(histogram)
+    assert found["saturation_time_s"].value == pytest.approx(np.log(10.0) * 16.0 / 2.0, rel=0.03)
+    for name in ("strength_um", "strength_p05_um", "strength_p95_um"):
+        assert found[name].value == pytest.approx(0.9e6, rel=0.02), name
+
+
+def test_percentiles_are_those_of_two_strengths() -> None:
+    strong, weak = histogram_of((1.0, 2.0)), histogram_of((0.5 - 1e-9, 2.0))
+    histogram = np.concatenate([np.tile(strong, (40, 1)), np.tile(weak, (40, 1))])
+    found = known(histogram)
+    assert found["strength_p95_um"].value == pytest.approx(0.9e6, rel=0.02)
+    assert found["strength_p05_um"].value == pytest.approx(0.45e6, rel=0.03)
+    assert found["strength_um"].value == pytest.approx(0.675e6, rel=0.02)
+
+
+def test_scatter_of_counts_moves_no_percentile() -> None:
+    """Dents of two sizes fall at random, as often everywhere: all places are alike."""
+    rng, field = np.random.default_rng(9), plane_field()
+    sizes = np.array([0.1e-3, 0.2e-3])
+    found = figures(field, [[plane_dents(rng, 7.5, sizes)] for _ in range(8)])
+    mean = found["strength_um"]
+    for name in ("strength_p05_um", "strength_p95_um"):
+        assert abs(found[name].value - mean.value) < found[name].half_width + mean.half_width
+        assert found[name].half_width < 0.1 * mean.value
+
+
+def test_twice_the_simulated_time_saturates_in_twice_the_time() -> None:
+    strip, density = strip_material(DESIGN.shot), DESIGN.shot.density
+    rng, field = np.random.default_rng(10), plane_field()
+    batches = [[plane_dents(rng, 7.5, np.array([0.2e-3]))] for _ in range(8)]
+    one, two = (strength_estimates(field, batches, s, density, strip) for s in (1.0, 2.0))
+    ratio = two["saturation_time_s"].value / one["saturation_time_s"].value
+    assert ratio == pytest.approx(2.0)
+    # All balls have one speed, so that each place comes to 0.9 of one strength.
+    strength = strip_dents(batches[0][0], density, strip)[1][0]
+    assert one["strength_um"].value == pytest.approx(0.9e6 * strength, rel=0.03)
+
+
+def test_the_layer_of_equal_dents_grows_as_their_coverage() -> None:
+    """z = 1.1 d (1 - exp(-L t)), and its interval holds the 30 % of the estimate itself."""
+    rng, field, d = np.random.default_rng(11), plane_field(), 0.2e-3
+    batches = [[plane_dents(rng, 7.5, np.array([d]))] for _ in range(8)]
+    rate = 60.0e6 * np.pi / 4.0 * d**2  # dented area over area, in 8 s
+    for time in (1.0, 8.0, 80.0):
+        found = compression_estimate(field, batches, 1.0, time)
+        exact = 1e6 * OF_DENT * d * -np.expm1(-rate * time / 8.0)
+        assert found.value == pytest.approx(exact, rel=0.03)
+        assert ERROR * found.value < found.half_width < 0.4 * found.value
+
+
+def test_the_error_of_the_depth_is_common_to_two_designs_of_one_metal() -> None:
+    """Their difference has 30 % of itself, and replicas; with another metal 30 % of each."""
+    rng, field, d = np.random.default_rng(11), plane_field(), 0.2e-3
+    batches = [[plane_dents(rng, 7.5, np.array([d]))] for _ in range(8)]
+    short, long = (compression_estimate(field, batches, 1.0, time) for time in (8.0, 9.0))
+    assert short.beyond_scatter == pytest.approx(short.bias)
+    gap = paired_difference(long, short)
+    own = ERROR * gap.value
+    assert own < gap.half_width < 2.0 * own + long.bias + short.bias
+    assert gap.half_width < 0.1 * long.value
+    apart = paired_difference(long.of_another_metal(), short)
+    assert apart.half_width > ERROR * np.hypot(long.value, short.value)
+    assert short.of_another_metal().half_width == short.half_width
+
+
+def test_a_metal_that_hardens_strongly_gets_no_depth() -> None:
+    """Tensile over yield strength of 316L is 2, of a quenched steel 1.1."""
+    part = DESIGN.materials.part
+    assert not stress_notes(part)
+    assert not part.hardens_strongly
+    hard = part.model_copy(update={"yield_MPa": 900.0, "tensile_MPa": 1000.0})
+    assert stress_notes(hard) == stress_notes(hard.model_copy(update={"yield_MPa": None}))
+    assert "500 to 700 MPa" in stress_notes(hard)[0]
+    soft = part.model_copy(update={"yield_MPa": 290.0, "tensile_MPa": 580.0})
+    assert soft.hardens_strongly
+    assert "cannot be estimated" in stress_notes(soft)[1]

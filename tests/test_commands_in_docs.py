@@ -1,0 +1,78 @@
+"""The commands of worked examples in docs/ run as printed, on settings that make them quick."""
+
+import json
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from benchmarks.made_up_shop import SHOP, compared
+from chamberopt.cli import main
+from chamberopt.output.viewer import missing_opengl
+
+ROOT = Path(__file__).parents[1]
+QUICK = {
+    "replicas": "3\npoints = 1000", "simulated_time_s": "0.05", "warmup_time_s": "0.02",
+    "evaluations": "2", "confirm": "1", "confirm_replicas": "3",
+    "objective_half_width": "0.5\nmax_replicas = 3",
+}  # fmt: skip
+
+
+def commands(page: str) -> list[list[str]]:
+    """The commands of a page, as lists of words."""
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+    return [line.split() for line in re.findall(r"^    (.*)$", text, re.MULTILINE)]
+
+
+def make_quick(path: Path) -> None:
+    """Replace the settings of a design or a study that make it accurate."""
+    text = path.read_text(encoding="utf-8")
+    for name, value in QUICK.items():
+        text = re.sub(rf"^{name} = [\d.]+", f"{name} = {value}", text, flags=re.MULTILINE)
+    path.write_text(text, encoding="utf-8")
+
+
+@pytest.mark.long
+def test_the_peening_examples(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for folder in ("designs", "studies"):
+        shutil.copytree(ROOT / folder, tmp_path / folder)
+    for name in ("designs/shop/coupon", "designs/gear_zones", "studies/gear_zones"):
+        make_quick(tmp_path / f"{name}.toml")
+    monkeypatch.chdir(tmp_path)
+    words = [rest for program, *rest in commands("peening_examples.md") if program == "chamberopt"]
+    assert [name for name, *_ in words] == ["calibrate", "run", "report", "simulate", "report"]
+    for command in words:
+        assert main(command) == 0, (command, capsys.readouterr().err)
+    assert (tmp_path / "results/shop/machine.toml").is_file()
+    found = json.loads((tmp_path / "results/gear/result.json").read_text(encoding="utf-8"))
+    assert [zone["name"] for zone in found["zones"]] == ["flank", "root"]
+    assert found["metrics"]["flank.almen_intensity"]["value"] > 0.0
+    assert "process.treatment_time_s" in found["tolerances"]["box"]
+    for folder in ("gear_study", "gear"):
+        page = (tmp_path / "results" / folder / "report.html").read_text(encoding="utf-8")
+        assert "Limits, by the whole interval" in page
+
+
+def test_the_shipped_calibration_holds_the_hidden_machine() -> None:
+    rows = compared(SHOP / "machine.toml")
+    names = ["amplitude", "C0", "v0", "hardness", "K", "beta"]
+    assert [(row["parameter"], row["held"]) for row in rows] == [(name, "yes") for name in names]
+
+
+def test_the_tutorial(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("gmsh", reason="STEP needs the extra cad", exc_type=ImportError)
+    monkeypatch.chdir(tmp_path)
+    for program, *words in commands("tutorial.md"):
+        if program == "cd":
+            monkeypatch.chdir(words[0])
+        elif words[0] != "inspect" or not missing_opengl():
+            assert main(words) == 0, (words, capsys.readouterr().err)
+        if words[0] == "new":
+            make_quick(Path("chamber/design.toml"))
+            make_quick(Path("chamber/study.toml"))
+    assert Path("results/study/process_sheet.pdf").read_bytes().startswith(b"%PDF")
