@@ -23,6 +23,7 @@ from tests.helpers.scenes.cavities import box_around
 FLIGHTS = 100
 
 
+@pytest.mark.long
 def test_all_structures_find_the_same_contacts() -> None:
     """In a room with a body: faces, edges and corners to be met."""
     mesh = box_around(trimesh.creation.icosphere(subdivisions=1, radius=0.012), 0.03)

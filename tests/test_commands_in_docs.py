@@ -62,6 +62,7 @@ def test_the_shipped_calibration_holds_the_hidden_machine() -> None:
     assert [(row["parameter"], row["held"]) for row in rows] == [(name, "yes") for name in names]
 
 
+@pytest.mark.long
 def test_the_tutorial(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

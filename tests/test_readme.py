@@ -36,6 +36,7 @@ def test_the_readmes_python_runs_as_printed(snippet: str, tmp_path: Path) -> Non
     assert "±" in printed or "impacts" in printed
 
 
+@pytest.mark.long
 def test_the_page_for_science_prints_what_it_shows(tmp_path: Path) -> None:
     """Words as shown, and numbers within a tenth: on another processor a gas takes other paths."""
     page = (ROOT / "docs/science.md").read_text(encoding="utf-8")

@@ -22,6 +22,7 @@ def test_a_ball_locks_from_where_theory_says(share: float, kept: bool) -> None:
     assert bouncing_ball.locks(share * first_locking(0.5), 0.5) is kept
 
 
+@pytest.mark.long
 def test_a_gas_cools_by_haffs_law() -> None:
     times = np.linspace(0.25, 1.0, 4)
     grown = np.mean([gases.cooling(0.95, 0.05, seed, times) for seed in range(2)], axis=0) - 1.0

@@ -110,7 +110,7 @@ def winding_numbers(corners: np.ndarray, places: np.ndarray) -> np.ndarray:
     return np.array(found)
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
 @example(PLATE)
 @example(
     PLATE

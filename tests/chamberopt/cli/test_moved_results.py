@@ -89,6 +89,7 @@ def looked_at(
     }, printed
 
 
+@pytest.mark.long
 @needs_opengl
 def test_a_folder_sent_elsewhere_gives_the_same(
     project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -74,6 +74,7 @@ def test_finds_a_known_optimum(tmp_path: Path) -> None:
     assert len([t for t in result.trials if t.stage == "search"]) == 40
 
 
+@pytest.mark.long
 def test_finds_a_known_optimum_in_noise(tmp_path: Path) -> None:
     # The noise is 0.02 on a hill that rises 0.1 from the start. The mean regret measured over 12
     # seeds is 0.01.
@@ -226,6 +227,7 @@ def test_a_folder_in_use_is_refused(tmp_path: Path) -> None:
         make_output_folder(tmp_path / "link")
 
 
+@pytest.mark.long
 def test_the_real_thing_end_to_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # Twice the amplitude hits harder and more often: even a study of seconds must see that.
     monkeypatch.setattr(viewer, "draw_coverage", lambda *_: None)

@@ -57,6 +57,7 @@ def failing(folder: Path, at: int, error: Callable[[], BaseException], times: in
 
 
 class TestFullDisk:
+    @pytest.mark.long
     def test_no_room_for_a_row(
         self, tmp_path: Path, expected: bytes, monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -345,7 +346,11 @@ class TestCommandLine:
 
     @pytest.mark.parametrize(
         "step",
-        ["results.write.write_coverage", "results.write.write_chamber", "viewer.draw_coverage"],
+        [
+            "results.write.write_coverage",
+            pytest.param("results.write.write_chamber", marks=pytest.mark.long),
+            pytest.param("viewer.draw_coverage", marks=pytest.mark.long),
+        ],
     )
     def test_stopped_while_it_writes_its_results(
         self, step: str, evaluated: list, monkeypatch: pytest.MonkeyPatch
@@ -386,6 +391,7 @@ class TestCommandLine:
         assert main(["run", "small.toml", "--out", "out"]) == 2
         assert "study.optimizer.evaluations: was 5, is 6" in capfd.readouterr().err
 
+    @pytest.mark.long
     def test_comments_change_nothing(self, evaluated: list) -> None:
         self.at[3] = lambda: os.kill(os.getpid(), signal.SIGINT)
         assert main(["run", "small.toml", "--out", "out"]) == 130
@@ -408,6 +414,7 @@ class TestCommandLine:
         assert self.rows("results/small") == 3
         assert self.rows("results/small-2") == ROWS
 
+    @pytest.mark.long
     def test_from_python_too(self, evaluated: list) -> None:
         self.at[3] = lambda: signal.raise_signal(signal.SIGINT)  # no handler of ours there
         with pytest.raises(KeyboardInterrupt):

@@ -310,5 +310,5 @@ CASES = [
     named(triple_contact),
     named(four_balls_close_on_one),
     Case("packing of 64 %", packing_of_64_percent),
-    named(random_packing_compressed),
+    Case("random packing compressed", random_packing_compressed, long=True),
 ]

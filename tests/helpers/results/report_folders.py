@@ -29,7 +29,12 @@ def studied(folder: Path, evaluations: int = 8) -> Path:
     question = Study(
         design=DESIGN,
         vary={"shot.mass_g": (1.5, 8.0), "chamber.sonotrode_distance_mm": (8.0, 19.0)},
-        optimizer={"evaluations": evaluations, "confirm": 2, "confirm_replicas": 4},
+        optimizer={
+            "evaluations": evaluations,
+            "confirm": 2,
+            "confirm_replicas": 4,
+            "confirm_rounds": 1,
+        },
         constraints={"chamber.sonotrode_distance_mm": {"min": 9.5}},
     )
 

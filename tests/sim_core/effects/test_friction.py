@@ -215,6 +215,7 @@ def turned(vectors: np.ndarray, angle: float) -> np.ndarray:
     return vectors @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
+@pytest.mark.long
 def test_a_part_seen_from_its_own_frame_spins_the_balls_as_it_does_in_the_rooms() -> None:
     """Standing still at an angle, against the scene turned back by that angle, where it is as the
     mesh has it.

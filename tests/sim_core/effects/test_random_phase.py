@@ -79,7 +79,10 @@ def test_phases_at_the_envelope_are_uniform() -> None:
     assert kstest((at_envelope / math.tau) % 1.0, "uniform").pvalue > UNLIKELY
 
 
-@pytest.mark.parametrize(("law", "share"), [("the paper's", 0.015), ("two materials", 0.015)])
+@pytest.mark.parametrize(
+    ("law", "share"),
+    [pytest.param("the paper's", 0.015, marks=pytest.mark.long), ("two materials", 0.015)],
+)
 def test_rates_and_speeds_are_those_of_the_sinusoid(law: str, share: float) -> None:
     """Fast balls of a lossy floor and ceiling arrive at any phase anyway."""
     room, balls = balls_side_by_side(24, np.random.default_rng(7))
@@ -148,6 +151,7 @@ def test_the_same_seed_gives_the_same_bits_on_threads_and_another_does_not() -> 
     assert fingerprint(simulate(scene(2))) not in same
 
 
+@pytest.mark.long
 def test_balls_at_rest_beside_the_floor_do_not_mind() -> None:
     """A ball within the swing that never leaves it keeps its phase."""
     ball = Balls(np.array([[0.005, 0.005, RADIUS + 5e-5]]), np.zeros((1, 3)), DIAMETER)

@@ -56,6 +56,7 @@ def test_a_tuple_of_one_is_that_one_to_the_last_bit() -> None:
     np.testing.assert_array_equal(one.balls.velocities, other.balls.velocities)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("still", [HIGH, HIGH._replace(frequency=19.7)])
 def test_one_beside_it_that_keeps_still_changes_nothing(still: Vibration) -> None:
     """But the rounding of its clock, which a chamber makes ten times larger every hit or two: so
@@ -135,6 +136,7 @@ def test_one_vibration_needs_no_table() -> None:
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("wall", [FLOOR, 3])
 @pytest.mark.parametrize("phase", np.linspace(0.0, 2.0 * np.pi, 4, endpoint=False))
 def test_a_vibrating_wall_beyond_does_not_hide_the_face_a_ball_comes_down_on(
@@ -155,6 +157,7 @@ def test_a_vibrating_wall_beyond_does_not_hide_the_face_a_ball_comes_down_on(
     assert log.time[0] == pytest.approx(2 * 0.6 / 500, rel=0.05)
 
 
+@pytest.mark.long
 def test_a_ball_that_lies_still_waits_for_the_slowest() -> None:
     """It lies 0.2 mm from a wall that comes by 0.5 mm, five times a second, while the ceiling
     shakes at 20 kHz.

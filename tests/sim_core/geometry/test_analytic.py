@@ -87,6 +87,7 @@ def test_a_prism_is_its_mesh_event_by_event(shape: str) -> None:
     assert abs(room.volume / mesh.volume - 1.0) < 1e-14
 
 
+@pytest.mark.long
 def test_elastic_shot_of_two_sizes_keeps_its_energy_in_a_cylinder() -> None:
     balls = shot(CYLINDER, 30, 5, np.repeat([3e-3, 2e-3], 15))
     physics = Physics(Gravity(), ball_collisions=BallCollisions())

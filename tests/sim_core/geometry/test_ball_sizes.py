@@ -93,6 +93,7 @@ def test_a_pair_keeps_its_momentum_whatever_it_loses() -> None:
         assert energy(result.balls) < energy(balls)
 
 
+@pytest.mark.long
 def test_an_elastic_mixture_keeps_its_energy_its_room_and_its_distances() -> None:
     room = cylinder(0.02, 0.02, sections=37)
     start = mixture(room, (60, 30, 15), 2)
@@ -160,6 +161,7 @@ def test_each_ball_of_a_mixture_flies_as_it_does_alone() -> None:
         assert (together.balls.velocities[ball] == alone.balls.velocities[0]).all()
 
 
+@pytest.mark.long
 def test_a_mixture_in_a_chamber_that_shakes_stays_inside_and_apart() -> None:
     room = cylinder(0.015, 0.02, sections=37)
     law = uniform_restitution(0.9, 0.7)
@@ -176,6 +178,7 @@ def test_a_mixture_in_a_chamber_that_shakes_stays_inside_and_apart() -> None:
     assert np.abs(height).max() <= 25e-6 * (1.0 + 1e-9)
 
 
+@pytest.mark.long
 def test_many_balls_in_blocks_meet_as_few_do() -> None:
     """Above 1,024 balls the filter looks in blocks: energy and distances say whether it misses a
     meeting.

@@ -305,6 +305,7 @@ def crowd(turn: PartRotation, duration: float, count: int = 40, seed: int = 4) -
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "turn",
     [

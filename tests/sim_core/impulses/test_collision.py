@@ -50,6 +50,7 @@ def sides(log: ImpactLog) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return log.time[own], log.position[own, :2] - CENTRE, log.velocity[own, :2]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("alpha", [1.5, 0.7, 0.05, 1e-3])
 def test_circling_it_hits_at_even_times(alpha: float) -> None:
     speed = 3.0

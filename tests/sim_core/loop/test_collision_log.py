@@ -15,7 +15,7 @@ from tests.helpers.scenes.gas import lattice_gas
 ROOM = box((0.1, 0.1, 0.1))
 
 
-@pytest.mark.parametrize("rest", [None, Rest()])
+@pytest.mark.parametrize("rest", [None, pytest.param(Rest(), marks=pytest.mark.long)])
 def test_two_balls_meet_where_and_when_they_must(rest: Rest | None) -> None:
     """Both fall alike, so that they meet as without gravity, lower down: in contact mode too.
 

@@ -102,7 +102,9 @@ def test_fast_balls_meet_after_any_number_of_trips_round_the_box() -> None:
     assert trips > 10.0
 
 
-@pytest.mark.parametrize("count", [5, 200, MIN_BALLS, pytest.param(3000, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "count", [5, 200, *(pytest.param(n, marks=pytest.mark.long) for n in (MIN_BALLS, 3000))]
+)
 def test_every_meeting_with_an_image_is_found(count: int) -> None:
     """Against the quadratic of every image; the filter takes sixteen balls at a time in float32."""
     rng, window = np.random.default_rng(count), 0.02
@@ -156,7 +158,7 @@ def test_every_meeting_with_an_image_is_found(count: int) -> None:
     assert met > 10
 
 
-@pytest.mark.parametrize("count", [300, 2 * MIN_BALLS])
+@pytest.mark.parametrize("count", [300, pytest.param(2 * MIN_BALLS, marks=pytest.mark.long)])
 def test_where_the_box_is_cut_does_not_matter(count: int) -> None:
     """All balls moved by a vector, modulo the sides, meet at the same times: a hundred collisions,
     of which each magnifies rounding.
@@ -249,6 +251,7 @@ def everything(duration: float, count: int = 60) -> Scene:
     return Scene(BOX, replace(start, positions=places), physics, duration, record_collisions=True)
 
 
+@pytest.mark.long
 def test_further_effects_work_together_with_it() -> None:
     result = simulate(everything(0.5))
     assert result.collisions.sonotrode > 100

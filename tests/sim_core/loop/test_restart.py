@@ -115,6 +115,7 @@ def test_several_sonotrodes_go_on() -> None:
     assert_same(whole, *rest, least=10, off=1e-9)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "turn",
     [

@@ -42,7 +42,9 @@ def middle_of(packing: float, ratio: float) -> float:
     return float(brentq(lambda middle: average(middle) - packing, 0.5 * packing, 1.5 * packing))
 
 
-@pytest.mark.parametrize("per_side", [8, 11])  # fewer and more balls than blocks begin with
+@pytest.mark.parametrize(
+    "per_side", [8, pytest.param(11, marks=pytest.mark.long)]
+)  # fewer and more balls than blocks begin with
 @pytest.mark.parametrize("packing", [0.02, 0.1, 0.2, 0.3])
 def test_pressure_and_collision_rate(packing: float, per_side: int) -> None:
     """The walls bear the pressure p of the middle. Along them the gas bears less, by the tension:

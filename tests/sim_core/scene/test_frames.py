@@ -30,6 +30,7 @@ def test_a_ball_in_free_fall_trades_height_for_speed() -> None:
     np.testing.assert_array_equal(energies(frames, balls).potential, 0.0)
 
 
+@pytest.mark.long
 def test_a_rough_elastic_bounce_turns_translation_into_spin() -> None:
     """With beta0 = 1 and no limit on friction, a solid sphere without spin that hits with u along
     the wall keeps 3/7 u and has the spin 10/7 u / R: energy is kept.

@@ -35,7 +35,9 @@ def shot(count: int) -> Balls:
 
 
 @pytest.mark.parametrize(
-    "physics", [THROUGH, THROUGH._replace(rest=Rest())], ids=["flying", "contact mode"]
+    "physics",
+    [THROUGH, pytest.param(THROUGH._replace(rest=Rest()), marks=pytest.mark.long)],
+    ids=["flying", "contact mode"],
 )
 def test_each_ball_has_the_history_it_has_alone(physics: Physics) -> None:
     balls = shot(12)

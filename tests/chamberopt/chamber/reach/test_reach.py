@@ -200,6 +200,7 @@ def test_smaller_balls_reach_more_of_a_gear() -> None:
     assert means[-1] < 0.5
 
 
+@pytest.mark.long
 def test_no_impact_falls_where_no_ball_is_said_to_reach() -> None:
     values = {"process.accuracy.simulated_time_s": 0.1, "process.accuracy.warmup_time_s": 0.02}
     design = load_design(DESIGNS / "gear.toml").changed(values)

@@ -50,7 +50,8 @@ def cut(whole: Path, folder: Path, length: int) -> None:
 
 @pytest.mark.usefixtures("quick_disk")
 @pytest.mark.parametrize(
-    ("algorithm", "batch"), [*[(one, 1) for one in ALGORITHMS], ("auto", 3), ("surrogate", 2)]
+    ("algorithm", "batch"),
+    [*[(one, 1) for one in ALGORITHMS], pytest.param("auto", 3, marks=pytest.mark.long)],
 )
 def test_every_algorithm_goes_on_from_any_row(algorithm: str, batch: int, tmp_path: Path) -> None:
     whole, question = tmp_path / "whole", study(algorithm=algorithm, batch=batch)

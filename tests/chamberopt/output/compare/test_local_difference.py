@@ -68,7 +68,11 @@ def test_more_on_one_half_is_found_there_and_not_elsewhere(tmp_path: Path) -> No
     assert found.less < 0.05
 
 
-@pytest.mark.parametrize("per_mm2", [15.0, 80.0], ids=["averaged over discs", "window by window"])
+@pytest.mark.parametrize(
+    "per_mm2",
+    [15.0, pytest.param(80.0, marks=pytest.mark.long)],
+    ids=["averaged over discs", "window by window"],
+)
 def test_few_differences_are_real_by_chance_where_nothing_differs(
     tmp_path: Path, per_mm2: float
 ) -> None:

@@ -121,6 +121,7 @@ def test_one_dent_is_a_disc_of_its_diameter_at_its_place(plate: Chamber, tmp_pat
     assert white_share(slanted).sum() * wide**2 == pytest.approx(cosine * area, rel=0.03)
 
 
+@pytest.mark.long
 @needs_opengl
 def test_a_rim_parts_large_dents_and_small_ones_have_none(plate: Chamber, tmp_path: Path) -> None:
     file, rims = coverage_file(tmp_path, plate), []
@@ -151,6 +152,7 @@ def test_the_later_dent_lies_on_top(plate: Chamber, tmp_path: Path) -> None:
     assert red[0] < 0.7 * green[0]
 
 
+@pytest.mark.long
 @needs_opengl
 def test_dents_on_the_far_side_and_behind_the_part_are_hidden(
     plate: Chamber, tmp_path: Path
@@ -173,7 +175,8 @@ def test_dents_on_the_far_side_and_behind_the_part_are_hidden(
 
 @needs_opengl
 @pytest.mark.parametrize(
-    ("name", "count", "radius"), [("plate", 6000, 0.3e-3), ("gear", 150_000, 0.06e-3)]
+    ("name", "count", "radius"),
+    [("plate", 6000, 0.3e-3), pytest.param("gear", 150_000, 0.06e-3, marks=pytest.mark.long)],
 )
 def test_the_share_of_colour_is_what_coverage_says(
     name: str, count: int, radius: float, tmp_path: Path
@@ -198,6 +201,7 @@ def test_the_share_of_colour_is_what_coverage_says(
         assert target.sum() * pixel**2 == pytest.approx(area, rel=0.01)
 
 
+@pytest.mark.long
 @needs_opengl
 def test_a_ball_is_drawn_round_and_without_cracks(tmp_path: Path) -> None:
     ball_result(tmp_path / "ball")
