@@ -1,7 +1,7 @@
 """The problems that optimizers.py searches: noisy functions, and chambers from tables.
 
 A problem is maximised over the unit cube. Scores are of the size of uniform_coverage, from 0 to
-0.8, and are means of four replicas, so that each has its own, badly known, error. A figure that is
+0.8, and are means of eight replicas, so that each has its own, badly known, error. A figure that is
 limited must not be above 0; it is measured with noise too. PROBLEMS are those that the search was
 developed with, ASIDE those that were kept aside to check it.
 """
@@ -21,7 +21,7 @@ from chamberopt.coverage.metrics import highest_uniform_coverage
 from chamberopt.optimize.search.domain import Axis, Domain
 
 RESULTS = Path(__file__).parent / "results"
-REPLICAS = 4
+REPLICAS = 8
 NUMBER = Axis()
 
 # Hartmann's function of three parameters, with four local maxima, the best 3.86278: L. C. W. Dixon

@@ -45,14 +45,14 @@ def optuna_search(
     )
     names = [f"x{k}" for k in range(len(domain))]
     study.enqueue_trial(dict(zip(names, start.tolist(), strict=True)))
-    simulated = 0
-    for _ in range(2 * settings.evaluations):
+    left = float(settings.evaluations)
+    for _ in range(4 * settings.evaluations):
         trial = study.ask()
         point = np.array([trial.suggest_float(name, 0.0, 1.0) for name in names])
         scored = begin(start if not trial.number else np.round(point, 4))()
         study.tell(trial, scored.score)
-        simulated += scored.simulated
-        if simulated == settings.evaluations:
+        left -= scored.cost
+        if left < 1.0:
             break
     return "optuna"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections import deque
 from collections.abc import Callable
@@ -111,7 +112,7 @@ class Candidates:
 
         def wait() -> Scored:
             trial = self._finish(number)
-            return Scored(trial.score, bool(trial.goals))
+            return Scored(trial.score, self._evaluator.cost(trial))
 
         return wait
 
@@ -287,7 +288,12 @@ class Candidates:
         # Trials from the record but the last one are not shown.
         if self._progress and one.number + 1 >= len(self._folder.recorded.trials):
             settings = self._study.optimizer
-            total = max(len(self.trials), settings.evaluations + 1 + settings.confirm)
+            searched = [t for t in self.trials if t.stage == "search"]
+            expected = len(searched) + 1 + settings.confirm
+            if one.stage == "search":  # at most: some will cost a part of an evaluation
+                spent = sum(map(self._evaluator.cost, searched))
+                expected += math.ceil(settings.evaluations - spent)
+            total = max(len(self.trials), expected)
             scores = (t.score for t in self.trials if t.feasible and t.stage == one.stage)
             self._progress(len(self.trials), total, max(scores, default=None))
 

@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 # Score of a candidate that cannot be simulated: this many units of the objective below the start.
 # It is finite, because NLopt's models fail with inf and NaN.
 FAILURE_PENALTY = 2.0
+# Share of an evaluation with all its replicas that is spent before the first of them ends: chamber,
+# search tree, reach (benchmarks/study_cores.py).
+SET_UP = 0.25
 
 Simulator = Callable[["Design", str, "int | None"], Evaluation]
 """simulator(design, stream of seeds, number of replicas or None) evaluates one candidate; it raises
@@ -54,6 +57,9 @@ class CandidateEvaluator:
         self._study, self._simulator = study, simulator
         self.space = ParameterSpace(study.design, study.vary)
         self.reference = Reference()
+        accuracy = study.at_search_accuracy(study.design).process.accuracy
+        is_fixed = accuracy.objective_half_width is None
+        self._replicas = accuracy.replicas if is_fixed else None  # of a candidate of the search
 
     def goals(self, evaluation: Evaluation) -> tuple[Estimate, ...]:
         """Estimate of each objective of the study."""
@@ -108,6 +114,15 @@ class CandidateEvaluator:
             raise
         return evaluation
 
+    def cost(self, trial: Trial) -> float:
+        """What a trial of the search took of an evaluation with all replicas; 0 if not simulated.
+
+        It follows from the number of replicas, not from a clock, so that it is the same everywhere.
+        """
+        if not trial.goals:
+            return 0.0
+        return evaluation_cost(trial.replicas or 0, self._replicas) if self._replicas else 1.0
+
     def trial(
         self, number: int, point: np.ndarray, stage: str, evaluation: Evaluation | InputError
     ) -> Trial:
@@ -153,9 +168,8 @@ class CandidateEvaluator:
         design = self._study.at_search_accuracy(design)
         if best_low is not None:
             self._require_promise(design, best_low)
-        few, accuracy = self._study.optimizer.first_replicas, design.process.accuracy
-        fixed_replicas = accuracy.objective_half_width is None
-        if best_low is not None and 0 < few < accuracy.replicas and fixed_replicas:
+        few = self._study.optimizer.first_replicas
+        if best_low is not None and 0 < few < (self._replicas or 0):
             first = self._simulate(design, "search", few)
             if len(self._study.objective.goals) == 1 and first.objective.high < best_low:
                 return first
@@ -205,6 +219,11 @@ class CandidateEvaluator:
             is_share = metric is not None and metric.highest <= 1.0
             sizes.append(abs(weight) * (1.0 if is_share else abs(metrics[name].value)))
         return max(sizes) or 1.0
+
+
+def evaluation_cost(replicas: int, all_replicas: int) -> float:
+    """The cost of so many replicas of a candidate, where that of all of them is 1."""
+    return SET_UP + (1.0 - SET_UP) * min(1.0, replicas / all_replicas)
 
 
 def is_start(number: int, stage: str) -> bool:

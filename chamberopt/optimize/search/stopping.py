@@ -2,8 +2,9 @@
 
 A search ends for one of these reasons:
 
-1. The budget is spent: `optimizer.evaluations` different points were simulated
-   (BudgetSpentError). A point that cannot be simulated, or that geometry alone shows to be no
+1. The budget is spent: what is left of `optimizer.evaluations` is less than a whole evaluation
+   (BudgetSpentError). A point that got only a few replicas, as it is clearly worse than the best,
+   costs a part of one. A point that cannot be simulated, or that geometry alone shows to be no
    better, costs nothing, until there are as many of those as the budget.
 2. All points were evaluated, where every parameter has levels.
 3. It has converged: the last phase ends because the steps of its local algorithm are below
@@ -28,11 +29,13 @@ import numpy as np
 
 
 class Scored(NamedTuple):
-    """A score, a finite number to be maximised, and whether it took a simulation."""
+    """A score, a finite number to be maximised, and its cost: 1 for a whole evaluation, or less."""
 
     score: float
-    simulated: bool = True
+    cost: float = 1.0
 
+
+ROUNDING = 1e-9  # of a sum of costs
 
 Begin = Callable[[np.ndarray], Callable[[], Scored]]
 """begin(point (d,) of the unit cube) starts an evaluation, and returns a function that waits for
@@ -44,7 +47,7 @@ class BudgetSpentError(Exception):
 
 
 class ScoredPoints:
-    """The points of a search; each is evaluated once and counts once in the budget.
+    """The points of a search; each is evaluated once.
 
     Up to `batch` evaluations run at a time. Scores are taken in the order in which the evaluations
     began, so that nothing depends on which of them ends first. `points` (d,) are all that began,
@@ -58,22 +61,24 @@ class ScoredPoints:
         self._begin, self.budget, self._batch, self._size = begin, budget, batch, size
         self._numbers: dict[bytes, int] = {}  # by the exact bytes of the point
         self._running: deque[Callable[[], Scored]] = deque()
-        self._free = 0  # points that took no simulation
+        self._costs: list[float] = []  # of the scores
         self.points: list[np.ndarray] = []
         self.scores: list[float] = []
         self.best, self._best_score = start, -np.inf
 
     def left(self, limit: int) -> int:
-        """How many more points may begin, until as many as `limit` count.
+        """How many more whole evaluations may begin, until they and those before cost `limit`.
 
-        Where none is left, those that run are waited for: they may turn out to cost nothing.
+        Where none is left, those that run are waited for: they may turn out to cost less.
         """
         if len(self.points) >= self._size:
             return 0
         for _ in range(2):
-            left = min(limit, self.budget) - len(self.points) + min(self._free, self.budget)
-            if left > 0:
-                return left
+            free = max(0, self._costs.count(0.0) - self.budget)
+            running = len(self.points) - len(self.scores)
+            left = min(limit, self.budget) - math.fsum(self._costs) - free - running
+            if left > 1.0 - ROUNDING:
+                return int(left + ROUNDING)
             self.wait()
         return 0
 
@@ -86,7 +91,7 @@ class ScoredPoints:
     def begin(self, point: np.ndarray, limit: int | None = None) -> int:
         """Begin to evaluate a point, unless that was done; returns its place in `points`.
 
-        BudgetSpentError if it is new, and there are `limit` points, or as many as the budget.
+        BudgetSpentError if it is new, and `limit` or the budget has no place for it.
         """
         key = point.tobytes()
         if key not in self._numbers:
@@ -105,8 +110,8 @@ class ScoredPoints:
     def wait(self, running: int = 0) -> None:
         """Wait for the scores of all evaluations but the last so many."""
         while len(self._running) > running:
-            value, simulated = self._running.popleft()()
-            self._free += not simulated
+            value, cost = self._running.popleft()()
+            self._costs.append(cost)
             if value > self._best_score:
                 self.best, self._best_score = self.points[len(self.scores)], value
             self.scores.append(value)

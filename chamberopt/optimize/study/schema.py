@@ -124,7 +124,9 @@ class Optimizer(FileTable):
     tolerance: float = quantity(
         1e-6, 0.5, "of the bounds", "step below which local algorithms stop", 0.02
     )
-    evaluations: int = quantity(2, 1000000, "", "candidates that the search simulates", 40)
+    evaluations: int = quantity(
+        2, 1000000, "", "what the search may simulate, in candidates with all their replicas", 40
+    )
     batch: int = quantity(
         1, 64, "", "candidates evaluated at a time, each proposed before the others have scores", 2
     )
@@ -132,7 +134,7 @@ class Optimizer(FileTable):
     confirm: int = quantity(1, 1000, "", "best candidates simulated again with new seeds", 3)
     confirm_replicas: int = quantity(3, 100000, "", "replicas of each confirmation", 16)
     first_replicas: int = quantity(
-        0, 100000, "", "replicas after which a clearly worse candidate gets no more; 0: never", 4
+        0, 100000, "", "replicas after which a clearly worse candidate gets no more; 0: never", 3
     )
     confirm_rounds: int = quantity(
         1,

@@ -113,15 +113,29 @@ def test_what_cannot_be_simulated_costs_nothing() -> None:
 
     def begin(point: np.ndarray) -> Callable[[], Scored]:
         simulated.append(bool(point[0] < 0.5))
-        return lambda: Scored(hill(point) if point[0] < 0.5 else -1.0, bool(point[0] < 0.5))
+        return lambda: Scored(hill(point) if point[0] < 0.5 else -1.0, float(point[0] < 0.5))
 
     maximise(begin, np.full(3, 0.4), Optimizer(evaluations=20))
     assert sum(simulated) == 20
     assert 0 < simulated.count(False) <= 20
     simulated.clear()
-    maximise(lambda x: lambda: Scored(hill(x), simulated=bool(simulated.append(False))),
+    maximise(lambda x: lambda: Scored(hill(x), float(bool(simulated.append(False)))),
              np.full(3, 0.4), Optimizer(evaluations=6))  # fmt: skip
     assert len(simulated) == 12  # nowhere: it ends
+
+
+def test_what_costs_a_part_of_an_evaluation_leaves_room_for_others() -> None:
+    """The sum of the costs is the budget, but for less than one evaluation."""
+    costs: list[float] = []
+
+    def begin(point: np.ndarray) -> Callable[[], Scored]:
+        costs.append(1.0 if len(costs) % 3 == 0 else 0.4)
+        cost = costs[-1]
+        return lambda: Scored(hill(point), cost)
+
+    maximise(begin, np.full(3, 0.4), Optimizer(evaluations=20))
+    assert 19.0 < sum(costs) <= 20.0
+    assert len(costs) > 30
 
 
 @pytest.mark.parametrize("flat", [False, True])
