@@ -55,11 +55,12 @@ class CandidateEvaluator:
 
     def __init__(self, study: Study, simulator: Simulator) -> None:
         self._study, self._simulator = study, simulator
-        self.space = ParameterSpace(study.design, study.vary)
+        counts_worst = study.objective.over_tolerances == "worst"
+        self.space = ParameterSpace(study.design, study.vary, counts_worst)
         self.reference = Reference()
         accuracy = study.at_search_accuracy(study.design).process.accuracy
         is_fixed = accuracy.objective_half_width is None
-        self._replicas = accuracy.replicas if is_fixed else None  # of a candidate of the search
+        self._replicas = accuracy.replicas if is_fixed else 0  # of a candidate of the search
 
     def goals(self, evaluation: Evaluation) -> tuple[Estimate, ...]:
         """Estimate of each objective of the study."""
@@ -121,7 +122,9 @@ class CandidateEvaluator:
         """
         if not trial.goals:
             return 0.0
-        return evaluation_cost(trial.replicas or 0, self._replicas) if self._replicas else 1.0
+        few = self._study.optimizer.first_replicas
+        given_up = trial.replicas == few < self._replicas
+        return evaluation_cost(few, self._replicas) if given_up else 1.0
 
     def trial(
         self, number: int, point: np.ndarray, stage: str, evaluation: Evaluation | InputError
@@ -169,7 +172,7 @@ class CandidateEvaluator:
         if best_low is not None:
             self._require_promise(design, best_low)
         few = self._study.optimizer.first_replicas
-        if best_low is not None and 0 < few < (self._replicas or 0):
+        if best_low is not None and 0 < few < self._replicas:
             first = self._simulate(design, "search", few)
             if len(self._study.objective.goals) == 1 and first.objective.high < best_low:
                 return first
@@ -223,7 +226,7 @@ class CandidateEvaluator:
 
 def evaluation_cost(replicas: int, all_replicas: int) -> float:
     """The cost of so many replicas of a candidate, where that of all of them is 1."""
-    return SET_UP + (1.0 - SET_UP) * min(1.0, replicas / all_replicas)
+    return SET_UP + (1.0 - SET_UP) * replicas / all_replicas
 
 
 def is_start(number: int, stage: str) -> bool:

@@ -40,8 +40,8 @@ if TYPE_CHECKING:
 TOLERANCES = (
     "what the [tolerances] do to the best design: chamberopt simulate best.toml --tolerances"
 )
-MEAN = (
-    "the search maximised the mean of the objective over the [tolerances] of what it varies; at "
+MAXIMISED = (
+    "the search maximised the {which} of the objective over the [tolerances] of what it varies; at "
     "the best design it is {lost:.2g} {side} the value without them, by its model"
 )
 
@@ -70,7 +70,8 @@ class StudyResult:
     def notes(self) -> tuple[str, ...]:
         """What tolerances did to the search, and each parameter whose best value is on a bound."""
         lost = self.best.lost_to_tolerances
-        sentences = tolerance_notes(lost) if self.study.design.tolerances else []
+        which = "mean" if self.study.objective.over_tolerances == "mean" else "worst value"
+        sentences = tolerance_notes(lost, which) if self.study.design.tolerances else []
         numbers = {name: one for name, one in self.study.vary.items() if not one.texts}
         for name, varied in numbers.items():
             low, high = varied.bounds
@@ -169,10 +170,11 @@ def run_study(
     )
 
 
-def tolerance_notes(lost: float) -> list[str]:
+def tolerance_notes(lost: float, which: str = "mean") -> list[str]:
     """What a search with tolerances has maximised; a loss of 0 is that without a model."""
     side = "below" if lost > 0.0 else "above"
-    return [*([MEAN.format(lost=abs(lost), side=side)] if lost else []), TOLERANCES]
+    maximised = [MAXIMISED.format(which=which, lost=abs(lost), side=side)] if lost else []
+    return [*maximised, TOLERANCES]
 
 
 def fixed_target(study: Study) -> np.ndarray | None:

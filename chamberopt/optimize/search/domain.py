@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-MISSES = 8  # places in the box of tolerances
+MISSES = 16  # places in the box of tolerances
 
 
 class Axis(NamedTuple):
@@ -37,10 +37,17 @@ class Domain:
         axes: the parameters.
         misses: by how much a shop may miss each, lowest and highest, where the coordinate is 0 and
             where it is 1, shape (2, 2, d); between them in proportion; default 0.
+        counts_worst: whether the worst of MISSES places counts that a shop may end at, instead of
+            their mean.
     """
 
-    def __init__(self, axes: Sequence[Axis], misses: np.ndarray | None = None) -> None:
-        self.axes = tuple(axes)
+    def __init__(
+        self,
+        axes: Sequence[Axis],
+        misses: np.ndarray | None = None,
+        counts_worst: bool = False,
+    ) -> None:
+        self.axes, self.counts_worst = tuple(axes), counts_worst
         self._misses = misses if misses is not None and misses.any() else None
         self._steps = np.array([max(1, axis.levels - 1) for axis in self.axes], dtype=float)
         self._are_ordered = np.array([axis.ordered for axis in self.axes])

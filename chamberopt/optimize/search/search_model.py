@@ -96,13 +96,25 @@ class SearchModel:
     def expected(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and standard deviation of the score of a shop that aims at points (k, d): (k,).
 
-        It is the mean over where the shop may end; the standard deviation is the mean one there.
+        It is the mean over where the shop may end, and the standard deviation the mean one there;
+        or both are of the worst of these places, by the model.
         """
+        if self.domain.counts_worst:
+            return self.score(self._worst(at))
         mean, deviation = np.mean([self.score(one) for one in self.domain.around(at)], axis=0)
         return mean, deviation
 
+    def _worst(self, aims: np.ndarray) -> np.ndarray:
+        """Where a shop that aims at points (k, d) may end worst, (k, d)."""
+        around = self.domain.around(aims)
+        worst = np.argmin([self.score(one)[0] for one in around], axis=0)
+        places: np.ndarray = around[worst, np.arange(len(aims))]
+        return places
+
     def covariance(self, at: np.ndarray, aims: np.ndarray) -> np.ndarray:
         """Covariance of the scores at points (k, d) and of a shop that aims at (m, d): (k, m)."""
+        if self.domain.counts_worst:
+            return self.score.covariance(at, self._worst(aims))
         around = self.domain.around(aims)
         whole: np.ndarray = np.mean([self.score.covariance(at, one) for one in around], axis=0)
         return whole

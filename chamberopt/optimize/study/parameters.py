@@ -237,18 +237,22 @@ class ParameterSpace:
     """The varied parameters of a design, mapped to the unit cube.
 
     `start` is the design of the study as a point (d,), `domain` says which values each coordinate
-    can have, and `bounds` are low and high (d, 2) in the units of the file.
+    can have, and `bounds` are low and high (d, 2) in the units of the file. `counts_worst` as of
+    Domain.
     """
 
-    def __init__(self, design: Design, vary: Mapping[str, Varied]) -> None:
+    def __init__(
+        self, design: Design, vary: Mapping[str, Varied], counts_worst: bool = False
+    ) -> None:
         self.names, self._design, whole = tuple(vary), design, design.whole_numbers()
         self.varied = tuple(vary.values())
         self._levels = [np.array(one.values(name in whole)) for name, one in vary.items()]
         self.bounds = np.array([one.bounds for one in vary.values()], dtype=float)
         low, high = self.bounds.T
         misses = np.array([_misses(design, vary, side) for side in (0, 1)]) / (high - low)
-        axes = zip(self._levels, self.varied, strict=True)
-        self.domain = Domain([Axis(len(levels), not one.texts) for levels, one in axes], misses)
+        both = zip(self._levels, self.varied, strict=True)
+        axes = [Axis(len(levels), not one.texts) for levels, one in both]
+        self.domain = Domain(axes, misses, counts_worst)
         start = self.point_of({name: design.setting(name) for name in vary})
         self.start = self.domain.snap(start[None])[0]
 

@@ -66,6 +66,10 @@ class Objective(FileTable):
         None,
     )
 
+    over_tolerances: Literal["mean", "worst"] = Field(
+        default="mean", description="what counts over the design's [tolerances], by the model"
+    )
+
     def _problems(self) -> Iterator[Problem]:
         names = (*OBJECTIVES, *METRICS)
         for name in self.sum:
@@ -258,6 +262,9 @@ class Study(FileTable):
             yield Problem("optimizer.evaluations", text)
         for name, limits in self.constraints.items():
             yield from limit_problems(self.design, bounds, name, limits)
+        if self.objective.over_tolerances == "worst" and not self.design.tolerances:
+            text = 'given "worst", but the design has no [tolerances]; add them, or leave it out'
+            yield Problem("objective.over_tolerances", text)
         for goal in self.objective.goals:
             for name in parse_objective(goal).terms:
                 if problem := metric_problem(self.design, name):

@@ -96,3 +96,23 @@ def test_a_shop_that_may_miss_is_kept_away_from_a_steep_side() -> None:
     around = at + np.array([[-0.1, 0.0], [0.1, 0.0]])
     assert model.expected(at)[0][0] == pytest.approx(model.score(around)[0].mean(), abs=0.03)
     assert propose_point(model, np.random.default_rng(0)).shape == (2,)
+
+
+def test_where_the_worst_counts_a_plateau_wins_over_a_peak() -> None:
+    """Over 0.1 to both sides the peak of 0.9 at 0.7 has a mean of 0.67 and a worst of 0.43."""
+    points = np.random.default_rng(2).random((90, 2))
+    scores = np.maximum(0.55 - 0.5 * np.maximum(points[:, 0] - 0.4, 0.0),
+                        0.9 - 0.7 / 0.15 * np.abs(points[:, 0] - 0.7))  # fmt: skip
+    misses = np.stack([np.outer([-1.0, 1.0], [0.1, 0.0])] * 2)
+    by_mean, by_worst = (
+        model_of(points, scores, domain=Domain([Axis(), Axis()], misses, counts_worst=one))
+        for one in (False, True)
+    )
+    (_, mean), (_, worst) = (recommend_points(one, 1) for one in (by_mean, by_worst))
+    assert worst[0] < 0.45
+    assert mean[0] == pytest.approx(0.7, abs=0.03)
+    at = np.array([[0.7, 0.5]])
+    assert by_worst.expected(at)[0][0] == pytest.approx(0.43, abs=0.08)
+    assert by_mean.expected(at)[0][0] == pytest.approx(0.67, abs=0.08)
+    assert by_worst.covariance(at, at).shape == (1, 1)
+    assert propose_point(by_worst, np.random.default_rng(0)).shape == (2,)

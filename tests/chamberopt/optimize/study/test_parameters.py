@@ -105,7 +105,7 @@ def test_a_tolerance_in_percent_is_of_the_value_that_is_aimed_at() -> None:
     around = space.domain.around(np.array([[0.0, 0.0], [0.5, 1.0]]))
     height, mass = np.moveaxis(around - [[0.0, 0.0], [0.5, 1.0]], 2, 0)
     np.testing.assert_allclose(height.mean(axis=0), 0.0, atol=1e-12)
-    np.testing.assert_allclose(np.abs(height).max(axis=0), 0.8 / 30 * 7 / 8)
+    np.testing.assert_allclose(np.abs(height).max(axis=0), 0.8 / 30 * 15 / 16)
     np.testing.assert_allclose(mass.mean(axis=0), [-0.1 / 8, -0.5 / 8])  # of 2 g and of 10 g
 
 
