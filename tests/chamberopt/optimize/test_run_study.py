@@ -355,7 +355,7 @@ def test_a_corner_of_the_bounds_that_is_no_design_is_a_penalty_with_the_reason(
         x = (np.array([design.value(name) for name in vary]) - low) / (high - low)
         return judged(PEAK - ((x - corner) ** 2).sum() + np.zeros(replicas or 8))
 
-    settings = {"evaluations": 24, "confirm": 1, "confirm_replicas": 8}
+    settings = {"evaluations": 24, "confirm": 1, "confirm_replicas": 8, "first_replicas": 0}
     result = run(Study(design=GEAR, vary=vary, optimizer=settings), tmp_path, simulator)
     rows = read_trials(tmp_path)
     failed = [row for row in rows if row["objective"] is None]
