@@ -14,10 +14,11 @@ them, as studies do, and pays for three and the set-up; `ours-whole` and the oth
 `optuna-raced` as ours. Ours also knows what geometry tells without an evaluation, which only the
 gear has. What a search saw is then judged in the same way: the start, the best that it saw, and the
 two points that our model recommends from its evaluations, one of them seen, are measured again with
-fresh noise and four times the replicas. The answer is the best of them by our rule: its whole interval must be within the limit, or, if there is
-none such, may be. The regret is the best true score within the limit less that of the answer; an
-answer that truly is not within the limit counts as the start. Limits are told to those that take
-them (ours, Optuna); the others get the score less the expected violation.
+fresh noise and four times the replicas. The answer is the best of them by our rule: its whole
+interval must be within the limit, or, if there is none such, may be. The regret is the best true
+score within the limit less that of the answer; an answer that truly is not within the limit counts
+as the start. Limits are told to those that take them (ours, Optuna); the others get the score less
+the expected violation.
 """
 
 from __future__ import annotations
@@ -53,7 +54,16 @@ from chamberopt.optimize.study.constraints import (
 EVALUATIONS, SEEDS = (20, 40, 80), 20
 FRESH, CONFIRM_REPLICAS = 1, 32  # seeds of the confirmation
 LIMIT = {"figure": Limits(max=0.0)}
-OTHERS = "ours-whole", "optuna-gp", "optuna-raced", "optuna-tpe", "cma-es", "sobol", "egobox", "nlopt-mlsl"
+OTHERS = (
+    "ours-whole",
+    "optuna-gp",
+    "optuna-raced",
+    "optuna-tpe",
+    "cma-es",
+    "sobol",
+    "egobox",
+    "nlopt-mlsl",
+)
 
 
 class Record:
@@ -76,10 +86,10 @@ class Record:
         """
         point = self.problem.domain.snap(np.asarray(point, dtype=float)[None])[0]
         score, figure = self.problem.measure(point, (self.seed,), REPLICAS)
-        if 0 < first_replicas < REPLICAS and self.scores:
-            if estimate(score[:first_replicas]).high < self._best_low:
-                score = score[:first_replicas]
-                figure = None if figure is None else figure[:first_replicas]
+        is_raced = self.scores and 0 < first_replicas < REPLICAS
+        if is_raced and estimate(score[:first_replicas]).high < self._best_low:
+            score = score[:first_replicas]
+            figure = None if figure is None else figure[:first_replicas]
         self.left -= evaluation_cost(len(score), REPLICAS)
         if self.left < -1e-9:
             raise RuntimeError(f"asked for more than {self.evaluations} evaluations")
@@ -99,7 +109,7 @@ class Record:
 
     @property
     def _best_low(self) -> float:
-        """The highest lower end of the intervals of what is within the limit, as studies take it."""
+        """The highest lower end of the intervals of what is within the limit, as in studies."""
         lows = (
             one.low
             for k, one in enumerate(self.scores)

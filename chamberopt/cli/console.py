@@ -199,7 +199,9 @@ def table_lines(table: Mapping[str, Any], prefix: str = "") -> list[str]:
     for name, value in table.items():
         label = f"{prefix + name:33} "
         if isinstance(value, Mapping) and set(value) == {"low", "start", "high"}:
-            lines.append(f"{label}{value['start']:g} in {value['low']:g} .. {value['high']:g}")
+            start = value["start"]  # a text if the design has none
+            shown = start if isinstance(start, str) else f"{start:g}"
+            lines.append(f"{label}{shown} in {value['low']:g} .. {value['high']:g}")
         elif isinstance(value, Mapping):
             lines += table_lines(value, f"{prefix}{name}.")
         elif name in ("notes", "warnings"):

@@ -41,6 +41,7 @@ from chamberopt.design.table_base import STRICT, FileTable
 
 # Each further sonotrode has a tag below 255 and needs a cut through all walls that come before it.
 MAX_SONOTRODES = 50
+SHAPE = "chamber.shape"
 NOT_VARIED = ("calibration.", "zones.", "part.tessellation.")
 
 
@@ -210,12 +211,19 @@ class Design(FileTable):
         """Dotted names of the texts of which a study may choose, and what each may be."""
         tables = {"chamber": self.chamber, "sonotrode": self.sonotrode, "shot": self.shot}
         found = (one for name, table in tables.items() for one in text_choices(table, name))
-        return {name: texts for name, texts in found if name != "chamber.unit"}
+        choices = {name: texts for name, texts in found if name != "chamber.unit"}
+        generated = tuple(name for name in SHAPES if name != IMPORTED)
+        return choices | ({SHAPE: generated} if self.chamber.shape in generated else {})
+
+    def chamber_fields(self, shape: str) -> dict[str, bool]:
+        """Dotted names of the numbers that a chamber of a shape has, and whether each is whole."""
+        fields = toml_errors.numeric_fields(SHAPES[shape], "chamber.")
+        return {name: field.annotation is int for name, field in fields}
 
     def why_fixed(self, name: str) -> str:
         """Why a number cannot be changed by degrees; an empty text if it can."""
-        if name == "chamber.shape":
-            return "each shape has keys of its own; run a study for each and compare them"
+        if name == SHAPE:
+            return "a shape of your own, or one that is drawn; it cannot vary"
         if name.startswith("calibration."):
             return "what was measured, with errors that intervals hold already; it cannot vary"
         numbers = self.numbers()
@@ -258,10 +266,14 @@ class Design(FileTable):
         """A copy with other values, checked again as a whole.
 
         They are in the file's units by dotted name, e.g. {"chamber.height_mm": 45}; an entry of a
-        list goes by its position: part.offset_mm.0. InputError if a name is not a key of a design,
-        or the new values are out of range or contradict each other.
+        list goes by its position: part.offset_mm.0. With another chamber.shape the chamber keeps
+        what both shapes have. InputError if a name is not a key of a design, or the new values are
+        out of range or contradict each other.
         """
         data = self.model_dump()
+        if (shape := values.get(SHAPE, self.chamber.shape)) != self.chamber.shape:
+            known = SHAPES[shape].model_fields if shape in SHAPES else data["chamber"]
+            data["chamber"] = {key: one for key, one in data["chamber"].items() if key in known}
         for name, value in values.items():
             data = _replaced(data, name, name.split("."), value)
         return validate(Design, data, recorded=self.is_recorded)

@@ -75,7 +75,9 @@ class StudyResult:
         numbers = {name: one for name, one in self.study.vary.items() if not one.texts}
         for name, varied in numbers.items():
             low, high = varied.bounds
-            value = self.best.design.value(name)
+            value = self.best.parameters[name]
+            if isinstance(value, str):
+                continue
             for bound, side in ((low, "lower"), (high, "upper")):
                 if abs(value - bound) < 1e-3 * (high - low):
                     place = f"{name} = {value:g} lies on its {side} bound"

@@ -20,6 +20,7 @@ import numpy as np
 from chamberopt.common.errors import InputError, WorkerLostError
 from chamberopt.common.parallel.executor import SerialExecutor, share
 from chamberopt.common.progress import Progress
+from chamberopt.design.design import SHAPE
 from chamberopt.optimize.evaluate_candidate import CandidateEvaluator, Simulator
 from chamberopt.optimize.run_study import ChamberSimulator, fixed_target, save_inputs
 from chamberopt.optimize.storage.trial_log import HISTORY, Trial
@@ -81,6 +82,9 @@ def plan_sweep(
     """
     from scipy.stats.qmc import Sobol
 
+    if SHAPE in study.vary:
+        text = "not supported in a sweep; sweep each shape by itself"
+        raise InputError(f"vary.{SHAPE}: {text}")
     domain, dimensions = ParameterSpace(study.design, study.vary).domain, len(study.vary)
     if (grid is None) == (sobol is None):
         given = "neither" if grid is None else "both"

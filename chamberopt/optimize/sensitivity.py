@@ -14,9 +14,10 @@ import numpy as np
 
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.number_text import plain
+from chamberopt.design.design import SHAPE
 from chamberopt.optimize.search.gaussian_process import GaussianProcess, one_thread
 from chamberopt.optimize.search.search_model import SearchModel
-from chamberopt.optimize.study.parameters import ParameterSpace
+from chamberopt.optimize.study.parameters import NONE, ParameterSpace
 
 NORMAL_95 = 1.96  # standard deviations of a 95 % interval
 SLICE_POINTS = 41
@@ -104,6 +105,8 @@ def analyse_sensitivity(
         noise = max(noise, NORMAL_95 * deviation_at_top)  # less, the model cannot tell
         whole_variance = float(model(sample)[0].var())
         for i, name in enumerate(space.names):
+            if best[name] == NONE:
+                continue
             texts = space.varied[i].texts
             steps = np.linspace(0.0, 1.0, len(texts) or SLICE_POINTS)
             # The ends of numbers stand for half a step each; with whole ones, effects would have a
@@ -112,6 +115,8 @@ def analyse_sensitivity(
             weights = np.where(inside | bool(texts), 1.0, 0.5)
             line = np.repeat(at[None], len(steps), axis=0)
             line[:, i] = steps
+            if name == SHAPE:
+                line = _with_best_of_its_own(search, line, at, sample)
             mean, deviation = model(line)
             effect = _main_effect(model, sample, i, steps)
             main = float(np.cov(effect, ddof=0, aweights=weights))
@@ -133,6 +138,22 @@ def analyse_sensitivity(
         together = float((model(within)[0] >= top - noise).mean())
     expected = Estimate(top, NORMAL_95 * deviation_at_top)
     return Sensitivity(tuple(slices), noise, expected, together)
+
+
+def _with_best_of_its_own(
+    search: SearchModel, line: np.ndarray, at: np.ndarray, sample: np.ndarray
+) -> np.ndarray:
+    """Points (k, d) of a shape each; what `at` (d,) does not have is the best by the model.
+
+    Args:
+        sample: places of which the best is taken, (n, d).
+    """
+    domain, found = search.domain, []
+    own = domain.has(domain.snap(at[None]))[0]
+    for point in line:
+        tried = domain.snap(np.where(own, point, sample))
+        found.append(tried[int(np.argmax(search.score(tried)[0]))])
+    return np.array(found)
 
 
 def _main_effect(

@@ -59,6 +59,7 @@ def _check(file: Path, pilot: bool, screenshot: Path | None, json: bool, out: Pa
     from chamberopt.common.progress import step
     from chamberopt.geometry.mesh_io.surface_error import SurfaceError
     from chamberopt.optimize.study import Study, load
+    from chamberopt.optimize.study.parameters import setting
     from chamberopt.output.vtp_files import write_chamber
     from chamberopt.simulation.effect_pilot import groups
 
@@ -84,9 +85,9 @@ def _check(file: Path, pilot: bool, screenshot: Path | None, json: bool, out: Pa
             draw_target(chamber, reach, screenshot)
     if isinstance(loaded, Study):
         facts["vary"] = {
-            name: {"values": list(varied.texts), "start": design.setting(name)}
+            name: {"values": list(varied.texts), "start": setting(design, name)}
             if varied.texts
-            else {"low": varied.bounds[0], "start": design.value(name), "high": varied.bounds[1]}
+            else {"low": varied.bounds[0], "start": setting(design, name), "high": varied.bounds[1]}
             for name, varied in loaded.vary.items()
         }
         facts["evaluations"] = loaded.optimizer.evaluations

@@ -24,10 +24,13 @@ class Axis(NamedTuple):
 
     levels: how many values it can have; 0 for any number between its bounds.
     ordered: whether near levels are alike. If not, they are choices, and all differ alike.
+    where: if only some points have it: the axis of choices that decides, and the levels of that
+        axis with which they do.
     """
 
     levels: int = 0
     ordered: bool = True
+    where: tuple[int, frozenset[int]] | None = None
 
 
 class Domain:
@@ -42,10 +45,7 @@ class Domain:
     """
 
     def __init__(
-        self,
-        axes: Sequence[Axis],
-        misses: np.ndarray | None = None,
-        counts_worst: bool = False,
+        self, axes: Sequence[Axis], misses: np.ndarray | None = None, counts_worst: bool = False
     ) -> None:
         self.axes, self.counts_worst = tuple(axes), counts_worst
         self._misses = misses if misses is not None and misses.any() else None
@@ -59,16 +59,35 @@ class Domain:
     def snap(self, points: np.ndarray) -> np.ndarray:
         """The points (k, d) of the cube with each coordinate on its nearest level.
 
-        Choices have equal parts of the cube, so that evenly spread points try each as often.
+        Choices have equal parts of the cube, so that evenly spread points try each as often. A
+        parameter that a point does not have is 0.
         """
         choice = np.minimum(np.floor(points * (self._steps + 1.0)), self._steps)
         level = np.where(self._are_ordered, np.rint(points * self._steps), choice)
-        return np.where(self.free, points, level / self._steps)
+        snapped = np.where(self.free, points, level / self._steps)
+        return np.where(self.has(snapped), snapped, 0.0)
+
+    def has(self, snapped: np.ndarray) -> np.ndarray:
+        """Which parameters points (k, d) on their levels have, (k, d) bool."""
+        there = np.ones(snapped.shape, dtype=bool)
+        for k, axis in enumerate(self.axes):
+            if axis.where is not None:
+                decides, levels = axis.where
+                level = np.rint(snapped[:, decides] * self._steps[decides])
+                there[:, k] = np.isin(level, list(levels))
+        return there
 
     @property
     def size(self) -> float:
         """How many points there are; infinite if a parameter can be any number."""
-        return math.prod(axis.levels or math.inf for axis in self.axes)
+        by = next((axis.where[0] for axis in self.axes if axis.where), None)
+        if by is None:
+            return math.prod(axis.levels or math.inf for axis in self.axes)
+        rest = [axis for k, axis in enumerate(self.axes) if k != by]
+        return sum(
+            math.prod(x.levels or math.inf for x in rest if not x.where or level in x.where[1])
+            for level in range(self.axes[by].levels)
+        )
 
     @property
     def has_misses(self) -> bool:

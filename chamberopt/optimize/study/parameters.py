@@ -3,6 +3,9 @@
 A search works on points of the unit cube [0, 1]^d, where d is the number of parameters in [vary];
 0 and 1 are the bounds of each. A number gets no more decimals than a shop can set: three digits of
 the width of its bounds, so that the best design is rounded when it is simulated.
+
+If `chamber.shape` varies, a key of the chamber that only some of the shapes have is a parameter of
+their candidates alone; the others have NONE in its place.
 """
 
 from __future__ import annotations
@@ -18,7 +21,7 @@ from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
 from chamberopt.common.toml_errors import CrossCheckError, Problem
 from chamberopt.common.toml_fields import list_field
-from chamberopt.design.design import Design
+from chamberopt.design.design import SHAPE, Design
 from chamberopt.design.materials import balls, find
 from chamberopt.design.peening.tolerances import tolerance_box
 from chamberopt.design.table_base import FileTable
@@ -26,6 +29,7 @@ from chamberopt.optimize.search.domain import Axis, Domain
 
 NEAR = 1e-9  # of a step: how far a value may be from its place
 MAX_LEVELS = 1000
+NONE = "none"  # in the place of a value that a candidate's shape does not have
 CATALOGUE = "catalogue"  # in the place of a list: the sizes in which balls are sold
 
 
@@ -82,7 +86,9 @@ class Varied(FileTable):
         return self.texts or self.bounds
 
     def place(self, value: float | str) -> float:
-        """A number itself, or the position of a text."""
+        """A number itself, or the position of a text; the first one for NONE."""
+        if value == NONE and NONE not in self.texts:
+            return self.bounds[0]
         return float(self.texts.index(value) if isinstance(value, str) else value)
 
     @property
@@ -164,6 +170,44 @@ def from_catalogue(vary: Mapping[str, Any], material: str | None) -> dict[str, A
     return read
 
 
+def has_key(design: Design, name: str) -> bool:
+    """Whether the design's chamber, in its shape, has a key; of other tables they all have all."""
+    key = name.removeprefix("chamber.").split(".")[0]
+    return not name.startswith("chamber.") or key in type(design.chamber).model_fields
+
+
+def setting(design: Design, name: str) -> float | str:
+    """The value that a design has of what varies, or NONE; InputError as `Design.value`."""
+    return design.setting(name) if has_key(design, name) else NONE
+
+
+def designs_by_shape(design: Design, vary: Mapping[str, Varied]) -> dict[str, Design]:
+    """The design in each shape that it may have, its own one first.
+
+    In another shape, the varied numbers that its own shape does not have are at their lowest.
+    InputError if the design cannot have a shape.
+    """
+    own = design.chamber.shape
+    found = {own: design}
+    added = {
+        name: one.values(is_whole=False)[0] if one.choose or one.step else one.bounds[0]
+        for name, one in vary.items()
+        if not has_key(design, name)
+    }
+    for shape in vary[SHAPE].texts if SHAPE in vary else ():
+        if shape == own:
+            continue
+        bare = design.chamber_fields(shape)
+        values = {name: one for name, one in added.items() if name in bare}
+        whole = {name: int(one) if bare[name] else one for name, one in values.items()}
+        try:
+            found[shape] = design.changed({SHAPE: shape, **whole})
+        except InputError as error:
+            text = f"the design cannot have chamber.shape = {shape!r}: {error}; vary what it lacks"
+            raise InputError(text) from None
+    return found
+
+
 def vary_problems(design: Design, name: str, varied: Varied) -> list[Problem]:
     """Reasons why a parameter of the design cannot vary like this."""
     field = f"vary.{name}"
@@ -209,7 +253,7 @@ def _choice_problems(design: Design, name: str, varied: Varied) -> Iterator[str]
         yield f"given {unknown[0]!r}; {toml_errors.did_you_mean(unknown[0], allowed)}"
     elif start not in varied.texts:
         yield f"the design starts at {start!r}, which is none of its values; add it"
-    for one in varied.texts if not unknown else ():
+    for one in varied.texts if not unknown and name != SHAPE else ():
         try:
             laws = design.changed({name: one}).materials
         except InputError as error:
@@ -222,15 +266,35 @@ def _choice_problems(design: Design, name: str, varied: Varied) -> Iterator[str]
             return
 
 
-def _misses(design: Design, vary: Mapping[str, Varied], side: int) -> np.ndarray:
-    """By how much a shop may miss each parameter at its lower or upper bound, shape (2, d)."""
+def _misses(designs: Mapping[str, Design], vary: Mapping[str, Varied], side: int) -> np.ndarray:
+    """By how much a shop may miss each parameter at its lower or upper bound, shape (2, d).
+
+    Args:
+        designs: one that has it, for each parameter.
+    """
     ends = []
     for name, varied in vary.items():
-        value = varied.bounds[side]
+        value, design = varied.bounds[side], designs[name]
         tolerated = design.tolerances and not varied.texts
         box = tolerance_box(design.changed({name: value})) if tolerated else {}
         ends.append(np.subtract(box.get(name, (value, value)), value))
     return np.array(ends).T
+
+
+def with_key(by_shape: Mapping[str, Design], name: str) -> Design | None:
+    """The first of the designs that has a key."""
+    return next((one for one in by_shape.values() if has_key(one, name)), None)
+
+
+def _where(
+    by_shape: Mapping[str, Design], vary: Mapping[str, Varied], name: str
+) -> tuple[int, frozenset[int]] | None:
+    """`Axis.where` of a parameter."""
+    if SHAPE not in vary or all(has_key(one, name) for one in by_shape.values()):
+        return None
+    shapes = vary[SHAPE].texts
+    levels = (k for k, shape in enumerate(shapes) if has_key(by_shape[shape], name))
+    return list(vary).index(SHAPE), frozenset(levels)
 
 
 class ParameterSpace:
@@ -244,16 +308,20 @@ class ParameterSpace:
     def __init__(
         self, design: Design, vary: Mapping[str, Varied], counts_worst: bool = False
     ) -> None:
-        self.names, self._design, whole = tuple(vary), design, design.whole_numbers()
-        self.varied = tuple(vary.values())
-        self._levels = [np.array(one.values(name in whole)) for name, one in vary.items()]
+        self.names, self._design, self.varied = tuple(vary), design, tuple(vary.values())
+        by_shape = designs_by_shape(design, vary)
+        self._whole = {name for one in by_shape.values() for name in one.whole_numbers()}
+        self._levels = [np.array(one.values(name in self._whole)) for name, one in vary.items()]
         self.bounds = np.array([one.bounds for one in vary.values()], dtype=float)
         low, high = self.bounds.T
-        misses = np.array([_misses(design, vary, side) for side in (0, 1)]) / (high - low)
-        both = zip(self._levels, self.varied, strict=True)
-        axes = [Axis(len(levels), not one.texts) for levels, one in both]
+        designs = {name: with_key(by_shape, name) or design for name in vary}
+        misses = np.array([_misses(designs, vary, side) for side in (0, 1)]) / (high - low)
+        axes = [
+            Axis(len(levels), not one.texts, _where(by_shape, vary, name))
+            for levels, (name, one) in zip(self._levels, vary.items(), strict=True)
+        ]
         self.domain = Domain(axes, misses, counts_worst)
-        start = self.point_of({name: design.setting(name) for name in vary})
+        start = self.point_of({name: setting(design, name) for name in vary})
         self.start = self.domain.snap(start[None])[0]
 
     def point_of(self, values: Mapping[str, float | str]) -> np.ndarray:
@@ -276,20 +344,24 @@ class ParameterSpace:
         """Values of the parameters at a point (d,), in the units of the file."""
         # The start has the numbers of its file: the way through the unit cube could round them.
         if np.array_equal(point, self.start):
-            return {name: self._design.setting(name) for name in self.names}
+            return {name: setting(self._design, name) for name in self.names}
         values: dict[str, float | str] = {}
-        for k, (name, share) in enumerate(
-            zip(self.names, self.domain.snap(point[None])[0], strict=True)
-        ):
+        snapped = self.domain.snap(point[None])
+        there = self.domain.has(snapped)[0]
+        for k, (name, share) in enumerate(zip(self.names, snapped[0], strict=True)):
             place = float(self.values_on(k, np.array([share]))[0])
-            if texts := self.varied[k].texts:
+            if not there[k]:
+                values[name] = NONE
+            elif texts := self.varied[k].texts:
                 values[name] = texts[round(place)]
             else:
                 values[name] = place if len(self._levels[k]) else self._rounded(k, place)
         return values
 
     def design_at(self, point: np.ndarray) -> Design:
-        return self._design.changed(self.values_at(point))
+        values = {name: one for name, one in self.values_at(point).items() if one != NONE}
+        whole = {name: int(values[name]) for name in self._whole & values.keys()}
+        return self._design.changed(values | whole)
 
     def _share(self, k: int, value: float) -> float:
         levels, (low, high) = self._levels[k], self.bounds[k]

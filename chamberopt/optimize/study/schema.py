@@ -19,11 +19,20 @@ from chamberopt.coverage.metrics import (
     parse_objective,
     renamed_objective,
 )
-from chamberopt.design.design import Design
+from chamberopt.design.design import SHAPE, Design
 from chamberopt.design.load import load_design
 from chamberopt.design.table_base import FileTable
 from chamberopt.optimize.study.constraints import Limits, limit_problems, zone_constraints
-from chamberopt.optimize.study.parameters import Vary, from_catalogue, vary_problems
+from chamberopt.optimize.study.parameters import (
+    NONE,
+    Vary,
+    designs_by_shape,
+    from_catalogue,
+    has_key,
+    setting,
+    vary_problems,
+    with_key,
+)
 
 
 def _refuse_old_name(name: Any) -> Any:
@@ -214,7 +223,7 @@ class Study(FileTable):
             if isinstance(one, str):
                 try:
                     design = load_design(from_file(one, info.context))
-                    one = {name: design.setting(name) for name in data["vary"]}
+                    one = {name: setting(design, name) for name in data["vary"]}
                 except InputError as error:
                     raise CrossCheckError([Problem(f"begin_with.{k}", str(error))]) from None
             read.append(one)
@@ -234,9 +243,26 @@ class Study(FileTable):
         values = self.search_accuracy.items()
         return design.changed({f"{tables.get(k, 'process.accuracy')}.{k}": v for k, v in values})
 
-    def _problems(self) -> Iterator[Problem]:
+    def _vary_problems(self) -> Iterator[Problem]:
+        if SHAPE in self.vary:
+            problems = vary_problems(self.design, SHAPE, self.vary[SHAPE])
+            if problems:
+                yield from problems
+                return
+        try:
+            by_shape = designs_by_shape(self.design, self.vary)
+        except InputError as error:
+            yield Problem(f"vary.{SHAPE}", str(error))
+            return
         for name, varied in self.vary.items():
-            yield from vary_problems(self.design, name, varied)
+            yield from vary_problems(with_key(by_shape, name) or self.design, name, varied)
+            partly = not all(has_key(one, name) for one in by_shape.values())
+            if name in self.constraints and partly:
+                text = "only some of the shapes have it; not supported, leave it out"
+                yield Problem(f"constraints.{name}", text)
+
+    def _problems(self) -> Iterator[Problem]:
+        yield from self._vary_problems()
         bounds = {name: one.bounds for name, one in self.vary.items() if not one.texts}
         for k, values in enumerate(self.begin_with):
             if values.keys() != self.vary.keys():
@@ -245,6 +271,8 @@ class Study(FileTable):
             for name, value in values.items():
                 low, high = bounds.get(name, (-math.inf, math.inf))
                 texts = self.vary[name].texts if name in self.vary else ()
+                if value == NONE and SHAPE in self.vary and name.startswith("chamber."):
+                    continue
                 if texts or isinstance(value, str):
                     if value not in texts:
                         text = (

@@ -159,7 +159,9 @@ def _draw_parameter(
     """Draw the search over one parameter, later ones darker, and start and best as confirmed."""
     varied = result.study.vary[name]
     search = [one for one in candidates if one.stage == "search"]
-    shown = [one for one in search if one.objective]
+    shown = [
+        one for one in search if one.objective and is_there(one.parameters[name], varied.texts)
+    ]
     axes.scatter(
         [varied.place(one.parameters[name]) for one in shown],
         [one.objective.value for one in shown if one.objective],
@@ -173,6 +175,8 @@ def _draw_parameter(
         (result.start, ORANGE, "o", 8, "start"),
         (result.best, GREEN, "*", 13, "best"),
     ):
+        if not is_there(confirmed.parameters[name], varied.texts):
+            continue
         value = confirmed.evaluation.objective.value
         place = varied.place(confirmed.parameters[name])
         axes.plot(place, value, marker, color=colour, label=label, ms=size, mec="white")
@@ -181,7 +185,13 @@ def _draw_parameter(
     axes.set_xlim(low - margin, high + margin)
     name_choices(axes.xaxis, varied.texts)
     style_axes(axes, name)
-    axes.legend(fontsize=SMALL, frameon=False)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(fontsize=SMALL, frameon=False)
+
+
+def is_there(value: float | str, texts: Sequence[str]) -> bool:
+    """Whether a candidate has a parameter, whose value is else the text of parameters.NONE."""
+    return not isinstance(value, str) or value in texts
 
 
 def slices_picture(path: Path, result: StudyResult, sensitivity: Sensitivity) -> None:
@@ -233,7 +243,8 @@ def slices_figure(
             axes.plot(one.values, one.mean, color=BLUE, label=of_slice)
             axes.plot(one.values, one.effect, color=GREY, ls="--", label=of_mean)
         axes.axvline(_place(one, best[one.name]), color=GREEN, lw=1.2, label="best")
-        axes.axvline(_place(one, start[one.name]), color=ORANGE, lw=1.0, ls=":", label="start")
+        if is_there(start[one.name], one.texts):
+            axes.axvline(_place(one, start[one.name]), color=ORANGE, lw=1.0, ls=":", label="start")
         axes.set_title(f"alone {one.share:.0%} of the variance", loc="left", fontsize=SMALL)
         style_axes(axes, one.name)
     for axes in panels[len(slices) :]:

@@ -234,7 +234,7 @@ def influence(study: Mapping[str, Any], label: Label) -> dict[str, Any]:
             "said": [_reason_without_model(count, study.get("failed", 0), len(names))],
         }
     rows = sorted(
-        (_parameter_row(name, study, label) for name in names),
+        (_parameter_row(name, study, label) for name in names if name in model["parameters"]),
         key=lambda row: (-row["surely"], -row["loss"]),
     )
     sentences = []

@@ -212,8 +212,8 @@ class _Study(_Table):
     def _has_the_same_parameters(self) -> Self:
         candidates = self.best, self.start, *self.front, *self.confirmed
         names = [set(one.parameters) for one in candidates]
-        names += [set(self.model.parameters)] if self.model else []
-        if any(one != set(self.vary) for one in names):
+        modelled = set(self.model.parameters) if self.model else set()  # those of the best's shape
+        if any(one != set(self.vary) for one in names) or not modelled <= set(self.vary):
             raise ValueError("other parameters than vary")
         return self
 

@@ -111,7 +111,7 @@ def _result_lines(result: StudyResult) -> list[str]:
     study, start, best = result.study, result.start, result.best
     lines = [f"{'parameter':34}{'start':>12}{'best':>12}"]
     for name in study.vary:
-        values = (f"{plain(one.setting(name), 6):>12}" for one in (study.design, best.design))
+        values = (f"{plain(one.parameters[name], 6):>12}" for one in (start, best))
         lines.append(f"{name:34}{''.join(values)}")
     for title, one in (("start", start), ("best", best)):
         limits = console.zone_lines(one.design, one.evaluation)
