@@ -181,7 +181,7 @@ HEAVY = GEAR.changed({
         (GEAR, "shot.material", {"choose": ["steel", 2]}, "of numbers, or of texts, not both"),
         (OWN, "shot.material", VARY["shot.material"], "materials.wall has numbers that are those"),
         (GEAR, "shot.mass_g", {"choose": ["a", "b"]}, "it is a number: give a list of numbers"),
-        (GEAR, "chamber.shape", {"choose": ["box", "cylinder"]}, "each shape has keys of its own"),
+        (GEAR, "chamber.shape", {"choose": ["box", "cylinder"]}, "vary what it lacks"),
         (GEAR, "shot.diameter_mm", {"choose": "catalogue", "low": 7.9}, "fewer than two sizes"),
         (GEAR, "shot.diameter_mm", {"choose": "catalogue", "low": math.nan}, "low: given nan"),
         (GEAR, "shot.mass_g", {"choose": "catalogue"}, "given 'catalogue'; allowed: a list"),
