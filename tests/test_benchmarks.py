@@ -44,6 +44,7 @@ def test_all_structures_find_the_same_contacts() -> None:
     )
 
 
+@pytest.mark.long
 def test_all_structures_find_the_same_meetings() -> None:
     gas = sample_gas(MIN_BALLS, np.random.default_rng(3))
     answers = who_meets_whom.answers(gas)

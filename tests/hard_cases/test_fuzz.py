@@ -30,8 +30,9 @@ SAVED = sorted(FOLDER.glob("*.npz"))
 SLOW = [HealthCheck.too_slow, HealthCheck.data_too_large]
 
 
+@pytest.mark.long
 @settings(
-    max_examples=3, derandomize=True, deadline=None, database=None, suppress_health_check=SLOW
+    max_examples=40, derandomize=True, deadline=None, database=None, suppress_health_check=SLOW
 )
 @given(plans(FEW))
 def test_any_scene_runs_or_says_why_not(plan: Plan) -> None:

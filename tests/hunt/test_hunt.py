@@ -24,7 +24,7 @@ DRAW: dict[str, Callable[[random.Random, Path, Path], list[str]]] = {
     "arguments": arguments.draw_arguments,
     "results": results.write_altered_results,
 }
-FEW = {"toml": 40, "mesh": 20, "arguments": 12, "results": 4}
+FEW = {"toml": 40, "mesh": 20, "arguments": 8, "results": 4}
 # Seeds whose commands end within seconds, for the program that a user starts.
 STARTED = {"toml": (0, 1, 2), "mesh": (1, 4, 10), "arguments": (1, 4, 7), "results": (3, 6, 8)}
 MANY = {"toml": 5_000, "mesh": 3_000, "arguments": 1_000, "results": 1_000}

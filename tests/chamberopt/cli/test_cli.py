@@ -517,6 +517,7 @@ class TestWhole:
         assert (status, "two or more" in err) == (2, True)
         assert not Path("results").exists()
 
+    @pytest.mark.long
     def test_simulate_analytically(self, small: Path, chamberopt: Said) -> None:
         status, out, _ = chamberopt("simulate", "designs/plate.toml", "--analytic", "--json")
         folder = Path(json.loads(out)["folder"])
@@ -529,6 +530,7 @@ class TestWhole:
         assert "the part reaches into the cavity" in err
         assert not Path("results/gear").exists()
 
+    @pytest.mark.long
     def test_inspect(self, small: Path, chamberopt: Said) -> None:
         from chamberopt.output.viewer import missing_opengl
 
@@ -569,6 +571,7 @@ class TestWhole:
             status, out, err = chamberopt("inspect", "results/plate", "--off-screen", *wrong)
             assert (status, why in err, err.count("\n")) == (2, True, 1), err
 
+    @pytest.mark.long
     def test_run(self, small: Path, chamberopt: Said) -> None:
         status, out, _ = chamberopt("run", "studies/small.toml", "--json")
         result = json.loads(out)

@@ -79,10 +79,8 @@ def test_phases_at_the_envelope_are_uniform() -> None:
     assert kstest((at_envelope / math.tau) % 1.0, "uniform").pvalue > UNLIKELY
 
 
-@pytest.mark.parametrize(
-    ("law", "share"),
-    [pytest.param("the paper's", 0.015, marks=pytest.mark.long), ("two materials", 0.015)],
-)
+@pytest.mark.long
+@pytest.mark.parametrize(("law", "share"), [("the paper's", 0.015), ("two materials", 0.015)])
 def test_rates_and_speeds_are_those_of_the_sinusoid(law: str, share: float) -> None:
     """Fast balls of a lossy floor and ceiling arrive at any phase anyway."""
     room, balls = balls_side_by_side(24, np.random.default_rng(7))

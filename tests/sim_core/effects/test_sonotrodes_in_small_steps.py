@@ -92,6 +92,7 @@ def plates_hit(log: ImpactLog, room: TriangleMesh) -> np.ndarray:
     return np.where(tags == FLOOR, 0, 1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("g", [0.0, STANDARD])
 def test_a_bead_between_two_gentle_plates_follows_its_reference_for_hundreds_of_hits(
     g: float,

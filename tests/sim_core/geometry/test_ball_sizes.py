@@ -77,6 +77,7 @@ def test_two_unequal_balls_collide_as_momentum_and_energy_say() -> None:
     np.testing.assert_allclose(after.positions[:, 0], places, rtol=1e-12)
 
 
+@pytest.mark.long
 def test_a_pair_keeps_its_momentum_whatever_it_loses() -> None:
     room, rng = box((0.1, 0.1, 0.1)), np.random.default_rng(3)
     physics = Physics(restitution=Restitution(((1.0, 1.0),) * 3, (0.6, 0.5)))

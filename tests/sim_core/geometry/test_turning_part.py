@@ -338,6 +338,7 @@ def test_impacts_lie_on_the_part_in_its_own_frame_and_balls_stay_outside_it(
     assert gap.min() > scene.balls.radius - 1e-9
 
 
+@pytest.mark.long
 def test_the_same_scene_gives_the_same_bits_with_the_jit_on_and_off() -> None:
     code = (
         "from tests.sim_core.loop.test_determinism import fingerprint;"

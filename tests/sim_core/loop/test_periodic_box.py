@@ -183,7 +183,7 @@ def test_where_the_box_is_cut_does_not_matter(count: int) -> None:
     np.testing.assert_allclose(off - sides * np.rint(off / sides), 0.0, atol=1e-9)
 
 
-@pytest.mark.parametrize("count", [200, 2 * MIN_BALLS])
+@pytest.mark.parametrize("count", [200, pytest.param(2 * MIN_BALLS, marks=pytest.mark.long)])
 def test_momentum_along_the_periodic_directions_is_kept(count: int) -> None:
     """And the centre of mass moves as if there were no balls, and energy is kept."""
     sides = SIDES * (count / 200) ** (1 / 3)
@@ -202,7 +202,7 @@ def test_momentum_along_the_periodic_directions_is_kept(count: int) -> None:
     assert set(result.impacts.triangle.tolist()) == {0, 1}
 
 
-@pytest.mark.parametrize("count", [200, 2 * MIN_BALLS])
+@pytest.mark.parametrize("count", [200, pytest.param(2 * MIN_BALLS, marks=pytest.mark.long)])
 def test_a_box_that_falls_sideways_is_the_box_at_rest(count: int) -> None:
     """Gravity along x alone adds g t to all velocities, whatever meets, and changes no collision;
     at 100 m/s a ball goes round the box a thousand times in ten windows.

@@ -237,6 +237,7 @@ def test_targets_of_other_triangles_are_refused(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.long
 def test_what_cannot_be_compared(tmp_path: Path) -> None:
     one = left(tmp_path / "one", 20)
     with pytest.raises(InputError, match="two or more"):

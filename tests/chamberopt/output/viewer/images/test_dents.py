@@ -135,6 +135,7 @@ def test_a_rim_parts_large_dents_and_small_ones_have_none(plate: Chamber, tmp_pa
     assert rims[1] < 0.01
 
 
+@pytest.mark.long
 @needs_opengl
 def test_the_later_dent_lies_on_top(plate: Chamber, tmp_path: Path) -> None:
     places = [(0.0, 0.0, plate.height), (0.3e-3, 0.0, plate.height)]
@@ -173,6 +174,7 @@ def test_dents_on_the_far_side_and_behind_the_part_are_hidden(
     np.testing.assert_array_equal(hidden, bare_below)
 
 
+@pytest.mark.long
 @needs_opengl
 @pytest.mark.parametrize(
     ("name", "count", "radius"),
