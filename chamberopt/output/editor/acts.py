@@ -120,7 +120,7 @@ class Acts:
         if not STUDY_NAME.fullmatch(name):
             raise InputError(f"{name!r}: give a name of letters and digits that ends in .toml")
         if not evaluations.is_integer():
-            raise InputError(f"simulated chambers: given {evaluations:g}; give a whole number")
+            raise InputError(f"evaluations: given {evaluations:g}; give a whole number")
         file, path = self._file(asked), check_new_file(self.inside(name))
         bounds = {key: {"low": low, "high": high} for key, (low, high) in asked["vary"].items()}
         if not bounds:

@@ -198,6 +198,7 @@ def cost_rows(
         rows["evaluations"] = {
             "in the search": _count(study["evaluations"]),
             "of these not simulated": _count(study.get("failed", 0)),
+            "of these given up after a few replicas": _count(study.get("given_up", 0)),
             "of these miss a constraint": _count(study.get("missing_a_constraint", 0)),
             "confirmations": _count(sum(row["stage"] == "confirm" for row in evaluations)),
             "run time of all": f"{plain(study['seconds'], 3)} s",

@@ -79,7 +79,7 @@ def _question(contents: Contents) -> str:
     text = (
         f"Which chamber gives the {aim} {objective['label']}{meaning}? "
         f"The part is {part}; its target{reach} is peened {peening}. "
-        f"{question['evaluations']} candidates were simulated, chosen by: {question['algorithm']}."
+        f"{question['evaluations']} candidates were tried, chosen by: {question['algorithm']}."
     )
     limits = "There were no constraints."
     if question["constraints"]:

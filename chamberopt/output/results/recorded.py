@@ -195,6 +195,7 @@ class _Study(_Table):
     algorithm: str
     vary: dict[str, Bounds | Texts]
     evaluations: Count
+    given_up: Count = 0
     accuracy: _Accuracies
     failed: Count
     missing_a_constraint: Count

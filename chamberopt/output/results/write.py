@@ -208,10 +208,13 @@ def _number(value: float) -> float | None:
 
 def _about_study(result: StudyResult) -> dict[str, Any]:
     search = [trial for trial in result.trials if trial.stage == "search"]
+    few = result.study.optimizer.first_replicas
+    all_of = max((trial.replicas or 0 for trial in search), default=0)
     return {
         "algorithm": result.algorithm,
         "vary": {name: list(one.ends) for name, one in result.study.vary.items()},
         "evaluations": len(search),
+        "given_up": sum(one.replicas == few < all_of for one in search),
         "accuracy": {
             "search": result.study.at_search_accuracy(
                 result.study.design
