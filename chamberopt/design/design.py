@@ -215,10 +215,10 @@ class Design(FileTable):
         generated = tuple(name for name in SHAPES if name != IMPORTED)
         return choices | ({SHAPE: generated} if self.chamber.shape in generated else {})
 
-    def chamber_fields(self, shape: str) -> dict[str, bool]:
-        """Dotted names of the numbers that a chamber of a shape has, and whether each is whole."""
-        fields = toml_errors.numeric_fields(SHAPES[shape], "chamber.")
-        return {name: field.annotation is int for name, field in fields}
+    def chamber_keys(self, shape: str) -> dict[str, bool]:
+        """Dotted names of the keys of a shape's chamber; whether each is a whole number."""
+        fields = SHAPES[shape].model_fields.items()
+        return {f"chamber.{key}": field.annotation is int for key, field in fields}
 
     def why_fixed(self, name: str) -> str:
         """Why a number cannot be changed by degrees; an empty text if it can."""

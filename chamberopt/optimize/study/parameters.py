@@ -184,24 +184,23 @@ def setting(design: Design, name: str) -> float | str:
 def designs_by_shape(design: Design, vary: Mapping[str, Varied]) -> dict[str, Design]:
     """The design in each shape that it may have, its own one first.
 
-    In another shape, the varied numbers that its own shape does not have are at their lowest.
-    InputError if the design cannot have a shape.
+    In another shape, what varies and its own shape does not have is at its first value. InputError
+    if the design cannot have a shape.
     """
     own = design.chamber.shape
     found = {own: design}
-    added = {
-        name: one.values(is_whole=False)[0] if one.choose or one.step else one.bounds[0]
-        for name, one in vary.items()
-        if not has_key(design, name)
-    }
+    added = {name: one.ends[0] for name, one in vary.items() if not has_key(design, name)}
     for shape in vary[SHAPE].texts if SHAPE in vary else ():
         if shape == own:
             continue
-        bare = design.chamber_fields(shape)
-        values = {name: one for name, one in added.items() if name in bare}
-        whole = {name: int(one) if bare[name] else one for name, one in values.items()}
+        is_whole = design.chamber_keys(shape)
+        values = {
+            name: int(one) if is_whole[name] and not isinstance(one, str) else one
+            for name, one in added.items()
+            if name in is_whole
+        }
         try:
-            found[shape] = design.changed({SHAPE: shape, **whole})
+            found[shape] = design.changed({SHAPE: shape, **values})
         except InputError as error:
             text = f"the design cannot have chamber.shape = {shape!r}: {error}; vary what it lacks"
             raise InputError(text) from None

@@ -243,17 +243,19 @@ class Study(FileTable):
         values = self.search_accuracy.items()
         return design.changed({f"{tables.get(k, 'process.accuracy')}.{k}": v for k, v in values})
 
-    def _vary_problems(self) -> Iterator[Problem]:
-        if SHAPE in self.vary:
-            problems = vary_problems(self.design, SHAPE, self.vary[SHAPE])
-            if problems:
-                yield from problems
-                return
+    def _shape_problems(self) -> list[Problem]:
+        """Why the design cannot have the shapes of [vary]."""
+        if SHAPE not in self.vary:
+            return []
+        if problems := vary_problems(self.design, SHAPE, self.vary[SHAPE]):
+            return problems
         try:
-            by_shape = designs_by_shape(self.design, self.vary)
+            designs_by_shape(self.design, self.vary)
         except InputError as error:
-            yield Problem(f"vary.{SHAPE}", str(error))
-            return
+            return [Problem(f"vary.{SHAPE}", str(error))]
+        return []
+
+    def _vary_problems(self, by_shape: Mapping[str, Design]) -> Iterator[Problem]:
         for name, varied in self.vary.items():
             yield from vary_problems(with_key(by_shape, name) or self.design, name, varied)
             partly = not all(has_key(one, name) for one in by_shape.values())
@@ -262,7 +264,11 @@ class Study(FileTable):
                 yield Problem(f"constraints.{name}", text)
 
     def _problems(self) -> Iterator[Problem]:
-        yield from self._vary_problems()
+        problems = self._shape_problems()
+        yield from problems
+        by_shape = {} if problems else designs_by_shape(self.design, self.vary)
+        if not problems:
+            yield from self._vary_problems(by_shape)
         bounds = {name: one.bounds for name, one in self.vary.items() if not one.texts}
         for k, values in enumerate(self.begin_with):
             if values.keys() != self.vary.keys():
@@ -271,8 +277,15 @@ class Study(FileTable):
             for name, value in values.items():
                 low, high = bounds.get(name, (-math.inf, math.inf))
                 texts = self.vary[name].texts if name in self.vary else ()
-                if value == NONE and SHAPE in self.vary and name.startswith("chamber."):
-                    continue
+                if len(by_shape) > 1 and name in self.vary:
+                    base = by_shape.get(str(values.get(SHAPE)), self.design)
+                    if (value == NONE) == has_key(base, name):
+                        text = f"given {value!r}, but a {values.get(SHAPE)} "
+                        text += "has none" if value != NONE else "has it; give a value"
+                        yield Problem(f"begin_with.{k}.{name}", text)
+                        continue
+                    if value == NONE:
+                        continue
                 if texts or isinstance(value, str):
                     if value not in texts:
                         text = (

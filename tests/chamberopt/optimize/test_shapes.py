@@ -33,6 +33,13 @@ VARY = {
     "shot.mass_g": (1.5, 8.0),
 }
 
+FEW = {name: VARY[name] for name in list(VARY)[:4]}
+FEW["chamber.shape"] = {"choose": ["cylinder", "prism"]}
+PRISM = {
+    "chamber.shape": "prism", "chamber.diameter_mm": NONE, "chamber.across_mm": 50.0,
+    "chamber.sides": 6.0,
+}  # fmt: skip
+
 
 def study(vary: object = VARY, **tables: object) -> Study:
     return validate(Study, {"design": PLATE, "vary": vary, **tables})
@@ -69,6 +76,19 @@ def test_a_point_has_only_the_parameters_of_its_shape() -> None:
     assert design.chamber.height_mm == PLATE.chamber.height_mm
     one, other = np.array([[0.5, 0.2, 0.5, 0.6, 0.3, 0.4, 0.5], [0.5, 0.9, 0.5, 0.6, 0.8, 0, 0.5]])
     np.testing.assert_array_equal(*space.domain.snap(np.stack([one, other])))
+
+
+def test_texts_of_a_shape_can_vary_and_a_search_begin_with_another_shape() -> None:
+    hull = {"chamber.outline": {"choose": ["hull", "silhouette"]}, "chamber.gap_mm": (12.0, 15.0)}
+    shapes = {"chamber.shape": {"choose": ["cylinder", "conformal"]}}
+    space = ParameterSpace(PLATE, study(shapes | hull).vary)
+    assert space.values_at(space.start)["chamber.outline"] == NONE
+    found = space.design_at(np.array([1.0, 1.0, 0.5]))
+    assert (found.chamber.shape, found.chamber.outline) == ("conformal", "silhouette")
+    question = study(FEW, begin_with=[PRISM])
+    space = ParameterSpace(PLATE, question.vary)
+    point = space.domain.snap(space.point_of(question.begin_with[0])[None])[0]
+    assert space.values_at(point) == PRISM
 
 
 def test_points_of_few_levels_are_counted_by_shape() -> None:
@@ -118,6 +138,8 @@ def test_it_is_resumed_to_the_same_bytes(searched: StudyResult, tmp_path: Path) 
         ({**VARY, "chamber.sides": (4.5, 8)}, {}, "whole bounds"),
         ({**VARY, "chamber.across_mm": (1.0, 56.0)}, {}, "chamber.across_mm"),
         ({**VARY, "chamber.gap_mm": (1.0, 5.0)}, {}, "chamber.gap_mm"),
+        (FEW, {"begin_with": [PRISM | {"chamber.sides": NONE}]}, "a prism has it"),
+        (FEW, {"begin_with": [PRISM | {"chamber.diameter_mm": 50}]}, "a prism has none"),
     ],
 )
 def test_what_no_shape_has_is_refused(vary: dict, tables: dict, said: str) -> None:
